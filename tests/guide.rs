@@ -1,8 +1,9 @@
-//! Figures of the user guide against those that a test finds.
+//! Comparison of figures in the user guide with those that a test computes.
 //!
-//! What stands in a chapter between `<!-- from: COMMAND -->` and `<!-- end -->` is what COMMAND finds. A test that finds it
-//! tells it line by line (`told!`), and [`hold`] looks for every line of the block that has numbers among the lines told: all
-//! numbers of the line have to be there in one of them, in the same order, rounded to the digits shown.
+//! The text of a chapter between `<!-- from: COMMAND -->` and `<!-- end -->` is the output of COMMAND. A test that
+//! computes it prints it line by line (`print_row!`), and [`hold`] searches the printed lines for every line of the
+//! block that contains numbers: all numbers of the line must occur in one of them, in the same order, rounded to the
+//! digits shown.
 
 #![allow(dead_code, unused_imports, unused_macros, reason = "each test takes its part")]
 
@@ -12,24 +13,26 @@ thread_local! {
     static TOLD: RefCell<Vec<String>> = const { RefCell::new(Vec::new()) };
 }
 
-/// Print a line and keep it for [`hold`].
+/// Prints a line and keeps it for [`hold`].
 macro_rules! print_row {
     ($($argument:tt)*) => { $crate::guide::tell(format!($($argument)*)) };
 }
 pub(crate) use print_row;
 
-/// Rounding of the last digits of a sum differs from compiler to compiler: numbers below this are held to be as small.
+/// The rounding of the last digits of a sum depends on the compiler: numbers below this value only have to be equally
+/// small.
 const ROUNDING: f64 = 1e-10;
-/// By how much of a unit of its last digit a number may be off: half of one is how it was rounded, and the line told is rounded too.
+/// Permitted difference of a number in units of its last digit: half a unit is its rounding, and the printed line is
+/// rounded too.
 const OFF: f64 = 0.56;
 
 /// A number as the guide shows it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shown {
     value: f64,
-    /// One in its last digit.
+    /// One unit of its last digit.
     unit: f64,
-    /// Whether it is shown with a sign.
+    /// True if it is shown with a sign.
     signed: bool,
 }
 
@@ -42,7 +45,7 @@ impl Shown {
     }
 }
 
-/// The numbers of a line; digits within words (hex8, L2) are none.
+/// Returns the numbers of a line; digits within words (hex8, L2) do not count.
 pub fn numbers(line: &str) -> Vec<Shown> {
     let characters: Vec<char> = line.replace('−', "-").chars().collect();
     let (mut all, mut at) = (Vec::new(), 0);
@@ -94,19 +97,19 @@ pub fn numbers(line: &str) -> Vec<Shown> {
     all
 }
 
-/// Whether a line found holds all numbers of a line of the guide, in order.
+/// Returns whether a printed line contains all numbers of a line of the guide, in order.
 pub fn holds(found: &str, shown: &[Shown]) -> bool {
     let mut found = numbers(found).into_iter();
     shown.iter().all(|wanted| found.any(|number| wanted.is(number.value)))
 }
 
-/// Print a line and keep it.
+/// Prints a line and keeps it.
 pub fn tell(line: String) {
     println!("{line}");
     TOLD.with_borrow_mut(|all| all.push(line));
 }
 
-/// README and chapters: name and text.
+/// Returns name and text of the README and the chapters.
 pub fn pages() -> Vec<(String, String)> {
     let mut root = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
     while !root.join("docs").is_dir() {
@@ -120,7 +123,7 @@ pub fn pages() -> Vec<(String, String)> {
     paths.iter().map(|path| (name(path), fs::read_to_string(path).unwrap())).collect()
 }
 
-/// All blocks of the guide: page, command, lines.
+/// Returns all blocks of the guide: page, command, lines.
 pub fn blocks() -> Vec<(String, String, String)> {
     let mut all = Vec::new();
     for (page, text) in pages() {
@@ -133,12 +136,12 @@ pub fn blocks() -> Vec<(String, String, String)> {
     all
 }
 
-/// Whether this line divides the head of a table from its body.
+/// Returns whether this line separates the head of a table from its body.
 fn divides(line: &str) -> bool {
     line.contains("|-") && line.chars().all(|c| "|-: ".contains(c))
 }
 
-/// Lines of a block that are not among those found; heads of tables are words.
+/// Returns the lines of a block that are not among the printed ones; heads of tables are words.
 pub fn missing<'a>(block: &'a str, found: &[String]) -> Vec<&'a str> {
     let after = block.lines().skip(1).chain([""]);
     let lines = block.lines().zip(after).filter(|(_, after)| !divides(after)).map(|(line, _)| (line, numbers(line)));
@@ -149,7 +152,7 @@ pub fn missing<'a>(block: &'a str, found: &[String]) -> Vec<&'a str> {
 /// Checks that the blocks from `command` contain what this test printed.
 ///
 /// # Panics
-/// A line of the guide was not told, or there is no such block.
+/// If a line of the guide was not printed, or there is no such block.
 #[track_caller]
 pub fn hold(command: &str) {
     let own: Vec<_> = blocks().into_iter().filter(|block| block.1 == command).collect();

@@ -1,4 +1,4 @@
-//! The contact simulation as a unit.
+//! The contact simulation as a co-simulation unit.
 
 use std::path::Path;
 
@@ -6,10 +6,10 @@ use tiprub_core::simulation::InputCourses;
 use tiprub_core::{Result, Simulation, Warning};
 use tiprub_fmi_facade::{CoSimulationUnit, Loaded};
 
-/// A compiled scene.
+/// Compiled scene.
 struct RubUnit(Simulation);
 
-/// The scene of the resources, compiled.
+/// Reads and compiles the scene in the resources.
 pub(crate) fn load(resources: &Path) -> Result<Loaded, String> {
     let loaded = tiprub_format::load_resources(resources).map_err(|error| error.to_string())?;
     let scene = loaded.scene;

@@ -1,4 +1,5 @@
-//! A digest of the sources that the library inside an FMU is built from, so that a program packages no library of other sources.
+//! A digest of the sources that the library inside an FMU is built from, so that a program does not package a library
+//! built from other sources.
 
 mod digest;
 

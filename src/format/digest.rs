@@ -18,7 +18,7 @@ pub fn set(variable: &str, sources: &[&str]) {
     let mut hash = Sha256::new();
     for file in files {
         let mut bytes = fs::read(&file).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
-        // The same on every system, whatever ends lines and separates names there.
+        // Equal on every system, regardless of line endings and path separators.
         bytes.retain(|byte| *byte != b'\r');
         let name = file.to_string_lossy().replace('\\', "/");
         for item in [name.as_bytes(), &bytes] {

@@ -8,7 +8,7 @@ use crate::scene::UnpackedResources;
 use crate::{Journal, journal2, pointer};
 use tiprub_fmi_host::api::{Fmi2Api, Fmi2Callbacks, InstancePointer, StatePointer};
 
-/// Arguments of the instantiation; change a field to try something else.
+/// Arguments of the instantiation; tests change single fields.
 #[derive(Debug, Clone)]
 pub struct Fmi2Arguments {
     /// `instanceName`.
@@ -24,7 +24,7 @@ pub struct Fmi2Arguments {
 }
 
 impl Fmi2Arguments {
-    /// Proper ones.
+    /// Returns valid arguments.
     pub fn new(resources: &UnpackedResources) -> Self {
         let text = |text: String| Some(CString::new(text).expect("no NUL"));
         Self {
@@ -47,7 +47,7 @@ pub struct Fmi2TestSlave<'a> {
     context: *mut Journal,
 }
 
-/// Load the library.
+/// Loads the library.
 #[track_caller]
 pub fn load(path: &Path) -> Fmi2Api {
     Fmi2Api::load(path).unwrap_or_else(|failure| panic!("{failure}"))
@@ -60,10 +60,10 @@ calls_of_both! {
 }
 
 impl<'a> Fmi2TestSlave<'a> {
-    /// Instantiate; on failure the messages.
+    /// Creates an instance, or returns the messages.
     ///
     /// # Errors
-    /// All messages logged.
+    /// A failed instantiation, with all messages logged.
     pub fn try_new(api: &'a Fmi2Api, arguments: &Fmi2Arguments) -> Result<Self, String> {
         let context = Box::into_raw(Box::new(Journal::default()));
         let callbacks = Fmi2Callbacks {
@@ -74,7 +74,7 @@ impl<'a> Fmi2TestSlave<'a> {
             componentEnvironment: context.cast(),
         };
         let Fmi2Arguments { name, kind, token, location, logging_on } = arguments;
-        // SAFETY: all pointers are valid for the call or NULL, which the library must bear.
+        // SAFETY: all pointers are valid for the call or NULL, which the library must handle.
         let handle = unsafe {
             (api.fmi2Instantiate)(
                 pointer(name),
@@ -90,13 +90,13 @@ impl<'a> Fmi2TestSlave<'a> {
         if handle.is_null() { Err(slave.log()) } else { Ok(slave) }
     }
 
-    /// Instantiate the scene of the tests.
+    /// Creates an instance of the scene of the tests.
     #[track_caller]
     pub fn new(api: &'a Fmi2Api, resources: &UnpackedResources) -> Self {
         Self::try_new(api, &Fmi2Arguments::new(resources)).unwrap_or_else(|log| panic!("{log}"))
     }
 
-    /// Instantiate and initialise, start time 0, no stop time.
+    /// Creates and initialises an instance, start time 0, no stop time.
     #[track_caller]
     pub fn initialised(api: &'a Fmi2Api, resources: &UnpackedResources) -> Self {
         let slave = Self::new(api, resources);
@@ -104,20 +104,20 @@ impl<'a> Fmi2TestSlave<'a> {
         slave
     }
 
-    /// From instantiated to ready for steps.
+    /// Goes from instantiated to ready for steps.
     #[track_caller]
     pub fn initialise(&self) {
         self.expect(self.enter());
         self.expect(self.exit());
     }
 
-    /// `fmi2EnterInitializationMode`.
+    /// Calls `fmi2EnterInitializationMode`.
     pub fn enter(&self) -> i32 {
         // SAFETY: the instance is alive.
         unsafe { (self.api.fmi2EnterInitializationMode)(self.handle) }
     }
 
-    /// `fmi2SetupExperiment`.
+    /// Calls `fmi2SetupExperiment`.
     pub fn setup(&self, start: f64, stop: Option<f64>) -> i32 {
         // SAFETY: the instance is alive.
         unsafe {
@@ -125,13 +125,13 @@ impl<'a> Fmi2TestSlave<'a> {
         }
     }
 
-    /// `fmi2DoStep`.
+    /// Calls `fmi2DoStep`.
     pub fn step(&self, time: f64, size: f64) -> i32 {
         // SAFETY: the instance is alive.
         unsafe { (self.api.fmi2DoStep)(self.handle, time, size, 1) }
     }
 
-    /// `fmi2GetReal`.
+    /// Calls `fmi2GetReal`.
     #[track_caller]
     pub fn reals(&self, references: &[u32]) -> Vec<f64> {
         let mut values = vec![0.0; references.len()];
@@ -142,13 +142,13 @@ impl<'a> Fmi2TestSlave<'a> {
         values
     }
 
-    /// `fmi2SetReal`.
+    /// Calls `fmi2SetReal`.
     pub fn set_reals(&self, references: &[u32], values: &[f64]) -> i32 {
         // SAFETY: arrays of that length.
         unsafe { (self.api.fmi2SetReal)(self.handle, references.as_ptr(), references.len(), values.as_ptr()) }
     }
 
-    /// `fmi2SetRealInputDerivatives`, all of the given order.
+    /// Calls `fmi2SetRealInputDerivatives`, with one order for all references.
     pub fn set_derivatives(&self, references: &[u32], order: i32, values: &[f64]) -> i32 {
         let orders = vec![order; references.len()];
         // SAFETY: arrays of that length.

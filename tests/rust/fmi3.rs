@@ -8,7 +8,7 @@ use crate::scene::UnpackedResources;
 use crate::{Journal, OK, journal3, pointer};
 use tiprub_fmi_host::api::{Fmi3Api, InstancePointer, StatePointer, Update};
 
-/// Arguments of the instantiation; change a field to try something else.
+/// Arguments of the instantiation; tests change single fields.
 #[derive(Debug, Clone)]
 pub struct Fmi3Arguments {
     /// `instanceName`.
@@ -23,12 +23,12 @@ pub struct Fmi3Arguments {
     pub early_return: bool,
     /// `requiredIntermediateVariables`.
     pub intermediate: Vec<u32>,
-    /// `intermediateUpdate`; it is given the importer's [`CallbackContext`].
+    /// `intermediateUpdate`; it receives the importer's [`CallbackContext`].
     pub update: Option<Update>,
 }
 
 impl Fmi3Arguments {
-    /// Proper ones.
+    /// Returns valid arguments.
     pub fn new(resources: &UnpackedResources) -> Self {
         let text = |text: String| Some(CString::new(text).expect("no NUL"));
         Self {
@@ -53,9 +53,9 @@ pub struct CallbackContext {
     pub api: *const Fmi3Api,
     /// The instance, for callbacks.
     pub handle: InstancePointer,
-    /// Whatever a test's callback wants to note.
+    /// Values recorded by the callback of a test.
     pub notes: Vec<f64>,
-    /// Whatever a test's callback wants to know.
+    /// Value passed to the callback of a test.
     pub wish: f64,
 }
 
@@ -85,7 +85,7 @@ pub struct Fmi3TestSlave<'a> {
     pub context: *mut CallbackContext,
 }
 
-/// Load the library.
+/// Loads the library.
 #[track_caller]
 pub fn load(path: &Path) -> Fmi3Api {
     Fmi3Api::load(path).unwrap_or_else(|failure| panic!("{failure}"))
@@ -104,10 +104,10 @@ impl AsMut<Journal> for CallbackContext {
 }
 
 impl<'a> Fmi3TestSlave<'a> {
-    /// Instantiate; on failure the messages.
+    /// Creates an instance, or returns the messages.
     ///
     /// # Errors
-    /// All messages logged.
+    /// A failed instantiation, with all messages logged.
     pub fn try_new(api: &'a Fmi3Api, arguments: &Fmi3Arguments) -> Result<Self, String> {
         let context = Box::into_raw(Box::new(CallbackContext {
             journal: Journal::default(),
@@ -117,7 +117,7 @@ impl<'a> Fmi3TestSlave<'a> {
             wish: 0.0,
         }));
         let Fmi3Arguments { name, token, path, event_mode, early_return, intermediate, update } = arguments;
-        // SAFETY: all pointers are valid for the call or NULL, which the library must bear.
+        // SAFETY: all pointers are valid for the call or NULL, which the library must handle.
         let handle = unsafe {
             (api.fmi3InstantiateCoSimulation)(
                 pointer(name),
@@ -140,30 +140,30 @@ impl<'a> Fmi3TestSlave<'a> {
         if handle.is_null() { Err(slave.log()) } else { Ok(slave) }
     }
 
-    /// Instantiate the scene of the tests.
+    /// Creates an instance of the scene of the tests.
     #[track_caller]
     pub fn new(api: &'a Fmi3Api, resources: &UnpackedResources) -> Self {
         Self::try_new(api, &Fmi3Arguments::new(resources)).unwrap_or_else(|log| panic!("{log}"))
     }
 
-    /// From instantiated to ready for steps.
+    /// Goes from instantiated to ready for steps.
     #[track_caller]
     pub fn initialise(&self) {
         self.expect(self.enter(0.0, None));
         self.expect(self.exit());
     }
 
-    /// `fmi3EnterInitializationMode`.
+    /// Calls `fmi3EnterInitializationMode`.
     pub fn enter(&self, start: f64, stop: Option<f64>) -> i32 {
         let (defined, stop) = (stop.is_some(), stop.unwrap_or(0.0));
         // SAFETY: the instance is alive.
         unsafe { (self.api.fmi3EnterInitializationMode)(self.handle, false, 0.0, start, defined, stop) }
     }
 
-    /// `fmi3DoStep`; the places for the answers hold improper values before.
+    /// Calls `fmi3DoStep`; the outputs hold invalid values before the call.
     pub fn step(&self, time: f64, size: f64) -> Step {
         let (mut event, mut terminate, mut early, mut last) = (true, true, true, f64::NAN);
-        // SAFETY: places for the four answers.
+        // SAFETY: valid locations for the four outputs.
         let status = unsafe {
             (self.api.fmi3DoStep)(
                 self.handle,
@@ -179,7 +179,7 @@ impl<'a> Fmi3TestSlave<'a> {
         Step { status, event, terminate, early, time: last }
     }
 
-    /// `fmi3GetFloat64`.
+    /// Calls `fmi3GetFloat64`; returns the status if it fails.
     pub fn try_reals(&self, references: &[u32], count: usize) -> Result<Vec<f64>, i32> {
         let mut values = vec![0.0; count];
         // SAFETY: arrays of that length.
@@ -189,13 +189,13 @@ impl<'a> Fmi3TestSlave<'a> {
         if status == OK { Ok(values) } else { Err(status) }
     }
 
-    /// `fmi3GetFloat64`.
+    /// Calls `fmi3GetFloat64`.
     #[track_caller]
     pub fn reals(&self, references: &[u32], count: usize) -> Vec<f64> {
         self.try_reals(references, count).unwrap_or_else(|status| panic!("status {status}: {}", self.log()))
     }
 
-    /// `fmi3SetFloat64`.
+    /// Calls `fmi3SetFloat64`.
     pub fn set_reals(&self, references: &[u32], values: &[f64]) -> i32 {
         let (count, n) = (references.len(), values.len());
         // SAFETY: arrays of that length.
@@ -208,7 +208,7 @@ impl<'a> Fmi3TestSlave<'a> {
         std::mem::take(unsafe { &mut (*self.context).notes })
     }
 
-    /// Tell the test's callback something.
+    /// Passes a value to the callback of the test.
     pub fn wish(&self, value: f64) {
         // SAFETY: as in `log`.
         unsafe { (*self.context).wish = value };

@@ -1,8 +1,9 @@
-//! Golden bits: outputs of scenes that together have every feature, scheme, solver and gap law, to the last bit, from
-//! the core and from both faces of the library.
+//! Golden bits: outputs of scenes that together cover every feature, scheme, solver and gap law, to the last bit, from
+//! the core and from both interfaces of the library.
 //!
-//! `GOLDEN=write cargo test -p tiprub-tests --release --test golden` renews the table. What changes is then on purpose, and the
-//! commit says why. Where the digest differs and the numbers beside it hardly do, only rounding has changed.
+//! `GOLDEN=write cargo test -p tiprub-tests --release --test golden` rewrites the table. Do this only for an intended
+//! change, and give the reason in the commit. If the digest differs and the adjacent numbers hardly do, only rounding
+//! has changed.
 
 #[path = "golden/scenes.rs"]
 mod scenes;
@@ -15,17 +16,17 @@ use tiprub_core::{Scene, Simulation};
 use tiprub_tests::scene::UnpackedResources;
 use tiprub_tests::{OK, fmi2, fmi3, root, shipped};
 
-/// Lengths of the communication steps (s): internal steps of one and two lengths, and back.
+/// Returns the lengths of the communication steps (s): internal steps of one and two lengths, and back.
 fn lengths() -> impl Iterator<Item = f64> {
     let times = |count, length| std::iter::repeat_n(length, count);
     times(60, 2.5e-5).chain(times(30, 1.03e-5)).chain(times(40, 2.5e-5))
 }
 
-/// Value and slope of an input of a scene at `time` (s).
+/// Returns value and slope of an input of a scene at `time` (s).
 fn course(name: &str, time: f64) -> (f64, f64) {
     let (rate, speed) = (700.0, 1300.0);
     let (sine, cosine) = (rate * time).sin_cos();
-    // Of several structures or pairs each follows the course of one.
+    // Several structures or pairs use the courses of a single one.
     match name.rsplit('.').next().unwrap_or(name) {
         "speed" => (speed + 3e4 * time, 3e4),
         "whirl_x" => (6e-5 * sine, 6e-5 * rate * cosine),
@@ -41,7 +42,7 @@ fn course(name: &str, time: f64) -> (f64, f64) {
     }
 }
 
-/// One input: its name, and reference of each element.
+/// Returns the inputs: name, and reference of each element.
 fn inputs(simulation: &Simulation) -> Vec<(String, Vec<u32>)> {
     let rows = simulation.table().variables().iter().filter(|row| row.causality == Causality::Input);
     rows.map(|row| (row.name.clone(), elements(row).collect())).collect()
@@ -114,7 +115,8 @@ impl SteppedBy for fmi3::Fmi3TestSlave<'_> {
     }
 }
 
-/// Digest of all real outputs at all communication points (FNV-1a, 64 bit), and those of the last one.
+/// Returns the digest of all real outputs at all communication points (FNV-1a, 64 bit), and the outputs at the last
+/// one.
 fn run(scene: &Scene, face: &mut impl SteppedBy, derivatives: bool) -> (u64, Vec<f64>) {
     let table = Simulation::new(scene).unwrap();
     let (inputs, outputs) = (inputs(&table), outputs(&table));
@@ -142,7 +144,8 @@ fn native(scene: &Scene, derivatives: bool) -> (u64, Vec<f64>) {
     run(scene, &mut simulation, derivatives)
 }
 
-/// A line of the table: name, digests without and with derivatives, and some numbers at the end of the first.
+/// Returns a line of the table: name, digests without and with derivatives, and some numbers at the end of the first
+/// run.
 fn line(scene: &Scene) -> String {
     let ((ramped, last), (led, _)) = (native(scene, false), native(scene, true));
     let table = Simulation::new(scene).unwrap();
@@ -166,7 +169,7 @@ fn held(name: &str, found: &str) -> String {
     fs::read_to_string(&path).unwrap()
 }
 
-/// `preset = "paper"` is what it was: settings as they are read, and the same settings and bits as spelled out.
+/// `preset = "paper"` is unchanged: its settings, and the settings and bits of the equivalent explicit scene.
 #[test]
 fn paper_preset_is_unchanged() {
     let preset = scenes::around_blades(scenes::PRESET);

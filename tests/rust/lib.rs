@@ -12,7 +12,7 @@ use std::ffi::{CStr, CString, c_char, c_void};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Status numbers of both standards.
+/// Status numbers of both standards: OK.
 pub const OK: i32 = 0;
 /// Warning.
 pub const WARNING: i32 = 1;
@@ -21,16 +21,16 @@ pub const DISCARD: i32 = 2;
 /// Error.
 pub const ERROR: i32 = 3;
 
-/// Root of the workspace.
+/// Returns the root of the workspace.
 pub fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the tests lie inside the workspace").to_path_buf()
 }
 
-/// Build the FMU library as it is shipped (or with the feature that makes it panic on request) and give its path.
+/// Builds the FMU library as it is released (or with the feature that makes it panic on request) and returns its path.
 ///
-/// The environment variables `TIPRUB_LIBRARY`, `TIPRUB_LIBRARY_TEST_PANIC` and `TIPRUB_LIBRARY_THERMAL` name libraries built elsewhere
-/// (against an old glibc, say) to be tested instead. It is built alone (`-p`), because a workspace build would unify features, and in its
-/// own target directory, because the one in use may be locked.
+/// The environment variables `TIPRUB_LIBRARY`, `TIPRUB_LIBRARY_TEST_PANIC` and `TIPRUB_LIBRARY_THERMAL` select
+/// libraries built elsewhere (for example against an old glibc) instead. It is built alone (`-p`), because a workspace
+/// build would unify features, and in a separate target directory, because the default one may be locked.
 #[track_caller]
 pub fn library(profile: &str, features: &[&str]) -> PathBuf {
     let elsewhere = if features.is_empty() { "TIPRUB_LIBRARY" } else { "TIPRUB_LIBRARY_TEST_PANIC" };
@@ -54,19 +54,19 @@ fn library_of((package, file, elsewhere): (&str, &str, &str), profile: &str, fea
     target.join(profile).join(file)
 }
 
-/// The shipped library.
+/// Returns the path of the released library.
 #[track_caller]
 pub fn shipped() -> PathBuf {
     library("fmu", &[])
 }
 
-/// The shipped library of heat conduction.
+/// Returns the path of the released library of heat conduction.
 #[track_caller]
 pub fn thermal() -> PathBuf {
     library_of(("tiprub-fmi-thermal", "libtiprub_thermal_fmi.so", "TIPRUB_LIBRARY_THERMAL"), "fmu", &[])
 }
 
-/// One message an importer was given.
+/// One message that an importer received.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Message {
     /// Status of the message.
@@ -85,7 +85,7 @@ pub struct Journal {
 }
 
 impl Journal {
-    /// All texts, one per line.
+    /// Returns all texts, one per line.
     pub fn text(&self) -> String {
         self.messages.iter().map(|message| format!("{}\n", message.text)).collect()
     }
@@ -121,7 +121,7 @@ pub unsafe extern "C" fn journal2(
     text: *const c_char,
 ) {
     assert_eq!((owned(name).as_str(), owned(format).as_str()), ("rub", "%s"));
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     let journal = unsafe { &mut *environment.cast::<Journal>() };
     journal.messages.push(Message { status, category: owned(category), text: owned(text) });
 }
@@ -131,7 +131,7 @@ pub unsafe extern "C" fn journal2(
 /// # Safety
 /// `environment` points to a [`Journal`].
 pub unsafe extern "C" fn journal3(environment: *mut c_void, status: i32, category: *const c_char, text: *const c_char) {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     let journal = unsafe { &mut *environment.cast::<Journal>() };
     journal.messages.push(Message { status, category: owned(category), text: owned(text) });
 }

@@ -1,4 +1,4 @@
-//! The strings that users read: errors, warnings, notes, help, progress, reports and studies, collected from the sources.
+//! Strings that users read: errors, warnings, notes, help, progress, reports and studies, collected from the sources.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -8,7 +8,7 @@ use tiprub_tests::root;
 
 /// Derives whose doc comments are help texts.
 const HELP: [&str; 4] = ["Args", "Parser", "Subcommand", "ValueEnum"];
-/// Attributes whose strings are read by users.
+/// Attributes whose strings users read.
 const SHOWN: [&str; 3] = ["arg", "command", "value"];
 
 /// One string literal.
@@ -18,7 +18,7 @@ struct UserString {
     text: String,
 }
 
-/// Whether tokens contain a word.
+/// Returns whether tokens contain a word.
 fn has_word(stream: &TokenStream, word: &str) -> bool {
     stream.clone().into_iter().any(|token| match token {
         TokenTree::Ident(ident) => ident == word,
@@ -50,7 +50,7 @@ fn string_value(literal: &str) -> Option<String> {
     Some(text)
 }
 
-/// Whether a string is a sentence or part of one: two words of letters, neither markup nor code.
+/// Returns whether a string is a sentence or part of one: two words of letters, neither markup nor code.
 fn is_prose(text: &str) -> bool {
     let words = text.split_whitespace().filter(|word| {
         let word = word.trim_matches(|letter: char| !letter.is_alphabetic());
@@ -60,7 +60,7 @@ fn is_prose(text: &str) -> bool {
     !markup && words.count() >= 2
 }
 
-/// Collects the strings of a sequence of tokens; `help`: doc comments are help texts.
+/// Collects the strings of a sequence of tokens. If `help` is true, doc comments are help texts.
 fn collect(stream: TokenStream, help: bool, found: &mut Vec<UserString>) {
     let tokens: Vec<TokenTree> = stream.into_iter().collect();
     let (mut index, mut helps) = (0, help);
@@ -116,12 +116,12 @@ fn is_punct(token: Option<&TokenTree>, sign: char) -> bool {
     matches!(token, Some(TokenTree::Punct(punct)) if punct.as_char() == sign)
 }
 
-/// Whether a block has statements or arms; else it is the value of a structure.
+/// Returns whether a block has statements or arms; otherwise it is the value of a structure.
 fn has_statements(stream: &TokenStream) -> bool {
     stream.clone().into_iter().any(|token| is_punct(Some(&token), ';') || is_punct(Some(&token), '>'))
 }
 
-/// Strings of one call are one message.
+/// Joins the strings of one call to one message.
 fn join(first: usize, found: &mut Vec<UserString>) {
     let texts: Vec<UserString> = found.drain(first..).collect();
     let Some(line) = texts.first().map(|one| one.line) else { return };
@@ -153,7 +153,7 @@ fn is_derive_of_help(attribute: &Group) -> bool {
     attribute.stream().to_string().starts_with("derive") && HELP.iter().any(|name| has_word(&attribute.stream(), name))
 }
 
-/// Index after the item that starts at `index`.
+/// Returns the index after the item that starts at `index`.
 fn end_of_item(tokens: &[TokenTree], index: usize) -> usize {
     let ends = |token: &TokenTree| match token {
         TokenTree::Group(group) => group.delimiter() == Delimiter::Brace,
@@ -163,7 +163,7 @@ fn end_of_item(tokens: &[TokenTree], index: usize) -> usize {
     tokens[index..].iter().position(ends).map_or(tokens.len(), |end| index + end + 1)
 }
 
-/// Words that users stumbled over, and what to write instead.
+/// Words that readers found hard to understand, and their replacements.
 const BANNED: [(&str, &str); 20] = [
     ("told", "reported"),
     ("tells", "reports, warns, prints"),
@@ -205,7 +205,7 @@ fn plain_words(text: &str) -> String {
     words
 }
 
-/// Rust sources of the product and of its evidence below a folder, without tests.
+/// Returns the Rust sources of the product and of its evidence below a folder, without tests.
 fn product_sources(folder: &Path) -> Vec<PathBuf> {
     let mut files = Vec::new();
     super::sources(folder, &mut files);
@@ -220,7 +220,7 @@ fn product_sources(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// Writes all strings to `target/messages.md`, to be read in one sitting.
+/// Also writes all strings to `target/messages.md` for review.
 #[test]
 fn user_visible_strings_avoid_confusing_words() {
     let (mut list, mut count, mut banned) = (String::from("# Strings that users read\n"), 0, Vec::new());

@@ -1,18 +1,18 @@
-//! Hostile calls, counted.
+//! Counters of hostile calls.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::ERROR;
 
-/// Cases tried, for the summary.
+/// Number of cases tried, for the summary.
 static CASES: AtomicUsize = AtomicUsize::new(0);
 
-/// Count cases that were refused as they should be.
+/// Counts cases that were rejected as expected.
 pub fn count(cases: usize) {
     CASES.fetch_add(cases, Ordering::Relaxed);
 }
 
-/// A call must have ended in Error, with a message that names the reason.
+/// Checks that a call ended in Error, with a message that contains the reason.
 #[track_caller]
 pub fn refused(status: i32, log: &str, reason: &str) {
     count(1);
@@ -20,7 +20,7 @@ pub fn refused(status: i32, log: &str, reason: &str) {
     assert!(log.contains(reason), "the message does not say \"{reason}\": {log}");
 }
 
-/// Tell how many.
+/// Prints the number of cases.
 pub fn summary(name: &str) {
     println!("{name}: {} hostile cases so far, all refused as they should be", CASES.load(Ordering::Relaxed));
 }

@@ -1,4 +1,4 @@
-//! A small scene that touches: six blades with three contact nodes each, light and soft enough to be quick.
+//! A small scene with contact: six blades with three contact nodes each, light and soft enough to be fast.
 
 use std::path::Path;
 
@@ -11,14 +11,14 @@ use tiprub_core::{Rom, Scene};
 /// Radius of the blade tips (m).
 pub const RADIUS: f64 = 0.25;
 
-/// Three point masses of 10 g, coupled by springs: the stiffest direction of each is near 2 kHz, the softest near 300 Hz;
-/// three more internal coordinates hang on the first three.
+/// Returns three point masses of 10 g, coupled by springs: the stiffest direction of each is near 2 kHz, the softest
+/// near 300 Hz; three more internal coordinates are attached to the first three.
 pub fn rom() -> Rom {
     let order = 12;
     let mass = DMatrix::from_diagonal_element(order, order, 0.01);
     let mut stiffness = DMatrix::zeros(order, order);
     for coordinate in 0..order {
-        // Radial stiff, tangential soft, axial between; internal ones stiffest.
+        // Radial stiff, tangential soft, axial in between; internal coordinates stiffest.
         let frequency = if coordinate >= 9 { 2500.0 } else { [1800.0, 310.0, 640.0][coordinate % 3] };
         let omega = std::f64::consts::TAU * frequency;
         stiffness[(coordinate, coordinate)] += 0.01 * omega * omega;
@@ -89,17 +89,18 @@ stop = 0.1
 communication_step = 1e-4
 "#;
 
-/// The scene as data.
+/// Returns the scene as data.
 #[track_caller]
 pub fn scene() -> Scene {
     let settings = tiprub_format::parse_scene(SCENE, "toy.toml").expect("the scene of the tests is valid");
     Scene { settings, roms: vec![rom()] }
 }
 
-/// Patches of the ring.
+/// Number of patches of the ring.
 pub const PATCHES: usize = 4;
 
-/// A ring around the blades that breathes and ovalises, with a contact grid of 12 by 2 nodes and four warm quarters.
+/// Returns a ring around the blades with breathing and ovalising modes, a contact grid of 12 by 2 nodes and four heated
+/// quarters.
 pub fn ring() -> Rom {
     let quarter = std::f64::consts::FRAC_PI_2;
     let (around, along) = (12, 2);
@@ -147,7 +148,7 @@ pub fn ring() -> Rom {
     }
 }
 
-/// The scene with the casing on a ring whose temperatures are inputs.
+/// Returns the scene with the casing on a ring whose temperatures are inputs.
 #[track_caller]
 pub fn warm_scene() -> Scene {
     let mut scene = scene();
@@ -164,35 +165,35 @@ pub fn warm_scene() -> Scene {
     scene
 }
 
-/// First value reference of a variable of the scene.
+/// Returns the first value reference of a variable of the scene.
 #[track_caller]
 pub fn reference(name: &str) -> u32 {
     let simulation = tiprub_core::Simulation::new(&scene()).expect("the scene of the tests is valid");
     simulation.table().find(name).unwrap_or_else(|| panic!("no variable {name}")).reference
 }
 
-/// An unpacked FMU's resources.
+/// Unpacked resources of an FMU.
 #[derive(Debug)]
 pub struct UnpackedResources {
     directory: TempDir,
-    /// The token that belongs to them.
+    /// Token that belongs to the resources.
     pub token: String,
 }
 
 impl UnpackedResources {
-    /// Write the scene of the tests.
+    /// Writes the scene of the tests.
     #[track_caller]
     pub fn new(arrays: bool) -> Self {
         Self::of(&scene(), arrays)
     }
 
-    /// Write a scene.
+    /// Writes a scene.
     #[track_caller]
     pub fn of(scene: &Scene, arrays: bool) -> Self {
         Self::of_files(&tiprub_format::resource_files(scene, arrays))
     }
 
-    /// Write a model of heat conduction.
+    /// Writes a model of heat conduction.
     #[track_caller]
     pub fn of_thermal(model: &tiprub_thermal::ConductionModel, arrays: bool) -> Self {
         Self::of_files(&tiprub_format::thermal_resource_files(model, arrays))
@@ -206,7 +207,7 @@ impl UnpackedResources {
         Self { directory, token: tiprub_format::instantiation_token(files) }
     }
 
-    /// Where they are.
+    /// Returns the path of the resources.
     pub fn path(&self) -> &Path {
         self.directory.path()
     }

@@ -1,4 +1,4 @@
-//! The shape of the code, as absences: which floors know nothing of which, and where unsafe code is not.
+//! The structure of the code, as absences: crates that must not depend on others, and places without unsafe code.
 
 mod messages;
 
@@ -8,7 +8,7 @@ use std::process::Command;
 
 use tiprub_tests::root;
 
-/// Every crate that a package is built of (normal dependencies, with its own features).
+/// Returns every crate that a package is built from (normal dependencies, with its features).
 fn built_of(package: &str) -> BTreeSet<String> {
     let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     command.current_dir(root()).args(["tree", "--offline", "-p", package, "-e", "normal", "--prefix", "none"]);
@@ -61,7 +61,7 @@ fn sources(directory: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// Lines of code (not comments) that contain a word.
+/// Returns the lines of code (not comments) that contain a word.
 fn lines_with(path: &Path, word: &str) -> Vec<String> {
     let text = std::fs::read_to_string(path).expect("a source file");
     let code = text.lines().map(|line| line.split("//").next().unwrap_or_default().to_owned());
@@ -98,14 +98,14 @@ fn the_library_is_only_a_shared_library() {
     }
 }
 
-/// Text of the blocks `impl <name> {` of a file.
+/// Returns the text of the blocks `impl <name> {` of a file.
 fn implementations(text: &str, name: &str) -> String {
     let start = format!("\nimpl {name} {{\n");
     let blocks = text.split(start.as_str()).skip(1);
     blocks.map(|block| block.split("\n}\n").next().unwrap_or_default()).collect::<Vec<_>>().join("\n")
 }
 
-/// Public functions of a text whose doc comment has no example.
+/// Returns the public functions of a text whose doc comment has no example.
 fn without_example(text: &str) -> Vec<String> {
     let (mut missing, mut has_example) = (Vec::new(), false);
     for line in text.lines().map(str::trim_start) {
@@ -123,7 +123,8 @@ fn without_example(text: &str) -> Vec<String> {
     missing
 }
 
-/// What programs call first: simulations, files, meshes and reductions. `cargo test --doc` compiles and runs the examples.
+/// Covers the functions that programs call first: simulations, files, meshes and reductions. `cargo test --doc`
+/// compiles and runs the examples.
 #[test]
 fn public_entry_points_have_examples() {
     let folder = |path: &str| {

@@ -1,4 +1,5 @@
-//! The C ABIs of FMI 2.0 (44 functions) and FMI 3.0 (75 functions) over one neutral slave, for any [`CoSimulationUnit`].
+//! The C ABIs of FMI 2.0 (44 functions) and FMI 3.0 (75 functions) over one version-independent slave, for any
+//! [`CoSimulationUnit`].
 //!
 //! ```text
 //! fmi2/  fmi3/     one expression per exported function, no unsafe block
@@ -10,13 +11,14 @@
 //!     unit         what a simulation offers to be driven so
 //! ```
 //!
-//! A shared library is a crate that implements [`CoSimulationUnit`] and says how to load it with [`library`]. The functions of the
-//! standards are exported from there: this crate holds all of them but the two that make an instance, since only these have to
-//! know the unit. Several such libraries live in one process without knowing of each other.
+//! A shared library is a crate that implements [`CoSimulationUnit`] and calls [`library`] with the function that loads
+//! it. That crate exports the functions of the standards: all of them are defined here except the two that create an
+//! instance, because only these depend on the unit. Several such libraries can be loaded in one process without
+//! interfering.
 //!
-//! Invariants, written as what is absent: no unsafe code outside `boundary` (the `no_mangle` attributes of the façades
-//! apart), no global mutable state (but the silent panic hook of this library's own copy of the standard library), no
-//! thread, no output, no panic across the ABI, no value handed out by a call that did not succeed.
+//! Invariants, stated as absences: no unsafe code outside `boundary` (except the `no_mangle` attributes of the
+//! façades), no global mutable state (except the silent panic hook of this library's copy of the standard library), no
+//! threads, no output, no panic across the ABI, no value returned by a call that did not succeed.
 #![warn(unreachable_pub)]
 #![deny(unsafe_op_in_unsafe_fn)]
 
@@ -47,7 +49,7 @@ pub mod abi {
     pub use crate::slave::FmiStatus;
 }
 
-/// Make the crate a library of FMI: exports what makes an instance, by a function of type [`Load`].
+/// Makes the crate an FMI library: exports the functions that create an instance with a function of type [`Load`].
 #[macro_export]
 macro_rules! library {
     ($load:expr) => {
@@ -107,8 +109,8 @@ macro_rules! library {
     };
 }
 
-/// The methods of [`CoSimulationUnit`] that a simulation `self.0` has by the same names: all but those in which units differ. `$courses` is
-/// what its inputs do over time.
+/// Implements the methods of [`CoSimulationUnit`] that a simulation `self.0` has under the same names, which are all
+/// methods that do not differ between units. `$courses` is the type of its inputs over time.
 #[macro_export]
 macro_rules! delegate {
     ($courses:ty) => {

@@ -1,12 +1,13 @@
-//! Where the resources directory is: FMI 2.0 says it with a URI, FMI 3.0 with a native path.
+//! Location of the resources directory: a URI in FMI 2.0, a native path in FMI 3.0.
 
 use std::path::{Path, PathBuf};
 
-/// Directory named by `fmuResourceLocation` of `fmi2Instantiate`: `file:///path`, `file:/path` or
-/// `file://localhost/path`, percent-encoded UTF-8. A plain absolute path is taken as it is, because importers pass it.
+/// Returns the directory given as `fmuResourceLocation` of `fmi2Instantiate`: `file:///path`, `file:/path` or
+/// `file://localhost/path`, percent-encoded UTF-8. A plain absolute path is accepted too, because importers pass it.
 ///
 /// # Errors
-/// A message naming the location: empty, another scheme or host, not absolute, damaged encoding, no such directory.
+/// A location that is empty, has another scheme or host, is not absolute, has a damaged encoding or is not a directory;
+/// the message contains it.
 pub(crate) fn from_uri(location: &str) -> Result<PathBuf, String> {
     let remedy = "Pass the URI of the unpacked resources directory, such as file:///tmp/fmu/resources";
     if location.trim().is_empty() {
@@ -24,13 +25,13 @@ pub(crate) fn from_uri(location: &str) -> Result<PathBuf, String> {
     existing(PathBuf::from(decoded), "fmuResourceLocation", remedy)
 }
 
-/// Native path of what follows `file:`: on Windows a drive without the slash before it, and a host as
+/// Returns the native path of the text after `file:`: on Windows a drive without the slash before it, and a host as
 /// `\\host\share` (RFC 8089, appendix E).
 fn path_of(rest: &str, windows: bool) -> Result<String, String> {
     let Some(after) = rest.strip_prefix("//") else {
         return Ok(without_slash_of_drive(&decode(rest)?, windows));
     };
-    // `file://C:/fmu` and `file://C%3A%5Cfmu`, one slash short, as importers write them.
+    // `file://C:/fmu` and `file://C%3A%5Cfmu`, with one slash missing, as some importers write them.
     let whole = decode(after)?;
     if windows && whole.as_bytes().get(1) == Some(&b':') {
         return Ok(whole);
@@ -51,11 +52,11 @@ fn without_slash_of_drive(path: &str, windows: bool) -> String {
     path[usize::from(drive)..].to_owned()
 }
 
-/// Directory named by `resourcePath` of `fmi3InstantiateCoSimulation`: an absolute native path, with or without a
-/// separator at the end. A `file:` URI is taken as such, because importers pass it.
+/// Returns the directory given as `resourcePath` of `fmi3InstantiateCoSimulation`: an absolute native path, with or
+/// without a separator at the end. A `file:` URI is accepted too, because importers pass it.
 ///
 /// # Errors
-/// A message naming the path: empty, not absolute, no such directory.
+/// A path that is empty, not absolute or not a directory; the message contains it.
 pub(crate) fn from_native(path: &str) -> Result<PathBuf, String> {
     let remedy = "Pass the absolute native path of the unpacked resources directory, such as /tmp/fmu/resources/";
     if path.trim().is_empty() {
@@ -77,7 +78,7 @@ fn existing(path: PathBuf, argument: &str, remedy: &str) -> Result<PathBuf, Stri
     Ok(path)
 }
 
-/// Undo percent-encoding (RFC 3986). A percent sign without two hexadecimal digits stands for itself.
+/// Decodes percent-encoding (RFC 3986). A percent sign without two hexadecimal digits stands for itself.
 fn decode(text: &str) -> Result<String, String> {
     let bytes = text.as_bytes();
     let mut out = Vec::with_capacity(bytes.len());
@@ -105,7 +106,7 @@ fn decode(text: &str) -> Result<String, String> {
 mod tests {
     use super::*;
 
-    /// A directory with a blank, an umlaut, a percent sign and zeros without one in its name.
+    /// Returns a directory whose name contains a blank, an umlaut, a percent sign and zeros without a percent sign.
     fn directory() -> tempfile::TempDir {
         tempfile::Builder::new().prefix("tiprub location \u{fc} 50% off 4400-0041-").tempdir().unwrap()
     }
@@ -157,7 +158,7 @@ mod tests {
             ("//C%3A%5Cfmu%5Cresources", r"C:\fmu\resources"),
             ("//localhost/C:/a%20b", "C:/a b"),
             ("//server/share/a%20b/resources", r"\\server\share\a b\resources"),
-            // Four slashes: a server in the path itself, as some write it.
+            // Four slashes: the server is part of the path, as some importers write it.
             ("////server/share/resources", "//server/share/resources"),
         ] {
             assert_eq!(path_of(rest, true).as_deref(), Ok(path), "{rest}");

@@ -1,5 +1,6 @@
-//! Drive an FMU through its C ABI over its default experiment, or over so many communication steps, and print all outputs as
-//! CSV: `drive FILE.fmu [STEPS]`. Cross-compiled, it compares platforms to the bit (`tests/importers`).
+//! Drives an FMU through its C ABI over its default experiment, or over a given number of communication steps, and
+//! prints all outputs as CSV: `drive FILE.fmu [STEPS]`. Cross-compiled, it compares platforms to the bit
+//! (`tests/importers`).
 
 use std::process::ExitCode;
 

@@ -1,6 +1,6 @@
 //! All functions of both standards as an importer declares them: names and types from `fmi2FunctionTypes.h` (FMI 2.0.4)
-//! and `fmi3FunctionTypes.h` (FMI 3.0.2). Written apart from the library's own declarations.
-//! A boolean that a library writes is read as a byte: one that is neither 0 nor 1 is no `bool`.
+//! and `fmi3FunctionTypes.h` (FMI 3.0.2), written independently of the library's declarations. A boolean that a library
+//! writes is read as a byte, because a byte other than 0 or 1 is not a valid `bool`.
 #![allow(non_snake_case, reason = "names of the standards")]
 #![allow(missing_docs, reason = "the standards document them")]
 
@@ -19,14 +19,14 @@ pub(crate) type TextPointer = *const c_char;
 /// Value references.
 pub(crate) type ReferencePointer = *const u32;
 
-/// Structs of function pointers, loaded by name, and the list of the names.
+/// Defines structs of function pointers, loaded by name, and the list of the names.
 macro_rules! api {
     ($(#[$doc:meta])* $type:ident { $($name:ident($($argument:ty),*) -> $result:ty;)* }) => {
         $(#[$doc])*
         #[derive(Debug)]
         pub struct $type {
             $(pub $name: unsafe extern "C" fn($($argument),*) -> $result,)*
-            /// Keeps the functions in memory.
+            /// Keeps the library loaded.
             _library: Library,
         }
 
@@ -34,18 +34,20 @@ macro_rules! api {
             /// Names of all functions.
             pub const NAMES: &[&str] = &[$(stringify!($name)),*];
 
-            /// Load a library and look up every function.
+            /// Loads a library and looks up every function.
             ///
             /// # Errors
-            /// The file is no library of this platform, or a function is missing.
+            /// A file that is not a library of this platform, or a missing function.
             pub fn load(path: &Path) -> Result<Self> {
-                // SAFETY: loading runs the library's initialisers; that is what importing an FMU means, and the user named it.
+                // SAFETY: loading runs the library's initialisers, which importing an FMU implies, and the user chose
+                // the file.
                 let library = unsafe { Library::new(path) }.map_err(|error| {
                     let remedy = "Check that the library was built for this machine";
                     Failure::new(path.display(), format!("cannot be loaded: {error}"), remedy)
                 })?;
                 Ok(Self {
-                    // SAFETY: the types are those of the standard's header; the library is kept as long as the functions.
+                    // SAFETY: the types are those of the standard's header; the library stays loaded as long as the
+                    // functions are used.
                     $($name: *unsafe { library.get(stringify!($name)) }.map_err(|error| {
                         Failure::new("FMU library", format!("does not export {}: {error}", stringify!($name)), "")
                     })?,)*

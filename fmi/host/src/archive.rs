@@ -1,9 +1,9 @@
-//! The zip of an FMU: strict, small and reproducible.
+//! The zip archive of an FMU: strict, small and reproducible.
 //!
-//! Rules kept here, since importers differ in what they can read: entries are stored or deflated, need no more
-//! than zip 2.0, have no zip64 fields, no data descriptors, no directories and no "./"; names are ASCII with
-//! forward slashes; the first entry is the first given. The same entries give the same bytes: time stamps are
-//! 1980-01-01 00:00:00 (the zip epoch) and permissions are fixed.
+//! Importers differ in the zip features they can read, so the archive follows these rules: entries are stored or
+//! deflated, need no more than zip 2.0, have no zip64 fields, no data descriptors, no directories and no "./"; names
+//! are ASCII with forward slashes; the first entry in the file is the first one passed. Equal entries give equal bytes:
+//! time stamps are 1980-01-01 00:00:00 (the zip epoch) and permissions are fixed.
 
 use std::{
     collections::BTreeSet,
@@ -24,27 +24,27 @@ pub struct ArchiveEntry {
 }
 
 impl ArchiveEntry {
-    /// An entry with these contents.
+    /// Creates an entry.
     pub fn new(name: impl Into<String>, bytes: impl Into<Vec<u8>>) -> Self {
         Self { name: name.into(), bytes: bytes.into() }
     }
 }
 
-/// Write the archive to `target`, whole or not at all. It is made in memory: the zip library prints a message of its own
-/// when an unfinished archive cannot go on being written.
+/// Writes the archive to `target`, completely or not at all. It is created in memory, because the zip library prints a
+/// message when writing an unfinished archive fails.
 ///
 /// # Errors
-/// A name that breaks the rules above, a file that is too large, or a disk that does not take it.
+/// A name that breaks the rules above, a file that is too large, or a failed write.
 pub fn write(target: &Path, entries: &[ArchiveEntry]) -> Result<()> {
     let mut archive = std::io::Cursor::new(Vec::new());
     write_into(&mut archive, entries).map_err(|failure| Failure { what: target.display().to_string(), ..failure })?;
     output_file::write(target, archive.into_inner())
 }
 
-/// Write the archive into anything seekable.
+/// Writes the archive to any seekable target.
 ///
 /// # Errors
-/// As [`write()`].
+/// Same as [`write()`].
 pub(crate) fn write_into(target: impl Write + Seek, entries: &[ArchiveEntry]) -> Result<()> {
     check_names(entries)?;
     let mut writer = ZipWriter::new(target);
@@ -61,7 +61,7 @@ pub(crate) fn write_into(target: impl Write + Seek, entries: &[ArchiveEntry]) ->
 }
 
 fn options(entry: &ArchiveEntry) -> SimpleFileOptions {
-    // Deflating a picture or an empty file only makes it longer.
+    // Deflating a picture or an empty file only makes it larger.
     let stored = entry.bytes.is_empty() || entry.name.ends_with(".png");
     let shared_library = entry.name.starts_with("binaries/");
     SimpleFileOptions::default()
@@ -127,7 +127,8 @@ mod tests {
         usize::try_from(u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap())).unwrap()
     }
 
-    /// Every header field, read by the layout of PKWARE's APPNOTE 4.3.7, 4.3.12 and 4.3.16 and nothing else.
+    /// Checks every header field against the layout in PKWARE's APPNOTE 4.3.7, 4.3.12 and 4.3.16, without another
+    /// library.
     #[test]
     fn zip_headers_conform_to_the_specification() {
         let entries = sample();

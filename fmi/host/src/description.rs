@@ -1,4 +1,4 @@
-//! modelDescription.xml as an importer reads it: both FMI versions into one list of variables.
+//! Reader of modelDescription.xml for an importer: both FMI versions give one list of variables.
 
 use std::collections::BTreeMap;
 
@@ -8,12 +8,12 @@ use quick_xml::{
 };
 use tiprub_shell::{Failure, Result};
 
-/// Deeper elements, and more attributes of one, are in no description; each would take memory, and attributes are compared with
-/// each other.
+/// Maximum depth of elements and number of attributes of one; no description has more. Each takes memory, and
+/// attributes are compared with each other.
 const MOST_NESTED: usize = 50;
 const MOST_ATTRIBUTES: usize = 50;
 
-/// Data type of a variable, by the getter that reads it.
+/// Data type of a variable, which selects the getter that reads it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum VariableType {
     /// fmi2Real, fmi3Float64.
@@ -37,7 +37,7 @@ pub struct ImportedVariable {
     pub reference: u32,
     /// Data type.
     pub kind: VariableType,
-    /// Causality (`local` where the attribute is absent).
+    /// Causality (`local` if the attribute is missing).
     pub causality: String,
     /// Variability, if given.
     pub variability: Option<String>,
@@ -71,14 +71,14 @@ pub struct ImportedDescription {
 }
 
 impl ImportedDescription {
-    /// The outputs that hold numbers, in file order.
+    /// Returns the numeric outputs, in file order.
     pub(crate) fn numeric_outputs(&self) -> impl Iterator<Item = &ImportedVariable> {
         self.variables.iter().filter(|variable| variable.causality == "output" && variable.kind != VariableType::Text)
     }
 }
 
 impl ImportedVariable {
-    /// Scalar names of all elements.
+    /// Returns the scalar names of all elements.
     pub(crate) fn scalar_names(&self) -> Vec<String> {
         match self.elements {
             None => vec![self.name.clone()],
@@ -87,10 +87,10 @@ impl ImportedVariable {
     }
 }
 
-/// Read modelDescription.xml of FMI 2.0 or 3.0.
+/// Parses modelDescription.xml of FMI 2.0 or 3.0.
 ///
 /// # Errors
-/// Not well-formed, or without what every importer needs; the place is named.
+/// Text that is not well-formed or misses data that every importer needs; the message contains the place.
 pub fn parse(text: &str) -> Result<ImportedDescription> {
     let mut reader = Reader::from_str(text);
     let mut parser = Parser::default();
@@ -117,7 +117,7 @@ fn wrong(problem: impl std::fmt::Display) -> Failure {
 struct Parser {
     path: Vec<String>,
     description: ImportedDescription,
-    /// Starting value of each structural parameter, for dimensions that refer to one.
+    /// Start value of each structural parameter, for dimensions that refer to one.
     structural: BTreeMap<u32, usize>,
 }
 
@@ -195,7 +195,7 @@ impl Parser {
         Ok(())
     }
 
-    /// FMI 2.0: the type is a child element of the variable.
+    /// Reads the type of an FMI 2.0 variable, which is a child element.
     fn scalar_type(&mut self, kind: &str, attributes: &Attributes) {
         let kind = match kind {
             "Real" => VariableType::Float64,
@@ -210,7 +210,7 @@ impl Parser {
         }
     }
 
-    /// FMI 3.0: one element per dimension of an array.
+    /// Reads a dimension of an FMI 3.0 array, one element each.
     fn dimension(&mut self, attributes: &Attributes) -> Result<()> {
         let Some(variable) = self.description.variables.last_mut() else { return Ok(()) };
         let fixed = attributes.get("start").and_then(|text| text.parse().ok());
@@ -323,7 +323,7 @@ mod tests {
     #[test]
     fn rejects_every_truncation() {
         for (length, _) in FMI3.char_indices() {
-            // Cut after the last variable it would still lack the closing tags.
+            // If it is cut after the last variable, the closing tags are missing.
             let result = parse(&FMI3[..length]);
             assert!(result.is_err(), "{length} characters: {result:?}");
         }

@@ -14,7 +14,7 @@ use super::{
 const CO_SIMULATION: i32 = 1;
 
 extern "C" fn allocate(count: usize, size: usize) -> *mut c_void {
-    // SAFETY: calloc has no preconditions; the FMU gives the block back through `release`.
+    // SAFETY: calloc has no preconditions; the FMU returns the block through `release`.
     unsafe { libc::calloc(count, size) }
 }
 
@@ -23,11 +23,11 @@ extern "C" fn release(block: *mut c_void) {
     unsafe { libc::free(block) }
 }
 
-/// The logger, as seen by a caller that passes the format "%s" and one string.
+/// Logger as seen by a caller that passes the format "%s" and one string.
 ///
-/// Rust cannot define variadic functions. In the calling conventions of System V x86-64, of AAPCS64 and of Windows the
-/// six pointer-sized arguments are passed in the same places whether or not the callee is variadic, so a plain function
-/// can stand in; Apple's on Arm puts them on the stack. Any other format is shown as it is.
+/// Rust cannot define variadic functions. In the calling conventions of System V x86-64, AAPCS64 and Windows the six
+/// pointer-sized arguments are passed in the same places whether or not the callee is variadic, so a plain function can
+/// be used instead; Apple's convention on Arm puts them on the stack. Any other format is shown unchanged.
 #[cfg(not(all(target_vendor = "apple", target_arch = "aarch64")))]
 unsafe extern "C" fn log_message(
     environment: *mut c_void,
@@ -63,14 +63,14 @@ fn logger() -> *const c_void {
 pub(super) struct Fmi2Slave {
     component: InstancePointer,
     messages: Box<MessageList>,
-    /// The FMU may keep the pointer it was given.
+    /// The FMU may keep the pointer to these callbacks.
     _callbacks: Box<Fmi2Callbacks>,
-    /// Last, so that the code is unloaded after everything else.
+    /// Last field, so that the code is unloaded after everything else.
     api: Fmi2Api,
 }
 
 impl Fmi2Slave {
-    /// Load the library and instantiate.
+    /// Loads the library and creates an instance.
     pub(super) fn new(fmu: &UnpackedFmu) -> Result<Self> {
         let api = Fmi2Api::load(&fmu.library()?)?;
         let messages = Box::new(MessageList::default());
@@ -84,7 +84,7 @@ impl Fmi2Slave {
         let name = c_text(&fmu.description.model_name)?;
         let token = c_text(&fmu.description.token)?;
         let resources = c_text(&file_uri(&fmu.resources().to_string_lossy(), cfg!(windows)))?;
-        // SAFETY: all strings live through the call, the callbacks as long as the instance.
+        // SAFETY: all strings outlive the call, and the callbacks outlive the instance.
         let component = unsafe {
             (api.fmi2Instantiate)(name.as_ptr(), CO_SIMULATION, token.as_ptr(), resources.as_ptr(), &*callbacks, 0, 0)
         };
@@ -104,7 +104,7 @@ impl Drop for Fmi2Slave {
 
 impl HostedSlave for Fmi2Slave {
     fn initialise(&mut self, schedule: &Schedule) -> Result<()> {
-        // SAFETY: a live component, in the order the standard wants.
+        // SAFETY: a live component, in the order that the standard requires.
         let (setup, enter, exit) = unsafe {
             (
                 (self.api.fmi2SetupExperiment)(self.component, 0, 0.0, schedule.start, 1, schedule.stop),
@@ -164,7 +164,8 @@ impl HostedSlave for Fmi2Slave {
     }
 }
 
-/// A file URI as in RFC 8089, with everything but unreserved characters percent-encoded; on Windows of a path with a drive.
+/// Returns a file URI by RFC 8089, with everything but unreserved characters percent-encoded; on Windows the path has a
+/// drive.
 fn file_uri(path: &str, windows: bool) -> String {
     use std::fmt::Write as _;
     let (path, kept): (String, &[u8]) =
@@ -195,7 +196,7 @@ mod tests {
         let messages = MessageList::default();
         let environment: *mut c_void = std::ptr::from_ref(&messages).cast_mut().cast();
         type Logger = unsafe extern "C" fn(*mut c_void, *const c_char, i32, *const c_char, *const c_char, ...);
-        // SAFETY: same registers for the first six arguments, as said at `log_message`.
+        // SAFETY: the first six arguments use the same registers, as explained at `log_message`.
         let log = unsafe { std::mem::transmute::<*const c_void, Logger>(logger()) };
         // SAFETY: a variadic call as an FMU makes it, with live strings.
         unsafe {

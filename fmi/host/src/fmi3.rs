@@ -10,7 +10,7 @@ use super::{
     slave::{HostedSlave, MessageList, OutputGroup, c_text, check},
 };
 
-/// The logger: the environment is the message list of the slave.
+/// Logger; the environment is the message list of the slave.
 unsafe extern "C" fn log_message(
     environment: *mut c_void,
     _status: i32,
@@ -28,20 +28,20 @@ unsafe extern "C" fn log_message(
 pub(super) struct Fmi3Slave {
     instance: InstancePointer,
     messages: Box<MessageList>,
-    /// Last, so that the code is unloaded after everything else.
+    /// Last field, so that the code is unloaded after everything else.
     api: Fmi3Api,
 }
 
 impl Fmi3Slave {
-    /// Load the library and instantiate.
+    /// Loads the library and creates an instance.
     pub(super) fn new(fmu: &UnpackedFmu) -> Result<Self> {
         let api = Fmi3Api::load(&fmu.library()?)?;
         let messages = Box::new(MessageList::default());
         let name = c_text(&fmu.description.model_name)?;
         let token = c_text(&fmu.description.token)?;
-        // FMI 3.0 wants an absolute native path with a trailing separator.
+        // FMI 3.0 requires an absolute native path with a trailing separator.
         let resources = c_text(&format!("{}/", fmu.resources().display()))?;
-        // SAFETY: all strings live through the call, the message list as long as the instance.
+        // SAFETY: all strings outlive the call, and the message list outlives the instance.
         let instance = unsafe {
             (api.fmi3InstantiateCoSimulation)(
                 name.as_ptr(),
@@ -65,7 +65,7 @@ impl Fmi3Slave {
         Ok(Self { instance, messages, api })
     }
 
-    /// Read `group.values` numbers with one getter.
+    /// Reads `group.values` numbers with one getter.
     fn get<T: Copy + Default>(
         &self,
         function: &str,
@@ -74,7 +74,7 @@ impl Fmi3Slave {
     ) -> Result<Vec<T>> {
         let mut values = vec![T::default(); group.values];
         let references = &group.references;
-        // SAFETY: the two counts say how much is behind the two pointers.
+        // SAFETY: the two counts are the lengths of the two arrays.
         let status =
             unsafe { get(self.instance, references.as_ptr(), references.len(), values.as_mut_ptr(), values.len()) };
         check(function, None, status, &self.messages)?;
@@ -91,7 +91,7 @@ impl Drop for Fmi3Slave {
 
 impl HostedSlave for Fmi3Slave {
     fn initialise(&mut self, schedule: &Schedule) -> Result<()> {
-        // SAFETY: a live instance, in the order the standard wants.
+        // SAFETY: a live instance, in the order that the standard requires.
         let (enter, exit) = unsafe {
             (
                 (self.api.fmi3EnterInitializationMode)(self.instance, false, 0.0, schedule.start, true, schedule.stop),
@@ -105,7 +105,7 @@ impl HostedSlave for Fmi3Slave {
     fn do_step(&mut self, time: f64, step: f64) -> Result<()> {
         let (mut event, mut terminate, mut early) = (false, false, false);
         let mut last_time = f64::NAN;
-        // SAFETY: a live instance in step mode, four valid places to write to.
+        // SAFETY: a live instance in step mode, four valid output locations.
         let status = unsafe {
             (self.api.fmi3DoStep)(
                 self.instance,

@@ -1,5 +1,5 @@
-//! A packaged FMU driven the way any importer would: unzip, read modelDescription.xml, load the shared library,
-//! and go through the standard's call sequence. It knows nothing of the scene or of the core behind the ABI.
+//! A packaged FMU driven as an importer does it: unzip, read modelDescription.xml, load the shared library, and follow
+//! the call sequence of the standard. It does not depend on the scene or the core behind the ABI.
 
 #![warn(unreachable_pub)]
 pub mod api;
@@ -27,14 +27,14 @@ pub use session::Session;
 
 use tiprub_shell::{Failure, Result, recording::Recording, schedule::Schedule};
 
-/// Largest size (bytes) of all files of an archive together, unpacked: far beyond any FMU, far below a zip bomb.
+/// Maximum size (bytes) of all files of an archive together, unpacked: far above any FMU, far below a zip bomb.
 const LARGEST_UNPACKED: u64 = 2 << 30;
-/// Describes the FMU, at the root of the archive.
+/// Name of the model description at the root of the archive.
 const DESCRIPTION: &str = "modelDescription.xml";
-/// Largest size of a description (bytes): that of a hundred thousand variables with long descriptions.
+/// Maximum size of a description (bytes), which a hundred thousand variables with long descriptions need.
 const LARGEST_DESCRIPTION: u64 = 64 << 20;
 
-/// An FMU unpacked to a temporary directory, which lives as long as this value.
+/// An FMU unpacked to a temporary directory, which is deleted with this value.
 #[derive(Debug)]
 pub struct UnpackedFmu {
     directory: TempDir,
@@ -53,10 +53,10 @@ pub struct ImportedRun {
     pub messages: Vec<String>,
 }
 
-/// Open a zip for reading, with messages for the ways in which a file can fail to be one.
+/// Opens a zip for reading, with messages for the ways in which a file can fail to be one.
 ///
 /// # Errors
-/// The file cannot be opened or is not a whole zip.
+/// A file that cannot be opened or is not a complete zip.
 pub fn open_archive(path: &Path) -> Result<ZipArchive<io::BufReader<fs::File>>> {
     let file = tiprub_format::open_file(path).map_err(|error| Failure::file(path, "cannot be opened", &error))?;
     ZipArchive::new(io::BufReader::new(file)).map_err(|error| {
@@ -68,7 +68,7 @@ pub fn open_archive(path: &Path) -> Result<ZipArchive<io::BufReader<fs::File>>> 
     })
 }
 
-/// Names and sizes of all entries, as the archive announces them.
+/// Returns the names and sizes of all entries, as declared in the archive.
 ///
 /// # Errors
 /// A damaged entry, or more than 2 GiB in all.
@@ -93,10 +93,10 @@ pub fn entries(archive: &mut ZipArchive<impl Read + io::Seek>) -> Result<Vec<(St
     Ok(entries)
 }
 
-/// Unpack entry `index` into `target`, checked against its CRC and the size that was announced; never writes more than that.
+/// Unpacks entry `index` into `target`, checked against its CRC and its declared size; never writes more than that.
 ///
 /// # Errors
-/// A damaged entry, or a target that takes no more.
+/// A damaged entry, or a target that cannot be written.
 pub(crate) fn unpack_entry(
     archive: &mut ZipArchive<impl Read + io::Seek>,
     index: usize,
@@ -106,7 +106,7 @@ pub(crate) fn unpack_entry(
     let mut entry = archive.by_index(index).map_err(|error| damaged(name, &error))?;
     let size = entry.size();
     let written = io::copy(&mut entry.by_ref().take(size), target).map_err(|error| damaged(name, &error))?;
-    // Past the end the checksum is compared.
+    // Reading past the end compares the checksum.
     let more = entry.read(&mut [0]).map_err(|error| damaged(name, &error))?;
     if written != size || more != 0 {
         return Err(damaged(name, &format!("its size differs from the {size} bytes that the archive declares")));
@@ -114,7 +114,7 @@ pub(crate) fn unpack_entry(
     Ok(())
 }
 
-/// A file may not be larger than what it can mean.
+/// Rejects a file that is larger than its kind can be.
 fn check_size(name: &str, size: u64, largest: Option<u64>) -> Result<()> {
     let Some(most) = largest.filter(|most| size > *most) else { return Ok(()) };
     let problem = format!("it would take {size} bytes unpacked, more than the limit of {most} bytes for this file");
@@ -131,19 +131,19 @@ fn damaged(name: &str, error: &dyn std::fmt::Display) -> Failure {
 }
 
 impl UnpackedFmu {
-    /// Unzip to a temporary directory and read modelDescription.xml.
+    /// Unzips to a temporary directory and reads modelDescription.xml.
     ///
     /// # Errors
-    /// Not a zip, a damaged entry, a name that leads out of the directory, or an unreadable description.
+    /// A file that is not a zip, a damaged entry, a name that leads out of the directory, or an unreadable description.
     pub fn open(path: &Path) -> Result<Self> {
         Self::open_part(path, |_| Some(LARGEST_UNPACKED))
     }
 
-    /// The same with those entries alone that `largest` gives a size for, the largest that they may have (bytes), beside
-    /// modelDescription.xml; the others are only read, to check them.
+    /// Opens an FMU and unpacks modelDescription.xml and the entries for which `largest` returns a maximum size
+    /// (bytes); the others are only read, to check them.
     ///
     /// # Errors
-    /// As [`UnpackedFmu::open`]; an entry larger than that, before any is unpacked.
+    /// Same as [`UnpackedFmu::open`]; an entry above its maximum size, before any is unpacked.
     pub fn open_part(path: &Path, largest: impl Fn(&str) -> Option<u64>) -> Result<Self> {
         let in_file = |failure: Failure| Failure { what: format!("{}: {}", path.display(), failure.what), ..failure };
         let mut archive = open_archive(path)?;
@@ -176,10 +176,10 @@ impl UnpackedFmu {
         Ok(Self { directory, description })
     }
 
-    /// The shared library for this machine.
+    /// Returns the path of the shared library for this machine.
     ///
     /// # Errors
-    /// The FMU has none; those it has are named.
+    /// An FMU without such a library; the message lists the ones it has.
     pub(crate) fn library(&self) -> Result<PathBuf> {
         let (version, identifier) = (self.description.fmi_version.as_str(), self.description.model_identifier.as_str());
         let place = |platform: Platform| platform.place(version, identifier);
@@ -201,20 +201,20 @@ impl UnpackedFmu {
         ))
     }
 
-    /// Directory of the unpacked resources.
+    /// Returns the directory of the unpacked resources.
     pub fn resources(&self) -> PathBuf {
         self.directory.path().join("resources")
     }
 
-    /// Co-simulate over the schedule and record all outputs.
+    /// Simulates over the schedule and records all outputs.
     ///
     /// # Errors
-    /// The library cannot be loaded, or a call answers worse than Warning; the FMU's own messages are included.
+    /// A library that cannot be loaded, or a call with a status worse than Warning; the FMU's messages are included.
     pub fn simulate(&self, schedule: &Schedule, progress: &dyn Fn(usize)) -> Result<ImportedRun> {
         slave::drive(&mut *self.instance()?, &self.description, schedule, progress)
     }
 
-    /// An instance of the FMU, of whichever version it is.
+    /// Creates an instance of the FMU, of either version.
     fn instance(&self) -> Result<Box<dyn slave::HostedSlave>> {
         match self.description.fmi_version.as_str() {
             "2.0" => Ok(Box::new(fmi2::Fmi2Slave::new(self)?)),
@@ -236,7 +236,7 @@ fn unpack(archive: &mut ZipArchive<impl Read + io::Seek>, index: usize, name: &s
     unpack_entry(archive, index, name, &mut file)
 }
 
-/// Where an entry goes.
+/// Returns the path to which an entry is unpacked.
 fn inside(directory: &Path, name: &str) -> Result<PathBuf> {
     let relative = Path::new(name);
     if relative.components().all(|component| matches!(component, Component::Normal(_))) {
@@ -296,7 +296,7 @@ mod tests {
         assert_eq!(inside(root.path(), "a/b").unwrap(), root.path().join("a/b"));
     }
 
-    /// The size of an entry stands in its local header and in the directory; a liar changes both.
+    /// Changes the declared size of an entry, in its local header and in the directory.
     fn announce(path: &Path, size: u32) {
         let mut bytes = fs::read(path).unwrap();
         let mut change = |at: usize| bytes[at..at + 4].copy_from_slice(&size.to_le_bytes());
@@ -312,7 +312,7 @@ mod tests {
         announce(&path, 3 << 30);
         let failure = UnpackedFmu::open(&path).unwrap_err();
         assert!(failure.what.contains("x.fmu") && failure.problem.contains("3221225472 bytes"), "{failure}");
-        // One that announces less than it holds is unpacked no further.
+        // An entry that declares less than it holds is not unpacked further.
         for size in [0, 1, (1 << 20) - 1, (1 << 20) + 1] {
             announce(&path, size);
             let failure = UnpackedFmu::open(&path).unwrap_err();
@@ -323,7 +323,7 @@ mod tests {
         }
     }
 
-    /// An entry that compresses well, such as a text of newlines, may not take more disk or memory than its content can mean.
+    /// A well compressed entry, such as a text of newlines, may not take more disk or memory than its kind can need.
     #[test]
     fn rejects_oversized_entries_before_unpacking() {
         for name in [DESCRIPTION, "resources/scene.toml", "resources/package.toml", "resources/a.safetensors"] {

@@ -1,4 +1,4 @@
-//! The platforms an FMU can hold a library for, and where FMI puts it.
+//! Platforms for which an FMU can contain a library, and the folders that FMI defines for them.
 
 use object::{Architecture, BinaryFormat, Object, ObjectSection};
 
@@ -22,7 +22,8 @@ struct PlatformFacts {
     platform: Platform,
     /// Folder of FMI 3.0 (section 2.5.1.4.1).
     tuple: &'static str,
-    /// Folder of FMI 2.0 (section 2.3); it knows no Arm, where FMI 3.0's is taken, as newer importers look for it.
+    /// Folder of FMI 2.0 (section 2.3); it defines none for Arm, where the folder of FMI 3.0 is used, as newer
+    /// importers expect.
     fmi2: &'static str,
     extension: &'static str,
     format: BinaryFormat,
@@ -80,7 +81,7 @@ const FACTS: [PlatformFacts; 5] = [
 ];
 
 impl Platform {
-    /// All of them, in the order in which an FMU holds them.
+    /// All platforms, in the order in which an FMU contains them.
     pub const ALL: [Self; 5] = {
         let mut all = [Self::X86_64Linux; 5];
         let mut index = 0;
@@ -95,31 +96,31 @@ impl Platform {
         &FACTS[self as usize]
     }
 
-    /// The platform this program was compiled for, if it is one of them.
+    /// Returns the platform this program was compiled for, if it is in the list.
     pub fn here() -> Option<Self> {
         let here = (std::env::consts::OS, std::env::consts::ARCH);
         FACTS.iter().find(|facts| facts.here == here).map(|facts| facts.platform)
     }
 
-    /// Name, which is FMI 3.0's platform tuple (section 2.5.1.4.1).
+    /// Returns the name, which is the platform tuple of FMI 3.0 (section 2.5.1.4.1).
     pub fn tuple(self) -> &'static str {
         self.facts().tuple
     }
 
-    /// File name of an installed library.
+    /// Returns the file name of an installed library.
     pub fn file_name(self) -> String {
         format!("{}.{}", self.facts().tuple, self.facts().extension)
     }
 
-    /// Where in an FMU of `version` (`"2.0"` or `"3.0"`) the library of `identifier` is.
+    /// Returns the path inside an FMU of `version` (`"2.0"` or `"3.0"`) of the library of `identifier`.
     pub fn place(self, version: &str, identifier: &str) -> String {
         let PlatformFacts { tuple, fmi2, extension, .. } = self.facts();
         let folder = if version.starts_with('2') { fmi2 } else { tuple };
         format!("binaries/{folder}/{identifier}.{extension}")
     }
 
-    /// The platform of a shared library, from its content (ELF, PE or Mach-O); none for anything else, a truncated library
-    /// or an executable of a fixed place among them.
+    /// Returns the platform of a shared library, from its content (ELF, PE or Mach-O); `None` for anything else, such
+    /// as a truncated library or an executable with a fixed load address.
     pub fn of_library(bytes: &[u8]) -> Option<Self> {
         let file = object::File::parse(bytes).ok()?;
         let length = bytes.len() as u64;

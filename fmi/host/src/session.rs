@@ -8,7 +8,8 @@ use super::{
     slave::{self, HostedSlave, OutputGroup},
 };
 
-/// A co-simulation instance; freed when dropped. A call that answers worse than Warning is a failure with the FMU's words.
+/// A co-simulation instance; freed when dropped. A call with a status worse than Warning is a failure with the message
+/// of the FMU.
 pub struct Session<'a> {
     fmu: &'a UnpackedFmu,
     slave: Box<dyn HostedSlave>,
@@ -22,19 +23,19 @@ impl std::fmt::Debug for Session<'_> {
 }
 
 impl<'a> Session<'a> {
-    /// Load the library and instantiate.
+    /// Loads the library and creates an instance.
     ///
     /// # Errors
-    /// As [`UnpackedFmu::simulate`].
+    /// Same as [`UnpackedFmu::simulate`].
     pub fn new(fmu: &'a UnpackedFmu) -> Result<Self> {
         let slave = fmu.instance()?;
         Ok(Self { fmu, slave, groups: slave::group_outputs(&fmu.description) })
     }
 
-    /// Set a scalar, or the first element of an array written as scalars.
+    /// Sets a scalar, or the first element of an array written as scalars.
     ///
     /// # Errors
-    /// No variable of this name, or the FMU refuses.
+    /// No variable of this name, or an error of the FMU.
     pub fn set_real(&mut self, name: &str, value: f64) -> Result<()> {
         let first = format!("{name}[1]");
         let found =
@@ -43,27 +44,27 @@ impl<'a> Session<'a> {
         self.slave.set_real(found.ok_or_else(missing)?.reference, value)
     }
 
-    /// From instantiated to step mode.
+    /// Goes from instantiated to step mode.
     ///
     /// # Errors
-    /// The FMU refuses.
+    /// An error of the FMU.
     pub fn initialise(&mut self, start: f64) -> Result<()> {
         let experiment = ExperimentSettings { start, stop: start + 1.0, communication_step: 1.0 };
         self.slave.initialise(&Schedule::new(&experiment, None, None)?)
     }
 
-    /// One communication step (s).
+    /// Performs one communication step (s).
     ///
     /// # Errors
-    /// The FMU refuses.
+    /// An error of the FMU.
     pub fn do_step(&mut self, time: f64, step: f64) -> Result<()> {
         self.slave.do_step(time, step)
     }
 
-    /// All numeric outputs, in file order.
+    /// Returns all numeric outputs, in file order.
     ///
     /// # Errors
-    /// The FMU refuses.
+    /// An error of the FMU.
     pub fn outputs(&mut self) -> Result<Vec<f64>> {
         let mut values = Vec::new();
         for group in &self.groups {

@@ -1,4 +1,4 @@
-//! What the two FMI versions have in common for an importer: the run over communication points.
+//! The parts of an importer that both FMI versions share: the run over communication points.
 
 use std::{
     cell::RefCell,
@@ -16,27 +16,27 @@ pub(super) struct OutputGroup {
     pub(super) kind: VariableType,
     /// Value references.
     pub(super) references: Vec<u32>,
-    /// Number of scalar values: arrays count with all elements.
+    /// Number of scalar values; arrays count with all elements.
     pub(super) values: usize,
 }
 
 /// A co-simulation instance of either FMI version.
 pub(super) trait HostedSlave {
-    /// From instantiated to step mode.
+    /// Goes from instantiated to step mode.
     fn initialise(&mut self, schedule: &Schedule) -> Result<()>;
-    /// One communication step.
+    /// Performs one communication step.
     fn do_step(&mut self, time: f64, step: f64) -> Result<()>;
-    /// Append the values of a group.
+    /// Appends the values of a group.
     fn read(&mut self, group: &OutputGroup, values: &mut Vec<f64>) -> Result<()>;
-    /// Set one real value.
+    /// Sets one real value.
     fn set_real(&mut self, reference: u32, value: f64) -> Result<()>;
-    /// End of the run.
+    /// Ends the run.
     fn terminate(&mut self) -> Result<()>;
-    /// Everything the FMU logged.
+    /// Returns everything the FMU logged.
     fn messages(&self) -> Vec<String>;
 }
 
-/// Initialise, step over the schedule, record all numeric outputs at every communication point, terminate.
+/// Initialises, steps over the schedule, records all numeric outputs at every communication point, and terminates.
 pub(super) fn drive(
     slave: &mut dyn HostedSlave,
     description: &ImportedDescription,
@@ -92,13 +92,13 @@ impl MessageList {
         self.0.borrow().clone()
     }
 
-    /// The last message as the end of a sentence.
+    /// Returns the last message as the end of a sentence.
     pub(super) fn last_words(&self) -> String {
         self.0.borrow().last().map_or_else(|| " without a message".into(), |message| format!(": {message}"))
     }
 }
 
-/// OK and Warning pass; anything else is a failure with the FMU's own words.
+/// Accepts OK and Warning; any other status is a failure with the message of the FMU.
 pub(super) fn check(function: &str, time: Option<f64>, status: i32, messages: &MessageList) -> Result<()> {
     let status_name = match status {
         0 | 1 => return Ok(()),
@@ -112,7 +112,7 @@ pub(super) fn check(function: &str, time: Option<f64>, status: i32, messages: &M
     Err(Failure::new("FMU", format!("{function}{at} returned {status_name}{}", messages.last_words()), ""))
 }
 
-/// A string for the C side.
+/// Converts a string for C.
 pub(super) fn c_text(text: &str) -> Result<CString> {
     CString::new(text).map_err(|_| Failure::new(format!("{text:?}"), "contains a zero byte", "Remove it"))
 }

@@ -1,4 +1,4 @@
-//! Conduction of a casing as a unit.
+//! Heat conduction of a casing as a co-simulation unit.
 
 use std::path::Path;
 
@@ -6,10 +6,10 @@ use tiprub_core::{Result, Warning};
 use tiprub_fmi_facade::{CoSimulationUnit, Loaded};
 use tiprub_thermal::{ThermalInputs, ThermalSimulation};
 
-/// A reduced model and its state.
+/// Reduced model and its state.
 struct ConductionUnit(ThermalSimulation);
 
-/// The model of the resources.
+/// Reads the model in the resources.
 pub(crate) fn load(resources: &Path) -> Result<Loaded, String> {
     let loaded = tiprub_format::load_thermal_resources(resources).map_err(|error| error.to_string())?;
     let model = loaded.model;
@@ -38,12 +38,12 @@ impl CoSimulationUnit for ConductionUnit {
         self.0.begin_step(current_time, step_size)
     }
 
-    /// A communication step is one internal step: there is no time between to end at.
+    /// A communication step is one internal step, so there is no time in between at which it could end.
     fn end_step_early(&mut self) -> Result<()> {
         Ok(())
     }
 
-    /// Outputs are those of the last communication point as soon as that is reached.
+    /// Outputs belong to the last communication point as soon as it is reached.
     fn update_outputs(&mut self, _time: f64) -> Result<()> {
         Ok(())
     }

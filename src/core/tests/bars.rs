@@ -1,4 +1,4 @@
-//! Carpenter's two bars through the core: force, release, impulse and energy loss against the exact ones.
+//! Carpenter's two bars through the core: force, release, impulse and energy loss against the exact values.
 
 #[path = "../../../tests/guide.rs"]
 mod guide;
@@ -105,7 +105,7 @@ fn impact_of_two_bars_matches_plane_wave_solution() {
     );
     print_row!("|---|---|---|---|---|---|---|---|---|---|");
     for scheme in SCHEMES {
-        // With one contact node all solvers have one problem to solve: the others are looked at on the coarsest mesh.
+        // With one contact node all solvers solve the same problem, so the other solvers run only on the coarsest mesh.
         for (solver, meshes) in SOLVERS.map(|solver| (solver, if solver == Solver::Lcp { 4 } else { 1 })) {
             for elements in [20, 40, 80, 200].into_iter().take(meshes) {
                 let found = collide(elements, scheme, solver);
@@ -125,11 +125,12 @@ fn impact_of_two_bars_matches_plane_wave_solution() {
                 assert!(residual.abs() < 1e-12, "ledger {residual:e}");
                 assert!(momentum.abs() < 1e-10 * exact.impulse, "momentum {momentum:e}");
                 if scheme == Scheme::MasslessBoundary {
-                    // A node without mass has nothing to lose; 1e-4 of it is left.
+                    // A node without mass loses no energy; 1e-4 of its mass remains.
                     assert!(energy_loss.abs() < 1e-1 * size, "loss {energy_loss:e}");
                 } else {
-                    // The lumped contact node stops inelastically: about 1/(2n) of the energy is lost. To modal-exact, whose
-                    // response to a force of one step is smaller at high frequencies, the node is up to a quarter heavier.
+                    // The lumped contact node stops inelastically and loses about 1/(2n) of the energy. In modal-exact,
+                    // whose response to a force of one step is smaller at high frequencies, the node acts up to a
+                    // quarter heavier.
                     let most = if scheme == Scheme::ModalExact { 1.6 } else { 1.4 };
                     assert!((0.6..most).contains(&(energy_loss / (0.5 * size))), "loss {energy_loss:e}");
                 }

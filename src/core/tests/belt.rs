@@ -1,8 +1,8 @@
 //! Sticking and sliding against closed forms: a block on a belt, held by a spring (den Hartog's stick-slip oscillator).
 //!
-//! The block sticks until the spring pulls with F_s, then slides under F_k. Sliding it moves as
-//! x = F_k/k + a cos ωt + (v/ω) sin ωt, a = (F_s − F_k)/k, until it has the belt's velocity v again after
-//! (2π − 2 atan(aω/v))/ω; it then sticks for 2a/v. Amplitude √(a² + v²/ω²).
+//! The block sticks until the spring pulls with F_s, then slides under F_k. While it slides, x = F_k/k + a cos ωt +
+//! (v/ω) sin ωt, a = (F_s − F_k)/k, until it reaches the velocity v of the belt again after (2π − 2 atan(aω/v))/ω; it
+//! then sticks for 2a/v. Amplitude √(a² + v²/ω²).
 
 #[path = "../../../tests/guide.rs"]
 mod guide;
@@ -22,7 +22,7 @@ const OMEGA: f64 = 50.0;
 const BELT: f64 = 0.1;
 const FRICTION: f64 = 0.4;
 
-/// Block on the belt: a mode along the belt (spring), one across (free), pressed on by a load.
+/// Returns a block on the belt: one mode along the belt (spring), one across (free), pressed on by a load.
 fn block(scheme: Scheme, step: f64) -> System {
     let model = ModalModel {
         frequencies: vec![0.0, OMEGA],
@@ -34,7 +34,7 @@ fn block(scheme: Scheme, step: f64) -> System {
     let law = GapLaw::Fixed(FixedGap {
         normals: vec![[0.0, 0.0, 1.0]],
         gaps: vec![0.0],
-        // The belt runs towards +x: the block slides back on it.
+        // The belt runs towards +x, so the block slides backwards on it.
         sliding: vec![[-BELT, 0.0, 0.0]],
     });
     let settings = SystemSettings { scheme, solver: Solver::Coulomb, ledger: true };
@@ -47,13 +47,13 @@ fn block(scheme: Scheme, step: f64) -> System {
 }
 
 struct BeltRecord {
-    /// Position of the block (m) and whether it stuck, step by step.
+    /// Position of the block (m) and whether it sticks, for each step.
     position: Vec<f64>,
     stuck: Vec<bool>,
     residual: f64,
 }
 
-/// The normal force is `sticking` (N) while the block sticks and `sliding` (N) while it slides.
+/// Simulates a block whose normal force is `sticking` (N) while it sticks and `sliding` (N) while it slides.
 fn run(scheme: Scheme, step: f64, sticking: f64, sliding: f64, steps: usize) -> BeltRecord {
     let mut system = block(scheme, step);
     let mut record = BeltRecord { position: Vec::new(), stuck: Vec::new(), residual: 0.0 };
@@ -105,7 +105,7 @@ fn stick_slip_matches_the_closed_form() {
             errors.push(found.iter().fold(0.0, |a: f64, e| a.max(e.abs())));
             assert!(record.residual.abs() < 1e-12);
         }
-        // Times are known to a step: first order.
+        // Times are accurate to one step: first order.
         assert!(errors[0] < 3e-3 && errors[2] < 0.3 * errors[0], "{errors:?}");
     }
     guide::hold("cargo test -p tiprub-core --test belt");
@@ -127,12 +127,13 @@ fn block_swings_about_the_friction_force() {
     assert!((swing / (BELT / OMEGA) - 1.0).abs() < 5e-3);
 }
 
-/// Flexibility of the contact (m/N), the force of friction (N), and how fast the block begins (m/s).
+/// Flexibility of the contact (m/N), the friction force (N), and the initial velocity of the block (m/s).
 const FLEXIBILITY: f64 = 4e-6;
 const FORCE: f64 = 2.0;
 const THROWN: f64 = 0.5;
 
-/// A block whose contact node has no mass, and a node that touches nothing: its gap is what a tolerance is a share of.
+/// Returns a block whose contact node has no mass, and a node without contact, whose gap defines the scale of the
+/// tolerance.
 fn by_tolerance(tolerance: f64, longest: f64) -> System {
     let fast = 1e5;
     let mut contact_modes = DMatrix::zeros(6, 7);
@@ -183,7 +184,7 @@ fn adaptive_tolerance_matches_stick_slip_closed_form() {
             "tolerance {tolerance:.0e}: error {:.2} of it after {count} longest steps, {steps} steps, {trials} trials",
             error / tolerance
         );
-        // The contact begins with a jump, which the shortest steps miss at the smallest tolerance.
+        // The contact begins with a jump, which the shortest steps cannot resolve at the smallest tolerance.
         assert!(error < 3.0 * tolerance && residual < 1e-12 && effort.missed < 20, "{effort:?}, {residual:e}");
     }
     guide::hold("cargo test -p tiprub-core --test belt tolerance");

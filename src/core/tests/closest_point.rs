@@ -1,4 +1,4 @@
-//! The closest point of a surface spline to a node: at its definition, from every start, over seams, edges and creases.
+//! The closest point of a surface spline to a node: its definition, from every start, over seams, edges and creases.
 
 #![allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 
@@ -16,7 +16,7 @@ use tiprub_core::gaps::dot;
 use tiprub_core::gaps::surface_spline::{ClosestPoint, Evaluation, Projection, REACH, SurfaceSpline};
 use tiprub_core::settings::{Closure, Interpolation};
 
-/// A node at a signed distance inside a place, with its closest point known by construction.
+/// Returns a node at a signed distance inside a point of the surface, with its closest point known by construction.
 fn node(surface: &SurfaceSpline, at: ClosestPoint, gap: f64) -> [f64; 3] {
     let Evaluation { point, d_s, d_t, .. } = surface.evaluate(at);
     let cross =
@@ -65,7 +65,7 @@ fn finds_the_closest_point_from_any_start() {
     }
 }
 
-/// Smallest distance over a fine sampling, for whatever lies between.
+/// Returns the smallest distance over a fine sampling.
 fn brute_force(surface: &SurfaceSpline, x: [f64; 3], per_patch: usize) -> f64 {
     let mut least = f64::INFINITY;
     for p in 0..surface.around() {
@@ -92,7 +92,7 @@ fn no_sampled_point_is_closer() {
             let samples = 1500 / around;
             for index in 0..40 {
                 let mut at = ClosestPoint { t: random.within(0.05, 0.95), ..anywhere(&mut random, &surface) };
-                // Half of the nodes stand next to a border of patches, where facets and free ends kink.
+                // Half of the nodes are next to a border of patches, where facets and free ends have kinks.
                 if index % 2 == 0 {
                     (at.patch[0], at.s) = (if index % 4 == 0 { 0 } else { at.patch[0] }, 1e-3 * random.unit());
                 }
@@ -105,7 +105,7 @@ fn no_sampled_point_is_closer() {
             }
             let name = format!("{around} x {along}, {closure:?}, {interpolation:?}");
             assert_below(&format!("{name}: closer sampled point (m)"), closer, 1e-16);
-            // Samples lie half a spacing along both directions from the closest point, seen under the distance.
+            // Samples lie half a spacing along both directions from the closest point, relative to the distance.
             let (half_s, half_t) = (TAU * 0.26 / around as f64 / samples as f64, 0.06 / samples as f64);
             assert_below(&format!("{name}: samples are at most this much farther (m)"), farther, half_s + half_t);
         }
@@ -143,7 +143,7 @@ fn projection_started_on_opposite_side_converges() {
         let surface = SurfaceSpline::new(&data(around, 3, casing), around, 3, closure, interpolation).unwrap();
         for p in [0, 1, around / 2, around - 1] {
             for s in [0.0, 1e-12, 0.4, 1.0] {
-                // On the exact opposite f has its maximum.
+                // On the exact opposite side f has its maximum.
                 let guess = place(p, 1, s, 0.5);
                 let across = surface.evaluate(guess).point;
                 let scale = (RADIUS - 1e-3) / RADIUS;
@@ -198,7 +198,7 @@ fn projection_succeeds_only_within_the_axial_extension() {
                 let guess = ClosestPoint { t: random.unit(), patch: [p, random.below(2)], s: random.unit() };
                 let (at, _, _, value) = found(surface.project(x, guess));
                 assert!((value - gap).abs() < 4e-16 && (at.t - t).abs() < 1e-9, "{at:?} for {edge:?}");
-                // Anywhere on what goes on, at its distance, on either side of it.
+                // Anywhere on the continuation, at its distance, on either side of it.
                 let reach = 2.0 * REACH;
                 let out = t + outwards * reach * random.within(0.0, 0.999);
                 let beyond = ClosestPoint { t: out, ..edge };
@@ -207,11 +207,11 @@ fn projection_succeeds_only_within_the_axial_extension() {
                     assert!((value - gap).abs() < 4e-16, "{value} for {gap} at {at:?}");
                     assert!((at.t - out).abs() < 1e-9 && at.patch == [p, q], "{at:?} for {beyond:?}");
                 }
-                // It goes on along the tangent of the edge.
+                // The surface continues along the tangent of the edge.
                 let (first, last) = (surface.evaluate(edge), surface.evaluate(beyond));
                 let tangent: [f64; 3] = std::array::from_fn(|i| first.point[i] + (out - t) * first.d_t[i]);
                 assert!(distance(tangent, last.point) < 4e-16 && distance(first.d_t, last.d_t) < 4e-16);
-                // Further out it is lost, and found again from the last place.
+                // Further out the point is lost, and it is found again from the last one.
                 let tangent = last.d_t;
                 let gone: [f64; 3] = std::array::from_fn(|i| x[i] + outwards * (reach + 1e-6) * tangent[i]);
                 let Projection::BeyondEdge { place: last } = surface.project(gone, guess) else {
@@ -231,7 +231,7 @@ fn facets_project_to_flats_and_corners() {
         let points = data(around, 3, radius);
         SurfaceSpline::new(&points, around, 3, Closure::Smooth, Interpolation::Facets).unwrap()
     };
-    // Inside a convex polygon: the nearest of two flats, never the corner between them.
+    // Inside a convex polygon the nearest of two flats is closest, never the corner between them.
     let surface = facets(round);
     let corner = surface.evaluate(place(3, 0, 0.0, 0.5)).point;
     let inwards = [-corner[0] / RADIUS, -corner[1] / RADIUS, 0.0];
@@ -241,13 +241,13 @@ fn facets_project_to_flats_and_corners() {
         let (at, _, normal, gap) = found(surface.project(x, place(guess, 1, 0.2, 0.9)));
         assert!((gap - 1e-3 * half.cos()).abs() < 4e-16, "{gap}");
         assert!((dot(normal, inwards) - half.cos()).abs() < 4e-15 && at.patch[0].abs_diff(2) <= 1);
-        // Outside the corner it is the closest point.
+        // Outside, the corner is the closest point.
         let x: [f64; 3] = std::array::from_fn(|i| corner[i] - 1e-3 * inwards[i]);
         let (at, point, normal, gap) = found(surface.project(x, place(guess, 1, 0.2, 0.9)));
         assert!(distance(point, corner) < 1e-15 && (gap + 1e-3 * half.cos()).abs() < 4e-16, "{gap} at {at:?}");
         assert!((dot(normal, inwards) - half.cos()).abs() < 4e-15);
     }
-    // Turned a little around the corner, the facet on that side faces the node more squarely.
+    // Turned slightly around the corner, the facet on that side faces the node more directly.
     let tangent = [-inwards[1], inwards[0], 0.0];
     for side in [-1.0, 1.0] {
         let x: [f64; 3] = std::array::from_fn(|i| corner[i] - 1e-3 * inwards[i] - side * 1e-4 * tangent[i]);
@@ -307,7 +307,7 @@ fn unprojectable_nodes_are_reported_without_panic() {
         assert_eq!(folded.project([0.2, 0.1, 0.0], start), Projection::Lost);
         folded.set_control_points(&vec![[f64::NAN; 3]; surface.around() * surface.along()]);
         assert_eq!(folded.project([0.2, 0.1, 0.0], start), Projection::Lost);
-        // Far away and on the axis something is found, or the node is over an edge.
+        // Far away and on the axis either a point is found or the node is over an edge.
         for x in [[1e6, 0.0, 0.0], [0.0, 0.0, 0.0], [-1e-300, 0.0, 0.0], [1.0, 2.0, -1e9], [1e200, 1e200, 0.0]] {
             surface.project(x, start);
         }
@@ -359,13 +359,13 @@ fn facets_kick_a_sliding_node_and_splines_do_not() {
     let relative = impulse / expected / AROUND as f64 - 1.0;
     println!("impulse per border {expected:.4e} N·s; found {relative:+.2e} relative to it");
     assert!(relative.abs() < 0.05, "{relative}");
-    // The spline leaves the force of the spring, to the depth that it is off the circle.
+    // The spline reproduces the force of the spring, up to its deviation from the circle.
     let [least, most] = smooth.range();
     let ripple = 1.5 * STIFFNESS * 6.1e-7;
     assert!(least > STIFFNESS * INTERFERENCE - ripple && most < STIFFNESS * INTERFERENCE + ripple, "{least}..{most}");
     println!("largest changes: {:.3e} {:.3e} {:.3e} N", largest(&facets), largest(&free), largest(&smooth));
     assert!(largest(&smooth) < 1e-2 && largest(&facets) > 6e4 && largest(&free) > 3e4);
-    // Far from the seam both closures are the same.
+    // Far from the seam both closures agree.
     let far = |history: &sliding::SlidingHistory| history.changes()[100..5000].iter().copied().fold(0.0, f64::max);
     assert!(far(&free) < 2e-2, "{:e}", far(&free));
 }

@@ -1,4 +1,4 @@
-//! The Coulomb solver against Siconos, against the law itself, and against the frictionless solver.
+//! The Coulomb solver against Siconos, against the friction law, and against the frictionless solver.
 
 #[path = "common/counting.rs"]
 mod counting;
@@ -10,7 +10,7 @@ use tiprub_core::laws::de_saxce::CoulombSolver;
 const BLADE_MODES: usize = 29;
 const CASING_MODES: usize = 24;
 
-/// The generator of tests/data/coulomb_siconos.py.
+/// The random generator of tests/data/coulomb_siconos.py.
 struct Lcg(u64);
 
 impl Lcg {
@@ -29,7 +29,7 @@ impl Lcg {
     }
 }
 
-/// Add shapes · diag(flexibility) · shapesᵀ to the block that starts at `start`.
+/// Adds shapes · diag(flexibility) · shapesᵀ to the block that starts at `start`.
 fn add_modes(w: &mut DMatrix<f64>, start: usize, shapes: &[Vec<f64>], flexibility: impl Fn(usize) -> f64) {
     for (i, a) in shapes.iter().enumerate() {
         for (j, b) in shapes.iter().enumerate() {
@@ -43,7 +43,8 @@ fn shapes(lcg: &mut Lcg, rows: usize, modes: usize) -> Vec<Vec<f64>> {
     (0..rows).map(|_| (0..modes).map(|_| lcg.uniform()).collect()).collect()
 }
 
-/// Blades of three contact nodes, each with its own modes, rubbing a casing whose modes all of them share.
+/// Returns blades of three contact nodes, each with separate modes, that rub a casing whose modes are common to all of
+/// them.
 fn blades_in_casing(contacts: usize, seed: u64) -> (DMatrix<f64>, Vec<f64>) {
     let mut lcg = Lcg(seed);
     let order = 3 * contacts;
@@ -71,8 +72,8 @@ fn solver(w: &DMatrix<f64>, free: &[f64], friction: &[f64]) -> CoulombSolver {
     solver
 }
 
-/// How far a state is from Signorini's and Coulomb's laws, written out as such: the worst share of the terms that
-/// displacements (by rows of W) and forces are made of.
+/// Returns the violation of Signorini's and Coulomb's laws, evaluated directly: the largest one relative to the terms
+/// of displacements (by rows of W) and forces.
 fn violation(w: &DMatrix<f64>, free: &[f64], friction: &[f64], r: &[f64]) -> f64 {
     let order = free.len();
     let terms = |row: usize| (0..order).map(move |j| w[(row, j)] * r[j]);
@@ -88,7 +89,7 @@ fn violation(w: &DMatrix<f64>, free: &[f64], friction: &[f64], r: &[f64]) -> f64
         }
         note(-u[k] / size[k]);
         note((w[(k, k)] * r[k]).min(u[k]) / size[k]);
-        // Sticking, or the force is on the cone and against the slip.
+        // Either sticking, or the force is on the cone and opposes the slip.
         let slip = u_t / size[k + 1].max(size[k + 2]);
         let limit = mu * r[k];
         if limit > 0.0 && slip > 1e-12 {
@@ -106,7 +107,7 @@ fn random_modes(lcg: &mut Lcg, contacts: usize, modes: usize) -> DMatrix<f64> {
     w
 }
 
-/// Random problems of many kinds; all of them can be solved by moving the bodies apart.
+/// Returns random problems of many kinds; moving the bodies apart solves each of them.
 fn random_problem(lcg: &mut Lcg, contacts: usize, kind: usize) -> (DMatrix<f64>, Vec<f64>) {
     let order = 3 * contacts;
     let mut w = match kind {
@@ -128,7 +129,7 @@ fn random_problem(lcg: &mut Lcg, contacts: usize, kind: usize) -> (DMatrix<f64>,
                 }
             }
         }
-        // Coincident nodes: several contacts of the same material point, with gaps of their own.
+        // Coincident nodes: several contacts of one material point, with different gaps.
         6 => {
             for contact in 1..contacts {
                 let twin = lcg.below(contact);
@@ -229,7 +230,7 @@ fn agrees_with_siconos() {
         let pairs = solver.reactions.iter().zip(&reactions);
         let off = pairs.fold(0.0_f64, |most, (ours, theirs)| most.max((ours - theirs).abs())) / largest;
         assert!(outcome.solved && off <= 1e-10, "{contacts} contacts, friction {friction}: {off:e}, {outcome:?}");
-        // A silent slowdown fails.
+        // Fails if the solver becomes slower.
         assert!(outcome.sweeps <= 12 && outcome.factorisations <= 14, "{contacts}, {friction}: {outcome:?}");
     }
 }
@@ -316,7 +317,7 @@ fn unsolvable_problems_end_finite_and_unsolved() {
         assert!(broken.reactions.iter().all(|value| *value == 0.0));
         let mut broken = solver(&w, &free, &[0.5, poison, 0.5]);
         assert!(!broken.solve(3).solved);
-        // A warm start without meaning is no harm.
+        // A meaningless warm start is harmless.
         let mut warm = solver(&w, &free, &[0.5; 3]);
         warm.reactions[1] = poison;
         assert!(warm.solve(3).solved);
@@ -380,7 +381,8 @@ fn solving_does_not_allocate() {
     assert_eq!(allocations, 0);
 }
 
-/// Blades are stiffer along than across, and casings sideways hardly yield: the law holds as well as elsewhere.
+/// Blades are stiffer along than across, and casings hardly yield sideways: the law must hold as accurately as
+/// elsewhere.
 #[test]
 fn solves_contacts_with_small_tangential_flexibility() {
     let mut lcg = Lcg(31);

@@ -25,7 +25,7 @@ const LENGTH: f64 = 0.254;
 const SPEED: f64 = 5.13588;
 const GAP: f64 = 0.508e-3 / 2.0;
 
-/// Half of the problem, its contact node at the wall keeping this share of its lumped mass.
+/// Returns half of the problem; the contact node at the wall keeps the fraction `kept` of its lumped mass.
 fn bar(elements: usize, kept: f64) -> StraightRod {
     StraightRod { young: YOUNG, density: DENSITY, area: AREA, length: LENGTH, elements, end: elements, kept }
 }
@@ -42,7 +42,7 @@ fn system(model: &ModalModel, scheme: Scheme, step: f64) -> System {
 fn a_bar_bounces_off_without_impact_loss() {
     let exact = carpenter::exact();
     print_row!("exact: {:.2} to {:.2} us, {:.4} N.s, loss 0", 1e6 * exact.touch, 1e6 * exact.release, exact.impulse);
-    // With 1e-4 of its mass one mode stands for the flexibility of the end node alone.
+    // With 1e-4 of the mass, one mode represents the flexibility of the end node alone.
     for (scheme, end_mass, losses) in
         [(Scheme::MasslessBoundary, NEARLY_NONE, [0.0, 1e-3]), (Scheme::ModalExact, 1.0, [5e-3, 0.02])]
     {
@@ -74,7 +74,7 @@ fn a_bar_bounces_off_without_impact_loss() {
             system.ledger().impact_loss.value() / (before.0 + before.1),
             system.ledger().residual(kinetic + strain) / (before.0 + before.1)
         );
-        // Exact: touch at 49.46, release at 148.39 us, impulse 13.203 N.s (the article's closed form).
+        // Exact: contact at 49.46, release at 148.39 us, impulse 13.203 N.s (the article's closed form).
         assert!((touched - 49.46e-6).abs() < 0.3e-6 && (released - 148.39e-6).abs() < 3e-6);
         assert!((impulse - 13.203).abs() < 0.02 * 13.203);
         assert!((losses[0]..losses[1]).contains(&loss), "{loss:e}");
@@ -83,8 +83,8 @@ fn a_bar_bounces_off_without_impact_loss() {
     guide::hold("cargo test -p tiprub-core --test massless");
 }
 
-/// A bar pressed onto a wall for good: its largest energy (J) over 4000 steps of a share of the limit that is computed, and how
-/// much it still changes in the last hundred, relative to that.
+/// Returns, for a bar permanently pressed onto a wall, its largest energy (J) over 4000 steps with the fraction `share`
+/// of the computed limit, and the relative change in the last hundred steps.
 fn pressed(damping_ratio: f64, share: f64) -> (f64, f64) {
     let mut model = bar(12, NEARLY_NONE).clamped_model();
     model.damping_ratios.fill(damping_ratio);
@@ -101,7 +101,7 @@ fn pressed(damping_ratio: f64, share: f64) -> (f64, f64) {
         if pressed.step(&[PrescribedMotion::default()]).is_err() {
             return (f64::INFINITY, f64::INFINITY);
         }
-        // Fixed obstacles have no axis: the force is the one on the node, as it is.
+        // Fixed obstacles have no axis, so the force is the unrotated one on the node.
         for event in pressed.events() {
             assert!(event.force[0] < 0.0 && event.wrench.force.map(f64::to_bits) == event.force.map(f64::to_bits));
         }
@@ -114,7 +114,7 @@ fn pressed(damping_ratio: f64, share: f64) -> (f64, f64) {
     (most, (last[1] - last[0]) / most)
 }
 
-/// Above the limit that is computed closed contact grows without bound, below it stays.
+/// Above the computed limit closed contact grows without bound, below it the energy stays bounded.
 #[test]
 fn closed_contact_is_stable_only_up_to_the_limit() {
     let (stable, unstable) = (pressed(0.0, 0.8).0, pressed(0.0, 1.1).0);
@@ -122,8 +122,8 @@ fn closed_contact_is_stable_only_up_to_the_limit() {
     assert!(unstable > 1e3 * stable && pressed(0.05, 0.7).1 < 1e-9 && pressed(0.05, 1.05).1 > 1e-3);
 }
 
-/// One mode with inertia on the residual flexibility of a node: q⁺ = (1 + β − S)q − βq⁻ with S = κ + c K. Damping lowers β, and
-/// with it the S up to which both roots stay within the unit circle.
+/// One mode with inertia on the residual flexibility of a node: q⁺ = (1 + β − S)q − βq⁻ with S = κ + c K. Damping
+/// lowers β, and with it the largest S at which both roots stay within the unit circle.
 #[test]
 fn step_limit_accounts_for_damping() {
     let (frequency, fixed) = (2e4, 5e4);
@@ -149,8 +149,9 @@ fn step_limit_accounts_for_damping() {
     }
 }
 
-/// Largest amplitude of two undamped oscillators, of `frequencies`, after 3000 steps of their exact motion. A spring between them
-/// takes the forces: of stiffness K = 1, displaced by `seen` per amplitude, held for a step.
+/// Returns the largest amplitude of two undamped oscillators of `frequencies` after 3000 steps of their exact motion. A
+/// spring of stiffness K = 1 between them carries the forces, which are held for a step; `seen` are its displacements
+/// per amplitude.
 fn joined(frequencies: [f64; 2], seen: [f64; 2], step: f64) -> f64 {
     let (mut now, mut before) = ([1.0, 0.4], [0.9, 0.5]);
     for _ in 0..3000 {
@@ -165,7 +166,8 @@ fn joined(frequencies: [f64; 2], seen: [f64; 2], step: f64) -> f64 {
     now[0].hypot(before[0]).max(now[1].hypot(before[1]))
 }
 
-/// Soft or stiff against the master, hardly seen or more than it: below the limit no step is unstable, and a little above one is.
+/// For slaves that are soft or stiff compared with the master, and with small or large participation, no step below the
+/// limit is unstable, and one slightly above is.
 #[test]
 fn step_limit_accounts_for_slave_flexibility() {
     for (own, slave) in [(0.3, 0.05), (0.5, 1e-3), (0.5, 0.5), (0.7, 1.5), (0.3, 4.0), (0.3, 20.0)] {
@@ -186,7 +188,7 @@ fn step_limit_accounts_for_slave_flexibility() {
             let flexible = check(vec![(DMatrix::from_element(1, 1, seen), &other)]);
             let (limit, alone) =
                 (flexible.limit(100.0).unwrap().closed, check(Vec::new()).limit(100.0).unwrap().closed);
-            // Two slaves that are seen as the one is are as good as it.
+            // Two slaves with 1/√2 of the participation are equivalent to one.
             let half = || (DMatrix::from_element(1, 1, seen * std::f64::consts::FRAC_1_SQRT_2), &other);
             let halves = check(vec![half(), half()]).limit(100.0).unwrap().closed;
             assert!((halves / limit - 1.0).abs() < 1e-9, "{halves} and {limit}");
@@ -200,10 +202,11 @@ fn step_limit_accounts_for_slave_flexibility() {
     }
 }
 
-/// Two bodies behind a light end node, stiff along x and along y: pressed against a wall at x and dragged along +y at 1 m/s.
+/// Returns two bodies behind a light end node, stiff along x and along y, which is pressed against a wall at x and
+/// dragged along +y at 1 m/s.
 fn dragged(step: f64, solver: Solver) -> (System, f64) {
     let (outer, inner, light) = (1e6, 1e4, 1e-6);
-    // What presses along x also deflects along y.
+    // A force along x also deflects along y.
     let between = [[outer, 0.6 * outer], [0.6 * outer, outer]];
     let stiffness = DMatrix::from_fn(4, 4, |i, j| {
         let ground = if i == j && i > 1 { inner } else { 0.0 };
@@ -226,7 +229,7 @@ fn dragged(step: f64, solver: Solver) -> (System, f64) {
 #[test]
 fn friction_opposes_sliding_for_any_step_length() {
     for solver in [Solver::Lcp, Solver::Film] {
-        // By its forces the node stands 1e-5 m and more away from where it would be without: 10 m/s at the first of these steps.
+        // The contact forces displace the node by 1e-5 m and more: 10 m/s in the first of these steps.
         let ends = [1e-6, 1e-7, 1e-8].map(|step| {
             let (mut system, step) = dragged(step, solver);
             let mut time = 0.0;

@@ -1,10 +1,10 @@
-//! One error type: every variant names the file, the place in it, what is wrong, and the remedy.
+//! One error type: every variant contains the file, the place in it, the problem and the remedy.
 
 use std::path::Path;
 
 use thiserror::Error;
 
-/// Why a scene, a ROM or a resources directory was refused.
+/// Reason why a scene, a ROM or a resources directory was rejected.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum Error {
     /// A ROM file is damaged, incomplete, or not a ROM file.
@@ -38,7 +38,7 @@ pub enum Error {
     File {
         /// Path as it was opened.
         path: String,
-        /// The problem, in the operating system's words.
+        /// The problem, as the operating system words it.
         problem: String,
         /// The remedy.
         remedy: String,

@@ -1,10 +1,11 @@
-//! Files that are read: whole, and nothing but files.
+//! Reading of complete regular files.
 
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Read};
 use std::path::Path;
 
-/// Open a file to read. Directories are refused, and so are pipes and devices, which may have no end or never begin.
+/// Opens a file for reading. Directories are rejected, and so are pipes and devices, which may never end or never
+/// deliver data.
 ///
 /// # Examples
 /// ```
@@ -18,7 +19,7 @@ use std::path::Path;
 /// ```
 ///
 /// # Errors
-/// No file, or one that cannot be opened.
+/// A path that is not a regular file, or a file that cannot be opened.
 pub fn open_file(path: &Path) -> io::Result<File> {
     let metadata = fs::metadata(path)?;
     if metadata.is_dir() {
@@ -30,7 +31,7 @@ pub fn open_file(path: &Path) -> io::Result<File> {
     File::open(path)
 }
 
-/// Contents of a file of at most `most` bytes.
+/// Returns the contents of a file of at most `most` bytes.
 ///
 /// # Examples
 /// ```
@@ -44,7 +45,7 @@ pub fn open_file(path: &Path) -> io::Result<File> {
 /// ```
 ///
 /// # Errors
-/// As [`open_file`]; more bytes, or ones that cannot be read.
+/// Same as [`open_file`]; more than `most` bytes, or bytes that cannot be read.
 pub fn read_file(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     let file = open_file(path)?;
     let length = file.metadata()?.len();
@@ -73,7 +74,7 @@ mod tests {
         #[cfg(target_os = "linux")]
         {
             assert!(read_file(Path::new("/dev/zero"), 1).unwrap_err().to_string().contains("device"));
-            // Its length shows as zero.
+            // The length of this file is reported as zero.
             assert_eq!(read_file(Path::new("/proc/self/status"), 9).unwrap_err().kind(), ErrorKind::FileTooLarge);
         }
     }

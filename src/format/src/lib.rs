@@ -1,9 +1,9 @@
-//! Scene files (TOML), ROM files (safetensors) and the `resources/` directory of an FMU: text and bytes to the plain
-//! data of `tiprub-core`, and back.
+//! Scene files (TOML), ROM files (safetensors) and the `resources/` directory of an FMU: conversion of text and bytes
+//! to the plain data of `tiprub-core`, and back.
 //!
-//! Everything here is used twice: by the command line, which writes, and by the library inside the FMU, which reads
-//! what the command line wrote. Nothing is trusted: every length, shape, key and value is checked, and every refusal
-//! names the file, the place in it, what is wrong, and the remedy.
+//! Both the command line, which writes these files, and the library inside the FMU, which reads them, use this crate.
+//! No input is trusted: every length, shape, key and value is checked, and every error contains the file, the place in
+//! it, the problem and the remedy.
 #![warn(unreachable_pub)]
 #![forbid(unsafe_code)]
 
@@ -33,9 +33,10 @@ pub use thermal_file::{
     THERMAL_FILE, ThermalResources, load_thermal_resources, read_thermal, thermal_resource_files, write_thermal,
 };
 
-/// Beginning of the marks of all releases.
+/// Prefix of the marks of all releases.
 pub const LIBRARY_MARK: &str = "tiprub library ";
-/// Stands in every library of an FMU, and in the program that packages it: the release and a digest of the sources of both.
+/// Mark in every library of an FMU, and in the program that packages it: the release and a digest of the sources of
+/// both.
 pub const LIBRARY_RELEASE: &str =
     concat!("tiprub library ", env!("CARGO_PKG_VERSION"), ", sources ", env!("TIPRUB_LIBRARY_SOURCES"));
 

@@ -1,4 +1,4 @@
-//! A scene file and the ROM files it names.
+//! Reading of a scene file and its ROM files.
 
 use std::path::Path;
 
@@ -7,26 +7,27 @@ use tiprub_core::{Rom, Scene};
 
 use crate::{Error, Result, builtin_model, parse_scene, read_file, read_rom, read_scene};
 
-/// Start of a `rom` entry that names a model which comes with the program.
+/// Prefix of a `rom` entry that names a built-in model.
 pub(crate) const BUILTIN_PREFIX: &str = "builtin:";
 
-/// Largest ROM file (bytes): mass, stiffness and three matrices of spin of 3500 coordinates, whose eigenvalues take minutes.
+/// Maximum size of a ROM file (bytes): mass, stiffness and three spin matrices of 3500 coordinates, whose eigenvalues
+/// take minutes.
 pub const LARGEST_ROM: u64 = 512 << 20;
-/// Largest scene file (bytes): six hundred rotors, each with its surface, or a measured casing of fifty thousand points. A parser makes
-/// seventy times as much of a text of short tables.
+/// Maximum size of a scene file (bytes): six hundred rotors, each with its surface, or a measured casing of fifty
+/// thousand points. A parser needs seventy times as much memory for a text of short tables.
 pub(crate) const LARGEST_SCENE: u64 = 1 << 20;
-/// Largest size of all ROM files of a scene together (bytes).
+/// Maximum size of all ROM files of a scene together (bytes).
 const LARGEST_ROMS: u64 = 2 << 30;
 
-/// Counts the bytes of the ROM files of a scene, of which several structures may name one.
+/// Counter of the bytes of the ROM files of a scene; several structures may use one file.
 #[derive(Default)]
 pub(crate) struct RomBytes(u64);
 
 impl RomBytes {
-    /// Account for one more file.
+    /// Adds one more file.
     ///
     /// # Errors
-    /// All of them together are more than is read.
+    /// A total above the maximum size.
     pub(crate) fn add(&mut self, path: &Path, bytes: usize) -> Result<()> {
         self.0 = self.0.saturating_add(bytes as u64);
         if self.0 <= LARGEST_ROMS {
@@ -37,8 +38,8 @@ impl RomBytes {
     }
 }
 
-/// Read a scene file and its ROM files, which are named relative to it. Names after `builtin:` are handed to
-/// `builtin`, which answers `None` for a name it does not know, and otherwise a ROM or why there is none.
+/// Reads a scene file and its ROM files, whose paths are relative to it. Names after `builtin:` are passed to
+/// `builtin`, which returns `None` for an unknown name, and otherwise a ROM or the reason why there is none.
 ///
 /// # Examples
 /// ```
@@ -56,7 +57,7 @@ impl RomBytes {
 /// ```
 ///
 /// # Errors
-/// [`Error::File`] for files that cannot be read, else as [`parse_scene`] and [`read_rom`].
+/// [`Error::File`] for files that cannot be read, otherwise same as [`parse_scene`] and [`read_rom`].
 pub fn load_scene(path: &Path, builtin: &dyn Fn(&str) -> Option<Result<Rom, String>>) -> Result<Scene> {
     let directory = path.parent().unwrap_or(Path::new(""));
     let mut read = RomBytes::default();
@@ -81,7 +82,7 @@ fn scene_text(path: &Path) -> Result<String> {
     read_text(path, "Give the path of a scene file (TOML)")
 }
 
-/// Read a scene file, without the ROM files.
+/// Reads a scene file, without the ROM files.
 ///
 /// # Examples
 /// ```
@@ -96,7 +97,7 @@ fn scene_text(path: &Path) -> Result<String> {
 /// ```
 ///
 /// # Errors
-/// [`Error::File`] for a file that cannot be read, else as [`parse_scene`].
+/// [`Error::File`] for a file that cannot be read, otherwise same as [`parse_scene`].
 pub fn load_settings(path: &Path) -> Result<SceneSettings> {
     parse_scene(&scene_text(path)?, &path.display().to_string())
 }
@@ -124,7 +125,7 @@ fn builtin_rom(scene: &Path, index: usize, name: &str, answer: Option<Result<Rom
     }
 }
 
-/// Bytes of a file of at most `most` bytes; `remedy` says what to do where it cannot be read.
+/// Returns the bytes of a file of at most `most` bytes; `remedy` is the remedy in the message if it cannot be read.
 pub(crate) fn read_bytes(path: &Path, most: u64, remedy: &str) -> Result<Vec<u8>> {
     read_file(path, most).map_err(|error| Error::file(path, format!("cannot be read: {error}"), remedy))
 }

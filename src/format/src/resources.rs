@@ -1,4 +1,4 @@
-//! The `resources/` directory of an FMU: the scene, its ROMs, and how the variables were packaged.
+//! The `resources/` directory of an FMU: the scene, its ROMs, and the packaging options of the variables.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -15,11 +15,11 @@ use crate::{Error, Result, parse_scene, read_rom, write_rom, write_scene};
 
 /// File name of the scene inside `resources/`.
 pub const SCENE_FILE: &str = "scene.toml";
-/// File name of the packaging choices inside `resources/`.
+/// File name of the packaging options inside `resources/`.
 pub(crate) const PACKAGE_FILE: &str = "package.toml";
-/// Largest size of it (bytes).
+/// Maximum size of that file (bytes).
 const LARGEST_PACKAGE: u64 = 1 << 12;
-/// End of the names of ROM files and thermal models.
+/// Suffix of the names of ROM files and thermal models.
 const ARRAYS_END: &str = ".safetensors";
 /// Version of the layout of `resources/`.
 pub(crate) const RESOURCES_FORMAT_VERSION: u32 = 1;
@@ -34,11 +34,11 @@ pub struct Resources {
     pub scene: Scene,
     /// Instantiation token (FMI 2.0: GUID) that belongs to these resources.
     pub token: String,
-    /// Whether the FMI 3.0 description has arrays (else scalars, as FMI 2.0 has).
+    /// True if the FMI 3.0 description has arrays (otherwise scalars, as in FMI 2.0).
     pub fmi3_arrays: bool,
 }
 
-/// Largest size (bytes) of a file of this name inside `resources/`; none of a file that is not read.
+/// Returns the maximum size (bytes) of a file of this name inside `resources/`; `None` if the file is not read.
 ///
 /// # Examples
 /// ```
@@ -54,7 +54,7 @@ pub fn largest_resource(name: &str) -> Option<u64> {
     }
 }
 
-/// The content of `package.toml`.
+/// Content of `package.toml`.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct PackageFile {
@@ -62,8 +62,9 @@ struct PackageFile {
     fmi3_arrays: bool,
 }
 
-/// The files of `resources/`, in fixed order with fixed content for a given scene: the scene (each `rom` replaced by
-/// the file name beside it), one ROM file per structure with what this scene needs of it, the packaging choices.
+/// Returns the files of `resources/`, in fixed order with fixed content for a given scene: the scene (each `rom`
+/// replaced by the name of the file next to it), one ROM file per structure with the data that this scene needs, and
+/// the packaging options.
 ///
 /// # Examples
 /// ```
@@ -88,20 +89,20 @@ pub fn resource_files(scene: &Scene, fmi3_arrays: bool) -> Vec<(String, Vec<u8>)
     files
 }
 
-/// The packaging choices as a file.
+/// Returns the packaging options as a file.
 pub(crate) fn package_file(fmi3_arrays: bool) -> (String, Vec<u8>) {
     let package = PackageFile { format_version: RESOURCES_FORMAT_VERSION, fmi3_arrays };
     let package = toml::to_string(&package).expect("a number and a flag can be written");
     (PACKAGE_FILE.to_owned(), package.into_bytes())
 }
 
-/// Read the packaging choices beside what else was read; whether FMI 3.0 has arrays.
+/// Reads the packaging options and adds their file to `files`; returns whether FMI 3.0 has arrays.
 pub(crate) fn read_package(directory: &Path, files: &mut Vec<(String, Vec<u8>)>) -> Result<bool> {
     let text = read_into(directory, PACKAGE_FILE, files)?;
     Ok(parse_package(&directory.join(PACKAGE_FILE), &text)?.fmi3_arrays)
 }
 
-/// Refuse a place that is no directory.
+/// Rejects a path that is not a directory.
 pub(crate) fn check_directory(directory: &Path) -> Result<()> {
     if directory.is_dir() {
         return Ok(());
@@ -109,7 +110,7 @@ pub(crate) fn check_directory(directory: &Path) -> Result<()> {
     Err(Error::file(directory, "directory not found (the FMU's resources are expected here)", INTACT))
 }
 
-/// The ROMs of a scene as an FMU holds them: without what this scene does not use.
+/// Returns the ROMs of a scene as an FMU holds them: without the data that this scene does not use.
 ///
 /// # Examples
 /// ```
@@ -125,17 +126,17 @@ pub fn packed_roms(scene: &Scene) -> Vec<Rom> {
     structures.map(|(structure, rom)| Rom { extras: needed(structure, rom, &scene.settings), ..rom.clone() }).collect()
 }
 
-/// Returns the ROM without data of effects that are off.
+/// Returns the ROM without the data of effects that are off.
 fn needed(structure: &StructureSettings, rom: &Rom, settings: &SceneSettings) -> RomExtras {
     let spins = structure.spin != SpinSettings::default();
     let carries = settings.surfaces.iter().any(|surface| surface.structure.as_ref() == Some(&structure.name));
     RomExtras {
         spin: rom.extras.spin.clone().filter(|_| spins),
         thermal: rom.extras.thermal.clone().filter(|_| structure.thermal),
-        // A nodal-diameter load is laid on the grid too.
+        // A nodal-diameter load is distributed on the grid too.
         grid: rom.extras.grid.filter(|_| carries || structure.load.is_some()),
         harmonics: rom.extras.harmonics.clone(),
-        // Its displacements are outputs of watched sectors.
+        // The displacements of these points are outputs of watched sectors.
         watched: rom.extras.watched.clone().filter(|_| !settings.outputs.watched_sectors.is_empty()),
         stress: rom.extras.stress.clone().filter(|_| settings.outputs.stress),
         stress_thermal: rom.extras.stress_thermal.clone().filter(|_| settings.outputs.stress && structure.thermal),
@@ -143,7 +144,7 @@ fn needed(structure: &StructureSettings, rom: &Rom, settings: &SceneSettings) ->
             .filter(|_| settings.outputs.stress && structure.spin.growth),
         support: rom.extras.support.clone().filter(|_| carries && settings.outputs.support_reaction).map(|support| {
             SupportRows {
-                // Its columns are the patches.
+                // The columns of this matrix are the patches.
                 thermal: if structure.thermal { support.thermal } else { DMatrix::zeros(SUPPORT_ROWS, 0) },
                 ..support
             }
@@ -153,8 +154,8 @@ fn needed(structure: &StructureSettings, rom: &Rom, settings: &SceneSettings) ->
     }
 }
 
-/// `<structure>.rom.safetensors`, in characters that every file system and zip reader takes. Names that would
-/// collide get their number.
+/// Returns `<structure>.rom.safetensors`, in characters that every file system and zip reader accepts. Names that would
+/// collide get a number.
 fn rom_file_name(scene: &Scene, index: usize) -> String {
     let safe = |name: &str| {
         let keep = |c: char| if c.is_ascii_alphanumeric() || c == '_' || c == '-' { c } else { '_' };
@@ -162,14 +163,15 @@ fn rom_file_name(scene: &Scene, index: usize) -> String {
     };
     let structures = &scene.settings.structures;
     let name = safe(&structures[index].name);
-    // Case is ignored as some file systems do.
+    // Case is ignored, as on some file systems.
     let same = structures.iter().filter(|other| safe(&other.name).eq_ignore_ascii_case(&name)).count();
     let number = if same > 1 { format!(".{}", index + 1) } else { String::new() };
     format!("{name}{number}.rom.safetensors")
 }
 
-/// The instantiation token of a set of resource files: `{8-4-4-4-12}` hexadecimal digits of a SHA-256 over the release
-/// of this library and over names and contents, so that a description never meets other resources or another release.
+/// Returns the instantiation token of a set of resource files: `{8-4-4-4-12}` hexadecimal digits of a SHA-256 over the
+/// release of this library and over names and contents, so that a description cannot be combined with other resources
+/// or another release.
 ///
 /// # Examples
 /// ```
@@ -202,7 +204,7 @@ pub fn instantiation_token(files: &[(String, Vec<u8>)]) -> String {
     token
 }
 
-/// Read the `resources/` directory of an unpacked FMU.
+/// Reads the `resources/` directory of an unpacked FMU.
 ///
 /// # Examples
 /// ```
@@ -219,7 +221,7 @@ pub fn instantiation_token(files: &[(String, Vec<u8>)]) -> String {
 /// ```
 ///
 /// # Errors
-/// [`Error::File`] with the path of a file that is missing, unreadable or from another release; else as
+/// [`Error::File`] with the path of a file that is missing, unreadable or from another release; otherwise same as
 /// [`parse_scene`] and [`read_rom`].
 pub fn load_resources(directory: &Path) -> Result<Resources> {
     check_directory(directory)?;

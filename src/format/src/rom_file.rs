@@ -26,7 +26,7 @@ pub(crate) struct Array {
 pub(crate) type Arrays = BTreeMap<String, Array>;
 pub(crate) type Metadata = BTreeMap<String, String>;
 
-/// Read a ROM from the bytes of a ROM file; `origin` names the file in messages.
+/// Reads a ROM from the bytes of a ROM file; `origin` names the file in messages.
 ///
 /// # Examples
 /// ```
@@ -38,17 +38,18 @@ pub(crate) type Metadata = BTreeMap<String, String>;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
-/// # Errors
+/// [`Error::Rom`] with `origin`, the array or metadata entry, the expected and actual value, and the remedy. A returned
+/// ROM has passed [`Rom::validate`].
 /// [`Error::Rom`] naming `origin`, the array or metadata entry, expected and found, and the remedy. The ROM returned
 /// has passed [`Rom::validate`].
 pub fn read_rom(bytes: &[u8], origin: &str) -> Result<Rom> {
     RomReader { origin }.read(bytes)
 }
 
-/// Largest header (bytes): names of ten thousand contact nodes, or the arrays of a thousand nodal diameters.
+/// Maximum size of a header (bytes): names of ten thousand contact nodes, or the arrays of a thousand nodal diameters.
 const LARGEST_HEADER: u64 = 4 << 20;
 
-/// Length and content of the header of a safetensors container.
+/// Returns length and content of the header of a safetensors container.
 pub(crate) fn header(bytes: &[u8]) -> std::result::Result<(usize, safetensors::tensor::Metadata), SafeTensorError> {
     let length = bytes.first_chunk().map(|length| u64::from_le_bytes(*length));
     if length.is_some_and(|length| length > LARGEST_HEADER) {
@@ -77,7 +78,7 @@ impl RomReader<'_> {
         Error::Rom { origin: self.origin.to_owned(), what: what.into(), problem: problem.into(), remedy: remedy.into() }
     }
 
-    /// Arrays and metadata of the container, names and data types checked.
+    /// Returns arrays and metadata of the container, with names and data types checked.
     fn content(&self, bytes: &[u8]) -> Result<(Arrays, Metadata)> {
         let (_, header) = header(bytes).map_err(|error| self.container_error(&error, bytes))?;
         let metadata: Metadata = header.metadata().iter().flatten().map(|(k, v)| (k.clone(), v.clone())).collect();
@@ -323,7 +324,7 @@ fn quoted(value: Option<&str>) -> String {
     value.map_or_else(|| "nothing".to_owned(), |value| format!("{value:?}"))
 }
 
-/// SHA-256 over metadata (without the checksum itself) and arrays, both by name, every item with its length.
+/// Computes SHA-256 over metadata (without the checksum itself) and arrays, both by name, every item with its length.
 pub(crate) fn checksum(arrays: &Arrays, metadata: &Metadata) -> String {
     let mut hash = Sha256::new();
     let mut item = |bytes: &[u8]| {
@@ -346,10 +347,10 @@ fn little_endian(values: &[f64]) -> Vec<u8> {
     values.iter().flat_map(|value| value.to_le_bytes()).collect()
 }
 
-/// The bytes of a ROM file; equal ROMs give equal bytes.
+/// Returns the bytes of a ROM file; equal ROMs give equal bytes.
 ///
 /// A ROM that does not pass [`Rom::validate`], or whose contact node names are not distinct identifiers, gives a file
-/// that [`read_rom`] refuses.
+/// that [`read_rom`] rejects.
 ///
 /// # Examples
 /// ```
@@ -395,7 +396,7 @@ fn names(points: &[ContactNode]) -> String {
     points.iter().map(|point| point.name.as_str()).collect::<Vec<_>>().join(",")
 }
 
-/// The file stores rows, nalgebra columns.
+/// Converts a matrix: the file stores rows, nalgebra columns.
 pub(crate) fn matrix(matrix: &DMatrix<f64>) -> Array {
     Array { shape: vec![matrix.nrows(), matrix.ncols()], values: matrix.transpose().as_slice().to_vec() }
 }
@@ -443,9 +444,10 @@ fn rom_arrays(rom: &Rom) -> Arrays {
     named.chain(harmonics::arrays(rom)).collect()
 }
 
-/// The safetensors container: header length, JSON header padded to 8 bytes, data. Written here because the library's
-/// writer takes the metadata from a hash map, whose order, and so the bytes, differ from run to run. Keys are inserted
-/// in alphabetical order, so that serde_json gives the same text whether or not it keeps insertion order.
+/// Writes the safetensors container: header length, JSON header padded to 8 bytes, data. The library's writer is not
+/// used because it takes the metadata from a hash map, whose order, and therefore the bytes, differ from run to run.
+/// Keys are inserted in alphabetical order, so that serde_json gives the same text whether or not it preserves
+/// insertion order.
 pub(crate) fn container(arrays: &Arrays, metadata: &Metadata) -> Vec<u8> {
     let mut header = serde_json::Map::new();
     header.insert("__metadata__".into(), serde_json::json!(metadata));

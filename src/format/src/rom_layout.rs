@@ -1,4 +1,4 @@
-//! What a ROM file contains: one list for reader, writer and user guide.
+//! Contents of a ROM file: one list for reader, writer and user guide.
 
 /// Value of the metadata entry `format`.
 pub(crate) const ROM_FORMAT: &str = "tiprub-rom";
@@ -14,7 +14,7 @@ pub struct ArrayLayout {
     pub shape: &'static str,
     /// SI unit.
     pub unit: &'static str,
-    /// Whether a file must have it.
+    /// True if every file must have it.
     pub required: bool,
     /// One sentence.
     pub description: &'static str,
@@ -25,7 +25,7 @@ pub struct ArrayLayout {
 pub struct MetadataLayout {
     /// Key.
     pub name: &'static str,
-    /// Default where the entry may be left out.
+    /// Default, if the entry is optional.
     pub default: Option<&'static str>,
     /// One sentence.
     pub description: &'static str,
@@ -41,8 +41,8 @@ const fn array(
     ArrayLayout { name, shape, unit, required, description }
 }
 
-/// Number of [`ARRAYS`] that every structure may have; the others belong to structures that spin, heat up, or have coupled sectors. Only files with
-/// one of those mention it.
+/// Number of [`ARRAYS`] that every structure may have; the others belong to structures with spin, heat or coupled
+/// sectors, and only files with one of these mention it.
 const GENERAL_ARRAYS: usize = 9;
 
 /// Every array.
@@ -248,20 +248,20 @@ pub const ARRAYS: [ArrayLayout; 34] = [
     ),
 ];
 
-/// The arrays of a structure that spins: all or none.
+/// Arrays of a structure with spin: all or none.
 pub(crate) const SPIN_ARRAYS: [&str; 5] =
     ["stiffness_speed2", "stiffness_speed4", "coriolis", "centrifugal_load", "centrifugal_load_speed4"];
-/// The arrays of watched points: both or none.
+/// Arrays of watched points: both or none.
 pub(crate) const WATCHED_ARRAYS: [&str; 2] = ["watched_map", "watched_positions"];
-/// The arrays of places with stress: both or none.
+/// Arrays of points with stress: both or none.
 pub(crate) const STRESS_ARRAYS: [&str; 2] = ["stress_map", "stress_positions"];
-/// Static stress of a structure that heats up, and of one that spins.
+/// Static stress of a structure with thermal loads, and of one with spin.
 pub(crate) const STRESS_THERMAL: &str = "stress_thermal";
 pub(crate) const STRESS_CENTRIFUGAL: &str = "stress_centrifugal";
-/// The arrays of a support: both or none; the third comes with thermal loads.
+/// Arrays of a support: both or none; the third one requires thermal loads.
 pub(crate) const SUPPORT_ARRAYS: [&str; 2] = ["support_stiffness", "support_mass"];
 pub(crate) const SUPPORT_THERMAL: &str = "support_thermal";
-/// The arrays of a structure that heats up: both or none.
+/// Arrays of a structure with thermal loads: both or none.
 pub(crate) const THERMAL_ARRAYS: [&str; 2] = ["thermal_loads", "thermal_patches"];
 
 const fn entry(name: &'static str, default: Option<&'static str>, description: &'static str) -> MetadataLayout {
@@ -321,11 +321,11 @@ pub const METADATA: [MetadataLayout; 18] = [
     entry("checksum", Some(""), "SHA-256 of the content, checked if present; omit it if you write the file yourself."),
 ];
 
-/// Arrays of one nodal diameter above 0, and what stands for its number in their names.
+/// Arrays of one nodal diameter above 0, with the placeholder for its number in their names.
 pub(crate) const HARMONIC_ARRAYS: [&str; 3] = ["mass_<n>", "stiffness_<n>", "contact_map_<n>"];
 pub(crate) const NUMBER: &str = "<n>";
 
-/// The text of the metadata entry `units` of a file, given which arrays it holds.
+/// Returns the text of the metadata entry `units` of a file, given which arrays it holds.
 pub(crate) fn units_text(holds: impl Fn(&str) -> bool) -> String {
     let (general, special) = ARRAYS.split_at(GENERAL_ARRAYS);
     let listed = general.iter().chain(special.iter().filter(|array| holds(array.name)));

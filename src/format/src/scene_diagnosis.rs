@@ -1,8 +1,8 @@
-//! From what the TOML library says about a wrong scene file to a message a user can act on.
+//! Conversion of errors of the TOML library to messages that a user can act on.
 //!
-//! The library reports a span of the text and a sentence. The field path is found again by searching the parsed
-//! document for that span; inside the tagged table `shape`, where the library only knows the whole table, the key or
-//! value meant is found by its name or by its description in the sentence.
+//! The library reports a span of the text and a sentence. The field path is recovered by searching the parsed document
+//! for that span; inside the tagged table `shape`, for which the library reports only the whole table, the key or value
+//! is found by its name or by its description in the sentence.
 
 use std::ops::Range;
 
@@ -19,7 +19,7 @@ pub(crate) struct Document<'a> {
     pub root: &'a DeTable<'a>,
 }
 
-/// Line and column, both from 1, of a byte offset; columns count characters.
+/// Returns line and column, both from 1, of a byte offset; columns count characters.
 pub(crate) fn position(text: &str, offset: usize) -> (usize, usize) {
     let before = text.get(..offset.min(text.len())).unwrap_or(text);
     let line_start = before.rfind('\n').map_or(0, |index| index + 1);
@@ -35,8 +35,8 @@ struct TomlNode<'a> {
 }
 
 impl<'a> Document<'a> {
-    /// A refusal of a field that [`SceneSettings::validate`](tiprub_core::settings::SceneSettings::validate) names by
-    /// its path, with or without indices; located where the document holds exactly one such field.
+    /// Returns the error for a field that [`SceneSettings::validate`](tiprub_core::settings::SceneSettings::validate)
+    /// names by its path, with or without indices; it has a position if the document holds exactly one such field.
     pub(crate) fn refusal(&self, path: &str, problem: String, remedy: String) -> Error {
         let bare = path.replace('`', "");
         let mut candidates: Vec<_> = self.places().into_iter().filter(|place| place.path == bare).collect();
@@ -46,7 +46,7 @@ impl<'a> Document<'a> {
         }
         let only = candidates.first().filter(|first| candidates.iter().all(|place| place.path == first.path));
         let what = only.map_or(path, |place| &place.path);
-        // A key that is not there is missed in its table.
+        // A missing key is reported at its table.
         let table = || {
             let (table, _) = bare.rsplit_once('.')?;
             self.places().into_iter().rfind(|place| place.path == table)
@@ -55,12 +55,12 @@ impl<'a> Document<'a> {
         self.error(span, what, problem, remedy)
     }
 
-    /// Whether the document has the key at this path, indices counted from 1.
+    /// Returns whether the document has the key at this path, indices counted from 1.
     pub(crate) fn holds(&self, path: &str) -> bool {
         self.places().iter().any(|place| place.path == path)
     }
 
-    /// Line and column of the key at this path.
+    /// Returns line and column of the key at this path.
     pub(crate) fn position(&self, path: &str) -> Option<(usize, usize)> {
         let place = self.places().into_iter().find(|place| place.path == path)?;
         Some(position(self.text, place.span.start))
@@ -82,7 +82,7 @@ impl<'a> Document<'a> {
         places
     }
 
-    /// The narrowest place that covers `span`; of equals the deepest.
+    /// Returns the narrowest node that covers `span`; of equally narrow ones the deepest.
     fn covering(&self, span: &Range<usize>) -> Option<TomlNode<'a>> {
         let covers = |place: &TomlNode| place.span.start <= span.start && span.end <= place.span.end;
         let candidates = self.places().into_iter().filter(covers);
@@ -113,10 +113,10 @@ fn collect_value<'a>(value: &'a Spanned<DeValue<'a>>, path: &str, fields: &str, 
     }
 }
 
-/// The refusal of a document that does not fit the settings.
+/// Returns the error for a document that does not match the settings.
 pub(crate) fn diagnose(document: &Document, error: &toml::de::Error) -> Error {
     let message = error.message();
-    // The library marks a key missing at the top level with the empty span at the start of the text.
+    // The library reports a missing key at the top level with the empty span at the start of the text.
     let place = error.span().filter(|span| !span.is_empty()).and_then(|span| document.covering(&span));
     if let Some(name) = quoted(message, "missing field") {
         return missing(document, place, name);
@@ -146,7 +146,7 @@ fn missing(document: &Document, place: Option<TomlNode>, name: &str) -> Error {
 }
 
 fn unknown_key(document: &Document, place: &TomlNode, name: &str, accepted: &[&str]) -> Error {
-    // The span is that of the key itself, or (in `shape`) that of the table which holds it.
+    // The span covers the key itself, or (in `shape`) the table that holds it.
     let is_key = place.path.rsplit('.').next() == Some(name);
     let path = if is_key { place.path.clone() } else { format!("{}.{name}", place.path) };
     let span = document.places().into_iter().find(|other| other.path == path).map(|other| other.span);
@@ -180,8 +180,8 @@ fn wrong_value(document: &Document, place: TomlNode, message: &str) -> Error {
     document.error(Some(place.span), &place.path, problem, remedy)
 }
 
-/// `[contact]` where `[[contact]]` is meant, and the reverse. Checked before the settings are filled in, since the
-/// library would take a list of values in place of a table of named ones.
+/// Rejects `[contact]` instead of `[[contact]]` and vice versa. Checked before the settings are deserialised, because
+/// the library would accept a list of values instead of a table of named ones.
 pub(crate) fn check_brackets(document: &Document) -> Result<(), Error> {
     for (key, value) in document.root {
         let name: &str = key.get_ref();
@@ -208,7 +208,7 @@ pub(crate) fn check_brackets(document: &Document) -> Result<(), Error> {
     }
 }
 
-/// The first value below `path` that the library would describe as `found`.
+/// Returns the first value below `path` that the library would describe as `found`.
 fn culprit<'a>(document: &Document<'a>, path: &str, found: &str) -> Option<TomlNode<'a>> {
     let below = format!("{path}.");
     document
@@ -218,7 +218,7 @@ fn culprit<'a>(document: &Document<'a>, path: &str, found: &str) -> Option<TomlN
         .max_by_key(|place| place.path.len())
 }
 
-/// A value as the TOML library names it in messages.
+/// Returns a value as the TOML library names it in messages.
 fn description(value: &DeValue) -> String {
     match value {
         DeValue::String(text) => format!("string {text:?}"),
@@ -236,14 +236,14 @@ fn description(value: &DeValue) -> String {
     }
 }
 
-/// Type, range and meaning of a field, for a remedy; empty for unknown paths.
+/// Returns type, range and meaning of a field, for a remedy; empty for unknown paths.
 pub(crate) fn requirement(fields: &str) -> String {
     let Some(field) = FIELDS.iter().find(|field| field.path == fields) else { return String::new() };
     let range = if field.range.is_empty() { String::new() } else { format!(" ({})", field.range) };
     format!("{}{range}. {}", field.value, field.description.trim_end_matches('.'))
 }
 
-/// The library's names of Rust types in words.
+/// Translates the library's names of Rust types to plain words.
 fn plain(expected: &str) -> &str {
     match expected {
         "f64" => "a number",
@@ -254,13 +254,13 @@ fn plain(expected: &str) -> &str {
     }
 }
 
-/// The names that a message of the library lists after `expected`, each between backticks.
+/// Returns the names that a message of the library lists after `expected`, each between backticks.
 fn accepted(message: &str) -> Vec<&str> {
     let list = message.split_once(", expected ").map_or("", |(_, list)| list);
     list.split('`').skip(1).step_by(2).collect()
 }
 
-/// The name quoted in a message such as "unknown field `x`, expected ...".
+/// Returns the name quoted in a message such as "unknown field `x`, expected ...".
 fn quoted<'a>(message: &'a str, start: &str) -> Option<&'a str> {
     let rest = message.strip_prefix(start)?.strip_prefix(" `")?;
     Some(rest.split_once("`, ").map_or_else(|| rest.trim_end_matches('`'), |(name, _)| name))

@@ -9,11 +9,12 @@ use crate::load::BUILTIN_PREFIX;
 use crate::scene_diagnosis::{Document, check_brackets, diagnose, position};
 use crate::{Error, Result};
 
-/// Keys that a file may leave out.
+/// Keys that are optional in a file.
 const SCHEME: &str = "time.scheme";
 const STEP: &str = "time.step";
 
-/// Read a scene; `origin` names the file in messages. If the text names no scheme, that of the settings without their ROMs is chosen.
+/// Reads a scene; `origin` names the file in messages. If the text has no scheme, one is chosen from the settings
+/// without their ROMs.
 ///
 /// # Examples
 /// ```
@@ -49,8 +50,8 @@ const STEP: &str = "time.step";
 /// ```
 ///
 /// # Errors
-/// [`Error::Scene`] with line and column, the field path, what is wrong and the remedy: wrong syntax, unknown keys,
-/// missing keys, values of the wrong type, and whatever [`SceneSettings::validate`] refuses.
+/// [`Error::Scene`] with line and column, the field path, the problem and the remedy: wrong syntax, unknown keys,
+/// missing keys, values of the wrong type, and everything that [`SceneSettings::validate`] rejects.
 pub fn parse_scene(text: &str, origin: &str) -> Result<SceneSettings> {
     with_document(text, origin, |document| {
         let mut settings = parse(document)?;
@@ -59,8 +60,8 @@ pub fn parse_scene(text: &str, origin: &str) -> Result<SceneSettings> {
     })
 }
 
-/// Read a scene with its ROMs, which `rom` returns by the place of their structure and its settings. If the text names no scheme, it is
-/// chosen here with the ROMs, and all that runs, studies or packages the scene has this choice.
+/// Reads a scene with its ROMs, which `rom` returns for the path of a structure and its settings. If the text has no
+/// scheme, it is chosen here with the ROMs, and everything that runs, studies or packages the scene uses this choice.
 ///
 /// # Examples
 /// ```
@@ -100,7 +101,7 @@ pub fn parse_scene(text: &str, origin: &str) -> Result<SceneSettings> {
 /// ```
 ///
 /// # Errors
-/// As [`parse_scene`], and those of `rom`.
+/// Same as [`parse_scene`], and the errors of `rom`.
 pub fn read_scene<E: From<Error>>(
     text: &str,
     origin: &str,
@@ -131,7 +132,7 @@ fn with_document<T, E: From<Error>>(
     work(&Document { text, origin, root: root.get_ref() })
 }
 
-/// Returns validated settings. The scheme of a document that names none is not chosen yet.
+/// Returns validated settings. If the document has no scheme, it is not chosen yet.
 fn parse(document: &Document) -> Result<SceneSettings> {
     check_brackets(document)?;
     let mut settings: SceneSettings = toml::from_str(document.text).map_err(|error| diagnose(document, &error))?;
@@ -146,7 +147,7 @@ fn parse(document: &Document) -> Result<SceneSettings> {
     Ok(settings)
 }
 
-/// Chooses the scheme of a document that names none, with the ROMs that are known, and refuses fixed steps without a length.
+/// Chooses the scheme of a document without one from the known ROMs, and rejects fixed steps without a length.
 fn choose_scheme(settings: &mut SceneSettings, roms: &[Rom], document: &Document) -> Result<()> {
     if !document.holds(SCHEME) && settings.preset == Preset::None {
         let (scheme, reason) = settings.default_scheme(roms);
@@ -167,7 +168,8 @@ fn choose_scheme(settings: &mut SceneSettings, roms: &[Rom], document: &Document
     ))
 }
 
-/// Line and column, from 1, of the key at this path (indices from 1) in the text of a scene; `None` where it is not there.
+/// Returns line and column, from 1, of the key at this path (indices from 1) in the text of a scene; `None` if it is
+/// missing.
 ///
 /// # Examples
 /// ```
@@ -181,7 +183,7 @@ pub fn position_of(text: &str, path: &str) -> Option<(usize, usize)> {
     Document { text, origin: "", root: document.get_ref() }.position(path)
 }
 
-/// Sets the keys of a preset that the file leaves out.
+/// Sets the keys of a preset that are missing in the file.
 fn apply_preset(settings: &mut SceneSettings, document: &Document) {
     if settings.preset != Preset::Paper {
         return;
@@ -209,7 +211,7 @@ pub fn builtin_model(structure: &StructureSettings) -> Option<&str> {
     structure.rom.strip_prefix(BUILTIN_PREFIX)
 }
 
-/// A scene as TOML; reading it back gives the same settings, bit for bit.
+/// Writes a scene as TOML; reading it back gives the same settings, bit for bit.
 ///
 /// # Examples
 /// ```
@@ -221,7 +223,7 @@ pub fn builtin_model(structure: &StructureSettings) -> Option<&str> {
 /// ```
 ///
 /// # Panics
-/// If a whole number exceeds the range of TOML, 2⁶³ − 1: no such number passes [`SceneSettings::validate`].
+/// If an integer exceeds the range of TOML, 2⁶³ − 1, which [`SceneSettings::validate`] rejects.
 pub fn write_scene(settings: &SceneSettings) -> String {
     toml::to_string(settings).expect("the settings consist of tables, texts, numbers and lists")
 }

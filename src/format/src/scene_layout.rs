@@ -1,4 +1,4 @@
-//! What a scene file contains: one list for error messages and the user guide.
+//! Contents of a scene file: one list for error messages and the user guide.
 
 mod fields;
 
@@ -9,9 +9,9 @@ pub use fields::FIELDS;
 pub struct SceneField {
     /// Dotted path without indices, for example `contact.gap`.
     pub path: &'static str,
-    /// Type, as TOML has it; with the SI unit where there is one.
+    /// Type as TOML names it, with the SI unit if there is one.
     pub value: &'static str,
-    /// Default, `None` where the key must be given.
+    /// Default, `None` if the key is required.
     pub default: Option<&'static str>,
     /// Accepted range.
     pub range: &'static str,
@@ -20,12 +20,12 @@ pub struct SceneField {
 }
 
 impl SceneField {
-    /// The key alone.
+    /// Returns the key without its table.
     pub fn key(&self) -> &'static str {
         self.path.rsplit('.').next().unwrap_or(self.path)
     }
 
-    /// Path of the table that holds the key; empty for the top level.
+    /// Returns the path of the table that holds the key; empty for the top level.
     pub fn table(&self) -> &'static str {
         self.path.rsplit_once('.').map_or("", |(table, _)| table)
     }

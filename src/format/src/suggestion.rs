@@ -1,8 +1,8 @@
-//! Did-you-mean for misspelt names.
+//! Suggestions for misspelt names.
 
 use strsim::{damerau_levenshtein, jaro_winkler};
 
-/// The accepted name closest to `given`, if one is close enough to be meant.
+/// Returns the accepted name closest to `given`, if one is close enough.
 pub(crate) fn closest<'a>(given: &str, accepted: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let given = normalised(given);
     let similarity = |name: &str| jaro_winkler(&given, &normalised(name));
@@ -12,12 +12,13 @@ pub(crate) fn closest<'a>(given: &str, accepted: impl IntoIterator<Item = &'a st
     (distance <= allowed || similarity(best) > 0.9).then_some(best)
 }
 
-/// Case and the choice between `-` and `_` are the commonest slips: they do not count as differences.
+/// Returns the name without differences in case and between `-` and `_`, which are the most common slips and do not
+/// count.
 fn normalised(name: &str) -> String {
     name.to_lowercase().replace('-', "_")
 }
 
-/// `Did you mean `x`? Accepted here: `x`, `y`, `z`` (the question only where a name is close).
+/// Returns `Did you mean `x`? Accepted here: `x`, `y`, `z`` (the question only if a name is close).
 pub(crate) fn remedy(given: &str, accepted: &[&str]) -> String {
     if accepted.is_empty() {
         return "No further keys are accepted here".to_owned();

@@ -25,11 +25,11 @@ pub struct ThermalResources {
     pub model: ConductionModel,
     /// Instantiation token that belongs to these resources.
     pub token: String,
-    /// Whether the FMI 3.0 description has arrays.
+    /// True if the FMI 3.0 description has arrays.
     pub fmi3_arrays: bool,
 }
 
-/// The files of `resources/` of a thermal FMU, in fixed order with fixed content for a given model.
+/// Returns the files of `resources/` of a thermal FMU, in fixed order with fixed content for a given model.
 ///
 /// # Examples
 /// ```
@@ -45,7 +45,7 @@ pub fn thermal_resource_files(model: &ConductionModel, fmi3_arrays: bool) -> Vec
     vec![(THERMAL_FILE.to_owned(), write_thermal(model)), package_file(fmi3_arrays)]
 }
 
-/// Read the `resources/` directory of an unpacked thermal FMU.
+/// Reads the `resources/` directory of an unpacked thermal FMU.
 ///
 /// # Examples
 /// ```
@@ -61,7 +61,7 @@ pub fn thermal_resource_files(model: &ConductionModel, fmi3_arrays: bool) -> Vec
 /// ```
 ///
 /// # Errors
-/// [`Error::File`] for a file that is missing, unreadable or from another release; else as [`read_thermal`].
+/// [`Error::File`] for a file that is missing, unreadable or from another release; otherwise same as [`read_thermal`].
 pub fn load_thermal_resources(directory: &Path) -> Result<ThermalResources> {
     check_directory(directory)?;
     let path = directory.join(THERMAL_FILE);
@@ -72,7 +72,7 @@ pub fn load_thermal_resources(directory: &Path) -> Result<ThermalResources> {
     Ok(ThermalResources { model, token: instantiation_token(&files), fmi3_arrays })
 }
 
-/// The matrices of a model by their names in the file.
+/// Returns the matrices of a model with their names in the file.
 fn matrices(model: &ConductionModel) -> [(&'static str, &DMatrix<f64>); 7] {
     [
         ("conduction", &model.conduction),
@@ -85,7 +85,7 @@ fn matrices(model: &ConductionModel) -> [(&'static str, &DMatrix<f64>); 7] {
     ]
 }
 
-/// The bytes of a thermal model; equal models give equal bytes.
+/// Returns the bytes of a thermal model; equal models give equal bytes.
 ///
 /// # Examples
 /// ```
@@ -115,7 +115,7 @@ pub fn write_thermal(model: &ConductionModel) -> Vec<u8> {
     container(&arrays, &metadata)
 }
 
-/// Read a thermal model; `origin` names the file in messages.
+/// Reads a thermal model; `origin` names the file in messages.
 ///
 /// # Examples
 /// ```
@@ -128,7 +128,8 @@ pub fn write_thermal(model: &ConductionModel) -> Vec<u8> {
 /// ```
 ///
 /// # Errors
-/// [`Error::Rom`] naming `origin`, the array or metadata entry, and the remedy. The model has passed [`ConductionModel::validate`].
+/// [`Error::Rom`] with `origin`, the array or metadata entry, and the remedy. A returned model has passed
+/// [`ConductionModel::validate`].
 pub fn read_thermal(bytes: &[u8], origin: &str) -> Result<ConductionModel> {
     let refuse = |what: String, problem: String| Error::Rom {
         origin: origin.to_owned(),

@@ -1,4 +1,4 @@
-//! The chapters on scene file and ROM file list exactly the keys, arrays and entries that the code knows, and their
+//! The chapters on scene file and ROM file list exactly the keys, arrays and entries that the code defines, and their
 //! examples are accepted.
 
 mod common;
@@ -18,7 +18,7 @@ fn chapter(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../docs").join(name)
 }
 
-/// Compare the generated part `what` of a chapter; `UPDATE_SNAPSHOTS=1 cargo test` rewrites it.
+/// Compares the generated part `what` of a chapter; `UPDATE_SNAPSHOTS=1 cargo test` rewrites it.
 #[track_caller]
 fn compare(name: &str, what: &str, expected: &str) {
     let text = fs::read_to_string(chapter(name)).unwrap();
@@ -34,7 +34,7 @@ fn compare(name: &str, what: &str, expected: &str) {
     }
 }
 
-/// Paths of all keys in a scene, indices left out.
+/// Returns the paths of all keys in a scene, without indices.
 fn keys(scene: &SceneSettings) -> BTreeSet<String> {
     fn collect(value: &toml::Value, path: &str, keys: &mut BTreeSet<String>) {
         match value {
@@ -77,7 +77,7 @@ fn documented_keys_match_the_settings() {
     (coating.modulus, coating.yield_stress, coating.hardening) = (0.0, 0.0, 0.0);
     coating.cutting = Some(CuttingSettings { specific_energy: 1e8, normal_ratio: 1.0 });
     found.extend(keys(&cut));
-    // Tables are not keys with values of their own, except those inside others.
+    // Tables are not keys with values, except those inside other tables.
     for table in ["structure", "surface", "contact", "time", "outputs", "experiment"] {
         assert!(found.remove(table), "{table}");
     }
@@ -85,7 +85,7 @@ fn documented_keys_match_the_settings() {
     assert_eq!(listed, found);
 }
 
-/// Every identifier of a warning can be looked up.
+/// The guide contains every identifier of a warning.
 #[test]
 fn documented_warnings_match_the_core() {
     let mut text = String::from("\n| identifier | meaning | what to do |\n|---|---|---|\n");
@@ -95,7 +95,7 @@ fn documented_warnings_match_the_core() {
     compare("warnings.md", "warnings", &format!("{text}\n"));
 }
 
-/// A scene with every key that has no default.
+/// Returns a scene with every key that has no default.
 fn least() -> String {
     let mut scene: toml::Table = toml::from_str(&write_scene(&common::complete_scene())).unwrap();
     for field in FIELDS.iter().filter(|field| field.default.is_some()) {
@@ -162,7 +162,7 @@ fn example_in_scene_chapter_is_a_valid_scene() {
     assert_eq!(scene.structures[0].rom, "builtin:rotor37");
 }
 
-/// Lines of a fragment in the place of those of the scene; tables of a list are told apart by their names.
+/// Replaces lines of the scene by those of a fragment; tables of a list are distinguished by their names.
 fn overlay(scene: &mut toml::Table, fragment: toml::Table) {
     for (key, value) in fragment {
         match (scene.get_mut(&key), value) {
@@ -183,13 +183,13 @@ fn overlay(scene: &mut toml::Table, fragment: toml::Table) {
     }
 }
 
-/// The TOML of a page.
+/// Returns the TOML examples of a page.
 fn examples(page: &str) -> Vec<String> {
     let blocks = page.split("```toml\n").skip(1).map(|text| text.split("```").next().unwrap());
     blocks.map(String::from).collect()
 }
 
-/// README and chapters: name and TOML.
+/// Returns name and TOML of the examples in the README and the chapters.
 fn all_examples() -> Vec<(String, String)> {
     let chapters = fs::read_dir(chapter("")).unwrap().map(|entry| entry.unwrap().path());
     let mut pages: Vec<_> = chapters.filter(|path| path.extension().is_some_and(|kind| kind == "md")).collect();
@@ -201,7 +201,8 @@ fn all_examples() -> Vec<(String, String)> {
     pages.into_iter().flat_map(of_page).collect()
 }
 
-/// A whole scene has a name, and is a scene. Else it is what a scene can add: to the first one of the chapter on scenes.
+/// An example with a name must be a complete scene. Any other one is an addition to a scene: to the first one of the
+/// chapter on scenes.
 #[test]
 fn every_example_in_the_guide_is_a_valid_scene() {
     let base = examples(&fs::read_to_string(chapter("scene-file.md")).unwrap()).remove(0);

@@ -1,5 +1,5 @@
-//! What a blade is reduced to: modes with the contact held or free, contact at nodes or patches. Error, largest steps and cost against
-//! the number of modes.
+//! Reduction bases of a blade: modes with the contact held or free, contact at nodes or patches. Error, largest steps
+//! and cost against the number of modes.
 
 use serde_json::{Value, json};
 use tiprub_core::{
@@ -27,7 +27,7 @@ use tiprub_study::{
 
 /// Time between samples (s).
 const INTERVAL: f64 = 1e-5;
-/// Steps in a sample: of the truth, and of runs that judge models.
+/// Steps per sample of the reference, and of runs that assess models.
 const TRUE_DIVISION: u32 = 80;
 const MODEL_DIVISION: u32 = 40;
 /// Errors at which costs are compared.
@@ -37,18 +37,18 @@ const EQUAL: [f64; 2] = [3e-2, 1e-2];
 struct BasisSize {
     mesh: MeshCounts,
     modes: &'static [usize],
-    /// With fewer of them responses go beyond the frequencies that are kept.
+    /// With fewer modes, responses exceed the retained frequencies.
     covered: usize,
     /// Number of modes of the reference, and of the full model for the comparison of responses.
     true_modes: usize,
     checked: usize,
     patches: usize,
     samples: usize,
-    /// Steps in a sample of runs that are timed, with the one that the time of a step is taken of.
+    /// Steps per sample of the timed runs, including the one that determines the time of a step.
     divisions: &'static [u32],
 }
 
-/// Steps per sample of the run by which the time of a step is measured.
+/// Steps per sample of the run that determines the time of a step.
 const TYPICAL: u32 = 20;
 
 const FULL: BasisSize = BasisSize {
@@ -72,16 +72,16 @@ const QUICK: BasisSize = BasisSize {
     divisions: &[2, 5, TYPICAL],
 };
 
-/// Contact of the tip, and the modes besides.
+/// Contact of the tip, and the type of modes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct BasisChoice {
-    /// Patches, or else three nodes.
+    /// Number of patches; otherwise three nodes.
     patches: Option<usize>,
     kind: ReductionKind,
 }
 
 impl BasisChoice {
-    /// All, the paper's first and the default last.
+    /// Returns all choices, that of the paper first and the default last.
     fn all(patches: usize) -> [Self; 4] {
         let of =
             |patches| [ReductionKind::FixedInterface, ReductionKind::FreeInterface].map(|kind| Self { patches, kind });
@@ -105,14 +105,14 @@ impl BasisChoice {
         Ok(reduction::rotor37(&Rotor37Options { checked_modes: size.checked, ..own }, console)?.rom)
     }
 
-    /// The same contact with most modes.
+    /// Runs the same contact with the largest number of modes.
     fn truth(self, size: &BasisSize, console: &Console) -> Result<RunSummary> {
         let rom = Self { kind: ReductionKind::FreeInterface, ..self }.rom(size, size.true_modes, console)?;
         marched(&scene(rom)?, TRUE_DIVISION, size.samples)
     }
 }
 
-/// The light rub of rotor 37.
+/// Returns the light rub of rotor 37.
 fn scene(rom: Rom) -> Result<Scene> {
     let mut scene = scene_source::rotor37_scene_with(rom)?;
     scene.settings.experiment.communication_step = INTERVAL;
@@ -128,7 +128,7 @@ fn with(scene: &Scene, scheme: Scheme, division: u32) -> Scene {
     SceneRun::changed(scene, (scheme, Solver::Lcp), INTERVAL / f64::from(division), 0.0)
 }
 
-/// A run that went well: error against the truth of the same contact, and processor time per simulated millisecond (s).
+/// A successful run: error against the reference of the same contact, and processor time per simulated millisecond (s).
 #[derive(Debug, Clone, Copy)]
 struct Timed {
     modes: usize,
@@ -138,26 +138,27 @@ struct Timed {
     seconds: f64,
 }
 
-/// A model.
+/// Results of a model.
 struct BasisModel {
     basis: BasisChoice,
     modes: usize,
-    /// Worst static flexibility at the contact, and worst forced response (shares).
+    /// Largest relative errors of the static flexibility at the contact and of the forced response.
     flexibility: f64,
     response: f64,
-    /// Displacements against the same contact with most modes, and against patches with most modes.
+    /// Errors of displacements against the same contact with the largest number of modes, and against patches with the
+    /// largest number of modes.
     same: f64,
     patches: f64,
-    /// The first with massless-boundary, which takes the inertia from the contact.
+    /// Error against the same contact with massless-boundary, which removes the inertia of the contact.
     massless: f64,
-    /// Limits of central differences, modal-exact, massless-boundary with closed contact (s), where there are.
+    /// Limits of central differences, modal-exact, massless-boundary with closed contact (s), if there are any.
     limits: Vec<(&'static str, Option<f64>)>,
     /// Processor time of an internal step of all blades (s).
     step_time: f64,
     timed: Vec<Timed>,
 }
 
-/// Runs of a model by all schemes and steps.
+/// Runs a model with all schemes and steps.
 fn timed(scene: &Scene, modes: usize, truth: &RunSummary, size: &BasisSize) -> Vec<Timed> {
     let schemes = [Scheme::CentralDifference, Scheme::ModalExact, Scheme::MasslessBoundary];
     let samples = size.samples;
@@ -205,7 +206,7 @@ fn model(
     Ok(BasisModel { basis, modes, flexibility, response, same, patches, massless, limits, step_time, timed })
 }
 
-/// The cheapest run of a basis within an error.
+/// Returns the cheapest run of a basis within an error.
 fn cheapest(all: &[BasisModel], basis: BasisChoice, error: f64) -> Option<Timed> {
     let runs = all.iter().filter(|found| found.basis == basis).flat_map(|found| &found.timed);
     runs.filter(|one| one.error <= error).min_by(|a, b| a.seconds.total_cmp(&b.seconds)).copied()
@@ -359,7 +360,7 @@ fn results(all: &[BasisModel]) -> Value {
     Value::Array(all.iter().map(row).collect())
 }
 
-/// The study.
+/// Runs the study.
 ///
 /// # Errors
 /// A model that cannot be reduced, a run at short steps that fails, a plot that cannot be drawn.

@@ -1,5 +1,6 @@
-//! Any scene of blades without coupling in a rigid casing beside a stepper that shares nothing with the product but the matrices of
-//! the ROM: geometry, modes, contact problem and time stepping are those of the reference crate (Moreau and Jean).
+//! Comparison of any scene of uncoupled blades in a rigid casing with a stepper that shares only the matrices of the
+//! ROM with the product: geometry, modes, contact problem and time stepping are those of the reference crate (Moreau
+//! and Jean).
 
 use serde_json::json;
 use tiprub_core::{
@@ -18,21 +19,21 @@ use tiprub_study::{Picture, Sheet, Statement, Study, StudyFigure};
 
 use crate::cli::BesideArguments;
 
-/// Communication steps that are compared, where the scene asks for more.
+/// Maximum number of communication steps compared.
 const MOST_SAMPLES: u32 = 1050;
 const QUICK_SAMPLES: u32 = 150;
-/// Steps of the witness, as shares of that of the product, or of [`LONGEST`] where that is shorter.
+/// Divisors of the step of the witness, relative to that of the product, or to [`LONGEST`] if that is shorter.
 const SHARES: [u32; 3] = [1, 2, 4];
 /// Longest step of the witness (s).
 const LONGEST: f64 = 5e-7;
-/// Both must meet within so many times what they change when their steps are halved.
+/// Both must agree within this multiple of the change caused by halving their steps.
 const MARGIN: f64 = 4.0;
 
 /// Result of one of the two programs.
 struct SideBySideRun {
     /// Displacements of all contact rows and blades at the communication points (m), sample by sample.
     displacements: Vec<f64>,
-    /// Sum over all contacts of λ, per communication step (N·s).
+    /// Sum of λ over all contacts, per communication step (N·s).
     impulses: Vec<f64>,
 }
 
@@ -42,10 +43,10 @@ fn refused(what: impl Into<String>, why: &str) -> Failure {
     Failure::new(what.into(), why.to_owned(), remedy)
 }
 
-/// The scene as the reference crate knows it.
+/// Converts the scene to the reference crate.
 ///
 /// # Errors
-/// The scene has what the witness does not know, by name.
+/// A feature that the witness does not support, by name.
 pub(crate) fn blades_of(scene: &Scene) -> Result<BladeScene> {
     let settings = &scene.settings;
     let ([rotor], [surface], [contact]) = (&settings.structures[..], &settings.surfaces[..], &settings.contacts[..])
@@ -104,7 +105,7 @@ pub(crate) fn blades_of(scene: &Scene) -> Result<BladeScene> {
     BladeScene::new(blades).ok_or_else(|| refused("rom", "the mass matrix is not positive definite"))
 }
 
-/// The product over `samples` communication steps, its internal step divided by `division`.
+/// Runs the product over `samples` communication steps, with its internal step divided by `division`.
 fn product(scene: &Scene, division: u32, samples: u32) -> tiprub_core::Result<SideBySideRun> {
     let mut scene = scene.clone();
     let (time, interval) = (&mut scene.settings.time, scene.settings.experiment.communication_step);
@@ -113,7 +114,7 @@ fn product(scene: &Scene, division: u32, samples: u32) -> tiprub_core::Result<Si
     } else {
         time.step /= f64::from(division);
     }
-    // What the preset stands for is in the settings now, but for the step.
+    // The settings now contain everything that the preset selects, except for the step.
     scene.settings.preset = Preset::None;
     let mut simulation = Simulation::new(&scene)?;
     simulation.initialise(0.0)?;
@@ -129,13 +130,13 @@ fn product(scene: &Scene, division: u32, samples: u32) -> tiprub_core::Result<Si
     Ok(found)
 }
 
-/// Σ λ over the last communication step (N·s).
+/// Returns Σ λ over the last communication step (N·s).
 fn impulse(simulation: &Simulation) -> f64 {
     let reference = simulation.table().find("normal_impulse").map(|variable| variable.reference);
     reference.and_then(|reference| simulation.real(reference).ok()).unwrap_or(f64::NAN)
 }
 
-/// The witness over as many, in steps of at most `longest` (s).
+/// Runs the witness over as many steps, each at most `longest` (s).
 fn witness(
     scene: &BladeScene,
     interval: f64,
@@ -159,17 +160,17 @@ fn witness(
     Ok(found)
 }
 
-/// Relative distance of two sequences (L2).
+/// Returns the relative distance of two sequences (L2).
 fn apart(a: &[f64], b: &[f64]) -> f64 {
     let square = |values: &mut dyn Iterator<Item = f64>| values.map(|value| value * value).sum::<f64>();
     let size = square(&mut b.iter().copied());
     if size == 0.0 { 0.0 } else { (square(&mut a.iter().zip(b).map(|(a, b)| a - b)) / size).sqrt() }
 }
 
-/// The study.
+/// Runs the study.
 ///
 /// # Errors
-/// A scene with what the witness does not know, by name; a run that is refused or fails.
+/// A scene with features that the witness does not support, by name; a run that is rejected or fails.
 pub(crate) fn study(arguments: &BesideArguments, console: &Console) -> Result<Study> {
     let scene = scene_source::load(&arguments.scene, &arguments.common.cache.cache(), console)?;
     let blades = blades_of(&scene)?;
@@ -198,7 +199,7 @@ pub(crate) fn study(arguments: &BesideArguments, console: &Console) -> Result<St
     Ok(report(&scene, (&own, &half), &witnesses, interval))
 }
 
-/// Distances: of two runs in displacements, and of their whole impulses.
+/// Returns the distances of two runs in displacements, and of their total impulses.
 fn distances(a: &SideBySideRun, b: &SideBySideRun) -> [f64; 2] {
     let [own, other] = [a, b].map(|found| found.impulses.iter().sum::<f64>());
     [apart(&a.displacements, &b.displacements), if other == 0.0 { own.abs() } else { (own / other - 1.0).abs() }]

@@ -1,4 +1,4 @@
-//! What can be asked of the laboratory.
+//! Commands of the laboratory.
 
 use std::path::PathBuf;
 
@@ -188,7 +188,7 @@ pub enum ErrorScene {
 }
 
 impl ErrorScene {
-    /// All of them.
+    /// All scenes.
     pub const ALL: [Self; 11] = [
         Self::Rotor37Light,
         Self::Rotor37Heavy,
@@ -281,7 +281,7 @@ pub struct RandomArguments {
 }
 
 impl LabCli {
-    /// Do what is asked for.
+    /// Runs the selected study.
     ///
     /// # Errors
     /// A study that fails, or files that cannot be written.

@@ -1,5 +1,6 @@
-//! How many component modes the reduced disk needs: frequency deviation (eq. 13) and residual convergence criterion
-//! (eq. 12) of the lowest modes of the disk against the number kept, as figs 9 and 10 of the paper.
+//! Number of component modes that the reduced disk needs: frequency deviation (eq. 13) and residual convergence
+//! criterion (eq. 12) of the lowest modes of the disk against the number of component modes, as in figs 9 and 10 of the
+//! paper.
 
 use serde_json::json;
 use tiprub_figure::{
@@ -11,10 +12,10 @@ use tiprub_packaging::rom_facts::{DEVIATION_LIMIT, RESIDUAL_LIMIT};
 use tiprub_shell::Result;
 use tiprub_study::{Picture, Sheet, Statement, Study, StudyFigure};
 
-/// Where the paper's figures end, in %.
+/// Upper limits of the paper's figures (%).
 const DEVIATION_SHOWN: f64 = 3.0;
 const RESIDUAL_SHOWN: f64 = 5.0;
-/// Modes of the disk that the paper asks for.
+/// Number of modes of the disk that the paper evaluates.
 const MODES: usize = 56;
 /// Changes of a frequency deviation below this are rounding of the eigenvalues (%).
 const ROUNDING: f64 = 1e-6;
@@ -49,7 +50,7 @@ const CRITERIA: [Criterion; 2] = [
 ];
 
 impl Criterion {
-    /// Largest magnitude over the modes compared; infinite where one of them is not known.
+    /// Returns the largest magnitude over the modes compared; infinite if one of them is unknown.
     fn worst(&self, row: &ConvergenceRow) -> f64 {
         let values = (self.values)(row);
         let known = values.len() >= MODES && values.iter().take(MODES).all(|value| !value.is_nan());
@@ -57,7 +58,7 @@ impl Criterion {
         if known { worst } else { f64::INFINITY }
     }
 
-    /// The fewest component modes per nodal diameter from which on the limit is kept.
+    /// Returns the smallest number of component modes per nodal diameter from which on the limit is met.
     fn enough<'a>(&self, rows: &'a [ConvergenceRow]) -> Option<&'a ConvergenceRow> {
         let good = rows.iter().rev().take_while(|row| self.worst(row) < self.limit);
         good.last()
@@ -116,7 +117,8 @@ impl Criterion {
     }
 }
 
-/// Both criteria at once, the largest over the modes: what decides how many component modes to keep.
+/// Returns the figure of both criteria, the largest value over the modes, which determines the number of component
+/// modes.
 fn worst_figure(rows: &[ConvergenceRow]) -> Result<StudyFigure> {
     let series = CRITERIA.iter().map(|criterion| {
         let points = rows.iter().map(|row| (row.modes as f64, criterion.worst(row)));
@@ -149,8 +151,8 @@ fn worst_figure(rows: &[ConvergenceRow]) -> Result<StudyFigure> {
     })
 }
 
-/// Whether modes appear by pairs: apart from those with n = 0 and n = N/2 every mode of a disk is double. `order` holds the nodal
-/// diameters of the lowest modes, double ones twice.
+/// Checks that modes occur in pairs: except those with n = 0 and n = N/2 every mode of a disk is double. `order` holds
+/// the nodal diameters of the lowest modes, double ones twice.
 fn pairs(rows: &[ConvergenceRow], order: &[usize], sectors: usize) -> Statement {
     let values =
         rows.last().map_or(&[][..], |row| &row.frequency_deviation[..row.frequency_deviation.len().min(MODES)]);
@@ -159,7 +161,7 @@ fn pairs(rows: &[ConvergenceRow], order: &[usize], sectors: usize) -> Statement 
         let number = order[index];
         let paired = values.get(index + 1).is_some_and(|next| next.to_bits() == values[index].to_bits());
         let single = number == 0 || 2 * number == sectors;
-        // A pair may be cut at the end of the list.
+        // The end of the list may split a pair.
         wrong += usize::from(single == paired && index + 1 < values.len());
         if single {
             alone.push(number.to_string());
@@ -181,7 +183,7 @@ fn pairs(rows: &[ConvergenceRow], order: &[usize], sectors: usize) -> Statement 
     )
 }
 
-/// Nodal diameters of the lowest modes of the disk, double ones twice, as the rows have them.
+/// Returns the nodal diameters of the lowest modes of the disk, double ones twice, in the order of the rows.
 fn disk_order(diameters: &[NodalDiameter], sectors: usize) -> Vec<usize> {
     let copies = |number: usize| if number == 0 || 2 * number == sectors { 1 } else { 2 };
     let mut modes: Vec<(f64, usize)> = diameters
@@ -195,11 +197,11 @@ fn disk_order(diameters: &[NodalDiameter], sectors: usize) -> Vec<usize> {
     modes.into_iter().map(|mode| mode.1).take(MODES).collect()
 }
 
-/// A reduced model is stiffer than the full one, and the less so the more component modes it has.
+/// Checks that a reduced model is stiffer than the full one, and less so with more component modes.
 fn monotone(rows: &[ConvergenceRow]) -> Statement {
     let changes = rows.windows(2).flat_map(|pair| {
         let [few, many] = [&pair[0], &pair[1]].map(|row| &row.frequency_deviation);
-        // A mode for which there is no room is infinitely far off, and may stay so.
+        // A mode that the model cannot represent has an infinite deviation, and may keep it.
         few.iter()
             .zip(many)
             .take(MODES)
@@ -219,10 +221,10 @@ fn monotone(rows: &[ConvergenceRow]) -> Statement {
     )
 }
 
-/// The study of a reduction that took so many `seconds`.
+/// Creates the study of a reduction that took `seconds`.
 ///
 /// # Errors
-/// A plot cannot be drawn.
+/// A plot that cannot be drawn.
 pub(crate) fn study(reduction: &CyclicReduction, seconds: f64, quick: bool) -> Result<Study> {
     let rows = &reduction.convergence;
     let rom = &reduction.rom;
@@ -282,7 +284,7 @@ mod tests {
     use super::*;
 
     fn row(modes: usize, deviation: f64) -> ConvergenceRow {
-        // A single mode, then pairs, as of one family.
+        // A single mode, then pairs, as in one family.
         let factor = |mode: usize| f64::from(u32::try_from(mode.div_ceil(2)).unwrap()) / 28.0;
         let values: Vec<f64> = (0..56).map(|mode| deviation * factor(mode)).collect();
         ConvergenceRow {
@@ -300,12 +302,12 @@ mod tests {
     #[test]
     fn criterion_counts_only_if_satisfied_from_then_on() {
         let rows = rows();
-        // One component mode alone is good by chance: two are worse again.
+        // A single component mode is accurate by chance: two are worse again.
         assert_eq!(CRITERIA[0].enough(&rows).unwrap().modes, 3);
         assert_eq!(CRITERIA[1].enough(&rows).unwrap().modes, 3);
         assert!(CRITERIA[0].enough(&rows[..3]).is_none());
         assert_eq!(CRITERIA[0].statement(&rows[..3]).holds, Some(false));
-        // Fewer modes than are spoken of, or one that is not a number, is not "each of them".
+        // With fewer modes than required, or a NaN, "each of them" is false.
         let mut short = rows.clone();
         short[4].frequency_deviation.truncate(55);
         assert_eq!(CRITERIA[0].statement(&short).holds, Some(false));

@@ -1,5 +1,5 @@
-//! A rub and a shaft in its bearings, stepped by turns: once per step, by iterations that go back to saved states, and by Newton's method with
-//! derivatives over the step or with differences.
+//! A rub and a shaft in its bearings, stepped alternately: once per step, by iterations from saved states, and by
+//! Newton's method with derivatives over the step or with differences.
 
 use std::f64::consts::TAU;
 use std::time::Instant;
@@ -16,20 +16,20 @@ use crate::stability::models;
 
 /// Communication steps (s).
 const STEPS: [f64; 4] = [2e-4, 1e-4, 5e-5, 2.5e-5];
-/// That of the run all others are judged by.
+/// Communication step of the reference run (s).
 const FINE: f64 = 6.25e-6;
 /// Length of the runs (s).
 const LENGTH: f64 = 7e-3;
-/// Iterations of a step at most.
+/// Maximum number of iterations of a step.
 const MOST: usize = 25;
-/// Newton's method goes at least this share of its way.
+/// Smallest fraction of a Newton step.
 const SHORTEST: f64 = 0.1;
-/// A step is solved when the shaft is within this share of the clearance of where its force puts it: a hundredth of the tolerance of the rub,
-/// whose forces jump by less than it where its steps change.
+/// A step is solved if the shaft is within this fraction of the clearance from the position that its force causes: a
+/// hundredth of the tolerance of the rub, whose forces jump by less than it when its steps change.
 const SOLVED: f64 = 1e-5;
-/// By how much an importer would move whirl for a difference (m).
+/// Change of the whirl by which an importer computes a difference (m).
 const MOVED: f64 = 1e-6;
-/// The unbalance would move the shaft on its springs by so much (m); it grows over a part of the run.
+/// Static displacement of the shaft on its springs by the unbalance (m), which grows over a part of the run.
 const UNBALANCE: f64 = 5e-5;
 const GROWTH: f64 = 2e-3;
 
@@ -47,7 +47,7 @@ const SHAFTS: [Shaft; 2] = [
     Shaft { name: "without mass", mass: 0.0, damping: 150.0, stiffness: 2e6 },
 ];
 
-/// Displacement (m) and velocity (m/s) of the shaft's centre.
+/// Displacement (m) and velocity (m/s) of the shaft centre.
 #[derive(Debug, Clone, Copy, Default)]
 struct ShaftMotion {
     place: Vector2<f64>,
@@ -55,7 +55,8 @@ struct ShaftMotion {
 }
 
 impl Shaft {
-    /// Where a mean force (N) puts it after `step` (s), by the midpoint rule: x₁ = free + compliance·F.
+    /// Returns the position after `step` (s) as a function of the mean force (N), by the midpoint rule: x₁ = free +
+    /// compliance·F.
     fn law(&self, at: ShaftMotion, step: f64, unbalance: Vector2<f64>) -> (Vector2<f64>, f64) {
         let inertia = 2.0 * self.mass / (step * step) + self.damping / step;
         let compliance = 1.0 / (inertia + 0.5 * self.stiffness);
@@ -63,7 +64,7 @@ impl Shaft {
         ((kept + unbalance) * compliance, compliance)
     }
 
-    /// Force of the unbalance in the middle of a step (N).
+    /// Returns the force of the unbalance in the middle of a step (N).
     fn unbalance(&self, speed: f64, time: f64) -> Vector2<f64> {
         let grown = 0.5 * (1.0 - (0.5 * TAU * (time / GROWTH).min(1.0)).cos());
         let (sine, cosine) = (speed * time).sin_cos();
@@ -74,13 +75,13 @@ impl Shaft {
 /// Method of stepping both models.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum CouplingMethod {
-    /// The shaft goes by the last force, then the rub by the shaft.
+    /// The shaft is stepped with the last force, then the rub with the new shaft position.
     Once,
-    /// Again and again with the force found, from a saved state.
+    /// Repeated with the resulting force, from a saved state.
     FixedPoint,
     /// Newton's method with derivatives over the step.
     Newton,
-    /// The same with differences of steps repeated from a saved state.
+    /// Newton's method with differences of steps repeated from a saved state.
     Differences,
 }
 
@@ -100,9 +101,9 @@ impl CouplingMethod {
 /// Result of a run.
 #[derive(Debug, Clone, Default)]
 struct CouplingRun {
-    /// At multiples of the longest step.
+    /// Displacement of the shaft at multiples of the longest step.
     orbit: Vec<Vector2<f64>>,
-    /// Steps of the rub, those repeated and those of differences included, per communication step.
+    /// Steps of the rub per communication step, including repeated ones and those for differences.
     steps: f64,
     /// Derivatives per communication step.
     derivatives: f64,
@@ -134,7 +135,7 @@ impl CoupledRub {
         Ok(Self { simulation, inputs, outputs, state, steps: 0, derivatives: 0 })
     }
 
-    /// Mean force over the step from the saved state to `whirl`.
+    /// Returns the mean force over the step from the saved state to `whirl`.
     fn force(&mut self, whirl: Vector2<f64>, step: f64) -> tiprub_core::Result<Vector2<f64>> {
         self.simulation.restore_state(&self.state)?;
         self.steps += 1;
@@ -144,7 +145,7 @@ impl CoupledRub {
         Ok(Vector2::new(self.simulation.real(self.outputs[0])?, self.simulation.real(self.outputs[1])?))
     }
 
-    /// ∂force/∂whirl over the step done last.
+    /// Returns ∂force/∂whirl over the last step.
     fn derivative(&mut self) -> tiprub_core::Result<Matrix2<f64>> {
         let mut all = Matrix2::zeros();
         for (column, input) in self.inputs.into_iter().enumerate() {
@@ -156,7 +157,7 @@ impl CoupledRub {
         Ok(all)
     }
 
-    /// The same from two more steps, moved by [`MOVED`].
+    /// Returns this derivative from two more steps, moved by [`MOVED`].
     fn difference(&mut self, whirl: Vector2<f64>, force: Vector2<f64>, step: f64) -> tiprub_core::Result<Matrix2<f64>> {
         let x = (self.force(whirl + Vector2::new(MOVED, 0.0), step)? - force) / MOVED;
         let y = (self.force(whirl + Vector2::new(0.0, MOVED), step)? - force) / MOVED;
@@ -193,7 +194,7 @@ fn march(scene: &Scene, shaft: Shaft, way: CouplingMethod, step: f64) -> tiprub_
                     matrix.lu().solve(&left).unwrap_or(left)
                 }
             };
-            // Forces have kinks, across which Newton's method may go to and fro: shorter then.
+            // Forces have kinks, across which Newton's method may oscillate; the step is then shortened.
             let (from, before) = (place, left.norm());
             let mut share = 1.0;
             loop {
@@ -218,7 +219,7 @@ fn march(scene: &Scene, shaft: Shaft, way: CouplingMethod, step: f64) -> tiprub_
     Ok(found)
 }
 
-/// Largest distance of two orbits as a share of the clearance.
+/// Returns the largest distance of two orbits as a fraction of the clearance.
 fn distance(one: &CouplingRun, other: &CouplingRun, clearance: f64) -> f64 {
     one.orbit.iter().zip(&other.orbit).map(|(one, other)| (one - other).norm()).fold(0.0, f64::max) / clearance
 }
@@ -233,7 +234,7 @@ fn scene(arguments: &StudyCommon, console: &Console) -> Result<Scene> {
     Ok(scene)
 }
 
-/// A way, a communication step (s), and what came of it with its error; nothing where the run failed.
+/// A method, a communication step (s), and its result with the error; `None` if the run failed.
 type CouplingRow = (CouplingMethod, f64, Option<(CouplingRun, f64)>);
 
 /// All runs with one shaft.
@@ -254,7 +255,7 @@ fn runs(scene: &Scene, shaft: Shaft, console: &Console) -> Result<CouplingRuns> 
     for way in CouplingMethod::ALL {
         for step in STEPS {
             task.at(all.len() as u64);
-            // A shaft thrown through the casing is what a way that does not converge may end in.
+            // A method that does not converge may throw the shaft through the casing.
             let found = march(scene, shaft, way, step).ok();
             all.push((way, step, found.map(|found| (found.clone(), distance(&found, &fine, clearance)))));
         }
@@ -320,7 +321,7 @@ fn figure(runs: &CouplingRuns, name: &'static str) -> Result<StudyFigure> {
     })
 }
 
-/// Communication steps of all runs of one way.
+/// Returns the communication steps of all runs of one method.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "constants: some hundreds of steps")]
 fn steps_of_all() -> usize {
     STEPS.iter().map(|step| (LENGTH / step).round() as usize).sum()
@@ -370,7 +371,7 @@ fn statements(runs: &CouplingRuns) -> Vec<Statement> {
     ]
 }
 
-/// The study.
+/// Runs the study.
 ///
 /// # Errors
 /// A model that cannot be reduced, a fine run that fails, a plot that cannot be drawn.

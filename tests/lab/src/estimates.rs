@@ -1,5 +1,6 @@
-//! Estimates of what steps, modes, patches and the mesh leave, against the truth: rubs of rotor 37, each refined far in one direction. Those of
-//! the mesh are made from one coarser mesh, and from two, as `tiprub study convergence` does it.
+//! Estimates of the discretisation errors of steps, modes, patches and mesh, against the true errors: rubs of rotor 37,
+//! each refined far in one direction. The mesh error is estimated from one coarser mesh, and from two, as `tiprub study
+//! convergence` does.
 
 use serde_json::{Value, json};
 use tiprub_core::{Rom, Scene};
@@ -21,7 +22,8 @@ use tiprub_study::{
 
 use crate::cli::EstimatesArguments;
 
-/// Rubs of one model: elements of its mesh, of two coarser ones (the coarsest first) and of the true one, modes, and depths of the bumps, friction coefficients and speeds (rad/s), each with each.
+/// Rubs of one model: elements of its mesh, of two coarser ones (the coarsest first) and of the reference, modes, and
+/// depths of the bumps, friction coefficients and speeds (rad/s) in all combinations.
 struct RubGroup {
     mesh: [usize; 3],
     coarser: [[usize; 3]; 2],
@@ -32,7 +34,7 @@ struct RubGroup {
     speeds: &'static [f64],
 }
 
-/// The first group is the one that the bounds of [`estimate`] were chosen with, the second is not.
+/// The first group was used to choose the bounds of [`estimate`], the second was not.
 static GROUPS: [RubGroup; 2] = [
     RubGroup {
         mesh: [16, 1, 16],
@@ -58,17 +60,17 @@ const INTERVAL: f64 = 4e-6;
 const DIVISION: u32 = 8;
 const LENGTH: f64 = 5e-3;
 const QUICK_LENGTH: f64 = 2e-3;
-/// Own patches, and what stands for the truth.
+/// Number of patches of the model, and of the reference.
 const PATCHES: usize = 9;
 const TRUE_MODES: usize = 200;
 const TRUE_PATCHES: usize = 17;
 const TRUE_DIVISION: u32 = 64;
-/// An estimate is right where it is within this factor of the truth.
+/// An estimate is correct if it is within this factor of the true error.
 const FACTOR: f64 = 3.0;
-/// Errors below this are as good as none: 1e-4 of displacements is beyond what anybody asks of a rub.
+/// Errors below this are negligible: 1e-4 of displacements is beyond any requirement on a rub.
 const NONE: f64 = 1e-4;
 const DIRECTIONS: [&str; 5] = ["steps", "modes", "patches", "mesh (one coarser mesh)", "mesh (two coarser meshes)"];
-/// Number of directions that the product estimates from the scene alone.
+/// Number of directions that the product estimates without further models.
 const OF_SCENE: usize = 3;
 
 /// Estimated and true errors of the displacements.
@@ -80,14 +82,14 @@ struct Compared {
     truth: Option<f64>,
 }
 
-/// One rub: its group, and with its own model and others.
+/// A rub: its group, and its scene with the original and other models.
 struct EstimatedRub {
     name: String,
     group: &'static RubGroup,
     own: Scene,
     modes: Scene,
     patches: Scene,
-    /// The coarsest first.
+    /// Scenes on coarser meshes, the coarsest first.
     coarser: [Scene; 2],
     finer: Scene,
 }
@@ -114,11 +116,12 @@ fn rubs(quick: bool, console: &Console) -> Result<Vec<EstimatedRub>> {
     Ok(found)
 }
 
-/// The own model of a group, with more modes, with more patches, on the coarser meshes and on the true one.
+/// Returns the model of a group, and variants with more modes, with more patches, on the coarser meshes and on the
+/// reference mesh.
 fn roms(group: &RubGroup, console: &Console) -> Result<[Rom; 6]> {
     let rom = |[chord, thickness, span]: [usize; 3], modes: usize, patches: usize| {
         let mesh = MeshCounts { chord, thickness, span };
-        // Nobody reads the checks of these.
+        // The checks of these models are not used.
         let own = Rotor37Options::default();
         let options = Rotor37Options { mesh, tip: TipContact::Patches(patches), modes, checked_modes: 1, ..own };
         reduction::rotor37(&options, console).map(|found| found.rom)
@@ -140,7 +143,7 @@ fn run(scene: &Scene, division: u32, samples: usize) -> Result<RunSummary> {
     march(&scene, &[], division, samples).map_err(|why| Failure::new(&scene.settings.name, why, ""))
 }
 
-/// Edges of the elements, up to a factor.
+/// Returns the edge length of the elements, up to a factor.
 fn edge([chord, _, span]: [usize; 3]) -> f64 {
     1.0 / ((chord * span) as f64).sqrt()
 }
@@ -159,7 +162,7 @@ fn of_mesh(rub: &EstimatedRub, own: &RunSummary, samples: usize) -> [Option<f64>
     [two, three].map(|limit| limit.map(|limit| limit.rest))
 }
 
-/// One rub over its mesh.
+/// Compares estimated and true mesh errors of one rub.
 fn compared_over_meshes(rubs: &[EstimatedRub], scene: usize, samples: usize) -> Result<Vec<Compared>> {
     let rub = &rubs[scene];
     let own = run(&rub.own, DIVISION, samples)?;
@@ -168,7 +171,7 @@ fn compared_over_meshes(rubs: &[EstimatedRub], scene: usize, samples: usize) -> 
     Ok(of_mesh(rub, &own, samples).into_iter().enumerate().map(of).collect())
 }
 
-/// The same in the directions that a scene tells of itself.
+/// Compares estimated and true errors in the directions that need no further models.
 fn compared_by_itself(rubs: &[EstimatedRub], scene: usize, samples: usize) -> Result<Vec<Compared>> {
     let quiet = Console::new(true, false);
     let rub = &rubs[scene];
@@ -204,7 +207,7 @@ fn statement(all: &[Compared], direction: usize) -> Statement {
     )
 }
 
-/// The same of every group, with true errors and ratios.
+/// Returns statements on the true errors and ratios of every group.
 fn groups(rubs: &[EstimatedRub], all: &[Compared], direction: usize) -> Vec<Statement> {
     let of = |(group, number): (&'static RubGroup, usize)| {
         let own = |one: &&Compared| one.direction == direction && core::ptr::eq(rubs[one.scene].group, group);
@@ -252,10 +255,10 @@ fn figure(all: &[Compared]) -> Result<StudyFigure> {
     })
 }
 
-/// The study.
+/// Runs the study.
 ///
 /// # Errors
-/// A model that cannot be reduced, a run of the own model that fails, a plot that cannot be drawn.
+/// A model that cannot be reduced, a failed run of the unrefined model, a plot that cannot be drawn.
 pub(crate) fn study(arguments: &EstimatesArguments, console: &Console) -> Result<Study> {
     let (arguments, mesh_only) = (&arguments.common, arguments.mesh_only);
     let rubs = rubs(arguments.quick, console)?;

@@ -1,5 +1,5 @@
-//! What the communication step does to inputs that move or load something: each as a staircase of values, with derivatives
-//! and held, beside a run whose communication step is the internal one.
+//! Effect of the communication step on inputs that move or load a structure: each as a staircase of values, with
+//! derivatives and held, compared with a run whose communication step is the internal one.
 
 use std::f64::consts::{PI, TAU};
 
@@ -18,9 +18,9 @@ use crate::stability::models;
 
 /// Communication steps (s); the first is the internal step.
 const STEPS: [f64; 3] = [1e-6, 1e-5, 1e-4];
-/// Torque is averaged over parts of the run of this length (s), the same for all communication steps.
+/// Length of the parts of the run over which the torque is averaged (s), equal for all communication steps.
 const PART: f64 = 1e-4;
-/// Radius of the whirl (m), its speed (rad/s), and the time in which it grows (s).
+/// Radius of the whirl (m), its speed (rad/s), and the time of its growth (s).
 const WHIRL: (f64, f64, f64) = (0.39e-3, 600.0, 2e-3);
 /// Depth of casing or bumps beyond the clearance (m).
 const DEPTH: f64 = 3e-5;
@@ -60,7 +60,7 @@ struct InputCase {
     name: &'static str,
     title: &'static str,
     scene: Scene,
-    /// Inputs (all elements alike) and their values at a time (s).
+    /// Inputs (all elements equal) and their values at a time (s).
     values: fn(&Scene, f64, f64) -> Vec<(&'static str, f64)>,
 }
 
@@ -75,12 +75,12 @@ struct InputRun {
     mean: f64,
 }
 
-/// Grows smoothly from 0 to 1.
+/// Returns a value that grows smoothly from 0 to 1.
 fn grown(share: f64) -> f64 {
     0.5 * (1.0 - (PI * share.clamp(0.0, 1.0)).cos())
 }
 
-/// Smoothly from 0 to 1 and back over the run.
+/// Returns a value that changes smoothly from 0 to 1 and back over the run.
 fn swing(time: f64, length: f64) -> f64 {
     0.5 * (1.0 - (TAU * time / length).cos())
 }
@@ -108,7 +108,7 @@ fn temperature(_: &Scene, time: f64, length: f64) -> Vec<(&'static str, f64)> {
     vec![("casing_temperature", -COOLING * swing(time, length))]
 }
 
-/// All courses; the quick ones on models of a few masses and springs, which need no reduction.
+/// Returns all courses; the quick ones on models of a few masses and springs, which need no reduction.
 fn courses(arguments: &StudyCommon, console: &Console) -> Result<Vec<InputCase>> {
     let (rigid, elastic) = if arguments.quick {
         let mut elastic = models::bumps(models::blade(12));
@@ -118,7 +118,7 @@ fn courses(arguments: &StudyCommon, console: &Console) -> Result<Vec<InputCase>>
     } else {
         let cache = arguments.cache.cache();
         let load = |name| scene_source::load(name, &cache, console);
-        // The page has the figures of three nodes, which the step below does.
+        // The page contains the figures of three nodes, which match the step below.
         let of_nodes = |name| -> Result<Scene> {
             let mut scene = load(name)?;
             scene.roms[0].clone_from(&load("builtin:rotor37-paper")?.roms[0]);
@@ -160,7 +160,7 @@ fn courses(arguments: &StudyCommon, console: &Console) -> Result<Vec<InputCase>>
 }
 
 impl InputCase {
-    /// One run by communication steps of `step` (s).
+    /// Runs one case with communication steps of `step` (s).
     fn run(&self, way: InputMethod, step: f64, length: f64) -> Result<InputRun> {
         let mut scene = self.scene.clone();
         if way == InputMethod::Hold {
@@ -195,7 +195,7 @@ impl InputCase {
         Ok(found)
     }
 
-    /// Set the inputs at the first of two communication points.
+    /// Sets the inputs at the first of two communication points.
     fn give(
         &self,
         simulation: &mut Simulation,
@@ -209,7 +209,7 @@ impl InputCase {
             let Some((first, count, quantity)) = row else { continue };
             for reference in (first..).take(count) {
                 simulation.set_real(reference, value)?;
-                // A parameter has no derivative: of it that way sets where it is to be at the end.
+                // A parameter has no derivative: this method sets it to its value at the end.
                 if way == InputMethod::Derivatives && quantity == Quantity::GapOffset {
                     simulation.set_real(reference, next)?;
                 } else if way == InputMethod::Derivatives {
@@ -221,7 +221,7 @@ impl InputCase {
     }
 }
 
-/// All runs of a course: the fine one, then by ways and steps.
+/// All runs of a course: the fine one, then by input methods and steps.
 struct InputRuns {
     fine: InputRun,
     by_way: Vec<[InputRun; 3]>,
@@ -306,7 +306,7 @@ fn statements(course: &InputCase, runs: &InputRuns) -> [Statement; 2] {
     ]
 }
 
-/// The study.
+/// Runs the study.
 ///
 /// # Errors
 /// A model that cannot be reduced, a run that fails, a plot that cannot be drawn.

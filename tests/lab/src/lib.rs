@@ -1,15 +1,16 @@
-//! The laboratory: evidence for the product, one command per study. Nothing of it ships.
+//! The laboratory: evidence for the product, one command per study. It is not part of a release.
 //!
-//! - `error`: error against run time of built-in scenes and standard problems, beside methods that share no code with the product;
-//! - `stability`: stiff and extreme cases, each in a process of its own, judged;
-//! - `random`: random valid scenes, small and violent, with what must hold of each;
-//! - `cube`, `stage`, `convergence`, `modes`: what the paper's figures show of the models that ship;
-//! - `beside`: any scene of blades beside an independent stepper;
-//! - `witness`: reduced blades against full finite elements; `bases`: what a blade is reduced to;
+//! - `error`: error against run time of built-in scenes and standard problems, compared with methods that share no code
+//!   with the product;
+//! - `stability`: stiff and extreme cases, each in a separate process, with a verdict;
+//! - `random`: random valid scenes, small and violent, with the properties that each must have;
+//! - `cube`, `stage`, `convergence`, `modes`: comparison of the built-in models with the paper's figures;
+//! - `beside`: any scene of blades compared with an independent stepper;
+//! - `witness`: reduced blades against full finite elements; `bases`: reduction bases of a blade;
 //! - `scatter`: adaptive steps on random rubs and sectors;
-//! - `conjugacy`: forces, moments and work on both sides of contacts; `inputs`: what the communication step does;
-//! - `coupling`: a rub and a shaft stepped by turns, with and without derivatives over the step;
-//! - `wear`: one blade in a coating, lobes of the wear beside its vibrations.
+//! - `conjugacy`: forces, moments and work on both sides of contacts; `inputs`: effect of the communication step;
+//! - `coupling`: a rub and a shaft stepped alternately, with and without derivatives over the step;
+//! - `wear`: one blade in a coating, wear lobes compared with its vibrations.
 
 #![warn(unreachable_pub)]
 mod bases;

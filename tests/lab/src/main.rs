@@ -1,4 +1,4 @@
-//! `lab`: the studies that are evidence for the product.
+//! `lab`: the studies that provide evidence for the product.
 
 use std::{ffi::OsString, process::ExitCode};
 

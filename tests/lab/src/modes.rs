@@ -17,7 +17,7 @@ use tiprub_study::{Picture, Sheet, Statement, Study, StudyFigure, map::predictio
 /// Azimuth and elevation of the pictures of a sector (rad).
 const AZIMUTH: f64 = 1.0;
 const ELEVATION: f64 = 0.3;
-/// Displacements are drawn so that the largest is this share of the sector's height.
+/// Largest drawn displacement, as a fraction of the sector's height.
 const DRAWN_DISPLACEMENT: f64 = 0.08;
 /// Families of frequencies in the diagram.
 const FAMILIES: usize = 8;
@@ -27,10 +27,10 @@ const SHAPES: [(usize, usize); 8] = [(0, 0), (2, 0), (2, 1), (2, 2), (4, 0), (4,
 const FLAT: f64 = 1e-3;
 /// Spread of a flat family (%).
 const FLAT_SPREAD: f64 = 5.0;
-/// Relative distance below which an engine order is said to meet a mode.
+/// Relative distance within which an engine order is considered to excite a mode.
 const NEAR: f64 = 0.05;
 
-/// The engine order that meets a mode of a nodal diameter at the nearest frequency, among those up to `most`.
+/// Returns the engine order that excites a mode of a nodal diameter at the nearest frequency, among those up to `most`.
 fn nearest_order(number: usize, frequency: f64, turns: f64, sectors: usize) -> Option<usize> {
     let most = (1.5 * frequency / turns).ceil().max(2.0 * sectors as f64);
     let orders = (1_u32..).take_while(|order| f64::from(*order) <= most).map(|order| order as usize);
@@ -98,7 +98,7 @@ fn diagram(diameters: &[NodalDiameter], sectors: usize, speed: f64) -> Result<St
     })
 }
 
-/// Pictures of mode shapes of one sector, at the phase of largest displacement.
+/// Draws mode shapes of one sector, at the phase of largest displacement.
 fn shapes(mesh: &Mesh, diameters: &[NodalDiameter]) -> StudyFigure {
     let surface: MeshSurface = surface_of(mesh);
     let view = ViewPoint::of_blade(&surface, AZIMUTH, ELEVATION);
@@ -134,7 +134,8 @@ fn shapes(mesh: &Mesh, diameters: &[NodalDiameter]) -> StudyFigure {
     }
 }
 
-/// Real displacements of a complex shape at the phase in which its largest node is farthest out.
+/// Returns the real displacements of a complex shape at the phase in which the displacement of its largest node is
+/// maximal.
 fn at_largest(shape: &[[nalgebra::Complex<f64>; 3]]) -> Vec<[f64; 3]> {
     let square = |vector: &[nalgebra::Complex<f64>; 3]| vector.iter().map(nalgebra::Complex::norm_sqr).sum::<f64>();
     let largest = shape.iter().max_by(|a, b| square(a).total_cmp(&square(b)));
@@ -151,7 +152,8 @@ fn length(vector: [f64; 3]) -> f64 {
     vector.iter().map(|component| component * component).sum::<f64>().sqrt()
 }
 
-/// Disk and blades take turns: a family of blades is flat over the nodal diameters, the disk stiffens with their number.
+/// States that disk and blade modes interact: a family of blades is flat over the nodal diameters, the disk stiffens
+/// with their number.
 fn flat_families(diameters: &[NodalDiameter]) -> Statement {
     let half = &diameters[diameters.len() / 2..];
     let first = |diameter: &NodalDiameter| diameter.full_frequencies.first().copied().unwrap_or(f64::NAN);
@@ -173,7 +175,7 @@ fn flat_families(diameters: &[NodalDiameter]) -> Statement {
 
 fn disk_stiffens(diameters: &[NodalDiameter]) -> Statement {
     let first: Vec<f64> = diameters.iter().filter_map(|diameter| diameter.full_frequencies.first().copied()).collect();
-    // A family of blades is flat: mesh and curvature of the diagram leave it falling by a trace.
+    // A family of blades is flat, but mesh and curvature of the diagram cause a slight decrease.
     let fall = first.windows(2).skip(1).map(|pair| 1.0 - pair[1] / pair[0]).fold(0.0, f64::max);
     let [zero, low, high] = [first.first(), first.get(1), first.last()].map(|one| one.copied().unwrap_or(f64::NAN));
     Statement::tested(
@@ -192,7 +194,7 @@ fn disk_stiffens(diameters: &[NodalDiameter]) -> Statement {
     )
 }
 
-/// Modes that an engine order meets within [`NEAR`] at this speed, lowest orders first.
+/// States the modes that an engine order excites within [`NEAR`] at this speed, lowest orders first.
 fn resonances(sheet: &Sheet) -> Statement {
     let near = sheet.rows.iter().filter(|row| (row[5] / row[2] - 1.0).abs() < NEAR && row[1] <= 3.0);
     let mut near: Vec<&Vec<f64>> = near.collect();
@@ -208,7 +210,7 @@ fn resonances(sheet: &Sheet) -> Statement {
     )
 }
 
-/// The modes drawn, as a VTK file of the sector for ParaView and others.
+/// Returns the modes drawn as a VTK file of the sector, for ParaView and others.
 fn vtk(mesh: &Mesh, diameters: &[NodalDiameter]) -> Result<Vec<u8>> {
     let mut fields = Vec::new();
     for (number, mode) in SHAPES {
@@ -219,11 +221,11 @@ fn vtk(mesh: &Mesh, diameters: &[NodalDiameter]) -> Result<Vec<u8>> {
     tiprub_model::vtk::write(mesh, &fields).map_err(|error| Failure::from_below("VTK file", error))
 }
 
-/// The study of a reduction of the sector `mesh`, with the engine orders of `speed` (rad/s); without one, of the speed at
-/// which an oval casing meets the first mode of nodal diameter 2.
+/// Creates the study of a reduction of the sector `mesh`, with the engine orders of `speed` (rad/s); without a speed,
+/// the one at which an oval casing excites the first mode of nodal diameter 2.
 ///
 /// # Errors
-/// A plot cannot be drawn.
+/// A plot that cannot be drawn.
 pub(crate) fn study(reduction: &CyclicReduction, mesh: &Mesh, speed: Option<f64>, quick: bool) -> Result<Study> {
     let diameters = &reduction.nodal_diameters;
     let sectors = reduction.rom.sectors;
@@ -273,7 +275,7 @@ pub(crate) fn study(reduction: &CyclicReduction, mesh: &Mesh, speed: Option<f64>
 mod tests {
     use super::*;
 
-    /// Frequencies of a chain of equal blades coupled through their feet.
+    /// Returns the frequencies of a chain of equal blades coupled through their feet.
     fn chain(number: usize, sectors: usize) -> NodalDiameter {
         let sine = (std::f64::consts::PI * number as f64 / sectors as f64).sin();
         let frequencies: Vec<f64> = [100.0, 250.0].map(|f: f64| (f * f + 4.0 * 300.0 * sine * sine).sqrt()).to_vec();
@@ -290,7 +292,7 @@ mod tests {
 
     #[test]
     fn finds_the_nearest_engine_order_of_a_nodal_diameter() {
-        // 10 turns a second, 12 sectors: n = 2 is excited by the orders 2, 10, 14, 22 ...
+        // 10 revolutions per second, 12 sectors: n = 2 is excited by the orders 2, 10, 14, 22 ...
         assert_eq!(nearest_order(2, 95.0, 10.0, 12), Some(10));
         assert_eq!(nearest_order(2, 130.0, 10.0, 12), Some(14));
         assert_eq!(nearest_order(0, 5.0, 10.0, 12), Some(12));
@@ -309,7 +311,7 @@ mod tests {
         assert_eq!(flat_families(&diameters).holds, Some(true));
         let falling: Vec<_> = (0..=6).map(|number| chain(6 - number, 12)).collect();
         assert_eq!(disk_stiffens(&falling).holds, Some(false));
-        // Falling to the last but one and rising by one step is not rising.
+        // A family that falls to the last but one and rises by one step is not rising.
         let valley: Vec<_> = (0..=6).map(|number: usize| chain(if number == 6 { 1 } else { 5 - number }, 12)).collect();
         assert_eq!(disk_stiffens(&valley).holds, Some(false));
     }

@@ -1,5 +1,5 @@
-//! What refining the standard scenes changes: rubs of rotor 37 and of the stage, with friction and without, over patches, meshes, modes and
-//! steps; where each sequence goes, and the error of the scene as it ships.
+//! Effects of refining the standard scenes: rubs of rotor 37 and of the stage, with and without friction, over patches,
+//! meshes, modes and steps; the limit of each sequence, and the error of the scene as built in.
 
 use serde_json::json;
 use tiprub_core::{
@@ -29,23 +29,24 @@ use tiprub_study::{
 
 use crate::cli::RefinementArguments;
 
-/// Depth of the bumps around rotor 37: they intrude by 2·depth − 1 of the gap.
+/// Depth of the bumps around rotor 37, which intrude by 2·depth − 1 of the gap.
 const LIGHT: f64 = 0.6;
 const HEAVY: f64 = 1.0;
 /// Friction coefficient of the scenes with friction.
 const FRICTION: f64 = 0.15;
-/// Scenes that are drawn together.
+/// Families of scenes that share a picture.
 const FAMILIES: [&str; 2] = ["rotor37", "stage"];
-/// Family of scenes that are in no picture.
+/// Family of scenes without a picture.
 const APART: &str = "apart";
 /// Tips of a blade of the stage: two rows of patches, and three nodes.
 const STAGE_TIPS: [(TipContact, &str, &str); 2] =
     [(TipContact::Rows([9, 2]), "stage", "9 × 2 patches"), (TipContact::Nodes(3), "stage-nodes", "3 contact nodes")];
-/// Friction coefficients of the stage: none, less than its tip digs in with, and more.
+/// Friction coefficients of the stage: none, below the lock-up friction of its tip, and above.
 const STAGE_FRICTIONS: [(f64, &str); 3] = [(0.0, "-smooth"), (0.05, ""), (FRICTION, "-digging")];
-/// The mesh of its sector, so that the one that ships is the finest of four: to reduce a finer one takes many minutes.
+/// Mesh factor of its sector, so that the built-in mesh is the finest of four: reducing a finer one takes many minutes.
 const STAGE_MESH: f64 = core::f64::consts::FRAC_1_SQRT_2;
-/// Spaces between contact points of the finest tip of the stage, times those of the scene: its mesh has places for 17 patches.
+/// Number of spaces between contact points of the finest tip of the stage, as a multiple of the scene: its mesh
+/// provides points for 17 patches.
 const STAGE_FINEST: usize = 2;
 
 /// One scene of the study.
@@ -55,9 +56,9 @@ struct Standard {
     /// Picture of the scene: `rotor37` or `stage`, or none.
     family: &'static str,
     settings: SceneSettings,
-    /// Tip and mesh of the structure that touches, instead of what the scene names.
+    /// Tip and mesh of the touching structure, instead of those of the scene.
     other: Option<(TipContact, f64)>,
-    /// Spaces between contact points of the finest tip, times its own.
+    /// Number of spaces between contact points of the finest tip, as a multiple of the scene.
     finest_tip: usize,
 }
 
@@ -114,7 +115,7 @@ impl Standard {
     }
 }
 
-/// Results of a scene, or why it does not run.
+/// Results of a scene, or the reason why it does not run.
 struct RefinementCase {
     title: String,
     name: String,
@@ -123,7 +124,7 @@ struct RefinementCase {
     seconds: f64,
 }
 
-/// The study.
+/// Runs the study.
 ///
 /// # Errors
 /// A model that cannot be reduced, a plot that cannot be drawn.
@@ -196,11 +197,11 @@ fn statements(case: &RefinementCase) -> Vec<Statement> {
     }
 }
 
-/// Headings of a table; the sixth is the [energy].
+/// Headings of a table; the sixth is the one of [energy].
 const HEADINGS: [&str; 7] =
     ["refined", "value", "displacements", "impulse (N·s)", "error", "friction work or strain energy (J)", "error"];
 
-/// "1.2 %"; in brackets how far it is from the finest level, where no limit is read.
+/// Returns "1.2 %"; in brackets the distance from the finest level if no limit could be determined.
 fn percent(error: Option<f64>, to_finest: Option<f64>) -> String {
     let reported = |error: f64| match 100.0 * error {
         small if small < 0.095 => format!("{small:.3} %"),
@@ -213,12 +214,13 @@ fn percent(error: Option<f64>, to_finest: Option<f64>) -> String {
     }
 }
 
-/// Returns the energy that is compared, counted with the displacements: strain energy of a scene without friction, else the work of friction.
+/// Returns the energy that is compared, as an index after the displacements: strain energy of a scene without friction,
+/// otherwise the work of friction.
 fn energy(refined: &Refined) -> usize {
     if refined.ran().iter().any(|(_, run)| run.friction_work > 0.0) { 2 } else { 4 }
 }
 
-/// Returns the name of a direction in a word or two.
+/// Returns a short name of a direction.
 fn short(direction: &RefinementDirection) -> &str {
     match direction.name {
         refine::STEP if direction.unit == refine::OF_CLEARANCE => "tolerance",
@@ -228,7 +230,7 @@ fn short(direction: &RefinementDirection) -> &str {
     }
 }
 
-/// The levels of a direction with their errors, and its limit.
+/// Returns the levels of a direction with their errors, and its limit.
 fn rows(refined: &Refined) -> Vec<Vec<String>> {
     let energy = energy(refined);
     let direction = &refined.direction;
@@ -279,7 +281,7 @@ fn rows(refined: &Refined) -> Vec<Vec<String>> {
     levels.chain((direction.levels.len() > 2).then_some(last)).collect()
 }
 
-/// The beginning of a reason: it stands whole in the statements.
+/// Returns the beginning of a reason, which the statements contain in full.
 fn first_words(why: &str) -> String {
     why.split_whitespace().take(18).collect::<Vec<_>>().join(" ")
 }
@@ -298,7 +300,7 @@ fn tables(case: &RefinementCase) -> Vec<Table> {
     vec![Table { rows: directions.flat_map(rows).collect(), ..Table::new(caption, headings) }]
 }
 
-/// Error of the scene as it stands: a row per scene, a column per direction.
+/// Returns the table of the errors of the unrefined scenes: a row per scene, a column per direction.
 fn summary(cases: &[RefinementCase]) -> Table {
     let mut table = Table::new(
         "Error of the displacements of the unrefined scene (relative L2)",
@@ -382,7 +384,7 @@ const PICTURES: [(&str, &str, &str, [&str; 3]); 10] = [
     ),
 ];
 
-/// Pictures per family of scenes and direction, a curve per scene.
+/// Returns the pictures per family of scenes and direction, with a curve per scene.
 fn pictures(cases: &[RefinementCase]) -> Result<Vec<StudyFigure>> {
     let mut figures = Vec::new();
     for (family, direction, label, names) in PICTURES {
@@ -394,7 +396,7 @@ fn pictures(cases: &[RefinementCase]) -> Result<Vec<StudyFigure>> {
     Ok(figures)
 }
 
-/// Errors of one quantity over the levels of a direction; `None` where no scene has them.
+/// Draws the errors of one quantity over the levels of a direction; `None` if no scene has them.
 fn picture(
     cases: &[&RefinementCase],
     (direction, label): (&str, &str),
@@ -455,7 +457,7 @@ mod tests {
         let names: std::collections::BTreeSet<&str> = PICTURES.iter().flat_map(|(.., names)| *names).collect();
         assert_eq!(names.len(), 3 * PICTURES.len(), "a picture is written over another");
         assert!(all.iter().all(|standard| FAMILIES.contains(&standard.family) || standard.family == APART));
-        // The scene that ships has two rows, and the other one is held beside it.
+        // The built-in scene has two rows, and the other one is compared with it.
         let rows = |name: &str| of(name).settings.structures[0].rom.clone();
         assert_eq!(["rotor37-light", "rotor37-one-row"].map(rows), ["builtin:rotor37", "builtin:rotor37-one-row"]);
     }

@@ -1,10 +1,10 @@
-//! `lab error` in its quick form: what must be true of errors whatever the machine.
+//! `lab error` in its quick form: properties of errors that hold on every machine.
 
 use std::{fs, path::Path, process::Command};
 
 use serde_json::Value;
 
-/// Run the quick study of some scenes.
+/// Runs the quick study of some scenes.
 fn study(root: &Path, scenes: &[&str]) -> Value {
     let mut command = Command::new(env!("CARGO_BIN_EXE_lab"));
     command.current_dir(root).env("TIPRUB_CACHE", env!("CARGO_TARGET_TMPDIR")).env("SOURCE_DATE_EPOCH", "951782400");
@@ -23,7 +23,7 @@ fn study(root: &Path, scenes: &[&str]) -> Value {
     json
 }
 
-/// (step, value) of a competitor at the standard size, finest last; refusals have no value.
+/// Returns (step, value) of a competitor at the standard size, finest last; rejected runs have no value.
 fn values(scene: &Value, competitor: &str, key: &str) -> Vec<(f64, Option<f64>)> {
     let rows = scene["rows"].as_array().unwrap().iter();
     let own = rows.filter(|row| row["competitor"] == competitor && row["size"] == scene["standard_size"]);
@@ -42,13 +42,13 @@ fn bars_converge_with_elements_and_steps() {
         let truncation: Vec<f64> =
             scene["reference_from_truth"].as_array().unwrap().iter().map(|value| value.as_f64().unwrap()).collect();
         assert!(truncation.windows(2).all(|pair| pair[1] < 0.8 * pair[0]), "{truncation:?}");
-        // Modal-exact beats the paper's scheme at equal steps, and both outside methods find the same.
+        // Modal-exact is more accurate than the paper's scheme at equal steps, and both independent methods agree.
         let steps = |competitor| finest(scene, competitor, "error_of_steps");
         assert!(steps("modal-exact + lcp") < 0.3 * steps("central-difference + film"));
         assert!(steps("Moreau-Jean, implicit") < 1e-2);
-        // Film and lcp are the same with one contact; a massless contact node keeps its energy at an impact.
+        // Film and lcp agree with one contact; a massless contact node keeps its energy at an impact.
         assert_eq!(steps("modal-exact + lcp").to_bits(), steps("modal-exact + film").to_bits());
-        // Central differences are refused beyond their limit, and the refusal says so.
+        // Central differences are rejected beyond their limit, which the error states.
         let refused = values(scene, "central-difference + film", "seconds");
         assert!(refused.iter().filter(|(_, seconds)| seconds.is_none()).count() >= 2, "{refused:?}");
         let reason = scene["rows"].as_array().unwrap().iter().find_map(|row| row["refused"].as_str()).unwrap();
@@ -75,10 +75,10 @@ fn a_sticking_block_converges_to_its_closed_form() {
         .filter(|row| row["competitor"] == "galerkin + coulomb")
         .map(|row| row["total_error"].as_f64().unwrap())
         .collect();
-    // A tolerance is relative to the clearance of 1 mm, and an error here to displacements of some 10 mm.
+    // A tolerance is relative to the clearance of 1 mm, and the error here to displacements of some 10 mm.
     assert!(adaptive.len() == 4 && adaptive[3] < 5e-6, "{adaptive:?}");
     assert!(adaptive.iter().zip([1e-2, 1e-3, 1e-4, 1e-5]).all(|(error, tolerance)| *error < tolerance), "{adaptive:?}");
-    // Schemes with and without mass of the contact node have limits of their own.
+    // Schemes with and without mass of the contact node have different limits.
     let of_steps = |competitor| -> Vec<f64> {
         values(scene, competitor, "error_of_own_limit").into_iter().filter_map(|(_, error)| error).collect()
     };
@@ -100,7 +100,7 @@ fn film_error_stagnates_where_lcp_converges() {
     let count = lcp.len();
     assert!(lcp[count - 1] < 0.7 * lcp[count - 2], "lcp converges: {lcp:?}");
     assert!(film[count - 1] > 3.0 * lcp[count - 1] && film[count - 1] > 0.4 * film[count - 2], "{film:?}");
-    // The product and Moreau-Jean share no code and are closer to each other than film comes to either.
+    // The product and Moreau-Jean share no code and are closer to each other than film is to either.
     let apart = scene["references_apart"][0][0].as_f64().unwrap();
     assert!(apart < film[count - 1], "{apart} {film:?}");
     assert!(finest(scene, "modal-exact + lcp", "penetration") <= 0.0);
@@ -137,7 +137,7 @@ fn adaptive_steps_converge_faster_than_the_paper_method() {
         .map(|row| row["error_of_own_limit"].as_f64().unwrap())
         .collect();
     assert!(errors.len() == 2 && errors[1] < 0.7 * errors[0] && errors[0] < 3e-2, "{errors:?}");
-    // The paper's method is rejected at the longer steps, for the limit of stability or for growth.
+    // The paper's method is rejected at the longer steps, because of the stability limit or growth.
     let rejected: Vec<&str> = rows()
         .filter(|row| row["competitor"] == "central-difference + film")
         .filter_map(|row| row["refused"].as_str())

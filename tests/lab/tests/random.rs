@@ -1,4 +1,5 @@
-//! `lab random`: 300 random scenes, with oracles that know nothing of the scene; and scenes that are run alone by their seed.
+//! `lab random`: 300 random scenes, with oracles that are independent of the scene; and single scenes run by their
+//! seed.
 
 use std::process::Command;
 
@@ -8,7 +9,7 @@ use serde_json::Value;
 fn random(arguments: &[&str], code: i32) -> Value {
     let mut command = Command::new(env!("CARGO_BIN_EXE_lab"));
     command.args(["--json", "--quiet", "random"]).args(arguments);
-    // A library built elsewhere is tested where one is named; else the program builds one.
+    // A library built elsewhere is tested if it is named; otherwise the program builds one.
     if let Some(library) = std::env::var_os("TIPRUB_LIBRARY") {
         command.arg("--library").arg(library);
     }
@@ -28,7 +29,7 @@ fn all_invariants_hold_in_300_random_scenes() {
     let wrong = json["wrong"].as_array().unwrap();
     assert!(wrong.is_empty(), "{wrong:?}");
     assert_eq!(json["compared"], 60);
-    // The generator covers what it should: most scenes are not rejected, and each feature is in some that run.
+    // The generator has sufficient coverage: most scenes are not rejected, and each feature occurs in some that run.
     assert!(json["counts"]["rejected"].as_u64().unwrap() < 100, "{}", json["counts"]);
     for cell in json["cells"].as_array().unwrap() {
         let feature = &cell["feature"];
@@ -47,17 +48,18 @@ fn a_scene_follows_from_its_seed_alone() {
     for key in ["scheme", "solver", "features", "outcome", "message"] {
         assert_eq!(first[key], second[key], "{key}");
     }
-    // The scene is written as an FMU holds it.
+    // The scene is written as an FMU contains it.
     assert!(out.join("12345/scene.toml").is_file());
 }
 
-/// Massless nodes of a free body that swing between the points of the shortest steps: such steps miss the tolerance, and are counted.
+/// Massless nodes of a free body that vibrate between the points of the shortest steps: such steps miss the tolerance,
+/// and are counted.
 #[test]
 fn gaps_within_shortest_steps_respect_the_tolerance() {
     random(&["--only", "3119184997545909494", "--fmu", "0"], 0);
 }
 
-/// Blades that turn slowly in their cut: the force of the cut would feed them.
+/// For blades that turn slowly in their cut, the cutting force would supply energy.
 #[test]
 fn cutting_that_adds_energy_ends_the_run_with_reason() {
     let directory = tempfile::tempdir().unwrap();

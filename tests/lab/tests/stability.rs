@@ -1,4 +1,5 @@
-//! `lab stability --quick`: every case right, or refused or ended as it should be; and the proof that the judge sees what is not.
+//! `lab stability --quick`: every case is correct, rejected or ended as expected; and the judge detects the ones that
+//! are not.
 
 use std::{path::Path, process::Command};
 
@@ -8,7 +9,7 @@ use serde_json::Value;
 fn stability(root: &Path, arguments: &[&str], code: i32) -> Value {
     let mut command = Command::new(env!("CARGO_BIN_EXE_lab"));
     command.current_dir(root).args(["--json", "--quiet", "stability", "--out", "out"]).args(arguments);
-    // A library built elsewhere is tested where one is named; else the program builds one.
+    // A library built elsewhere is tested if it is named; otherwise the program builds one.
     if let Some(library) = std::env::var_os("TIPRUB_LIBRARY") {
         command.arg("--library").arg(library);
     }
@@ -35,7 +36,7 @@ fn every_quick_case_is_correct_or_rejected() {
     }
 }
 
-/// Families that are about one scheme, or about files and settings, need no other.
+/// Families about one scheme, or about files and settings, which need no other scheme.
 const OF_ONE_SCHEME: [&str; 5] = ["massless", "rom", "settings", "rotor37", "stage"];
 
 fn every_family_meets_galerkin(methods: &[Value]) {
@@ -55,7 +56,7 @@ fn every_family_meets_galerkin(methods: &[Value]) {
 #[test]
 fn judge_detects_every_kind_of_failure() {
     let root = tempfile::tempdir().unwrap();
-    // What is not sound is a failure of the command, with the table written all the same.
+    // An unsound case is a failure of the command, but the table is written.
     let failure = stability(root.path(), &["--case", "judge/"], 1);
     let reported = failure.to_string();
     assert!(
@@ -82,7 +83,7 @@ fn judge_detects_every_kind_of_failure() {
     ] {
         assert_eq!(verdict(name), expected, "{name}");
     }
-    // Small faults of mechanics are seen by the check that is there for them, and are no refusals.
+    // Small faults of mechanics are detected by the corresponding check, and are not errors.
     let happened = |name: &str| {
         let rows = json["rows"].as_array().unwrap();
         let row = rows.iter().find(|row| row["case"] == format!("judge/{name}")).unwrap();
@@ -111,7 +112,7 @@ fn judge_detects_every_kind_of_failure() {
     }
 }
 
-/// Whatever would fail after an hour of cases fails before the first, and leaves nothing.
+/// Problems that would occur after an hour of cases are reported before the first one, and no files remain.
 #[test]
 fn rejects_invalid_result_paths_before_the_first_case() {
     let root = tempfile::tempdir().unwrap();
@@ -127,7 +128,7 @@ fn rejects_invalid_result_paths_before_the_first_case() {
     };
     let reported = refuse(&["--case", "judge/hang", "--out", "file/out"], 1);
     assert!(reported.contains("file/out: cannot create the directory"), "{reported}");
-    // Nothing is written over what is read.
+    // Inputs are never overwritten.
     std::fs::create_dir(path("results")).unwrap();
     std::fs::write(path("results/index.html"), "").unwrap();
     let reported = refuse(&["--out", "results", "--library", "results/index.html"], 2);

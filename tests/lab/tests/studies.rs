@@ -15,7 +15,8 @@ fn lab(directory: &Path, cache: &str, arguments: &[&str]) -> (String, String) {
     (stdout, stderr)
 }
 
-/// The results of a quick study, with all files there and each figure's numbers whole.
+/// Returns the results of a quick study, after checking that all files exist and that the numbers of each figure are
+/// complete.
 #[track_caller]
 fn study(root: &Path, name: &str, more: &[&str]) -> Value {
     let arguments = [&[name, "--quick", "--json", "--quiet", "--out", "out"], more].concat();
@@ -35,7 +36,7 @@ fn study(root: &Path, name: &str, more: &[&str]) -> Value {
     json
 }
 
-/// These statements are answered with no, and no other is.
+/// Checks that exactly these statements are answered with no.
 #[track_caller]
 fn only_no(json: &Value, no: &[&str]) {
     let statements = json["statements"].as_array().unwrap();
@@ -86,8 +87,8 @@ fn the_quick_study_of_modes_draws_folded_engine_orders() {
     assert!(root.path().join("out/shapes.vtu").is_file());
 }
 
-/// Three casings. The rigid oval closes all nodes; with friction contact on it flutters, and presses harder than without. The
-/// elastic casing is held at one end and gives way: the leading edge does not touch.
+/// There are three casings. The rigid oval closes all nodes; with friction, contact on it flutters, and forces are
+/// larger than without. The elastic casing is held at one end and yields: the leading edge does not touch.
 #[test]
 fn quick_stage_study_separates_rigid_and_flexible_casings() {
     let root = tempfile::tempdir().unwrap();
@@ -110,7 +111,8 @@ fn quick_stage_study_separates_rigid_and_flexible_casings() {
     }
 }
 
-/// The first 0.2 ms: two rows of nodes touch. Statements hold, and the numbers are those of methods that are near and not equal.
+/// In the first 0.2 ms two rows of nodes touch. Statements hold, and the results are close to those of independent
+/// methods, but not equal.
 #[test]
 fn quick_cube_study_agrees_with_independent_methods() {
     let root = tempfile::tempdir().unwrap();
@@ -132,10 +134,10 @@ fn quick_cube_study_agrees_with_independent_methods() {
         assert!(shares[0] > 1e-6 && shares[0] < 0.005 && shares[1] < 0.02 && shares[2] < 0.01, "{pair}");
     }
     let (names, rows) = columns(&root.path().join("out/fig4a-u1x.csv"));
-    // Names hold commas of their own; numbers do not.
+    // Names contain commas; numbers do not.
     assert_eq!(names[0], "time (ms)");
     assert!(rows.iter().all(|row| row.len() == 5), "time and four methods");
-    // 1 mm of interference is shared by the cube and the rings.
+    // The cube and the rings share 1 mm of interference.
     let crest = rows.iter().map(|row| row[4]).fold(0.0, f64::max);
     assert!((0.5..1.0).contains(&crest), "{crest} mm");
     let tables = fs::read_to_string(root.path().join("out/tables.md")).unwrap();
@@ -156,7 +158,7 @@ fn quick_conjugacy_study_finds_agreement() {
     }
     let rows = json["results"]["rows"].as_array().unwrap();
     assert_eq!(rows.len(), 25);
-    // Whirl turns: a moment that is not zero about the shaft is about the axis of the casing.
+    // Whirl rotates: a moment about the shaft also acts about the axis of the casing.
     for row in rows {
         assert!(row["contacts"].as_u64().unwrap() > 300, "{row}");
         assert!(row["shaft"].as_f64().unwrap() < 1e-13 && row["ledger"].as_f64().unwrap() < 1e-13, "{row}");
@@ -166,7 +168,7 @@ fn quick_conjugacy_study_finds_agreement() {
     assert_eq!(table.lines().count(), 27, "{table}");
 }
 
-/// Ways and steps of all four inputs; the table of the guide has a row of each run.
+/// Methods and steps of all four inputs; the table of the guide has a row for each run.
 #[test]
 fn quick_input_study_shows_impacts_only_for_held_inputs() {
     let root = tempfile::tempdir().unwrap();
@@ -179,7 +181,7 @@ fn quick_input_study_shows_impacts_only_for_held_inputs() {
         assert!(fine > 1.0, "no contact: {input} {fine}");
         assert_eq!(force(input, "derivatives given", 0).to_bits(), fine.to_bits(), "{input}");
     }
-    // What the longest communication step does to the force of the fine run: nothing much with the ramp, blows if held.
+    // Effect of the longest communication step on the force of the fine run: small with the ramp, impacts if held.
     for input in ["whirl", "gap-offset", "shape-factor"] {
         let fine = json["results"][input]["fine"]["force"].as_f64().unwrap();
         let [ramp, hold] = ["ramp (default)", "hold"].map(|way| (force(input, way, 2) - fine) / fine);
@@ -201,7 +203,8 @@ fn quick_coupling_study_requires_derivatives_without_mass() {
             .map(|run| run["found"].clone())
             .collect()
     };
-    // A fixed point is enough for a heavy shaft and none for one without mass; steps done once get better with H.
+    // A fixed-point iteration suffices for a heavy shaft and fails for one without mass; the error of single steps
+    // decreases with H.
     assert!(found("heavy", "fixed point").iter().all(|found| found["unsolved"] == 0));
     assert!(
         found("without mass", "fixed point")
@@ -214,7 +217,7 @@ fn quick_coupling_study_requires_derivatives_without_mass() {
     assert!(solved.iter().zip(&errors).all(|(solved, once)| *solved < 0.8 * once), "{solved:?} {errors:?}");
 }
 
-/// The blade dips into the coating, which wears; statements hold, and depths are of the size of the closing.
+/// The blade enters the coating, which wears; statements hold, and depths are of the order of the closing.
 #[test]
 fn quick_wear_study_counts_lobes_and_vibrations() {
     let root = tempfile::tempdir().unwrap();
@@ -233,7 +236,7 @@ fn quick_wear_study_counts_lobes_and_vibrations() {
     assert_eq!(fs::read_to_string(root.path().join("out/wear.md")).unwrap().lines().count(), 2 + 6);
 }
 
-/// Told at once: nothing is reduced for it, and no directory stays.
+/// The errors occur before any reduction, and no directory is created.
 #[test]
 fn rejects_unsupported_studies_before_running() {
     let root = tempfile::tempdir().unwrap();
@@ -266,7 +269,7 @@ fn rejects_unsupported_studies_before_running() {
     }
 }
 
-/// `lab NAME` at the start of a line of code or of what stands between backticks.
+/// Returns the study names in `lab NAME`, at the start of a line of code or of text between backticks.
 fn studies_named(page: &str) -> impl Iterator<Item = &str> {
     let lines = page.lines().filter_map(|line| line.strip_prefix("    "));
     let spans = page.split('`').skip(1).step_by(2);
@@ -284,13 +287,13 @@ fn quick_estimate_study_matches_true_errors() {
     for (index, row) in rows.iter().enumerate() {
         let truth = row["truth"].as_f64().unwrap();
         let estimate = row["estimate"].as_f64();
-        // What the mesh leaves may be unknown.
+        // The discretisation error of the mesh may be unknown.
         assert!(estimate.map_or(index >= 6, |estimate| estimate > 0.0) && (1e-6..0.5).contains(&truth), "{row:#}");
     }
 }
 
-/// The full model, which nothing was reduced of, and the product on reduced models: with the same contact they are one, with another they
-/// are not. Three patches on this coarse mesh are too few to be better than three nodes.
+/// The unreduced full model and the product on reduced models agree with the same contact, and differ with another one.
+/// Three patches on this coarse mesh are too few to be better than three nodes.
 #[test]
 fn quick_witness_study_matches_reduced_models() {
     let root = tempfile::tempdir().unwrap();
@@ -310,7 +313,8 @@ fn quick_witness_study_matches_reduced_models() {
     assert!(json["results"]["refused"].as_array().unwrap().is_empty());
 }
 
-/// Stress of the full model under the same contact forces comes back as modes are added, faster than in a rub where time steps differ too.
+/// Under the same contact forces the stress converges to that of the full model as modes are added, faster than in a
+/// rub, in which time steps differ too.
 #[test]
 fn quick_stress_study_recovers_full_model_stress() {
     let root = tempfile::tempdir().unwrap();
@@ -330,8 +334,8 @@ fn quick_stress_study_recovers_full_model_stress() {
     assert!(full.len() == 6 && full.iter().all(|value| value.as_f64().unwrap() > 5e7), "{full:?}");
 }
 
-/// Blades of different clearances and frequencies, bumps that begin elsewhere, a cylinder: own geometry, modes, contact and steps agree. What
-/// the witness does not know it says.
+/// Blades of different clearances and frequencies, shifted bumps, a cylinder: independent geometry, modes, contact and
+/// steps agree. Unsupported features give an error.
 #[test]
 fn independent_witness_agrees_with_any_blade_scene() {
     let root = tempfile::tempdir().unwrap();
@@ -402,7 +406,7 @@ fn quick_basis_study_compares_free_and_fixed_interface() {
             |name: &str| row["limits"].as_array().unwrap().iter().find(|limit| limit[0] == name).unwrap()[1].as_f64();
         let [central, massless] = ["central-difference", "massless-boundary"].map(|name| limit(name).unwrap());
         assert!(massless > 2.0 * central, "{row:#}");
-        // A step beyond the limit is refused, and so not timed.
+        // A step beyond the limit is rejected, and therefore not timed.
         for run in row["runs"].as_array().unwrap().iter().filter(|run| run["scheme"] == "central-difference") {
             assert!(run["step"].as_f64().unwrap() < central, "{run}");
         }

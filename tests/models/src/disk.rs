@@ -1,4 +1,4 @@
-//! Disks of coupled sectors given by real matrices: as harmonics, and as one structure with all sectors in it.
+//! Disks of coupled sectors defined by real matrices: as harmonics, and as one structure with all sectors.
 
 use nalgebra::{Complex, DMatrix};
 use tiprub_core::Scene;
@@ -11,14 +11,14 @@ use crate::{SeededRandom, node, rub, structure};
 pub struct TestDisk {
     pub sectors: usize,
     pub nodes: usize,
-    /// Matrices of one sector, and of a sector with the one after it (row: this sector, column: the next).
+    /// Matrices of one sector, and of a sector with the next one (row: this sector, column: the next).
     pub mass: [DMatrix<f64>; 2],
     pub stiffness: [DMatrix<f64>; 2],
     pub contact_map: DMatrix<f64>,
 }
 
 impl TestDisk {
-    /// Random matrices; `coupling` is the size of those between neighbours relative to those of a sector.
+    /// Returns random matrices; `coupling` is the size of those between neighbours relative to those of a sector.
     pub fn random(sectors: usize, nodes: usize, order: usize, coupling: f64, seed: u64) -> Self {
         let mut numbers = SeededRandom(seed);
         let square = numbers.matrix(order, order);
@@ -72,7 +72,7 @@ impl TestDisk {
         Rom { sectors, frame: DisplacementFrame::Cylindrical, damping_ratio: 0.01, ..rom }
     }
 
-    /// As a ROM with one pencil per nodal diameter.
+    /// Returns a ROM with one pencil per nodal diameter.
     pub fn cyclic(&self) -> Rom {
         let zero = self.harmonic(0);
         let real = |matrix: DMatrix<Complex<f64>>| matrix.map(|value| value.re);
@@ -81,7 +81,7 @@ impl TestDisk {
         rom
     }
 
-    /// As a ROM of one general structure with the contact nodes of all sectors, sector by sector.
+    /// Returns a ROM of one general structure with the contact nodes of all sectors, sector by sector.
     pub fn whole(&self) -> Rom {
         let (order, count) = (self.contact_map.ncols(), self.sectors);
         let expand = |[own, next]: &[DMatrix<f64>; 2]| {
@@ -108,7 +108,7 @@ impl TestDisk {
     }
 }
 
-/// [`rub`] with another rotor, of coupled sectors or whole.
+/// Returns [`rub`] with another rotor, of coupled sectors or as one structure.
 pub fn with_rotor(rom: Rom) -> Scene {
     let mut scene = rub(1);
     scene.settings.outputs.nodal_diameters = None;

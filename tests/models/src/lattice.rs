@@ -1,4 +1,4 @@
-//! A free block of masses and springs between two plates, with nothing reduced: every node is a contact node.
+//! A free block of masses and springs between two plates, without reduction: every node is a contact node.
 
 use nalgebra::{DMatrix, Vector3};
 use tiprub_core::rom::{ContactGrid, Rom};
@@ -9,7 +9,7 @@ use crate::{node, real, structure};
 
 /// Side of the block (m).
 pub const SIDE: f64 = 0.04;
-/// Nodes per side of the block.
+/// Number of nodes per side of the block.
 pub const PER_SIDE: usize = 3;
 /// Radius of curved plates (m).
 pub const RADIUS: f64 = 0.18;
@@ -19,7 +19,7 @@ fn rom(name: &str, mass: DMatrix<f64>, stiffness: DMatrix<f64>, nodes: Vec<(Stri
     structure(name, mass, stiffness, map, nodes.into_iter().map(|(name, place)| node(name, place, 0.0)).collect())
 }
 
-/// Spring of stiffness `k` (N/m) between two nodes along the line that joins them.
+/// Adds a spring of stiffness `k` (N/m) between two nodes along their connecting line.
 fn spring(matrix: &mut DMatrix<f64>, positions: &[[f64; 3]], [a, b]: [usize; 2], k: f64) {
     let along = (Vector3::from(positions[a]) - Vector3::from(positions[b])).normalize();
     for i in 0..3 {
@@ -33,17 +33,18 @@ fn spring(matrix: &mut DMatrix<f64>, positions: &[[f64; 3]], [a, b]: [usize; 2],
     }
 }
 
-/// Mass of a node of the block (kg): not the same in all corners, yet alike in x and −x.
+/// Returns the mass of a node of the block (kg), which differs between corners but is symmetric in x and −x.
 pub fn node_mass(place: [usize; 3]) -> f64 {
     0.01 * (1.0 + 0.2 * place[1] as f64 + 0.1 * place[2] as f64)
 }
 
-/// Places of the nodes of the block.
+/// Returns the lattice positions of the nodes of the block.
 pub fn places() -> impl Iterator<Item = [usize; 3]> {
     (0..PER_SIDE).flat_map(|x| (0..PER_SIDE).flat_map(move |y| (0..PER_SIDE).map(move |z| [x, y, z])))
 }
 
-/// The block, its middle at `centre` (m), springs to all neighbours; nodes `left_…` at low x, `right_…` at high x and `core_…`.
+/// Returns the block with its middle at `centre` (m) and springs to all neighbours; nodes `left_…` at low x, `right_…`
+/// at high x and `core_…`.
 pub fn block(centre: [f64; 3], k: f64) -> Rom {
     let step = SIDE / (PER_SIDE - 1) as f64;
     let places: Vec<[usize; 3]> = places().collect();
@@ -70,7 +71,7 @@ pub fn block(centre: [f64; 3], k: f64) -> Rom {
     rom("block", mass, stiffness, nodes)
 }
 
-/// The block with contact nodes on its faces alone: what is between them keeps its inertia.
+/// Returns the block with contact nodes on its faces only: the nodes in between keep their inertia.
 pub fn faces(centre: [f64; 3]) -> Rom {
     let mut rom = block(centre, 3e6);
     let kept: Vec<usize> =
@@ -82,7 +83,7 @@ pub fn faces(centre: [f64; 3]) -> Rom {
     rom
 }
 
-/// Which side of the block a plate is on.
+/// Side of the block on which a plate is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BlockSide {
     Left,
@@ -95,8 +96,8 @@ impl BlockSide {
     }
 }
 
-/// Points of a plate over y and z, `rows` along y and `columns` along z, whose nearest line to the block is x = ±`distance`;
-/// flat, or a cylinder about z. Row after row along y; z runs so that the normal points to the block.
+/// Returns the points of a plate over y and z, `rows` along y and `columns` along z, whose nearest line to the block is
+/// x = ±`distance`; flat, or a cylinder about z. Row after row along y; z runs so that the normal points to the block.
 pub fn plate_points(side: BlockSide, distance: f64, curved: bool, [rows, columns]: [usize; 2]) -> Vec<[f64; 3]> {
     let centred = |index: usize, count: usize| (2.0 * index as f64 - (count - 1) as f64) / (count - 1) as f64;
     (0..rows)
@@ -114,7 +115,7 @@ pub fn plate_points(side: BlockSide, distance: f64, curved: bool, [rows, columns
         .collect()
 }
 
-/// A plate of masses on springs to the ground and to their neighbours.
+/// Returns a plate of masses on springs to the ground and to their neighbours.
 pub fn plate(side: BlockSide, distance: f64, curved: bool, k: f64) -> Rom {
     let [rows, columns] = [9, 5];
     let points = plate_points(side, distance, curved, [rows, columns]);
@@ -140,7 +141,7 @@ pub fn plate(side: BlockSide, distance: f64, curved: bool, k: f64) -> Rom {
     rom
 }
 
-/// The block between plates: `left` and `right` each a distance (m) from x = 0.
+/// Returns the block between plates: `left` and `right` each at a distance (m) from x = 0.
 pub fn scene(block: Rom, plates: &[(BlockSide, f64)], curved: bool, velocity: [f64; 3]) -> Scene {
     let names = |side: BlockSide| {
         if side == BlockSide::Left {
@@ -194,7 +195,7 @@ pub fn scene(block: Rom, plates: &[(BlockSide, f64)], curved: bool, velocity: [f
     Scene { settings, roms }
 }
 
-/// Friction, solver and scheme of all pairs.
+/// Sets friction, solver and scheme of all pairs.
 pub fn with(mut scene: Scene, friction: f64, solver: Solver, scheme: Scheme) -> Scene {
     for contact in &mut scene.settings.contacts {
         (contact.friction, contact.solver) = (friction, solver);
@@ -203,12 +204,12 @@ pub fn with(mut scene: Scene, friction: f64, solver: Solver, scheme: Scheme) -> 
     scene
 }
 
-/// The block, 0.3 mm too wide on each side, thrown between two cylinders.
+/// Returns the block, 0.3 mm too wide on each side, thrown between two cylinders.
 pub fn squeezed() -> Scene {
     squeezed_by(3e-4, [0.0, -40.0, 0.0])
 }
 
-/// The same with this interference (m) and velocity (m/s).
+/// Returns the squeezed block with this interference (m) and velocity (m/s).
 pub fn squeezed_by(interference: f64, velocity: [f64; 3]) -> Scene {
     let distance = 0.5 * SIDE - interference;
     scene(block([0.0, 0.045, 0.0], 3e6), &[(BlockSide::Left, distance), (BlockSide::Right, distance)], true, velocity)

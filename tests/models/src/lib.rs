@@ -1,4 +1,4 @@
-//! Structures and scenes whose answers can be written down: no finite elements, no files.
+//! Structures and scenes with analytic solutions: no finite elements, no files.
 #![allow(clippy::missing_panics_doc, reason = "helpers of tests panic where a test fails")]
 #![allow(missing_docs, reason = "names of what they build")]
 
@@ -30,12 +30,12 @@ pub const RADIUS: f64 = 0.25;
 /// Clearance (m).
 pub const GAP: f64 = 3.56e-4;
 
-/// A contact node.
+/// Returns a contact node.
 pub fn node(name: impl Into<String>, position: [f64; 3], meridional_slope: f64) -> ContactNode {
     ContactNode { name: name.into(), position, meridional_slope, ..ContactNode::default() }
 }
 
-/// One structure in Cartesian coordinates, without damping.
+/// Returns a structure in Cartesian coordinates, without damping.
 pub fn structure(
     name: &str,
     mass: DMatrix<f64>,
@@ -58,7 +58,8 @@ pub fn structure(
     }
 }
 
-/// One about the z axis given by its modes (M = I): frequencies (Hz), displacements of the contact nodes per unit amplitude.
+/// Returns a structure about the z axis defined by its modes (M = I): frequencies (Hz), displacements of the contact
+/// nodes per unit amplitude.
 pub fn modal(
     name: &str,
     frequencies: &[f64],
@@ -72,7 +73,7 @@ pub fn modal(
     Rom { frame: DisplacementFrame::Cylindrical, ..structure(name, mass, stiffness, map, contact_nodes) }
 }
 
-/// Frequencies of the whole blade (Hz).
+/// Frequencies of the complete blade (Hz).
 const BLADE: [f64; 8] = [850.0, 2300.0, 3100.0, 5200.0, 9000.0, 15_000.0, 24_000.0, 40_000.0];
 
 fn blade_shape(row: usize, mode: usize) -> f64 {
@@ -89,12 +90,13 @@ fn blade_of(sectors: usize, frequencies: &[f64], shape: impl Fn(usize, usize) ->
     Rom { sectors, damping_ratio: 0.005, ..modal("blade", frequencies, shape, nodes) }
 }
 
-/// Blade of analytic modes: bending (tangential with some radial), torsion and edge modes, three contact nodes.
+/// Returns a blade of analytic modes: bending (tangential with some radial), torsion and edge modes, three contact
+/// nodes.
 pub fn blade(sectors: usize) -> Rom {
     blade_of(sectors, &BLADE, blade_shape)
 }
 
-/// [`blade`] with ten more modes, nine of which stand for the local flexibility at the contact nodes.
+/// Returns [`blade`] with ten more modes, nine of which represent the local flexibility at the contact nodes.
 pub fn rich_blade(sectors: usize) -> Rom {
     let local = (0..10).map(|mode| 45_000.0 + 9000.0 * f64::from(mode));
     let frequencies: Vec<f64> = BLADE.into_iter().chain(local).collect();
@@ -106,7 +108,8 @@ pub fn rich_blade(sectors: usize) -> Rom {
     })
 }
 
-/// Spin matrices for a blade: stiffening in proportion to the stiffness with some coupling, a skew matrix, radial load.
+/// Returns spin matrices for a blade: stiffening in proportion to the stiffness with some coupling, a skew matrix,
+/// radial load.
 pub fn spin(order: usize) -> Spin {
     let symmetric =
         |size: f64| {
@@ -125,13 +128,13 @@ pub fn spin(order: usize) -> Spin {
     }
 }
 
-/// Casing ring of analytic modes: nodal diameters 0 to 4 in pairs, each with a constant and a tilting axial shape;
-/// radial w = cos nθ with the inextensional tangential motion v = −sin(nθ)/n. Thermal patches: quarters.
+/// Returns a casing ring of analytic modes: nodal diameters 0 to 4 in pairs, each with a constant and a tilting axial
+/// shape; radial w = cos nθ with the inextensional tangential motion v = −sin(nθ)/n. Thermal patches: quarters.
 pub fn ring(around: usize, along: usize) -> Rom {
     ring_of(around, along, 5)
 }
 
-/// The same with as many nodal diameters as asked.
+/// Returns the ring with the requested number of nodal diameters.
 pub fn ring_of(around: usize, along: usize, diameters: usize) -> Rom {
     let z = |ring: usize| -0.02 + 0.07 * ring as f64 / (along - 1) as f64;
     let angle = |i: usize| TAU * i as f64 / around as f64;
@@ -168,7 +171,7 @@ pub fn ring_of(around: usize, along: usize, diameters: usize) -> Rom {
     rom
 }
 
-/// Four thermal patches around.
+/// Returns four thermal patches around the circumference.
 pub(crate) fn quarters(axial: [f64; 2]) -> Vec<ThermalPatch> {
     let quarter = |index: u32| [FRAC_PI_2 * f64::from(index), FRAC_PI_2 * f64::from(index + 1)];
     (0..4).map(|index| ThermalPatch { angle: quarter(index), axial }).collect()

@@ -1,8 +1,8 @@
-//! Numbers that are the same everywhere.
+//! Random numbers that are equal on every platform.
 
 use nalgebra::DMatrix;
 
-/// A sequence, by its seed.
+/// A sequence of random numbers, defined by its seed.
 #[derive(Debug, Clone)]
 pub struct SeededRandom(pub u64);
 
@@ -12,45 +12,45 @@ impl SeededRandom {
         (self.0 >> 11) as f64
     }
 
-    /// In [0, 1).
+    /// Returns a number in [0, 1).
     pub fn unit(&mut self) -> f64 {
         self.bits() / (1_u64 << 53) as f64
     }
 
-    /// In [−1, 1).
+    /// Returns a number in [−1, 1).
     pub fn signed(&mut self) -> f64 {
         self.bits() / (1_u64 << 52) as f64 - 1.0
     }
 
-    /// In [low, high).
+    /// Returns a number in [low, high).
     pub fn within(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.unit()
     }
 
-    /// In [low, high), evenly in the logarithm.
+    /// Returns a number in [low, high), uniform in the logarithm.
     pub fn scale(&mut self, low: f64, high: f64) -> f64 {
         low * (high / low).powf(self.unit())
     }
 
-    /// Components in [−size, size).
+    /// Returns a vector with components in [−size, size).
     pub fn vector(&mut self, size: f64) -> [f64; 3] {
         [(); 3].map(|()| self.within(-size, size))
     }
 
-    /// In 0 .. count.
+    /// Returns an integer in 0 .. count.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "in [0, count)")]
     pub fn below(&mut self, count: usize) -> usize {
         ((self.unit() * count as f64) as usize).min(count - 1)
     }
 
-    /// One of these.
+    /// Returns one of the choices.
     pub fn of<T: Copy>(&mut self, choices: &[T]) -> T {
         let count = choices.len();
         let index = (0..count).filter(|index| self.unit() < 1.0 / (index + 1) as f64).max().unwrap_or(0);
         choices[index.min(count - 1)]
     }
 
-    /// Entries in [−1, 1).
+    /// Returns a matrix with entries in [−1, 1).
     pub fn matrix(&mut self, rows: usize, columns: usize) -> DMatrix<f64> {
         DMatrix::from_fn(rows, columns, |_, _| self.signed())
     }

@@ -1,4 +1,4 @@
-//! Rotors in casings, and what is added to them.
+//! Rotors in casings, and optional features for them.
 
 use tiprub_core::settings::{
     BodyMotion, CoatingSettings, ContactSettings, ExperimentSettings, Meridian, OutputSettings, Preset, SceneSettings,
@@ -8,7 +8,7 @@ use tiprub_core::{Rom, Scene};
 
 use crate::{GAP, blade, ring};
 
-/// A rotor in a round rigid casing whose radius is an input; no friction.
+/// Returns a rotor in a round rigid casing whose radius is an input; no friction.
 pub fn round(rom: Rom) -> Scene {
     let settings = SceneSettings {
         name: "written_down".into(),
@@ -43,7 +43,7 @@ pub fn round(rom: Rom) -> Scene {
     Scene { settings, roms: vec![rom] }
 }
 
-/// The same with two bumps that grow in over a millisecond, and friction.
+/// Returns a rotor in a casing with two bumps that grow over a millisecond, and friction.
 pub fn bumps(rom: Rom) -> Scene {
     let mut scene = round(rom);
     scene.settings.surfaces[0].shape = Shape::TwoLobe { depth: 0.6, width: 0.15, phase: 0.0 };
@@ -52,7 +52,7 @@ pub fn bumps(rom: Rom) -> Scene {
     scene
 }
 
-/// A rub of [`blade`] against those bumps, with outputs of every kind.
+/// Returns a rub of [`blade`] against those bumps, with outputs of every kind.
 pub fn rub(sectors: usize) -> Scene {
     let mut scene = bumps(blade(sectors));
     scene.settings.outputs = OutputSettings {
@@ -66,7 +66,7 @@ pub fn rub(sectors: usize) -> Scene {
     scene
 }
 
-/// Let an elastic ring carry the surface.
+/// Makes an elastic ring carry the surface.
 pub fn on_ring(scene: &mut Scene, ring: Rom, damping_ratio: f64) {
     scene.settings.structures.push(StructureSettings {
         name: "ring".into(),
@@ -79,17 +79,17 @@ pub fn on_ring(scene: &mut Scene, ring: Rom, damping_ratio: f64) {
     scene.settings.surfaces[0].structure = Some("ring".into());
 }
 
-/// The casing an elastic ring of 36 × 3 contact nodes.
+/// Makes the casing an elastic ring of 36 × 3 contact nodes.
 pub fn flexible(scene: &mut Scene) {
     on_ring(scene, ring(36, 3), 0.01);
 }
 
-/// An abradable coating on it.
+/// Adds an abradable coating to the casing.
 pub fn coating(scene: &mut Scene) {
     scene.settings.contacts[0].coating = Some(coating_of(1.5e-4, [500, 7]));
 }
 
-/// A soft coating of this thickness (m), with so many cells around and along.
+/// Returns a soft coating of this thickness (m), with the given numbers of cells around and along.
 pub fn coating_of(thickness: f64, [cells_around, cells_along]: [usize; 2]) -> CoatingSettings {
     CoatingSettings {
         thickness,

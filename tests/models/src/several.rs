@@ -3,7 +3,7 @@
 use tiprub_core::Scene;
 use tiprub_core::settings::{BodyMotion, Shape, Solver, StructureSettings};
 
-/// The blades' three nodes each a pair of its own, all against the same casing.
+/// Assigns each of the blades' three nodes to a separate pair, all against the same casing.
 pub fn split(scene: &Scene) -> Scene {
     let mut split = scene.clone();
     let names: Vec<String> = scene.roms[0].contact_nodes.iter().map(|node| node.name.clone()).collect();
@@ -19,7 +19,8 @@ pub fn split(scene: &Scene) -> Scene {
     split
 }
 
-/// The rotor of the scene again as `rear`, further along the axis, with its own casing; names of the first are `front`.
+/// Duplicates the rotor of the scene as `rear`, further along the axis, with a separate casing; the names of the first
+/// one begin with `front`.
 pub fn two_rotors(mut scene: Scene, shift: f64, change: impl Fn(&mut StructureSettings)) -> Scene {
     let settings = &mut scene.settings;
     settings.structures[0].name = "front".into();
@@ -41,7 +42,7 @@ pub fn two_rotors(mut scene: Scene, shift: f64, change: impl Fn(&mut StructureSe
     scene
 }
 
-/// The rotor of the scene so many times, each in its own casing.
+/// Returns `count` copies of the rotor of the scene, each in a separate casing.
 pub fn rotors(scene: &Scene, count: usize) -> Scene {
     let (mut many, settings) = (scene.clone(), &scene.settings);
     (many.settings.structures, many.settings.surfaces, many.settings.contacts) = (Vec::new(), Vec::new(), Vec::new());
@@ -59,7 +60,7 @@ pub fn rotors(scene: &Scene, count: usize) -> Scene {
     many
 }
 
-/// Two rotors in one elastic ring.
+/// Returns two rotors in one elastic ring.
 pub fn in_one_casing(mut scene: Scene, solver: Solver, friction: f64) -> Scene {
     scene.roms[0].contact_nodes.iter_mut().for_each(|node| node.position[2] *= 0.4);
     let mut scene = two_rotors(scene, 0.03, |rear| rear.speed = -1100.0);
@@ -79,7 +80,8 @@ pub fn in_one_casing(mut scene: Scene, solver: Solver, friction: f64) -> Scene {
     scene
 }
 
-/// Two nodes of each blade meet the casing, the third a seal of smaller radius and other friction.
+/// Lets two nodes of each blade touch the casing and the third a seal of smaller radius with another friction
+/// coefficient.
 pub fn tip_and_seal(mut scene: Scene, solver: Solver) -> Scene {
     scene.roms[0].contact_nodes[2].position[0] = 0.2;
     scene.roms[0].contact_nodes[0].name = "tip_1".into();

@@ -6,7 +6,8 @@ use nalgebra::{DMatrix, DVector};
 use tiprub_core::rom::ThermalPatch;
 use tiprub_thermal::ConductionModel;
 
-/// A wall of 50 J/K with gas on one side (1 W/K) and air on the other (0.2 W/K), with one conduction mode across its thickness.
+/// Returns a wall of 50 J/K with gas on one side (1 W/K) and air on the other (0.2 W/K), with one conduction mode
+/// across its thickness.
 pub fn wall() -> ConductionModel {
     let capacity = 50.0_f64;
     let uniform = 1.0 / capacity.sqrt();

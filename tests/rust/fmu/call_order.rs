@@ -1,9 +1,9 @@
 //! The call order of both standards, pair by pair: every function in every state, through the C ABI.
 //!
-//! The expected tables are written from the text of the standards, apart from the library's own: FMI 2.0.4 section 4.2.4
-//! (table of allowed calls against states) and FMI 3.0.2 sections 2.3 and 4.2 (text of each state). Letters are states in
-//! which a function is allowed; "-" is a function whose capability this FMU does not claim, which must answer Error with a
-//! message in every state.
+//! The expected tables are written from the text of the standards, independently of those in the library: FMI 2.0.4
+//! section 4.2.4 (table of allowed calls against states) and FMI 3.0.2 sections 2.3 and 4.2 (text of each state).
+//! Letters are states in which a function is allowed; "-" is a function whose capability this FMU does not claim, which
+//! must return Error with a message in every state.
 
 mod tables;
 
@@ -25,7 +25,7 @@ fn complete(table: &'static str, apart: &str, names: &[&str]) {
     assert_eq!(listed, names, "the expected table has every function once");
 }
 
-/// Compare an answer with the expected row.
+/// Compares a status with the expected row.
 #[track_caller]
 fn judge(name: &str, allowed: &str, state: char, status: i32, log: &str) {
     let out_of_order = log.contains("not allowed in state");
@@ -49,7 +49,7 @@ struct Subject {
     known: CallReferences,
 }
 
-/// References: input, what drives the step to failure, text, enumeration, output with derivative.
+/// References: input, input that makes the step fail, text, enumeration, output with derivative.
 #[derive(Clone, Copy)]
 struct CallReferences {
     input: u32,
@@ -60,11 +60,12 @@ struct CallReferences {
     output: u32,
 }
 
-/// Functions of the tables that this unit has, and the contact unit of the tests has not.
+/// Functions of the tables that this unit supports and the contact unit of the tests does not.
 const DERIVATIVES: [&str; 3] =
     ["fmi2GetDirectionalDerivative", "fmi3GetDirectionalDerivative", "fmi3GetAdjointDerivative"];
 
-/// A scene whose casing an importer can drive to infinity, so that a step fails; or a casing that conducts heat.
+/// Returns a scene whose casing an importer can drive to infinity, so that a step fails, or a casing that conducts
+/// heat.
 fn subject(thermal: bool) -> Subject {
     if thermal {
         return Subject {
@@ -103,13 +104,14 @@ fn references(thermal: bool) -> CallReferences {
     }
 }
 
-/// Rows of a table that hold for the unit.
+/// Returns the rows of a table that apply to the unit.
 fn rows_of(table: &'static str, known: CallReferences) -> Vec<(&'static str, &'static str)> {
     let asked = |name: &str| known.closing.is_some() || !DERIVATIVES.contains(&name);
     rows(table).into_iter().filter(|(name, _)| asked(name)).collect()
 }
 
-/// Call the function of that name: `function(arguments after the instance);` one by one. None of them: the other.
+/// Calls the function of that name, from a list of `function(arguments after the instance);`, otherwise evaluates the
+/// last expression.
 macro_rules! call {
     ($name:expr, $api:expr, $handle:expr, $other:expr; $($function:ident($($argument:expr),*);)*) => {
         match $name {
@@ -119,7 +121,7 @@ macro_rules! call {
     };
 }
 
-/// Call one function with arguments that are proper where it is allowed.
+/// Calls one function with arguments that are valid where it is allowed.
 fn call2(api: &Fmi2Api, slave: &fmi2::Fmi2TestSlave<'_>, name: &str, known: CallReferences) -> i32 {
     let (h, value, mut real, mut integer) = (slave.handle, 300.0, 0.0, 0);
     let (mut text, mut flag, mut state, order) = (null(), 0, null_mut(), 1);
@@ -212,14 +214,15 @@ fn fmi2_pairs(subject: &Subject) {
     println!("FMI 2.0: {pairs} pairs of function and state");
 }
 
-/// Call one function with arguments that are proper where it is allowed. Works on the bare handle, so that it can be used
-/// from within an intermediate update.
+/// Calls one function with arguments that are valid where it is allowed. Works on the bare handle, so that it can be
+/// used from within an intermediate update.
 unsafe fn call3(api: &Fmi3Api, h: *mut c_void, saved: (*mut c_void, &[u8]), name: &str, known: CallReferences) -> i32 {
     let (value, mut real, mut long, order) = (300.0, 0.0, 0_i64, 1);
     let (mut text, mut state, (saved, bytes)) = (null(), null_mut(), saved);
     let (input, output, string, choice) = (&known.input, &known.output, &known.text, &known.choice);
     let (mut a, mut b, mut c, mut size, mut copy) = (false, false, false, 0, bytes.to_vec());
-    // SAFETY: all pointers are to single values, or NULL with a count of zero, or not touched by refusing functions.
+    // SAFETY: all pointers are to single values, or NULL with a count of zero, or not accessed by functions that reject
+    // the call.
     unsafe {
         call! { name, api, h, refused3(api, h, name, input);
             fmi3SetDebugLogging(false, 0, null());
@@ -271,11 +274,11 @@ unsafe fn call3(api: &Fmi3Api, h: *mut c_void, saved: (*mut c_void, &[u8]), name
     }
 }
 
-/// The same of functions that a unit for co-simulation without events has no use for.
+/// Calls functions that a unit for co-simulation without events does not support.
 unsafe fn refused3(api: &Fmi3Api, h: *mut c_void, name: &str, input: *const u32) -> i32 {
     let (value, mut real, mut size) = (300.0, 0.0, 0);
     let (mut a, mut b, mut c) = (false, false, false);
-    // SAFETY: all pointers are to single values, or not touched by refusing functions.
+    // SAFETY: all pointers are to single values, or not accessed by functions that reject the call.
     unsafe {
         call! { name, api, h, panic!("{name} is not called");
             fmi3EnterConfigurationMode();
@@ -307,7 +310,7 @@ unsafe fn refused3(api: &Fmi3Api, h: *mut c_void, name: &str, input: *const u32)
     }
 }
 
-/// In an intermediate update: call the function whose row number is the wish, note the status.
+/// Calls, in an intermediate update, the function whose row number is the wish, and records the status.
 unsafe extern "C" fn call_inside<const THERMAL: bool>(
     environment: *mut c_void,
     _time: f64,
@@ -411,7 +414,7 @@ fn random_calls(subject: &Subject) {
     for _ in 0..20 {
         let slave = fmi2::Fmi2TestSlave::new(&api, resources);
         for _ in 0..400 {
-            // Some calls more often than others, so that every phase is reached.
+            // Some calls are more frequent than others, so that every phase is reached.
             let name = match next(6) {
                 0 => "fmi2EnterInitializationMode",
                 1 => "fmi2ExitInitializationMode",

@@ -1,4 +1,4 @@
-//! What the shipped library exports, and what it needs from the system.
+//! Exports of the released library, and its requirements on the system.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -51,7 +51,8 @@ fn needs_only_the_system(path: &Path) {
     assert!(size < 8_000_000, "{size} bytes");
 }
 
-/// The library must not print, start threads, or change process-wide state: it does not even import the means.
+/// The library must not print, start threads, or change process-wide state: it does not even import the functions for
+/// this.
 #[test]
 fn library_does_not_print_fork_or_change_the_process() {
     [shipped(), thermal()].iter().for_each(|path| imports_no_such_means(path));

@@ -1,5 +1,5 @@
 //! Inputs that are arrays, over the C ABI and against callers that break the rules; and features that are off, which
-//! leave nothing behind.
+//! leave no trace.
 
 #![allow(clippy::float_cmp, reason = "values are compared for being untouched")]
 
@@ -8,7 +8,7 @@ use tiprub_core::{Scene, Simulation};
 use tiprub_tests::scene::{PATCHES, UnpackedResources, ring, rom, scene, warm_scene};
 use tiprub_tests::{ERROR, OK, fmi2, fmi3, shipped};
 
-/// First reference of a variable of a scene.
+/// Returns the first reference of a variable of a scene.
 #[track_caller]
 fn of(scene: &Scene, name: &str) -> u32 {
     let simulation = Simulation::new(scene).unwrap();
@@ -50,7 +50,7 @@ fn array_input_is_set_completely_or_not_at_all() {
         assert_eq!(slave.reals(&[array], PATCHES), START, "{references:?} {values:?}");
         assert_eq!(slave.reals(&[speed], 1), [300.0]);
     }
-    // What comes back is what was set, and a step goes on.
+    // The values set are returned, and a step succeeds.
     slave.expect(slave.set_reals(&[speed, array], &[310.0, 1.0, 2.0, 3.0, -4.0]));
     assert_eq!(slave.reals(&[array, speed], 5), [1.0, 2.0, 3.0, -4.0, 310.0]);
     assert_eq!(slave.step(0.0, 1e-4).status, OK);
@@ -95,7 +95,7 @@ fn each_element_of_an_array_input_has_its_derivative() {
     }
     refused(slave.set_derivatives(&[array + 4], 1, &[1.0]), &slave.log(), "not a continuous input");
     refused(slave.set_derivatives(&[moved], 1, &[1.0]), &slave.log(), "not a continuous input");
-    // A good and a wrong one together: neither is taken.
+    // One valid and one invalid value together: neither is accepted.
     refused(slave.set_derivatives(&[array, array + 1], 1, &[1e6, f64::INFINITY]), &slave.log(), "not finite");
     slave.expect(slave.step(0.0, 1e-4));
     assert_eq!(slave.reals(&[moved]), [0.0], "nothing warms up");
@@ -106,7 +106,7 @@ fn each_element_of_an_array_input_has_its_derivative() {
     assert!(grown > 1e-9, "{grown}");
 }
 
-/// Names that only some scenes have.
+/// Names that exist only in some scenes.
 const OF_FEATURES: [&str; 25] = [
     "whirl_x",
     "whirl_y",
@@ -142,12 +142,12 @@ fn disabled_features_have_no_variables_or_data() {
     for name in OF_FEATURES {
         assert!(simulation.table().find(name).is_none(), "{name}");
     }
-    // One feature more or less does not move the others' names.
+    // Adding or removing a feature does not change the names of others.
     let warm = Simulation::new(&warm_scene()).unwrap();
     for variable in simulation.table().variables() {
         assert!(warm.table().find(&variable.name).is_some(), "{}", variable.name);
     }
-    // A ROM that could do more gives the same files, bytes and token as one that cannot.
+    // A ROM with unused optional data gives the same files, bytes and token as one without them.
     let order = rom().order();
     let mut able = plain.clone();
     able.roms[0].extras.spin = Some(Spin {
@@ -166,12 +166,12 @@ fn disabled_features_have_no_variables_or_data() {
     let names: Vec<&str> = files.iter().map(|(name, _)| name.as_str()).collect();
     assert_eq!(names, ["scene.toml", "rotor.rom.safetensors", "package.toml"]);
     assert_eq!(tiprub_format::resource_files(&able, true), files);
-    // A casing that bears a surface but is not heated keeps its grid and loses its heat.
+    // A casing that carries a surface but is not heated keeps its grid and loses its thermal data.
     let mut cold = warm_scene();
     cold.settings.structures[1].thermal = false;
     let warm_size = |scene: &Scene| tiprub_format::resource_files(scene, true)[2].1.len();
     let (with, without) = (warm_size(&warm_scene()), warm_size(&cold));
-    // Two arrays of 4 x 4 and 3 x 4 numbers, and what the header says of them.
+    // Two arrays of 4 x 4 and 3 x 4 numbers, and their entries in the header.
     assert!(with - without > (16 + 12) * 8, "{with} bytes with heat, {without} without");
     let ring_file = String::from_utf8_lossy(&tiprub_format::resource_files(&cold, true)[2].1).into_owned();
     assert!(ring_file.contains("contact_grid") && !ring_file.contains("thermal"));
@@ -204,7 +204,7 @@ fn packaged_scene_runs_as_unpackaged() {
     assert!(touching > 5, "{touching} steps with contact");
 }
 
-/// An importer multiplies mean torque and speed, step after step, while the rotor slows down.
+/// An importer multiplies mean torque and speed, step by step, while the rotor slows down.
 #[test]
 fn mean_torque_times_speed_equals_shaft_work() {
     let (path, mut scene) = (shipped(), scene());

@@ -1,5 +1,5 @@
-//! Hosts that are hostile by what surrounds the calls: loggers and callbacks that misbehave, steps that fail, threads, the
-//! floating-point environment.
+//! Hosts with hostile surroundings: loggers and callbacks that misbehave, steps that fail, threads, the floating-point
+//! environment.
 
 #![allow(clippy::float_cmp, reason = "values are compared for being untouched")]
 
@@ -33,7 +33,7 @@ fn log_categories_control_the_logger() {
         assert_eq!(slave.exit(), ERROR);
         assert!(slave.log().contains("fmi2ExitInitializationMode"), "without a choice, errors are explained");
     }
-    // "#r3#" would stand for the variable of value reference 3; an importer shows "##" as the character it is.
+    // "#r3#" would represent the variable of value reference 3; an importer shows "##" as the character itself.
     let named = CString::new("a#r3# of mine").expect("no NUL");
     let api3 = fmi3::load(&path);
     let third = fmi3::Fmi3TestSlave::new(&api3, &resources);
@@ -47,7 +47,7 @@ fn log_categories_control_the_logger() {
             "\"a##r3## of mine\"",
         );
     }
-    // No callbacks at all, and callbacks without a logger: everything works in silence.
+    // No callbacks at all, and callbacks without a logger: everything works without messages.
     let good = fmi2::Fmi2Arguments::new(&resources);
     let (name, token, place) = (good.name.expect("set"), good.token.expect("set"), good.location.expect("set"));
     let none = tiprub_fmi_host::api::Fmi2Callbacks {
@@ -58,7 +58,7 @@ fn log_categories_control_the_logger() {
         componentEnvironment: std::ptr::null_mut(),
     };
     for callbacks in [std::ptr::null(), &raw const none] {
-        // SAFETY: all texts live; callbacks are NULL or hold NULL.
+        // SAFETY: all texts are alive; callbacks are NULL or contain NULL.
         unsafe {
             let handle = (api.fmi2Instantiate)(name.as_ptr(), 1, token.as_ptr(), place.as_ptr(), callbacks, 0, 1);
             assert!(!handle.is_null());
@@ -67,14 +67,14 @@ fn log_categories_control_the_logger() {
             (api.fmi2FreeInstance)(handle);
         }
     }
-    // The callback struct and the texts are copied: those of `Slave::new` are gone by now, and messages still come with the
-    // instance's name, which the journal checks.
+    // The callback struct and the texts are copied: those of `Slave::new` no longer exist, and messages still contain
+    // the instance name, which the journal checks.
     assert_eq!(slave.step(0.0, 1.0), ERROR);
     assert!(slave.log().contains("not allowed in state Instantiated"));
     summary("loggers");
 }
 
-/// Calls from within an intermediate update that are not allowed there.
+/// Makes calls that are not allowed within an intermediate update.
 unsafe extern "C" fn misbehave(
     environment: *mut c_void,
     _time: f64,
@@ -124,7 +124,7 @@ fn forbidden_calls_within_intermediate_update_are_rejected() {
         let log = slave.log();
         assert!(log.contains("the instance is not freed because a step is in progress"), "{log}");
         assert!(log.contains("not a continuous input"), "{log}");
-        // A request that was not allowed is answered with Warning, one to return at NaN is not fulfilled.
+        // A request that is not allowed returns Warning; a request to return at NaN is not fulfilled.
         assert_eq!((answer.status, answer.early), (i32::from(!early_return), false), "{log}");
         assert_eq!(answer.time.to_bits(), 1e-5_f64.to_bits());
         count(9);
@@ -145,11 +145,11 @@ fn a_step_that_fails_ends_in_error_with_the_last_good_time() {
     let simulation = tiprub_core::Simulation::new(&moving).expect("valid");
     let closing = ["casing_radius_change", "gap_offset"]
         .map(|name| simulation.table().find(name).expect("a variable of this scene").reference);
-    // Each within its range, together a tenth of the radius and more.
+    // Each is within its range, together they are a tenth of the radius and more.
     slave.expect(slave.set_reals(&closing, &[-0.024; 2]));
     refused(slave.step(1e-4, 1e-4), &slave.log(), "last good time 0.0001 s");
     let (mut last, mut terminated) = (0.0, 0);
-    // SAFETY: places for one value.
+    // SAFETY: valid locations for one value.
     unsafe {
         slave.expect((api.fmi2GetRealStatus)(slave.handle, 2, &raw mut last));
         slave.expect((api.fmi2GetBooleanStatus)(slave.handle, 3, &raw mut terminated));
@@ -164,9 +164,9 @@ fn a_step_that_fails_ends_in_error_with_the_last_good_time() {
     summary("failed steps");
 }
 
-/// An instance that two threads use at once, against the rules.
+/// An instance that two threads use simultaneously, against the rules.
 struct Shared(*mut c_void);
-// SAFETY: the library under test refuses concurrent calls on an instance.
+// SAFETY: the library under test rejects concurrent calls to an instance.
 unsafe impl Sync for Shared {}
 
 #[test]
@@ -199,7 +199,7 @@ fn threads_use_separate_instances_but_cannot_share_one() {
             assert_eq!(thread.join().expect("no thread fails"), alone);
         }
     });
-    // Two threads on one instance is against the rules: some calls are refused, none is undefined.
+    // Two threads on one instance are against the rules: some calls are rejected, none is undefined.
     let slave = fmi2::Fmi2TestSlave::initialised(&api2, &resources);
     let shared = Shared(slave.handle);
     let reset = || {
@@ -207,7 +207,7 @@ fn threads_use_separate_instances_but_cannot_share_one() {
         // SAFETY: a live instance; the library serialises access itself.
         unsafe { (api2.fmi2Reset)(*handle) }
     };
-    // Messages would go to one journal from two threads: switch them off by asking for a category that never comes.
+    // Two threads would write messages to one journal: switch them off by selecting a category that never occurs.
     let fatal = CString::new("logStatusFatal").expect("no NUL");
     let list = [fatal.as_ptr()];
     // SAFETY: an array of one text.
@@ -226,7 +226,7 @@ fn threads_use_separate_instances_but_cannot_share_one() {
     summary("threads");
 }
 
-/// Floating-point control of the host: what `fenv.h` and the compilers' intrinsics set, without their flags.
+/// Floating-point control of the host, as `fenv.h` and the compilers' intrinsics set it, without its flags.
 #[cfg(target_arch = "x86_64")]
 mod control {
     /// All but the six sticky flags.
@@ -234,17 +234,18 @@ mod control {
 
     pub fn get() -> u32 {
         let mut value = 0_u32;
-        // SAFETY: writes the four bytes given.
+        // SAFETY: writes the given four bytes.
         unsafe { std::arch::asm!("stmxcsr [{}]", in(reg) &raw mut value, options(nostack)) };
         value
     }
 
     pub fn set(value: u32) {
-        // SAFETY: reads the four bytes given; only bits that exist are ever set.
+        // SAFETY: reads the given four bytes; only existing bits are ever set.
         unsafe { std::arch::asm!("ldmxcsr [{}]", in(reg) &raw const value, options(nostack)) };
     }
 
-    /// Do something under another control word, and check that it is still the same afterwards and no flag is raised.
+    /// Runs `action` under another control word, and checks that the word is unchanged afterwards and no flag is
+    /// raised.
     pub fn under<T>(word: u32, action: impl FnOnce() -> T) -> T {
         let before = get();
         set(word);
@@ -257,12 +258,12 @@ mod control {
     }
 }
 
-/// An unmasked exception ends this very process with SIGFPE: then no test of this file passes.
+/// An unmasked exception terminates this process with SIGFPE, and then all tests of this file fail.
 #[test]
 #[cfg(target_arch = "x86_64")]
 fn host_floating_point_environment_has_no_effect() {
     const MASKED: u32 = 0x1F80;
-    let traps = MASKED & !(0x0080 | 0x0200 | 0x0400 | 0x0800); // invalid, division by zero, overflow, underflow
+    let traps = MASKED & !(0x0080 | 0x0200 | 0x0400 | 0x0800); // Invalid operation, division by zero, overflow, underflow.
     let (path, resources) = (shipped(), UnpackedResources::new(false));
     let (api2, api3) = (fmi2::load(&path), fmi3::load(&path));
     let references =

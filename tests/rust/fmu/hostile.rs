@@ -1,5 +1,5 @@
 //! Callers that break every rule of the standards short of passing dangling pointers. Each case ends in Error (or NULL)
-//! with a message that names the culprit, changes nothing, and leaves the instance usable.
+//! with a message that names the cause, changes nothing, and leaves the instance usable.
 
 #![allow(clippy::float_cmp, reason = "values are compared for being untouched")]
 
@@ -36,7 +36,7 @@ fn fmi2_instantiation_is_rejected_with_reason() {
     for (arguments, reason) in cases2 {
         // The journal checks the instance name; NULL arrives as "".
         if arguments.name.is_none() {
-            // SAFETY: NULL is what is tried.
+            // SAFETY: NULL is the tested case.
             let handle = unsafe {
                 let null = std::ptr::null();
                 (api2.fmi2Instantiate)(null, 1, null, null, std::ptr::null(), 0, 0)
@@ -78,7 +78,7 @@ fn fmi3_instantiation_is_rejected_with_reason() {
     for (arguments, reason) in cases3 {
         refused(ERROR, &fmi3::Fmi3TestSlave::try_new(&api3, &arguments).expect_err("must be refused"), reason);
     }
-    // A trailing slash, none, and a URI are all understood.
+    // A trailing slash, none, and a URI are all accepted.
     let path = resources.path().display().to_string();
     for form in [path.clone(), format!("{path}/"), format!("file://{path}")] {
         let arguments = fmi3::Fmi3Arguments { path: text(&form), ..good.clone() };
@@ -92,7 +92,7 @@ fn other_interfaces(api3: &Fmi3Api) {
     let mut context = tiprub_tests::Journal::default();
     let environment: *mut c_void = (&raw mut context).cast();
     let (null, none) = (std::ptr::null(), std::ptr::null());
-    // SAFETY: NULL texts must be borne; the environment is a journal.
+    // SAFETY: NULL texts must be handled; the environment is a journal.
     unsafe {
         let logger = Some(tiprub_tests::journal3 as LogMessage);
         assert!((api3.fmi3InstantiateModelExchange)(null, null, null, false, false, environment, logger).is_null());
@@ -143,7 +143,7 @@ fn every_function_rejects_a_null_instance() {
     let (api2, api3) = (fmi2::load(&path), fmi3::load(&path));
     let null = std::ptr::null_mut();
     let (mut value, reference) = (0.0, 0_u32);
-    // SAFETY: NULL is what is tried; arrays have one element.
+    // SAFETY: NULL is the tested case; arrays have one element.
     unsafe {
         (api2.fmi2FreeInstance)(null);
         (api3.fmi3FreeInstance)(null);
@@ -175,9 +175,9 @@ fn rejects_invalid_arguments_of_get_and_set() {
     let (null_in, null_out) = (std::ptr::null(), std::ptr::null_mut());
     let (speed, friction, output) = ([reference("speed")], reference("friction_coefficient"), reference("rotor_angle"));
     let mut out = [7.5_f64; 4];
-    // SAFETY: every pointer is NULL or to an array of at least the elements that a correct library touches.
+    // SAFETY: every pointer is NULL or to an array of at least the elements that a correct library accesses.
     unsafe {
-        // Nothing to do is legal, with NULL arrays too.
+        // An empty request is legal, also with NULL arrays.
         assert_eq!((api.fmi2GetReal)(handle, std::ptr::null(), 0, null_out), OK);
         assert_eq!((api.fmi2SetReal)(handle, std::ptr::null(), 0, null_in), OK);
         assert_eq!((api.fmi2GetString)(handle, std::ptr::null(), 0, std::ptr::null_mut()), OK);
@@ -206,7 +206,7 @@ fn rejects_invalid_arguments_of_get_and_set() {
         refused((api.fmi2SetInteger)(handle, speed.as_ptr(), 1, &raw const integer), &slave.log(), "of type Real");
         assert_eq!(integer, 5);
         refused((api.fmi2SetReal)(handle, speed.as_ptr(), 1, null_in), &slave.log(), "argument value is NULL");
-        // The first is fine, the second is not: neither is set.
+        // The first is valid, the second is not: neither is set.
         for (second, value, reason) in [
             (friction, f64::NAN, "friction_coefficient"),
             (friction, f64::INFINITY, "not finite"),
@@ -252,14 +252,14 @@ fn fmi3_array_arguments_are_validated() {
         (vec![1], usize::MAX, "nValues"),
     ] {
         let mut values = [0.0; 8];
-        // SAFETY: a correct library touches no more than the values it announces in its message.
+        // SAFETY: a correct library accesses no more than the number of values in its message.
         let status = unsafe {
             (api.fmi3GetFloat64)(slave.handle, references.as_ptr(), references.len(), values.as_mut_ptr(), count)
         };
         let log = slave.log();
         refused(status, &log, if count == usize::MAX { "" } else { reason });
     }
-    // Scalars when packaged so.
+    // Scalars if packaged as such.
     let scalars = UnpackedResources::new(false);
     let scalar = fmi3::Fmi3TestSlave::new(&api, &scalars);
     scalar.initialise();
@@ -289,7 +289,7 @@ fn string_enumeration_and_boolean_access_is_validated() {
     unsafe {
         two.expect((api2.fmi2GetString)(two.handle, &raw const scene, 1, &raw mut name));
         two.expect((api2.fmi2GetInteger)(two.handle, &raw const scheme, 1, &raw mut number));
-        // The text lives on while other calls are made, until texts are asked for again.
+        // The text stays valid during other calls until texts are requested again.
         assert_eq!(std::ffi::CStr::from_ptr(name).to_str(), Ok("toy_rub"));
         assert_eq!(number, 2, "modal-exact");
         three.expect((api3.fmi3GetInt64)(three.handle, &raw const scheme, 1, &raw mut long, 1));
@@ -343,7 +343,7 @@ fn rejects_steps_with_wrong_time_or_size() {
     slave.expect(slave.step(1e-4, 1e-4));
     // Status of the last step.
     let (mut real, mut boolean) = (0.0, 7);
-    // SAFETY: places for one value.
+    // SAFETY: valid locations for one value.
     unsafe {
         slave.expect((api.fmi2GetRealStatus)(slave.handle, 2, &raw mut real));
         slave.expect((api.fmi2GetBooleanStatus)(slave.handle, 3, &raw mut boolean));
@@ -368,9 +368,9 @@ fn rejects_steps_with_wrong_time_or_size() {
         refused(third.enter(start, stop), &third.log(), reason);
     }
     third.initialise();
-    // A missing place for an answer is refused before anything moves; the other three are written.
+    // A missing output location is rejected before anything changes; the other three outputs are written.
     let (mut event, mut early, mut last) = (true, true, f64::NAN);
-    // SAFETY: NULL is what is tried.
+    // SAFETY: NULL is the tested case.
     let status = unsafe {
         let null = std::ptr::null_mut();
         (three.fmi3DoStep)(third.handle, 0.0, 1e-4, true, &raw mut event, null, &raw mut early, &raw mut last)

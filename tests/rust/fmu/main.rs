@@ -1,4 +1,4 @@
-//! The FMU library through its C ABIs: what it exports, the call order, steps, saved states, and hosts that break the rules.
+//! The FMU library through its C ABIs: exports, call order, steps, saved states, and hosts that break the rules.
 
 mod call_order;
 mod exports;

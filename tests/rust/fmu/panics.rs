@@ -1,4 +1,4 @@
-//! A panic inside the library: caught, logged, nothing printed, the instance out of order, the host and other instances
+//! A panic inside the library: caught, logged, nothing printed, the instance unusable, the host and other instances
 //! alive. The library is built with the feature that makes one magic step size panic.
 
 use std::process::Command;
@@ -6,10 +6,10 @@ use std::process::Command;
 use tiprub_tests::scene::UnpackedResources;
 use tiprub_tests::{ERROR, OK, fmi2, fmi3, library, shipped};
 
-/// The magic number of the feature `test-panic`.
+/// The magic step size of the feature `test-panic`.
 const PANIC: f64 = 1.234_567_890_123e-5;
 
-/// The child process: panics in both versions, in two threads at once, everything checked.
+/// Runs in the child process: panics in both versions, in two threads simultaneously, with all checks.
 fn abuse() {
     let path = library("release", &["test-panic"]);
     let (api2, api3) = (fmi2::load(&path), fmi3::load(&path));
@@ -23,7 +23,7 @@ fn abuse() {
     let log = slave.log();
     assert!(log.contains("panic requested by the panic test") && log.contains("stepping.rs:"), "{log}");
     let mut value = 0.0;
-    // SAFETY: arrays of one element; the library must refuse all of this.
+    // SAFETY: arrays of one element; the library must reject all of this.
     unsafe {
         assert_eq!((api2.fmi2GetReal)(slave.handle, &raw const value as *const u32, 1, &raw mut value), ERROR);
         assert_eq!((api2.fmi2GetRealStatus)(slave.handle, 2, &raw mut value), ERROR);
@@ -36,7 +36,7 @@ fn abuse() {
     drop(slave);
     other.expect(other.step(0.0, 1e-4));
 
-    // The same through FMI 3.0, from two threads at once.
+    // The same through FMI 3.0, from two threads simultaneously.
     std::thread::scope(|scope| {
         for _ in 0..2 {
             scope.spawn(|| {
@@ -55,7 +55,7 @@ fn abuse() {
     assert_eq!(fresh.step(0.0, 1e-4).status, OK);
 }
 
-/// Only does something when the test below runs this binary again.
+/// Has an effect only when the test below runs this binary again.
 #[test]
 fn child() {
     if std::env::var_os("TIPRUB_TEST_PANIC").is_some() {

@@ -1,4 +1,5 @@
-//! Saved states: bit for bit, in the same instance, in another, in another process; and what must not be restored.
+//! Saved states: bit for bit, in the same instance, in another one and in another process; and states that must not be
+//! restored.
 
 use std::process::Command;
 
@@ -15,7 +16,7 @@ fn references() -> Vec<u32> {
     (0..count).filter(|reference| simulation.real(*reference).is_ok()).collect()
 }
 
-/// Step from `first` to `last`, with a step size that changes; all reals at every point, as bits.
+/// Steps from `first` to `last` with a varying step size; returns all reals at every point, as bits.
 fn march(slave: &fmi2::Fmi2TestSlave<'_>, references: &[u32], first: u32, last: u32) -> Vec<Vec<u64>> {
     let size = |step: u32| H * (1.0 + 0.5 * f64::from(step % 3));
     let mut time: f64 = (0..first).fold(0.0, |time, step| time + size(step));
@@ -37,7 +38,7 @@ fn contact(slave: &fmi2::Fmi2TestSlave<'_>) -> bool {
     value > 0
 }
 
-/// March until a blade touches at a communication point; the number of steps taken.
+/// Steps until a blade touches at a communication point; returns the number of steps.
 #[track_caller]
 fn march_into_contact(slave: &fmi2::Fmi2TestSlave<'_>, references: &[u32]) -> u32 {
     for step in 0..2000 {
@@ -59,7 +60,7 @@ fn rerun_from_state_saved_in_contact_is_bit_identical() {
     let first = march(&slave, &references, begin, begin + 150);
     slave.expect(slave.restore(state));
     assert_eq!(march(&slave, &references, begin, begin + 150), first, "after restoring");
-    // Deserialised in another instance, never initialised.
+    // Deserialised in another instance that was never initialised.
     let other = fmi2::Fmi2TestSlave::new(&api, &resources);
     let (status, copy) = other.deserialise(&slave.serialise(state));
     other.expect(status);
@@ -70,7 +71,7 @@ fn rerun_from_state_saved_in_contact_is_bit_identical() {
     // SAFETY: a state of this instance.
     slave.expect(unsafe { (api.fmi2GetFMUstate)(slave.handle, &raw mut again) });
     assert_eq!(again, state);
-    // SAFETY: as before; the second call is on the NULL that the first one left.
+    // SAFETY: as before; the second call passes the NULL that the first one wrote.
     unsafe {
         slave.expect((api.fmi2FreeFMUstate)(slave.handle, &raw mut again));
         assert!(again.is_null());
@@ -80,7 +81,7 @@ fn rerun_from_state_saved_in_contact_is_bit_identical() {
     assert!(slave.log().contains("not a saved state of this instance"));
 }
 
-/// Only does something when the test below runs this binary again.
+/// Has an effect only when the test below runs this binary again.
 #[test]
 fn child_continues_from_a_file() {
     let Some(file) = std::env::var_os("TIPRUB_TEST_STATE") else { return };
@@ -131,7 +132,7 @@ fn a_thousand_resets_give_the_same_bits() {
     for cycle in 1..1000 {
         assert!(run() == first, "cycle {cycle}");
     }
-    // And once as far as contact.
+    // And once up to contact.
     slave.expect(slave.reset());
     slave.initialise();
     let touching = march(&slave, &references, 0, begin);
@@ -195,7 +196,7 @@ fn rejects_invalid_damaged_and_foreign_states() {
         }
     }
     println!("{flips} single flipped bits found");
-    // The same scene packaged otherwise is another FMU.
+    // The same scene with other packaging options is another FMU.
     let other = fmi3::Fmi3TestSlave::new(&api3, &arrays);
     let foreign = other.serialise(other.save());
     assert_eq!(foreign.len(), bytes.len());
@@ -208,8 +209,8 @@ fn rejects_invalid_damaged_and_foreign_states() {
     slave.expect(slave.step(H, H));
 }
 
-/// To read outputs in Initialization Mode changes nothing that a saved state holds: what is set after it is restored is where the
-/// run starts, at once.
+/// Reading outputs in Initialization Mode changes nothing in a saved state: values set after restoring it are the start
+/// values of the run.
 #[test]
 fn reading_in_initialization_mode_leaves_the_state() {
     let api = fmi3::load(&shipped());
@@ -225,7 +226,7 @@ fn reading_in_initialization_mode_leaves_the_state() {
         slave.expect(slave.restore(read));
         slave.expect(slave.set_reals(&[offset], &[opened]));
         let found = slave.reals(&[clearance], 1)[0] - at_first;
-        // But for the flanks of the shape, 1.5e-5 of it.
+        // Except for the flanks of the shape, 1.5e-5 of it.
         assert!((found / opened - 1.0).abs() < 1e-4, "{found} m for {opened} m");
     }
     slave.expect(slave.restore(read));

@@ -1,4 +1,5 @@
-//! Steps through both C ABIs against the core driven directly: same bits, exact landing, inputs, intermediate updates.
+//! Steps through both C ABIs against the core driven directly: same bits, exact end times, inputs, intermediate
+//! updates.
 
 use std::ffi::c_void;
 
@@ -8,9 +9,9 @@ use tiprub_fmi_host::api::Fmi3Api;
 use tiprub_tests::scene::{UnpackedResources, scene};
 use tiprub_tests::{DISCARD, ERROR, OK, WARNING, fmi2, fmi3, shipped};
 
-/// Communication step (s): not a multiple of the internal step of 2 µs.
+/// Communication step (s), which is not a multiple of the internal step of 2 µs.
 const H: f64 = 1.0137e-4;
-/// More than two revolutions at 300 rad/s.
+/// Number of steps for more than two revolutions at 300 rad/s.
 const STEPS: u32 = 450;
 
 fn simulation() -> Simulation {
@@ -23,7 +24,7 @@ fn reference_of(simulation: &Simulation, name: &str) -> u32 {
     simulation.table().find(name).unwrap_or_else(|| panic!("no variable {name}")).reference
 }
 
-/// References of all real elements.
+/// Returns the references of all real elements.
 fn all_reals(simulation: &Simulation) -> Vec<u32> {
     let count = u32::try_from(simulation.table().references()).expect("few variables");
     (0..count).filter(|reference| simulation.real(*reference).is_ok()).collect()
@@ -146,7 +147,7 @@ fn derivatives_of_outputs_follow_the_outputs() {
     assert!(slave.log().contains("order 2"));
 }
 
-/// Notes the time of each internal step, reads time and angle, and sets the speed to the wish if that is not zero.
+/// Records the time of each internal step, reads time and angle, and sets the speed to the wish if that is not zero.
 unsafe extern "C" fn watch(
     environment: *mut c_void,
     time: f64,
@@ -157,7 +158,7 @@ unsafe extern "C" fn watch(
     requested: *mut bool,
     at: *mut f64,
 ) {
-    // SAFETY: the environment is the importer's context, which nobody else touches during a step.
+    // SAFETY: the environment is the importer's context, which is not accessed elsewhere during a step.
     let context = unsafe { &mut *environment.cast::<fmi3::CallbackContext>() };
     assert!(get_allowed && finished);
     // SAFETY: the functions outlive the instance.
@@ -168,7 +169,7 @@ unsafe extern "C" fn watch(
     assert_eq!((status, values[0].to_bits()), (OK, time.to_bits()), "the time inside a step");
     context.notes.push(time);
     if context.wish > 0.0 && can_return && time >= context.wish {
-        // SAFETY: places for the two answers.
+        // SAFETY: valid locations for the two outputs.
         unsafe { (*requested, *at) = (true, time) };
     }
     if context.wish < 0.0 && set_requested {
@@ -188,7 +189,8 @@ fn intermediate_updates_see_every_internal_step() {
     let path = shipped();
     let (api, resources) = (fmi3::load(&path), UnpackedResources::new(false));
     let core = simulation();
-    // Damping loss is gathered per communication step or per look inside: the energies may differ in the last bits.
+    // Damping loss is summed per communication step or per intermediate update, so the energies may differ in the last
+    // bits.
     let energies =
         ["damping_loss", "energy_residual", "energy_residual_relative"].map(|name| reference_of(&core, name));
     let references: Vec<_> = all_reals(&core).into_iter().filter(|reference| !energies.contains(reference)).collect();
@@ -222,7 +224,7 @@ fn early_return_ends_the_step_at_the_requested_time() {
     assert_eq!((rest.status, rest.early), (OK, false));
     assert_eq!(slave.step(rest.time, 1e-4).status, OK);
 
-    // Without the importer's consent at instantiation a request is not followed, and answered with a warning.
+    // Without the importer's consent at instantiation a request is not fulfilled, and a warning is returned.
     let strict = fmi3::Fmi3TestSlave::try_new(&api, &watched(&resources, false)).unwrap_or_else(|log| panic!("{log}"));
     strict.initialise();
     strict.wish(4.1e-5);
@@ -243,8 +245,9 @@ fn inputs_set_during_intermediate_updates_act_from_then_on() {
     for step in 0..steps {
         assert_eq!(slave.step(f64::from(step) * size, size).status, OK);
     }
-    // 300 + 1000·t, held over internal steps of h = 2 µs: the angle lags the exact integral by ½·1000·h·T, and the set at
-    // the end of each step, which is not requested, is missing once a step (another ½... of one h): bounded by 2·1000·h·T.
+    // 300 + 1000·t, held over internal steps of h = 2 µs: the angle lags the exact integral by ½·1000·h·T, and the
+    // value at the end of each step, which is not requested, is missing once per step (another ½... of one h): bounded
+    // by 2·1000·h·T.
     let end = f64::from(steps) * size;
     let exact = 300.0 * end + 500.0 * end * end;
     let error = exact - slave.reals(&[angle], 1)[0];
@@ -327,7 +330,7 @@ fn steps_of_any_length_are_rejected_or_give_finite_outputs() {
     }
 }
 
-/// As many modes as three contact nodes have directions: massless-boundary leaves none.
+/// There are as many modes as three contact nodes have directions, so massless-boundary keeps none.
 #[test]
 fn rejects_a_scheme_without_modes_reversibly() {
     let mut scene = scene();
@@ -382,7 +385,7 @@ fn warnings_of_the_actual_step_are_logged_once() {
     assert_eq!(counts, [0, 1, 0, 0, 0]);
 }
 
-/// Tries, after every internal step, to set a good value together with a speed that nothing can follow.
+/// Tries, after every internal step, to set a valid value together with an impossible speed.
 unsafe extern "C" fn overreach(
     environment: *mut c_void,
     _time: f64,
@@ -396,7 +399,7 @@ unsafe extern "C" fn overreach(
     if !set_requested {
         return;
     }
-    // SAFETY: the environment is the importer's context, which nobody else touches during a step.
+    // SAFETY: the environment is the importer's context, which is not accessed elsewhere during a step.
     let context = unsafe { &mut *environment.cast::<fmi3::CallbackContext>() };
     // SAFETY: the functions outlive the instance.
     let api: &Fmi3Api = unsafe { &*context.api };
@@ -437,14 +440,14 @@ fn rejected_values_within_a_step_do_not_change_ramps() {
     assert_eq!(plain.reals(&whirl, 2), asked.reals(&whirl, 2));
 }
 
-/// The scene with a bound on its internal steps, which an importer may change.
+/// Returns the scene with a maximum number of internal steps, which an importer can change.
 fn bounded() -> Scene {
     let mut scene = scene();
     scene.settings.time.max_internal_steps = Some(0);
     scene
 }
 
-/// The scene with a tolerance in place of a step.
+/// Returns the scene with adaptive steps.
 fn marched() -> Scene {
     let mut scene = scene();
     (scene.settings.time.scheme, scene.settings.time.step) = (Scheme::Galerkin, 8e-5);
@@ -455,7 +458,8 @@ fn marched() -> Scene {
 /// Communication step of these tests (s): five spans of the longest step.
 const LONG: f64 = 4e-4;
 
-/// Run of a scene without a bound: the communication step with the most internal steps, their number, and the values there.
+/// Run of a scene without a maximum: the communication step with the most internal steps, their number, and the values
+/// there.
 struct Free {
     scene: Scene,
     references: Vec<u32>,
@@ -509,7 +513,7 @@ fn fmi2_discards_too_many_steps_and_can_repeat() {
             let state = slave.serialise(slave.save());
             assert_eq!(slave.step(time, LONG), DISCARD, "{}", slave.log());
             let (mut last, mut terminated) = (0.0, 7);
-            // SAFETY: places for the answers.
+            // SAFETY: valid locations for the outputs.
             unsafe {
                 slave.expect((api.fmi2GetRealStatus)(slave.handle, 2, &raw mut last));
                 slave.expect((api.fmi2GetBooleanStatus)(slave.handle, 3, &raw mut terminated));
@@ -519,7 +523,7 @@ fn fmi2_discards_too_many_steps_and_can_repeat() {
             assert_eq!(bits(&slave.reals(&found.references)), found.before);
             assert!(slave.serialise(slave.save()) == state, "as if it had not been tried");
         }
-        // A shorter one from here, and back; then the whole step with as many as it takes.
+        // A shorter step from here, and back; then the whole step with exactly the internal steps it needs.
         let here = slave.save();
         slave.expect(slave.step(time, 1e-6));
         slave.expect(slave.restore(here));
@@ -571,10 +575,10 @@ fn fmi3_returns_early_or_discards_too_many_steps() {
             assert_eq!((answer.status, answer.early), (OK, true), "{}", slave.log());
             assert!(answer.time > time && answer.time < time + LONG * (1.0 - 1e-6), "{}", answer.time);
             assert_eq!(slave.reals(&[0], 1)[0].to_bits(), answer.time.to_bits());
-            // The rest takes no more than what is left.
+            // The rest needs only the remaining internal steps.
             let rest = slave.step(answer.time, time + LONG - answer.time);
             assert_eq!((rest.status, rest.early), (OK, false), "{}", slave.log());
-            // Not even one internal step of a marched scene.
+            // Not even one internal step of a scene with adaptive steps.
             set(1);
             let answer = slave.step(rest.time, LONG);
             let marched = found.scene.settings.time.scheme == Scheme::Galerkin;

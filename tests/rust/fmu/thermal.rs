@@ -1,5 +1,5 @@
-//! The library of heat conduction through both faces: bits of the native simulation, saved states, derivatives, refusals. The call
-//! order is tested with that of the contact unit.
+//! The library of heat conduction through both interfaces: bits of the native simulation, saved states, derivatives,
+//! errors. The call order is tested with that of the contact unit.
 
 use nalgebra::DMatrix;
 use tiprub_core::rom::ThermalPatch;
@@ -10,7 +10,7 @@ use tiprub_thermal::{ConductionModel, ThermalSimulation};
 const PATCHES: usize = 3;
 const ORDER: usize = 5;
 
-/// A model that no mesh made.
+/// Returns a model without a mesh.
 pub fn model() -> ConductionModel {
     let capacity = 50.0_f64;
     let share = 1.0 / capacity.sqrt();
@@ -42,17 +42,17 @@ pub fn model() -> ConductionModel {
     }
 }
 
-/// References of inputs, and of all reals.
+/// Returns the references of inputs, and of all reals.
 fn references() -> (u32, u32, Vec<u32>) {
     let simulation = ThermalSimulation::new(model()).expect("valid");
     let find = |name: &str| simulation.table().find(name).unwrap_or_else(|| panic!("no {name}")).reference;
     let count = u32::try_from(simulation.table().references()).expect("few variables");
-    // Time of an instance is its own in every phase: the rest are reals.
+    // The time belongs to the instance in every phase: the others are reals.
     let reals = (1..count).filter(|reference| simulation.real(*reference).is_ok()).collect();
     (find("casing_heat"), find("gas_convection_factor"), reals)
 }
 
-/// Heat, factor and length of a step.
+/// Returns heat, factor and length of a step.
 fn inputs(step: u32) -> ([f64; PATCHES], f64, f64) {
     let wave = |k: u32| 50.0 * f64::from(step + 3 * k).sin();
     ([0, 1, 2].map(wave), if step % 7 < 3 { 1.0 } else { 0.25 }, 0.1 * f64::from(1 + step % 4))
@@ -126,7 +126,7 @@ fn states_restore_continue_and_transfer_between_instances() {
     assert!(other.log().contains("checksum"));
 }
 
-/// Steps in which heat does not pass an element: a message of each instance, once, with what to do.
+/// Steps in which heat does not cross an element cause one message per instance, with the remedy.
 #[test]
 fn short_steps_are_warned_of_once_in_fmi2_and_fmi3() {
     let path = thermal();
@@ -150,7 +150,7 @@ fn short_steps_are_warned_of_once_in_fmi2_and_fmi3() {
     }
 }
 
-/// Both libraries in one process, with the resources of the other.
+/// Both libraries in one process, each with the resources of the other.
 #[test]
 fn library_rejects_the_model_of_the_other_library() {
     let (contact, conduction) = (fmi2::load(&shipped()), fmi2::load(&thermal()));
@@ -164,7 +164,7 @@ fn library_rejects_the_model_of_the_other_library() {
         (fmi2::Fmi2TestSlave::initialised(&contact, &scene), fmi2::Fmi2TestSlave::initialised(&conduction, &model));
     one.expect(one.step(0.0, 1e-4));
     other.expect(other.step(0.0, 1e-4));
-    // A state of one is none of the other.
+    // The state of one is invalid for the other.
     let bytes = one.serialise(one.save());
     assert_eq!(other.deserialise(&bytes).0, ERROR);
 }

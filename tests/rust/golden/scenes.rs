@@ -1,4 +1,4 @@
-//! Scenes that together have every feature, scheme, solver, gap law and shape.
+//! Scenes that together cover every feature, scheme, solver, gap law and shape.
 
 use tiprub_core::Scene;
 use tiprub_core::settings::{
@@ -13,7 +13,7 @@ use tiprub_test_models::{
 
 const SECTORS: usize = 12;
 
-/// Twelve uncoupled blades in a rigid casing of two bumps.
+/// Returns twelve uncoupled blades in a rigid casing with two bumps.
 fn rotor(name: &str, scheme: Scheme, solver: Solver, change: impl Fn(&mut Scene)) -> Scene {
     let mut scene = rub(SECTORS);
     scene.roms[0] = rich_blade(SECTORS);
@@ -33,7 +33,7 @@ fn shaft(scene: &mut Scene) {
     (rotor.whirl, rotor.axial_shift) = (true, true);
 }
 
-/// The ring with temperatures, a load, and heat shared with the blades.
+/// Adds the ring with temperatures, a load, and heat shared with the blades.
 fn warm(scene: &mut Scene) {
     flexible(scene);
     let ring = &mut scene.settings.structures[1];
@@ -59,7 +59,7 @@ fn spinning(scene: &mut Scene) {
     (spin.stiffening, spin.growth, spin.coriolis) = (true, true, true);
 }
 
-/// The same blades coupled to their neighbours.
+/// Couples the blades to their neighbours.
 fn coupled(scene: &mut Scene) {
     scene.roms[0] = disk::TestDisk::random(SECTORS, 3, 12, 0.1, 7).cyclic();
 }
@@ -82,13 +82,13 @@ fn table(scene: &mut Scene) {
     shape(Shape::Table { radius_change: (0..32).map(change).collect() })(scene);
 }
 
-/// Several changes at once.
+/// Combines several changes.
 fn all_of(changes: &[fn(&mut Scene)]) -> impl Fn(&mut Scene) {
     let changes = changes.to_vec();
     move |scene| changes.iter().for_each(|change| change(scene))
 }
 
-/// Blades whose steps go by a tolerance.
+/// Returns blades with adaptive steps.
 fn galerkin(name: &str, changes: &[fn(&mut Scene)]) -> Scene {
     let changes = changes.to_vec();
     rotor(name, Scheme::Galerkin, Solver::Lcp, |scene| {
@@ -157,7 +157,7 @@ fn mistuned_gaps(scene: &mut Scene) {
     scene.settings.structures[0].frequency_factors.clear();
 }
 
-/// A free body between elastic or rigid surfaces.
+/// Returns scenes of a free body between elastic or rigid surfaces.
 fn bodies() -> Vec<Scene> {
     let named = |name: &str, mut scene: Scene| {
         scene.settings.name = name.into();
@@ -191,7 +191,7 @@ fn bodies() -> Vec<Scene> {
     ]
 }
 
-/// Several structures, several pairs.
+/// Returns scenes of several structures and pairs.
 fn several() -> Vec<Scene> {
     let named = |name: &str, mut scene: Scene| {
         scene.settings.name = name.into();
@@ -206,17 +206,17 @@ fn several() -> Vec<Scene> {
     ]
 }
 
-/// The scene that ships with `preset = "paper"`.
+/// The built-in scene with `preset = "paper"`.
 pub const PRESET: &str = include_str!("../../../src/gallery/scenes/rotor37-paper.toml");
 
-/// A scene as text around blades of analytic modes: no bit of it depends on a reduction.
+/// Returns the scene of a text with blades of analytic modes, so that no bit depends on a reduction.
 #[track_caller]
 pub fn around_blades(text: &str) -> Scene {
     let settings = tiprub_format::parse_scene(text, "golden.toml").unwrap_or_else(|error| panic!("{error}"));
     Scene { settings, roms: vec![rich_blade(SECTORS)] }
 }
 
-/// All of them.
+/// Returns all scenes.
 pub fn all() -> Vec<Scene> {
     rotors().into_iter().chain(bodies()).chain(several()).chain([around_blades(PRESET)]).collect()
 }

@@ -1,4 +1,4 @@
-//! Calls that both versions of the standard share, differing in names and C types only.
+//! Calls that exist in both versions of the standard and differ only in names and C types.
 
 use std::ffi::{CString, c_char};
 
@@ -7,7 +7,7 @@ use super::{In, Out, TextArgument};
 use crate::slave::order::CallRule;
 use crate::slave::{AccessRequest, Dialect, FmiStatus, Refusal, Result, Slave, Value};
 
-/// Names of the arguments of get and set functions: references, values.
+/// Returns the argument names of get and set functions: references, values.
 fn arguments(dialect: Dialect) -> (&'static str, &'static str) {
     match dialect {
         Dialect::Fmi2 => ("vr", "value"),
@@ -15,7 +15,7 @@ fn arguments(dialect: Dialect) -> (&'static str, &'static str) {
     }
 }
 
-/// Get values of one type; `convert` makes the C value.
+/// Returns values of one type; `convert` creates the C value.
 pub(crate) fn get<T: Value, C: Copy>(
     (handle, rule, type_name): (InstanceHandle, &CallRule, &'static str),
     (references, count): (In<u32>, usize),
@@ -32,7 +32,7 @@ pub(crate) fn get<T: Value, C: Copy>(
     })
 }
 
-/// Set values of one type; `convert` makes the Rust value, or says what is wrong with the C value.
+/// Sets values of one type; `convert` creates the Rust value, or describes the problem with the C value.
 pub(crate) fn set<T: Value, C>(
     (handle, rule, type_name): (InstanceHandle, &CallRule, &'static str),
     (references, count): (In<u32>, usize),
@@ -49,7 +49,7 @@ pub(crate) fn set<T: Value, C>(
     })
 }
 
-/// Get texts; they live in the instance until texts are asked for again.
+/// Returns strings, which the instance owns until the next call that returns strings.
 pub(crate) fn strings(
     (handle, rule): (InstanceHandle, &CallRule),
     (references, count): (In<u32>, usize),
@@ -66,7 +66,7 @@ pub(crate) fn strings(
     })
 }
 
-/// `fmi2SetDebugLogging`, `fmi3SetDebugLogging`.
+/// Implements `fmi2SetDebugLogging` and `fmi3SetDebugLogging`.
 pub(crate) fn set_debug_logging(
     handle: InstanceHandle,
     rule: &CallRule,
@@ -82,7 +82,7 @@ pub(crate) fn set_debug_logging(
     outcome.0
 }
 
-/// `fmi2FMUstate`, `fmi3FMUState`: an opaque name of a saved state.
+/// `fmi2FMUstate`, `fmi3FMUState`: an opaque handle of a saved state.
 pub(crate) type StateHandle = *const Vec<u8>;
 
 /// Saved states.
@@ -96,7 +96,7 @@ pub(crate) mod state {
         Ok(state)
     }
 
-    /// Save into a new state, or into the one that `*state` names.
+    /// Saves into a new state, or into the one that `*state` refers to.
     pub(crate) fn save(handle: InstanceHandle, rule: &CallRule, state: Out<StateHandle>) -> FmiStatus {
         guard(handle, rule, |slave| {
             let window = state.single("FMUstate")?;
@@ -107,7 +107,7 @@ pub(crate) mod state {
         })
     }
 
-    /// Restore.
+    /// Restores a state.
     pub(crate) fn restore(handle: InstanceHandle, rule: &CallRule, state: StateHandle) -> FmiStatus {
         guard(handle, rule, |slave| {
             slave.restore(required(state)?)?;
@@ -115,7 +115,7 @@ pub(crate) mod state {
         })
     }
 
-    /// Free; NULL, or a pointer to NULL, is legal.
+    /// Frees a state; NULL, or a pointer to NULL, is legal.
     pub(crate) fn free(handle: InstanceHandle, rule: &CallRule, state: Out<StateHandle>) -> FmiStatus {
         guard(handle, rule, |slave| {
             if state.is_null() {
@@ -130,7 +130,7 @@ pub(crate) mod state {
         })
     }
 
-    /// Size in bytes.
+    /// Writes the size in bytes.
     pub(crate) fn size(handle: InstanceHandle, rule: &CallRule, state: StateHandle, size: Out<usize>) -> FmiStatus {
         guard(handle, rule, |slave| {
             let window = size.single("size")?;
@@ -149,7 +149,7 @@ pub(crate) mod state {
         )))
     }
 
-    /// Serialise.
+    /// Serialises a state.
     pub(crate) fn serialise(
         handle: InstanceHandle,
         rule: &CallRule,
@@ -165,7 +165,7 @@ pub(crate) mod state {
         })
     }
 
-    /// Deserialise into a new state, or into the one that `*state` names.
+    /// Deserialises into a new state, or into the one that `*state` refers to.
     pub(crate) fn deserialise(
         handle: InstanceHandle,
         rule: &CallRule,

@@ -1,21 +1,22 @@
-//! Directional and adjoint derivatives, of which both versions of the standard have functions.
+//! Directional and adjoint derivatives, for which both versions of the standard have functions.
 
 use super::{In, InstanceHandle, Out, guard};
 use crate::slave::order::unsupported;
 use crate::slave::{AccessRequest, Dialect, FmiStatus, Result, Slave};
 
-/// Value references with the number of their values, and the names of both arguments.
+/// Value references, their number, the number of their values, and the name of the argument.
 pub(crate) type ReferenceArguments = (In<u32>, usize, usize, &'static str);
 
 /// Function of the slave that computes derivatives.
 type DerivativeFunction = fn(&mut Slave, &[u32], &[u32], &[f64]) -> Result<Vec<f64>>;
 
-/// Forward: outputs move as inputs do.
+/// Forward derivatives: changes of outputs caused by changes of inputs.
 pub(crate) const DIRECTIONAL: DerivativeFunction = Slave::directional;
-/// Backward: inputs weigh as outputs do.
+/// Backward derivatives: weights of inputs from weights of outputs.
 pub(crate) const ADJOINT: DerivativeFunction = Slave::adjoint;
 
-/// Answer with derivatives of `unknowns` by `knowns`; `seed` and `sensitivity` with the names of their arguments.
+/// Computes derivatives of `unknowns` with respect to `knowns`; `seed` and `sensitivity` contain the names of their
+/// arguments.
 pub(crate) fn derivatives(
     (handle, name, answer): (InstanceHandle, &'static str, DerivativeFunction),
     unknowns: ReferenceArguments,

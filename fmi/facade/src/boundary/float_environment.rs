@@ -1,14 +1,14 @@
-//! Floating-point environment of the caller, put aside while the library computes.
+//! Floating-point environment of the caller, which is saved and replaced while the library computes.
 //!
-//! Importers run with exceptions unmasked (to find the origin of a NaN), with other rounding modes, or with denormals
-//! flushed to zero. Compiled Rust assumes the default environment: it evaluates both branches of a condition where that
-//! is faster, and infinite gaps of lanes that pad a vector register are arithmetic without consequence. Under unmasked
-//! exceptions either would end the importer's process, and under another rounding mode results would differ.
+//! Importers may run with unmasked exceptions (to find the origin of a NaN), with other rounding modes, or with
+//! denormals flushed to zero. Compiled Rust assumes the default environment: it evaluates both branches of a condition
+//! where that is faster, and it computes with infinite gaps in lanes that pad a vector register. With unmasked
+//! exceptions either would terminate the importer's process, and another rounding mode would change the results.
 
-/// While this lives, exceptions are masked, rounding is to nearest and denormals are kept; then the caller's control and
-/// status bits are back, so that no exception flag raised in between is seen outside.
+/// While this guard is alive, exceptions are masked, rounding is to nearest and denormals are kept. Dropping it
+/// restores the caller's control and status bits, so that the caller sees no exception flag raised in between.
 ///
-/// On processors other than x86-64 and AArch64 nothing is changed.
+/// On processors other than x86-64 and AArch64 it does nothing.
 #[derive(Debug)]
 pub(crate) struct StandardFloats {
     of_caller: control::Environment,
@@ -19,19 +19,19 @@ mod control {
     /// Control and status register of SSE.
     pub(super) type Environment = u32;
 
-    /// After power-up (Intel 64 manual, volume 1, section 10.2.3).
+    /// State after power-up (Intel 64 manual, volume 1, section 10.2.3).
     pub(super) const STANDARD: Environment = 0x1F80;
 
     pub(super) fn read() -> Environment {
         let mut value = 0_u32;
-        // SAFETY: `stmxcsr` writes four bytes to the place given and changes nothing else; every x86-64 has it.
+        // SAFETY: `stmxcsr` writes four bytes to the given address and changes nothing else; every x86-64 has it.
         unsafe { std::arch::asm!("stmxcsr [{}]", in(reg) &raw mut value, options(nostack, preserves_flags)) };
         value
     }
 
     pub(super) fn write(value: Environment) {
         // SAFETY: `ldmxcsr` reads four bytes; the value is the standard one, which compiled code assumes, or one that
-        // `read` gave for the code that goes on with it, hence no reserved bit is set.
+        // `read` returned for the code that continues with it, so no reserved bit is set.
         unsafe { std::arch::asm!("ldmxcsr [{}]", in(reg) &raw const value, options(nostack, preserves_flags)) };
     }
 }
@@ -55,8 +55,8 @@ mod control {
     }
 
     pub(super) fn write([control, status]: Environment) {
-        // SAFETY: the values are the standard ones, which compiled code assumes, or those that `read` gave for the code
-        // that goes on with them, hence no reserved bit is set.
+        // SAFETY: the values are the standard ones, which compiled code assumes, or those that `read` returned for the
+        // code that continues with them, so no reserved bit is set.
         unsafe {
             std::arch::asm!("msr fpcr, {}", "msr fpsr, {}", in(reg) control, in(reg) status, options(nomem, nostack, preserves_flags));
         }
@@ -75,7 +75,7 @@ mod control {
 }
 
 impl StandardFloats {
-    /// Put the caller's environment aside.
+    /// Saves the caller's environment and sets the standard one.
     pub(super) fn enter() -> Self {
         let of_caller = control::read();
         control::write(control::STANDARD);

@@ -1,4 +1,4 @@
-//! Instances as the importer holds them, and the guard around every call on one.
+//! Instances as the importer holds them, and the guard around every call to one.
 
 use std::fmt::Display;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -14,7 +14,7 @@ use crate::slave::order::{self, CallRule};
 use crate::slave::{Dialect, FmiStatus, InstancePhase, Refusal, Result, Slave};
 use crate::unit::Load;
 
-/// FMI 3.0 callbacks and flags that belong to stepping.
+/// Callbacks and flags of FMI 3.0 for stepping.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Callbacks {
     /// `intermediateUpdate`, may be NULL.
@@ -25,18 +25,19 @@ pub(crate) struct Callbacks {
     pub environment: ImporterEnvironment,
 }
 
-/// Target of a handle. The mutex costs some twenty nanoseconds per call and settles two cases that the standard leaves open: a call on an instance
-/// that another thread is using is rejected, and a panic inside the slave poisons the instance for good.
+/// Target of a handle. The mutex costs about twenty nanoseconds per call and settles two cases that the standard leaves
+/// open: a call to an instance that another thread is using is rejected, and a panic inside the slave poisons the
+/// instance permanently.
 pub(crate) struct Instance {
     dialect: Dialect,
     slave: Mutex<Slave>,
-    /// Messages go out after the lock is released, so that a logger may call functions on the instance.
+    /// Messages are sent after the lock is released, so that a logger may call functions of the instance.
     pub(super) log: Log,
     /// Set at instantiation.
     pub callbacks: Option<Callbacks>,
 }
 
-/// `fmi2Component`, `fmi3Instance`: NULL, or what `instantiate` returned and `release` has not yet taken back.
+/// `fmi2Component`, `fmi3Instance`: NULL, or a pointer that `instantiate` returned and `release` has not yet freed.
 #[derive(Debug, Clone, Copy)]
 #[repr(transparent)]
 pub struct InstanceHandle(*mut Instance);
@@ -45,18 +46,18 @@ impl InstanceHandle {
     const NULL: Self = Self(std::ptr::null_mut());
 
     fn instance(&self) -> Option<&Instance> {
-        // SAFETY: null is handled by `as_ref`; otherwise the importer passes what `instantiate` returned and `release` has
-        // not taken back (the contract of both standards). Only shared borrows of an instance are ever made, so that calls
-        // from callbacks are sound; the mutex inside gives exclusive access to the slave.
+        // SAFETY: null is handled by `as_ref`; otherwise the importer passes a pointer that `instantiate` returned and
+        // `release` has not freed (the contract of both standards). Only shared borrows of an instance are ever
+        // created, so that calls from callbacks are sound; the mutex inside gives exclusive access to the slave.
         unsafe { Some(self.0).filter(|pointer| pointer.is_aligned())?.as_ref() }
     }
 }
 
 /// Arguments of the instantiation functions.
 pub(crate) struct Instantiation<'a> {
-    /// Version of the standard, and with it how to read the location.
+    /// Version of the standard, which determines how the location is read.
     pub dialect: Dialect,
-    /// Exported function, for messages.
+    /// Name of the exported function, for messages.
     pub function: &'static str,
     /// `instanceName`.
     pub name: TextArgument,
@@ -64,21 +65,21 @@ pub(crate) struct Instantiation<'a> {
     pub token: TextArgument,
     /// `fmuResourceLocation`, `resourcePath`.
     pub location: TextArgument,
-    /// Makes the unit.
+    /// Loads the unit.
     pub load: Load,
     /// Reads the location.
     pub locate: fn(&str) -> Result<PathBuf, String>,
-    /// Where messages go.
+    /// Destination of messages.
     pub sink: Sink,
     /// `loggingOn`.
     pub logging_on: bool,
     /// FMI 3.0 only.
     pub callbacks: Option<Callbacks>,
-    /// Further checks by the version's own rules.
+    /// Further checks of this version of the standard.
     pub check: &'a dyn Fn(&Slave) -> Result<()>,
 }
 
-/// Make an instance; NULL with a message if that is not possible.
+/// Creates an instance; returns NULL with a message if that is not possible.
 pub(crate) fn instantiate(request: Instantiation<'_>) -> InstanceHandle {
     panics::silence();
     let function = request.function;
@@ -120,13 +121,14 @@ pub(crate) fn instantiate(request: Instantiation<'_>) -> InstanceHandle {
     }
 }
 
-/// Refuse to instantiate; the message goes to the importer.
+/// Rejects an instantiation; the message is sent to the importer.
 pub(crate) fn refuse_instantiation(sink: Sink, function: &str, reason: &str) -> InstanceHandle {
     Log::new(sink, false).emit(FmiStatus::Error, &format!("{function}: {reason}"));
     InstanceHandle::NULL
 }
 
-/// Free an instance. NULL is legal. A free from within an intermediate update is refused: the step under way needs it.
+/// Frees an instance. NULL is legal. A call from within an intermediate update is rejected, because the step in
+/// progress needs the instance.
 pub(crate) fn release(handle: InstanceHandle, rule: &CallRule) {
     let Some(instance) = handle.instance() else { return };
     if instance.dialect != rule.dialect() {
@@ -141,10 +143,10 @@ pub(crate) fn release(handle: InstanceHandle, rule: &CallRule) {
         let message = "the instance is not freed because a step is in progress. Free it after the step has returned";
         return instance.log.emit(FmiStatus::Error, &format!("{}: {message}", rule.name));
     }
-    // SAFETY: the handle came from `Box::into_raw` in `instantiate`, and by the contract of both standards this is the last
-    // use of it; no borrow is alive, for the shared one above is not used any more and no call is under way.
+    // SAFETY: the handle came from `Box::into_raw` in `instantiate`, and by the contract of both standards this is its
+    // last use; no borrow is alive, because the shared one above is no longer used and no call is in progress.
     let instance = unsafe { Box::from_raw(handle.0) };
-    // A destructor that panics must not reach the importer; there is no state left to save then.
+    // A panicking destructor must not reach the importer; there is no state to save any more.
     let _ = catch_unwind(AssertUnwindSafe(|| drop(instance)));
 }
 
@@ -152,9 +154,10 @@ fn other_version(instance: &Instance) -> String {
     format!("the instance was created by the functions of {:?}. Call the functions of that version", instance.dialect)
 }
 
-/// The guard: every call on an instance goes through here. It checks the instance, that it is not faulted, that the call
-/// is allowed now; it puts the caller's floating-point environment aside (callbacks have it again), catches panics, hands
-/// messages to the importer and gives the status. `None` if not carried out.
+/// Runs a call to an instance behind the guard, which every call passes. It checks that the instance exists and is not
+/// faulted and that the call is allowed now; it saves the caller's floating-point environment (callbacks run with it
+/// again), catches panics, sends messages to the importer and returns the status. `None` if the call was not carried
+/// out.
 pub(crate) fn enter<T>(
     handle: InstanceHandle,
     rule: &CallRule,
@@ -182,8 +185,8 @@ pub(crate) fn enter<T>(
         Ok(Err(refusal)) => (Err(refusal), Vec::new(), None),
         Err(payload) => (Err(Refusal::error(panics::describe(&*payload))), Vec::new(), None),
     };
-    // Calls without a message allocate nothing. The text is written in the standard environment, for it is arithmetic too;
-    // the callback has the caller's.
+    // Calls without a message allocate nothing. The text is formatted in the standard environment, because formatting
+    // is arithmetic too; the callback runs in the caller's.
     let emit = |status, message: &dyn Display| {
         let text = {
             let _floats = StandardFloats::enter();
@@ -202,7 +205,7 @@ pub(crate) fn enter<T>(
     }
 }
 
-/// The guard for calls whose only result is their status.
+/// Runs a call whose only result is its status behind the guard.
 pub(crate) fn guard(
     handle: InstanceHandle,
     rule: &CallRule,
@@ -211,7 +214,7 @@ pub(crate) fn guard(
     enter(handle, rule, |slave, _| Ok((action(slave)?, ()))).0
 }
 
-/// Answer of a function whose capability this FMU does not have.
+/// Returns the status of a function whose capability this FMU does not have.
 pub(crate) fn unsupported(handle: InstanceHandle, name: &'static str, capability: &str) -> FmiStatus {
     guard(handle, &order::unsupported(name), |_| {
         Err(Refusal::error(format!(

@@ -1,4 +1,4 @@
-//! Messages to the importer's logger.
+//! Messages for the importer's logger.
 
 use std::ffi::{CStr, CString, c_char};
 use std::fmt;
@@ -14,22 +14,22 @@ pub type Fmi2Logger =
 /// `fmi3LogMessageCallback`.
 pub type Fmi3Logger = unsafe extern "C" fn(ImporterEnvironment, FmiStatus, *const c_char, *const c_char);
 
-/// Categories as `modelDescription.xml` lists them; the last one stands for everything.
+/// Categories in the order of `modelDescription.xml`; the last one stands for all.
 const CATEGORIES: [&CStr; 5] =
     [c"logStatusWarning", c"logStatusDiscard", c"logStatusError", c"logStatusFatal", c"logAll"];
 
 /// Bit of `logAll`.
 const ALL: u8 = 1 << 4;
-/// Bits of the messages that explain an answer other than OK.
+/// Bits of the messages that explain a status other than OK.
 const EXPLANATIONS: u8 = ALL - 1;
 
-/// Where messages go.
+/// Destination of messages.
 pub(crate) enum Sink {
     /// FMI 2.0.
     Fmi2 {
         /// May be NULL.
         logger: Option<Fmi2Logger>,
-        /// Goes back to the importer.
+        /// Passed back to the importer.
         environment: ImporterEnvironment,
         /// Instance name, copied.
         name: CString,
@@ -38,7 +38,7 @@ pub(crate) enum Sink {
     Fmi3 {
         /// May be NULL.
         logger: Option<Fmi3Logger>,
-        /// Goes back to the importer.
+        /// Passed back to the importer.
         environment: ImporterEnvironment,
     },
 }
@@ -52,10 +52,10 @@ impl fmt::Debug for Sink {
     }
 }
 
-/// The importer's logger with the categories it wants.
+/// The importer's logger with the requested categories.
 ///
-/// Messages that explain an answer other than OK are given with `loggingOn` false too: an importer that gets an error
-/// must be able to say why. Only a choice of categories silences them.
+/// Messages that explain a status other than OK are sent even if `loggingOn` is false, because an importer must be able
+/// to report the reason for an error. Only a choice of categories suppresses them.
 #[derive(Debug)]
 pub(crate) struct Log {
     sink: Sink,
@@ -63,17 +63,17 @@ pub(crate) struct Log {
 }
 
 impl Log {
-    /// A log as at instantiation.
+    /// Creates the log as it is at instantiation.
     pub(super) fn new(sink: Sink, logging_on: bool) -> Self {
         let log = Self { sink, wanted: AtomicU8::new(EXPLANATIONS) };
         log.choose(logging_on, &[]).unwrap_or_default();
         log
     }
 
-    /// `fmi2SetDebugLogging`, `fmi3SetDebugLogging`: no categories means all.
+    /// Implements `fmi2SetDebugLogging` and `fmi3SetDebugLogging`: no categories means all.
     ///
     /// # Errors
-    /// A category that does not exist; nothing is changed then.
+    /// An unknown category; nothing is changed then.
     pub(super) fn choose(&self, logging_on: bool, categories: &[&str]) -> Result<(), String> {
         let mut wanted = 0;
         for category in categories {
@@ -93,7 +93,7 @@ impl Log {
         Ok(())
     }
 
-    /// Hand a message to the importer, if it wants its category.
+    /// Sends a message to the importer if its category is enabled.
     pub(crate) fn emit(&self, status: FmiStatus, message: &str) {
         let category = match status {
             FmiStatus::Ok => 4,
@@ -104,7 +104,8 @@ impl Log {
         if self.wanted.load(Ordering::Relaxed) & (1 << category | ALL) == 0 {
             return;
         }
-        // In messages "#" begins a value reference (FMI 2.0.4, section 2.1.5); text is free of NUL after the replacement.
+        // In messages "#" begins a value reference (FMI 2.0.4, section 2.1.5); the text contains no NUL after the
+        // replacement.
         let text = CString::new(message.replace('#', "##").replace('\0', " ")).unwrap_or_default();
         self.sink.send(status, CATEGORIES[category], &text);
     }
@@ -114,14 +115,14 @@ impl Sink {
     fn send(&self, status: FmiStatus, category: &CStr, text: &CStr) {
         match self {
             Self::Fmi2 { logger: Some(logger), environment, name } => {
-                // SAFETY: the importer's own function, called as the standard says; the texts outlive the call. The format
-                // consumes exactly the one argument that follows it.
+                // SAFETY: the importer's own function, called as the standard requires; the texts outlive the call. The
+                // format consumes exactly the one argument that follows it.
                 unsafe {
                     logger(*environment, name.as_ptr(), status, category.as_ptr(), c"%s".as_ptr(), text.as_ptr());
                 }
             }
             Self::Fmi3 { logger: Some(logger), environment } => {
-                // SAFETY: the importer's own function, called as the standard says; the texts outlive the call.
+                // SAFETY: the importer's own function, called as the standard requires; the texts outlive the call.
                 unsafe { logger(*environment, status, category.as_ptr(), text.as_ptr()) }
             }
             _ => {}

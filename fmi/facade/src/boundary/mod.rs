@@ -1,4 +1,5 @@
-//! The only unsafe code of the library: C pointers to Rust values and back, callbacks, and the guard around every call.
+//! The only unsafe code of the library: conversion of C pointers to Rust values and back, callbacks, and the guard
+//! around every call.
 
 mod calls;
 mod derivatives;
@@ -31,7 +32,8 @@ pub type IntermediateUpdate = unsafe extern "C" fn(
     early_return_time: *mut f64,
 );
 
-/// Call the importer's intermediate update; the time at which it wants the step to end early, if it does.
+/// Calls the importer's intermediate update; returns the time at which the importer requests an early end of the step,
+/// if it does.
 pub(crate) fn intermediate_update(
     callback: IntermediateUpdate,
     environment: ImporterEnvironment,
@@ -40,9 +42,9 @@ pub(crate) fn intermediate_update(
     can_return_early: bool,
 ) -> Option<f64> {
     let (mut requested, mut at) = (0u8, time);
-    // SAFETY: the importer gave this function at instantiation for exactly this use (FMI 3.0.2, section 4.2.2), the two
-    // pointers are to locals that outlive the call, and no borrow of the instance is held, so that the callback may call
-    // get and set functions on it.
+    // SAFETY: the importer passed this function at instantiation for exactly this use (FMI 3.0.2, section 4.2.2), the
+    // two pointers are to locals that outlive the call, and no borrow of the instance is held, so that the callback may
+    // call get and set functions on it.
     unsafe {
         callback(
             environment,
@@ -58,7 +60,7 @@ pub(crate) fn intermediate_update(
     (requested != 0).then_some(at)
 }
 
-/// Exported functions with their arguments after the instance, and the capability they belong to.
+/// Exported functions with their arguments after the instance, and the capability they require.
 macro_rules! refused {
     ($($name:ident ($($argument:ident: $type:ty),*) $capability:expr;)*) => {$(
         #[unsafe(no_mangle)]

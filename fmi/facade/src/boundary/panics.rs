@@ -1,15 +1,15 @@
-//! A panic is a defect of this library: it is caught, logged and nothing is printed.
+//! A panic is a defect of this library: it is caught and logged, and nothing is printed.
 //!
-//! The standard library inside this shared library is its own copy, linked statically; its panic hook is therefore seen
-//! by nobody else, not even by a host written in Rust. The hook set here replaces the one that prints.
+//! This shared library contains a statically linked copy of the standard library, so its panic hook is invisible to
+//! everything else, including a host written in Rust. The hook set here replaces the one that prints.
 
 use std::any::Any;
 use std::cell::Cell;
 use std::panic::{self, PanicHookInfo};
 use std::sync::Once;
 
-/// Where the last panic of a thread happened: the end of the file's path, its length, the line. Without a destructor, so
-/// that the library can be unloaded while threads that used it live on.
+/// Place of the last panic of a thread: the end of the file's path, its length, the line. It has no destructor, so that
+/// the library can be unloaded while threads that used it are still running.
 type PanicPlace = ([u8; 48], usize, u32);
 
 thread_local! {
@@ -18,7 +18,7 @@ thread_local! {
 
 static HOOK: Once = Once::new();
 
-/// Make panics of this library silent, once.
+/// Makes panics of this library silent, once.
 pub(crate) fn silence() {
     HOOK.call_once(|| panic::set_hook(Box::new(remember)));
 }
@@ -32,7 +32,7 @@ fn remember(info: &PanicHookInfo<'_>) {
     PLACE.set((bytes, tail.len(), location.line()));
 }
 
-/// Message for the importer's log.
+/// Returns the message for the importer's log.
 pub(super) fn describe(payload: &(dyn Any + Send)) -> String {
     let text = payload.downcast_ref::<&str>().copied();
     let text = text.or_else(|| payload.downcast_ref::<String>().map(String::as_str)).unwrap_or("no message");

@@ -1,12 +1,12 @@
-//! Pointers as C passes them. Each type is a bare pointer in the ABI; what the standard promises about it (valid for as
-//! many elements as the accompanying count says, for the duration of the call) is used here and nowhere else.
+//! Pointers as C passes them. Each type is a bare pointer in the ABI; only this module relies on the guarantees of the
+//! standard (a pointer is valid for as many elements as the accompanying count states, for the duration of the call).
 
 use std::ffi::{CStr, c_char, c_void};
 use std::mem::size_of;
 
 use crate::slave::{Refusal, Result};
 
-/// The importer's pointer that goes back to it with every callback, never followed.
+/// The importer's pointer, which is passed back with every callback and never dereferenced.
 pub type ImporterEnvironment = *mut c_void;
 
 /// Array or single value to read from.
@@ -24,7 +24,7 @@ pub(crate) struct Out<T>(*mut T);
 #[repr(transparent)]
 pub struct TextArgument(*const c_char);
 
-/// A checked place for a known number of values.
+/// Checked destination for a known number of values.
 #[derive(Debug)]
 pub(crate) struct ArrayArgument<T> {
     pointer: *mut T,
@@ -49,10 +49,10 @@ fn check<T>(pointer: *const T, count: usize, name: &str) -> Result<()> {
 }
 
 impl<T> In<T> {
-    /// The array; empty without touching the pointer if `count` is zero.
+    /// Returns the array; if `count` is zero, an empty one without touching the pointer.
     ///
     /// # Errors
-    /// NULL, misaligned, or more than `limit` elements.
+    /// A pointer that is NULL or misaligned, or more than `limit` elements.
     pub(crate) fn array(&self, count: usize, limit: usize, name: &str) -> Result<&[T]> {
         if count == 0 {
             return Ok(&[]);
@@ -63,12 +63,12 @@ impl<T> In<T> {
             )));
         }
         check(self.0, count, name)?;
-        // SAFETY: not null, aligned, and by the standard's contract an array of `count` initialised elements that nobody
-        // changes during the call; the borrow ends with the argument, which lives for the call.
+        // SAFETY: not null, aligned, and by the standard's contract an array of `count` initialised elements that does
+        // not change during the call; the borrow ends with the argument, which lives for the call.
         Ok(unsafe { std::slice::from_raw_parts(self.0, count) })
     }
 
-    /// The single value; `None` if the pointer is NULL.
+    /// Returns the single value; `None` if the pointer is NULL.
     pub(crate) fn single(&self) -> Option<&T> {
         // SAFETY: null is handled by `as_ref`, misalignment by the filter, and by the standard's contract the pointer is to
         // an initialised value for the duration of the call.
@@ -77,10 +77,10 @@ impl<T> In<T> {
 }
 
 impl<T: Copy> Out<T> {
-    /// ClosestPoint for `count` values; nothing is touched if that is zero.
+    /// Returns the destination of `count` values; the pointer is not touched if `count` is zero.
     ///
     /// # Errors
-    /// NULL or misaligned.
+    /// A pointer that is NULL or misaligned.
     pub(crate) fn window(&self, count: usize, name: &str) -> Result<ArrayArgument<T>> {
         if count > 0 {
             check(self.0.cast_const(), count, name)?;
@@ -88,38 +88,38 @@ impl<T: Copy> Out<T> {
         Ok(ArrayArgument { pointer: self.0, length: count })
     }
 
-    /// ClosestPoint for one value.
+    /// Returns the destination of one value.
     ///
     /// # Errors
-    /// NULL or misaligned.
+    /// A pointer that is NULL or misaligned.
     pub(crate) fn single(&self, name: &str) -> Result<ArrayArgument<T>> {
         self.window(1, name)
     }
 
-    /// Write one value if there is a place for it.
+    /// Writes one value if the pointer is valid.
     pub(crate) fn offer(&self, value: T) {
         if let Ok(window) = self.single("") {
             window.fill(&[value]);
         }
     }
 
-    /// Whether the pointer is NULL.
+    /// Returns whether the pointer is NULL.
     pub(crate) fn is_null(&self) -> bool {
         self.0.is_null()
     }
 }
 
 impl<T: Copy> ArrayArgument<T> {
-    /// Write the values. Their number must be that of the window; with any other nothing is written.
+    /// Writes the values. Nothing is written unless their number equals the length of the destination.
     pub(crate) fn fill(self, values: &[T]) {
         if values.len() == self.length && self.length > 0 {
-            // SAFETY: checked not null and aligned, by the standard's contract valid for `length` elements; `copy` allows
-            // the importer's array to be anywhere.
+            // SAFETY: checked not null and aligned, by the standard's contract valid for `length` elements; `copy`
+            // permits overlap with the importer's array.
             unsafe { std::ptr::copy(values.as_ptr(), self.pointer, self.length) };
         }
     }
 
-    /// The value in the first place, which by the standard is initialised for in-out arguments.
+    /// Returns the first value, which by the standard is initialised for in-out arguments.
     pub(crate) fn current(&self) -> Option<T> {
         // SAFETY: checked not null and aligned; in-out arguments are initialised by the importer.
         (self.length > 0).then(|| unsafe { self.pointer.read() })
@@ -127,10 +127,10 @@ impl<T: Copy> ArrayArgument<T> {
 }
 
 impl TextArgument {
-    /// The text; `None` if the pointer is NULL.
+    /// Returns the text; `None` if the pointer is NULL.
     ///
     /// # Errors
-    /// Not UTF-8.
+    /// Text that is not UTF-8.
     pub(crate) fn read(&self, name: &str) -> Result<Option<&str>> {
         if self.0.is_null() {
             return Ok(None);
@@ -141,10 +141,10 @@ impl TextArgument {
         text.map(Some)
     }
 
-    /// The text.
+    /// Returns the text.
     ///
     /// # Errors
-    /// NULL or not UTF-8.
+    /// A pointer that is NULL, or text that is not UTF-8.
     pub(crate) fn required(&self, name: &str) -> Result<&str> {
         self.read(name)?.ok_or_else(|| Refusal::error(format!("argument {name} is NULL. Pass a string")))
     }

@@ -7,7 +7,7 @@ use crate::boundary::{DIRECTIONAL, In, InstanceHandle, Out, derivatives, guard};
 use crate::slave::order::fmi2 as order;
 use crate::slave::{AccessRequest, FmiStatus, InstancePhase, Refusal, Result, Slave};
 
-/// Kinds of `fmi2StatusKind` that carry information here.
+/// Kind of `fmi2StatusKind` for the last successful time; this and the next one are the only kinds with information.
 const LAST_SUCCESSFUL_TIME: i32 = 2;
 /// `fmi2Terminated`.
 const TERMINATED: i32 = 3;
@@ -62,7 +62,8 @@ pub(super) extern "C" fn fmi2DoStep(
     })
 }
 
-/// No step is ever pending, so most status kinds have no information: `fmi2Discard` says so (FMI 2.0.4, section 4.2.3).
+/// Answers a status request. No step is ever pending, so most status kinds have no information and return `fmi2Discard`
+/// (FMI 2.0.4, section 4.2.3).
 fn status<T: Copy>(kind: i32, value: &Out<T>, answer: Option<T>) -> Result<FmiStatus> {
     let window = value.single("value")?;
     let nothing = || {
@@ -90,7 +91,7 @@ pub(super) extern "C" fn fmi2GetIntegerStatus(c: InstanceHandle, s: i32, value: 
     guard(c, &order::GET_INTEGER_STATUS, |_| status(s, &value, None))
 }
 
-/// Whether the slave wants to end the simulation: only after its state became non-finite.
+/// Returns whether the slave requests the end of the simulation, which it does only after its state became non-finite.
 fn wants_to_terminate(slave: &Slave) -> Boolean {
     Boolean::from(matches!(slave.phase(), InstancePhase::Failed { .. }))
 }
@@ -107,7 +108,7 @@ pub(super) extern "C" fn fmi2GetStringStatus(c: InstanceHandle, s: i32, value: O
     guard(c, &order::GET_STRING_STATUS, |_| status(s, &value, None))
 }
 
-/// By inputs over the last communication step, where the parameter `step_derivatives` is on.
+/// Derivatives with respect to inputs over the last communication step, which require the parameter `step_derivatives`.
 #[unsafe(no_mangle)]
 pub(super) extern "C" fn fmi2GetDirectionalDerivative(
     c: InstanceHandle,

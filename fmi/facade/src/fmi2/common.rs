@@ -46,7 +46,8 @@ pub(super) extern "C" fn fmi2SetDebugLogging(
     boundary::set_debug_logging(c, &order::SET_DEBUG_LOGGING, loggingOn != 0, (categories, nCategories))
 }
 
-/// `fmi2Instantiate` of a library: makes its unit by `load`. The library exports it, see [`crate::library`].
+/// Implements `fmi2Instantiate` of a library with a unit created by `load`. The library exports it, see
+/// [`crate::library`].
 pub fn instantiate_unit(
     load: Load,
     instanceName: TextArgument,
@@ -229,7 +230,7 @@ pub(super) extern "C" fn fmi2DeSerializeFMUstate(
     state::deserialise(c, &order::DESERIALIZE_FMU_STATE, serializedState, size, FMUstate)
 }
 
-/// Answer of `fmi2CancelStep`: there is never an asynchronous step.
+/// Implements `fmi2CancelStep`: there is never an asynchronous step.
 #[unsafe(no_mangle)]
 pub(super) extern "C" fn fmi2CancelStep(c: InstanceHandle) -> FmiStatus {
     guard(c, &order::CANCEL_STEP, |_| {

@@ -1,5 +1,5 @@
 //! The 44 functions of FMI 2.0, named and typed as `fmi2FunctionTypes.h` (2.0.4) declares them. Each is one expression
-//! through the guard; none has an unsafe block.
+//! that passes the guard; none has an unsafe block.
 #![allow(non_snake_case, reason = "names of the standard")]
 #![allow(clippy::too_many_arguments, reason = "signatures of the standard")]
 

@@ -1,11 +1,12 @@
-//! Functions for Model Exchange: exported because importers look all of them up, refused because this FMU has none.
+//! Functions for Model Exchange: exported because importers look all of them up, rejected because this FMU does not
+//! support it.
 
 use super::Boolean;
 use crate::boundary::{In, Out, refused};
 
 const CAPABILITY: &str = "Model Exchange interface";
 
-/// `fmi2EventInfo`, which is never touched.
+/// `fmi2EventInfo`, which is never accessed.
 #[repr(C)]
 pub(crate) struct EventInfo {
     _private: [u8; 0],

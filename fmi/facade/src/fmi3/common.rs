@@ -1,4 +1,4 @@
-//! Life of an instance, saved states, logging.
+//! Life cycle of an instance, saved states, logging.
 
 use std::ffi::c_char;
 
@@ -44,7 +44,8 @@ pub(super) extern "C" fn fmi3InstantiateModelExchange(
     )
 }
 
-/// `fmi3InstantiateCoSimulation` of a library: makes its unit by `load`. The library exports it, see [`crate::library`].
+/// Implements `fmi3InstantiateCoSimulation` of a library with a unit created by `load`. The library exports it, see
+/// [`crate::library`].
 pub fn instantiate_unit(
     load: Load,
     instanceName: TextArgument,

@@ -1,5 +1,5 @@
 //! The 75 functions of FMI 3.0, named and typed as `fmi3FunctionTypes.h` (3.0.2) declares them. Each is one expression
-//! through the guard; none has an unsafe block.
+//! that passes the guard; none has an unsafe block.
 #![allow(non_snake_case, reason = "names of the standard")]
 #![allow(clippy::too_many_arguments, reason = "signatures of the standard")]
 

@@ -1,5 +1,5 @@
-//! Functions of capabilities that this FMU does not have: exported because importers look all of them up, refused with a
-//! message. Their arguments are not touched.
+//! Functions of capabilities that this FMU does not have: they are exported because importers look all of them up, and
+//! rejected with a message. Their arguments are not touched.
 
 use super::Boolean;
 use crate::boundary::{In, Out, refused};

@@ -1,9 +1,10 @@
 //! `fmi3DoStep` with intermediate updates, and output derivatives.
 //!
-//! With a callback the communication step is marched internal step by internal step, each in its own passage through the
-//! guard: while the callback runs nothing of the instance is borrowed, and it may get and set variables.
+//! With a callback the communication step is computed one internal step at a time, each in a separate call of the
+//! guard. While the callback runs, the instance is not borrowed, so the callback may get and set variables.
 //!
-//! Where the internal steps allowed are used up, the step returns early if the importer allows that, else it is discarded.
+//! If the maximum number of internal steps is reached, the step returns early if the importer allows it, otherwise it
+//! is discarded.
 
 use tiprub_core::simulation::StepProgress;
 

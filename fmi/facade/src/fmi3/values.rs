@@ -1,5 +1,5 @@
 //! Getting and setting variables. Reals are `Float64`, integers and enumerations `Int64`; the functions of the other
-//! types exist, and refuse every reference because no variable has their type.
+//! types exist, and reject every reference because no variable has their type.
 
 use std::ffi::c_char;
 
@@ -8,8 +8,8 @@ use crate::boundary::{self, ADJOINT, DIRECTIONAL, In, InstanceHandle, Out, TextA
 use crate::slave::order::{CallRule, fmi3 as order};
 use crate::slave::{AccessRequest, FmiStatus, Refusal};
 
-/// Functions of a type that has variables: exported getter and setter, their rules, name of the type, C type, Rust type,
-/// conversions.
+/// Defines functions of a type that has variables: exported getter and setter, their rules, name of the type, C type,
+/// Rust type, conversions.
 macro_rules! with_variables {
     ($($get:ident $get_rule:ident $set:ident $set_rule:ident $name:literal $c:ty, $rust:ty, $out:expr, $in:expr;)*) => {$(
         #[unsafe(no_mangle)]
@@ -71,7 +71,8 @@ pub(super) extern "C" fn fmi3SetString(
     })
 }
 
-/// No variable has the type: every reference is refused with the type it really has, no reference is nothing to do.
+/// Handles a type that no variable has: every reference is rejected with a message that states its actual type; a call
+/// without references succeeds.
 fn no_variable(
     instance: InstanceHandle,
     rule: &CallRule,
@@ -89,7 +90,7 @@ fn no_variable(
     })
 }
 
-/// Functions of a type that no variable has.
+/// Defines functions of a type that no variable has.
 macro_rules! without_variables {
     ($($get:ident $get_rule:ident $set:ident $set_rule:ident $name:literal $c:ty;)*) => {$(
         #[unsafe(no_mangle)]
@@ -171,8 +172,8 @@ pub(super) extern "C" fn fmi3SetClock(
     no_variable(instance, &order::SET_CLOCK, "Clock", (valueReferences, nValueReferences))
 }
 
-/// Derivatives by inputs over the last communication step, where the parameter `step_derivatives` is on; last, the numbers of values of unknowns
-/// and of knowns.
+/// Defines derivatives with respect to inputs over the last communication step, which require the parameter
+/// `step_derivatives`; the last arguments are the numbers of values of unknowns and of knowns.
 macro_rules! derivative {
     ($($name:ident $answer:ident $nSeed:ident $nSensitivity:ident $unknowns:ident $knowns:ident;)*) => {$(
         #[unsafe(no_mangle)]

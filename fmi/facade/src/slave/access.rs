@@ -1,4 +1,4 @@
-//! Reading and setting variables: every request is checked in full before anything is read or written.
+//! Getting and setting variables: every request is checked completely before anything is read or written.
 
 use tiprub_core::variables::{Causality, DataType, Variability, Variable};
 use tiprub_core::{Error, shown};
@@ -6,33 +6,33 @@ use tiprub_core::{Error, shown};
 use super::{Dialect, InstancePhase, Refusal, Result, Slave};
 use crate::unit::CoSimulationUnit;
 
-/// A get or set call as the importer made it.
+/// A get or set call of the importer.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct AccessRequest<'a> {
     /// Type in the function's name: `Real`, `Float64`, ...
     pub type_name: &'static str,
     /// Value references.
     pub references: &'a [u32],
-    /// Number of values the importer's array holds.
+    /// Number of values in the importer's array.
     pub values: usize,
 }
 
 /// A value of one of the types that variables have.
 pub(crate) trait Value: Sized {
-    /// Say what is wrong with the value for this variable, if anything.
+    /// Returns the problem with the value for this variable, if there is one.
     fn problem(&self, _variable: &Variable) -> Option<String> {
         None
     }
 
-    /// The value of the independent variable, for the type that it has.
+    /// Returns the value of the independent variable, if this is its type.
     fn of_time(_time: f64) -> Option<Self> {
         None
     }
 
-    /// Read one element.
+    /// Reads one element.
     fn get(unit: &dyn CoSimulationUnit, reference: u32) -> tiprub_core::Result<Self>;
 
-    /// Set one element.
+    /// Sets one element.
     fn set(&self, unit: &mut dyn CoSimulationUnit, reference: u32) -> tiprub_core::Result<()>;
 }
 
@@ -81,7 +81,7 @@ impl Value for i32 {
     }
 }
 
-/// Integers and enumerations of FMI 3.0 travel as 64-bit integers.
+/// FMI 3.0 transfers integers and enumerations as 64-bit integers.
 impl Value for i64 {
     fn problem(&self, variable: &Variable) -> Option<String> {
         let DataType::Enumeration(enumeration) = variable.kind else { return None };
@@ -129,7 +129,7 @@ impl Value for String {
     }
 }
 
-/// Name of a variable's type in the standard's function names.
+/// Returns the name of a variable's type in the function names of the standard.
 fn type_name(dialect: Dialect, kind: DataType) -> &'static str {
     match (dialect, kind) {
         (Dialect::Fmi2, DataType::Real) => "Real",
@@ -142,16 +142,16 @@ fn type_name(dialect: Dialect, kind: DataType) -> &'static str {
 }
 
 impl Slave {
-    /// Most value references a single call may bring. More than this can only be a mistaken count, and following it would
-    /// read beyond the importer's array; repeating references is legal, hence the margin.
+    /// Returns the maximum number of value references in a call. A larger count can only be a mistake, and following it
+    /// would read beyond the importer's array; repeated references are legal, hence the margin.
     pub(crate) fn reference_limit(&self) -> usize {
         16 * self.unit.table().references() + 1024
     }
 
-    /// Value references of the single elements a request stands for.
+    /// Returns the value references of the single elements of a request.
     ///
     /// # Errors
-    /// Unknown reference, another type, reference into the middle of an array, wrong number of values.
+    /// Unknown reference, variable of another type, reference into the middle of an array, wrong number of values.
     pub(crate) fn elements(&self, request: &AccessRequest<'_>) -> Result<Vec<u32>> {
         let mut elements = Vec::with_capacity(request.references.len());
         for &reference in request.references {
@@ -188,10 +188,10 @@ impl Slave {
         )))
     }
 
-    /// Read values.
+    /// Reads values.
     ///
     /// # Errors
-    /// As [`Slave::elements`]; a value that does not exist yet; an initial state that cannot be computed.
+    /// Same as [`Slave::elements`]; a value that does not exist yet; an initial state that cannot be computed.
     pub(crate) fn read<T: Value>(&mut self, request: &AccessRequest<'_>) -> Result<Vec<T>> {
         let elements = self.elements(request)?;
         if matches!(self.phase, InstancePhase::Instantiated { .. }) {
@@ -202,7 +202,7 @@ impl Slave {
         elements.iter().map(|&element| self.value(element)).collect()
     }
 
-    /// One value; time is the instance's own in every phase.
+    /// Returns one value; the time is that of the instance in every phase.
     fn value<T: Value>(&self, element: u32) -> Result<T> {
         let (variable, _) = self.unit.table().locate(element)?;
         let time = (variable.causality == Causality::Independent).then(|| T::of_time(self.time())).flatten();
@@ -227,10 +227,10 @@ impl Slave {
         Ok(())
     }
 
-    /// Set values: all of them, or none.
+    /// Sets either all values or none.
     ///
     /// # Errors
-    /// As [`Slave::elements`]; a variable that cannot be set now; a value out of range.
+    /// Same as [`Slave::elements`]; a variable that cannot be set now; a value out of range.
     pub(crate) fn write<T: Value>(&mut self, elements: &[u32], values: &[T]) -> Result<()> {
         for (&element, value) in elements.iter().zip(values) {
             let (variable, index) = self.unit.table().locate(element)?;
@@ -247,7 +247,7 @@ impl Slave {
         self.apply(elements, values)
     }
 
-    /// The core has the last word; what was written before its refusal is taken back.
+    /// Sets the values in the unit; if the unit rejects one, the previous ones are restored.
     fn apply<T: Value>(&mut self, elements: &[u32], values: &[T]) -> Result<()> {
         let (courses, mut former) = (self.unit.courses(), Vec::with_capacity(elements.len()));
         for (&element, value) in elements.iter().zip(values) {
@@ -256,7 +256,7 @@ impl Slave {
                 for (element, before) in former.into_iter().rev() {
                     T::set(&before, &mut *self.unit, element)?;
                 }
-                // Derivatives and ramps under way, which setting a value ends.
+                // Restores derivatives and ramps in progress, which end when a value is set.
                 self.unit.restore_courses(courses);
                 return Err(error.into());
             }
@@ -266,7 +266,7 @@ impl Slave {
         Ok(())
     }
 
-    /// Why a variable cannot be set in the present phase, if it cannot.
+    /// Returns the reason why a variable cannot be set in the present phase, if it cannot.
     fn not_settable(&self, variable: &Variable) -> Option<String> {
         if !variable.is_settable() || variable.variability == Variability::Constant {
             return Some("is computed by the FMU and cannot be set. Set inputs and parameters only".into());
@@ -284,10 +284,10 @@ impl Slave {
         }
     }
 
-    /// First time derivatives of continuous real inputs: all of them, or none.
+    /// Sets the first time derivatives of continuous real inputs, either all or none.
     ///
     /// # Errors
-    /// Unknown reference, not a continuous input, order other than 1, non-finite value.
+    /// Unknown reference, variable that is not a continuous input, order other than 1, value that is not finite.
     pub(crate) fn set_input_derivatives(&mut self, references: &[u32], orders: &[i32], values: &[f64]) -> Result<()> {
         for ((&reference, &order), value) in references.iter().zip(orders).zip(values) {
             let what = self.check_derivative(reference, order, Causality::Input)?;
@@ -308,7 +308,7 @@ impl Slave {
         Ok(())
     }
 
-    /// One order per element, of one order per value reference.
+    /// Returns one order per element, from one order per value reference.
     pub(crate) fn orders_of_elements(&self, references: &[u32], orders: &[i32]) -> Vec<i32> {
         let table = self.unit.table();
         let count = |reference: u32| match table.locate(reference) {
@@ -322,10 +322,10 @@ impl Slave {
             .collect()
     }
 
-    /// First time derivatives of continuous real outputs at the last communication point.
+    /// Returns the first time derivatives of continuous real outputs at the last communication point.
     ///
     /// # Errors
-    /// Unknown reference, not a continuous output, order other than 1.
+    /// Unknown reference, variable that is not a continuous output, order other than 1.
     pub(crate) fn output_derivatives(&self, elements: &[u32], orders: &[i32]) -> Result<Vec<f64>> {
         let derivative = |(&element, &order): (&u32, &i32)| {
             self.check_derivative(element, order, Causality::Output)?;

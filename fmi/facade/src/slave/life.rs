@@ -1,14 +1,14 @@
-//! From instantiated to terminated and back: initialisation, termination, reset.
+//! Life cycle from instantiation to termination: initialisation, termination, reset.
 
 use tiprub_core::variables::Causality;
 
 use super::{ExperimentTimes, FmiStatus, InstancePhase, Refusal, Result, Slave, logged};
 
 impl ExperimentTimes {
-    /// Check start and stop time as an importer gives them.
+    /// Checks start and stop time as given by the importer.
     ///
     /// # Errors
-    /// Non-finite times, stop before start.
+    /// Times that are not finite, or a stop time before the start time.
     pub(crate) fn new(start: f64, stop: Option<f64>) -> Result<Self> {
         if !start.is_finite() {
             return Err(Refusal::error(format!("startTime = {start} is not finite. Give a start time in seconds")));
@@ -24,26 +24,26 @@ impl ExperimentTimes {
 }
 
 impl Slave {
-    /// `fmi2SetupExperiment`; may be called again, the last call counts.
+    /// Implements `fmi2SetupExperiment`; the last of several calls counts.
     pub(crate) fn set_experiment(&mut self, experiment: ExperimentTimes) {
         if let InstancePhase::Instantiated { experiment: current } = &mut self.phase {
             *current = experiment;
         }
     }
 
-    /// Enter Initialization Mode, with the experiment given here (FMI 3.0) or before (FMI 2.0).
+    /// Enters Initialization Mode, with the experiment given here (FMI 3.0) or before (FMI 2.0).
     ///
-    /// Nothing is computed yet: parameters may still be set one after the other.
+    /// Nothing is computed yet: parameters can still be set one after the other.
     pub(crate) fn enter_initialisation(&mut self, given: Option<ExperimentTimes>) {
         if let InstancePhase::Instantiated { experiment } = self.phase {
             self.phase = InstancePhase::Initialising { experiment: given.unwrap_or(experiment), before: None };
         }
     }
 
-    /// Bring outputs up to date: in Initialization Mode and between internal steps they are computed when asked for.
+    /// Updates the outputs: in Initialization Mode and between internal steps they are computed only when requested.
     ///
     /// # Errors
-    /// The core's refusal to initialise; other parameters can then be set and the call repeated.
+    /// An error of the unit at initialisation; other parameters can then be set and the call repeated.
     pub(super) fn refresh(&mut self) -> Result<()> {
         match &mut self.phase {
             InstancePhase::Initialising { experiment, before: before @ None } => {
@@ -64,7 +64,7 @@ impl Slave {
         Ok(())
     }
 
-    /// A value is about to be set: in Initialization Mode go back to before the outputs were computed.
+    /// Prepares for setting a value: in Initialization Mode it restores the state before the outputs were computed.
     pub(super) fn invalidate(&mut self) -> Result<()> {
         if let InstancePhase::Initialising { before, .. } = &mut self.phase
             && let Some(state) = before.take()
@@ -74,10 +74,10 @@ impl Slave {
         Ok(())
     }
 
-    /// Exit Initialization Mode. `Warning` if the core warns of something; notes leave the status `Ok`.
+    /// Exits Initialization Mode. Returns `Warning` if the unit reports a warning; notes leave the status `Ok`.
     ///
     /// # Errors
-    /// The core's refusal; the instance stays in Initialization Mode and can be given other parameters.
+    /// An error of the unit; the instance stays in Initialization Mode and other parameters can be set.
     pub(crate) fn exit_initialisation(&mut self) -> Result<FmiStatus> {
         self.refresh()?;
         if let InstancePhase::Initialising { experiment, .. } = self.phase {
@@ -90,22 +90,22 @@ impl Slave {
         Ok(status)
     }
 
-    /// Terminate; values can still be read afterwards.
+    /// Terminates the instance; values can still be read afterwards.
     pub(crate) fn terminate(&mut self) {
         self.phase = InstancePhase::Terminated { time: self.time() };
     }
 
-    /// Back to the state after instantiation. Saved states stay valid.
+    /// Restores the state after instantiation. Saved states stay valid.
     pub(crate) fn reset(&mut self) {
         self.unit.reset();
         self.strings.clear();
         self.phase = InstancePhase::Instantiated { experiment: ExperimentTimes::default() };
     }
 
-    /// FMI 3.0: the inputs and outputs which the importer means to access during intermediate updates.
+    /// Checks the inputs and outputs that an FMI 3.0 importer will access during intermediate updates.
     ///
     /// # Errors
-    /// A reference that does not exist, or is no input, output or time.
+    /// An unknown reference, or a variable that is not an input, an output or the time.
     pub(crate) fn check_intermediate_variables(&self, references: &[u32]) -> Result<()> {
         for &reference in references {
             let (variable, index) = self.unit.table().locate(reference)?;

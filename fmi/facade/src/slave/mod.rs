@@ -1,4 +1,4 @@
-//! The neutral slave: what an FMU instance is, whichever version of the standard it is driven through.
+//! The version-independent slave: an FMU instance, regardless of the version of the standard that drives it.
 
 mod access;
 mod life;
@@ -20,22 +20,22 @@ use crate::unit::{CoSimulationUnit, Load};
 pub(crate) use access::{AccessRequest, Value};
 pub(crate) use phase::{ExperimentTimes, InstancePhase};
 
-/// Answer of a call. The numbers are those of `fmi2Status` and `fmi3Status`; `Fatal` (4) is never answered, because in
-/// FMI 2.0 it would condemn all instances of the process.
+/// Status of a call. The numbers are those of `fmi2Status` and `fmi3Status`; `Fatal` (4) is never returned, because in
+/// FMI 2.0 it would invalidate all instances of the process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(i32)]
 pub enum FmiStatus {
-    /// All well.
+    /// Success.
     Ok = 0,
-    /// Done, and the message logged deserves attention.
+    /// Success, with a logged message that deserves attention.
     Warning = 1,
-    /// Nothing done, the simulation can go on.
+    /// Nothing was done, and the simulation can continue.
     Discard = 2,
-    /// Refused or failed, the message logged says why.
+    /// Rejected or failed, with a logged message that states the reason.
     Error = 3,
 }
 
-/// Which version of the standard an instance was made by: names of types and arguments differ.
+/// Version of the standard by which an instance was created: names of types and arguments differ.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Dialect {
     /// FMI 2.0.
@@ -44,22 +44,22 @@ pub(crate) enum Dialect {
     Fmi3,
 }
 
-/// A call that was not carried out, and the message that explains it.
+/// A call that was not carried out, with the message that explains it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Refusal {
     /// `Error` or `Discard`.
     pub status: FmiStatus,
-    /// What, where, and the remedy.
+    /// Problem, place and remedy.
     pub message: String,
 }
 
 impl Refusal {
-    /// A refusal that answers `Error`.
+    /// Creates a refusal with the status `Error`.
     pub(crate) fn error(message: impl Into<String>) -> Self {
         Self { status: FmiStatus::Error, message: message.into() }
     }
 
-    /// A refusal that answers `Discard`.
+    /// Creates a refusal with the status `Discard`.
     pub(crate) fn discard(message: impl Into<String>) -> Self {
         Self { status: FmiStatus::Discard, message: message.into() }
     }
@@ -68,7 +68,7 @@ impl Refusal {
 impl From<tiprub_core::Error> for Refusal {
     fn from(error: tiprub_core::Error) -> Self {
         match error {
-            // Nothing is lost: the importer may go on.
+            // Nothing is lost: the importer can continue.
             tiprub_core::Error::Exhausted { .. } => Self::discard(error.to_string()),
             _ => Self::error(error.to_string()),
         }
@@ -91,23 +91,23 @@ pub(crate) struct Slave {
     token: String,
     arrays: bool,
     phase: InstancePhase,
-    /// Saved states handed out: the importer holds the address of a box as an opaque handle, which is only ever
-    /// compared, never followed. They are freed with the instance at the latest.
+    /// Saved states in use: the importer holds the address of a box as an opaque handle, which is only compared and
+    /// never dereferenced. They are freed with the instance at the latest.
     ///
-    /// The box is needed: its address is the handle, and must not move when the list grows.
+    /// The box is required: its address is the handle, and must not move when the list grows.
     #[expect(clippy::vec_box)]
     snapshots: Vec<Box<snapshot::SavedState>>,
-    /// Texts handed out by the last call that returned texts.
+    /// Strings returned by the last call that returns strings.
     strings: Vec<CString>,
-    /// Messages for the importer that do not come with a refusal.
+    /// Messages for the importer that do not belong to a refusal.
     notes: Vec<(FmiStatus, String)>,
 }
 
 impl Slave {
-    /// Load the unit from the FMU's resources directory.
+    /// Loads the unit from the FMU's resources directory.
     ///
     /// # Errors
-    /// Unreadable or damaged resources, a token that does not belong to them, a model that the unit refuses.
+    /// Unreadable or damaged resources, a token that does not belong to them, or a model that the unit rejects.
     pub(crate) fn new(dialect: Dialect, resources: &Path, token: &str, load: Load) -> Result<Self> {
         let loaded = load(resources).map_err(Refusal::error)?;
         if loaded.token != token {
@@ -135,17 +135,17 @@ impl Slave {
         })
     }
 
-    /// Version of the standard this instance was made by.
+    /// Returns the version of the standard by which this instance was created.
     pub(crate) fn dialect(&self) -> Dialect {
         self.dialect
     }
 
-    /// Phase of life.
+    /// Returns the current phase.
     pub(crate) fn phase(&self) -> &InstancePhase {
         &self.phase
     }
 
-    /// Time of the instance (s): what the importer would call the current time, in any phase.
+    /// Returns the time of the instance (s), which the importer would call the current time, in any phase.
     pub(crate) fn time(&self) -> f64 {
         match self.phase {
             InstancePhase::Instantiated { experiment } | InstancePhase::Initialising { experiment, .. } => {
@@ -157,29 +157,29 @@ impl Slave {
         }
     }
 
-    /// Keep texts that are handed out by pointer.
+    /// Stores strings that are returned by pointer.
     pub(crate) fn keep(&mut self, texts: Vec<CString>) -> &[CString] {
         self.strings = texts;
         &self.strings
     }
 
-    /// Messages that do not come with a refusal, in order; the list is empty afterwards.
+    /// Returns the messages that do not belong to a refusal, in order; the list is empty afterwards.
     pub(crate) fn take_notes(&mut self) -> Vec<(FmiStatus, String)> {
         std::mem::take(&mut self.notes)
     }
 
-    /// Hand on what the unit has to say since it was last asked.
+    /// Collects the messages of the unit since the last call.
     pub(super) fn collect_notes(&mut self) {
         self.notes.extend(self.unit.take_notes().iter().map(logged));
     }
 
-    /// Add a message to be handed to the importer after the call.
+    /// Adds a message that is sent to the importer after the call.
     pub(crate) fn note(&mut self, status: FmiStatus, message: impl Into<String>) {
         self.notes.push((status, message.into()));
     }
 }
 
-/// A warning as a message of the log: notes have the status `Ok`.
+/// Converts a warning to a log message: notes have the status `Ok`.
 fn logged(warning: &Warning) -> (FmiStatus, String) {
     let status = match warning.level() {
         Severity::Note => FmiStatus::Ok,

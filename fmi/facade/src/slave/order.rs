@@ -1,13 +1,14 @@
 //! The call order of both standards as data: one row per exported function that takes an instance, with the phases in
 //! which it is allowed.
 //!
-//! Sources: FMI 2.0.4, section 4.2.4 (state machine of calling sequence, table of functions against states) and
-//! FMI 3.0.2, sections 2.3 and 4.2. `fmi3EnterEventMode` and the like belong to capabilities that this FMU does not
-//! have; they are allowed nowhere ([`NOWHERE`] says so to the importer) or refused by their own message.
+//! Sources: FMI 2.0.4, section 4.2.4 (state machine of calling sequence, table of functions against states) and FMI
+//! 3.0.2, sections 2.3 and 4.2. Functions such as `fmi3EnterEventMode` belong to capabilities that this FMU does not
+//! have; they are never allowed ([`NOWHERE`] produces the message) or rejected with their own message.
 //!
-//! Beyond the standard one thing is tolerated, because importers do it: FMI 2.0 reading of values that have a start
-//! value while the instance is still `Instantiated` (FMI 3.0 allows that). Stricter than the standard is one row:
-//! `fmi3GetOutputDerivatives` is refused during an intermediate update, because derivatives belong to communication points.
+//! One deviation from the standard is tolerated because importers rely on it: in FMI 2.0, variables with a start value
+//! can be read while the instance is still `Instantiated` (FMI 3.0 allows that). One row is stricter than the standard:
+//! `fmi3GetOutputDerivatives` is rejected during an intermediate update, because derivatives belong to communication
+//! points.
 
 use super::phase::{ANY, FAILED, INITIALISING, INSTANTIATED, STEPPING, States, TERMINATED, UPDATING, names};
 use super::{Dialect, InstancePhase, Refusal, Result};
@@ -17,20 +18,20 @@ use super::{Dialect, InstancePhase, Refusal, Result};
 pub(crate) struct CallRule {
     /// Name of the exported function.
     pub name: &'static str,
-    /// Phases in which it may be called.
+    /// Phases in which the function may be called.
     pub states: States,
 }
 
 impl CallRule {
-    /// Version of the standard, by the prefix of the name.
+    /// Returns the version of the standard, from the prefix of the name.
     pub(crate) fn dialect(&self) -> Dialect {
         if self.name.starts_with("fmi2") { Dialect::Fmi2 } else { Dialect::Fmi3 }
     }
 
-    /// Refuse a call that is out of order.
+    /// Rejects a call that is out of order.
     ///
     /// # Errors
-    /// The message names the phase and the phases in which the call is allowed.
+    /// A call in a phase in which it is not allowed; the message contains the phase and the allowed phases.
     pub(crate) fn check(&self, phase: &InstancePhase) -> Result<()> {
         if self.states & phase.state() != 0 {
             return Ok(());
@@ -150,7 +151,7 @@ pub(crate) mod fmi3 {
     }
 }
 
-/// Row of a function that belongs to a capability this FMU does not have; its own message says so in every phase.
+/// Returns the row of a function whose capability this FMU does not have; it has a separate message in every phase.
 pub(crate) const fn unsupported(name: &'static str) -> CallRule {
     CallRule { name, states: ANY }
 }

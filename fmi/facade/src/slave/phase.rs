@@ -1,15 +1,15 @@
-//! Phases of an instance's life; the data of a phase exists only in it.
+//! Phases of an instance; the data of a phase exists only in that phase.
 
 /// Start and stop time given by the importer.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct ExperimentTimes {
     /// Start time (s).
     pub start: f64,
-    /// Stop time (s), where defined: steps beyond it are refused.
+    /// Stop time (s), if defined; longer steps are rejected.
     pub stop: Option<f64>,
 }
 
-/// Where an instance is in the state machines of the standards.
+/// Phase of an instance in the state machines of the standards.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum InstancePhase {
     /// Instantiated: start values can be set.
@@ -19,10 +19,10 @@ pub(crate) enum InstancePhase {
     },
     /// Initialization Mode.
     Initialising {
-        /// As given.
+        /// Experiment as given.
         experiment: ExperimentTimes,
-        /// `None` if a value was set after outputs were last computed; else the core's state from before they were, to go
-        /// back to when the next value is set.
+        /// `None` if a value was set after the outputs were last computed; otherwise the core's state before their
+        /// computation, which is restored when the next value is set.
         before: Option<Vec<u8>>,
     },
     /// FMI 2.0 stepComplete, FMI 3.0 Step Mode.
@@ -30,16 +30,16 @@ pub(crate) enum InstancePhase {
         /// Stop time (s).
         stop: Option<f64>,
     },
-    /// FMI 3.0 Intermediate Update Mode: between two internal steps of a `fmi3DoStep` under way.
+    /// FMI 3.0 Intermediate Update Mode: between two internal steps of a `fmi3DoStep` in progress.
     Updating {
         /// Stop time (s).
         stop: Option<f64>,
         /// Internal time reached (s).
         reached: f64,
-        /// Whether the outputs are those of that time.
+        /// True if the outputs belong to that time.
         fresh: bool,
     },
-    /// FMI 2.0 stepFailed: the state became non-finite. Reset or restore a saved state.
+    /// FMI 2.0 stepFailed: the state became non-finite. Reset the instance or restore a saved state.
     Failed {
         /// Last communication point with a good state (s).
         last_good: f64,
@@ -74,7 +74,7 @@ const NAMES: [&str; 6] =
     ["Instantiated", "Initialization Mode", "Step Mode", "Intermediate Update Mode", "Step Failed", "Terminated"];
 
 impl InstancePhase {
-    /// The phase as a set of one.
+    /// Returns the set that contains only this phase.
     pub(crate) fn state(&self) -> States {
         match self {
             Self::Instantiated { .. } => INSTANTIATED,
@@ -87,7 +87,7 @@ impl InstancePhase {
     }
 }
 
-/// Names of the phases in a set, for messages.
+/// Returns the names of the phases in a set, for messages.
 pub(super) fn names(states: States) -> String {
     let named = NAMES.iter().enumerate().filter(|(bit, _)| states & (1 << bit) != 0);
     named.map(|(_, name)| *name).collect::<Vec<_>>().join(", ")

@@ -1,8 +1,8 @@
 //! Saved states: everything that determines the future of an instance, as bytes.
 //!
-//! Layout, little-endian: magic (8 bytes), version u32, length of the token u32, token, phase u8, stop defined u8, two
-//! zero bytes, time f64, stop time f64, length of the core's state u64, the core's state, FNV-1a 64 of all before. The
-//! length is the same for all states of an FMU.
+//! Layout, little-endian: magic (8 bytes), version u32, length of the token u32, token, phase u8, flag of a defined
+//! stop time u8, two zero bytes, time f64, stop time f64, length of the core's state u64, the core's state, FNV-1a 64
+//! of everything before. The length is the same for all states of an FMU.
 
 use super::{ExperimentTimes, InstancePhase, Refusal, Result, Slave};
 
@@ -13,7 +13,7 @@ const CHECKSUM: usize = 8;
 /// One saved state.
 pub(super) type SavedState = Vec<u8>;
 
-/// Opaque address by which the importer names a saved state.
+/// Opaque address that the importer uses as the handle of a saved state.
 pub(crate) type SnapshotHandle = *const SavedState;
 
 fn damaged(problem: impl std::fmt::Display) -> Refusal {
@@ -22,12 +22,12 @@ fn damaged(problem: impl std::fmt::Display) -> Refusal {
     ))
 }
 
-/// FNV-1a, 64 bit.
+/// Computes FNV-1a, 64 bit.
 fn checksum(bytes: &[u8]) -> u64 {
     bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3))
 }
 
-/// Takes fields off the front of a byte string.
+/// Reads fields from the front of a byte string.
 struct SnapshotReader<'a>(&'a [u8]);
 
 impl<'a> SnapshotReader<'a> {
@@ -48,7 +48,7 @@ impl<'a> SnapshotReader<'a> {
     }
 }
 
-/// Fields of a phase as written: tag, time, stop.
+/// Writes the fields of a phase: tag, time, stop time.
 fn encode_phase(phase: &InstancePhase, out: &mut SavedState) {
     let (tag, time, stop) = match *phase {
         InstancePhase::Instantiated { experiment } => (0, experiment.start, experiment.stop),
@@ -81,10 +81,10 @@ fn decode_phase(reader: &mut SnapshotReader<'_>) -> Result<InstancePhase> {
 }
 
 impl Slave {
-    /// Save the state and hand out a handle for it. `existing` is a handle of this instance whose state is replaced.
+    /// Saves the state and returns a handle for it. `existing` is a handle of this instance whose state is replaced.
     ///
     /// # Errors
-    /// A handle that this instance did not hand out.
+    /// A handle that this instance did not return.
     pub(crate) fn save(&mut self, existing: Option<SnapshotHandle>) -> Result<SnapshotHandle> {
         let bytes = self.encode()?;
         self.store(existing, bytes)
@@ -110,10 +110,10 @@ impl Slave {
         })
     }
 
-    /// Restore a saved state, with the phase of life it was saved in.
+    /// Restores a saved state together with its phase.
     ///
     /// # Errors
-    /// Not a state of this instance, or not one of this FMU; nothing is changed then.
+    /// A handle that is not a state of this instance, or a state of another FMU; nothing is changed then.
     pub(crate) fn restore(&mut self, handle: SnapshotHandle) -> Result<()> {
         let index = self.index(handle)?;
         let snapshot = std::mem::take(&mut *self.snapshots[index]);
@@ -126,33 +126,33 @@ impl Slave {
         Ok(())
     }
 
-    /// Free a saved state.
+    /// Frees a saved state.
     ///
     /// # Errors
-    /// Not a state of this instance.
+    /// A handle that is not a state of this instance.
     pub(crate) fn free_snapshot(&mut self, handle: SnapshotHandle) -> Result<()> {
         let index = self.index(handle)?;
         self.snapshots.swap_remove(index);
         Ok(())
     }
 
-    /// The bytes of a saved state.
+    /// Returns the bytes of a saved state.
     ///
     /// # Errors
-    /// Not a state of this instance.
+    /// A handle that is not a state of this instance.
     pub(crate) fn serialised(&self, handle: SnapshotHandle) -> Result<&[u8]> {
         Ok(&self.snapshots[self.index(handle)?])
     }
 
-    /// Length of every saved state of this FMU (bytes).
+    /// Returns the length of every saved state of this FMU (bytes).
     pub(crate) fn serialised_size(&self) -> usize {
         MAGIC.len() + 4 + 4 + self.token.len() + 4 + 8 + 8 + 8 + self.unit.state_size() + CHECKSUM
     }
 
-    /// Make a saved state of bytes that came from [`Slave::serialised`], perhaps in another process.
+    /// Creates a saved state from bytes that [`Slave::serialised`] returned, possibly in another process.
     ///
     /// # Errors
-    /// Wrong length, another FMU's state, damaged bytes.
+    /// Bytes of wrong length, of another FMU, or damaged.
     pub(crate) fn deserialise(&mut self, bytes: &[u8], existing: Option<SnapshotHandle>) -> Result<SnapshotHandle> {
         self.decode(bytes)?;
         self.store(existing, bytes.to_vec())
@@ -171,7 +171,7 @@ impl Slave {
         let start = out.len();
         out.resize(start + state, 0);
         match &self.phase {
-            // Outputs computed in Initialization Mode are computed again when asked for.
+            // Outputs computed in Initialization Mode are computed again when they are requested.
             InstancePhase::Initialising { before: Some(before), .. } => out[start..].copy_from_slice(before),
             _ => self.unit.save_state(&mut out[start..])?,
         }
@@ -213,7 +213,7 @@ impl Slave {
 mod tests {
     use super::*;
 
-    /// Tag, flag of the stop time, two bytes of nothing, time, stop time.
+    /// Returns the tag, the flag of the stop time, two zero bytes, the time and the stop time as bytes.
     fn bytes(head: [u8; 4], time: f64, stop: f64) -> Vec<u8> {
         [&head[..], &time.to_le_bytes(), &stop.to_le_bytes()].concat()
     }

@@ -1,26 +1,28 @@
-//! Communication steps: whole, or internal step by internal step for FMI 3.0 intermediate updates.
+//! Communication steps: as a whole, or one internal step at a time for FMI 3.0 intermediate updates.
 
 use tiprub_core::simulation::StepProgress;
 use tiprub_core::{shown, shown_time};
 
 use super::{FmiStatus, InstancePhase, Refusal, Result, Slave};
 
-/// Distance by which a step may end beyond the stop time, as a fraction of the step: importers add up their communication points, and the sum of many
-/// steps misses the stop time by rounding.
+/// Distance by which a step may exceed the stop time, as a fraction of the step: importers add up their communication
+/// points, and the sum of many steps misses the stop time by rounding.
 const STOP_TOLERANCE: f64 = 1e-3;
-/// The same as a fraction of the stop time, for runs of very many steps.
+/// Permitted excess as a fraction of the stop time, for runs of very many steps.
 const STOP_ROUNDING: f64 = 1e-9;
 
-/// With the feature `test-panic`, the communication step size that makes the step panic: an odd number that nobody uses.
+/// With the feature `test-panic`, the communication step size that makes the step panic: an odd number that does not
+/// occur otherwise.
 #[cfg(feature = "test-panic")]
 const PANIC_STEP_SIZE: f64 = 1.234_567_890_123e-5;
 
 impl Slave {
-    /// Begin a communication step, which may end early (`partial`) where the internal steps allowed are used up; the phase becomes
-    /// [`InstancePhase::Updating`] until it is ended.
+    /// Begins a communication step, which may end early (`partial`) if the maximum number of internal steps is reached;
+    /// the phase is [`InstancePhase::Updating`] until the step ends.
     ///
     /// # Errors
-    /// Wrong time, bad step size, a step beyond the stop time, too many internal steps; the state is as before.
+    /// A wrong time, an invalid step size, a step beyond the stop time, or too many internal steps; the state is
+    /// unchanged.
     pub(crate) fn begin_step(&mut self, current_time: f64, step_size: f64, partial: bool) -> Result<()> {
         let InstancePhase::Stepping { stop } = self.phase else {
             return Err(Refusal::error("a step cannot begin in this phase"));
@@ -47,11 +49,13 @@ impl Slave {
         Ok(())
     }
 
-    /// March one internal step. When it finishes the communication step, the phase is [`InstancePhase::Stepping`] again.
+    /// Computes one internal step. When it finishes the communication step, the phase is [`InstancePhase::Stepping`]
+    /// again.
     ///
     /// # Errors
-    /// The state became non-finite; the phase is [`InstancePhase::Failed`] then. Or the internal steps allowed are used up: the phase is
-    /// [`InstancePhase::Stepping`] as if the step had not begun, or [`InstancePhase::Updating`] where it may end at the internal step reached.
+    /// A state that became non-finite; the phase is [`InstancePhase::Failed`] then. Or the maximum number of internal
+    /// steps is reached: the phase is [`InstancePhase::Stepping`] as if the step had not begun, or
+    /// [`InstancePhase::Updating`] if it can end at the internal step reached.
     pub(crate) fn advance(&mut self) -> Result<StepProgress> {
         let last_good = self.unit.time();
         let InstancePhase::Updating { stop, .. } = self.phase else {
@@ -72,7 +76,8 @@ impl Slave {
         Ok(progress)
     }
 
-    /// Ends all stepping until a saved state is restored or the instance is reset, and returns the refusal that says so.
+    /// Stops all stepping until a saved state is restored or the instance is reset, and returns the refusal that
+    /// reports it.
     fn fail(&mut self, last_good: f64, error: tiprub_core::Error) -> Refusal {
         self.phase = InstancePhase::Failed { last_good };
         let Refusal { status, message } = error.into();
@@ -82,10 +87,11 @@ impl Slave {
         }
     }
 
-    /// March one internal step; `None` where the internal steps allowed are used up, and the communication step has ended early.
+    /// Computes one internal step; returns `None` if the maximum number of internal steps is reached and the
+    /// communication step has ended early.
     ///
     /// # Errors
-    /// As [`Slave::advance`] and [`Slave::end_step`].
+    /// Same as [`Slave::advance`] and [`Slave::end_step`].
     pub(crate) fn advance_partially(&mut self) -> Result<Option<StepProgress>> {
         match self.advance() {
             Err(refusal)
@@ -100,10 +106,10 @@ impl Slave {
         }
     }
 
-    /// End the communication step: at its end, or at the internal step reached (early return).
+    /// Ends the communication step: at its end, or at the internal step reached (early return).
     ///
     /// # Errors
-    /// Early: the state is not finite; the phase is [`InstancePhase::Failed`] then.
+    /// Early return with a state that is not finite; the phase is [`InstancePhase::Failed`] then.
     pub(crate) fn end_step(&mut self, early: bool) -> Result<()> {
         let last_good = self.unit.time();
         if let InstancePhase::Updating { stop, .. } = self.phase {
@@ -116,10 +122,10 @@ impl Slave {
         Ok(())
     }
 
-    /// A whole communication step.
+    /// Computes a whole communication step.
     ///
     /// # Errors
-    /// As [`Slave::begin_step`] and [`Slave::advance`].
+    /// Same as [`Slave::begin_step`] and [`Slave::advance`].
     pub(crate) fn step(&mut self, current_time: f64, step_size: f64) -> Result<()> {
         self.begin_step(current_time, step_size, false)?;
         self.unit.fly_ahead();
@@ -127,10 +133,11 @@ impl Slave {
         self.end_step(false)
     }
 
-    /// A communication step, or as much of it as the internal steps allowed are enough for; whether it ended early.
+    /// Computes a communication step as far as the maximum number of internal steps permits; returns whether it ended
+    /// early.
     ///
     /// # Errors
-    /// As [`Slave::step`]; where not even one internal step is allowed, [`FmiStatus::Discard`].
+    /// Same as [`Slave::step`]; [`FmiStatus::Discard`] if not even one internal step is permitted.
     pub(crate) fn step_partially(&mut self, current_time: f64, step_size: f64) -> Result<bool> {
         self.begin_step(current_time, step_size, true)?;
         self.unit.fly_ahead();

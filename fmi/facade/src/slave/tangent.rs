@@ -1,30 +1,30 @@
-//! Derivatives of outputs over the last communication step: an extension, where the unit has it.
+//! Derivatives of outputs over the last communication step, an extension of units that support it.
 
 use super::{Refusal, Result, Slave};
 
 impl Slave {
-    /// Refuse where the unit has none.
+    /// Rejects the call if the unit has no derivatives.
     ///
     /// # Errors
-    /// Says what it would need.
+    /// A unit without derivatives; the message states what they require.
     pub(crate) fn check_derivatives(&self) -> Result<()> {
         self.unit.no_derivatives().map_or(Ok(()), |reason| Err(Refusal::error(reason)))
     }
 
-    /// Σ_j ∂y_i(t+H)/∂u_j s_j of the last communication step, for each output.
+    /// Computes Σ_j ∂y_i(t+H)/∂u_j s_j of the last communication step, for each output.
     ///
     /// # Errors
-    /// As [`crate::Unit::step_derivative`].
+    /// Same as [`crate::CoSimulationUnit::step_derivative`].
     pub(crate) fn directional(&mut self, outputs: &[u32], inputs: &[u32], seed: &[f64]) -> Result<Vec<f64>> {
         let mut sensitivity = vec![0.0; outputs.len()];
         self.unit.step_derivative(outputs, inputs, seed, &mut sensitivity)?;
         Ok(sensitivity)
     }
 
-    /// Σ_i s_i ∂y_i(t+H)/∂u_j of the last communication step, for each input.
+    /// Computes Σ_i s_i ∂y_i(t+H)/∂u_j of the last communication step, for each input.
     ///
     /// # Errors
-    /// As [`Slave::directional`].
+    /// Same as [`Slave::directional`].
     pub(crate) fn adjoint(&mut self, outputs: &[u32], inputs: &[u32], seed: &[f64]) -> Result<Vec<f64>> {
         if let Some(wrong) = seed.iter().find(|value| !value.is_finite()) {
             return Err(Refusal::error(format!("seed {wrong} is not finite. Give finite seeds")));

@@ -1,4 +1,4 @@
-//! An elastic bar that bounces under gravity for ever, through the core, against its exact series.
+//! An elastic bar that bounces under gravity indefinitely, computed by the core, against its exact series.
 //!
 //! D. Doyen, A. Ern, S. Piperno, SIAM J. Sci. Comput. 33 (2011): period 16/3 s, contacts on [1, 5/3] and [11/3, 13/3].
 
@@ -10,27 +10,27 @@ use tiprub_reference::closed::bouncing_bar::{
     CONTACTS, DENSITY, GRAVITY, HEIGHT, LENGTH, PERIOD, YOUNG, displacement, energy, pressure,
 };
 
-/// Periods that are computed.
+/// Number of periods computed.
 const PERIODS: usize = 3;
-/// Gaps between touches that count as one contact (s).
+/// Gaps between touches up to this length count as one contact (s).
 const APART: f64 = 0.1;
 
 #[derive(Debug, Default)]
 struct BouncingRun {
     step: f64,
-    /// Error of the bottom over the first period, largest and relative L2, and relative L2 over the last.
+    /// Error at the bottom over the first period, maximum and relative L2, and relative L2 over the last.
     bottom: [f64; 3],
-    /// Error of the force in the first contact: impulse and L2, relative.
+    /// Relative error of the force in the first contact: impulse and L2.
     force: [f64; 2],
-    /// Begin and end of every contact (s).
+    /// Start and end of every contact (s).
     contacts: Vec<[f64; 2]>,
-    /// Share of the energy lost after every period.
+    /// Fraction of the energy lost after every period.
     losses: Vec<f64>,
     /// Residual of the ledger.
     residual: f64,
 }
 
-/// Sums of squares of error and of value.
+/// Sums of squares of the error and of the value.
 #[derive(Debug, Clone, Copy, Default)]
 struct Squares([f64; 2]);
 
@@ -45,7 +45,8 @@ impl Squares {
     }
 }
 
-/// `fraction` is the Courant number; massless-boundary takes less where closed contact asks for it.
+/// Simulates a bouncing bar with the Courant number `fraction`; massless-boundary uses less if closed contact requires
+/// it.
 fn bounce(elements: usize, scheme: Scheme, solver: Solver, fraction: f64) -> BouncingRun {
     let kept = if scheme == Scheme::MasslessBoundary { NEARLY_NONE } else { 1.0 };
     let rod = StraightRod { young: YOUNG, density: DENSITY, area: 1.0, length: LENGTH, elements, end: 0, kept };
@@ -56,7 +57,7 @@ fn bounce(elements: usize, scheme: Scheme, solver: Solver, fraction: f64) -> Bou
     }
     let mut system = against_plane(&model, (scheme, solver), 1.0, HEIGHT, true);
     system.set_step(step);
-    // Uniform gravity pushes on the rigid mode alone. Let go at rest it is at −gh²/2 a step earlier.
+    // Uniform gravity acts on the rigid mode alone. Released at rest, it is at −gh²/2 one step earlier.
     let mass = DENSITY * LENGTH;
     let weight = -GRAVITY * mass.sqrt();
     set_samples(&mut system, &model, 0, 0.0, 0.5 * weight * step * step);
@@ -69,7 +70,7 @@ fn bounce(elements: usize, scheme: Scheme, solver: Solver, fraction: f64) -> Bou
         system.bank_mut().loads_mut()[0] = weight;
         system.step(&[PrescribedMotion::default()]).unwrap();
         let (time, force) = (system.steps() as f64 * step, system.multiplier(0, 0));
-        // The series is long: as many samples for every mesh.
+        // The series is expensive: every mesh uses the same number of samples.
         if system.steps().is_multiple_of((elements / 25) as u64) {
             let (period, exact) = (periods(time).min(PERIODS - 1), displacement(0.0, time));
             squares[period].add(system.gap(0, 0), exact);
@@ -86,7 +87,7 @@ fn bounce(elements: usize, scheme: Scheme, solver: Solver, fraction: f64) -> Bou
         if periods(time) > outcome.losses.len() {
             let (kinetic, strain) = system.energies();
             let (position, increment) = system.bank().modal_state(0, 0);
-            // Potential energy as the scheme has it: mean of now and before. Heights are from the release.
+            // Potential energy as the scheme defines it: mean of now and before. Heights are measured from the release.
             let potential = GRAVITY * mass * HEIGHT - weight * (position - 0.5 * increment);
             outcome.losses.push(1.0 - (kinetic + strain + potential) / energy());
         }
@@ -100,7 +101,7 @@ fn bounce(elements: usize, scheme: Scheme, solver: Solver, fraction: f64) -> Bou
     outcome
 }
 
-/// Whole periods in a time (s).
+/// Returns the number of whole periods in a time (s).
 fn periods(time: f64) -> usize {
     (1..=PERIODS).take_while(|count| time >= *count as f64 * PERIOD).count()
 }
@@ -144,7 +145,7 @@ fn bouncing_bar_matches_series_solution() {
             print(scheme, Solver::Lcp, elements, &found);
             check(scheme, elements, &found);
             errors.push(found.bottom[1]);
-            // With one contact node all solvers have one problem to solve.
+            // With one contact node all solvers solve the same problem.
             for solver in SOLVERS.into_iter().filter(|solver| *solver != Solver::Lcp && elements == 25) {
                 let other = bounce(elements, scheme, solver, 0.9);
                 print(scheme, solver, elements, &other);
@@ -154,7 +155,8 @@ fn bouncing_bar_matches_series_solution() {
         }
         let orders = orders(&errors);
         print_row!("{scheme:?}: orders of L2 {orders:.2?}");
-        // A displacement whose velocity jumps is met with order 2/3 · 3/2 = 1 by methods of second order; the loss is of order 1.
+        // Methods of second order converge with order 2/3 · 3/2 = 1 to a displacement whose velocity jumps; the loss is
+        // of order 1.
         let mean = orders.iter().sum::<f64>() / 3.0;
         assert!((0.65..1.15).contains(&mean), "order {mean}");
     }
@@ -164,13 +166,13 @@ fn bouncing_bar_matches_series_solution() {
 fn check(scheme: Scheme, elements: usize, found: &BouncingRun) {
     let size = 1.0 / elements as f64;
     assert!(found.residual.abs() < 1e-12, "ledger {:e}", found.residual);
-    // 25 elements lose so much that the third period is not one any more.
+    // 25 elements lose so much energy that the third period no longer repeats.
     assert!(elements < 50 || found.contacts.len() == 2 * PERIODS, "{:?}", found.contacts);
     for (found, exact) in found.contacts.iter().zip(CONTACTS) {
         assert!((0..2).all(|i| (found[i] - exact[i]).abs() < 1.5 * size), "{found:?} of {exact:?}");
     }
     assert!(found.bottom[1] < 2.5 * size && found.force[0].abs() < 0.3 * size, "{found:?}");
-    // Each of two contacts takes the kinetic energy of the lumped contact node, E/2n; a massless node has none.
+    // Each of two contacts absorbs the kinetic energy of the lumped contact node, E/2n; a massless node has none.
     let lost = found.losses[0] / size;
     let range = if scheme == Scheme::MasslessBoundary { 0.0..0.15 } else { 0.8..1.2 };
     assert!(range.contains(&lost), "{lost} of E/n lost");

@@ -1,5 +1,5 @@
-//! Energy over many undamped steps: in free flight, with contact that stays closed, and over contacts that take nothing; and
-//! the sums it is booked in.
+//! Energy over many undamped steps: in free flight, with permanently closed contact, and over lossless contacts; and
+//! the sums of the energy ledger.
 //!
 //! 1e5 steps here; 1e7 by `cargo test --release -p tiprub-core --test closed_forms drift -- --ignored --nocapture`.
 
@@ -12,13 +12,13 @@ use tiprub_core::settings::{Scheme, Solver};
 use tiprub_core::system::System;
 use tiprub_core::{Ledger, Sum};
 
-/// A rod of 12 elements; its contact node has mass or none, as the scheme wants.
+/// Returns a rod of 12 elements, whose contact node has mass or not as the scheme requires.
 fn rod(scheme: Scheme) -> ModalModel {
     let kept = if scheme == Scheme::MasslessBoundary { NEARLY_NONE } else { 1.0 };
     StraightRod { young: 2e11, density: 7800.0, area: 1e-4, length: 0.1, elements: 12, end: 0, kept }.model()
 }
 
-/// Elastic modes ringing with 1 mJ each.
+/// Lets the elastic modes vibrate with 1 mJ each.
 fn ring(system: &mut System, model: &ModalModel, amplitude: f64) {
     for mode in 1..model.dynamic_modes(system.settings().scheme).min(8) {
         let omega = model.frequencies[mode];
@@ -28,12 +28,12 @@ fn ring(system: &mut System, model: &ModalModel, amplitude: f64) {
     }
 }
 
-/// Largest change of the energy relative to that at the start, and its change at the end.
+/// Returns the largest change of the energy relative to that at the start, and its change at the end.
 fn march(system: &mut System, steps: u64, load: Option<f64>) -> [f64; 2] {
     let mut swing = [f64::INFINITY, f64::NEG_INFINITY];
     let energy = |system: &System| {
         let (kinetic, strain) = system.energies();
-        // Potential energy of the load, as the scheme has it.
+        // Potential energy of the load, as the scheme defines it.
         let potential = load.map_or(0.0, |load| {
             let (position, increment) = system.bank().modal_state(0, 0);
             -load * (position - 0.5 * increment)
@@ -57,7 +57,7 @@ fn march(system: &mut System, steps: u64, load: Option<f64>) -> [f64; 2] {
         swing = [swing[0].min(strain), swing[1].max(strain)];
         most = most.max((energy(system) / before - 1.0).abs());
     }
-    // Something moves: strain energy comes and goes.
+    // Something moves: strain energy varies.
     assert!(swing[1] > 1.5 * swing[0], "{swing:?}");
     [most, energy(system) / before - 1.0]
 }
@@ -71,14 +71,16 @@ fn free(scheme: Scheme, steps: u64) -> [f64; 2] {
     march(&mut system, steps, None)
 }
 
-/// Pressed onto the plane by a load on its rigid mode, ringing without ever leaving it.
+/// Returns the energy change of a rod that is pressed onto the plane by a load on its rigid-body mode and vibrates
+/// without opening.
 fn closed(scheme: Scheme, steps: u64) -> [f64; 2] {
     let model = rod(scheme);
     let mut system = against_plane(&model, (scheme, Solver::Lcp), 1.0, 0.0, true);
     system.set_step(quiet_step(&model, 1e-6));
     system.start(&[PrescribedMotion::default()]);
     let load = -2e4;
-    // Half of the load comes in slowly, the other half at once: the rod rings between half and one and a half times its rest.
+    // Half of the load is applied slowly, the other half suddenly: the rod vibrates between half and one and a half
+    // times its static deflection.
     for index in 0..20_000 {
         let share = f64::from(index) / 20_000.0;
         system.bank_mut().loads_mut()[0] = 0.5 * load * share * share * (3.0 - 2.0 * share);
@@ -86,13 +88,13 @@ fn closed(scheme: Scheme, steps: u64) -> [f64; 2] {
     }
     let losses = system.ledger().impact_loss.value();
     let found = march(&mut system, steps, Some(load));
-    // A contact that opened would have taken energy as it closed.
+    // A contact that opened would have lost energy when it closed.
     let lost = system.ledger().impact_loss.value() - losses;
     assert!(scheme == Scheme::MasslessBoundary || lost.abs() < 1e-12 * system.ledger().scale(), "{lost:e}");
     found
 }
 
-/// Impacts on an elastic stop, which take nothing: massless-boundary only.
+/// Returns the energy change over impacts on an elastic stop without loss: massless-boundary only.
 fn impacts(steps: u64, step: f64) -> [f64; 2] {
     let omega = 60.0;
     let model = single(&[(omega, 1.0), (1e5, 1e5 / (3.0 * omega))], 1);
@@ -109,7 +111,7 @@ fn measure(steps: u64) {
     for scheme in SCHEMES {
         for (name, [most, end]) in [("free flight", free(scheme, steps)), ("closed contact", closed(scheme, steps))] {
             print_row!("| {name} | {scheme:?} | {most:.1e} | {end:+.1e} |");
-            // Rounding walks with the root of the number of steps.
+            // Rounding errors accumulate with the square root of the number of steps.
             let bound = 1e-13 * (steps as f64).sqrt();
             assert!(most < bound, "{name}, {scheme:?}: {most:e}");
         }
@@ -133,7 +135,8 @@ fn energy_is_conserved_over_ten_million_undamped_steps() {
     measure(10_000_000);
 }
 
-/// A thousandth of a rounding error a million times, and a term larger than the sum so far: no term is lost, nor by a saved state.
+/// A thousandth of a rounding error added a million times, and a term larger than the sum so far: no term is lost, not
+/// even in a saved state.
 #[test]
 fn compensated_sums_keep_small_terms() {
     let mut sum = Sum::default();
@@ -159,7 +162,7 @@ fn compensated_sums_keep_small_terms() {
 /// A term of the balance and its sign.
 type Term = (fn(&mut Ledger) -> &mut Sum, f64);
 
-/// Every term has its sign, and large work in and out leaves the small rest that is in the ledger.
+/// Every term has its sign, and the small difference of large work in and out is exact in the ledger.
 #[test]
 fn residual_is_the_balance_without_cancellation() {
     let terms: [Term; 12] = [

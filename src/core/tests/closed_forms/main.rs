@@ -1,4 +1,4 @@
-//! Through the core, against closed forms: what moves, what touches, what is prescribed, what travels.
+//! The core against closed forms: motion, contact, prescribed inputs, travelling waves.
 
 #[path = "../../../../tests/guide.rs"]
 mod guide;

@@ -1,5 +1,5 @@
-//! Observed orders of convergence of the schemes, against what theory gives: free flight, forced vibration, contact that stays
-//! closed, impacts.
+//! Observed orders of convergence of the schemes, against theory: free flight, forced vibration, permanently closed
+//! contact, impacts.
 
 use crate::guide::print_row;
 use crate::rods::{SCHEMES, SOLVERS, against_plane, orders, set_samples, single};
@@ -9,7 +9,7 @@ use tiprub_core::gaps::PrescribedMotion;
 use tiprub_core::settings::{Scheme, Solver};
 use tiprub_reference::closed::oscillator::{Bilinear, DeadStop};
 
-/// Never reached.
+/// A gap that never closes.
 const FAR: f64 = 1e9;
 
 fn row(phase: &str, scheme: Scheme, solver: Solver, quantity: &str, errors: &[f64], theory: &str) -> f64 {
@@ -23,7 +23,8 @@ fn row(phase: &str, scheme: Scheme, solver: Solver, quantity: &str, errors: &[f6
     orders.iter().sum::<f64>() / orders.len() as f64
 }
 
-/// With one contact node all solvers have one problem to solve: the others are looked at with one scheme.
+/// Returns the solvers to test. With one contact node all of them solve the same problem, so the others are tested with
+/// one scheme.
 fn solvers(scheme: Scheme) -> Vec<Solver> {
     if scheme == Scheme::ModalExact { SOLVERS.to_vec() } else { vec![Solver::Lcp] }
 }
@@ -33,10 +34,10 @@ fn head() {
     print_row!("|---|---|---|---|---|---|---|");
 }
 
-/// Modes seen by one node: (ω, shape).
+/// Mode shapes at one node: (ω, shape).
 const MODES: [(f64, f64); 4] = [(0.0, 1.0), (90.0, 0.8), (260.0, -1.1), (610.0, 0.9)];
 
-/// The same with a quasi-static one, for massless-boundary.
+/// Returns the modes, with a quasi-static one for massless-boundary.
 fn free_model(scheme: Scheme) -> ModalModel {
     let mut modes = MODES.to_vec();
     if scheme == Scheme::MasslessBoundary {
@@ -45,12 +46,14 @@ fn free_model(scheme: Scheme) -> ModalModel {
     single(&modes, 1)
 }
 
-/// Exact amplitude of a mode under force·cos Ωt in steady state, started on it; a rigid mode swings about its place.
+/// Returns the exact steady-state amplitude of a mode under force·cos Ωt, started on it; a rigid mode oscillates about
+/// its initial position.
 fn forced(frequency: f64, force: f64, omega: f64, time: f64) -> f64 {
     force / (frequency * frequency - omega * omega) * (omega * time).cos()
 }
 
-/// Largest error of the node over 0.2 s relative to its largest displacement; with `force` on every mode, or none.
+/// Returns the largest error of the node over 0.2 s relative to its largest displacement, with `force` on every mode or
+/// none.
 fn smooth_error(scheme: Scheme, solver: Solver, step: f64, force: Option<(f64, f64)>) -> f64 {
     let model = free_model(scheme);
     let exact = |mode: usize, time: f64| match force {
@@ -99,10 +102,10 @@ fn free_flight_and_forced_vibration_have_expected_order() {
     crate::guide::hold("cargo test -p tiprub-core --test closed_forms free_flight");
 }
 
-/// A chain of masses between two walls; the node of the last presses on the plane of the contact and never leaves it.
+/// Chain of masses between two walls; the node of the last mass presses on the contact plane and never leaves it.
 struct PressedChain {
     model: ModalModel,
-    /// ψ of the closed system in the coordinates of `model`'s reduced ones, and its frequencies.
+    /// ψ of the closed system in the reduced coordinates of `model`, and its frequencies.
     shapes: DMatrix<f64>,
     frequencies: Vec<f64>,
     stiffness: DMatrix<f64>,
@@ -113,7 +116,7 @@ struct PressedChain {
 const MASSES: usize = 5;
 
 impl PressedChain {
-    /// With mass at the contact node: K and M of the chain, the last displacement held at 0.
+    /// Returns the chain with mass at the contact node: K and M of the chain, with the last displacement held at 0.
     fn new() -> Self {
         let mut stiffness = DMatrix::<f64>::zeros(MASSES, MASSES);
         for i in 0..MASSES {
@@ -132,7 +135,7 @@ impl PressedChain {
             * DMatrix::from_diagonal(&inner.eigenvalues.map(|value| 1.0 / value))
             * inner.eigenvectors.transpose()
             * preload.rows(0, MASSES - 1);
-        // Masses of 1: the modes of the free chain are eigenvectors.
+        // Unit masses: the modes of the free chain are eigenvectors.
         let free = SymmetricEigen::new(stiffness.clone());
         let mut order: Vec<usize> = (0..MASSES).collect();
         order.sort_by(|a, b| free.eigenvalues[*a].total_cmp(&free.eigenvalues[*b]));
@@ -158,19 +161,19 @@ impl PressedChain {
         }
     }
 
-    /// Displacements of all masses.
+    /// Returns the displacements of all masses.
     fn exact(&self, time: f64) -> DVector<f64> {
         let swing = DVector::from_fn(MASSES - 1, |mode, _| 1e-4 * (self.frequencies[mode] * time + mode as f64).cos());
         let inner = &self.rest + &self.shapes * swing;
         DVector::from_fn(MASSES, |i, _| if i + 1 < MASSES { inner[i] } else { 0.0 })
     }
 
-    /// Force of the plane on the last mass, which does not move.
+    /// Returns the force of the plane on the last mass, which is at rest.
     fn multiplier(&self, time: f64) -> f64 {
         self.preload[MASSES - 1] - (self.stiffness.row(MASSES - 1) * self.exact(time))[0]
     }
 
-    /// Largest errors of displacement (of the first mass) and multiplier over 0.1 s, relative.
+    /// Returns the largest relative errors of displacement (of the first mass) and multiplier over 0.1 s.
     fn errors(&self, scheme: Scheme, solver: Solver, step: f64) -> [f64; 2] {
         let mut system = against_plane(&self.model, (scheme, solver), -1.0, 0.0, true);
         system.set_step(step);
@@ -198,7 +201,8 @@ impl PressedChain {
     }
 }
 
-/// Massless-boundary closed for good: the residual flexibility is a spring, whose modes are the closed form.
+/// Permanently closed contact with massless-boundary: the residual flexibility is a spring, whose modes are the closed
+/// form.
 struct PressedMassless {
     model: ModalModel,
     shapes: DMatrix<f64>,
@@ -248,7 +252,7 @@ impl PressedMassless {
         let mut acting = seen(&now) / 1e-5;
         while system.steps() as f64 * step < 0.1 {
             system.bank_mut().loads_mut()[..3].fill(PRELOAD);
-            // The force that closed contact has at the start acts in the first step; from then on the system finds it.
+            // The initial force of closed contact acts in the first step; afterwards the system computes it.
             if system.steps() == 0 {
                 for mode in 0..3 {
                     let shape = self.model.contact_modes[(0, mode)];
@@ -279,8 +283,8 @@ fn contact_that_stays_closed_has_expected_order() {
                 _ => pressed.errors(scheme, solver, step),
             });
             for (i, quantity) in ["displacement", "multiplier"].into_iter().enumerate() {
-                // The mass with which modal-exact meets constraints is M + h²K/12 + …: B. V. Numerov's, of fourth order whatever
-                // is held. Its multiplier stands for (λ⁺ + 10 λ + λ⁻)/12.
+                // The mass with which modal-exact satisfies constraints is M + h²K/12 + …: that of B. V. Numerov, of
+                // fourth order for any constraint. Its multiplier represents (λ⁺ + 10 λ + λ⁻)/12.
                 let numerov = scheme == Scheme::ModalExact && i == 0;
                 let (theory, expected) = if numerov { ("4", 4.0) } else { ("2", 2.0) };
                 let order = row("closed contact", scheme, solver, quantity, &errors.map(|errors| errors[i]), theory);
@@ -291,8 +295,8 @@ fn contact_that_stays_closed_has_expected_order() {
     crate::guide::hold("cargo test -p tiprub-core --test closed_forms contact_that_stays");
 }
 
-/// Root mean square over starts, of what `error` gives for a shift of time (s) by shares of a step and a factor on the amplitude:
-/// impacts at every place within a step, and all lengths of contact.
+/// Returns the root mean square of `error` over starts, with time shifts (s) by fractions of a step and factors on the
+/// amplitude: impacts at every position within a step, and all lengths of contact.
 fn over_starts(step: f64, error: impl Fn(f64, f64) -> f64) -> f64 {
     let starts = 64;
     let one = |i: i32| {
@@ -302,7 +306,7 @@ fn over_starts(step: f64, error: impl Fn(f64, f64) -> f64) -> f64 {
     ((0..starts).map(one).sum::<f64>() / f64::from(starts)).sqrt()
 }
 
-/// Error of the position 0.05 s after the first impact, relative to the amplitude, with a stop that stops the mass.
+/// Returns the error of the position 0.05 s after the first impact, relative to the amplitude, with an inelastic stop.
 fn dead_error(scheme: Scheme, solver: Solver, step: f64, shift: f64, factor: f64) -> f64 {
     let case = DeadStop { omega: 60.0, amplitude: factor * 1e-3, distance: 4e-4 };
     let model = single(&[(case.omega, 1.0)], 0);
@@ -318,7 +322,8 @@ fn dead_error(scheme: Scheme, solver: Solver, step: f64, shift: f64, factor: f64
     (system.bank().row(0, 0) - case.position(time)) / case.amplitude
 }
 
-/// The same with the elastic stop of massless-boundary, after four contacts: position, and energy that came or went.
+/// Returns the error with the elastic stop of massless-boundary, after four contacts: position, and energy gained or
+/// lost.
 fn elastic_error(solver: Solver, step: f64, shift: f64, factor: f64) -> [f64; 2] {
     let case = Bilinear { omega: 60.0, ratio: 9.0, distance: 1e-3, amplitude: factor * 2e-3 };
     let model = single(&[(case.omega, 1.0), (1e5, 1e5 / (case.ratio.sqrt() * case.omega))], 1);

@@ -1,5 +1,5 @@
-//! What is prescribed and where it acts, against closed forms that know signs and places: how inputs and parameters move casing
-//! and shaft, what slides on what, which sector and which structure a setting belongs to.
+//! Prescribed motions and the points where they act, against closed forms with signs and positions: how inputs and
+//! parameters move casing and shaft, which body slides on which, which sector and which structure a setting belongs to.
 
 use std::f64::consts::TAU;
 
@@ -18,11 +18,11 @@ use tiprub_test_models::{self as models, element, go, lattice, move_on, real, re
 const SECTORS: usize = 5;
 const SLOPE: f64 = -0.2;
 const LOBES: (f64, u32, f64) = (8e-5, 3, 0.4);
-/// Watched points: how far inside the cone (m), angle (rad), axial position (m).
+/// Watched points: distance inside the cone (m), angle (rad), axial position (m).
 const WATCHED: [[f64; 3]; 4] = [[0.0, 0.0, 0.0], [3e-4, 0.013, 0.011], [0.0, 0.05, 0.031], [0.02, -0.1, 0.018]];
 const GAPS: [f64; SECTORS] = [5e-4, 5.3e-4, 4.8e-4, 5.1e-4, 5.6e-4];
 
-/// Blades with conical tips in a casing of lobes that can be moved in every way.
+/// Returns blades with conical tips in a casing with lobes that every input can move.
 fn movable() -> Scene {
     let mut scene = models::rub(SECTORS);
     for node in &mut scene.roms[0].contact_nodes {
@@ -40,7 +40,8 @@ fn movable() -> Scene {
     scene
 }
 
-/// Distance of a point of a sector from the cone with lobes, in Cartesian coordinates, for the values of [`INPUTS`].
+/// Returns the distance of a point of a sector from the cone with lobes, in Cartesian coordinates, for the values of
+/// [`INPUTS`].
 fn distance([radius, theta, z]: [f64; 3], sector: usize, values: [f64; 8]) -> f64 {
     let [offset, change, factor, rotation, whirl_x, whirl_y, shift, start] = values;
     let angle = theta + TAU * sector as f64 / SECTORS as f64 + start;
@@ -52,7 +53,7 @@ fn distance([radius, theta, z]: [f64; 3], sector: usize, values: [f64; 8]) -> f6
     (casing - x.hypot(y)) / (1.0 + flank * flank + SLOPE * SLOPE).sqrt()
 }
 
-/// Name, value where nothing is moved, value tried.
+/// Name, neutral value, tested value.
 const INPUTS: [(&str, f64, f64); 8] = [
     ("gap_offset", 0.0, 7e-5),
     ("casing_radius_change", 0.0, -9e-5),
@@ -65,14 +66,14 @@ const INPUTS: [(&str, f64, f64); 8] = [
 ];
 
 type Kind = (&'static str, fn(&mut Scene));
-/// Each kind of surface.
+/// Kinds of surfaces.
 const KINDS: [Kind; 3] = [
     ("revolution", |_| {}),
     ("spline", |scene| scene.settings.surfaces[0].spline = Some(SplineSettings::default())),
     ("flexible casing", models::flexible),
 ];
 
-/// Each kind of surface, each input alone and all of them together.
+/// Covers each kind of surface, each input alone and all of them together.
 #[test]
 fn gaps_are_distances_for_any_casing_and_shaft_motion() {
     for (kind, change) in KINDS {
@@ -84,7 +85,7 @@ fn gaps_are_distances_for_any_casing_and_shaft_motion() {
             let (mut values, unmoved) = (INPUTS.map(|input| input.1), INPUTS.map(|input| input.1));
             for input in &moved {
                 let (name, _, value) = INPUTS[*input];
-                // The shape of a casing that a structure carries does not turn.
+                // The shape of a casing that belongs to a structure does not turn.
                 if simulation.table().find(name).is_some() {
                     set(&mut simulation, name, value);
                     values[*input] = value;
@@ -107,7 +108,7 @@ fn gaps_are_distances_for_any_casing_and_shaft_motion() {
             {
                 let name = format!("blade[{}].watched_clearance", sector + 1);
                 let found = element(&simulation, &name, u32::try_from(point).unwrap());
-                // Far inside the surface is curved under the point that is nearest.
+                // Far inside, the curvature of the surface around the closest point matters.
                 let curved = 1e-2 * WATCHED[point][0];
                 let off = (found - distance(watched[point].position, sector, values)).abs();
                 assert!(off < 1e-6 + curved, "{kind}, {moved:?}, {name}[{point}]: {found:e} is off by {off:e}");
@@ -120,8 +121,8 @@ fn gaps_are_distances_for_any_casing_and_shaft_motion() {
     }
 }
 
-/// A point at the place of a contact node, with its motion, in a rub: the gap of a node is linear in what contact moves, that of a point is
-/// not.
+/// A watched point at the position of a contact node moves with it in a rub: the gap of a node is linear in the
+/// displacements, that of a point is not.
 #[test]
 fn a_point_at_a_contact_node_has_its_clearance_in_a_rub() {
     for (kind, change) in KINDS {
@@ -147,8 +148,8 @@ fn a_point_at_a_contact_node_has_its_clearance_in_a_rub() {
     }
 }
 
-/// Two pairs of one rotor: a point is held against the surface of the contact node next to it; without friction or watched sectors there
-/// is nothing to pay for.
+/// Two pairs of one rotor: a point uses the surface of the nearest contact node; without friction or watched sectors it
+/// costs nothing.
 #[test]
 fn output_point_uses_the_surface_of_its_nearest_contact_node() {
     let mut scene = movable();
@@ -164,7 +165,7 @@ fn output_point_uses_the_surface_of_its_nearest_contact_node() {
     let normal = (1.0 + SLOPE * SLOPE).sqrt();
     assert!((of(2) - 9e-4 / normal).abs() < 1e-9, "{:e}", of(2));
     assert!((of(0) - element(&simulation, "blade[1].clearance", 0)).abs() < 1e-15, "{:e}", of(0));
-    // Next to mid-chord, which meets nothing.
+    // Next to mid-chord, which touches nothing.
     assert!(of(1) >= 1e9 && of(3) >= 1e9, "{:e} {:e}", of(1), of(3));
     scene.settings.outputs.watched_sectors.clear();
     assert!(started(&scene).table().find("blade[1].watched_clearance").is_none());
@@ -177,10 +178,10 @@ const STIFFNESS: f64 = MODES[0] * MODES[0] / (SHAPE * SHAPE);
 const CLOSING: f64 = 2e-4;
 const FRICTION: f64 = 0.1;
 const VELOCITY: f64 = 0.02;
-/// Direction of the motion of the shaft or the casing: no blade is near it or across it.
+/// Direction of the motion of the shaft or the casing: no blade is close to it or perpendicular to it.
 const TOWARDS: f64 = 0.3;
 
-/// Blades with one mode along each direction, in a round casing that can close; nothing turns.
+/// Returns blades with one mode along each direction, in a round casing that can close; nothing turns.
 fn blades(scheme: Scheme, solver: Solver, friction: f64) -> Scene {
     let mut scene = models::rub(SECTORS);
     let rom = &mut scene.roms[0];
@@ -198,7 +199,7 @@ fn blades(scheme: Scheme, solver: Solver, friction: f64) -> Scene {
     scene
 }
 
-/// Close the casing by more than the gap, and wait.
+/// Closes the casing by more than the gap, and waits.
 fn close(simulation: &mut Simulation, closing: f64) {
     move_on(simulation, "casing_radius_change", 0.0, -closing / 4e-3);
     go(simulation, 4e-3);
@@ -206,7 +207,8 @@ fn close(simulation: &mut Simulation, closing: f64) {
     go(simulation, 4e-3);
 }
 
-/// Every blade that slides with `slip(θ)` (tangential, axial; m/s) is held back by µλ against it, and heats by µλ|slip|.
+/// Checks that every blade that slides with `slip(θ)` (tangential, axial; m/s) feels the friction µλ against it, and
+/// the heat µλ|slip|.
 fn check_friction(simulation: &Simulation, case: &str, slip: impl Fn(f64) -> [f64; 2]) {
     let (mut heat, mut torque, mut axial) = (0.0, 0.0, 0.0);
     assert_eq!(simulation.system().events().len(), SECTORS, "{case}: open");
@@ -233,13 +235,13 @@ fn check_friction(simulation: &Simulation, case: &str, slip: impl Fn(f64) -> [f6
     }
 }
 
-/// The shaft moves sideways (and along) at a constant velocity, while the rotor turns slowly or not at all.
+/// The shaft moves sideways (and axially) at a constant velocity, while the rotor turns slowly or not at all.
 #[test]
 fn friction_opposes_whirl_and_axial_motion_of_the_shaft() {
     for scheme in [Scheme::CentralDifference, Scheme::ModalExact] {
         for solver in [Solver::Film, Solver::Lcp, Solver::Coulomb] {
             for (speed, along) in [(0.0, 0.0), (0.04, 0.0), (-0.04, 0.0), (0.04, 0.02), (-0.04, -0.02)] {
-                // Axial slip is the business of `coulomb`.
+                // Only `coulomb` models axial slip.
                 if along != 0.0 && solver != Solver::Coulomb {
                     continue;
                 }
@@ -264,11 +266,11 @@ fn friction_opposes_whirl_and_axial_motion_of_the_shaft() {
     }
 }
 
-/// A load of one nodal diameter that grows moves the casing as a whole; the blades stand still and are dragged along.
+/// An increasing load of one nodal diameter moves the casing as a rigid body; the blades are at rest and dragged along.
 #[test]
 fn friction_drags_blades_along_with_a_moving_casing() {
     for scheme in [Scheme::CentralDifference, Scheme::ModalExact] {
-        // From rest tips vibrate faster than they slide, where the law of `lcp` puts energy in, and its run ends.
+        // From rest tips vibrate faster than they slide; the friction law of `lcp` then adds energy, and its run ends.
         let solver = Solver::Coulomb;
         let mut scene = blades(scheme, solver, FRICTION);
         models::flexible(&mut scene);
@@ -277,7 +279,7 @@ fn friction_drags_blades_along_with_a_moving_casing() {
         scene.settings.outputs.slave_displacement = true;
         let mut simulation = started(&scene);
         close(&mut simulation, 3.56e-4 + CLOSING);
-        // The mode has the displacement 0.5 cos θ and the mass 1: line load times π R/2 is its force.
+        // The mode has the displacement 0.5 cos θ and the mass 1, so its force is the line load times π R/2.
         let rate = VELOCITY * (TAU * 900.0).powi(2) / (0.5 * 0.5 * std::f64::consts::PI * 0.25);
         move_on(&mut simulation, "casing_load_amplitude", 0.0, rate);
         go(&mut simulation, 4e-3);
@@ -301,7 +303,8 @@ const DEPTH: f64 = 2e-4;
 /// Flexibility of the contact of massless-boundary (m/N).
 const SOFT: f64 = 1e-6;
 
-/// Unit masses on springs: (ω, direction, displacement of the node), of which the last `quasi_static` have no inertia.
+/// Returns unit masses on springs: (ω, direction, displacement of the node), of which the last `quasi_static` have no
+/// inertia.
 fn masses(modes: &[(f64, usize, f64)], rows: usize, quasi_static: usize) -> ModalModel {
     ModalModel {
         frequencies: modes.iter().map(|mode| mode.0).collect(),
@@ -318,7 +321,7 @@ fn masses(modes: &[(f64, usize, f64)], rows: usize, quasi_static: usize) -> Moda
     }
 }
 
-/// A mass that is pressed along z by its spring and swings along x, on a plane.
+/// Returns a mass on a plane, which its spring presses along z and which vibrates along x.
 fn swinging_blade(scheme: Scheme, friction: f64, settings: SystemSettings) -> System {
     let modes = [(SWING, 0, 1.0), (PRESS, 2, 1.0), (1e4, 0, 1e4 * SOFT.sqrt()), (1e4, 2, 1e4 * SOFT.sqrt())];
     let delayed = scheme == Scheme::MasslessBoundary;
@@ -327,7 +330,7 @@ fn swinging_blade(scheme: Scheme, friction: f64, settings: SystemSettings) -> Sy
     System::new(&model, 1, GapLaw::Fixed(law), friction, settings)
 }
 
-/// The same, where the plane swings. A second node, which meets nothing, gives the free structure an extent.
+/// Returns a mass on a vibrating plane. A second node without contact gives the free structure an extent.
 fn swinging_plane(scheme: Scheme, friction: f64, settings: SystemSettings) -> System {
     let modes = [(PRESS, 2, 1.0), (1e4, 0, 1e4 * SOFT.sqrt()), (1e4, 2, 1e4 * SOFT.sqrt())];
     let delayed = scheme == Scheme::MasslessBoundary;
@@ -344,7 +347,8 @@ fn swinging_plane(scheme: Scheme, friction: f64, settings: SystemSettings) -> Sy
     System::of(vec![touching, StructureParts::Carrying(&plane, false)], vec![pair], Vec::new(), settings)
 }
 
-/// Friction F on a mass on a spring k takes 2F/k of the amplitude at every turn, whichever of the two bodies swings.
+/// Friction F on a mass on a spring k reduces the amplitude by 2F/k at every reversal, whichever of the two bodies
+/// vibrates.
 #[test]
 fn friction_reduces_amplitude_equally_every_half_period() {
     println!("| swings | scheme | solver | amplitudes (mm) | largest error |\n|---|---|---|---|---|");
@@ -397,7 +401,8 @@ fn friction_reduces_amplitude_equally_every_half_period() {
     }
 }
 
-/// Two bumps are as deep as the mean of the clearances says, on a surface of revolution, on a spline and in the nominal values.
+/// The depth of two bumps is relative to the mean clearance, on a surface of revolution, on a spline and in the nominal
+/// values.
 #[test]
 fn sector_gaps_replace_the_common_gap() {
     for spline in [None, Some(SplineSettings::default())] {
@@ -417,7 +422,7 @@ fn sector_gaps_replace_the_common_gap() {
     }
 }
 
-/// Blades of different frequencies behind different gaps, grown by spin, pressed on the casing: each carries its own force.
+/// Blades of different frequencies and gaps, elongated by spin, press on the casing: each has its individual force.
 #[test]
 fn gaps_and_frequency_factors_belong_to_their_own_sectors() {
     let factors = [1.0, 1.1, 0.85, 0.95, 1.25];
@@ -441,7 +446,7 @@ fn gaps_and_frequency_factors_belong_to_their_own_sectors() {
         }
         move_on(&mut simulation, "casing_radius_change", 0.0, -8e-4 / 4e-3);
         go(&mut simulation, 4e-3);
-        // The forces of a step close its gaps: each blade gives way by its own flexibility.
+        // The forces of a step close its gaps: each blade deflects by its individual flexibility.
         for (sector, gap) in GAPS.iter().enumerate() {
             let left = gap - 8e-4 - simulation.system().bank().row(0, sector);
             assert!(left.abs() < 1e-12, "{scheme:?}, sector {sector}: {left:e} m are left between blade and casing");
@@ -456,7 +461,7 @@ fn gaps_and_frequency_factors_belong_to_their_own_sectors() {
     }
 }
 
-/// e^(−2ξωh) of every mode: damping given as a parameter reaches the structure it is named after.
+/// e^(−2ξωh) of every mode: a damping parameter affects the structure in its name.
 #[test]
 fn damping_parameters_belong_to_their_own_structures() {
     let mut ring = models::rub(3);
@@ -487,7 +492,8 @@ fn damping_parameters_belong_to_their_own_structures() {
     }
 }
 
-/// What is let go decays by its own damping, whatever the scene said: the casing by its load, the blades by their speed.
+/// A released structure decays with its damping parameter, whatever the scene sets: the casing by its load, the blades
+/// by their speed.
 #[test]
 fn casing_and_blades_decay_at_their_damping_parameters() {
     let (casing, rotor) = (0.06, 0.03);
@@ -510,7 +516,7 @@ fn casing_and_blades_decay_at_their_damping_parameters() {
     let start = read(&simulation);
     set(&mut simulation, "casing_load_amplitude", 0.0);
     set(&mut simulation, "speed", 0.0);
-    // One internal step of a thousandth of a period: how the load goes within it does not matter.
+    // One internal step of a thousandth of a period: the course of the load within it is irrelevant.
     go(&mut simulation, 1e-6);
     for _ in 0..40 {
         go(&mut simulation, 1e-4);

@@ -1,4 +1,4 @@
-//! Oscillators and balls against stops, through the core, against closed forms: exact times, losses, grazing, long sequences.
+//! The core against closed forms for oscillators and balls at stops: exact times, losses, grazing, long sequences.
 
 use crate::guide::print_row;
 use crate::rods::{SOLVERS, against_plane, set_samples, single};
@@ -11,7 +11,7 @@ use tiprub_reference::closed::oscillator::{Ball, Bilinear, DeadStop};
 const OMEGA: f64 = 60.0;
 const RIGID: [Scheme; 2] = [Scheme::CentralDifference, Scheme::ModalExact];
 
-/// Run until `end`; `each` sees the system after every step.
+/// Runs until `end`; `each` is called with the system after every step.
 fn march(system: &mut System, end: f64, mut each: impl FnMut(&System, f64)) {
     let step = system.bank().step();
     while system.steps() as f64 * step < end {
@@ -26,7 +26,8 @@ fn residual(system: &System) -> f64 {
     system.ledger().residual(kinetic + strain) / system.ledger().scale()
 }
 
-/// Error of the position over `turns` turns relative to A, of the time of the impact relative to h, and the loss.
+/// Returns the error of the position over `turns` turns relative to A, of the time of the impact relative to h, and the
+/// loss.
 fn dead_stop(case: DeadStop, methods: (Scheme, Solver), step: f64, turns: f64) -> [f64; 4] {
     let model = single(&[(case.omega, 1.0)], 0);
     let mut system = against_plane(&model, methods, 1.0, case.distance, false);
@@ -62,7 +63,7 @@ fn mass_stays_at_rigid_stop_until_the_spring_returns_it() {
                         step * 1e6,
                         case.loss()
                     );
-                    // Known to a step; v h is what it may be off by.
+                    // Accurate to one step; the position error is at most v h.
                     assert!((0.0..1.0001).contains(&touch), "{touch} steps late");
                     assert!(position < 4.0 * OMEGA * step && position < last, "{position:e}");
                     assert!((loss - case.loss()).abs() < 5.0 * (OMEGA * step).powi(2), "{loss} of {}", case.loss());
@@ -74,7 +75,7 @@ fn mass_stays_at_rigid_stop_until_the_spring_returns_it() {
     }
 }
 
-/// Amplitudes just beyond the stop: after one impact the mass swings to the stop and no further, for ever.
+/// Amplitudes slightly beyond the stop: after one impact the mass reaches the stop without passing it, indefinitely.
 #[test]
 fn after_one_impact_an_oscillator_only_grazes() {
     for scheme in RIGID {
@@ -85,7 +86,7 @@ fn after_one_impact_an_oscillator_only_grazes() {
                 "{scheme:?}, A = (1 + {excess:e})d: position {position:.1e}, touch {touch:.2} steps late, loss {loss:.3e} of {:.3e}",
                 case.loss()
             );
-            // The impact is known to a step, which the phase keeps; what a graze takes is of second order.
+            // The impact time is accurate to one step, which the phase retains; the loss of a graze is of second order.
             assert!(position < 2.5 * OMEGA * 1e-5, "{position:e}");
             assert!((loss - case.loss()).abs() < 5.0 * (OMEGA * 1e-5).powi(2), "loss off by {:e}", loss - case.loss());
             assert!(ledger.abs() < 1e-12);
@@ -93,7 +94,7 @@ fn after_one_impact_an_oscillator_only_grazes() {
     }
 }
 
-/// A spring that pulls towards the stop holds the mass there: λ is the force of the spring, to rounding.
+/// A spring that pulls towards the stop holds the mass there: λ equals the spring force to rounding.
 #[test]
 fn a_preloaded_mass_stays_on_its_stop() {
     for scheme in RIGID {
@@ -101,7 +102,7 @@ fn a_preloaded_mass_stays_on_its_stop() {
             let model = single(&[(OMEGA, 1.0)], 0);
             let mut system = against_plane(&model, (scheme, solver), 1.0, -2e-4, false);
             system.set_step(1e-4);
-            // Let go above the stop at x = 2e-4, on its way to x = 0.
+            // Released above the stop at x = 2e-4, moving towards x = 0.
             set_samples(&mut system, &model, 0, 1e-3, 1e-3 * (OMEGA * 1e-4).cos());
             system.start(&[PrescribedMotion::default()]);
             let mut force = 0.0;
@@ -115,14 +116,14 @@ fn a_preloaded_mass_stays_on_its_stop() {
     }
 }
 
-/// A unit mass that flies into a stop in the first step of another length: the stop takes ½v², and nothing turns or curves.
+/// A unit mass hits a stop in the first step of another length: the stop absorbs ½v², and nothing turns or curves.
 #[test]
 fn impact_after_step_change_is_recorded_as_impact_loss() {
     let (step, speed) = (1e-5, 2.0);
     for methods in RIGID.into_iter().flat_map(|scheme| SOLVERS.map(|solver| (scheme, solver))) {
         for ratio in [0.1, 0.9, 1.7, 12.0] {
             let model = single(&[(0.0, 1.0)], 0);
-            // Five steps in flight, the stop in the middle of the sixth.
+            // Five steps of flight, the stop in the middle of the sixth.
             let mut system = against_plane(&model, methods, 1.0, speed * step * (5.0 + 0.5 * ratio), false);
             system.set_step(step);
             system.bank_mut().set_modal_state(0, 0, 0.0, -speed);
@@ -148,7 +149,8 @@ fn impact_after_step_change_is_recorded_as_impact_loss() {
     }
 }
 
-/// A mode of `omega` and the flexibility `compliance` (m/N) of the contact node, one quasi-static mode; unit mass.
+/// Returns a mode of `omega` with unit mass and a quasi-static mode with the flexibility `compliance` (m/N) of the
+/// contact node.
 fn on_a_spring(omega: f64, compliance: f64) -> ModalModel {
     let high = 1e5;
     single(&[(omega, 1.0), (high, high * compliance.sqrt())], 1)
@@ -205,7 +207,7 @@ fn ball_on_a_spring_bounces_without_loss() {
     }
 }
 
-/// Period (s) over `turns` turns and largest force of a mass that meets an elastic stop.
+/// Returns the period (s) over `turns` turns and the largest force of a mass at an elastic stop.
 fn bilinear(case: Bilinear, solver: Solver, step: f64, turns: u32) -> [f64; 3] {
     let model = on_a_spring(case.omega, 1.0 / (case.ratio * case.omega * case.omega));
     let mut system = against_plane(&model, (Scheme::MasslessBoundary, solver), -1.0, case.distance, false);
@@ -217,7 +219,7 @@ fn bilinear(case: Bilinear, solver: Solver, step: f64, turns: u32) -> [f64; 3] {
     march(&mut system, case.period() * (f64::from(turns) + 0.9), |system, time| {
         let (now, increment) = system.bank().modal_state(0, 0);
         if now >= 0.0 && now - increment < 0.0 {
-            // Upwards through 0, where the motion is that of the spring alone.
+            // Upwards through 0, where only the spring determines the motion.
             crossings.push(time - step * now / increment);
         }
         force = force.max(system.multiplier(0, 0));

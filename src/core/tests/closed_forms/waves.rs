@@ -1,5 +1,5 @@
-//! Waves around the circumference against closed forms: a cyclic chain pressed at rest, pressed by a casing of lobes and by
-//! whirl that travel around it, and a flexible ring under a travelling load.
+//! Waves around the circumference against closed forms: a cyclic chain pressed at rest, pressed by a casing with lobes
+//! and by whirl that travel around it, and a flexible ring under a travelling load.
 
 use std::f64::consts::TAU;
 
@@ -14,7 +14,7 @@ use tiprub_test_models::{
 };
 
 const CHAIN: Chain = Chain { sectors: 12, mass: 0.3, spring: 2e6, coupling: 7e5, damping_ratio: 0.05 };
-/// Schemes that a chain without local flexibility can be stepped with.
+/// Schemes that support a chain without local flexibility.
 const SCHEMES: [Scheme; 2] = [Scheme::CentralDifference, Scheme::ModalExact];
 
 fn set(simulation: &mut Simulation, name: &str, value: f64, rate: f64) {
@@ -23,7 +23,7 @@ fn set(simulation: &mut Simulation, name: &str, value: f64, rate: f64) {
     simulation.set_input_derivative(reference, 1, rate).unwrap();
 }
 
-/// One radial degree of freedom per sector in a casing whose normal is radial; nothing turns.
+/// Returns one radial degree of freedom per sector in a casing with radial normals; nothing turns.
 fn chain(chain: Chain, scheme: Scheme, solver: Solver, step: f64) -> Scene {
     let one = |value: f64| DMatrix::from_element(1, 1, value);
     let disk = TestDisk {
@@ -45,7 +45,7 @@ fn chain(chain: Chain, scheme: Scheme, solver: Solver, step: f64) -> Scene {
     scene
 }
 
-/// Close the casing by `closing` (m) within `time` (s), then keep it for `rest` (s).
+/// Closes the casing by `closing` (m) within `time` (s), then keeps it for `rest` (s).
 fn close(simulation: &mut Simulation, closing: f64, time: f64, rest: f64) {
     set(simulation, "casing_radius_change", 0.0, -closing / time);
     simulation.do_step(simulation.time(), time).unwrap();
@@ -57,7 +57,7 @@ fn radial(simulation: &Simulation, sector: usize) -> f64 {
     simulation.system().bank().row(0, sector)
 }
 
-/// Sectors 0 and `other` meet the casing, the rest hangs on them: λ by two equations, all displacements by the influence.
+/// Sectors 0 and `other` touch the casing: λ follows from two equations, all displacements from the influence function.
 #[test]
 fn pressed_chain_follows_its_influence_function() {
     println!("| scheme | solver | N | second sector | λ0 (N) | λ0 off by | λ off by | displacements off by |");
@@ -93,8 +93,8 @@ fn pressed_chain_follows_its_influence_function() {
     }
 }
 
-/// Largest error of the force on any sector over a turn, relative to the amplitude of its wave, with all sectors pressed on
-/// a casing whose shape gives every sector the displacement −B − A cos(nθ_s + ωt).
+/// Returns the largest error of the force on any sector over a turn, relative to the amplitude of its wave, with all
+/// sectors pressed on a casing whose shape gives every sector the displacement −B − A cos(nθ_s + ωt).
 fn wave_error(simulation: &mut Simulation, n: u32, omega: f64, amplitude: f64, mean: f64) -> f64 {
     let (force, ahead) = CHAIN.wave_force(n, omega);
     let at_rest = CHAIN.mass * CHAIN.frequency(0).powi(2) * mean;
@@ -106,7 +106,7 @@ fn wave_error(simulation: &mut Simulation, n: u32, omega: f64, amplitude: f64, m
         let finished = simulation.advance().unwrap().finished;
         let system = simulation.system();
         let step = system.bank().step();
-        // λ enforces the gap at the end of the step and is the force at its beginning.
+        // λ enforces the gap at the end of the step and acts as the force at its beginning.
         let time = begin + step * (system.steps() - before - 1) as f64;
         assert_eq!(system.events().len(), CHAIN.sectors, "open at {time}");
         for event in system.events() {
@@ -120,8 +120,8 @@ fn wave_error(simulation: &mut Simulation, n: u32, omega: f64, amplitude: f64, m
     }
 }
 
-/// The rotor turns in a casing of n lobes and is pressed on it all around: every sector is moved by the lobes, and the force is
-/// the dynamic stiffness of nodal diameter n, also at its resonance, where damping alone is left.
+/// The rotor turns in a casing with n lobes and is pressed on it all around: the lobes move every sector, and the force
+/// is the dynamic stiffness of nodal diameter n, also at its resonance, where only damping remains.
 #[test]
 fn lobe_response_matches_chain_dynamic_stiffness() {
     println!("| scheme | n | nω/ω_n | dynamic stiffness (N/m) | error with 128, 256, 512 steps per turn | order |");
@@ -155,8 +155,8 @@ fn lobe_response_matches_chain_dynamic_stiffness() {
     }
 }
 
-/// Shaft on a circle in a round casing that presses the turning rotor all around: nodal diameter 1 travels at the speed of the
-/// shaft less that of the rotor.
+/// The shaft moves on a circle in a round casing that presses the turning rotor all around: nodal diameter 1 travels at
+/// the speed of the shaft minus that of the rotor.
 #[test]
 fn whirl_response_matches_chain_dynamic_stiffness() {
     println!("| scheme | whirl/ω_1 | rotor/ω_1 | error at h = 20, 10, 5 µs | order |");
@@ -183,10 +183,10 @@ fn whirl_response_matches_chain_dynamic_stiffness() {
     }
 }
 
-/// As [`wave_error`], over two turns of a whirl that grows over the first 20 ms.
+/// Returns the error as [`wave_error`] does, over two turns of a whirl that grows over the first 20 ms.
 fn whirl_error(simulation: &mut Simulation, whirl: f64, rotor: f64, step: f64) -> f64 {
     let (begin, circle) = (simulation.time(), 2e-5);
-    // In the frame of the rotor, where outward displacement of the shaft at angle θ closes the gap there.
+    // In the frame of the rotor, where an outward displacement of the shaft at angle θ closes the gap there.
     let omega = rotor - whirl;
     let (force, ahead) = CHAIN.wave_force(1, omega);
     let at_rest = CHAIN.mass * CHAIN.frequency(0).powi(2) * 3e-4;
@@ -194,8 +194,8 @@ fn whirl_error(simulation: &mut Simulation, whirl: f64, rotor: f64, step: f64) -
         let grown = (0.5 - 0.5 * (0.5 * TAU * (time / 0.02).min(1.0)).cos()) * circle;
         [grown * (whirl * time).cos(), grown * (whirl * time).sin()]
     };
-    // The circle is no straight line: a shaft off by e_t along it closes the gap by e_t²/2R more, which is half as much on all
-    // sectors and a wave with two diameters.
+    // The circle is curved: a shaft displaced by e_t along it closes the gap by another e_t²/2R, half of which is equal
+    // on all sectors and half a wave with two diameters.
     let curved = circle * circle / (4.0 * (0.25 - 3e-4));
     let ((second, second_ahead), uniform) = (CHAIN.wave_force(2, 2.0 * omega), CHAIN.mass * CHAIN.frequency(0).powi(2));
     let mut worst = 0.0_f64;
@@ -223,7 +223,8 @@ fn whirl_error(simulation: &mut Simulation, whirl: f64, rotor: f64, step: f64) -
     worst / (circle * force)
 }
 
-/// A load of n nodal diameters that turns around the flexible casing: a wave of the amplitude and lag of its pair of modes.
+/// A load of n nodal diameters that travels around the flexible casing causes a wave with the amplitude and phase lag
+/// of its pair of modes.
 #[test]
 fn travelling_load_acts_as_a_harmonic_force() {
     println!("| scheme | n | ω/ω_n | amplitude (m) | error at h = 5, 2.5, 1.25 µs | order |");
@@ -248,11 +249,12 @@ fn travelling_load_acts_as_a_harmonic_force() {
     }
 }
 
-/// Largest error of the casing's radial displacement over the last turn, relative to the amplitude, and the amplitude (m).
+/// Returns the largest error of the casing's radial displacement over the last turn, relative to the amplitude, and the
+/// amplitude (m).
 fn travelling(scheme: Scheme, n: u32, own: f64, ratio: f64, step: f64) -> (f64, f64) {
     let (load, damping, omega) = (1e3, 0.05, ratio * own);
     let turn = TAU / omega.abs();
-    // One step size for all that follows.
+    // One step size for everything below.
     let step = turn / 24.0 / (turn / 24.0 / step).round();
     let mut scene = models::rub(1);
     models::flexible(&mut scene);
@@ -265,15 +267,15 @@ fn travelling(scheme: Scheme, n: u32, own: f64, ratio: f64, step: f64) -> (f64, 
     scene.settings.surfaces[0].shape = Shape::Circular {};
     scene.settings.contacts[0].gap = 2e-2;
     scene.settings.outputs.slave_displacement = true;
-    // Under a load that does not move it starts settled.
+    // Under a constant load it starts in equilibrium.
     let mut simulation = started(&scene);
     set(&mut simulation, "casing_load_phase", 0.0, omega);
     let first = simulation.table().find("casing_displacement").unwrap().reference;
-    // 26 time constants: e⁻²⁶ of the start is left.
+    // 26 time constants: e⁻²⁶ of the transient remains.
     simulation.do_step(0.0, (26.0 / (damping * own) / turn).ceil() * turn).unwrap();
     let phase = omega * simulation.time();
     set(&mut simulation, "casing_load_phase", phase, omega);
-    // Modes of displacement 0.5 cos nθ and modal mass 1: the line load does π R/2 of work per unit.
+    // Modes of displacement 0.5 cos nθ and modal mass 1: the work of the line load per unit is π R/2.
     let force = load * std::f64::consts::PI * 0.25 * 0.5;
     let (real, imaginary) = (own * own - omega * omega, 2.0 * damping * own * omega);
     let (amplitude, lag) = (0.5 * force / real.hypot(imaginary), imaginary.atan2(real));

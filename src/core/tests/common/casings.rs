@@ -1,4 +1,4 @@
-//! Casings through data points, and random places on them.
+//! Casings through data points, and random points on them.
 
 #![allow(dead_code, reason = "each test binary uses its part")]
 
@@ -12,7 +12,7 @@ pub use tiprub_test_models::SeededRandom;
 pub const RADIUS: f64 = 0.25;
 pub const EPS: f64 = f64::EPSILON;
 
-/// Somewhere on a surface.
+/// Returns a random point on a surface.
 pub fn anywhere(random: &mut SeededRandom, surface: &SurfaceSpline) -> ClosestPoint {
     ClosestPoint {
         patch: [random.below(surface.around()), random.below(surface.along() - 1)],
@@ -21,7 +21,7 @@ pub fn anywhere(random: &mut SeededRandom, surface: &SurfaceSpline) -> ClosestPo
     }
 }
 
-/// Rings of a casing, unevenly spaced in z, from a radius r(θ, z).
+/// Returns the rings of a casing, unevenly spaced in z, from a radius r(θ, z).
 pub fn data(around: usize, along: usize, radius: impl Fn(f64, f64) -> f64) -> Vec<[f64; 3]> {
     let axial = |ring: usize| {
         let x = ring as f64 / (along - 1) as f64;
@@ -50,7 +50,7 @@ pub fn lobed(angle: f64, z: f64) -> f64 {
     RADIUS - 0.2 * z - 1.5e-3 * (3.0 * angle + 10.0 * z).cos() + 2.0 * z * z
 }
 
-/// A casing with random dents of 20 µm.
+/// Returns a casing with random dents of 20 µm.
 pub fn rough(around: usize, along: usize, seed: u64) -> Vec<[f64; 3]> {
     let mut random = SeededRandom(seed);
     let mut points = data(around, along, lobed);
@@ -92,7 +92,7 @@ pub fn place(p: usize, q: usize, s: f64, t: f64) -> ClosestPoint {
     ClosestPoint { patch: [p, q], s, t }
 }
 
-/// The larger of two errors and an absolute bound on it, reported when it fails.
+/// Asserts that an error is below an absolute bound, and reports both otherwise.
 #[track_caller]
 pub fn assert_below(name: &str, error: f64, bound: f64) {
     println!("{name}: {error:.2e} (bound {bound:.1e})");

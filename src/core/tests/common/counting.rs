@@ -1,4 +1,4 @@
-//! Counts the allocations of one thread.
+//! Counting of the allocations of one thread.
 
 use std::alloc::{GlobalAlloc, Layout, System as SystemAllocator};
 use std::cell::Cell;
@@ -10,7 +10,7 @@ thread_local! {
     static COUNT: Cell<usize> = const { Cell::new(0) };
 }
 
-// SAFETY: forwards to the system allocator; the bookkeeping does not allocate.
+// SAFETY: forwards to the system allocator; the counting does not allocate.
 unsafe impl GlobalAlloc for Counting {
     // SAFETY: the caller's guarantees are those of the system allocator.
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
@@ -30,7 +30,7 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// How often `work` asks for memory.
+/// Returns the number of allocations in `work`.
 pub fn allocations_of(work: impl FnOnce()) -> usize {
     COUNT.set(0);
     ARMED.set(true);

@@ -1,4 +1,4 @@
-//! Elastic rods of linear elements with lumped mass, and other small systems given by their modes.
+//! Elastic rods of linear elements with lumped mass, and other small systems defined by their modes.
 
 #![allow(dead_code, reason = "each test binary uses its part")]
 
@@ -17,7 +17,7 @@ use tiprub_test_models::{node, structure};
 pub const SCHEMES: [Scheme; 3] = Scheme::RECURRENCES;
 pub const SOLVERS: [Solver; 3] = Solver::ALL;
 
-/// Share of its mass that the contact node of a rod keeps where it is to be massless; the matrix must stay invertible.
+/// Fraction of its mass that a nominally massless contact node of a rod keeps; the matrix must stay invertible.
 pub const NEARLY_NONE: f64 = 1e-4;
 
 /// A straight rod along x.
@@ -30,7 +30,7 @@ pub struct StraightRod {
     pub elements: usize,
     /// Contact node, 0 or `elements`.
     pub end: usize,
-    /// Share of its lumped mass that the contact node keeps; the rest goes to its neighbour.
+    /// Fraction of its lumped mass that the contact node keeps; the rest goes to its neighbour.
     pub kept: f64,
 }
 
@@ -60,12 +60,12 @@ impl StraightRod {
         structure("rod", m, k, map, vec![node("end", [0.0; 3], 0.0)])
     }
 
-    /// Its modes; one of them, the highest, is the flexibility of the contact node.
+    /// Returns the modes; the highest one is the flexibility of the contact node.
     pub fn model(&self) -> ModalModel {
         ModalModel { quasi_static: 1, ..ModalModel::from_rom(&self.rom(), 0.0).unwrap() }
     }
 
-    /// The same, held at the other end.
+    /// Returns the modes of the rod clamped at the other end.
     pub fn clamped_model(&self) -> ModalModel {
         let mut rom = self.rom();
         let held = self.elements - self.end;
@@ -76,7 +76,7 @@ impl StraightRod {
     }
 }
 
-/// Modes in ascending order of their frequencies, after structures were put side by side.
+/// Returns the modes in ascending order of frequency, after structures were combined.
 pub fn ascending(model: &ModalModel, quasi_static: usize) -> ModalModel {
     let mut order: Vec<usize> = (0..model.len()).collect();
     order.sort_by(|a, b| model.frequencies[*a].total_cmp(&model.frequencies[*b]));
@@ -89,7 +89,8 @@ pub fn ascending(model: &ModalModel, quasi_static: usize) -> ModalModel {
     }
 }
 
-/// One contact node that moves along x only, given by its modes (ω, displacement of the node per unit amplitude).
+/// Returns one contact node that moves along x only, defined by its modes (ω, displacement of the node per unit
+/// amplitude).
 pub fn single(modes: &[(f64, f64)], quasi_static: usize) -> ModalModel {
     ModalModel {
         frequencies: modes.iter().map(|mode| mode.0).collect(),
@@ -100,7 +101,7 @@ pub fn single(modes: &[(f64, f64)], quasi_static: usize) -> ModalModel {
     }
 }
 
-/// One node against a plane across x; `normal` is +1 where the plane is below it, −1 where it is above.
+/// Returns one node against a plane normal to x; `normal` is +1 if the plane is below it, −1 if it is above.
 pub fn against_plane(model: &ModalModel, methods: (Scheme, Solver), normal: f64, gap: f64, loads: bool) -> System {
     let law = FixedGap { normals: vec![[normal, 0.0, 0.0]], gaps: vec![gap], sliding: vec![[0.0; 3]] };
     let settings = SystemSettings { scheme: methods.0, solver: methods.1, ledger: true };
@@ -108,7 +109,7 @@ pub fn against_plane(model: &ModalModel, methods: (Scheme, Solver), normal: f64,
     System::alone(SectorModel::Uncoupled(model, 1), bank, GapLaw::Fixed(law), 0.0, settings)
 }
 
-/// Set amplitude and increment q(0) − q(−h) of a mode.
+/// Sets amplitude and increment q(0) − q(−h) of a mode.
 pub fn set_samples(system: &mut System, model: &ModalModel, mode: usize, now: f64, before: f64) {
     let (frequency, step) = (model.frequencies[mode], system.bank().step());
     let at_rest = free_increment(frequency, 0.0, now, 0.0, step);
@@ -116,14 +117,14 @@ pub fn set_samples(system: &mut System, model: &ModalModel, mode: usize, now: f6
     system.bank_mut().set_modal_state(mode, 0, now, (now - before - at_rest) / per_velocity);
 }
 
-/// Step of massless-boundary at which contact that opens and closes gains no energy, at most `largest` (s).
+/// Returns the step of massless-boundary, at most `largest` (s), at which opening and closing contact gains no energy.
 pub fn quiet_step(model: &ModalModel, largest: f64) -> f64 {
     let check = MasslessCheck { model, normals: vec![[1.0, 0.0, 0.0]], slaves: Vec::new() };
     let limit = check.limit(1e3 * largest).unwrap();
     (0.95 * (QUIET * limit.closed).min(limit.usable)).min(largest)
 }
 
-/// Order of convergence from errors at steps halved again and again.
+/// Returns the orders of convergence from errors at repeatedly halved steps.
 pub fn orders(errors: &[f64]) -> Vec<f64> {
     errors.windows(2).map(|pair| (pair[0] / pair[1]).log2()).collect()
 }

@@ -1,4 +1,4 @@
-//! Structures that do not feel each other: what concerns one is judged and told without the others.
+//! Structures that do not influence each other: each is checked and reported without the others.
 
 use tiprub_core::settings::{BodyMotion, LoadSettings, PatchSettings, Scheme, Shape, Solver, StructureSettings};
 use tiprub_core::{Rom, Scene, Simulation, Warning};
@@ -7,7 +7,7 @@ use tiprub_test_models::{
     several, started, try_started,
 };
 
-/// Rotors `front` and `rear`, each in a rigid casing of its own.
+/// Returns the rotors `front` and `rear`, each in a separate rigid casing.
 fn two(change: impl Fn(&mut Scene)) -> Scene {
     let mut scene = rub(6);
     scene.roms[0] = rich_blade(6);
@@ -16,7 +16,7 @@ fn two(change: impl Fn(&mut Scene)) -> Scene {
     scene
 }
 
-/// The first rotor by itself.
+/// Returns the first rotor alone.
 fn alone(scene: &Scene) -> Scene {
     let mut alone = scene.clone();
     alone.settings.structures.truncate(1);
@@ -26,7 +26,7 @@ fn alone(scene: &Scene) -> Scene {
     alone
 }
 
-/// Checks that look for each name among all of them, pair by pair, take more than a minute here.
+/// Checks that search for each name among all of them, pair by pair, would take more than a minute here.
 #[test]
 fn start_up_time_grows_in_proportion_to_the_number_of_rotors() {
     let start = |rotors: usize| {
@@ -43,7 +43,7 @@ fn start_up_time_grows_in_proportion_to_the_number_of_rotors() {
     assert!(ratio < 20.0, "{ratio}");
 }
 
-/// A name, a column and a place in memory each: no reader has so many.
+/// Each value needs a name, a column and memory: no reader supports so many.
 #[test]
 fn rejects_too_many_output_values_by_name() {
     let mut scene = rub(4);
@@ -57,7 +57,7 @@ fn lobes(amplitude: f64, order: u32) -> Shape {
     Shape::Lobes { amplitude, order, phase: 0.0 }
 }
 
-/// Runs until it is refused, and why.
+/// Runs until an error, and returns it.
 fn refused(scene: &Scene) -> (Simulation, String) {
     let mut simulation = started(scene);
     let length = scene.settings.experiment.communication_step;
@@ -69,8 +69,8 @@ fn refused(scene: &Scene) -> (Simulation, String) {
     panic!("ran to its end: {:?}", simulation.system().ledger())
 }
 
-/// Normals that turn too far within a step, and modes that the step does not resolve, of the front rotor; the rear one exchanges a
-/// hundred times as much.
+/// Normals of the front rotor that turn too far within a step, and modes that the step does not resolve; the rear one
+/// exchanges a hundred times as much energy.
 #[test]
 fn energy_gain_of_one_rotor_ends_the_run() {
     let rubbing = |scene: &mut Scene| {
@@ -94,18 +94,18 @@ fn energy_gain_of_one_rotor_ends_the_run() {
         assert!(why.contains(word) && !why.contains("of front"), "{why}");
         assert!(reported.contains(word) && reported.contains(" of front ") && !reported.contains("rear"), "{reported}");
         assert_eq!(single.time().to_bits(), both.time().to_bits(), "{why}\n{reported}");
-        // Taken together, the two are within all bounds.
+        // Together the two are within all bounds.
         let (ledger, energy) = (both.system().ledger(), real(&both, "kinetic_energy") + real(&both, "strain_energy"));
         println!("{word}: {} J of {} J, {energy} J", ledger.curvature_work.value(), ledger.exchanged());
         assert!(ledger.curvature_work.value().abs() < 0.3 * ledger.exchanged(), "{ledger:?}");
         assert!(energy < ledger.supplied().max(0.0) + 0.01 * ledger.scale(), "{energy} J, {ledger:?}");
-        // What is told of the scene is the sum.
+        // The outputs of the scene are the sum.
         let sum: f64 = both.system().ledgers().iter().map(|ledger| ledger.friction_loss.value()).sum();
         assert!(both.system().ledgers().len() == 2 && (sum / ledger.friction_loss.value() - 1.0).abs() < 1e-15);
     }
 }
 
-/// Two rotors in one casing, and between them, in the order of the scene, a third in its own.
+/// Returns two rotors in one casing, and between them, in the order of the scene, a third one in a separate casing.
 fn one_between_two() -> Scene {
     let mut scene = several::in_one_casing(rub(6), Solver::Lcp, 0.15);
     let settings = &mut scene.settings;
@@ -123,7 +123,7 @@ fn one_between_two() -> Scene {
     scene
 }
 
-/// A scene of two sets continues from its state with the same bits, ledgers and energies of the start included.
+/// A scene of two sets continues from its state with the same bits, including ledgers and energies of the start.
 #[test]
 fn saved_state_contains_energies_of_every_coupled_set() {
     let all = Scheme::RECURRENCES.into_iter().flat_map(|scheme| [(scheme, two(|_| ())), (scheme, one_between_two())]);
@@ -141,7 +141,7 @@ fn saved_state_contains_energies_of_every_coupled_set() {
             [2.5e-5, 1.03e-5, 2.5e-5].into_iter().for_each(|length| go(one, length));
         }
         assert_eq!(saved(&simulation), saved(&other), "{scheme:?}");
-        // The books of the scene are those of its sets.
+        // The ledger of the scene is the sum of those of its sets.
         let relative = real(&simulation, "energy_residual_relative").abs();
         let largest = simulation.system().ledgers().iter().map(tiprub_core::Ledger::scale).fold(0.0, f64::max);
         let residual = real(&simulation, "energy_residual").abs();
@@ -152,8 +152,8 @@ fn saved_state_contains_energies_of_every_coupled_set() {
     }
 }
 
-/// A tip that meets a stiff ring, and a seal that meets a lighter one: the step of massless-boundary is that of both together, in
-/// whichever order they are written.
+/// A tip that touches a stiff ring, and a seal that touches a lighter one: the step of massless-boundary accounts for
+/// both, in whichever order they are written.
 #[test]
 fn massless_limit_includes_every_casing_of_a_blade() {
     let scene = |light: f64, seal_first: bool| {
@@ -184,7 +184,7 @@ fn massless_limit_includes_every_casing_of_a_blade() {
     }
 }
 
-/// As many contacts as are solved together at most are counted where they push each other.
+/// The maximum number of contacts solved together is counted for contacts that influence each other.
 #[test]
 fn only_coupled_contacts_count_towards_the_limit() {
     let both = several::in_one_casing(rub(350), Solver::Lcp, 0.0);
@@ -207,7 +207,8 @@ fn flutter(texts: &[Warning], name: &str) -> usize {
     texts.iter().filter(|text| text.starts_with(&format!("{name}: ")) && text.contains("flutter")).count()
 }
 
-/// Turning backwards either rotor flutters with friction; the front one starts with it, the rear one gets it later.
+/// Each rotor flutters with friction when it turns backwards; the front one starts with friction, the rear one gets it
+/// later.
 #[test]
 fn flutter_is_reported_for_each_rotor() {
     let scene = two(|scene| {
@@ -223,14 +224,14 @@ fn flutter_is_reported_for_each_rotor() {
     set(&mut simulation, "rear_casing.friction_coefficient", 0.15);
     let reported = simulation.take_notes();
     assert!(flutter(&reported, "rear") == front && flutter(&reported, "front") == 0, "{reported:?}");
-    // Once.
+    // Only once.
     for friction in [0.001, 0.15] {
         set(&mut simulation, "rear_casing.friction_coefficient", friction);
     }
     assert!(simulation.take_notes().is_empty());
 }
 
-/// Rotors bent aside by their rub, each in its turn: what linear gaps miss is told of each.
+/// Rotors bent aside by their rub, one after the other: the error of linear gaps is reported for each.
 #[test]
 fn linear_gap_error_is_reported_for_each_rotor() {
     let scene = two(|scene| {
@@ -254,7 +255,7 @@ fn linear_gap_error_is_reported_for_each_rotor() {
     assert!(of("front") == 1 && of("rear") == 1 && reported.len() == 2, "{reported:?}\n{why}");
 }
 
-/// A rotor that fails is not told to flutter because another one does.
+/// The failure of a rotor is not attributed to the flutter of another one.
 #[test]
 fn failure_is_attributed_to_flutter_of_the_same_structure() {
     let fails = |front: f64| {
@@ -272,7 +273,7 @@ fn failure_is_attributed_to_flutter_of_the_same_structure() {
     assert!(fluttering.contains("front: ") && fluttering.contains("flutter"), "{fluttering}");
 }
 
-/// A warning that holds for the step is told of each structure that it holds for.
+/// A warning about the step is reported for each structure concerned.
 #[test]
 fn unresolved_modes_are_reported_for_each_structure() {
     let mut scene = two(|scene| {
@@ -280,7 +281,7 @@ fn unresolved_modes_are_reported_for_each_structure() {
         scene.settings.time.step = 8e-6;
         scene.settings.experiment.communication_step = 1e-6;
     });
-    // The highest mode of the rear is half as fast.
+    // The highest frequency of the rear rotor is half as high.
     scene.roms[1].stiffness *= 0.25;
     let mut simulation = started(&scene);
     let reported = [1e-6, 3e-6, 6e-6].map(|length| {
@@ -291,7 +292,7 @@ fn unresolved_modes_are_reported_for_each_structure() {
     assert_eq!(reported.each_ref().map(|texts| [of(texts, "front: "), of(texts, "rear: ")]), [[0, 0], [1, 0], [1, 1]]);
 }
 
-/// Radial displacement of a flexible casing is an output of rotors; another pair's open surface has none.
+/// The radial displacement of a flexible casing is an output of rotors; the open surface of another pair has none.
 #[test]
 fn rejects_output_that_no_pair_provides() {
     let mut scene = lattice::squeezed();
@@ -315,7 +316,7 @@ fn rejects_output_that_no_pair_provides() {
     assert_eq!(rows.map(|row| row.name.as_str()).collect::<Vec<_>>(), ["ring.casing_displacement"]);
 }
 
-/// What is wrong is told with its number or its name.
+/// Messages identify the item by its number or its name.
 #[test]
 fn messages_name_the_contact_surface_or_structure() {
     let reported = |change: fn(&mut Scene)| Simulation::new(&two(change)).unwrap_err().to_string();
@@ -331,7 +332,7 @@ fn messages_name_the_contact_surface_or_structure() {
         let reported = reported(change);
         assert!(reported.starts_with(beginning), "{reported}");
     }
-    // Tips that are too fast are refused by the name of their input, or accepted once.
+    // Tips that are too fast are rejected by the name of their input, or accepted once.
     let fast = |accept: bool| {
         two(|scene| {
             scene.settings.accept_implausible = accept;
@@ -348,14 +349,14 @@ fn messages_name_the_contact_surface_or_structure() {
     go(&mut simulation, 1e-6);
     go(&mut simulation, 1e-6);
     assert!(simulation.take_notes().iter().any(|text| text.starts_with("`front.speed`: at speed 7000")));
-    // Patches without friction tell nothing.
+    // Patches without friction cause no warning.
     let scene = two(|scene| {
         scene.settings.contacts.iter_mut().for_each(|contact| contact.friction = 0.0);
         scene.settings.surfaces[1].patches = Some(PatchSettings { around: 4, along: 1 });
     });
     let warnings = started(&scene).warnings().join("; ");
     assert!(warnings.contains("surface[2].patches: no contact has friction"), "{warnings}");
-    // Nodes of no contact are told of.
+    // Nodes without contact are reported.
     let mut scene = several::tip_and_seal(rub(3), Solver::Lcp);
     scene.settings.contacts.truncate(1);
     scene.settings.surfaces.truncate(1);
@@ -366,7 +367,7 @@ fn messages_name_the_contact_surface_or_structure() {
     assert!(real(&simulation, "clearance_minimum") < 1.0 && !names.contains(&"clearance_minimum"));
 }
 
-/// A disk with one node per blade: that node alone is all of them.
+/// In a disk with one node per blade, that node represents all nodes.
 #[test]
 fn warns_once_of_disk_flutter_with_one_node_per_blade() {
     let mut scene = disk::with_rotor(disk::TestDisk::random(6, 1, 9, 0.25, 6).cyclic());
@@ -375,11 +376,11 @@ fn warns_once_of_disk_flutter_with_one_node_per_blade() {
     assert_eq!(warnings.iter().filter(|text| text.contains("flutter")).count(), 1, "{warnings:?}");
 }
 
-/// A node that leans digs in beyond µ = 0.5; that of the other pair does not, and may have more.
+/// An inclined node locks up above µ = 0.5; that of the other pair does not and may have a higher coefficient.
 #[test]
 fn contact_pairs_have_independent_friction() {
     let outcome = |leaning: f64, upright: f64| {
-        // Both nodes on springs of their own, along all axes.
+        // Both nodes on separate springs, along all axes.
         let shape = |row: usize, mode: usize| match (mode, row) {
             (0, 0) => 0.5,
             (0, 1) | (1, 3) => 1.0,

@@ -1,4 +1,4 @@
-//! Everything that is off unless a scene asks for it: a ledger that closes, states that continue, laws of mechanics.
+//! Optional features: a ledger that closes, states that continue, laws of mechanics.
 
 use crate::checks::{allocates_nothing, disturb, ledger_closes, state_continues};
 use tiprub_core::gaps::PrescribedMotion;
@@ -6,7 +6,7 @@ use tiprub_core::settings::{LoadSettings, PatchSettings, Scheme, Shape, Solver, 
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{self as models, coating, element, flexible, go, real, saved, set, started, try_started};
 
-/// Twelve blades that rub the two-lobe casing, with one thing added.
+/// Twelve blades that rub the two-lobe casing, with one feature added.
 type Feature = (&'static str, fn(&mut Scene));
 
 fn spinning(scene: &mut Scene) {
@@ -68,13 +68,14 @@ fn scene_with(feature: Feature, scheme: Scheme, solver: Solver) -> Scene {
     scene
 }
 
-/// What is refused, as documented: every other combination of scheme, solver and feature runs.
+/// Returns whether a combination is rejected, as documented: every other combination of scheme, solver and feature
+/// runs.
 fn is_refused(feature: &str, scheme: Scheme, solver: Solver) -> bool {
     (feature.contains("coating") && solver != Solver::Lcp)
         || (scheme == Scheme::MasslessBoundary && (feature == "coriolis" || solver == Solver::Film))
 }
 
-/// Every combination that is not refused, by its name; what is refused says so at once.
+/// Runs `check` on every accepted combination, with its name; rejected ones must fail immediately.
 fn every_combination(mut check: impl FnMut(&str, Scene)) {
     for feature in FEATURES {
         for (scheme, solver) in
@@ -118,7 +119,7 @@ fn rejects_casing_load_that_the_grid_cannot_resolve() {
         scene.settings.structures[1].load = Some(LoadSettings { order, amplitude: 0.0, phase: 0.0 });
         Simulation::new(&scene)
     };
-    // 36 nodes around tell nodal diameters up to 17 apart: 18 has no phase, 34 would be 2.
+    // 36 nodes around the circumference distinguish nodal diameters up to 17: 18 has no phase, 34 would be 2.
     with(17).unwrap();
     for order in [18, 34, u32::MAX] {
         let message = with(order).unwrap_err().to_string();
@@ -133,7 +134,7 @@ fn rejects_state_with_any_bit_changed_without_changes() {
     coating(&mut scene);
     scene.settings.contacts[0].coating.as_mut().unwrap().cells_around = 40;
     let mut simulation = started(&scene);
-    // Saved in the middle of a communication step, after contact.
+    // Saved within a communication step, after contact.
     for index in 0..40 {
         disturb(&mut simulation, index);
         go(&mut simulation, 5e-5);
@@ -156,7 +157,7 @@ fn rejects_state_with_any_bit_changed_without_changes() {
     }
     twin.save_state(&mut again).unwrap();
     assert!(again == untouched);
-    // Reset forgets everything, wear included.
+    // A reset clears everything, including wear.
     assert!(real(&simulation, "worn_volume") > 0.0);
     simulation.reset();
     simulation.initialise(0.0).unwrap();
@@ -175,7 +176,7 @@ fn complementarity_holds_over_a_long_rub_of_the_whole_casing() {
         [("rigid", ("plain", (|_| {}) as fn(&mut Scene))), ("flexible", ("flexible casing", flexible))]
     {
         let mut scene = scene_with(feature, Scheme::ModalExact, Solver::Lcp);
-        // A round casing: gaps are affine in the displacements, so that they can be evaluated again independently.
+        // A round casing: gaps are affine in the displacements, so that they can be recomputed independently.
         scene.settings.surfaces[0].shape = Shape::Circular {};
         let mut simulation = started(&scene);
         let (mut adhesion, mut penetration, mut product, mut again, mut most) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64, 0);
@@ -214,7 +215,7 @@ fn complementarity_holds_over_a_long_rub_of_the_whole_casing() {
         );
         assert_eq!(most, 36, "{name}");
         assert!(adhesion <= 1e-10 && penetration <= 1e-10 && product <= 1e-10, "{name}");
-        // On the flexible casing the normal turns within the step, which the step's linear gap does not follow.
+        // On the flexible casing the normal turns within the step, which the linear gap of the step neglects.
         assert!(again <= if name == "rigid" { 1e-10 } else { 1e-3 }, "{name}: {again:e}");
     }
 }
@@ -241,7 +242,7 @@ fn the_order_of_the_casing_load_is_a_parameter() {
             let found = displacement(order, phase).unwrap();
             let angle = |i: usize| f64::from(order) * std::f64::consts::TAU * i as f64 / 36.0 - phase;
             let amplitude = found.iter().enumerate().map(|(i, u)| u * angle(i).cos()).sum::<f64>() / 18.0;
-            // One pair of modes answers: u = A cos(nθ − φ), outwards where the load is.
+            // One pair of modes responds: u = A cos(nθ − φ), outwards where the load is.
             let off = found.iter().enumerate().map(|(i, u)| (u - amplitude * angle(i).cos()).abs()).fold(0.0, f64::max);
             assert!(amplitude > 0.0 && off < 1e-12 * amplitude, "order {order}: {amplitude:e}, {off:e}");
             // 1000 N/m cos² over the circumference, on modes of amplitude 0.5 with ω = 2πf.
@@ -270,7 +271,7 @@ fn wear_energy_is_at_least_yield_stress_times_volume() {
     assert!(before >= 1e6 * volume * (1.0 - 1e-12) && before <= (1e6 + 2e7 * strain) * volume, "{before:e} J");
 }
 
-/// Friction heat goes where the scene says: into the patches of the casing and into the blades, all of it.
+/// Friction heat goes into the patches of the casing and into the blades as the scene prescribes, without loss.
 #[test]
 fn friction_power_is_shared_between_blades_and_patches() {
     let (share, length) = (0.3, 5e-5);
@@ -291,7 +292,7 @@ fn friction_power_is_shared_between_blades_and_patches() {
     assert!(before > 0.01, "{before} J");
 }
 
-/// Friction forces where there is friction, forces of the last step where they are asked for.
+/// Friction forces exist with friction, forces of the last step if they are requested.
 #[test]
 fn blade_has_the_outputs_requested_by_its_scene() {
     let of = |friction: f64, instantaneous: bool| {

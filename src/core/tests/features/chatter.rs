@@ -12,9 +12,9 @@ use tiprub_test_models::{self as models, element, go, move_on, started};
 const STIFFNESS: f64 = 1e7;
 const OMEGA: f64 = TAU * 1000.0;
 const DAMPING: f64 = 0.03;
-/// Along the axis (m).
+/// Length along the axis (m).
 const LENGTH: f64 = 0.03;
-/// Normal per tangential force.
+/// Ratio of normal to tangential force.
 const RATIO: f64 = 0.8;
 /// Whole waves between two passes: the lobe.
 const WAVES: f64 = 1.0;
@@ -23,12 +23,13 @@ const DEPTH: f64 = 5e-6;
 
 type C = Complex<f64>;
 
-/// 1/G of the blade: m s² + c s + k.
+/// Returns 1/G of the blade: m s² + c s + k.
 fn dynamic_stiffness(s: C) -> C {
     (s * s / (OMEGA * OMEGA) + s * (2.0 * DAMPING / OMEGA) + 1.0) * STIFFNESS
 }
 
-/// Limit of the cutting stiffness (N/m) and time between passes (s) where the blade chatters at `omega` (rad/s).
+/// Returns the limit of the cutting stiffness (N/m) and the time between passes (s) at which the blade chatters with
+/// `omega` (rad/s).
 fn limit(omega: f64) -> (f64, f64) {
     let inverse = dynamic_stiffness(C::new(0.0, omega));
     let stiffness = -0.5 / inverse.inv().re;
@@ -37,7 +38,7 @@ fn limit(omega: f64) -> (f64, f64) {
     (stiffness, (phase.rem_euclid(TAU) + WAVES * TAU) / omega)
 }
 
-/// Root near `s` of the equation whose cutting force runs `lead` (s) ahead of the motion.
+/// Returns the root near `s` of the equation whose cutting force leads the motion by `lead` (s).
 fn root(cutting: f64, delay: f64, lead: f64, mut s: C) -> C {
     for _ in 0..50 {
         let (ahead, behind) = ((s * lead).exp(), (s * (lead - delay)).exp());
@@ -49,13 +50,13 @@ fn root(cutting: f64, delay: f64, lead: f64, mut s: C) -> C {
     s
 }
 
-/// The root that grows fastest, of those about the frequency of the blade.
+/// Returns the root with the largest growth rate, among those near the frequency of the blade.
 fn fastest(cutting: f64, delay: f64) -> C {
     let roots = (0..40).map(|i| root(cutting, delay, 0.0, C::new(0.0, OMEGA * (0.8 + 0.02 * f64::from(i)))));
     roots.max_by(|a, b| a.re.total_cmp(&b.re)).unwrap()
 }
 
-/// Blades with a rigid tip and one radial mode.
+/// Returns blades with a rigid tip and one radial mode.
 fn rotor(blades: usize) -> Rom {
     let size = OMEGA / STIFFNESS.sqrt();
     let shape = move |row: usize, _: usize| if row.is_multiple_of(3) { size } else { 0.0 };
@@ -64,7 +65,7 @@ fn rotor(blades: usize) -> Rom {
     Rom { sectors: blades, damping_ratio: DAMPING, ..models::modal("cutter", &[OMEGA / TAU], shape, nodes) }
 }
 
-/// What cuts, and how finely: blades, cells and steps from one pass to the next.
+/// Number of blades, and of cells and steps from one pass to the next.
 #[derive(Clone, Copy)]
 struct ChatterCase {
     blades: usize,
@@ -94,13 +95,14 @@ impl ChatterCase {
         scene
     }
 
-    /// The step that holds a force ahead of the motion: root of the continuous equation with that lead.
+    /// Returns the root of the continuous equation with the lead that a step causes, because it holds a force ahead of
+    /// the motion.
     fn with_lead(self, cutting: f64, delay: f64) -> C {
         root(cutting, delay, delay / self.steps as f64, fastest(cutting, delay))
     }
 
-    /// Growth rate and frequency (rad/s) of the vibration while the casing closes in by the same depth every pass: amplitudes
-    /// near a frequency in two windows, whose ratio is exact for a single exponential.
+    /// Measures growth rate and frequency (rad/s) of the vibration while the casing closes by the same depth every
+    /// pass: amplitudes near a frequency in two windows, whose ratio is exact for a single exponential.
     fn measured(self, cutting: f64, delay: f64) -> C {
         let mut run = started(&self.scene(cutting, delay));
         move_on(&mut run, "casing_radius_change", 0.0, -DEPTH / delay);
@@ -113,7 +115,7 @@ impl ChatterCase {
         }
         let cut = &moved[samples * early..];
         let mean = cut.iter().sum::<f64>() / cut.len() as f64;
-        // It never leaves the coating, where the equation would end.
+        // The tip never leaves the coating, where the equation would no longer hold.
         let swing = cut.iter().fold(0.0_f64, |most, value| most.max((value - mean).abs()));
         assert!(swing < 0.4 * DEPTH, "{swing:e} m");
         let amplitude = |first: usize| -> C {
@@ -129,7 +131,7 @@ impl ChatterCase {
     }
 }
 
-/// Just below and above the limit at three speeds of a lobe: rates and the limit are of first order in the step.
+/// Slightly below and above the limit at three speeds of a lobe: rates and the limit are of first order in the step.
 #[test]
 fn chatter_grows_beyond_the_limit_of_its_lobe() {
     println!(
@@ -147,7 +149,7 @@ fn chatter_grows_beyond_the_limit_of_its_lobe() {
                 [found, exact, ahead].map(|root| root.re)
             });
             assert!(below[0] < 0.0 && above[0] > 0.0, "{below:?} {above:?}");
-            // Where the measured rate is zero, by the slope of the exact one.
+            // Point at which the measured rate is zero, by the slope of the exact one.
             let shift = (0.5 * (below[1] + above[1]) - 0.5 * (below[0] + above[0])) / ((above[1] - below[1]) / 0.2);
             println!(
                 "| {:.1} rad/s, {chatter} | 1/{steps} pass | {:.2}, {:.2} | {:.2}, {:.2} | {:.2}, {:.2} | {:.2} % |",
@@ -166,8 +168,8 @@ fn chatter_grows_beyond_the_limit_of_its_lobe() {
     }
 }
 
-/// What cells leave is of second order in their width, also where the ends of steps lie on their borders; two blades are as one that
-/// turns twice as fast.
+/// The error caused by cells is of second order in their width, also if the ends of steps coincide with their borders;
+/// two blades are equivalent to one that turns twice as fast.
 #[test]
 fn chatter_growth_is_independent_of_cell_width() {
     let (limit, delay) = limit(1.03 * OMEGA);
@@ -180,13 +182,13 @@ fn chatter_growth_is_independent_of_cell_width() {
     };
     let widths = [25, 50, 100].map(|cells| off(1, cells, 500));
     assert!(widths.array_windows().all(|[wide, narrow]| (wide / narrow - 4.0).abs() < 0.4), "{widths:?}");
-    // Two and a half steps a cell, cells of less than two steps, none that fit, two blades.
+    // Two and a half steps per cell, cells of less than two steps, incommensurate ones, two blades.
     for [blades, cells, steps] in [[1, 200, 500], [1, 300, 500], [1, 207, 503], [2, 100, 500]] {
         assert!(off(blades, cells, steps) < 1.1 * widths[2], "{blades} {cells} {steps}");
     }
 }
 
-/// Below 2kζ(1 + ζ) no speed makes it grow.
+/// Below 2kζ(1 + ζ) the vibration grows at no speed.
 #[test]
 fn every_speed_is_stable_below_the_minimum_limit() {
     let least = 2.0 * STIFFNESS * DAMPING * (1.0 + DAMPING);

@@ -1,11 +1,11 @@
-//! What every combination of features has to keep to.
+//! Checks that every combination of features must pass.
 
 use tiprub_core::Simulation;
 use tiprub_test_models::{bits, go, real, reference, saved, set_element};
 
 use crate::counting;
 
-/// Inputs that change from step to step, wherever the scene has them.
+/// Changes the inputs of the scene from step to step.
 pub fn disturb(simulation: &mut Simulation, index: u32) {
     let x = f64::from(index);
     let inputs: [(&str, f64); 6] = [
@@ -28,7 +28,7 @@ pub fn disturb(simulation: &mut Simulation, index: u32) {
     }
 }
 
-/// Communication steps of two lengths, from the `from`-th on.
+/// Performs communication steps of two lengths, starting with number `from`.
 fn steps(simulation: &mut Simulation, from: u32, count: u32) -> usize {
     let mut contacts = 0;
     for index in from..from + count {
@@ -39,7 +39,7 @@ fn steps(simulation: &mut Simulation, from: u32, count: u32) -> usize {
     contacts
 }
 
-/// The ledger closes at every communication point, and the work of all inputs is the external work.
+/// Checks that the ledger closes at every communication point, and that the work of all inputs is the external work.
 pub fn ledger_closes(name: &str, mut simulation: Simulation, bound: f64) {
     let (mut contacts, mut worst) = (0, 0.0_f64);
     for index in 0..60 {
@@ -50,13 +50,14 @@ pub fn ledger_closes(name: &str, mut simulation: Simulation, bound: f64) {
     assert!(contacts > 0, "{name} never touched");
     assert!(worst <= bound, "{name}: {worst:e}");
     for loss in ["friction_loss", "impact_loss", "wear_energy"] {
-        // What a scene has not has no variable.
+        // A missing feature has no variable.
         let Some(row) = simulation.table().find(loss) else { continue };
         assert!(loss == "impact_loss" || simulation.real(row.reference).unwrap() > 0.0, "{name}: {loss}");
     }
 }
 
-/// Saved after contact, at a communication point and within a step, and restored into another instance that has been elsewhere.
+/// Checks that a state saved after contact, at a communication point and within a step, continues in another instance
+/// with a different past.
 pub fn state_continues(name: &str, start: &dyn Fn() -> Simulation) {
     let mut simulation = start();
     let mut contacts = steps(&mut simulation, 0, 30);
@@ -82,7 +83,7 @@ pub fn state_continues(name: &str, start: &dyn Fn() -> Simulation) {
             saved(simulation)
         });
         assert!(ends[0] == ends[1], "{name}, {within} internal steps in");
-        // The same instance goes back, too.
+        // The state is also restored into the same instance.
         simulation.restore_state(&state).unwrap();
         assert_eq!(bits(&simulation), outputs, "{name}, {within} internal steps in");
         if within > 0 {
@@ -92,7 +93,7 @@ pub fn state_continues(name: &str, start: &dyn Fn() -> Simulation) {
     assert!(contacts > 0, "{name} never touched");
 }
 
-/// Steps and saving ask for no memory.
+/// Checks that steps and saving allocate no memory.
 pub fn allocates_nothing(name: &str, mut simulation: Simulation) {
     let mut state = saved(&simulation);
     let mut contacts = 0;

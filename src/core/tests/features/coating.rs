@@ -14,7 +14,7 @@ const HARDENING: f64 = 5e8;
 const THICKNESS: f64 = 5e-3;
 const RADIUS: f64 = 0.25;
 const AXIAL: [f64; 3] = [0.0, 0.02, 0.045];
-/// Of the tip around the circumference (m).
+/// Width of the tip around the circumference (m).
 const WIDTH: f64 = 4e-3;
 
 fn settings() -> CoatingSettings {
@@ -30,7 +30,7 @@ fn settings() -> CoatingSettings {
     }
 }
 
-/// One step of a blade whose tip would stand at `gap` without contact; returns the work of the wear (J).
+/// Performs one step of a blade whose tip would have the gap `gap` without contact; returns the work of the wear (J).
 fn rub(coating: &mut Coating, problem: &mut CoatedProblem, angle: f64, gap: f64) -> f64 {
     problem.clear();
     coating.locate(problem, &[angle; 3]);
@@ -44,7 +44,7 @@ fn rub(coating: &mut Coating, problem: &mut CoatedProblem, angle: f64, gap: f64)
     coating.commit(problem)
 }
 
-/// All around a steep cone, evenly deep: 2π r̄ L of the mean radius, times the depth, and its work.
+/// Uniform wear around a steep cone: 2π r̄ L of the mean radius, times the depth, and its work.
 #[test]
 fn uniform_wear_of_a_cone_has_the_closed_form_volume() {
     let radii = AXIAL.map(|z| 0.1 + 4.0 * z);
@@ -53,7 +53,7 @@ fn uniform_wear_of_a_cone_has_the_closed_form_volume() {
     for cell in 0..360 {
         problem.clear();
         coating.locate(&mut problem, &[(f64::from(cell) + 0.5) * TAU / 360.0; 3]);
-        // Nodes that do not yield.
+        // Rigid nodes.
         problem.gaps.fill(-4e-4);
         assert!(problem.solve().solved);
         work += coating.commit(&problem);
@@ -72,7 +72,7 @@ fn uniform_wear_of_a_cone_has_the_closed_form_volume() {
 fn a_blade_cuts_a_groove_and_then_runs_free_in_it() {
     let mut coating = Coating::new(&settings(), &BladeTip::new(&AXIAL, &[RADIUS; 3], WIDTH), 1).unwrap();
     let mut problem = coating.problem(1);
-    let depth = |angle: f64| 4e-4 * angle.cos(); // an eccentric rotor
+    let depth = |angle: f64| 4e-4 * angle.cos(); // An eccentric rotor.
     let mut works = [0.0; 3];
     let allocations = allocations_of(|| {
         for work in &mut works {
@@ -83,10 +83,11 @@ fn a_blade_cuts_a_groove_and_then_runs_free_in_it() {
         }
     });
     assert_eq!(allocations, 0, "while stepping");
-    // The second turn meets the groove of the first one, whose slope carries less of the tip than fresh coating: it sinks in a little more.
+    // The second turn meets the groove of the first one, whose slope supports less of the tip than fresh coating: it
+    // penetrates slightly deeper.
     assert!(works[0] > 1.0, "{works:?} J");
     assert!(works[1] < 5e-3 * works[0] && works[2] < 0.5 * works[1], "{works:?} J");
-    // All the work of the wear is in the cells: Y·ε_p + K·ε_p²/2 of their volume.
+    // The work of the wear is stored completely in the cells: Y·ε_p + K·ε_p²/2 of their volume.
     let volume = RADIUS * TAU / 360.0 * (0.045 / 20.0) * THICKNESS;
     let stored = |cell: usize| {
         let plastic = coating.wear_depth(cell) / THICKNESS;
@@ -94,7 +95,7 @@ fn a_blade_cuts_a_groove_and_then_runs_free_in_it() {
     };
     let total: f64 = (0..coating.cells()).map(stored).sum();
     assert!((total - works.iter().sum::<f64>()).abs() < 1e-12 * total, "{total} J, {works:?} J");
-    // Worn where the rotor comes close, untouched opposite.
+    // Worn where the rotor comes close, unworn on the opposite side.
     for cell in 0..coating.cells() {
         let (angle, _) = coating.centre(cell);
         let depth = depth(angle);
@@ -104,12 +105,12 @@ fn a_blade_cuts_a_groove_and_then_runs_free_in_it() {
     assert!(coating.largest_wear_depth() > 1e-4, "{}", coating.largest_wear_depth());
 }
 
-/// Depth of a rigid tip below the unworn surface at an angle, in one pass over a bump (m).
+/// Returns the depth of a rigid tip below the unworn surface at an angle, in one pass over a bump (m).
 fn pressed(angle: f64) -> f64 {
     8e-4 * (angle.cos() - 0.6)
 }
 
-/// Of a coating without cells: ∫F dθ over the pass (N rad), and the volume worn (m³), by quadrature.
+/// Returns ∫F dθ over the pass (N rad) and the volume worn (m³) of a coating without cells, by quadrature.
 fn of_a_continuum() -> [f64; 2] {
     let (reach, half) = (0.6_f64.acos(), 0.5 * WIDTH / RADIUS);
     let plastic = |depth: f64| ((MODULUS * depth / THICKNESS - YIELD) / (MODULUS + HARDENING)).max(0.0);
@@ -118,7 +119,7 @@ fn of_a_continuum() -> [f64; 2] {
         let at = |index: i32| from + (to - from) * (f64::from(index) + 0.5) / f64::from(count);
         (0..count).map(|index| of(at(index))).sum::<f64>() * (to - from) / f64::from(count)
     };
-    // The deepest that a place has been pressed while the tip, now at an angle, has been over it.
+    // The largest depth to which a point has been pressed while the tip, now at an angle, has been over it.
     let deepest = |place: f64, now: f64| pressed(0.0_f64.clamp(place - half, now.min(place + half)));
     let stress = |place: f64, now: f64| (MODULUS * (pressed(now) / THICKNESS - plastic(deepest(place, now)))).max(0.0);
     let force = |now: f64| mean(now - half, now + half, 200, &|place| length * stress(place, now));
@@ -138,7 +139,7 @@ fn force_and_volume_converge_as_cells_become_narrow() {
         let (mut problem, mut force, mut work) = (coating.problem(1), 0.0, 0.0);
         let steps = 23_040;
         for step in 0..steps {
-            // Not in step with the cells.
+            // Not synchronous with the cells.
             let angle = (f64::from(step) / f64::from(steps) - 0.5) * TAU + 1e-5;
             if pressed(angle) <= 0.0 {
                 continue;
@@ -155,7 +156,7 @@ fn force_and_volume_converge_as_cells_become_narrow() {
         println!("| {cells_around} | {:.4} | {:.4} |", off[0], off[1]);
         errors.push(off.map(f64::abs));
     }
-    // Of second order, down to what the quadrature and the steps leave.
+    // Second order, down to the errors of the quadrature and the steps.
     for quantity in 0..2 {
         assert!(errors[0][quantity] > 12.0 * errors[2][quantity], "{errors:?}");
     }
@@ -165,7 +166,7 @@ fn force_and_volume_converge_as_cells_become_narrow() {
     );
 }
 
-/// Whole scenes: what a rub leaves does not depend on how finely its coating is divided.
+/// Whole scenes: the result of a rub does not depend on the number of cells of its coating.
 #[test]
 fn heat_force_and_volume_of_a_scene_converge_with_its_cells() {
     println!("| cells | friction loss (J) | worn volume (mm3) | wear energy (J) | residual |");

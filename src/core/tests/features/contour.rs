@@ -1,10 +1,10 @@
-//! Slopes of the tip contour that a ROM gives, against its positions.
+//! Slopes of the tip contour in a ROM, against its positions.
 
 use tiprub_core::settings::Meridian;
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models as models;
 
-/// Twelve blades whose radii fall by 0.2 m per m along the axis, with these slopes.
+/// Returns twelve blades whose radii fall by 0.2 m per m along the axis, with these slopes.
 fn tapered(slopes: [f64; 3]) -> Scene {
     let mut scene = models::rub(12);
     for (node, slope) in scene.roms[0].contact_nodes.iter_mut().zip(slopes) {
@@ -32,16 +32,17 @@ fn rejects_slopes_that_contradict_the_positions() {
         ["ROM `blade`, array `contact_meridional_slopes`", "`leading_edge` and `mid_chord`", "rise by -0.2 m per m"];
     for scene in [tapered, on_ring] {
         Simulation::new(&scene([-0.2; 3])).unwrap();
-        // A sign, and an angle in degrees.
+        // A wrong sign, and an angle in degrees.
         for wrong in [0.2, -11.3] {
             refused(&scene([wrong; 3]), &named);
         }
-        // One of them alone, beside what the contour bends.
+        // One slope alone, in addition to the curvature of the contour.
         refused(&scene([-0.2, -0.2, 1.2]), &["`mid_chord` and `trailing_edge`", "slopes -0.2 and 1.2"]);
     }
 }
 
-/// Zeros are a cylinder where the surface takes its normals from slopes, and nothing where it follows the positions.
+/// Zero slopes are a cylinder if the surface takes its normals from slopes, and have no effect if it follows the
+/// positions.
 #[test]
 fn missing_slopes_default_to_a_cylinder() {
     let mut scene = tapered([0.0; 3]);

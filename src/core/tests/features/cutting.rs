@@ -1,4 +1,5 @@
-//! Blades that cut a coating, against closed forms: kinematics alone gives the depth of cut, and with it force, torque, volume.
+//! Blades that cut a coating, against closed forms: kinematics alone determines the depth of cut, and with it force,
+//! torque and volume.
 
 use std::f64::consts::TAU;
 
@@ -6,18 +7,18 @@ use tiprub_core::settings::{CoatingSettings, CuttingSettings, Scheme, Shape, Sol
 use tiprub_core::{Rom, Scene};
 use tiprub_test_models::{self as models, element, go, move_on, real, started};
 
-/// Specific cutting energy (J/m³), normal per tangential force.
+/// Specific cutting energy (J/m³), and ratio of normal to tangential force.
 const ENERGY: f64 = 5e7;
 const RATIO: f64 = 0.8;
-/// Along the axis (m).
+/// Length along the axis (m).
 const LENGTH: f64 = 0.03;
 const SPEED: f64 = 1000.0;
 const GAP: f64 = 2e-5;
 const BLADES: usize = 2;
-/// Largest flexibility: of radial modes (m/N).
+/// Stiffness of the most flexible modes, the radial ones (N/m).
 const STIFFNESS: f64 = 4e8;
 
-/// Two contact nodes, each with a radial and a tangential mode of its own.
+/// Returns a blade of two contact nodes, each with a radial and a tangential mode.
 fn blade() -> Rom {
     let frequencies = [20_000.0, 20_000.0, 31_000.0, 31_000.0];
     let size = TAU * 20_000.0 / STIFFNESS.sqrt();
@@ -50,14 +51,14 @@ fn scene([cells_around, cells_along]: [usize; 2], step: f64) -> Scene {
     scene
 }
 
-/// The casing closes in at a steady rate: every blade takes the same depth of cut, whatever it yields.
+/// The casing closes at a steady rate: every blade takes the same depth of cut, regardless of its flexibility.
 #[test]
 fn steady_incursion_follows_its_kinematics() {
     println!("| cells | step (s) | torque | volume | work/(u V) | shaft work | cutting/shaft work | residual |");
     let (rate, turn) = (5e-3, TAU / SPEED);
     let depth = rate * turn / BLADES as f64;
     let cases = [([200, 1], 2e-6), ([400, 3], 2e-6), ([400, 3], 1e-6), ([800, 7], 5e-7)];
-    // The last one turns the other way round.
+    // The last one turns in the opposite direction.
     for (cells, step, speed) in
         cases.map(|(cells, step)| (cells, step, SPEED)).into_iter().chain([(cases[1].0, 2e-6, -SPEED)])
     {
@@ -74,7 +75,7 @@ fn steady_incursion_follows_its_kinematics() {
                 torque += real(&run, "torque") / f64::from(steps / 2);
             }
         }
-        // Volume per time 2πR L v, of which the blades have half a depth of cut before them and yield by their flexibility.
+        // Volume per time 2πR L v, reduced by half a depth of cut in front of the blades and by their deflection.
         let flow = TAU * models::RADIUS * LENGTH;
         let torque = torque / (-ENERGY * flow * rate / speed) - 1.0;
         let yielded = 0.5 * RATIO * ENERGY * LENGTH * depth / STIFFNESS;
@@ -91,13 +92,13 @@ fn steady_incursion_follows_its_kinematics() {
             ratio.abs() < 1e-12 && shaft.abs() < 1e-12 && residual.abs() < 1e-12,
             "{ratio:e} {shaft:e} {residual:e}"
         );
-        // What is left is heat of the tangential vibration.
+        // The rest is heat of the tangential vibration.
         assert!(cutting.abs() < 1e-7, "{cutting:e}");
         assert!((real(&run, "wear_energy") / work - 1.0).abs() < 1e-12);
     }
 }
 
-/// A shaft that stands off the middle cuts a sickle: e cos θ − g deep, 2RL(√(e² − g²) − g arccos(g/e)) in volume.
+/// An eccentric shaft cuts a sickle: e cos θ − g deep, 2RL(√(e² − g²) − g arccos(g/e)) in volume.
 #[test]
 fn displaced_shaft_cuts_a_crescent_and_then_runs_free() {
     println!("| cells | step (s) | largest error of depth / deepest | volume | (shaft + whirl) work / losses |");
@@ -132,7 +133,7 @@ fn displaced_shaft_cuts_a_crescent_and_then_runs_free() {
         println!("| {around} x 2 | {step:.0e} | {worst:.1e} | {volume:.1e} | {:.1e} |", paid / lost - 1.0);
         assert!((paid / lost - 1.0).abs() < 1e-3, "{paid} {lost}");
         errors.push((worst, volume.abs()));
-        // The same along the axis, and by the wear of every cell.
+        // The same value from the profile along the axis, and from the wear of every cell.
         let along: f64 = (0..2).map(|row| element(&run, "wear_profile_along", row)).sum::<f64>() * 0.5;
         assert!((along * TAU * models::RADIUS * LENGTH / real(&run, "worn_volume") - 1.0).abs() < 1e-12);
         let peak = real(&run, "torque");
@@ -140,11 +141,12 @@ fn displaced_shaft_cuts_a_crescent_and_then_runs_free() {
     }
     let (first, last) = (errors[0], errors[2]);
     assert!(last.0 < 8e-3 && last.1 < 6e-3, "{errors:?}");
-    // Of first order in the width of a cell, which ends as deep as the deepest pass in it.
+    // First order in the width of a cell, which ends as deep as the deepest pass in it.
     assert!(last.0 < 0.3 * first.0 && last.1 < 0.3 * first.1, "{errors:?}");
 }
 
-/// Force of a cut does not know the width of cells; what is pressed in is another law, and the hard casing has its own friction.
+/// The force of a cut does not depend on the width of cells; pressing follows another law, and the hard casing has a
+/// separate friction coefficient.
 #[test]
 fn hard_casing_with_friction_acts_beyond_the_coating() {
     let mut scene = scene([200, 2], 2e-6);
@@ -157,7 +159,7 @@ fn hard_casing_with_friction_acts_beyond_the_coating() {
     for _ in 0..40 {
         go(&mut run, turn / 20.0);
     }
-    // All around the coating is gone.
+    // The coating is removed around the whole circumference.
     let volume = TAU * models::RADIUS * LENGTH * 2e-6;
     assert!((real(&run, "worn_volume") / volume - 1.0).abs() < 2e-2, "{:e}", real(&run, "worn_volume") / volume - 1.0);
     let (friction, cut) = (real(&run, "friction_loss"), real(&run, "cutting_work"));
@@ -180,13 +182,14 @@ fn cutting_state_is_restored_without_allocation() {
     crate::checks::ledger_closes("cutting", start(), 1e-11);
 }
 
-/// A normal mode that bends along the way, into the coating in one sense of it: what ends the run is called what it is.
+/// A normal mode that bends along the sliding direction, into the coating for one sign: the error that ends the run
+/// names the cause.
 #[test]
 fn warns_of_growth_under_a_cut_when_it_ends_a_run() {
     let mut scene = scene([200, 2], 1e-6);
     let rom = &mut scene.roms[0];
     for node in 0..2 {
-        // Each node's radial mode moves it along the way too.
+        // The radial mode of each node also moves it in the sliding direction.
         rom.contact_map[(3 * node + 1, node)] = -3.0 * rom.contact_map[(3 * node, node)];
     }
     let cutting = &mut scene.settings.contacts[0].coating.as_mut().unwrap().cutting;

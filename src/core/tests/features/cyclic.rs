@@ -1,4 +1,4 @@
-//! A disk of coupled sectors stepped by nodal diameters against the same disk as one general structure.
+//! A disk of coupled sectors stepped by nodal diameters against the equivalent single structure.
 
 use tiprub_core::Simulation;
 use tiprub_core::dynamics::cyclic::CyclicModel;
@@ -11,7 +11,7 @@ use tiprub_test_models::{
 const SCHEMES: [Scheme; 3] = Scheme::RECURRENCES;
 const SOLVERS: [Solver; 3] = Solver::ALL;
 
-/// Both forms of one disk with the same settings.
+/// Returns both forms of one disk with the same settings.
 fn pair(disk: &TestDisk, scheme: Scheme, solver: Solver, friction: f64) -> [Simulation; 2] {
     [disk.cyclic(), disk.whole()].map(|rom| {
         let mut scene = with_rotor(rom);
@@ -19,7 +19,7 @@ fn pair(disk: &TestDisk, scheme: Scheme, solver: Solver, friction: f64) -> [Simu
         scene.settings.contacts[0].solver = solver;
         scene.settings.contacts[0].friction = friction;
         scene.settings.structures[0].damping_ratio = Some(0.2);
-        // Values act in steps of every length alike.
+        // Values act equally in steps of every length.
         scene.settings.time.input_interpolation = InputInterpolation::Hold;
         started(&scene)
     })
@@ -43,8 +43,8 @@ impl Differences {
     }
 }
 
-/// Step both until `contact_steps` internal steps had contact; the casing closes by up to `closing`, with `nudge` added on
-/// the second. Returns the differences and the most contacts at once.
+/// Steps both until `contact_steps` internal steps had contact; the casing closes by up to `closing`, with `nudge`
+/// added on the second. Returns the differences and the largest number of simultaneous contacts.
 fn compare(
     disk: &TestDisk,
     [one, two]: &mut [Simulation; 2],
@@ -63,7 +63,7 @@ fn compare(
             simulation.set_real(reference, radius).unwrap();
             simulation.begin_step(time, length).unwrap();
         }
-        // Nodes of all sectors in a row where the other disk is one structure.
+        // The nodes of all sectors are in sequence if the other disk is a single structure.
         let copies = disk.sectors / two.system().bank().sectors();
         loop {
             let finished = one.advance().unwrap().finished;
@@ -86,7 +86,7 @@ fn compare(
             }
         }
         for name in ["kinetic_energy", "strain_energy", "damping_loss", "friction_loss", "impact_loss"] {
-            // Without friction there is no such loss.
+            // Without friction this loss does not exist.
             if one.table().find(name).is_some() {
                 differences.add(2, real(one, name), real(two, name));
             }
@@ -98,7 +98,7 @@ fn compare(
     (differences.relative(), most)
 }
 
-/// All disks with every scheme and solver, without and with friction.
+/// Runs `check` on all disks with every scheme and solver, without and with friction.
 fn every_pair(mut check: impl FnMut(&TestDisk, [Simulation; 2], String)) {
     for (sectors, nodes, order) in [(5, 1, 5), (6, 1, 5), (8, 1, 5), (6, 2, 8), (3, 1, 5), (2, 2, 8)] {
         for scheme in SCHEMES {
@@ -122,13 +122,13 @@ fn thousand_contact_steps_equal_the_whole_disk() {
         let ([moved, multiplier, energy], most) = compare(disk, &mut both, 1000, 1e-4, 0.0);
         println!("| {name} | {most} | {moved:.1e} | {multiplier:.1e} | {energy:.1e} |");
         assert!(moved <= 1e-12 && energy <= 1e-12, "{name}: {moved:e}, {energy:e}");
-        // A multiplier is a displacement over h²/m: rounding of displacements is that much larger in it.
+        // A multiplier is a displacement over h²/m, which amplifies the rounding of displacements.
         assert!(multiplier <= 5e-11, "{name}: {multiplier:e}");
     });
 }
 
-/// Blades that bounce between each other amplify rounding with every impact, whoever computes it: the same disk
-/// stepped by the same code with the casing 1e-19 m away is the measure.
+/// Blades that bounce against each other amplify rounding with every impact in any implementation; the reference is the
+/// same disk and code with the casing 1e-19 m away.
 #[test]
 fn bouncing_disk_differs_only_by_rounding() {
     println!(

@@ -1,4 +1,5 @@
-//! Everything a disk of coupled sectors can be combined with: against uncoupled sectors in the limit, the ledger, states, refusals.
+//! All features that a disk of coupled sectors supports: against uncoupled sectors in the limit, the ledger, states,
+//! errors.
 
 use crate::checks::{allocates_nothing, disturb, ledger_closes, state_continues};
 use nalgebra::Complex;
@@ -47,7 +48,7 @@ const FEATURES: [Feature; 9] = [
     }),
 ];
 
-/// What is refused, as documented.
+/// Returns whether the scene is rejected, as documented.
 fn is_refused(scene: &Scene) -> bool {
     let (contact, scheme) = (&scene.settings.contacts[0], scene.settings.time.scheme);
     (contact.coating.is_some() && contact.solver != Solver::Lcp)
@@ -63,7 +64,7 @@ fn scene_with(rom: Rom, feature: Feature, scheme: Scheme, solver: Solver) -> Sce
     scene
 }
 
-/// Uncoupled sectors written as coupled ones: every nodal diameter has the same matrices.
+/// Writes uncoupled sectors as coupled ones: every nodal diameter has the same matrices.
 fn without_coupling(rom: &Rom) -> Rom {
     let complex = |matrix: &nalgebra::DMatrix<f64>| matrix.map(|value| Complex::new(value, 0.0));
     let mut rom = rom.clone();
@@ -131,7 +132,7 @@ fn uncoupled_disk_equals_independent_sectors() {
     println!("worst {worst:.1e}");
 }
 
-/// Blades without coupling, on a ring that yields as they do: written as a disk they have the same largest step.
+/// Uncoupled blades, on a ring that yields as they do, have the same largest step when they are written as a disk.
 #[test]
 fn uncoupled_disk_has_the_step_limit_of_its_sectors() {
     let rom = models::rich_blade(12);
@@ -147,7 +148,7 @@ fn uncoupled_disk_has_the_step_limit_of_its_sectors() {
     assert!((named[0] / named[1] - 1.0).abs() < 1e-6, "{named:?}");
 }
 
-/// Every combination that is not refused, by its name.
+/// Runs `check` on every accepted combination, with its name.
 fn every_combination(mut check: impl FnMut(&str, Scene)) {
     let disk = TestDisk::random(7, 2, 9, 0.25, 5);
     for feature in FEATURES {
@@ -239,7 +240,7 @@ fn reading_outputs_within_a_step_changes_nothing() {
 
 #[test]
 fn a_change_of_step_keeps_the_order_of_the_scheme() {
-    // Free vibration of all nodal diameters after the casing has gone: modal-exact is exact at every step size.
+    // Free vibration of all nodal diameters after the casing has moved away: modal-exact is exact at every step size.
     let disk = TestDisk::random(7, 1, 5, 0.25, 5);
     let run = |steps: &[f64]| {
         let mut scene = scene_with(disk.cyclic(), FEATURES[0], Scheme::ModalExact, Solver::Lcp);
@@ -295,7 +296,7 @@ fn rejects_features_unsupported_for_coupled_sectors() {
             scene.settings.structures[0].spin.coriolis = true;
         }),
         ("µ below", |scene| {
-            // Tips that swing inwards when they are pushed back.
+            // Tips that move into the casing when friction pushes them backwards.
             let harmonics = &mut scene.roms[0].extras.harmonics;
             let map = &mut harmonics[1].contact_map;
             for mode in 0..map.ncols() {
@@ -317,7 +318,7 @@ fn rejects_features_unsupported_for_coupled_sectors() {
     }
 }
 
-/// An array, and what is done to it.
+/// An array, and the change made to it.
 type Damage = (&'static str, fn(&mut Rom));
 
 #[test]
@@ -348,8 +349,8 @@ fn rejects_invalid_harmonics_by_name() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
 
-    /// Random disks, frictionless and undamped: ledgers close, gaps and multipliers keep their sign, and the reaction on
-    /// one sector moves the others as the reciprocal one moves it.
+    /// Random disks, frictionless and undamped: ledgers close, gaps and multipliers have the correct sign, and the
+    /// response of the other sectors to a force on one is reciprocal.
     #[test]
     fn random_disks_satisfy_energy_contact_and_reciprocity(
         sectors in 2..=23_usize,

@@ -1,4 +1,4 @@
-//! Excitation of blades by engine orders against frequency responses, its work against forces times displacements.
+//! Excitation of blades by engine orders against frequency responses, and its work against forces times displacements.
 
 use std::f64::consts::TAU;
 
@@ -11,7 +11,7 @@ use tiprub_test_models::{self as models, bits, disk::TestDisk, go, real, saved, 
 const AMPLITUDE: f64 = 0.4;
 const PHASE: f64 = 0.7;
 
-/// A rotor that touches nothing, excited by `order` at `speed` (rad/s).
+/// Returns a rotor without contact, excited by `order` at `speed` (rad/s).
 fn scene(rom: Rom, scheme: Scheme, order: u32, speed: f64) -> Scene {
     let mut scene = models::round(rom);
     let structure = &mut scene.settings.structures[0];
@@ -24,15 +24,15 @@ fn scene(rom: Rom, scheme: Scheme, order: u32, speed: f64) -> Scene {
     scene
 }
 
-/// A force at a node in place of a modal load.
+/// Replaces the modal load by a force at a node.
 fn at_node(scene: &mut Scene, node: &str) {
     let excitation = scene.settings.structures[0].excitation.as_mut().unwrap();
     (excitation.mode, excitation.node, excitation.direction) =
         (None, Some(node.into()), Some(ForceDirection::Tangential));
 }
 
-/// Largest difference of the contact displacements from `expected` (sector, row: complex amplitude of e^(i order θ_r)), as a share of the
-/// largest amplitude, once transients are gone.
+/// Returns the largest difference of the contact displacements from `expected` (sector, row: complex amplitude of e^(i
+/// order θ_r)), relative to the largest amplitude, after transients have decayed.
 fn off(simulation: &mut Simulation, order: u32, expected: impl Fn(usize, usize) -> Complex<f64>) -> f64 {
     while simulation.time() < 0.055 {
         go(simulation, 5e-4);
@@ -53,7 +53,7 @@ fn off(simulation: &mut Simulation, order: u32, expected: impl Fn(usize, usize) 
     off / size
 }
 
-/// Amplitude of a mode per unit modal force.
+/// Returns the amplitude of a mode per unit modal force.
 fn response(frequency: f64, ratio: f64, excited: f64) -> Complex<f64> {
     Complex::new(1.0, 0.0) / Complex::new(frequency * frequency - excited * excited, 2.0 * ratio * frequency * excited)
 }
@@ -62,7 +62,7 @@ fn turned(angle: f64) -> Complex<f64> {
     Complex::new(angle.cos(), angle.sin())
 }
 
-/// At resonance the component that the mode moves most answers with A/(2ζk), k = ω²/φ², a quarter of a period late.
+/// At resonance the component with the largest mode shape responds with A/(2ζk), k = ω²/φ², a quarter of a period late.
 #[test]
 fn mode_at_resonance_has_the_closed_form_amplitude() {
     println!("| scheme | error of A/(2ζk) at h | at h/2 |");
@@ -86,13 +86,14 @@ fn mode_at_resonance_has_the_closed_form_amplitude() {
             off(&mut started(&scene), order, expected)
         });
         println!("| {} | {:.1e} | {:.1e} |", scheme.name(), errors[0], errors[1]);
-        // Below 1e-6 transients are what is left.
+        // Below 1e-6 only transients remain.
         let converges = errors[0] / errors[1] > 3.0 || errors[0] < 2e-6;
         assert!(errors[1] < 5e-5 && converges, "{scheme:?}: {errors:?}");
     }
 }
 
-/// The same where the excitation turns by most of a radian in one step, near the limit: a force that is held would make 7 % more of it.
+/// Also if the excitation turns by most of a radian in one step, near the limit: a held force would increase the
+/// amplitude by 7 %.
 #[test]
 fn resonance_amplitude_is_correct_for_long_steps() {
     for (scheme, mode, turn) in [(Scheme::ModalExact, 4, 0.95), (Scheme::MasslessBoundary, 5, 0.3)] {
@@ -122,7 +123,7 @@ fn resonance_amplitude_is_correct_for_long_steps() {
     }
 }
 
-/// Central differences move the resonance with the step, which no factor on the force can mend.
+/// Central differences shift the resonance with the step, which no factor on the force can correct.
 #[test]
 fn central_differences_warn_of_excitation_on_long_steps() {
     for (turn, warned) in [(0.2, false), (0.3, true)] {
@@ -137,7 +138,7 @@ fn central_differences_warn_of_excitation_on_long_steps() {
     }
 }
 
-/// A force at a contact node answers in all modes, also in quasi-static ones, which follow it one step late.
+/// A force at a contact node excites all modes, also quasi-static ones, which follow it one step late.
 #[test]
 fn force_at_a_node_follows_the_frequency_response() {
     for (scheme, tolerance) in
@@ -167,7 +168,8 @@ fn force_at_a_node_follows_the_frequency_response() {
     }
 }
 
-/// Coupled sectors under every engine order against the whole disk as one structure, whose modes know no nodal diameters.
+/// Coupled sectors under every engine order against the whole disk as one structure, whose modes have no nodal
+/// diameters.
 #[test]
 fn engine_order_excitation_matches_full_disk() {
     let mut worst = 0.0_f64;
@@ -179,7 +181,7 @@ fn engine_order_excitation_matches_full_disk() {
             let mut scene = scene(disk.cyclic(), Scheme::ModalExact, order, speed);
             at_node(&mut scene, "node_0_0");
             let force = |s: usize| turned(TAU * f64::from(order) * s as f64 / sectors as f64 - PHASE) * AMPLITUDE;
-            // Order 0 rests at its real part.
+            // Order 0 is constant at its real part.
             let force = |s: usize| if order == 0 { Complex::new(force(s).re, 0.0) } else { force(s) };
             let modal: Vec<Complex<f64>> = (0..whole.len())
                 .map(|mode| {
@@ -196,7 +198,7 @@ fn engine_order_excitation_matches_full_disk() {
             let error = off(&mut run, order, expected);
             worst = worst.max(error);
             assert!(error < 5e-5, "{sectors} sectors, order {order}: {error:e}");
-            // Nothing but the nodal diameter of the order moves.
+            // Only the nodal diameter of the order moves.
             let alias = order as usize % sectors;
             let excited = alias.min(sectors - alias);
             let disk = run.system().bank().coupled().unwrap();
@@ -211,7 +213,7 @@ fn engine_order_excitation_matches_full_disk() {
     println!("largest difference of all orders: {worst:.1e} of the amplitude");
 }
 
-/// One mode family of a disk that is not coupled answers as that of uncoupled sectors.
+/// One mode family of an uncoupled disk responds like that of uncoupled sectors.
 #[test]
 fn family_of_an_uncoupled_disk_responds_as_one_blade() {
     let mut disk = TestDisk::random(6, 1, 6, 0.2, 5);
@@ -233,7 +235,7 @@ fn family_of_an_uncoupled_disk_responds_as_one_blade() {
     }
 }
 
-/// While blades rub too: F cos(…) at a node times its own displacement, which knows no modes, is what the ledger has.
+/// During a rub of the blades, the ledger contains F cos(…) at a node times its displacement, computed without modes.
 #[test]
 fn excitation_work_is_force_times_displacement() {
     let disk = TestDisk::random(6, 2, 10, 0.2, 3);
@@ -270,7 +272,7 @@ fn excitation_work_is_force_times_displacement() {
                 touched += usize::from(!run.system().events().is_empty());
             }
             let reported = real(&run, "excitation_work");
-            // Quasi-static modes take the force of their own instant.
+            // Quasi-static modes use the force of the current time.
             let tolerance = if scheme.is_massless() { 3e-3 } else { 1e-10 };
             let (apart, residual) = ((reported - work).abs() / exchanged, real(&run, "energy_residual_relative").abs());
             println!(
@@ -303,7 +305,7 @@ fn restored_state_keeps_the_excitation_phase() {
         }
         assert_eq!(bits(&run), bits(&other));
         assert!(real(&run, "energy_residual_relative").abs() < 1e-12);
-        // Another order is another motion, at once and in a state.
+        // Another order gives another motion, both immediately and from a state.
         let mut third = Simulation::new(&scene).unwrap();
         let order = models::reference(&third, "excitation_order");
         third.set_integer(order, 2).unwrap();
@@ -345,7 +347,7 @@ fn rejects_invalid_excitations() {
     assert!(error.contains("`excitation_order`") && error.contains("2.000e0 rad"), "{error}");
 }
 
-/// The pattern turns by the speed and by its phase: what the phase adds counts, either way round.
+/// The pattern turns with the speed and with its phase: the change of the phase counts in both directions.
 #[test]
 fn rejects_excessive_excitation_phase_change() {
     let mut scene = scene(models::blade(3), Scheme::ModalExact, 2, 500.0);
@@ -355,7 +357,7 @@ fn rejects_excessive_excitation_phase_change() {
         set(&mut run, "excitation_phase", PHASE + turn);
         let done = run.do_step(0.0, 2e-6);
         assert_eq!(done.is_err(), refused, "{turn}: {done:?}");
-        // The same phase at once is no turning.
+        // A constant phase is no rotation.
         let mut scene = scene.clone();
         scene.settings.time.input_interpolation = InputInterpolation::Hold;
         let mut run = started(&scene);

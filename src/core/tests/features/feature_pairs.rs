@@ -1,5 +1,5 @@
-//! Every pair of features, with fixed and with adaptive steps: the energy balance closes while inputs move, and states continue; or the scene
-//! is rejected by a rule. The guide has the table.
+//! Every pair of features, with fixed and with adaptive steps: either the energy balance closes while inputs move, and
+//! states continue, or the scene is rejected by a rule. The table is in the guide.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
@@ -85,7 +85,7 @@ fn flexible(scene: &mut Scene) {
     rom.extras.support = Some(SupportRows { stiffness: rows(1e6), mass: rows(0.1), thermal });
 }
 
-/// Four blades that rub, whose ROM has what any feature needs.
+/// Returns four blades that rub, whose ROM has the data for every feature.
 fn rubbing() -> Scene {
     let mut rom = models::rich_blade(4);
     let order = rom.order();
@@ -99,7 +99,7 @@ fn rubbing() -> Scene {
     models::bumps(rom)
 }
 
-/// Two features of one scene. Coupled sectors bring their own ROM, so they come first.
+/// Combines two features in one scene. Coupled sectors replace the ROM, so they come first.
 fn together(first: Feature, second: Feature) -> Scene {
     let mut scene = rubbing();
     let mut pair = [first, second];
@@ -132,7 +132,7 @@ fn steps(run: &mut Simulation, from: u32, count: u32) -> f64 {
     worst
 }
 
-/// What comes of a scene: whether its balance closes and its states continue, or the rule that rejects it.
+/// Returns whether the balance of a scene closes and its states continue, or the rule that rejects it.
 fn outcome(name: &str, scene: &Scene) -> Result<(), String> {
     let rejected = |error: tiprub_core::Error| {
         assert!(matches!(error, tiprub_core::Error::Invalid { .. }), "{name}: {error}");
@@ -156,14 +156,14 @@ fn outcome(name: &str, scene: &Scene) -> Result<(), String> {
 /// The table of the guide and the rules below it.
 struct Matrix {
     text: String,
-    /// Rules, and the pairs that each rejects.
+    /// Rules, and the pairs that each of them rejects.
     rules: BTreeMap<String, Vec<String>>,
-    /// What is rejected with a feature alone: no news of its pairs.
+    /// Rejections of single features, which are not repeated for pairs.
     alone: BTreeSet<(&'static str, String)>,
 }
 
 impl Matrix {
-    /// The cell of a pair: both, fixed steps only, or rejected.
+    /// Returns the cell of a pair: both, fixed steps only, or rejected.
     fn cell(&mut self, [first, second]: [&'static str; 2], scene: &Scene) -> &'static str {
         let pair = if first == second { first.to_owned() } else { format!("{first} with {second}") };
         let fixed = outcome(&format!("{pair}, fixed steps"), &with_fixed_steps(scene.clone()));
@@ -190,7 +190,7 @@ fn every_pair_of_features_runs_or_is_rejected_by_a_rule() {
     let mut matrix = Matrix { text: String::new(), rules: BTreeMap::new(), alone: BTreeSet::new() };
     let count = FEATURES.len();
     let mut cells = vec![vec![""; count + 1]; count];
-    // Alone first.
+    // Single features first.
     let pairs = (0..count).flat_map(|apart| (0..count - apart).map(move |row| (row, row + apart)));
     for (row, column) in pairs {
         let [first, second] = [FEATURES[row], FEATURES[column]];
@@ -213,7 +213,7 @@ fn every_pair_of_features_runs_or_is_rejected_by_a_rule() {
     compare(&matrix.text);
 }
 
-/// Compare the generated part of the page; `UPDATE_SNAPSHOTS=1` writes it.
+/// Compares the generated part of the page; `UPDATE_SNAPSHOTS=1` writes it.
 fn compare(expected: &str) {
     let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/feature-pairs.md");
     let text = std::fs::read_to_string(&page).unwrap();

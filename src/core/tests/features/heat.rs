@@ -1,4 +1,4 @@
-//! Blades that are warm: free expansion, softening, their work.
+//! Heated blades: free expansion, softening, their work.
 
 use std::f64::consts::{PI, TAU};
 
@@ -11,7 +11,7 @@ use tiprub_test_models::{self as models, bits, disk::TestDisk, go, real, saved, 
 
 const SOFTENING: f64 = 4e-4;
 
-/// With a load per kelvin.
+/// Adds a load per kelvin to the ROM.
 fn heated(mut rom: Rom) -> Rom {
     let load = DMatrix::from_fn(rom.order(), 1, |row, _| 2.0 + 1.5 * (row as f64).sin());
     let patches = vec![ThermalPatch { angle: [0.0, TAU], axial: [-1.0, 1.0] }];
@@ -42,7 +42,8 @@ fn apart(found: &[f64], expected: &[f64]) -> f64 {
     found.iter().zip(expected).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs())) / size
 }
 
-/// CΦω⁻²Φᵀf T, the free expansion: at the start, and once warmed up slowly; of coupled sectors all alike. Softening leaves it.
+/// The free expansion CΦω⁻²Φᵀf T is reached at the start, and after slow heating; coupled sectors agree. Softening does
+/// not change it.
 #[test]
 fn warm_blades_rest_at_their_free_expansion() {
     for rom in [models::blade(3), TestDisk::random(3, 1, 6, 0.2, 3).cyclic()] {
@@ -73,8 +74,8 @@ fn warm_blades_rest_at_their_free_expansion() {
     }
 }
 
-/// A blade that turns and stiffens expands as it does at rest: growth K(Ω)⁻¹(Ω²c + Ω⁴c₂) plus free expansion, at the start and where
-/// speed and temperature come to later. Softening leaves the expansion and not the growth.
+/// A rotating, stiffened blade expands as at rest: growth K(Ω)⁻¹(Ω²c + Ω⁴c₂) plus free expansion, at the start and for
+/// later changes of speed and temperature. Softening changes the growth but not the expansion.
 #[test]
 fn rotation_does_not_change_thermal_expansion() {
     let mut rom = models::blade(3);
@@ -111,7 +112,7 @@ fn rotation_does_not_change_thermal_expansion() {
         assert!(left < 1e-6, "{left:e}");
         assert!(real(&run, "energy_residual_relative").abs() < 1e-10);
     }
-    // What nothing holds has no free expansion to keep.
+    // An unconstrained structure has no static thermal expansion to preserve.
     let mut loose = scene(rom);
     loose.settings.structures[0].spin.stiffening = true;
     loose.roms[0].stiffness.row_mut(0).fill(0.0);
@@ -120,7 +121,8 @@ fn rotation_does_not_change_thermal_expansion() {
     assert!(refused.contains("`stiffness`") && refused.contains("not positive definite"), "{refused}");
 }
 
-/// A softened blade rings at ω√(1 − sT): as it starts, and when it is warmed up on the way, where its energy changes by what heat takes.
+/// A softened blade vibrates at ω√(1 − sT): from the start, and when it is heated during the vibration, where its
+/// energy changes by the work of the heat.
 #[test]
 fn softening_lowers_frequency_by_root_of_stiffness() {
     let (temperature, first) = (300.0, ModalModel::from_rom(&models::blade(1), 0.0).unwrap().frequencies[0]);
@@ -151,7 +153,7 @@ fn softening_lowers_frequency_by_root_of_stiffness() {
             }
             go(&mut run, 1e-4);
         }
-        // From the phase between two instants of one mode alone.
+        // From the phase between two times of one mode alone.
         let q = |run: &Simulation| run.system().bank().modal_state(0, 0).0;
         let third = TAU / first / 3.0;
         let samples: Vec<f64> = (0..30)
@@ -170,7 +172,7 @@ fn softening_lowers_frequency_by_root_of_stiffness() {
         assert!(real(&run, "energy_residual_relative").abs() < 1e-11);
         let work = real(&run, "stiffening_work");
         assert!(if starts_warm { work == 0.0 } else { work < 0.0 }, "{work:e}");
-        // Slowly softened vibration keeps its action: energy falls as its frequency.
+        // Slowly softened vibration keeps its action: its energy falls with its frequency.
         if !starts_warm {
             let energy = real(&run, "kinetic_energy") + real(&run, "strain_energy");
             let before = energy - work;
@@ -180,7 +182,8 @@ fn softening_lowers_frequency_by_root_of_stiffness() {
     assert!((left - (1.0_f64 - 0.12).sqrt()).abs() < 1e-15 && PI > 3.0);
 }
 
-/// Spin and heat at once: states go on with the same bits, and a start at speed and temperature is the same as K₀(1 − sT) + Ω²K₁ + Ω⁴K₂.
+/// Spin and heat together: states continue with the same bits, and a start at speed and temperature agrees with K₀(1 −
+/// sT) + Ω²K₁ + Ω⁴K₂.
 #[test]
 fn speed_and_temperature_act_together() {
     let mut given = scene(models::blade(2));
@@ -228,14 +231,14 @@ fn rejects_temperatures_that_remove_all_stiffness() {
     assert!(hot.initialise(0.0).is_err());
 }
 
-/// Displacements of all blades as far as they go by themselves: `rows` of each, in the lanes of a run.
+/// Returns the displacements of all blades as far as they reach without contact: `rows` of each, in the lanes of a run.
 fn in_lanes(run: &Simulation, rows: &DMatrix<f64>) -> Vec<f64> {
     let (lanes, sectors) = (run.system().bank().lanes(), run.system().bank().sectors());
     rows.iter().flat_map(|row| (0..lanes).map(move |lane| if lane < sectors { *row } else { 0.0 })).collect()
 }
 
-/// α T L for any stiffness: blades of other frequencies rest where the others do, at the start and once they are warmed up, also where
-/// speed and heat change their stiffness.
+/// α T L holds for any stiffness: mistuned blades rest at the position of the others, at the start and after heating,
+/// also if speed and heat change their stiffness.
 #[test]
 fn mistuned_blades_expand_equally() {
     let factors = vec![0.9, 1.0, 1.1];
@@ -272,8 +275,8 @@ fn mistuned_blades_expand_equally() {
     }
 }
 
-/// Modes that a step does not resolve, and quasi-static ones, soften as the others do: free expansion is that of any temperature, and a
-/// force moves the blade as far as the softened one.
+/// Modes that a step does not resolve, and quasi-static ones, soften like the others: the free expansion is correct at
+/// any temperature, and a force moves the blade as far as its softened stiffness permits.
 #[test]
 fn softening_applies_to_unresolved_and_quasi_static_modes() {
     for (scheme, step) in
@@ -310,7 +313,7 @@ fn softening_applies_to_unresolved_and_quasi_static_modes() {
     }
 }
 
-/// The factor of a blade is one on its frequencies at every temperature and speed, wherever it started.
+/// The mistuning factor of a blade scales its frequencies at every temperature and speed, regardless of the start.
 #[test]
 fn mistuned_blades_soften_and_stiffen_by_their_own_stiffness() {
     let factor = 1.2;
@@ -342,7 +345,7 @@ fn mistuned_blades_soften_and_stiffen_by_their_own_stiffness() {
             go(&mut run, 1e-4);
         }
         assert!(real(&run, "energy_residual_relative").abs() < 1e-11);
-        // Zero crossings of the mode of the start.
+        // Zero crossings of the initial mode.
         let mut crossings = Vec::new();
         let q = |run: &Simulation| run.system().bank().modal_state(0, sector).0;
         let mut before = q(&run);
@@ -366,7 +369,8 @@ fn mistuned_blades_soften_and_stiffen_by_their_own_stiffness() {
     }
 }
 
-/// A rub while speed and temperature move, with everything that changes stiffness or loads at once: books close, states go on.
+/// A rub with changing speed and temperature, and with everything that changes stiffness or loads: the energy balance
+/// closes, states continue.
 #[test]
 fn the_energy_balance_closes_in_a_rub_that_warms_up() {
     for scheme in [Scheme::ModalExact, Scheme::CentralDifference, Scheme::MasslessBoundary] {

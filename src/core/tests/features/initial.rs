@@ -1,4 +1,4 @@
-//! Blades that move at the start, and modes with damping of their own, against free vibration written down.
+//! Blades that move at the start, and modes with individual damping, against closed forms of free vibration.
 
 use std::f64::consts::TAU;
 
@@ -11,7 +11,7 @@ use tiprub_test_models::{self as models, disk::TestDisk, go, real, set_element, 
 const NONE: InitialSettings =
     InitialSettings { mode: 1, sector: None, nodal_diameter: None, phase: 0.0, displacement: 0.0, velocity: 0.0 };
 
-/// A rotor far from its casing.
+/// Returns a rotor far from its casing.
 fn scene(rom: Rom, scheme: Scheme, initial: Vec<InitialSettings>) -> Scene {
     let mut scene = models::round(rom);
     let structure = &mut scene.settings.structures[0];
@@ -21,7 +21,7 @@ fn scene(rom: Rom, scheme: Scheme, initial: Vec<InitialSettings>) -> Scene {
     scene
 }
 
-/// q(t)/q₀ and q(t)/v₀ of free vibration.
+/// Returns q(t)/q₀ and q(t)/v₀ of free vibration.
 fn free(frequency: f64, ratio: f64, time: f64) -> [f64; 2] {
     let damped = frequency * (1.0 - ratio * ratio).sqrt();
     let (sine, cosine) = (damped * time).sin_cos();
@@ -33,7 +33,8 @@ fn most(values: impl Iterator<Item = f64>) -> f64 {
     values.fold(0.0, |most: f64, value| if value.abs() > most.abs() { value } else { most })
 }
 
-/// Two modes of all blades in patterns, and one of one blade: each goes on as free vibration to rounding, whatever the first step.
+/// Two modes of all blades in patterns, and one mode of one blade: each continues as free vibration to rounding,
+/// regardless of the first step.
 #[test]
 fn initial_motion_continues_as_free_vibration() {
     for scheme in [Scheme::ModalExact, Scheme::MasslessBoundary, Scheme::Galerkin, Scheme::CentralDifference] {
@@ -59,7 +60,7 @@ fn initial_motion_continues_as_free_vibration() {
         assert!((reported / energy - 1.0).abs() < tolerance, "{scheme:?}: {reported:e} J, {energy:e} J");
         let (mut off, mut largest) = (0.0_f64, 0.0_f64);
         for _ in 0..60 {
-            // Not the step that the initialisation took.
+            // Not the step used at initialisation.
             go(&mut run, 3.3e-5);
             for s in 0..6 {
                 for row in 0..9 {
@@ -111,7 +112,7 @@ fn initial_nodal_diameter_decays_without_exciting_others() {
     }
 }
 
-/// Logarithmic decrement of each mode: its own ratio where it has one, the common one where not. Of uncoupled and coupled sectors.
+/// Logarithmic decrement of each mode, with individual or common damping ratio, for uncoupled and coupled sectors.
 #[test]
 fn every_mode_decays_at_its_damping_ratio() {
     let ratios = [0.003, 0.05];

@@ -1,4 +1,4 @@
-//! What a scene may ask for, in all combinations: the ledger, states, laws of mechanics, no allocation.
+//! The features of a scene in all combinations: the ledger, states, laws of mechanics, no allocation.
 
 #[path = "../common/counting.rs"]
 mod counting;

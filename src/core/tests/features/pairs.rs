@@ -1,4 +1,4 @@
-//! Scenes of several structures and pairs: each is what it is alone, and together they keep the books.
+//! Scenes of several structures and pairs: each behaves as it does alone, and together they close the energy balance.
 
 use tiprub_core::settings::{BodyMotion, Scheme, Shape, Solver, StructureSettings};
 use tiprub_core::variables::{Causality, DataType};
@@ -8,7 +8,7 @@ use tiprub_test_models::{lattice, real, rich_blade, rub, several, spin};
 const SCHEMES: [Scheme; 3] = Scheme::RECURRENCES;
 const SOLVERS: [Solver; 3] = Solver::ALL;
 
-/// Set every input and parameter whose name ends with `name`.
+/// Sets every input and parameter whose name ends with `name`.
 fn set_all(simulation: &mut Simulation, name: &str, value: f64) {
     let rows = simulation.table().variables().iter().filter(|row| row.is_settable() && row.name.ends_with(name));
     let references: Vec<u32> = rows.map(|row| row.reference).collect();
@@ -18,7 +18,7 @@ fn set_all(simulation: &mut Simulation, name: &str, value: f64) {
     }
 }
 
-/// Real outputs, by name.
+/// Returns the real outputs with their names.
 fn outputs(simulation: &Simulation) -> Vec<(String, f64)> {
     let rows = simulation.table().variables().iter();
     let rows = rows.filter(|row| row.causality == Causality::Output && row.kind == DataType::Real);
@@ -29,12 +29,13 @@ fn outputs(simulation: &Simulation) -> Vec<(String, f64)> {
     elements.map(|(row, element)| (row.element_name(element), value(row, element))).collect()
 }
 
-/// Steps of 31 µs while the casing closes; `each` sees every internal step, and whether it ends a communication step.
+/// Performs steps of 31 µs while the casing closes; `each` sees every internal step, and whether it ends a
+/// communication step.
 fn run(scene: &Scene, steps: u32, each: impl FnMut(&Simulation, bool)) -> Simulation {
     run_closing(scene, steps, 5e-5, each)
 }
 
-/// The same by another length (m).
+/// Closes by `length` (m) instead.
 fn run_closing(scene: &Scene, steps: u32, length: f64, mut each: impl FnMut(&Simulation, bool)) -> Simulation {
     let mut simulation = Simulation::new(scene).unwrap();
     simulation.initialise(0.0).unwrap();
@@ -58,7 +59,7 @@ fn splitting_a_contact_pair_keeps_bit_identical_results() {
         for solver in SOLVERS {
             let mut whole = rub(6);
             (whole.settings.time.scheme, whole.settings.contacts[0].solver) = (scheme, solver);
-            // massless-boundary makes nine modes quasi-static of eight here.
+            // massless-boundary would make nine of the eight modes quasi-static here.
             if scheme == Scheme::MasslessBoundary {
                 continue;
             }
@@ -115,7 +116,7 @@ fn energy_balance_of_two_rotors_in_one_casing_closes() {
         let (mut off, mut largest, mut together) = (0.0_f64, 0.0_f64, 0);
         let simulation = run_closing(&scene, 80, 3.7e-4, |simulation, finished| {
             let system = simulation.system();
-            // Modal forces on the ring are those of the contacts at their places.
+            // Modal forces on the ring equal those of the contacts at their points.
             let tiprub_core::dynamics::sectors::Sectors::Uncoupled(bank) = system.structures()[2].modes() else {
                 panic!("the ring is one structure")
             };
@@ -160,20 +161,20 @@ fn torques_of_two_rotors_match_their_shaft_work() {
     });
     let shaft = simulation.system().ledger().shaft_work.value();
     assert!(shaft > 0.1 && (work / shaft - 1.0).abs() < 1e-12, "{work} and {shaft} J");
-    // Forces on the rotors are told by structure and by surface.
+    // Forces on the rotors are reported by structure and by surface.
     for (rotor, surface) in [("front", "front_casing"), ("rear", "rear_casing")] {
         let [own, of] = [rotor, surface].map(|name| real(&simulation, &format!("{name}.force_x")));
         assert_eq!(own.to_bits(), of.to_bits(), "{rotor}");
     }
 }
 
-/// What one rotor does to the casing the other one feels; with a casing a hundred times as stiff much less.
+/// The effect of one rotor on the casing is felt by the other one; much less with a casing a hundred times as stiff.
 #[test]
 fn rub_affects_the_other_rotor_through_the_casing() {
     let felt = |stiffness: f64| {
         let mut scene = several::in_one_casing(rub(6), Solver::Lcp, 0.15);
         scene.roms[2].stiffness *= stiffness;
-        // The rear never touches.
+        // The rear rotor never touches.
         scene.settings.contacts[1].gap = 2e-3;
         scene.settings.surfaces[1].shape = Shape::Circular {};
         let (mut changed, mut first) = (0.0_f64, None);
@@ -192,7 +193,7 @@ fn rub_affects_the_other_rotor_through_the_casing() {
     assert!(soft > 1e-6 && stiff < 0.1 * soft, "{soft:e} m, {stiff:e} m");
 }
 
-/// The leading edge meets a casing, the trailing edge a seal of smaller radius and other friction.
+/// The leading edge touches a casing, the trailing edge a seal of smaller radius with another friction coefficient.
 #[test]
 fn tip_and_seal_on_one_blade_have_separate_friction() {
     for solver in [Solver::Lcp, Solver::Film] {
@@ -220,7 +221,7 @@ fn tip_and_seal_on_one_blade_have_separate_friction() {
     }
 }
 
-/// Two blocks between two pairs of plates, in one scene or two.
+/// Two blocks between two pairs of plates, in one scene or in two.
 #[test]
 fn free_bodies_are_independent() {
     let one = lattice::squeezed();
@@ -265,7 +266,7 @@ fn free_bodies_are_independent() {
     assert!(real(&together, "energy_residual_relative").abs() < 1e-11);
 }
 
-/// States of several structures continue with the same bits, elsewhere and after a change of the step.
+/// States of several structures continue with the same bits, in another instance and after a change of the step.
 #[test]
 fn a_saved_state_of_two_rotors_continues_with_the_same_bits() {
     let scene = several::in_one_casing(rub(6), Solver::Coulomb, 0.15);
@@ -285,8 +286,8 @@ fn a_saved_state_of_two_rotors_continues_with_the_same_bits() {
     }
 }
 
-/// Bytes with a right checksum that one of two rotors refuses: its speed is beyond what its stiffness was fitted for. The other
-/// rotor would take its own.
+/// Bytes with a correct checksum that one of two rotors rejects: its speed exceeds the range for which its stiffness
+/// was fitted. The other rotor would accept its part.
 #[test]
 fn state_rejected_by_one_rotor_changes_nothing() {
     let mut scene = rub(6);
@@ -299,7 +300,7 @@ fn state_rejected_by_one_rotor_changes_nothing() {
     simulation.save_state(&mut own).unwrap();
     let mut refused = 0;
     for at in 0..own.len() - 24 {
-        // Reference speeds of both stand side by side, and so do the values that were set.
+        // The reference speeds of both are adjacent, and so are the values that were set.
         if own[at..at + 16] != [1300.0_f64.to_le_bytes(), (-1100.0_f64).to_le_bytes()].concat()[..] {
             continue;
         }

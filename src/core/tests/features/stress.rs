@@ -1,4 +1,4 @@
-//! Stress at chosen places, against the rows of the ROM and the definition of von Mises.
+//! Stress at chosen points, against the rows of the ROM and the definition of von Mises.
 
 use std::f64::consts::TAU;
 
@@ -8,12 +8,12 @@ use tiprub_core::settings::Shape;
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{self as models, element, go, set, started};
 
-/// A blade whose stresses are known functions of its contact displacements, ready to rub.
+/// Returns a blade whose stresses are known functions of its contact displacements, ready to rub.
 fn scene() -> Scene {
     let mut scene = models::bumps(models::blade(4));
     let rom = &mut scene.roms[0];
     let (order, nodes) = (rom.order(), rom.contact_nodes.len());
-    // As many watched points as contact nodes, so that their displacements are told beside.
+    // As many watched points as contact nodes, so that their displacements are outputs too.
     rom.extras.watched = Some(WatchedPoints { map: rom.contact_map.clone(), points: rom.contact_nodes.clone() });
     let factor =
         |row: usize, column: usize| 1e11 * (1.0 + row as f64) * if column.is_multiple_of(2) { 1.0 } else { -0.3 };
@@ -98,7 +98,7 @@ fn rejects_stress_output_without_stress_points() {
     assert!(broken.contains("`stress_map`: non-finite entry at (1, 1)"), "{broken}");
 }
 
-/// Blades with a load per kelvin and by the speed, whose static thermal stress is given.
+/// Returns blades with a load per kelvin and by the speed, and with a given static thermal stress.
 fn heated(thermal: fn(usize) -> f64) -> Scene {
     let mut scene = scene();
     (scene.settings.surfaces[0].shape, scene.settings.contacts[0].gap) = (Shape::Circular {}, 5e-3);
@@ -124,8 +124,8 @@ fn warm(scene: &Scene, temperature: f64) -> Simulation {
     run
 }
 
-/// At rest it is the static stress of the full model, none where that expands freely; with softening as much less as there is stiffness,
-/// and of a stiffer blade as much more.
+/// At rest the stress is the static one of the full model, which is zero for free expansion; softening reduces it in
+/// proportion to the stiffness, and a stiffer blade increases it in proportion.
 #[test]
 fn thermal_stress_of_warm_blade_matches_full_model() {
     for thermal in [(|_| 0.0) as fn(usize) -> f64, |row| 1e5 * (row as f64 - 4.5)] {
@@ -146,7 +146,7 @@ fn thermal_stress_of_warm_blade_matches_full_model() {
                 go(&mut moving, 2e-4);
             }
             for (run, tolerance) in [(warm(&scene, temperature), 1e-9), (moving, 1e-5)] {
-                // What the modes alone say is up to 4e9 Pa.
+                // The modes alone give up to 4e9 Pa.
                 for (found, expected) in stress_of(&run, 2).iter().zip(&expected) {
                     assert!((found - expected).abs() < 1e9 * tolerance, "{softening} {factor}: {found:e} {expected:e}");
                 }
@@ -155,8 +155,9 @@ fn thermal_stress_of_warm_blade_matches_full_model() {
     }
 }
 
-/// Forces decide the stress of what is held one way only: pulled by its own weight as it turns, a blade has the static stress of the full
-/// model whatever heat and mistuning leave of its stiffness, although it stretches by 13.6 % more.
+/// Forces determine the stress of a statically determinate blade: under its centrifugal force it has the static stress
+/// of the full model regardless of the effect of heat and mistuning on the stiffness, although it stretches by 13.6 %
+/// more.
 #[test]
 fn statically_determinate_stress_ignores_stiffness() {
     let mut scene = heated(|_| 0.0);
@@ -176,7 +177,7 @@ fn statically_determinate_stress_ignores_stiffness() {
             let expected = if temperature > 0.0 { longer } else { 0.88 * longer };
             assert!((moved / expected - 1.0).abs() < 1e-12, "{moved} {expected}");
             for (row, found) in stress_of(&run, sector).into_iter().enumerate() {
-                // What the modes alone say is up to 1e9 Pa.
+                // The modes alone give up to 1e9 Pa.
                 let expected = 1300.0 * 1300.0 * growth(row);
                 assert!((found - expected).abs() < 1e-2, "blade {sector}: {found:e} {expected:e}");
             }
@@ -193,7 +194,8 @@ fn statically_determinate_stress_ignores_stiffness() {
     assert!(refused.contains("`stress_centrifugal`"), "{refused}");
 }
 
-/// Displacements alone say nothing of the stress of what expands: it is refused by name, and never told wrongly.
+/// Displacements alone do not determine the stress of a structure that expands: the scene is rejected by name, and no
+/// wrong stress is reported.
 #[test]
 fn heated_blade_stress_requires_static_thermal_stress() {
     let mut scene = heated(|_| 0.0);

@@ -1,4 +1,5 @@
-//! Forces on casings and of their supports, amplitudes of modes, displacements of tips: against momentum and each other.
+//! Forces on casings and on their supports, amplitudes of modes, displacements of tips: against momentum and each
+//! other.
 
 use nalgebra::DMatrix;
 use tiprub_core::rom::{SUPPORT_ROWS, SupportRows};
@@ -10,8 +11,8 @@ use tiprub_test_models::{self as models, element, go, move_on, real, set, starte
 const SWING: f64 = 900.0;
 const STEP: f64 = 2e-7;
 
-/// A rub on a ring that swings as a whole on springs, beside its bending: nodal diameters 0 and 1, without tilt, have modal mass
-/// 1 kg and displacement 0.5 m, so that it weighs 4 kg and the springs have 4 kg (2πf)².
+/// Returns a rub on a ring that moves as a rigid body on springs, in addition to its bending: nodal diameters 0 and 1,
+/// without tilt, have modal mass 1 kg and displacement 0.5 m, so that it weighs 4 kg and the springs have 4 kg (2πf)².
 fn scene(scheme: Scheme) -> Scene {
     let mut scene = models::bumps(models::blade(3));
     models::on_ring(&mut scene, models::ring(36, 3), 0.0);
@@ -22,7 +23,7 @@ fn scene(scheme: Scheme) -> Scene {
     scene.settings.outputs.support_reaction = true;
     let rom = &mut scene.roms[1];
     rom.damping_ratio = 0.0;
-    // Translations of the ring: the mean of what its nodes do along x and y.
+    // Translations of the ring: the mean displacement of its nodes along x and y.
     let nodes = rom.contact_nodes.len();
     let mean = DMatrix::from_fn(2, 3 * nodes, |axis, row| {
         let (sine, cosine) = rom.contact_nodes[row / 3].position[1].sin_cos();
@@ -32,7 +33,7 @@ fn scene(scheme: Scheme) -> Scene {
     let stiffness = 4.0 * (std::f64::consts::TAU * SWING).powi(2);
     let mut rows = DMatrix::zeros(SUPPORT_ROWS, rom.order());
     rows.view_mut((0, 0), (2, rom.order())).copy_from(&(moved * -stiffness));
-    // Modes that tilt have the mean 0 but for rounding and the middle of the rings.
+    // Modes that tilt have the mean 0, except for rounding and the middle of the rings.
     for mode in 0..rom.order() {
         if (rom.stiffness[(mode, mode)].sqrt() / std::f64::consts::TAU - SWING).abs() > 1.0 {
             rows.column_mut(mode).fill(0.0);
@@ -44,7 +45,7 @@ fn scene(scheme: Scheme) -> Scene {
     scene
 }
 
-/// Displacement of the ring as a whole, by what the output tells of its middle nodes.
+/// Returns the rigid-body displacement of the ring, from the displacement outputs of its middle nodes.
 fn place(run: &Simulation) -> [f64; 2] {
     let radial = |i: u32| element(run, "casing_displacement", 36 + i);
     let angle = |i: u32| std::f64::consts::TAU * f64::from(i) / 36.0;
@@ -52,7 +53,8 @@ fn place(run: &Simulation) -> [f64; 2] {
     [sum(f64::cos), sum(f64::sin)]
 }
 
-/// Force of the blades plus that of the support is mass times acceleration, step by step: second differences of the places.
+/// The force of the blades plus that of the support is mass times acceleration, step by step: second differences of the
+/// positions.
 #[test]
 fn casing_forces_equal_its_momentum_change() {
     let mut run = started(&scene(Scheme::CentralDifference));
@@ -85,7 +87,7 @@ fn casing_forces_equal_its_momentum_change() {
     assert!(worst.iter().all(|worst| *worst < 1e-9 * largest), "{worst:?} of {largest}");
 }
 
-/// The moment about the axis is that on the rotor turned round, displaced by the shaft; on a rigid casing as well.
+/// The moment about the axis is the opposite of that on the rotor, displaced by the shaft; on a rigid casing as well.
 #[test]
 fn casing_moments_balance_rotor_moments_about_origin() {
     for flexible in [true, false] {
@@ -110,18 +112,18 @@ fn casing_moments_balance_rotor_moments_about_origin() {
             let expected = -(real(&run, "torque") + shaft[0] * fy - shaft[1] * fx);
             let moment = real(&run, "casing_moment_z");
             seen = seen.max(moment.abs());
-            // Of a surface of revolution the torque is that of the undeformed arm.
+            // For a surface of revolution the torque uses the undeformed lever arm.
             assert!((moment - expected).abs() <= 1e-9 * 0.25 * fx.hypot(fy), "{moment} {expected}");
         }
         assert!(seen > 1.0, "{seen} N m");
     }
 }
 
-/// A load that stays: the support takes all of it, the casing's own motion nothing.
+/// Under a constant load the support carries all of it, and the inertia of the casing nothing.
 #[test]
 fn support_balances_static_contact_force() {
     let mut scene = scene(Scheme::ModalExact);
-    // A blade that stands pressed into the casing, damped.
+    // A resting, damped blade pressed into the casing.
     scene.settings.structures[0].speed = 0.0;
     scene.settings.structures[0].damping_ratio = Some(0.5);
     scene.settings.structures[1].damping_ratio = Some(0.5);
@@ -137,8 +139,8 @@ fn support_balances_static_contact_force() {
     assert!(contact.abs() > 10.0 && (contact + support).abs() < 1e-6 * contact.abs(), "{contact} {support}");
 }
 
-/// Friction turns the casing: its support takes the moment of the contact, also where the mesh is larger than the surface, since a lining
-/// lies between them.
+/// Friction turns the casing: its support carries the moment of the contact, also if the mesh is larger than the
+/// surface, with a lining in between.
 #[test]
 fn support_balances_static_contact_moment() {
     for larger in [0.0, 0.07] {
@@ -150,7 +152,7 @@ fn support_balances_static_contact_moment() {
         scene.settings.contacts[0].friction = 0.3;
         scene.settings.time.step = 1e-6;
         let rom = &mut scene.roms[1];
-        // The ring turns as a whole on springs, beside its other modes: v = q/2 of a mass of 4 kg.
+        // The ring turns as a rigid body on springs, in addition to its other modes: v = q/2 of a mass of 4 kg.
         let radius = (1.0 + larger) * (models::RADIUS + models::GAP);
         rom.contact_nodes.iter_mut().for_each(|node| node.position[0] = radius);
         let (mode, square) = (rom.order(), (std::f64::consts::TAU * SWING).powi(2));
@@ -168,7 +170,7 @@ fn support_balances_static_contact_moment() {
         let mut run = started(&scene);
         set(&mut run, "gap_offset", -3.7e-4);
         (0..100).for_each(|_| go(&mut run, 2e-4));
-        // The ring turns to and fro a little; over some time it gains no momentum.
+        // The ring oscillates slightly; over some time it gains no momentum.
         let (mut contact, mut support) = (0.0, 0.0);
         for _ in 0..200 {
             go(&mut run, 2e-4);
@@ -180,7 +182,7 @@ fn support_balances_static_contact_moment() {
     }
 }
 
-/// Contact displacements are the modes' sum, of modes with unit modal mass.
+/// Contact displacements are the sum of the modes, with unit modal mass.
 #[test]
 fn tip_displacement_matches_modal_amplitudes() {
     let mut scene = models::bumps(models::blade(4));
@@ -197,7 +199,7 @@ fn tip_displacement_matches_modal_amplitudes() {
             for (axis, name) in ["radial", "tangential", "axial"].into_iter().enumerate() {
                 let reported = element(&run, &format!("blade[3].tip_{name}_displacement"), node);
                 let row = 3 * node as usize + axis;
-                // The modes of this ROM are its coordinates, up to their sense.
+                // The modes of this ROM are its coordinates, up to their sign.
                 let term = |mode: usize| {
                     let column = map.column(mode);
                     let most = column.iter().fold(0.0_f64, |a, b| if b.abs() > a.abs() { *b } else { a });

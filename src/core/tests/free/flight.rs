@@ -1,4 +1,4 @@
-//! A free master: flight, impact, sliding between two surfaces. Laws of mechanics, and states that continue.
+//! Free masters: flight, impact, sliding between two surfaces; laws of mechanics, and states that continue.
 
 use lattice::*;
 use tiprub_core::settings::*;
@@ -16,7 +16,7 @@ fn size(v: [f64; 3]) -> f64 {
     v.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// Scenes in which something happens: (name, scene, communication steps of 1e-5 s).
+/// Returns scenes with contact: (name, scene, communication steps of 1e-5 s).
 fn events() -> Vec<(&'static str, Scene, usize)> {
     let thrown = |velocity| {
         scene(block([0.0; 3], 3e6), &[(BlockSide::Left, 0.0203), (BlockSide::Right, 0.021)], false, velocity)
@@ -38,7 +38,7 @@ fn events() -> Vec<(&'static str, Scene, usize)> {
     ]
 }
 
-/// What counts as a small displacement is so beside the smallest surface that the body meets, for both of its pairs.
+/// The limit of small displacements is relative to the smallest surface that the body can touch, for both of its pairs.
 #[test]
 fn displacement_limit_scales_with_the_smallest_surface() {
     let mut both = scene(block([0.0; 3], 3e6), &[(BlockSide::Left, 0.06), (BlockSide::Right, 0.06)], false, [0.0; 3]);
@@ -107,7 +107,7 @@ fn every_scheme_and_solver_conserves_momentum_and_energy() {
     println!("momentum within {momentum_off:.1e}, energy within {residual_off:.1e}");
 }
 
-/// Angular momentum about z of linear theory, Σ m (X × v), from the displacements of all nodes.
+/// Returns the angular momentum about z of linear theory, Σ m (X × v), from the displacements of all nodes.
 fn angular_momentum(simulation: &Simulation, rom: &tiprub_core::Rom) -> f64 {
     let bank = simulation.system().bank();
     let rate = |node: usize, i: usize| {
@@ -147,7 +147,7 @@ fn off_centre_impact_rotates_the_body() {
     }
 }
 
-/// Largest difference between left and right and largest value: displacements across (m), forces (N).
+/// Returns the largest difference between left and right and the largest value: displacements across (m), forces (N).
 fn asymmetry(simulation: &Simulation) -> [[f64; 2]; 2] {
     let mirror = |node: usize| (PER_SIDE - 1 - node / 9) * 9 + node % 9;
     let values = |name: &str| (0..27).map(|node| element(simulation, name, node)).collect::<Vec<_>>();
@@ -171,7 +171,7 @@ fn a_symmetric_scene_stays_symmetric_to_rounding() {
         let [off, uneven] = most.map(|[off, largest]| off / largest);
         let most = most[1][1];
         println!("{scheme:?}, {solver:?}: displacements {off:.1e}, forces {uneven:.1e} of {most:.3e} N");
-        // Gauss-Seidel goes through the contacts one by one and ends at its tolerance.
+        // Gauss-Seidel handles the contacts one after the other and ends at its tolerance.
         let bound = if solver == Solver::Coulomb { 1e-8 } else { 1e-10 };
         assert!(off < bound && uneven < bound && most > 100.0, "{scheme:?}, {solver:?}: {off:e}, {uneven:e}");
     }
@@ -198,7 +198,7 @@ fn film_with_central_differences_matches_the_paper() {
     let gaps = DVector::from_iterator(18, contacts.iter().map(|(_, x)| distances[usize::from(*x < 0.0)] - 0.5 * SIDE));
     let (mut off, mut force_off, mut touched) = (0.0_f64, 0.0_f64, 0);
     for _ in 0..500 {
-        // Prediction (9), whose slip gives the direction of friction.
+        // Prediction (9), whose slip determines the direction of friction.
         let force = &rom.stiffness * &dense.now;
         let moved = DVector::from_fn(order, |row, _| {
             dense.now[row] - dense.before[row] - h * h * force[row] / rom.mass[(row, row)]
@@ -347,7 +347,7 @@ fn the_first_step_may_have_any_length() {
             Solver::Lcp,
             scheme,
         );
-        // The scene's own steps are 1e-6 s; these make others.
+        // The scene uses steps of 1e-6 s; these change them.
         for first in [1e-5, 0.7e-6, 1.4e-6, 3.3e-6, 1e-9, 1e-12] {
             let mut simulation = started(&scene);
             let state = saved(&simulation);
@@ -369,7 +369,7 @@ fn the_first_step_may_have_any_length() {
     }
 }
 
-/// The scene turned about the origin by the rotation `r` and moved by `shift` (m).
+/// Returns the scene rotated about the origin by `r` and shifted by `shift` (m).
 fn carried_elsewhere(scene: &Scene, r: [[f64; 3]; 3], shift: [f64; 3]) -> Scene {
     let turned = |v: [f64; 3]| r.map(|row| (0..3).map(|j| row[j] * v[j]).sum::<f64>());
     let mut scene = scene.clone();
@@ -441,7 +441,7 @@ fn gaps_at_the_start_are_distances_to_the_surfaces() {
         let expected = match place[0] {
             0 => 0.0003,
             2 => 0.001,
-            // Nodes of no pair have nothing to touch.
+            // Nodes without a pair have nothing to touch.
             _ => 1e9,
         };
         let found = element(&simulation, "block.clearance", u32::try_from(node).unwrap());

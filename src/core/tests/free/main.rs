@@ -1,4 +1,4 @@
-//! Free structures: how they move, and what is refused.
+//! Free structures: motion, and errors.
 
 #[path = "../common/counting.rs"]
 mod counting;

@@ -1,4 +1,4 @@
-//! Free bodies by a tolerance: an impact in closed form, momentum and energy, convergence, states that continue.
+//! Free bodies with adaptive steps: an impact in closed form, momentum and energy, convergence, states that continue.
 
 use crate::counting::allocations_of;
 use crate::guide::{self, print_row};
@@ -16,10 +16,10 @@ const STIFFNESS: f64 = 1e7;
 const VELOCITY: f64 = 1.0;
 const DISTANCE: f64 = 3e-4;
 
-/// Mass where each of four springs ends (kg).
+/// Mass at the end of each of four springs (kg).
 const END: f64 = 1e-9;
 
-/// A mass on four springs, with next to no mass where they end.
+/// Returns a mass on four springs with almost massless ends.
 fn sprung() -> Rom {
     let order = 15;
     let mass = DMatrix::from_fn(order, order, |i, j| match (i == j, i) {
@@ -42,7 +42,8 @@ fn sprung() -> Rom {
     structure("sprung", mass, stiffness, map, nodes)
 }
 
-/// A body in front of the left wall (m, m/s). Springs as stiff as these are rarely meant; here they are.
+/// Returns a body in front of the left wall (m, m/s). Springs of this stiffness are usually a mistake; here they are
+/// intended.
 fn thrown_at_wall(body: Rom, distance: f64, velocity: [f64; 3]) -> Scene {
     let mut scene = scene(body, &[(BlockSide::Left, distance)], false, velocity);
     scene.settings.accept_implausible = true;
@@ -55,7 +56,8 @@ fn marched(mut scene: Scene, tolerance: f64, friction: f64) -> Scene {
     scene
 }
 
-/// It touches for half a period and leaves as fast as it came, less what friction takes along the wall: 2µ of it.
+/// The body touches for half a period and leaves with its approach speed, reduced along the wall by the friction
+/// impulse: 2µ of it.
 #[test]
 fn mass_on_springs_rebounds_after_half_a_period() {
     let frequency = (STIFFNESS / MASS).sqrt();
@@ -67,7 +69,7 @@ fn mass_on_springs_rebounds_after_half_a_period() {
             let mut scene = marched(thrown, tolerance, friction);
             scene.settings.surfaces[0].rigid = true;
             let (mut simulation, mut impulse) = (started(&scene), 0.0);
-            // By then the body is where it would be without the wall for half a period in its middle.
+            // The body is then where it would be if the wall had held it for half a period.
             let steps = 40;
             for _ in 0..steps {
                 go(&mut simulation, H);
@@ -79,10 +81,10 @@ fn mass_on_springs_rebounds_after_half_a_period() {
             let left = time - touch - std::f64::consts::PI / frequency;
             assert!(left > 1e-4, "it has not left: {left}");
             assert!((impulse - (MASS + 4.0 * END) * (VELOCITY + vx)).abs() < 1e-12, "{impulse} N·s");
-            // ∫ of the velocity along the wall: friction takes µ times what the wall gives.
+            // ∫ of the velocity along the wall: the friction impulse is µ times the normal impulse.
             let lost = friction * (x + VELOCITY * time);
             let off = [x - (VELOCITY * left - DISTANCE), y - (along * time - lost)].map(f64::abs);
-            // A thousandth of the extent is what the tolerance is a share of.
+            // The tolerance is a fraction of a thousandth of the extent.
             errors.push(off[0].max(off[1]) / (tolerance * 1e-3 * SIDE));
             let speeds = [vx - VELOCITY, vy - (along - friction * (vx + VELOCITY))].map(f64::abs);
             assert!(speeds[0] < 0.2 * tolerance && speeds[1] < 1e-11, "µ {friction}, {tolerance}: {speeds:?}");
@@ -93,7 +95,7 @@ fn mass_on_springs_rebounds_after_half_a_period() {
     }
 }
 
-/// Scenes in which something happens, and for how many steps.
+/// Returns scenes with contact, and their numbers of steps.
 fn events() -> Vec<(&'static str, Scene, usize)> {
     let thrown =
         scene(faces([0.0; 3]), &[(BlockSide::Left, 0.0203), (BlockSide::Right, 0.021)], false, [-6.0, 30.0, 4.0]);
@@ -138,7 +140,7 @@ fn momentum_and_energy_are_conserved_within_tolerance() {
     }
 }
 
-/// Displacements of all contact nodes at communication points, without the flight (m).
+/// Returns the displacements of all contact nodes at communication points, without the free flight (m).
 fn flown(scene: &Scene, steps: usize) -> Vec<f64> {
     let mut simulation = started(scene);
     let velocity = scene.settings.structures[0].velocity;
@@ -156,7 +158,8 @@ fn apart(a: &[f64], b: &[f64]) -> f64 {
     (square(&mut a.iter().zip(b).map(|(a, b)| a - b)) / square(&mut b.iter().copied())).sqrt()
 }
 
-/// Errors (root mean square) over the tolerances, which are a share of a thousandth of the extent, against a far smaller one.
+/// Returns the errors (root mean square) over the tolerances, which are relative to a thousandth of the extent, against
+/// a far smaller tolerance.
 fn over_tolerance(of: impl Fn(f64) -> Scene, steps: usize, tolerances: &[f64], smallest: f64) -> Vec<f64> {
     let exact = flown(&of(smallest), steps);
     let size = (exact.iter().map(|value| value * value).sum::<f64>() / exact.len() as f64).sqrt();
@@ -166,7 +169,7 @@ fn over_tolerance(of: impl Fn(f64) -> Scene, steps: usize, tolerances: &[f64], s
 
 const TOLERANCES: [f64; 4] = [1e-2, 1e-3, 1e-4, 1e-5];
 
-/// What remains goes down with the tolerance, on plates that give way, with friction.
+/// The error decreases with the tolerance, on flexible plates with friction.
 #[test]
 fn error_stays_below_the_tolerance() {
     for (name, scene, steps) in events().drain(..2) {
@@ -181,7 +184,8 @@ fn error_stays_below_the_tolerance() {
     guide::hold("cargo test -p tiprub-core --test free marched");
 }
 
-/// The same body by other equations: with the mass of its contact nodes. Both tend to the same flight, but for that mass.
+/// The same body with massive contact nodes: both models converge to the same flight, except for the effect of that
+/// mass.
 #[test]
 fn light_contact_nodes_converge_to_massless_ones() {
     let mut thrown = thrown_at_wall(sprung(), DISTANCE, [-VELOCITY, 3.0, 0.0]);
@@ -221,7 +225,7 @@ fn goes_on(scene: &Scene, steps: usize) {
     assert!(simulation.system().factorisations() > 100, "nothing touched");
 }
 
-/// Over a free edge, and behind the surface already.
+/// Over a free edge and already behind the surface.
 #[test]
 fn node_passing_behind_the_surface_ends_the_run() {
     let distance = 0.5 * SIDE - 3e-3;
@@ -232,7 +236,7 @@ fn node_passing_behind_the_surface_ends_the_run() {
     assert!(error.contains("edge"), "{error}");
 }
 
-/// Some of its nodes go off the plate along z while they touch.
+/// Some of its nodes leave the plate along z while they touch.
 #[test]
 fn body_sliding_off_an_edge_continues() {
     for friction in [0.0, 0.2] {
@@ -254,7 +258,8 @@ fn body_sliding_off_an_edge_continues() {
     }
 }
 
-/// Thrown at a plate more across than along it: vibration turns sliding round, and friction of sliding would put energy in.
+/// Thrown at a plate more normally than tangentially: vibration reverses the sliding, and sliding friction would add
+/// energy.
 #[test]
 fn friction_that_adds_energy_ends_the_run() {
     for (rigid, tolerance) in [(false, 1e-1), (false, 1e-3), (true, 1e-1), (true, 1e-3)] {
@@ -275,7 +280,7 @@ fn friction_that_adds_energy_ends_the_run() {
     }
 }
 
-/// The same throws with a law that knows sticking: friction takes, and what remains goes down with the tolerance.
+/// The same throws with sticking friction: friction only dissipates, and the error decreases with the tolerance.
 #[test]
 fn sticking_friction_only_dissipates_energy() {
     for rigid in [true, false] {
@@ -309,7 +314,8 @@ fn sticking_friction_only_dissipates_energy() {
     guide::hold("cargo test -p tiprub-core --test free sticking");
 }
 
-/// Slower along the wall than friction stops: by other equations, with the mass of its contact nodes, it sticks as well.
+/// The tangential velocity is so small that friction stops the body: the model with massive contact nodes sticks as
+/// well.
 #[test]
 fn rebound_after_stick_matches_light_contact_nodes() {
     let mut thrown = thrown_at_wall(sprung(), DISTANCE, [-VELOCITY, 0.05, 0.0]);
@@ -327,8 +333,8 @@ fn rebound_after_stick_matches_light_contact_nodes() {
     assert!(errors[1] < 0.6 * errors[0] && errors[1] < 1e-3, "{errors:?}");
 }
 
-/// The modes that follow contact at once leave some directions rigid. Of a body whose contact nodes are where all springs end they leave
-/// none.
+/// Quasi-static modes may leave some directions rigid. For a body whose contact nodes are at the ends of all springs
+/// there is no such direction.
 #[test]
 fn warns_of_contact_without_independent_flexibility() {
     let reported = |rom: Rom| {

@@ -1,4 +1,4 @@
-//! What a scene with a free master is refused for, before it flies and on the flight.
+//! Errors of scenes with a free master, before and during the flight.
 
 use lattice::*;
 use tiprub_core::settings::*;
@@ -13,7 +13,7 @@ fn excessive_penetration_of_free_body_ends_with_reason() {
     assert!(error.contains("a tenth of the extent"), "{error}");
 }
 
-/// Why a scene is refused.
+/// Returns the error of a rejected scene.
 #[track_caller]
 fn refusal(change: impl FnOnce(&mut Scene)) -> String {
     let mut scene = squeezed();
@@ -63,7 +63,7 @@ fn rejects_meaningless_scenes_with_reason() {
     }
 }
 
-/// A light mode of its own that moves some contact nodes by some vectors.
+/// Adds a light mode that moves some contact nodes by given vectors.
 fn with_mode(mut rom: Rom, shape: impl IntoIterator<Item = (usize, [f64; 3])>) -> Rom {
     let order = rom.order();
     let grown = |matrix: &nalgebra::DMatrix<f64>, rows: usize| matrix.clone().resize(rows, order + 1, 0.0);
@@ -77,13 +77,13 @@ fn with_mode(mut rom: Rom, shape: impl IntoIterator<Item = (usize, [f64; 3])>) -
     rom
 }
 
-/// The block flies at a plate a distance (m) away.
+/// Returns the block flying at a plate at a distance (m).
 fn at_plate(distance: f64) -> Scene {
     let scene = scene(block([0.0; 3], 3e6), &[(BlockSide::Left, distance)], false, [-15.0, 3.0, 0.0]);
     with(scene, 1.5, Solver::Lcp, Scheme::ModalExact)
 }
 
-/// That plate rigid, and the block with such a mode.
+/// Returns the block with such a mode, and the plate rigid.
 fn with_local_mode(distance: f64, shape: &[(usize, [f64; 3])]) -> Scene {
     let mut scene = at_plate(distance);
     scene.settings.surfaces[0].rigid = true;
@@ -93,9 +93,9 @@ fn with_local_mode(distance: f64, shape: &[(usize, [f64; 3])]) -> Scene {
 
 #[test]
 fn rejects_friction_that_jams_a_free_body() {
-    // Near, and after two lengths of the block.
+    // Near, and after a flight of two lengths of the block.
     for distance in [0.0203, 0.1] {
-        // Pushed in, the node moves along its slip: friction against the slip pushes it in further.
+        // When it is pushed in, the node moves along its slip: friction against the slip pushes it in further.
         let mut simulation = Simulation::new(&with_local_mode(distance, &[(0, [1.0, 1.0, 0.0])])).unwrap();
         let error = simulation.initialise(0.0).unwrap_err().to_string();
         assert!(error.contains("contact of left_000 alone has no unique solution"), "{error}");
@@ -104,7 +104,7 @@ fn rejects_friction_that_jams_a_free_body() {
     }
 }
 
-/// The same where it is the plate that yields along its slip.
+/// The plate yields along the slip instead.
 #[test]
 fn rejects_friction_that_jams_contact_on_a_plate() {
     let with_plate = |sideways: f64| {
@@ -144,7 +144,7 @@ fn rejects_a_body_that_is_too_fast_for_the_step() {
             "{error}"
         );
     }
-    // A tenth of the block in one step is the limit.
+    // The limit is a tenth of the block in one step.
     let mut slow = scene(block([0.0; 3], 3e6), &[(BlockSide::Left, 0.5)], false, [3900.0, 0.0, 0.0]);
     slow.settings.accept_implausible = true;
     let mut slow = started(&slow);
@@ -163,7 +163,8 @@ fn rejects_node_that_crosses_an_edge_from_behind() {
         let error = thrown(0.02 - depth, [0.0, -40.0, 0.0], 60).unwrap_err().to_string();
         assert!(error.contains("contact node left_0") && error.contains("has passed the edge"), "{depth} m: {error}");
     }
-    // In front of it all is well, and what arrives from in front in the step that passes the edge is an impact.
+    // In front of the plate there is no error, and a node that arrives from the front in the step that passes the edge
+    // has an impact.
     assert!(real(&thrown(0.0203, [0.0, -40.0, 0.0], 60).unwrap(), "impact_loss") == 0.0);
     for distance in [0.020_010, 0.020_05] {
         let hit = thrown(distance, [-4.0, -40.0, 0.0], 8).unwrap();

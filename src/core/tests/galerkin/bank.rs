@@ -1,11 +1,11 @@
-//! Energy over very many impacts that take none: what the bank holds is bounded.
+//! Energy over very many impacts without loss: the content of the energy bank is bounded.
 
 use super::{SECTORS, scene};
 use crate::guide::{self, print_row};
 use tiprub_core::settings::{Scheme, Shape};
 use tiprub_test_models::{go, real, set, started};
 
-/// Blades without damping and friction that are squeezed by a round casing, and then swing against it.
+/// Undamped, frictionless blades are squeezed by a round casing, and then vibrate against it.
 #[test]
 fn blades_conserve_energy_over_thousands_of_impacts() {
     let (longest, turns) = (8e-5, 40.0);

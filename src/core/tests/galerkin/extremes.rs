@@ -1,4 +1,5 @@
-//! Smallest clearances and largest forces of communication steps: those within internal steps, not only at their points.
+//! Smallest clearances and largest forces of communication steps: those within internal steps, not only at their end
+//! points.
 
 use super::{H, SECTORS, run, scene};
 use tiprub_core::settings::{Scheme, Shape};
@@ -6,10 +7,10 @@ use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::disk::TestDisk;
 use tiprub_test_models::{GAP, element, go, real, set, started};
 
-/// Communication step (s), of ten longest steps.
+/// Communication step (s), equal to ten of the longest steps.
 const WINDOW: f64 = 8e-4;
 
-/// Smallest clearance of every blade (m), and the largest force (N), of each communication step.
+/// Returns the smallest clearance of every blade (m) and the largest force (N) of each communication step.
 fn windows(scene: &Scene, drive: fn(&mut Simulation, u32)) -> Vec<(Vec<f64>, f64)> {
     let mut simulation = started(scene);
     let all = (0..12).map(|n| {
@@ -21,7 +22,8 @@ fn windows(scene: &Scene, drive: fn(&mut Simulation, u32)) -> Vec<(Vec<f64>, f64
     all.collect()
 }
 
-/// How far the smallest clearances (m) are from others, and the largest forces as a share of the largest of all.
+/// Returns the largest difference of the smallest clearances (m), and that of the largest forces relative to the
+/// largest of all.
 fn apart(found: &[(Vec<f64>, f64)], others: &[(Vec<f64>, f64)]) -> (f64, f64) {
     let largest = others.iter().fold(1.0, |largest: f64, other| largest.max(other.1));
     let pairs = found.iter().zip(others);
@@ -31,7 +33,7 @@ fn apart(found: &[(Vec<f64>, f64)], others: &[(Vec<f64>, f64)]) -> (f64, f64) {
     })
 }
 
-/// A change of the scene, and what the importer sets before a communication step.
+/// A change of the scene, and the inputs that the importer sets before a communication step.
 type ExtremesCase = (&'static str, fn(&mut Scene), fn(&mut Simulation, u32));
 
 const CASES: [ExtremesCase; 5] = [
@@ -58,7 +60,8 @@ fn wide(simulation: &mut Simulation, _: u32) {
     set(simulation, "casing_radius_change", 2e-4);
 }
 
-/// The smallest clearance is within the tolerance, a share of the clearance, of what steps of half a microsecond find.
+/// The smallest clearance agrees with that of steps of half a microsecond within the tolerance, a fraction of the
+/// clearance.
 #[test]
 fn extremes_do_not_depend_on_the_longest_step() {
     for (name, change, drive) in CASES {

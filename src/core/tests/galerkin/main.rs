@@ -1,5 +1,5 @@
-//! Continuous Galerkin in time on whole scenes: against massless-boundary with ever shorter steps, within its tolerance, with books that
-//! close, with all it may be combined with.
+//! Continuous Galerkin in time on whole scenes: against massless-boundary with ever shorter steps, within its
+//! tolerance, with a closed energy balance, with all supported features.
 
 mod bank;
 #[path = "../common/counting.rs"]
@@ -41,7 +41,7 @@ fn scene(scheme: Scheme, step: f64, tolerance: f64) -> Scene {
     scene
 }
 
-/// What a run shows.
+/// Results of a run.
 struct GalerkinRun {
     /// Displacements of all contact rows at communication points (m).
     displacements: Vec<f64>,
@@ -51,7 +51,7 @@ struct GalerkinRun {
     shaft: f64,
     residual: f64,
     lowest: f64,
-    /// Per blade.
+    /// Number of steps per blade.
     steps: u64,
 }
 
@@ -91,7 +91,7 @@ fn apart(a: &[f64], b: &[f64]) -> f64 {
 fn massless_boundary_converges_to_galerkin_within_tolerance() {
     let exact = run(&scene(Scheme::Galerkin, H, 1e-7), still);
     assert!(exact.residual < 1e-13 && exact.lowest > -1e-9, "{:e}, {:e}", exact.residual, exact.lowest);
-    // The longest step changes nothing, a shape that grows in included.
+    // The longest step has no influence, even with a ramped shape.
     let shorter = run(&scene(Scheme::Galerkin, 0.25 * H, 1e-7), still);
     let distance = apart(&shorter.displacements, &exact.displacements);
     assert!(distance < 1e-6, "{distance:e}");
@@ -101,7 +101,7 @@ fn massless_boundary_converges_to_galerkin_within_tolerance() {
     let distance = apart(&fine.displacements, &exact.displacements);
     print_row!("massless-boundary, h = 0.05 us: {distance:.1e}, impulse {:.1e}", second / exact.impulse);
     assert!(distance < 1e-5);
-    // Of first order in h, towards the same.
+    // First order in h, towards the same limit.
     assert!((first / second - 2.0).abs() < 0.1 && (second / exact.impulse).abs() < 1e-4, "{first:e} {second:e}");
     for tolerance in [1e-2, 1e-3, 1e-4, 1e-5] {
         let found = run(&scene(Scheme::Galerkin, H, tolerance), still);
@@ -112,7 +112,7 @@ fn massless_boundary_converges_to_galerkin_within_tolerance() {
     guide::hold("cargo test -p tiprub-core --test galerkin");
 }
 
-/// What the scheme may be combined with: a change of the scene, and what the importer sets on the way.
+/// A change of the scene for each feature that the scheme supports.
 type Combination = fn(&mut Scene);
 
 type CombinedFeature = (&'static str, f64, Combination, fn(&mut Simulation, f64));
@@ -191,7 +191,7 @@ fn every_combination_agrees_with_massless_boundary() {
     }
 }
 
-/// Coupled sectors step together, by nodal diameters; as one structure they are one sector that steps by itself.
+/// Coupled sectors step together, by nodal diameters; the equivalent single structure is one sector that steps alone.
 #[test]
 fn coupled_sectors_match_the_disk_as_one_structure() {
     for (sectors, nodes, friction) in [(5, 2, 0.0), (6, 1, 0.15)] {
@@ -210,7 +210,7 @@ fn coupled_sectors_match_the_disk_as_one_structure() {
     }
 }
 
-/// Displacements of all contact rows of a disk, sector by sector, at communication points (m).
+/// Returns the displacements of all contact rows of a disk, sector by sector, at communication points (m).
 fn disk_displacements(mut scene: Scene, tolerance: f64) -> Vec<f64> {
     scene.settings.time = TimeSettings { tolerance: Some(tolerance), ..scene_time() };
     scene.settings.outputs.energies = true;
@@ -219,7 +219,7 @@ fn disk_displacements(mut scene: Scene, tolerance: f64) -> Vec<f64> {
     for _ in 0..60 {
         go(&mut simulation, H);
         let bank = simulation.system().bank();
-        // Of sectors, or of one structure with the nodes of all in a row.
+        // Of sectors, or of a single structure with the nodes of all sectors in sequence.
         for sector in 0..bank.sectors() {
             displacements.extend((0..bank.rows()).map(|row| bank.row(row, sector)));
         }
@@ -231,7 +231,7 @@ fn disk_displacements(mut scene: Scene, tolerance: f64) -> Vec<f64> {
     displacements
 }
 
-/// A tolerance that asks for nothing: books close all the same, and nothing is above what was put in.
+/// With a very loose tolerance the energy balance still closes, and the energy does not exceed the energy supplied.
 #[test]
 fn elastic_casing_with_blades_at_rest_gains_no_energy() {
     let mut scene = scene(Scheme::Galerkin, H, 0.1);
@@ -254,7 +254,7 @@ fn elastic_casing_with_blades_at_rest_gains_no_energy() {
     assert!(most > 0.1, "{most}");
 }
 
-/// Slip that is small against what casings and blades swing by, and gaps that cannot be closer than rounding.
+/// Covers slip that is small compared with the vibration of casings and blades, and gaps that are close to rounding.
 #[test]
 fn converges_for_slow_rotors_and_small_tolerances() {
     for (speed, tolerance, carried) in
@@ -341,7 +341,7 @@ fn goes_on_with_the_same_bits(scene: &Scene) {
     simulation.restore_state(&state).unwrap();
     go_on(&mut simulation);
     assert_eq!(bits(&simulation), expected);
-    // Between two spans of one communication step as well.
+    // Also between two spans of one communication step.
     simulation.begin_step(simulation.time(), 3.0 * H).unwrap();
     simulation.advance().unwrap();
     let between = saved(&simulation);
@@ -352,7 +352,7 @@ fn goes_on_with_the_same_bits(scene: &Scene) {
     assert_eq!(bits(&other), expected);
 }
 
-/// A blade that nothing comes near takes one step a span, and no gap is looked at.
+/// A blade far from any surface takes one step per span without any gap evaluation.
 #[test]
 fn free_flight_takes_one_step_per_span() {
     let mut scene = scene(Scheme::Galerkin, H, 1e-3);
@@ -386,7 +386,7 @@ fn damping_follows_the_parameter() {
         (0..60).for_each(|_| go(&mut simulation, H));
         let loss = real(&simulation, "damping_loss");
         let state = saved(&simulation);
-        // A state brings its damping with it.
+        // A state includes its damping.
         let mut other = Simulation::new(&scene).unwrap();
         other.restore_state(&state).unwrap();
         [&mut simulation, &mut other].into_iter().for_each(|one| (0..20).for_each(|_| go(one, H)));
@@ -434,7 +434,7 @@ fn bound(simulation: &mut Simulation, most: i32) -> tiprub_core::Result<()> {
     simulation.set_integer(reference, most)
 }
 
-/// All that can be read, and all that is saved.
+/// Returns everything that can be read, and everything that is saved.
 fn everything(simulation: &Simulation) -> (Vec<u64>, Vec<u8>) {
     (bits(simulation), saved(simulation))
 }
@@ -454,7 +454,7 @@ fn discarded_step_changes_nothing() {
         assert_eq!(real(&free, "internal_steps_max").to_bits(), (most as f64).to_bits());
     }
     assert!(most > 20, "{most}");
-    // The next three spans at once, with inputs that change.
+    // The next three spans in one communication step, with changing inputs.
     let length = 3.0 * H;
     for simulation in [&mut free, &mut bounded] {
         set(simulation, "speed", 1.01 * real(simulation, "speed"));
@@ -481,7 +481,7 @@ fn discarded_step_changes_nothing() {
         );
         assert_eq!(everything(&bounded), state, "{allowed}");
     }
-    // A shorter step, withdrawn again by the importer's own means, and the same with enough steps: the same bits.
+    // A shorter step, withdrawn by restoring a state, and the same step with enough internal steps give the same bits.
     bound(&mut bounded, i32::try_from(needed).unwrap()).unwrap();
     let state = saved(&bounded);
     go(&mut bounded, 0.25 * H);
@@ -489,7 +489,7 @@ fn discarded_step_changes_nothing() {
     assert_eq!(allocations_of(|| go(&mut bounded, length)), 0);
     assert_eq!(bits(&bounded), expected);
     free.restore_state(&here).unwrap();
-    // What may end early ends where the last span left it.
+    // A step that may end early ends at the end of the last span.
     bound(&mut free, i32::try_from(needed - 1).unwrap()).unwrap();
     free.begin_partial_step(free.time(), length).unwrap();
     let mut done = 0;
@@ -528,12 +528,12 @@ fn schemes_respect_the_step_limit_and_reject_invalid_ones() {
         }
         assert_eq!(bits(&simulation), bits(&other));
         assert_eq!(real(&simulation, "internal_steps_max").to_bits(), 400.0_f64.to_bits());
-        // What may end early does as many as are allowed.
+        // A step that may end early takes as many internal steps as are allowed.
         simulation.begin_partial_step(simulation.time(), 1000e-7).unwrap();
         while simulation.advance().is_ok() {}
         simulation.end_step_early().unwrap();
         assert!((simulation.time() - 800e-7).abs() < 1e-15, "{}", simulation.time());
-        // Set while a step is under way it holds from the next on.
+        // A limit set during a step applies from the next step on.
         bound(&mut other, 0).unwrap();
         other.begin_step(other.time(), 1000e-7).unwrap();
         bound(&mut other, 1).unwrap();
@@ -561,7 +561,7 @@ fn distant_bodies_take_whole_communication_steps() {
     let long = 0.05;
     let lengths = |count: usize| std::iter::repeat_n(long / count as f64, count);
     let run = |parts: usize| {
-        // Wide at first; then lobes rub.
+        // Wide at first; later the lobes rub.
         let mut simulation = Simulation::new(&scene).unwrap();
         set(&mut simulation, "casing_radius_change", 5e-4);
         simulation.initialise(0.0).unwrap();
@@ -593,7 +593,7 @@ fn distant_bodies_take_whole_communication_steps() {
     assert!(marched[0].0 == 625 * sectors && flown[3].1 > 1000 && residual < 1e-12);
     assert!(flown[7] == (2 * sectors, 0), "at rest again: {flown:?}");
     for (long, short) in long.iter().zip(&short) {
-        // The narrowest place, where spans look every 80 µs; the tolerance of either.
+        // The smallest clearance, where spans end every 80 µs, within the tolerance of either.
         assert!(long[0] <= short[0] + 4e-7 && long[0] > short[0] - 3e-6, "{long:?} {short:?}");
         assert!(
             (long[1] - short[1]).abs() <= 5e-2 * short[1].abs() && (long[2] - short[2]).abs() < 4e-6,
@@ -602,13 +602,13 @@ fn distant_bodies_take_whole_communication_steps() {
     }
 }
 
-/// Of all watched nodes now (m).
+/// Returns the smallest current clearance of all watched nodes (m).
 fn least_clearance(simulation: &Simulation) -> f64 {
     let of = |sector: usize, node: u32| element(simulation, &format!("blade[{sector}].clearance"), node);
     (1..=SECTORS).flat_map(|sector| (0..NODES).map(move |node| of(sector, node))).fold(f64::INFINITY, f64::min)
 }
 
-/// From far away onto blades at rest within one span: it does not pass for free flight.
+/// A casing that closes on resting blades from far away within one span must not be mistaken for free flight.
 #[test]
 fn detects_casing_that_closes_within_one_span() {
     let mut scene = scene(Scheme::Galerkin, H, 1e-3);
@@ -625,7 +625,7 @@ fn detects_casing_that_closes_within_one_span() {
     assert!(impulse > 0.0);
 }
 
-/// Peaks and means over a span are those of a thousand short steps.
+/// Peaks and means over a span agree with those of a thousand short steps.
 #[test]
 fn span_outputs_match_many_short_steps() {
     let of = |scheme: Scheme, step: f64| {
@@ -666,7 +666,7 @@ fn without_friction_there_is_no_heat() {
     assert!(kinetic + strain > 0.0 && ledger.residual(kinetic + strain).abs() < 1e-12 * ledger.scale());
 }
 
-/// A second surface, never met: the tolerance is a share of the smallest clearance, whatever the others are.
+/// A second surface is never touched: the tolerance is a fraction of the smallest clearance, regardless of the others.
 #[test]
 fn a_wide_clearance_does_not_loosen_the_tolerance() {
     let run = |gap: f64| {

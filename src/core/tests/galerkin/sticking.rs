@@ -1,4 +1,5 @@
-//! Contacts that may stick, by a tolerance, on whole scenes: blades by themselves, in elastic casings, coupled.
+//! Contacts that may stick with adaptive steps, on whole scenes: single blades, blades in elastic casings, coupled
+//! sectors.
 
 use super::{Combination, H, apart, disk_displacements, goes_on_with_the_same_bits, run, scene, scene_time, still};
 use crate::guide::{self, print_row};
@@ -7,8 +8,8 @@ use tiprub_core::{Rom, Scene};
 use tiprub_test_models::disk::TestDisk;
 use tiprub_test_models::{GAP, RADIUS, bumps, flexible, go, modal, node, real, started};
 
-/// The solver that knows sticking, on a rub where all slides: it tends to what massless-boundary tends to with it, and errors are those
-/// asked for.
+/// The solver with sticking, on a rub in which everything slides: it converges to the limit of massless-boundary with
+/// this solver, within the requested errors.
 #[test]
 fn sticking_friction_meets_the_requested_tolerance() {
     for (name, change) in [("rigid", (|_: &mut Scene| {}) as Combination), ("flexible", flexible)] {
@@ -35,7 +36,8 @@ fn sticking_friction_meets_the_requested_tolerance() {
     guide::hold("cargo test -p tiprub-core --test galerkin sticking");
 }
 
-/// Sectors that step together are what they are as one structure, where they slide and where they are slow enough to stick.
+/// Sectors that step together agree with the equivalent single structure, both in sliding and at speeds low enough to
+/// stick.
 #[test]
 fn sticking_of_coupled_sectors_matches_one_structure() {
     let disk = TestDisk::random(6, 1, 8, 0.25, 3);
@@ -68,7 +70,7 @@ fn sticking_state_is_saved_without_allocation() {
     [alone, carried, coupled].iter().for_each(goes_on_with_the_same_bits);
 }
 
-/// A blade of three modes and one contact node, which lets the node give way in every direction.
+/// Returns a blade of three modes and one contact node, which can yield in every direction.
 fn three_springs() -> Rom {
     let frequencies = [350.0, 520.0, 800.0, 40e3, 45e3, 50e3];
     let springs = [[1.2, 0.5, 0.1], [-0.4, 1.1, 0.3], [0.2, -0.3, 1.0]];
@@ -80,7 +82,7 @@ fn three_springs() -> Rom {
     Rom { damping_ratio: 0.002, ..modal("blade", &frequencies, shape, vec![tip]) }
 }
 
-/// A slow blade that lobes press on: it sticks, slips and leaves again and again.
+/// A slow blade under passing lobes: it repeatedly sticks, slips and separates.
 #[test]
 fn errors_stay_near_the_tolerance_where_blades_stick_and_slip() {
     for (speed, friction, steps) in [(60.0, 0.3, 600), (200.0, 0.2, 600)] {

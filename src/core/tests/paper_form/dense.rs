@@ -1,4 +1,4 @@
-//! The paper's equations with dense matrices against the modal form of the core: the same numbers.
+//! The paper's equations with dense matrices against the modal form of the core: equal results.
 
 use nalgebra::{DMatrix, DVector};
 use tiprub_core::dynamics::modal::ModalModel;
@@ -33,9 +33,10 @@ fn a_thousand_contact_steps_agree_to_rounding() {
     let step = 0.2 / model.largest_frequency();
     let normals = vec![[0.6, 0.0, 0.8]; CONTACTS];
     let tangent = [0.0, 1.0, 0.0];
-    // Sliding so fast that vibration does not turn the slip direction by one rounding error: the case the paper assumes.
+    // Sliding so fast that vibration does not turn the slip direction by even a rounding error: the case that the paper
+    // assumes.
     let sliding = vec![[0.0, 1e18, 0.0]; CONTACTS];
-    // Two nodes are pressed against the obstacle at rest, one touches now and then.
+    // Two nodes are pressed against the obstacle at rest, one touches intermittently.
     let gaps = [-1e-4, 0.1e-4, -0.5e-4];
     let law = GapLaw::Fixed(FixedGap { normals: normals.clone(), gaps: gaps.to_vec(), sliding });
     let settings = SystemSettings { scheme: Scheme::CentralDifference, solver: Solver::Film, ledger: true };

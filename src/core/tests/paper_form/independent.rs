@@ -1,5 +1,5 @@
-//! The step of blades on a flexible casing, written a second time from the ROMs and the theory chapter alone: own
-//! spline, own closest point, own dense Delassus matrix, own recurrence, own solver. Nothing is shared with the crate.
+//! The step of blades on a flexible casing, implemented a second time from the ROMs and the theory chapter alone, with
+//! a separate spline, closest point, dense Delassus matrix, recurrence and solver. It shares nothing with the crate.
 
 #![expect(
     clippy::cast_possible_truncation,
@@ -18,7 +18,7 @@ const GAP: f64 = 3.56e-4;
 const STEP: f64 = 1e-6;
 const SPEED: f64 = 1300.0;
 
-/// Cardinal cubic B-spline (support −2 … 2) and its first derivative.
+/// Returns the cardinal cubic B-spline (support −2 … 2) and its first derivative.
 fn basis(x: f64) -> [f64; 2] {
     let (a, sign) = (x.abs(), x.signum());
     if a >= 2.0 {
@@ -63,7 +63,7 @@ impl PaperSurface {
         Self { around, along, interpolation }
     }
 
-    /// Weights of the data points at (ξ, η), in grid steps, and their derivatives along ξ and η.
+    /// Returns the weights of the data points at (ξ, η), in grid steps, and their derivatives along ξ and η.
     fn weights(&self, xi: f64, eta: f64) -> [DVector<f64>; 3] {
         let mut control = [(); 3].map(|()| DVector::zeros(self.around * self.along));
         let first = (xi.floor() as i64) - 1;
@@ -93,7 +93,7 @@ impl PaperSurface {
     }
 }
 
-/// q⁺ = a q − b q⁻ + c f.
+/// Returns a, b and c of q⁺ = a q − b q⁻ + c f.
 fn recurrence(frequency: f64, ratio: f64) -> [f64; 3] {
     let decay = (-ratio * frequency * STEP).exp();
     let a = 2.0 * decay * (frequency * (1.0 - ratio * ratio).sqrt() * STEP).cos();
@@ -130,13 +130,13 @@ impl PaperBody {
     }
 }
 
-/// Radial, tangential, axial direction at an angle.
+/// Returns the radial, tangential and axial direction at an angle.
 fn directions(angle: f64) -> [Vector3<f64>; 3] {
     let (s, c) = angle.sin_cos();
     [Vector3::new(c, s, 0.0), Vector3::new(-s, c, 0.0), Vector3::z()]
 }
 
-/// Modes seen along fixed directions at a contact node that stands at `angle`: 3 × modes.
+/// Returns the mode shapes along fixed directions at a contact node at `angle`: 3 × modes.
 fn fixed_modes(rom: &Rom, node: usize, angle: f64) -> DMatrix<f64> {
     let axes = directions(angle);
     DMatrix::from_fn(3, rom.order(), |i, mode| (0..3).map(|k| axes[k][i] * rom.contact_map[(3 * node + k, mode)]).sum())
@@ -146,7 +146,7 @@ struct Second {
     surface: PaperSurface,
     data: Vec<Vector3<f64>>,
     casing: PaperBody,
-    /// Modes of every data point along fixed directions.
+    /// Mode shapes of every data point along fixed directions.
     seen: Vec<DMatrix<f64>>,
     blades: Vec<PaperBody>,
     places: Vec<[f64; 2]>,
@@ -154,7 +154,7 @@ struct Second {
     gaps: Vec<f64>,
 }
 
-/// Per contact node: modes of blade and casing at it, normal, force per multiplier.
+/// Mode shapes of blade and casing, normal, and force per multiplier of each contact node.
 #[derive(Default)]
 struct PaperContact {
     blade_rows: Vec<DMatrix<f64>>,
@@ -192,7 +192,7 @@ impl Second {
             .collect()
     }
 
-    /// Closest point by Newton's method on x(ξ, η)·∂S = 0 with differences for the second derivatives.
+    /// Returns the closest point by Newton's method on x(ξ, η)·∂S = 0 with differences for the second derivatives.
     fn project(&self, points: &[Vector3<f64>], x: Vector3<f64>, place: &mut [f64; 2]) -> (Vector3<f64>, DVector<f64>) {
         let at = |weights: &DVector<f64>| points.iter().zip(weights).fold(Vector3::zeros(), |sum, (p, w)| sum + p * *w);
         let residual = |xi: f64, eta: f64| {
@@ -221,7 +221,7 @@ impl Second {
         (at(&value), value)
     }
 
-    /// Gaps of the predicted places at the given angle, and what the forces on them act on.
+    /// Computes the gaps of the predicted positions at the given angle, and the contacts on which their forces act.
     fn meet(&mut self, angle: f64, closing: f64, shaft: Vector3<f64>, friction: f64) -> PaperContact {
         let points = self.points();
         let mut met = PaperContact::default();
@@ -258,7 +258,7 @@ impl Second {
         met
     }
 
-    /// Projected Gauss-Seidel to rounding.
+    /// Solves by projected Gauss-Seidel to rounding.
     fn settle(&mut self, delassus: &DMatrix<f64>) {
         let size = self.gaps.len();
         for _ in 0..20_000 {
@@ -275,7 +275,8 @@ impl Second {
         }
     }
 
-    /// One step to the given angle; `shaft` is the displacement of its centre, `closing` reduces the casing's radius.
+    /// Steps to the given angle; `shaft` is the displacement of the shaft centre, `closing` reduces the casing's
+    /// radius.
     fn step(&mut self, angle: f64, closing: f64, shaft: Vector3<f64>, friction: f64) {
         self.casing.predict();
         self.blades.iter_mut().for_each(PaperBody::predict);
@@ -308,7 +309,7 @@ impl Second {
     }
 }
 
-/// Mistuned blades on a shaft that whirls, in an elastic casing that is warm.
+/// Returns mistuned blades on a whirling shaft, in an elastic, warm casing.
 fn scene(factors: &[f64], friction: f64) -> Scene {
     let mut scene = models::rub(SECTORS);
     scene.roms[0] = models::rich_blade(SECTORS);

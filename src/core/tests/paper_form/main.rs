@@ -1,4 +1,4 @@
-//! The step written a second time, from the equations alone.
+//! The step implemented a second time from the equations alone.
 
 mod dense;
 mod independent;

@@ -1,10 +1,10 @@
-//! Twelve blades in a round casing, and what a test asks of them.
+//! Twelve blades in a round casing, and helpers for tests.
 
 use tiprub_core::settings::{Scheme, Shape, TimeSettings};
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{self as models, real};
 
-/// Twelve blades in a round casing, without friction.
+/// Returns twelve blades in a round casing, without friction.
 pub fn round(scheme: Scheme) -> Scene {
     let mut scene = models::rub(12);
     scene.roms[0] = models::rich_blade(12);
@@ -29,7 +29,8 @@ pub fn energy(simulation: &Simulation) -> f64 {
     real(simulation, "strain_energy") + real(simulation, "kinetic_energy")
 }
 
-/// A blade of contact nodes whose shapes are random, but for a mode that takes all of them out of the casing.
+/// Returns a blade with contact nodes whose mode shapes are random, except for one mode that moves all of them out of
+/// the casing.
 pub fn crowded(nodes: usize, modes: usize, seed: u64) -> Scene {
     let mut random = models::SeededRandom(seed);
     let shapes = random.matrix(3 * nodes, modes);
@@ -45,7 +46,7 @@ pub fn crowded(nodes: usize, modes: usize, seed: u64) -> Scene {
     scene
 }
 
-/// What a scene of a hundred steps of 0.1 ms is refused with.
+/// Returns the error of a scene that runs a hundred steps of 0.1 ms.
 pub fn refusal(scene: &Scene) -> String {
     let run = || {
         let mut simulation = Simulation::new(scene)?;

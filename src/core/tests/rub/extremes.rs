@@ -1,4 +1,4 @@
-//! Extreme cases: each ends in a right answer or in a refusal that says why.
+//! Extreme cases: each gives a correct answer or an error that states the reason.
 
 use proptest::prelude::*;
 use tiprub_core::settings::{LoadSettings, Scheme, Shape, SplineSettings};
@@ -35,14 +35,14 @@ fn rejects_casing_shapes_too_large_for_small_displacements() {
         let message = refusal(&scene);
         assert!(message.contains("surface[1].shape") && message.contains("metres"), "{depth}: {message}");
     }
-    // Each length within its limit, together far too deep.
+    // Each length is within its limit, but together they are far too deep.
     scene.settings.surfaces[0].shape = Shape::TwoLobe { depth: 30.0, width: 0.15, phase: 0.0 };
     let mut simulation = started(&scene);
     simulation.set_real(reference(&simulation, "gap_offset"), -0.02).unwrap();
     let outcome = (0..100).try_for_each(|_| simulation.do_step(simulation.time(), 1e-4));
     let message = outcome.unwrap_err().to_string();
     assert!(message.contains("tenth of") && message.contains("sector"), "{message}");
-    // Millimetres for metres.
+    // Millimetres instead of metres.
     let mut scene = models::rub(12);
     scene.settings.contacts[0].gap = 0.356;
     assert!(refusal(&scene).contains("metres"));
@@ -75,7 +75,7 @@ fn rejects_a_derivative_that_leaves_the_range_within_the_step() {
         let error = refused.do_step(0.0, 1e-4).unwrap_err().to_string();
         assert!(error.contains("casing_radius_change") && error.contains(said) && error.contains("smaller"), "{error}");
     }
-    // To the bound and not beyond, in steps whose sum is rounded.
+    // Exactly to the bound, in steps whose sum is rounded.
     let most = refused.table().find("casing_radius_change").unwrap().max.unwrap();
     for count in [3, 7, 10, 11, 30, 49] {
         let mut ramp = started(&scene);
@@ -113,7 +113,7 @@ fn rejects_a_speed_beyond_the_fitted_one() {
 
 #[test]
 fn checks_the_actual_step_rather_than_the_maximum_step() {
-    // Central differences far beyond their limit by internal_step_max, well within it by the communication step.
+    // Central differences far above their limit by internal_step_max, far below it by the communication step.
     let mut scene = models::rub(12);
     scene.settings.time.scheme = Scheme::CentralDifference;
     scene.settings.contacts[0].friction = 0.0;
@@ -126,7 +126,7 @@ fn checks_the_actual_step_rather_than_the_maximum_step() {
     let time = simulation.time();
     let message = simulation.do_step(time, 1e-4).unwrap_err().to_string();
     assert!(message.contains("ω_max"), "{message}");
-    // A refused step changes nothing.
+    // A rejected step changes nothing.
     simulation.do_step(time, 1e-6).unwrap();
 }
 
@@ -139,7 +139,7 @@ fn growth_warning_names_node_and_sense_of_rotation() {
     let reported = |scene: &Scene| started(scene).warnings().join("\n");
     let text = reported(&scene);
     assert!(text.contains("trailing_edge") && text.contains("+θ") && !text.contains("−θ"), "{text}");
-    // The same physical step, asked for through the communication step alone.
+    // The same physical step, selected by the communication step alone.
     scene.settings.time.step = 1.0;
     scene.settings.experiment.communication_step = 5e-5 / 7.0;
     assert_eq!(reported(&scene), text);
@@ -188,7 +188,7 @@ fn a_blade_keeps_its_energy_over_ten_million_undamped_steps() {
     }
 }
 
-/// Small scenes of every kind: rigid, elastic and coated casings, coupled sectors, all schemes, a free body.
+/// Returns small scenes of every kind: rigid, elastic and coated casings, coupled sectors, all schemes, a free body.
 fn kinds() -> Vec<Scene> {
     let mut scenes = Vec::new();
     for scheme in [Scheme::ModalExact, Scheme::CentralDifference, Scheme::MasslessBoundary] {
@@ -213,7 +213,7 @@ fn kinds() -> Vec<Scene> {
     scenes
 }
 
-/// Outputs that are no numbers.
+/// Returns the names of outputs that are not finite.
 fn unbounded(simulation: &Simulation) -> Vec<String> {
     let outputs = simulation.table().variables().iter().filter(|row| row.causality == Causality::Output);
     let mut found = Vec::new();
@@ -247,7 +247,7 @@ proptest! {
                 }
                 prop_assert!(unbounded(&simulation).is_empty(), "start {start:e}: {:?}", unbounded(&simulation));
                 for (exponent, usual) in &lengths {
-                    // Half of the steps have lengths that can be taken; none takes long.
+                    // Half of the steps have acceptable lengths; none takes long.
                     let length = if *usual { 10_f64.powf(-12.0 + exponent.abs() / 60.0) } else { 10_f64.powf(*exponent) };
                     let long = length > 1e3 * simulation_step(&simulation) && length < 1e9 * simulation_step(&simulation);
                     if long {
@@ -286,7 +286,7 @@ fn rejects_steps_at_the_level_of_rounding() {
             simulation.do_step(start, 1e-12).unwrap();
             assert!(unbounded(&simulation).is_empty(), "{:?}", unbounded(&simulation));
         }
-        // Far from zero the time itself is too coarse.
+        // Far from zero the resolution of the time is too coarse.
         let mut simulation = Simulation::new(&scene).unwrap();
         simulation.initialise(1e6).unwrap();
         let message = simulation.do_step(1e6, 1e-9).unwrap_err().to_string();
@@ -295,7 +295,7 @@ fn rejects_steps_at_the_level_of_rounding() {
     }
 }
 
-/// SI value of one of a unit, and its exponents of kg, m, s, rad, K: products of powers of prefixed units.
+/// Returns the SI value of one unit, and its exponents of kg, m, s, rad, K: products of powers of prefixed units.
 fn in_si(name: &str) -> (f64, [i32; 5]) {
     const UNITS: [(&str, f64, [i32; 5]); 11] = [
         ("kg", 1.0, [1, 0, 0, 0, 0]),
@@ -349,7 +349,8 @@ fn unit_definitions_match_their_names() {
     assert!(seen.iter().eq(&all), "{seen:?}");
 }
 
-/// Flanks of teeth by their slope: 44° is rubbed on, 46° is refused, by its angle in a step, and by itself as a contact.
+/// Flanks of teeth by their slope: 44° is accepted and rubbed, 46° is rejected, both by its angle in a step and as a
+/// contact.
 #[test]
 fn rejects_flanks_steeper_than_45_degrees() {
     let mut scene = models::rub(4);
@@ -367,8 +368,8 @@ fn rejects_flanks_steeper_than_45_degrees() {
         let normal = [-1.0, 0.0, 0.0];
         assert!(law.is_plausible(0, -0.0249, normal) && !law.is_plausible(0, -0.0251, normal), "{kind}");
     }
-    // A node comes along the circumference and meets a tooth where its height is the clearance, 0.356 mm: 60 % of the height,
-    // where the slope is 0.8 of the largest.
+    // A node moves around the circumference and meets a tooth where its height is the clearance, 0.356 mm: 60 % of the
+    // height, where the slope is 0.8 of the largest.
     scene.settings.contacts[0].friction = 0.0;
     scene.roms[0].contact_nodes.iter_mut().for_each(|node| node.position[1] = 0.0);
     scene.settings.structures[0].speed = 5.0;

@@ -1,5 +1,5 @@
-//! Energy out of nothing ends a run by name: friction that feeds a vibration, impacts that give, nodes left inside, and curvature work that
-//! turns the sign of what users read.
+//! Spurious energy gains end a run with a specific error: friction that feeds a vibration, impacts that gain energy,
+//! nodes that stay inside, and curvature work that changes the sign of a result.
 
 use tiprub_core::settings::{Scheme, Solver};
 use tiprub_core::{Result, Scene, Simulation};
@@ -8,7 +8,7 @@ use tiprub_test_models::{self as models, GAP, move_on, real, started};
 /// Communication step (s).
 const LENGTH: f64 = 5e-5;
 
-/// Blades that turn slowly in a casing which closes on them, and opens, in time with their lowest mode.
+/// Returns slowly turning blades in a casing that closes on them and opens in time with their lowest mode.
 fn slow(scheme: Scheme, solver: Solver) -> Scene {
     let mut scene = models::round(models::rich_blade(2));
     scene.settings.time.scheme = scheme;
@@ -21,7 +21,8 @@ fn slow(scheme: Scheme, solver: Solver) -> Scene {
     scene
 }
 
-/// Close the casing by so much more than the clearance (m), and open it again, with 850 Hz; `look` after every communication step.
+/// Closes the casing by `depth` more than the clearance (m) and opens it again, at 850 Hz; calls `look` after every
+/// communication step.
 fn squeeze(simulation: &mut Simulation, depth: f64, steps: u32, mut look: impl FnMut(&Simulation)) -> Result<()> {
     let rate = std::f64::consts::TAU * 850.0;
     let place = |index: u32| -0.5 * (GAP + depth) * (1.0 - (rate * LENGTH * f64::from(index)).cos());

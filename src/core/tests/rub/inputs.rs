@@ -1,4 +1,4 @@
-//! Inputs between communication points: nothing that moves or loads something jumps, unless the scene asks for it.
+//! Inputs between communication points: inputs that move or load a structure never jump unless the scene requests it.
 
 use tiprub_core::settings::{BodyMotion, InputInterpolation, LoadSettings, Shape, StructureSettings};
 use tiprub_core::{Rom, Scene, Simulation};
@@ -12,14 +12,15 @@ fn outputs(simulation: &Simulation) -> Vec<u64> {
     references.filter_map(|reference| simulation.real(reference).ok()).map(f64::to_bits).collect()
 }
 
-/// Factor on the shape that acts now, to the last bit.
+/// Checks the current factor on the shape, to the last bit.
 #[track_caller]
 fn acts(simulation: &Simulation, expected: f64) {
     let found = simulation.shape_factor();
     assert_eq!(found.to_bits(), expected.to_bits(), "{found} {expected}");
 }
 
-/// Blades in bumps whose size is an input, at once; no contact as long as the factor is small.
+/// Returns blades in a casing with bumps whose size is an input without ramp; no contact as long as the factor is
+/// small.
 fn bumps() -> Scene {
     let mut scene = models::rub(6);
     (scene.settings.time.step, scene.settings.surfaces[0].ramp_time) = (STEP, 0.0);
@@ -31,7 +32,7 @@ pub fn held(mut scene: Scene) -> Scene {
     scene
 }
 
-/// A round casing around a shaft that whirls.
+/// Returns a round casing around a whirling shaft.
 pub fn whirling() -> Scene {
     let mut scene = bumps();
     scene.settings.surfaces[0].shape = Shape::Circular {};
@@ -45,7 +46,8 @@ pub fn spinning_rom() -> Rom {
     rom
 }
 
-/// The same with everything else that an importer can move: an elastic ring with patches and a load, and spin.
+/// Returns a whirling shaft with everything else that an importer can move: an elastic ring with patches and a load,
+/// and spin.
 fn rich() -> Scene {
     let mut scene = whirling();
     scene.roms[0] = spinning_rom();
@@ -66,13 +68,13 @@ fn rich() -> Scene {
     scene
 }
 
-/// Radius grows smoothly to 0.39 mm, beyond the clearance of 0.356 mm.
+/// Returns a whirl whose radius grows smoothly to 0.39 mm, beyond the clearance of 0.356 mm.
 fn whirl(time: f64) -> [f64; 2] {
     let radius = 0.195e-3 * (1.0 - (std::f64::consts::PI * (time / 1e-3).min(1.0)).cos());
     [radius * (600.0 * time).cos(), radius * (600.0 * time).sin()]
 }
 
-/// Give a whirl at `now` (s) in one of three ways.
+/// Sets a whirl at `now` (s) in one of three ways.
 fn give(simulation: &mut Simulation, derivatives: bool, [now, next]: [f64; 2]) {
     let (from, to) = (whirl(now), whirl(next));
     for (axis, name) in ["whirl_x", "whirl_y"].into_iter().enumerate() {
@@ -83,7 +85,7 @@ fn give(simulation: &mut Simulation, derivatives: bool, [now, next]: [f64; 2]) {
     }
 }
 
-/// Largest node force over two milliseconds by steps of `length`, the whirl late by `delay`.
+/// Returns the largest node force over two milliseconds with steps of `length`, and the whirl delayed by `delay`.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most two thousand steps")]
 fn peak(scene: &Scene, derivatives: bool, length: f64, delay: f64) -> f64 {
     let mut simulation = started(scene);
@@ -100,7 +102,7 @@ fn peak(scene: &Scene, derivatives: bool, length: f64, delay: f64) -> f64 {
 #[test]
 fn stepwise_whirl_input_causes_no_impact() {
     for length in [1e-5, 1e-4] {
-        // Ramps are late by H, where the rotor is elsewhere.
+        // Ramps are late by H, while the rotor has moved on.
         let [fine, late] = [0.0, length].map(|delay| peak(&whirling(), true, STEP, delay));
         let [ramp, line, hold] =
             [(whirling(), false), (whirling(), true), (held(whirling()), false)].map(|(s, d)| peak(&s, d, length, 0.0));
@@ -109,7 +111,7 @@ fn stepwise_whirl_input_causes_no_impact() {
         );
         // The chords turn by ΩH at every communication point.
         assert!(fine > 10.0 && ramp < 1.7 * late && line < 1.7 * fine, "{ramp} of {late}, {line} of {fine}");
-        // Held values go on growing as 1/h.
+        // The force of held values continues to grow as 1/h.
         assert!(hold > 2.0 * fine && hold > 2.0 * ramp, "what the ramp is for: {hold} {ramp} {fine}");
     }
 }
@@ -126,7 +128,7 @@ fn ramp_equals_derivatives_one_step_later() {
             simulation.do_step(times[0], length).unwrap();
         }
     }
-    // Slip and ledger see the same velocity of the shaft.
+    // Slip and ledger use the same velocity of the shaft.
     for name in ["friction_loss", "external_work", "force_x", "torque", "clearance_minimum", "kinetic_energy"] {
         let [a, b] = [real(&ramp, name), real(&line, name)];
         assert!((a - b).abs() <= 1e-6 * a.abs().max(b.abs()), "{name}: {a} {b}");
@@ -142,9 +144,10 @@ fn value_is_reached_exactly_at_the_end_of_the_step() {
     // Start values are reached at the start.
     acts(&simulation, 1.0);
     let mut before = 1.0_f64;
-    // Steps of every length that is not below half of the one before, the first a single internal step; the same value again.
+    // Steps of various lengths, none shorter than half of the one before, the first a single internal step; one value
+    // is repeated.
     for (value, length) in [(0.1, STEP), (0.3, 1e-5), (0.7, 5e-6), (0.7, 3.3e-5), (-1.0 / 3.0, 1e-4), (0.1, 5e-5)] {
-        // Set several times the last one counts.
+        // If a value is set several times, the last one counts.
         for value in [9.0, -2.0, value] {
             set(&mut simulation, "casing_shape_factor", value);
         }
@@ -175,7 +178,7 @@ fn held_inputs_act_immediately() {
     simulation.begin_step(0.0, 1e-5).unwrap();
     simulation.advance().unwrap();
     assert!((simulation.shape_factor() - 0.251).abs() < 1e-15);
-    // Chosen by the parameter too, before the start and not after.
+    // The parameter also selects it, before the start but not after.
     let mut chosen = Simulation::new(&bumps()).unwrap();
     let row = reference(&chosen, "input_interpolation");
     assert_eq!(chosen.integer(row).unwrap(), 1);
@@ -189,7 +192,7 @@ fn held_inputs_act_immediately() {
 #[test]
 fn input_derivatives_define_the_end_value_without_jumps() {
     let (mut simulation, length) = (started(&bumps()), 1e-5);
-    // Consistent ones give the line itself.
+    // Consistent values give the line itself.
     for index in 0..5 {
         let value = 1.0 - 0.1 * f64::from(index);
         set(&mut simulation, "casing_shape_factor", value);
@@ -200,7 +203,7 @@ fn input_derivatives_define_the_end_value_without_jumps() {
             assert!((simulation.shape_factor() - (value - 0.01 * f64::from(part))).abs() < 1e-14);
         }
     }
-    // Others start from the value reached, and a step without news goes on along the line.
+    // Other values start from the value reached, and a step without new values continues along the line.
     set(&mut simulation, "casing_shape_factor", 0.2);
     slope(&mut simulation, "casing_shape_factor", 0.1 / length);
     assert!((simulation.shape_factor() - 0.5).abs() < 1e-14);
@@ -225,7 +228,7 @@ fn value_set_within_a_step_redirects_the_ramp() {
     assert!((simulation.shape_factor() - 0.6).abs() < 1e-14);
     simulation.end_step_early().unwrap();
     assert!((simulation.shape_factor() - 0.6).abs() < 1e-14, "the value reached is the state");
-    // What is left to go takes the whole next step, or as long as it had left.
+    // The remaining change takes the whole next step, or the remaining time.
     let mut twin = simulation.clone();
     simulation.begin_step(simulation.time(), 8e-6).unwrap();
     for _ in 0..4 {
@@ -238,7 +241,7 @@ fn value_set_within_a_step_redirects_the_ramp() {
     assert!((twin.shape_factor() - (0.6 + 0.4 * 2.0 / 7.0)).abs() < 1e-14, "{}", twin.shape_factor());
 }
 
-/// Everything moves; every element of an array alike.
+/// Moves everything; the elements of an array move equally.
 fn disturb(simulation: &mut Simulation, index: u32) {
     let x = f64::from(index);
     let inputs = [
@@ -270,7 +273,8 @@ fn state_saved_within_a_ramp_continues_bit_identically() {
         go(&mut simulation, 1e-5);
     }
     let mut other = Simulation::new(&scene).unwrap();
-    // At a communication point with values that wait for the next step, within it, and with a ramp turned there.
+    // At a communication point with values that wait for the next step, within the step, and with a ramp that turns
+    // there.
     disturb(&mut simulation, 17);
     other.restore_state(&saved(&simulation)).unwrap();
     for part in 0..12 {
@@ -313,7 +317,7 @@ fn a_thousand_resets_within_a_ramp_clear_all_state() {
     }
 }
 
-/// What a refused step must leave alone.
+/// Checks that a rejected step changes nothing.
 #[track_caller]
 fn refused(simulation: &mut Simulation, length: f64, words: &[&str]) {
     let before = saved(simulation);
@@ -328,10 +332,10 @@ fn rejected_steps_name_the_input_and_change_nothing() {
     set(&mut simulation, "casing_radius_change", 0.02);
     slope(&mut simulation, "casing_radius_change", 100.0);
     refused(&mut simulation, 1e-4, &["`casing_radius_change`", "it reaches 0.03", "outside"]);
-    // The value may be where the derivative alone would not lead from the value reached.
+    // The value may differ from the one that the derivative alone would reach.
     slope(&mut simulation, "casing_radius_change", 1.0);
     set(&mut simulation, "casing_radius_change", 0.0);
-    // The shape's own rotation counts: the rotor stands by its side.
+    // The rotation of the shape counts: the rotor is next to it.
     set(&mut simulation, "casing_shape_rotation", 3.0);
     refused(&mut simulation, 3e-6, &["`casing_shape_rotation`", "features of the casing shape"]);
     // An angle wrapped to one turn.
@@ -340,7 +344,7 @@ fn rejected_steps_name_the_input_and_change_nothing() {
     set(&mut simulation, "casing_shape_rotation", 0.2 - std::f64::consts::TAU);
     refused(&mut simulation, 1e-2, &["`casing_shape_rotation`", "half a turn", "without wrapping"]);
     set(&mut simulation, "casing_shape_rotation", 0.2);
-    // A fast turn is no wrap where the derivative says it.
+    // A fast turn is not treated as wrapped if the derivative confirms it.
     slope(&mut simulation, "casing_shape_rotation", 1300.0);
     go(&mut simulation, 1e-2);
 }
@@ -366,10 +370,10 @@ fn interpolation_choice_exists_only_with_ramped_inputs() {
     let mut scene = models::rub(6);
     let has = |scene: &Scene| Simulation::new(scene).unwrap().table().find("input_interpolation").is_some();
     assert!(has(&scene) && has(&whirling()));
-    // Only gap_offset is left, which is ramped.
+    // Only gap_offset remains, which is ramped.
     scene.settings.surfaces[0].moving = false;
     assert!(!has(&scene));
-    // What the scene file chose can be read and chosen back.
+    // The choice of the scene file can be read and selected again.
     assert!(has(&held(scene)));
     for row in Simulation::new(&rich()).unwrap().table().variables() {
         let moves = row.causality == tiprub_core::variables::Causality::Input || row.name == "gap_offset";
@@ -397,7 +401,8 @@ fn single_short_step_causes_no_impact() {
     for short in [1e-7, 1e-9] {
         let found = whirl(Some(short));
         println!("H = {short:e} once: {found:.1} N, of {even:.1} N");
-        // Put into the short step, what came together over the one before would hit hundreds of times as hard.
+        // A short step that receives the accumulated change of the step before would cause a force hundreds of times as
+        // large.
         assert!(even > 10.0 && found < 2.0 * even, "{found} of {even}");
     }
 }
@@ -430,7 +435,7 @@ fn early_return_equals_a_shorter_communication_step() {
         simulation.advance().unwrap();
     }
     simulation.end_step_early().unwrap();
-    // The same six steps as a communication step of their own.
+    // The same six steps as one communication step.
     let mut twin = started(&scene);
     go(&mut twin, 1e-5);
     go(&mut twin, 6e-6);
@@ -441,7 +446,7 @@ fn early_return_equals_a_shorter_communication_step() {
     for (early, whole) in derivatives(&simulation).into_iter().zip(derivatives(&twin)) {
         assert!((early - whole).abs() <= 1e-9 * whole.abs(), "{early} {whole}");
     }
-    // Means cover the part done, however often they are asked for.
+    // Means cover the completed part, however often they are read.
     let before = outputs(&simulation);
     simulation.update_outputs();
     assert_eq!(before, outputs(&simulation));

@@ -1,4 +1,4 @@
-//! Which steps and which friction are refused, what is told of them, and that what is taken is sound.
+//! Rejected steps and friction coefficients, their warnings, and the soundness of accepted ones.
 
 use crate::blades::{crowded, energy, on_a_ring, round, with_step};
 use nalgebra::DMatrix;
@@ -8,7 +8,7 @@ use tiprub_core::warning::Topic;
 use tiprub_core::{Error, Scene, Simulation};
 use tiprub_test_models::{self as models, bits, disk, go, real, reference, saved, set, try_started};
 
-/// The largest usable step that a refusal names (s).
+/// Returns the largest usable step that an error contains (s).
 fn usable_step(scene: Scene) -> f64 {
     let message = try_started(&with_step(scene, 1e-3)).unwrap_err().to_string();
     let number = message.split("`internal_step_max`) below ").nth(1).and_then(|text| text.split(' ').next());
@@ -25,7 +25,7 @@ fn massless_boundary_limit_uses_the_stiffest_blade() {
     assert!((mistuned * 1.3 / tuned - 1.0).abs() < 1e-4, "{mistuned:e} of {tuned:e}");
 }
 
-/// Communication steps may become longer than the one that the start expects.
+/// Communication steps may become longer than the one expected at the start.
 #[test]
 fn rejects_a_later_step_beyond_massless_boundary() {
     let usable = usable_step(round(Scheme::MasslessBoundary));
@@ -63,7 +63,8 @@ fn pressed_blades_gain_no_energy_at_the_massless_limit() {
     }
 }
 
-/// One blade presses on a ring whose modes are raised up to where the step that the blade allows passes over them: they count.
+/// One blade presses on a ring whose modes are raised until the step that the blade allows no longer resolves them:
+/// they count.
 #[test]
 fn stiff_casing_gains_no_energy_at_the_massless_limit() {
     for (raised, seen) in [(1.0, 1.0), (10.0, 1.0), (10.0, 4.0), (60.0, 10.0)] {
@@ -130,7 +131,7 @@ fn restored_state_uses_the_limits_of_its_parameters() {
 
 #[test]
 fn rejected_friction_keeps_the_current_limits() {
-    // Growth by friction forbids steps from 2.3e-5 s on.
+    // Growth by friction forbids steps above 2.3e-5 s.
     let (short, long) = (1e-6, 3e-5);
     let mut scene = with_step(models::rub(3), 1e-4);
     scene.settings.experiment.communication_step = short;
@@ -164,7 +165,7 @@ fn warns_of_fast_rotor_with_stiffness_at_rest() {
     }
     scene.settings.silence = vec![Topic::StiffnessAtRest.id().to_owned()];
     assert!(!warned(&scene));
-    // What helps depends on the ROM, and stiffening ends the warning.
+    // The remedy depends on the ROM, and stiffening ends the warning.
     let remedy = |scene: &Scene| {
         let simulation = try_started(scene).unwrap();
         let warning = simulation.warnings().iter().find(|warning| warning.topic() == Topic::StiffnessAtRest);
@@ -200,7 +201,7 @@ fn warnings_refer_to_the_actual_step_and_appear_once() {
     }
     assert!(reported[2].contains("8.000e-6"), "{reported:?}");
     assert_eq!(reported.iter().filter(|text| !text.is_empty()).count(), 1, "{reported:?}");
-    // Told at the start for the step to expect, it is told again when the step is materially longer.
+    // Reported at the start for the expected step, the warning is repeated when the step is materially longer.
     let mut scene = with_step(scene, 2e-5);
     scene.settings.experiment.communication_step = 1e-5;
     let mut simulation = try_started(&scene).unwrap();
@@ -215,7 +216,7 @@ fn warnings_refer_to_the_actual_step_and_appear_once() {
 
 #[test]
 fn warns_of_reverse_rotation_when_the_rotor_reverses() {
-    // Slip in one sense only makes this blade flutter.
+    // Slip in one direction only makes this blade flutter.
     let mut scene = with_step(models::rub(3), 1e-6);
     let flutters = |scene: &Scene| {
         let warnings = try_started(scene).unwrap().warnings().to_vec();
@@ -238,7 +239,7 @@ fn warns_of_reverse_rotation_when_the_rotor_reverses() {
     }
 }
 
-/// What is too large to be looked at is told, and only where friction makes it matter.
+/// Structures that are too large for the check are reported, and only if friction makes it relevant.
 #[test]
 fn warns_when_growth_was_not_checked() {
     let reported = |scheme: Scheme, modes: usize, friction: f64| {
@@ -263,7 +264,7 @@ fn warns_when_growth_was_not_checked() {
     }
 }
 
-/// What a shorter step is refused for, a longer one is too; the step that the refusal names is taken.
+/// If a shorter step is rejected, so is a longer one; the step that the error contains is accepted.
 #[test]
 fn rejects_all_steps_above_the_growth_limit() {
     let mut named = 0;
@@ -279,7 +280,7 @@ fn rejects_all_steps_above_the_growth_limit() {
                 try_started(&scene).map(drop).map_err(|error| error.to_string())
             };
             let mut refused = None;
-            // Steps of all lengths, not only those that the check looks at.
+            // Steps of all lengths, not only those that the check evaluates.
             for place in 0..30 {
                 let outcome = at(0.1 / highest * 1.27_f64.powi(place));
                 assert!(refused.is_none() || outcome.is_err(), "{seed}, {scheme:?}: {refused:?}");
@@ -298,7 +299,7 @@ fn rejects_all_steps_above_the_growth_limit() {
     assert!(named > 0);
 }
 
-/// Where a fixed step is refused, the remedy names adaptive steps first, if the scene allows them.
+/// If a fixed step is rejected, the remedy names adaptive steps first, provided that the scene allows them.
 #[test]
 fn rejected_steps_suggest_adaptive_steps_first() {
     let remedy = |change: &dyn Fn(&mut Scene)| {
@@ -317,7 +318,7 @@ fn rejected_steps_suggest_adaptive_steps_first() {
     }
     let film = remedy(&|scene| scene.settings.contacts[0].solver = Solver::Film);
     assert!(film.contains("\"galerkin\"` and `contact.solver = \"lcp\"`), or set `time.step`"), "{film}");
-    // Too few modes, and what its tables do not have.
+    // Too few modes, and features that its tables do not support.
     let few = remedy(&|scene| scene.roms[0] = models::blade(12));
     let excited = remedy(&|scene| {
         scene.settings.structures[0].excitation = Some(ExcitationSettings {
@@ -345,10 +346,10 @@ fn remedies_are_compatible_with_the_preset() {
     assert!(paper.contains("remove `preset`") && !paper.contains("modal-exact"), "{paper}");
 }
 
-/// A blade that friction bends into the casing: the warning names the µ* above which it does, and there is one only.
+/// For a blade that friction bends into the casing, a single warning contains the lock-up friction µ*.
 #[test]
 fn lock_up_warning_names_its_friction() {
-    // A node on one leaning spring: w_nn/w_nt = cot of its lean.
+    // A node on one inclined spring: w_nn/w_nt = cot of its inclination.
     let place = models::node("tip", [models::RADIUS, 0.0, 0.0], 0.0);
     let shape =
         |row: usize, mode: usize| [[0.5, 1.0, 0.0], [1.0, -0.5, 0.0], [0.0, 0.0, 1.0], [0.1, 0.1, 0.0]][mode][row];
@@ -367,13 +368,13 @@ fn lock_up_warning_names_its_friction() {
     // Σ φ_r²/ω² over Σ φ_r φ_θ/ω², in units of the first.
     let [along, across] = [(0.25 + 1.0 / 16.0 + 0.01 / 81.0), (0.5 - 0.5 / 16.0 + 0.01 / 81.0)];
     let expected = format!("µ* = {:.3}", along / across);
-    // It does so without swinging, and nothing else grows.
+    // It locks up without oscillation, and nothing else grows.
     let reported = reported.iter().filter(|text| text.contains("locks up")).collect::<Vec<_>>();
     assert!(reported.len() == 1 && reported[0].contains(&expected), "{expected}: {reported:?}");
     assert!(reported[0].contains("1/s and 0 Hz") && !reported[0].contains("flutter"), "{reported:?}");
 }
 
-/// A casing that turns as it yields: under one blade its part of W is the rank-one matrix c(1 − µτ), whatever the angle.
+/// A casing that turns as it yields: under one blade its part of W is the rank-one matrix c(1 − µτ), for any angle.
 #[test]
 fn unsolvable_contact_on_casing_names_its_position() {
     let reported = |turned: f64, friction: f64| {
@@ -400,7 +401,8 @@ fn unsolvable_contact_on_casing_names_its_position() {
     }
 }
 
-/// Blades of four nodes, of many alone and together: what grows most when all are closed is told of all.
+/// For blades of four nodes, some with further blades, the warning of the largest growth with all nodes closed covers
+/// all of them.
 #[test]
 fn growth_warning_lists_all_participating_nodes() {
     let (mut alone, mut together) = (0, 0);
@@ -415,7 +417,7 @@ fn growth_warning_lists_all_participating_nodes() {
     assert!(together > 0 && alone > 0, "{together}, {alone}");
 }
 
-/// The number of blades that is told may press on the casing at once, each adding as much as the first.
+/// The reported number of blades may press on the casing simultaneously, each adding as much as the first.
 #[test]
 fn massless_boundary_reports_the_stable_number_of_blades() {
     let reported = |blades: usize, share: f64| {
@@ -432,7 +434,7 @@ fn massless_boundary_reports_the_stable_number_of_blades() {
     assert_eq!([reported(many, 0.9), reported(many + 1, 0.9)], [None, Some(many)]);
 }
 
-/// Of coupled sectors the sense of the start alone is looked at: the other takes as long again.
+/// For coupled sectors only the direction of rotation at the start is checked, because the other takes as long again.
 #[test]
 fn warns_that_reverse_rotation_of_a_disk_is_unchecked() {
     let mut simulation = models::started(&disk::with_rotor(disk::TestDisk::random(6, 1, 9, 0.25, 6).cyclic()));

@@ -1,4 +1,4 @@
-//! Rubs of bladed disks through the whole simulation: books, states, time, inputs; what is refused.
+//! Rubs of bladed disks through the whole simulation: energy balance, states, time, inputs, errors.
 
 #[path = "../../../../tests/guide.rs"]
 mod guide;

@@ -1,4 +1,5 @@
-//! Film on contact nodes that push each other apart: it pulls at some, which is told, and ends a run where it is too much.
+//! FILM on contact nodes that push each other apart: it produces tensile forces at some of them, which is reported, and
+//! ends a run if they are too large.
 
 use nalgebra::DMatrix;
 use tiprub_core::dynamics::modal::ModalModel;
@@ -7,16 +8,17 @@ use tiprub_core::settings::{Preset, Scheme, Solver};
 use tiprub_core::{Result, Scene, Simulation, Warning};
 use tiprub_test_models::{self as models, reference, saved, set, try_started};
 
-/// How far the casing closes on the tips (m).
+/// Depth by which the casing closes on the tips (m).
 const DEPTH: f64 = 2e-5;
-/// Steps in which it does so, and in which it then stays.
+/// Steps in which the casing closes, and in which it then stays closed.
 const STEPS: u32 = 400;
-/// Flexibility of the first node (m/N); of the second it is three times as large.
+/// Flexibility of the first node (m/N); that of the second is three times as large.
 const FLEXIBILITY: f64 = 1e-7;
 
-/// Two nodes on a blade, of which pressing one moves the other by `coupling` flexibilities: where it is more than 1, the first opens the
-/// second as both are pressed alike. The step has ω_max h = `product`. With `whole` masses in proportion to the stiffness a step sees
-/// nodes as statics does, however short; else each node is a mass.
+/// Returns a blade with two nodes; pressing one moves the other by `coupling` times its flexibility: if `coupling`
+/// exceeds 1, pressing both equally opens the second. The step has ω_max h = `product`. If `whole`, the masses are
+/// proportional to the stiffness and a step of any length sees the static flexibility; otherwise each node has its
+/// mass.
 fn scene(coupling: f64, whole: bool, scheme: Scheme, product: f64) -> Scene {
     let flexibility = DMatrix::from_row_slice(2, 2, &[1.0, coupling, coupling, 3.0]) * FLEXIBILITY;
     let stiffness = flexibility.try_inverse().unwrap();
@@ -34,7 +36,7 @@ fn scene(coupling: f64, whole: bool, scheme: Scheme, product: f64) -> Scene {
     scene
 }
 
-/// Close the casing on both nodes, and hold it there.
+/// Closes the casing on both nodes and keeps it closed.
 fn press(simulation: &mut Simulation, steps: std::ops::Range<u32>) -> Result<()> {
     let step = simulation.real(reference(simulation, "internal_step_max"))?;
     for index in steps {
@@ -55,8 +57,9 @@ fn about_film(notes: Vec<Warning>) -> Vec<Warning> {
     notes.into_iter().filter(|text| text.contains("film has applied a tensile impulse")).collect()
 }
 
-/// Steps that see each node by its own mass leave the second open, as statics does. Longer ones would close both, with the force of the
-/// second a third of that of the first, and pulling. So would all where masses couple the nodes as springs do.
+/// Steps in which each node acts by its mass alone leave the second one open, as in statics. Longer ones would close
+/// both, with a tensile force at the second of a third of the force at the first. So would all steps if masses couple
+/// the nodes as springs do.
 #[test]
 fn run_fails_only_when_film_forces_are_tensile() {
     for (whole, scheme, product, pulls) in [
@@ -83,14 +86,15 @@ fn run_fails_only_when_film_forces_are_tensile() {
             assert!((front * FLEXIBILITY / DEPTH - 1.0).abs() < 1e-9 && rear.abs() < 1e-9 * front, "{case}");
         }
         assert_eq!(about_film(simulation.take_notes()), Vec::<Warning>::new(), "{case}");
-        // Complementarity looks again.
+        // The complementarity solver is iterative.
         scene.settings.contacts[0].solver = Solver::Lcp;
         let (simulation, outcome) = pressed(&scene);
         assert!(outcome.is_ok() && simulation.system().multiplier(1, 0) >= 0.0, "{outcome:?}");
     }
 }
 
-/// λ of nodes pressed alike are as 3 − c and 1 − c, c the coupling. The paper's method is stepped as it is.
+/// The λ of equally pressed nodes are as 3 − c and 1 − c, with the coupling c. The method of the paper is used
+/// unchanged.
 #[test]
 fn warns_once_of_small_tensile_forces_and_paper_preset() {
     for (coupling, preset, expected) in
@@ -110,7 +114,7 @@ fn warns_once_of_small_tensile_forces_and_paper_preset() {
     }
 }
 
-/// What was pulled so far is part of a state, and the next start has none.
+/// The tensile impulse so far is part of a state, and a new start resets it.
 #[test]
 fn saved_state_includes_tensile_impulses() {
     let scene = scene(1.5, true, Scheme::ModalExact, 1.0);

@@ -1,4 +1,4 @@
-//! What users may combine without thinking of it: every case once gave wrong numbers in silence.
+//! Combinations that users may choose without a second thought: every case once gave wrong results silently.
 
 use crate::blades::{crowded, energy, on_a_ring, round, with_step};
 use nalgebra::DMatrix;
@@ -7,7 +7,7 @@ use tiprub_core::settings::{CoatingSettings, Scheme, Solver, SplineSettings};
 use tiprub_core::{Result, Scene, Simulation};
 use tiprub_test_models::{self as models, bits, go, real, reference, saved, set, try_started};
 
-/// Stiffens with the speed by 3Ω².
+/// Returns a blade that stiffens with the speed by 3Ω².
 fn stiffening(scheme: Scheme, step: f64) -> Scene {
     let mut scene = with_step(models::rub(12), step);
     let order = scene.roms[0].order();
@@ -23,7 +23,7 @@ fn stiffening(scheme: Scheme, step: f64) -> Scene {
     scene
 }
 
-/// Rubs for 1000 steps on the way up to 1300 rad/s, then turns freely.
+/// Rubs for 1000 steps while accelerating to 1300 rad/s, then runs without contact.
 fn run_up(simulation: &mut Simulation, step: f64) -> Result<()> {
     for index in 0..6000 {
         set(simulation, "speed", 1300.0 * (f64::from(index) / 2000.0).min(1.0));
@@ -37,12 +37,12 @@ fn run_up(simulation: &mut Simulation, step: f64) -> Result<()> {
 
 #[test]
 fn stiffening_does_not_make_unresolved_modes_grow() {
-    // ωh of the highest mode is an odd multiple of π, where the least explicit stiffness is unstable.
+    // ωh of the highest mode is an odd multiple of π, where the smallest explicit stiffness is unstable.
     let highest = std::f64::consts::TAU * 40_000.0;
     for turns in [1.0, 1.001, 3.0] {
         let step = turns * std::f64::consts::PI / highest;
         let mut scene = stiffening(Scheme::ModalExact, step);
-        // Here a resonance of the step, not the bound on energies, is looked at.
+        // This test is about a resonance of the step, not about the bound on energies.
         scene.settings.outputs.energies = false;
         let mut simulation = try_started(&scene).unwrap();
         run_up(&mut simulation, step).unwrap();
@@ -64,7 +64,7 @@ fn rejects_central_differences_beyond_stiffened_limit() {
         let mut simulation = try_started(&scene).unwrap();
         let message = run_up(&mut simulation, step).unwrap_err().to_string();
         assert!(message.contains("ω_max"), "{message}");
-        // Slower again, it goes on.
+        // At a lower speed it continues.
         set(&mut simulation, "speed", 500.0);
         go(&mut simulation, step);
     }
@@ -92,7 +92,7 @@ fn step_change_keeps_pressed_casing_at_rest() {
 
 #[test]
 fn node_returning_over_the_edge_rubs_as_on_a_wide_surface() {
-    // A cylinder, whose extension beyond the edge is the cylinder: a surface of revolution has no edge at all.
+    // A cylinder, whose extension beyond the edge is again the cylinder; a surface of revolution has no edge.
     let run = |spline: Option<SplineSettings>, reach: f64| {
         let mut scene = round(Scheme::ModalExact);
         scene.roms[0].contact_nodes.iter_mut().for_each(|node| node.meridional_slope = 0.0);
@@ -121,7 +121,7 @@ fn node_returning_over_the_edge_rubs_as_on_a_wide_surface() {
     let (peak, work) = run(None, 0.018).unwrap();
     let (found, done) = run(Some(SplineSettings::default()), 0.018).unwrap();
     println!("peak {found:.4e} N for {peak:.4e} N; impact, friction, external {done:.4?} J for {work:.4?} J");
-    // A spline takes positions as they are, a surface of revolution the radial displacement alone: 0.7 %.
+    // A spline uses full positions, a surface of revolution the radial displacement alone: 0.7 %.
     assert!((found - peak).abs() < 0.01 * peak && peak > 100.0, "{found:e} for {peak:e}");
     for (found, expected) in done.into_iter().zip(work) {
         assert!((found - expected).abs() < 0.02 * expected, "{found:e} for {expected:e}");
@@ -157,7 +157,7 @@ fn node_over_the_casing_edge_respects_the_energy_bound() {
 #[test]
 fn rejects_a_node_that_starts_beyond_the_surface() {
     let mut scene = on_a_ring(round(Scheme::ModalExact));
-    // Rings from z = -20 mm to 50 mm, which go on for 17.5 mm.
+    // Rings from z = -20 mm to 50 mm, which continue for 17.5 mm.
     scene.roms[0].contact_nodes.iter_mut().for_each(|node| node.position[2] -= 0.015);
     scene.settings.structures[0].axial_shift = true;
     let mut simulation = Simulation::new(&scene).unwrap();
@@ -179,7 +179,7 @@ fn rejects_a_node_that_starts_beyond_the_surface() {
 fn rejects_casing_displacements_that_are_too_large() {
     let mut scene = on_a_ring(round(Scheme::ModalExact));
     scene.settings.structures[1].thermal = true;
-    // Radial forces outwards on every node: the casing flees from the blades.
+    // Radial forces outwards on every node: the casing moves away from the blades.
     let map = &scene.roms[1].contact_map;
     let load = DMatrix::from_fn(map.ncols(), 4, |mode, _| (0..map.nrows() / 3).map(|node| map[(3 * node, mode)]).sum());
     for (scale, refused) in [(1e3, false), (4e3, true)] {
@@ -235,7 +235,8 @@ fn checks_speed_set_within_a_communication_step() {
     assert!((turned - 1300.0 * 5e-5).abs() < 1e-12, "{turned}");
 }
 
-/// What the FMU does when an output is asked for in Initialization Mode: on a refusal it goes back to the state before.
+/// Behaves as the FMU does when an output is requested in Initialization Mode: on an error it restores the state
+/// before.
 fn tried(simulation: &mut Simulation) -> bool {
     let state = saved(simulation);
     let outcome = simulation.initialise(0.0);
@@ -245,7 +246,7 @@ fn tried(simulation: &mut Simulation) -> bool {
     outcome.is_ok()
 }
 
-/// Scenes with parameters that are refused in many ways.
+/// Returns scenes with parameters that are rejected for many reasons.
 fn refusing() -> Vec<Scene> {
     let small = models::rub(3);
     let mut elastic = on_a_ring(models::rub(3));
@@ -306,7 +307,7 @@ proptest! {
                 }
             }
         }
-        // After a reset it is as good as new: with parameters that are refused, and with those of the scene.
+        // After a reset the instance behaves like a new one: with rejected parameters, and with those of the scene.
         for scheme in [3, 1, scene.settings.time.scheme as i32 + 1] {
             simulation.reset();
             let mut fresh = Simulation::new(scene).unwrap();
@@ -364,7 +365,7 @@ fn runs_with_more_contact_nodes_than_modes() {
                     let inward = 5e-4 * (0.5 - 0.5 * (f64::from(index) / 10.0).cos());
                     set(&mut simulation, "casing_radius_change", -inward);
                     if let Err(error) = simulation.do_step(simulation.time(), 1e-5) {
-                        // A solution there is, but one that pulls.
+                        // A solution exists, but with a tensile force.
                         let pulled =
                             solver == Solver::Film && error.to_string().contains("film has applied a tensile impulse");
                         assert!(pulled, "{name}, {index}: {error}");
@@ -378,7 +379,7 @@ fn runs_with_more_contact_nodes_than_modes() {
     }
 }
 
-/// Two contact nodes of which the only mode takes one out of the casing by as much as it takes the other in.
+/// Two contact nodes whose only mode moves one out of the casing by as much as it moves the other in.
 #[test]
 fn reports_nodes_that_no_mode_can_separate() {
     let shape = |row: usize, _: usize| if row.is_multiple_of(3) { 1.0 - 2.0 * (row / 3) as f64 } else { 0.0 };

@@ -1,4 +1,4 @@
-//! A rub of a synthetic bladed disk through the whole simulation: books, states, time, steps.
+//! A rub of a synthetic bladed disk through the whole simulation: energy balance, states, time, steps.
 
 use tiprub_core::Simulation;
 use tiprub_core::settings::{Scheme, Shape};
@@ -11,8 +11,9 @@ fn run(simulation: &mut Simulation, steps: u32, length: f64) {
     }
 }
 
-/// On a round casing tips slide along the circumference: µλ times the way of the rotor plus half of what the node moved over
-/// the last two steps, since forces act at the middle instant of those. Impulses and displacements are read from outside.
+/// On a round casing tips slide along the circumference: the heat is µλ times the distance of the rotor plus half of
+/// the displacement of the node over the last two steps, because forces act at the middle of those. Impulses and
+/// displacements are read from outside.
 #[test]
 fn friction_heat_is_force_times_sliding() {
     let (friction, radius, sectors) = (0.15, 0.25, 4);
@@ -44,7 +45,7 @@ fn friction_heat_is_force_times_sliding() {
 
 #[test]
 fn shaft_power_is_torque_times_speed() {
-    // Without friction the power comes from the slope of the lobes alone.
+    // Without friction the power comes only from the slope of the lobes.
     for friction in [0.0, 0.15] {
         shaft_power(friction);
     }
@@ -82,7 +83,7 @@ fn forces_and_torque_are_in_the_fixed_frame() {
         let (mut force, mut torque, mut size) = ([0.0; 3], 0.0, 0.0);
         for event in simulation.system().events() {
             let [r, theta, _] = nodes[event.node].position;
-            // Where the step found the contact: the displacement around is an arc of the undeformed radius.
+            // Contact point of the step: the circumferential displacement is an arc of the undeformed radius.
             let [outwards, around, _] = event.point;
             let theta = theta + std::f64::consts::TAU * event.sector as f64 / 12.0 + angle + around / r;
             let [radial, conjugate, axial] = event.force;
@@ -109,7 +110,7 @@ fn forces_and_torque_are_in_the_fixed_frame() {
 
 #[test]
 fn pressed_blade_stays_at_rest_for_any_step_sizes() {
-    // Closed contact under a constant force: carrying (q, d) to another h must neither push nor pull.
+    // Closed contact under a constant force: converting (q, d) to another h must neither push nor pull.
     let mut scene = models::rub(1);
     scene.settings.contacts[0].friction = 0.0;
     scene.settings.structures[0].damping_ratio = Some(0.3);
@@ -135,7 +136,7 @@ fn pressed_blade_stays_at_rest_for_any_step_sizes() {
     assert!(at_rest > 100.0 && worst < 1e-6, "{worst} of {at_rest} N");
 }
 
-/// Clearances in a round casing that opens, and above lobes that pass: their rates by the closed form and by differences.
+/// Rates of clearances in a round casing that opens, and above passing lobes, against the closed form and differences.
 #[test]
 fn clearance_and_angle_rates_match_the_motion() {
     let rate = |simulation: &Simulation, reference| simulation.output_derivative(reference, 1).unwrap();
@@ -155,7 +156,7 @@ fn clearance_and_angle_rates_match_the_motion() {
             assert!((found / (opening * per_opening) - 1.0).abs() < 1e-6, "node {node}, H = {length}: {found} m/s");
         }
         assert_eq!(rate(&simulation, angle).to_bits(), 1300.0_f64.to_bits());
-        // Nor does the beginning of a step of another length change how fast they are.
+        // Beginning a step of another length does not change their rates either.
         let before = rate(&simulation, clearance);
         simulation.begin_step(simulation.time(), 0.37 * length).unwrap();
         assert!((rate(&simulation, clearance) / before - 1.0).abs() < 1e-9);
@@ -177,7 +178,7 @@ fn clearance_and_angle_rates_match_the_motion() {
     assert!(fastest > 0.1, "{fastest} m/s");
 }
 
-/// Outputs over a communication step, gathered a second time from what can be seen between its internal steps.
+/// Outputs over a communication step are recomputed from the values visible between its internal steps.
 #[test]
 fn outputs_cover_all_internal_steps() {
     let (sectors, nodes) = (12, 3);
@@ -257,7 +258,7 @@ fn any_step_sequence_ends_exactly_and_converges() {
         let mut index = 0;
         while simulation.time() < end {
             let time = simulation.time();
-            // Time stays representable differences of the importer's own clock.
+            // Time differences stay representable in the importer's clock.
             let length = lengths(index).min(end - time);
             simulation.do_step(time, length).unwrap();
             assert_eq!(simulation.time().to_bits(), (time + length).to_bits());
@@ -276,7 +277,7 @@ fn any_step_sequence_ends_exactly_and_converges() {
         "relative differences from the fine run: regular {regular:.1e}, uneven {uneven:.1e}, changing {changing:.1e}, odd {odd:.1e}"
     );
     assert!(regular < 1e-2, "{regular}");
-    // Uneven steps are as good as even ones: changing h costs no order.
+    // Uneven steps are as accurate as even ones: changing h costs no order.
     for found in [uneven, changing, odd] {
         assert!(found < 1.2 * regular, "{found}");
     }
@@ -385,7 +386,7 @@ fn rejects_unstable_or_penetrating_starts_with_numbers() {
     scene.settings.experiment.communication_step = scene.settings.time.step;
     scene.settings.contacts[0].friction = 0.0;
     Simulation::new(&scene).unwrap().initialise(0.0).unwrap();
-    // A bump right over sector 1, without a ramp: depth 0.6 intrudes by 0.2 gaps.
+    // A bump directly over sector 1, without a ramp: depth 0.6 intrudes by 0.2 gaps.
     scene.settings.surfaces[0].ramp_time = 0.0;
     scene.settings.surfaces[0].shape = Shape::TwoLobe { depth: 0.6, width: 0.15, phase: std::f64::consts::FRAC_PI_2 };
     let message = Simulation::new(&scene).unwrap().initialise(0.0).unwrap_err().to_string();
@@ -403,7 +404,7 @@ fn round_casing_never_touches_an_undisturbed_disk() {
     assert!(real(&simulation, "kinetic_energy").abs() < 1e-30);
 }
 
-/// An importer takes lengths as differences of times, which late ones round: to 1e-5 of H here.
+/// An importer computes lengths as differences of times, which are rounded at late times: to 1e-5 of H here.
 #[test]
 fn rub_is_independent_of_the_start_time() {
     let (scene, length) = (models::rub(6), 1e-5);
@@ -434,8 +435,8 @@ fn rub_is_independent_of_the_start_time() {
     }
 }
 
-/// Amplitudes of nodal diameters are those of a Fourier sum over the blades, by its own letters: of the middle node, and of patches in rows
-/// of the mean over the thickness, not of the first patch of another row.
+/// Amplitudes of nodal diameters equal an independently computed Fourier sum over the blades: of the middle node, and
+/// for patches in rows of the mean over the thickness, not of the first patch of another row.
 #[test]
 fn amplitudes_of_nodal_diameters_are_fourier_coefficients() {
     for (rows, middle) in [(None, vec![1]), (Some(3), vec![0, 1, 2])] {

@@ -12,13 +12,13 @@ use crate::inputs::{held, spinning_rom, whirling};
 
 const SPEED: f64 = 1800.0;
 const RESTING: f64 = 5000.0;
-/// Entry of G: the whirl of a point mass is turned by Ωg.
+/// Entry of G: the whirl of a point mass turns by Ωg.
 const SKEW: f64 = 0.7;
 /// Stiffness per Ω².
 const STIFFENING: f64 = 3.0;
 const AMPLITUDE: f64 = 1e-3;
 
-/// Two modes of one frequency that Coriolis force couples, with the modes of speed 0.
+/// Returns two modes of one frequency that the Coriolis force couples, with the modes of speed 0.
 fn bank(scheme: Scheme, stiffening: bool, coriolis: bool) -> ModalBank {
     let model = ModalModel {
         frequencies: vec![RESTING; 2],
@@ -42,20 +42,21 @@ fn bank(scheme: Scheme, stiffening: bool, coriolis: bool) -> ModalBank {
     bank
 }
 
-/// With z = q₁ + iq₂: z̈ + 2iΩg ż + ω²z = 0, so that z = e^(ist), s = √(ω² + Ω²g²) − Ωg, circles at constant speed.
+/// Returns the rate of the whirl. With z = q₁ + iq₂: z̈ + 2iΩg ż + ω²z = 0, so that z = e^(ist), s = √(ω² + Ω²g²) − Ωg,
+/// circles at constant speed.
 fn whirl(stiffening: bool, coriolis: bool) -> f64 {
     let square = RESTING * RESTING + if stiffening { STIFFENING * SPEED * SPEED } else { 0.0 };
     let turned = if coriolis { SPEED * SKEW } else { 0.0 };
     (square + turned * turned).sqrt() - turned
 }
 
-/// Put the bank on the circle with the increment that it has there.
+/// Puts the bank on the circle, with the increment that belongs to it.
 fn start(bank: &mut ModalBank, rate: f64) {
     let step = bank.step();
     let points = [[0.0_f64.cos(), 0.0], [(rate * step).cos(), -(rate * step).sin()]];
     for mode in 0..2 {
         let (now, before) = (AMPLITUDE * points[0][mode], AMPLITUDE * points[1][mode]);
-        // The velocity of the free motion that has this increment.
+        // Velocity of the free motion with this increment.
         let (at_rest, per_velocity) =
             (free_increment(RESTING, 0.0, now, 0.0, step), free_increment(RESTING, 0.0, 0.0, 1.0, step));
         bank.set_modal_state(mode, 0, now, (now - before - at_rest) / per_velocity);
@@ -109,7 +110,7 @@ fn whirl_continues_across_step_size_changes() {
         start(&mut bank, rate);
         let (mut time, mut alone) = (0.0, 0.0_f64);
         for block in 0..2000 {
-            // Long steps after short ones more often than back: what a change adds does not cancel.
+            // Changes to longer steps are more frequent than changes back, so that their effects do not cancel.
             bank.resample(Scheme::ModalExact, [4e-7, 8e-7, 1.6e-6][block % 3], &[]);
             for _ in 0..5 {
                 bank.predict(true);
@@ -124,7 +125,7 @@ fn whirl_continues_across_step_size_changes() {
     }
 }
 
-/// Growth: one blade under Ω²c, as a speed that jumps and as the same speed ramped.
+/// The growth of one blade under Ω²c, with a speed that jumps and with the same speed ramped.
 #[test]
 fn growth_and_stiffening_smooth_out_speed_jumps() {
     let mut scene = whirling();
@@ -152,7 +153,7 @@ fn growth_and_stiffening_smooth_out_speed_jumps() {
     assert!(ramp < 0.1 * hold && (ramp / line - 1.0).abs() < 0.5 && closed < 1e-9, "{ramp} {line} {hold} {closed}");
 }
 
-/// Blades stretched by a speed stand where K(Ω)u = Ω²c₂ + Ω⁴c₄ says, solved in the coordinates of the ROM, and stay there.
+/// Blades stretched by a speed rest at the solution of K(Ω)u = Ω²c₂ + Ω⁴c₄ in the coordinates of the ROM.
 #[test]
 fn centrifugal_growth_uses_the_stiffness_at_speed() {
     let mut scene = whirling();
@@ -161,14 +162,14 @@ fn centrifugal_growth_uses_the_stiffness_at_speed() {
     for (speed, stiffening) in [(300.0, true), (1300.0, true), (1300.0, false), (-1900.0, true)] {
         let structure = &mut scene.settings.structures[0];
         (structure.speed, structure.spin.growth, structure.spin.stiffening) = (speed, true, stiffening);
-        // Both powers count: they are alike at 1000 rad/s.
+        // Both powers count: they are equal at 1000 rad/s.
         let mut spin = models::spin(scene.roms[0].order());
         let loads = spin.centrifugal_load.iter().enumerate();
         spin.centrifugal_load_speed4 = loads.map(|(i, load)| load * (1e-6 - 1e-7 * i as f64)).collect();
         scene.roms[0].extras.spin = Some(spin.clone());
         let rom = &scene.roms[0];
         let square = speed * speed;
-        // With the stiffness of a resting blade the force of a resting blade.
+        // The stiffness of a resting blade goes with the force of a resting blade.
         let (fourth, share) = (square * square, if stiffening { 1.0 } else { 0.0 });
         let stiffness = &rom.stiffness + (&spin.stiffness_speed2 * square + &spin.stiffness_speed4 * fourth) * share;
         let force = |i: usize| square * spin.centrifugal_load[i] + share * fourth * spin.centrifugal_load_speed4[i];
@@ -193,7 +194,8 @@ fn centrifugal_growth_uses_the_stiffness_at_speed() {
     }
 }
 
-/// A blade left vibrating while its rotor speeds up, its stiffness that of the middle of each step: of second order in H.
+/// A blade keeps vibrating while its rotor accelerates, with the stiffness of the middle of each step: second order in
+/// H.
 #[test]
 fn held_speed_input_acts_by_its_mean_over_the_step() {
     let mut scene = held(models::rub(1));
@@ -208,7 +210,7 @@ fn held_speed_input_acts_by_its_mean_over_the_step() {
     while rubbed.time() < 2e-3 {
         rubbed.do_step(rubbed.time(), 5e-5).unwrap();
     }
-    // No casing in the way from here on.
+    // Without the casing from here on.
     set(&mut rubbed, "casing_shape_factor", 0.0);
     set(&mut rubbed, "casing_radius_change", 5e-3);
     let left = saved(&rubbed);

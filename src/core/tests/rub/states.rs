@@ -1,5 +1,5 @@
-//! States that are restored go on as if nothing had been; those whose content is none are refused with nothing changed, or run on to an
-//! end.
+//! Restored states continue as if nothing had happened; states with invalid content are rejected without any change, or
+//! run to an end.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use tiprub_core::variables::{Causality, Variability};
 use tiprub_core::{Error, Scene, Simulation};
 use tiprub_test_models::{self as models, bits, coating, disk, flexible, go, lattice, real, reference, saved, started};
 
-/// Magic, format version and fingerprint of the scene, in front of what is damaged here.
+/// Magic, format version and fingerprint of the scene, before the bytes that are damaged here.
 const HEADER: usize = 24;
 
 fn scenes() -> Vec<(&'static str, Scene)> {
@@ -56,7 +56,7 @@ fn sealed(mut state: Vec<u8>) -> Vec<u8> {
     state
 }
 
-/// Before the start, at the start, in contact between two steps, and within one.
+/// Returns states before the start, at the start, in contact between two steps, and within one.
 fn moments(scene: &Scene, length: f64) -> Vec<Vec<u8>> {
     let mut simulation = Simulation::new(scene).unwrap();
     let mut states = vec![saved(&simulation)];
@@ -78,7 +78,7 @@ fn moments(scene: &Scene, length: f64) -> Vec<Vec<u8>> {
     states
 }
 
-/// A small generator of its own, so that every run tries the same.
+/// A small random generator, so that every run tries the same cases.
 struct Dice(u64);
 
 impl Dice {
@@ -90,7 +90,7 @@ impl Dice {
     }
 }
 
-/// One to three bits, bytes or words changed behind the header.
+/// Returns the state with one to three bits, bytes or words changed after the header.
 fn damage(state: &[u8], dice: &mut Dice) -> Vec<u8> {
     let words: [u64; 12] = [
         0,
@@ -107,7 +107,7 @@ fn damage(state: &[u8], dice: &mut Dice) -> Vec<u8> {
         1.0_f64.to_bits(),
     ];
     let mut damaged = state.to_vec();
-    // What the rest follows from stands in front and is short.
+    // The data that determine the rest are at the front and short.
     let end = if dice.below(3) == 0 { (HEADER + 400).min(state.len() - 16) } else { state.len() - 16 };
     for _ in 0..=dice.below(3) {
         let at = HEADER + dice.below(end - HEADER);
@@ -123,14 +123,14 @@ fn damage(state: &[u8], dice: &mut Dice) -> Vec<u8> {
     sealed(damaged)
 }
 
-/// Ends in an error or with outputs that are numbers.
+/// Runs until an error or with finite outputs.
 fn run_on(simulation: &mut Simulation, created: bool, length: f64) -> Result<(), Error> {
     if created {
         simulation.initialise(0.0)?;
     }
-    // Within a communication step already, or not.
+    // Possibly within a communication step already.
     simulation.advance().map(drop).or_else(|_| simulation.begin_step(simulation.time(), length))?;
-    // The step begun may have been ended by its first internal one.
+    // The first internal step may have ended the communication step.
     let under_way = |simulation: &mut Simulation| while simulation.advance().is_ok_and(|now| !now.finished) {};
     for _ in 0..3 {
         under_way(simulation);
@@ -171,7 +171,7 @@ fn survives_damage_under_a_valid_checksum() {
     }
 }
 
-/// Every undamaged moment of every scene is taken, by any other moment.
+/// Every undamaged state of every scene is accepted at any other moment.
 #[test]
 fn saved_state_restores_from_any_other_state() {
     for (name, scene) in scenes() {
@@ -188,7 +188,7 @@ fn saved_state_restores_from_any_other_state() {
     }
 }
 
-/// The scenes with shapes that are there at once, too shallow to reach the blades, or that grow in.
+/// Returns the scenes with shapes that are present from the start, too shallow to reach the blades, or ramped.
 fn ramped() -> impl Iterator<Item = (&'static str, Scene)> {
     let with = |(name, scene): (&'static str, Scene), ramp: f64| {
         let mut scene = scene;
@@ -203,7 +203,7 @@ fn ramped() -> impl Iterator<Item = (&'static str, Scene)> {
     scenes().into_iter().flat_map(move |(name, scene)| [0.0, 1.0].map(|ramp| with((name, scene.clone()), ramp)))
 }
 
-/// The times of a state are its own: when the receiving instance started is of no account.
+/// A state contains its times: the start time of the receiving instance is irrelevant.
 #[test]
 fn restores_a_state_in_an_instance_with_another_start_time() {
     for (name, scene) in ramped() {
@@ -233,7 +233,7 @@ fn run(simulation: &mut Simulation, steps: u32, length: f64) {
     }
 }
 
-/// Every element of every continuous output: its derivative (1/s), as bits.
+/// Returns the derivative (1/s) of every element of every continuous output, as bits.
 fn derivatives(simulation: &Simulation) -> BTreeMap<u32, u64> {
     let rows = simulation.table().variables().iter();
     let rows = rows.filter(|row| row.causality == Causality::Output && row.variability == Variability::Continuous);
@@ -242,7 +242,7 @@ fn derivatives(simulation: &Simulation) -> BTreeMap<u32, u64> {
         .collect()
 }
 
-/// Steps of other lengths lie behind the instance that takes the state over: none of them counts.
+/// The receiving instance has made steps of other lengths before: none of them counts.
 #[test]
 fn restored_state_reproduces_step_derivatives() {
     let scene = models::rub(12);
@@ -256,7 +256,7 @@ fn restored_state_reproduces_step_derivatives() {
     let now = read(&simulation);
     let state = saved(&simulation);
     let at_save = derivatives(&simulation);
-    // Means belong to the middles of their steps.
+    // Means belong to the middle of their steps.
     for (index, length) in [5e-5, 5e-5, 7e-5, 7e-5].into_iter().enumerate() {
         let exact = (now[index] - before[index]) / length;
         let found = simulation.output_derivative(reference(&simulation, names[index]), 1).unwrap();
@@ -273,7 +273,7 @@ fn restored_state_reproduces_step_derivatives() {
         assert_eq!(derivatives(&other), at_save, "after steps of {lengths:?}");
         run(&mut other, 1, 4e-5);
         assert_eq!(derivatives(&other), after, "a step after steps of {lengths:?}");
-        // And into an instance that has stepped since, or was never started.
+        // And into an instance that has continued since, or was never started.
         other.restore_state(&state).unwrap();
         assert_eq!(derivatives(&other), at_save);
     }
@@ -311,7 +311,7 @@ fn a_thousand_resets_give_identical_bits() {
     }
 }
 
-/// The search for closest points begins where the saved nodes are, not where trials of an earlier span have left off.
+/// The search for closest points begins at the saved nodes, not where trials of an earlier span ended.
 #[test]
 fn adaptive_steps_continue_from_states_with_the_same_bits() {
     const LENGTH: f64 = 2e-5;
@@ -330,7 +330,7 @@ fn adaptive_steps_continue_from_states_with_the_same_bits() {
     }
     assert!(simulation.system().ledger().contact_work.value() > 0.0, "it has touched");
     for (index, state) in states.iter().enumerate() {
-        // Where it has just been, it comes from the end of the run.
+        // The state is restored from the end of the run.
         for other in [&mut simulation, &mut started(&scene)] {
             other.restore_state(state).unwrap();
             go(other, LENGTH);
@@ -339,7 +339,8 @@ fn adaptive_steps_continue_from_states_with_the_same_bits() {
     }
 }
 
-/// A free body that touches in its first internal step, which is not as long as the scene proposes.
+/// The contact of a free body begins in its first internal step, whose length differs from the one that the scene
+/// proposes.
 #[test]
 fn energy_balance_of_free_body_closes_from_the_first_step() {
     for scheme in [Scheme::CentralDifference, Scheme::ModalExact] {

@@ -1,5 +1,6 @@
-//! Derivatives of outputs at the end of a communication step by inputs over it: against central differences by states saved and restored,
-//! out of contact, near its onset and in it, for all that steps in another way; what they leave alone; what is refused.
+//! Derivatives of outputs at the end of a communication step with respect to inputs over it: against central
+//! differences from saved and restored states, out of contact, near its onset and in contact, for all stepping methods;
+//! their side effects; errors.
 
 use std::collections::BTreeMap;
 
@@ -72,10 +73,10 @@ fn scenes() -> Vec<(&'static str, Scene)> {
     ]
 }
 
-/// A casing that whirls a little, so that no two blades see the same.
+/// A small offset of the casing, so that no two blades have the same gap.
 const OFF: [(&str, f64); 2] = [("whirl_x", 1.3e-5), ("whirl_y", -0.7e-5)];
 
-/// How far a test moves an input: other lengths than the product's own.
+/// Returns the step by which a test moves an input, different from the one that the product uses.
 fn small(name: &str) -> f64 {
     let kinds = [
         ("speed", 3e-4),
@@ -88,7 +89,7 @@ fn small(name: &str) -> f64 {
     kinds.iter().find(|(kind, _)| name.contains(kind)).map_or(1e-9, |(_, small)| *small)
 }
 
-/// Central differences by states saved before the step.
+/// Computes central differences from states saved before the step.
 fn central(
     simulation: &Simulation,
     state: &[u8],
@@ -107,7 +108,7 @@ fn central(
     (up.iter().zip(&down).map(|(up, down)| (up - down) / (2.0 * by)).collect(), up)
 }
 
-/// What the blades did over a step, beside the step before.
+/// Contact of the blades over a step, compared with the step before.
 #[derive(Clone, Copy, PartialEq)]
 enum Contact {
     None,
@@ -115,7 +116,7 @@ enum Contact {
     Lasting,
 }
 
-/// Errors of all derivatives over a step, as shares of the largest among outputs of the same unit.
+/// Returns the errors of all derivatives over a step, relative to the largest derivative among outputs of one unit.
 fn errors(simulation: &mut Simulation, state: &[u8], [inputs, outputs]: [&[u32]; 2]) -> Vec<f64> {
     let mut errors = Vec::new();
     for &input in inputs {
@@ -131,7 +132,7 @@ fn errors(simulation: &mut Simulation, state: &[u8], [inputs, outputs]: [&[u32];
         }
         for (i, output) in outputs.iter().enumerate() {
             let [change, value] = scales[unit(*output)];
-            // What rounding leaves of the difference of two values.
+            // Rounding error of the difference of two values.
             let scale = change.max(1e-9 * value / by);
             if scale > 0.0 {
                 errors.push((own[i] - central[i]).abs() / scale);
@@ -192,7 +193,7 @@ fn a_rigid_casing_moves_clearances_by_the_cosine_of_its_slope() {
     let node = &models::blade(6).contact_nodes[0];
     let cosine = node.meridional_slope.atan().cos();
     let turned = real(&simulation, "rotor_angle") + node.position[1];
-    // What is moved, what is read, and what follows from geometry.
+    // The input moved, the output read, and the value that follows from geometry.
     let expected = [(angle, [H, 0.0]), (change, [0.0, cosine]), (whirl, [0.0, -cosine * turned.cos()])];
     for (input, expected) in expected {
         let mut found = [0.0; 2];
@@ -250,7 +251,7 @@ fn derivatives_do_not_change_the_simulation() {
             asked.step_derivative(&outputs, &inputs, &seed, &mut first).unwrap();
             assert_eq!(bits(&plain), bits(&asked), "{name}");
             assert!(before == saved(&asked), "{name}");
-            // Asked again, and after a return to the start of a step, the same.
+            // Repeated, and after a return to the start of a step, the result is the same.
             let mut again = vec![0.0; outputs.len()];
             asked.step_derivative(&outputs, &inputs, &seed, &mut again).unwrap();
             assert!(first.iter().zip(&again).all(|(first, again)| first.to_bits() == again.to_bits()), "{name}");
@@ -300,7 +301,7 @@ fn rejects_variables_without_derivatives() {
     assert!(ask(on, torque, friction, 1.0).contains("not a real input"));
     assert!(ask(on, torque, speed, f64::NAN).contains("seed"));
     assert!(ask(on, u32::MAX, speed, 1.0).contains("does not exist"));
-    // A step that is not the whole story.
+    // A step that is not complete.
     on.begin_partial_step(on.time(), H).unwrap();
     on.advance().unwrap();
     assert!(ask(on, torque, speed, 1.0).contains("none has been completed"));
@@ -315,7 +316,8 @@ fn rejects_variables_without_derivatives() {
     on.step_derivative(&[torque], &[speed], &[1.0], &mut [0.0]).unwrap();
 }
 
-/// Steps far shorter than those before: ramps act in part, inputs are moved by more, and contacts open or close beside.
+/// Steps far shorter than those before: ramps act only in part, inputs are moved by more, and contacts open or close
+/// nearby.
 #[test]
 fn derivatives_stay_one_sided_near_a_kink() {
     for solver in [Solver::Lcp, Solver::Film] {
@@ -340,7 +342,7 @@ fn derivatives_stay_one_sided_near_a_kink() {
                 let (coarse, fine) = (at(1e-10), at(1e-11));
                 let largest = |all: &[f64]| all.iter().fold(0.0, |most: f64, one| most.max(one.abs()));
                 let apart = |one: &[f64]| largest(&one.iter().zip(&fine).map(|(a, b)| a - b).collect::<Vec<_>>());
-                // Where differences disagree there is a kink between them, or nothing but rounding.
+                // If differences disagree, there is a kink between them or only rounding.
                 if largest(&fine) < 1.0 || apart(&coarse) > 1e-4 * largest(&fine) {
                     continue;
                 }

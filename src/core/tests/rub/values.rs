@@ -1,4 +1,4 @@
-//! Values of a scene and of a ROM that cannot be meant: refused by name, or asked about.
+//! Implausible values of a scene and of a ROM: rejected by name, or questioned.
 
 use nalgebra::DMatrix;
 use tiprub_core::settings::Shape;
@@ -7,7 +7,7 @@ use tiprub_test_models::{self as models, started};
 
 use crate::blades::refusal;
 
-/// Every number of a scene and its ROM, beyond the table of ranges.
+/// Covers every number of a scene and its ROM that the table of ranges does not include.
 #[test]
 fn rejects_out_of_range_values_by_name() {
     type Change = fn(&mut Scene, f64);
@@ -112,7 +112,7 @@ fn error_messages_print_short_numbers_of_any_size() {
     scene.settings.surfaces[0].shape = Shape::Lobes { amplitude: 4e-4, order: 100_000, phase: 0.0 };
     let message = refusal(&scene);
     assert!(message.contains("features of the casing shape that are 1.000e-5 rad wide"), "{message}");
-    // What is wrong is that entries are too far apart, not that stiffness is negative.
+    // The problem is that entries differ too much, not that stiffness is negative.
     scene = models::rub(12);
     scene.roms[0].mass[(2, 2)] = 1e-310;
     let message = refusal(&scene);

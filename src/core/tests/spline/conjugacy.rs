@@ -1,5 +1,5 @@
-//! Forces, moments and work agree: the normal is the gradient of the gap, the torque is conjugate to the rotor angle, every
-//! input has its work, and what acts on the master acts on the slave.
+//! Consistency of forces, moments and work: the normal is the gradient of the gap, the torque is conjugate to the rotor
+//! angle, every input has its work, and the forces on master and slave are opposite.
 
 use tiprub_core::gaps::wrench::{At, MotionIncrement};
 use tiprub_core::gaps::{GapLaw, PrescribedMotion};
@@ -61,7 +61,7 @@ fn scene(feature: Feature, scheme: Scheme, solver: Solver, friction: f64, step: 
 
 const LENGTH: f64 = 1e-5;
 
-/// All inputs move; the speed is held over a communication step.
+/// Moves all inputs; the speed is held over a communication step.
 fn drive(simulation: &mut Simulation) -> f64 {
     let time = simulation.time();
     let (rate, speed) = (900.0, 1300.0 + 4e4 * time);
@@ -76,8 +76,8 @@ fn drive(simulation: &mut Simulation) -> f64 {
     speed
 }
 
-/// The shaft's centre is off the axis: a force through the axis of the casing has the moment e × F about it. Works of all inputs sum
-/// to the external work.
+/// The shaft centre is off the axis: a force through the axis of the casing has the moment e × F about it. The works of
+/// all inputs sum to the external work.
 #[test]
 fn whirl_adds_shaft_torque_and_external_work() {
     for feature in FEATURES.into_iter().filter(|feature| feature.0.contains("whirl")) {
@@ -102,7 +102,7 @@ fn whirl_adds_shaft_torque_and_external_work() {
     }
 }
 
-/// Gap and normal of the first node of a law at a state.
+/// Returns gap and normal of the first node of a gap law at a state.
 fn looked(
     law: &mut GapLaw,
     lanes: usize,
@@ -130,21 +130,21 @@ fn normals_and_motions_are_the_derivatives_of_the_gap() {
             shaft: [4e-4, -3e-4, 2e-4],
             ..PrescribedMotion::default()
         };
-        // A gap of zero: there the length of the gradient does not matter.
+        // At a gap of zero the length of the gradient is irrelevant.
         let (gap, normal, _) = looked(&mut law, lanes, &drive, &displacement);
         let drive = PrescribedMotion { radius_change: gap / normal[0], ..drive };
         let (gap, normal, places) = looked(&mut law, lanes, &drive, &displacement);
         let at = At { node: 0, index: 0, drive: &drive };
         let moved = [0, 1, 2].map(|component| displacement[component * lanes]);
         let point = law.contact_point(at, moved, places.get(at.index).copied().unwrap_or_default());
-        // Any force: its work on a shaft that moves is the same in both coordinates.
+        // The work of any force on a moving shaft is equal in both coordinates.
         let (force, shaft) = ([0.3, -0.7, 0.4], [2e-4, 5e-4, -3e-4]);
         let work = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let own = law.shaft_motion(at, point, &MotionIncrement { shaft, ..MotionIncrement::default() });
         let acting = law.wrench(at, point, force);
         let (own, fixed) = (work(force, own), work(acting.force, shaft));
         assert!((own / fixed - 1.0).abs() < 1e-12, "{}: {own:e} {fixed:e}", feature.0);
-        // Its moment is that of the force at the contact point, about the shaft's centre.
+        // The moment is that of the force at the contact point, about the shaft centre.
         let ([x, y, z], [fx, fy, fz]) = (std::array::from_fn(|i| acting.point[i] - drive.shaft[i]), acting.force);
         for (reported, found) in acting.moment.into_iter().zip([y * fz - z * fy, z * fx - x * fz, x * fy - y * fx]) {
             assert!((reported - found).abs() < 1e-12, "{}: {:?}, {found}", feature.0, acting.moment);
@@ -204,7 +204,7 @@ fn friction_heat_goes_to_the_patch_facing_the_node() {
                 let ([u, v, _], [x, y, _]) = (event.point, system.pairs()[0].drive_now().shaft);
                 let angle = undisplaced + v / node[0];
                 let place = [(node[0] + u) * angle.cos() + x, (node[0] + u) * angle.sin() + y];
-                // Quarters from θ = 0 on.
+                // Quarters, starting at θ = 0.
                 let patch = |angle: f64| match (angle.sin() >= 0.0, angle.cos() > 0.0) {
                     (true, true) => 0,
                     (true, false) => 1,
@@ -235,7 +235,7 @@ fn unexplained_energy_gain_ends_the_run() {
             let time = simulation.time();
             set(&mut simulation, "casing_radius_change", -0.05 * time, -0.05);
             if let Err(error) = simulation.do_step(time, 2e-4) {
-                // As after any failure only a reset helps.
+                // After any failure only a reset helps.
                 assert!(simulation.do_step(time, 2e-4).is_err());
                 return Some(error.to_string());
             }

@@ -1,4 +1,4 @@
-//! Surfaces through data points: the spline, open edges, forces on them.
+//! Surfaces through data points: the spline, open edges, and forces on them.
 
 #[path = "../common/casings.rs"]
 mod casings;

@@ -11,7 +11,7 @@ use tiprub_reference::surface::{SplineSurface, SurfaceKind};
 const KINDS: [Interpolation; 2] = [Interpolation::Spline, Interpolation::Facets];
 const GRIDS: [(usize, usize); 6] = [(2, 2), (2, 5), (3, 3), (4, 2), (9, 41), (12, 7)];
 
-/// A bent and twisted sheet with random dents, far from the origin.
+/// Returns a bent and twisted sheet with random dents, far from the origin.
 fn sheet(around: usize, along: usize) -> Vec<[f64; 3]> {
     let mut random = SeededRandom(5 + (around * along) as u64);
     let share = |index: usize, count: usize| index as f64 / (count - 1) as f64 - 0.5;
@@ -35,7 +35,7 @@ fn place(p: usize, q: usize, s: f64, t: f64) -> ClosestPoint {
     ClosestPoint { patch: [p, q], s, t }
 }
 
-/// ClosestPoint of a data point.
+/// Returns the surface point of a data point.
 fn at(index: usize, around: usize, along: usize) -> ClosestPoint {
     let (i, j) = (index % around, index / around);
     let (p, q) = (i.min(around - 2), j.min(along - 2));
@@ -56,7 +56,7 @@ fn interpolation_and_forces_do_equal_work() {
                 let place = place(random.below(around - 1), random.below(along - 1), random.unit(), random.unit());
                 let weights = surface.weights(place);
                 partition = partition.max((weights.iter().map(|(_, weight)| weight).sum::<f64>() - 1.0).abs());
-                // Work of a force at the place on displacements of the data points, both ways round.
+                // Work of a force at the point on displacements of the data points, in both forms.
                 let (force, mut forces) = (random.vector(1.0), vec![[0.0; 3]; around * along]);
                 let moved: Vec<[f64; 3]> = (0..around * along).map(|_| random.vector(1.0)).collect();
                 let mut control = moved.clone();
@@ -123,7 +123,7 @@ fn patches_join_with_two_continuous_derivatives() {
     assert_below("jump at borders of patches (m)", off, 5e-16);
 }
 
-/// Parameters of a place over the whole grid.
+/// Returns the parameters of a surface point over the whole grid.
 fn parameters(place: ClosestPoint) -> [f64; 2] {
     [place.patch[0] as f64 + place.s, place.patch[1] as f64 + place.t]
 }
@@ -135,7 +135,7 @@ fn closest_points_and_gaps_match_the_reference() {
     {
         let (around, along) = (9, 41);
         let (surface, points) = open(around, along, kind);
-        // Rows of the reference are those of the core, S_s × S_t its own; its s runs from row to row.
+        // The rows of the reference are those of the core, but it has its own S_s × S_t, with s from row to row.
         let other = SplineSurface::new(reference, along, around, 1.0);
         let carriers = other.carriers(&points);
         let (mut gaps, mut normals, mut found) = (0.0_f64, 0.0_f64, 0);
@@ -152,7 +152,7 @@ fn closest_points_and_gaps_match_the_reference() {
             let Some(theirs) = other.foot(x, &carriers, [t, s]) else { continue };
             found += 1;
             gaps = gaps.max((gap - theirs.gap).abs());
-            // On a crease between facets either normal is right.
+            // On a crease between facets both normals are correct.
             let on_crease =
                 kind == Interpolation::Facets && [place.s, place.t].iter().any(|x| *x < 1e-9 || *x > 1.0 - 1e-9);
             if !on_crease {
@@ -195,7 +195,7 @@ fn nodes_beyond_any_edge_are_off_the_surface() {
                 assert!(beyond([x, y, 0.1], start), "{kind:?}: ({x}, {y}) from {start:?}");
             }
         }
-        // Exactly on an edge is still on the surface.
+        // A point exactly on an edge is still on the surface.
         for (x, y) in [(0.0, 1.0), (3.0, 0.4), (1.2, 0.0), (2.9, 2.0), (0.0, 0.0), (3.0, 2.0)] {
             assert!(!beyond([x, y, 0.1], surface.locate([x, y, 0.1])), "{kind:?}: ({x}, {y})");
         }
@@ -240,7 +240,7 @@ fn projects_onto_distant_surfaces() {
             match surface.project(x, surface.locate(x)) {
                 Projection::Lost => panic!("{kind:?}: lost {x:?}"),
                 Projection::BeyondEdge { .. } => {}
-                // On a crease between facets the node is not above the normal.
+                // On a crease between facets the node is not on the normal.
                 Projection::Found { point, gap, .. } if kind == Interpolation::Facets => {
                     assert!(gap.abs() <= distance(x, point) * (1.0 + 1e-14), "{gap} m, {} m", distance(x, point));
                 }
@@ -249,7 +249,7 @@ fn projects_onto_distant_surfaces() {
                 }
             }
         }
-        // The residual is along the normal.
+        // The residual is parallel to the normal.
         assert_below(&format!("{kind:?}: distance and gap, relative"), off, 1e-12);
     }
 }

@@ -1,4 +1,4 @@
-//! The surface spline: what it is by definition, what end conditions do, and exact transfer of forces.
+//! The surface spline: its definition, its end conditions, and exact transfer of forces.
 
 #![allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 
@@ -97,7 +97,7 @@ fn derivatives(evaluation: &Evaluation) -> [[f64; 3]; 6] {
     [point, d_s, d_t, d_ss, d_st, d_tt]
 }
 
-/// Largest difference of point, first and second derivatives between two places, relative to the radius.
+/// Returns the largest difference of point, first and second derivatives between two points, relative to the radius.
 fn jumps(surface: &SurfaceSpline, a: ClosestPoint, b: ClosestPoint) -> [f64; 3] {
     let (a, b) = (derivatives(&surface.evaluate(a)), derivatives(&surface.evaluate(b)));
     let jump = |from: usize, to: usize| (from..to).map(|i| distance(a[i], b[i])).fold(0.0, f64::max) / RADIUS;
@@ -166,7 +166,8 @@ fn second_derivative_vanishes_at_edges_and_free_ends() {
     assert!(kink > 0.01, "free ends do not join smoothly");
 }
 
-/// Largest jumps of derivatives over the edges, and difference of Σ weight · control point and the point of what goes on.
+/// Returns the largest jumps of derivatives over the edges, and the difference of Σ weight · control point and the
+/// point on the continuation.
 fn beyond_the_edges() -> ([f64; 3], f64) {
     let (mut worst, mut weights) = ([0.0_f64; 3], 0.0_f64);
     for (surface, _) in every_surface() {
@@ -202,7 +203,7 @@ fn derivatives_match_the_surface_point() {
             };
             let point =
                 |i: f64, j: f64| surface.evaluate(ClosestPoint { s: at.s + i * step, t: at.t + j * step, ..at }).point;
-            // Third derivatives are constant along a parameter: two step sizes leave no truncation error.
+            // Third derivatives are constant along a parameter, so two step sizes eliminate the truncation error.
             let first = |one: [f64; 3], other: [f64; 3], two: [f64; 3], opposite: [f64; 3]| -> [f64; 3] {
                 std::array::from_fn(|c| (8.0 * (one[c] - other[c]) - (two[c] - opposite[c])) / (12.0 * step))
             };
@@ -305,7 +306,7 @@ fn spline_converges_to_round_casing_at_fourth_order() {
     crate::guide::hold("cargo test -p tiprub-core --test spline");
 }
 
-/// Largest distance from the circle, of all patches.
+/// Returns the largest distance from the circle over all patches.
 fn off_the_circle(around: usize, closure: Closure, interpolation: Interpolation) -> f64 {
     let surface = SurfaceSpline::new(&data(around, 3, round), around, 3, closure, interpolation).unwrap();
     let radius = |index: usize| {

@@ -1,5 +1,5 @@
-//! What only some structures have: spin, heat, contact grid (coupled sectors: [`super::harmonics`]). Files without it
-//! are those of the first release.
+//! Optional data of a ROM: spin, heat, contact grid (coupled sectors: [`super::harmonics`]). A file without them has
+//! the format of the first release.
 
 use nalgebra::DMatrix;
 use tiprub_core::rom::{
@@ -24,7 +24,7 @@ const ROWS: &str = "contact_rows";
 const BASES: [(&str, ReductionBasis); 2] =
     [("craig-bampton", ReductionBasis::FixedInterface), ("free-interface", ReductionBasis::FreeInterface)];
 
-/// Metadata entry of the names of points with this array of positions.
+/// Returns the metadata entry of the names of points with this array of positions.
 fn names_of(positions: &str) -> String {
     positions.replace("positions", "names")
 }
@@ -67,7 +67,8 @@ impl RomReader<'_> {
         }
     }
 
-    /// Points that are looked at: an array of so many components each, one of positions, and an entry of names.
+    /// Reads watched points: an array with a fixed number of components per point, an array of positions, and an entry
+    /// of names.
     fn watched(
         &self,
         (arrays, metadata): (&Arrays, &Metadata),
@@ -97,7 +98,7 @@ impl RomReader<'_> {
         Ok(Some(WatchedPoints { map, points: points.collect() }))
     }
 
-    /// Whether the arrays of a group are there: all or none.
+    /// Returns whether the arrays of a group are present: all or none.
     fn group(&self, arrays: &Arrays, names: &[&str]) -> Result<bool> {
         let Some(given) = names.iter().find(|name| arrays.contains_key(**name)) else { return Ok(false) };
         match names.iter().find(|name| !arrays.contains_key(**name)) {
@@ -155,7 +156,8 @@ impl RomReader<'_> {
         Ok(Some(Thermal { loads, patches: places.iter().map(patch).collect() }))
     }
 
-    /// Static stress of one load, or of `several`; the validation of the ROM compares its shape with that of other arrays.
+    /// Reads the static stress of one load, or of `several`; the validation of the ROM compares its shape with that of
+    /// other arrays.
     fn static_stress(&self, arrays: &Arrays, name: &str, several: bool) -> Result<Option<DMatrix<f64>>> {
         if !arrays.contains_key(name) {
             return Ok(None);

@@ -10,8 +10,8 @@ use super::{Array, Arrays, RomReader, WRITE_AGAIN, list};
 use crate::Result;
 use crate::rom_layout::{HARMONIC_ARRAYS, NUMBER};
 
-/// The kind (as in [`HARMONIC_ARRAYS`]) and the nodal diameter of an array of coupled sectors; `None` for other names.
-/// A number has one way to be written: without sign and leading zeros.
+/// Returns the kind (as in [`HARMONIC_ARRAYS`]) and the nodal diameter of an array of coupled sectors; `None` for other
+/// names. A number is written without sign and leading zeros, so that its text is unique.
 pub(super) fn parts(name: &str) -> Option<(&'static str, usize)> {
     HARMONIC_ARRAYS.iter().find_map(|kind| {
         let digits = name.strip_prefix(kind.strip_suffix(NUMBER)?)?;
@@ -25,7 +25,7 @@ fn array_name(kind: &str, number: usize) -> String {
 }
 
 impl RomReader<'_> {
-    /// All nodal diameters 1 ..= sectors/2, or none.
+    /// Reads all nodal diameters 1 ..= sectors/2, or none.
     pub(super) fn harmonics(&self, arrays: &Arrays, sectors: usize, nodes: usize) -> Result<Vec<Harmonic>> {
         let numbers: BTreeSet<usize> = arrays.keys().filter_map(|name| Some(parts(name)?.1)).collect();
         let largest = sectors / 2;
@@ -73,7 +73,7 @@ impl RomReader<'_> {
         })
     }
 
-    /// One whole number per mode of the checks, only with coupled sectors.
+    /// Reads one integer per mode of the checks, only with coupled sectors.
     pub(super) fn nodal_diameters(&self, arrays: &Arrays, sectors: usize, uncoupled: bool) -> Result<Vec<u32>> {
         let name = "nodal_diameters";
         let values = self.check_values(arrays, name)?;
@@ -110,7 +110,7 @@ impl RomReader<'_> {
     }
 }
 
-/// Row-major values, real and imaginary part of each entry beside each other.
+/// Returns a matrix from row-major values, in which the real and the imaginary part of each entry are adjacent.
 fn complex(rows: usize, columns: usize, values: &[f64]) -> DMatrix<Complex<f64>> {
     let (pairs, _) = values.as_chunks::<2>();
     DMatrix::from_row_iterator(rows, columns, pairs.iter().map(|[re, im]| Complex::new(*re, *im)))

@@ -1,4 +1,4 @@
-//! What a reduction leaves of a rub, where somebody has found it.
+//! Rub errors of a reduction, if they have been determined.
 
 use tiprub_core::rom::RubErrors;
 
@@ -48,7 +48,7 @@ impl RomReader<'_> {
     }
 }
 
-/// The entries; none where nothing is known.
+/// Returns the metadata entries; empty if no error is known.
 pub(super) fn metadata(errors: &RubErrors) -> Vec<(&'static str, String)> {
     let known = DIRECTIONS.iter().zip([errors.modes, errors.patches, errors.rows, errors.mesh]);
     let known: Vec<String> = known.filter_map(|(name, error)| Some(format!("{name}={}", error?))).collect();

@@ -1,4 +1,4 @@
-//! The list itself.
+//! The list of all keys.
 
 use super::SceneField;
 

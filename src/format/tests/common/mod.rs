@@ -1,8 +1,8 @@
-//! A scene that gives every optional key.
+//! A scene that sets every optional key.
 
 use tiprub_core::settings::*;
 
-/// One of everything.
+/// Returns a scene with one item of every kind.
 pub fn complete_scene() -> SceneSettings {
     let mut settings = tiprub_test_models::round(tiprub_test_models::blade(2)).settings;
     (settings.name, settings.description) = ("complete".into(), "Every key.".into());

@@ -1,10 +1,11 @@
-//! A scene that uses what most scenes leave off.
+//! A scene with features that most scenes do not use.
 
 use tiprub_core::settings::*;
 
 use crate::common::complete_scene;
 
-/// What `complete_scene` leaves at its default: a coated flexible casing around a spinning, mistuned rotor.
+/// Returns a scene with the features that `complete_scene` leaves at their default: a coated flexible casing around a
+/// spinning, mistuned rotor.
 pub fn scene_with_every_feature() -> SceneSettings {
     let mut scene = complete_scene();
     let rotor = &mut scene.structures[0];
@@ -48,7 +49,7 @@ pub fn scene_with_every_feature() -> SceneSettings {
     scene
 }
 
-/// A coating with values of its own.
+/// Returns a coating without default values.
 fn coating() -> CoatingSettings {
     CoatingSettings {
         thickness: 5e-3,
@@ -62,7 +63,7 @@ fn coating() -> CoatingSettings {
     }
 }
 
-/// What only a master that flies freely has: two pairs against open surfaces.
+/// Returns a scene with the keys that require a free master: two pairs against open surfaces.
 pub fn scene_with_a_free_master() -> SceneSettings {
     let still = |name: &str| StructureSettings {
         name: name.into(),

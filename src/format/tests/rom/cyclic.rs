@@ -10,7 +10,7 @@ use tiprub_core::rom::{DisplacementFrame, Harmonic, RomChecks, RomExtras};
 use tiprub_format::{read_rom, write_rom};
 use tiprub_test_models::{node, structure};
 
-/// Hermitian, positive definite, exactly its own adjoint; real where nothing can travel.
+/// Returns a Hermitian, positive definite matrix that equals its adjoint exactly; real for standing patterns.
 fn hermitian(order: usize, real: bool, value: &mut dyn FnMut() -> f64) -> DMatrix<Complex<f64>> {
     let mut entry = |row: usize, column: usize| match (row == column, real) {
         (true, _) => Complex::new(4.0 * order as f64 + value(), 0.0),
@@ -21,7 +21,7 @@ fn hermitian(order: usize, real: bool, value: &mut dyn FnMut() -> f64) -> DMatri
     DMatrix::from_fn(order, order, |i, j| if i <= j { upper[(i, j)] } else { upper[(j, i)].conj() })
 }
 
-/// A disk whose nodal diameters have different numbers of coordinates.
+/// Returns a disk whose nodal diameters have different numbers of coordinates.
 fn disk(seed: u64, sectors: usize, nodes: usize, order: impl Fn(usize) -> usize) -> Rom {
     let mut value = numbers(seed);
     let harmonic = |number: usize, value: &mut dyn FnMut() -> f64| {
@@ -49,13 +49,13 @@ fn disk(seed: u64, sectors: usize, nodes: usize, order: impl Fn(usize) -> usize)
     Rom { sectors, frame: DisplacementFrame::Cylindrical, damping_ratio: 0.005, checks, extras, ..rom }
 }
 
-/// Disks of all sizes, with any orders.
+/// Generates disks of all sizes, with any orders.
 pub fn disks() -> impl Strategy<Value = Rom> {
     (0..u64::MAX / 2, 1..9usize, 1..4usize, prop::collection::vec(1..5usize, 5))
         .prop_map(|(seed, sectors, nodes, orders)| disk(seed, sectors, nodes, |number| orders[number]))
 }
 
-/// Real and imaginary part lie beside each other, last; rows before columns.
+/// The real and the imaginary part are adjacent on the last axis; rows come before columns.
 #[test]
 fn complex_arrays_use_numpy_layout_with_parts_last() {
     let rom = disk(7, 4, 1, |number| 2 + number);
@@ -81,7 +81,8 @@ impl MapBits for [f64] {
     }
 }
 
-/// 34 coordinates at 29 nodal diameters, three contact nodes: the matrices of all nodal diameters, and little besides.
+/// 34 coordinates at 29 nodal diameters, three contact nodes: the file contains the matrices of all nodal diameters and
+/// little else.
 #[test]
 fn reference_disk_takes_a_few_megabytes() {
     let size = write_rom(&disk(2, 56, 3, |_| 34)).len();
@@ -163,7 +164,8 @@ fn rejects_impossible_values_by_name() {
     refused(7, |file| file.array("stiffness_3").1[1] += 1e6, &["array `stiffness_3`", "not Hermitian"]);
     refused(7, |file| file.array("mass_1").1[0] = -9.0, &["array `mass_1`", "not positive definite"]);
     refused(7, |file| file.array("contact_map_2").1[5] = f64::NAN, &["array `contact_map_2`", "non-finite"]);
-    // Half as many nodal diameters as sectors: neighbours move in opposite directions, and nothing travels.
+    // For half as many nodal diameters as sectors, neighbours move in opposite directions, so the pattern cannot
+    // travel.
     refused(6, |file| file.array("contact_map_3").1[1] = 0.5, &["array `contact_map_3`", "imaginary part"]);
 }
 
@@ -181,7 +183,7 @@ fn rejects_inconsistent_nodal_diameters_of_the_checks() {
     refused(6, uncoupled, &[name, "given although the sectors are not coupled"]);
 }
 
-/// Taken from the file: what does not belong to nodal diameters reads as it did.
+/// After removing these arrays from the file, everything that does not belong to nodal diameters is read unchanged.
 #[test]
 fn without_the_arrays_of_nodal_diameters_sectors_are_uncoupled() {
     let mut file = Loose::of(&disk(9, 6, 1, |_| 2));

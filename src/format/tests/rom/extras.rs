@@ -1,4 +1,4 @@
-//! What only some ROM files hold: spin, heat, contact grid.
+//! Optional data of ROM files: spin, heat, contact grid.
 
 use crate::loose::{Loose, numbers};
 use nalgebra::DMatrix;
@@ -15,7 +15,7 @@ use tiprub_test_models::{node, structure};
 const AROUND: usize = 6;
 const ALONG: usize = 2;
 
-/// A ring of 6 x 2 contact nodes with `order` coordinates; `value` gives its numbers one by one.
+/// Returns a ring of 6 x 2 contact nodes with `order` coordinates; `value` generates its numbers.
 fn ring(order: usize, value: &mut dyn FnMut() -> f64) -> Rom {
     let nodes = AROUND * ALONG;
     let place = |index: usize| {
@@ -85,7 +85,7 @@ fn complete(seed: u64, order: usize, patches: usize) -> Rom {
     rom
 }
 
-/// Without most of what a ROM may have beside its matrices.
+/// Returns the ROM without most of its optional data.
 fn plain(rom: &Rom) -> Rom {
     let mut rom = rom.clone();
     (rom.extras.watched, rom.extras.stress, rom.extras.basis) = (None, None, ReductionBasis::default());
@@ -110,7 +110,7 @@ fn reads_back_known_rub_errors() {
         rom
     };
     let without = write_rom(&with(None));
-    // Nothing known is nothing written.
+    // Unknown errors are not written.
     assert_eq!(write_rom(&with(Some(RubErrors { found_on: "nothing".into(), ..RubErrors::default() }))), without);
     let none = RubErrors { found_on: String::new(), patches: Some(0.0), ..rub_errors() };
     let across = RubErrors { rows: None, mesh: None, ..rub_errors() };
@@ -163,7 +163,7 @@ fn rejects_incomplete_or_unsupported_watched_points() {
     assert!(reported.contains("`contact_areas`, node 1"), "{reported}");
 }
 
-/// ROMs with any of the extras.
+/// Generates ROMs with any of the extras.
 pub fn with_extras() -> impl Strategy<Value = Rom> {
     (0..u64::MAX / 2, 1..7usize, 1..5usize, prop::array::uniform5(any::<bool>())).prop_map(
         |(seed, order, patches, has)| {
@@ -173,7 +173,7 @@ pub fn with_extras() -> impl Strategy<Value = Rom> {
                 (extras.spin, extras.stress_centrifugal) = (None, None);
             }
             if !has[1] {
-                // The patches are columns of the others.
+                // The patches are columns of the other arrays.
                 (extras.thermal, extras.stress_thermal, extras.support) = (None, None, None);
             }
             if !has[2] {
@@ -187,7 +187,7 @@ pub fn with_extras() -> impl Strategy<Value = Rom> {
     )
 }
 
-/// Rows of patches are whole rows of two or more, of patches with areas; one row is none.
+/// Rows of patches must be complete rows of at least two patches with areas; a single row is rejected.
 #[test]
 fn rejects_patch_rows_that_do_not_match_the_patches() {
     let mut rom = complete(7, 3, 1);
@@ -210,7 +210,7 @@ fn rejects_patch_rows_that_do_not_match_the_patches() {
     assert!(with(&rom, "2").unwrap_err().to_string().contains("without areas"));
 }
 
-/// A rectangle of 4 x 3 nodes with free edges, in a Cartesian frame.
+/// Returns a rectangle of 4 x 3 nodes with free edges, in a Cartesian frame.
 fn panel(order: usize, value: &mut dyn FnMut() -> f64) -> Rom {
     let mut rom = ring(order, value);
     rom.frame = DisplacementFrame::Cartesian;
@@ -244,7 +244,7 @@ fn open_grid_is_marked_in_the_metadata() {
     refused(|file| drop(file.entries.insert("contact_grid".into(), "6,2,open".into())), &["needs a Cartesian frame"]);
 }
 
-/// Written by the release before there were extras.
+/// The reference file was written by the release before there were extras.
 #[test]
 fn file_without_extras_is_unchanged() {
     let mut value = numbers(5);

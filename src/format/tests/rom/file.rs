@@ -1,4 +1,4 @@
-//! ROM files: round trips, files written by hand as the user guide says, and every kind of damage.
+//! ROM files: round trips, files written by hand as the user guide describes, and every kind of damage.
 
 use nalgebra::DMatrix;
 use proptest::prelude::*;
@@ -9,7 +9,7 @@ use tiprub_format::{Error, read_rom, write_rom};
 use crate::cyclic::disks;
 use crate::extras::with_extras;
 
-/// So many numbers in (-1, 1).
+/// Returns `count` numbers in (-1, 1).
 fn numbers(seed: u64, count: usize) -> Vec<f64> {
     let mut next = crate::loose::numbers(seed);
     (0..count).map(|_| next()).collect()
@@ -17,7 +17,7 @@ fn numbers(seed: u64, count: usize) -> Vec<f64> {
 
 fn random_rom(seed: u64, order: usize, nodes: usize, modes: usize, text: String) -> Rom {
     let square = |seed| DMatrix::from_vec(order, order, numbers(seed, order * order));
-    let symmetric = |m: &DMatrix<f64>| (m + m.transpose()) * 0.5; // exactly symmetric in floating point
+    let symmetric = |m: &DMatrix<f64>| (m + m.transpose()) * 0.5; // Exactly symmetric in floating point.
     let positive = |seed| symmetric(&(square(seed) * square(seed).transpose())) + DMatrix::identity(order, order);
     let values = numbers(seed + 5, nodes * 4);
     let contact_node = |index: usize| ContactNode {
@@ -48,7 +48,7 @@ fn random_rom(seed: u64, order: usize, nodes: usize, modes: usize, text: String)
     }
 }
 
-/// Of all kinds.
+/// Generates ROMs of all kinds.
 fn roms() -> impl Strategy<Value = Rom> {
     let plain = (0..u64::MAX / 2, 1..8usize, 1..5usize, 0..6usize, ".*")
         .prop_map(|(seed, order, nodes, modes, text)| random_rom(seed, order, nodes, modes, text));
@@ -67,7 +67,7 @@ proptest! {
         let bytes = write_rom(&rom);
         let again = read_rom(&bytes, "rom").unwrap();
         prop_assert_eq!(&again, &rom);
-        // Equal bits, not only equal values (0.0 == -0.0): equal ROMs are written to equal bytes.
+        // Compares bits, not values (0.0 == -0.0), because equal ROMs must give equal bytes.
         prop_assert_eq!(write_rom(&again), bytes);
     }
 
@@ -126,7 +126,7 @@ struct ByHand {
 }
 
 impl ByHand {
-    /// Two coordinates, one contact node: the example of the user guide.
+    /// Returns the example of the user guide: two coordinates, one contact node.
     fn example() -> Self {
         let text = |key, value: &str| (key, value.to_owned());
         Self {

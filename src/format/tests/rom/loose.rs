@@ -1,4 +1,4 @@
-//! A ROM file as arrays and entries that a test may change before it is written again, without checksum.
+//! A ROM file as arrays and metadata entries that a test can change before writing it again, without checksum.
 
 use std::collections::BTreeMap;
 
@@ -12,7 +12,7 @@ pub struct Loose {
 }
 
 impl Loose {
-    /// The file of this ROM.
+    /// Returns the arrays and metadata of this ROM.
     pub fn of(rom: &Rom) -> Self {
         let bytes = write_rom(rom);
         let (_, header) = safetensors::SafeTensors::read_metadata(&bytes).unwrap();
@@ -26,12 +26,12 @@ impl Loose {
         Self { arrays: container.tensors().into_iter().map(array).collect(), entries }
     }
 
-    /// One of the arrays.
+    /// Returns one of the arrays.
     pub fn array(&mut self, name: &str) -> &mut (Vec<usize>, Vec<f64>) {
         self.arrays.get_mut(name).unwrap()
     }
 
-    /// The file.
+    /// Returns the file as bytes.
     pub fn bytes(&self) -> Vec<u8> {
         let mut header = serde_json::Map::from_iter([("__metadata__".to_owned(), serde_json::json!(self.entries))]);
         let mut data: Vec<u8> = Vec::new();
@@ -46,7 +46,7 @@ impl Loose {
     }
 }
 
-/// Numbers in (-1, 1), one after the other: matrices need many, and proptest's own vectors are slow to shrink.
+/// Returns a generator of numbers in (-1, 1): matrices need many, and proptest's vectors are slow to shrink.
 pub fn numbers(seed: u64) -> impl FnMut() -> f64 {
     let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
     move || {
@@ -57,7 +57,8 @@ pub fn numbers(seed: u64) -> impl FnMut() -> f64 {
     }
 }
 
-/// The file of `rom` is read as it; changed, it is refused with words that hold all `parts`.
+/// Checks that the file of `rom` is read back as `rom`, and that the changed file is rejected with a message that
+/// contains all `parts`.
 #[track_caller]
 pub fn refused(rom: &Rom, change: impl FnOnce(&mut Loose), parts: &[&str]) {
     let mut file = Loose::of(rom);

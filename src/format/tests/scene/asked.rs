@@ -1,4 +1,4 @@
-//! Keys of flexible casings, coatings, spin and heat: written only where used, refused where they do not fit.
+//! Keys of flexible casings, coatings, spin and heat: written only if used, rejected where they do not fit.
 
 use tiprub_core::settings::*;
 use tiprub_format::{FIELDS, parse_scene, write_scene};
@@ -13,7 +13,7 @@ fn scene_with_every_feature_round_trips() {
     let again = parse_scene(&text, "written").unwrap();
     assert_eq!(again, scene);
     assert_eq!(write_scene(&again), text);
-    // Bit by bit: a negative zero too.
+    // Compared bit by bit, which covers a negative zero.
     assert_eq!(again.structures[1].load.unwrap().phase.to_bits(), (-0.0_f64).to_bits());
 }
 
@@ -28,7 +28,7 @@ fn scene_with_free_master_round_trips() {
     assert_eq!(text.matches("velocity").count(), 1, "{text}");
 }
 
-/// Line and column of what is wrong, and what to do.
+/// The message contains line and column of the problem, and the remedy.
 #[test]
 fn free_master_errors_report_their_location() {
     let text = write_scene(&features::scene_with_a_free_master());
@@ -104,7 +104,7 @@ fn defaults_of_the_inner_tables_are_as_documented() {
     assert_eq!(scene.structures[0].spin, SpinSettings { growth: true, ..SpinSettings::default() });
 }
 
-/// A refusal that names the field and its line.
+/// Checks that the error names the field and its line.
 #[track_caller]
 fn refused(change: impl FnOnce(&mut SceneSettings), parts: &[&str]) {
     let mut scene = features::scene_with_every_feature();
@@ -224,7 +224,7 @@ fn rejects_mutually_exclusive_features() {
     refused(|scene| scene.contacts[0].solver = Solver::Coulomb, &parts);
     let parts = ["time.scheme: `massless-boundary` excludes `structure.spin.coriolis`", "\"modal-exact\""];
     refused(|scene| scene.time.scheme = Scheme::MasslessBoundary, &parts);
-    // Only the Coriolis force.
+    // Coriolis force only.
     let mut scene = features::scene_with_every_feature();
     scene.time.scheme = Scheme::MasslessBoundary;
     scene.structures[0].spin.coriolis = false;
@@ -234,7 +234,7 @@ fn rejects_mutually_exclusive_features() {
     parse_scene(&write_scene(&scene), "scene").unwrap();
 }
 
-/// It comes back as it was, without the figures of what yields, which it need not give.
+/// The coating is unchanged by a round trip without the properties of yielding, which it does not require.
 #[test]
 fn cutting_coating_is_written_without_plasticity_values() {
     let mut scene = features::scene_with_every_feature();

@@ -1,4 +1,4 @@
-//! The scheme of a scene file that names none: chosen when the file is read, with the reason.
+//! The scheme of a scene file without one: chosen when the file is read, with the reason.
 
 use tiprub_core::Rom;
 use tiprub_core::settings::{ADAPTIVE_STEP, SceneSettings, Scheme};
@@ -25,14 +25,14 @@ communication_step = 1e-3
 const COATING: &str = "coating = { thickness = 2e-3, modulus = 1e9, yield_stress = 5e6, hardening = 1e8, cells_around = 90, cells_along = 3 }\n";
 const RING: &str = "[[structure]]\nname = \"ring\"\nrom = \"ring.safetensors\"\nmotion = \"still\"\n";
 
-/// The scene with lines after others, and fixed steps where it needs them.
+/// Returns the scene with lines inserted after others, and with fixed steps where it needs them.
 fn scene(after: &str, line: &str, step: bool) -> Result<SceneSettings, Error> {
     assert_eq!(SCENE.matches(after).count(), 1, "{after:?}");
     let time = if step { "[time]\nstep = 1e-6\n" } else { "" };
     parse_scene(&(SCENE.replace(after, &format!("{after}{line}")) + time), "demo.toml")
 }
 
-/// Lines of a scene after others, and what its reason says.
+/// Lines inserted into a scene, the line before them, and the reason that is reported.
 const FIXED: [(&str, &str, &str); 6] = [
     ("gap = 1e-3\n", COATING, "`contact.coating`"),
     ("rom = \"rotor.safetensors\"\n", "spin = { growth = true }\n", "`structure.spin`"),
@@ -47,7 +47,7 @@ fn rigid_casing_defaults_to_adaptive_steps() {
     let settings = parse_scene(SCENE, "demo.toml").unwrap();
     assert_eq!((settings.time.scheme, settings.time.step), (Scheme::Galerkin, ADAPTIVE_STEP));
     assert!(settings.time.scheme_reason.as_ref().unwrap().contains("the default for rigid surfaces"));
-    // What is packaged is this choice, and its reason stays with it.
+    // The choice is packaged together with its reason.
     assert_eq!(parse_scene(&write_scene(&settings), "again").unwrap(), settings);
 }
 
@@ -59,10 +59,10 @@ fn chooses_fixed_steps_with_a_reason_where_galerkin_is_excluded() {
         let own = settings.time.scheme_reason.clone().unwrap();
         assert_eq!((settings.time.scheme, settings.time.step), (Scheme::ModalExact, 1e-6), "{line}");
         assert!(own.contains("fixed steps, because") && own.contains(reason), "{line}: {own}");
-        // Fixed steps need a length: the refusal says why they are fixed.
+        // Fixed steps need a length: the error states why the steps are fixed.
         let refusal = scene(after, &text, false).unwrap_err().to_string();
         assert!(refusal.contains("time.step: missing") && refusal.contains(reason), "{refusal}");
-        // What the file names is taken as it is.
+        // A scheme in the file is used as it is.
         let named = format!("{}[time]\nscheme = \"galerkin\"\n", SCENE.replace(after, &format!("{after}{text}")));
         match parse_scene(&named, "demo.toml") {
             Ok(settings) => assert!(reason.contains("elastic") && settings.time.scheme_reason.is_none()),
@@ -101,7 +101,7 @@ fn default_scheme_depends_on_the_rom() {
     assert!(scheme == Scheme::ModalExact && reason.contains("more than three modes per contact node"), "{reason}");
     let (scheme, reason) = choice(TestDisk::random(6, 1, 4, 0.1, 1).cyclic());
     assert!(scheme == Scheme::ModalExact && reason.contains("the sectors of `rotor` are coupled"), "{reason}");
-    // Without a step it is only known with the ROM that one is missing.
+    // A missing step is detected only with the ROM.
     let refusal = read_scene::<Error>(SCENE, "demo.toml", |_, _| Ok(blade(4))).unwrap_err().to_string();
     assert!(refusal.contains("time.step: missing") && refusal.contains("three modes per contact node"), "{refusal}");
 }

@@ -49,8 +49,8 @@ fn defaults_are_as_documented() {
     assert_eq!(scene.surfaces[0].shape, Shape::Lobes { amplitude: 1e-4, order: 2, phase: 0.0 });
 }
 
-/// `preset = "paper"` says what the file leaves out, keeps what says the same, and bears nothing else.
-/// A parser makes far more of short tables than their text has bytes; a measured casing is long and still read.
+/// Scene files that are too large are rejected. A parser needs far more memory for short tables than their text has
+/// bytes; a measured casing is long and is still accepted.
 #[test]
 fn rejects_oversized_scene_files() {
     let directory = tempfile::tempdir().unwrap();
@@ -179,7 +179,7 @@ fn arbitrary_text_never_panics() {
     {
         assert!(parse_scene(text, "t").is_err(), "{text:?}");
     }
-    // Every line left out, and every line cut in half.
+    // Every line removed, and every line cut in half.
     for line in GOOD.lines() {
         let _ = parse_scene(&GOOD.replace(line, ""), "t");
         let half = line.char_indices().nth(line.len() / 2).map_or(0, |(index, _)| index);

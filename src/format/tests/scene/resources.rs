@@ -95,7 +95,7 @@ fn rejects_damaged_resources_with_their_path() {
         refused(&|path| fs::remove_file(path.join(name)).unwrap(), &[name, "cannot be read", "tiprub package"]);
         refused(&|path| fs::write(path.join(name), b"\xff\xfe\x00").unwrap(), &[name]);
     }
-    // Larger than what they can mean: refused by their size, before a byte is read.
+    // Files larger than their kind can be are rejected by their size, before a byte is read.
     for (name, size) in [("scene.toml", 9 << 20), ("rotor.rom.safetensors", 1 << 30), ("package.toml", 1 << 13)] {
         let grow = |path: &Path| fs::File::create(path.join(name)).and_then(|file| file.set_len(size)).unwrap();
         refused(&grow, &[name, "it exceeds the limit of"]);

@@ -1,5 +1,5 @@
-//! Forces, moments and work: whether the torque is conjugate to the rotor angle, master and slave get equal and opposite
-//! forces and moments, and every input has its work, over all features, schemes and solvers.
+//! Forces, moments and work: the torque is conjugate to the rotor angle, master and slave get equal and opposite forces
+//! and moments, and every input has its work, over all features, schemes and solvers.
 
 mod run;
 
@@ -22,9 +22,9 @@ const SCHEMES: [(Scheme, &str); Scheme::RECURRENCES.len()] =
     [(Scheme::CentralDifference, "central"), (Scheme::ModalExact, "exact"), (Scheme::MasslessBoundary, "massless")];
 /// Largest internal step of the table (s).
 const STEP: f64 = 1e-6;
-/// Halvings of the figure.
+/// Number of halvings in the figure.
 const HALVINGS: i32 = 4;
-/// The table as a file.
+/// File name of the table.
 pub(crate) const TABLE: &str = "table.md";
 
 /// One row of the table.
@@ -36,13 +36,13 @@ struct ConjugacyCase {
     friction: f64,
 }
 
-/// Results of its runs.
+/// Results of the runs of a case.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct ConjugacyRow {
     case: ConjugacyCase,
-    /// With steps h and h/2.
+    /// Runs with steps h and h/2.
     seen: [ConjugacyRun; 2],
-    /// Without friction in a round rigid casing.
+    /// Result without friction in a round rigid casing.
     round: Option<f64>,
 }
 
@@ -100,10 +100,10 @@ fn cases(quick: bool) -> Vec<ConjugacyCase> {
     cases
 }
 
-/// Run all and judge.
+/// Runs all cases and states the results.
 ///
 /// # Errors
-/// A run is refused or fails.
+/// A run that is rejected or fails.
 pub(crate) fn study(quick: bool) -> Result<Study> {
     let rows = sweep::sweep(&cases(quick), sweep::processors(), ConjugacyCase::row, |_| ())?;
     let figure = curvature(if quick { 2 } else { HALVINGS })?;
@@ -126,7 +126,7 @@ pub(crate) fn study(quick: bool) -> Result<Study> {
     })
 }
 
-/// Largest of something over the rows.
+/// Returns the largest value over the rows.
 fn worst(rows: &[ConjugacyRow], value: impl Fn(&ConjugacyRow) -> f64) -> f64 {
     rows.iter().map(value).fold(0.0, |worst, value| if value > worst || value.is_nan() { value } else { worst })
 }
@@ -203,7 +203,7 @@ impl ConjugacyRow {
     }
 }
 
-/// The table in Markdown.
+/// Returns the table in Markdown.
 fn table(rows: &[ConjugacyRow]) -> String {
     let mut text = String::from(
         "| scene | scheme | solver | µ | contacts | axial moment, round casing, µ = 0 | torque·speed + shaft work | \
@@ -232,7 +232,7 @@ fn table(rows: &[ConjugacyRow]) -> String {
     text
 }
 
-/// Curvature work over the step.
+/// Draws the curvature work against the step.
 fn curvature(halvings: i32) -> Result<StudyFigure> {
     let features = [SurfaceFeature::Revolution, SurfaceFeature::Spline, SurfaceFeature::Casing];
     let steps: Vec<f64> = (0..halvings).rev().map(|halving| STEP * 0.5_f64.powi(halving)).collect();

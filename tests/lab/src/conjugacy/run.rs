@@ -14,7 +14,7 @@ use crate::stability::{
     observe::{real, worse},
 };
 
-/// Length of the communication steps of a rotor (s), and how many there are.
+/// Length of the communication steps of a rotor (s), and their number.
 const LENGTH: f64 = 1e-5;
 const COUNT: u32 = 120;
 /// Rate of whirl, shift and casing (rad/s).
@@ -22,7 +22,7 @@ const RATE: f64 = 900.0;
 /// Angular acceleration of the rotor (rad/s²).
 const RAMP: f64 = 4e4;
 
-/// Surface that the contact nodes meet, and the moving parts.
+/// Surface that the contact nodes touch, and the moving parts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum SurfaceFeature {
     /// Rigid surface of revolution.
@@ -42,11 +42,11 @@ pub(crate) enum SurfaceFeature {
 }
 
 impl SurfaceFeature {
-    /// All of them.
+    /// All features.
     pub(crate) const ALL: [Self; 7] =
         [Self::Revolution, Self::Spline, Self::Casing, Self::Disk, Self::DiskInCasing, Self::Coating, Self::Free];
 
-    /// For the table.
+    /// Returns the name for the table.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Revolution => "surface of revolution",
@@ -68,7 +68,7 @@ impl SurfaceFeature {
         }
     }
 
-    /// The rotor's scene; `None` for the free body.
+    /// Returns the scene of a rotor; `None` for the free body.
     fn rotor(self) -> Option<Scene> {
         let disk = || Tower { neighbour: 1e6, ..Tower::default() }.rom();
         let mut scene = match self {
@@ -85,7 +85,8 @@ impl SurfaceFeature {
         Some(scene)
     }
 
-    /// The scene with friction, and with whirl and axial shift where there is a shaft. A round casing for the torque.
+    /// Returns the scene with friction, and with whirl and axial shift if there is a shaft. If `round`, the casing is
+    /// round, for the torque.
     pub(crate) fn scene(self, friction: f64, moves: bool, round: bool) -> Scene {
         let Some(mut scene) = self.rotor() else {
             let left = Plate { stiffness: 1e7, ..Plate::left(HALF + 2e-4) };
@@ -116,41 +117,42 @@ impl SurfaceFeature {
 /// Source of the forces and moments on the slave.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum WrenchSide {
-    /// Forces on control points, where they stand.
+    /// Forces on control points, at their positions.
     ControlPoints,
-    /// The same force where the surface of revolution is.
+    /// The contact force at the position of the surface of revolution.
     Surface,
-    /// A coating yields: the contact stands in it.
+    /// A coating yields: the contact is inside it.
     Dented,
 }
 
 /// Results of a run; residuals are relative.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct ConjugacyRun {
-    /// Contacts, summed over the steps.
+    /// Number of contacts, summed over the steps.
     pub contacts: usize,
-    /// Largest moment of a step about the axis of the casing, of Σ|F| r.
+    /// Largest moment of a step about the axis of the casing, relative to Σ|F| r.
     pub axis_moment: f64,
-    /// Forces on the slave's control points and on the master, of Σ|F|.
+    /// Sum of the forces on the slave's control points and on the master, relative to Σ|F|.
     pub force: f64,
-    /// Their moments about the origin, of Σ|F| r.
+    /// Sum of their moments about the origin, relative to Σ|F| r.
     pub moment: f64,
-    /// Modal forces on the carrier against those of the control points' forces, of the largest.
+    /// Difference of the modal forces on the surface carrier from those of the control points' forces, relative to the
+    /// largest.
     pub modal: f64,
-    /// ∫ torque·speed dt plus the shaft's work, of all work exchanged.
+    /// ∫ torque·speed dt plus the shaft's work, relative to all work exchanged.
     pub shaft: f64,
-    /// Closure of the ledger, of all work exchanged.
+    /// Closure of the ledger, relative to all work exchanged.
     pub balance: f64,
-    /// Curvature work, of all work exchanged.
+    /// Curvature work, relative to all work exchanged.
     pub curvature: f64,
     /// All work exchanged (J).
     pub turnover: f64,
 }
 
-/// Run a scene with steps of length `step` (s).
+/// Runs a scene with steps of length `step` (s).
 ///
 /// # Errors
-/// The scene is refused, or fails.
+/// A scene that is rejected or fails.
 pub(crate) fn run(scene: &Scene, step: f64) -> Result<ConjugacyRun> {
     let mut scene = scene.clone();
     scene.settings.time.step = step;
@@ -177,14 +179,14 @@ pub(crate) fn run(scene: &Scene, step: f64) -> Result<ConjugacyRun> {
     Ok(seen)
 }
 
-/// Give every input that the scene has a value and a rate; returns the speed.
+/// Sets a value and a rate for every input of the scene; returns the speed.
 fn drive(simulation: &mut Simulation, time: f64) -> Result<f64> {
     let phase = RATE * time;
     let (sine, cosine) = phase.sin_cos();
     let speed = 1300.0 + RAMP * time;
     let closing = if time < 1e-3 { -0.45 } else { 0.0 };
     let inputs = [
-        // Held over the communication step, so that its work is the mean torque times it.
+        // Held over the communication step, so that its work is the mean torque times the speed.
         ("speed", speed, 0.0),
         ("whirl_x", 5e-5 * sine, 5e-5 * RATE * cosine),
         ("whirl_y", 5e-5 * (1.0 - cosine), 5e-5 * RATE * sine),
@@ -202,7 +204,7 @@ fn drive(simulation: &mut Simulation, time: f64) -> Result<f64> {
     Ok(speed)
 }
 
-/// Forces and moments of the internal step just done.
+/// Evaluates the forces and moments of the last internal step.
 fn look(scene: &Scene, simulation: &Simulation, seen: &mut ConjugacyRun) {
     let system = simulation.system();
     let events = system.events();
@@ -228,8 +230,9 @@ fn look(scene: &Scene, simulation: &Simulation, seen: &mut ConjugacyRun) {
     seen.modal = worse(seen.modal, modal[0]);
 }
 
-/// Force and moment on what the nodes touch, from where it stands: the control points of surfaces through data points, the
-/// casing's radius at the angle of the contact of a surface of revolution. The third: how far modal forces are off.
+/// Returns force and moment on the touched surface, with its positions: the control points of surfaces through data
+/// points, the casing's radius at the angle of the contact for a surface of revolution. The third vector contains the
+/// error of modal forces.
 fn reaction(scene: &Scene, simulation: &Simulation) -> [[f64; 3]; 3] {
     let system = simulation.system();
     let (mut force, mut moment) = ([0.0; 3], [0.0; 3]);
@@ -271,7 +274,7 @@ fn modal_residual(system: &System, expected: &[Vec<f64>]) -> f64 {
     if largest > 0.0 { off / largest } else { 0.0 }
 }
 
-/// Surface through data points, place and rotation of the surface (rad) of a contact.
+/// Returns the surface through data points, the surface point and the rotation of the surface (rad) of a contact.
 fn surface_of<'a>(
     simulation: &'a Simulation,
     event: &ContactEvent,
@@ -282,7 +285,7 @@ fn surface_of<'a>(
     Some((pair.gap().spline()?, place, pair.drive_now().shape_rotation))
 }
 
-/// Where the casing of revolution is at the angle of a contact (m).
+/// Returns the point of the casing of revolution at the angle of a contact (m).
 fn on_revolution(scene: &Scene, simulation: &Simulation, event: &ContactEvent) -> [f64; 3] {
     let [x, y, z] = event.wrench.point;
     let (settings, drive) = (&scene.settings, simulation.system().pairs()[event.pair].drive_now());

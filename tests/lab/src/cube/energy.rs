@@ -1,4 +1,4 @@
-//! What the slow flight without friction loses, and to what that tends with the step.
+//! Energy loss of the slow flight without friction, and its limit for small steps.
 
 use std::fmt::Write as _;
 
@@ -12,42 +12,42 @@ use tiprub_study::Statement;
 
 use super::{END, FRICTIONLESS, PAPER_LOSS, product::Product};
 
-/// Internal step that ships (s), and what it is divided by.
+/// Internal step of the built-in scene (s), and its divisors.
 const STEP: f64 = 5e-7;
 const DIVISORS: [f64; 3] = [1.0, 2.0, 5.0];
-/// Records of the energies (s).
+/// Interval of the energy records (s).
 const RECORD: f64 = 1e-6;
 
-/// Shares of the energy at the start.
+/// Energy losses as fractions of the initial energy.
 #[derive(Debug, Clone, Copy)]
 struct EnergyShares {
     step: f64,
-    /// Up to the lowest total energy.
+    /// Loss up to the lowest total energy.
     lost: f64,
-    /// The same without what curvature work had added by then.
+    /// Loss without the curvature work up to then.
     without_gain: f64,
 }
 
-/// Losses with smaller and smaller steps.
+/// Losses for decreasing steps.
 #[derive(Debug)]
 pub(crate) struct Losses(Vec<EnergyShares>);
 
 impl Losses {
-    /// Fly with every step.
+    /// Runs the flight with every step.
     ///
     /// # Errors
-    /// A flight fails.
+    /// A flight that fails.
     pub(super) fn new(scene: &Scene) -> Result<Self> {
         DIVISORS.into_iter().map(|divisor| loss(scene, STEP / divisor)).collect::<Result<_>>().map(Self)
     }
 
-    /// Loss for h → 0, of first order, from the two smallest steps.
+    /// Returns the loss for h → 0, of first order, from the two smallest steps.
     fn limit(&self) -> f64 {
         let [.., coarse, fine] = self.0.as_slice() else { return f64::NAN };
         fine.lost + (fine.lost - coarse.lost) * fine.step / (coarse.step - fine.step)
     }
 
-    /// Whether the loss without curvature work is the one that the loss tends to.
+    /// States whether the loss without curvature work equals the limit of the loss.
     pub(super) fn statement(&self) -> Statement {
         let limit = self.limit();
         let off = self.0.iter().map(|loss| (loss.without_gain / limit - 1.0).abs()).fold(0.0, f64::max);
@@ -67,7 +67,7 @@ impl Losses {
         )
     }
 
-    /// As a table.
+    /// Returns the losses as a table.
     pub(super) fn markdown(&self) -> String {
         let mut text = String::from(
             "## Energy at 50 m/s without friction\n\nlcp, modal-exact; loss up to the minimum of the total \
@@ -80,7 +80,7 @@ impl Losses {
         text
     }
 
-    /// For programs.
+    /// Returns the losses for programs.
     pub(super) fn json(&self) -> Value {
         let rows =
             self.0.iter().map(|loss| json!({"step": loss.step, "lost": loss.lost, "without_gain": loss.without_gain}));

@@ -14,13 +14,13 @@ use super::{
     runs::CubeRun,
 };
 
-/// Forces are drawn as means over this time (s): the impact of a node with mass takes one step.
+/// Forces are drawn as means over this time (s), because the impact of a node with mass takes one step.
 const MEAN: f64 = 1e-5;
 const CORNERS: [&str; 8] = ["1", "6", "85", "90", "31", "36", "91", "96"];
 const AXES: [&str; 3] = ["x", "y", "z"];
 const TIME: &str = "time (ms)";
 
-/// The three meshes at the start.
+/// Draws the three meshes at the start.
 pub(super) fn scene() -> StudyFigure {
     let mut whole = MeshSurface::default();
     let mut marks = Vec::new();
@@ -49,7 +49,7 @@ pub(super) fn scene() -> StudyFigure {
     }
 }
 
-/// Mean forces over the windows that lie within the times, at their middles.
+/// Returns mean forces over the windows that lie within the times, at their middles.
 fn means(times: &[f64], force: &[f64]) -> Vec<(f64, f64)> {
     let end = times.last().copied().unwrap_or(0.0);
     let windows = windowed(times, force, MEAN, end);
@@ -60,7 +60,7 @@ fn line(times: &[f64], values: impl Iterator<Item = f64>, end: f64) -> Vec<(f64,
     times.iter().zip(values).filter(|(time, _)| **time <= end).map(|(time, value)| (1e3 * time, value)).collect()
 }
 
-/// Columns side by side; shorter ones end without numbers.
+/// Returns a sheet of adjacent columns; shorter ones end with empty cells.
 fn sheet(series: &[(String, Vec<(f64, f64)>)]) -> Sheet {
     let mut sheet = Sheet::default();
     sheet.columns.push(TIME.into());
@@ -85,7 +85,7 @@ fn figure(
     Ok(StudyFigure { name, caption, picture: Picture::plot(&plot)?, sheet: sheet(&curves) })
 }
 
-/// Fig. 3: corners of both faces of one run.
+/// Draws fig. 3: corners of both faces of one run.
 pub(super) fn symmetry(name: &str, history: &CubeHistory) -> Result<Vec<StudyFigure>> {
     let end = f64::MAX;
     let moved = (0..8).map(|corner| {
@@ -107,7 +107,7 @@ pub(super) fn symmetry(name: &str, history: &CubeHistory) -> Result<Vec<StudyFig
     ])
 }
 
-/// Fig. 4: node 1 over the whole run, and fig. 5: λ1 while it touches (to `touching`, s).
+/// Draws fig. 4: node 1 over the whole run, and fig. 5: λ1 while it touches (to `touching`, s).
 pub(super) fn node_1(outcomes: &[CubeRun], speed: f64, touching: f64) -> Result<Vec<StudyFigure>> {
     let runs: Vec<_> = outcomes.iter().filter_map(|outcome| Some((outcome.name, outcome.history()?))).collect();
     let mut figures = Vec::new();
@@ -135,7 +135,7 @@ pub(super) fn node_1(outcomes: &[CubeRun], speed: f64, touching: f64) -> Result<
     Ok(figures)
 }
 
-/// Fig. 6: energies of one run.
+/// Draws fig. 6: energies of one run.
 pub(super) fn energies(name: &'static str, label: &str, history: &CubeHistory) -> Result<StudyFigure> {
     let curve = |label: &str, values: Vec<f64>| (label.to_owned(), line(&history.times, values.into_iter(), f64::MAX));
     let curves = vec![
@@ -146,7 +146,7 @@ pub(super) fn energies(name: &'static str, label: &str, history: &CubeHistory) -
     figure(name, format!("Energies of all bodies, {label} (fig. 6)."), "energy (J)", curves)
 }
 
-/// All pairs: picture on a logarithmic axis, table below.
+/// Draws all pairs: picture on a logarithmic axis, table below.
 pub(super) fn agreement(pairs: &[RunPair]) -> Result<StudyFigure> {
     let mut sheet = Sheet::new(["pair", "u1x (%)", "slowing (%)", "u1z (%)", "lambda1 in windows (%)"]);
     let places = [0, 1, 2, 4];
@@ -183,7 +183,7 @@ pub(super) fn agreement(pairs: &[RunPair]) -> Result<StudyFigure> {
 mod tests {
     use super::*;
 
-    /// 100 N to the last record, which lies within a window: the mean over what is not there would be less.
+    /// 100 N to the last record, which lies within a window: a mean that included the missing part would be smaller.
     #[test]
     fn force_curve_ends_with_the_last_complete_window() {
         let times: Vec<f64> = (0..=104).map(|index| f64::from(index) * 1e-6).collect();
@@ -191,7 +191,7 @@ mod tests {
         assert_eq!(points.len(), 10, "{points:?}");
         assert!(points.iter().all(|(_, force)| (force - 100.0).abs() < 1e-9), "{points:?}");
         assert!((points[9].0 - 0.095).abs() < 1e-12, "{points:?}");
-        // A window that ends with the records is whole.
+        // A window that ends with the records is complete.
         assert_eq!(means(&times[..=100], &vec![100.0; 101]).len(), 10);
     }
 
@@ -205,7 +205,7 @@ mod tests {
         assert!(rows[2][1].to_bits() == 2.0_f64.to_bits() && rows[2][2].is_nan(), "{rows:?}");
     }
 
-    /// Some of the eight corners are behind the cube itself or a ring.
+    /// Some of the eight corners are behind the cube or a ring.
     #[test]
     fn scene_picture_hides_occluded_parts() {
         let svg = scene().picture.svg;

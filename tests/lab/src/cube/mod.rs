@@ -1,5 +1,5 @@
-//! The cube between two rings: the shipped simulation against independent methods on the full finite-element model (the
-//! paper's section 5).
+//! The cube between two rings: the released simulation against independent methods on the full finite-element model
+//! (the paper's section 5).
 
 mod energy;
 mod figures;
@@ -25,7 +25,7 @@ use tiprub_study::{Statement, Study, machine};
 
 use crate::cli::LabCubeArguments;
 
-/// The paper's flight, and the slower one of its energies.
+/// Speed of the paper's flight, and the lower one of its energies (m/s).
 const FAST: f64 = 100.0;
 const SLOW: f64 = 50.0;
 const FRICTION: f64 = 0.15;
@@ -33,13 +33,13 @@ const FRICTIONLESS: CubeFlight = CubeFlight { speed: SLOW, friction: 0.0 };
 /// End of the runs (s), and of the quick ones.
 const END: f64 = 3e-3;
 const QUICK_END: f64 = 2e-4;
-/// Energy that the paper loses without friction (share).
+/// Fraction of energy that the paper loses without friction.
 const PAPER_LOSS: f64 = 1.0 - 1216.83 / 1218.75;
 
-/// Largest difference of left and right that is rounding, and residual of a ledger that closes (relative).
+/// Largest difference of left and right that counts as rounding, and residual of a ledger that closes (relative).
 const SYMMETRIC: f64 = 1e-6;
 const LEDGER: f64 = 1e-12;
-/// Share of the strain energy that the kinetic energy of a blocked cube is below.
+/// Kinetic energy of a blocked cube is below this fraction of the strain energy.
 const AT_REST: f64 = 0.03;
 
 /// All runs of one flight.
@@ -64,10 +64,10 @@ impl Flown {
     }
 }
 
-/// The study: load the models, run all methods, compare.
+/// Runs the study: loads the models, runs all methods, compares.
 ///
 /// # Errors
-/// The models cannot be made. A method that fails is a result.
+/// Models that cannot be created. A method that fails is a result.
 pub(crate) fn study(arguments: &LabCubeArguments, console: &Console) -> Result<Study> {
     let LabCubeArguments { patches_only, common: arguments } = arguments;
     let quick = arguments.quick;
@@ -100,7 +100,7 @@ pub(crate) fn study(arguments: &LabCubeArguments, console: &Console) -> Result<S
     report(&scene, &flown, &sizes, &patches, quick)
 }
 
-/// The study of patches alone.
+/// Creates the study of patches alone.
 fn of_patches(patches: &PatchStudy) -> Study {
     Study {
         name: "cube",
@@ -217,7 +217,7 @@ fn meeting(main: &Flown) -> Vec<Statement> {
         near(main, B, BEST, [0.5, 1.0, 0.5], independent),
     ];
     if main.outcomes.iter().any(|outcome| outcome.name == C) {
-        // 5·10⁸ N/m let nodes in by 30 µm of 1 mm.
+        // With 5·10⁸ N/m nodes penetrate by 30 µm of 1 mm.
         all.push(near(main, BEST, C, [3.0, 3.0, 4.0], ", which has softer contact"));
     }
     all
@@ -258,7 +258,7 @@ fn at_any_speed(flown: &[Flown]) -> Vec<Statement> {
             format!("{}, {}: {moved:.0e}, {force:.0e}", flown.title(), outcome.name)
         })
         .collect();
-    // While the cube passes; in the end of a blocked flight rounding has grown with the vibration.
+    // While the cube passes; at the end of a blocked flight rounding has grown with the vibration.
     let passing = ran().filter(|(flown, ..)| flown.flight.speed > SLOW || flown.flight.friction == 0.0);
     let apart: Vec<f64> = passing.flat_map(|(.., run)| asymmetry(&run.history, f64::MAX)).collect();
     vec![
@@ -283,7 +283,7 @@ fn at_any_speed(flown: &[Flown]) -> Vec<Statement> {
     ]
 }
 
-/// Energies at 50 m/s.
+/// States the energies at 50 m/s.
 fn slow(flown: &[Flown]) -> Result<Vec<Statement>> {
     let flight = |friction: bool| {
         let missing = || Failure::new("lab cube", "there is no slow run", "");

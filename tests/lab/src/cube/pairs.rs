@@ -1,4 +1,4 @@
-//! Every two methods beside each other, and every run by itself, as tables.
+//! Tables of all pairs of methods, and of every single run.
 
 use std::fmt::Write as _;
 
@@ -43,7 +43,7 @@ pub(super) struct RunPair {
 }
 
 impl RunPair {
-    /// Shares as in [`PAIR`].
+    /// Returns the relative differences in the columns of [`PAIR`].
     pub(super) fn shares(&self) -> [f64; 10] {
         let HistoryDifference { touching, contact, path, windows, peak, impulse, left_impulse, exit } = self.found;
         let [x, slowing, z] = touching;
@@ -58,7 +58,7 @@ impl RunPair {
     }
 }
 
-/// Every two runs that ended well, windows as those of `a`, the first of them.
+/// Returns all pairs of successful runs, with windows as those of `a`, the first of them.
 pub(super) fn pairs(outcomes: &[CubeRun], flight: &CubeFlight) -> Vec<RunPair> {
     let runs: Vec<_> = outcomes.iter().filter_map(|outcome| Some((outcome.name, outcome.history()?))).collect();
     let Some((_, a)) = runs.first() else { return Vec::new() };
@@ -85,7 +85,7 @@ fn readings(outcome: &CubeRun) -> Vec<String> {
         format!("{:.3} … {:.3}", 1e3 * low, 1e3 * high)
     };
     let end = history.times.last().copied().unwrap_or(0.0);
-    // What has not ended with the run has no time.
+    // A contact that has not ended with the run has no time.
     let ended = |time: f64, text: String| if time < end * (1.0 - 1e-9) { text } else { "–".into() };
     let (leaves, last) = (released(history), history.last_contact().unwrap_or(0.0));
     let means = windowed(&history.times, &history.first_force(), WINDOW, end);
@@ -103,7 +103,7 @@ fn readings(outcome: &CubeRun) -> Vec<String> {
     ]
 }
 
-/// Both tables as Markdown.
+/// Returns both tables as Markdown.
 pub(super) fn markdown(outcomes: &[CubeRun], pairs: &[RunPair]) -> String {
     let mut text = String::new();
     let heading = |first: &str, columns: &[&str]| {
@@ -124,7 +124,7 @@ pub(super) fn markdown(outcomes: &[CubeRun], pairs: &[RunPair]) -> String {
     text
 }
 
-/// The pairs for the page.
+/// Returns the pairs for the page.
 pub(super) fn html(pairs: &[RunPair]) -> String {
     let mut html = String::from("<table><thead><tr><th>pair</th>");
     for name in PAIR {
@@ -139,7 +139,7 @@ pub(super) fn html(pairs: &[RunPair]) -> String {
     html
 }
 
-/// Runs and pairs for programs.
+/// Returns runs and pairs for programs.
 pub(super) fn json(outcomes: &[CubeRun], pairs: &[RunPair], flight: &CubeFlight) -> Value {
     json!({
         "speed": flight.speed,

@@ -1,5 +1,5 @@
-//! The faces of the cube as patches: means of gaps over hat functions in place of nodes. Global quantities against finer meshes,
-//! symmetry, energy, and GetFEM's table of the same flight.
+//! The faces of the cube as patches: means of gaps over hat functions instead of nodes. Global quantities against finer
+//! meshes, symmetry, energy, and GetFEM's table of the same flight.
 
 use serde_json::{Value, json};
 use tiprub_core::{
@@ -21,9 +21,9 @@ use super::{
     runs::{CubeFlight, RECORD},
 };
 
-/// GetFEM's flight: facets, consistent mass, forces that hold the gaps of nodes.
+/// GetFEM's flight: facets, consistent mass, forces that enforce the gaps of nodes.
 const GETFEM: &str = include_str!("../../../../src/reference/tests/data/cube_getfem_held.csv");
-/// Elements along a side of the cube, patches along a side of its faces; its nodes where there are none.
+/// Elements along a side of the cube, and patches along a side of its faces; `None` means its nodes.
 const CASES: [(usize, Option<usize>); 9] = [
     (5, None),
     (5, Some(2)),
@@ -36,7 +36,7 @@ const CASES: [(usize, Option<usize>); 9] = [
     (7, Some(8)),
 ];
 const QUICK_CASES: [(usize, Option<usize>); 2] = [(5, None), (5, Some(3))];
-/// Ends (s): of the fast flight, which is over then, and of the slow one.
+/// End times (s): of the fast flight, which is over then, and of the slow one.
 const FAST_END: f64 = 1.2e-3;
 const SLOW_END: f64 = 2.1e-3;
 
@@ -48,21 +48,22 @@ fn product(interpolation: Interpolation) -> Product {
 #[derive(Debug, Clone)]
 pub(super) struct Patched {
     name: String,
-    /// Impulse of the left face (N·s) and speed in the end (m/s) of the fast flight.
+    /// Impulse of the left face (N·s) and final speed (m/s) of the fast flight.
     impulse: f64,
     exit: f64,
-    /// Left and right: displacements and forces.
+    /// Differences of left and right: displacements and forces.
     apart: [f64; 2],
     residual: f64,
-    /// Deepest penetration of what touches (m).
+    /// Deepest penetration of contact nodes or patches (m).
     deepest: f64,
-    /// Energy lost without friction at most (share), and speed in the end (m/s), of the slow flight.
+    /// Largest fraction of energy lost without friction, and final speed (m/s), of the slow flight.
     slow: Option<[f64; 2]>,
-    /// Beside GetFEM: relative difference of the left face's impulse, and of what the centre of the cube has lost of its speed (L2).
+    /// Comparison with GetFEM: relative difference of the left face's impulse, and of the loss of speed of the cube's
+    /// centre (L2).
     getfem: Option<[f64; 2]>,
 }
 
-/// All of them.
+/// Results of all cases.
 #[derive(Debug, Clone)]
 pub(super) struct PatchStudy(Vec<Patched>);
 
@@ -75,10 +76,10 @@ struct PatchRuns<'a> {
 }
 
 impl PatchStudy {
-    /// Reduce, fly. Quick ones end early (`end`, s) and have the fast flight only.
+    /// Reduces the models and runs the flights. Quick ones end early (`end`, s) and include the fast flight only.
     ///
     /// # Errors
-    /// A reduction or a run that is refused; never with what ships.
+    /// A reduction or a run that is rejected; never with the built-in models.
     pub(super) fn new(
         scene: &Scene,
         (fast, slow): (&CubeFlight, CubeFlight),
@@ -101,7 +102,7 @@ impl PatchStudy {
             apart.iter().all(|apart| *apart < SYMMETRIC) && residual < LEDGER,
             format!("largest difference {:.0e}, residual {residual:.0e}", apart.iter().fold(0.0_f64, |a, b| a.max(*b))),
         )];
-        // The first touch of the corners tells nothing of the whole.
+        // The first contact of the corners does not represent the whole flight.
         if self.0.iter().all(|one| one.slow.is_some()) {
             let impulse = |start: &str| self.0.iter().find(|one| one.name.starts_with(start)).map(|one| one.impulse);
             let nodes = impulse("5, nodes").unwrap_or(f64::NAN);
@@ -205,7 +206,7 @@ impl PatchRuns<'_> {
         Ok([impulse(&own, end) / impulse(&theirs, end) - 1.0, lost])
     }
 
-    /// The scene with this cube, all of its modes kept.
+    /// Returns the scene with this cube and all its modes.
     fn with(&self, elements: usize, patches: Option<usize>, mass: MassMatrix) -> Result<Scene> {
         let (cache, console) = self.tools;
         let options = CubeOptions { elements, mass, patches: patches.map(|side| [side; 2]), ..CubeOptions::default() };
@@ -224,13 +225,13 @@ impl PatchRuns<'_> {
     }
 }
 
-/// Impulse of the left face up to a time (s).
+/// Returns the impulse of the left face up to a time (s).
 fn impulse(history: &CubeHistory, end: f64) -> f64 {
     let left: Vec<f64> = history.forces.iter().map(|sides| sides[0]).collect();
     windowed(&history.times, &left, end, end)[0] * end
 }
 
-/// Put a ROM in the place of that of the same name.
+/// Replaces the ROM of the same name.
 pub(super) fn replace(scene: &mut Scene, rom: Rom) -> Result<()> {
     let missing = || Failure::new("lab cube", format!("the scene has no structure `{}`", rom.name), "");
     let place = scene.roms.iter().position(|old| old.name == rom.name).ok_or_else(missing)?;

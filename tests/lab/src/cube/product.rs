@@ -1,4 +1,5 @@
-//! The shipped simulation on the cube's scene, its outputs as a history of the reference methods' kind.
+//! The released simulation on the cube's scene, with its outputs as a history of the same type as that of the reference
+//! methods.
 
 use std::time::{Duration, Instant};
 
@@ -11,7 +12,8 @@ use tiprub_reference::cube::history::{CubeHistory, processor_time};
 
 use super::CubeFlight;
 
-/// Corners 1, 6, 85, 90 and 31, 36, 91, 96 of the paper's figure 2 among the contact nodes of two faces, each a square of `face` nodes.
+/// Returns corners 1, 6, 85, 90 and 31, 36, 91, 96 of the paper's figure 2 among the contact nodes of two faces, each a
+/// square of `face` nodes.
 fn corners(face: usize) -> [usize; 8] {
     let side = face.isqrt();
     let own = [0, side - 1, face - side, face - 1];
@@ -28,7 +30,7 @@ pub(crate) struct Product {
     pub interpolation: Interpolation,
 }
 
-/// A history and what only the product tells.
+/// A history, with the results that only the product provides.
 #[derive(Debug, Clone)]
 pub(crate) struct ProductRun {
     pub history: CubeHistory,
@@ -42,10 +44,10 @@ pub(crate) struct ProductRun {
 }
 
 impl Product {
-    /// Run to `end` (s), one record per communication step of `record` (s).
+    /// Runs to `end` (s), with one record per communication step of `record` (s).
     ///
     /// # Errors
-    /// A scene that is refused, a state that is.
+    /// A scene or a state that is rejected.
     pub(super) fn run(&self, scene: &Scene, flight: &CubeFlight, end: f64, record: f64) -> Result<ProductRun> {
         let started = processor_time();
         let mut simulation = Simulation::new(&self.scene(scene, flight))?;
@@ -103,12 +105,12 @@ struct Columns {
     strain: u32,
     curvature: u32,
     residual: u32,
-    /// Contact nodes or patches of one face.
+    /// Number of contact nodes or patches of one face.
     face: usize,
 }
 
 impl Columns {
-    /// All of them exist in the scene that ships.
+    /// Finds the outputs, all of which exist in the built-in scene.
     fn new(simulation: &Simulation, face: usize) -> Self {
         let first = |quantity| simulation.table().with_quantity(quantity).map_or(0, |variable| variable.reference);
         Self {

@@ -1,4 +1,4 @@
-//! Who runs what: the product with its schemes and solvers, the reference methods, four flights.
+//! Runs of the study: the product with its schemes and solvers, the reference methods, four flights.
 
 use tiprub_core::{
     Scene,
@@ -57,16 +57,16 @@ fn reference(method: CubeMethod, surface: SurfaceKind, step: f64, stride: usize)
     CubeCompetitor::Reference { method, surface, step, stride }
 }
 
-/// Names of the product's runs that statements are about.
+/// Name of the product's run with the paper's method, to which statements refer.
 pub(super) const PAPER: &str = "product, film, central differences";
 pub(crate) const BEST: &str = "product, lcp, modal-exact";
 pub(super) const STICKING: &str = "product, coulomb, modal-exact";
-/// Names of the reference methods on the same surface.
+/// Name of the reference method a on the same surface.
 pub(super) const A: &str = "a, film";
 pub(super) const B: &str = "b, bi-potential";
 pub(super) const C: &str = "c, augmented Lagrangian";
 
-/// All methods of a flight; on facets as well where `facets`.
+/// Returns all methods of a flight, also on facets if `facets`.
 pub(super) fn competitors(flight: &CubeFlight, quick: bool, facets: bool) -> Vec<(&'static str, CubeCompetitor)> {
     let (film, augmented, spline) =
         (CubeMethod::Film(Default::default()), CubeMethod::Augmented(Default::default()), SurfaceKind::Spline);
@@ -99,13 +99,13 @@ pub(super) fn competitors(flight: &CubeFlight, quick: bool, facets: bool) -> Vec
     list
 }
 
-/// Interval of the records (s), the same for all.
+/// Interval of the records (s), equal for all runs.
 pub(crate) const RECORD: f64 = 1e-6;
 
-/// One run to `end` (s), alone, so that processor time is its own.
+/// Performs one run to `end` (s), alone, so that the processor time is exact.
 ///
 /// # Errors
-/// The full model cannot be assembled.
+/// A full model that cannot be assembled.
 pub(super) fn run(
     (name, competitor): (&'static str, CubeCompetitor),
     scene: &Scene,
@@ -130,7 +130,7 @@ pub(super) fn run(
     Ok(CubeRun { name, competitor, result })
 }
 
-/// Last time of contact of node 1 (s), as far as it has one contact: until it is free for 50 µs.
+/// Returns the last time of contact of node 1 (s); a contact ends when the node has been free for 50 µs.
 pub(super) fn released(history: &CubeHistory) -> f64 {
     let mut last = None;
     for (time, force) in history.times.iter().zip(history.first_force()) {

@@ -1,4 +1,4 @@
-//! What modes the bodies need: cube and rings reduced further and less far than those that ship.
+//! Number of modes that the bodies need: cube and rings with more and fewer modes than the built-in models.
 
 use serde_json::{Value, json};
 use tiprub_core::{Scene, settings::Interpolation, settings::Scheme, settings::Solver};
@@ -16,7 +16,7 @@ use super::{
 /// Modes and static responses of the rings.
 const RINGS: [[usize; 2]; 7] = [[20, 0], [40, 0], [60, 60], [100, 0], [300, 0], [200, 400], [200, 1000]];
 const QUICK_RINGS: [[usize; 2]; 2] = [[20, 0], [100, 0]];
-/// Fixed-interface modes of the cube; the last are all.
+/// Numbers of fixed-interface modes of the cube; the last is all of them.
 const CUBE: [usize; 5] = [30, 60, 120, 240, 432];
 /// End of the runs (s): while node 1 touches, and the windows of its force.
 const END: f64 = 4.5e-4;
@@ -28,7 +28,7 @@ const PRODUCT: Product = Product {
     interpolation: Interpolation::Spline,
 };
 
-/// A run with one body reduced otherwise.
+/// A run with one body reduced differently.
 #[derive(Debug, Clone)]
 pub(crate) struct CubeSize {
     pub modes: usize,
@@ -41,7 +41,7 @@ pub(crate) struct CubeSize {
     pub seconds: f64,
 }
 
-/// Rings against method a, and the cube against all its modes.
+/// Rings compared with method a, and the cube with all its modes.
 #[derive(Debug, Clone)]
 pub(crate) struct SizeStudy {
     pub rings: Vec<CubeSize>,
@@ -49,10 +49,10 @@ pub(crate) struct SizeStudy {
 }
 
 impl SizeStudy {
-    /// Reduce (or take from the cache), run, compare; `a` is the flight of method a.
+    /// Reduces (or loads from the cache), runs and compares; `a` is the flight of method a.
     ///
     /// # Errors
-    /// A reduction or a run that is refused; never with what ships.
+    /// A reduction or a run that is rejected; never with the built-in models.
     pub(super) fn new(
         scene: &Scene,
         flight: &CubeFlight,
@@ -69,7 +69,7 @@ impl SizeStudy {
         Ok(Self { rings, cube: if quick { Vec::new() } else { work.cubes()? } })
     }
 
-    /// For programs.
+    /// Returns the study for programs.
     pub(super) fn json(&self) -> Value {
         let rows = |sizes: &[CubeSize]| -> Vec<Value> {
             let row = |size: &CubeSize| {
@@ -83,7 +83,7 @@ impl SizeStudy {
         json!({ "rings": rows(&self.rings), "cube": rows(&self.cube) })
     }
 
-    /// Both tables.
+    /// Returns both tables.
     pub(super) fn markdown(&self) -> String {
         let percent = |share: f64| format!("{:.3} %", 100.0 * share);
         let mut text = String::from(
@@ -113,7 +113,7 @@ struct SizeRuns<'a> {
     scene: &'a Scene,
     flight: &'a CubeFlight,
     end: f64,
-    /// While node 1 touches (s).
+    /// Contact time of node 1 (s).
     touching: f64,
     tools: (&'a RomCache, &'a Console),
 }

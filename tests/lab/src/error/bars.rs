@@ -1,4 +1,5 @@
-//! Scenes 1 and 2: Carpenter's bars and the bouncing bar, with exact solutions; and bars that are only shaken, for orders.
+//! Scenes 1 and 2: Carpenter's bars and the bouncing bar, with exact solutions; and bars with forced vibration only, to
+//! determine orders.
 
 use tiprub_reference::{
     carpenter,
@@ -15,29 +16,29 @@ use super::{
     run::{TimedRun, Trace},
 };
 
-/// Share of its mass that a contact node keeps where it should have none: one mode then stands for its flexibility alone.
+/// Fraction of its mass that a nominally massless contact node keeps: one mode then represents its flexibility alone.
 const END_MASS: f64 = 1e-4;
 /// Steps relative to the time a wave takes through an element, which is the limit of central differences.
 const COURANT: [f64; 9] = [4.0, 1.6, 1.02, 0.9, 0.5, 0.25, 0.125, 0.0625, 0.03125];
-/// The same of the references.
+/// Relative step of the references.
 const REFERENCE_COURANT: f64 = 1.0 / 256.0;
 
-/// A rod at one number of elements, for everyone.
+/// A rod at one number of elements, for all methods.
 struct BarSize {
     elements: usize,
     outside: RodScene,
     core: CoreRod,
     massless: CoreRod,
-    /// Contact stiffness of soft methods (N/m), and the penetration they may leave (m).
+    /// Contact stiffness of soft methods (N/m), and the penetration they may cause (m).
     softness: Softness,
 }
 
-/// Which problem.
+/// Problem of a bar.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum BarProblem {
     Carpenter,
     Bouncing,
-    /// Never touching, or never lifting off.
+    /// Never in contact, or always in contact.
     Shaken {
         touching: bool,
     },
@@ -50,36 +51,36 @@ pub(crate) struct Bars {
     standard: usize,
     interval: f64,
     samples: usize,
-    /// Length of an element at one element, over the speed of waves (s).
+    /// Length of an element if there is one element, divided by the wave speed (s).
     passage: f64,
     courant: Vec<f64>,
 }
 
 impl Bars {
-    /// Scene 1.
+    /// Creates scene 1.
     ///
     /// # Errors
-    /// Never.
+    /// None.
     pub(crate) fn carpenter(quick: bool) -> Result<Self, String> {
         let elements = if quick { vec![10, 20, 40] } else { vec![20, 40, 80, 160] };
         let passage = carpenter::LENGTH / carpenter::wave_speed();
         Self::new(BarProblem::Carpenter, &elements, 10e-6, 22, passage, quick)
     }
 
-    /// Scene 2, over its period with two contacts.
+    /// Creates scene 2, over its period with two contacts.
     ///
     /// # Errors
-    /// Never.
+    /// None.
     pub(crate) fn bouncing(quick: bool) -> Result<Self, String> {
         let elements = if quick { vec![10, 20, 40] } else { vec![20, 40, 80, 160] };
         let passage = bouncing_bar::LENGTH / bouncing_bar::wave_speed();
         Self::new(BarProblem::Bouncing, &elements, bouncing_bar::PERIOD / 64.0, 64, passage, quick)
     }
 
-    /// A bar of twenty elements that is shaken without a change of contact.
+    /// Creates a bar of twenty elements with forced vibration and no change of contact.
     ///
     /// # Errors
-    /// Never.
+    /// None.
     pub(crate) fn shaken(touching: bool) -> Result<Self, String> {
         let passage = bouncing_bar::LENGTH / bouncing_bar::wave_speed();
         let mut bars =
@@ -136,7 +137,7 @@ impl BarSize {
         };
         let whole = matches!(problem, BarProblem::Shaken { .. });
         let ends = if problem == BarProblem::Carpenter { 2 } else { 1 };
-        // As stiff as two elements; a hundredth of an element is what commercial codes let pass.
+        // As stiff as two elements; commercial codes permit a penetration of a hundredth of an element.
         let (stiffness, length) = match problem {
             BarProblem::Carpenter => (carpenter::YOUNG * carpenter::AREA / carpenter::LENGTH, carpenter::LENGTH),
             _ => (bouncing_bar::YOUNG / bouncing_bar::LENGTH, bouncing_bar::LENGTH),
@@ -261,7 +262,7 @@ impl ErrorCase for Bars {
     }
 
     fn exact(&self) -> Option<Trace> {
-        /// Points per sample at which the force is looked at.
+        /// Number of points per sample at which the force is evaluated.
         const POINTS: u32 = 2000;
         if matches!(self.problem, BarProblem::Shaken { .. }) {
             return None;
@@ -281,7 +282,7 @@ impl ErrorCase for Bars {
         };
         let energy = match self.problem {
             BarProblem::Carpenter => carpenter::exact().energy,
-            // The potential is counted from where the bar starts.
+            // The potential is relative to the initial position of the bar.
             _ => 0.0,
         };
         Some(Trace {
@@ -298,7 +299,7 @@ impl ErrorCase for Bars {
         })
     }
 
-    /// Without friction nothing sticks.
+    /// Without friction there is no sticking.
     fn families(&self, _: usize) -> Vec<EquationFamily> {
         vec![EquationFamily::MASSLESS]
     }

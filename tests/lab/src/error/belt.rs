@@ -1,4 +1,4 @@
-//! Scene: a block on a spring, thrown along a belt at rest, that stops and sticks again and again; with a closed form.
+//! A block on a spring, thrown along a belt at rest, that repeatedly stops and sticks; with a closed form.
 
 use nalgebra::DMatrix;
 use tiprub_core::{
@@ -17,22 +17,23 @@ use super::{
 };
 
 const BLOCK: ThrownBlock = ThrownBlock { mass: 2.0, omega: 50.0, flexibility: 4e-6, friction: 2.0, velocity: 0.5 };
-/// Friction coefficient; the normal force is the friction force over it.
+/// Friction coefficient; the normal force is the friction force divided by it.
 const FRICTION: f64 = 0.4;
 /// Clearance of a second node that never touches (m): tolerances are relative to it.
 const CLEARANCE: f64 = 1e-3;
-/// Frequency of the modes that stand for the contact's flexibility (rad/s). Schemes with mass at the contact node keep their inertia.
+/// Frequency of the modes that represent the flexibility of the contact (rad/s). Schemes with mass at the contact node
+/// keep their inertia.
 const FAST: f64 = 1e5;
 /// Contact nodes: the one on the belt, and the one with the clearance.
 const NODES: usize = 2;
 /// Outward normal of the belt.
 const NORMAL: [f64; 3] = [0.0, 0.0, 1.0];
-/// Time between samples (s), and their numbers: all, and of the quick form.
+/// Time between samples (s), and their numbers: full study, quick form.
 const INTERVAL: f64 = 2e-3;
 const SAMPLES: [usize; 2] = [500, 100];
-/// Fixed steps per sample. The longest are beyond the limit of central differences.
+/// Numbers of fixed steps per sample. The longest are beyond the limit of central differences.
 const DIVISIONS: [u32; 7] = [1, 4, 20, 80, 200, 800, 3200];
-/// The same of the references.
+/// Numbers of steps per sample of the references.
 const REFERENCE: [u32; 2] = [12_800, 6400];
 
 /// The block on the belt.
@@ -43,7 +44,7 @@ pub(crate) struct BeltCase {
 }
 
 impl BeltCase {
-    /// The block as modes: the spring, and six that stand for the flexibility of two contact nodes.
+    /// Creates the block as modes: the spring, and six that represent the flexibility of two contact nodes.
     pub(crate) fn new(quick: bool) -> Self {
         let rows = 3 * NODES;
         let mut contact_modes = DMatrix::zeros(rows, rows + 1);
@@ -91,7 +92,7 @@ impl BeltCase {
         system.set_step(step);
         let velocity = BLOCK.velocity * (1.0 + perturbation) * BLOCK.mass.sqrt();
         system.bank_mut().set_modal_state(0, 0, 0.0, velocity);
-        // The mode that the belt presses back, where it has inertia.
+        // The mode that the belt presses back, if it has inertia.
         let normal = 3;
         if normal < self.model.dynamic_modes(scheme) {
             let amplitude = Self::pressed() / self.model.contact_modes[(normal - 1, normal)];
@@ -198,7 +199,7 @@ impl ErrorCase for BeltCase {
         let samples = self.samples_of();
         let motion = BLOCK.motion(INTERVAL, samples);
         let start = 0.5 * BLOCK.mass * BLOCK.velocity * BLOCK.velocity;
-        // The normal force is constant, and its spring as well.
+        // The normal force is constant, and so is its spring.
         let normal = BLOCK.friction / FRICTION;
         let pressed = 0.5 * normal * Self::pressed();
         Some(Trace {
@@ -227,7 +228,7 @@ impl ErrorCase for BeltCase {
 /// A run of the block.
 struct BeltRun {
     system: System,
-    /// Step of fixed steps, or the longest of adaptive steps (s), and how many of them make a sample.
+    /// Length of fixed steps, or the longest adaptive step (s), and their number per sample.
     step: f64,
     count: u32,
 }

@@ -1,4 +1,5 @@
-//! Built-in scenes as they ship: adaptive steps beside fixed steps and the paper's method, each with the same model.
+//! Unmodified built-in scenes: adaptive steps compared with fixed steps and the paper's method, each with the same
+//! model.
 
 use tiprub_core::{
     Scene,
@@ -17,11 +18,12 @@ use super::{
 
 /// Time between samples, and communication step of all runs (s).
 const INTERVAL: f64 = 8e-5;
-/// The massless-boundary scheme with the contact solver of the default.
+/// The massless-boundary scheme with the default contact solver.
 const MASSLESS: Competitor = Competitor::Core(Scheme::MasslessBoundary, Solver::Lcp);
 /// Samples per window of impulses.
 const IMPULSE_WINDOW: usize = 4;
-/// Internal steps per sample of the runs that show how long trajectories can be followed: the first that the scene accepts.
+/// Internal steps per sample of the runs that determine the time over which trajectories can be compared; the first one
+/// that the scene accepts is used.
 const PARTING_DIVISIONS: [u32; 4] = [80, 160, 320, 640];
 
 /// A built-in scene and the steps that are compared on it.
@@ -33,13 +35,13 @@ pub(crate) struct BuiltInFacts {
     pub description: &'static str,
     /// Source of the scene.
     pub scene: &'static str,
-    /// Depth of the two bumps (fraction of the gap); `None` leaves the casing as the scene has it.
+    /// Depth of the two bumps (fraction of the gap); `None` leaves the casing unchanged.
     pub depth: Option<f64>,
-    /// Samples: the whole study, its quick form.
+    /// Number of samples: full study, quick form.
     pub samples: [usize; 2],
     /// Internal steps per sample of the paper's method, of `modal-exact` and of `massless-boundary`, ascending.
     pub divisions: [&'static [u32]; 3],
-    /// Internal steps per sample of the fine run that all errors are relative to.
+    /// Internal steps per sample of the fine reference run.
     pub reference: u32,
 }
 
@@ -91,7 +93,7 @@ pub(crate) const STAGE: BuiltInFacts = BuiltInFacts {
     ..CASING
 };
 
-/// One scene, one model: errors of the steps only.
+/// One scene, one model: discretisation errors of the steps only.
 pub(crate) struct BuiltIn {
     facts: BuiltInFacts,
     scene: Scene,
@@ -101,10 +103,10 @@ pub(crate) struct BuiltIn {
 }
 
 impl BuiltIn {
-    /// Loads the scene and finds how long its trajectories can be followed.
+    /// Loads the scene and determines the time over which its trajectories can be compared.
     ///
     /// # Errors
-    /// The model cannot be reduced or a run fails; never with the built-in scenes.
+    /// A model that cannot be reduced or a run that fails; never with the built-in scenes.
     pub(crate) fn new(facts: BuiltInFacts, quick: bool, cache: &RomCache, console: &Console) -> Result<Self> {
         let mut scene = scene_source::load(facts.scene, cache, console)?;
         scene.settings.preset = Preset::None;
@@ -127,7 +129,7 @@ impl BuiltIn {
         Ok(case)
     }
 
-    /// The scene.
+    /// Returns the scene.
     pub(crate) fn scene(&self) -> &Scene {
         &self.scene
     }
@@ -174,7 +176,7 @@ impl ErrorCase for BuiltIn {
         self.facts.divisions[1].to_vec()
     }
 
-    /// The quick form leaves out the finer half.
+    /// The quick form omits the finer half.
     fn divisions_of(&self, _: usize, competitor: Competitor) -> Vec<u32> {
         let all = match competitor {
             TOLERANT => &TOLERANCES[..],
@@ -203,7 +205,7 @@ impl ErrorCase for BuiltIn {
         vec![PAPER, DEFAULT, MASSLESS, TOLERANT]
     }
 
-    /// Known where every direction was refined, on the blade in a rigid casing.
+    /// Known if every direction was refined, for the blade in a rigid casing.
     fn model_error(&self) -> Option<f64> {
         let [rom] = &self.scene.roms[..] else { return None };
         let known = rom.checks.rub_errors.as_ref()?;

@@ -1,4 +1,4 @@
-//! What the length H of the communication step costs with adaptive steps, by tolerance: time and error of the same rub.
+//! Cost of the communication step length H with adaptive steps, by tolerance: time and error of one rub.
 
 use tiprub_core::{
     Scene, Simulation,
@@ -16,10 +16,11 @@ const SHORTEST: f64 = 1e-6;
 const TOLERANCES: [f64; 3] = [1e-1, 1e-2, 1e-3];
 /// Tolerance of the run that errors are relative to.
 const FINEST: f64 = 1e-6;
-/// Runs of which the median time counts.
+/// Number of runs for the median time.
 const REPETITIONS: usize = 3;
 
-/// Displacements at the end of every 0.1 ms, or of every communication step where that is longer (m), and processor time of the steps (s).
+/// Displacements at the end of every 0.1 ms, or of every communication step if that is longer (m), and processor time
+/// of the steps (s).
 struct DisplacementSamples {
     displacements: Vec<Vec<f64>>,
     seconds: f64,
@@ -53,7 +54,7 @@ fn record(
     Ok(recording)
 }
 
-/// Relative error at the instants that a coarser recording shares with the finest one.
+/// Returns the relative error at the times that a coarser recording shares with the finest one.
 fn error(found: &DisplacementSamples, finest: &DisplacementSamples) -> f64 {
     let every = finest.displacements.len() / found.displacements.len();
     let shared: Vec<Vec<f64>> = finest.displacements.iter().skip(every - 1).step_by(every).cloned().collect();
@@ -61,10 +62,11 @@ fn error(found: &DisplacementSamples, finest: &DisplacementSamples) -> f64 {
     parts_apart(&found.displacements, &shared, &[length])
 }
 
-/// Time and error by H and tolerance. The shortest H is left out of the quick form and where structures move each other, which takes hours.
+/// Returns time and error by H and tolerance. The shortest H is omitted in the quick form and for coupled structures,
+/// where it takes hours.
 ///
 /// # Errors
-/// A run fails; never with the built-in scenes.
+/// A run that fails; never with the built-in scenes.
 pub(crate) fn table(case: &BuiltIn, quick: bool, console: &Console) -> Result<Table> {
     let scene = case.scene();
     let simulated = case.interval() * case.samples() as f64;

@@ -1,4 +1,4 @@
-//! Scene 3: the cube between two rings; four methods on the full finite-element model take part.
+//! Scene 3: the cube between two rings, with four methods on the full finite-element model.
 
 use tiprub_core::Scene;
 use tiprub_gallery::{reduction, rom_cache::RomCache, scene_source};
@@ -19,12 +19,12 @@ use super::{
     window,
 };
 
-/// Modes of each ring; the middle one is what ships.
+/// Modes of each ring; the middle one is the built-in number.
 const MODES: [usize; 3] = [20, 100, 300];
 const QUICK_MODES: [usize; 2] = [20, 100];
 /// Time between samples (s).
 const INTERVAL: f64 = 8e-6;
-/// Samples of the window: while node 1 touches.
+/// Number of samples of the window, while node 1 touches.
 const SAMPLES: usize = 47;
 const QUICK_SAMPLES: usize = 10;
 /// Internal steps per sample; the limit of central differences is between the first two of the full list.
@@ -36,7 +36,7 @@ const FULL_DIVISIONS: [&[u32]; 4] = [&[4, 8, 16, 32, 64], &[1, 2, 4, 8, 16], &[2
 const QUICK_FULL_DIVISIONS: [&[u32]; 4] = [&[8, 16], &[4, 8], &[], &[]];
 const FULL_REFERENCES: [u32; 2] = [160, 32];
 const QUICK_FULL_REFERENCES: [u32; 2] = [64, 16];
-/// The same of the product's reference, and of the runs that show whether trajectories part.
+/// Internal steps per sample of the product's reference, and of the runs that check the divergence of trajectories.
 const REFERENCE: u32 = 256;
 const QUICK_REFERENCE: u32 = 64;
 const PARTING_DIVISION: u32 = 16;
@@ -48,16 +48,16 @@ pub(crate) struct Cube {
     quick: bool,
     samples: usize,
     speed: f64,
-    /// Methods a and b at fine steps.
+    /// Methods a and b with fine steps.
     references: Vec<Trace>,
     parting: Vec<f64>,
 }
 
 impl Cube {
-    /// Reduce the rings with several numbers of modes (or take them from the cache) and run the references.
+    /// Reduces the rings with several numbers of modes (or loads them from the cache) and runs the references.
     ///
     /// # Errors
-    /// The reduction or a reference fails; never with what ships.
+    /// A failed reduction or reference; never with the built-in models.
     pub(crate) fn new(quick: bool, cache: &RomCache, console: &Console) -> Result<Self> {
         let shipped = scene_source::load("builtin:cube-between-rings", cache, console)?;
         let mut sizes = Vec::new();
@@ -180,10 +180,10 @@ impl ErrorCase for Cube {
         ))
     }
 
-    /// Methods on the full model once: they know of no modes.
+    /// Methods on the full model occur once, because they do not use modes.
     fn competitors(&self, size: usize) -> Vec<Competitor> {
         let takes_part = |competitor: &Competitor| match competitor {
-            // The solution for a tolerance is sought at one size.
+            // The solution for a tolerance is computed at one size.
             &TOLERANT => size == self.standard(),
             Competitor::Core(..) => true,
             Competitor::Full(method) => size == self.standard() && !self.full_divisions(*method).is_empty(),
@@ -222,13 +222,13 @@ impl ErrorCase for Cube {
         "the speed"
     }
 
-    /// Massless-boundary is refused, and at this speed nothing sticks.
+    /// Massless-boundary is rejected, and at this speed there is no sticking.
     fn families(&self, _: usize) -> Vec<EquationFamily> {
         Vec::new()
     }
 }
 
-/// A run of the product, its displacements without the flight.
+/// A run of the product, with the rigid motion removed from its displacements.
 struct FlightRemoved {
     run: SceneRun,
     speed: f64,

@@ -10,22 +10,22 @@ use super::{
     run::{StepExtremes, TimedRun},
 };
 
-/// A run that is over: the methods run to the end in one go and keep a history, which is then walked through.
+/// Replay of a finished run: the methods run to the end without interruption and keep a history.
 pub(crate) struct FullRun {
     history: CubeHistory,
     step: f64,
     speed: f64,
     interval: f64,
     samples: usize,
-    /// Records that belong to the samples so far.
+    /// Index of the record that belongs to the current sample.
     record: usize,
 }
 
 impl FullRun {
-    /// Run to the end of `samples` samples with `division` steps each.
+    /// Runs to the end of `samples` samples with `division` steps each.
     ///
     /// # Errors
-    /// What the method refuses.
+    /// A run that the method rejects.
     pub(crate) fn new(
         scene: &CubeScene,
         method: Full,
@@ -51,7 +51,7 @@ impl FullRun {
     }
 }
 
-/// Displacements of the nodes of a body that flies along −y, without the flight (m).
+/// Returns the displacements of the nodes of a body that flies along −y, without the rigid motion (m).
 pub(crate) fn without_flight(displacements: impl IntoIterator<Item = f64>, flown: f64) -> Vec<f64> {
     let all = displacements.into_iter().enumerate();
     all.map(|(index, value)| if index % 3 == 1 { value + flown } else { value }).collect()
@@ -69,7 +69,7 @@ impl TimedRun for FullRun {
         while self.record < history.times.len() && history.times[self.record] < end {
             let forces = history.forces[self.record].into_iter();
             seen.add(history.times[self.record], self.step, forces, -history.penetration[self.record]);
-            // Sums over a face hide what a single node pulls.
+            // Sums over a face hide a tensile force at a single node.
             seen.adhesion = history.corner_forces[self.record].into_iter().fold(seen.adhesion, f64::min);
             self.record += 1;
         }

@@ -12,16 +12,16 @@ const TABLES: [(&str, &str); 4] = [
     ("summary-limits", "error-study.md"),
     ("communication-steps", "co-simulation.md"),
 ];
-/// The page that says on which machine and when, as the block of this name.
+/// The page and the block that state machine and date.
 const MACHINE: (&str, &str) = ("machine", "error-study.md");
-/// Where pictures are, beside the pages.
+/// Directory of the pictures, next to the pages.
 const PICTURES: &str = "error";
 
-/// Replaces pictures and blocks of the guide in `directory`: every block by a study of all scenes, else only the rows of the scenes that were
-/// run. Nothing is written unless every block is there.
+/// Replaces pictures and blocks of the guide in `directory`: complete blocks after a study of all scenes, otherwise
+/// only the rows of the scenes that were run. Nothing is written if a block is missing.
 ///
 /// # Errors
-/// A page or a block is missing, or a file cannot be written.
+/// A missing page or block, or a file that cannot be written.
 pub(super) fn write(study: &Study, directory: &Path, is_whole: bool) -> Result<()> {
     let fact = |name: &str| study.facts.iter().find(|(known, _)| known == name).map_or("", |(_, value)| value.as_str());
     let seconds = fact("processor time of the study");
@@ -39,7 +39,7 @@ pub(super) fn write(study: &Study, directory: &Path, is_whole: bool) -> Result<(
             continue;
         }
         let (.., bytes) = found.ok_or_else(|| failed(directory, format!("the study has no table `{name}`")))?;
-        // The caption is the page's own heading.
+        // The heading of the page is the caption.
         let text = String::from_utf8_lossy(bytes);
         let rows: Vec<&str> = text.lines().filter(|line| line.starts_with('|')).collect();
         blocks.push((name, page, rows.join("\n")));
@@ -71,7 +71,8 @@ fn failed(path: &Path, problem: String) -> Failure {
     Failure::new(path.display().to_string(), problem, "Set `--guide` to the directory `docs` of the sources")
 }
 
-/// The table of a block of the page with the rows of the scenes in `table` replaced or added; the first cell of a row is its scene.
+/// Returns the table of a block of the page with the rows of the scenes in `table` replaced or added; the first cell of
+/// a row is its scene.
 fn with_rows(page: &str, name: &str, table: &str) -> String {
     let scene = |row: &str| row.split('|').nth(1).unwrap_or_default().to_owned();
     let begin = format!("<!-- written: lab error {name};");
@@ -83,7 +84,7 @@ fn with_rows(page: &str, name: &str, table: &str) -> String {
     kept.chain(added.iter().copied()).collect::<Vec<_>>().join("\n")
 }
 
-/// The page with the content of one block replaced, and its date.
+/// Returns the page with the content of one block and its date replaced.
 fn replaced(page: &str, name: &str, content: &str, date: &str) -> std::result::Result<String, String> {
     let begin = format!("<!-- written: lab error {name};");
     let end = "<!-- end -->";

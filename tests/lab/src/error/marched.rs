@@ -1,6 +1,7 @@
-//! Rods by a tolerance: a sector against a fixed obstacle, marched without a scene around it.
+//! Rods with adaptive steps: a sector against a fixed obstacle, integrated without a scene.
 //!
-//! What constant loads do without contact is known: static displacement, and a parabola of rigid motion. The rest has no loads.
+//! The effect of constant loads without contact is known: static displacement, and a parabola of rigid motion. The rest
+//! has no loads.
 
 use nalgebra::{DMatrix, DVector};
 use tiprub_core::{
@@ -19,17 +20,17 @@ use super::{
     run::{StepExtremes, TimedRun},
 };
 
-/// Gaps of contacts count as closed within this share of the tolerance, and what rounding leaves of lengths (m).
+/// Gaps count as closed within this fraction of the tolerance, and within the rounding of lengths (m).
 const PRECISION: [f64; 2] = [1e-4, 1e-15];
-/// Points of a step.
+/// Number of points of a step.
 const POINTS: usize = 4;
 
-/// The obstacle, and what has touched it.
+/// The obstacle, and a record of its contacts.
 struct RigidObstacle {
     gap: f64,
-    /// Displacement of the contact by loads alone: at the start (m), and its acceleration (m/s²).
+    /// Displacement of the contact by loads alone: initial value (m), and its acceleration (m/s²).
     loaded: [f64; 2],
-    /// Where the span begins, and how long it is (s).
+    /// Start and length of the span (s).
     span: [f64; 2],
     times: [f64; POINTS],
     seen: StepExtremes,
@@ -101,7 +102,7 @@ pub(crate) struct RodMarch<'a> {
 }
 
 impl<'a> RodMarch<'a> {
-    /// In spans of `interval` (s), within `tolerance` of the rod's length of reference.
+    /// Creates a run in spans of `interval` (s), with `tolerance` relative to the reference length of the rod.
     pub(crate) fn new(rod: &'a CoreRod, interval: f64, tolerance: f64, perturbation: f64) -> Self {
         let model = &rod.model;
         let dynamic = model.dynamic_modes(Scheme::Galerkin);
@@ -122,7 +123,7 @@ impl<'a> RodMarch<'a> {
             times: [0.0; POINTS],
             seen: StepExtremes::nothing(),
         };
-        // What is closed at the start is carried from then on.
+        // A contact that is closed at the start carries the load from then on.
         let moved: f64 = (0..dynamic).map(|mode| seen_by(mode) * state.position[mode]).sum();
         let gap = ground.gap_at(0.0, moved);
         if gap < 0.0 {
@@ -147,7 +148,7 @@ impl<'a> RodMarch<'a> {
         }
     }
 
-    /// Modal displacements and velocities, loads and contact forces included.
+    /// Returns modal displacements and velocities, including those by loads and contact forces.
     fn modal(&self) -> [DVector<f64>; 2] {
         let (model, time) = (&self.rod.model, self.ground.span[0]);
         let both = |mode: usize| {
@@ -162,7 +163,7 @@ impl<'a> RodMarch<'a> {
     }
 }
 
-/// Modes with inertia, and what the others give way by.
+/// Returns the modes with inertia, and the flexibility of the others.
 fn modes_of(model: &ModalModel, dynamic: usize) -> ContactModes {
     let mut residual = DMatrix::zeros(3, 3);
     for mode in dynamic..model.len() {

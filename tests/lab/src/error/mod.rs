@@ -1,4 +1,5 @@
-//! Error against run time of built-in scenes and standard problems, beside methods that share nothing with the product.
+//! Error against run time of built-in scenes and standard problems, compared with methods that share nothing with the
+//! product.
 
 pub(crate) mod bars;
 mod belt;
@@ -30,13 +31,13 @@ use tiprub_study::{
 
 use crate::cli::{ErrorScene, LabErrorArguments};
 
-/// Time and error by the length of the communication step, as Markdown.
+/// Name of the table of time and error by communication step length (Markdown).
 const COMMUNICATION: &str = "communication-steps.md";
 
-/// The study. Its tables and pictures go into the guide where that was asked for.
+/// Runs the study. Its tables and pictures are written into the guide if requested.
 ///
 /// # Errors
-/// A reference fails, which does not happen with built-in scenes, or the guide cannot be written.
+/// A reference that fails, which does not happen with built-in scenes, or a guide that cannot be written.
 pub(crate) fn study(arguments: &LabErrorArguments, console: &Console) -> Result<Study> {
     let guide = arguments.guide.as_deref();
     if guide.is_some() && arguments.common.quick {
@@ -74,7 +75,8 @@ fn never(problem: String) -> Failure {
     Failure::new("lab error", problem, "Report this to the developers")
 }
 
-/// The scene of this name, reduced where it has to be; rows of built-in scenes are added to the table of communication steps.
+/// Returns the scene of this name, reduced if necessary; rows of built-in scenes are added to the table of
+/// communication steps.
 fn case_of(
     scene: ErrorScene,
     (quick, cache): (bool, &RomCache),
@@ -135,7 +137,7 @@ mod tests {
         scene
     }
 
-    /// A body of two lumps that is thrown at a plate beside the rotor, along it at 30 m/s.
+    /// Adds a body of two masses that is thrown at a plate next to the rotor, along it at 30 m/s.
     fn beside(mut rotor: Scene, approach: f64) -> Scene {
         let throw = Throw {
             body: LumpChain::elastic(&[0.05, 0.05], 1e7),
@@ -166,7 +168,7 @@ mod tests {
         let alone = error(&rotor());
         assert!((1e-7..0.1).contains(&alone), "{alone:e}");
         assert_eq!(error(&beside(rotor(), 0.0)).to_bits(), alone.to_bits(), "untouched");
-        // The impact has an error of its own, relative to what it changes.
+        // The impact has an error that is relative to its change of velocity.
         let hit = error(&beside(rotor(), 1.0));
         assert!(hit >= alone && hit < 0.5, "{hit:e} {alone:e}");
     }
@@ -181,7 +183,7 @@ mod tests {
         let hit = last(1.0);
         let largest =
             |axis: usize| hit.iter().skip(axis).step_by(3).fold(0.0, |most: f64, value| most.max(value.abs()));
-        // It has flown 18 mm along the plate, and was sent back by it.
+        // The body has flown 18 mm along the plate, and has bounced off it.
         assert!(largest(1) < 1e-9 && (1e-5..2e-3).contains(&largest(0)), "{:e} {:e}", largest(0), largest(1));
     }
 }

@@ -17,9 +17,9 @@ use super::{
 pub(crate) struct Softness {
     /// Contact stiffness of the softer penalty (N/m); the augmented Lagrangian has ten times as much.
     pub stiffness: f64,
-    /// Penetration that the augmented Lagrangian lets pass (m).
+    /// Penetration that the augmented Lagrangian permits (m).
     pub tolerance: f64,
-    /// Nodes nearer than this take part (m).
+    /// Distance up to which nodes are included (m).
     pub margin: f64,
 }
 
@@ -34,10 +34,10 @@ pub(crate) struct OutsideRun<'a, S: ReducedScene> {
 }
 
 impl<'a, S: ReducedScene> OutsideRun<'a, S> {
-    /// From the scene's start, with `division` steps per sample `interval` (s).
+    /// Starts from the initial state of the scene, with `division` steps per sample `interval` (s).
     ///
     /// # Errors
-    /// A step that the method refuses; a competitor that is none of the reference crate.
+    /// A step that the method rejects; a competitor that does not belong to the reference crate.
     pub(crate) fn new(
         scene: &'a S,
         competitor: Competitor,

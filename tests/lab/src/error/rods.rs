@@ -1,4 +1,4 @@
-//! Rods through the core: one structure against a fixed obstacle, stepped by [`System`] without a scene around it.
+//! Rods through the core: one structure against a fixed obstacle, stepped by [`System`] without a scene.
 
 use nalgebra::{DMatrix, DVector};
 use tiprub_core::{
@@ -13,7 +13,7 @@ use tiprub_test_models::{node, structure};
 
 use super::run::{StepExtremes, TimedRun};
 
-/// Normal of the one contact: the structure's first direction closes the gap.
+/// Normal of the only contact: the structure's first direction closes the gap.
 pub(super) const NORMAL: [f64; 3] = [-1.0, 0.0, 0.0];
 
 /// A rod prepared for the core.
@@ -31,10 +31,11 @@ pub(crate) struct CoreRod {
 }
 
 impl CoreRod {
-    /// `ends`: contact nodes without mass under massless-boundary. `whole`: compare all nodes, not the contact alone.
+    /// Prepares a rod; `ends` is the number of contact nodes without mass under massless-boundary. If `whole`, all
+    /// nodes are compared, not the contact alone.
     ///
     /// # Errors
-    /// Never with rods.
+    /// None for rods.
     pub(crate) fn new(rod: &RodModel, ends: usize, whole: bool) -> Result<Self, String> {
         let count = rod.closing.len();
         let mut contact_map = DMatrix::zeros(3, count);
@@ -56,10 +57,10 @@ impl CoreRod {
         })
     }
 
-    /// Start a run, refused as a scene would be.
+    /// Starts a run, with the checks of a scene.
     ///
     /// # Errors
-    /// Steps beyond the limit of the scheme, with numbers.
+    /// Steps beyond the limit of the scheme; the message contains numbers.
     pub(crate) fn run(
         &self,
         (scheme, solver): (Scheme, Solver),
@@ -87,7 +88,7 @@ impl CoreRod {
         Ok(RodRun { rod: self, system, division, step })
     }
 
-    /// Displacement and velocity of a mode by its load alone at a time (s): at rest, or rigid motion from rest.
+    /// Returns displacement and velocity of a mode by its load alone at a time (s): at rest, or rigid motion from rest.
     pub(super) fn loaded(&self, mode: usize, time: f64) -> [f64; 2] {
         match (self.model.frequencies[mode], self.load[mode]) {
             (0.0, load) => [0.5 * load * time * time, load * time],
@@ -95,7 +96,8 @@ impl CoreRod {
         }
     }
 
-    /// The core takes a start without loads: the velocity that gives its first increment what the load adds to it.
+    /// Returns the velocity that gives the first increment the contribution of the load, because the core starts
+    /// without loads.
     fn half_kick(&self, mode: usize, step: f64) -> f64 {
         let (frequency, load) = (self.model.frequencies[mode], self.load[mode]);
         if load == 0.0 {

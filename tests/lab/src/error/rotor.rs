@@ -14,26 +14,27 @@ use super::{
     turning::{TurningCase, TurningFacts},
 };
 
-/// Component modes kept beside the contact nodes' own.
+/// Component modes in addition to the constraint modes.
 const MODES: [usize; 3] = [8, 20, 40];
 const QUICK_MODES: [usize; 2] = [4, 12];
-/// Depth of the bumps: they intrude by 2·depth − 1 of the gap.
+/// Depth of the bumps, which intrude by 2·depth − 1 of the gap.
 const LIGHT: f64 = 0.6;
 const HEAVY: f64 = 1.0;
-/// Time between samples (s): a fiftieth of what the first bending mode takes to swing.
+/// Time between samples (s): a fiftieth of the period of the first bending mode.
 const INTERVAL: f64 = 1e-5;
-/// Samples of the window: a revolution.
+/// Number of samples of the window: one revolution.
 const SAMPLES: usize = 349;
 const QUICK_SAMPLES: usize = 150;
-/// Runs are followed for so many windows to see whether they part, with so many internal steps per sample.
+/// Number of windows over which the divergence of runs is checked, and internal steps per sample.
 const LONG: (usize, u32) = (3, 20);
 /// Internal steps per sample; the limit of central differences is at 5.8.
 const DIVISIONS: [u32; 8] = [1, 2, 5, 6, 10, 20, 40, 80];
 const QUICK_DIVISIONS: [u32; 5] = [2, 5, 10, 20, 40];
-/// The same of the references, the product's and Moreau-Jean's.
+/// Internal steps per sample of the references: of the product and of Moreau-Jean.
 const REFERENCES: (u32, u32) = (1280, 640);
 const QUICK_REFERENCES: (u32, u32) = (320, 160);
-/// Contact stiffness of soft methods (N/m) per node, the penetration they may leave and how near a node takes part (m).
+/// Contact stiffness of soft methods (N/m) per node, the penetration they may cause, and the distance up to which a
+/// node is included (m).
 const SOFTNESS: Softness = Softness { stiffness: 1e8, tolerance: 5e-6, margin: 2e-5 };
 
 /// Depth of the bumps.
@@ -43,10 +44,10 @@ pub(crate) enum BumpDepth {
     Heavy,
 }
 
-/// Reduce the blade (or take it from the cache) with several numbers of modes.
+/// Reduces the blade (or loads it from the cache) with several numbers of modes.
 ///
 /// # Errors
-/// The reduction refuses; never with what ships.
+/// A failed reduction; never with the built-in model.
 pub(crate) fn rotor(
     rub: BumpDepth,
     quick: bool,

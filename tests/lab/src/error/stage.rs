@@ -18,12 +18,12 @@ const MODES: [usize; 3] = [4, 8, 16];
 const QUICK_MODES: [usize; 2] = [2, 4];
 /// Time between samples (s).
 const INTERVAL: f64 = 2e-5;
-/// Time over which the lobes grow (s), sooner than in the scene that ships; the casing touches from about half of it on.
+/// Time over which the lobes grow (s), shorter than in the built-in scene; the casing touches from about half of it on.
 const RAMP: f64 = 1.5e-3;
-/// Samples of the window.
+/// Number of samples of the window.
 const SAMPLES: usize = 125;
 const QUICK_SAMPLES: usize = 75;
-/// Runs are followed for so many windows to see whether they part.
+/// Number of windows over which the divergence of runs is checked, and internal steps per sample.
 const LONG: (usize, u32) = (2, 16);
 const DIVISIONS: [u32; 6] = [4, 8, 12, 16, 32, 64];
 const QUICK_DIVISIONS: [u32; 3] = [2, 8, 16];
@@ -31,13 +31,14 @@ const REFERENCES: (u32, u32) = (256, 128);
 const QUICK_REFERENCES: (u32, u32) = (64, 64);
 /// Internal steps per sample of the outside methods, whose steps take ten times as long.
 const OUTSIDE_DIVISIONS: [u32; 3] = [8, 16, 32];
-/// Contact stiffness of soft methods (N/m) per node, the penetration they may leave and how near a node takes part (m).
+/// Contact stiffness of soft methods (N/m) per node, the penetration they may cause, and the distance up to which a
+/// node is included (m).
 const SOFTNESS: Softness = Softness { stiffness: 1e8, tolerance: 5e-6, margin: 2e-5 };
 
-/// Reduce the disk on its coarse mesh with several numbers of modes (or take it from the cache).
+/// Reduces the disk on its coarse mesh with several numbers of modes (or loads it from the cache).
 ///
 /// # Errors
-/// The reduction refuses; never with what ships.
+/// A failed reduction; never with the built-in model.
 pub(crate) fn stage(quick: bool, cache: &RomCache, console: &Console) -> Result<TurningCase<StageScene>> {
     let coarse = scene_source::stage_scene(true, cache, console)?;
     let mut sizes = Vec::new();
@@ -75,7 +76,8 @@ fn disk(modes: usize, cache: &RomCache, console: &Console) -> Result<Rom> {
     cache.get(&format!("stage-study-{modes}"), &model, console, &|| Ok(model.reduce(console)?.0.rom))
 }
 
-/// The scene's data for the reference crate; what it does not know of (spin, whirl, mistuning, heat) is off in this scene.
+/// Converts the scene to the reference crate; features without support there (spin, whirl, mistuning, heat) are off in
+/// this scene.
 fn outside(scene: &Scene) -> Option<StageScene> {
     let (disk, ring, settings) = (&scene.roms[0], &scene.roms[1], &scene.settings);
     let (surface, contact) = (&settings.surfaces[0], &settings.contacts[0]);

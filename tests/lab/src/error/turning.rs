@@ -1,4 +1,4 @@
-//! Rotors in casings at several numbers of modes, with the methods of the reference crate beside the product.
+//! Rotors in casings at several numbers of modes, with the methods of the reference crate for comparison.
 
 use tiprub_core::Scene;
 use tiprub_reference::reduced;
@@ -24,15 +24,15 @@ pub(crate) struct TurningFacts {
     pub size_name: &'static str,
     /// Time between samples (s).
     pub interval: f64,
-    /// Samples of the window at most, and per window of impulses.
+    /// Maximum number of samples of the window, and per window of impulses.
     pub samples: [usize; 2],
-    /// Runs are followed for so many windows to see whether they part, with so many internal steps per sample.
+    /// Number of windows over which the divergence of runs is checked, and internal steps per sample.
     pub long: (usize, u32),
     /// Internal steps per sample.
     pub divisions: Vec<u32>,
-    /// The same of the outside methods, where their steps take much longer.
+    /// Internal steps per sample of the independent methods, if their steps take much longer.
     pub outside_divisions: Option<Vec<u32>>,
-    /// The same of the references, the product's and Moreau-Jean's.
+    /// Internal steps per sample of the references: of the product and of Moreau-Jean.
     pub references: (u32, u32),
     /// Equations whose limits are computed at the standard size, and at the others.
     pub families: [Vec<EquationFamily>; 2],
@@ -48,10 +48,10 @@ pub(crate) struct TurningCase<S> {
 }
 
 impl<S: reduced::ReducedScene> TurningCase<S> {
-    /// See how long it can be followed.
+    /// Determines the time over which trajectories can be compared.
     ///
     /// # Errors
-    /// A run fails; never with what ships.
+    /// A run that fails; never with the built-in models.
     pub(crate) fn new(facts: TurningFacts, sizes: Vec<(usize, Scene, S)>) -> Result<Self> {
         let [samples, _] = facts.samples;
         let mut turning = Self { facts, sizes, samples, parting: Vec::new() };
@@ -100,7 +100,7 @@ impl<S: reduced::ReducedScene> ErrorCase for TurningCase<S> {
         self.facts.samples[1]
     }
 
-    /// Steps are compared at the standard size; the others leave the finest out.
+    /// Steps are compared at the standard size; the others omit the finest.
     fn divisions(&self, size: usize) -> Vec<u32> {
         without_finest(&self.facts.divisions, size == self.standard())
     }
@@ -120,7 +120,7 @@ impl<S: reduced::ReducedScene> ErrorCase for TurningCase<S> {
 
     fn reference_divisions(&self, size: usize) -> (u32, u32) {
         let (own, outside) = self.facts.references;
-        // Only where steps are compared must the outside reference be as fine.
+        // The independent reference must be equally fine only at the size where steps are compared.
         (own, if size == self.standard() { outside } else { outside / 4 })
     }
 

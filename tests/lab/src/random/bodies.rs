@@ -1,4 +1,4 @@
-//! Free bodies thrown among plates, by chance.
+//! Free bodies thrown randomly among plates.
 
 use tiprub_core::Rom;
 use tiprub_core::settings::{Interpolation, SceneSettings, Scheme, Solver, SplineSettings};
@@ -8,10 +8,11 @@ use super::structures::chance;
 use crate::stability::bodies::{HALF, LumpChain, Plate, Throw};
 use crate::stability::models::StabilityMethod;
 
-/// Settings, structures, and a length (m) that displacements go by.
+/// Returns settings, structures, and a length (m) that scales displacements.
 pub(crate) fn scene(random: &mut SeededRandom, scheme: Scheme, solver: Solver) -> (SceneSettings, Vec<Rom>, f64) {
     let friction = random.of(&[0.0, 0.1, 0.3, 0.8]);
-    // Contact nodes on its faces alone leave modes that keep their inertia, as galerkin needs them; it is large, hence rare.
+    // Contact nodes on its faces alone preserve modes with inertia, which galerkin needs; the model is large and
+    // therefore rare.
     let mut scene = if scheme == Scheme::Galerkin && chance(random, 0.3) {
         let plates = [(lattice::BlockSide::Left, HALF + 5e-5), (lattice::BlockSide::Right, HALF + 1e-4)];
         let faces = lattice::faces([0.0; 3]);

@@ -1,4 +1,4 @@
-//! `lab random`: run random scenes, print the table, write out what is wrong.
+//! `lab random`: runs random scenes, prints the table and writes failed scenes.
 
 use std::path::Path;
 
@@ -12,13 +12,13 @@ use super::table::{RandomTable, row_as_json, row_as_text};
 use super::{judged, scenes};
 use crate::cli::RandomArguments;
 
-/// Names at most this many wrong scenes.
+/// Maximum number of failed scenes that are named.
 const NAMED: usize = 10;
 
-/// Run the scenes asked for.
+/// Runs the requested scenes.
 ///
 /// # Errors
-/// No library, files that cannot be written, or a scene that is wrong.
+/// A missing library, files that cannot be written, or a failed scene.
 pub(crate) fn run(arguments: &RandomArguments, console: &Console) -> Result<CommandOutcome> {
     let directory = tempfile::tempdir()
         .map_err(|error| Failure::file(&std::env::temp_dir(), "cannot create a temporary directory", &error))?;
@@ -60,12 +60,12 @@ pub(crate) fn run(arguments: &RandomArguments, console: &Console) -> Result<Comm
     Err(Failure::new("lab random", problem, format!("Run a single scene with `lab random --only {}`", named[0])))
 }
 
-/// Seed of a scene of a run: its place in the run decides nothing else.
+/// Returns the seed of a scene of a run, which is the only effect of its index.
 fn seed_of(seed: u64, index: usize) -> u64 {
     scenes::numbers(seed, 0x5ce0 + index as u64).0
 }
 
-/// One scene in full.
+/// Runs one scene and prints its full result.
 fn only(arguments: &RandomArguments, faces: Option<&LibraryFaces>, seed: u64) -> Result<CommandOutcome> {
     let row = judged(seed, faces);
     if let Some(out) = &arguments.out {
@@ -78,7 +78,7 @@ fn only(arguments: &RandomArguments, faces: Option<&LibraryFaces>, seed: u64) ->
     Ok(CommandOutcome { text: row_as_text(&row), json: row_as_json(&row), ..CommandOutcome::default() })
 }
 
-/// The scene as TOML with its ROMs, as an FMU has them.
+/// Writes the scene as TOML with its ROMs, as an FMU contains them.
 fn write_scene(out: &Path, seed: u64) -> Result<()> {
     let directory = out.join(seed.to_string());
     output_file::create_directory(&directory)?;

@@ -1,4 +1,5 @@
-//! The FMU library beside the native run: the same bits, the same rejections, states that go from one instance to another.
+//! The FMU library compared with the native run: the same bits, the same rejections, states that are moved between
+//! instances.
 
 use std::path::Path;
 
@@ -12,7 +13,7 @@ use super::oracles::Finding;
 use super::scenes::{RandomScene, numbers};
 use super::states::LATER;
 
-/// Both faces of the library.
+/// Both interfaces of the library.
 #[derive(Debug)]
 pub(crate) struct LibraryFaces {
     two: Fmi2Api,
@@ -22,13 +23,13 @@ pub(crate) struct LibraryFaces {
 /// Native result of a scene.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Native<'a> {
-    /// It was rejected with this message.
+    /// Rejected with this message.
     Rejected(&'a str),
-    /// It ran.
+    /// Completed.
     Ran(&'a RandomPlan, &'a OutputRecord),
 }
 
-/// An instance whose states can be carried elsewhere.
+/// An instance whose states can be moved to another one.
 trait PortableInstance: SteppedInstance {
     fn state(&self) -> Vec<u8>;
     fn resume(&self, bytes: &[u8]) -> std::result::Result<(), String>;
@@ -58,15 +59,15 @@ fn is_good(status: i32) -> bool {
 }
 
 impl LibraryFaces {
-    /// Load a library.
+    /// Loads a library.
     ///
     /// # Errors
-    /// It cannot be loaded.
+    /// A library that cannot be loaded.
     pub(crate) fn load(path: &Path) -> Result<Self> {
         Ok(Self { two: Fmi2Api::load(path)?, three: Fmi3Api::load(path)? })
     }
 
-    /// Run a scene as both versions and compare with what came of it natively.
+    /// Runs a scene through both versions and compares it with the native result.
     pub(crate) fn compare(&self, trial: &RandomScene, native: Native) -> Vec<Finding> {
         let resources = UnpackedResources::of(&trial.scene, false);
         let two = |time: f64| {
@@ -125,7 +126,7 @@ fn difference<I: PortableInstance>(
     if let Some(off) = own.differs(record, plan, 0) {
         return Some(format!("{name}: {off}"));
     }
-    // A scene whose shape has grown in by then may not start later.
+    // A scene whose shape has finished growing may not start later.
     let (began, mut other) = match start(LATER) {
         Ok(other) if random.unit() < 0.6 => (LATER, other),
         _ => (0.0, start(0.0).ok()?),

@@ -1,9 +1,9 @@
-//! Which features a scene has, by the names of the table.
+//! The features of a scene, with the names of the table.
 
 use tiprub_core::Scene;
 use tiprub_core::settings::{BodyMotion, InputInterpolation, Interpolation, StructureSettings, SurfaceSettings};
 
-/// A feature's name, and whether a scene has it.
+/// A feature's name, and a function that returns whether a scene has it.
 type SceneFeature = (&'static str, fn(&Scene) -> bool);
 
 /// All features.
@@ -68,7 +68,7 @@ fn coatings(scene: &Scene, cut: bool) -> bool {
     coatings.into_iter().any(|coating| coating.cutting.is_some() == cut)
 }
 
-/// Places in [`FEATURES`] of those that a scene has.
+/// Returns the indices in [`FEATURES`] of the features of a scene.
 pub(crate) fn of(scene: &Scene) -> Vec<usize> {
     (0..FEATURES.len()).filter(|index| FEATURES[*index].1(scene)).collect()
 }

@@ -1,4 +1,4 @@
-//! How inputs go over time: waves that close the clearance within a few periods.
+//! Courses of inputs over time: waves that close the clearance within a few periods.
 
 use tiprub_core::Simulation;
 use tiprub_core::variables::{Causality, DataType};
@@ -15,14 +15,14 @@ pub(crate) struct RandomInput {
     /// Angular frequency (rad/s) and phase (rad).
     rate: f64,
     phase: f64,
-    /// Growth per time.
+    /// Growth per time (1/s).
     slope: f64,
-    /// From `start` and back, instead of around it.
+    /// True for a wave from `start` and back, instead of around it.
     one_sided: bool,
 }
 
 impl RandomInput {
-    /// Value and slope at a time (s).
+    /// Returns value and slope at a time (s).
     pub(crate) fn at(&self, time: f64) -> (f64, f64) {
         let (sine, cosine) = (self.rate * time + self.phase).sin_cos();
         let line = self.start + self.slope * time;
@@ -36,7 +36,7 @@ impl RandomInput {
     }
 }
 
-/// Courses of all inputs of a scene. They begin at the start values.
+/// Returns the courses of all inputs of a scene, which begin at the start values.
 pub(crate) fn courses(trial: &RandomScene, simulation: &Simulation) -> Vec<RandomInput> {
     let total: f64 = trial.lengths.iter().sum();
     let rows = simulation.table().variables().iter();
@@ -56,7 +56,7 @@ fn course(trial: &RandomScene, total: f64, (name, reference): (&str, u32), start
     let phase = random.within(-3.0, 3.0);
     let still = RandomInput { reference, start, amplitude: 0.0, rate, phase, slope: 0.0, one_sided: false };
     let wave = |amplitude: f64| RandomInput { amplitude, ..still };
-    // Of several structures or pairs each follows the course of one.
+    // Several structures or pairs use the courses of a single one.
     match name.rsplit('.').next().unwrap_or(name) {
         "speed" => RandomInput { slope: 0.1 * random.signed() * start / total, ..wave(0.0) },
         "whirl_x" | "whirl_y" => wave(0.4 * trial.gap * random.signed()),

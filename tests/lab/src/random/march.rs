@@ -7,13 +7,13 @@ use tiprub_tests::{OK, WARNING, fmi2, fmi3};
 use super::inputs::{RandomInput, courses};
 use super::scenes::RandomScene;
 
-/// Whatever can be stepped.
+/// Interface of an instance that can be stepped.
 pub(crate) trait SteppedInstance {
-    /// Set an input, with its slope where it is given.
+    /// Sets an input, with its slope if there is one.
     fn set(&mut self, reference: u32, value: f64, slope: Option<f64>) -> Result<(), String>;
-    /// One communication step.
+    /// Performs one communication step.
     fn step(&mut self, time: f64, length: f64) -> Result<(), String>;
-    /// Values as bits.
+    /// Returns values as bits.
     fn bits(&self, references: &[u32]) -> Vec<u64>;
 }
 
@@ -29,17 +29,17 @@ pub(crate) struct RandomPlan {
     slopes: bool,
 }
 
-/// Outputs after each communication step, and how the run ended where it did not reach the end.
+/// Outputs after each communication step, and the reason if the run ended early.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct OutputRecord {
-    /// Outputs as bits, communication step by communication step.
+    /// Outputs as bits, for each communication step.
     pub points: Vec<Vec<u64>>,
-    /// The message of the step that was not done.
+    /// Message of the step that failed.
     pub end: Option<String>,
 }
 
 impl RandomPlan {
-    /// Makes the plan of a scene whose tables are those of `simulation`, which has not started.
+    /// Creates the plan of a scene with the variable table of `simulation`, which has not started.
     pub(crate) fn new(trial: &RandomScene, simulation: &Simulation) -> Self {
         let mut times = vec![0.0];
         for length in &trial.lengths {
@@ -52,22 +52,22 @@ impl RandomPlan {
         Self { courses: courses(trial, simulation), outputs, times, lengths: trial.lengths.clone(), slopes }
     }
 
-    /// Number of communication steps.
+    /// Returns the number of communication steps.
     pub(crate) fn len(&self) -> usize {
         self.lengths.len()
     }
 
-    /// Length of a communication step (s).
+    /// Returns the length of a communication step (s).
     pub(crate) fn length(&self, index: usize) -> f64 {
         self.lengths[index]
     }
 
-    /// References of all inputs.
+    /// Returns the references of all inputs.
     pub(crate) fn inputs(&self) -> Vec<u32> {
         self.courses.iter().map(|course| course.reference).collect()
     }
 
-    /// Set the inputs of a communication step: where they go by its end, or with slopes where they are at its start.
+    /// Sets the inputs of a communication step: to their values at its end, or with slopes to those at its start.
     pub(crate) fn set_inputs(&self, face: &mut impl SteppedInstance, index: usize) -> Result<(), String> {
         for course in &self.courses {
             if self.slopes {
@@ -80,14 +80,14 @@ impl RandomPlan {
         Ok(())
     }
 
-    /// One communication step with its inputs.
+    /// Performs one communication step with its inputs.
     pub(crate) fn step(&self, face: &mut impl SteppedInstance, index: usize) -> Result<Vec<u64>, String> {
         self.set_inputs(face, index)?;
         face.step(self.times[index], self.lengths[index])?;
         Ok(face.bits(&self.outputs))
     }
 
-    /// From a communication point to the end, or as far as it goes.
+    /// Runs from a communication point to the end, or as far as possible.
     pub(crate) fn march<F: SteppedInstance>(
         &self,
         face: &mut F,
@@ -115,7 +115,7 @@ impl OutputRecord {
         Self { points: self.points[index.min(self.points.len())..].to_vec(), end: self.end.clone() }
     }
 
-    /// The first difference from another record, in words; ends are compared by their message.
+    /// Returns a description of the first difference from another record; ends are compared by their message.
     pub(crate) fn differs(&self, other: &Self, plan: &RandomPlan, from: usize) -> Option<String> {
         for (index, (own, other)) in self.points.iter().zip(&other.points).enumerate() {
             let off = own.iter().zip(other).position(|(own, other)| own != other);

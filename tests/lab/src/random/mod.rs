@@ -1,8 +1,9 @@
-//! Scenes that nobody chose, and what must hold of each: `lab random`.
+//! Random scenes, and the properties that each must have: `lab random`.
 //!
-//! A [`Trial`] follows from its seed alone: structures with a handful of modes, features, scheme, solver and inputs by chance, and casings
-//! that close within a few periods, so that contact is violent. [`judged`] runs it natively and, where it is given the FMU library, through
-//! the C interface of both versions, and compares it with oracles that know nothing of the scene.
+//! A [`RandomScene`] follows from its seed alone: structures with a handful of modes, random features, scheme, solver
+//! and inputs, and casings that close within a few periods, so that contact is violent. [`judged`] runs it natively
+//! and, if the FMU library is given, through the C interface of both versions, and checks it with oracles that are
+//! independent of the scene.
 
 mod bodies;
 pub(crate) mod command;
@@ -29,27 +30,27 @@ use scenes::RandomScene;
 /// Result of a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum SceneOutcome {
-    /// It ran to its end.
+    /// The scene ran to its end.
     Ran,
-    /// It was rejected before its start.
+    /// The scene was rejected before its start.
     Rejected,
     /// A step was rejected, with its reason.
     Ended,
 }
 
-/// A scene with what came of it, and all that should not be.
+/// A scene with its outcome and all findings.
 #[derive(Debug, Clone, PartialEq)]
 struct RandomRow {
     seed: u64,
     scheme: Scheme,
     solver: Solver,
-    /// Places in [`features::FEATURES`].
+    /// Indices in [`features::FEATURES`].
     features: Vec<usize>,
     outcome: SceneOutcome,
-    /// The message of a rejection or of an end.
+    /// Message of a rejection or of an early end.
     message: Option<String>,
     findings: Vec<Finding>,
-    /// It was compared with the FMU library.
+    /// True if it was compared with the FMU library.
     compared: bool,
     /// Wall-clock time (s).
     seconds: f64,
@@ -61,7 +62,7 @@ impl RandomRow {
     }
 }
 
-/// Run a scene and ask all oracles; with the library, those of the FMU too.
+/// Runs a scene and applies all oracles; with the library, those of the FMU too.
 fn judged(seed: u64, faces: Option<&LibraryFaces>) -> RandomRow {
     let clock = std::time::Instant::now();
     let trial = scenes::trial(seed);

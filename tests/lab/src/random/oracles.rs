@@ -1,4 +1,4 @@
-//! What must hold of any scene: energy, losses, penetration, finite outputs, messages.
+//! Properties of any scene: energy, losses, penetration, finite outputs, messages.
 
 use tiprub_core::rom::DisplacementFrame;
 use tiprub_core::settings::{ContactSettings, Scheme, Solver};
@@ -10,37 +10,42 @@ use super::structures::largest_frequency;
 
 /// Rounding of the energy ledger, as a fraction of all energy exchanged.
 const ROUNDING: f64 = 1e-9;
-/// Galerkin seeks the contact forces of a step by iterations: work that these leave, as a fraction of all energy exchanged.
+/// Work caused by the iterations with which galerkin computes the contact forces of a step, as a fraction of all energy
+/// exchanged.
 const ITERATED: f64 = 1e-5;
-/// Energy of the instant beyond its bound, as a fraction of all energy exchanged.
+/// Excess of the instantaneous energy over its bound, as a fraction of all energy exchanged.
 const INSTANT: f64 = 1e-2;
-/// Kinetic plus strain energy of the instant may be so many times what was supplied, as `check_energy` of the core has it: that of a
-/// step scheme equals what the scheme conserves up to the second order of the step only, and work on quasi-static modes is known a step late.
+/// Limit of the instantaneous kinetic plus strain energy, as a multiple of the energy supplied, as in `check_energy` of
+/// the core: for a fixed-step scheme it equals the conserved energy only up to the second order of the step, and work
+/// on quasi-static modes is known one step late.
 const FACTOR: f64 = 4.0;
-/// The same for a scheme whose forces act one internal step later: quasi-static modes hold the strain energy of a force whose work is not counted yet.
+/// Additional multiple for a scheme whose forces act one internal step later: quasi-static modes hold the strain energy
+/// of a force whose work is not counted yet.
 const INSTANT_LATER: f64 = 1.0;
 /// Rounding of gaps, as a fraction of the clearance.
 const GAP_ROUNDING: f64 = 1e-9;
-/// Limits of the guide (chapter 12, "Losses only grow"): impacts may give back this fraction of the work of contact forces where the method is known
-/// for it, and friction of free bodies this fraction of all energy exchanged. A run ends beyond it.
+/// Limits of the guide (chapter 12, "Losses only grow"): impacts may return this fraction of the work of contact forces
+/// for methods where this is known, and friction of free bodies this fraction of all energy exchanged. A larger value
+/// ends a run.
 const RETURNED: f64 = 0.02;
 const STOPPED: f64 = 0.01;
-/// Limit of the guide for `film` (chapter 5): nodes stay inside by less than this fraction of the clearance without a warning, of a free body by this
-/// fraction of a thousandth of its extent; warnings follow once it is twice as deep.
+/// Limit of the guide for `film` (chapter 5): the penetration of nodes without a warning is less than this fraction of
+/// the clearance, for a free body less than this fraction of a thousandth of its extent; warnings follow at twice the
+/// depth.
 const FILM_INSIDE: f64 = 0.05;
 const FILM_INSIDE_FREE: f64 = 0.2e-3;
 const FILM_DEEPER: f64 = 2.0;
 
-/// Something that must not be.
+/// A violated property.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Finding {
-    /// Which oracle.
+    /// Name of the oracle.
     pub oracle: &'static str,
-    /// Figures.
+    /// Description with figures.
     pub text: String,
 }
 
-/// Outputs that only grow, and their names.
+/// Names of outputs that only grow.
 const GROWING: [&str; 8] = [
     "damping_loss",
     "friction_loss",
@@ -52,14 +57,15 @@ const GROWING: [&str; 8] = [
     "internal_steps",
 ];
 
-/// Allowed fall of a quantity, as the guide announces it.
+/// Allowed decrease of a quantity, as documented in the guide.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Fall {
     /// By this fraction of its scale.
     Rounding(f64),
-    /// By rounding, and by [`RETURNED`] of the work of contact forces; where `steps`, once the internal step has changed.
+    /// By rounding, and by [`RETURNED`] of the work of contact forces; if `steps`, only after the internal step has
+    /// changed.
     Returned { steps: bool },
-    /// As it likes, but below zero by no more than that.
+    /// Unlimited, but not below zero by more than rounding.
     Spent,
 }
 
@@ -70,15 +76,15 @@ struct Growing {
     reference: u32,
     energy: bool,
     may: Fall,
-    /// The most it has been so far, and what it is.
+    /// Largest value so far, and the current value.
     most: f64,
     now: f64,
-    /// Largest fall beyond what is announced so far: beyond, fall (both as fractions of the scale), time (s).
+    /// Largest decrease above the documented limit so far: excess, decrease (both as fractions of the scale), time (s).
     worst: Option<[f64; 3]>,
 }
 
 impl Growing {
-    /// At a communication point.
+    /// Updates the record at a communication point.
     fn look(&mut self, now: f64, ledger: &Ledger, another_step: bool, time: f64) {
         let scale = if self.energy { ledger.scale() } else { self.most.abs() }.max(f64::MIN_POSITIVE);
         let returned = RETURNED * (ledger.initial.abs() + ledger.contact_work.value());
@@ -89,7 +95,7 @@ impl Growing {
             Fall::Spent => (0.0, ROUNDING * scale + returned),
         };
         let beyond = (most - now - allowed) / scale;
-        // What is no number is found by another oracle.
+        // NaN is found by another oracle.
         if beyond > self.worst.map_or(0.0, |[worst, ..]| worst) {
             self.worst = Some([beyond, (most - now) / scale, time]);
         }
@@ -97,29 +103,30 @@ impl Growing {
     }
 }
 
-/// Largest of everything that should be small, over a run.
+/// Largest values over a run of everything that should be small.
 #[derive(Debug, Clone)]
 pub(crate) struct OracleWatch {
     growing: Vec<Growing>,
-    /// Length of the internal step at first (s), and whether it has been another one.
+    /// Initial length of the internal step (s), and whether it has changed.
     step: f64,
     another_step: bool,
     clearance: Option<u32>,
-    /// Deepest penetration and what the law promises (m).
+    /// Deepest penetration and the limit of the contact law (m).
     deepest: [f64; 2],
-    /// Energy of the instant may be so many times what the scheme conserves.
+    /// Limit of the instantaneous energy, as a multiple of the conserved energy.
     factor: f64,
     residual: f64,
-    /// Contact forces act, and their work is booked, one internal step after they are found.
+    /// True if contact forces act, and their work is counted, one internal step after their computation.
     acts_later: bool,
     /// The losses of a step are counted before the instantaneous energy, a mean over two steps, has decreased.
     loses_later: bool,
     /// Fixed steps: the instantaneous energy is a mean over two steps, so that the loss of an impact is counted before the energy has decreased.
     averages: bool,
-    /// Bound of the energy of the instant, and impact losses, at the last communication point (J).
+    /// Bound of the instantaneous energy, and impact losses, at the last communication point (J).
     bound_before: f64,
     loss_before: f64,
-    /// Energy of the instant that is to be explained at the next communication point: excess, energy, bound (J), time (s).
+    /// Excess of instantaneous energy that the next communication point must explain: excess, energy, bound (J), time
+    /// (s).
     pending: Option<[f64; 4]>,
     /// Largest energy beyond its bound: excess, energy, bound (J), time (s).
     excess: Option<[f64; 4]>,
@@ -128,7 +135,7 @@ pub(crate) struct OracleWatch {
 }
 
 impl OracleWatch {
-    /// Makes the watch of a simulation that has not started.
+    /// Creates the watch of a simulation that has not started.
     pub(crate) fn new(trial: &RandomScene, simulation: &Simulation) -> Self {
         let table = simulation.table();
         let grows = |row: &&tiprub_core::variables::Variable| {
@@ -169,7 +176,7 @@ impl OracleWatch {
         self.bound_before = self.factor * simulation.system().ledger().initial;
     }
 
-    /// At a communication point.
+    /// Updates the watch at a communication point.
     pub(crate) fn look(&mut self, simulation: &Simulation) {
         let time = simulation.time();
         let real = |reference: u32| simulation.real(reference).unwrap_or(f64::NAN);
@@ -200,7 +207,7 @@ impl OracleWatch {
             + if self.acts_later { INSTANT_LATER } else { INSTANT } * self.scale;
         let last = std::mem::replace(&mut self.bound_before, bound);
         let bound = if self.loses_later { bound.max(last) } else { bound };
-        // Work that is booked one internal step later is found in the bound of the next communication point.
+        // Work that is counted one internal step later appears in the bound of the next communication point.
         if let Some([_, energy, before, when]) = self.pending.take() {
             self.exceeds([energy - bound.max(before), energy, bound.max(before), when]);
         }
@@ -275,7 +282,8 @@ fn promised(scene: &Scene, gap: f64) -> f64 {
     thickness + gap * GAP_ROUNDING + loosest_gap(scene, gap) * tolerance + film
 }
 
-/// Clearance that the tolerance is a fraction of (m): the smallest one of each structure, and the largest of these.
+/// Returns the clearance that the tolerance is a fraction of (m): the smallest one of each structure, and the largest
+/// of these.
 fn loosest_gap(scene: &Scene, gap: f64) -> f64 {
     let contacts = &scene.settings.contacts;
     let of = |master: &str| {
@@ -285,7 +293,7 @@ fn loosest_gap(scene: &Scene, gap: f64) -> f64 {
     contacts.iter().map(|contact| of(&contact.master)).filter(|gap| gap.is_finite()).fold(gap, f64::max)
 }
 
-/// Returns the depth at which `film` may leave a node inside without a warning (m).
+/// Returns the depth up to which the penetration with `film` causes no warning (m).
 fn film_inside(scene: &Scene) -> f64 {
     if scene.roms.iter().any(|rom| rom.frame == DisplacementFrame::Cartesian) {
         return FILM_INSIDE_FREE * scene.roms.iter().map(extent).fold(f64::INFINITY, f64::min);
@@ -293,7 +301,7 @@ fn film_inside(scene: &Scene) -> f64 {
     FILM_INSIDE * scene.settings.contacts.iter().map(ContactSettings::nominal_gap).fold(0.0, f64::max)
 }
 
-/// Longest side of the box around the contact nodes of a structure described in fixed directions (m).
+/// Returns the longest side of the box around the contact nodes of a structure described in fixed directions (m).
 fn extent(rom: &Rom) -> f64 {
     let side = |axis: usize| {
         let values = || rom.contact_nodes.iter().map(|node| node.position[axis]);
@@ -302,14 +310,14 @@ fn extent(rom: &Rom) -> f64 {
     (0..3).map(side).fold(0.0, f64::max)
 }
 
-/// Returns the depth of the last warning about nodes that `film` has left inside (m).
+/// Returns the depth in the last warning about penetration with `film` (m).
 fn warned_depth(simulation: &Simulation) -> f64 {
     let warned = simulation.warnings().iter().filter(|warning| warning.topic() == Topic::FilmInside);
     let depth = |text: &str| text.split_once(" by ")?.1.split_once(" m")?.0.parse().ok();
     warned.map(|warning| depth(&warning.lines()[0]).unwrap_or(f64::NAN)).fold(0.0, f64::max)
 }
 
-/// Returns the allowed fall of a quantity that should only grow, as the guide announces it.
+/// Returns the allowed decrease of a quantity that should only grow, as documented in the guide.
 fn announced(name: &str, scene: &Scene) -> Fall {
     let scheme = scene.settings.time.scheme;
     let is_free = scene.roms.iter().any(|rom| rom.frame == DisplacementFrame::Cartesian);
@@ -322,7 +330,7 @@ fn announced(name: &str, scene: &Scene) -> Fall {
     }
 }
 
-/// Energy of the instant over what was supplied, at most.
+/// Returns the maximum of the instantaneous energy divided by the energy supplied.
 fn factor(scene: &Scene) -> f64 {
     let fastest = scene.roms.iter().map(largest_frequency).fold(0.0, f64::max);
     let half = 0.5 * fastest * scene.settings.time.step;
@@ -339,7 +347,7 @@ fn infinite(simulation: &Simulation) -> Option<String> {
     rows.filter(|row| !(row.reference..).take(row.len()).all(real)).map(|row| row.name.clone()).next()
 }
 
-/// A rejection or an end must say what, where and what to do.
+/// Checks that a rejection or an end states the problem, its place and the remedy.
 pub(crate) fn names(error: &Error) -> Option<Finding> {
     let finding = |problem: &str| Some(Finding { oracle: "message", text: format!("{problem}: {error}") });
     let (what, problem, remedy) = match error {
@@ -362,7 +370,7 @@ pub(crate) fn names(error: &Error) -> Option<Finding> {
     None
 }
 
-/// The message of a step that was not done: when, why, and what to do.
+/// Checks the message of a failed step: time, reason and remedy.
 pub(crate) fn ends(message: &str) -> Option<Finding> {
     let finding = |problem: &str| Some(Finding { oracle: "message", text: format!("{problem}: {message}") });
     if message.contains("non-finite") {
@@ -379,7 +387,7 @@ pub(crate) fn ends(message: &str) -> Option<Finding> {
     }
 }
 
-/// The law that a scene is solved by.
+/// Returns the solver of a scene.
 pub(crate) fn solver(scene: &Scene) -> Solver {
     scene.settings.contacts.first().map_or(Solver::Lcp, |contact| contact.solver)
 }

@@ -1,4 +1,4 @@
-//! Valid scenes that nobody chose: features, schemes, solvers and inputs by chance.
+//! Random valid scenes: features, schemes, solvers and inputs by chance.
 
 use tiprub_core::settings::{
     BodyMotion, Closure, CoatingSettings, ContactSettings, CuttingSettings, ExcitationSettings, ExperimentSettings,
@@ -12,7 +12,7 @@ use tiprub_test_models::SeededRandom;
 use super::bodies;
 use super::structures::{self, casing, chance, largest_frequency, lowest_frequency, rotor};
 
-/// A scene with the communication steps that it is run by.
+/// A scene with its communication steps.
 #[derive(Debug, Clone)]
 pub(crate) struct RandomScene {
     /// Seed of the scene.
@@ -21,13 +21,13 @@ pub(crate) struct RandomScene {
     pub scene: Scene,
     /// Lengths of the communication steps (s).
     pub lengths: Vec<f64>,
-    /// Clearance (m) that inputs which move something go by.
+    /// Clearance (m) that scales the inputs which move a structure.
     pub gap: f64,
-    /// Inputs are given with their derivatives.
+    /// True if inputs are set with their derivatives.
     pub slopes: bool,
 }
 
-/// Numbers that follow from a seed, and another purpose gives others.
+/// Returns random numbers for a seed; each purpose has separate ones.
 pub(crate) fn numbers(seed: u64, purpose: u64) -> SeededRandom {
     let mut mixed = seed ^ purpose.wrapping_mul(0x9e37_79b9_7f4a_7c15);
     mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -35,7 +35,7 @@ pub(crate) fn numbers(seed: u64, purpose: u64) -> SeededRandom {
     SeededRandom(mixed ^ (mixed >> 31))
 }
 
-/// The scene of a seed.
+/// Returns the scene of a seed.
 pub(crate) fn trial(seed: u64) -> RandomScene {
     let mut random = numbers(seed, 1);
     let scheme = random.of(&Scheme::ALL);
@@ -43,7 +43,7 @@ pub(crate) fn trial(seed: u64) -> RandomScene {
         Scheme::Galerkin if chance(&mut random, 0.9) => random.of(&[Solver::Lcp, Solver::Coulomb]),
         _ => random.of(&[Solver::Film, Solver::Lcp, Solver::Coulomb]),
     };
-    // The two exclude each other.
+    // These two exclude each other.
     let solver = if scheme == Scheme::MasslessBoundary && solver == Solver::Film { Solver::Lcp } else { solver };
     let free = chance(&mut random, if scheme == Scheme::MasslessBoundary { 0.02 } else { 0.12 });
     let (settings, roms, gap) = if free {
@@ -61,10 +61,10 @@ pub(crate) fn trial(seed: u64) -> RandomScene {
     RandomScene { seed, scene, lengths, gap, slopes }
 }
 
-/// Without structures.
+/// Returns settings without structures.
 pub(crate) fn empty() -> SceneSettings {
     SceneSettings {
-        // Small random models have sizes and speeds that nobody means.
+        // Small random models have implausible sizes and speeds.
         accept_implausible: true,
         silence: Vec::new(),
         name: "random".into(),
@@ -79,7 +79,7 @@ pub(crate) fn empty() -> SceneSettings {
     }
 }
 
-/// Internal step, communication steps and what bounds them.
+/// Chooses the internal step, the communication steps and their limits.
 fn time(random: &mut SeededRandom, scene: &mut Scene, scheme: Scheme) -> Vec<f64> {
     let fastest = scene.roms.iter().map(largest_frequency).fold(0.0, f64::max);
     let slowest = scene.roms.iter().map(lowest_frequency).fold(f64::INFINITY, f64::min);
@@ -89,7 +89,7 @@ fn time(random: &mut SeededRandom, scene: &mut Scene, scheme: Scheme) -> Vec<f64
         Scheme::Galerkin => random.scale(4.0, 60.0) / fastest,
         _ => random.scale(0.08, 1.9) / fastest,
     };
-    // What many contacts couple is dear with galerkin.
+    // Coupled problems with many contacts are expensive with galerkin.
     let dense = scene.roms.iter().any(|rom| rom.is_cyclic() || rom.order() > 70) || scene.roms.len() > 1;
     let internal = match scheme {
         Scheme::Galerkin => {
@@ -101,7 +101,7 @@ fn time(random: &mut SeededRandom, scene: &mut Scene, scheme: Scheme) -> Vec<f64
         }
         _ => 400.0,
     };
-    // A few periods of the slowest mode, where so many steps are enough.
+    // A few periods of the slowest mode, if the number of steps permits it.
     let total = (random.within(1.0, 4.0) * std::f64::consts::TAU / slowest).min(internal * time.step);
     let count = 10 + random.below(15);
     let length = total / count as f64;
@@ -131,7 +131,8 @@ impl Draw<'_> {
         chance(self.random, probability)
     }
 
-    /// A feature that some scheme or solver has no place for: drawn rarely there, so that most scenes run.
+    /// Returns whether to use a feature; if the scheme or solver does not support it, the probability is small, so that
+    /// most scenes run.
     fn feature(&mut self, probability: f64, supported: bool) -> bool {
         let probability = if supported { probability } else { 0.06 * probability };
         self.chance(probability)
@@ -230,7 +231,7 @@ impl Draw<'_> {
         }
     }
 
-    /// A surface and the contact with it.
+    /// Adds a surface and the contact with it.
     fn pair(&mut self, master: &str, rom: &Rom, nodes: Option<String>, coated: bool) {
         let slave = format!("casing_{}", self.settings.surfaces.len() + 1);
         let gap = self.random.scale(5e-5, 8e-4);
@@ -322,7 +323,7 @@ impl Draw<'_> {
         }
     }
 
-    /// An elastic casing that carries the first surface, or all of them.
+    /// Adds an elastic casing that carries the first surface, or all of them.
     fn ring(&mut self) {
         let rom = casing(self.random);
         let rings = rom.extras.grid.map_or(4, |grid| grid.around);

@@ -1,4 +1,5 @@
-//! Saved states at random points, restored where they were saved and elsewhere; derivatives over steps that must not disturb.
+//! Saved states at random points, restored in the same and in other instances; derivatives over steps, which must have
+//! no side effects.
 
 use tiprub_core::Simulation;
 use tiprub_test_models::SeededRandom;
@@ -8,10 +9,10 @@ use super::oracles::Finding;
 use super::scenes::{RandomScene, numbers};
 use super::structures::chance;
 
-/// A start time of an instance that begins later than any state was saved (s).
+/// Start time of an instance that begins later than any saved state (s).
 pub(crate) const LATER: f64 = 7.5;
 
-/// Findings of the oracle of saved states, of a scene that ran as `record` says.
+/// Returns the findings of the oracle of saved states, for a scene with the native `record`.
 pub(crate) fn restored(trial: &RandomScene, plan: &RandomPlan, record: &OutputRecord) -> Vec<Finding> {
     let mut random = numbers(trial.seed, 2);
     if record.points.is_empty() {
@@ -36,7 +37,7 @@ fn save(simulation: &Simulation) -> Vec<u8> {
     state
 }
 
-/// Go on from a state and compare.
+/// Continues from a state and compares.
 fn go_on(
     name: &str,
     simulation: &mut Simulation,
@@ -52,7 +53,8 @@ fn go_on(
     Some(format!("state of communication point {at} restored into {name}: {off}"))
 }
 
-/// At a communication point: saving disturbs nothing, and the state leads to the same bits in this and in other instances.
+/// Checks at a communication point that saving has no side effects, and that the state leads to the same bits in this
+/// and in other instances.
 fn saved_between(
     trial: &RandomScene,
     plan: &RandomPlan,
@@ -76,11 +78,11 @@ fn saved_between(
         2 => ("a fresh instance", started(trial, 0.0)),
         _ => ("an instance that started later", started(trial, LATER)),
     };
-    // Where ramps are still to come, a scene may not start later.
+    // With future ramps, a scene may not start later.
     go_on(name, &mut other.ok()?, &state, at, both)
 }
 
-/// Within a communication step, between two internal ones.
+/// Checks within a communication step, between two internal steps.
 fn saved_within(
     trial: &RandomScene,
     plan: &RandomPlan,
@@ -123,7 +125,7 @@ fn saved_within(
     None
 }
 
-/// The same run after a reset at a random point.
+/// Checks the run after a reset at a random point.
 fn after_reset(
     trial: &RandomScene,
     plan: &RandomPlan,
@@ -147,7 +149,7 @@ fn after_reset(
     Some(format!("after a reset at communication point {at}: {off}"))
 }
 
-/// Derivatives over some steps: they disturb nothing.
+/// Checks that derivatives over some steps have no side effects.
 pub(crate) fn differentiated(trial: &RandomScene, plan: &RandomPlan, record: &OutputRecord) -> Option<Finding> {
     let mut random = numbers(trial.seed, 3);
     let inputs = plan.inputs();

@@ -1,4 +1,4 @@
-//! Reduced models that nobody chose: blades, coupled disks and casings with a handful of modes.
+//! Random reduced models: blades, coupled disks and casings with a handful of modes.
 
 use std::f64::consts::TAU;
 
@@ -10,17 +10,18 @@ use tiprub_core::rom::{
 use tiprub_test_models::disk::TestDisk;
 use tiprub_test_models::{RADIUS, SeededRandom, modal, node, ring_of, spin};
 
-/// True with this probability.
+/// Returns true with this probability.
 pub(crate) fn chance(random: &mut SeededRandom, probability: f64) -> bool {
     random.unit() < probability
 }
 
-/// Largest angular frequency (rad/s) of a structure; of coupled sectors a bound that holds nearly always.
+/// Returns the largest angular frequency (rad/s) of a structure; for coupled sectors a bound that is almost always
+/// valid.
 pub(crate) fn largest_frequency(rom: &Rom) -> f64 {
     frequencies(rom).fold(0.0, f64::max) * if rom.is_cyclic() { 1.3 } else { 1.0 }
 }
 
-/// Lowest angular frequency of a mode that vibrates (rad/s).
+/// Returns the lowest angular frequency of a vibrating mode (rad/s).
 pub(crate) fn lowest_frequency(rom: &Rom) -> f64 {
     frequencies(rom).filter(|value| *value > 1.0).fold(f64::INFINITY, f64::min)
 }
@@ -38,17 +39,17 @@ fn frequencies(rom: &Rom) -> impl Iterator<Item = f64> {
 /// Form of a rotor.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct RotorShape {
-    /// Identical sectors.
+    /// Number of identical sectors.
     pub sectors: usize,
-    /// Contact nodes of a sector.
+    /// Number of contact nodes of a sector.
     pub nodes: usize,
-    /// Neighbours are coupled.
+    /// True if neighbours are coupled.
     pub coupled: bool,
     /// Axial position of the first node (m).
     pub axial: f64,
 }
 
-/// A rotor; the names of its contact nodes begin with `tip_`.
+/// Returns a rotor; the names of its contact nodes begin with `tip_`.
 pub(crate) fn rotor(random: &mut SeededRandom, shape: RotorShape) -> Rom {
     let mut rom = if shape.coupled { disk(random, shape) } else { blade(random, shape) };
     let slope = random.of(&[0.0, -0.2, 0.3]);
@@ -66,7 +67,8 @@ pub(crate) fn rotor(random: &mut SeededRandom, shape: RotorShape) -> Rom {
     rom
 }
 
-/// Radii of the contour whose slopes the contact nodes have; nodes at one place along the axis have the radius of the mean slope.
+/// Sets the radii to the contour that the slopes of the contact nodes define; nodes at one axial position have the
+/// radius of the mean slope.
 fn follow_slopes(rom: &mut Rom) {
     let axial: Vec<f64> = rom.contact_nodes.iter().map(|node| node.position[2]).collect();
     let mut order: Vec<usize> = (0..axial.len()).collect();
@@ -83,7 +85,7 @@ fn follow_slopes(rom: &mut Rom) {
     }
 }
 
-/// Turn contact nodes into patches, in two rows where their number allows it.
+/// Turns contact nodes into patches, in two rows if their number permits it.
 fn patches(random: &mut SeededRandom, rom: &mut Rom) {
     let count = rom.contact_nodes.len();
     for node in &mut rom.contact_nodes {
@@ -99,11 +101,11 @@ fn patches(random: &mut SeededRandom, rom: &mut Rom) {
     }
 }
 
-/// Uncoupled blades given by their modes, the highest of which move single contact directions.
+/// Returns uncoupled blades defined by their modes, the highest of which move single contact directions.
 fn blade(random: &mut SeededRandom, shape: RotorShape) -> Rom {
     let rows = 3 * shape.nodes;
     let slow = 1 + random.below(5);
-    // Too few for quasi-static modes at times.
+    // Sometimes too few for quasi-static modes.
     let local = if chance(random, 0.85) { rows } else { random.below(rows) };
     let lowest = random.scale(150.0, 2500.0);
     let mut frequencies: Vec<f64> = (0..slow).map(|_| lowest * random.scale(1.0, 12.0)).collect();
@@ -128,7 +130,7 @@ fn blade(random: &mut SeededRandom, shape: RotorShape) -> Rom {
     rom
 }
 
-/// Adds data that only uncoupled blades have: spin matrices, heat, places of stress, watched points.
+/// Adds data that only uncoupled blades have: spin matrices, heat, stress points, watched points.
 fn add_extras(random: &mut SeededRandom, rom: &mut Rom) {
     let order = rom.order();
     rom.extras.spin = Some(spin(order));
@@ -143,7 +145,7 @@ fn add_extras(random: &mut SeededRandom, rom: &mut Rom) {
     rom.extras.watched = Some(points(3, 3.0, "gauge"));
 }
 
-/// Sectors coupled to their neighbours.
+/// Returns sectors coupled to their neighbours.
 fn disk(random: &mut SeededRandom, shape: RotorShape) -> Rom {
     let order = 3 * shape.nodes + 1 + random.below(4);
     let seed = (random.unit() * 1e9).to_bits();
@@ -154,7 +156,7 @@ fn disk(random: &mut SeededRandom, shape: RotorShape) -> Rom {
     rom
 }
 
-/// A casing of analytic modes with four warm quarters and a support.
+/// Returns a casing of analytic modes with four heated quarters and a support.
 pub(crate) fn casing(random: &mut SeededRandom) -> Rom {
     let (around, along) = (random.of(&[12, 16, 24]), random.of(&[2, 3, 4]));
     let mut rom = ring_of(around, along, random.of(&[3, 4, 5]));

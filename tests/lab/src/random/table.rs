@@ -1,4 +1,4 @@
-//! Tables of what came of random scenes.
+//! Tables of the outcomes of random scenes.
 
 use std::fmt::Write as _;
 
@@ -8,7 +8,7 @@ use tiprub_core::settings::{Scheme, Solver};
 use super::features::FEATURES;
 use super::{RandomRow, SceneOutcome};
 
-/// Numbers of scenes that ran, were rejected, ended with their reason, or are wrong.
+/// Numbers of scenes that ran, were rejected, ended with a reason, or failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 struct SceneCounts([usize; 4]);
 
@@ -47,12 +47,12 @@ impl SceneCounts {
 /// All rows of a run.
 #[derive(Debug)]
 pub(super) struct RandomTable {
-    /// One per scene.
+    /// One row per scene.
     pub rows: Vec<RandomRow>,
 }
 
 impl RandomTable {
-    /// Rows that something is wrong with.
+    /// Returns the rows with findings.
     pub(super) fn wrong(&self) -> impl Iterator<Item = &RandomRow> {
         self.rows.iter().filter(|row| row.is_wrong())
     }
@@ -84,7 +84,7 @@ impl RandomTable {
         counts
     }
 
-    /// For a terminal.
+    /// Returns the table for a terminal.
     pub(super) fn to_text(&self) -> String {
         let all = SceneCounts::of(self.rows.iter());
         let summary =
@@ -110,7 +110,7 @@ impl RandomTable {
         text
     }
 
-    /// Everything, with the counts of each scheme, solver and feature.
+    /// Returns everything, with the counts of each scheme, solver and feature.
     pub(super) fn to_json(&self) -> Value {
         let mut cells = Vec::new();
         for (scheme, solver) in self.methods() {
@@ -137,7 +137,7 @@ impl RandomTable {
     }
 }
 
-/// A row in full.
+/// Returns a complete row.
 pub(super) fn row_as_json(row: &RandomRow) -> Value {
     json!({
         "seed": row.seed,
@@ -151,7 +151,7 @@ pub(super) fn row_as_json(row: &RandomRow) -> Value {
     })
 }
 
-/// A row in words.
+/// Describes a row in words.
 pub(super) fn row_as_text(row: &RandomRow) -> String {
     let features: Vec<&str> = row.features.iter().map(|index| FEATURES[*index].0).collect();
     let mut text = format!(

@@ -1,18 +1,18 @@
-//! Long missions: communication steps far longer than a rub's, most of them without contact.
+//! Long missions: communication steps far longer than those of a rub, most of them without contact.
 
 use super::H;
 use tiprub_core::{Simulation, settings::Scheme};
 use tiprub_study::error::clock;
 use tiprub_test_models::{bumps, rich_blade};
 
-/// Length of a communication step (s), and how far the casing is open (m): away, and where it rubs.
+/// Length of a communication step (s), and opening of the casing (m): without contact, and in the rub.
 const LONG: f64 = 0.1;
 const WIDE: [f64; 2] = [5e-4, 5e-5];
-/// Communication steps of an hour, and of them those of the rub in its middle.
+/// Number of communication steps of an hour, and those of the rub in its middle.
 const HOUR: u32 = 36_000;
 const RUBBING: u32 = 100;
 
-/// A machine of 36 blades, and the communication steps that it has done.
+/// A machine of 36 blades, and the number of its communication steps so far.
 struct Machine {
     simulation: Simulation,
     done: u32,
@@ -36,7 +36,7 @@ impl Machine {
         }
     }
 
-    /// Processor time (s) of so many communication steps, span by span where asked.
+    /// Returns the processor time (s) of `count` communication steps, span by span if `by_spans`.
     fn go(&mut self, count: u32, by_spans: bool) -> tiprub_core::Result<f64> {
         let before = clock::now();
         for _ in 0..count {
@@ -53,7 +53,7 @@ impl Machine {
     }
 }
 
-/// Milliseconds of a communication step: flown over, span by span, and with a rub.
+/// Returns the time of a communication step (ms): in one free flight, span by span, and with a rub.
 pub(super) fn long_steps(steps: u32) -> tiprub_core::Result<[f64; 3]> {
     let mut machine = Machine::new()?;
     let mut taken = [0.0; 3];
@@ -65,24 +65,24 @@ pub(super) fn long_steps(steps: u32) -> tiprub_core::Result<[f64; 3]> {
     Ok(taken)
 }
 
-/// An hour with a rub in its middle.
+/// Results of an hour with a rub in its middle.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Mission {
-    /// Communication steps, and those of them in the rub.
+    /// Number of communication steps, and of those in the rub.
     pub(super) steps: u32,
     pub(super) rubbing: u32,
-    /// Processor time (s) without the rub, and of it.
+    /// Processor time (s) without the rub, and of the rub.
     pub(super) seconds: [f64; 2],
-    /// Steps of all blades in the rub, and those tried.
+    /// Number of steps of all blades in the rub, including rejected ones.
     pub(super) internal: u64,
     pub(super) trials: u64,
     /// Friction heat (J).
     pub(super) friction: f64,
-    /// Residual of the ledger, relative to what was exchanged.
+    /// Residual of the ledger, relative to the energy exchanged.
     pub(super) residual: f64,
 }
 
-/// A `part`th of an hour.
+/// Runs a `part`th of an hour.
 pub(super) fn hour(part: u32) -> tiprub_core::Result<Mission> {
     let (steps, rubbing) = (HOUR / part, RUBBING / part);
     let mut machine = Machine::new()?;

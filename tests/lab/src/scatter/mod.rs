@@ -1,5 +1,5 @@
-//! How well `galerkin` keeps its tolerance where nothing was chosen: random rubs, what is left at its shortest steps, energy over very many
-//! switches, random contact problems.
+//! Accuracy of `galerkin` relative to its tolerance on random data: random rubs, errors at its shortest steps, energy
+//! over very many switches, random contact problems.
 
 mod mission;
 mod sectors;
@@ -19,27 +19,28 @@ use tiprub_shell::{
 use tiprub_study::{Statement, Study, arguments::StudyCommon, machine};
 use tiprub_test_models::{GAP, SeededRandom, bumps, rich_blade};
 
-/// Sectors of the random rotors.
+/// Number of sectors of the random rotors.
 const SECTORS: usize = 4;
-/// Communication step of all runs (s), and how many.
+/// Communication step of all runs (s), and their number.
 const H: f64 = 8e-5;
 const STEPS: u32 = 100;
-/// Tolerances that are asked for; longest step (s) and tolerance of the truth, and of what has to agree with it.
+/// Requested tolerances; longest step (s) and tolerance of the reference, and of the run that must agree with it.
 const TOLERANCES: [f64; 4] = [1e-2, 1e-3, 1e-4, 1e-5];
 const TRUTH: [(f64, f64); 2] = [(1e-5, 1e-9), (2e-5, 1e-8)];
-/// So far they may be apart, or the truth is not known: a third of the smallest tolerance.
+/// Largest difference of these runs for which the reference counts as known: a third of the smallest tolerance.
 const KNOWN: f64 = 3e-6;
 const SMALL: [f64; 4] = [1e-6, 1e-7, 1e-8, 1e-9];
 const LONGEST: [f64; 3] = [8e-5, 4e-5, 2e-5];
-/// Relative change of the clearance, and how far it may grow until a run is not followed any further.
+/// Relative change of the clearance; a run is followed until the difference exceeds [`GROWN`] times as much.
 const PERTURBATION: f64 = 1e-12;
 const GROWN: f64 = 10.0;
-/// Rubs, switches, contact problems of each degree and friction: of a quick study, and of a whole one, a million problems in all.
+/// Numbers of rubs, switches, contact problems of each degree and friction: of a quick study, and of a full one, a
+/// million problems in all.
 const RUBS: [usize; 2] = [12, 200];
 const SWITCHES: [u64; 2] = [2_000, 100_000];
 const TRIALS: [u64; 2] = [5_000, 125_000];
 
-/// A rub that nobody chose.
+/// Returns a random rub.
 fn random_rub(number: usize) -> Scene {
     let mut random = SeededRandom(1 + 7919 * number as u64);
     let mut scene = bumps(rich_blade(SECTORS));
@@ -59,7 +60,7 @@ fn random_rub(number: usize) -> Scene {
     scene
 }
 
-/// Displacements of all contact rows, communication step by communication step, and the steps that were missed and taken.
+/// Displacements of all contact rows for each communication step, and the numbers of missed and accepted steps.
 struct Ran {
     displacements: Vec<Vec<f64>>,
     steps: [u64; 2],
@@ -72,7 +73,7 @@ fn run(scene: &Scene, (longest, tolerance): (f64, f64), perturbation: f64) -> ti
     run_of(scene, perturbation)
 }
 
-/// Until a step is refused: a blade that digs in ends beyond small displacements.
+/// Runs until a step is rejected: a blade that locks up exceeds small displacements.
 fn run_of(mut scene: Scene, perturbation: f64) -> tiprub_core::Result<Ran> {
     scene.settings.contacts[0].gap *= 1.0 + perturbation;
     let mut simulation = Simulation::new(&scene)?;
@@ -88,7 +89,8 @@ fn run_of(mut scene: Scene, perturbation: f64) -> tiprub_core::Result<Ran> {
     Ok(Ran { displacements, steps: [effort.missed, effort.steps] })
 }
 
-/// Communication steps until a run by fixed steps of the same equations that starts almost like another has left it by ten times as much.
+/// Returns the number of communication steps until two fixed-step runs of the same equations with slightly different
+/// starts differ by ten times the initial difference.
 fn followed(scene: &Scene) -> tiprub_core::Result<usize> {
     let mut scene = scene.clone();
     (scene.settings.time.scheme, scene.settings.time.step) = (Scheme::MasslessBoundary, 2e-7);
@@ -110,11 +112,11 @@ fn apart(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
 enum ScatterRub {
     /// Errors over the tolerances.
     Followed([f64; 4]),
-    /// Nothing touches.
+    /// No contact.
     Open,
-    /// Refused at its start, or not followed for three communication steps from the first touch.
+    /// Rejected at its start, or not followed for three communication steps from the first contact.
     Lost,
-    /// Two runs far finer than all tolerances do not agree.
+    /// Two runs far finer than all tolerances disagree.
     Unknown,
 }
 
@@ -143,7 +145,8 @@ fn errors(number: &usize) -> Result<ScatterRub> {
     Ok(ScatterRub::Followed(std::array::from_fn(|index| off(&runs[index]) / TOLERANCES[index])))
 }
 
-/// Median, 95 % and most of sorted values: the smallest value that so many are not above.
+/// Returns median, 95 % quantile and maximum of sorted values: the smallest value that the given fraction does not
+/// exceed.
 fn quantiles(sorted: &[f64]) -> [f64; 3] {
     let rank = |percent: usize| (sorted.len() * percent).div_ceil(100).saturating_sub(1);
     [rank(50), rank(95), rank(100)].map(|index| sorted.get(index).copied().unwrap_or(f64::NAN))
@@ -156,10 +159,10 @@ fn table(head: &[&str], rows: &[Vec<String>]) -> String {
     format!("{}|{}\n{rows}", line(&head), "---|".repeat(head.len()))
 }
 
-/// The study.
+/// Runs the study.
 ///
 /// # Errors
-/// A run that is refused.
+/// A run that is rejected.
 pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study> {
     let which = usize::from(!arguments.quick);
     let numbers: Vec<usize> = (0..RUBS[which]).collect();
@@ -231,7 +234,7 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
     })
 }
 
-/// Errors with the shortest steps: longest step (s), tolerance, error, steps missed and accepted.
+/// Errors with the shortest steps: longest step (s), tolerance, error, missed and accepted steps.
 type Left = (f64, f64, f64, [u64; 2]);
 
 fn left() -> Result<Vec<Left>> {

@@ -9,7 +9,8 @@ use tiprub_core::galerkin::{
 };
 use tiprub_test_models::SeededRandom;
 
-/// Modes from some hundred to some 10⁵ rad/s, what as many beyond leave, and `stiff` times that of a local flexibility.
+/// Returns modes from some hundred to some 10⁵ rad/s, the flexibility of as many higher ones, and `stiff` times that of
+/// a local flexibility.
 fn modes(count: usize, nodes: usize, stiff: f64, random: &mut SeededRandom) -> ContactModes {
     let rows = 3 * nodes;
     let shapes = random.matrix(rows, 2 * count) * 3.0;
@@ -26,13 +27,13 @@ fn modes(count: usize, nodes: usize, stiff: f64, random: &mut SeededRandom) -> C
     }
 }
 
-/// A plane across x at a place, that slides along y.
+/// A plane normal to x that slides along y.
 struct ScatterWall {
     place: f64,
     friction: f64,
-    /// Steps in which a node opens or closes.
+    /// Number of steps in which a node opens or closes.
     switches: u64,
-    /// Energy that constant forces have lost (J).
+    /// Energy dropped by constant forces (J).
     dropped: f64,
 }
 
@@ -70,16 +71,16 @@ impl Witness for ScatterWall {
 pub(super) struct SectorEnergy {
     pub(super) tolerance: f64,
     pub(super) switches: u64,
-    /// Most at the end of any span, and at the end, relative to the start.
+    /// Largest energy at the end of any span, and final energy, relative to the start.
     pub(super) most: f64,
     pub(super) left: f64,
     pub(super) effort: Effort,
 }
 
-/// Steps tried per switch, until a sector is taken to have come to rest.
+/// Number of attempted steps per switch after which a sector counts as at rest.
 const MOST_TRIED: u64 = 100;
 
-/// March until so many contacts have opened or closed, or nothing touches any more.
+/// Runs until `switches` contacts have opened or closed, or no contact remains.
 pub(super) fn energy(tolerance: f64, switches: u64) -> Option<SectorEnergy> {
     let (span, nodes, count) = (4e-5, 2, 10);
     let modes = modes(count, nodes, 1.0, &mut SeededRandom(11));
@@ -97,7 +98,7 @@ pub(super) fn energy(tolerance: f64, switches: u64) -> Option<SectorEnergy> {
     };
     let (start, mut most, mut effort) = (energy(&state), 0.0_f64, Effort::default());
     let demand = StepGoal { tolerance, precision: 1e-15, most: u64::MAX };
-    // What switches lose may end contact for good.
+    // The losses of switches may end contact permanently.
     while wall.switches < switches && effort.tried() < MOST_TRIED * switches {
         marcher.march(&tables, &mut state, &mut wall, demand, &mut effort).ok()?;
         most = most.max(energy(&state));
@@ -105,26 +106,27 @@ pub(super) fn energy(tolerance: f64, switches: u64) -> Option<SectorEnergy> {
     Some(SectorEnergy { tolerance, switches: wall.switches, most: most / start, left: energy(&state) / start, effort })
 }
 
-/// Contact problems that came up.
+/// Statistics of contact problems.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Problems {
     pub(super) degree: usize,
     pub(super) friction: f64,
     pub(super) trials: u64,
-    /// Without a solution found, halved then.
+    /// Number of problems without a solution found; the step is then halved.
     pub(super) unsolved: u64,
-    /// Spans in which no step was short enough.
+    /// Number of spans in which no step was short enough.
     pub(super) given_up: u64,
 }
 
-/// Random sectors with random motion at a wall, span by span, until `trials` contact problems of one degree were tried.
+/// Runs random sectors with random motion at a wall, span by span, until `trials` contact problems of one degree were
+/// tried.
 pub(super) fn problems(degree: usize, friction: f64, trials: u64) -> Problems {
     let mut random = SeededRandom(7 + degree as u64);
     let mut found = Problems { degree, friction, ..Problems::default() };
     while found.trials < trials {
         let nodes = 1 + random.below(3);
         let count = 4 + random.below(9);
-        // Little residual flexibility leaves degree 2.
+        // With little residual flexibility the degree is 2.
         let modes = modes(count, nodes, random.scale(1e-3, 10.0), &mut random);
         let span = random.scale(5e-6, 8e-5);
         let mut tables = Tables::new(modes, span);
@@ -159,7 +161,7 @@ pub(super) struct Solutions {
     pub(super) several: u64,
 }
 
-/// Solutions of 0 ≤ λ ⟂ g + Wλ ≥ 0: every set of closed points is tried.
+/// Returns the number of solutions of 0 ≤ λ ⟂ g + Wλ ≥ 0, by trying every set of closed points.
 fn count_solutions(w: &DMatrix<f64>, gaps: &[f64]) -> usize {
     let size = gaps.len();
     let scale = gaps.iter().fold(0.0, |most: f64, gap| most.max(gap.abs()));
@@ -179,7 +181,7 @@ fn count_solutions(w: &DMatrix<f64>, gaps: &[f64]) -> usize {
     (0..1_usize << size).filter(|set| holds(*set)).count()
 }
 
-/// Contact problems of one and two nodes in random motion without forces, on a step of random length.
+/// Solves contact problems of one and two nodes in random motion without forces, on a step of random length.
 pub(super) fn solutions(degree: usize, friction: f64, problems: u64) -> Solutions {
     let mut random = SeededRandom(70 + degree as u64);
     let mut found = Solutions { degree, friction, ..Solutions::default() };
@@ -193,7 +195,7 @@ pub(super) fn solutions(degree: usize, friction: f64, problems: u64) -> Solution
         let mut level = StepTables::new(&modes, degree);
         level.set_step(&modes, step);
         let lanes = level.compliance.lanes();
-        // Displacement along x per force (−1, −µ) opens by as much less.
+        // The displacement along x per force (−1, −µ) opens by correspondingly less.
         let w = DMatrix::from_fn(lanes.len(), lanes.len(), |row, column| {
             let [x, y, _] = level.compliance.of_lane(column);
             x[row] + friction * y[row]

@@ -1,4 +1,4 @@
-//! Free bodies whose flights and impacts can be written down: lumps in a row, springs between them, plates beside them.
+//! Free bodies with closed-form flights and impacts: masses in a row, springs between them, plates next to them.
 
 use nalgebra::DMatrix;
 use tiprub_core::{
@@ -17,47 +17,47 @@ use super::{models::StabilityMethod, observe::real};
 pub(crate) const HALF: f64 = 0.02;
 /// Half the extent of a plate along y (m).
 pub(crate) const PLATE: f64 = 0.09;
-/// Nodes that move in one step by more than this could pass a surface unseen (m): a tenth of the body.
+/// Nodes that move by more than this in one step could pass a surface undetected (m): a tenth of the body.
 pub(crate) const FURTHEST: f64 = 0.1 * 2.0 * HALF;
 
-/// Lumps in a row along x, the first at the left face and the last at the right one; four contact nodes on each of these faces.
-/// One lump is a rigid body without rotation: it has both faces.
+/// Masses in a row along x, the first at the left face and the last at the right one; four contact nodes on each of
+/// these faces. A single mass is a rigid body without rotation: it has both faces.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct LumpChain {
-    /// Masses of the lumps (kg).
+    /// Masses of the chain (kg).
     pub masses: Vec<f64>,
     /// Stiffness of the springs between neighbours, each direction (N/m).
     pub spring: f64,
-    /// Where the middle is (m).
+    /// Position of the middle (m).
     pub centre: [f64; 3],
-    /// Stiffness of a spring from each lump to the ground (N/m): 0 for a body that is free.
+    /// Stiffness of a spring from each mass to the ground (N/m): 0 for a free body.
     pub ground: f64,
-    /// Contact nodes of each face: four in its corners, or one in its middle.
+    /// Number of contact nodes of each face: four in its corners, or one in its middle.
     pub corners: usize,
 }
 
 impl LumpChain {
-    /// One lump at the origin.
+    /// Returns one mass at the origin.
     pub(crate) fn rigid(mass: f64) -> Self {
         Self { masses: vec![mass], spring: 0.0, centre: [0.0; 3], ground: 0.0, corners: 4 }
     }
 
-    /// Lumps at the origin.
+    /// Returns several masses at the origin.
     pub(crate) fn elastic(masses: &[f64], spring: f64) -> Self {
         Self { masses: masses.to_vec(), spring, ..Self::rigid(1.0) }
     }
 
-    /// With one contact node in the middle of each face: few enough that modes with inertia are left without them.
+    /// Uses one contact node in the middle of each face: few enough that modes with inertia remain.
     pub(crate) fn with_middles(self) -> Self {
         Self { corners: 1, ..self }
     }
 
-    /// With its middle elsewhere.
+    /// Moves the middle.
     pub(crate) fn at(self, centre: [f64; 3]) -> Self {
         Self { centre, ..self }
     }
 
-    /// Mass of all of it (kg).
+    /// Returns the total mass (kg).
     pub(crate) fn mass(&self) -> f64 {
         self.masses.iter().sum()
     }
@@ -108,26 +108,26 @@ fn rom(
     structure(name, mass, stiffness, contact_map, nodes)
 }
 
-/// A plate beside the body: at x = −distance on the left, +distance on the right.
+/// A plate next to the body: at x = −distance on the left, +distance on the right.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Plate {
-    /// −1 left, 1 right.
+    /// Side: −1 left, 1 right.
     pub side: f64,
-    /// From x = 0 (m), at the line nearest to the body.
+    /// Distance from x = 0 (m), at the line nearest to the body.
     pub distance: f64,
     /// Radius of a cylinder about z (m); 0 for a flat plate.
     pub radius: f64,
-    /// Stiffness of each node to the ground (N/m); 0 for a plate that does not give way.
+    /// Stiffness of each node to the ground (N/m); 0 for a rigid plate.
     pub stiffness: f64,
 }
 
 impl Plate {
-    /// Flat and rigid, to the left.
+    /// Returns a flat, rigid plate on the left.
     pub(crate) fn left(distance: f64) -> Self {
         Self { side: -1.0, distance, radius: 0.0, stiffness: 0.0 }
     }
 
-    /// Flat and rigid, to the right.
+    /// Returns a flat, rigid plate on the right.
     pub(crate) fn right(distance: f64) -> Self {
         Self { side: 1.0, ..Self::left(distance) }
     }
@@ -159,9 +159,9 @@ impl Plate {
 pub(crate) struct Throw {
     /// The body.
     pub body: LumpChain,
-    /// Where it goes (m/s).
+    /// Velocity (m/s).
     pub velocity: [f64; 3],
-    /// At most one on each side.
+    /// Plates, at most one on each side.
     pub plates: Vec<Plate>,
     /// Coefficient µ of all pairs.
     pub friction: f64,
@@ -172,7 +172,7 @@ pub(crate) struct Throw {
 }
 
 impl Throw {
-    /// The scene.
+    /// Returns the scene.
     pub(crate) fn scene(&self) -> Scene {
         let name = |plate: &Plate| if plate.side < 0.0 { "left" } else { "right" };
         let mut structures = vec![StructureSettings {
@@ -221,7 +221,7 @@ impl Throw {
     }
 }
 
-/// Three components of an output.
+/// Returns the three components of an output.
 pub(crate) fn vector(simulation: &Simulation, name: &str) -> [f64; 3] {
     ["x", "y", "z"].map(|axis| real(simulation, &format!("{name}_{axis}")))
 }

@@ -1,50 +1,50 @@
-//! What a case is, what can happen to it, and what that is worth.
+//! Cases, their possible ends, and the verdicts.
 
 use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
-/// Wall-clock limit of most cases (s): far beyond what any of them takes on a loaded machine.
+/// Wall-clock limit of most cases (s): far above the time of any of them on a loaded machine.
 const TIME_LIMIT: f64 = 120.0;
 
 /// Expected end of a case.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Expected {
-    /// A right answer, and what it is held against.
+    /// A correct result, and the reference that it is compared with.
     Right(String),
-    /// A refusal that contains all words of one of these lists.
+    /// An error that contains all words of one of these lists.
     Refused(Vec<Vec<String>>),
-    /// Either; a refusal contains all words of one of the lists.
+    /// Either of them; an error contains all words of one of the lists.
     Either(String, Vec<Vec<String>>),
 }
 
 impl Expected {
-    /// A right answer, and what it is held against.
+    /// Expects a correct result, compared with the reference `against`.
     pub(crate) fn right(against: impl Into<String>) -> Self {
         Self::Right(against.into())
     }
 
-    /// A refusal that contains all of these words.
+    /// Expects an error that contains all of these words.
     pub(crate) fn refused<const N: usize>(words: [&str; N]) -> Self {
         Self::refused_as(&[&words])
     }
 
-    /// A refusal that contains all words of one of these lists: where several are sound.
+    /// Expects an error that contains all words of one of these lists, if several errors are correct.
     pub(crate) fn refused_as(lists: &[&[&str]]) -> Self {
         Self::Refused(owned(lists))
     }
 
-    /// A right answer or such a refusal.
+    /// Expects a correct result or such an error.
     pub(crate) fn either<const N: usize>(against: impl Into<String>, words: [&str; N]) -> Self {
         Self::either_as(against, &[&words])
     }
 
-    /// A right answer or a refusal that contains all words of one of these lists.
+    /// Expects a correct result or an error that contains all words of one of these lists.
     pub(crate) fn either_as(against: impl Into<String>, lists: &[&[&str]]) -> Self {
         Self::Either(against.into(), owned(lists))
     }
 
-    /// For tables.
+    /// Returns the text for tables.
     pub(crate) fn to_text(&self) -> String {
         let named = |lists: &[Vec<String>]| {
             let lists: Vec<String> = lists.iter().map(|words| words.join(", ")).collect();
@@ -62,7 +62,7 @@ fn owned(lists: &[&[&str]]) -> Vec<Vec<String>> {
     lists.iter().map(|words| words.iter().map(|word| (*word).to_owned()).collect()).collect()
 }
 
-/// Returns a word that a message lacks, if none of the lists is complete. An empty word names nothing.
+/// Returns a word that a message lacks, if none of the lists is complete. An empty word matches nothing.
 fn unnamed(message: &str, lists: &[Vec<String>]) -> Option<String> {
     let named = |word: &String| !word.is_empty() && message.contains(word.as_str());
     if lists.iter().any(|words| !words.is_empty() && words.iter().all(named)) {
@@ -75,34 +75,34 @@ fn unnamed(message: &str, lists: &[Vec<String>]) -> Option<String> {
     Some(lists.iter().map(missing).collect::<Vec<_>>().join(" | "))
 }
 
-/// One comparison: holds while `found` is a number and at most `bound`.
+/// One comparison, which holds if `found` is finite and at most `bound`.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Check {
     /// The compared quantity.
     pub what: String,
-    /// Size of the difference found.
+    /// Magnitude of the difference.
     pub found: f64,
-    /// Largest that is right.
+    /// Largest correct value.
     pub bound: f64,
 }
 
 impl Check {
-    /// Something that may be at most `bound`.
+    /// Creates the check of a quantity that may be at most `bound`.
     pub(crate) fn at_most(what: impl Into<String>, found: f64, bound: f64) -> Self {
         Self { what: what.into(), found, bound }
     }
 
-    /// Something that must be so.
+    /// Creates the check of a condition.
     pub(crate) fn so(what: impl Into<String>, holds: bool) -> Self {
         Self::at_most(what, if holds { 0.0 } else { 1.0 }, 0.0)
     }
 
-    /// Relative difference of two numbers.
+    /// Creates the check of the relative difference of two numbers.
     pub(crate) fn relative(what: impl Into<String>, found: f64, exact: f64, bound: f64) -> Self {
         Self::at_most(what, if exact == 0.0 { found.abs() } else { (found / exact - 1.0).abs() }, bound)
     }
 
-    /// Whether it holds; not-a-number does not.
+    /// Returns whether the check holds; with NaN it does not.
     pub(crate) fn holds(&self) -> bool {
         self.found <= self.bound
     }
@@ -126,42 +126,42 @@ impl Check {
     }
 }
 
-/// End of a case that ended by itself.
+/// End of a case whose process was not killed.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct CaseEnd {
-    /// The refusal, if there was one.
+    /// The error, if there was one.
     pub refusal: Option<String>,
     /// Comparisons.
     pub checks: Vec<Check>,
-    /// Figures worth telling beside the checks.
+    /// Further figures for the table.
     pub remarks: Vec<String>,
 }
 
 impl CaseEnd {
-    /// An answer with its checks.
+    /// Creates a result with its checks.
     pub(crate) fn answer(checks: Vec<Check>) -> Self {
         Self { checks, ..Self::default() }
     }
 
-    /// A refusal.
+    /// Creates an end with an error.
     pub(crate) fn refused(message: impl ToString) -> Self {
         Self { refusal: Some(message.to_string()), ..Self::default() }
     }
 
-    /// The outcome of work that may be refused by the core.
+    /// Converts the outcome of work that the core may reject.
     pub(crate) fn of(outcome: tiprub_core::Result<Vec<Check>>) -> Self {
         outcome.map_or_else(Self::refused, Self::answer)
     }
 
-    /// With a figure worth telling.
+    /// Adds a figure for the table.
     pub(crate) fn remark(mut self, text: impl Into<String>) -> Self {
         self.remarks.push(text.into());
         self
     }
 
-    /// For the parent process.
+    /// Returns the text for the parent process.
     pub(crate) fn to_json(&self) -> Value {
-        // Numbers as bits: JSON knows neither NaN nor infinity.
+        // Numbers as bits, because JSON supports neither NaN nor infinity.
         let checks = self
             .checks
             .iter()
@@ -188,30 +188,30 @@ impl CaseEnd {
 /// Verdict on a case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum CaseVerdict {
-    /// A right answer.
+    /// A correct result.
     Right,
-    /// Refused as it should be, before the first step.
+    /// Rejected as expected, before the first step.
     Refused,
-    /// Ended in a step, by the name that it should be.
+    /// Ended in a step, with the expected error.
     Ended,
-    /// A wrong answer, a wrong refusal, or an answer where there is none.
+    /// A wrong result, a wrong error, or a result where an error is expected.
     Wrong,
-    /// The process ended by itself: panic, abort, signal.
+    /// The process terminated abnormally: panic, abort, signal.
     Crashed,
     /// The process did not end in time.
     Hung,
 }
 
 impl CaseVerdict {
-    /// All of them, in the order of a table.
+    /// All verdicts, in the order of a table.
     pub(crate) const ALL: [Self; 6] = [Self::Right, Self::Refused, Self::Ended, Self::Wrong, Self::Crashed, Self::Hung];
 
-    /// As it should be.
+    /// Returns whether the verdict is as expected.
     pub(crate) fn is_sound(self) -> bool {
         matches!(self, Self::Right | Self::Refused | Self::Ended)
     }
 
-    /// In a word.
+    /// Returns the name of the verdict.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Right => "right",
@@ -224,10 +224,10 @@ impl CaseVerdict {
     }
 }
 
-/// Text of a message that ends a run in a step.
+/// Text in a message that ends a run in a step.
 const IN_A_STEP: &str = "last good time";
 
-/// Verdict on what happened, and what to say about it.
+/// Returns the verdict on an end, and its explanation.
 pub(crate) fn judge(expected: &Expected, happened: &CaseEnd) -> (CaseVerdict, String) {
     let failed: Vec<String> = happened.checks.iter().filter(|check| !check.holds()).map(Check::to_text).collect();
     let remarks = happened.remarks.iter().map(|remark| format!("; {remark}")).collect::<String>();
@@ -254,7 +254,7 @@ pub(crate) fn judge(expected: &Expected, happened: &CaseEnd) -> (CaseVerdict, St
     }
 }
 
-/// The check that took up most of its bound stands for all.
+/// Returns the check with the largest used fraction of its bound, which represents all.
 fn tightest(checks: &[Check]) -> String {
     let most = checks.iter().max_by(|a, b| a.share().total_cmp(&b.share()));
     let others = match checks.len() {
@@ -264,10 +264,10 @@ fn tightest(checks: &[Check]) -> String {
     most.map_or_else(String::new, |check| format!("{}{others}", check.to_text()))
 }
 
-/// Data that a case may use besides its own models.
+/// Data that a case may use in addition to its models.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct CaseContext {
-    /// Directory with packaged FMUs, where the parent made some.
+    /// Directory of packaged FMUs, if the parent created some.
     pub fmus: Option<PathBuf>,
 }
 
@@ -276,13 +276,13 @@ type CaseWork = Box<dyn Fn(&CaseContext) -> CaseEnd + Send + Sync>;
 
 /// One row of the table.
 pub(crate) struct StabilityCase {
-    /// Family, slash, what sets it apart: `step-limit/central-difference/lcp/h=0.9`.
+    /// Family, slash, and the distinguishing part: `step-limit/central-difference/lcp/h=0.9`.
     pub name: String,
     /// Expected end.
     pub expected: Expected,
-    /// In the quick table as well.
+    /// True if the quick table includes it.
     pub quick: bool,
-    /// Needs packaged FMUs.
+    /// True if it needs packaged FMUs.
     pub imports: bool,
     /// Wall-clock limit (s).
     pub limit: f64,
@@ -296,7 +296,7 @@ impl std::fmt::Debug for StabilityCase {
 }
 
 impl StabilityCase {
-    /// A case of the full table.
+    /// Creates a case of the full table.
     pub(crate) fn new(
         name: impl Into<String>,
         expected: Expected,
@@ -306,17 +306,17 @@ impl StabilityCase {
         Self { name, expected, quick: false, imports: false, limit: TIME_LIMIT, work }
     }
 
-    /// Also in the quick table, if `so`.
+    /// Adds the case to the quick table if `so`.
     pub(crate) fn quick(self, so: bool) -> Self {
         Self { quick: so, ..self }
     }
 
-    /// With another time limit (s).
+    /// Sets another time limit (s).
     pub(crate) fn within(self, limit: f64) -> Self {
         Self { limit, ..self }
     }
 
-    /// Needs packaged FMUs.
+    /// Marks the case as one that needs packaged FMUs.
     pub(crate) fn importing(self) -> Self {
         Self { imports: true, ..self }
     }
@@ -326,15 +326,15 @@ impl StabilityCase {
         self.name.split('/').next().unwrap_or(&self.name)
     }
 
-    /// Do it, in this process.
+    /// Runs the case in this process.
     pub(crate) fn run(&self, context: &CaseContext) -> CaseEnd {
         (self.work)(context)
     }
 }
 
-/// Cases in a row.
+/// A list of cases.
 pub(crate) trait Cases {
-    /// One whose work finds checks, or is refused; in the quick table as well, if `quick`.
+    /// Adds a case whose work gives checks or an error; also to the quick table, if `quick`.
     fn add(
         &mut self,
         quick: bool,
@@ -388,7 +388,7 @@ mod tests {
         assert_eq!(verdict(several(), CaseEnd::refused("µ = 2")), CaseVerdict::Wrong);
         let ended = CaseEnd::refused("at t = 2 s (last good time 1 s) the load is 1e300");
         assert_eq!(verdict(several(), ended), CaseVerdict::Ended);
-        // Nothing named is nothing asked: no refusal counts.
+        // Without words there is no expectation: no error counts.
         for nothing in [Expected::refused([""]), Expected::refused([]), Expected::refused_as(&[])] {
             assert_eq!(verdict(nothing, CaseEnd::refused("no")), CaseVerdict::Wrong);
         }

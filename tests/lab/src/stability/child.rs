@@ -1,4 +1,4 @@
-//! A case in a process of its own: what it wrote, or how it ended.
+//! Runs of cases in separate processes: their output, or how they ended.
 
 use std::{
     env,
@@ -13,14 +13,14 @@ use tiprub_shell::{Failure, Result};
 
 use super::{CaseContext, CaseEnd, CaseVerdict, StabilityCase, judge};
 
-/// Between two looks at a child.
+/// Interval at which a child is polled.
 const PATIENCE: Duration = Duration::from_millis(4);
-/// Names the directory of packaged FMUs for a child.
+/// Name of the environment variable with the directory of packaged FMUs for a child.
 const FMUS: &str = "TIPRUB_STABILITY_FMUS";
-/// Last characters of what a crashed child said.
+/// Number of last characters of the output of a crashed child.
 const LAST_WORDS: usize = 300;
 
-/// One row of the table, filled in.
+/// One completed row of the table.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct StabilityRow {
     /// Name of the case.
@@ -35,16 +35,16 @@ pub(crate) struct StabilityRow {
     pub seconds: f64,
 }
 
-/// This program, also where its file was replaced since it began (Linux).
+/// Returns the path of this program, even if its file has been replaced since the start (Linux).
 fn program() -> std::io::Result<PathBuf> {
     let running = PathBuf::from("/proc/self/exe");
     if running.exists() { Ok(running) } else { env::current_exe() }
 }
 
-/// Run a case in a child process and judge it.
+/// Runs a case in a child process and returns the verdict.
 ///
 /// # Errors
-/// No child process can be started.
+/// A child process that cannot be started.
 pub(crate) fn run(case: &StabilityCase, context: &CaseContext) -> Result<StabilityRow> {
     let clock = Instant::now();
     let lost = |error: std::io::Error| Failure::new("child process", error, "Free memory and try again");
@@ -55,7 +55,7 @@ pub(crate) fn run(case: &StabilityCase, context: &CaseContext) -> Result<Stabili
         command.env(FMUS, fmus);
     }
     let mut child = command.spawn().map_err(lost)?;
-    // Both pipes are emptied while it runs, so that it never waits for us.
+    // Both pipes are emptied while the child runs, so that it never blocks.
     let stdout = drain(child.stdout.take());
     let stderr = drain(child.stderr.take());
     let code = wait(&mut child, Duration::from_secs_f64(case.limit)).map_err(lost)?;
@@ -84,13 +84,13 @@ fn read(case: &StabilityCase, ended: &str, stdout: &str, stderr: &str) -> (CaseV
 fn drain(pipe: Option<impl Read + Send + 'static>) -> thread::JoinHandle<String> {
     thread::spawn(move || {
         let mut bytes = Vec::new();
-        // A pipe that breaks shows up as a missing answer.
+        // A broken pipe appears as a missing result.
         let _ = pipe.map(|mut pipe| pipe.read_to_end(&mut bytes));
         String::from_utf8_lossy(&bytes).into_owned()
     })
 }
 
-/// Waits for the end of a child; empty if well, `None` if it had to be killed.
+/// Waits for the end of a child; returns an empty text on success, `None` if it had to be killed.
 fn wait(child: &mut Child, limit: Duration) -> std::io::Result<Option<String>> {
     let clock = Instant::now();
     loop {
@@ -106,10 +106,10 @@ fn wait(child: &mut Child, limit: Duration) -> std::io::Result<Option<String>> {
     }
 }
 
-/// In the child: run the case of this name and return what goes to stdout.
+/// Runs the case of this name in the child and returns the text for stdout.
 ///
 /// # Errors
-/// There is no such case.
+/// An unknown case.
 pub(crate) fn answer(name: &str) -> Result<serde_json::Value> {
     let case = super::named(name, false).into_iter().find(|case| case.name == name);
     let case = case.ok_or_else(|| Failure::usage("--child", format!("there is no case {name}"), ""))?;

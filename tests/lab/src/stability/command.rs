@@ -1,4 +1,4 @@
-//! `lab stability`: stiff and extreme cases, each in a process of its own, judged.
+//! `lab stability`: stiff and extreme cases, each in a separate process, with a verdict.
 
 use tiprub_packaging::{
     cli::LibraryArguments,
@@ -18,10 +18,10 @@ use crate::{
     stability::{self, CaseContext, StabilityCase, child, families::values, table::StabilityTable},
 };
 
-/// Run the cases asked for and write the table.
+/// Runs the requested cases and writes the table.
 ///
 /// # Errors
-/// No case of that name, files that cannot be written, or a case that is neither right nor refused as it should be.
+/// An unknown case, files that cannot be written, or a case that is neither correct nor rejected as expected.
 pub(crate) fn run(arguments: &LabStabilityArguments, console: &Console) -> Result<CommandOutcome> {
     if let Some(name) = &arguments.child {
         let json = child::answer(name)?;
@@ -30,9 +30,9 @@ pub(crate) fn run(arguments: &LabStabilityArguments, console: &Console) -> Resul
     let cases = chosen(arguments)?;
     let written = StabilityTable::FILES.map(|name| NamedFile::new("--out", arguments.out.join(name)));
     places::apart(&Vec::from_iter(NamedFile::option("--library", &arguments.library)), &written)?;
-    // Before the long work: what would fail after it.
+    // Checked before the long work, because it would fail afterwards.
     output_file::try_directory(&arguments.out)?;
-    // Lives as long as the cases run.
+    // Must live as long as the cases run.
     let fmus = if cases.iter().any(|case| case.imports) { Some(package(arguments, console)?) } else { None };
     let context = CaseContext { fmus: fmus.as_ref().map(|directory| directory.path().to_owned()) };
     let task = console.task("Stability", Some(cases.len() as u64));
@@ -55,10 +55,10 @@ pub(crate) fn run(arguments: &LabStabilityArguments, console: &Console) -> Resul
     verdict(&table, &arguments.out).map_or(Ok(outcome), Err)
 }
 
-/// Names at most this many unsound cases.
+/// Maximum number of unsound cases that are named.
 const NAMED: usize = 5;
 
-/// The failure of a table with cases that are neither right nor refused as they should be.
+/// Returns the failure of a table with cases that are neither correct nor rejected as expected.
 fn verdict(table: &StabilityTable, directory: &std::path::Path) -> Option<Failure> {
     let unsound: Vec<String> = table.unsound().map(|row| format!("{} {}", row.verdict.name(), row.name)).collect();
     if unsound.is_empty() {
@@ -75,7 +75,7 @@ fn verdict(table: &StabilityTable, directory: &std::path::Path) -> Option<Failur
     Some(Failure::new("lab stability", problem, remedy))
 }
 
-/// The scenes whose variables are walked, as FMUs of both versions in a temporary directory.
+/// Packages the scenes whose variables are tested as FMUs of both versions in a temporary directory.
 fn package(arguments: &LabStabilityArguments, console: &Console) -> Result<tempfile::TempDir> {
     let chosen =
         LibraryArguments { library: arguments.library.iter().cloned().collect(), ..LibraryArguments::default() };

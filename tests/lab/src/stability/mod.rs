@@ -1,8 +1,9 @@
-//! Numerical stability on stiff and extreme cases: each ends in a right answer or in a refusal that says why.
+//! Numerical stability on stiff and extreme cases: each ends in a correct result or in an error that states the reason.
 //!
-//! A [`StabilityCase`] says what is expected, and by what independent property an answer counts as right; [`judge`] turns what
-//! happened into a [`CaseVerdict`]. Every case runs in a child process of this program with a time limit ([`child`]), so that a
-//! crash, an abort or a hang is seen as what it is. [`families`] holds the cases, [`table`] writes them down.
+//! A [`StabilityCase`] defines the expected end and the independent property that makes a result correct; [`judge`]
+//! converts the actual end to a [`CaseVerdict`]. Every case runs in a child process of this program with a time limit
+//! ([`child`]), so that a crash, an abort or a hang is reported as such. [`families`] contains the cases, [`table`]
+//! writes them.
 
 pub(crate) mod bodies;
 pub(crate) mod case;
@@ -17,12 +18,13 @@ pub(crate) mod table;
 pub(crate) use case::{CaseContext, Cases, Check, Expected, StabilityCase, judge};
 pub(crate) use case::{CaseEnd, CaseVerdict};
 
-/// All cases of the full table, or of the quick one; those that prove the judge itself come with their family's name only.
+/// Returns all cases of the full table, or of the quick one; those that test the judge itself are included only by
+/// their family's name.
 pub(crate) fn cases(quick: bool) -> Vec<StabilityCase> {
     families::all().into_iter().filter(|case| case.quick || !quick).collect()
 }
 
-/// Cases whose name begins with `prefix`; those of the judge's own proof are among them only here.
+/// Returns the cases whose name begins with `prefix`; those that test the judge itself are included only here.
 pub(crate) fn named(prefix: &str, quick: bool) -> Vec<StabilityCase> {
     let proof = families::proof::cases();
     cases(quick).into_iter().chain(proof).filter(|case| case.name.starts_with(prefix)).collect()

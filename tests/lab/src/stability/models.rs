@@ -1,4 +1,4 @@
-//! Structures and scenes whose answers can be written down, and blades and rings of analytic modes.
+//! Structures and scenes with analytic solutions, and blades and rings of analytic modes.
 
 use std::f64::consts::TAU;
 
@@ -11,7 +11,7 @@ use tiprub_core::{
 pub(crate) use tiprub_test_models::{GAP, RADIUS, SeededRandom, bumps, rich_blade as blade, round};
 use tiprub_test_models::{node, ring, structure};
 
-/// Longest step of adaptive integration (s), as scenes have it that name none.
+/// Longest step of adaptive integration (s), the default of scenes.
 pub(crate) const LONGEST: f64 = tiprub_core::settings::ADAPTIVE_STEP;
 /// All contact solvers with their names.
 pub(crate) const SOLVERS: [(Solver, &str); Solver::ALL.len()] =
@@ -20,9 +20,9 @@ pub(crate) const SOLVERS: [(Solver, &str); Solver::ALL.len()] =
 /// Choice of the step length.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum StepChoice {
-    /// The case gives the internal step; for galerkin the longest one, with the largest tolerance that scenes accept.
+    /// The case defines the internal step; for galerkin the longest one, with the largest tolerance that scenes accept.
     Fixed,
-    /// The tolerance of the method (a fraction of the clearance) chooses it.
+    /// The method chooses the step by this tolerance (a fraction of the clearance).
     Adaptive(f64),
 }
 
@@ -47,28 +47,29 @@ const INTEGRATIONS: [(Scheme, StepChoice, &str); Scheme::ALL.len() + 1] = [
 ];
 
 impl StabilityMethod {
-    /// Modal-exact with this solver.
+    /// Returns modal-exact with this solver.
     pub(crate) const fn exact(solver: Solver) -> Self {
         Self { scheme: Scheme::ModalExact, solver, steps: StepChoice::Fixed }
     }
 
-    /// Every method.
+    /// Returns every method.
     pub(crate) fn all() -> impl Iterator<Item = Self> {
         let with = |(scheme, steps, _)| SOLVERS.into_iter().map(move |(solver, _)| Self { scheme, solver, steps });
         INTEGRATIONS.into_iter().flat_map(with)
     }
 
-    /// Every scheme and choice of the step, with one solver.
+    /// Returns every scheme and choice of the step, with one solver.
     pub(crate) fn all_with(solver: Solver) -> impl Iterator<Item = Self> {
         Self::all().filter(move |method| method.solver == solver)
     }
 
-    /// Modal-exact and both ways of galerkin, with every solver: for cases that the choice of a recurrence does not change.
+    /// Returns modal-exact and both forms of galerkin, with every solver: for cases that do not depend on the choice of
+    /// a recurrence.
     pub(crate) fn common() -> impl Iterator<Item = Self> {
         Self::all().filter(|method| [Scheme::ModalExact, Scheme::Galerkin].contains(&method.scheme))
     }
 
-    /// Scheme and choice of the step, in a word.
+    /// Returns the name of scheme and choice of the step.
     pub(crate) fn integration(self) -> &'static str {
         let adaptive = |steps| matches!(steps, StepChoice::Adaptive(_));
         let own = |&(scheme, steps, _): &(Scheme, StepChoice, &str)| {
@@ -77,49 +78,49 @@ impl StabilityMethod {
         INTEGRATIONS.iter().find(|row| own(row)).map_or("", |(.., name)| name)
     }
 
-    /// Name of the solver.
+    /// Returns the name of the solver.
     pub(crate) fn solver_name(self) -> &'static str {
         SOLVERS.iter().find(|(solver, _)| *solver == self.solver).map_or("", |(_, name)| name)
     }
 
-    /// Both, as parts of the name of a case.
+    /// Returns both as parts of the name of a case.
     pub(crate) fn name(self) -> String {
         format!("{}/{}", self.integration(), self.solver_name())
     }
 
-    /// The method that the name of a case holds: scheme with choice of the step, and solver.
+    /// Returns the method in the name of a case: scheme with choice of the step, and solver.
     pub(crate) fn in_name(name: &str) -> (Option<&'static str>, Option<&'static str>) {
         let part = |known: &'static str| name.split('/').any(|part| part == known).then_some(known);
         let scheme = INTEGRATIONS.iter().find_map(|(.., known)| part(known));
         (scheme, SOLVERS.iter().find_map(|(_, known)| part(known)))
     }
 
-    /// Names of schemes with their choice of the step.
+    /// Returns the names of schemes with their choice of the step.
     pub(crate) fn integrations() -> impl Iterator<Item = &'static str> {
         INTEGRATIONS.iter().map(|(.., name)| *name)
     }
 
-    /// Steps by a tolerance, or at longest steps.
+    /// Returns whether the scheme is galerkin, with a tolerance or at longest steps.
     pub(crate) fn is_galerkin(self) -> bool {
         self.scheme == Scheme::Galerkin
     }
 
-    /// Steps by a tolerance.
+    /// Returns whether a tolerance chooses the steps.
     pub(crate) fn is_adaptive(self) -> bool {
         matches!(self.steps, StepChoice::Adaptive(_))
     }
 
-    /// Massless-boundary.
+    /// Returns whether the scheme is massless-boundary.
     pub(crate) fn is_massless(self) -> bool {
         self.scheme == Scheme::MasslessBoundary
     }
 
-    /// With another tolerance, if it has one.
+    /// Returns the method with another tolerance, if it has one.
     pub(crate) fn within(self, tolerance: f64) -> Self {
         if self.is_adaptive() { Self { steps: StepChoice::Adaptive(tolerance), ..self } } else { self }
     }
 
-    /// Returns the method for comparison: a smaller tolerance; and the divisor of the step.
+    /// Returns the method for comparison, with a smaller tolerance, and the divisor of the step.
     pub(crate) fn finer(self) -> (Self, f64) {
         match self.steps {
             StepChoice::Adaptive(tolerance) => (self.within((tolerance / 16.0).max(1e-9)), 1.0),
@@ -127,12 +128,12 @@ impl StabilityMethod {
         }
     }
 
-    /// Internal step, or the longest of adaptive integration (s).
+    /// Returns the internal step, or the longest one of adaptive integration (s).
     pub(crate) fn step(self, step: f64) -> f64 {
         if self.is_adaptive() { LONGEST } else { step }
     }
 
-    /// A scene with this method.
+    /// Returns a scene with this method.
     pub(crate) fn on(self, scene: Scene) -> Scene {
         let mut scene = with_methods(scene, self.scheme, self.solver);
         scene.settings.time.tolerance = match self.steps {
@@ -143,13 +144,14 @@ impl StabilityMethod {
         scene
     }
 
-    /// A scene with this method in internal steps of `step` (s), or in the longest adaptive ones, and communication steps as long.
+    /// Returns a scene with this method in internal steps of `step` (s), or in the longest adaptive ones, and
+    /// communication steps of the same length.
     pub(crate) fn stepping(self, scene: Scene, step: f64) -> Scene {
         with_step(self.on(scene), self.step(step))
     }
 }
 
-/// Distance that the tolerance of a scene allows (m); 0 for schemes without one.
+/// Returns the distance that the tolerance of a scene permits (m); 0 for schemes without one.
 pub(crate) fn allowed(scene: &Scene) -> f64 {
     let contacts = scene.settings.contacts.iter();
     let smallest = contacts.flat_map(|contact| {
@@ -174,13 +176,14 @@ pub(crate) struct Tower {
     pub base: [f64; 3],
     /// Stiffness of the spring of the contact node, each direction (N/m).
     pub tip: f64,
-    /// Angle by which the principal axes of the base spring are turned from radial to tangential (rad): couples them.
+    /// Angle by which the principal axes of the base spring are turned from radial to tangential (rad), which couples
+    /// them.
     pub turned: f64,
-    /// Contact nodes at the same place.
+    /// Number of coincident contact nodes.
     pub copies: usize,
     /// Slope of the tip contour.
     pub slope: f64,
-    /// Stiffness of springs between the bases of neighbouring sectors (N/m), each direction; 0 = uncoupled.
+    /// Stiffness of springs between the bases of neighbouring sectors (N/m) in each direction; 0 = uncoupled.
     pub neighbour: f64,
 }
 
@@ -200,14 +203,14 @@ impl Default for Tower {
 }
 
 impl Tower {
-    /// Stiffness of the base spring in radial, tangential and axial direction.
+    /// Returns the stiffness of the base spring in radial, tangential and axial direction.
     fn base_stiffness(&self) -> Matrix3<f64> {
         let (sine, cosine) = self.turned.sin_cos();
         let turn = Matrix3::new(cosine, -sine, 0.0, sine, cosine, 0.0, 0.0, 0.0, 1.0);
         turn * Matrix3::from_diagonal(&self.base.into()) * turn.transpose()
     }
 
-    /// Stiffness matrix of one sector with `more` on the diagonal of its base: (base, tip) by directions.
+    /// Returns the stiffness matrix of one sector with `more` on the diagonal of its base: (base, tip) by directions.
     fn stiffness(&self, more: f64) -> DMatrix<f64> {
         let base = self.base_stiffness();
         DMatrix::from_fn(6, 6, |i, j| {
@@ -220,7 +223,7 @@ impl Tower {
         })
     }
 
-    /// The ROM.
+    /// Returns the ROM.
     pub(crate) fn rom(&self) -> Rom {
         let mass = DMatrix::from_fn(6, 6, |i, j| if i == j { self.mass[i / 3] } else { 0.0 });
         let contact_map =
@@ -242,7 +245,7 @@ impl Tower {
         Rom { sectors: self.sectors, frame: DisplacementFrame::Cylindrical, damping_ratio: 0.005, extras, ..rom }
     }
 
-    /// Largest angular frequency of one sector (rad/s), from the springs as written.
+    /// Returns the largest angular frequency of one sector (rad/s), from the springs as written.
     pub(crate) fn largest_frequency(&self) -> f64 {
         let scale = |i: usize| 1.0 / self.mass[i / 3].sqrt();
         let stiffness = self.stiffness(4.0 * self.neighbour);
@@ -250,12 +253,12 @@ impl Tower {
     }
 }
 
-/// Let an elastic ring carry the surface.
+/// Makes an elastic ring carry the surface.
 pub(crate) fn on_ring(scene: &mut Scene, damping_ratio: f64) {
     tiprub_test_models::on_ring(scene, ring(36, 3), damping_ratio);
 }
 
-/// Choose scheme and solver. Scenes of the families are extreme, and meant.
+/// Sets scheme and solver. Scenes of the families are intentionally extreme.
 pub(crate) fn with_methods(mut scene: Scene, scheme: Scheme, solver: Solver) -> Scene {
     scene.settings.accept_implausible = true;
     scene.settings.time.scheme = scheme;
@@ -263,7 +266,7 @@ pub(crate) fn with_methods(mut scene: Scene, scheme: Scheme, solver: Solver) -> 
     scene
 }
 
-/// Choose the internal step, with communication steps as long.
+/// Sets the internal step, with communication steps of the same length.
 pub(crate) fn with_step(mut scene: Scene, step: f64) -> Scene {
     scene.settings.accept_implausible = true;
     scene.settings.time.step = step;

@@ -1,4 +1,4 @@
-//! What is watched while a simulation runs, each time from the state and not from what the solver said.
+//! Observation of a running simulation, based on the state and not on the solver's output.
 
 use tiprub_core::{
     Result, Scene, Simulation,
@@ -7,43 +7,43 @@ use tiprub_core::{
 
 use super::{Check, models::allowed};
 
-/// Largest share of the energy exchanged that massless-boundary may give back in one step: its warning names it.
+/// Largest fraction of the energy exchanged that massless-boundary may return in one step; its warning contains it.
 pub(crate) const MASSLESS_RETURN: f64 = 2e-2;
-/// Work that the iterations of galerkin may miss, as a fraction of the energy exchanged.
+/// Work error of the iterations of galerkin, as a fraction of the energy exchanged.
 const ITERATED: f64 = 1e-5;
 
-/// Smallest number of steps of `length` (s) that cover `time` (s).
+/// Returns the smallest number of steps of `length` (s) that cover `time` (s).
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a positive number of steps")]
 pub(crate) fn steps(time: f64, length: f64) -> u32 {
     (time / length * (1.0 - 1e-9)).ceil() as u32
 }
 
-/// At time 0, with what watches it.
+/// Initialises a simulation at time 0, and its watch.
 ///
 /// # Errors
-/// The scene is refused.
+/// A rejected scene.
 pub(crate) fn begin(scene: &Scene) -> Result<(Simulation, StabilityWatch)> {
     let mut simulation = Simulation::new(scene)?;
     simulation.initialise(0.0)?;
     Ok((simulation, StabilityWatch::new(scene)))
 }
 
-/// Value of a real variable that the scene has.
+/// Returns the value of a real variable that the scene has.
 pub(crate) fn real(simulation: &Simulation, name: &str) -> f64 {
     let row = simulation.table().find(name);
     row.and_then(|row| simulation.real(row.reference).ok()).unwrap_or(f64::NAN)
 }
 
-/// Set the first element of a real variable; a variable that is not there is left alone.
+/// Sets the first element of a real variable; a missing variable is ignored.
 ///
 /// # Errors
-/// The value is refused.
+/// A rejected value.
 pub(crate) fn set(simulation: &mut Simulation, name: &str, value: f64) -> Result<()> {
     let Some(reference) = simulation.table().find(name).map(|row| row.reference) else { return Ok(()) };
     simulation.set_real(reference, value)
 }
 
-/// All numeric outputs, to compare two runs bit by bit.
+/// Returns all numeric outputs, to compare two runs bit by bit.
 pub(crate) fn outputs(simulation: &Simulation) -> Vec<f64> {
     let mut values = Vec::new();
     for variable in simulation.table().variables() {
@@ -56,7 +56,7 @@ pub(crate) fn outputs(simulation: &Simulation) -> Vec<f64> {
     values
 }
 
-/// The same as bits.
+/// Returns all numeric outputs as bits.
 pub(crate) fn bits(simulation: &Simulation) -> Vec<u64> {
     outputs(simulation).into_iter().map(f64::to_bits).collect()
 }
@@ -75,17 +75,17 @@ pub(crate) fn amplitudes(simulation: &Simulation, order: u32) -> [f64; 3] {
     [cosine, sine, values.iter().enumerate().map(rest).fold(0.0, f64::max)]
 }
 
-/// Largest of everything that should be small, over a run.
+/// Largest values over a run of everything that should be small.
 #[derive(Debug, Clone)]
 pub(crate) struct StabilityWatch {
     sectors: usize,
     slopes: Vec<f64>,
     clearances: Vec<f64>,
-    /// Gaps follow from displacements and radius alone: rigid, round, on springs of any kind.
+    /// True if gaps follow from displacements and radius alone: a rigid, round casing, on springs of any kind.
     round: bool,
-    /// Lengths are compared with this (m).
+    /// Length with which others are compared (m).
     pub scale: f64,
-    /// Distance that the tolerance of the scene allows (m).
+    /// Distance that the tolerance of the scene permits (m).
     allowed: f64,
     galerkin: bool,
     largest: f64,
@@ -100,16 +100,16 @@ pub(crate) struct StabilityWatch {
     before: [f64; 2],
     /// Energy exchanged so far (J).
     exchanged: f64,
-    /// Contacts of all internal steps.
+    /// Number of contacts in all internal steps.
     pub contacts: u64,
     /// ∫Σλ dt (N·s).
     pub impulse: f64,
-    /// All outputs were finite.
+    /// True if all outputs were finite.
     pub finite: bool,
 }
 
 impl StabilityWatch {
-    /// Before the first step of an initialised simulation of `scene`.
+    /// Creates the watch before the first step of an initialised simulation of `scene`.
     pub(crate) fn new(scene: &tiprub_core::Scene) -> Self {
         let (contact, rom) = (&scene.settings.contacts[0], &scene.roms[0]);
         let clearances =
@@ -145,10 +145,10 @@ impl StabilityWatch {
         }
     }
 
-    /// One communication step, watched after every internal one.
+    /// Performs one communication step, observed after every internal step.
     ///
     /// # Errors
-    /// The step is refused.
+    /// A rejected step.
     pub(crate) fn step(&mut self, simulation: &mut Simulation, length: f64) -> Result<()> {
         simulation.begin_step(simulation.time(), length)?;
         loop {
@@ -163,10 +163,10 @@ impl StabilityWatch {
         Ok(())
     }
 
-    /// The same while inputs change within the step: gaps are not evaluated again.
+    /// Performs a step while inputs change within it: gaps are not recomputed.
     ///
     /// # Errors
-    /// The step is refused.
+    /// A rejected step.
     pub(crate) fn step_moving(&mut self, simulation: &mut Simulation, length: f64) -> Result<()> {
         self.round = false;
         self.step(simulation, length)
@@ -213,7 +213,8 @@ impl StabilityWatch {
         }
     }
 
-    /// Books that close, and entries that have their physical signs: contact takes energy, friction heats.
+    /// Checks that the energy balance closes, and that its entries have the correct signs: contact dissipates energy,
+    /// friction generates heat.
     pub(crate) fn laws(&self) -> Vec<Check> {
         vec![
             Check::so("all outputs finite", self.finite),
@@ -223,7 +224,8 @@ impl StabilityWatch {
         ]
     }
 
-    /// Impacts take energy. Those of galerkin are paid from impacts before: their loss stays above 0.
+    /// Checks that impacts dissipate energy. With galerkin, gains are paid from earlier losses: the loss stays
+    /// positive.
     pub(crate) fn impact(&self, bound: f64) -> Check {
         if self.galerkin {
             return Check::at_most("negative impact loss", self.share(self.impact_deficit), ITERATED);
@@ -231,13 +233,14 @@ impl StabilityWatch {
         Check::at_most("decrease of the impact loss", self.impact_drop(), bound)
     }
 
-    /// Friction takes energy.
+    /// Checks that friction dissipates energy.
     pub(crate) fn heat(&self, bound: f64) -> Check {
         let bound = if self.galerkin { bound.max(ITERATED) } else { bound };
         Check::at_most("decrease of the friction heat", self.heat_drop(), bound)
     }
 
-    /// The same for a scheme: massless-boundary takes contact forces a step late, and gives back a little of what it took.
+    /// Checks the laws for a scheme: massless-boundary applies contact forces a step late, and returns a little of the
+    /// energy it absorbed.
     pub(crate) fn books_of(&self, scheme: Scheme) -> Vec<Check> {
         let mut checks = self.laws();
         if scheme == Scheme::MasslessBoundary {
@@ -246,17 +249,17 @@ impl StabilityWatch {
         checks
     }
 
-    /// The ledger alone.
+    /// Checks the ledger alone.
     pub(crate) fn ledger(&self) -> Check {
         Check::at_most("energy residual", self.residual, 1e-9)
     }
 
-    /// Returns the largest fall of the impact loss in a communication step, relative to all energy exchanged.
+    /// Returns the largest decrease of the impact loss in a communication step, relative to all energy exchanged.
     pub(crate) fn impact_drop(&self) -> f64 {
         self.share(self.impact_drop)
     }
 
-    /// The same of the friction heat.
+    /// Returns the largest decrease of the friction heat, likewise.
     pub(crate) fn heat_drop(&self) -> f64 {
         self.share(self.heat_drop)
     }
@@ -265,7 +268,8 @@ impl StabilityWatch {
         if energy > 0.0 { energy / self.exchanged } else { energy }
     }
 
-    /// λ ≥ 0, g ≥ 0, λg = 0 at every internal step, and g again from the displacements. Galerkin closes gaps within its tolerance.
+    /// Checks λ ≥ 0, g ≥ 0, λg = 0 at every internal step, and g recomputed from the displacements. Galerkin closes
+    /// gaps within its tolerance.
     pub(crate) fn complementarity(&self) -> Vec<Check> {
         let distance = 1e-10 + self.allowed / self.scale;
         let mut checks = vec![
@@ -280,7 +284,7 @@ impl StabilityWatch {
     }
 }
 
-/// The larger one; not-a-number sticks.
+/// Returns the larger value; NaN is preserved.
 pub(crate) fn worse(before: f64, now: f64) -> f64 {
     if before >= now || before.is_nan() { before } else { now }
 }
@@ -291,7 +295,7 @@ fn open(simulation: &Simulation) -> f64 {
     real(simulation, "gap_offset") + if change.is_nan() { 0.0 } else { change }
 }
 
-/// Largest difference of two histories of displacements relative to the largest of the second.
+/// Returns the largest difference of two histories of displacements relative to the largest value of the second.
 pub(crate) fn apart(first: &[f64], second: &[f64]) -> f64 {
     let largest = second.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
     let square = |values: &mut dyn Iterator<Item = f64>| values.map(|value| value * value).sum::<f64>();
@@ -302,7 +306,7 @@ pub(crate) fn apart(first: &[f64], second: &[f64]) -> f64 {
     (off / square(&mut second.iter().map(|value| value / largest))).sqrt()
 }
 
-/// Displacements of all contact nodes of the sectors (m).
+/// Returns the displacements of all contact nodes of the sectors (m).
 pub(crate) fn displacements(simulation: &Simulation) -> Vec<f64> {
     let system = simulation.system();
     let rows = system.bank().rows();

@@ -1,7 +1,7 @@
-//! A round casing that closes on all blades and stays: the static answer is known whatever scheme, step and solver.
+//! A round casing that closes on all blades and stays: the static solution is known for any scheme, step and solver.
 //!
-//! With u = Σ S_j f_j, S = C K⁻¹ Cᵀ the static flexibility, f_j = λ_j (n_j − µ t_j), contact at rest is 0 ≤ λ ⟂ g₀ + Wλ ≥ 0
-//! with W_ij = n_i·S_ij (n_j − µ t_j). Its few nodes are solved here by trying every set of closed contacts.
+//! With u = Σ S_j f_j, S = C K⁻¹ Cᵀ the static flexibility, f_j = λ_j (n_j − µ t_j), contact at rest is 0 ≤ λ ⟂ g₀ + Wλ
+//! ≥ 0 with W_ij = n_i·S_ij (n_j − µ t_j). The small problem is solved here by trying every set of closed contacts.
 
 use std::f64::consts::PI;
 
@@ -20,7 +20,8 @@ use super::{
 /// Damping that brings the blades to rest.
 const DAMPING: f64 = 0.3;
 
-/// Gaps of galerkin close to this fraction of the tolerance, and forces follow: with a margin for stiffness that differs from node to node.
+/// Fraction of the tolerance to which galerkin closes gaps, and therefore the accuracy of forces: with a margin for
+/// stiffness that differs between nodes.
 const PRECISION: f64 = 1e-3;
 
 /// A casing that closes over `rise` seconds by gap and depth, and stays for `hold` seconds.
@@ -34,7 +35,7 @@ pub(crate) struct Press {
     pub rise: f64,
     /// Time to come to rest (s).
     pub hold: f64,
-    /// Allowed relative distance of λ, strain energy and torque from the static ones.
+    /// Allowed relative distance of λ, strain energy and torque from the static values.
     pub tolerance: f64,
 }
 
@@ -48,21 +49,21 @@ pub(crate) struct Static {
 }
 
 impl Press {
-    /// Five hundredths of a millimetre, 4 ms to close and 12 ms to come to rest.
+    /// Creates a press of 0.05 mm, with 4 ms to close and 12 ms to come to rest.
     pub(crate) fn new(scene: Scene) -> Self {
         Self { scene, depth: 5e-5, rise: 4e-3, hold: 12e-3, tolerance: 1e-6 }
     }
 
-    /// Radius change at a time (m).
+    /// Returns the radius change at a time (m).
     fn change(&self, time: f64) -> f64 {
         let share = (time / self.rise).min(1.0);
         -(self.scene.settings.contacts[0].gap + self.depth) * 0.5 * (1.0 - (PI * share).cos())
     }
 
-    /// Run and compare.
+    /// Runs the scene and compares.
     ///
     /// # Errors
-    /// The scene is refused.
+    /// A rejected scene.
     pub(crate) fn run(&self) -> Result<Vec<Check>> {
         let (simulation, watch) = self.march()?;
         let mut checks = Vec::new();
@@ -70,7 +71,7 @@ impl Press {
         if self.scene.settings.contacts[0].solver != Solver::Film {
             checks.extend(watch.complementarity());
         } else if self.scene.roms[0].contact_nodes.len() > 1 {
-            // Film lets λ of nodes that push each other apart go negative.
+            // With film, λ of nodes that push each other apart can become negative.
             checks.retain(|check| !check.what.contains("impact"));
         }
         checks.extend(self.compare(&simulation));
@@ -99,7 +100,7 @@ impl Press {
         let precise = PRECISION * allowed(&self.scene) / self.depth;
         let tolerance = self.tolerance + precise;
         let system = simulation.system();
-        // Those of galerkin are polynomials in time: means over the last step, which displacements follow.
+        // The forces of galerkin are polynomials in time: means over the last step, which displacements follow.
         let mut means = vec![vec![0.0; rom.sectors]; rom.contact_nodes.len()];
         system.events().iter().for_each(|event| means[event.node][event.sector] = event.normal);
         let galerkin = self.scene.settings.time.scheme == Scheme::Galerkin;
@@ -109,7 +110,7 @@ impl Press {
         let scale = exact.multipliers.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
         let (mut off, mut alike, mut total) = (0.0_f64, 0.0_f64, 0.0);
         for sector in 0..rom.sectors {
-            // Of coincident nodes only the sum is determined.
+            // Of coincident nodes only the sum of forces is determined.
             let sum: f64 = (0..nodes).map(|node| multiplier(node, sector)).sum();
             let first: f64 = (0..nodes).map(|node| multiplier(node, 0)).sum();
             alike = alike.max((sum - first).abs() / scale);
@@ -151,7 +152,7 @@ fn coincident(rom: &Rom) -> bool {
     places.windows(2).any(|pair| pair[0].map(f64::to_bits) == pair[1].map(f64::to_bits))
 }
 
-/// Directions of the nodes: normal and force per multiplier, `friction` with the sign of the speed.
+/// Returns the directions of the nodes: normal and force per multiplier, `friction` with the sign of the speed.
 fn directions(rom: &Rom, friction: f64) -> Vec<([f64; 3], [f64; 3])> {
     let each = rom.contact_nodes.iter().map(|node| {
         let length = (1.0 + node.meridional_slope * node.meridional_slope).sqrt();
@@ -161,9 +162,9 @@ fn directions(rom: &Rom, friction: f64) -> Vec<([f64; 3], [f64; 3])> {
     each.collect()
 }
 
-/// Static flexibility of the contact rows (m/N).
+/// Returns the static flexibility of the contact rows (m/N).
 fn flexibility(rom: &Rom) -> DMatrix<f64> {
-    // Scaled first: stiffness may span many orders of magnitude.
+    // Scaled first, because stiffness may span many orders of magnitude.
     let order = rom.order();
     let scale = DVector::from_fn(order, |i, _| 1.0 / rom.stiffness[(i, i)].sqrt());
     let scaled = DMatrix::from_fn(order, order, |i, j| scale[i] * rom.stiffness[(i, j)] * scale[j]);
@@ -173,7 +174,8 @@ fn flexibility(rom: &Rom) -> DMatrix<f64> {
     map * solved
 }
 
-/// Static solution with the casing `depth` (m, radial) beyond the tips; `friction` with the sign of the speed.
+/// Returns the static solution with the casing `depth` (m, radial) beyond the tips; `friction` with the sign of the
+/// speed.
 pub(crate) fn pressed(rom: &Rom, friction: f64, depth: f64) -> Static {
     let (along, flexible) = (directions(rom, friction), flexibility(rom));
     let count = along.len();
@@ -185,7 +187,7 @@ pub(crate) fn pressed(rom: &Rom, friction: f64, depth: f64) -> Static {
     };
     let gap = |i: usize| depth * along[i].0[0];
     let multipliers = if coincident(rom) {
-        // All alike: each carries an equal share of what one alone would.
+        // All nodes are equal: each carries an equal fraction of the force of a single one.
         vec![-gap(0) / entry(0, 0) / count as f64; count]
     } else {
         let delassus = DMatrix::from_fn(count, count, entry);
@@ -195,7 +197,7 @@ pub(crate) fn pressed(rom: &Rom, friction: f64, depth: f64) -> Static {
     Static { strain: 0.5 * force.dot(&(&flexible * &force)), multipliers }
 }
 
-/// The solution with exactly these contacts closed, if it is one.
+/// Returns the solution with exactly these contacts closed, if there is one.
 fn closed(delassus: &DMatrix<f64>, gap: &dyn Fn(usize) -> f64, set: usize) -> Option<Vec<f64>> {
     let count = delassus.nrows();
     let members: Vec<usize> = (0..count).filter(|node| set >> node & 1 == 1).collect();

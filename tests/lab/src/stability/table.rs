@@ -19,7 +19,7 @@ impl StabilityTable {
     /// Files that [`StabilityTable::write`] writes.
     pub(crate) const FILES: [&str; 4] = ["index.html", "results.json", "stability.csv", "stability.md"];
 
-    /// Number of rows of a verdict.
+    /// Returns the number of rows with a verdict.
     pub(crate) fn count(&self, verdict: CaseVerdict) -> usize {
         self.rows.iter().filter(|row| row.verdict == verdict).count()
     }
@@ -35,7 +35,7 @@ impl StabilityTable {
         families
     }
 
-    /// Families with a row for each of their methods: cases, and how many of each verdict.
+    /// Returns the families with a row for each of their methods: cases, and the number of each verdict.
     fn methods(&self) -> Vec<FamilyCount<'_>> {
         let mut counted: Vec<FamilyCount<'_>> = Vec::new();
         for row in &self.rows {
@@ -51,7 +51,8 @@ impl StabilityTable {
         counted
     }
 
-    /// Families by schemes with their choice of the step: right + refused + ended, and what is wrong where something is.
+    /// Returns the families by schemes with their choice of the step: right + refused + ended, and the failures if
+    /// there are any.
     fn by_method(&self) -> (Vec<&'static str>, Vec<(&str, Vec<String>)>) {
         let columns: Vec<Option<&str>> = StabilityMethod::integrations().map(Some).chain([None]).collect();
         let counted = self.methods();
@@ -71,7 +72,7 @@ impl StabilityTable {
         (names, self.families().into_iter().map(line).collect())
     }
 
-    /// Rows that are neither right nor refused.
+    /// Returns the rows that are neither correct nor rejected as expected.
     pub(crate) fn unsound(&self) -> impl Iterator<Item = &StabilityRow> {
         self.rows.iter().filter(|row| !row.verdict.is_sound())
     }
@@ -110,7 +111,7 @@ impl StabilityTable {
         self.rows.iter().filter(|row| family(row) == asked && row.verdict == verdict).count()
     }
 
-    /// For programs.
+    /// Returns the table for programs.
     pub(crate) fn to_json(&self) -> Value {
         let counts: serde_json::Map<_, _> = CaseVerdict::ALL
             .iter()
@@ -137,7 +138,8 @@ impl StabilityTable {
         csv
     }
 
-    /// The chapter of the guide, below its fixed introduction. No times: the same sources give the same text.
+    /// Returns the chapter of the guide, below its fixed introduction. It contains no times: equal sources give equal
+    /// text.
     pub(crate) fn to_markdown(&self) -> String {
         let mut text =
             format!("{}\n\n| family | {} |\n", self.summary(), CaseVerdict::ALL.map(CaseVerdict::name).join(" | "));
@@ -187,10 +189,10 @@ impl StabilityTable {
         page
     }
 
-    /// Write page, CSV and JSON into a directory, and sum up.
+    /// Writes page, CSV and JSON to a directory, and returns a summary.
     ///
     /// # Errors
-    /// Files cannot be written.
+    /// Files that cannot be written.
     pub(crate) fn write(&self, directory: &Path) -> Result<CommandOutcome> {
         output_file::create_directory(directory)?;
         let page = directory.join("index.html");
@@ -207,13 +209,13 @@ impl StabilityTable {
     }
 }
 
-/// Cases of a family that one method runs.
+/// Cases of a family with one method.
 #[derive(Debug)]
 struct FamilyCount<'a> {
     family: &'a str,
-    /// Scheme with its choice of the step, and solver; as far as the names of cases tell.
+    /// Scheme with its choice of the step, and solver, as far as the names of cases contain them.
     method: (Option<&'static str>, Option<&'static str>),
-    /// Numbers of each verdict.
+    /// Number of cases per verdict.
     counts: [usize; CaseVerdict::ALL.len()],
 }
 
@@ -232,10 +234,10 @@ impl FamilyCount<'_> {
     }
 }
 
-/// Column of cases whose names hold no method: most run modal-exact with lcp.
+/// Column of cases without a method in their names: most run modal-exact with lcp.
 const OTHER: &str = "other";
 
-/// Cells of a table in text.
+/// Returns the cells of a table as text.
 fn wide(cells: &[impl AsRef<str>]) -> String {
     cells.iter().map(|cell| format!("{:>18}", cell.as_ref())).collect()
 }
@@ -244,13 +246,13 @@ fn family(row: &StabilityRow) -> &str {
     row.name.split('/').next().unwrap_or(&row.name)
 }
 
-/// Families of more cases than this have one line per group in the guide.
+/// Families with more cases than this have one line per group in the guide.
 const LISTED: usize = 60;
-/// Characters of what happened that the guide shows.
+/// Number of characters of the actual end that the guide shows.
 const SHOWN: usize = 160;
 
-/// Rows of a family with the names they go by: each by itself, or those that differ in the last part of the name together,
-/// the first of them as an example.
+/// Returns the rows of a family with their labels: single rows, or rows that differ in the last part of the name
+/// together, with the first of them as an example.
 fn groups<'a>(rows: &[&'a StabilityRow]) -> Vec<(String, Vec<&'a StabilityRow>)> {
     let own = |row: &StabilityRow| row.name.split_once('/').map_or(row.name.clone(), |(_, rest)| rest.to_owned());
     if rows.len() <= LISTED {

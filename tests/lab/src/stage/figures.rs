@@ -1,4 +1,4 @@
-//! Pictures of the stage.
+//! Figures of the stage.
 
 use tiprub_figure::{
     plots::{Plot, Series},
@@ -9,10 +9,10 @@ use tiprub_study::{Picture, Sheet, StudyFigure};
 
 use super::{CASINGS, RAMP_PERIODS, Run, SHOWN, StageCasing, StageSetup, nearest};
 
-/// Nodal diameters below this share of the largest amplitude are not drawn.
+/// Nodal diameters below this fraction of the largest amplitude are not drawn.
 const SILENT: f64 = 1e-4;
 
-/// All pictures of one casing.
+/// Draws all pictures of one casing.
 pub(super) fn of(setup: &StageSetup, casing: StageCasing, runs: &[Run], names: &[String]) -> Result<Vec<StudyFigure>> {
     let mut all = vec![clearances(setup, casing, nearest(setup, runs)?, names)?];
     all.extend(SHOWN.map(|number| waterfall(setup, casing, runs, number)));
@@ -24,7 +24,7 @@ fn of_casing(casing: StageCasing, names: [&'static str; 3]) -> &'static str {
     names[casing as usize]
 }
 
-/// Clearances of blade 1 over time at one speed: fig. 11.
+/// Draws the clearances of blade 1 over time at one speed: fig. 11.
 fn clearances(setup: &StageSetup, casing: StageCasing, run: &Run, names: &[String]) -> Result<StudyFigure> {
     let gap = setup.gap();
     let time = |time: &f64| time * setup.frequency;
@@ -61,7 +61,7 @@ fn clearances(setup: &StageSetup, casing: StageCasing, run: &Run, names: &[Strin
     })
 }
 
-/// Amplitude of one nodal diameter over time and speed: fig. 12.
+/// Draws the amplitude of one nodal diameter over time and speed: fig. 12.
 fn waterfall(setup: &StageSetup, casing: StageCasing, runs: &[Run], nodal_diameter: usize) -> StudyFigure {
     let critical = setup.critical_speed();
     let points = |run: &Run| {
@@ -97,7 +97,7 @@ fn waterfall(setup: &StageSetup, casing: StageCasing, runs: &[Run], nodal_diamet
     }
 }
 
-/// Effective amplitudes against speed.
+/// Draws effective amplitudes against speed.
 fn amplitudes(setup: &StageSetup, casing: StageCasing, runs: &[Run], names: &[String]) -> Result<StudyFigure> {
     let diameters = runs.first().map_or(0, |run| run.amplitudes.len());
     let value = |run: &Run, number: usize| run.effective(number, setup.full());
@@ -155,7 +155,7 @@ fn speeds_sheet(setup: &StageSetup, runs: &[Run], names: &[String]) -> Sheet {
     sheet
 }
 
-/// Nodal diameter 4 relative to 2, all casings.
+/// Draws nodal diameter 4 relative to 2, for all casings.
 pub(super) fn shares(setup: &StageSetup, runs: &[Vec<Run>; 3]) -> Result<StudyFigure> {
     let share = |run: &Run| match run.ended {
         Some(_) => f64::NAN,

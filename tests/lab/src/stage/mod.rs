@@ -1,6 +1,6 @@
-//! The paper's application (figs 11 and 12): coupled blades against an oval casing, for a range of angular velocities. The casing is
-//! rigid, as the paper's French summary has it, and elastic, as its section 6 has it. On a rigid one, which takes no energy, sliding
-//! contact of these blades flutters; it is shown without friction as well.
+//! The paper's application (figs 11 and 12): coupled blades against an oval casing, for a range of angular velocities.
+//! The casing is rigid, as in the paper's French summary, and elastic, as in its section 6. On a rigid casing, which
+//! absorbs no energy, sliding contact of these blades flutters; it is shown without friction as well.
 
 mod figures;
 mod run;
@@ -21,33 +21,33 @@ use tiprub_study::{Study, arguments::Speeds};
 
 use self::run::Run;
 
-/// By how much the oval casing would reach beyond the tips at rest, as a share of the clearance.
+/// Interference of the oval casing with the tips at rest, as a fraction of the clearance.
 const OVERLAP: f64 = 0.15;
 /// Run length and the part of it in which the oval grows, in periods of the first mode of nodal diameter 2.
 const PERIODS: f64 = 25.0;
 const QUICK_PERIODS: f64 = 10.0;
 const RAMP_PERIODS: f64 = 4.0;
-/// Angular velocities, relative to the one at which the oval meets the first mode of nodal diameter 2.
+/// Angular velocities, relative to the one at which the oval excites the first mode of nodal diameter 2.
 const RANGE: [f64; 2] = [0.5, 1.5];
 const COUNT: usize = 21;
 const QUICK_COUNT: usize = 5;
 /// The nodal diameters of the paper's figure.
 const SHOWN: [usize; 2] = [2, 4];
-/// Largest clearance, as a share of the clearance at rest, that counts as contact.
+/// Largest clearance that counts as contact, as a fraction of the clearance at rest.
 const CLOSED: f64 = 1e-6;
 
 /// Casing of the blades.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum StageCasing {
-    /// Oval by its shape; nothing gives way. Without friction.
+    /// Oval by its shape and rigid, without friction.
     Smooth,
-    /// The same with the friction of the scene.
+    /// Oval and rigid, with the friction of the scene.
     Rigid,
-    /// Round, and bent by a load with two nodal diameters and by the blades.
+    /// Round, and deformed by a load with two nodal diameters and by the blades.
     Flexible,
 }
 
-/// All, in the order of everything that is told.
+/// All casings, in the order of the results.
 const CASINGS: [StageCasing; 3] = [StageCasing::Smooth, StageCasing::Rigid, StageCasing::Flexible];
 
 impl StageCasing {
@@ -68,7 +68,7 @@ struct StageSetup {
     amplitude: f64,
     /// First frequency of nodal diameter 2 (Hz).
     frequency: f64,
-    /// Angular velocity at which four waves per revolution meet the first mode of nodal diameter 4 (rad/s).
+    /// Angular velocity at which four waves per revolution excite the first mode of nodal diameter 4 (rad/s).
     second_resonance: f64,
     schedule: Schedule,
     ramp: f64,
@@ -82,7 +82,7 @@ impl StageSetup {
         let disk = CyclicModel::from_rom(disk, disk.damping_ratio).map_err(in_scene)?;
         let frequency = disk.diameters[2].frequencies[0] / std::f64::consts::TAU;
         let second_resonance = disk.diameters.get(SHOWN[1]).map_or(f64::NAN, |modes| modes.frequencies[0] / 4.0);
-        // The load alone makes the casing oval here; the scene that ships adds a shape, which importers need not drive.
+        // Here the load alone makes the casing oval; the built-in scene adds a shape, which importers need not drive.
         scene.settings.surfaces[0].shape = Shape::Circular {};
         let amplitude = (1.0 + OVERLAP) * scene.settings.contacts[0].gap / flexibility(&scene)?;
         if let Some(load) = &mut scene.settings.structures[1].load {
@@ -105,22 +105,23 @@ impl StageSetup {
         &self.scenes[casing as usize]
     }
 
-    /// Clearance at rest (m).
+    /// Returns the clearance at rest (m).
     fn gap(&self) -> f64 {
         self.scenes[0].settings.contacts[0].gap
     }
 
-    /// Where the oval, which the turning blades see twice per revolution, meets the first mode of nodal diameter 2 (rad/s).
+    /// Returns the speed at which the oval, which the rotating blades pass twice per revolution, excites the first mode
+    /// of nodal diameter 2 (rad/s).
     fn critical_speed(&self) -> f64 {
         std::f64::consts::PI * self.frequency
     }
 
-    /// When the oval is there (s).
+    /// Returns the time at which the oval is complete (s).
     fn full(&self) -> f64 {
         self.schedule.start + self.ramp
     }
 
-    /// The load grows smoothly from nothing, as the shape of the rigid casing does.
+    /// Returns the load, which grows smoothly from zero, as the shape of the rigid casing does.
     fn load(&self, time: f64) -> f64 {
         let share = ((time - self.schedule.start) / self.ramp).clamp(0.0, 1.0);
         0.5 * self.amplitude * (1.0 - (std::f64::consts::PI * share).cos())
@@ -134,13 +135,14 @@ impl StageSetup {
     }
 }
 
-/// The same in a rigid casing: a spline through as many points, oval all along the axis, and as far beyond the tips.
+/// Returns the scene with a rigid casing: a spline through as many points, oval all along the axis, and as far beyond
+/// the tips.
 fn rigid(scene: &Scene, ramp: f64) -> Scene {
     let mut scene = scene.clone();
     scene.roms.truncate(1);
     let ring = scene.settings.structures.pop();
     let amplitude = (1.0 + OVERLAP) * scene.settings.contacts[0].gap;
-    // In the sense of the load, whose phase is half a turn: narrow at θ = 0.
+    // With the orientation of the load, whose phase is half a turn: narrow at θ = 0.
     let phase = ring.and_then(|ring| ring.load).map_or(0.0, |load| load.phase + std::f64::consts::PI);
     let surface = &mut scene.settings.surfaces[0];
     surface.structure = None;
@@ -151,14 +153,14 @@ fn rigid(scene: &Scene, ramp: f64) -> Scene {
     scene
 }
 
-/// Largest static radial displacement of the casing per unit amplitude of its load (m per N/m).
+/// Returns the largest static radial displacement of the casing per unit amplitude of its load (m per N/m).
 fn flexibility(scene: &Scene) -> Result<f64> {
     let in_scene = |error| Failure::from_core("static deformation of the casing", error);
     let mut scene = scene.clone();
     scene.settings.outputs.slave_displacement = true;
     let load = scene.settings.structures[1].load.as_mut();
     let load = load.ok_or_else(|| Failure::new("scene `stage`", "the casing has no load", ""))?;
-    // Small enough not to touch.
+    // Small enough to avoid contact.
     load.amplitude = 1e-3;
     let amplitude = load.amplitude;
     let mut simulation = Simulation::new(&scene).map_err(in_scene)?;
@@ -176,10 +178,10 @@ fn flexibility(scene: &Scene) -> Result<f64> {
     }
 }
 
-/// The study: load the models, run all speeds in all casings, draw.
+/// Runs the study: loads the models, runs all speeds in all casings, draws.
 ///
 /// # Errors
-/// A model or a run fails.
+/// A model or a run that fails.
 pub(crate) fn study(arguments: &crate::cli::LabStageArguments, console: &Console) -> Result<Study> {
     let quick = arguments.common.quick;
     let scene = scene_source::stage_scene(quick, &arguments.common.cache.cache(), console)?;
@@ -187,7 +189,7 @@ pub(crate) fn study(arguments: &crate::cli::LabStageArguments, console: &Console
     let critical = setup.critical_speed();
     let count = if quick { QUICK_COUNT } else { COUNT };
     let speeds = arguments.speeds.unwrap_or(Speeds { from: RANGE[0] * critical, to: RANGE[1] * critical, count });
-    // The elastic casing takes longer: it comes first, so that no processor waits in the end.
+    // The elastic casing takes longer and comes first, so that no processor is idle at the end.
     let speeds = speeds.values();
     let asked: Vec<(StageCasing, f64)> =
         CASINGS.iter().rev().flat_map(|casing| speeds.iter().map(|speed| (*casing, *speed))).collect();
@@ -212,7 +214,7 @@ pub(crate) fn study(arguments: &crate::cli::LabStageArguments, console: &Console
     Ok(study)
 }
 
-/// Every warning once, whichever run it came from.
+/// Returns every warning once, regardless of its run.
 fn warnings<'a>(runs: impl Iterator<Item = &'a Run>) -> Vec<String> {
     let mut all: Vec<String> = runs.flat_map(|run| run.warnings.iter().cloned()).collect();
     all.sort();
@@ -220,7 +222,7 @@ fn warnings<'a>(runs: impl Iterator<Item = &'a Run>) -> Vec<String> {
     all
 }
 
-/// The run nearest to resonance, of those that reach their end where one does.
+/// Returns the run nearest to resonance, among the complete ones if there are any.
 fn nearest<'a>(setup: &StageSetup, runs: &'a [Run]) -> Result<&'a Run> {
     let place = |run: &Run| (run.ended.is_some(), (run.speed / setup.critical_speed() - 1.0).abs());
     let shown = runs.iter().min_by(|a, b| {

@@ -1,10 +1,10 @@
-//! One run of the stage: the blades' clearances and amplitudes over time.
+//! One run of the stage: clearances and amplitudes of the blades over time.
 
 use tiprub_core::{Scene, Simulation, variables::Quantity};
 
 use super::{CLOSED, StageCasing, StageSetup};
 
-/// Points of one curve that are kept.
+/// Maximum number of points of one curve.
 const MOST_POINTS: usize = 1000;
 
 /// One run.
@@ -15,11 +15,11 @@ pub(super) struct Run {
     pub clearances: Vec<Vec<f64>>,
     /// Smallest clearances of the same nodes at any internal step (m).
     pub least: Vec<f64>,
-    /// Number of times that each of them closes and opens again once the casing is oval.
+    /// Number of times that each of them closes and opens again after the casing is oval.
     pub touches: Vec<usize>,
     /// Amplitudes by nodal diameter from 0 (m).
     pub amplitudes: Vec<Vec<f64>>,
-    /// Nodes in contact on the whole disk.
+    /// Number of nodes in contact on the whole disk.
     pub contacts: Vec<f64>,
     /// Smallest clearance of all blades at any communication point (m).
     pub least_clearance: f64,
@@ -30,12 +30,12 @@ pub(super) struct Run {
     pub internal_steps: u64,
     /// Warnings of the simulation, such as flutter of closed contact.
     pub warnings: Vec<String>,
-    /// Why it ended early, where it did.
+    /// Reason if the run ended early.
     pub ended: Option<String>,
 }
 
 impl Run {
-    /// Nothing yet, of so many contact nodes of a blade and so many nodal diameters.
+    /// Creates an empty run for a number of contact nodes of a blade and of nodal diameters.
     pub(super) fn new(speed: f64, nodes: usize, diameters: usize) -> Self {
         Self {
             speed,
@@ -55,14 +55,14 @@ impl Run {
         }
     }
 
-    /// Root mean square of an amplitude once the oval is there.
+    /// Returns the root mean square of an amplitude after the oval is complete.
     pub(super) fn effective(&self, nodal_diameter: usize, from: f64) -> f64 {
         let values = self.times.iter().zip(&self.amplitudes[nodal_diameter]).filter(|(time, _)| **time >= from);
         let (sum, count) = values.fold((0.0, 0_u32), |(sum, count), (_, value)| (sum + value * value, count + 1));
         (sum / f64::from(count.max(1))).sqrt()
     }
 
-    /// Share of the points at which any blade touches.
+    /// Returns the fraction of the points at which any blade touches.
     pub(super) fn touching(&self) -> f64 {
         let count = self.contacts.iter().filter(|count| **count > 0.0).count();
         count as f64 / self.contacts.len().max(1) as f64
@@ -113,7 +113,7 @@ impl StageWatch {
         full: bool,
     ) -> tiprub_core::Result<()> {
         let most = |list: &[u32], before: f64| -> tiprub_core::Result<f64> {
-            // NaN stays: an extreme of nothing known is not known.
+            // NaN is preserved: an extreme that includes an unknown value is unknown.
             list.iter().try_fold(before, |most, one| {
                 let value = simulation.real(*one)?.abs();
                 Ok(if value.is_nan() || value > most { value } else { most })
@@ -148,7 +148,7 @@ fn record(run: &mut Run, simulation: &Simulation, elements: &Elements, time: f64
     Ok(())
 }
 
-/// One communication step.
+/// Performs one communication step.
 fn advance(run: &mut Run, simulation: &mut Simulation, time: f64, length: f64) -> tiprub_core::Result<()> {
     simulation.begin_step(time, length)?;
     loop {
@@ -159,7 +159,7 @@ fn advance(run: &mut Run, simulation: &mut Simulation, time: f64, length: f64) -
     }
 }
 
-/// The run at one speed; one that is refused on its way keeps what came before.
+/// Performs the run at one speed; if it fails, the results so far are kept.
 pub(super) fn march(setup: &StageSetup, scene: &Scene, casing: StageCasing, speed: f64) -> tiprub_core::Result<Run> {
     let mut simulation = Simulation::new(scene)?;
     let schedule = &setup.schedule;
@@ -178,7 +178,7 @@ pub(super) fn march(setup: &StageSetup, scene: &Scene, casing: StageCasing, spee
             break;
         }
         if casing == StageCasing::Flexible {
-            // What is set is reached at the end of the step.
+            // An input reaches its value at the end of the step.
             for one in &elements.load {
                 simulation.set_real(*one, setup.load(schedule.time(index + 1)))?;
             }

@@ -1,13 +1,13 @@
-//! Whether the stage shows what the paper's figures 11 and 12 do.
+//! Statements that compare the stage with the paper's figures 11 and 12.
 
 use tiprub_shell::Result;
 use tiprub_study::Statement;
 
 use super::{RAMP_PERIODS, Run, SHOWN, StageCasing, StageSetup, nearest, warnings};
 
-/// Ratio of nodal diameter 4 to 2 from which on its share counts as negligible.
+/// Ratio of nodal diameter 4 to 2 below which nodal diameter 4 counts as negligible.
 const NEGLIGIBLE: f64 = 0.1;
-/// Times that a node must touch to touch again and again.
+/// Minimum number of touches of a node for repeated contact.
 const OFTEN: usize = 2;
 /// Largest residual of a ledger that closes, relative to the energy exchanged.
 const LEDGER: f64 = 1e-9;
@@ -53,7 +53,7 @@ fn capital(word: &str) -> String {
     word[..1].to_uppercase() + &word[1..]
 }
 
-/// The paper's curves of all three nodes come down to zero, several times each.
+/// Checks that the clearances of all three nodes return to zero several times each, as in the paper.
 pub(crate) fn all_nodes_touch(run: &Run, names: &[String], gap: f64) -> Statement {
     let nodes = names.iter().zip(run.least.iter().zip(&run.touches));
     let reported = nodes.map(|(name, (least, touches))| {
@@ -93,7 +93,7 @@ fn listed(shares: &[(f64, f64)]) -> String {
     shares.iter().map(|(speed, share)| format!("{share:.2} at {speed:.0}")).collect::<Vec<_>>().join(", ")
 }
 
-/// Above the resonance of nodal diameter 2 alone: undecided where there is no run.
+/// Checks runs above the resonance of nodal diameter 2 only: undecided without such a run.
 pub(crate) fn prevails(shares: &[(f64, f64)], critical: f64) -> Statement {
     let expected = format!(
         "Nodal diameter {}, that of the oval, dominates nodal diameter {} in every run at or above the critical speed",
@@ -110,7 +110,7 @@ pub(crate) fn prevails(shares: &[(f64, f64)], critical: f64) -> Statement {
     Statement::tested(expected, fast.iter().all(|(_, share)| *share < 1.0), found)
 }
 
-/// Checks the statement of the paper about its figure 12: the share falls all the way, and is negligible in the end.
+/// Checks the statement of the paper about its figure 12: the ratio falls monotonically, and is negligible in the end.
 pub(crate) fn becomes_negligible(shares: &[(f64, f64)], resonance: &str) -> Statement {
     let expected = format!(
         "Nodal diameter {} becomes negligible compared with {} as the angular velocity increases (fig. 12): the ratio \

@@ -12,7 +12,7 @@ fn names() -> Vec<String> {
     ["leading_edge", "mid_chord", "trailing_edge"].map(String::from).to_vec()
 }
 
-/// One node that stays away, or touches once, is not what figure 11 shows.
+/// A node that stays away, or touches only once, does not agree with figure 11.
 #[test]
 fn every_node_must_touch_repeatedly() {
     let holds = |touches| statements::all_nodes_touch(&run(touches), &names(), 1.0).holds;
@@ -22,7 +22,7 @@ fn every_node_must_touch_repeatedly() {
     assert!(found.contains("leading edge 0.100 of the clearance at rest, 0 times"), "{found}");
 }
 
-/// The ratios that an average of the slowest and fastest third let pass.
+/// Ratios that an average over the slowest and fastest third would accept.
 #[test]
 fn fraction_that_persists_or_rises_is_not_negligible() {
     let holds = |ratios: &[f64]| {
@@ -37,7 +37,7 @@ fn fraction_that_persists_or_rises_is_not_negligible() {
     assert_eq!(holds(&[4.85, 0.01]), None);
 }
 
-/// Nothing is said of speeds at which there was no run.
+/// Nothing is stated about speeds without a run.
 #[test]
 fn verdict_uses_every_run_above_the_critical_speed() {
     let holds = |shares: &[(f64, f64)]| statements::prevails(shares, 2.0).holds;

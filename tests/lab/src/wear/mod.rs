@@ -1,4 +1,4 @@
-//! One blade in a coating that closes on it: lobes of the wear beside what the blade vibrates per revolution.
+//! One blade in a coating that closes on it: wear lobes compared with the blade vibrations per revolution.
 
 mod spectrum;
 
@@ -24,24 +24,25 @@ use spectrum::SpectralLine;
 
 /// The scene of all runs, as the guide shows it.
 const SCENE: &str = include_str!("scene.toml");
-/// Communication steps per revolution, and revolutions: of a run, until the casing stands, of a window, before the first one.
+/// Communication steps per revolution, and numbers of revolutions: of a run, until the casing stops, of a window,
+/// before the first window.
 const SAMPLES: u32 = 100;
 const TURNS: u32 = 40;
 const CLOSED: u32 = 32;
 const WINDOW: u32 = 4;
 const FIRST: u32 = 16;
-/// By so much the casing closes (m).
+/// Distance by which the casing closes (m).
 const CLOSING: f64 = 4e-4;
 /// Clearance of the blades that do not touch (m).
 const AWAY: f64 = 5e-3;
-/// Mean addition of a window that is judged (m): a twentieth of the closing.
+/// Mean added wear of a window from which on it is evaluated (m): a twentieth of the closing.
 const JUDGED: f64 = CLOSING / 20.0;
-/// Multiples of what the tip swings at that lobes may stand next to.
+/// Multiples of the vibration frequency of the tip that are compared with the lobes.
 const MULTIPLES: u32 = 3;
-/// Lobes of the casing: wear and vibration are looked at above them.
+/// Number of lobes of the casing: wear and vibration are evaluated above it.
 const CASING: u32 = 2;
 
-/// A run: the speed at which so many times it are the first mode, modes, the internal step (s), and cells around.
+/// A run: frequency of the first mode as a multiple of the speed, modes, the internal step (s), and cells around.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct WearCase {
     order: u32,
@@ -71,43 +72,43 @@ impl WearCase {
     }
 }
 
-/// Results of some revolutions of a run.
+/// Results over some revolutions of a run.
 #[derive(Debug, Clone)]
 struct WearWindow {
     case: WearCase,
     speed: f64,
     /// Second mode without contact, per revolution.
     second: f64,
-    /// Revolution at its end.
+    /// Revolution at the end of the window.
     end: u32,
-    /// At its end: mean and largest (m).
+    /// Wear at the end of the window: mean and largest (m).
     wear: [f64; 2],
-    /// Mean wear that it added (m).
+    /// Mean added wear (m).
     added: f64,
     /// Strongest vibrations of the tip, per revolution.
     swings: Vec<SpectralLine>,
-    /// Largest orders of the wear that it added.
+    /// Largest orders of the added wear.
     lobes: Vec<SpectralLine>,
 }
 
 impl WearWindow {
-    /// While the casing closes, where there is new wear to speak of.
+    /// Returns whether the window is evaluated: while the casing closes, if there is enough new wear.
     fn judged(&self) -> bool {
         self.end <= CLOSED && self.added >= JUDGED
     }
 
-    /// Largest order of the new wear.
+    /// Returns the largest order of the new wear.
     fn order(&self) -> f64 {
         self.lobes.first().map_or(f64::NAN, |line| line.rate)
     }
 
-    /// From there to the nearest of this multiple of what the tip swings at.
+    /// Returns the distance of that order from this multiple of the nearest vibration of the tip.
     fn apart(&self, multiple: u32) -> f64 {
         let apart = |line: &SpectralLine| (f64::from(multiple) * line.rate - self.order()).abs();
         self.swings.iter().map(apart).fold(f64::INFINITY, f64::min)
     }
 
-    /// The nearest of the second mode's.
+    /// Returns the ratio of the nearest vibration to the second mode.
     fn swings_over_second(&self) -> f64 {
         let ratios = self.swings.iter().map(|line| line.rate / self.second);
         ratios.min_by(|a, b| (a - 1.0).abs().total_cmp(&(b - 1.0).abs())).unwrap_or(f64::NAN)
@@ -145,7 +146,7 @@ fn rom(quick: bool, modes: usize, console: &Console) -> Result<Rom> {
     Ok(reduction::rotor37(&options, console)?.rom)
 }
 
-/// The scene, and the second mode per revolution.
+/// Returns the scene, and the second mode per revolution.
 fn scene(rom: &Rom, case: WearCase) -> Result<(Scene, f64)> {
     let mut settings = tiprub_format::parse_scene(SCENE, "scene of the study")?;
     let (squares, _) = dense_modes(&rom.stiffness, &rom.mass).map_err(|error| reduction::failure("modes", error))?;
@@ -164,7 +165,7 @@ fn scene(rom: &Rom, case: WearCase) -> Result<(Scene, f64)> {
     Ok((Scene { settings, roms: vec![rom.clone()] }, squares[1].sqrt() / speed))
 }
 
-/// Clearance of the first patch at all communication points, and the wear map after every revolution (m).
+/// Returns the clearance of the first patch at all communication points, and the wear map after every revolution (m).
 fn run(scene: &Scene) -> tiprub_core::Result<(Vec<f64>, Vec<Vec<f64>>)> {
     let mut simulation = Simulation::new(scene)?;
     let find = |name: &str| simulation.table().find(name).map_or((0, 0), |row| (row.reference, row.len()));
@@ -174,7 +175,7 @@ fn run(scene: &Scene) -> tiprub_core::Result<(Vec<f64>, Vec<Vec<f64>>)> {
     let step = scene.settings.experiment.communication_step;
     let (mut clearances, mut maps) = (Vec::new(), vec![vec![0.0; cells]]);
     for sample in 1..=SAMPLES * TURNS {
-        // What is set is reached at the end of the step.
+        // An input reaches its value at the end of the step.
         let share = f64::from(sample) / f64::from(SAMPLES * CLOSED);
         simulation.set_real(closing, -CLOSING * share.min(1.0))?;
         simulation.do_step(f64::from(sample - 1) * step, step)?;
@@ -304,10 +305,10 @@ fn statements(windows: &[WearWindow]) -> Vec<Statement> {
     ]
 }
 
-/// The study.
+/// Runs the study.
 ///
 /// # Errors
-/// A model that cannot be reduced, a run that is refused.
+/// A model that cannot be reduced, or a run that is rejected.
 pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study> {
     let roms = [PLAIN.modes, 2 * PLAIN.modes].into_iter().take(if arguments.quick { 1 } else { 2 });
     let roms: Vec<(usize, Rom)> =

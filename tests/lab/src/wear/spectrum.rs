@@ -1,21 +1,21 @@
-//! What swings, and how many lobes there are: largest amplitudes by their number per revolution.
+//! Vibrations and numbers of lobes: largest amplitudes by their number per revolution.
 
 use std::f64::consts::TAU;
 
-/// Numbers per revolution looked at, from just above the casing's lobes on.
+/// Largest number per revolution evaluated, starting just above the casing's lobes.
 const MOST: u32 = 40;
 const FINENESS: u32 = 100;
-/// A second one is told where it is at least so much of the largest.
+/// Fraction of the largest from which on a second line is reported.
 const SHARE: f64 = 0.5;
 
-/// Something that comes so many times per revolution.
+/// An oscillation with a number of periods per revolution.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct SpectralLine {
     pub(super) rate: f64,
     pub(super) amplitude: f64,
 }
 
-/// |Σ x exp(-iωk)|.
+/// Returns |Σ x exp(-iωk)|.
 fn transform(values: &[f64], step: f64) -> f64 {
     let each = values.iter().zip(0_u32..).map(|(value, index)| {
         let (sine, cosine) = (step * f64::from(index)).sin_cos();
@@ -25,14 +25,15 @@ fn transform(values: &[f64], step: f64) -> f64 {
     real.hypot(imaginary)
 }
 
-/// The largest one, and a second that is not much smaller.
+/// Returns the largest line, and a second one that is not much smaller.
 fn largest(mut lines: Vec<SpectralLine>) -> Vec<SpectralLine> {
     lines.sort_by(|a, b| b.amplitude.total_cmp(&a.amplitude));
     let least = SHARE * lines.first().map_or(0.0, |line| line.amplitude);
     lines.into_iter().take(2).filter(|line| line.amplitude >= least).collect()
 }
 
-/// Peaks of the spectrum of so many samples per revolution, without what drifts and what is at most `below` per revolution; Hann's window.
+/// Returns the peaks of the spectrum of `per_turn` samples per revolution, without drift and without numbers up to
+/// `below` per revolution; Hann's window.
 pub(super) fn swings(samples: &[f64], per_turn: u32, below: u32) -> Vec<SpectralLine> {
     let count = samples.len() as f64;
     let middle = 0.5 * (count - 1.0);
@@ -54,7 +55,7 @@ pub(super) fn swings(samples: &[f64], per_turn: u32, below: u32) -> Vec<Spectral
     largest(peaks.map(|of| of[1]).collect())
 }
 
-/// Largest orders of a map over the circumference, above `below`.
+/// Returns the largest orders of a map over the circumference, above `below`.
 pub(super) fn lobes(map: &[f64], below: u32) -> Vec<SpectralLine> {
     let count = map.len() as f64;
     let line = |order: u32| {
@@ -72,7 +73,7 @@ mod tests {
         (0..count).map(|index| value(TAU * f64::from(index) / 100.0)).collect()
     }
 
-    /// Two vibrations of any phases on a drift and the casing's lobes.
+    /// Two vibrations of any phase on a drift and the casing's lobes.
     #[test]
     fn detects_vibrations_despite_drift_and_lobes() {
         for (first, second) in [(5.78, 11.56), (8.72, 17.41), (6.59, 12.0)] {

@@ -1,5 +1,5 @@
-//! Reduced blades against the full finite-element model, which nothing was reduced of, stepped and touched by other code than the
-//! product's.
+//! Reduced blades against the full, unreduced finite-element model, with time stepping and contact that share no code
+//! with the product.
 
 mod stress;
 
@@ -36,20 +36,20 @@ pub(crate) use stress::study as stress;
 
 /// Time between samples (s).
 const INTERVAL: f64 = 4e-6;
-/// From the middle of the tip at the start to that of the first bump (rad).
+/// Angle from the middle of the tip at the start to that of the first bump (rad).
 const AHEAD: f64 = 0.5;
 /// Size of the models.
 struct WitnessSize {
     mesh: MeshCounts,
-    /// Samples: two touches, or one.
+    /// Number of samples: two touches, or one.
     samples: usize,
-    /// Steps of the witness in a sample, ascending.
+    /// Numbers of steps of the witness per sample, ascending.
     divisions: [u32; 3],
-    /// Patches of the default and of the refined model.
+    /// Numbers of patches of the default and of the refined model.
     patches: [usize; 2],
-    /// Modes of the default model, then of the refined one.
+    /// Numbers of modes of the default model, and of the refined one.
     modes: [usize; 2],
-    /// Rows of patches across the thickness at most.
+    /// Maximum number of rows of patches across the thickness.
     rows: usize,
 }
 
@@ -74,9 +74,9 @@ const QUICK: WitnessSize = WitnessSize {
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Touching {
     Nodes(usize),
-    /// So many along the chord, in so many rows across the thickness.
+    /// Numbers of patches along the chord and of rows across the thickness.
     Patches(usize, usize),
-    /// Gauss's points of its faces, so many along either direction of a face.
+    /// Gauss points of its faces, with this number along either direction of a face.
     Points(usize),
     /// The nodes of its outline: a tip with sharp sides.
     Sides,
@@ -94,20 +94,21 @@ impl Touching {
     }
 }
 
-/// A reduced model and how the product steps it.
+/// A reduced model and the method with which the product steps it.
 struct WitnessModel {
     name: &'static str,
     touching: Touching,
     modes: usize,
     method: (Scheme, Solver),
-    /// Steps in a sample.
+    /// Number of steps per sample.
     division: u32,
 }
 
-/// A run of the product, or why it was refused.
+/// A run of the product, or the reason why it was rejected.
 type WitnessRun = std::result::Result<RunSummary, String>;
 
-/// Default method and step; short steps, that the model alone is judged; and the paper's.
+/// Default method and step, which is followed by one with short steps, to assess the model alone, one without boundary
+/// mass, and that of the paper.
 const DEFAULT: ((Scheme, Solver), u32) = ((Scheme::ModalExact, Solver::Lcp), 8);
 const FINE: ((Scheme, Solver), u32) = ((Scheme::ModalExact, Solver::Lcp), 64);
 const MASSLESS: ((Scheme, Solver), u32) = ((Scheme::MasslessBoundary, Solver::Lcp), 8);
@@ -138,12 +139,12 @@ impl WitnessSize {
             one("three rows, more modes", patches(few, 3), most, FINE),
             one("two rows, more patches", patches(many, 2), most, FINE),
         ];
-        // Each asks at its start whether closed contact grows, which takes longer than the run.
+        // Each checks at its start whether closed contact grows, which takes longer than the run.
         let quick = ["paper model", "default", "more modes", "two rows, more modes"];
         all.into_iter().filter(|one| self.rows > 2 || quick.contains(&one.name)).collect()
     }
 
-    /// Runs of the witness: what touches, steps in a sample. Of each contact the last has the shortest steps.
+    /// Returns the runs of the witness: contact, steps per sample. The last run of each contact has the shortest steps.
     fn witnesses(&self) -> Vec<(Touching, u32)> {
         let ([few, many], finest) = (self.patches, self.divisions[2]);
         let refined = self.divisions.iter().map(|division| (Touching::Patches(few, 1), *division));
@@ -156,7 +157,7 @@ impl WitnessSize {
     }
 }
 
-/// The scene: that of rotor 37, one blade without damping that meets the first bump soon.
+/// The scene of rotor 37 with one undamped blade that soon reaches the first bump.
 struct WitnessScene {
     size: &'static WitnessSize,
     material: Material,
@@ -179,12 +180,12 @@ impl WitnessScene {
         Ok(setting)
     }
 
-    /// Phase of the bumps (rad): one is ahead of the tip.
+    /// Returns the phase of the bumps (rad): one is ahead of the tip.
     fn phase(&self) -> f64 {
         self.middle + AHEAD - FRAC_PI_2
     }
 
-    /// Contact of a reduced model.
+    /// Returns the contact of a reduced model.
     fn contact(&self, touching: Touching) -> Result<Vec<ContactPoint>> {
         let mesh = &self.blade.mesh;
         let found = match touching {
@@ -238,7 +239,7 @@ impl WitnessScene {
         Ok(reduce_model(model, clamped, &contact, &options, None, &silent).map_err(reported)?.rom)
     }
 
-    /// The scene around a reduced model.
+    /// Returns the scene for a reduced model.
     fn scene(&self, reduced: &WitnessModel) -> Result<Scene> {
         self.scene_of(reduced, self.rom(reduced)?)
     }
@@ -257,12 +258,12 @@ impl WitnessScene {
         Ok(Scene { settings, roms: vec![rom] })
     }
 
-    /// A run, or why it is refused.
+    /// Runs the scene, or returns the reason why it is rejected.
     fn run_reduced(&self, reduced: &WitnessModel) -> Result<WitnessRun> {
         Ok(march(&self.scene(reduced)?, &[], reduced.division, self.size.samples))
     }
 
-    /// The full model, with stress at gauges.
+    /// Runs the full model, with stress at gauges.
     fn run_full(&self, touching: Touching, division: u32, gauges: &[Gauge]) -> Result<BladeHistory> {
         let reported = |error| failure("full model of the blade", error);
         let settings = scene_source::settings("builtin:rotor37-one-row")?;
@@ -281,13 +282,13 @@ impl WitnessScene {
         self.full.march(&parts, &obstacle, steps, (&self.watched()?, gauges)).map_err(reported)
     }
 
-    /// Nodes whose displacements are compared.
+    /// Returns the nodes whose displacements are compared.
     fn watched(&self) -> Result<Vec<usize>> {
         let points = self.blade.contact_points(3).map_err(|error| failure("full model of the blade", error))?;
         Ok(points.iter().map(|point| point.node).collect())
     }
 
-    /// The full model; energy that its steps lose or make beside what contact supplies.
+    /// Runs the full model; also returns the energy that its steps lose or gain in addition to the contact.
     fn run_witness(&self, touching: Touching, division: u32) -> Result<(RunSummary, f64)> {
         let found = self.run_full(touching, division, &[])?;
         let place = |node: &usize| {
@@ -315,7 +316,7 @@ struct WitnessRuns {
 }
 
 impl WitnessRuns {
-    /// The witness with this contact and the shortest steps.
+    /// Returns the witness with this contact and the shortest steps.
     fn witness(&self, touching: Touching) -> Result<&RunSummary> {
         let missing =
             || Failure::new("lab witness", format!("there is no full-model run with {}", touching.name()), "");
@@ -357,13 +358,13 @@ impl WitnessRuns {
 #[derive(Default)]
 struct WitnessRow {
     name: String,
-    /// N·s.
+    /// Impulse (N·s).
     impulse: f64,
-    /// J.
+    /// Friction work (J).
     friction_work: f64,
     own: [Option<f64>; 5],
     sides: [Option<f64>; 5],
-    /// Not the full model with longer steps than another run of it has.
+    /// False for the full model if another run of it has shorter steps.
     finest: bool,
 }
 
@@ -380,8 +381,8 @@ fn shown(value: &Option<f64>) -> String {
     }
 }
 
-/// Every run against the full model with the same contact, then each contact against that at the nodes of the outline: the full model with its
-/// shortest steps, and the reduced ones.
+/// Returns tables of every run against the full model with the same contact, then of each contact against that at the
+/// nodes of the outline: the full model with its shortest steps, and the reduced ones.
 fn tables(rows: &[WitnessRow]) -> String {
     let mut text = String::from(
         "| run | impulse (N·s) | friction work (J) | against the full model with the same contact: displacements | \
@@ -522,7 +523,7 @@ fn results(rows: &[WitnessRow], runs: &WitnessRuns) -> Value {
     json!({ "runs": rows.iter().map(row).collect::<Vec<_>>(), "refused": refused.collect::<Vec<_>>() })
 }
 
-/// The study.
+/// Runs the study.
 ///
 /// # Errors
 /// A model that cannot be reduced, a run that fails, a plot that cannot be drawn.
@@ -530,7 +531,7 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
     let setting = WitnessScene::new(arguments.quick)?;
     let size = setting.size;
     let task = console.task("Full model of the blade", Some(size.witnesses().len() as u64));
-    // The longest first.
+    // The longest runs first.
     let mut asked = size.witnesses();
     asked.sort_by_key(|(_, division)| std::cmp::Reverse(*division));
     let run = |(touching, division): &(Touching, u32)| setting.run_witness(*touching, *division);

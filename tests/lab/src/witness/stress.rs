@@ -1,4 +1,4 @@
-//! Stress that reduced blades recover in a rub, against that of the full finite-element model, by the number of modes.
+//! Recovered stress of reduced blades in a rub, against that of the full finite-element model, by the number of modes.
 
 use nalgebra::{DMatrix, DVector};
 use serde_json::{Value, json};
@@ -17,16 +17,16 @@ use tiprub_study::{
 
 use super::{FINE, GALERKIN, INTERVAL, Touching, WitnessModel, WitnessScene, percent};
 
-/// Modes whose places of largest stress are looked at.
+/// Number of modes whose points of largest stress are evaluated.
 const PLACES: usize = 6;
 
 /// Results of a run, sample by sample.
 struct StressHistory {
     /// Displacements of the watched points (m).
     displacements: Vec<Vec<f64>>,
-    /// Six components of every place (Pa).
+    /// Six stress components at every point (Pa).
     stresses: Vec<Vec<f64>>,
-    /// Von Mises of every place (Pa).
+    /// Von Mises stress at every point (Pa).
     equivalents: Vec<Vec<f64>>,
 }
 
@@ -38,14 +38,14 @@ impl StressHistory {
         (Self { displacements: history.displacements, stresses: history.stresses, equivalents }, history.forces)
     }
 
-    /// Stress at one place beside that of another run (L2).
+    /// Returns the relative difference of the stress at one point from that of another run (L2).
     fn apart_at(&self, other: &Self, place: usize) -> f64 {
         let at = |all: &Vec<f64>| all[STRESSES * place..STRESSES * (place + 1)].to_vec();
         let of = |reported: &Self| reported.stresses.iter().map(at).collect::<Vec<_>>();
         parts_apart(&of(self), &of(other), &[STRESSES])
     }
 
-    /// Largest von Mises of every place (Pa).
+    /// Returns the largest von Mises stress at every point (Pa).
     fn largest(&self) -> Vec<f64> {
         let count = self.equivalents.first().map_or(0, Vec::len);
         let of = |place: usize| self.equivalents.iter().fold(0.0, |most: f64, sample| most.max(sample[place]));
@@ -67,12 +67,13 @@ impl StressHistory {
     }
 }
 
-/// Six components of every place.
+/// Returns the six components at every point.
 fn places(sample: &[f64]) -> impl Iterator<Item = [f64; STRESSES]> {
     sample.chunks_exact(STRESSES).map(|all| std::array::from_fn(|component| all[component]))
 }
 
-/// Relative distances: of histories (L2), of the largest von Mises at the place that has most, and at the place where that is farthest off.
+/// Relative distances: of histories (L2), of the largest von Mises stress at the point with the largest value, and at
+/// the point with the largest error.
 #[derive(Debug, Clone, Copy)]
 struct Apart {
     displacements: f64,
@@ -92,12 +93,12 @@ impl Apart {
     }
 }
 
-/// Numbers of modes, ascending.
+/// Returns the numbers of modes, ascending.
 fn counts(quick: bool) -> &'static [usize] {
     if quick { &[4, 20, 120] } else { &[5, 10, 20, 40, 80, 160, 400] }
 }
 
-/// Steps of the full model in a sample, ascending.
+/// Returns the numbers of steps of the full model per sample, ascending.
 fn divisions(quick: bool) -> &'static [u32] {
     if quick { &[4, 8, 16] } else { &[8, 16, 32] }
 }
@@ -107,7 +108,7 @@ impl WitnessScene {
         self.rom_with(reduced, StressPlaces { modes: PLACES, ..StressPlaces::default() })
     }
 
-    /// Names of the places, and the full model's gauges there.
+    /// Returns the names of the points, and the full model's gauges there.
     fn gauges(&self, rom: &Rom) -> Result<(Vec<String>, Vec<Gauge>)> {
         let missing = || Failure::new("lab stress", "the reduced model has no stress points", "");
         let mesh = &self.blade.mesh;
@@ -126,7 +127,7 @@ impl WitnessScene {
         Ok((points.iter().map(|point| point.name.clone()).collect(), gauges))
     }
 
-    /// Where the places of a ROM are between hub (0) and tip (1), at the mean radii of either.
+    /// Returns the heights of the points of a ROM between hub (0) and tip (1), at the mean radii of either.
     fn heights(&self, rom: &Rom) -> Vec<f64> {
         let mesh = &self.blade.mesh;
         let mean = |set: &str| {
@@ -138,7 +139,7 @@ impl WitnessScene {
         points.map(|point| (point.position[0] - hub) / (tip - hub)).collect()
     }
 
-    /// The product's run, as an importer sees it; or why it is refused.
+    /// Runs the product as an importer does, or returns the reason why it is rejected.
     fn told_by(&self, reduced: &WitnessModel, rom: Rom) -> Result<std::result::Result<StressHistory, String>> {
         let mut scene = self.scene_of(reduced, rom)?;
         scene.settings.outputs.watched_sectors = vec![1];
@@ -146,7 +147,8 @@ impl WitnessScene {
         Ok(run(&scene, self.size.samples).map_err(|error| error.to_string()))
     }
 
-    /// Stress of the same forces at rest, ROM against full model: difference beside the largest.
+    /// Compares the stress of equal forces at rest, ROM against full model; returns the difference relative to the
+    /// largest stress.
     fn at_rest(&self, rom: &Rom, gauges: &[Gauge], touching: Touching) -> Result<f64> {
         let reported = |error| failure("blade at rest", error);
         let solve = || rom.stiffness.clone().cholesky();
@@ -154,7 +156,7 @@ impl WitnessScene {
         let stress = rom.extras.stress.as_ref().map(|stress| stress.map.clone()).unwrap_or_default();
         let (mut off, mut largest) = (0.0_f64, 0.0_f64);
         for (index, point) in self.contact(touching)?.iter().enumerate() {
-            // Inwards and back along the circumference, as a rub does.
+            // Inwards and backwards along the circumference, as in a rub.
             let push = [-1000.0, -150.0, 0.0];
             let mut force = DVector::zeros(rom.contact_map.nrows());
             force.rows_mut(3 * index, 3).copy_from_slice(&push);
@@ -178,7 +180,7 @@ impl WitnessScene {
     }
 }
 
-/// Displacements and stress at the communication points.
+/// Returns displacements and stress at the communication points.
 fn run(scene: &tiprub_core::Scene, samples: usize) -> tiprub_core::Result<StressHistory> {
     let mut simulation = Simulation::new(scene)?;
     simulation.initialise(0.0)?;
@@ -204,7 +206,8 @@ fn run(scene: &tiprub_core::Scene, samples: usize) -> tiprub_core::Result<Stress
     Ok(reported)
 }
 
-/// The reduced model under forces of every step, by the steps that the full model took: what the missing modes alone do.
+/// Runs the reduced model under the forces of every step of the full model, with the steps of the latter, which
+/// isolates the effect of the missing modes.
 fn pushed(rom: &Rom, forces: &[Vec<f64>], division: u32) -> Result<StressHistory> {
     let (squares, shapes) = dense_modes(&rom.stiffness, &rom.mass).map_err(|error| failure("modes", error))?;
     let loads = (&rom.contact_map * &shapes).transpose();
@@ -232,28 +235,29 @@ fn pushed(rom: &Rom, forces: &[Vec<f64>], division: u32) -> Result<StressHistory
     Ok(reported)
 }
 
-/// Everything that is found.
+/// All results of the study.
 struct StressResult {
     names: Vec<String>,
-    /// Radii of the places as shares of the way from hub to tip.
+    /// Heights of the points as fractions of the distance from hub to tip.
     heights: Vec<f64>,
-    /// The full model with steps in a sample, ascending, and the mean forces of its shortest steps.
+    /// Runs of the full model by steps per sample, ascending, and the mean forces of the one with the shortest steps.
     full: Vec<(u32, StressHistory)>,
-    /// By the number of modes: under the full model's forces, and in a rub of its own or why that is refused.
+    /// Runs by the number of modes: under the full model's forces, and in an independent rub or the reason why that is
+    /// rejected.
     reduced: Vec<(usize, StressHistory, std::result::Result<StressHistory, String>)>,
-    /// As it ships, by a tolerance: its modes, and its rub.
+    /// Default model with adaptive steps: its number of modes, and its rub.
     ships: (usize, StressHistory),
-    /// Difference of stress at rest with the fewest modes.
+    /// Difference of stress at rest with the smallest number of modes.
     rest: f64,
 }
 
 impl StressResult {
-    /// The full model with its shortest steps.
+    /// Returns the full model with its shortest steps.
     fn witness(&self) -> &StressHistory {
         &self.full[self.full.len() - 1].1
     }
 
-    /// Rows: name, distance under the same forces and in the same rub.
+    /// Returns the rows: name, distance under the same forces and in the same rub.
     fn rows(&self) -> Vec<(String, Option<Apart>, Option<Apart>)> {
         let witness = self.witness();
         let own = self.full[..self.full.len() - 1].iter().map(|(division, reported)| {
@@ -408,10 +412,11 @@ fn statements(found: &StressResult) -> Vec<Statement> {
     ]
 }
 
-/// The study.
+/// Runs the study.
 ///
 /// # Errors
-/// A model that cannot be reduced, a run of the full model or of what ships that fails, a plot that cannot be drawn.
+/// A model that cannot be reduced, a run of the full model or of the default model that fails, a plot that cannot be
+/// drawn.
 pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study> {
     let setting = WitnessScene::new(arguments.quick)?;
     let found = find(&setting, arguments.quick, console)?;

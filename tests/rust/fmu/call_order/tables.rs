@@ -47,7 +47,7 @@ fmi2GetContinuousStates -
 fmi2GetNominalsOfContinuousStates -
 ";
 
-/// Not called on an instance that must survive, or on none at all.
+/// Functions not called on an instance that is used further, or on any instance.
 pub const FMI2_APART: &str = "fmi2GetTypesPlatform fmi2GetVersion fmi2Instantiate fmi2FreeInstance";
 
 /// FMI 3.0: as above, and U Intermediate Update Mode.
@@ -127,7 +127,7 @@ fmi3ActivateModelPartition -
 pub const FMI3_APART: &str = "fmi3GetVersion fmi3InstantiateModelExchange fmi3InstantiateCoSimulation \
                           fmi3InstantiateScheduledExecution fmi3FreeInstance";
 
-/// Names of functions and states.
+/// Returns the names of functions and states.
 pub fn rows(table: &'static str) -> Vec<(&'static str, &'static str)> {
     let row = |line: &'static str| line.split_once(' ').unwrap_or((line, ""));
     table.lines().filter(|line| !line.is_empty()).map(row).collect()

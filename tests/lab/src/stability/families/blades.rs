@@ -1,7 +1,8 @@
-//! What turning, heat and an engine order do to blades, blades that are not alike, and coatings that are cut.
+//! Effects of rotation, heat and an engine order on blades; mistuned blades, and coatings that are cut.
 //!
-//! Every answer is that of the matrices as they are written: static displacements from K(Ω), free motion from the exponential of the
-//! equations in the rotating frame, the response of every mode to a harmonic force, λ from the static flexibility.
+//! Every reference follows from the matrices directly: static displacements from K(Ω), free motion from the exponential
+//! of the equations in the rotating frame, the response of every mode to a harmonic force, λ from the static
+//! flexibility.
 
 use std::f64::consts::TAU;
 
@@ -22,20 +23,20 @@ use super::decay::modes;
 
 /// Internal step (s).
 const STEP: f64 = 1e-6;
-/// Clearance of blades that touch nothing (m).
+/// Clearance of blades without contact (m).
 const FAR: f64 = 0.02;
 
-/// All of them.
+/// Returns all cases of this family.
 pub(crate) fn cases() -> Vec<StabilityCase> {
     [spin(), mistuning(), excitation(), temperature(), cutting()].into_iter().flatten().collect()
 }
 
-/// All methods with one solver; those that a rule excludes are expected to name it.
+/// Returns all methods with one solver; those that a rule excludes must give the error of the rule.
 fn methods() -> impl Iterator<Item = StabilityMethod> {
     StabilityMethod::all_with(Solver::Lcp)
 }
 
-/// A right answer, or the rule that excludes the scheme.
+/// Expects a correct result, or the rule that excludes the scheme.
 fn unless<const N: usize>(excluded: bool, against: &str, rule: [&str; N]) -> Expected {
     if excluded { Expected::refused(rule) } else { Expected::right(against) }
 }
@@ -44,7 +45,8 @@ fn tower() -> Tower {
     Tower { sectors: 2, mass: [0.1, 1e-2], tip: 2e7, slope: 0.0, turned: 0.3, ..Tower::default() }
 }
 
-/// The tower with what a steady speed does to its point masses: −m in the plane of rotation, 2Ωm across, mR outwards.
+/// Returns the tower with the effect of a steady speed on its point masses: −m in the plane of rotation, 2Ωm across, mR
+/// outwards.
 fn spinning() -> Rom {
     let tower = tower();
     let mut rom = tower.rom();
@@ -71,7 +73,8 @@ fn far(rom: Rom, method: StabilityMethod) -> Scene {
     scene
 }
 
-/// Largest difference of the contact rows of the first sector from `expected`, relative to the largest of these.
+/// Returns the largest difference of the contact rows of the first sector from `expected`, relative to the largest of
+/// these.
 fn off(simulation: &Simulation, expected: &DVector<f64>) -> f64 {
     let row = |row: usize| simulation.system().bank().row(row, 0);
     let off = (0..expected.len()).map(|i| (row(i) - expected[i]).abs()).fold(0.0, worse);
@@ -135,7 +138,7 @@ fn grown(method: StabilityMethod, speed: f64, stiffening: bool) -> Result<Vec<Ch
     .concat())
 }
 
-/// A blade that is let go in its first mode; no damping.
+/// Compares a blade that is released in its first mode, without damping.
 fn turned(method: StabilityMethod, speed: f64) -> Result<Vec<Check>> {
     let mut scene = far(spinning(), method);
     let rotor = &mut scene.settings.structures[0];
@@ -176,7 +179,7 @@ fn turned(method: StabilityMethod, speed: f64) -> Result<Vec<Check>> {
     ])
 }
 
-/// exp(A t) of (q, q̇) with M q̈ + D q̇ + K q = 0.
+/// Returns exp(A t) of (q, q̇) with M q̈ + D q̇ + K q = 0.
 fn propagator(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>, damping: &DMatrix<f64>, time: f64) -> DMatrix<f64> {
     let order = mass.nrows();
     let mut matrix = DMatrix::zeros(2 * order, 2 * order);
@@ -187,7 +190,7 @@ fn propagator(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>, damping: &DMatrix<f
             matrix[(order + i, order + j)] = -damping[(i, j)] / mass[(i, i)];
         }
     }
-    // A Taylor series of a short time, squared.
+    // A Taylor series of a short time, squared repeatedly.
     let short = &matrix * (time / 65_536.0);
     let one = DMatrix::identity(2 * order, 2 * order);
     let series = (1..=12).rev().fold(one.clone(), |sum, power| &one + &short * sum / f64::from(power));
@@ -207,7 +210,7 @@ fn mistuning() -> Vec<StabilityCase> {
     cases
 }
 
-/// Close a round casing on the blades of a scene and wait until they are at rest.
+/// Closes a round casing on the blades of a scene and waits until they are at rest.
 fn at_rest(scene: &Scene, depth: f64) -> Result<(Simulation, StabilityWatch)> {
     let mut scene = scene.clone();
     scene.settings.structures[0].damping_ratio = Some(0.3);
@@ -256,7 +259,7 @@ fn excitation() -> Vec<StabilityCase> {
     cases
 }
 
-/// A tangential force on the tips of five blades, of `ratio` times their first frequency.
+/// Compares blades under a tangential force on the tips of five blades, of `ratio` times their first frequency.
 fn excited(method: StabilityMethod, order: u32, ratio: f64) -> Result<Vec<Check>> {
     let (sectors, damping, force, phase) = (5, 0.05, 20.0, 0.6);
     let rom = Tower { sectors, ..tower() }.rom();
@@ -278,7 +281,7 @@ fn excited(method: StabilityMethod, order: u32, ratio: f64) -> Result<Vec<Check>
     simulation.initialise(0.0)?;
     let response = |row: usize| -> Complex<f64> {
         let each = frequencies.iter().enumerate().map(|(mode, own)| {
-            // Its three highest modes follow the force at once.
+            // Its three highest modes follow the force immediately.
             let per_force = if method.is_massless() && mode >= 3 {
                 Complex::from(1.0 / (own * own))
             } else {
@@ -365,7 +368,8 @@ fn cutting() -> Vec<StabilityCase> {
             let expected = if method.solver != Solver::Lcp {
                 Expected::refused(["solver", "coating"])
             } else if energy > 1e10 && !excluded {
-                // So hard that the cut drags blades around the axis, or feeds tips that vibrate faster than they slide.
+                // The force is so large that the cut drags blades around the axis, or feeds tips that vibrate faster
+                // than they slide.
                 let feeds: &[&str] = &["cutting forces have added"];
                 Expected::either_as(against, &[&["is displaced by", "around the axis"], feeds])
             } else {

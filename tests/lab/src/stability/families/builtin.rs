@@ -1,4 +1,4 @@
-//! The models that ship: rotor 37 and the coupled stage in its elastic casing, and ROMs that are not what they say.
+//! Built-in models: rotor 37 and the coupled stage in its elastic casing, and inconsistent ROMs.
 
 use tiprub_core::{
     Result, Rom, Scene, Simulation,
@@ -17,7 +17,7 @@ use super::{
     limits::massless_step,
 };
 
-/// All of them.
+/// Returns all cases of this family.
 pub(crate) fn cases() -> Vec<StabilityCase> {
     [rotor37(), stage(), exchanged()].into_iter().flatten().collect()
 }
@@ -37,7 +37,8 @@ fn rotor37() -> Vec<StabilityCase> {
                 Scheme::CentralDifference if factor > 1.0 => Expected::refused(["central-difference", "ω_max"]),
                 Scheme::MasslessBoundary if factor > 1.0 => Expected::refused(["massless-boundary"]),
                 Scheme::ModalExact if factor > 50.0 => Expected::refused(["modal-exact", "contact flexibility"]),
-                // Steps of several periods: film closes all patches, and pulls at those that the static solution has open.
+                // Steps of several periods: film closes all patches, with tensile forces at those that the static
+                // solution opens.
                 Scheme::ModalExact if method.solver == Solver::Film && factor > 5.0 => {
                     Expected::refused(["film", "tensile impulse at contact node", "lcp"])
                 }
@@ -68,7 +69,7 @@ fn rotor37() -> Vec<StabilityCase> {
             }
         }
     }
-    // Steps at which growth by the mass of contact nodes goes up and down, whatever it does to the run.
+    // Steps at which growth by the mass of contact nodes varies, whatever its effect on the run.
     for method in StabilityMethod::common().filter(|method| method.solver == Solver::Lcp && !method.is_adaptive()) {
         for friction in [0.15, 0.4, 0.8] {
             for step in [5e-7, 1e-6, 2e-6, 4e-6] {
@@ -82,7 +83,7 @@ fn rotor37() -> Vec<StabilityCase> {
     cases
 }
 
-/// Against bumps that nothing moves.
+/// Rubs against bumps that do not move.
 fn grown(method: StabilityMethod, friction: f64, step: f64) -> Result<Vec<Check>> {
     let Some(rom) = model("rotor37-one-row") else { return Ok(Vec::new()) };
     let mut scene = super::super::models::bumps(rom);
@@ -107,9 +108,9 @@ fn at_limit(method: StabilityMethod, factor: f64) -> CaseEnd {
     CaseEnd::of(press.run())
 }
 
-/// At a share of the limit of closed contact that a refusal tells.
+/// Runs with a fraction of the limit of closed contact that an error contains.
 fn share_of_limit(share: f64, damping: f64) -> CaseEnd {
-    // With few nodes: lightly damped blades come to rest after a second of steps near the limit.
+    // With few nodes: lightly damped blades need a second of steps near the limit to come to rest.
     let Some(rom) = model("rotor37-paper") else { return CaseEnd::refused("the model of rotor 37 is missing") };
     let method = StabilityMethod { scheme: Scheme::MasslessBoundary, ..StabilityMethod::exact(Solver::Lcp) };
     let mut scene = method.on(round(rom));
@@ -140,7 +141,7 @@ fn rubbed(method: StabilityMethod, friction: f64, sense: f64) -> Result<Vec<Chec
     against_finer(&scene, method, 5e-7, 150, 0.1)
 }
 
-/// A scene against itself with a fourth of the step, or a sixteenth of the tolerance.
+/// Compares a scene with the same scene with a fourth of the step, or a sixteenth of the tolerance.
 fn against_finer(scene: &Scene, method: StabilityMethod, step: f64, count: usize, bound: f64) -> Result<Vec<Check>> {
     let run = |method: StabilityMethod, step: f64| -> Result<(Vec<f64>, StabilityWatch)> {
         let mut scene = method.stepping(scene.clone(), step);
@@ -204,7 +205,7 @@ fn on_stage(method: StabilityMethod, friction: f64, load: f64) -> Result<Vec<Che
         scene.settings.structures[1].load =
             scene.settings.structures[1].load.map(|old| tiprub_core::settings::LoadSettings { amplitude: load, ..old });
     }
-    // Much friction makes contact that grows by itself: small steps, before they part.
+    // High friction makes contact unstable: small steps, before the runs diverge.
     let (step, count) = if friction > 0.5 { (2.5e-7, 60) } else { (2e-6, 120) };
     against_finer(&scene, method, step, count, 0.1)
 }
@@ -222,7 +223,8 @@ fn exchanged() -> Vec<StabilityCase> {
     cases
 }
 
-/// A disk whose checks hold the frequencies of each nodal diameter, with two of its harmonics exchanged.
+/// Checks a disk whose checks contain the frequencies of each nodal diameter, with two of its harmonics exchanged if
+/// `swap`.
 fn harmonics(swap: bool) -> Result<Vec<Check>> {
     let tower = Tower { sectors: 8, neighbour: 1e6, ..Tower::default() };
     let mut rom = tower.rom();

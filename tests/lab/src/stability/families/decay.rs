@@ -1,8 +1,10 @@
-//! Free vibration after a release: blades that a casing let go, rings that a load let go, against the decay of each mode.
+//! Free vibration after a release: blades that a casing releases, rings that a load releases, against the decay of each
+//! mode.
 //!
-//! A structure at rest under a force that ends goes on from q₀ = q₋₁ = φᵀf/ω². Without force every scheme is a recurrence whose
-//! two roots a, b are known: e^(−ξωh ± iω√(1 − ξ²)h) where it is exact, those of central differences else. So
-//! q_n = (A aⁿ + B bⁿ) q₀ to rounding, with A + B = A/a + B/b = 1, logarithmic decrement and all.
+//! A structure at rest under a force that ends continues from q₀ = q₋₁ = φᵀf/ω². Without force every scheme is a
+//! recurrence whose two roots a, b are known: e^(−ξωh ± iω√(1 − ξ²)h) for the exact one, otherwise those of central
+//! differences. Therefore q_n = (A aⁿ + B bⁿ) q₀ to rounding, with A + B = A/a + B/b = 1, including the logarithmic
+//! decrement.
 
 use std::f64::consts::{PI, TAU};
 
@@ -19,12 +21,12 @@ use super::super::{
     press::pressed,
 };
 
-/// Depth of the casing before it lets go (m).
+/// Depth of the casing before the release (m).
 const DEPTH: f64 = 5e-5;
-/// The motion is followed until this share of the slowest mode is left.
+/// The motion is followed until this fraction of the slowest mode remains.
 const LEFT: f64 = 1e-4;
 
-/// All of them.
+/// Returns all cases of this family.
 pub(crate) fn cases() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     for method in StabilityMethod::all() {
@@ -46,16 +48,16 @@ pub(crate) fn cases() -> Vec<StabilityCase> {
     cases
 }
 
-/// A blade with one node that is let go.
+/// A blade with one node that is released.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Released {
     /// Method.
     pub method: StabilityMethod,
-    /// Turn of the principal axes of the base (rad).
+    /// Rotation angle of the principal axes of the base (rad).
     pub turned: f64,
     /// Damping ratio of the scene.
     pub ratio: f64,
-    /// Damping ratio that the closed form is told: another one must be found out.
+    /// Damping ratio of the closed form: a different one must be detected.
     pub reported: f64,
 }
 
@@ -71,7 +73,7 @@ impl Decay {
     fn new(scheme: Scheme, frequency: f64, ratio: f64, step: f64) -> Self {
         let (rate, angle) = (ratio * frequency * step, frequency * step);
         let roots = if scheme == Scheme::CentralDifference {
-            // Of (1 + ξωh) z² − (2 − ω²h²) z + (1 − ξωh); real where damping is high and the step coarse.
+            // Roots of (1 + ξωh) z² − (2 − ω²h²) z + (1 − ξωh); real for high damping and a coarse step.
             let (middle, product) = ((1.0 - 0.5 * angle * angle) / (1.0 + rate), (1.0 - rate) / (1.0 + rate));
             let apart = Complex::from(middle * middle - product).sqrt();
             [apart + middle, -apart + middle]
@@ -82,7 +84,7 @@ impl Decay {
         let [a, b] = roots;
         let one = Complex::from(1.0);
         let shares = if scheme == Scheme::Galerkin {
-            // Of the mode itself: one at rest at n = 0, where A ln a + B ln b = 0.
+            // Exact solution of the mode: one at rest at n = 0, where A ln a + B ln b = 0.
             [b.ln() / (b.ln() - a.ln()), a.ln() / (a.ln() - b.ln())]
         } else {
             // One at n = 0 and at n = −1.
@@ -91,18 +93,18 @@ impl Decay {
         Self { roots, shares, radius: a.norm().max(b.norm()) }
     }
 
-    /// Displacement after `n` steps without force, per displacement at rest.
+    /// Returns the displacement after `n` steps without force, per displacement at rest.
     fn at(&self, n: f64) -> f64 {
         self.roots.iter().zip(self.shares).map(|(root, share)| (share * root.powf(n)).re).sum()
     }
 
-    /// Steps until `share` of the motion is left.
+    /// Returns the number of steps until the fraction `share` of the motion remains.
     fn steps(&self, share: f64) -> f64 {
         (share.ln() / self.radius.ln()).ceil()
     }
 }
 
-/// Modes of a pencil with diagonal mass: frequencies (rad/s) ascending, and mass-normalised shapes.
+/// Returns the modes of a pencil with diagonal mass: frequencies (rad/s) ascending, and mass-normalised shapes.
 pub(crate) fn modes(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> (Vec<f64>, DMatrix<f64>) {
     let order = mass.nrows();
     let scale = |i: usize| 1.0 / mass[(i, i)].sqrt();
@@ -114,16 +116,17 @@ pub(crate) fn modes(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> (Vec<f64>,
 }
 
 impl Released {
-    /// Press at rest, let go, and compare the node's displacement in every step.
+    /// Presses at rest, releases, and compares the displacement of the node in every step.
     ///
     /// # Errors
-    /// The scene is refused.
+    /// A rejected scene.
     pub(crate) fn blade(self) -> Result<Vec<Check>> {
         let step = 2e-6;
         let tower = Tower { sectors: 1, turned: self.turned, ..Tower::default() };
         let mut scene = self.method.stepping(round(tower.rom()), step);
         scene.settings.structures[0].damping_ratio = Some(self.ratio);
-        // The casing is taken away at once: by recurrences within a step. Forces of galerkin are continuous, and so is its way.
+        // The casing is removed instantly: within a step for recurrences. The forces of galerkin are continuous, and so
+        // is the motion of its casing.
         if !self.method.is_galerkin() {
             scene.settings.time.input_interpolation = InputInterpolation::Hold;
         }
@@ -138,7 +141,7 @@ impl Released {
         simulation.initialise(0.0)?;
         let settle = 30.0 / (self.ratio * frequencies[0]);
         close(&mut simulation, settle)?;
-        // With the radial depth, λ along the normal of the sloped tip.
+        // With the radial depth; λ along the normal of the sloped tip.
         let length = (1.0 + tower.slope * tower.slope).sqrt();
         let force = pressed(rom, 0.0, DEPTH).multipliers[0] / length;
         let force = DVector::from_row_slice(&[-force, 0.0, tower.slope * force]);
@@ -146,8 +149,8 @@ impl Released {
             .map(|mode| seen.column(mode).dot(&force) / (frequencies[mode] * frequencies[mode]))
             .collect();
         let massless = self.method.is_massless();
-        // The highest modes of both schemes without mass in the contact node have no inertia. With massless-boundary the force acts on
-        // the others one step longer.
+        // In both schemes without mass in the contact node, the highest modes have no inertia. With massless-boundary
+        // the force acts on the others one step longer.
         let late = if massless { 1.0 } else { 0.0 };
         let moving = frequencies.len() - if self.method.scheme.is_massless() { 3 } else { 0 };
         let slowest = decays[..moving].iter().max_by(|a, b| a.radius.total_cmp(&b.radius));
@@ -165,7 +168,8 @@ impl Released {
             .map(|i| (0..frequencies.len()).map(|mode| seen[(i, mode)] * rest[mode]).sum::<f64>() - found[i])
             .fold(0.0, |most: f64, off| worse(most, off.abs()));
         if massless {
-            // Only so far that the force is gone: the one before still acts, and would work on all of the way.
+            // Only far enough to end the force: the previous force still acts, and would do work over the whole
+            // distance.
             let rest = |row: usize| (moving..frequencies.len()).map(|mode| seen[(row, mode)] * rest[mode]).sum::<f64>();
             let open = 1.05 * (rest(0) - tower.slope * rest(2)).abs();
             set(&mut simulation, "casing_radius_change", open - GAP - DEPTH)?;
@@ -185,7 +189,8 @@ impl Released {
             }
             set(&mut simulation, "casing_radius_change", AWAY)?;
         }
-        // The way of the casing takes the force away while it opens the gap by the tip's own displacement, which is a ten-thousandth of a step.
+        // The motion of the casing removes the force while it opens the gap by the displacement of the tip, which takes
+        // a ten-thousandth of a step.
         let bound =
             if self.method.is_galerkin() { 1e-6 + 0.1 * near(&scene, step, frequencies[moving - 1]) } else { 1e-6 };
         Ok(vec![
@@ -204,15 +209,16 @@ impl Released {
     }
 }
 
-/// Where the casing is taken to (m).
+/// Distance by which the casing is removed (m).
 const AWAY: f64 = 2e-2;
 
-/// Returns the accuracy of the release of galerkin: its tolerance, but at most the effect of a force that acts half a step longer.
+/// Returns the accuracy of the release with galerkin: its tolerance, but at most the effect of a force that acts half a
+/// step longer.
 fn near(scene: &tiprub_core::Scene, step: f64, frequency: f64) -> f64 {
     (allowed(scene) / DEPTH).min(0.5 * frequency * step)
 }
 
-/// Close over 2 ms and wait (s).
+/// Closes over 2 ms and waits (s).
 fn close(simulation: &mut Simulation, settle: f64) -> Result<()> {
     let Some(row) = simulation.table().find("casing_radius_change").map(|row| row.reference) else { return Ok(()) };
     simulation.set_input_derivative(row, 1, -(GAP + DEPTH) / 2e-3)?;
@@ -227,10 +233,10 @@ fn close(simulation: &mut Simulation, settle: f64) -> Result<()> {
     Ok(())
 }
 
-/// A ring under a nodal-diameter load that ends; damping `ratio` in the scene, `reported` in the closed form.
+/// Compares a ring under a nodal-diameter load that ends; damping `ratio` in the scene, `reported` in the closed form.
 ///
 /// # Errors
-/// The scene is refused.
+/// A rejected scene.
 pub(crate) fn ring(method: StabilityMethod, order: u32, ratio: f64, reported: f64) -> Result<Vec<Check>> {
     let step = 2e-6;
     let mut scene = method.stepping(round(Tower { slope: 0.0, ..Tower::default() }.rom()), step);
@@ -238,7 +244,7 @@ pub(crate) fn ring(method: StabilityMethod, order: u32, ratio: f64, reported: f6
     scene.settings.structures[1].load = Some(LoadSettings { order, amplitude: 1e4, phase: 0.0 });
     scene.settings.outputs.slave_displacement = true;
     scene.settings.contacts[0].gap = 0.02;
-    // The load is taken off at once.
+    // The load is removed instantly.
     scene.settings.time.input_interpolation = InputInterpolation::Hold;
     let mut simulation = Simulation::new(&scene)?;
     simulation.initialise(0.0)?;

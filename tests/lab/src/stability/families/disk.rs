@@ -1,7 +1,9 @@
-//! Coupled sectors whose waves have a sense: the whole disk at rest under a few blades' forces, and the disk in the mirror.
+//! Coupled sectors whose waves depend on the direction: the whole disk at rest under forces on a few blades, and the
+//! mirrored disk.
 //!
-//! A spring from each sector to the next acts along one direction here and along another one there, so that waves of both
-//! senses differ: an exchange of harmonics with their complex conjugates, of sectors or of senses is seen.
+//! A spring from each sector to the next acts along one direction at this end and along another one at the other end,
+//! so that waves of both directions differ: exchanging harmonics with their complex conjugates, sectors or directions
+//! is detected.
 
 use std::f64::consts::TAU;
 
@@ -23,7 +25,7 @@ const COUPLING: f64 = 8e6;
 /// Depth of the casing (m).
 const DEPTH: f64 = 5e-5;
 
-/// All of them.
+/// Returns all cases of this family.
 pub(crate) fn cases() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     for method in StabilityMethod::all() {
@@ -44,7 +46,7 @@ pub(crate) fn cases() -> Vec<StabilityCase> {
     cases
 }
 
-/// Own stiffness of a sector, and that of a sector (rows) with the next (columns), base and tip by directions.
+/// Returns the stiffness of a sector, and that of a sector (rows) with the next (columns), base and tip by directions.
 fn blocks(tower: &Tower, coupling: f64) -> [DMatrix<f64>; 2] {
     let here = DVector::from_row_slice(&[0.8, 0.5, 0.2, 0.0, 0.0, 0.0]);
     let there = DVector::from_row_slice(&[0.0, 0.3, 0.4, 0.6, -0.3, 0.0]);
@@ -56,7 +58,8 @@ fn tower(sectors: usize) -> Tower {
     Tower { sectors, turned: 0.2, ..Tower::default() }
 }
 
-/// The disk as one pencil per nodal diameter; in the mirror sector s is sector −s, and tangential motion goes the other way.
+/// Returns the disk as one pencil per nodal diameter; in the mirrored disk sector s is sector −s, and tangential motion
+/// is reversed.
 fn disk(sectors: usize, mirrored: bool, conjugate: bool) -> Rom {
     let tower = tower(sectors);
     let [own, next] = blocks(&tower, COUPLING);
@@ -81,7 +84,7 @@ fn disk(sectors: usize, mirrored: bool, conjugate: bool) -> Rom {
     rom
 }
 
-/// Some blades of a disk pressed, the others free to follow.
+/// Some blades of a disk are pressed, the others follow freely.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Still {
     /// Method.
@@ -90,12 +93,12 @@ pub(crate) struct Still {
     pub sectors: usize,
     /// Coefficient µ.
     pub friction: f64,
-    /// Coupling that the closed form is told (N/m): another than that of the disk must be found out.
+    /// Coupling in the closed form (N/m): a value other than that of the disk must be detected.
     pub coupling: f64,
 }
 
 impl Still {
-    /// Displacement of all tips per force on them, from the matrix of the whole disk.
+    /// Returns the displacement of all tips per force on them, from the matrix of the whole disk.
     fn flexibility(self) -> DMatrix<f64> {
         let (count, [own, next]) = (self.sectors, blocks(&tower(self.sectors), self.coupling));
         let mut whole = DMatrix::zeros(6 * count, 6 * count);
@@ -114,10 +117,10 @@ impl Still {
         map.transpose() * moved
     }
 
-    /// Close, come to rest, compare.
+    /// Closes, waits for rest, and compares.
     ///
     /// # Errors
-    /// The scene is refused.
+    /// A rejected scene.
     pub(crate) fn run(self) -> Result<Vec<Check>> {
         let pressed: Vec<usize> = (0..self.sectors).filter(|sector| [0, 3].contains(sector)).collect();
         let rom = disk(self.sectors, false, true);
@@ -176,14 +179,14 @@ impl Still {
     }
 }
 
-/// A rub and the same in the mirror.
+/// A rub and its mirror image.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Mirrored {
     /// Method.
     pub method: StabilityMethod,
     /// Number of sectors.
     pub sectors: usize,
-    /// The mirrored disk has the complex conjugate harmonics; without it must be found out.
+    /// True if the mirrored disk has the complex conjugate harmonics; their absence must be detected.
     pub conjugate: bool,
 }
 
@@ -200,7 +203,7 @@ impl Mirrored {
         scene
     }
 
-    /// Close on the blades and follow them for 1.5 ms.
+    /// Closes on the blades and follows them for 1.5 ms.
     fn history(self, mirrored: bool) -> Result<(Vec<f64>, u64)> {
         let scene = self.scene(mirrored);
         let (mut simulation, mut watch) = begin(&scene)?;
@@ -223,14 +226,14 @@ impl Mirrored {
         Ok((history, watch.contacts))
     }
 
-    /// Run both and compare.
+    /// Runs both and compares.
     ///
     /// # Errors
-    /// The scene is refused.
+    /// A rejected scene.
     pub(crate) fn run(self) -> Result<Vec<Check>> {
         let (first, contacts) = self.history(false)?;
         let (second, _) = self.history(true)?;
-        // Blades are solved one after another until gaps hold, to a fraction of the tolerance.
+        // Blades are solved one after the other until the gaps hold, to a fraction of the tolerance.
         let bound = 1e-8 + allowed(&self.scene(false)) / GAP;
         Ok(vec![
             Check::so("the blades touched", contacts > if self.method.is_adaptive() { 10 } else { 100 }),

@@ -1,4 +1,4 @@
-//! Free bodies by themselves and against one plate: flights, impacts, rebounds, from hardly moving to far too fast.
+//! Single free bodies, also against one plate: flights, impacts, rebounds, from almost at rest to far too fast.
 
 use tiprub_core::{
     Result, Simulation,
@@ -15,12 +15,12 @@ use super::decay::modes;
 
 /// Internal step of most cases (s).
 pub(crate) const STEP: f64 = 1e-6;
-/// Methods of free bodies.
+/// Returns the methods of free bodies.
 pub(crate) fn methods() -> impl Iterator<Item = StabilityMethod> {
     StabilityMethod::all().filter(|method| !method.is_massless())
 }
 
-/// A right answer, or the rule that excludes bodies with as few modes as contact nodes have directions.
+/// Expects a correct result, or the rule that excludes bodies with as few modes as contact nodes have directions.
 pub(crate) fn unless_few_modes(method: StabilityMethod, expected: Expected) -> Expected {
     if method.is_galerkin() {
         Expected::refused(["galerkin", "more than three modes per contact node"])
@@ -29,34 +29,34 @@ pub(crate) fn unless_few_modes(method: StabilityMethod, expected: Expected) -> E
     }
 }
 
-/// All of them.
+/// Returns all cases of this family.
 pub(crate) fn cases() -> Vec<StabilityCase> {
     [flights(), tunnels(), impacts(), rebounds(), bounces()].into_iter().flatten().collect()
 }
 
-/// Thrown without friction.
+/// Returns a throw without friction.
 pub(crate) fn throw(body: LumpChain, velocity: [f64; 3], plates: Vec<Plate>) -> Throw {
     Throw { body, velocity, plates, friction: 0.0, method: StabilityMethod::exact(Solver::Lcp), step: STEP }
 }
 
-/// At time 0.
+/// Initialises the simulation at time 0.
 ///
 /// # Errors
-/// The scene is refused.
+/// A rejected scene.
 pub(crate) fn started(throw: &Throw) -> Result<Simulation> {
     let mut simulation = Simulation::new(&throw.scene())?;
     simulation.initialise(0.0)?;
     Ok(simulation)
 }
 
-/// Length of a vector.
+/// Returns the length of a vector.
 pub(crate) fn size(v: [f64; 3]) -> f64 {
-    // Scaled: squares of what is tiny or huge leave the range of numbers.
+    // Scaled, because squares of tiny or huge values leave the range of numbers.
     let largest = v.iter().fold(0.0, |most: f64, x| worse(most, x.abs()));
     if largest == 0.0 { 0.0 } else { largest * v.iter().map(|x| (x / largest).powi(2)).sum::<f64>().sqrt() }
 }
 
-/// Length of a difference.
+/// Returns the length of a difference.
 pub(crate) fn apart(a: [f64; 3], b: [f64; 3]) -> f64 {
     size(std::array::from_fn(|i| a[i] - b[i]))
 }
@@ -80,7 +80,7 @@ fn flights() -> Vec<StabilityCase> {
 
 fn flight(method: StabilityMethod, speed: f64, mass: f64) -> Result<Vec<Check>> {
     let velocity = [speed, -2.0 / 3.0 * speed, 0.1 * speed];
-    // ω h is the same whatever the mass.
+    // ω h is equal for any mass.
     let body = LumpChain::elastic(&[0.2 * mass, 0.5 * mass, 0.3 * mass], 1e9 * mass);
     let body = if method.is_galerkin() { body.with_middles() } else { body };
     let count = 2 * body.corners;
@@ -137,20 +137,20 @@ fn tunnels() -> Vec<StabilityCase> {
     cases
 }
 
-/// A body of one lump that hits a plate obliquely.
+/// A body of one mass that hits a plate obliquely.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Impact {
     /// Method.
     pub method: StabilityMethod,
-    /// Towards the plate (m/s).
+    /// Speed towards the plate (m/s).
     pub speed: f64,
     /// Mass (kg).
     pub mass: f64,
     /// Coefficient µ.
     pub friction: f64,
-    /// Along the plate per speed towards it.
+    /// Speed along the plate, relative to the one towards it.
     pub along: f64,
-    /// The closed form is told this share of the mass: another than 1 must be found out.
+    /// Fraction of the mass in the closed form: a value other than 1 must be detected.
     pub share: f64,
 }
 
@@ -159,7 +159,7 @@ fn impacts() -> Vec<StabilityCase> {
     for method in methods() {
         for speed in [1e-6, 1e-3, 1.0, 100.0, 0.9 * FURTHEST / STEP] {
             for mass in [1e-12, 1.0, 1e12] {
-                // Film and lcp know sliding only: bodies that friction stops are for coulomb.
+                // Film and lcp model sliding only: bodies that friction stops require coulomb.
                 for (friction, along) in [(0.0, 0.5), (0.15, 0.5), (0.49, 0.5), (1.0, 0.5), (2.0, 0.9), (0.15, 0.0)] {
                     if method.solver != Solver::Coulomb && friction > 0.9 * along {
                         continue;
@@ -179,10 +179,10 @@ fn impacts() -> Vec<StabilityCase> {
 }
 
 impl Impact {
-    /// Fly, hit, slide on.
+    /// Lets the body fly, hit and slide on.
     ///
     /// # Errors
-    /// The scene is refused.
+    /// A rejected scene.
     pub(crate) fn run(self) -> Result<Vec<Check>> {
         let (speed, mass, sideways) = (self.speed, self.mass * self.share, self.along * self.speed);
         let velocity = [-speed, 0.8 * sideways, -0.6 * sideways];
@@ -205,7 +205,7 @@ impl Impact {
         let after = [0.0, velocity[1] * kept, velocity[2] * kept];
         let exact: [f64; 3] = std::array::from_fn(|i| mass * (after[i] - velocity[i]));
         let energy = |v: f64| 0.5 * mass * v * v;
-        // Places round to 1e-17 m, whatever the speed.
+        // Positions round to 1e-17 m at any speed.
         let bound = 1e-9 + 1e-16 / (speed * STEP);
         let all = energy(speed) + energy(sideways);
         let mut checks = vec![
@@ -248,7 +248,7 @@ fn rebounds() -> Vec<StabilityCase> {
     for method in methods() {
         for ratio in [1e-6, 1e-2, 1.0, 10.0] {
             for speed in [1e-6, 1.0, 10.0] {
-                // 10 m/s move the rear lump by 10 mm, more than what counts as small.
+                // 10 m/s move the rear mass by 10 mm, above the limit of small displacements.
                 let expected = if speed > 5.0 {
                     Expected::refused(["moved relative to each other", "Check positions and velocity"])
                 } else {
@@ -264,14 +264,14 @@ fn rebounds() -> Vec<StabilityCase> {
     cases
 }
 
-/// Three lumps with one node on each face, none of whose own modes has inertia with galerkin.
+/// Returns cases of three masses with one node on each face, none of whose local modes has inertia with galerkin.
 fn bounces() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     for method in methods().filter(|method| method.is_galerkin()) {
         for speed in [1e-6, 1e-3, 0.1, 1.0] {
             for friction in [0.0, 0.15] {
                 let against = "contact for half a period on the flexibility of the body, impulse 2Mv, no loss";
-                // Nothing slides, and lcp knows sliding only.
+                // Nothing slides, and lcp models sliding only.
                 let expected = if friction > 0.0 && method.solver == Solver::Lcp {
                     Expected::either(against, ["friction has added", "not model sticking"])
                 } else {
@@ -286,7 +286,8 @@ fn bounces() -> Vec<StabilityCase> {
     cases
 }
 
-/// A mass on the static flexibility G of its front node leaves a plate after π√(GM), as fast as it came.
+/// Compares the bounce of a mass on the static flexibility G of its front node, which leaves a plate after π√(GM) at
+/// its approach speed.
 fn bounce(method: StabilityMethod, speed: f64, friction: f64) -> Result<Vec<Check>> {
     let body = LumpChain::elastic(&[0.05, 0.1, 0.05], 1e6).with_middles();
     let (rom, mass) = (body.rom(), body.mass());
@@ -304,7 +305,7 @@ fn bounce(method: StabilityMethod, speed: f64, friction: f64) -> Result<Vec<Chec
         impulse += length * real(&simulation, "force_x");
         residual = worse(residual, real(&simulation, "energy_residual_relative").abs());
     }
-    // It is where it flies after half a period at the plate.
+    // Its position after half a period at the plate, plus the flight since then.
     let place = -0.37 * speed * LONGEST + speed * (simulation.time() - 0.37 * LONGEST - held);
     let bound = BOUNCED + ROUNDED / deepest;
     Ok(vec![
@@ -319,12 +320,13 @@ fn bounce(method: StabilityMethod, speed: f64, friction: f64) -> Result<Vec<Chec
     ])
 }
 
-/// Relative error of a bounce: of the tolerance of its steps.
+/// Relative error of a bounce, from the tolerance of its steps.
 const BOUNCED: f64 = 1e-4;
-/// Distance that precision and rounding of gaps leave (m): a thousandth of the tolerance.
+/// Distance caused by precision and rounding of gaps (m): a thousandth of the tolerance.
 const ROUNDED: f64 = 4e-12;
 
-/// Two lumps: the front one is stopped by the plate, the rear one swings back on the spring and pulls it off after T = π/ω.
+/// Compares two masses: the plate stops the front one, the rear one moves back on the spring and pulls it off after T =
+/// π/ω.
 fn rebound(method: StabilityMethod, ratio: f64, speed: f64) -> Result<Vec<Check>> {
     let (rear, spring) = (0.1, 1e5);
     let front = ratio * rear;
@@ -348,7 +350,7 @@ fn rebound(method: StabilityMethod, ratio: f64, speed: f64) -> Result<Vec<Check>
     let held = last - touched.unwrap_or(f64::NAN);
     let (exact, total) = ((front + 2.0 * rear) * speed, front + rear);
     let after = rear * speed / total;
-    // Places round to 1e-17 m; the impact lies somewhere within a step.
+    // Positions round to 1e-17 m; the impact lies anywhere within a step.
     let bound = 2.0 * omega * step + 1e-16 / (speed * step);
     Ok(vec![
         Check::at_most(

@@ -1,4 +1,4 @@
-//! Friction from none to 2 with every solver in both senses; speeds at rest, tiny, reversed, jumping.
+//! Friction from 0 to 2 with every solver in both directions; speeds at rest, tiny, reversed, jumping.
 
 use tiprub_core::{
     Result, Scene,
@@ -14,7 +14,7 @@ use super::super::{
 
 const COEFFICIENTS: [f64; 6] = [0.0, 0.15, 0.5, 1.0, 1.5, 2.0];
 
-/// All of them.
+/// Returns all cases of this family.
 pub(crate) fn cases() -> Vec<StabilityCase> {
     coefficients().into_iter().chain(speeds()).collect()
 }
@@ -22,8 +22,8 @@ pub(crate) fn cases() -> Vec<StabilityCase> {
 /// Angle of the principal axes at which the flexibility couples radius and circumference.
 const TURNED: f64 = 0.45;
 
-/// −w_rr/w_rθ of the turned tower: beyond it W = w_rr + µ w_rθ is negative where tips slide along +θ, and never where they
-/// slide along −θ.
+/// Returns −w_rr/w_rθ of the turned tower: for a larger µ, W = w_rr + µ w_rθ is negative for tips that slide along +θ,
+/// and never for those that slide along −θ.
 fn turned_limit() -> f64 {
     let tower = Tower { turned: TURNED, slope: 0.0, ..Tower::default() };
     let (sine, cosine) = TURNED.sin_cos();
@@ -71,7 +71,7 @@ fn sliding(model: &str, friction: f64, method: StabilityMethod, sense: f64) -> C
             CaseEnd::answer(checks)
         }
         Err(error) => {
-            // A refusal is right where W loses its sign statically, or where the scheme or the contact grows.
+            // An error is correct if W loses its sign statically, or if the scheme or the contact grows.
             let message = error.to_string();
             let lost = sense > 0.0 && friction >= 0.99 * turned_limit();
             let text = format!("static contact lost from µ = {:.3}, or the message names growth", turned_limit());
@@ -109,7 +109,7 @@ fn speeds() -> Vec<StabilityCase> {
         for (course, text) in
             [("reversal", "torque −µΣλr in both directions of rotation"), ("jump", "unchanged torque −µΣλr")]
         {
-            // A speed that passes 0 is one at which tips stick.
+            // A speed that passes 0 lets tips stick.
             let expected = if course == "reversal" { slow(solver, 0.0, text) } else { Expected::right(text) };
             cases.add(lcp, format!("speed/{course}/{name}"), expected, move || changing(method, course));
         }
@@ -123,7 +123,8 @@ fn speeds() -> Vec<StabilityCase> {
     cases
 }
 
-/// Where tips stick, a law that only slides may end the run because its friction puts energy in.
+/// Expects a correct result; with sticking tips and a law without sticking also an error, because its friction adds
+/// energy.
 fn slow(solver: Solver, speed: f64, against: &str) -> Expected {
     if solver == Solver::Coulomb || speed.abs() >= 1.0 {
         return Expected::right(against);
@@ -131,7 +132,7 @@ fn slow(solver: Solver, speed: f64, against: &str) -> Expected {
     Expected::either(against, ["friction has added", "not model sticking"])
 }
 
-/// A pressed round casing at one speed. The normal forces do not know of it; friction is at most µλ.
+/// Compares a pressed round casing at one speed. The normal forces do not depend on it; friction is at most µλ.
 fn steady(method: StabilityMethod, speed: f64) -> Result<Vec<Check>> {
     let tower = Tower { slope: 0.0, ..Tower::default() };
     let mut scene = method.stepping(round(tower.rom()), 2e-6);
@@ -150,7 +151,8 @@ fn steady(method: StabilityMethod, speed: f64) -> Result<Vec<Check>> {
     let mut checks = watch.complementarity();
     checks.push(watch.ledger());
     checks.push(Check::so("all outputs finite", watch.finite));
-    // Film and lcp know sliding only: the work of their friction means nothing where tips stick, and the start must say so.
+    // Film and lcp model sliding only: the work of their friction is meaningless for sticking tips, and a warning at
+    // the start must state this.
     if method.solver != Solver::Coulomb && speed.abs() < 1.0 {
         let reported = simulation.warnings().iter().any(|text| text.contains("sticking"));
         checks.push(Check::so("a warning that sticking is not modelled", reported));
@@ -180,7 +182,7 @@ fn near(scene: &Scene) -> f64 {
     1e-3 * allowed(scene) / 5e-5
 }
 
-/// Speed changes while pressed: friction turns round with the sense of sliding and knows nothing of its size.
+/// Changes the speed of pressed tips: friction reverses with the direction of sliding and does not depend on its speed.
 fn changing(method: StabilityMethod, course: &str) -> Result<Vec<Check>> {
     let tower = Tower { slope: 0.0, ..Tower::default() };
     let mut scene = method.stepping(round(tower.rom()), 2e-6);
@@ -218,7 +220,7 @@ fn changing(method: StabilityMethod, course: &str) -> Result<Vec<Check>> {
     Ok(checks)
 }
 
-/// Speed changes while blades rub on two bumps: compared with a finer step before small differences have grown.
+/// Changes the speed while blades rub on two bumps: compared with a finer step before small differences have grown.
 fn on_bumps(method: StabilityMethod, course: &'static str) -> Result<Vec<Check>> {
     let run = |method: StabilityMethod, step: f64| -> Result<(Vec<f64>, StabilityWatch)> {
         let mut scene = method.stepping(bumps(blade(12)), step);
@@ -231,7 +233,7 @@ fn on_bumps(method: StabilityMethod, course: &'static str) -> Result<Vec<Check>>
             let time = f64::from(index) * length;
             let speed = match course {
                 "reversal" => 1300.0 * (1.0 - 2.0 * ((time - 5e-4) / 1e-3).clamp(0.0, 1.0)),
-                // Film and lcp know sliding only: they are compared while the tips slide.
+                // Film and lcp model sliding only: they are compared while the tips slide.
                 "stop" if method.solver != Solver::Coulomb => (1300.0 * (1.0 - time / 1.5e-3)).max(130.0),
                 "jump" => {
                     if time < 1e-3 {

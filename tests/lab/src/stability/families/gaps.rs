@@ -1,4 +1,4 @@
-//! Clearances from nothing to too much, contact nodes at one place, numbers of sectors, amplitudes down to denormals.
+//! Clearances from zero to too large, coincident contact nodes, numbers of sectors, amplitudes down to denormals.
 
 use tiprub_core::{Result, Scene, Simulation, settings::Solver};
 
@@ -9,7 +9,7 @@ use super::super::{
     press::Press,
 };
 
-/// All of them.
+/// Returns all cases of this family.
 pub(crate) fn cases() -> Vec<StabilityCase> {
     [clearances(), redundant(), sectors(), whole_casing(), scales()].into_iter().flatten().collect()
 }
@@ -30,7 +30,7 @@ fn clearances() -> Vec<StabilityCase> {
             let expected = if method.is_galerkin() && gap < 1e-11 {
                 Expected::either(against, ["the contact problem", "no solution"])
             } else if method.solver == Solver::Film && gap < 1e-18 {
-                // So does film, which leaves nodes inside by rounding: many times such a clearance.
+                // The same applies to film, whose penetration by rounding is a multiple of such a clearance.
                 Expected::either(against, ["film has left contact node", "Use solver"])
             } else {
                 Expected::right(against)
@@ -158,7 +158,7 @@ fn sectors() -> Vec<StabilityCase> {
     cases
 }
 
-/// A blade that is missing is one far from the casing; uncoupled sectors do not feel it.
+/// Compares a missing blade with one far from the casing; uncoupled sectors are not affected.
 fn missing(method: StabilityMethod) -> Result<Vec<Check>> {
     let run = |gaps: Vec<f64>| -> Result<Vec<f64>> {
         let mut scene = tower_scene(method);
@@ -188,7 +188,7 @@ fn missing(method: StabilityMethod) -> Result<Vec<Check>> {
     ])
 }
 
-/// A cubic through 36 points of the circle is off it by at most R (2π/36)⁴/384 (m).
+/// Largest deviation of a cubic through 36 points of the circle, R (2π/36)⁴/384 (m).
 const ROUNDNESS: f64 = 6.1e-7;
 
 fn whole_casing() -> Vec<StabilityCase> {
@@ -208,8 +208,9 @@ fn whole_casing() -> Vec<StabilityCase> {
     cases
 }
 
-/// All nodes of all blades closed for long. Twelve blades on a ring of 36 nodes are alike, so that the ring answers with its
-/// two round modes alone: its flexibility per blade is 12 (0.5)²/ω² at the node's place along the axis.
+/// Compares permanently closed contact of all nodes of all blades. Twelve blades on a ring of 36 nodes are equal, so
+/// that only the two round modes of the ring respond: its flexibility per blade is 12 (0.5)²/ω² at the axial position
+/// of the node.
 fn closed_long(method: StabilityMethod, friction: f64, flexible: bool) -> Result<Vec<Check>> {
     let tower = Tower { slope: 0.0, ..Tower::default() };
     let mut scene = method.stepping(round(tower.rom()), 2e-6);
@@ -217,7 +218,7 @@ fn closed_long(method: StabilityMethod, friction: f64, flexible: bool) -> Result
     scene.settings.structures[0].damping_ratio = Some(0.3);
     if flexible {
         on_ring(&mut scene, 0.3);
-        // A spline through 36 points of a circle ripples by 0.1 µm, which fast blades feel.
+        // A spline through 36 points of a circle has ripples of 0.1 µm, which affect fast blades.
         scene.settings.structures[0].speed = 10.0;
     }
     let length = scene.settings.experiment.communication_step;
@@ -261,7 +262,7 @@ fn scales() -> Vec<StabilityCase> {
         for method in StabilityMethod::common() {
             for friction in [0.0, 0.15] {
                 let against = "every λ scaled by the same power of two; time per step";
-                // A tolerance of such lengths is near the smallest numbers.
+                // The tolerance of such lengths is close to the smallest numbers.
                 let expected = if method.is_galerkin() && method.solver == Solver::Coulomb && exponent < -600 {
                     Expected::either(against, ["the contact problem", "no solution"])
                 } else {
@@ -276,19 +277,19 @@ fn scales() -> Vec<StabilityCase> {
     cases
 }
 
-/// Round contact without inertia of sliding is homogeneous: lengths times 2ⁿ give forces times 2ⁿ, in floating point bit by
-/// bit until numbers leave the normal range.
+/// Compares scaled scenes: round contact without inertia of sliding is homogeneous, so that lengths times 2ⁿ give
+/// forces times 2ⁿ, in floating point bit by bit until numbers leave the normal range.
 fn scaled(exponent: i32, method: StabilityMethod, friction: f64) -> Result<Vec<Check>> {
     let (plain, calm) = small_rub(0, method, friction)?;
     let (small, time) = small_rub(exponent, method, friction)?;
     let scale = power_of_two(exponent);
     let largest = plain.iter().fold(0.0, |most: f64, force| most.max(*force));
     let off = plain.iter().zip(&small).fold(0.0, |most: f64, (a, b)| {
-        // Divided in two parts: the inverse of the scale may not exist.
+        // Divided in two parts, because the inverse of the scale may not exist.
         let back = b / power_of_two(exponent / 2) / (scale / power_of_two(exponent / 2));
         most.max((back - a).abs() / largest)
     });
-    // Below 1e-150 modes are flushed to rest every 512 steps: what is left are forces of the size of the scaled ones.
+    // Below 1e-150 modes are flushed to rest every 512 steps: the remaining forces have the size of the scaled ones.
     let (bound, most) = if exponent > -440 { (1e-12, 1.0 + 1e-12) } else { (f64::INFINITY, 10.0) };
     let negative = small.iter().fold(0.0, |most: f64, force| most.max(-force));
     Ok(vec![
@@ -304,19 +305,19 @@ fn scaled(exponent: i32, method: StabilityMethod, friction: f64) -> Result<Vec<C
     ])
 }
 
-/// The clock of processor time ticks: less than this per step (s) it cannot tell.
+/// Resolution of the clock of processor time, per step (s).
 const LEAST_TIME: f64 = 5e-7;
 
-/// 2ⁿ, denormals included.
+/// Returns 2ⁿ, including denormals.
 fn power_of_two(exponent: i32) -> f64 {
     let half = 2_f64.powi(exponent / 2);
     half * 2_f64.powi(exponent - exponent / 2)
 }
 
-/// λ of a casing that swings into blades, all lengths times 2ⁿ, and processor time per step (s).
+/// Returns λ of a casing that oscillates into blades, all lengths times 2ⁿ, and processor time per step (s).
 fn small_rub(exponent: i32, method: StabilityMethod, friction: f64) -> Result<(Vec<f64>, f64)> {
     let scale = power_of_two(exponent);
-    // Without coupling of radius and circumference the sense of sliding does not change.
+    // Without coupling of radius and circumference the direction of sliding does not change.
     let tower = Tower { slope: 0.0, ..Tower::default() };
     let mut scene = method.stepping(round(tower.rom()), 2e-6);
     scene.settings.contacts[0].friction = friction;
@@ -337,7 +338,8 @@ fn small_rub(exponent: i32, method: StabilityMethod, friction: f64) -> Result<(V
     Ok((forces, (processor_time() - clock) / f64::from(count)))
 }
 
-/// Processor time of this process's only working thread (s), as the system counts it; 0 where it does not tell.
+/// Returns the processor time of the only working thread of this process (s), as the system reports it; 0 if it does
+/// not.
 pub(crate) fn processor_time() -> f64 {
     let reported = std::fs::read_to_string("/proc/self/schedstat").unwrap_or_default();
     reported

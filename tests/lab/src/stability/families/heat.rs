@@ -1,6 +1,7 @@
-//! Friction heat again: ∫ µ λ |v| dt from recorded normal forces and places of the tips, which the ledger knows nothing of.
+//! Independent computation of the friction heat: ∫ µ λ |v| dt from recorded normal forces and positions of the tips,
+//! without the ledger.
 //!
-//! A force that acts between t − h and t + h does its work over (x(t + h) − x(t − h))/2, Ωrh included.
+//! The work of a force that acts between t − h and t + h is that over (x(t + h) − x(t − h))/2, including Ωrh.
 
 use std::f64::consts::TAU;
 
@@ -24,11 +25,11 @@ pub(crate) struct HeatedBlades {
     pub friction: f64,
     /// Speed (rad/s).
     pub speed: f64,
-    /// The integral is told this share of µ: another than 1 must be found out.
+    /// Fraction of µ in the integral: a value other than 1 must be detected.
     pub share: f64,
 }
 
-/// All of them.
+/// Returns all cases of this family.
 pub(crate) fn cases() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     for method in StabilityMethod::all() {
@@ -46,17 +47,17 @@ pub(crate) fn cases() -> Vec<StabilityCase> {
 }
 
 impl HeatedBlades {
-    /// Rub, and add up.
+    /// Runs the rub and sums the heat.
     ///
     /// # Errors
-    /// The scene is refused.
+    /// A rejected scene.
     pub(crate) fn run(self) -> Result<Vec<Check>> {
         let tower = Tower { slope: 0.0, ..Tower::default() };
         let mut scene = self.method.stepping(round(tower.rom()), STEP);
         scene.settings.contacts[0].friction = self.friction;
         scene.settings.structures[0].speed = self.speed;
         scene.settings.structures[0].damping_ratio = Some(0.02);
-        // Ten times as far where the tolerance chooses the step.
+        // Ten times as long if the tolerance chooses the step.
         let length = if self.method.is_adaptive() { 10.0 * STEP } else { STEP };
         let mut simulation = Simulation::new(&scene)?;
         simulation.initialise(0.0)?;
@@ -79,7 +80,7 @@ impl HeatedBlades {
                 found = [0.0; 12];
                 simulation.system().events().iter().for_each(|event| found[event.sector] = event.normal);
             }
-            // Massless-boundary: forces found in one step act over the next.
+            // Massless-boundary: forces computed in one step act over the next.
             let acting = if late { forces } else { found };
             for sector in 0..12 {
                 let moved = if galerkin { now[sector] - before[sector] } else { 0.5 * (now[sector] - oldest[sector]) };
@@ -94,7 +95,7 @@ impl HeatedBlades {
             (oldest, before, forces) = (before, now, found);
         }
         let booked = real(&simulation, "friction_loss");
-        // The product of two means is not the mean of the product: of second order in the communication step.
+        // The product of two means is not the mean of the product: second order in the communication step.
         let bound = if galerkin { 1e-5 * (length / STEP).powi(2) } else { 1e-9 };
         Ok(vec![
             Check::so("the tips touched, and all slide in one direction", touched > 100 && reversed < 0.0),

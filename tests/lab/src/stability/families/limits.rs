@@ -1,4 +1,4 @@
-//! Step sizes across the limits of the schemes, and stiffness that spans many orders of magnitude.
+//! Step sizes around the limits of the schemes, and stiffness that spans many orders of magnitude.
 
 use tiprub_core::{
     Scene, Simulation,
@@ -13,12 +13,12 @@ use super::super::{
 
 const FACTORS: [f64; 5] = [0.9, 0.999, 1.001, 1.5, 10.0];
 
-/// All of them.
+/// Returns all cases of this family.
 pub(crate) fn cases() -> Vec<StabilityCase> {
     [step_limit(), ratios(), massless()].into_iter().flatten().collect()
 }
 
-/// Largest usable step of massless-boundary (s), as its refusal of a long one names it.
+/// Returns the largest usable step of massless-boundary (s), from its error for a long step.
 pub(crate) fn massless_step(scene: &Scene) -> Option<f64> {
     let scene = with_step(with_methods(scene.clone(), Scheme::MasslessBoundary, Solver::Lcp), 1e-2);
     let refusal = Simulation::new(&scene).and_then(|mut simulation| simulation.initialise(0.0)).err()?.to_string();
@@ -32,7 +32,7 @@ fn step_limit() -> Vec<StabilityCase> {
             let against = "static contact, signs of the energy terms";
             let quick = model == "tower" && friction > 0.0 && method.solver == Solver::Lcp;
             if method.is_adaptive() {
-                // The tolerance in place of the step.
+                // The tolerance instead of the step.
                 for tolerance in [1e-9, 1e-6, 1e-3, 0.1] {
                     let name = format!("step-limit/{}/{model}/µ={friction}/tolerance={tolerance:e}", method.name());
                     let work = move |_: &_| at(method.within(tolerance), friction, model, 1.0);
@@ -48,7 +48,8 @@ fn step_limit() -> Vec<StabilityCase> {
                     Scheme::MasslessBoundary if factor > 1.0 => {
                         Expected::refused(["massless-boundary", "internal step"])
                     }
-                    // Three nodes that push each other apart: film, which looks once, need not come to the static solution.
+                    // Three nodes that push each other apart: film, which does not iterate, need not converge to the
+                    // static solution.
                     _ if method.solver == Solver::Film && model == "blade" => Expected::either_as(
                         against,
                         &[
@@ -58,7 +59,7 @@ fn step_limit() -> Vec<StabilityCase> {
                         ],
                     ),
                     _ if friction > 0.0 && model == "blade" => Expected::either(against, ["grows"]),
-                    // A mode near ωh = π may come to hold energy that nobody supplied.
+                    // A mode near ωh = π may gain spurious energy.
                     Scheme::ModalExact if factor > 1.0 => {
                         Expected::either(against, ["kinetic and strain energy", "does not resolve"])
                     }
@@ -79,7 +80,7 @@ fn at(method: StabilityMethod, friction: f64, model: &str, factor: f64) -> CaseE
     let fastest = if model == "tower" { tower.largest_frequency() } else { rom.stiffness.diagonal().max().sqrt() };
     let mut scene = method.on(round(rom));
     scene.settings.contacts[0].friction = friction;
-    // Free of friction, so that what is refused is the step.
+    // Without friction, so that the error is about the step.
     let limit = match method.scheme {
         Scheme::MasslessBoundary => {
             let mut pressed = scene.clone();
@@ -114,7 +115,7 @@ fn ratios() -> Vec<StabilityCase> {
     cases
 }
 
-/// Ratio of the squares of the highest to the lowest frequency: by stiffness, or by mass.
+/// Compares models by the ratio of the squares of the highest to the lowest frequency: by stiffness, or by mass.
 fn ratio(kind: &str, ratio: f64, method: StabilityMethod) -> CaseEnd {
     let soft = 4e6 / 0.1;
     let mut tower = Tower { sectors: 2, ..Tower::default() };
@@ -131,7 +132,7 @@ fn ratio(kind: &str, ratio: f64, method: StabilityMethod) -> CaseEnd {
         Scheme::MasslessBoundary => {
             scene.settings.structures[0].damping_ratio = Some(0.3);
             match massless_step(&scene) {
-                // The family `massless` looks at more of the range.
+                // The family `massless` covers more of the range.
                 Some(step) => (0.9 * step).min(5e-6),
                 None => 5e-6,
             }
@@ -140,8 +141,8 @@ fn ratio(kind: &str, ratio: f64, method: StabilityMethod) -> CaseEnd {
     CaseEnd::of(Press::new(with_step(scene, step)).run())
 }
 
-/// Up to which share of the limit of closed contact, with how stiff a contact node and how much damping, does
-/// massless-boundary come to rest?
+/// Returns cases of massless-boundary for various fractions of the limit of closed contact, tip stiffnesses and
+/// damping: each must come to rest or be rejected.
 fn massless() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     for share in [0.2, 0.24, 0.26, 0.5, 0.7, 0.79] {
@@ -163,7 +164,7 @@ fn at_share(share: f64, ratio: f64, damping: f64) -> CaseEnd {
     tower.tip = ratio * 4e7 * tower.mass[1];
     let mut scene = with_methods(round(tower.rom()), Scheme::MasslessBoundary, Solver::Lcp);
     scene.settings.structures[0].damping_ratio = Some(damping);
-    // Closed, the base is held by both springs; modal-exact with the force a step late is stable while κ + cK < 4.
+    // In closed contact both springs hold the base; modal-exact with the force a step late is stable while κ + cK < 4.
     let open = tower.base[0] / tower.mass[0];
     let closed = tower.tip / tower.mass[0];
     let unstable = |step: f64| {

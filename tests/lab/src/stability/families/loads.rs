@@ -13,7 +13,7 @@ use super::super::{
     observe::{StabilityWatch, amplitudes, apart, begin, displacements, real, set, steps},
 };
 
-/// All of them.
+/// Returns all cases of this family.
 pub(crate) fn cases() -> Vec<StabilityCase> {
     [loads(), coatings(), shapes()].into_iter().flatten().collect()
 }
@@ -24,12 +24,12 @@ fn ringed(method: StabilityMethod) -> Scene {
     scene.settings.structures[1].thermal = true;
     scene.settings.structures[1].load = Some(LoadSettings { order: 2, amplitude: 0.0, phase: 0.0 });
     scene.settings.outputs.slave_displacement = true;
-    // Far enough away for what the ring may do.
+    // Far enough away for any motion of the ring.
     scene.settings.contacts[0].gap = 0.02;
     scene
 }
 
-/// Modal-exact and both ways of galerkin, which differ in how loads enter.
+/// Returns modal-exact and both forms of galerkin, which differ in the treatment of loads.
 fn methods() -> impl Iterator<Item = StabilityMethod> {
     StabilityMethod::common().filter(|method| method.solver == Solver::Lcp)
 }
@@ -46,7 +46,7 @@ fn loads() -> Vec<StabilityCase> {
                     } else if amplitude > 1e9 {
                         Expected::refused(["initial state", "start values of", "loads"])
                     } else if amplitude > 1e5 {
-                        // Less than what counts as large may still reach the blades.
+                        // Loads below the limit of large values may still make the ring reach the blades.
                         Expected::either_as(
                             against,
                             &[
@@ -140,13 +140,13 @@ fn heated(method: StabilityMethod, temperature: f64) -> Result<Vec<Check>> {
     Ok(vec![Check::at_most("deviation of the displacement from the static one", off / size.max(1e-300), 1e-9)])
 }
 
-/// A load put on at once: without damping the ring swings to twice its static place and back.
+/// Compares a sudden load: without damping the ring oscillates up to twice its static displacement and back.
 fn sudden(method: StabilityMethod, what: &str) -> Result<Vec<Check>> {
     let mut scene = ringed(method);
     scene.settings.time.input_interpolation = InputInterpolation::Hold;
     scene.settings.structures[1].damping_ratio = Some(0.0);
     let (mut simulation, mut watch) = begin(&scene)?;
-    // Short enough to see the largest displacement of the swing.
+    // Short enough to resolve the largest displacement of the oscillation.
     let length = scene.settings.experiment.communication_step.min(1e-5);
     let omega = TAU * 400.0;
     if what == "load" {
@@ -313,7 +313,7 @@ fn shapes() -> Vec<StabilityCase> {
             }
         }
         for order in [1, 2, 7, 36, 72, 300, 10_000] {
-            // A lobe in less than a step; steps of a tolerance are halved.
+            // A lobe in less than a step; adaptive steps are halved.
             let expected = if order > 1000 && method.is_galerkin() {
                 Expected::either(against, ["features of the casing shape", "internal_step_max (time.step) below"])
             } else if order > 1000 {
@@ -346,7 +346,7 @@ fn shapes() -> Vec<StabilityCase> {
     cases
 }
 
-/// A rub on a shape against itself with finer steps, over the first contacts.
+/// Compares a rub on a shape with the same rub with finer steps, over the first contacts.
 fn shaped(method: StabilityMethod, shape: Shape) -> Result<Vec<Check>> {
     // A bump or a lobe takes at least two hundred steps to pass.
     let feature = match shape {
@@ -355,7 +355,7 @@ fn shaped(method: StabilityMethod, shape: Shape) -> Result<Vec<Check>> {
         _ => TAU / 36.0,
     };
     let run = |method: StabilityMethod, step: f64| -> Result<(Vec<f64>, StabilityWatch)> {
-        // The longest adaptive step is short beside what the rotor turns past, as every scene is asked for.
+        // The longest adaptive step is short compared with the features of the shape, as required of every scene.
         let longest = if method.is_adaptive() { (0.1 * feature / 1300.0).min(LONGEST) } else { step };
         let mut scene = with_step(method.on(bumps(blade(6))), longest);
         scene.settings.surfaces[0].shape = shape.clone();

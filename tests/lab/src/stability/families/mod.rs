@@ -1,4 +1,4 @@
-//! The cases, family by family.
+//! All cases, family by family.
 
 pub(crate) mod blades;
 pub(crate) mod builtin;
@@ -20,7 +20,7 @@ pub(crate) mod values;
 
 use super::{Expected, StabilityCase, models::StabilityMethod};
 
-/// Every case of the full table.
+/// Returns every case of the full table.
 pub(crate) fn all() -> Vec<StabilityCase> {
     let families = [
         limits::cases(),
@@ -43,23 +43,24 @@ pub(crate) fn all() -> Vec<StabilityCase> {
     families.into_iter().flatten().map(without_film).map(short).collect()
 }
 
-/// Families in whose quick form galerkin takes longest steps too.
+/// Families whose quick form includes galerkin at longest steps.
 const SHORT: [&str; 6] = ["step-limit", "redundant", "jump", "resolution", "curved", "free"];
 
-/// Longest steps as short as those of recurrences take long: elsewhere adaptive ones stand for them.
+/// Removes galerkin cases with fixed steps from the quick table unless their family is in [`SHORT`], because they take
+/// long; adaptive ones represent them.
 fn short(case: StabilityCase) -> StabilityCase {
     let fixed = StabilityMethod::in_name(&case.name).0 == Some("galerkin-fixed");
     let keep = case.quick && (!fixed || SHORT.contains(&case.family()));
     case.quick(keep)
 }
 
-/// A case of film without the inertia of contact nodes, which every scene rejects.
+/// Converts a case of film without the inertia of contact nodes, which every scene rejects.
 fn without_film(mut case: StabilityCase) -> StabilityCase {
     let without = [("massless", "massless-boundary"), ("galerkin", "galerkin"), ("galerkin-fixed", "galerkin")];
     if let (Some(integration), Some("film")) = StabilityMethod::in_name(&case.name)
         && let Some((_, scheme)) = without.iter().find(|(name, _)| *name == integration)
     {
-        // Some scenes are rejected by another rule before.
+        // Some scenes are rejected by another rule first.
         let other = match &case.expected {
             Expected::Refused(lists) | Expected::Either(_, lists) => lists.clone(),
             Expected::Right(_) => Vec::new(),

@@ -1,4 +1,4 @@
-//! Free bodies among plates: balances of momentum and energy, left and right, edges, starts that are refused.
+//! Free bodies among plates: balances of momentum and energy, left and right, edges, rejected starts.
 
 use tiprub_core::{
     Result,
@@ -15,12 +15,12 @@ use super::{
     free::{STEP, apart, methods, size, started, throw, unless_few_modes},
 };
 
-/// All of them.
+/// Returns all cases of this family.
 pub(crate) fn cases() -> Vec<StabilityCase> {
     [balances(), mirrors(), edges(), starts()].into_iter().flatten().collect()
 }
 
-/// Between two plates that give way, one of them curved.
+/// A body between two elastic plates, one of them curved.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Balance {
     /// Method.
@@ -29,7 +29,7 @@ pub(crate) struct Balance {
     pub friction: f64,
     /// Speed (m/s).
     pub speed: f64,
-    /// The balance is told this share of the mass: another than 1 must be found out.
+    /// Fraction of the mass in the balance: a value other than 1 must be detected.
     pub share: f64,
 }
 
@@ -39,7 +39,7 @@ fn balances() -> Vec<StabilityCase> {
         for friction in [0.0, 0.15, 1.0] {
             for speed in [0.01, 1.0, 10.0, 100.0] {
                 let balance = Balance { method, friction, speed, share: 1.0 };
-                // 100 m/s dent the plates by more than what counts as small.
+                // At 100 m/s the dents in the plates exceed the limit of small displacements.
                 let against = "momentum and energy balance, sum of the pair forces, energy loss in contact";
                 let displaced: &[&str] =
                     &["left_plate, which carries a surface, is displaced", "Check positions and velocity"];
@@ -63,10 +63,10 @@ fn balances() -> Vec<StabilityCase> {
 }
 
 impl Balance {
-    /// Fly to and fro.
+    /// Lets the body fly back and forth.
     ///
     /// # Errors
-    /// The scene is refused.
+    /// A rejected scene.
     pub(crate) fn run(self) -> Result<Vec<Check>> {
         let body = LumpChain::elastic(&[0.1, 0.15, 0.05], 2e7);
         let mass = body.mass() * self.share;
@@ -125,7 +125,7 @@ fn mirrors() -> Vec<StabilityCase> {
     cases
 }
 
-/// A body 0.2 mm too wide on each side that is thrown between two cylinders.
+/// Compares left and right for a body 0.2 mm too wide on each side that is thrown between two cylinders.
 fn symmetric(method: StabilityMethod, friction: f64) -> Result<Vec<Check>> {
     let plate = |side: f64| Plate { side, radius: 0.18, stiffness: 1e7, ..Plate::left(HALF - 2e-4) };
     let body = LumpChain::elastic(&[0.1, 0.1, 0.1], 2e7).at([0.0, 0.045, 0.0]);
@@ -143,7 +143,7 @@ fn symmetric(method: StabilityMethod, friction: f64) -> Result<Vec<Check>> {
         across = worse(across, vector(&simulation, "force")[0].abs());
         pushed = pushed.max(vector(&simulation, "left_face.force")[0].abs());
     }
-    // Gauss-Seidel goes through the contacts one by one and ends at its tolerance.
+    // Gauss-Seidel handles the contacts one after the other and ends at its tolerance.
     let bound = if method.solver == Solver::Coulomb && friction > 0.0 { 1e-7 } else { 1e-9 };
     Ok(vec![
         Check::so("the body was squeezed", pushed > 100.0),
@@ -154,7 +154,7 @@ fn symmetric(method: StabilityMethod, friction: f64) -> Result<Vec<Check>> {
 
 fn edges() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
-    // From beyond the edge y = 0.09 m inwards, the face so far in front of the plate.
+    // From beyond the edge y = 0.09 m inwards, with the face this far in front of the plate.
     let beyond = PLATE + HALF + 1e-4;
     for (solver, name) in SOLVERS {
         for (what, front, velocity) in [
@@ -283,7 +283,7 @@ fn starts() -> Vec<StabilityCase> {
     cases
 }
 
-/// A few hundred steps with their balance.
+/// Performs a few hundred steps with their balance.
 fn begin(throw: &Throw) -> Result<Vec<Check>> {
     let mut simulation = started(throw)?;
     let (mut impulse, mut residual) = (0.0, 0.0_f64);

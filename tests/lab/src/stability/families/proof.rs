@@ -1,4 +1,4 @@
-//! Cases that must fail: they prove that the judge sees what it should. Run by name only (`--case judge`).
+//! Cases that must fail: they test the judge itself. Run by name only (`--case judge`).
 
 use std::time::Duration;
 
@@ -14,12 +14,12 @@ use super::{
     turning::{Flank, PressedRotor, Travelling},
 };
 
-/// All of them.
+/// Returns all cases of this family.
 pub(crate) fn cases() -> Vec<StabilityCase> {
     [ways(), faults()].into_iter().flatten().collect()
 }
 
-/// Small faults of mechanics: what is run and what the closed form is told differ by them.
+/// Returns cases with small faults of mechanics: the scene and the parameters of the closed form differ by them.
 fn faults() -> Vec<StabilityCase> {
     let method = StabilityMethod::exact(Solver::Lcp);
     let case = |name: &str, work: fn(StabilityMethod) -> tiprub_core::Result<Vec<Check>>| {
@@ -49,7 +49,7 @@ fn faults() -> Vec<StabilityCase> {
     ]
 }
 
-/// One way to fail each.
+/// Returns one case for each way to fail.
 fn ways() -> Vec<StabilityCase> {
     let right = || Expected::right("2 + 2 = 5");
     vec![
@@ -74,7 +74,7 @@ fn ways() -> Vec<StabilityCase> {
     ]
 }
 
-/// Until the stack ends.
+/// Recurses until the stack overflows.
 #[expect(unconditional_recursion, reason = "on purpose")]
 fn descend(depth: u64) -> f64 {
     let room = std::hint::black_box([depth as f64; 512]);

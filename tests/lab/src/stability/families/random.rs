@@ -1,4 +1,5 @@
-//! A hundred scenes of random parameters within their documented ranges, each held against mechanics and a finer step.
+//! A hundred scenes with random parameters within their documented ranges, each compared with the laws of mechanics and
+//! a finer step.
 
 use tiprub_core::{
     Result, Scene,
@@ -11,13 +12,13 @@ use super::super::{
     observe::{MASSLESS_RETURN, StabilityWatch, apart, begin, displacements, set},
 };
 
-/// Scenes in the quick table and in the full one.
+/// Numbers of scenes in the quick table and in the full one.
 const COUNT: [u64; 2] = [12, 100];
 
-/// All of them.
+/// Returns all cases of this family.
 pub(crate) fn cases() -> Vec<StabilityCase> {
     let case = |method: Option<StabilityMethod>, index: u64| {
-        // Of a scene, or another way to integrate it with its solver.
+        // The method of the scene, or another way to integrate it with its solver.
         let drawn = method_of(&scene(index).0);
         let method = method.map_or(drawn, |method| StabilityMethod { solver: drawn.solver, ..method });
         let against = "signs of the energy terms, complementarity, same result with a quarter of the step";
@@ -35,7 +36,7 @@ pub(crate) fn cases() -> Vec<StabilityCase> {
         );
         let name = format!("random/{index:03}/{}", method.name());
         let case = StabilityCase::new(name, expected, move |_| happened(method, index));
-        // Some take as long as all others.
+        // Some of them take as long as all others.
         case.quick(index < COUNT[0] && ![5, 9, 11].contains(&index)).within(300.0)
     };
     let mut cases: Vec<StabilityCase> = (0..COUNT[1]).map(|index| case(None, index)).collect();
@@ -45,7 +46,7 @@ pub(crate) fn cases() -> Vec<StabilityCase> {
     cases
 }
 
-/// Scene, and by how much and how fast the casing swings (m, rad/s).
+/// Returns the scene, and the amplitude and rate of the casing's oscillation (m, rad/s).
 fn scene(index: u64) -> (Scene, f64, f64) {
     let mut random = SeededRandom(0x9e37_79b9_7f4a_7c15 ^ (index + 1).wrapping_mul(0xd134_2543_de82_ef95));
     for _ in 0..8 {
@@ -86,7 +87,7 @@ fn scene(index: u64) -> (Scene, f64, f64) {
     (with_step(scene, step), swing, random.scale(2000.0, 20_000.0))
 }
 
-/// Method that a scene has been drawn with.
+/// Returns the method that was drawn for a scene.
 fn method_of(scene: &Scene) -> StabilityMethod {
     StabilityMethod { scheme: scene.settings.time.scheme, ..StabilityMethod::exact(scene.settings.contacts[0].solver) }
 }
@@ -109,7 +110,7 @@ fn checked(method: StabilityMethod, index: u64) -> Result<Vec<Check>> {
     let (error, better) = (apart(&coarse, &finest), apart(&fine, &finest));
     let mut checks = vec![
         Check::so("the blades touched", watch.contacts > 0 && finer.contacts > 0),
-        // Coarse steps may be coarse; they must come nearer as they get finer.
+        // Coarse steps may be inaccurate; finer ones must come closer.
         Check::at_most(
             "deviation of the displacements with h/4 from those with h/16, compared with h",
             better.min(better / error.max(1e-9) * 0.1),
@@ -123,13 +124,13 @@ fn checked(method: StabilityMethod, index: u64) -> Result<Vec<Check>> {
         checks.extend(watch.complementarity());
         checks.push(watch.impact(if massless { MASSLESS_RETURN } else { 1e-9 }));
     }
-    // Film and lcp turn the friction of a node that sticks for a moment with its vibration.
+    // Film and lcp reverse the friction of a node that sticks for a moment with its vibration.
     let sticks = method.solver == Solver::Coulomb && !massless;
     checks.push(watch.heat(if sticks { 1e-9 } else { 1e-2 }));
     Ok(checks)
 }
 
-/// 1.5 ms with the step, or the root of the tolerance, times `factor`; displacements every 50 µs.
+/// Runs 1.5 ms with the step, or the root of the tolerance, times `factor`; returns displacements every 50 µs.
 fn run(method: StabilityMethod, index: u64, factor: f64) -> Result<(Vec<f64>, StabilityWatch)> {
     let (scene, swing, rate) = scene(index);
     let step = scene.settings.time.step * factor;
@@ -141,7 +142,7 @@ fn run(method: StabilityMethod, index: u64, factor: f64) -> Result<(Vec<f64>, St
     for index in 0..150 {
         let time = 1e-5 * f64::from(index);
         let place = |time: f64| -swing * 0.5 * (1.0 - (rate * time).cos());
-        // Linear within the communication step, so that all step sizes see the same casing.
+        // Linear within the communication step, so that all step sizes have the same casing.
         set(&mut simulation, "casing_radius_change", place(time))?;
         if let Some(row) = simulation.table().find("casing_radius_change").map(|row| row.reference) {
             simulation.set_input_derivative(row, 1, (place(time + 1e-5) - place(time)) / 1e-5)?;

@@ -1,4 +1,5 @@
-//! Communication steps of every length, ten million steps without damping, jumps of inputs, states restored elsewhere.
+//! Communication steps of every length, ten million undamped steps, jumps of inputs, states restored in other
+//! instances.
 
 use tiprub_core::{
     Result, Scene, Simulation,
@@ -15,7 +16,7 @@ use super::{
     limits::massless_step,
 };
 
-/// All of them.
+/// Returns all cases of this family.
 pub(crate) fn cases() -> Vec<StabilityCase> {
     [communication(), long(), jumps(), restore()].into_iter().flatten().collect()
 }
@@ -45,7 +46,7 @@ fn communication() -> Vec<StabilityCase> {
         let name = method.integration();
         let expected = Expected::right("energy of free undamped blades, and their phase compared with ω t");
         cases.add(false, format!("communication/H=1e6h/{name}"), expected, move || huge(method));
-        // Steps of galerkin are counted as they are done.
+        // Steps of galerkin are counted as they are performed.
         let words = ["communicationStepSize", "internal steps"];
         let expected =
             if method.is_galerkin() { Expected::either("finite outputs", words) } else { Expected::refused(words) };
@@ -74,12 +75,12 @@ fn communication() -> Vec<StabilityCase> {
     cases
 }
 
-/// A step after a start at 1 s, so that the shortest ones do not change the time.
+/// Performs a step after a start at 1 s, so that the shortest ones do not change the time.
 fn beyond(method: StabilityMethod, length: f64) -> Result<Vec<Check>> {
     from(1.0, method, length)
 }
 
-/// A step from `start` (s).
+/// Performs a step from `start` (s).
 fn from(start: f64, method: StabilityMethod, length: f64) -> Result<Vec<Check>> {
     let scene = method.stepping(round(Tower::default().rom()), 1e-6);
     let mut simulation = Simulation::new(&scene)?;
@@ -92,11 +93,11 @@ fn from(start: f64, method: StabilityMethod, length: f64) -> Result<Vec<Check>> 
 fn rub(method: StabilityMethod, step: f64) -> Scene {
     let mut scene = method.stepping(bumps(blade(6)), step);
     scene.settings.structures[0].damping_ratio = Some(0.02);
-    // The bumps stand still at the start and are there at once where the blades are not.
+    // The bumps are at rest at the start and present from the beginning, away from the blades.
     scene
 }
 
-/// March a rub to 2 ms by communication steps of these lengths; displacements every 0.1 ms.
+/// Runs a rub to 2 ms with communication steps of these lengths; returns displacements every 0.1 ms.
 fn history(scene: &Scene, mut length: impl FnMut() -> f64) -> Result<(Vec<f64>, StabilityWatch)> {
     let mut simulation = Simulation::new(scene)?;
     simulation.initialise(0.0)?;
@@ -121,12 +122,12 @@ const STEP: f64 = 1e-6;
 fn lengths(method: StabilityMethod, ratio: f64) -> Result<Vec<Check>> {
     let length = (ratio * STEP).min(1e-4);
     let (found, watch) = if ratio < 0.01 {
-        // A thousand times as many: the first two marks are enough.
+        // A thousand times as many steps: the first two samples are enough.
         return short(method, length);
     } else {
         history(&rub(method, STEP), || length)?
     };
-    // What a tolerance chooses depends on the communication step.
+    // The step chosen by a tolerance depends on the communication step.
     let same = if method.is_galerkin() { 0.05 } else { 1e-6 };
     let (other, bound) = if ratio < 1.0 {
         (history(&rub(method, length / 4.0), || length)?.0, 0.05)
@@ -147,7 +148,7 @@ fn lengths(method: StabilityMethod, ratio: f64) -> Result<Vec<Check>> {
     Ok(checks)
 }
 
-/// h/1000 for a tenth of a microsecond in contact, continued from a state at h, against ten times as long steps.
+/// Compares h/1000 for a tenth of a microsecond in contact, continued from a state at h, with steps ten times as long.
 fn short(method: StabilityMethod, length: f64) -> Result<Vec<Check>> {
     let mut scene = rub(method, STEP);
     scene.settings.surfaces[0].ramp_time = 0.0;
@@ -191,7 +192,7 @@ fn wildly(method: StabilityMethod) -> Result<Vec<Check>> {
     Ok(checks)
 }
 
-/// A blade in free motion: kicked by the casing, which then leaves.
+/// Returns a blade in free motion: hit by the casing, which then leaves.
 fn kicked(method: StabilityMethod, step: f64) -> Result<(Simulation, f64)> {
     let tower = Tower { sectors: 1, ..Tower::default() };
     let mut scene = method.on(round(tower.rom()));
@@ -205,7 +206,7 @@ fn kicked(method: StabilityMethod, step: f64) -> Result<(Simulation, f64)> {
     let scene = with_step(scene, method.step(step));
     let mut simulation = Simulation::new(&scene)?;
     simulation.initialise(0.0)?;
-    // It leaves slowly: forces of massless-boundary act a step late, and work on what the casing does then.
+    // The casing leaves slowly, because the forces of massless-boundary act a step late and do work on its motion then.
     let place = |index: u32| match index {
         0..400 => -1.2 * f64::from(index.min(300)) / 300.0,
         _ => -1.2 + 2.2 * f64::from(index - 400) / 2000.0,
@@ -274,12 +275,13 @@ fn drift(method: StabilityMethod, steps: f64) -> Result<(Vec<Check>, String)> {
     }
     let time = (processor_time() - clock) / steps;
     let remark = format!("largest drift {most:.1e} over {steps:e} steps of {step:.2e} s, {:.0} ns each", 1e9 * time);
-    // Adaptive steps turn each mode by a matrix whose determinant is 1 to rounding, which adds up over 2.5e5 steps of 80 µs.
+    // Adaptive steps multiply each mode by a matrix whose determinant is 1 to rounding; the rounding adds up over 2.5e5
+    // steps of 80 µs.
     let bound = if method.scheme == Scheme::Galerkin { 2.5e5 * f64::EPSILON } else { 1e-11 };
     Ok((vec![Check::so("the energy is positive", before > 0.0), Check::at_most("energy drift", most, bound)], remark))
 }
 
-/// Blades without damping that bounce in a round casing for long: contact may take energy, never give it.
+/// Checks undamped blades that bounce in a round casing for a long time: contact may dissipate energy, never add it.
 fn chatter(method: StabilityMethod) -> Result<Vec<Check>> {
     let tower = Tower { sectors: 4, ..Tower::default() };
     let mut scene = method.stepping(round(tower.rom()), 2e-6);
@@ -320,8 +322,8 @@ fn jumps() -> Vec<StabilityCase> {
     cases
 }
 
-/// The casing jumps onto resting blades by a distance. In that step the force is the jump over W, an impulse p = λh; the casing
-/// does λ·jump/2 of work twice over two steps, what stays is in the blade.
+/// Checks a casing that jumps onto resting blades. In that step the force is the jump over W, an impulse p = λh; the
+/// casing does λ·jump/2 of work twice over two steps, and the remaining energy is in the blade.
 fn jumped(method: StabilityMethod, jump: f64) -> Result<Vec<Check>> {
     let tower = Tower { sectors: 3, slope: 0.0, ..Tower::default() };
     let mut scene = with_step(method.on(round(tower.rom())), 2e-6);
@@ -374,8 +376,9 @@ fn jumped(method: StabilityMethod, jump: f64) -> Result<Vec<Check>> {
     Ok(checks)
 }
 
-/// λ of a tip that a wall pushes in at constant speed, `jump` (m) deep at the end of a step that also closes the gap. The tip has no mass: with
-/// its residual flexibility G and one mode with inertia, q̈ + ω²q = φλ and φq + Gλ = vt.
+/// Returns λ of a tip that a wall pushes inwards at constant speed, `jump` (m) deep at the end of a step that also
+/// closes the gap. The tip has no mass: with its residual flexibility G and one mode with inertia, q̈ + ω²q = φλ and
+/// φq + Gλ = vt.
 fn pushed(rom: &tiprub_core::Rom, jump: f64, step: f64) -> f64 {
     let (frequencies, shapes) = super::decay::modes(&rom.mass, &rom.stiffness);
     let seen = |mode: usize| shapes[(3, mode)];
@@ -384,7 +387,7 @@ fn pushed(rom: &tiprub_core::Rom, jump: f64, step: f64) -> f64 {
     let (time, speed) = (step * jump / (GAP + jump), (GAP + jump) / step);
     let held = (frequencies[moving].powi(2) + seen(moving).powi(2) / flexible).sqrt();
     let turned = held * time;
-    // t − sin(Ωt)/Ω, where t is short by its series.
+    // t − sin(Ωt)/Ω, by its series for small t.
     let late = if turned < 1e-2 { turned * turned * time / 6.0 } else { time - turned.sin() / held };
     let moved = seen(moving) * speed / (flexible * held * held) * late;
     (jump - seen(moving) * moved) / flexible
@@ -420,7 +423,7 @@ fn elsewhere(method: StabilityMethod) -> Result<Vec<Check>> {
     }
     let mut state = vec![0; simulation.state_size()];
     simulation.save_state(&mut state)?;
-    // Another instance of the same scene with everything else, which has been elsewhere.
+    // Another instance of the same scene with different values and a different past.
     let mut other = Simulation::new(&scene)?;
     for (parameter, value) in [
         ("friction_coefficient", 0.05),
@@ -450,7 +453,7 @@ fn elsewhere(method: StabilityMethod) -> Result<Vec<Check>> {
     Ok(vec![Check::so("all outputs are bitwise equal over 40 steps", same)])
 }
 
-/// A scheme that leaves no mode, asked for and taken back as an FMU does in Initialization Mode.
+/// Selects a scheme that keeps no mode and reverts it, as an FMU does in Initialization Mode.
 fn after_refusal() -> Result<Vec<Check>> {
     // As many modes as three contact nodes have directions.
     let mut scene = rub(StabilityMethod::exact(Solver::Lcp), STEP);
@@ -478,7 +481,7 @@ fn after_refusal() -> Result<Vec<Check>> {
     ])
 }
 
-/// Steps longer than the scene proposes, across the step that resolves all modes.
+/// Checks steps longer than the scene proposes, across the step that resolves all modes.
 fn reported() -> Result<Vec<Check>> {
     let tower = Tower::default();
     let resolved = 2.0 / tower.largest_frequency();

@@ -1,4 +1,4 @@
-//! Blade tips beyond the edge of their casing, steps that pass over what contact acts on, and displacements that are not small.
+//! Blade tips beyond the edge of their casing, steps that do not resolve loaded modes, and large displacements.
 
 use tiprub_core::{
     Result, Scene, Simulation,
@@ -11,7 +11,7 @@ use super::super::{
     observe::{StabilityWatch, begin, real, set, steps},
 };
 
-/// All of them.
+/// Returns all cases of this family.
 pub(crate) fn cases() -> Vec<StabilityCase> {
     [edges(), resolution(), curved()].into_iter().flatten().collect()
 }
@@ -23,12 +23,12 @@ fn rubbing(method: StabilityMethod) -> Scene {
     scene
 }
 
-/// A cylinder: beyond the edge the spline goes on as what has no edge, a surface of revolution.
+/// Compares a cylinder: the spline continues beyond the edge like a surface of revolution, which has no edge.
 fn edges() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     for method in StabilityMethod::all_with(Solver::Lcp).filter(|method| !method.is_massless()) {
         let name = method.integration();
-        // Rings reach 7.5 mm beyond the contact nodes, and the surface goes on for 11.25 mm.
+        // Rings reach 7.5 mm beyond the contact nodes, and the surface continues for 11.25 mm.
         for (shift, expected) in [
             (0.005, Expected::right("agreement with a surface of revolution, signs of the energy terms")),
             (0.017, Expected::right("agreement with a surface of revolution, signs of the energy terms")),
@@ -60,7 +60,7 @@ fn over_the_edge(method: StabilityMethod, shift: f64) -> Result<Vec<Check>> {
     let mut checks = vec![Check::so("there is contact", impulse > 0.0), watch.ledger()];
     checks.push(Check::relative("impulse", impulse, expected, 0.05));
     if method.is_galerkin() {
-        // What its impacts lose is an error of the step.
+        // The loss of its impacts is an error of the step.
         checks.push(watch.impact(0.0));
     } else {
         checks.push(Check::at_most("deviation of the impact loss", (loss - expected_loss).abs() / expected_loss, 0.1));
@@ -68,7 +68,8 @@ fn over_the_edge(method: StabilityMethod, shift: f64) -> Result<Vec<Check>> {
     Ok(checks)
 }
 
-/// A step is refused once it passes over modes that carry the contact; not one that passes over a stiff node alone.
+/// Returns cases of the step resolution: a step is rejected if it does not resolve modes that carry the contact, but
+/// not because of a stiff node alone.
 fn resolution() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     for method in StabilityMethod::all_with(Solver::Lcp) {
@@ -80,7 +81,7 @@ fn resolution() -> Vec<StabilityCase> {
             for friction in [0.0, 0.15] {
                 let against = "signs of energies and energy terms";
                 let expected = if galerkin {
-                    // A step in which the rotor turns several times is refused.
+                    // A step in which the rotor turns several times is rejected.
                     Expected::either(against, ["features of the casing shape", "internal_step_max (time.step) below"])
                 } else if product < 10.0 {
                     Expected::either_as(against, &[&["grows"], &["gained spurious energy"]])
@@ -95,11 +96,11 @@ fn resolution() -> Vec<StabilityCase> {
     cases
 }
 
-/// Blades of one mass and spring, met by a casing that closes in: their only mode carries everything.
+/// Compares blades of one mass and spring in a casing that closes: their only mode carries everything.
 fn at_product(method: StabilityMethod, product: f64, friction: f64) -> Result<Vec<Check>> {
     let mut scene = method.on(round(blade(4)));
     let fastest = scene.roms[0].stiffness.diagonal().max();
-    // All modes at one frequency.
+    // All modes have the same frequency.
     scene.roms[0].stiffness.fill_diagonal(fastest);
     scene.settings.contacts[0].friction = friction;
     let step = product / fastest.sqrt();
@@ -115,7 +116,7 @@ fn at_product(method: StabilityMethod, product: f64, friction: f64) -> Result<Ve
     Ok(vec![watch.ledger(), Check::so("energies are not negative", negative >= 0.0)])
 }
 
-/// Blades dragged around by friction: told from 5 % of the clearance on, refused at 100 %.
+/// Returns cases of blades dragged around by friction: warned from 5 % of the clearance on, rejected at 100 %.
 fn curved() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     for method in StabilityMethod::common().filter(|method| method.solver == Solver::Lcp) {
@@ -132,7 +133,7 @@ fn curved() -> Vec<StabilityCase> {
     cases
 }
 
-/// A blade whose root is soft around the axis, pressed until friction has moved it by so much.
+/// Presses a blade whose root is soft around the axis until friction has moved it by `share` of the clearance.
 fn dragged(method: StabilityMethod, share: f64) -> Result<Vec<Check>> {
     let mut scene = method.on(round(Tower::default().rom()));
     scene.settings.contacts[0].friction = 0.3;

@@ -1,8 +1,8 @@
-//! What turns: a rotor pressed into lobes, a load that travels around a ring, a blade on the flank of a lobe.
+//! Rotating contact: a rotor pressed into lobes, a load that travels around a ring, a blade on the flank of a lobe.
 //!
-//! Phases give away a speed or an instant that is off. Under a force of e^(iΩt) each mode answers as its recurrence
-//! q⁺ = (1 + β − κ) q − β q⁻ + c f does, Q = c F/(z − 1 − β + κ + β/z) with z = e^(iΩh): to rounding, and within (Ωh)² of
-//! F/(ω² − Ω² + 2iξωΩ), which is looked at as well since it knows nothing of the scheme.
+//! Phases reveal a wrong speed or time. Under a force of e^(iΩt) each mode responds by its recurrence q⁺ = (1 + β − κ)
+//! q − β q⁻ + c f, Q = c F/(z − 1 − β + κ + β/z) with z = e^(iΩh): to rounding, and within (Ωh)² of F/(ω² − Ω² +
+//! 2iξωΩ), which is compared as well because it does not depend on the scheme.
 
 use std::f64::consts::{PI, TAU};
 
@@ -23,19 +23,20 @@ use super::{
 
 /// Internal step (s).
 const STEP: f64 = 2e-6;
-/// Longest time between two looks at slow lobes (s).
+/// Longest time between two samples of slow lobes (s).
 const LOBE_STRIDE: f64 = 5e-4;
-/// Angle of a load, or of a mode, in the longest step of galerkin (rad).
+/// Phase of a load, or of a mode, in the longest step of galerkin (rad).
 const LOAD_STEP: f64 = 0.05;
-/// Distance of the wave of λ from that of a blade without any scheme: its highest modes are followed coarsely.
+/// Difference of the wave of λ from that of a blade without time discretisation: its highest modes are followed
+/// coarsely.
 const BESIDE: f64 = 5e-4;
 
-/// All of them.
+/// Returns all cases of this family.
 pub(crate) fn cases() -> Vec<StabilityCase> {
     [loads(), lobes(), flanks()].into_iter().flatten().collect()
 }
 
-/// Recurrence of one mode as its formula says, not as the core holds it: (β, κ, c).
+/// Returns the recurrence of one mode by its formula, independently of the core: (β, κ, c).
 fn recurrence(scheme: Scheme, frequency: f64, ratio: f64, step: f64) -> [f64; 3] {
     let (rate, angle) = (ratio * frequency * step, frequency * step);
     if scheme == Scheme::CentralDifference {
@@ -46,14 +47,14 @@ fn recurrence(scheme: Scheme, frequency: f64, ratio: f64, step: f64) -> [f64; 3]
     [(-2.0 * rate).exp(), kappa, kappa / (frequency * frequency)]
 }
 
-/// Displacement per unit modal force, both as e^(iΩnh).
+/// Returns the displacement per unit modal force, both as e^(iΩnh).
 fn response(scheme: Scheme, frequency: f64, ratio: f64, omega: f64, step: f64) -> Complex<f64> {
     let [beta, kappa, compliance] = recurrence(scheme, frequency, ratio, step);
     let z = Complex::from_polar(1.0, omega * step);
     Complex::from(compliance) / (z - (1.0 + beta - kappa) + z.inv() * beta)
 }
 
-/// The same of the mode itself.
+/// Returns this response of the mode without time discretisation.
 fn mode(frequency: f64, ratio: f64, omega: f64) -> Complex<f64> {
     Complex::new(frequency * frequency - omega * omega, 2.0 * ratio * frequency * omega).inv()
 }
@@ -63,15 +64,15 @@ fn mode(frequency: f64, ratio: f64, omega: f64) -> Complex<f64> {
 pub(crate) struct Travelling {
     /// Method.
     pub method: StabilityMethod,
-    /// Nodal diameters.
+    /// Number of nodal diameters.
     pub order: u32,
-    /// Ω over the natural frequency, with the sense.
+    /// Ω over the natural frequency, with the sign of the direction.
     pub ratio: f64,
-    /// The load in the scene comes by so many internal steps too early: must be found out.
+    /// Number of internal steps by which the load in the scene is early, which must be detected.
     pub early: f64,
 }
 
-/// Natural frequency (rad/s) of the ring's nodal diameters.
+/// Returns the natural frequency (rad/s) of the ring's nodal diameters.
 fn ring_frequency(order: u32) -> f64 {
     TAU * [9000.0, 900.0, 400.0, 1100.0, 2100.0][order as usize]
 }
@@ -94,15 +95,15 @@ fn loads() -> Vec<StabilityCase> {
 }
 
 impl Travelling {
-    /// cos(nθ − Ωt) around the ring: wait, then compare over a turn.
+    /// Applies cos(nθ − Ωt) around the ring, waits, and compares over a turn.
     ///
     /// # Errors
-    /// The scene is refused.
+    /// A rejected scene.
     pub(crate) fn run(self) -> Result<Vec<Check>> {
         let (damping, load) = (0.05, 1e3);
         let frequency = ring_frequency(self.order);
         let omega = self.ratio * frequency;
-        // A tolerance knows nothing of loads: longest steps have to be short beside their turn.
+        // A tolerance does not account for loads: longest steps must be short compared with their period.
         let step = if self.method.is_galerkin() { LOAD_STEP / omega.abs().max(frequency) } else { STEP };
         let mut scene = self.method.on(round(Tower { slope: 0.0, ..Tower::default() }.rom()));
         on_ring(&mut scene, damping);
@@ -124,7 +125,7 @@ impl Travelling {
         for _ in 0..200 {
             simulation.do_step(simulation.time(), stride * step)?;
             let turned = Complex::from_polar(1.0, omega * simulation.time());
-            // cos and sin parts of cos(nθ − Ωt) are the real and the imaginary part of e^(iΩt).
+            // The cos and sin parts of cos(nθ − Ωt) are the real and the imaginary part of e^(iΩt).
             let [cosine, sine, other] = amplitudes(&simulation, self.order);
             off = worse(off, (Complex::new(cosine, sine) - discrete * turned).norm());
             beside = worse(beside, (Complex::new(cosine, sine) - exact * turned).norm());
@@ -148,18 +149,18 @@ impl Travelling {
     }
 }
 
-/// A rotor all of whose blades are pressed on a casing with lobes.
+/// A rotor with all blades pressed on a casing with lobes.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PressedRotor {
     /// Method.
     pub method: StabilityMethod,
-    /// Lobes.
+    /// Number of lobes.
     pub order: u32,
-    /// Speed that the closed form is told (rad/s).
+    /// Speed in the closed form (rad/s).
     pub speed: f64,
-    /// The rotor in the scene turns faster by this factor: must be found out unless 1.
+    /// Factor on the speed of the rotor in the scene, which must be detected unless it is 1.
     pub factor: f64,
-    /// It is ahead by so many internal steps: must be found out.
+    /// Number of internal steps by which the rotor is ahead, which must be detected.
     pub early: f64,
 }
 
@@ -168,7 +169,7 @@ fn lobes() -> Vec<StabilityCase> {
     for method in StabilityMethod::all() {
         for order in [1, 3, 12, 40] {
             for speed in [0.1, 50.0, 1300.0, -1300.0, 5000.0] {
-                // Lobes move the tip by less than a tolerance that is enough elsewhere.
+                // Lobes move the tip by less than a tolerance that is sufficient elsewhere.
                 let method = method.within(1e-7);
                 let pressed = PressedRotor { method, order, speed, factor: 1.0, early: 0.0 };
                 let expected = Expected::right("λ of every blade from the dynamic stiffness, over a pass of a lobe");
@@ -183,14 +184,14 @@ fn lobes() -> Vec<StabilityCase> {
 
 impl PressedRotor {
     fn scene(self) -> (Tower, Scene, f64) {
-        // Hardly any tangential motion: the blade is where the rotor is.
+        // With almost no tangential motion the blade follows the rotor.
         let tower = Tower { sectors: 7, base: [4e7, 1e10, 2e7], tip: 2e8, slope: 0.0, ..Tower::default() };
         let lobes = f64::from(self.order);
         let fast = (lobes * self.speed).abs();
-        // The longest adaptive step turns past a part of a lobe, as every scene is asked for.
+        // The longest adaptive step passes only a part of a lobe, as required of every scene.
         let longest = if self.method.is_adaptive() { LONGEST.min(0.5 / fast) } else { 5e-7 };
         let mut scene = with_step(self.method.on(round(tower.rom())), longest);
-        // Lobes that move the tip by less acceleration than the pressure on it stands.
+        // The lobes accelerate the tip by less than the pressure on it permits.
         let amplitude = 1e-6 / (1.0 + (fast / 2e4).powi(2)) / (1.0 + 0.1 * lobes);
         scene.settings.surfaces[0].shape = Shape::Lobes { amplitude, order: self.order, phase: 0.4 };
         scene.settings.structures[0].damping_ratio = Some(0.1);
@@ -198,7 +199,7 @@ impl PressedRotor {
         (tower, scene, amplitude)
     }
 
-    /// λ at the beginning of a step per tip displacement at its end, as e^(ikΩt).
+    /// Returns λ at the beginning of a step per tip displacement at its end, as e^(ikΩt).
     fn stiffness(self, tower: &Tower, step: f64, omega: f64) -> Complex<f64> {
         let rom = tower.rom();
         let (frequencies, shapes) = modes(&rom.mass, &rom.stiffness);
@@ -218,7 +219,8 @@ impl PressedRotor {
         (0..frequencies.len()).map(compliance).sum::<Complex<f64>>().inv()
     }
 
-    /// λ per tip displacement of the same time, of the blade itself; with galerkin the three highest modes have no inertia.
+    /// Returns λ per simultaneous tip displacement, of the blade without time discretisation; with galerkin the three
+    /// highest modes have no inertia.
     fn own_stiffness(self, tower: &Tower, omega: f64) -> Complex<f64> {
         let rom = tower.rom();
         let (frequencies, shapes) = modes(&rom.mass, &rom.stiffness);
@@ -230,10 +232,10 @@ impl PressedRotor {
         seen.sum::<Complex<f64>>().inv()
     }
 
-    /// Close, wait, compare over one lobe.
+    /// Closes, waits, and compares over one lobe.
     ///
     /// # Errors
-    /// The scene is refused.
+    /// A rejected scene.
     pub(crate) fn run(self) -> Result<Vec<Check>> {
         let (tower, scene, amplitude) = self.scene();
         let step = scene.settings.time.step;
@@ -250,7 +252,7 @@ impl PressedRotor {
         let stiffness = self.stiffness(&tower, step, omega);
         let at_rest = depth / (1.0 / tower.base[0] + 1.0 / tower.tip);
         let mut watch = StabilityWatch::new(&scene);
-        // λ is the force at the beginning of its step; that of galerkin is one of the instant.
+        // λ is the force at the beginning of its step; that of galerkin is instantaneous.
         let galerkin = self.method.is_galerkin();
         let late = if galerkin { 0.0 } else { omega * step };
         let own = self.own_stiffness(&tower, omega) * Complex::from_polar(1.0, -late);
@@ -264,7 +266,7 @@ impl PressedRotor {
             watch.step(&mut simulation, step)?;
             open += tower.sectors - simulation.system().events().len();
             for event in simulation.system().events() {
-                // Tip −depth − A cos(kθ − φ) at the end of the step: pushed in where the casing is narrow.
+                // Tip −depth − A cos(kθ − φ) at the end of the step: pushed inwards where the casing is narrow.
                 let angle = lobes * TAU * event.sector as f64 / tower.sectors as f64 + omega * simulation.time() - 0.4;
                 let [wave, exact] = [stiffness, own].map(|force| (force * Complex::from_polar(amplitude, angle)).re);
                 let normal =
@@ -278,7 +280,7 @@ impl PressedRotor {
         if !galerkin {
             checks.push(Check::at_most("deviation of λ from the dynamic stiffness of the blade", from_scheme, 1e-6));
         }
-        // Massless-boundary takes most of the force a step late.
+        // Massless-boundary applies most of the force a step late.
         if !self.method.is_massless() {
             let coarse = BESIDE + (omega * step).powi(2);
             let bound = if self.method.is_adaptive() { BESIDE + 10.0 * allowed(&scene) / amplitude } else { coarse };
@@ -288,14 +290,14 @@ impl PressedRotor {
     }
 }
 
-/// A blade that stands on the flank of a lobe; nothing turns, nothing rubs.
+/// A blade that rests on the flank of a lobe, without rotation or sliding.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Flank {
     /// Method.
     pub method: StabilityMethod,
     /// Slope of the flank, ds/dθ/R.
     pub slope: f64,
-    /// Share of the tangential part of the normal that the closed form is told: another than 1 must be found out.
+    /// Fraction of the tangential part of the normal in the closed form: a value other than 1 must be detected.
     pub share: f64,
 }
 
@@ -317,7 +319,7 @@ fn flanks() -> Vec<StabilityCase> {
 }
 
 impl Flank {
-    /// ClosestPoint of the tip and λ at rest: the tip stands on s(θ), θ = u_t/R, pushed along the normal there.
+    /// Returns the position of the tip and λ at rest: the tip is on s(θ), θ = u_t/R, pushed along the normal there.
     fn at_rest(self, tower: &Tower, shape: impl Fn(f64) -> [f64; 2], depth: f64) -> [f64; 4] {
         let flexible = [0, 1].map(|i| 1.0 / tower.base[i] + 1.0 / tower.tip);
         let (mut tangential, mut radial, mut force, mut tilt) = (0.0, 0.0, 0.0, 0.0);
@@ -334,10 +336,10 @@ impl Flank {
         [radial, tangential, force, tilt]
     }
 
-    /// Press slowly, come to rest, compare.
+    /// Presses slowly, waits for rest, and compares.
     ///
     /// # Errors
-    /// The scene is refused, or the flank is too steep.
+    /// A rejected scene, or a flank that is too steep.
     pub(crate) fn run(self) -> Result<Vec<Check>> {
         let tower = Tower { sectors: 1, base: [4e7, 4e7, 2e7], slope: 0.0, ..Tower::default() };
         let mut scene = self.method.stepping(round(tower.rom()), 5e-7);

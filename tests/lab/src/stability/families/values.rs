@@ -30,12 +30,12 @@ pub(crate) const VALUES: [(&str, f64); 12] = [
     ("-0", -0.0),
 ];
 
-/// Scenes whose tables are walked.
+/// Scenes whose variables are tested.
 pub(crate) const SCENES: [&str; 5] = ["bumps", "round", "ring", "disk", ADAPTIVE];
-/// The scene with a tolerance.
+/// Name of the scene with a tolerance.
 const ADAPTIVE: &str = "galerkin";
 
-/// One of them.
+/// Returns the scene of this name.
 pub(crate) fn scene(name: &str) -> Scene {
     let mut scene = match name {
         "bumps" => {
@@ -66,11 +66,11 @@ pub(crate) fn scene(name: &str) -> Scene {
     method.unwrap_or(StabilityMethod::exact(Solver::Lcp)).on(scene)
 }
 
-/// All of them.
+/// Returns all cases of this family.
 pub(crate) fn cases() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     for name in SCENES {
-        // The table of a scene is cheap to make, and the only list of what can be set.
+        // The variable table of a scene is cheap, and the only list of settable variables.
         let Ok(simulation) = Simulation::new(&scene(name)) else { continue };
         for variable in
             simulation.table().variables().iter().filter(|row| row.is_settable() && row.kind == DataType::Real)
@@ -102,7 +102,7 @@ fn of_variable(scene: &'static str, variable: &Variable, text: &str, value: f64)
             // Without a ramp some blades start inside the bumps.
             Expected::either(against, ["initial clearance"])
         } else if value.abs() > 1.0 {
-            // Large loads let tips vibrate faster than they slide.
+            // With large loads, tips may vibrate faster than they slide.
             Expected::either_as(against, &[&[word], &["friction has added", "not model sticking"]])
         } else {
             Expected::right(against)
@@ -145,12 +145,12 @@ fn of_variable(scene: &'static str, variable: &Variable, text: &str, value: f64)
     cases
 }
 
-/// Values of the quick table.
+/// Returns whether a value belongs to the quick table.
 fn common(text: &str) -> bool {
     ["NaN", "1e308", "denormal"].contains(&text)
 }
 
-/// A few steps before anything unusual.
+/// Number of steps before the extreme value.
 const CALM: usize = 3;
 const LENGTH: f64 = 2e-5;
 
@@ -163,8 +163,8 @@ fn started(scene: &Scene) -> Result<Simulation> {
     Ok(simulation)
 }
 
-/// Set before initialisation or in a run; the answer must be that of an ordinary value where there is one, and else finite
-/// and within the bounds of mechanics.
+/// Sets a value before initialisation or in a run; the result must equal that of an ordinary value if there is one, and
+/// otherwise be finite and within the bounds of mechanics.
 fn by_setter(name: &str, variable: &str, value: f64, during: bool) -> CaseEnd {
     let scene = scene(name);
     let outcome = (|| -> Result<CaseEnd> {
@@ -202,7 +202,7 @@ fn by_setter(name: &str, variable: &str, value: f64, during: bool) -> CaseEnd {
     outcome.unwrap_or_else(CaseEnd::refused)
 }
 
-/// The value that an extreme one should be as good as: nothing, or of an angle the rest of whole turns.
+/// Returns the value to which an extreme one must be equivalent: zero, or for an angle the remainder of whole turns.
 fn ordinary(variable: &str, value: f64) -> Option<f64> {
     let angle = ["initial_rotor_angle", "casing_shape_rotation"].contains(&variable);
     (value.abs() < 1e-300).then_some(0.0).or_else(|| angle.then_some(value % std::f64::consts::TAU))
@@ -215,7 +215,7 @@ fn go_on(simulation: &mut Simulation) -> Result<()> {
     Ok(())
 }
 
-/// Finite outputs, a ledger that closes, clearances without penetration, friction that heats.
+/// Checks finite outputs, a ledger that closes, clearances without penetration, and friction that generates heat.
 fn sane(simulation: &Simulation) -> Vec<Check> {
     let finite = outputs(simulation).iter().all(|value| value.is_finite());
     let ledger = simulation.system().ledger();
@@ -229,7 +229,7 @@ fn sane(simulation: &Simulation) -> Vec<Check> {
     ]
 }
 
-/// Largest difference of all outputs relative to their size; the total angle counts turns, and is left out.
+/// Returns the largest difference of all outputs relative to their size; the total angle counts turns, and is excluded.
 fn differ(first: &Simulation, second: &Simulation) -> f64 {
     let mut most = 0.0_f64;
     let table = first.table().variables();
@@ -245,7 +245,8 @@ fn differ(first: &Simulation, second: &Simulation) -> f64 {
     most
 }
 
-/// After a refusal the instance must go on as if nothing had been asked; where a step had begun, after a reset.
+/// Checks that the instance continues after an error as if the value had not been set; if a step had begun, after a
+/// reset.
 fn refused(
     error: &Error,
     mut simulation: Simulation,
@@ -259,7 +260,7 @@ fn refused(
         if during && simulation.set_real(row, before).is_ok() && go_on(&mut simulation).is_ok() {
             twin.set_real(row, before)?;
             go_on(&mut twin)?;
-            // A step refused in its middle cannot be undone: then only a reset helps, which is tried below.
+            // A step that fails in its middle cannot be undone: then only a reset helps, which is tested below.
             if bits(&simulation) == bits(&twin) {
                 return Ok(true);
             }
@@ -275,7 +276,7 @@ fn refused(
     CaseEnd { checks, ..CaseEnd::refused(error) }
 }
 
-/// A derivative of an input.
+/// Sets the derivative of an input.
 fn by_slope(name: &str, variable: &str, value: f64) -> CaseEnd {
     let scene = scene(name);
     let outcome = (|| -> Result<CaseEnd> {
@@ -291,7 +292,7 @@ fn by_slope(name: &str, variable: &str, value: f64) -> CaseEnd {
     outcome.unwrap_or_else(CaseEnd::refused)
 }
 
-/// Through a packaged FMU: set after the start, step, read everything.
+/// Uses a packaged FMU: sets the value after the start, steps, reads everything.
 fn by_import(context: &CaseContext, scene: &str, version: u8, variable: &str, value: f64) -> CaseEnd {
     let Some(directory) = &context.fmus else { return CaseEnd::refused("no FMUs were packaged") };
     let outcome = (|| -> tiprub_shell::Result<CaseEnd> {
@@ -310,7 +311,7 @@ fn by_import(context: &CaseContext, scene: &str, version: u8, variable: &str, va
         }
         let values = session.outputs()?;
         let mut checks = vec![Check::so("all outputs finite", values.iter().all(|value| value.is_finite()))];
-        // The same without FMI, bit by bit.
+        // The same run without FMI, bit by bit.
         let mut native =
             Simulation::new(&self::scene(scene)).map_err(|error| tiprub_shell::Failure::from_core("scene", error))?;
         let run = native.table().find(variable).map_or(0, |row| row.reference);
@@ -378,7 +379,7 @@ fn refusals(field: &str) -> &'static [&'static [&'static str]] {
     }
 }
 
-/// Settings of a scene, which have no setter.
+/// Returns the cases for settings of a scene, which have no setter.
 fn settings() -> Vec<StabilityCase> {
     type Change = fn(&mut Scene, f64);
     let fields: [(&str, &str, Change); 20] = [
@@ -430,7 +431,7 @@ fn settings() -> Vec<StabilityCase> {
                 let mut scene = scene("bumps");
                 change(&mut scene, value);
                 CaseEnd::of((|| {
-                    // As the ROM file is read.
+                    // As when the ROM file is read.
                     scene.roms[0].validate()?;
                     let mut simulation = Simulation::new(&scene)?;
                     simulation.initialise(0.0)?;
