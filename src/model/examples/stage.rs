@@ -1,9 +1,10 @@
-//! Mesh one sector of the parametric stage, print what came of it and write it for other programs.
+//! Meshes one sector of the parametric stage, prints its counts and quality and writes it for other programs.
 //!
 //!     cargo run --release -p tiprub-model --example stage [-- default|elements|coarse [BASE [n n ...]]]
 //!
-//! BASE.inp is a CalculiX input file of the sector with its cyclic symmetry and a frequency step (ten modes) for each nodal
-//! diameter n (0, 2, 5, 28 without); BASE-blade.inp is the blade clamped at its root; BASE.vtu has the sector with its sets.
+//! BASE.inp is a CalculiX input file of the sector with cyclic symmetry and a frequency step (ten modes) for each
+//! nodal diameter n (default: 0, 2, 5, 28); BASE-blade.inp is the blade clamped at its root; BASE.vtu contains the
+//! sector with its sets.
 
 use tiprub_model::assembly::lumped_masses;
 use tiprub_model::inp::{CyclicSymmetry, calculix_cyclic_input, calculix_input};

@@ -1,4 +1,4 @@
-//! Reduce the casing of the stage and print what came of it: counts, frequencies, checks.
+//! Reduces the casing of the stage and prints counts, frequencies and checks.
 //!
 //!     cargo run --release -p tiprub-model --example stage_casing -- [fixed-interface modes] [modes] [around] [hex8|hex8i|hex20]
 

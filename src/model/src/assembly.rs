@@ -1,4 +1,4 @@
-//! Global stiffness and mass: symbolic pattern from the mesh, numeric values from the elements.
+//! Global stiffness and mass matrices: symbolic pattern from the mesh, numeric values from the elements.
 
 use std::sync::Arc;
 
@@ -15,7 +15,8 @@ use crate::{Error, Result};
 /// Number of elements that are computed in parallel before their matrices are added to the global ones.
 const CHUNK: usize = 256;
 
-/// Stiffness (N/m) and consistent mass (kg) of the whole mesh; dof 3·node + component, no boundary applied.
+/// Stiffness (N/m) and consistent mass (kg) of the whole mesh; dof 3·node + component, no boundary conditions
+/// applied.
 #[derive(Debug, Clone)]
 pub struct Assembled {
     /// K.
@@ -53,7 +54,8 @@ fn pattern(neighbours: &[Vec<usize>]) -> Pattern {
     Pattern { starts, rows }
 }
 
-/// For every node pair (a, b) of an element: where the three columns of its 3 × 3 block begin among the entries.
+/// Visits every node pair (a, b) of an element with the positions of the three columns of its 3 × 3 block among the
+/// entries.
 pub(crate) fn for_each_block(pattern: &Pattern, nodes: &[usize], mut visit: impl FnMut(usize, usize, [usize; 3])) {
     for (b, &column) in nodes.iter().enumerate() {
         let start = pattern.starts[3 * column];
@@ -65,7 +67,7 @@ pub(crate) fn for_each_block(pattern: &Pattern, nodes: &[usize], mut visit: impl
     }
 }
 
-/// Assemble K and M.
+/// Assembles K and M.
 ///
 /// # Examples
 /// ```
@@ -90,12 +92,12 @@ pub(crate) fn for_each_block(pattern: &Pattern, nodes: &[usize], mut visit: impl
 /// ```
 ///
 /// # Errors
-/// [`Error::Invalid`] for an unsound mesh or material, [`Error::NegativeJacobian`] naming the element.
+/// [`Error::Invalid`] for an invalid mesh or material, [`Error::NegativeJacobian`] with the element.
 pub fn assemble(mesh: &Mesh, material: &Material, listener: Listener<'_>) -> Result<Assembled> {
     assemble_with(mesh, material, Formulation::default(), listener)
 }
 
-/// As [`assemble`], with hex8 elements in the given formulation.
+/// Assembles K and M as [`assemble`] does, with hex8 elements in the given formulation.
 ///
 /// # Examples
 /// ```
@@ -172,7 +174,7 @@ pub fn assemble_with(
     })
 }
 
-/// Lumped mass of every node (kg), for explicit time stepping of the full model; see `lumped_mass`.
+/// Returns the lumped mass of every node (kg), for explicit time stepping of the full model; see `lumped_mass`.
 ///
 /// # Examples
 /// ```
@@ -197,7 +199,7 @@ pub fn assemble_with(
 /// ```
 ///
 /// # Errors
-/// [`Error::Invalid`] for an unsound mesh, [`Error::NegativeJacobian`] naming the element.
+/// [`Error::Invalid`] for an invalid mesh, [`Error::NegativeJacobian`] with the element.
 pub fn lumped_masses(mesh: &Mesh, density: f64) -> Result<Vec<f64>> {
     mesh.validate()?;
     let mut masses = vec![0.0; mesh.nodes.len()];
@@ -208,7 +210,7 @@ pub fn lumped_masses(mesh: &Mesh, density: f64) -> Result<Vec<f64>> {
     Ok(masses)
 }
 
-/// The dofs that remain when some nodes are clamped, ascending.
+/// Returns the dofs that remain when some nodes are clamped, ascending.
 ///
 /// # Examples
 /// ```

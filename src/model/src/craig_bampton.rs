@@ -1,12 +1,11 @@
 //! Craig-Bampton reduction of a general structure (Craig and Bampton, AIAA Journal 6(7), 1968).
 //!
-//! u = T z with z = (u_b, η): interface displacements as they are, fixed-interface modes Φ (K_ii Φ = M_ii Φ Ω²,
-//! ΦᵀM_iiΦ = I) and constraint modes Ψ = -K_ii⁻¹ K_ib:
-//! T = \[I 0; Ψ Φ\], K̂ = blkdiag(K_bb + K_bi Ψ, Ω²), M̂ = TᵀMT.
+//! u = T z with z = (u_b, η): interface displacements, fixed-interface modes Φ (K_ii Φ = M_ii Φ Ω², ΦᵀM_iiΦ = I) and
+//! constraint modes Ψ = -K_ii⁻¹ K_ib: T = \[I 0; Ψ Φ\], K̂ = blkdiag(K_bb + K_bi Ψ, Ω²), M̂ = TᵀMT.
 //!
-//! The static response to interface forces is exact. For loads on the interior it is so once the static responses of the
-//! interior to them, K_ii⁻¹ f_i, are added to Φ: residual vectors (Dickens, Nakagawa, Wittbrodt, Computers & Structures
-//! 62(6), 1997). The space of both is then described by its own modes, so that the form of K̂ stays.
+//! The static response to interface forces is exact. For loads on the interior it is exact if the static responses of
+//! the interior to them, K_ii⁻¹ f_i, are added to Φ: residual vectors (Dickens, Nakagawa, Wittbrodt, Computers &
+//! Structures 62(6), 1997). The space of both is then expressed in its own modes, so that K̂ keeps its form.
 
 use faer::{Mat, MatRef, Side};
 use nalgebra::DMatrix;
@@ -16,7 +15,7 @@ use crate::progress::{Listener, ReductionStage, report};
 use crate::sparse::{Factor, SparseMatrix, add_tall, principal_pair, tall_product};
 use crate::{Error, Result};
 
-/// A reduced pencil and the way back to the full one.
+/// Reduced pencil with the transformation to the full one.
 #[derive(Debug, Clone)]
 pub struct CraigBampton {
     /// M̂, (interface + modes)², kg for the interface part.
@@ -29,11 +28,11 @@ pub struct CraigBampton {
     pub fixed_interface_frequencies: Vec<f64>,
 }
 
-/// Reduce (K, M) to the dofs `interface` (any order, kept) and `modes` fixed-interface modes.
+/// Reduces (K, M) to the dofs `interface` (any order, kept) and `modes` fixed-interface modes.
 ///
 /// # Errors
-/// [`Error::Invalid`] when the interface is empty, repeats a dof or leaves fewer inner dofs than modes;
-/// [`Error::NotPositiveDefinite`] when the structure can still move with the interface held.
+/// [`Error::Invalid`] if the interface is empty, repeats a dof or there are fewer inner dofs than modes;
+/// [`Error::NotPositiveDefinite`] if the structure can still move with the interface held.
 pub fn craig_bampton(
     stiffness: &SparseMatrix,
     mass: &SparseMatrix,
@@ -45,18 +44,21 @@ pub fn craig_bampton(
     craig_bampton_with(stiffness, mass, interface, &inner, listener)
 }
 
-/// Motion of the interior with the interface held.
+/// Choice of the basis of the interior with the interface held.
 #[derive(Debug, Clone, Copy)]
 pub struct InnerBasis<'a> {
     /// Number of fixed-interface modes.
     pub modes: usize,
-    /// Keep one mode less rather than half of a double one, which would split the double modes of the reduced model.
+    /// True to keep one mode less if the last would be half of a double mode, which would split the double modes of
+    /// the reduced model.
     pub whole_pairs: bool,
-    /// Loads, full dofs × loads (N), to any combination of which the reduced model is to answer exactly at rest.
+    /// Loads, full dofs × loads (N), whose static responses, and all combinations of them, the reduced model
+    /// reproduces exactly.
     pub loads: Option<MatRef<'a, f64>>,
 }
 
-/// As [`craig_bampton`], with the interior described as told. A load whose static response is there already adds nothing.
+/// Reduces (K, M) as [`craig_bampton`] does, with the given basis of the interior. A load whose static response is
+/// already in the basis adds nothing.
 ///
 /// # Errors
 /// The errors of [`craig_bampton`].
@@ -99,7 +101,7 @@ pub fn craig_bampton_with(
         interior.iter().zip(inner.shapes.col(k).iter()).for_each(|(&dof, shape)| column[dof] = *shape);
     }
     let eigenvalues = inner.eigenvalues;
-    // The shapes stand in the transformation now.
+    // The transformation now contains the shapes.
     drop(inner.shapes);
     let static_stiffness = constraint_modes(stiffness, &factor, &interior, interface, &mut transformation, listener);
     drop(factor);
@@ -113,10 +115,10 @@ pub fn craig_bampton_with(
     })
 }
 
-/// Columns that are worked on at once where there are many, which bounds the memory beside the transformation's own.
+/// Number of columns that are processed together, which bounds the memory beyond that of the transformation.
 const COLUMNS: usize = 64;
 
-/// Write the constraint modes, and the interface's own unit displacements, into the first columns of the
+/// Writes the constraint modes, and the unit displacements of the interface, into the first columns of the
 /// transformation; returns K_bb + K_bi Ψ.
 fn constraint_modes(
     stiffness: &SparseMatrix,
@@ -146,7 +148,7 @@ fn constraint_modes(
     static_stiffness
 }
 
-/// TᵀAT.
+/// Returns TᵀAT.
 pub(crate) fn projected(matrix: &SparseMatrix, transformation: &Mat<f64>) -> Mat<f64> {
     let size = transformation.ncols();
     let mut product = Mat::zeros(size, size);
@@ -158,10 +160,10 @@ pub(crate) fn projected(matrix: &SparseMatrix, transformation: &Mat<f64>) -> Mat
     product
 }
 
-/// ω² of a double mode agree to this share.
+/// Relative difference of ω² below which two modes form a double mode.
 const DOUBLE: f64 = 1e-6;
 
-/// The lowest `count` modes, or one fewer where more are there and the next one belongs to the last.
+/// Returns the lowest `count` modes, or one fewer if the next mode forms a double mode with the last.
 fn lowest_of(modes: EigenModes, count: usize) -> EigenModes {
     let squares = &modes.eigenvalues;
     if squares.len() <= count {
@@ -176,10 +178,10 @@ fn lowest_of(modes: EigenModes, count: usize) -> EigenModes {
     }
 }
 
-/// A static response this small beside its own size, once the modes are taken out of it, is round-off.
+/// A static response whose remainder without the modes is below this fraction of its size is round-off.
 const DEPENDENT: f64 = 1e-10;
 
-/// The space of modes and static responses, described by its own modes.
+/// Expresses the space of modes and static responses in its own modes.
 pub(crate) fn with_static_responses(
     fixed: EigenModes,
     stiffness: &SparseMatrix,
@@ -196,7 +198,7 @@ pub(crate) fn with_static_responses(
     if basis.ncols() == fixed.shapes.ncols() {
         return Ok(fixed);
     }
-    // The basis is M-orthonormal, so that its own modes come from the projected stiffness alone.
+    // The basis is M-orthonormal, so that its modes follow from the projected stiffness alone.
     let projected = projected(stiffness, &basis);
     let size = projected.nrows();
     let scale = projected.norm_max();
@@ -210,20 +212,20 @@ pub(crate) fn with_static_responses(
     Ok(EigenModes { eigenvalues, shapes, residuals: fixed.residuals })
 }
 
-/// `column` without its part in the M-orthonormal `basis`, scaled to unit mass; `None` where nothing is left.
+/// Returns `column` without its part in the M-orthonormal `basis`, scaled to unit mass; `None` if nothing remains.
 fn independent_part(basis: &Mat<f64>, mass: &SparseMatrix, mut column: Mat<f64>) -> Option<Mat<f64>> {
     let norm =
         |column: &Mat<f64>, mass_column: &Mat<f64>| (column.col(0).transpose() * mass_column.col(0)).max(0.0).sqrt();
     let mut mass_column = mass.times(column.as_ref());
     let first = norm(&column, &mass_column);
     let mut before = first;
-    // Until a pass takes nothing away any more, as in the Lanczos iteration.
+    // Repeated until a pass changes nothing, as in the Lanczos iteration.
     for _pass in 0..6 {
         let part = tall_product(basis.as_ref(), mass_column.as_ref());
         add_tall(column.as_mut(), -1.0, basis.as_ref(), part.as_ref());
         mass_column = mass.times(column.as_ref());
         let after = norm(&column, &mass_column);
-        // Not more than, so that a load of zeros is left out, too.
+        // `<=`, so that a load of zeros is omitted, too.
         if after <= DEPENDENT * first {
             return None;
         }
@@ -263,10 +265,10 @@ pub(crate) fn symmetrised(order: usize, entry: impl Fn(usize, usize) -> f64) -> 
     DMatrix::from_fn(order, order, |i, j| 0.5 * (entry(i, j) + entry(j, i)))
 }
 
-/// Eigenvalues ω² (ascending) and M̂-orthonormal vectors (columns) of a small dense pencil.
+/// Computes the eigenvalues ω² (ascending) and M̂-orthonormal vectors (columns) of a small dense pencil.
 ///
 /// # Errors
-/// [`Error::NotPositiveDefinite`] when the mass matrix is not.
+/// [`Error::NotPositiveDefinite`] if the mass matrix is not positive definite.
 pub fn dense_modes(stiffness: &DMatrix<f64>, mass: &DMatrix<f64>) -> Result<(Vec<f64>, DMatrix<f64>)> {
     let cholesky = mass.clone().cholesky().ok_or_else(|| Error::NotPositiveDefinite {
         matrix: "M (reduced mass)".into(),

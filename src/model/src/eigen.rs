@@ -1,9 +1,9 @@
 //! Lowest modes of K φ = ω² M φ by block Lanczos on the shift-inverted pencil.
 //!
-//! The operator A = (K - σM)⁻¹ M is symmetric in the M inner product; its largest eigenvalues θ = 1/(ω² - σ) belong to
-//! the lowest modes. The basis is kept M-orthonormal by two passes of block Gram-Schmidt against all of it (Grimes,
-//! Lewis, Simon, SIAM J. Matrix Anal. Appl. 1994, with full instead of partial reorthogonalisation), so that no
-//! spurious copies appear.
+//! The operator A = (K - σM)⁻¹ M is symmetric in the M inner product; its largest eigenvalues θ = 1/(ω² - σ) belong
+//! to the lowest modes. The basis is kept M-orthonormal by two passes of block Gram-Schmidt against all its vectors
+//! (Grimes, Lewis, Simon, SIAM J. Matrix Anal. Appl. 1994, with full instead of partial reorthogonalisation), so that
+//! no spurious copies appear.
 
 use faer::{Mat, MatRef, Side};
 
@@ -13,20 +13,22 @@ use crate::{Error, Result};
 
 /// Relative accuracy of the returned pairs: ‖Aφ - θφ‖_M ≤ `TOLERANCE` θ, which bounds the relative error of ω² - σ.
 pub(crate) const TOLERANCE: f64 = 1e-10;
-/// The explicitly formed residual is allowed this much, since it also contains the solve's round-off.
+/// Largest accepted residual; it includes the round-off of the solution.
 const CHECKED_TOLERANCE: f64 = 1e-8;
-/// Vectors that this share of the block's largest is left of depend on the basis.
+/// Fraction of the largest norm of a block below which the remainder of a vector depends on the basis.
 const DEPENDENT: f64 = 1e-13;
-/// A column that loses more than this share inside its block is projected against the whole basis again.
+/// Fraction of its norm below which a column is projected against the whole basis again after the projection in its
+/// block.
 const CANCELLED: f64 = 1e-2;
 const BLOCK: usize = 8;
-/// Vectors of the basis that are stored together.
+/// Number of vectors of the basis that are stored together.
 const PART: usize = 64;
-/// Convergence is looked for again when the basis has grown by this share: that takes a dense eigenvalue problem.
+/// Convergence is checked again when the basis has grown by its size divided by this number, since a check solves a
+/// dense eigenvalue problem.
 const LOOK: usize = 12;
-/// Modes whose residuals are formed together.
+/// Number of modes whose residuals are formed together.
 const CHECKED_TOGETHER: usize = 64;
-/// An ω² below this share of tr K / tr M is round-off of a rigid-body motion.
+/// Fraction of tr K / tr M below which an ω² is round-off of a rigid-body motion.
 const MECHANISM: f64 = 1e-14;
 
 /// Modes of a pencil.
@@ -41,7 +43,7 @@ pub struct EigenModes {
 }
 
 impl EigenModes {
-    /// The first `count`, or all where they are fewer.
+    /// Returns the first `count` modes, or all if there are fewer.
     pub(crate) fn lowest(&self, count: usize) -> Self {
         let count = count.min(self.eigenvalues.len());
         Self {
@@ -51,20 +53,21 @@ impl EigenModes {
         }
     }
 
-    /// Natural frequencies (Hz); 0 where round-off made ω² negative.
+    /// Returns the natural frequencies (Hz); 0 if round-off made ω² negative.
     pub fn frequencies(&self) -> Vec<f64> {
         self.eigenvalues.iter().map(|square| square.max(0.0).sqrt() / core::f64::consts::TAU).collect()
     }
 }
 
-/// A growing M-orthonormal basis Q.
+/// Growing M-orthonormal basis Q.
 ///
-/// It is kept in parts, so that it grows without being copied. M Q is not kept: M times a block costs less than the memory.
+/// The basis is stored in parts, so that it grows without being copied. M Q is not stored: recomputing it costs less
+/// than the memory.
 struct KrylovBasis<'a> {
     mass: &'a SparseMatrix,
     parts: Vec<Mat<f64>>,
     size: usize,
-    /// The basis grows to this size at most.
+    /// Largest size of the basis.
     capacity: usize,
 }
 
@@ -83,7 +86,7 @@ impl<'a> KrylovBasis<'a> {
         self.size += 1;
     }
 
-    /// The vectors from `first` on, part by part, each with its number.
+    /// Iterates over the vectors from `first` on, part by part, each with its number.
     fn from(&self, first: usize) -> impl Iterator<Item = (usize, MatRef<'_, f64>)> {
         self.parts.iter().enumerate().filter_map(move |(index, part)| {
             let start = first.max(index * PART);
@@ -92,14 +95,14 @@ impl<'a> KrylovBasis<'a> {
         })
     }
 
-    /// The vectors from `first` on.
+    /// Returns the vectors from `first` on.
     fn block(&self, first: usize) -> Mat<f64> {
         Mat::from_fn(self.mass.order(), self.size - first, |i, j| {
             self.parts[(first + j) / PART][(i, (first + j) % PART)]
         })
     }
 
-    /// Q C of the first vectors.
+    /// Returns Q C of the first vectors.
     fn combined(&self, coefficients: MatRef<'_, f64>) -> Mat<f64> {
         let mut sum = Mat::zeros(self.mass.order(), coefficients.ncols());
         for (start, part) in self.from(0) {
@@ -112,7 +115,7 @@ impl<'a> KrylovBasis<'a> {
         sum
     }
 
-    /// Remove the vectors from `first` on from `block`, once; returns the coefficients QᵀM·block.
+    /// Projects the vectors from `first` on out of `block`, once; returns the coefficients QᵀM·block.
     fn project_once(&self, first: usize, block: &mut Mat<f64>) -> Mat<f64> {
         let mut coefficients = Mat::zeros(self.size - first, block.ncols());
         let mass_block = self.mass.times(block.as_ref());
@@ -127,14 +130,14 @@ impl<'a> KrylovBasis<'a> {
         coefficients
     }
 
-    /// Remove the basis from `block`; returns the coefficients QᵀM·block.
+    /// Projects the basis out of `block`; returns the coefficients QᵀM·block.
     fn project_out(&self, block: &mut Mat<f64>) -> Mat<f64> {
         let first = self.project_once(0, block);
         first + self.project_once(0, block)
     }
 
-    /// Orthonormalise the columns of `block`, from which the basis has been removed, and append them; returns R of
-    /// block = Q_new R (rows: new vectors). Columns that depend on the others are left out.
+    /// Orthonormalises the columns of `block`, from which the basis has been removed, and appends them; returns R of
+    /// block = Q_new R (rows: new vectors). Columns that depend on the others are omitted.
     fn append(&mut self, block: &Mat<f64>) -> Mat<f64> {
         let (first, width) = (self.size, block.ncols());
         let norms = column_norms(block, &self.mass.times(block.as_ref()));
@@ -147,9 +150,9 @@ impl<'a> KrylovBasis<'a> {
             let mut column = block.get(.., j..j + 1).to_owned();
             let mut before = norms[j];
             let mut norm = 0.0;
-            // Repeat until a pass takes nothing away any more (Kahan: once more is enough, unless it is round-off).
+            // Repeat until a pass changes nothing (Kahan: one repetition is enough, unless the vector is round-off).
             for _pass in 0..6 {
-                // What cancels inside the block brings the older vectors back in proportion.
+                // Cancellation inside the block restores components along the older vectors in proportion.
                 let from = if before < CANCELLED * norms[j] { 0 } else { first };
                 let part = self.project_once(from, &mut column);
                 for i in first..self.size {
@@ -172,14 +175,15 @@ impl<'a> KrylovBasis<'a> {
     }
 }
 
-/// √(columnᵀ M column) of every column.
+/// Returns √(columnᵀ M column) of every column.
 fn column_norms(block: &Mat<f64>, mass_block: &Mat<f64>) -> Vec<f64> {
     (0..block.ncols()).map(|j| (block.col(j).transpose() * mass_block.col(j)).max(0.0).sqrt()).collect()
 }
 
-/// Factor of K - σM, refused when the structure is a mechanism that only round-off holds.
+/// Factors K - σM and rejects a mechanism that is stiff only by round-off.
 ///
-/// Round-off may leave the last pivots just positive. Two inverse iterations then find an ω² that is none.
+/// Round-off may make the last pivots just positive. Two inverse iterations then find an ω² at the level of
+/// round-off.
 ///
 /// # Errors
 /// [`Error::NotPositiveDefinite`] with the given name and remedy.
@@ -192,18 +196,18 @@ pub(crate) fn positive_factor(shifted: &SparseMatrix, mass: &SparseMatrix, name:
     let mass_start = mass.times(start.as_ref());
     let next = factor.solve(mass_start.clone());
     let largest = column_norms(&next, &mass.times(next.as_ref()))[0] / column_norms(&start, &mass_start)[0];
-    // A NaN compares as false and is refused, too.
+    // NaN compares as false and is rejected, too.
     let supported = 1.0 / largest > MECHANISM * shifted.trace() / mass.trace();
     if supported { Ok(factor) } else { Err(Error::NotPositiveDefinite { matrix: name.into(), remedy: remedy.into() }) }
 }
 
-/// The `count` lowest modes of the pencil.
+/// Computes the `count` lowest modes of the pencil.
 ///
-/// `shift` σ must lie below the lowest eigenvalue (0 for a supported structure, negative for a free one), and
-/// `factor` be that of K - σM.
+/// The `shift` σ must lie below the lowest eigenvalue (0 for a supported structure, negative for a free one), and
+/// `factor` must be that of K - σM.
 ///
 /// # Errors
-/// [`Error::Invalid`] when more modes are asked for than there are dofs, [`Error::NotConverged`].
+/// [`Error::Invalid`] if more modes are requested than there are dofs, [`Error::NotConverged`].
 pub fn lowest_modes(
     mass: &SparseMatrix,
     factor: &Factor,
@@ -269,7 +273,7 @@ struct RitzValues {
     bounds: Vec<f64>,
 }
 
-/// Largest eigenpairs of the projected operator, with residual bounds ‖R s_last‖ / θ.
+/// Computes the largest eigenpairs of the projected operator, with residual bounds ‖R s_last‖ / θ.
 fn ritz_pairs(
     projected: MatRef<'_, f64>,
     coupling: MatRef<'_, f64>,
@@ -277,8 +281,8 @@ fn ritz_pairs(
     complete: bool,
 ) -> Result<RitzValues> {
     let size = projected.nrows();
-    // The eigenvalue solver deflates against 1, not against the matrix' norm, so the matrix is scaled to it. The block
-    // columns are filled from the left, so of a pair of entries the later column's is the complete one.
+    // The eigenvalue solver deflates against 1, not against the norm of the matrix, so the matrix is scaled. The
+    // block columns are filled from the left, so the entry of the later column is the complete one of a pair.
     let scale = projected.norm_max();
     let symmetric = Mat::from_fn(size, size, |i, j| projected[(i.min(j), i.max(j))] / scale);
     let eigen = symmetric.self_adjoint_eigen(Side::Lower).map_err(|_| {
@@ -294,8 +298,8 @@ fn ritz_pairs(
     Ok(RitzValues { values, vectors, bounds })
 }
 
-/// Form the residual of every pair explicitly and refuse what does not hold: of a basis that has reached its capacity the bounds know
-/// nothing. `basis` is its size.
+/// Forms the residual of every pair explicitly and rejects inaccurate pairs: the bounds are meaningless for a basis
+/// that has reached its capacity. `basis` is its size.
 fn checked(
     (mass, factor): (&SparseMatrix, &Factor),
     shift: f64,
@@ -315,7 +319,7 @@ fn checked(
         let norms = column_norms(&residual, &mass.times(residual.as_ref()));
         residuals.extend(norms.iter().zip(some).map(|(norm, theta)| norm / theta.abs()));
     }
-    // NaN must count as failure, hence the comparison's direction.
+    // NaN must count as failure, hence the direction of the comparison.
     let converged = residuals.iter().filter(|&&residual| residual <= CHECKED_TOLERANCE).count();
     if converged < thetas.len() {
         let wanted = thetas.len();
@@ -325,7 +329,7 @@ fn checked(
     Ok(EigenModes { eigenvalues, shapes, residuals })
 }
 
-/// Entries in [-1, 1) of a fixed sequence (splitmix64), so that results repeat from run to run.
+/// Returns entries in [-1, 1) from a fixed sequence (splitmix64), so that results are reproducible.
 fn random_block(rows: usize, columns: usize, seed: &mut u64) -> Mat<f64> {
     Mat::from_fn(rows, columns, |_, _| {
         *seed = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);

@@ -1,4 +1,4 @@
-//! One error type for the crate: every variant names what, where and the remedy.
+//! Error type of the crate: every variant states the place, the problem and the remedy.
 
 use std::path::PathBuf;
 
@@ -6,10 +6,10 @@ use thiserror::Error;
 
 use crate::element::ElementKind;
 
-/// Error on the way from a mesh to a reduced model.
+/// Error in the steps from a mesh to a reduced model.
 #[derive(Debug, Error)]
 pub enum Error {
-    /// A value, set or count is outside what the method allows.
+    /// A value, set or count is out of range.
     #[error("{what}: {problem}. {remedy}")]
     Invalid {
         /// The field, set or array.
@@ -19,7 +19,7 @@ pub enum Error {
         /// The remedy.
         remedy: String,
     },
-    /// An element is turned inside out or degenerate.
+    /// An element is inverted or degenerate.
     #[error(
         "element {element} ({}): the Jacobian determinant at integration point {point} is {determinant:.3e}, not \
          positive. Check its node order and its distortion",
@@ -35,33 +35,33 @@ pub enum Error {
         /// Jacobian determinant there (m³ per unit of natural volume).
         determinant: f64,
     },
-    /// A Cholesky factorisation met a pivot that is not positive.
+    /// A Cholesky factorisation found a pivot that is not positive.
     #[error("the matrix {matrix} is not positive definite. {remedy}")]
     NotPositiveDefinite {
-        /// Which matrix.
+        /// The matrix.
         matrix: String,
         /// The remedy.
         remedy: String,
     },
-    /// The eigenvalue iteration ended before all wanted pairs were found.
+    /// The eigenvalue iteration ended before all requested pairs converged.
     #[error(
         "only {converged} of {wanted} eigenpairs converged to {tolerance:.1e} in a Krylov basis of {basis} vectors. Ask \
          for more modes, whose number the basis grows with, or check the mesh for parts that hang loosely together"
     )]
     NotConverged {
-        /// Pairs asked for.
+        /// Number of requested pairs.
         wanted: usize,
-        /// Pairs that reached the tolerance.
+        /// Number of pairs that reached the tolerance.
         converged: usize,
-        /// Size of the basis when it gave up.
+        /// Size of the basis when the iteration ended.
         basis: usize,
         /// Relative tolerance.
         tolerance: f64,
     },
-    /// The reduced model was refused by the stepping floor.
+    /// The crate `tiprub-core` rejected the reduced model.
     #[error(transparent)]
     Core(#[from] tiprub_core::Error),
-    /// A file was read and holds something that cannot be used.
+    /// The contents of a file cannot be used.
     #[error("{place}: {problem}. {remedy}")]
     Read {
         /// File and line (from 1), or byte of a binary file, or record.
@@ -74,7 +74,7 @@ pub enum Error {
     /// A file could not be read or written.
     #[error("{}: {source}", path.display())]
     File {
-        /// Which file.
+        /// The file.
         path: PathBuf,
         /// The message of the operating system.
         source: std::io::Error,
@@ -88,5 +88,5 @@ impl Error {
     }
 }
 
-/// Result of this floor.
+/// Result of this crate.
 pub type Result<T, E = Error> = core::result::Result<T, E>;

@@ -1,4 +1,4 @@
-//! A finite-element model ready for reduction, from a mesh of this crate or from the matrices of another code.
+//! Finite-element model ready for reduction, from a mesh of this crate or from the matrices of another program.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use crate::progress::Listener;
 use crate::sparse::SparseMatrix;
 use crate::{Error, Result};
 
-/// Matrices of all nodes with no boundary applied: dof 3·node + component, components along x, y, z.
+/// Matrices of all nodes without boundary conditions: dof 3·node + component, components along x, y, z.
 #[derive(Debug, Clone)]
 pub struct FeModel {
     /// Node coordinates (x, y, z) in m.
@@ -20,14 +20,14 @@ pub struct FeModel {
     pub stiffness: SparseMatrix,
     /// M (kg), with the pattern of K.
     pub mass: SparseMatrix,
-    /// The mesh and its material, where the matrices were assembled here; pictures and exports need it.
+    /// Mesh and material if the matrices were assembled here; figures and exports need them.
     pub mesh: Option<(Mesh, Material)>,
-    /// Where the model came from, for the ROM's `origin`.
+    /// Source of the model, for the `origin` of the ROM.
     pub origin: String,
 }
 
 impl FeModel {
-    /// Assemble a mesh of one material.
+    /// Assembles a mesh of one material.
     ///
     /// # Examples
     /// ```
@@ -66,7 +66,7 @@ impl FeModel {
         })
     }
 
-    /// The same model with its mass on the nodes, see [`lumped_masses`].
+    /// Returns the same model with lumped mass, see [`lumped_masses`].
     ///
     /// # Examples
     /// ```
@@ -94,7 +94,7 @@ impl FeModel {
     /// ```
     ///
     /// # Errors
-    /// [`Error::Invalid`] for a model without a mesh of one material; those of [`lumped_masses`].
+    /// [`Error::Invalid`] for a model without a mesh of one material; the errors of [`lumped_masses`].
     pub fn lumped(mut self) -> Result<Self> {
         let Some((mesh, material)) = &self.mesh else {
             let problem = "the model has no mesh with a single material";
@@ -105,7 +105,7 @@ impl FeModel {
         Ok(self)
     }
 
-    /// The nodes of a named set; upper and lower case may differ where only one set then fits.
+    /// Returns the nodes of a named set; the case of the name may differ if only one set then matches.
     ///
     /// # Examples
     /// ```
@@ -131,7 +131,7 @@ impl FeModel {
     /// ```
     ///
     /// # Errors
-    /// [`Error::Invalid`] listing the sets there are.
+    /// [`Error::Invalid`] with a list of the existing sets.
     pub fn set(&self, name: &str) -> Result<&[usize]> {
         if let Some(nodes) = self.sets.get(name) {
             return Ok(nodes);

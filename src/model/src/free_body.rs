@@ -1,8 +1,8 @@
-//! Reduction of a body that flies freely: Craig-Bampton on its contact nodes or patches, or its modes with exact residual flexibility, delivered
-//! in its own modes.
+//! Reduction of a free body: Craig-Bampton on its contact nodes or patches, or its modes with exact residual
+//! flexibility, in modal form.
 //!
-//! The rigid-body motions are known beforehand and stay exactly at rest in the stiffness: translations of the contact
-//! nodes are combinations of them, which is what a scene with a free structure needs.
+//! The rigid-body motions are known beforehand and have exactly zero stiffness: translations of the contact nodes are
+//! combinations of them, as a scene with a free structure requires.
 
 use nalgebra::{DMatrix, DVector};
 use tiprub_core::Rom;
@@ -18,7 +18,7 @@ use crate::reduce::{
     responses,
 };
 
-/// Rigid-body motions.
+/// Number of rigid-body motions.
 const RIGID: usize = 6;
 
 /// Options of the reduction of a free body.
@@ -26,22 +26,22 @@ const RIGID: usize = 6;
 pub(crate) struct FreeBodyOptions {
     /// Name of the structure.
     pub name: String,
-    /// Which modes are kept.
+    /// Kind of the modes.
     pub kind: ReductionKind,
-    /// Number of modes: with the contact held, or besides the rigid-body motions. All if absent, and the reduction is then exact.
+    /// Number of modes: with the contact held, or in addition to the rigid-body motions. All if absent, which makes
+    /// the reduction exact.
     pub modes: Option<usize>,
-    /// Number of modes compared with the full model, the six rigid-body motions among them.
+    /// Number of modes compared with the full model, including the six rigid-body motions.
     pub checked_modes: usize,
     /// Modal damping ratio proposed with the model.
     pub damping_ratio: f64,
 }
 
-/// Reduce an unsupported body to its contact nodes or patches; frame Cartesian, M = I, K = Λ with six zeros first.
+/// Reduces an unsupported body to its contact nodes or patches; frame Cartesian, M = I, K = Λ with six zeros first.
 ///
 /// # Errors
 /// [`crate::Error::Invalid`] for contact nodes that are repeated or do not exist;
-/// [`crate::Error::NotPositiveDefinite`] for contact nodes on one line, and where the body
-/// is not one connected part.
+/// [`crate::Error::NotPositiveDefinite`] for collinear contact nodes and for a body that is not one connected part.
 pub(crate) fn reduce_free_body(
     model: FeModel,
     contact: &[ContactPoint],
@@ -53,7 +53,7 @@ pub(crate) fn reduce_free_body(
     let free = free_dofs(model.nodes.len(), &[]);
     let held = HeldContact::new(&free, &model.nodes, contact, DisplacementFrame::Cartesian)?;
     let inner = free.len().saturating_sub(held.interface.len());
-    // All modes are all of them with the contact held.
+    // All modes means all modes with the contact held.
     let kind = if options.modes.is_none() { ReductionKind::FixedInterface } else { options.kind };
     let count = options.modes.unwrap_or(inner);
     let own = if kind == ReductionKind::FreeInterface { count + RIGID } else { 0 };

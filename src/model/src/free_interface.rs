@@ -1,15 +1,15 @@
 //! Reduction of a supported structure with free-interface modes and exact residual flexibility (R. H. MacNeal, Computers &
 //! Structures 1, 1971; S. Rubin, AIAA Journal 13(8), 1975).
 //!
-//! Kept are the lowest modes Φ of the structure as it is supported and its static responses K⁻¹B to unit forces on the contact
-//! coordinates u_c = Bᵀu. The response at rest to contact forces is exact whatever the number of modes, and forced responses
-//! converge faster than with modes of the held interface, since Φ need not be corrected for it. With the highest modes of the
-//! reduced model, as many as contact coordinates, taken as quasi-static (`massless-boundary`), this is MacNeal's model; with their
-//! mass, Rubin's.
+//! The basis consists of the lowest modes Φ of the structure as it is supported and its static responses K⁻¹B to unit
+//! forces on the contact coordinates u_c = Bᵀu. The static response to contact forces is exact for any number of
+//! modes, and forced responses converge faster than with modes of the held interface, since Φ needs no correction for
+//! the interface. If the highest modes of the reduced model, as many as contact coordinates, are quasi-static
+//! (`massless-boundary`), this is MacNeal's model; with their mass, it is Rubin's.
 //!
-//! The space has the coordinates of Craig and Bampton: C = K⁻¹B(BᵀK⁻¹B)⁻¹ moves one contact coordinate by one and no other, and is
-//! K-orthogonal to everything that moves none. What is left of the modes, D = Φ − C BᵀΦ, moves none. Its own modes under K and M
-//! stand where fixed-interface modes stand there, so that M̂, K̂ and T are of the same form.
+//! The reduced coordinates are those of Craig and Bampton: C = K⁻¹B(BᵀK⁻¹B)⁻¹ moves one contact coordinate by one and
+//! no other, and is K-orthogonal to everything that moves none. The remainder of the modes, D = Φ − C BᵀΦ, moves
+//! none. Its modes under K and M replace the fixed-interface modes, so that M̂, K̂ and T keep their form.
 
 use faer::{Mat, MatRef};
 use nalgebra::DMatrix;
@@ -20,17 +20,17 @@ use crate::progress::{Listener, ReductionStage, report};
 use crate::sparse::{SparseMatrix, add_tall, tall_product};
 use crate::{Error, Result};
 
-/// Share of the flexibility that the modes must leave to static responses in every direction: below it both describe the same, and
-/// are told apart by rounding only.
+/// Smallest fraction of the flexibility, in any direction, that the static responses must add to the modes: below it
+/// both describe the same motion, and only rounding distinguishes them.
 pub(crate) const LEAST_RESIDUAL: f64 = 1e-6;
 
-/// Reduce (K, M) to the contact coordinates Bᵀu, `contact` being B (full dofs × contact coordinates), and `modes` modes of the
-/// supported structure.
+/// Reduces (K, M) to the contact coordinates Bᵀu, with `contact` as B (full dofs × contact coordinates), and `modes`
+/// modes of the supported structure.
 ///
 /// # Errors
-/// [`Error::Invalid`] for more modes than degrees of freedom beside the contact coordinates, and for so many that no residual
-/// flexibility is left; [`Error::NotPositiveDefinite`] for a structure that is not supported or contact coordinates that depend on each
-/// other.
+/// [`Error::Invalid`] for more modes than degrees of freedom besides the contact coordinates, and for so many that no
+/// residual flexibility remains; [`Error::NotPositiveDefinite`] for an unsupported structure or contact coordinates
+/// that depend on each other.
 pub fn free_interface(
     stiffness: &SparseMatrix,
     mass: &SparseMatrix,
@@ -95,7 +95,7 @@ pub fn free_interface(
     })
 }
 
-/// The residual flexibility BᵀK⁻¹B − BᵀΦΛ⁻¹ΦᵀB must be positive definite beside the whole.
+/// Checks that the residual flexibility BᵀK⁻¹B − BᵀΦΛ⁻¹ΦᵀB is positive definite relative to the total flexibility.
 fn check_residual(flexibility: &DMatrix<f64>, seen: &DMatrix<f64>, squares: &[f64]) -> Result<()> {
     let lower = flexibility.clone().cholesky().ok_or_else(dependent)?.l();
     if squares.is_empty() {

@@ -1,9 +1,10 @@
-//! The inner surface of a casing mesh: points and parts of it by the shape functions of its faces.
+//! Inner surface of a casing mesh: points and parts of it, evaluated with the shape functions of its faces.
 //!
-//! Contact grids and thermal patches lie at given angles and axial positions, wherever the nodes of the mesh are. A point of a grid is the
-//! place on a face that has its angle and axial position. Its displacement is that of the face there, Σ N_i u_i, and a force on it goes to
-//! the nodes of the face with the same weights N_i. So work is the same on both sides, weights sum to one, and rigid motions, forces and
-//! moments are exact. Patches are cut out of the faces along their borders, so that the heat of every patch stays within it.
+//! Contact grids and thermal patches are at given angles and axial positions, independent of the nodes of the mesh. A
+//! point of a grid is the place on a face with its angle and axial position. Its displacement is that of the face
+//! there, Σ N_i u_i, and a force on it is distributed to the nodes of the face with the same weights N_i. So the work
+//! is the same on both sides, the weights sum to one, and rigid motions, forces and moments are exact. Patches are
+//! cut out of the faces along their borders, so that the heat of every patch stays within it.
 
 use core::f64::consts::{PI, TAU};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -14,37 +15,38 @@ use crate::mesh::{Element, Mesh};
 use crate::patches::{face_points, on_face, points_between};
 use crate::{Error, Result};
 
-/// A face looks towards the axis where its normal is within 45 degrees of that direction.
+/// A face faces the axis if its normal is within 45 degrees of that direction.
 const INWARD: f64 = -core::f64::consts::FRAC_1_SQRT_2;
-/// Fraction of a turn within which angles are the same; axial positions within this fraction of the length of a face are.
+/// Tolerance of equal angles as a fraction of a turn, and of equal axial positions as a fraction of the length of a
+/// face.
 const SAME: f64 = 1e-9;
-/// A point whose weight at a node is closer to one than this is the node.
+/// A point coincides with a node if its weight there is closer to one than this.
 const AT_NODE: f64 = 1e-9;
-/// Weights below are rounding.
+/// Weights below this value are rounding errors.
 const ROUNDING: f64 = 1e-14;
-/// Fraction of the radius by which the centre of the inner surface may miss the axis.
+/// Largest distance of the centre of the inner surface from the axis, as a fraction of the radius.
 const OFF_AXIS: f64 = 0.01;
-/// Newton steps to a place on a face; planar faces need one.
+/// Newton steps for a place on a face; planar faces need one.
 const STEPS: usize = 30;
-/// Secant steps to a border along an edge of a part of a face.
+/// Secant steps for the intersection of a border with an edge of a part of a face.
 const BORDER_STEPS: usize = 6;
-/// Gauss-Legendre on 0 to 1.
+/// Gauss-Legendre points and weights on 0 to 1.
 const GAUSS_3: [(f64, f64); 3] =
     [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
 
 const WHAT: &str = "inner surface of the casing";
 
-/// A face of an element: number of the element, its own numbers of the corners.
+/// Face of an element: number of the element, local numbers of the corners.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct InnerFace {
     pub(crate) element: usize,
     pub(crate) corners: &'static [usize],
 }
 
-/// A point of the inner surface.
+/// Point of the inner surface.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SurfacePoint {
-    /// Nodes and their weights, which sum to one; a single node where the point is at a node.
+    /// Nodes and their weights, which sum to one; a single node if the point coincides with it.
     pub weights: Vec<(usize, f64)>,
     /// Position (x, y, z) in m.
     pub position: [f64; 3],
@@ -58,7 +60,7 @@ enum CoveredFace {
     Triangles(Vec<[[f64; 3]; 3]>),
 }
 
-/// Faces that belong to one element, in the order of elements.
+/// Returns the faces that belong to one element only, in the order of elements.
 pub(crate) fn outer_faces(mesh: &Mesh) -> Vec<InnerFace> {
     let key = |element: &Element, corners: &[usize]| {
         let mut nodes: Vec<usize> = corners.iter().map(|&corner| element.nodes[corner]).collect();
@@ -84,7 +86,7 @@ impl InnerFace {
         self.corner_nodes(mesh).into_iter().map(|node| mesh.nodes[node]).collect()
     }
 
-    /// Whether its normal, counter-clockwise seen from outside, points towards the axis.
+    /// Returns whether the normal, counter-clockwise seen from outside, points towards the axis.
     pub(crate) fn looks_inward(&self, mesh: &Mesh) -> bool {
         let corners = self.corner_positions(mesh);
         let edge = |to: usize| -> [f64; 3] { core::array::from_fn(|i| corners[to][i] - corners[0][i]) };
@@ -95,7 +97,7 @@ impl InnerFace {
         x * middle[0] + y * middle[1] < INWARD * size
     }
 
-    /// Shape functions of the element and area at each point of a rule.
+    /// Visits the points of a rule with the shape functions of the element and the area.
     pub(crate) fn integrate(&self, mesh: &Mesh, mut visit: impl FnMut(&[f64], f64)) {
         let element: &Element = &mesh.elements[self.element];
         let coordinates = mesh.coordinates(element);
@@ -105,7 +107,7 @@ impl InnerFace {
         }
     }
 
-    /// The same over the part of the face within a patch. The parts in patches that fill the surface fill the face.
+    /// Integrates over the part of the face within a patch. The parts in patches that fill the surface fill the face.
     pub(crate) fn integrate_within(&self, mesh: &Mesh, patch: &ThermalPatch, mut visit: impl FnMut(&[f64], f64)) {
         let triangles = match self.part(mesh, patch) {
             CoveredFace::Nothing => return,
@@ -115,7 +117,7 @@ impl InnerFace {
         let element = &mesh.elements[self.element];
         let coordinates = mesh.coordinates(element);
         for [a, b, c] in triangles {
-            // The third and the fourth corner of a triangle are one: its sides degenerate, its area does not.
+            // The third and the fourth corner of a triangle coincide: its sides degenerate, its area does not.
             for (point, share) in points_between([a, b, c, c], GAUSS_3.to_vec()) {
                 let (shape, area, _) = on_face(element.kind, &coordinates, point);
                 visit(&shape, area * share);
@@ -123,7 +125,7 @@ impl InnerFace {
         }
     }
 
-    /// Whether some of the face lies in a patch.
+    /// Returns whether part of the face lies in a patch.
     pub(crate) fn meets(&self, mesh: &Mesh, patch: &ThermalPatch) -> bool {
         !matches!(self.part(mesh, patch), CoveredFace::Nothing)
     }
@@ -145,7 +147,7 @@ impl InnerFace {
         let spans = [0, 1].map(extent);
         let slacks = [SAME * TAU, SAME * (spans[1][1] - spans[1][0])];
         let start = wrapped(patch.angle[0] - middle);
-        // A patch that goes all the way round has no border; any other may begin on either side of the face.
+        // A patch around the whole circumference has no border; any other may begin on either side of the face.
         let turns: &[f64] = if width > TAU * (1.0 - SAME) { &[f64::NAN] } else { &[0.0, -TAU] };
         let mut triangles = Vec::new();
         for turn in turns {
@@ -179,12 +181,13 @@ impl InnerFace {
         if triangles.is_empty() { CoveredFace::Nothing } else { CoveredFace::Triangles(triangles) }
     }
 
-    /// The place on the face at an angle and an axial position, or the nearest to it: shape functions of the element, position, distance (m).
+    /// Returns the place on the face at an angle and an axial position, or the nearest to it: shape functions of the
+    /// element, position, distance (m).
     fn foot(&self, mesh: &Mesh, angle: f64, axial: f64) -> Option<(Vec<f64>, [f64; 3], f64)> {
         let element = &mesh.elements[self.element];
         let coordinates = mesh.coordinates(element);
         let (sin, cos) = angle.sin_cos();
-        // Along the circumference and along the axis from the place that is looked for.
+        // Offsets along the circumference and along the axis from the requested place.
         let off = |[x, y, z]: [f64; 3]| [y * cos - x * sin, z];
         let corners = self.corner_positions(mesh);
         let facing = corners.iter().all(|[x, y, _]| x * cos + y * sin > 0.0);
@@ -231,12 +234,13 @@ impl InnerFace {
     }
 }
 
-/// An angle between −π and π.
+/// Returns an angle between −π and π.
 fn wrapped(angle: f64) -> f64 {
     (angle + PI).rem_euclid(TAU) - PI
 }
 
-/// The part of a polygon on the faces of an element where a function is not negative; borders cross its edges where the function is zero.
+/// Clips a polygon on the faces of an element to the part where a function is not negative; borders cross its edges
+/// where the function is zero.
 fn clipped(polygon: &[[f64; 3]], side: impl Fn([f64; 3]) -> f64) -> Vec<[f64; 3]> {
     let sides: Vec<f64> = polygon.iter().map(|&corner| side(corner)).collect();
     let mut kept = Vec::with_capacity(polygon.len() + 2);
@@ -246,7 +250,7 @@ fn clipped(polygon: &[[f64; 3]], side: impl Fn([f64; 3]) -> f64) -> Vec<[f64; 3]
             kept.push(corner);
         }
         if (sides[i] >= 0.0) != (sides[next] >= 0.0) {
-            // From the same end on both sides of the border, so that both cut at the same place.
+            // Start from the same end on both sides of the border, so that both cut at the same place.
             let (from, to) = if sides[i] < 0.0 { (next, i) } else { (i, next) };
             let between = |t: f64| -> [f64; 3] {
                 core::array::from_fn(|k| polygon[from][k] + t * (polygon[to][k] - polygon[from][k]))
@@ -264,31 +268,31 @@ fn clipped(polygon: &[[f64; 3]], side: impl Fn([f64; 3]) -> f64) -> Vec<[f64; 3]
     kept
 }
 
-/// The inner surface of a full ring about the z axis.
+/// Inner surface of a full ring about the z axis.
 #[derive(Debug, Clone)]
 pub struct InnerSurface<'a> {
     mesh: &'a Mesh,
     faces: Vec<InnerFace>,
 }
 
-/// A border of a surface.
+/// Border of a surface.
 struct Border {
-    /// Times that it goes around the axis, with its sense.
+    /// Signed number of turns around the axis.
     turns: f64,
     /// Nodes, ascending.
     nodes: Vec<usize>,
-    /// Means of x and y along it (m).
+    /// Means of x and y along the border (m).
     middle: [f64; 2],
 }
 
 impl<'a> InnerSurface<'a> {
-    /// Finds the inner surface: the outer faces whose corners are all in the `set` (of all nodes where absent) and whose normals are within 45
-    /// degrees of the direction to the axis, as far as these are connected over edges and lie between the axial positions (m; everywhere
-    /// where absent).
+    /// Finds the inner surface: the outer faces whose corners are all in the `set` (all nodes if absent) and whose
+    /// normals are within 45 degrees of the direction to the axis, as far as they are connected by edges and lie
+    /// between the axial positions (m; everywhere if absent).
     ///
     /// # Errors
-    /// [`Error::Invalid`] for no such face, several surfaces, one that is no full ring about the z axis, and one with gaps between the axial
-    /// positions.
+    /// [`Error::Invalid`] if there is no such face, there are several surfaces, or the surface is not a full ring
+    /// about the z axis or has gaps between the axial positions.
     pub fn find(mesh: &'a Mesh, set: Option<&[usize]>, axial: Option<[f64; 2]>) -> Result<Self> {
         let mut chosen = vec![set.is_none(); mesh.nodes.len()];
         set.into_iter().flatten().for_each(|&node| chosen[node] = true);
@@ -311,7 +315,7 @@ impl<'a> InnerSurface<'a> {
                 "Give the set of all nodes of the inner surface (--contact-set), and check --axis and axial positions";
             return Err(Error::invalid(WHAT, problem, remedy));
         }
-        // Walls of holes look towards the axis in part; only a named set is meant as a whole.
+        // Walls of holes partly face the axis; only a named set must be used as a whole.
         if set.is_none() && there.iter().any(Self::is_ring) {
             there.retain(Self::is_ring);
         }
@@ -335,13 +339,13 @@ impl<'a> InnerSurface<'a> {
         Ok(surface)
     }
 
-    /// First and last axial position of its corners (m).
+    /// Returns the first and last axial position of its corners (m).
     pub fn axial(&self) -> [f64; 2] {
         let corners = self.faces.iter().flat_map(|face| face.corner_positions(self.mesh));
         corners.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], [_, _, z]| [low.min(z), high.max(z)])
     }
 
-    /// Mean radius (m), over its area.
+    /// Returns the mean radius (m), weighted by area.
     pub fn radius(&self) -> f64 {
         let (mut sum, mut whole) = (0.0, 0.0);
         for face in &self.faces {
@@ -356,16 +360,16 @@ impl<'a> InnerSurface<'a> {
         sum / whole
     }
 
-    /// Corner nodes of its faces, ascending.
+    /// Returns the corner nodes of its faces, ascending.
     pub fn corner_nodes(&self) -> Vec<usize> {
         let nodes: BTreeSet<usize> = self.faces.iter().flat_map(|face| face.corner_nodes(self.mesh)).collect();
         nodes.into_iter().collect()
     }
 
-    /// The point at an angle (rad) and an axial position (m).
+    /// Returns the point at an angle (rad) and an axial position (m).
     ///
     /// # Errors
-    /// [`Error::Invalid`] where the surface is further away than the tolerance (m).
+    /// [`Error::Invalid`] if the surface is further away than the tolerance (m).
     pub fn point(&self, angle: f64, axial: f64, tolerance: f64) -> Result<SurfacePoint> {
         let feet = self.faces.iter().filter_map(|face| Some((face, face.foot(self.mesh, angle, axial)?)));
         let nearest = feet.min_by(|a, b| a.1.2.total_cmp(&b.1.2));
@@ -421,7 +425,7 @@ impl<'a> InnerSurface<'a> {
                           give axial positions beside the hole (--contact-axial)";
             return Err(Error::invalid(WHAT, problem, remedy));
         }
-        // Of both ends: gaps between them do not move it.
+        // Uses both ends: gaps between them do not move the centre.
         let ends = || borders.iter().filter(|border| border.turns.abs() > 0.5);
         let [x, y] = [0, 1].map(|i| ends().map(|end| end.middle[i]).sum::<f64>() / ends().count() as f64);
         let radius = self.radius();
@@ -435,9 +439,9 @@ impl<'a> InnerSurface<'a> {
         Ok(())
     }
 
-    /// Where a surface that is no ring is open.
+    /// Describes where a surface that is not a full ring is open.
     fn opening(&self, borders: &[Border]) -> String {
-        // Tenths of a degree that faces cover.
+        // Tenths of a degree that are covered by faces.
         let mut covered = [false; 3600];
         for face in &self.faces {
             let angles: Vec<f64> = face.corner_positions(self.mesh).iter().map(|[x, y, _]| y.atan2(*x)).collect();
@@ -480,7 +484,7 @@ impl<'a> InnerSurface<'a> {
         values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
     }
 
-    /// Edges that belong to one face, as far as they are connected.
+    /// Returns the edges that belong to one face only, grouped by connectivity.
     fn borders(&self) -> Vec<Border> {
         let mut counted: BTreeMap<[usize; 2], Option<[usize; 2]>> = BTreeMap::new();
         for [a, b] in self.faces.iter().flat_map(|face| edges(&face.corner_nodes(self.mesh))) {
@@ -512,7 +516,7 @@ fn edges(corners: &[usize]) -> Vec<[usize; 2]> {
     (0..corners.len()).map(|i| [corners[i], corners[(i + 1) % corners.len()]]).collect()
 }
 
-/// Faces by what is connected over edges.
+/// Groups faces that are connected by edges.
 fn pieces(mesh: &Mesh, faces: &[InnerFace]) -> Vec<Vec<InnerFace>> {
     let mut numbers: HashMap<[usize; 2], usize> = HashMap::new();
     let of_face = |face: &InnerFace| {
@@ -526,7 +530,7 @@ fn pieces(mesh: &Mesh, faces: &[InnerFace]) -> Vec<Vec<InnerFace>> {
     groups(&keys).into_iter().map(|group| group.into_iter().map(|face| faces[face]).collect()).collect()
 }
 
-/// Items by what is connected over common keys, in the order of their first items.
+/// Groups items that are connected by common keys, in the order of their first items.
 fn groups(keys: &[Vec<usize>]) -> Vec<Vec<usize>> {
     let mut holders: HashMap<usize, Vec<usize>> = HashMap::new();
     for (item, own) in keys.iter().enumerate() {

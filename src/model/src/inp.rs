@@ -1,23 +1,24 @@
-//! Export of a mesh with material, sets and boundary as a CalculiX (Abaqus) input file.
+//! Export of a mesh with material, sets and boundary conditions as a CalculiX (Abaqus) input file.
 
 use std::fmt::Write as _;
 
 use crate::{Error, Result, element::ElementKind, material::Material, mesh::Mesh};
 
-/// A sector of a disk, for [`calculix_cyclic_input`].
+/// Sector of a disk, for [`calculix_cyclic_input`].
 #[derive(Debug, Clone, Copy)]
 pub struct CyclicSymmetry<'a> {
-    /// Node sets of the two faces, the second one turned by +2π/sectors about z.
+    /// Node sets of the two faces, the second one rotated by +2π/sectors about z.
     pub faces: [&'a str; 2],
     /// Number of sectors of the disk.
     pub sectors: usize,
-    /// Nodal diameters, a step for each.
+    /// Nodal diameters, with one step for each.
     pub nodal_diameters: &'a [usize],
 }
 
-/// Text of an input file that computes the lowest `frequencies` natural frequencies.
+/// Returns the text of an input file that computes the lowest `frequencies` natural frequencies.
 ///
-/// Numbers carry 13 significant digits: CalculiX reads at most 20 characters each. Every node set of the mesh is written; the nodes of `clamped` (a set name, if any) are fixed in all directions.
+/// Numbers have 13 significant digits, since CalculiX reads at most 20 characters each. Every node set of the mesh is
+/// written; the nodes of `clamped` (a set name, if any) are fixed in all directions.
 ///
 /// # Examples
 /// ```
@@ -42,17 +43,18 @@ pub struct CyclicSymmetry<'a> {
 /// ```
 ///
 /// # Errors
-/// [`Error::Invalid`] when the set does not exist or the mesh is not sound.
+/// [`Error::Invalid`] if the set does not exist or the mesh is invalid.
 pub fn calculix_input(mesh: &Mesh, material: &Material, clamped: Option<&str>, frequencies: usize) -> Result<String> {
     let mut text = model(mesh, material, clamped)?;
     put(&mut text, format_args!("*STEP\n*FREQUENCY\n{frequencies}\n*NODE FILE\nU\n*END STEP\n"));
     Ok(text)
 }
 
-/// As [`calculix_input`] for a sector of a disk (`*CYCLIC SYMMETRY MODEL`): a frequency step per nodal diameter.
+/// Returns the text of an input file as [`calculix_input`] does, for a sector of a disk (`*CYCLIC SYMMETRY MODEL`),
+/// with a frequency step per nodal diameter.
 ///
-/// CalculiX lists every frequency twice, also where the mode is single (no or half as many diameters as sectors); so
-/// twice as many are asked for. Clamped nodes are left out of the faces: CalculiX refuses to tie them.
+/// CalculiX lists every frequency twice, even for single modes (nodal diameter zero or half the number of sectors),
+/// so twice as many are requested. Clamped nodes are omitted from the faces, since CalculiX does not tie them.
 ///
 /// # Examples
 /// ```
@@ -86,7 +88,7 @@ pub fn calculix_cyclic_input(
         put(&mut text, format_args!("*SURFACE, NAME=S{name}, TYPE=NODE\n{name}\n"));
     }
     text.push_str("*TIE, NAME=CYCLIC, CYCLIC SYMMETRY\nSTIED_HIGH, STIED_LOW\n");
-    // The axis is given by two of its points.
+    // The axis is given by two points.
     put(&mut text, format_args!("*CYCLIC SYMMETRY MODEL, N={sectors}, TIE=CYCLIC, ELSET=EALL\n0, 0, 0, 0, 0, 1\n"));
     for n in nodal_diameters {
         put(&mut text, format_args!("*STEP\n*FREQUENCY\n{}\n", 2 * frequencies));
@@ -137,7 +139,7 @@ fn write_elements(text: &mut String, mesh: &Mesh, kind: ElementKind) {
     }
 }
 
-/// Numbers separated by commas, at most 12 a line; a comma at the end of a line continues it.
+/// Writes numbers separated by commas, at most 12 per line; a comma at the end of a line continues it.
 fn write_list(text: &mut String, numbers: impl Iterator<Item = usize>) {
     let numbers: Vec<String> = numbers.map(|number| number.to_string()).collect();
     let lines: Vec<String> = numbers.chunks(12).map(|line| line.join(", ")).collect();

@@ -1,10 +1,11 @@
-//! From a finite-element mesh to a reduced-order model of contact nodes.
+//! Reduction of finite-element meshes to reduced-order models of contact nodes.
 //!
 //! Floor 1. A [`Mesh`] of the six solid [elements](element) is [assembled](assembly) into sparse stiffness and mass,
-//! its lowest modes are found by [shift-invert Lanczos](eigen), and [Craig-Bampton](craig_bampton) leaves a small dense
-//! pencil in the displacements of the contact nodes: a [`tiprub_core::Rom`] with the checks that come with it
-//! (eqs 12 and 13 of the paper). [`rotor37`] is the blade that ships, [`casing`] the ring around it; [`cube`] a benchmark of free bodies and [open surfaces](panel); models of others are [`read`]. Nothing is printed: a caller passes a
-//! [listener](progress) and shows what it likes. SI units everywhere.
+//! its lowest modes are found by [shift-invert Lanczos](eigen), and [Craig-Bampton](craig_bampton) reduces it to a
+//! small dense pencil in the displacements of the contact nodes: a [`tiprub_core::Rom`] with its checks (eqs 12 and
+//! 13 of the paper). [`rotor37`] is the built-in blade, [`casing`] the ring around it, and [`cube`] a benchmark of
+//! free bodies and [open surfaces](panel); [`read`] imports user models. Nothing is printed: a caller passes a
+//! [listener](progress) and decides what to show. All quantities are in SI units.
 #![warn(unreachable_pub)]
 #![forbid(unsafe_code)]
 

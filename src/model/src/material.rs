@@ -4,7 +4,7 @@ use tiprub_core::shown;
 
 use crate::{Error, Result};
 
-/// A linear elastic isotropic material.
+/// Linear elastic isotropic material.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Material {
     /// Name, as written into exported files.
@@ -20,8 +20,8 @@ pub struct Material {
 }
 
 impl Material {
-    /// Maraging steel as taken for rotor 37: E = 180 GPa, ν = 0.3, ρ = 8000 kg/m³; α = 10.1e-6 1/K is that of 18Ni
-    /// maraging steel (250 grade, 24 to 284 °C, ASM Metals Handbook).
+    /// Returns maraging steel as used for rotor 37: E = 180 GPa, ν = 0.3, ρ = 8000 kg/m³; α = 10.1e-6 1/K is that of
+    /// 18Ni maraging steel (250 grade, 24 to 284 °C, ASM Metals Handbook).
     pub fn maraging_steel() -> Self {
         Self {
             name: "maraging_steel".into(),
@@ -32,8 +32,8 @@ impl Material {
         }
     }
 
-    /// Plain carbon steel: E = 210 GPa, ν = 0.3, ρ = 7850 kg/m³ (EN 1993-1-1, 3.2.6); α = 11.7e-6 1/K (low-carbon steel
-    /// AISI 1020, 0 to 100 °C, ASM Metals Handbook).
+    /// Returns plain carbon steel: E = 210 GPa, ν = 0.3, ρ = 7850 kg/m³ (EN 1993-1-1, 3.2.6); α = 11.7e-6 1/K
+    /// (low-carbon steel AISI 1020, 0 to 100 °C, ASM Metals Handbook).
     ///
     /// # Examples
     /// ```
@@ -44,7 +44,8 @@ impl Material {
         Self { name: "steel".into(), young_modulus: 210e9, poisson_ratio: 0.3, density: 7850.0, expansion: 11.7e-6 }
     }
 
-    /// Titanium Ti-6Al-4V, annealed: E = 113.8 GPa, ν = 0.342, ρ = 4430 kg/m³, α = 8.6e-6 1/K (20 to 100 °C, ASM).
+    /// Returns titanium Ti-6Al-4V, annealed: E = 113.8 GPa, ν = 0.342, ρ = 4430 kg/m³, α = 8.6e-6 1/K (20 to 100 °C,
+    /// ASM).
     pub fn titanium() -> Self {
         Self {
             name: "titanium".into(),
@@ -55,7 +56,7 @@ impl Material {
         }
     }
 
-    /// Lamé's constants (λ, µ) in Pa.
+    /// Returns Lamé's constants (λ, µ) in Pa.
     ///
     /// # Examples
     /// ```
@@ -68,10 +69,10 @@ impl Material {
         (e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), e / (2.0 * (1.0 + nu)))
     }
 
-    /// Check that the material is one.
+    /// Checks that the properties are valid.
     ///
     /// # Errors
-    /// [`Error::Invalid`] naming the property.
+    /// [`Error::Invalid`] with the property.
     pub(crate) fn validate(&self) -> Result<()> {
         let positive = |value: f64| value.is_finite() && value > 0.0;
         let fail = |property: &str, value: f64, range: &str| {
@@ -90,7 +91,7 @@ impl Material {
         if !(self.poisson_ratio > -1.0 && self.poisson_ratio < 0.5) {
             return fail("Poisson's ratio", self.poisson_ratio, "-1 < ν < 0.5");
         }
-        // Largest of the metals is below 1e-4; a value given in 1e-6/K must not pass as 1/K.
+        // All metals are below 1e-4; a value given in 1e-6/K must not pass as 1/K.
         if self.expansion.is_nan() || self.expansion.abs() > 1e-3 {
             return fail("thermal expansion coefficient", self.expansion, "|α| ≤ 1e-3 1/K");
         }

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, HashMap};
 
 use crate::{Error, Result, element::ElementKind};
 
-/// One solid element.
+/// Solid element.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Element {
     /// Kind.
@@ -13,7 +13,7 @@ pub struct Element {
     pub nodes: Vec<usize>,
 }
 
-/// A finite-element mesh. All indices count from 0; exported files count from 1.
+/// Finite-element mesh. All indices count from 0; exported files count from 1.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Mesh {
     /// Node coordinates (x, y, z) in m.
@@ -25,7 +25,7 @@ pub struct Mesh {
 }
 
 impl Mesh {
-    /// Coordinates of an element's nodes in the element's order (m).
+    /// Returns the coordinates of the nodes of an element in the order of the element (m).
     ///
     /// # Examples
     /// ```
@@ -51,7 +51,7 @@ impl Mesh {
         element.nodes.iter().map(|&node| self.nodes[node]).collect()
     }
 
-    /// The nodes of a named set.
+    /// Returns the nodes of a named set.
     ///
     /// # Examples
     /// ```
@@ -75,7 +75,7 @@ impl Mesh {
     /// ```
     ///
     /// # Errors
-    /// [`Error::Invalid`] listing the sets there are.
+    /// [`Error::Invalid`] with a list of the existing sets.
     pub fn set(&self, name: &str) -> Result<&[usize]> {
         self.sets.get(name).map(Vec::as_slice).ok_or_else(|| {
             let names: Vec<_> = self.sets.keys().map(String::as_str).collect();
@@ -87,7 +87,7 @@ impl Mesh {
         })
     }
 
-    /// Check node counts and indices of the elements, coordinates, and that every node belongs to an element.
+    /// Checks node counts and indices of the elements, coordinates, and that every node belongs to an element.
     ///
     /// # Examples
     /// ```
@@ -110,7 +110,7 @@ impl Mesh {
     /// ```
     ///
     /// # Errors
-    /// [`Error::Invalid`] naming the element, node or set.
+    /// [`Error::Invalid`] with the element, node or set.
     pub fn validate(&self) -> Result<()> {
         if let Some(index) = self.nodes.iter().position(|node| node.iter().any(|x| !x.is_finite())) {
             let problem = format!("coordinates {:?} are not finite", self.nodes[index]);
@@ -144,7 +144,7 @@ impl Mesh {
         Ok(())
     }
 
-    /// The same mesh with quadratic elements: a node is added in the middle of every edge of a linear element.
+    /// Returns the mesh with quadratic elements: a node is added in the middle of every edge of a linear element.
     ///
     /// # Examples
     /// ```
@@ -189,9 +189,9 @@ impl Mesh {
     }
 }
 
-/// Corner nodes of the outer faces, three or four per face, counter-clockwise seen from outside.
+/// Returns the corner nodes of the outer faces, three or four per face, counter-clockwise seen from outside.
 ///
-/// A face is an outer one when it belongs to a single element.
+/// A face is an outer face if it belongs to a single element.
 ///
 /// # Examples
 /// ```
@@ -233,7 +233,7 @@ pub fn surface_quads(mesh: &Mesh) -> Vec<Vec<usize>> {
     faces.into_iter().filter(|face| count[&sorted(face)] == 1).collect()
 }
 
-/// Sets with as many nodes as they have, for messages.
+/// Lists sets with their numbers of nodes, for messages.
 ///
 /// # Examples
 /// ```

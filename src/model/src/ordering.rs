@@ -1,11 +1,11 @@
 //! Elimination orders that keep a sparse Cholesky factor small.
 //!
-//! Degrees of freedom with the same neighbours, as the three of a node, are one vertex of a graph (compression, as in
-//! C. Ashcraft, SIAM J. Sci. Comput. 16(6), 1995). Nested dissection (A. George, SIAM J. Numer. Anal. 10(2), 1973) halves
-//! the graph by a small separator, which is eliminated last, and does so again with the halves; the separators are found
-//! on coarser and coarser graphs (G. Karypis, V. Kumar, SIAM J. Sci. Comput. 20(1), 1998). Small remainders are ordered by
-//! approximate minimum degree. Nothing here depends on time, addresses, threads or a C library's random numbers: the same
-//! pattern gives the same order on every machine.
+//! Degrees of freedom with the same neighbours, such as the three of a node, are one vertex of a graph (compression,
+//! as in C. Ashcraft, SIAM J. Sci. Comput. 16(6), 1995). Nested dissection (A. George, SIAM J. Numer. Anal. 10(2), 1973)
+//! halves the graph by a small separator, which is eliminated last, and repeats this with the halves; the separators
+//! are found on coarser and coarser graphs (G. Karypis, V. Kumar, SIAM J. Sci. Comput. 20(1), 1998). Small subgraphs
+//! are ordered by approximate minimum degree. The result does not depend on time, addresses, threads or the random
+//! numbers of a C library: the same pattern gives the same order on every machine.
 
 mod graph;
 mod separator;
@@ -20,23 +20,24 @@ use graph::Graph;
 /// Method that finds the elimination order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Ordering {
-    /// Nested dissection where it pays, which is from a few thousand degrees of freedom on.
+    /// Nested dissection if it is worthwhile, from a few thousand degrees of freedom.
     #[default]
     Automatic,
-    /// Approximate minimum degree, faer's own.
+    /// Approximate minimum degree of faer.
     MinimumDegree,
     /// Nested dissection.
     NestedDissection,
 }
 
-/// From this order on nested dissection pays.
+/// Number of degrees of freedom from which nested dissection is worthwhile.
 const LARGE: usize = 3000;
-/// Subgraphs of fewer vertices are not dissected.
+/// Number of vertices below which a subgraph is not dissected.
 const LEAF: usize = 120;
-/// Subgraphs of more vertices are dissected in parallel.
+/// Number of vertices above which a subgraph is dissected in parallel.
 const PARALLEL: usize = 4000;
 
-/// The order of elimination, `order[new] = old`; `None` where minimum degree is to be left to the factorisation.
+/// Returns the order of elimination, `order[new] = old`; `None` if the factorisation determines a minimum-degree
+/// order.
 pub(crate) fn elimination_order(pattern: &Pattern, ordering: Ordering) -> Option<Vec<usize>> {
     match ordering {
         Ordering::MinimumDegree => None,
@@ -45,21 +46,22 @@ pub(crate) fn elimination_order(pattern: &Pattern, ordering: Ordering) -> Option
     }
 }
 
-/// Nested dissection of a symmetric pattern, `order[new] = old`.
+/// Computes the nested dissection of a symmetric pattern, `order[new] = old`.
 pub fn nested_dissection(pattern: &Pattern) -> Vec<usize> {
     let (graph, members) = compressed(pattern);
     let order = postordered(&graph, dissected(&graph));
     order.into_iter().flat_map(|vertex| members[vertex].clone()).collect()
 }
 
-/// Graph of the groups of successive rows with the same entries, weighted with their number, and the rows of each group.
+/// Returns the graph of the groups of successive rows with the same entries, weighted with their number, and the rows
+/// of each group.
 fn compressed(pattern: &Pattern) -> (Graph, Vec<core::ops::Range<usize>>) {
     let column = |j: usize| &pattern.rows[pattern.starts[j]..pattern.starts[j + 1]];
     let mut members: Vec<core::ops::Range<usize>> = Vec::new();
     let mut group = Vec::with_capacity(pattern.order());
     for row in 0..pattern.order() {
         match members.last_mut() {
-            // Each holds the other by symmetry, as both diagonals are there.
+            // Each row contains the other by symmetry, since both diagonals are present.
             Some(last) if column(row) == column(last.start) => last.end = row + 1,
             _ => members.push(row..row + 1),
         }
@@ -88,7 +90,7 @@ fn dissected(graph: &Graph) -> Vec<usize> {
     let sides = separator::separator(graph);
     let [first, second, middle] =
         [0, 1, separator::SEPARATOR].map(|side| (0..graph.order()).filter(|&v| sides[v] == side).collect::<Vec<_>>());
-    // A graph without a separator worth the name, such as a complete one.
+    // The graph has no useful separator, such as a complete graph.
     if first.is_empty() || second.is_empty() {
         return minimum_degree(graph);
     }
@@ -105,7 +107,7 @@ fn dissected(graph: &Graph) -> Vec<usize> {
     order
 }
 
-/// Approximate minimum degree of a small graph.
+/// Computes the approximate minimum degree order of a small graph.
 fn minimum_degree(graph: &Graph) -> Vec<usize> {
     let order = graph.order();
     let pattern = SymbolicSparseColMatRef::new_checked(order, order, &graph.starts, None, &graph.neighbours);
@@ -118,16 +120,17 @@ fn minimum_degree(graph: &Graph) -> Vec<usize> {
         amd::Control::default(),
         MemStack::new(&mut memory),
     );
-    // It fails for overflowing indices only, which a graph in memory does not have.
+    // It only fails for overflowing indices, which a graph in memory cannot have.
     if found.is_ok() { forward } else { (0..order).collect() }
 }
 
-/// The same elimination in an order in which each subtree of the elimination tree is contiguous, so that columns of one
-/// structure stand beside each other. Fill does not change (J. W. H. Liu, SIAM J. Matrix Anal. Appl. 11(1), 1990).
+/// Returns an equivalent elimination order in which each subtree of the elimination tree is contiguous, so that
+/// columns of equal structure are adjacent. The fill does not change (J. W. H. Liu, SIAM J. Matrix Anal. Appl. 11(1),
+/// 1990).
 fn postordered(graph: &Graph, order: Vec<usize>) -> Vec<usize> {
     let size = order.len();
     let parent = elimination_tree(graph, &order);
-    // Children of each vertex, ascending, as linked lists; the roots hang from `size`.
+    // Children of each vertex, ascending, as linked lists; the lists of the roots start at `size`.
     let (mut first, mut next) = (vec![usize::MAX; size + 1], vec![usize::MAX; size]);
     for vertex in (0..size).rev() {
         let above = if parent[vertex] == usize::MAX { size } else { parent[vertex] };
@@ -151,7 +154,7 @@ fn postordered(graph: &Graph, order: Vec<usize>) -> Vec<usize> {
     result
 }
 
-/// Parent of every vertex, both counted in elimination order; `usize::MAX` for roots.
+/// Returns the parent of every vertex, both counted in elimination order; `usize::MAX` for roots.
 fn elimination_tree(graph: &Graph, order: &[usize]) -> Vec<usize> {
     let mut position = vec![0; order.len()];
     for (new, &old) in order.iter().enumerate() {
@@ -161,7 +164,7 @@ fn elimination_tree(graph: &Graph, order: &[usize]) -> Vec<usize> {
     for (new, &old) in order.iter().enumerate() {
         for &neighbour in graph.neighbours_of(old) {
             let mut vertex = position[neighbour];
-            // Up to the root of what is connected so far, with the path shortened on the way.
+            // Up to the root of the connected part, shortening the path on the way.
             while vertex < new {
                 let above = core::mem::replace(&mut ancestor[vertex], new);
                 if above == usize::MAX {

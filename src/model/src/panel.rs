@@ -1,10 +1,10 @@
 //! Reduction of a supported structure that carries an open contact surface: a grid of nodes with four free edges.
 //!
-//! Coordinates are the lowest modes of the supported structure, and static responses to forces on the grid that these modes
-//! leave out (residual attachment modes: MacNeal, Computers & Structures 1, 1971; Rubin, AIAA Journal 13(8), 1975). A grid has
-//! hundreds of nodes, and a response for each of them would be a large model again. So forces are taken by the
-//! principal directions of the flexibility that the modes lack, C (K⁻¹ − ΦΛ⁻¹Φᵀ) Cᵀ v = κ v: those with the largest κ
-//! first, which leave the least flexibility out for their number.
+//! Coordinates are the lowest modes of the supported structure and static responses to forces on the grid that these
+//! modes do not represent (residual attachment modes: MacNeal, Computers & Structures 1, 1971; Rubin, AIAA Journal
+//! 13(8), 1975). A grid has hundreds of nodes, and a response for each of them would make the model large again. So
+//! the forces are the principal directions of the flexibility that the modes lack, C (K⁻¹ − ΦΛ⁻¹Φᵀ) Cᵀ v = κ v, in
+//! order of descending κ, which minimises the neglected flexibility for their number.
 
 use faer::{Mat, Side};
 use nalgebra::{DMatrix, DVector};
@@ -20,21 +20,21 @@ use crate::reduce::{FullModes, Reduction, compare, description, full_modes};
 use crate::sparse::{SparseMatrix, principal_pair};
 use crate::{Error, Result};
 
-/// Right-hand sides that are solved at once.
+/// Number of right-hand sides that are solved together.
 const COLUMNS: usize = 64;
 
-/// Contact nodes of an open surface: node `along · around + i` is the i-th of row `along`. With S_s along a row and S_t from
-/// row to row, S_t × S_s points to the other body.
+/// Contact nodes of an open surface: node `along · around + i` is the i-th of row `along`. With S_s along a row and
+/// S_t from row to row, S_t × S_s points to the other body.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PanelGrid {
-    /// Nodes of a row.
+    /// Number of nodes per row.
     pub around: usize,
-    /// Node indices of the mesh (from 0), row by row; clamped ones may be among them.
+    /// Node indices of the mesh (from 0), row by row; they may include clamped nodes.
     pub nodes: Vec<usize>,
 }
 
 impl PanelGrid {
-    /// Number of rows.
+    /// Returns the number of rows.
     pub(crate) fn along(&self) -> usize {
         self.nodes.len() / self.around.max(1)
     }
@@ -66,8 +66,8 @@ pub(crate) struct PanelOptions {
     pub name: String,
     /// Number of modes.
     pub modes: usize,
-    /// Number of static responses to forces on the grid, at most three per node that can move: then the response at rest to
-    /// any contact force is that of the full model.
+    /// Number of static responses to forces on the grid, at most three per movable node; with the maximum, the static
+    /// response to any contact force is that of the full model.
     pub static_responses: usize,
     /// Number of modes compared with the full model.
     pub checked_modes: usize,
@@ -75,11 +75,11 @@ pub(crate) struct PanelOptions {
     pub damping_ratio: f64,
 }
 
-/// Reduce a supported structure to its modes and static responses; frame Cartesian, M = I, K = Λ.
+/// Reduces a supported structure to its modes and static responses; frame Cartesian, M = I, K = Λ.
 ///
 /// # Errors
 /// [`Error::Invalid`] for a grid of nodes that do not exist or are repeated, more modes than degrees of freedom or
-/// more static responses than forces; [`Error::NotPositiveDefinite`] for a structure that is not held.
+/// more static responses than forces; [`Error::NotPositiveDefinite`] for an unsupported structure.
 pub(crate) fn reduce_panel(
     model: FeModel,
     clamped: &[usize],
@@ -136,7 +136,7 @@ pub(crate) fn reduce_panel(
     Ok(reduction)
 }
 
-/// Rows among the free dofs of the components of grid nodes; `None` where clamped.
+/// Returns the rows of the components of grid nodes among the free dofs; `None` for clamped ones.
 fn grid_dofs(free: &[usize], grid: &PanelGrid) -> Vec<Option<usize>> {
     let dofs = grid.nodes.iter().flat_map(|node| (0..3).map(move |component| 3 * node + component));
     dofs.map(|dof| free.binary_search(&dof).ok()).collect()
@@ -167,7 +167,7 @@ fn with_grid_responses(
     let responses = full.responses(loads);
     let squares = kept.eigenvalues.clone();
     let mut basis = with_static_responses(kept, stiffness, mass, &responses)?;
-    // The projected problem finds the modes again; of those, what was iterated for is the better.
+    // The projected problem returns the modes again; the iterated ones are more accurate.
     basis.eigenvalues[..squares.len()].copy_from_slice(&squares);
     basis.eigenvalues.iter().is_sorted().then_some(basis).ok_or_else(|| {
         let remedy = "Request a few more or fewer modes";
@@ -175,7 +175,7 @@ fn with_grid_responses(
     })
 }
 
-/// Force patterns on the grid, dofs × `count`, along which the modes lack most flexibility.
+/// Computes the force patterns on the grid, dofs × `count`, for which the modes lack most flexibility.
 fn principal_forces(
     kept: &EigenModes,
     full: &FullModes,
@@ -204,7 +204,7 @@ fn principal_forces(
     Ok(Mat::from_fn(dofs.len(), count, |i, k| eigen.U()[(i, dofs.len() - 1 - k)]))
 }
 
-/// Displacements of the grid nodes, zero where clamped.
+/// Returns the displacements of the grid nodes, zero for clamped ones.
 fn contact_map(free: &[usize], grid: &PanelGrid, shapes: &Mat<f64>) -> DMatrix<f64> {
     let dofs = grid_dofs(free, grid);
     DMatrix::from_fn(dofs.len(), shapes.ncols(), |row, mode| dofs[row].map_or(0.0, |dof| shapes[(dof, mode)]))

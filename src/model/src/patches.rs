@@ -1,10 +1,11 @@
-//! Contact patches: a tip divided along its chord, force spread consistently over the faces of the mesh.
+//! Contact patches: a tip divided along its chord, with forces distributed consistently over the faces of the mesh.
 //!
-//! With hat functions h_k(s) over the chord, which add up to one, the patch k has the weights w_kp = ∫ h_k N_p dA / ∫ h_k dA
-//! over the nodes p of the tip, N_p their shape functions. Its displacement is Σ w_kp u_p, each node's in its own directions, and its
-//! force is spread with the same weights, so that the work of both is one. Its position is the mean of radii, angles and axial
-//! positions: a mean of Cartesian ones would lie inside the arc of the chord. Point forces do not converge as the mesh is refined,
-//! since their flexibility grows without bounds; forces per length do.
+//! With hat functions h_k(s) over the chord, which sum to one, patch k has the weights w_kp = ∫ h_k N_p dA / ∫ h_k dA
+//! over the nodes p of the tip, with their shape functions N_p. Its displacement is Σ w_kp u_p, with the directions
+//! of each node, and its force is distributed with the same weights, so that the work of both is the same. Its
+//! position is the mean of radii, angles and axial positions, since a mean of Cartesian ones would lie inside the arc
+//! of the chord. Point forces do not converge with mesh refinement, since their flexibility grows without bounds;
+//! forces per length do.
 
 mod coordinates;
 mod outline;
@@ -24,14 +25,14 @@ pub(crate) use coordinates::PatchCoordinates;
 use outline::Outline;
 pub use tip::{FoundTip, find_root, find_tip};
 
-/// Every face is divided into so many parts in both directions: hat functions have kinks.
+/// Number of parts into which every face is divided in both directions, because hat functions have kinks.
 const PARTS: usize = 4;
-/// Patches depend on each other below this share of the largest eigenvalue of their weights' products.
+/// Fraction of the largest eigenvalue of the products of the weights below which patches depend on each other.
 const DEPENDENT: f64 = 1e-9;
 /// Gauss-Legendre points and weights of a part, on 0 to 1.
 const GAUSS: [(f64, f64); 2] = [(0.211_324_865_405_187_1, 0.5), (0.788_675_134_594_812_9, 0.5)];
 
-/// Number of places along the chord at which a set has nodes, and so its largest number of patches.
+/// Returns the number of places along the chord at which a set has nodes, which is its largest number of patches.
 ///
 /// # Examples
 /// ```
@@ -56,7 +57,8 @@ pub fn places_along_chord(mesh: &Mesh, set: &[usize]) -> usize {
     Places::new(&mesh.nodes, set).stations()
 }
 
-/// `count` patches along the chord of the tip whose nodes are `set`, by growing z as contact nodes are; `name` of each.
+/// Returns `count` patches along the chord of the tip with the nodes `set`, by ascending z like contact nodes, each
+/// with its `name`.
 ///
 /// # Examples
 /// ```
@@ -82,7 +84,8 @@ pub fn places_along_chord(mesh: &Mesh, set: &[usize]) -> usize {
 /// ```
 ///
 /// # Errors
-/// [`Error::Invalid`] for no patches, more than the tip has nodes along its chord, or a set without a whole outer face of an element.
+/// [`Error::Invalid`] for no patches, more than the tip has nodes along its chord, or a set without a whole outer
+/// face of an element.
 pub fn contact_patches(
     mesh: &Mesh,
     set: &[usize],
@@ -92,13 +95,15 @@ pub fn contact_patches(
     tip_patches(mesh, set, [count, 1], name)
 }
 
-/// The same in rows across the thickness, one row after the other, by growing angle at the tip's chord. A tip that tilts touches with one of
-/// its sides: the mean over the thickness does not see it, and forces on that mean do not bend the blade.
+/// Returns patches in rows across the thickness, one row after the other, by ascending angle at the chord of the tip.
+/// A tilted tip touches with one of its sides: the mean over the thickness does not represent this, and forces on
+/// that mean do not bend the blade.
 ///
-/// With hat functions h_k along the chord and χ_l across, 0 to 1 between the sides of the tip's outline, the weights are
-/// w_p = ∫ h_k χ_l N_p dA / ∫ h_k χ_l dA. Hat functions h_l across would leave the outermost rows within the tip, two of them at its thirds.
-/// Their duals χ_l with ∫ χ_l h_m = δ_lm ∫ h_l add up to one as they do, and rows stand where the hats have their peaks: the outermost are the
-/// sides of the tip. A tip that stays straight across its thickness stays outside of all that two rows stay outside of.
+/// With hat functions h_k along the chord and χ_l across, from 0 to 1 between the sides of the outline of the tip,
+/// the weights are w_p = ∫ h_k χ_l N_p dA / ∫ h_k χ_l dA. Hat functions h_l across would place the outermost rows
+/// within the tip, two rows at its thirds. Their duals χ_l with ∫ χ_l h_m = δ_lm ∫ h_l also sum to one, and rows are
+/// at the peaks of the hat functions: the outermost at the sides of the tip. A tip that stays straight across its
+/// thickness is clear of a surface if two rows are.
 ///
 /// # Examples
 /// ```
@@ -123,7 +128,7 @@ pub fn contact_patches(
 /// ```
 ///
 /// # Errors
-/// The errors of [`contact_patches`]; no rows, or more than the nodes of the tip tell apart.
+/// The errors of [`contact_patches`]; no rows, or more than the nodes of the tip resolve.
 pub fn tip_patches(
     mesh: &Mesh,
     set: &[usize],
@@ -168,7 +173,8 @@ pub fn tip_patches(
     Ok(patches.map(point).collect())
 }
 
-/// Names of patches along the chord, that of each row of its own: `patch_5_row_2`.
+/// Returns the name of a patch from its name along the chord and, if there are several rows, its row:
+/// `patch_5_row_2`.
 pub fn row_name(along: &str, row: usize, rows: usize) -> String {
     if rows == 1 { along.to_owned() } else { format!("{along}_row_{}", row + 1) }
 }
@@ -177,7 +183,7 @@ fn rows_refused(problem: String) -> Error {
     Error::invalid("rows of contact patches", problem, "Use fewer rows or refine the tip across its thickness")
 }
 
-/// Duals of hat functions in hat functions: row l of ∫ h_l (∫ h h)⁻¹.
+/// Returns the duals of hat functions in terms of hat functions: row l of ∫ h_l (∫ h h)⁻¹.
 fn duals(rows: usize) -> DMatrix<f64> {
     let share = |row: usize| share_of_chord(row, rows);
     let product = |i: usize, j: usize| match (i.abs_diff(j), rows) {
@@ -190,12 +196,12 @@ fn duals(rows: usize) -> DMatrix<f64> {
     DMatrix::from_fn(rows, rows, |i, j| share(i) * inverse[(i, j)])
 }
 
-/// Values of all duals at a place, from those of the hats there.
+/// Returns the values of all duals at a place from those of the hat functions there.
 fn all_duals(duals: &DMatrix<f64>, hats: &[(usize, f64)]) -> Vec<f64> {
     (0..duals.nrows()).map(|row| hats.iter().map(|(other, hat)| duals[(row, *other)] * hat).sum()).collect()
 }
 
-/// Whether no patch follows from the others.
+/// Returns whether all patches are linearly independent.
 fn independent(weights: &[Vec<f64>]) -> bool {
     let size = |weights: &[f64]| weights.iter().map(|weight| weight * weight).sum::<f64>().sqrt();
     let scaled = DMatrix::from_fn(weights.len(), weights[0].len(), |i, j| weights[i][j] / size(&weights[i]));
@@ -203,14 +209,16 @@ fn independent(weights: &[Vec<f64>]) -> bool {
     gram.min() > DEPENDENT * gram.max()
 }
 
-/// A grid of patches over a face of a body, rows along the first of two directions (unit vectors), in growing place along the second. With the
-/// duals χ_k and χ_l of hat functions along both, each 0 to 1 between the outermost nodes of the set, patch (k, l) has the weights
-/// w_p = ∫ χ_k χ_l N_p dA / ∫ χ_k χ_l dA over the nodes p: products of duals add up to one, as duals do. So patches stand where the hats have their
-/// peaks, the outermost on the edges of the face: a flat face meets what is curved with its edges first. As many as there are nodes on a
-/// grid of linear elements are the nodes.
+/// Returns a grid of patches over a face of a body, rows along the first of two directions (unit vectors), ascending
+/// along the second. With the duals χ_k and χ_l of hat functions along both directions, from 0 to 1 between the
+/// outermost nodes of the set, patch (k, l) has the weights w_p = ∫ χ_k χ_l N_p dA / ∫ χ_k χ_l dA over the nodes p.
+/// Products of duals sum to one, as duals do. So patches are at the peaks of the hat functions, the outermost on the
+/// edges of the face: a flat face touches a curved body with its edges first. As many patches as nodes on a grid of
+/// linear elements coincide with the nodes.
 ///
 /// # Errors
-/// [`Error::Invalid`] for no patches, more than the face has places for, or a set without a whole outer face of an element.
+/// [`Error::Invalid`] for no patches, more than the face has places for, or a set without a whole outer face of an
+/// element.
 pub fn face_patches(
     mesh: &Mesh,
     set: &[usize],
@@ -261,13 +269,13 @@ pub fn face_patches(
     Ok(weights.into_iter().enumerate().map(named).collect())
 }
 
-/// Places closer than this share of a face's extent are one.
+/// Places closer than this fraction of the extent of a face coincide.
 const SAME_PLACE: f64 = 1e-3;
 
-/// Faces of elements with the element's own numbers of their corners.
+/// Faces of elements with the local numbers of their corners.
 type ElementFaces<'a> = Vec<(&'a Element, &'static [usize])>;
 
-/// ∫ h_k N_p dA over the faces, patch by patch over the nodes of the set.
+/// Computes ∫ h_k N_p dA over the faces, patch by patch over the nodes of the set.
 fn weights(
     mesh: &Mesh,
     (set, faces): (&[usize], ElementFaces<'_>),
@@ -282,7 +290,7 @@ fn weights(
             let (values, area, position) = on_face(element.kind, &coordinates, point);
             let hats = hats(position);
             for (&node, value) in element.nodes.iter().zip(values) {
-                // Nodes off the face have shape functions of zero on it.
+                // Nodes off the face have zero shape functions on it.
                 let Some(&place) = within.get(&node) else { continue };
                 for &(patch, hat) in &hats {
                     weights[patch][place] += hat * value * area * share;
@@ -299,7 +307,7 @@ fn weights(
     }
 }
 
-/// The hat functions that are not zero at a place along the chord, 0 to 1.
+/// Returns the hat functions that are not zero at a place along the chord, 0 to 1.
 fn hats(along: f64, count: usize) -> [(usize, f64); 2] {
     if count == 1 {
         return [(0, 1.0), (0, 0.0)];
@@ -311,20 +319,20 @@ fn hats(along: f64, count: usize) -> [(usize, f64); 2] {
     [(first, 1.0 - share), (first + 1, share)]
 }
 
-/// Nodes with weights other than zero, which then add up to one.
+/// Returns the nodes with nonzero weights, scaled to sum to one.
 fn shares(set: &[usize], weights: &[f64]) -> Vec<(usize, f64)> {
     let total: f64 = weights.iter().sum();
     let some = set.iter().zip(weights).filter(|(_, weight)| **weight != 0.0);
     some.map(|(&node, weight)| (node, weight / total)).collect()
 }
 
-/// The node of the set that is nearest to a place.
+/// Returns the node of the set that is nearest to a place.
 fn nearest(mesh: &Mesh, set: &[usize], middle: [f64; 3]) -> usize {
     let distance = |node: usize| -> f64 { mesh.nodes[node].iter().zip(middle).map(|(a, b)| (a - b) * (a - b)).sum() };
     set.iter().copied().min_by(|&a, &b| distance(a).total_cmp(&distance(b))).unwrap_or_default()
 }
 
-/// Integral of the hat function of a patch over the chord, of length 1.
+/// Returns the integral of the hat function of a patch over the chord of length 1.
 fn share_of_chord(patch: usize, count: usize) -> f64 {
     match count {
         1 => 1.0,
@@ -344,27 +352,27 @@ fn point(mesh: &Mesh, set: &[usize], places: &Places, (weights, length): (&[f64]
     ContactPoint { node: nearest(mesh, set, middle), ..point }
 }
 
-/// Natural coordinates and the vectors along the two directions of a face there.
+/// Natural coordinates of a point of a face, and the vectors along its two directions there.
 pub(crate) type FacePoint = ([f64; 3], [[f64; 3]; 2]);
 
-/// Points of a face, given by its corners, with shares of the parameters' area.
+/// Returns the integration points of a face, given by its corners, with their fractions of the parameter area.
 fn quadrature(kind: ElementKind, corners: &[usize]) -> impl Iterator<Item = (FacePoint, f64)> {
     let part = |part: usize| GAUSS.map(|(x, w)| ((part as f64 + x) / PARTS as f64, w / PARTS as f64));
     face_points(kind, corners, (0..PARTS).flat_map(part).collect())
 }
 
-/// The same by a rule on 0 to 1 for both directions.
+/// Returns the integration points of a face for a rule on 0 to 1 in both directions.
 pub(crate) fn face_points(
     kind: ElementKind,
     corners: &[usize],
     rule: Vec<(f64, f64)>,
 ) -> impl Iterator<Item = (FacePoint, f64)> {
     let at: Vec<[f64; 3]> = corners.iter().map(|&corner| kind.natural_nodes()[corner]).collect();
-    // Of a triangle the third and the fourth corner are one: its sides degenerate, its area does not.
+    // The third and the fourth corner of a triangle coincide: its sides degenerate, its area does not.
     points_between(std::array::from_fn(|corner| at[corner.min(at.len() - 1)]), rule)
 }
 
-/// The same between four corners in natural coordinates.
+/// Returns the integration points between four corners in natural coordinates.
 pub(crate) fn points_between(at: [[f64; 3]; 4], rule: Vec<(f64, f64)>) -> impl Iterator<Item = (FacePoint, f64)> {
     let pairs: Vec<_> = rule.iter().flat_map(|first| rule.iter().map(|second| (*first, *second))).collect();
     pairs.into_iter().map(move |((a, wa), (b, wb))| {
@@ -376,7 +384,8 @@ pub(crate) fn points_between(at: [[f64; 3]; 4], rule: Vec<(f64, f64)>) -> impl I
     })
 }
 
-/// Shape functions of an element at a point of a face, area per parameters' area (m²), and the position (m).
+/// Returns the shape functions of an element at a point of a face, the area per parameter area (m²), and the position
+/// (m).
 pub(crate) fn on_face(
     kind: ElementKind,
     coordinates: &[[f64; 3]],
@@ -396,7 +405,7 @@ pub(crate) fn on_face(
     (shape.values[..coordinates.len()].to_vec(), area, position)
 }
 
-/// Outer faces whose nodes, mid-side ones too, are all in the set.
+/// Returns the outer faces whose nodes, including mid-side ones, are all in the set.
 fn faces_within<'a>(mesh: &'a Mesh, set: &[usize]) -> Result<ElementFaces<'a>> {
     let mut chosen = vec![false; mesh.nodes.len()];
     set.iter().for_each(|&node| chosen[node] = true);
@@ -421,7 +430,7 @@ fn faces_within<'a>(mesh: &'a Mesh, set: &[usize]) -> Result<ElementFaces<'a>> {
     Ok(outer.into_iter().map(|(_, (_, element, corners))| (element, corners)).collect())
 }
 
-/// Mid-side nodes on the sides of a face.
+/// Returns the mid-side nodes on the sides of a face.
 fn middles<'a>(element: &'a Element, corners: &'static [usize]) -> impl Iterator<Item = usize> + 'a {
     let first = element.kind.corner_count();
     let sides = element.kind.edges().iter().enumerate();

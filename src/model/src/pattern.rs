@@ -1,8 +1,8 @@
-//! Where the entries of a sparse matrix are.
+//! Positions of the entries of a sparse matrix.
 
 use faer::sparse::SymbolicSparseColMatRef;
 
-/// Where the entries of a symmetric matrix are: compressed columns, rows ascending, both triangles.
+/// Positions of the entries of a symmetric matrix: compressed columns, rows ascending, both triangles.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Pattern {
     /// Start of each column in `rows`, and the end of the last one.
@@ -12,7 +12,7 @@ pub struct Pattern {
 }
 
 impl Pattern {
-    /// Number of rows and columns.
+    /// Returns the number of rows and columns.
     pub fn order(&self) -> usize {
         self.starts.len() - 1
     }
@@ -21,7 +21,7 @@ impl Pattern {
         SymbolicSparseColMatRef::new_checked(self.order(), self.order(), &self.starts, None, &self.rows)
     }
 
-    /// Pattern of the rows and columns `keep` (ascending), and for each of its entries the entry it is here.
+    /// Returns the pattern of the rows and columns `keep` (ascending), and the index here of each of its entries.
     pub(crate) fn principal(&self, keep: &[usize]) -> (Self, Vec<usize>) {
         let mut position = vec![usize::MAX; self.order()];
         for (new, &old) in keep.iter().enumerate() {

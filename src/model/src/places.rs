@@ -1,25 +1,25 @@
-//! Where the nodes of a tip are: in the meridional plane, along its chord, and across it.
+//! Positions of the nodes of a tip: in the meridional plane, along its chord and across it.
 
 use nalgebra::{DMatrix, DVector};
 
-/// Axial positions closer than this share of the set's extent are one.
+/// Axial positions closer than this fraction of the extent of the set coincide.
 const SAME_PLACE: f64 = 1e-3;
-/// A set that extends along the axis less than this share of its radius has no slope, and is ordered around the axis.
+/// Axial extent, as a fraction of the radius, below which a set has no slope and is ordered around the axis.
 const FLAT: f64 = 1e-6;
 
-/// The nodes of a set in the meridional plane, and on the developed surface in the direction of the chord and across it.
+/// Nodes of a set in the meridional plane, and on the developed surface along the chord and across it.
 pub(crate) struct Places {
     axial: Vec<f64>,
     radius: Vec<f64>,
-    /// Along the chord, by growing z (m).
+    /// Positions along the chord, by ascending z (m).
     along: Vec<f64>,
-    /// Across it (m).
+    /// Positions across the chord (m).
     across: Vec<f64>,
-    /// Whether the set lies in one plane across the axis.
+    /// True if the set lies in one plane across the axis.
     flat: bool,
     /// Direction of the chord on the developed surface, z and rθ.
     chord: [f64; 2],
-    /// Cosine and sine of the angle that rθ is counted from.
+    /// Cosine and sine of the reference angle of rθ.
     middle: [f64; 2],
 }
 
@@ -27,7 +27,7 @@ fn extent(values: &[f64]) -> [f64; 2] {
     values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &value| [low.min(value), high.max(value)])
 }
 
-/// Unit vector (z, rθ) of the largest extent of points: main axis of their second moments.
+/// Returns the unit vector (z, rθ) of the largest extent of points: main axis of their second moments.
 fn chord_direction(axial: &[f64], arc: &[f64]) -> [f64; 2] {
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
     let (z, s) = (mean(axial), mean(arc));
@@ -37,11 +37,11 @@ fn chord_direction(axial: &[f64], arc: &[f64]) -> [f64; 2] {
     let (zz, ss, zs) = (moment(&to_z, &to_z), moment(&to_s, &to_s), moment(&to_z, &to_s));
     let angle = 0.5 * (2.0 * zs).atan2(zz - ss);
     let (sin, cos) = angle.sin_cos();
-    // By growing z; a chord around the axis by growing angle.
+    // Ascending z; for a chord around the axis, ascending angle.
     if cos < -1e-9 || (cos.abs() <= 1e-9 && sin < 0.0) { [-cos, -sin] } else { [cos, sin] }
 }
 
-/// rθ of a point (m), θ counted from the direction `middle`, a cosine and a sine.
+/// Returns rθ of a point (m), with θ counted from the direction `middle`, a cosine and a sine.
 fn arc_from([cos, sin]: [f64; 2], [x, y, _]: [f64; 3]) -> f64 {
     x.hypot(y) * (y * cos - x * sin).atan2(x * cos + y * sin)
 }
@@ -64,7 +64,7 @@ impl Places {
         Self { axial, radius, along, across, flat, chord, middle }
     }
 
-    /// Distance of the outermost nodes along the chord (m).
+    /// Returns the distance of the outermost nodes along the chord (m).
     pub(crate) fn chord_length(&self) -> f64 {
         let [low, high] = extent(&self.along);
         high - low
@@ -77,19 +77,19 @@ impl Places {
         (cz * point[2] + cs * arc_from(self.middle, point) - low) / (high - low)
     }
 
-    /// Where a point stands along the chord of the set and across it (m).
+    /// Returns the position of a point along the chord of the set and across it (m).
     pub(crate) fn developed(&self, point: [f64; 3]) -> [f64; 2] {
         let ([cz, cs], arc) = (self.chord, arc_from(self.middle, point));
         [cz * point[2] + cs * arc, cz * arc - cs * point[2]]
     }
 
-    /// Length of the chord (m).
+    /// Returns the length of the chord (m).
     pub(crate) fn length(&self) -> f64 {
         let [low, high] = extent(&self.along);
         high - low
     }
 
-    /// Number of places along the chord that differ.
+    /// Returns the number of different positions along the chord.
     pub(crate) fn stations(&self) -> usize {
         let mut along = self.along.clone();
         along.sort_by(f64::total_cmp);
@@ -97,7 +97,8 @@ impl Places {
         1 + along.windows(2).filter(|pair| pair[1] - pair[0] > SAME_PLACE * (high - low)).count()
     }
 
-    /// Places in the set by growing z, as evenly along the chord as its nodes allow, in the middle of the thickness.
+    /// Returns positions in the set by ascending z, as evenly along the chord as its nodes allow, in the middle of
+    /// the thickness.
     pub(crate) fn evenly(&self, count: usize) -> Vec<usize> {
         let all = self.axial.len();
         let mut chosen: Vec<usize> = if count == all { (0..all).collect() } else { Vec::with_capacity(count) };
@@ -120,11 +121,12 @@ impl Places {
         chosen
     }
 
-    /// Middle of the thickness at a place along the chord: halfway between the outermost of the nearest nodes.
+    /// Returns the middle of the thickness at a position along the chord: halfway between the outermost of the
+    /// nearest nodes.
     fn middle_at(&self, target: f64) -> f64 {
         let mut nearest: Vec<usize> = (0..self.along.len()).collect();
         nearest.sort_by(|&a, &b| (self.along[a] - target).abs().total_cmp(&(self.along[b] - target).abs()));
-        // All that stand beside each other, or the middle of three would be that of two.
+        // Uses all adjacent nodes; otherwise the middle of three would be that of two.
         let [first, last] = extent(&self.along);
         let away = |place: usize| (self.along[place] - target).abs();
         let least = nearest[(self.along.len() / 10).max(2).min(nearest.len()) - 1];
@@ -134,7 +136,8 @@ impl Places {
         0.5 * (low + high)
     }
 
-    /// dr/dz at a node: parabola through the nearest third of the axial positions (at least three), by least squares.
+    /// Returns dr/dz at a node: parabola through the nearest third of the axial positions (at least three), by least
+    /// squares.
     pub(crate) fn slope(&self, place: usize) -> f64 {
         let mut levels = self.levels();
         let here = self.axial[place];
@@ -153,7 +156,7 @@ impl Places {
         powers.svd(true, true).solve(&radii, 1e-12).map_or(0.0, |coefficients| coefficients[1] / reach)
     }
 
-    /// Axial positions that differ, with the mean radius there.
+    /// Returns the different axial positions with the mean radius there.
     fn levels(&self) -> Vec<(f64, f64)> {
         let [low, high] = extent(&self.axial);
         let mut order: Vec<usize> = (0..self.axial.len()).collect();

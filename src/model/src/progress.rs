@@ -1,13 +1,13 @@
-//! How long work tells its caller where it stands; what is shown, and where, is the caller's business.
+//! Progress reports of long computations; the caller decides what to show.
 
 use std::fmt;
 
-/// The stages of a reduction, in the order in which they run.
+/// Stages of a reduction, in the order of execution.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ReductionStage {
     /// Building the mesh from the geometry.
     Mesh,
-    /// Element matrices and their sum.
+    /// Assembly of the element matrices.
     Assembly,
     /// Modes of the full model.
     FullModes,
@@ -17,7 +17,7 @@ pub enum ReductionStage {
     ConstraintModes,
     /// Frequency deviation and residual criterion.
     Checks,
-    /// Effects of spin, only when asked for.
+    /// Effects of spin, only if requested.
     Spin,
 }
 
@@ -35,19 +35,19 @@ impl fmt::Display for ReductionStage {
     }
 }
 
-/// One report: how much of a stage is done.
+/// Report of how much of a stage is done.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReductionProgress {
-    /// The stage that runs.
+    /// Current stage.
     pub stage: ReductionStage,
-    /// Share of the stage that is done, 0 to 1.
+    /// Fraction of the stage that is done, 0 to 1.
     pub fraction: f64,
 }
 
-/// Who listens. Called from the calling thread only.
+/// Receiver of progress reports. Called from the calling thread only.
 pub type Listener<'a> = &'a dyn Fn(ReductionProgress);
 
-/// A listener that ignores everything.
+/// Ignores all progress reports.
 pub fn silent(_: ReductionProgress) {}
 
 pub(crate) fn report(listener: Listener<'_>, stage: ReductionStage, done: usize, total: usize) {

@@ -6,15 +6,15 @@ use crate::mesh::Mesh;
 /// Shape quality of an element, or the worst of a mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ElementQuality {
-    /// Scaled Jacobian: over the corners, the least triple product of the unit tangents of the three edges that meet there,
-    /// over its value for the regular element (1 for cubes, √3/2 for prisms, √2/2 for tetrahedra). 1 is ideal, 0 flat.
-    /// P. M. Knupp, Int. J. Numer. Meth. Engng 48, 2000.
+    /// Scaled Jacobian: the smallest value, over the corners, of the triple product of the unit tangents of the three
+    /// edges that meet there, divided by its value for the regular element (1 for cubes, √3/2 for prisms, √2/2 for
+    /// tetrahedra). 1 is ideal, 0 flat. P. M. Knupp, Int. J. Numer. Meth. Engng 48, 2000.
     pub scaled_jacobian: f64,
-    /// Smallest over largest Jacobian determinant among nodes and integration points; ≤ 0 for an element that folds over.
+    /// Smallest over largest Jacobian determinant among nodes and integration points; ≤ 0 for a folded element.
     pub jacobian_ratio: f64,
 }
 
-/// Quality of one element from the coordinates of its nodes (m).
+/// Returns the quality of one element from the coordinates of its nodes (m).
 pub fn quality(kind: ElementKind, coordinates: &[[f64; 3]]) -> ElementQuality {
     let nodes = kind.natural_nodes();
     let corners = &nodes[..kind.corner_count()];
@@ -28,7 +28,7 @@ pub fn quality(kind: ElementKind, coordinates: &[[f64; 3]]) -> ElementQuality {
             })
         });
         let mut tangent = || tangents.next().expect("three edges meet at a corner of a solid element");
-        // Edges come in any order: the sign is that of the determinant.
+        // Edges come in any order, so the sign is that of the determinant.
         determinant([tangent(), tangent(), tangent()]).abs().copysign(determinant(jacobian)) / regular(kind)
     });
     let scaled_jacobian = scaled.fold(f64::INFINITY, f64::min);
@@ -39,7 +39,7 @@ pub fn quality(kind: ElementKind, coordinates: &[[f64; 3]]) -> ElementQuality {
     ElementQuality { scaled_jacobian, jacobian_ratio: least / most.abs() }
 }
 
-/// The worst of both figures over all elements.
+/// Returns the worst of both values over all elements.
 ///
 /// # Examples
 /// ```
@@ -69,7 +69,7 @@ pub fn worst_quality(mesh: &Mesh) -> ElementQuality {
     })
 }
 
-/// Triple product of unit edges at the corner of the regular element.
+/// Returns the triple product of unit edges at the corner of the regular element.
 fn regular(kind: ElementKind) -> f64 {
     match kind {
         ElementKind::Hex8 | ElementKind::Hex20 => 1.0,
@@ -78,7 +78,7 @@ fn regular(kind: ElementKind) -> f64 {
     }
 }
 
-/// ∂x/∂(natural coordinate), one row per natural coordinate.
+/// Returns ∂x/∂(natural coordinate), one row per natural coordinate.
 fn jacobian(kind: ElementKind, coordinates: &[[f64; 3]], point: [f64; 3]) -> [[f64; 3]; 3] {
     let gradients = kind.shape(point).gradients;
     let part = |d: usize, i: usize| coordinates.iter().zip(&gradients).map(|(x, gradient)| gradient[d] * x[i]).sum();

@@ -1,4 +1,4 @@
-//! From a mesh to a checked reduced-order model.
+//! Reduction of a mesh to a checked reduced-order model.
 
 mod held;
 mod outcome;
@@ -33,10 +33,10 @@ use outcome::build_rom;
 pub(crate) use outcome::{contact_node, description, direction, element_names, interface, responses};
 use response::{ContactResponse, with_responses};
 
-/// Coordinates of a structure besides its static responses to contact forces.
+/// Coordinates of a structure in addition to its static responses to contact forces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum ReductionKind {
-    /// Modes of the structure with its contact nodes held (Craig and Bampton): the paper's.
+    /// Modes of the structure with its contact nodes held (Craig and Bampton), as in the paper.
     #[default]
     FixedInterface,
     /// Modes of the structure as it is supported, with exact residual flexibility (MacNeal, Rubin).
@@ -44,7 +44,7 @@ pub enum ReductionKind {
 }
 
 impl ReductionKind {
-    /// As the ROM tells it.
+    /// Returns the basis as named in the ROM.
     pub(crate) fn basis(self) -> ReductionBasis {
         match self {
             Self::FixedInterface => ReductionBasis::FixedInterface,
@@ -58,7 +58,7 @@ impl ReductionKind {
 pub struct ReductionOptions {
     /// Name of the structure.
     pub name: String,
-    /// Which modes are kept.
+    /// Kind of the modes.
     pub kind: ReductionKind,
     /// Number of modes.
     pub modes: usize,
@@ -68,15 +68,15 @@ pub struct ReductionOptions {
     pub sectors: usize,
     /// Directions of the contact displacements.
     pub frame: DisplacementFrame,
-    /// Points whose displacements the ROM tells beside those of the contact nodes.
+    /// Points whose displacements the ROM reports in addition to those of the contact nodes.
     pub watched: Vec<ContactPoint>,
-    /// Places whose stress the ROM recovers; from a mesh of one material.
+    /// Places whose stress the ROM recovers; requires a mesh of one material.
     pub stress: StressPlaces,
     /// Modal damping ratio proposed with the model.
     pub damping_ratio: f64,
 }
 
-/// A mode of the full model, for pictures.
+/// Mode of the full model, for figures.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mode {
     /// Natural frequency (Hz).
@@ -85,12 +85,12 @@ pub struct Mode {
     pub shape: Vec<[f64; 3]>,
 }
 
-/// A reduced-order model with what it came from.
+/// Reduced-order model with the data of its reduction.
 #[derive(Debug, Clone)]
 pub struct Reduction {
     /// The reduced-order model, checks included.
     pub rom: Rom,
-    /// The mesh it was made of; none for a model from matrices and for one of several materials.
+    /// Mesh of the model; `None` for a model from matrices or of several materials.
     pub mesh: Option<Mesh>,
     /// Material of all elements of that mesh.
     pub material: Option<Material>,
@@ -98,19 +98,19 @@ pub struct Reduction {
     pub nodes: usize,
     /// Modes of the full model, ascending.
     pub modes: Vec<Mode>,
-    /// Largest relative residual of those modes, see [`EigenModes::residuals`].
+    /// Largest relative residual of these modes, see [`EigenModes::residuals`].
     pub largest_residual: f64,
-    /// Degrees of freedom that are not clamped.
+    /// Number of degrees of freedom that are not clamped.
     pub free_dofs: usize,
     /// All natural angular frequencies of the reduced model (rad/s), ascending; the last one bounds explicit steps.
     pub reduced_angular_frequencies: Vec<f64>,
     /// Natural frequencies with the contact nodes held (Hz).
     pub fixed_interface_frequencies: Vec<f64>,
-    /// Quality of the spin arrays, at half the largest speed and at the largest; empty if they were not requested.
+    /// Accuracy of the spin arrays at half the largest speed and at the largest; empty if they were not requested.
     pub spin_checks: Vec<SpinCheck>,
 }
 
-/// Reduce a mesh to its contact nodes and fixed-interface modes.
+/// Reduces a mesh to its contact nodes and fixed-interface modes.
 ///
 /// The reduced coordinates are the displacements of the contact nodes in `options.frame`, node by node, then the
 /// fixed-interface modes; so `contact_map` is \[I 0\]. A structure without clamped nodes keeps its rigid-body modes.
@@ -153,8 +153,8 @@ pub struct Reduction {
 /// ```
 ///
 /// # Errors
-/// [`Error::Invalid`] for contact nodes that are clamped, repeated or on the axis; and whatever assembly, eigenvalue
-/// iteration and the ROM's own validation refuse.
+/// [`Error::Invalid`] for contact nodes that are clamped, repeated or on the axis; the errors of assembly, eigenvalue
+/// iteration and ROM validation.
 pub fn reduce(
     mesh: Mesh,
     material: &Material,
@@ -168,10 +168,10 @@ pub fn reduce(
     reduce_model(model, clamped, contact, options, None, listener)
 }
 
-/// Reduce a model, from a mesh or from the matrices of another code, as [`reduce`] does.
+/// Reduces a model, from a mesh or from the matrices of another program, as [`reduce`] does.
 ///
-/// With a `largest_speed` (rad/s) the effects of spin up to it are added, in [`tiprub_core::rom::RomExtras::spin`], see [`crate::spin`]; the
-/// rest of the ROM stays the same, bit for bit.
+/// With a `largest_speed` (rad/s), the effects of spin up to it are added, in [`tiprub_core::rom::RomExtras::spin`],
+/// see [`crate::spin`]; the rest of the ROM stays the same to the last bit.
 ///
 /// # Examples
 /// ```
@@ -212,8 +212,8 @@ pub fn reduce(
 /// ```
 ///
 /// # Errors
-/// The errors of [`reduce`]; [`Error::Invalid`] for a speed that is not a finite number above zero, for effects of spin without a mesh or
-/// without clamped nodes, and where the structure finds no equilibrium with the centrifugal force.
+/// The errors of [`reduce`]; [`Error::Invalid`] for a speed that is not finite and positive, for effects of spin
+/// without a mesh or without clamped nodes, and if the structure has no equilibrium with the centrifugal force.
 pub fn reduce_model(
     model: FeModel,
     clamped: &[usize],
@@ -226,11 +226,12 @@ pub fn reduce_model(
         check_speed(speed)?;
     }
     check_nodes(&model.nodes, clamped, contact, options.frame)?;
-    // The library's own threads split sums by their number, and a ROM must have the same bits on every number of threads.
+    // Threads of faer would split sums by the number of threads, but the bits of a ROM must not depend on it.
     faer::set_global_parallelism(faer::Par::Seq);
     let free = free_dofs(model.nodes.len(), clamped);
     let (stiffness, mass) = principal_pair(&model.stiffness, &model.mass, &free);
-    // Nothing but modes and inertia holds a free structure in the reduced model, and they come from the same iteration.
+    // In the reduced model a free structure is only restrained by modes and inertia, which come from the same
+    // iteration.
     let relieved = options.kind == ReductionKind::FreeInterface && clamped.is_empty();
     let own = if relieved { options.modes } else { 0 };
     let full = full_modes(&stiffness, &mass, clamped.is_empty(), options.checked_modes.max(own), listener)?;
@@ -276,7 +277,7 @@ pub fn reduce_model(
     rom.extras.watched = watched(&model, &free, &craig_bampton.transformation, options)?;
     if let Some(places) = recovered_stress(&model, &free, &full.modes.shapes, options)? {
         rom.extras.stress = Some(places.reduced(&craig_bampton.transformation));
-        // What nothing holds expands without stress.
+        // An unsupported structure expands without stress.
         let moved = heat.map(|heat| if clamped.is_empty() { None } else { Some(full.responses(heat.forces)) });
         rom.extras.stress_thermal = moved.map(|moved| places.thermal(moved));
         if rom.extras.spin.is_some() {
@@ -316,7 +317,7 @@ fn spinning_states(
     SpinningStates::find(&body, speed, &|done| report(listener, ReductionStage::Spin, done, 6))
 }
 
-/// Modes of the full model, and the factor and shift they were found with.
+/// Modes of the full model, with the factor and shift of their iteration.
 #[derive(Debug, Clone)]
 pub struct FullModes {
     /// The modes.
@@ -330,18 +331,18 @@ pub struct FullModes {
 }
 
 impl FullModes {
-    /// With the first `count` modes only.
+    /// Keeps the first `count` modes only.
     pub(crate) fn truncated(self, count: usize) -> Self {
         Self { modes: self.modes.lowest(count), ..self }
     }
 
-    /// Displacements of the structure at rest under these loads, (K - σM)⁻¹ f, free dofs × loads.
+    /// Returns the static displacements of the structure under these loads, (K - σM)⁻¹ f, free dofs × loads.
     pub(crate) fn responses(&self, loads: Mat<f64>) -> Mat<f64> {
         self.factor.solve(loads)
     }
 }
 
-/// Lowest modes of a structure; `free` when it can move as a rigid body, which needs a negative shift.
+/// Computes the lowest modes of a structure; `free` if it can move as a rigid body, which requires a negative shift.
 ///
 /// # Examples
 /// ```
@@ -370,7 +371,7 @@ impl FullModes {
 /// ```
 ///
 /// # Errors
-/// [`Error::NotPositiveDefinite`] when a structure said to be supported is not; and those of [`lowest_modes`].
+/// [`Error::NotPositiveDefinite`] for an unsupported structure without `free`; the errors of [`lowest_modes`].
 pub fn full_modes(
     stiffness: &SparseMatrix,
     mass: &SparseMatrix,
@@ -391,10 +392,11 @@ pub fn full_modes(
     Ok(FullModes { modes, shifted, factor, shift })
 }
 
-/// Frequency deviation (eq. 13) and residual convergence criterion (eq. 12) of the lowest modes, both in %.
+/// Computes the frequency deviation (eq. 13) and residual convergence criterion (eq. 12) of the lowest modes, both in
+/// %.
 ///
-/// Eq. 12: ε = rᵀKr / (zᵀTᵀKTz) with r = K⁻¹(K - ω²M)Tz, ω and z of the reduced model. With K - σM for K where the
-/// structure is free, so that the norm exists.
+/// Eq. 12: ε = rᵀKr / (zᵀTᵀKTz) with r = K⁻¹(K - ω²M)Tz, ω and z of the reduced model. For a free structure K - σM
+/// replaces K, so that the norm exists.
 pub(crate) fn compare(
     full: &FullModes,
     mass: &SparseMatrix,
@@ -420,7 +422,7 @@ pub(crate) fn compare(
     let to_hertz = |square: &f64| square.max(0.0).sqrt() / core::f64::consts::TAU;
     let full_frequencies: Vec<f64> = full.modes.eigenvalues[..count].iter().map(to_hertz).collect();
     let reduced_frequencies: Vec<f64> = squares[..count].iter().map(to_hertz).collect();
-    // A rigid-body mode has no frequency to deviate from.
+    // A rigid-body mode has no relative deviation.
     let deviation = |(f, r): (&f64, &f64)| if *f > 0.0 { (r - f) / f * 100.0 } else { 0.0 };
     let frequency_deviation = full_frequencies.iter().zip(&reduced_frequencies).map(deviation).collect();
     RomChecks { full_frequencies, reduced_frequencies, frequency_deviation, residual_criterion, ..RomChecks::default() }
@@ -457,8 +459,8 @@ pub(crate) fn check_nodes(
     Ok(())
 }
 
-/// Unit forces on the contact coordinates, free dofs × 3·points: node by node its three directions in `frame`, spread over the nodes of a
-/// patch with each node's own directions.
+/// Returns unit forces on the contact coordinates, free dofs × 3·points: the three directions of each node in
+/// `frame`, distributed over the nodes of a patch in the directions of each node.
 fn contact_loads(
     free: &[usize],
     nodes: &[[f64; 3]],
@@ -480,7 +482,7 @@ fn contact_loads(
     Ok(loads)
 }
 
-/// Displacements of the watched points per reduced coordinate, in the directions of the contact nodes.
+/// Returns the displacements of the watched points per reduced coordinate, in the directions of the contact nodes.
 fn watched(
     model: &FeModel,
     free: &[usize],

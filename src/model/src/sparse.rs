@@ -1,7 +1,7 @@
 //! Symmetric sparse matrices with a shared pattern, and their Cholesky factors.
 //!
 //! Both triangles are stored: a column is then also a row, products are independent dot products, and a principal
-//! submatrix is a copy. The factorisation is faer's supernodal LLᵀ.
+//! submatrix is a copy. The factorisation is the supernodal LLᵀ of faer.
 
 use std::sync::Arc;
 
@@ -20,17 +20,17 @@ use crate::ordering::{Ordering, elimination_order};
 pub use crate::pattern::Pattern;
 use crate::{Error, Result};
 
-/// Columns of a dense matrix that a sparse one is multiplied with at once.
+/// Number of columns of a dense matrix that a sparse one is multiplied with together.
 const WIDTH: usize = 8;
-/// Rows of a tall matrix that are worked on as one piece. Sums go over the pieces in order, whoever worked on them, so
-/// that bits do not depend on the number of threads.
+/// Number of rows of a tall matrix that form one piece. Sums add the pieces in order, whichever thread computed them,
+/// so that bits do not depend on the number of threads.
 const ROWS: usize = 4096;
 
-/// AᵀB of two tall matrices, in parallel.
+/// Computes AᵀB of two tall matrices, in parallel.
 pub(crate) fn tall_product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
     assert_eq!(a.nrows(), b.nrows(), "the product's inner dimensions must agree");
     let pieces = a.nrows().div_ceil(ROWS);
-    // A few pieces at a time, so that their products need not be kept all at once.
+    // A few pieces at a time, so that not all of their products are stored together.
     let mut product = Mat::zeros(a.ncols(), b.ncols());
     for group in (0..pieces).collect::<Vec<_>>().chunks(16) {
         let parts: Vec<Mat<f64>> = group
@@ -50,7 +50,7 @@ pub(crate) fn tall_product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
     product
 }
 
-/// target + factor · A C for a tall A and a small C, in parallel.
+/// Computes target + factor · A C for a tall A and a small C, in parallel.
 pub(crate) fn add_tall(target: MatMut<'_, f64>, factor: f64, a: MatRef<'_, f64>, c: MatRef<'_, f64>) {
     let chunks: Vec<_> = target.par_row_chunks_mut(ROWS).collect();
     chunks.into_par_iter().enumerate().for_each(|(piece, rows)| {
@@ -59,22 +59,22 @@ pub(crate) fn add_tall(target: MatMut<'_, f64>, factor: f64, a: MatRef<'_, f64>,
     });
 }
 
-/// A symmetric sparse matrix.
+/// Symmetric sparse matrix.
 #[derive(Debug, Clone)]
 pub struct SparseMatrix {
-    /// Where the entries are.
+    /// Positions of the entries.
     pub pattern: Arc<Pattern>,
-    /// The entries, in the order of the pattern.
+    /// Entries in the order of the pattern.
     pub values: Vec<f64>,
 }
 
 impl SparseMatrix {
-    /// Number of rows and columns.
+    /// Returns the number of rows and columns.
     pub fn order(&self) -> usize {
         self.pattern.order()
     }
 
-    /// Product with a dense matrix, n × m.
+    /// Returns the product with a dense matrix, n × m.
     pub fn times(&self, dense: MatRef<'_, f64>) -> Mat<f64> {
         assert_eq!(dense.nrows(), self.order(), "the product's inner dimensions must agree");
         let mut product = Mat::zeros(self.order(), dense.ncols());
@@ -108,7 +108,7 @@ impl SparseMatrix {
         sums
     }
 
-    /// self + factor · other, for matrices of one pattern.
+    /// Returns self + factor · other, for matrices with the same pattern.
     #[must_use]
     pub fn plus_scaled(&self, factor: f64, other: &Self) -> Self {
         assert_eq!(self.pattern, other.pattern, "the two matrices must have the same sparsity pattern");
@@ -116,7 +116,7 @@ impl SparseMatrix {
         Self { pattern: Arc::clone(&self.pattern), values }
     }
 
-    /// Dense block of some rows and columns.
+    /// Returns the dense block of some rows and columns.
     pub fn block(&self, rows: &[usize], columns: &[usize]) -> Mat<f64> {
         let mut position = vec![usize::MAX; self.order()];
         for (new, &old) in rows.iter().enumerate() {
@@ -134,10 +134,10 @@ impl SparseMatrix {
         dense
     }
 
-    /// Become diagonal, in the same pattern.
+    /// Sets the matrix to a diagonal matrix, in the same pattern.
     ///
     /// # Panics
-    /// If the pattern lacks an entry of the diagonal: no assembled matrix does.
+    /// If the pattern lacks a diagonal entry, which no assembled matrix does.
     pub fn set_diagonal(&mut self, entry: impl Fn(usize) -> f64) {
         self.values.fill(0.0);
         for dof in 0..self.order() {
@@ -147,7 +147,7 @@ impl SparseMatrix {
         }
     }
 
-    /// Sum of the diagonal.
+    /// Returns the sum of the diagonal.
     pub fn trace(&self) -> f64 {
         let diagonal = |column: usize| {
             let range = self.pattern.starts[column]..self.pattern.starts[column + 1];
@@ -157,7 +157,7 @@ impl SparseMatrix {
         (0..self.order()).map(diagonal).sum()
     }
 
-    /// The Cholesky factor; `name` and `remedy` go into the error.
+    /// Computes the Cholesky factor; `name` and `remedy` appear in the error.
     ///
     /// # Errors
     /// [`Error::NotPositiveDefinite`].
@@ -167,8 +167,8 @@ impl SparseMatrix {
         self.factor_with(&symbolic).ok_or_else(fail)
     }
 
-    /// The Cholesky factor, with the structure that was found for this pattern; `None` when it is not positive definite
-    /// or memory does not suffice.
+    /// Computes the Cholesky factor with the given structure of the pattern; `None` if it is not positive definite or
+    /// memory does not suffice.
     pub fn factor_with(&self, symbolic: &SymbolicFactor) -> Option<Factor> {
         let matrix = SparseColMatRef::new(self.pattern.as_faer(), self.values.as_slice());
         let mut values = Vec::new();
@@ -192,7 +192,7 @@ impl SparseMatrix {
     }
 }
 
-/// Two matrices restricted to the same rows and columns; the result shares one pattern.
+/// Restricts two matrices to the same rows and columns; the results share one pattern.
 pub fn principal_pair(first: &SparseMatrix, second: &SparseMatrix, keep: &[usize]) -> (SparseMatrix, SparseMatrix) {
     assert_eq!(first.pattern, second.pattern, "the two matrices must have the same sparsity pattern");
     let (pattern, entries) = first.pattern.principal(keep);
@@ -204,17 +204,17 @@ pub fn principal_pair(first: &SparseMatrix, second: &SparseMatrix, keep: &[usize
     (pick(first), pick(second))
 }
 
-/// The library's own threads split sums by their number, and a ROM must have the same bits on every number of threads.
+/// Threads of faer would split sums by the number of threads, but the bits of a ROM must not depend on it.
 const PAR: Par = Par::Seq;
 
-/// Structure of the Cholesky factor of every matrix of one pattern.
+/// Structure of the Cholesky factor of every matrix with the same pattern.
 #[derive(Debug, Clone)]
 pub struct SymbolicFactor {
     inner: Arc<SymbolicCholesky<usize>>,
 }
 
 impl SymbolicFactor {
-    /// Find an order of elimination and the structure that comes of it; `None` when memory does not suffice.
+    /// Finds an order of elimination and the resulting structure; `None` if memory does not suffice.
     pub fn new(pattern: &Pattern, ordering: Ordering) -> Option<Self> {
         let order = elimination_order(pattern, ordering);
         let inverse = order.as_ref().map(|order| {
@@ -235,17 +235,17 @@ impl SymbolicFactor {
         Some(Self { inner: Arc::new(found.ok()?) })
     }
 
-    /// Number of stored entries of the factor, the zeros that blocks include counted.
+    /// Returns the number of stored entries of the factor, including the zeros in its blocks.
     pub fn entries(&self) -> usize {
         self.inner.len_val()
     }
 }
 
-/// Columns solved together where there are few, such as a block of the Lanczos iteration,
+/// Number of columns that are solved together if there are few, as in a block of the Lanczos iteration.
 const SHARE: usize = 4;
-/// and where there are many.
+/// Number of columns that are solved together if there are many.
 const WIDE_SHARE: usize = 16;
-/// Number of columns that are many.
+/// Number of columns from which there are many.
 const MANY: usize = 32;
 
 /// Sparse Cholesky factor.
@@ -256,17 +256,19 @@ pub struct Factor {
 }
 
 impl Factor {
-    /// Solution of A x = b for every column of `right`, n × m.
+    /// Solves A x = b for every column of `right`, n × m.
     pub fn solve(&self, mut right: Mat<f64>) -> Mat<f64> {
-        // Columns are independent: shares of them beat threads inside the triangular solves. The width of a share is fixed,
-        // because the kernels round differently for different widths, and a ROM must not depend on the number of threads.
+        // Columns are independent: groups of them are faster than threads inside the triangular solves. The width of
+        // a group is fixed, because the kernels round differently for different widths, and a ROM must not depend on
+        // the number of threads.
         let share = if right.ncols() < MANY { SHARE } else { WIDE_SHARE };
         let chunks: Vec<_> = right.as_mut().par_col_chunks_mut(share).collect();
         chunks.into_par_iter().for_each(|chunk| self.solve_in_place(chunk));
         right
     }
 
-    /// As [`Self::solve`], all columns together in the calling thread: for callers that are parallel themselves.
+    /// Solves as [`Self::solve`] does, all columns together in the calling thread, for callers that are parallel
+    /// themselves.
     pub(crate) fn solve_in_place(&self, right: MatMut<'_, f64>) {
         let scratch = self.symbolic.inner.solve_in_place_scratch::<f64>(right.ncols(), PAR);
         let mut memory = MemBuffer::new(scratch);

@@ -1,19 +1,19 @@
-//! Effects of a steady spin about the z axis on a structure that turns, in the rotating frame.
+//! Effects of a steady spin about the z axis on a rotating structure, in the rotating frame.
 //!
-//! At speed Ω the structure rests in the equilibrium u(Ω) of elastic and centrifugal forces, found without linearising
-//! either ([`Rotating::equilibrium`]). Small motions about it obey
+//! At speed Ω the structure is in the equilibrium u(Ω) of elastic and centrifugal forces, both of which are nonlinear
+//! ([`Rotating::equilibrium`]). Small motions about it obey
 //!
 //! M ü + (D + 2ΩG) u̇ + K(Ω) (u - u(Ω)) = f, K(Ω) = K_T(u(Ω)) - Ω²M_xy, G = ∫ρ Nᵀ \[0 -1 0; 1 0 0; 0 0 0\] N,
 //!
 //! with the tangent stiffness K_T (elasticity of the deformed structure, its stress) and the spin softening -Ω²M_xy.
-//! Craig-Bampton reduces each of these states with its own constraint and fixed-interface modes, turned so that the
-//! coordinates and the mass matrix stay those of the resting structure; its stiffness K(Ω) is fitted by
-//! K₀ + Ω²K₁ + Ω⁴K₂ through three speeds, 0, 0.6 Ω and Ω (`reduced_spin`). With modes of its own a state needs no more
-//! coordinates than the resting structure. In the resting modes the untwist would cost membrane strain that is not there.
-//! The load Ω²c + Ω⁴c₂ is such that its static response under K(Ω) is the growth u(Ω) of the contact nodes, exactly at
-//! 0.6 Ω and Ω.
+//! Craig-Bampton reduces each of these states with its constraint and fixed-interface modes, rotated so that the
+//! coordinates and the mass matrix stay those of the resting structure; its stiffness K(Ω) is fitted by K₀ + Ω²K₁ +
+//! Ω⁴K₂ through three speeds, 0, 0.6 Ω and Ω (`reduced_spin`). With separate modes a state needs no more coordinates
+//! than the resting structure; the resting modes would represent the untwist with spurious membrane strain. The load
+//! Ω²c + Ω⁴c₂ is such that its static response under K(Ω) is the growth u(Ω) of the contact nodes, exactly at 0.6 Ω
+//! and Ω.
 //!
-//! The fit over the speed is that of Sternchüss and Balmès, Proc. ISMA 2006, pp. 3925-3939.
+//! The fit over the speed follows Sternchüss and Balmès, Proc. ISMA 2006, pp. 3925-3939.
 
 mod equilibrium;
 mod reduced;
@@ -30,7 +30,7 @@ use crate::craig_bampton::dense_modes;
 use crate::fe_model::FeModel;
 use crate::{Error, Result};
 
-/// Centrifugal force on the free dofs of the resting structure per Ω², ∫ρ Nᵀ(x, y, 0), one column (kg m).
+/// Returns the centrifugal force on the free dofs of the resting structure per Ω², ∫ρ Nᵀ(x, y, 0), one column (kg m).
 pub(crate) fn centrifugal_load(model: &FeModel, free: &[usize]) -> Mat<f64> {
     let radial =
         Mat::from_fn(3 * model.nodes.len(), 1, |dof, _| if dof % 3 == 2 { 0.0 } else { model.nodes[dof / 3][dof % 3] });
@@ -38,7 +38,7 @@ pub(crate) fn centrifugal_load(model: &FeModel, free: &[usize]) -> Mat<f64> {
     Mat::from_fn(free.len(), 1, |row, _| load[(free[row], 0)])
 }
 
-/// Stiffness of a reduced model at a speed (rad/s): K₀ + Ω²K₁ + Ω⁴K₂.
+/// Returns the stiffness of a reduced model at a speed (rad/s): K₀ + Ω²K₁ + Ω⁴K₂.
 ///
 /// # Examples
 /// ```
@@ -83,7 +83,7 @@ pub fn stiffness_at(resting: &DMatrix<f64>, spin: &Spin, speed: f64) -> DMatrix<
     resting + &spin.stiffness_speed2 * square + &spin.stiffness_speed4 * (square * square)
 }
 
-/// Static growth of a reduced model at a speed (rad/s): K(Ω)⁻¹ (Ω²c + Ω⁴c₂), in reduced coordinates.
+/// Returns the static growth of a reduced model at a speed (rad/s): K(Ω)⁻¹ (Ω²c + Ω⁴c₂), in reduced coordinates.
 ///
 /// # Examples
 /// ```
@@ -126,7 +126,7 @@ pub fn stiffness_at(resting: &DMatrix<f64>, spin: &Spin, speed: f64) -> DMatrix<
 /// ```
 ///
 /// # Errors
-/// [`Error::NotPositiveDefinite`] when K(Ω) is not, as at speeds far beyond the fitted ones.
+/// [`Error::NotPositiveDefinite`] if K(Ω) is not positive definite, as at speeds far beyond the fitted ones.
 pub fn static_growth(resting: &DMatrix<f64>, spin: &Spin, speed: f64) -> Result<DVector<f64>> {
     let factor = stiffness_at(resting, spin, speed).cholesky().ok_or_else(|| Error::NotPositiveDefinite {
         matrix: format!("K (reduced stiffness at {speed} rad/s)"),
@@ -141,7 +141,7 @@ pub fn static_growth(resting: &DMatrix<f64>, spin: &Spin, speed: f64) -> Result<
     Ok(factor.solve(&load))
 }
 
-/// Natural frequencies (Hz) at a speed (rad/s), ascending, with or without the Coriolis force, undamped.
+/// Returns the natural frequencies (Hz) at a speed (rad/s), ascending, with or without the Coriolis force, undamped.
 ///
 /// # Examples
 /// ```
@@ -183,7 +183,7 @@ pub fn static_growth(resting: &DMatrix<f64>, spin: &Spin, speed: f64) -> Result<
 /// ```
 ///
 /// # Errors
-/// [`Error::Invalid`] for a ROM without spin matrices, [`Error::NotPositiveDefinite`] for a mass matrix that is none.
+/// [`Error::Invalid`] for a ROM without spin matrices, [`Error::NotPositiveDefinite`] for an invalid mass matrix.
 pub fn frequencies_at(rom: &Rom, speed: f64, coriolis: bool) -> Result<Vec<f64>> {
     let Some(spin) = &rom.extras.spin else {
         let remedy = "Reduce the model with `--spin` and the largest speed";
@@ -194,10 +194,11 @@ pub fn frequencies_at(rom: &Rom, speed: f64, coriolis: bool) -> Result<Vec<f64>>
     Ok(gyroscopic_frequencies(&squares, &(vectors.transpose() * &spin.coriolis * &vectors * strength)))
 }
 
-/// Natural frequencies (Hz), ascending, of q̈ + g q̇ + diag(ω²) q = 0 with a skew-symmetric g (1/s) and `squares` ω².
+/// Returns the natural frequencies (Hz), ascending, of q̈ + g q̇ + diag(ω²) q = 0 with a skew-symmetric g (1/s) and
+/// `squares` ω².
 ///
-/// With Λ = diag(ω) the motion is d/dt (Λq, q̇) = A (Λq, q̇), A = \[0 Λ; -Λ -g\] skew-symmetric: its eigenvalues are ±iω,
-/// so those of AᵀA are the squares, each twice.
+/// With Λ = diag(ω) the motion is d/dt (Λq, q̇) = A (Λq, q̇), A = \[0 Λ; -Λ -g\] skew-symmetric: its eigenvalues are
+/// ±iω, so the eigenvalues of AᵀA are the squares, each twice.
 ///
 /// # Examples
 /// ```

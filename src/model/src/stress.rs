@@ -1,6 +1,7 @@
-//! Stress at chosen nodes of a mesh: rows that give it from displacements, and where it is largest.
+//! Stress at chosen nodes of a mesh: matrix rows that compute it from displacements, and the places where it is
+//! largest.
 //!
-//! The stress at a node is the mean of what the elements around it have there, see [`crate::element::nodal_stress`].
+//! The stress at a node is the mean of the stresses of the elements around it, see [`crate::element::nodal_stress`].
 
 use faer::Mat;
 use nalgebra::{DMatrix, Matrix3};
@@ -14,26 +15,26 @@ use crate::reduce::{ContactPoint, ReductionOptions, contact_node, direction};
 use crate::sparse::tall_product;
 use crate::{Error, Result};
 
-/// Where stress is recovered.
+/// Places of stress recovery.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct StressPlaces {
     /// Nodes by name.
     pub nodes: Vec<(String, usize)>,
-    /// Besides, where each of so many of the lowest modes has its largest stress, clamped elements left out.
+    /// Number of the lowest modes whose places of largest stress are added, excluding clamped elements.
     pub modes: usize,
 }
 
 impl StressPlaces {
-    /// Whether there are none.
+    /// Returns whether there are no places.
     pub fn is_empty(&self) -> bool {
         self.nodes.is_empty() && self.modes == 0
     }
 }
 
-/// Stress at a node per displacement of the nodes around it: (node, component, of each of the six stresses).
+/// Stress at a node per displacement of the nodes around it: (node, component, value for each of the six stresses).
 type StressRows = Vec<(usize, usize, [f64; STRESSES])>;
 
-/// Means of the elements around each of these nodes.
+/// Computes the means over the elements around each of these nodes.
 fn rows(mesh: &Mesh, material: &Material, nodes: &[usize]) -> Result<Vec<StressRows>> {
     let mut all = vec![(StressRows::new(), 0.0); nodes.len()];
     for (number, element) in mesh.elements.iter().enumerate() {
@@ -58,7 +59,8 @@ fn rows(mesh: &Mesh, material: &Material, nodes: &[usize]) -> Result<Vec<StressR
     Ok(all.into_iter().map(mean).collect())
 }
 
-/// Stress components of these nodes per free degree of freedom, free dofs × 6·nodes, in the directions of the frame at each node.
+/// Computes the stress components of these nodes per free degree of freedom, free dofs × 6·nodes, in the directions
+/// of the frame at each node.
 ///
 /// # Errors
 /// The errors of [`nodal_stress`].
@@ -73,7 +75,7 @@ fn stress_rows(
         let (cos, sin) =
             if frame == DisplacementFrame::Cylindrical { direction(mesh.nodes[nodes[place]]) } else { (1.0, 0.0) };
         for (node, axis, values) in rows {
-            // What is clamped does not move.
+            // Clamped degrees of freedom do not move.
             let Ok(row) = free.binary_search(&(3 * node + axis)) else { continue };
             for (component, value) in turned(values, cos, sin).into_iter().enumerate() {
                 loads[(row, STRESSES * place + component)] += value;
@@ -83,14 +85,15 @@ fn stress_rows(
     Ok(loads)
 }
 
-/// Stress per kelvin of an isotropic body that is heated evenly and does not move, in any directions (Pa/K).
+/// Returns the stress per kelvin of an evenly heated isotropic body whose displacements are zero, in any directions
+/// (Pa/K).
 fn held_thermal_stress(material: &Material) -> [f64; STRESSES] {
     let (lambda, shear) = material.lame();
     let normal = -material.expansion * (3.0 * lambda + 2.0 * shear);
     [normal, normal, normal, 0.0, 0.0, 0.0]
 }
 
-/// The same stress in axes turned about z.
+/// Returns the stress in axes rotated about z.
 fn turned([xx, yy, zz, xy, yz, zx]: [f64; STRESSES], cos: f64, sin: f64) -> [f64; STRESSES] {
     let tensor = Matrix3::new(xx, xy, zx, xy, yy, yz, zx, yz, zz);
     let axes = Matrix3::new(cos, -sin, 0.0, sin, cos, 0.0, 0.0, 0.0, 1.0);
@@ -98,11 +101,12 @@ fn turned([xx, yy, zz, xy, yz, zx]: [f64; STRESSES], cos: f64, sin: f64) -> [f64
     [own[(0, 0)], own[(1, 1)], own[(2, 2)], own[(0, 1)], own[(1, 2)], own[(2, 0)]]
 }
 
-/// All places by name and node: those named, then where each mode (free dofs × modes) has its largest stress of von Mises. Elements that
-/// hold a clamped node are left out there: a clamped corner has no finite stress.
+/// Returns all places by name and node: the named ones, then those where each mode (free dofs × modes) has its
+/// largest von Mises stress. Elements with a clamped node are excluded there, since a clamped corner has no finite
+/// stress.
 ///
 /// # Errors
-/// A node that does not exist, a name that is there twice, more modes than are known.
+/// A node that does not exist, a repeated name, or more modes than were computed.
 fn all_places(
     (mesh, material): (&Mesh, &Material),
     free: &[usize],
@@ -137,7 +141,7 @@ fn all_places(
     Ok(places)
 }
 
-/// The node where each of so many modes has its largest stress.
+/// Returns the node where each of the first modes has its largest stress.
 fn largest(
     (mesh, material): (&Mesh, &Material),
     free: &[usize],
@@ -175,19 +179,20 @@ fn largest(
     Ok((0..count).map(place).collect())
 }
 
-/// Places whose stress is recovered.
+/// Places of stress recovery with their matrix rows.
 pub(crate) struct RecoveredStress {
     points: Vec<ContactNode>,
     /// Stress per displacement, free dofs × 6·places, in the directions of the contact nodes (Pa/m).
     rows: Mat<f64>,
-    /// Stress per kelvin of what is held everywhere (Pa/K).
+    /// Stress per kelvin if all displacements are zero (Pa/K).
     held: [f64; STRESSES],
 }
 
-/// The places that `options` name and those of the largest stress of modes (free dofs × modes); `None` where it asks for none.
+/// Returns the places that `options` name and those of the largest stress of modes (free dofs × modes); `None` if
+/// none are requested.
 ///
 /// # Errors
-/// A model without a mesh of one material, and those of [`all_places`].
+/// A model without a mesh of one material; the errors of [`all_places`].
 pub(crate) fn recovered_stress(
     model: &FeModel,
     free: &[usize],
@@ -214,7 +219,7 @@ pub(crate) fn recovered_stress(
 }
 
 impl RecoveredStress {
-    /// Per reduced coordinate.
+    /// Returns the stress per reduced coordinate.
     pub(crate) fn reduced(&self, transformation: &Mat<f64>) -> WatchedPoints {
         let map = tall_product(self.rows.as_ref(), transformation.as_ref());
         let map = DMatrix::from_fn(map.nrows(), map.ncols(), |i, j| map[(i, j)]);
@@ -227,8 +232,8 @@ impl RecoveredStress {
         DMatrix::from_fn(stress.nrows(), 1, |row, _| stress[(row, 0)])
     }
 
-    /// Static stress per kelvin, 6·places × 1 (Pa/K), of the displacements per kelvin under the thermal load (free dofs × 1); none of a
-    /// structure that nothing holds, whose expansion is free of stress.
+    /// Returns the static stress per kelvin, 6·places × 1 (Pa/K), for the displacements per kelvin under the thermal
+    /// load (free dofs × 1); zero for an unsupported structure, whose expansion causes no stress.
     pub(crate) fn thermal(&self, moved: Option<Mat<f64>>) -> DMatrix<f64> {
         let Some(moved) = moved else { return DMatrix::zeros(self.rows.ncols(), 1) };
         let mut stress = self.elastic(&moved);

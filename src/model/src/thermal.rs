@@ -1,9 +1,9 @@
-//! Thermal loads: what one kelvin of a patch does to the structure at rest.
+//! Thermal loads: static effect of one kelvin of a patch on the structure.
 //!
 //! A patch is a set of elements with one temperature T above the reference, at which the mesh is free of stress. The
 //! strain α T of its elements acts like the nodal forces f T with f = ∫ Bᵀ D α dV over the patch; loads of several
-//! patches add up. Forces and moments of every f vanish, since a rigid motion strains nothing. The temperature jumps at
-//! the edges of a patch: what is wanted of it is the deformation of the whole, not the stress at those edges.
+//! patches add up. Forces and moments of every f vanish, since a rigid motion causes no strain. The temperature jumps
+//! at the edges of a patch: the loads represent the deformation of the whole, not the stress at these edges.
 
 use core::f64::consts::{PI, TAU};
 use std::collections::BTreeMap;
@@ -19,12 +19,13 @@ use crate::mesh::{Element, Mesh};
 use crate::sparse::tall_product;
 use crate::{Error, Result};
 
-/// Centroids this close to the edge between two patches (share of a turn, of the mesh's axial extent) belong to the
-/// patch that begins there, whatever their rounding. Corners this close to it (of the element's extent) lie on it.
+/// Tolerance of the edge between two patches. Centroids within this fraction of a turn, or of the axial extent of the
+/// mesh, belong to the patch that begins there, independent of rounding. Corners within this fraction of the extent
+/// of the element lie on the edge.
 const EDGE: f64 = 1e-9;
 
-/// Equal patches, `around` × `along`, over a whole turn from θ = 0 and the axial positions `axial` (m); those of one
-/// ring follow each other.
+/// Returns equal patches, `around` × `along`, over a whole turn from θ = 0 and the axial positions `axial` (m); those
+/// of one ring are consecutive.
 ///
 /// # Examples
 /// ```
@@ -41,7 +42,7 @@ pub fn equal_patches(around: usize, along: usize, axial: [f64; 2]) -> Vec<Therma
     (0..along).flat_map(ring).collect()
 }
 
-/// The patch that holds all of a mesh.
+/// Returns the patch that contains the whole mesh.
 ///
 /// # Examples
 /// ```
@@ -71,7 +72,7 @@ pub fn whole_mesh(mesh: &Mesh) -> ThermalPatch {
     ThermalPatch { angle: [0.0, TAU], axial: [low - margin, high + margin] }
 }
 
-/// The patch of every element: the one that its centroid (mean of its corners) lies in.
+/// Returns the patch of every element: the one that contains its centroid (mean of its corners).
 ///
 /// # Examples
 /// ```
@@ -135,9 +136,9 @@ pub fn patch_of_elements(mesh: &Mesh, patches: &[ThermalPatch]) -> Result<Vec<Op
 /// Part of an element that belongs to patches.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum ElementShare {
-    /// No patch holds any of it.
+    /// No patch contains any part of it.
     Nothing,
-    /// One patch holds all of it.
+    /// One patch contains all of it.
     Whole(usize),
     /// Borders of patches pass through it.
     Divided,
@@ -157,7 +158,7 @@ pub(crate) fn shares_of_elements(mesh: &Mesh, patches: &[ThermalPatch]) -> Resul
         let [low, high] = ends(2);
         let slack = EDGE * (high - low);
         let [x, y, _] = centroid(mesh, element);
-        // Angles of the corners from the middle of a patch.
+        // Angles of the corners relative to the middle of a patch.
         let within = |patch: &ThermalPatch| {
             let (middle, half) = (0.5 * (patch.angle[0] + patch.angle[1]), 0.5 * (patch.angle[1] - patch.angle[0]));
             let turned = (y.atan2(x) - middle + PI).rem_euclid(TAU) - PI;
@@ -169,7 +170,7 @@ pub(crate) fn shares_of_elements(mesh: &Mesh, patches: &[ThermalPatch]) -> Resul
         };
         match found {
             Some(patch) if within(&patches[patch]) => ElementShare::Whole(patch),
-            // Without a patch for its middle, it may still reach into one.
+            // Even without a patch at its middle, the element may extend into one.
             None if patches.is_empty() => ElementShare::Nothing,
             _ => ElementShare::Divided,
         }
@@ -177,7 +178,7 @@ pub(crate) fn shares_of_elements(mesh: &Mesh, patches: &[ThermalPatch]) -> Resul
     Ok(mesh.elements.iter().zip(patch_of_elements(mesh, patches)?).map(share).collect())
 }
 
-/// Points of a rule by the patches that they lie in.
+/// Groups the points of an integration rule by the patches that contain them.
 pub(crate) fn patches_of_points(
     coordinates: &[[f64; 3]],
     (kind, rule): (ElementKind, &[QuadraturePoint]),
@@ -195,8 +196,9 @@ pub(crate) fn patches_of_points(
     found.into_iter().collect()
 }
 
-/// Nodal forces per kelvin of each patch, dofs (3·node + component) × patches (N/K). Elements across the border of a patch belong to it with
-/// the integration points that lie in it, so that the loads of patches that fill the mesh add up to that of the whole.
+/// Returns the nodal forces per kelvin of each patch, dofs (3·node + component) × patches (N/K). Elements across the
+/// border of a patch contribute the integration points that lie in it, so that the loads of patches that fill the
+/// mesh add up to that of the whole.
 ///
 /// # Examples
 /// ```
@@ -254,7 +256,7 @@ pub(crate) struct UniformHeat {
     patches: Vec<ThermalPatch>,
 }
 
-/// Load per kelvin of the whole structure, of a mesh of one material that expands.
+/// Returns the load per kelvin of the whole structure, for a mesh of one material with thermal expansion.
 pub(crate) fn uniform_heat(model: &FeModel, free: &[usize]) -> Result<Option<UniformHeat>> {
     let Some((mesh, material)) = model.mesh.as_ref().filter(|(_, material)| material.expansion != 0.0) else {
         return Ok(None);
@@ -265,8 +267,8 @@ pub(crate) fn uniform_heat(model: &FeModel, free: &[usize]) -> Result<Option<Uni
 }
 
 impl UniformHeat {
-    /// In reduced coordinates. Static responses to contact forces are among these, so that the free expansion of the contact nodes is
-    /// that of the full model.
+    /// Transforms the load to reduced coordinates. These include static responses to contact forces, so that the free
+    /// expansion of the contact nodes is that of the full model.
     pub(crate) fn reduced(&self, transformation: &Mat<f64>) -> Thermal {
         let loads = tall_product(transformation.as_ref(), self.forces.as_ref());
         Thermal { loads: DMatrix::from_fn(loads.nrows(), 1, |i, j| loads[(i, j)]), patches: self.patches.clone() }
@@ -278,13 +280,13 @@ fn centroid(mesh: &Mesh, element: &Element) -> [f64; 3] {
     core::array::from_fn(|i| corners.iter().map(|&node| mesh.nodes[node][i]).sum::<f64>() / corners.len() as f64)
 }
 
-/// Whether a point lies in a patch, its lower edges included.
+/// Returns whether a point lies in a patch, its lower edges included.
 fn contains(patch: &ThermalPatch, angle: f64, axial: f64, slack: f64) -> bool {
     let beyond = (angle - patch.angle[0]).rem_euclid(TAU);
     // Just below the edge counts as on it.
     let beyond = if beyond > TAU * (1.0 - EDGE) { 0.0 } else { beyond };
     let width = patch.angle[1] - patch.angle[0];
-    // A patch that goes all the way round has no edge.
+    // A patch around the whole circumference has no edge.
     let around = beyond < width - TAU * EDGE || width > TAU * (1.0 - EDGE);
     around && axial >= patch.axial[0] - slack && axial < patch.axial[1] - slack
 }

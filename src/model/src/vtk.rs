@@ -1,7 +1,7 @@
-//! Export of a mesh with node sets and fields as a VTK file (`.vtu`), for ParaView, meshio and others.
+//! Export of a mesh with node sets and fields as a VTK file (`.vtu`), for ParaView, meshio and other programs.
 //!
-//! XML `UnstructuredGrid`, arrays in base64, little-endian, not compressed. All element kinds have in VTK the node order they
-//! have here.
+//! The format is XML `UnstructuredGrid` with arrays in base64, little-endian, not compressed. The node order of all
+//! element kinds in VTK is the same as here.
 
 use core::f64::consts::TAU;
 use std::fmt::Write as _;
@@ -14,10 +14,10 @@ use crate::element::ElementKind;
 use crate::mesh::Mesh;
 use crate::{Error, Result};
 
-/// One quantity at every node.
+/// Quantity at every node.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NodalField {
-    /// Name under which ParaView shows it.
+    /// Name as shown in ParaView.
     pub name: String,
     /// Values at the nodes.
     pub values: Values,
@@ -33,7 +33,7 @@ pub enum Values {
 }
 
 impl NodalField {
-    /// A vector at every node.
+    /// Creates a field with a vector at every node.
     ///
     /// # Examples
     /// ```
@@ -59,7 +59,7 @@ impl NodalField {
         Self { name: name.into(), values: Values::Vectors(values) }
     }
 
-    /// A number at every node.
+    /// Creates a field with a scalar at every node.
     ///
     /// # Examples
     /// ```
@@ -85,8 +85,8 @@ impl NodalField {
         Self { name: name.into(), values: Values::Scalars(values) }
     }
 
-    /// A complex mode of one sector: `<name>_real`, `<name>_imaginary` and the length of the complex vector,
-    /// `<name>_amplitude`.
+    /// Creates the fields of a complex mode of one sector: `<name>_real`, `<name>_imaginary` and the length of the
+    /// complex vector, `<name>_amplitude`.
     pub fn mode(name: &str, shape: &[[Complex<f64>; 3]]) -> [Self; 3] {
         let part = |pick: fn(&Complex<f64>) -> f64| shape.iter().map(|node| node.each_ref().map(pick)).collect();
         let length = |node: &[Complex<f64>; 3]| node.iter().map(Complex::norm_sqr).sum::<f64>().sqrt();
@@ -98,7 +98,8 @@ impl NodalField {
     }
 }
 
-/// The file's bytes: nodes, elements, every node set as a field `set_<name>` of 0 and 1, and the fields.
+/// Returns the contents of the file: nodes, elements, every node set as a field `set_<name>` of 0 and 1, and the
+/// fields.
 ///
 /// # Examples
 /// ```
@@ -124,8 +125,8 @@ impl NodalField {
 /// ```
 ///
 /// # Errors
-/// [`Error::Invalid`] for an unsound mesh, a field with another number of values than the mesh has nodes, and names that
-/// appear twice.
+/// [`Error::Invalid`] for an invalid mesh, a field whose number of values differs from the number of nodes, and
+/// repeated names.
 pub fn write(mesh: &Mesh, fields: &[NodalField]) -> Result<Vec<u8>> {
     mesh.validate()?;
     check_fields(mesh, fields)?;
@@ -163,7 +164,8 @@ pub fn write(mesh: &Mesh, fields: &[NodalField]) -> Result<Vec<u8>> {
     Ok(text.into_bytes())
 }
 
-/// The mesh of a whole disk: copies of a sector turned about z, sector by sector; nodes on the faces are there twice.
+/// Returns the mesh of a whole disk: copies of a sector rotated about z, sector by sector; nodes on the faces are
+/// duplicated.
 ///
 /// # Examples
 /// ```
@@ -202,11 +204,11 @@ pub fn disk(sector: &Mesh, sectors: usize) -> Mesh {
     disk
 }
 
-/// A mode of n nodal diameters on [`disk`]: Re(u e^(2πi n s/N)) on sector s, turned with it.
+/// Returns a mode of n nodal diameters on [`disk`]: Re(u e^(2πi n s/N)) on sector s, rotated with it.
 #[expect(clippy::cast_precision_loss, reason = "numbers of sectors are small")]
 pub fn on_disk(shape: &[[Complex<f64>; 3]], nodal_diameters: usize, sectors: usize) -> Vec<[f64; 3]> {
     let copy = |sector: usize| {
-        // The remainder keeps the angle small, and its cosine exact where it can be.
+        // The remainder keeps the angle small, and its cosine exact where possible.
         let phase = TAU * ((nodal_diameters * sector) % sectors) as f64 / sectors as f64;
         let (sin, cos) = phase.sin_cos();
         shape.iter().map(move |node| turned(node.map(|u| u.re * cos - u.im * sin), sector, sectors))
@@ -244,7 +246,7 @@ fn check_fields(mesh: &Mesh, fields: &[NodalField]) -> Result<()> {
     Ok(())
 }
 
-/// Numbers of VTK's cell types (vtkCellType.h).
+/// Returns the cell types of VTK (vtkCellType.h).
 fn cell_type(kind: ElementKind) -> u8 {
     match kind {
         ElementKind::Tet4 => 10,
@@ -264,7 +266,7 @@ fn integers(values: impl Iterator<Item = usize>) -> Vec<u8> {
     values.flat_map(|value| (value as u64).to_le_bytes()).collect()
 }
 
-/// One `DataArray`: number of bytes (UInt64) and bytes, together in base64.
+/// Writes one `DataArray`: number of bytes (UInt64) and bytes, together in base64.
 fn array(text: &mut String, name: &str, kind: &str, components: usize, bytes: &[u8]) {
     let name = name.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;");
     put(

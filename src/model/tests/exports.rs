@@ -19,7 +19,7 @@ fn coarse() -> Mesh {
     sector_mesh(&SectorOptions::coarse()).unwrap().mesh
 }
 
-/// Keyword lines with the numbers that follow them, continuation lines joined.
+/// Returns keyword lines with the numbers that follow them, continuation lines joined.
 fn blocks(text: &str) -> Vec<(String, Vec<String>)> {
     let mut blocks: Vec<(String, Vec<String>)> = Vec::new();
     let mut open = false;
@@ -115,7 +115,7 @@ fn writes_a_sector_with_a_step_per_nodal_diameter() {
     assert!(cyclic(&[29]).unwrap_err().to_string().contains("29 is too large for 56 sectors"));
 }
 
-/// Bytes of a named array, the length before them checked.
+/// Returns the bytes of a named array after checking the length before them.
 fn array(text: &str, name: &str) -> Vec<u8> {
     let start = text.find(&format!("Name=\"{name}\"")).unwrap_or_else(|| panic!("no array {name}"));
     let block = text[start..].lines().nth(1).unwrap();
@@ -173,7 +173,7 @@ fn rejects_invalid_nodal_fields() {
     assert!(vtk::write(&mesh, &set).is_err());
 }
 
-/// A wave of n diameters known everywhere: what its first sector gives must come out on all of them.
+/// A known wave of n diameters: the field of the first sector must reproduce it on all sectors.
 #[test]
 fn a_mode_is_expanded_to_the_disk() {
     let (mesh, sectors) = (coarse(), 56);

@@ -1,7 +1,8 @@
-//! Hot running clearance against closed forms: a bar that turns in a ring, both warm.
+//! Hot running clearance against closed forms: a bar that rotates in a ring, both warm.
 //!
-//! A bar from radius a to b of one section, clamped at a, without lateral contraction, grows at its tip by
-//! ρΩ²/E (b²(b − a)/2 − (b³ − a³)/6) as it turns and by αΔT(b − a) as it warms up; a free ring of inner radius R opens by αΔT R.
+//! A bar from radius a to b of constant section, clamped at a, without lateral contraction, extends at its tip by
+//! ρΩ²/E (b²(b − a)/2 − (b³ − a³)/6) due to the rotation and by αΔT(b − a) due to the temperature; a free ring of
+//! inner radius R expands by αΔT R.
 
 use std::f64::consts::TAU;
 
@@ -27,14 +28,15 @@ const ROOT: f64 = 0.18;
 const TIP: f64 = 0.25;
 const GAP: f64 = 8e-4;
 const SPEED: f64 = 1800.0;
-/// Places of stress on the axis of the bar, as shares of its length; those of 3 and 12 elements are among them.
+/// Places of stress on the axis of the bar, as fractions of its length; meshes with 3 and 12 elements have nodes
+/// there.
 const PLACES: [f64; 3] = [1.0 / 3.0, 2.0 / 3.0, 1.0];
 
 fn metal() -> Material {
     Material { young_modulus: 200e9, poisson_ratio: 0.0, expansion: 10e-6, ..Material::maraging_steel() }
 }
 
-/// The bar, `elements` along its length.
+/// Returns the bar with `elements` along its length.
 fn bar(elements: usize, kind: ReductionKind) -> Rom {
     let [length, wide, high] = [TIP - ROOT, 0.006, 0.006];
     let mut mesh: Mesh = straight_box(ElementKind::Hex20, [elements, 2, 2], [length, wide, high]);
@@ -85,7 +87,7 @@ fn ring() -> (Rom, f64) {
     (reduce_ring(&options, &silent).unwrap().rom, options.material.expansion)
 }
 
-/// The bar turns in the ring; growth and both temperatures are on.
+/// Creates a scene in which the bar rotates in the ring, with growth and both temperatures.
 fn scene(blade: Rom, casing: Rom) -> Scene {
     let mut scene = models::round(blade);
     scene.settings.surfaces[0].moving = false;
@@ -99,7 +101,7 @@ fn scene(blade: Rom, casing: Rom) -> Scene {
     scene
 }
 
-/// Clearance at the tip (m) at rest at this speed (rad/s) and these temperatures (K) of rotor and casing.
+/// Returns the static clearance at the tip (m) at this speed (rad/s) and these temperatures (K) of rotor and casing.
 fn clearance(scene: &Scene, speed: f64, [rotor, casing]: [f64; 2]) -> f64 {
     let mut run = Simulation::new(scene).unwrap();
     models::set(&mut run, "speed", speed);
@@ -141,8 +143,8 @@ fn hot_running_clearance_matches_closed_form() {
     guide::hold("cargo test -p tiprub-model --test hot_clearance");
 }
 
-/// Whatever modes a reduction keeps, free expansion at the contact nodes is that of the mesh, which comes to the closed form: static
-/// responses to forces there are among them.
+/// The free expansion at the contact nodes is that of the mesh for any kept modes, and agrees with the closed form,
+/// since the basis contains static responses to forces there.
 #[test]
 fn both_reductions_reproduce_thermal_expansion_of_the_mesh() {
     let expected = metal().expansion * 100.0 * (TIP - ROOT);
@@ -162,8 +164,8 @@ fn both_reductions_reproduce_thermal_expansion_of_the_mesh() {
     }
 }
 
-/// A bar that turns and is warm is pulled by what stands outside: σ = ρΩ²(b² − x²)/2, whatever heat leaves of its stiffness, and with few
-/// modes too. The modes alone say a constant, since an end force is what they resolve.
+/// A warm rotating bar carries the centrifugal force of its outer part: σ = ρΩ²(b² − x²)/2, for any softening by heat
+/// and any number of modes. The modes alone would give a constant, since they represent an end force.
 #[test]
 fn stress_of_hot_rotating_bar_matches_closed_form() {
     let root = metal().density * SPEED * SPEED * (TIP * TIP - ROOT * ROOT) / 2.0;

@@ -1,4 +1,4 @@
-//! The blade of rotor 37: fit, mesh, frequencies against CalculiX, reduction.
+//! Blade of rotor 37: fit, mesh, frequencies against CalculiX, reduction.
 
 use std::sync::OnceLock;
 
@@ -10,7 +10,7 @@ use tiprub_model::rotor37::{AerofoilSection, FIT_ALONG_THETA, FIT_DISTANCE, Mesh
 use tiprub_model::sparse::principal_pair;
 use tiprub_model::{Reduction, Rotor37Options, inp, reduce_rotor37, surface_quads};
 
-/// One line of the table of NASA TP-1659: surface and station from 1, z and r in m, θ in rad.
+/// Line of the table of NASA TP-1659: surface and station from 1, z and r in m, θ in rad.
 struct Station {
     surface: usize,
     z: f64,
@@ -30,7 +30,7 @@ fn sample() -> Vec<Station> {
         .collect()
 }
 
-/// The complete table as published: `SURFACE NUMBER` lines, then lines of five columns.
+/// Parses the complete table as published: `SURFACE NUMBER` lines, then lines of five columns.
 fn complete_table(text: &str) -> Vec<Station> {
     let mut surface = 0;
     let mut stations = Vec::new();
@@ -54,7 +54,7 @@ fn distance_to_segment(p: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {
     (e[0] - t * d[0]).hypot(e[1] - t * d[1])
 }
 
-/// θ at which the fitted side runs over the plane abscissa `x`; `None` on the edge arcs.
+/// Returns θ of the fitted side at the plane abscissa `x`; `None` on the edge arcs.
 fn side_theta(section: &AerofoilSection, side: f64, x: f64) -> Option<f64> {
     let at = |u: f64| {
         let [camber, half] = section.sides(u);
@@ -72,8 +72,8 @@ fn side_theta(section: &AerofoilSection, side: f64, x: f64) -> Option<f64> {
     Some(at(low)[1] / section.mean_radius())
 }
 
-/// Largest errors (m) over the stations: normal distance to the closed outline combined with the error in r at equal
-/// z, the error in r alone, and the distance along rθ at equal z for points on the sides.
+/// Returns the largest errors (m) over the stations: normal distance to the closed outline combined with the error in
+/// r at equal z, the error in r alone, and the distance along rθ at equal z for points on the sides.
 fn fit_errors(stations: &[Station]) -> [f64; 3] {
     let outlines: Vec<Vec<[f64; 2]>> = sections().iter().map(|section| section.outline(400)).collect();
     let mut worst = [0.0_f64; 3];
@@ -113,8 +113,9 @@ fn fit_is_within_20_micrometres_of_the_sample() {
     assert_fit(&stations, "thinned table");
 }
 
-/// All 2400 points. The table does not ship: `TIPRUB_ROTOR37_COORDINATES=FILE cargo test --release -p tiprub-model --test
-/// rotor37 -- --ignored --nocapture` with FILE holding table IV of NASA TP-1659 runs it.
+/// All 2400 points. The table is not part of the repository:
+/// `TIPRUB_ROTOR37_COORDINATES=FILE cargo test --release -p tiprub-model --test rotor37 -- --ignored --nocapture`
+/// with table IV of NASA TP-1659 in FILE runs the test.
 #[test]
 #[ignore = "needs the complete table of NASA TP-1659 in the file named by TIPRUB_ROTOR37_COORDINATES"]
 fn fit_is_within_twenty_micrometres_of_the_table() {
@@ -132,8 +133,8 @@ fn detects_a_displaced_blade() {
     assert!(distance > 0.02e-3 && along > 0.02e-3, "{distance} {along}");
 }
 
-/// Area inside the outline (shoelace) against the area of the mesh's cross-section: the flat ends keep it to 0.1 %.
-/// Ending the mesh at the arcs' centres would lose 0.3 %.
+/// The area inside the outline (shoelace) agrees with the area of the cross-section of the mesh to 0.1 % because of
+/// the flat ends. Ending the mesh at the centres of the arcs would lose 0.3 %.
 #[test]
 fn mesh_volume_matches_rounded_sections() {
     let areas: Vec<f64> = sections()
@@ -172,7 +173,7 @@ fn mesh_is_valid_and_surface_is_closed() {
         }
     }
     assert!(edges.values().all(|&sum| sum == 0), "every edge is run through once in each direction");
-    // The divergence theorem over the faces gives the volume, positive when they look outwards.
+    // The divergence theorem over the faces gives the volume, positive if they are oriented outwards.
     let corner = |node: usize| nalgebra::Vector3::from(blade.mesh.nodes[node]);
     let volume: f64 = quads
         .iter()
@@ -191,7 +192,7 @@ fn mesh_is_valid_and_surface_is_closed() {
     assert!((volume / mass - 1.0).abs() < 0.02, "{volume} {mass}");
 }
 
-/// The compressor's blade moves with its leading edge ahead: for positive speed θ falls from leading to trailing edge.
+/// The leading edge of the compressor blade is ahead: for positive speed θ decreases from leading to trailing edge.
 #[test]
 fn leading_edge_is_ahead_for_positive_speed() {
     let blade = blade_mesh(MeshCounts::default()).unwrap();
@@ -225,13 +226,14 @@ fn contact_nodes_are_named_and_spread_along_the_tip() {
         let error = blade.contact_points(count).unwrap_err().to_string();
         assert!(error.starts_with(&format!("number of contact nodes: {count} is outside 2..=33")), "{error}");
     }
-    // With one element through the thickness the line runs through mid-side nodes, which corner stations have only.
+    // With one element through the thickness the line passes through mid-side nodes, which only exist at corner
+    // stations.
     assert_eq!(blade_mesh(MeshCounts { chord: 8, thickness: 1, span: 4 }).unwrap().contact_points(9).unwrap().len(), 9);
     let error = blade_mesh(MeshCounts { span: 0, ..MeshCounts::default() }).unwrap_err().to_string();
     assert!(error.starts_with("mesh count `span`: it is zero"), "{error}");
 }
 
-/// The reduced blade, made once for all tests of this file.
+/// Returns the reduced blade, computed once for all tests of this file.
 fn default_reduction() -> &'static Reduction {
     static REDUCTION: OnceLock<Reduction> = OnceLock::new();
     REDUCTION.get_or_init(|| reduce_rotor37(&Rotor37Options::paper(), &silent).unwrap())
@@ -252,7 +254,7 @@ fn default_blade_and_its_reduction_agree_with_calculix() {
     for (k, (full, reference)) in checks.full_frequencies.iter().zip(&reference).enumerate() {
         let deviation = (full / reference - 1.0) * 100.0;
         println!("mode {}: {full:.4} Hz, CalculiX {reference} Hz, deviation {deviation:.2e} %", k + 1);
-        // Seven digits are what CalculiX prints.
+        // CalculiX prints seven digits.
         assert!(deviation.abs() <= 5e-5, "{deviation:e} %");
     }
     for k in 0..checks.full_frequencies.len() {

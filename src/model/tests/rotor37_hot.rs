@@ -1,4 +1,5 @@
-//! Hot running clearance of rotor 37 against CalculiX: the blade turns, warms up and softens, and the gap at its tip closes.
+//! Hot running clearance of rotor 37 against CalculiX: the blade rotates, warms up and softens, and the gap at its
+//! tip closes.
 
 use guide::print_row;
 use tiprub_core::rom::ContactNode;
@@ -15,14 +16,14 @@ mod guide;
 
 const GAP: f64 = 8e-4;
 const WARM: f64 = 200.0;
-/// Of the state `soft` (1/K).
+/// Softening of the state `soft` (1/K).
 const SOFTENING: f64 = 2.5e-4;
-/// Few, as they carry the responses to forces at the contact nodes.
+/// Few modes, since they include the responses to forces at the contact nodes.
 const MODES: usize = 10;
-/// Contact nodes, which are the nodes of the reference.
+/// Number of contact nodes, which are the nodes of the reference.
 const NODES: usize = 9;
 
-/// Analyses of CalculiX and what the scene asks for beside growth.
+/// Analyses of CalculiX, and whether the scene requests stiffening in addition to growth.
 const ANALYSES: [(&str, bool); 2] = [("linear", false), ("nlgeom", true)];
 /// States, their speeds (rad/s), temperatures (K) and softening (1/K).
 const STATES: [(&str, [f64; 3]); 4] = [
@@ -32,14 +33,15 @@ const STATES: [(&str, [f64; 3]); 4] = [
     ("soft", [DESIGN_SPEED, WARM, SOFTENING]),
 ];
 
-/// Displacements x, y, z (m) of the nodes along the tip.
+/// Returns the displacements x, y, z (m) of the nodes along the tip.
 fn reference(analysis: &str, state: &str) -> Vec<[f64; 3]> {
     let lines = include_str!("data/rotor37_hot_calculix.csv").lines().map(|line| line.split(',').collect::<Vec<_>>());
     let own = lines.filter(|words| words[0] == analysis && words[1] == state);
     own.map(|words| [3, 4, 5].map(|i| words[i].parse().unwrap())).collect()
 }
 
-/// Normal to a casing that runs parallel to the tip: the clearance of a node displaced by this (m), as it is in space.
+/// Returns the clearance of a node displaced by this vector (m), normal to a casing parallel to the tip, in the fixed
+/// frame.
 fn clearance_of(node: &ContactNode, [x, y, z]: [f64; 3]) -> f64 {
     let [radius, angle, _] = node.position;
     let moved = (radius * angle.cos() + x).hypot(radius * angle.sin() + y) - radius;
@@ -57,7 +59,7 @@ fn reduced() -> Rom {
     reduce_rotor37(&options, &silent).unwrap().rom
 }
 
-/// Clearances of the contact nodes (m) where a run starts in this state.
+/// Returns the clearances of the contact nodes (m) at the start of a run in this state.
 fn clearances(rom: &Rom, stiffening: bool, [speed, temperature, softening]: [f64; 3]) -> Vec<f64> {
     let mut scene: Scene = models::round(rom.clone());
     let contact = &mut scene.settings.contacts[0];
@@ -88,7 +90,8 @@ fn hot_running_clearance_of_rotor37_matches_calculix() {
             let change = [0, NODES / 2, NODES - 1].map(|node| 1e6 * (expected[node] - cold[node]));
             let [leading, middle, trailing] = change;
             print_row!("| {analysis} | {state} | {leading:.1} | {middle:.1} | {trailing:.1} | {off:.2} |");
-            // Directions of the linear growth are those of the fit at speed; what heat and speed do together is left out.
+            // The directions of the linear growth are those of the fit over the speed; the combined effect of heat
+            // and speed is omitted.
             let most = if state == "warm" || (stiffening && state == "spin") { 0.12 } else { 2.0 };
             assert!(off < most, "{analysis} {state}: {off} µm");
         }

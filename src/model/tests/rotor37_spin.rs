@@ -1,4 +1,4 @@
-//! The blade of rotor 37 under spin against CalculiX: full model, and reduced model with its fit over the speed.
+//! Blade of rotor 37 under spin against CalculiX: full model, and reduced model with its fit over the speed.
 
 use std::sync::OnceLock;
 
@@ -15,7 +15,7 @@ use tiprub_model::spin::{
 };
 use tiprub_model::{Material, Mesh, Reduction, Rotor37Options, reduce_rotor37};
 
-/// Lines of the reference: kind, speed, number, values.
+/// Returns the lines of the reference: kind, speed, number, values.
 fn reference(kind: &str, speed: f64) -> Vec<(usize, Vec<f64>)> {
     include_str!("data/rotor37_spin_calculix.csv")
         .lines()
@@ -49,13 +49,13 @@ impl SpinBlade {
     }
 }
 
-/// The full blade, made once.
+/// Returns the full blade, computed once.
 fn full() -> &'static SpinBlade {
     static BLADE: OnceLock<SpinBlade> = OnceLock::new();
     BLADE.get_or_init(|| SpinBlade::new(MeshCounts::default()))
 }
 
-/// The reduced blade, made once for all tests of this file.
+/// Returns the reduced blade, computed once for all tests of this file.
 fn reduced() -> &'static Reduction {
     static REDUCTION: OnceLock<Reduction> = OnceLock::new();
     REDUCTION.get_or_init(|| {
@@ -96,7 +96,7 @@ fn the_full_model_under_spin_agrees_with_calculix() {
         if coriolis.is_empty() {
             continue;
         }
-        // Like CalculiX: the Coriolis force among these ten modes only.
+        // As in CalculiX: the Coriolis force among these ten modes only.
         let product =
             modes.shapes.transpose() * blade.mass.times(turned_about_axis(&blade.free, &modes.shapes).as_ref());
         let gyroscopic = DMatrix::from_fn(10, 10, |i, j| speed * (product[(i, j)] - product[(j, i)]));
@@ -107,7 +107,8 @@ fn the_full_model_under_spin_agrees_with_calculix() {
                 found - still,
                 expected[0] - still
             );
-            // The last printed digit is 1 mHz, CalculiX' own iteration stops about as far away; shifts reach 200 mHz.
+            // The last printed digit is 1 mHz, and the iteration of CalculiX has about the same error; shifts reach
+            // 200 mHz.
             assert!((found - expected[0]).abs() < 3e-3);
         }
     }
@@ -151,7 +152,8 @@ fn the_reduced_model_under_spin_agrees_with_calculix() {
     }
 }
 
-/// Unit forces on the contact nodes: the reduced model yields as the full one does about the same spinning state.
+/// Unit forces on the contact nodes: the reduced model has the compliance of the full one about the same spinning
+/// state.
 #[test]
 fn contact_compliance_under_spin_matches_full_model() {
     let (blade, rom) = (full(), &reduced().rom);
@@ -178,9 +180,9 @@ fn contact_compliance_under_spin_matches_full_model() {
     }
 }
 
-/// φᵢᵀGφⱼ between the first six modes about the spinning state, which are defined but for their signs. These entries are
-/// small, since the blade hardly moves across its flat sides, and sensitive to the shapes: 20 component modes of the
-/// default mesh leave 6 % of the largest, 80 leave 0.2 %, 1 % on the mesh of this test.
+/// φᵢᵀGφⱼ between the first six modes about the spinning state, which are defined up to their signs. These entries
+/// are small, since the blade hardly moves across its flat sides, and sensitive to the shapes: 20 component modes of
+/// the default mesh cause an error of 6 % of the largest, 80 an error of 0.2 %, 1 % on the mesh of this test.
 #[test]
 fn coriolis_coupling_matches_full_model() {
     let mesh = COARSE;
@@ -200,8 +202,8 @@ fn coriolis_coupling_matches_full_model() {
     assert!(largest > 0.01 && worst < 0.02 * largest);
 }
 
-/// Campbell table: frequencies over the speed rise by stress stiffness; the Coriolis force shifts them little, more the
-/// faster it turns, and not at rest.
+/// Campbell table: frequencies increase with the speed by stress stiffening; the Coriolis force shifts them slightly,
+/// by more at higher speeds, and not at rest.
 #[test]
 fn campbell_table_rises_and_coriolis_shift_is_small() {
     let rom = &reduced().rom;
@@ -237,8 +239,8 @@ fn built_in_blade_passes_its_spin_checks() {
     let still = reduce_rotor37(&Rotor37Options::paper(), &silent).unwrap();
     let mut stripped = reduction.rom.clone();
     stripped.extras.spin = None;
-    // Linear theory: the resting stiffness under Ω²c grows like a linear static step, 388.6 µm at the leading edge
-    // (CalculiX, without NLGEOM, node 103).
+    // Linear theory: the resting stiffness under Ω²c gives the growth of a linear static step, 388.6 µm at the
+    // leading edge (CalculiX, without NLGEOM, node 103).
     let spin = reduction.rom.extras.spin.as_ref().unwrap();
     let load = DVector::from_column_slice(&spin.centrifugal_load) * DESIGN_SPEED.powi(2);
     let linear = still.rom.stiffness.clone().cholesky().unwrap().solve(&load);
@@ -260,11 +262,11 @@ fn spin_arrays_are_bit_identical_for_any_thread_count() {
     }
 }
 
-/// An eighth of the elements, for what does not ask for the blade of the reference.
+/// An eighth of the elements, for tests that do not need the blade of the reference.
 const COARSE: MeshCounts = MeshCounts { chord: 8, thickness: 1, span: 10 };
 
-/// Named cases in which an earlier way to align the modes failed: more contact nodes, other numbers of modes; on a mesh with
-/// two fifths of the elements.
+/// Cases in which an earlier method of aligning the modes failed: more contact nodes, other numbers of modes; on a
+/// mesh with two fifths of the elements.
 #[test]
 fn spin_checks_pass_for_other_reductions() {
     use ReductionKind::{FixedInterface, FreeInterface};

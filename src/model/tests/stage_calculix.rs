@@ -1,7 +1,8 @@
 //! Cyclic symmetry of the stage against CalculiX's (`*SELECT CYCLIC SYMMETRY MODES`).
 //!
-//! CalculiX integrates the mass of C3D15 with the nine points of its stiffness, this crate with as many as make it exact.
-//! Both are compared: the model as it is, within what that rule changes, and with CalculiX's rule to its printed digits.
+//! CalculiX integrates the mass of C3D15 with the nine points of its stiffness, this crate with enough points to make
+//! it exact. Both are compared: the model as it is, within the effect of that rule, and with the rule of CalculiX to
+//! its printed digits.
 
 use tiprub_model::cyclic::{CyclicOptions, CyclicReduction, ModeSelection, reduce_cyclic};
 use tiprub_model::progress::silent;
@@ -13,7 +14,7 @@ use tiprub_model::{Material, Mesh};
 /// Half a unit of the seventh digit (%).
 const PRINTED: f64 = 5.01e-5;
 
-/// (nodal diameters, mode from 0, Hz)
+/// Parses (nodal diameters, mode from 0, Hz).
 fn reference(text: &str) -> Vec<(usize, usize, f64)> {
     let rows = text.lines().filter(|line| line.starts_with(|c: char| c.is_ascii_digit()));
     let rows = rows.map(|line| {
@@ -27,7 +28,7 @@ fn determinant([a, b, c]: [[f64; 3]; 3]) -> f64 {
     a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
 }
 
-/// Consistent mass by the rule of the stiffness, with the pattern of `mass`.
+/// Computes the consistent mass by the rule of the stiffness, with the pattern of `mass`.
 fn mass_by_stiffness_rule(mesh: &Mesh, material: &Material, mass: &SparseMatrix) -> SparseMatrix {
     let mut values = vec![0.0; mass.values.len()];
     let pattern = &mass.pattern;
@@ -53,7 +54,7 @@ fn mass_by_stiffness_rule(mesh: &Mesh, material: &Material, mass: &SparseMatrix)
     SparseMatrix { pattern: mass.pattern.clone(), values }
 }
 
-/// Largest deviation from the reference (%).
+/// Returns the largest deviation from the reference (%).
 fn largest(reduction: &CyclicReduction, reference: &[(usize, usize, f64)]) -> f64 {
     let deviation = |&(n, mode, hertz): &(usize, usize, f64)| {
         let found = reduction.nodal_diameters[n].full_frequencies[mode];
@@ -64,7 +65,7 @@ fn largest(reduction: &CyclicReduction, reference: &[(usize, usize, f64)]) -> f6
     reference.iter().map(deviation).fold(0.0, f64::max)
 }
 
-/// Largest deviations as the model is, and with CalculiX's rule for the mass (%).
+/// Returns the largest deviations of the model as it is, and with the mass rule of CalculiX (%).
 fn compared(sector: SectorOptions, reference: &[(usize, usize, f64)]) -> [f64; 2] {
     let mut stage = stage_model(&StageOptions { sector, ..StageOptions::default() }, &silent).unwrap();
     let options = CyclicOptions {
@@ -92,11 +93,11 @@ fn the_coarse_stage_agrees_with_calculix() {
     let reference = reference(include_str!("data/stage_coarse_calculix.csv"));
     assert_eq!(reference.len(), 40);
     let [exact, same_rule] = compared(SectorOptions::coarse(), &reference);
-    // Elements as long and twisted as these feel the nine points: 0.06 to 6 %.
+    // The nine points have a large effect on elements that are this long and twisted: 0.06 to 6 %.
     assert!(exact < 7.0 && same_rule < PRINTED);
 }
 
-/// A minute and 1 GB.
+/// Takes a minute and 1 GB.
 #[test]
 #[ignore = "the size of the paper's stage: cargo test --release -p tiprub-model --test stage_calculix -- --ignored --nocapture"]
 fn the_whole_stage_agrees_with_calculix() {

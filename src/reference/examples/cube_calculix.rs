@@ -1,4 +1,4 @@
-//! Write the CalculiX input file of the cube between two rings:
+//! Writes the CalculiX input file of the cube between two rings:
 //! `cube_calculix FILE.inp [increment in s] [end in s] [µ] [Pa/m of contact] [Pa/m of sticking] [small] [surfaces]`.
 
 use tiprub_reference::cube::{FRICTION, calculix};

@@ -1,6 +1,6 @@
-//! CalculiX beside the stress of a blade pushed at rest.
+//! Comparison of the static stress of a loaded blade with CalculiX.
 //!
-//! `stress_calculix write DIR` writes `pushed.inp` and `moved.inp`; after `ccx -i DIR/pushed` and `ccx -i DIR/moved`
+//! `stress_calculix write DIR` writes `pushed.inp` and `moved.inp`; after `ccx -i DIR/pushed` and `ccx -i DIR/moved`,
 //! `stress_calculix read DIR` prints the table of `tests/data/blade_stress_calculix.csv`.
 
 use std::{fs, path::Path};

@@ -1,4 +1,4 @@
-//! Two identical elastic bars meeting head-on: data and exact solution.
+//! Head-on impact of two identical elastic bars: data and exact solution.
 //!
 //! N. J. Carpenter, R. L. Taylor, M. G. Katona, Int. J. Numer. Meth. Engng 32 (1991) 103-128, section 5.
 
@@ -30,12 +30,12 @@ pub struct Exact {
     pub energy: f64,
 }
 
-/// Wave speed √(E/ρ) (m/s).
+/// Returns the wave speed √(E/ρ) (m/s).
 pub fn wave_speed() -> f64 {
     (YOUNG / DENSITY).sqrt()
 }
 
-/// Plane waves: force ρcvA for the time 2L/c of a wave to the free end and back.
+/// Returns the plane-wave solution: force ρcvA for the time 2L/c of a wave to the free end and back.
 pub fn exact() -> Exact {
     let force = DENSITY * wave_speed() * SPEED * AREA;
     let touch = GAP / (2.0 * SPEED);
@@ -48,7 +48,7 @@ pub fn exact() -> Exact {
 mod tests {
     #[test]
     fn exact_solution_matches_published_values() {
-        // Figures as stated for this benchmark: 133,452.9 N, 49.46 µs, 148.39 µs, 13.203 N·s, 33.906 J.
+        // Values as stated for this benchmark: 133,452.9 N, 49.46 µs, 148.39 µs, 13.203 N·s, 33.906 J.
         let exact = super::exact();
         assert!((exact.force - 133_452.9).abs() < 1.0, "{}", exact.force);
         assert!((exact.touch - 49.46e-6).abs() < 0.01e-6);

@@ -1,8 +1,8 @@
-//! Agreement of two histories, as numbers.
+//! Measures of the agreement of two histories.
 
 use crate::cube::history::CubeHistory;
 
-/// Value at a time between samples, by straight lines; the nearest end outside.
+/// Interpolates a value linearly at a time between samples; the nearest end outside.
 pub fn sample(times: &[f64], values: &[f64], time: f64) -> f64 {
     let after = times.partition_point(|t| *t <= time);
     if after == 0 {
@@ -15,7 +15,7 @@ pub fn sample(times: &[f64], values: &[f64], time: f64) -> f64 {
     values[after - 1] + share * (values[after] - values[after - 1])
 }
 
-/// ‖a − b‖/‖b‖ over samples at the given times.
+/// Returns ‖a − b‖/‖b‖ over samples at the given times.
 pub fn relative_l2(a: (&[f64], &[f64]), b: (&[f64], &[f64]), at: &[f64]) -> f64 {
     let (mut difference, mut size) = (0.0, 0.0);
     for &time in at {
@@ -26,7 +26,8 @@ pub fn relative_l2(a: (&[f64], &[f64]), b: (&[f64], &[f64]), at: &[f64]) -> f64 
     (difference / size).sqrt()
 }
 
-/// Means of a force over windows of a length (s) up to `end` (s); each record counts for the time since the one before.
+/// Returns the means of a force over windows of a length (s) up to `end` (s); each record counts for the time since
+/// the one before.
 pub fn windowed(times: &[f64], force: &[f64], length: f64, end: f64) -> Vec<f64> {
     let mut windows = Vec::new();
     while (windows.len() + 1) as f64 * length < end * (1.0 + 1e-12) {
@@ -39,31 +40,31 @@ pub fn windowed(times: &[f64], force: &[f64], length: f64, end: f64) -> Vec<f64>
     windows
 }
 
-/// Distance of one history from another.
+/// Difference of one history from another.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HistoryDifference {
-    /// Relative L2 difference of u1x, u1y + vt (the slowing down) and u1z while node 1 touches.
+    /// Relative L2 difference of u1x, u1y + vt (the deceleration) and u1z while node 1 touches.
     pub touching: [f64; 3],
-    /// The same while any node of the cube touches.
+    /// Relative L2 difference of these quantities while any node of the cube touches.
     pub contact: [f64; 3],
-    /// u1y itself, while any node touches.
+    /// Relative L2 difference of u1y while any node touches.
     pub path: f64,
     /// Relative L2 difference of the mean of λ1 over windows of [`WINDOW`].
     pub windows: f64,
-    /// Largest windowed λ1 over that of the other, less one.
+    /// Ratio of the largest windowed λ1 to that of the other history, minus one.
     pub peak: f64,
-    /// Impulse of λ1 over that of the other, less one.
+    /// Ratio of the impulse of λ1 to that of the other history, minus one.
     pub impulse: f64,
-    /// Impulse of all normal forces on the left face over that of the other, less one.
+    /// Ratio of the impulse of all normal forces on the left face to that of the other history, minus one.
     pub left_impulse: f64,
-    /// Exit speed over that of the other, less one.
+    /// Ratio of the exit speed to that of the other history, minus one.
     pub exit: f64,
 }
 
-/// Length of the windows of forces (s).
+/// Length of the force windows (s).
 pub const WINDOW: f64 = 20e-6;
 
-/// Compare `a` with `b`, both run at `speed` (m/s); `touching` and `contact` are the ends of the two windows (s).
+/// Compares `a` with `b`, both run at `speed` (m/s); `touching` and `contact` are the ends of the two windows (s).
 pub fn agreement(a: &CubeHistory, b: &CubeHistory, speed: f64, touching: f64, contact: f64) -> HistoryDifference {
     let series = |history: &CubeHistory, component: usize| -> Vec<f64> {
         let lag = if component == 1 { speed } else { 0.0 };
@@ -95,13 +96,13 @@ pub fn agreement(a: &CubeHistory, b: &CubeHistory, speed: f64, touching: f64, co
     }
 }
 
-/// Speed of the cube's centre along −y at the end (m/s).
+/// Returns the speed of the centre of the cube along −y at the end (m/s).
 pub fn exit_speed(history: &CubeHistory) -> f64 {
     history.velocity.last().map_or(f64::NAN, |velocity| -velocity[1])
 }
 
-/// Largest difference between left and right: displacements ux of the corner pairs (1, 31), (6, 36), (85, 91), (90, 96)
-/// relative to the largest, and their forces relative to the largest.
+/// Returns the largest difference between left and right: displacements ux of the corner pairs (1, 31), (6, 36), (85,
+/// 91), (90, 96) relative to the largest, and their forces relative to the largest.
 pub fn asymmetry(history: &CubeHistory, until: f64) -> [f64; 2] {
     let mut largest = [0.0_f64; 2];
     let mut difference = [0.0_f64; 2];

@@ -1,5 +1,6 @@
-//! Independent methods and closed forms that the product is compared with, by tests and by `lab error`. Nothing here
-//! goes into the FMU, and nothing here uses the product's stepping or contact code; meshes, element matrices and sparse factors are those of `tiprub-model`.
+//! Independent methods and closed forms for comparison with the product, by tests and by `lab error`. The FMU
+//! contains nothing from here, and nothing here uses the stepping or contact code of the product; meshes, element
+//! matrices and sparse factors are those of `tiprub-model`.
 
 #![warn(unreachable_pub)]
 #[cfg(feature = "cube")]

@@ -1,4 +1,4 @@
-//! The paper's algorithm written literally with dense matrices (section 4.3, eqs 9-11).
+//! Literal implementation of the algorithm of the paper with dense matrices (section 4.3, eqs 9-11).
 
 use nalgebra::{DMatrix, DVector, Dyn, LU};
 
@@ -18,7 +18,7 @@ pub struct DenseFilm {
 }
 
 impl DenseFilm {
-    /// Start from two displacement vectors one step `step` (s) apart.
+    /// Creates a run from two displacement vectors one step `step` (s) apart.
     pub fn new(
         mass: DMatrix<f64>,
         damping: DMatrix<f64>,
@@ -31,8 +31,8 @@ impl DenseFilm {
         Self { mass, damping, stiffness, step, inertia, now, before }
     }
 
-    /// One step: prediction (9), gaps, correction (10)-(11). `normal` and `sliding` are C_N and C_NT, dofs × contacts;
-    /// `gaps` the gaps at zero displacement (m). Returns the multipliers (N), zero where nothing penetrates.
+    /// Performs one step: prediction (9), gaps, correction (10)-(11). `normal` and `sliding` are C_N and C_NT, dofs ×
+    /// contacts; `gaps` the gaps at zero displacement (m). Returns the multipliers (N), zero without penetration.
     pub fn step(&mut self, normal: &DMatrix<f64>, sliding: &DMatrix<f64>, gaps: &DVector<f64>) -> DVector<f64> {
         let square = self.step * self.step;
         let right = (&self.mass * (2.0 / square) - &self.stiffness) * &self.now

@@ -1,4 +1,4 @@
-//! Closed forms against numbers computed another way.
+//! Closed forms against independent computations.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use tiprub_model::element::ElementKind;
@@ -57,13 +57,14 @@ fn contact_impulse_matches_momentum_of_the_bouncing_bar() {
         let steps = 100_000;
         let dt = (to - from) / f64::from(steps);
         let impulse: f64 = (0..steps).map(|i| pressure(from + (f64::from(i) + 0.5) * dt) * dt).sum();
-        // From −v₀ to +v₀, and the weight meanwhile.
+        // From −v₀ to +v₀, plus the weight during the contact.
         let expected = bar::DENSITY * bar::LENGTH * (20.0 + bar::GRAVITY * (to - from));
         assert!((impulse / expected - 1.0).abs() < 1e-9, "{impulse} N·s/m² instead of {expected}");
     }
 }
 
-/// Largest error of the bottom (m) up to the end of the first period with n elements; the paper's equations, Courant 0.9.
+/// Returns the largest error of the bottom (m) up to the end of the first period with n elements; equations of the
+/// paper, Courant number 0.9.
 fn bouncing_error(n: usize) -> f64 {
     let size = bar::LENGTH / n as f64;
     let step = 0.9 * size / bar::wave_speed();
@@ -76,7 +77,7 @@ fn bouncing_error(n: usize) -> f64 {
         mass[(e, e)] += 0.5 * bar::DENSITY * size;
         mass[(e + 1, e + 1)] += 0.5 * bar::DENSITY * size;
     }
-    // Gravity as a moving frame: heights above a point that falls freely, so that the ground rises.
+    // Gravity as a moving frame: heights above a free-falling point, so that the ground rises.
     let start = DVector::from_element(n + 1, bar::HEIGHT);
     let mut film = DenseFilm::new(mass, DMatrix::zeros(n + 1, n + 1), stiffness, step, start.clone(), start);
     let normal = DMatrix::from_fn(n + 1, 1, |i, _| if i == 0 { 1.0 } else { 0.0 });
@@ -99,7 +100,7 @@ fn paper_algorithm_converges_to_bouncing_bar_solution() {
     assert!(errors[2] < 0.05 * bar::HEIGHT, "{errors:?}");
 }
 
-/// Time, largest depth and force of a mass against a force law, by small steps of velocity Verlet.
+/// Returns the time, largest depth and force of a mass against a force law, by small steps of velocity Verlet.
 fn collide(mass: f64, speed: f64, step: f64, force: impl Fn(f64) -> f64) -> [f64; 3] {
     let (mut depth, mut velocity, mut time) = (0.0, speed, 0.0);
     let (mut deepest, mut strongest) = (0.0_f64, 0.0_f64);
@@ -139,7 +140,8 @@ fn bounces_of_rigid_bodies_follow_their_force_laws() {
 #[test]
 fn the_block_on_the_belt_follows_its_equation_of_motion() {
     let belt = StickSlipBelt { mass: 2.0, stiffness: 5000.0, speed: 0.1, sticking: 120.0, sliding: 80.0 };
-    // Starts to slide when the spring pulls with F_s; velocity Verlet under F_k until it has the speed of the belt again.
+    // Sliding starts when the spring force is F_s; velocity Verlet under F_k until the speed of the belt is reached
+    // again.
     let (step, mut x, mut v, mut time) = (1e-7, belt.sticking / belt.stiffness, belt.speed, 0.0);
     let force = |x: f64| (belt.sliding - belt.stiffness * x) / belt.mass;
     let (mut low, mut high) = (x, x);
@@ -155,7 +157,7 @@ fn the_block_on_the_belt_follows_its_equation_of_motion() {
     }
     assert!((time / belt.slide_time() - 1.0).abs() < 1e-5, "{time} s of {}", belt.slide_time());
     assert!((0.5 * (high - low) / belt.amplitude() - 1.0).abs() < 1e-7);
-    // From where it sticks the belt takes it back to F_s.
+    // From the start of sticking, the belt moves the block back to F_s.
     let stick = (belt.sticking / belt.stiffness - x) / belt.speed;
     assert!((stick / belt.stick_time() - 1.0).abs() < 1e-5, "{stick} s of {}", belt.stick_time());
 }
@@ -165,7 +167,7 @@ fn cantilever_roots_match_finite_element_frequency() {
     for (n, root) in [(1, 1.8751), (2, 4.6941), (3, 7.8548)] {
         assert!((cantilever_root(n) - root).abs() < 5e-5, "root {n}: {}", cantilever_root(n));
     }
-    // 60 beam elements with the classic matrices, one end clamped.
+    // 60 beam elements with the classical matrices, one end clamped.
     let (elements, length) = (60, 1.0_f64);
     let size = length / elements as f64;
     let order = 2 * elements + 2;
@@ -176,7 +178,7 @@ fn cantilever_roots_match_finite_element_frequency() {
     for e in 0..elements {
         for i in 0..4 {
             for j in 0..4 {
-                // Rotations as rotation × size, so that all entries have one unit.
+                // Rotations are scaled by the element size, so that all entries have one unit.
                 k[(2 * e + i, 2 * e + j)] += stiff[i][j] / size.powi(3);
                 m[(2 * e + i, 2 * e + j)] += heavy[i][j] * size / 420.0;
             }
@@ -215,7 +217,7 @@ fn frequencies_of_the_cyclic_chain_are_eigenvalues() {
     }
 }
 
-/// A thin free ring of quadratic bricks; the closed form leaves out shear and rotary inertia, about (t/R)² of the frequency.
+/// Thin free ring of quadratic bricks; the closed form omits shear and rotary inertia, about (t/R)² of the frequency.
 #[test]
 fn the_free_ring_has_its_two_wave_frequency() {
     let (radius, thickness, width, arc) = (1.0, 0.02, 0.02, 96_usize);
@@ -233,7 +235,7 @@ fn the_free_ring_has_its_two_wave_frequency() {
         mesh.elements.push(Element { kind: ElementKind::Hex8, nodes: [quad(0), quad(1)].concat() });
     }
     let mut mesh = mesh.quadratic();
-    // Nodes in the middle of arcs back onto their circles.
+    // Move mid-arc nodes back onto their circles.
     for node in &mut mesh.nodes {
         let r = node[0].hypot(node[1]);
         let exact = [radius - 0.5 * thickness, radius, radius + 0.5 * thickness]

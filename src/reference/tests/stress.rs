@@ -1,8 +1,8 @@
-//! Stress of a blade pushed at rest against CalculiX.
+//! Static stress of a loaded blade against CalculiX.
 
 use tiprub_reference::blade::{PushedBlade, equivalent};
 
-/// Node (from 0), and displacements, stress of the same displacements, CalculiX's own stress.
+/// Node (from 0), displacements, stress for the same displacements, and stress by CalculiX's default.
 type StressRow = (usize, [f64; 3], [f64; 6], [f64; 6]);
 
 fn recorded() -> Vec<StressRow> {
@@ -16,8 +16,9 @@ fn recorded() -> Vec<StressRow> {
     rows.collect()
 }
 
-/// Displacements are CalculiX's, and so is the stress of these displacements at the points of reduced integration, carried to the nodes by its
-/// code. What it makes of the 27 points of its own bricks is another reading of the same field.
+/// Displacements match those of CalculiX, and so does the stress of these displacements at the points of reduced
+/// integration, extrapolated to the nodes by CalculiX. The stress from the 27 points of its default bricks is another
+/// evaluation of the same field.
 #[test]
 fn stress_of_loaded_blade_matches_calculix() {
     let blade = PushedBlade::new().unwrap();
@@ -41,7 +42,7 @@ fn stress_of_loaded_blade_matches_calculix() {
             apart(&same, stress) / largest,
             apart(&moved, ours) / farthest,
         );
-        // Six digits are what CalculiX prints. Its stress is smaller than ours by one factor at all places, 2.6e-5.
+        // CalculiX prints six digits. Its stress is smaller than ours by the same factor at all places, 2.6e-5.
         assert!(apart(&moved, ours) < 2e-6 * farthest && apart(&same, stress) < 3e-5 * largest);
         assert!((equivalent(same) / equivalent(*stress) - 1.0 + 2.6e-5).abs() < 4e-5);
         assert!(apart(&own, stress) < 0.1 * largest);

@@ -1,4 +1,4 @@
-//! Reading and setting variables.
+//! Access to variables: reading and setting them.
 
 use tiprub_core::variables::{Causality, DataType, StartValue, Variability, Variable};
 use tiprub_core::{Error, Result, shown};
@@ -8,7 +8,7 @@ use crate::state::CREATED;
 use crate::table::Item;
 
 impl ThermalSimulation {
-    /// Read one element of a real variable; inputs and parameters give back what was set.
+    /// Returns one element of a real variable; inputs and parameters return their set values.
     ///
     /// # Examples
     /// ```
@@ -22,13 +22,13 @@ impl ThermalSimulation {
     /// ```
     ///
     /// # Errors
-    /// Unknown reference, or not a real.
+    /// Unknown reference, or not a real variable.
     pub fn real(&self, reference: u32) -> Result<f64> {
         self.of_kind(reference, "real", |kind| kind == DataType::Real)?;
         Ok(self.values[reference as usize])
     }
 
-    /// Read an item of an enumeration.
+    /// Returns an item of an enumeration.
     ///
     /// # Examples
     /// ```
@@ -50,7 +50,7 @@ impl ThermalSimulation {
         Ok(self.values[reference as usize] as i32)
     }
 
-    /// Read a boolean: there is none.
+    /// Returns a boolean variable; there is none.
     ///
     /// # Examples
     /// ```
@@ -70,7 +70,7 @@ impl ThermalSimulation {
         self.of_kind(reference, "boolean", |kind| kind == DataType::Boolean).map(|_| false)
     }
 
-    /// Read a text.
+    /// Returns a text.
     ///
     /// # Examples
     /// ```
@@ -123,7 +123,7 @@ impl ThermalSimulation {
         row.map_or(Item::Constant, |row| self.items[row])
     }
 
-    /// Set one element of a real input or parameter; a derivative given before is over.
+    /// Sets one element of a real input or parameter; ends a previous derivative.
     ///
     /// # Examples
     /// ```
@@ -138,7 +138,7 @@ impl ThermalSimulation {
     /// ```
     ///
     /// # Errors
-    /// Unknown reference, wrong kind, not settable, out of range; nothing is changed then.
+    /// Unknown reference, wrong kind, not settable or out of range; nothing is changed in these cases.
     pub fn set_real(&mut self, reference: u32, value: f64) -> Result<()> {
         self.of_kind(reference, "real", |kind| kind == DataType::Real)?;
         let (item, element, variable) = self.settable(reference)?;
@@ -160,7 +160,7 @@ impl ThermalSimulation {
         Ok(())
     }
 
-    /// Set an item of an enumeration.
+    /// Sets an item of an enumeration.
     ///
     /// # Examples
     /// ```
@@ -174,7 +174,7 @@ impl ThermalSimulation {
     /// ```
     ///
     /// # Errors
-    /// As [`ThermalSimulation::set_real`].
+    /// The errors of [`ThermalSimulation::set_real`].
     pub fn set_integer(&mut self, reference: u32, value: i32) -> Result<()> {
         self.of_kind(reference, "integer", |kind| matches!(kind, DataType::Integer | DataType::Enumeration(_)))?;
         let (item, _, variable) = self.settable(reference)?;
@@ -195,7 +195,7 @@ impl ThermalSimulation {
         Ok(())
     }
 
-    /// Set a boolean: there is none.
+    /// Sets a boolean variable; there is none.
     ///
     /// # Examples
     /// ```
@@ -214,7 +214,7 @@ impl ThermalSimulation {
         self.of_kind(reference, "boolean", |kind| kind == DataType::Boolean).map(drop)
     }
 
-    /// Set a text: none can be.
+    /// Sets a text; no text can be set.
     ///
     /// # Examples
     /// ```
@@ -234,7 +234,7 @@ impl ThermalSimulation {
         self.settable(reference).map(drop)
     }
 
-    /// First time derivative of heat or of a temperature of gas or air, until it is set again.
+    /// Sets the first time derivative of heat or of a temperature of gas or air, until the input is set again.
     ///
     /// # Examples
     /// ```
@@ -250,7 +250,7 @@ impl ThermalSimulation {
     /// ```
     ///
     /// # Errors
-    /// Another variable, an order other than 1, not finite.
+    /// Another variable, an order other than 1, or a value that is not finite.
     pub fn set_input_derivative(&mut self, reference: u32, order: i32, value: f64) -> Result<()> {
         let (variable, element) = self.table.locate(reference)?;
         let what = format!("derivative of `{}`", variable.name);
@@ -274,8 +274,8 @@ impl ThermalSimulation {
         Ok(())
     }
 
-    /// First time derivative of a continuous real output at the last communication point, under the inputs reached there; of means
-    /// over the step from their middle to there.
+    /// Returns the first time derivative of a continuous real output at the last communication point, under the
+    /// inputs at that point; for means over the step, the derivative is taken from its middle to that point.
     ///
     /// # Examples
     /// ```
@@ -290,7 +290,7 @@ impl ThermalSimulation {
     /// ```
     ///
     /// # Errors
-    /// Another variable, an order other than 1.
+    /// Another variable, or an order other than 1.
     pub fn output_derivative(&self, reference: u32, order: i32) -> Result<f64> {
         let (variable, element) = self.table.locate(reference)?;
         let what = format!("derivative of `{}`", variable.name);

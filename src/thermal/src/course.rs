@@ -1,15 +1,15 @@
-//! What an input does over time.
+//! Course of an input over time.
 
 use tiprub_core::persist_fields;
 
-/// An input between communication points.
+/// Input between communication points.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct InputCourse {
-    /// As set.
+    /// Set value.
     pub(crate) value: f64,
-    /// Time derivative, 0 unless given.
+    /// Time derivative, 0 if not given.
     pub(crate) slope: f64,
-    /// Time since it was set (s), where a derivative was given.
+    /// Time since the input was set (s), if a derivative was given.
     since: f64,
     /// Value at the end of the last step.
     pub(crate) reached: f64,
@@ -18,29 +18,30 @@ pub(crate) struct InputCourse {
 persist_fields!(InputCourse { value, slope, since, reached });
 
 impl InputCourse {
-    /// Take a value; a derivative given before is over.
+    /// Sets a value and ends a previous derivative.
     pub(crate) fn set(&mut self, value: f64) {
         (self.value, self.slope, self.since) = (value, 0.0, 0.0);
     }
 
-    /// Take a derivative, valid from now.
+    /// Sets a derivative, valid from now.
     pub(crate) fn set_slope(&mut self, slope: f64) {
         self.value += self.slope * self.since;
         (self.slope, self.since) = (slope, 0.0);
     }
 
-    /// At the start of the simulation there is nothing to come from.
+    /// Starts at the set value, since at the start of the simulation there is no previous one.
     pub(crate) fn start(&mut self) {
         self.reached = self.value;
     }
 
-    /// Values at the beginning and the end of a step of `length` (s). A ramp begins where the last step ended.
+    /// Returns the values at the beginning and the end of a step of `length` (s). A ramp begins at the value at the
+    /// end of the last step.
     pub(crate) fn over(&self, length: f64, ramp: bool) -> [f64; 2] {
         let asked = |time: f64| self.value + self.slope * (self.since + time);
         [if ramp { self.reached } else { asked(0.0) }, asked(length)]
     }
 
-    /// The step is over.
+    /// Ends the step.
     pub(crate) fn shift(&mut self, length: f64) {
         self.reached = self.value + self.slope * (self.since + length);
         if self.slope != 0.0 {

@@ -1,12 +1,12 @@
-//! Exponential integrators' functions of −λH, and one coordinate over a step exactly.
+//! Functions φ(−λH) of exponential integrators, and exact integration of one coordinate over a step.
 //!
 //! φ₀(x) = eˣ, φ₁(x) = (φ₀ − 1)/x, φ₂(x) = (φ₁ − 1)/x, φ₃(x) = (φ₂ − ½)/x (Hochbruck and Ostermann, Acta Numerica 2010).
 
 use libm::{exp, expm1};
 
-/// Below this |x| a series, above it the recurrence: there it loses two digits at most.
+/// Bound of |x| below which a series is used, and above it the recurrence, which loses two digits at most.
 const NEAR: f64 = 1.0;
-/// Terms of the series of φ₃: the last is below 1/22!.
+/// Number of terms of the series of φ₃: the last is below 1/22!.
 const TERMS: u32 = 20;
 
 /// φ₀ to φ₃ of one coordinate.
@@ -14,10 +14,10 @@ const TERMS: u32 = 20;
 pub(crate) struct Phi(pub [f64; 4]);
 
 impl Phi {
-    /// At x = −λH; x is not positive but for rounding.
+    /// Computes the functions at x = −λH; x is not positive except for rounding.
     pub(crate) fn new(x: f64) -> Self {
         if x.abs() < NEAR {
-            // φ₃ = Σ xᵏ/(k+3)!; the others by the recurrence upwards, which loses nothing.
+            // φ₃ = Σ xᵏ/(k+3)!; the others by the upward recurrence, which loses no accuracy.
             let (mut term, mut third) = (1.0 / 6.0, 1.0 / 6.0);
             for k in 1..TERMS {
                 term *= x / f64::from(k + 3);
@@ -32,8 +32,8 @@ impl Phi {
         Self([exp(x), first, second, (second - 0.5) / x])
     }
 
-    /// Value at the end of a step of length H and the integral over it, from `start`, under a load that runs from `load` linearly
-    /// by `change`: ẋ = −λx + load + change t/H.
+    /// Returns the value at the end of a step of length H and the integral over it, from `start`, under a load that
+    /// changes linearly from `load` by `change`: ẋ = −λx + load + change t/H.
     pub(crate) fn step(&self, length: f64, start: f64, load: f64, change: f64) -> [f64; 2] {
         let [decay, first, second, third] = self.0;
         [
@@ -47,7 +47,7 @@ impl Phi {
 mod tests {
     use super::*;
 
-    /// ∫₀¹ e^{(1−t)x} t^{k−1}/(k−1)! dt by Gauss-Legendre on many parts.
+    /// Computes ∫₀¹ e^{(1−t)x} t^{k−1}/(k−1)! dt by Gauss-Legendre on many parts.
     fn integral(k: i32, x: f64) -> f64 {
         let parts = 2000;
         let weights = [5.0 / 18.0, 4.0 / 9.0, 5.0 / 18.0];
@@ -76,7 +76,7 @@ mod tests {
         }
     }
 
-    /// The integral is that of a value found by fine steps of another kind.
+    /// Compares the integral with the integrated equation of the coordinate.
     #[test]
     fn integral_and_end_value_match_closed_form() {
         let (rate, length, start, load, change) = (3.0, 0.7, 2.0, -1.0, 5.0);

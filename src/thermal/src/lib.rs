@@ -1,9 +1,10 @@
-//! Heat conduction of a reduced-order model: everything that runs inside `doStep` of the thermal unit.
+//! Heat conduction of a reduced-order model: all code that runs inside `doStep` of the thermal unit.
 //!
-//! Floor 0, beside the contact simulation of `tiprub-core`, of which it takes the table of variables, errors and saved bytes. A
-//! [`ConductionModel`] is plain data; a [`ThermalSimulation`] solves C Ṫ + (K + s_g H_g + s_a H_a) T = heat exactly over each communication step, for
-//! inputs that are linear in it, whatever its length. No files, no threads, no clock, no printing. SI units; temperatures are
-//! differences from a reference (K).
+//! Floor 0, beside the contact simulation of `tiprub-core`, from which it uses the table of variables, errors and
+//! saved bytes. A [`ConductionModel`] is plain data; a [`ThermalSimulation`] solves C Ṫ + (K + s_g H_g + s_a H_a) T =
+//! heat exactly over each communication step of any length, for inputs that are linear in it. It uses no files, no
+//! threads, no clock, and prints nothing. All quantities are in SI units; temperatures are differences from a
+//! reference (K).
 #![warn(unreachable_pub)]
 #![forbid(unsafe_code)]
 

@@ -1,23 +1,26 @@
-//! A reduced-order model of heat conduction, as plain data.
+//! Reduced-order model of heat conduction, as plain data.
 
 use nalgebra::DMatrix;
 use tiprub_core::rom::ThermalPatch;
 use tiprub_core::{Error, Result, ranges, shown};
 
-/// Most coordinates: their eigenvalue problem is dense, and solved anew when a convection factor changes.
+/// Largest number of coordinates: their eigenvalue problem is dense, and solved again when a convection factor
+/// changes.
 pub const LARGEST_ORDER: usize = 1000;
-/// Matrices are symmetric, and conduction takes no heat of its own, up to this share of their largest entry.
+/// Tolerance of the symmetry of matrices and of the conservation of heat by conduction, as a fraction of their
+/// largest entry.
 const ROUNDING: f64 = 1e-9;
 
-/// Coordinates x with T = V x at the nodes of a mesh and Vᵀ C V = I, C the heat capacity: ẋ + (K + s_g H_g + s_a H_a) x = loads.
+/// Coordinates x with T = V x at the nodes of a mesh and Vᵀ C V = I, C the heat capacity: ẋ + (K + s_g H_g + s_a H_a)
+/// x = loads.
 ///
-/// The first coordinate is the uniform temperature, x₁ = √C T with the heat capacity C of the whole, so that heat is conserved
-/// whatever the other coordinates leave out: the heat stored is √C x₁.
+/// The first coordinate is the uniform temperature, x₁ = √C T with the total heat capacity C, so that heat is
+/// conserved regardless of the truncation of the other coordinates: the stored heat is √C x₁.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ConductionModel {
     /// Name.
     pub name: String,
-    /// Where it comes from, in words.
+    /// Origin of the model, as text.
     pub origin: String,
     /// Heat capacity C (J/K).
     pub heat_capacity: f64,
@@ -27,24 +30,24 @@ pub struct ConductionModel {
     pub gas_convection: DMatrix<f64>,
     /// H_a of the air outside, coordinates × coordinates (1/s).
     pub ambient_convection: DMatrix<f64>,
-    /// Heating of the coordinates by one watt into each patch, coordinates × patches (√(K/J)). Spread evenly over the heated surface of a patch, its
-    /// transpose gives the mean temperature there.
+    /// Heating of the coordinates by one watt into each patch, coordinates × patches (√(K/J)), distributed evenly
+    /// over the heated surface of the patch. The transpose gives the mean temperature there.
     pub heat_loads: DMatrix<f64>,
     /// Mean temperature of the volume of each patch, patches × coordinates (√(K/J)).
     pub patch_means: DMatrix<f64>,
-    /// Mean temperatures of the surface in the gas and of that in the air, 2 × coordinates.
+    /// Mean temperatures of the surfaces in the gas and in the air, 2 × coordinates.
     pub wetted_means: DMatrix<f64>,
     /// Temperatures of places on the heated surface, places × coordinates.
     pub places: DMatrix<f64>,
-    /// The patches, as those of the mechanical model.
+    /// Patches, identical with those of the mechanical model.
     pub patches: Vec<ThermalPatch>,
-    /// Diffusion time of the elements under the heated surface (s): their largest depth squared over the diffusivity. What heat does within
-    /// a shorter time happens inside one element, which does not resolve it.
+    /// Diffusion time of the elements under the heated surface (s): their largest depth squared over the diffusivity.
+    /// Shorter transients occur within one element, which does not resolve them.
     pub element_time: f64,
 }
 
 impl ConductionModel {
-    /// Number of coordinates.
+    /// Returns the number of coordinates.
     ///
     /// # Examples
     /// ```
@@ -56,7 +59,7 @@ impl ConductionModel {
         self.conduction.nrows()
     }
 
-    /// h A of the gas at a factor of 1 (W/K): xᵀ H_g x of the uniform temperature of 1 K.
+    /// Returns h A of the gas at a factor of 1 (W/K): xᵀ H_g x of the uniform temperature of 1 K.
     ///
     /// # Examples
     /// ```
@@ -69,7 +72,7 @@ impl ConductionModel {
         self.heat_capacity * self.gas_convection[(0, 0)]
     }
 
-    /// The same of the air.
+    /// Returns h A of the air at a factor of 1 (W/K).
     ///
     /// # Examples
     /// ```
@@ -81,7 +84,7 @@ impl ConductionModel {
         self.heat_capacity * self.ambient_convection[(0, 0)]
     }
 
-    /// Check sizes and what the simulation relies on.
+    /// Checks the sizes and the properties that the simulation relies on.
     ///
     /// # Examples
     /// ```
@@ -93,7 +96,7 @@ impl ConductionModel {
     /// ```
     ///
     /// # Errors
-    /// [`Error::Invalid`] naming the array.
+    /// [`Error::Invalid`] with the array.
     pub fn validate(&self) -> Result<()> {
         let (order, patches) = (self.order(), self.patches.len());
         if order == 0 || order > LARGEST_ORDER {
@@ -130,7 +133,7 @@ impl ConductionModel {
         self.validate_physics()
     }
 
-    /// Symmetry, signs, and that heat is conserved.
+    /// Checks symmetry, signs, and that heat is conserved.
     fn validate_physics(&self) -> Result<()> {
         for (name, matrix) in [
             ("conduction", &self.conduction),

@@ -1,4 +1,4 @@
-//! The model in the eigenvectors of its conduction and convection, for given convection factors.
+//! Model in the eigenvectors of its conduction and convection, for given convection factors.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -8,7 +8,7 @@ use crate::model::ConductionModel;
 /// ż = −λ z + loads, z = Eᵀ x.
 #[derive(Debug, Clone)]
 pub(crate) struct DiagonalOperator {
-    /// Factors of the gas and of the air that it was made for.
+    /// Factors of the gas and of the air for which the operator was computed.
     pub(crate) factors: [f64; 2],
     /// λ (1/s), ascending.
     pub(crate) rates: Vec<f64>,
@@ -16,18 +16,19 @@ pub(crate) struct DiagonalOperator {
     pub(crate) vectors: DMatrix<f64>,
     /// Loads of a watt in each patch, coordinates × patches.
     pub(crate) heat: DMatrix<f64>,
-    /// Loads per kelvin of the gas and of the air, their factors included; transposed, what flows back at a temperature.
+    /// Loads per kelvin of the gas and of the air, including their factors; the transpose gives the heat flow at a
+    /// temperature.
     pub(crate) films: [DVector<f64>; 2],
     /// Conductances of the surfaces at a uniform temperature, s h A (W/K).
     pub(crate) conductances: [f64; 2],
     /// Rows of outputs, see [`crate::outputs::rows`].
     pub(crate) rows: DMatrix<f64>,
-    /// The heat stored (J) by coordinates.
+    /// Stored heat (J) per coordinate.
     pub(crate) stored: DVector<f64>,
 }
 
 impl DiagonalOperator {
-    /// Makes the operator of a model with `rows` of outputs.
+    /// Computes the operator of a model with `rows` of outputs.
     pub(crate) fn new(model: &ConductionModel, rows: &DMatrix<f64>, factors: [f64; 2]) -> Self {
         let films = [&model.gas_convection, &model.ambient_convection];
         let matrix = &model.conduction + films[0] * factors[0] + films[1] * factors[1];
@@ -40,7 +41,7 @@ impl DiagonalOperator {
         let film = |index: usize| vectors.tr_mul(&(films[index].column(0) * (root * factors[index])));
         Self {
             factors,
-            // Without convection the uniform temperature has a rate of rounding, of either sign.
+            // Without convection the rate of the uniform temperature is a rounding error of either sign.
             rates: order.iter().map(|&k| eigen.eigenvalues[k].max(0.0)).collect(),
             heat: vectors.tr_mul(&model.heat_loads),
             films: [film(0), film(1)],
@@ -51,14 +52,14 @@ impl DiagonalOperator {
         }
     }
 
-    /// φ functions of all coordinates for a step of `length` (s).
+    /// Computes the φ functions of all coordinates for a step of `length` (s).
     pub(crate) fn fill_phi(&self, length: f64, phi: &mut [Phi]) {
         for (phi, rate) in phi.iter_mut().zip(&self.rates) {
             *phi = Phi::new(-rate * length);
         }
     }
 
-    /// Load of `heat` (W) and of the temperatures of gas and air (K) on one coordinate.
+    /// Returns the load of `heat` (W) and of the temperatures of gas and air (K) on one coordinate.
     pub(crate) fn load(&self, coordinate: usize, heat: &[f64], films: [f64; 2]) -> f64 {
         let patches = self.heat.row(coordinate);
         let heated: f64 = patches.iter().zip(heat).map(|(load, heat)| load * heat).sum();

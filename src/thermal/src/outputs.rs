@@ -1,4 +1,4 @@
-//! Outputs, from coordinates.
+//! Computation of outputs from coordinates.
 
 use nalgebra::DMatrix;
 
@@ -8,8 +8,8 @@ use crate::simulation::ThermalSimulation;
 use crate::state::ThermalState;
 use crate::table::Item;
 
-/// Rows of temperatures by coordinates x: of patches, of their heated surfaces, of the whole, of the surfaces in gas and air, of
-/// places.
+/// Returns the rows of temperatures by coordinates x: of patches, of their heated surfaces, of the whole model, of
+/// the surfaces in gas and air, of places.
 pub(crate) fn rows(model: &ConductionModel) -> DMatrix<f64> {
     let parts = [&model.patch_means, &model.heat_loads.transpose(), &mean(model), &model.wetted_means, &model.places];
     let count = parts.iter().map(|part| part.nrows()).sum();
@@ -29,23 +29,23 @@ fn mean(model: &ConductionModel) -> DMatrix<f64> {
     row
 }
 
-/// A row of the operator times coordinates.
+/// Multiplies a row of the operator by coordinates.
 pub(crate) fn row_times(operator: &DiagonalOperator, row: usize, coordinates: &[f64]) -> f64 {
     operator.rows.row(row).iter().zip(coordinates).map(|(a, b)| a * b).sum()
 }
 
-/// Heat stored (J).
+/// Returns the stored heat (J).
 pub(crate) fn stored(operator: &DiagonalOperator, coordinates: &[f64]) -> f64 {
     operator.stored.iter().zip(coordinates).map(|(a, b)| a * b).sum()
 }
 
 impl ThermalSimulation {
-    /// First row of the places.
+    /// Returns the first row of the places.
     pub(crate) fn first_place(&self) -> usize {
         2 * self.model.patches.len() + 3
     }
 
-    /// The hottest of the places.
+    /// Returns the row of the hottest place.
     pub(crate) fn hottest(&self) -> usize {
         let value = |row: usize| row_times(&self.operator, row, &self.state.coordinates);
         let rows = self.first_place()..self.operator.rows.nrows();
@@ -53,7 +53,7 @@ impl ThermalSimulation {
         best.map_or(0, |(row, _)| row)
     }
 
-    /// Fill the values of all outputs.
+    /// Computes the values of all outputs.
     pub(crate) fn compute_outputs(&mut self) {
         for row in 0..self.items.len() {
             let variable = &self.table.variables()[row];
@@ -66,7 +66,7 @@ impl ThermalSimulation {
         }
     }
 
-    /// One output; `None` of what is none.
+    /// Returns one output; `None` if the item is not an output.
     fn output(&self, item: Item, element: usize) -> Option<f64> {
         let (state, operator) = (&self.state, &self.operator);
         let ThermalState { coordinates, totals, powers, .. } = state;

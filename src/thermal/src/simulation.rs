@@ -1,4 +1,4 @@
-//! A model with its state: what an FMU instance and the tests drive.
+//! Model with its state, which an FMU instance or the tests drive.
 
 use tiprub_core::simulation::StepProgress;
 use tiprub_core::variables::{StartValue, VariableTable};
@@ -13,40 +13,44 @@ use crate::outputs::{rows, stored};
 use crate::state::{CREATED, FAILED, READY, ThermalState, fingerprint_of};
 use crate::table::{self, HEAT, Item, TEMPERATURES};
 
-/// Communication points may differ from the simulation's own time by this fraction of H, as in the contact unit.
+/// Largest difference between a communication point and the time of the simulation, as a fraction of H, as in the
+/// contact unit.
 const TIME_TOLERANCE: f64 = 1e-3;
-/// Rates below this share of the largest are those of a casing that nothing cools: it has no steady state.
+/// Fraction of the largest rate below which the slowest rate is that of a casing without cooling, which has no steady
+/// state.
 const UNCOOLED: f64 = 1e-13;
 
-/// A reduced model of conduction and its state.
+/// Reduced model of heat conduction with its state.
 ///
-/// Life: [`ThermalSimulation::new`] → set parameters and inputs → [`ThermalSimulation::initialise`] → any number of steps → ([`ThermalSimulation::reset`]
-/// and again). A communication step is one internal step, and exact.
+/// Life cycle: [`ThermalSimulation::new`] → set parameters and inputs → [`ThermalSimulation::initialise`] → any
+/// number of steps → ([`ThermalSimulation::reset`] and again). A communication step is one internal step, which is
+/// exact.
 #[derive(Debug, Clone)]
 pub struct ThermalSimulation {
     pub(crate) model: ConductionModel,
     pub(crate) table: VariableTable,
     pub(crate) items: Vec<Item>,
     pub(crate) fingerprint: u64,
-    /// Rows of the model's outputs, in its own coordinates.
+    /// Rows of the outputs of the model, in the coordinates of the model.
     pub(crate) model_rows: nalgebra::DMatrix<f64>,
     pub(crate) operator: DiagonalOperator,
     pub(crate) state: ThermalState,
-    /// Values of all references; of inputs and parameters as set.
+    /// Values of all references; for inputs and parameters, the set values.
     pub(crate) values: Vec<f64>,
-    /// Step that was begun: time at its end and length (s).
+    /// Step in progress: time at its end and length (s).
     under_way: Option<[f64; 2]>,
     phi: Vec<Phi>,
     /// Heat of the patches at the beginning and at the end of a step (W).
     heat: [Vec<f64>; 2],
-    /// Whether steps shorter than elements resolve were warned of, once for all steps of the instance.
+    /// True after the warning of steps shorter than elements resolve, which is given once for all steps of the
+    /// instance.
     warned: bool,
     /// Warnings since the last [`ThermalSimulation::take_notes`].
     notes: Vec<Warning>,
 }
 
 impl ThermalSimulation {
-    /// Start values are in place, nothing is computed yet.
+    /// Creates a simulation with start values; nothing is computed yet.
     ///
     /// # Examples
     /// ```
@@ -89,7 +93,7 @@ impl ThermalSimulation {
         Ok(simulation)
     }
 
-    /// The variable table.
+    /// Returns the variable table.
     ///
     /// # Examples
     /// ```
@@ -105,7 +109,7 @@ impl ThermalSimulation {
         &self.table
     }
 
-    /// The model.
+    /// Returns the model.
     ///
     /// # Examples
     /// ```
@@ -119,7 +123,7 @@ impl ThermalSimulation {
         &self.model
     }
 
-    /// Time of the last communication point (s).
+    /// Returns the time of the last communication point (s).
     ///
     /// # Examples
     /// ```
@@ -135,7 +139,8 @@ impl ThermalSimulation {
         self.state.time
     }
 
-    /// 1/λ of all coordinates (s), the slowest first, at the convection factors of the last step; infinite of what lasts for ever.
+    /// Returns 1/λ of all coordinates (s), the slowest first, at the convection factors of the last step; infinite
+    /// for constant coordinates.
     ///
     /// # Examples
     /// ```
@@ -151,7 +156,7 @@ impl ThermalSimulation {
         self.operator.rates.iter().map(|rate| 1.0 / rate).collect()
     }
 
-    /// Back to the start values.
+    /// Resets the simulation to the start values.
     ///
     /// # Examples
     /// ```
@@ -180,7 +185,7 @@ impl ThermalSimulation {
         self.follow_factors();
     }
 
-    /// Set the temperatures to the start.
+    /// Sets the temperatures to their initial state.
     ///
     /// # Examples
     /// ```
@@ -219,7 +224,7 @@ impl ThermalSimulation {
         Ok(())
     }
 
-    /// λ z = load.
+    /// Solves λ z = load.
     fn start_steady(&mut self) -> Result<()> {
         let rates = &self.operator.rates;
         let (slowest, fastest) = (rates[0], rates[rates.len() - 1]);
@@ -238,7 +243,7 @@ impl ThermalSimulation {
         Ok(())
     }
 
-    /// Eigenvectors of the factors that the state says it uses.
+    /// Updates the eigenvectors to the factors that the state uses.
     fn follow_factors(&mut self) {
         let used = self.state.factors_used;
         if used.map(f64::to_bits) != self.operator.factors.map(f64::to_bits) {
@@ -246,7 +251,7 @@ impl ThermalSimulation {
         }
     }
 
-    /// Go over to the factors set, with the same temperatures.
+    /// Changes to the set factors, with the same temperatures.
     fn change_factors(&mut self) {
         if self.state.factors.map(f64::to_bits) == self.operator.factors.map(f64::to_bits) {
             return;
@@ -257,7 +262,7 @@ impl ThermalSimulation {
         self.state.coordinates.copy_from_slice(self.operator.vectors.tr_mul(&model).as_slice());
     }
 
-    /// Take over a state whose content has been checked.
+    /// Adopts a state whose content has been checked.
     pub(crate) fn adopt(&mut self, state: ThermalState) {
         self.state = state;
         self.under_way = None;
@@ -266,7 +271,7 @@ impl ThermalSimulation {
         self.compute_outputs();
     }
 
-    /// Values of inputs and parameters from the state.
+    /// Writes the values of inputs and parameters from the state.
     fn write_back(&mut self) {
         let state = &self.state;
         for (variable, item) in self.table.variables().iter().zip(&self.items) {
@@ -286,7 +291,7 @@ impl ThermalSimulation {
         }
     }
 
-    /// Begin a communication step of length `step_size` (s) from `current_time` (s).
+    /// Begins a communication step of length `step_size` (s) from `current_time` (s).
     ///
     /// # Examples
     /// ```
@@ -301,8 +306,8 @@ impl ThermalSimulation {
     /// ```
     ///
     /// # Errors
-    /// Not at a communication point, another time than the simulation's, a length out of range, or inputs that leave their range
-    /// within it.
+    /// Not at a communication point, a time other than that of the simulation, a length out of range, or inputs that
+    /// leave their range within the step.
     pub fn begin_step(&mut self, current_time: f64, step_size: f64) -> Result<()> {
         if self.state.phase != READY {
             let remedy = "Initialise, reset or restore the instance";
@@ -311,7 +316,7 @@ impl ThermalSimulation {
         ranges::within("communication step", step_size, ranges::SHORTEST_STEP, ranges::TIME)?;
         ranges::at_most("end of the communication step", current_time + step_size, ranges::TIME)?;
         let time = self.state.time;
-        // Written so that a NaN is refused.
+        // Written so that NaN is rejected.
         let off = (current_time - time).abs();
         if off.is_nan() || off > TIME_TOLERANCE * step_size {
             let problem = format!("{} s, but the simulation is at {} s", shown(current_time), shown(time));
@@ -337,7 +342,7 @@ impl ThermalSimulation {
         Ok(())
     }
 
-    /// The warning of a communication step that ends before heat has passed an element.
+    /// Returns the warning of a communication step that is shorter than the diffusion time of an element.
     fn unresolved(&self, step_size: f64) -> Warning {
         let problem = format!(
             "{}: the communication step of {} s is shorter than the {:.3} s that heat needs to diffuse through an \
@@ -352,7 +357,7 @@ impl ThermalSimulation {
         Warning::new(Topic::ThermalStep, problem, remedy)
     }
 
-    /// Warnings since this was asked the last time.
+    /// Returns the warnings since the last call.
     ///
     /// # Examples
     /// ```
@@ -370,7 +375,7 @@ impl ThermalSimulation {
         std::mem::take(&mut self.notes)
     }
 
-    /// Solve the communication step that was begun.
+    /// Solves the communication step in progress.
     ///
     /// # Examples
     /// ```
@@ -384,7 +389,7 @@ impl ThermalSimulation {
     /// ```
     ///
     /// # Errors
-    /// None was begun; the state is not finite any more.
+    /// No step in progress; a state that is no longer finite.
     pub fn advance(&mut self) -> Result<StepProgress> {
         let Some([end, length]) = self.under_way.take() else {
             return Err(Error::invalid("step", "no step was begun", "Begin a step first"));
@@ -416,7 +421,7 @@ impl ThermalSimulation {
         Ok(StepProgress { time: end, finished: true })
     }
 
-    /// All coordinates over a step; heat from gas and air (J).
+    /// Advances all coordinates over a step; returns the heat from gas and air (J).
     fn march(&mut self, length: f64, films: [[f64; 2]; 2]) -> [f64; 2] {
         let operator = &self.operator;
         let mean = films.map(|[start, end]| 0.5 * (start + end) * length);
@@ -433,7 +438,7 @@ impl ThermalSimulation {
         flows
     }
 
-    /// A whole communication step.
+    /// Performs a whole communication step.
     ///
     /// # Examples
     /// ```
@@ -448,13 +453,13 @@ impl ThermalSimulation {
     /// ```
     ///
     /// # Errors
-    /// As [`ThermalSimulation::begin_step`] and [`ThermalSimulation::advance`].
+    /// The errors of [`ThermalSimulation::begin_step`] and [`ThermalSimulation::advance`].
     pub fn do_step(&mut self, current_time: f64, step_size: f64) -> Result<()> {
         self.begin_step(current_time, step_size)?;
         self.advance().map(drop)
     }
 
-    /// Whether a step was begun and not solved.
+    /// Returns whether a step is in progress.
     ///
     /// # Examples
     /// ```

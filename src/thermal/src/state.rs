@@ -1,4 +1,4 @@
-//! Everything that determines the future of a simulation, and its bytes.
+//! Complete state of a simulation, and its bytes.
 
 use tiprub_core::persist::{Persist, StateReader, StateWriter, fingerprint};
 use tiprub_core::{Error, Result, Sum, persist_fields};
@@ -6,23 +6,23 @@ use tiprub_core::{Error, Result, Sum, persist_fields};
 use crate::course::InputCourse;
 use crate::simulation::ThermalSimulation;
 
-/// Bytes of the fingerprint of the model, before the state.
+/// Number of bytes of the fingerprint of the model, before the state.
 const FINGERPRINT_BYTES: usize = 8;
-/// No number of a state is larger (J of a year of the largest heats).
+/// Largest absolute value of a number of a state (J of a year of the largest heats).
 const LARGEST: f64 = 1e30;
 
-/// Where in its life a simulation is.
+/// Phase of a simulation: created, not yet initialised.
 pub(crate) const CREATED: u64 = 0;
-/// At a communication point.
+/// Phase: at a communication point.
 pub(crate) const READY: u64 = 1;
-/// A step failed.
+/// Phase: a step failed.
 pub(crate) const FAILED: u64 = 2;
 
-/// The state.
+/// State of a simulation.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ThermalState {
     pub(crate) phase: u64,
-    /// s.
+    /// Time (s).
     pub(crate) time: f64,
     /// Parameters in the order of [`crate::table`]: initial temperature (K), item of the initial state, item of the interpolation.
     pub(crate) initial_temperature: f64,
@@ -32,20 +32,20 @@ pub(crate) struct ThermalState {
     pub(crate) heat: Vec<InputCourse>,
     /// Temperatures of gas and air (K).
     pub(crate) films: [InputCourse; 2],
-    /// Convection factors as set.
+    /// Set convection factors.
     pub(crate) factors: [f64; 2],
-    /// Factors of the last step, in whose eigenvectors the coordinates are.
+    /// Factors of the last step, which define the eigenvectors of the coordinates.
     pub(crate) factors_used: [f64; 2],
-    /// z.
+    /// Coordinates z.
     pub(crate) coordinates: Vec<f64>,
-    /// Length of the last step (s), 0 before there was one; whether its films were ramps.
+    /// Length of the last step (s), 0 before the first; below, whether its film temperatures were ramps.
     pub(crate) last_length: f64,
     pub(crate) last_ramped: bool,
     /// Mean heat flows from gas and air over the last step (W).
     pub(crate) powers: [f64; 2],
-    /// Heat supplied, from the gas, from the air since the start (J).
+    /// Heat supplied, from the gas and from the air since the start (J).
     pub(crate) totals: [Sum; 3],
-    /// Sum of the sizes of all of these (J).
+    /// Sum of the absolute values of these heats (J).
     pub(crate) exchanged: f64,
     /// Heat stored at the start (J).
     pub(crate) initial_heat: f64,
@@ -94,7 +94,7 @@ impl ThermalSimulation {
         ThermalInputs { heat: self.state.heat.clone(), films: self.state.films }
     }
 
-    /// Back to what the inputs did at the same instant.
+    /// Restores the courses of the inputs at the same instant.
     ///
     /// # Examples
     /// ```
@@ -112,7 +112,7 @@ impl ThermalSimulation {
         (self.state.heat, self.state.films) = (courses.heat, courses.films);
     }
 
-    /// Size of a saved state (bytes).
+    /// Returns the size of a saved state (bytes).
     ///
     /// # Examples
     /// ```
@@ -130,7 +130,7 @@ impl ThermalSimulation {
         FINGERPRINT_BYTES + writer.written()
     }
 
-    /// Save the state into exactly [`ThermalSimulation::state_size`] bytes.
+    /// Saves the state into exactly [`ThermalSimulation::state_size`] bytes.
     ///
     /// # Examples
     /// ```
@@ -144,7 +144,7 @@ impl ThermalSimulation {
     /// ```
     ///
     /// # Errors
-    /// Another length.
+    /// A buffer of another length.
     pub fn save_state(&self, buffer: &mut [u8]) -> Result<()> {
         self.check_size(buffer.len())?;
         let (head, body) = buffer.split_at_mut(FINGERPRINT_BYTES);
@@ -153,7 +153,7 @@ impl ThermalSimulation {
         Ok(())
     }
 
-    /// Restore a saved state; nothing is changed on an error.
+    /// Restores a saved state; an error changes nothing.
     ///
     /// # Examples
     /// ```
@@ -170,7 +170,7 @@ impl ThermalSimulation {
     /// ```
     ///
     /// # Errors
-    /// Another length, another model, or content that no state has.
+    /// Another length, another model, or contents that are not a valid state.
     pub fn restore_state(&mut self, buffer: &[u8]) -> Result<()> {
         self.check_size(buffer.len())?;
         let (head, body) = buffer.split_at(FINGERPRINT_BYTES);

@@ -1,4 +1,4 @@
-//! The variable table of the unit.
+//! Variable table of the unit.
 
 use std::ops::RangeInclusive;
 
@@ -9,11 +9,11 @@ use tiprub_core::variables::{
 
 use crate::model::ConductionModel;
 
-/// Temperatures above the reference (K), as those of the contact unit.
+/// Range of temperatures above the reference (K), as in the contact unit.
 pub(crate) const TEMPERATURES: RangeInclusive<f64> = -3000.0..=3000.0;
-/// Heat into a patch (W): beyond any engine's.
+/// Range of the heat into a patch (W), beyond that of any engine.
 pub(crate) const HEAT: RangeInclusive<f64> = -1e9..=1e9;
-/// Factors on film coefficients.
+/// Range of the factors on film coefficients.
 pub(crate) const FACTORS: RangeInclusive<f64> = 0.0..=1e3;
 
 static KELVIN: VariableUnit =
@@ -47,7 +47,7 @@ static INTERPOLATIONS: Enumeration = Enumeration {
     ],
 };
 
-/// Quantity of a variable; an item for each row, in the order of the table.
+/// Quantity of a variable, with an item for each row in the order of the table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Item {
     Time,
@@ -64,13 +64,13 @@ pub(crate) enum Item {
     Hottest,
     Power(usize),
     Stored,
-    /// Supplied, from the gas, from the air.
+    /// Heat supplied, from the gas, or from the air.
     Total(usize),
     Residual,
     RelativeResidual,
 }
 
-/// The table with its items.
+/// Builder of the table with its items.
 #[derive(Default)]
 struct ThermalTableBuilder {
     variables: Vec<Variable>,
@@ -103,7 +103,7 @@ impl ThermalTableBuilder {
         self.variables.last_mut().expect("just pushed")
     }
 
-    /// References of the last row are known once it is whole.
+    /// Sets the references of the last row, which are known once it is complete.
     fn close(&mut self) {
         if let Some(last) = self.variables.last() {
             self.next = last.reference + u32::try_from(last.len()).unwrap_or(u32::MAX);
@@ -147,7 +147,7 @@ fn limit(variable: &mut Variable, range: &RangeInclusive<f64>) {
     (variable.min, variable.max) = (Some(*range.start()), Some(*range.end()));
 }
 
-/// The table of a model, with what its rows stand for.
+/// Builds the table of a model, with the items of its rows.
 pub(crate) fn build(model: &ConductionModel) -> Result<(VariableTable, Vec<Item>)> {
     let (mut table, patches) = (ThermalTableBuilder::default(), model.patches.len());
     let time = table.push(Item::Time, "time", Some(&SECOND), "Simulated time");

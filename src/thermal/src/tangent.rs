@@ -1,4 +1,5 @@
-//! Derivatives: of outputs by time at a communication point, and of outputs at the end of the last step by inputs over it.
+//! Derivatives: of outputs with respect to time at a communication point, and of outputs at the end of the last step
+//! with respect to inputs over it.
 
 use tiprub_core::variables::Variable;
 use tiprub_core::{Error, Result};
@@ -12,12 +13,12 @@ use crate::table::Item;
 /// Changes of coordinates, their integrals over the step, and heats.
 struct ThermalChange {
     coordinates: Vec<f64>,
-    /// Supplied, from the gas, from the air (J).
+    /// Heat supplied, from the gas and from the air (J).
     heats: [f64; 3],
 }
 
 impl ThermalSimulation {
-    /// Rate of an output at the communication point.
+    /// Returns the rate of an output at the communication point.
     pub(crate) fn rate(&self, item: Item, element: usize) -> f64 {
         let (state, operator) = (&self.state, &self.operator);
         let heat: Vec<f64> = state.heat.iter().map(|course| course.reached).collect();
@@ -43,8 +44,8 @@ impl ThermalSimulation {
         }
     }
 
-    /// Derivatives of outputs at the end of the last step by inputs over it, in the direction `seed`: of heat held over the step, of
-    /// temperatures as they ran. Exact.
+    /// Computes the derivatives of outputs at the end of the last step with respect to inputs over it, in the
+    /// direction `seed`: constant changes of heat over the step, and of temperatures with their actual course. Exact.
     ///
     /// # Examples
     /// ```
@@ -63,7 +64,8 @@ impl ThermalSimulation {
     /// ```
     ///
     /// # Errors
-    /// No step was done since initialisation; other variables than real outputs and inputs that act linearly; a seed that is not finite.
+    /// No step since initialisation; variables other than real outputs and inputs that act linearly; a seed that is
+    /// not finite.
     pub fn step_derivative(
         &self,
         outputs: &[u32],
@@ -109,7 +111,7 @@ impl ThermalSimulation {
 
     fn change(&self, length: f64, heat: &[f64], films: [f64; 2]) -> ThermalChange {
         let operator: &DiagonalOperator = &self.operator;
-        // A ramp begins where the step before ended, whatever is set.
+        // A ramp begins where the previous step ended, whatever value is set.
         let ramped = self.state.last_ramped;
         let begin = if ramped { [0.0; 2] } else { films };
         let share = if ramped { 0.5 } else { 1.0 };

@@ -1,4 +1,4 @@
-//! The exact step as a property: against a Runge-Kutta method, by its own composition, its energy, its derivatives, its state.
+//! Properties of the exact step: comparison with a Runge-Kutta method, composition, energy, derivatives and state.
 
 use std::f64::consts::PI;
 
@@ -9,19 +9,19 @@ use tiprub_thermal::{ConductionModel, ThermalSimulation};
 const ORDER: usize = 7;
 const PATCHES: usize = 3;
 
-/// Numbers between −1 and 1, the same every time.
+/// Returns a reproducible number between −1 and 1.
 fn number(seed: usize) -> f64 {
     (1.0 + seed as f64 * 12.9898).sin()
 }
 
-/// Symmetric and not negative, with rates from slow to fast.
+/// Returns a symmetric positive semidefinite matrix with rates from slow to fast.
 fn positive(seed: usize, scale: f64) -> DMatrix<f64> {
     let factor =
         DMatrix::from_fn(ORDER, ORDER, |i, j| number(seed + 7 * i + j) * 4.0_f64.powi(i32::try_from(j).unwrap()));
     &factor * factor.transpose() * scale
 }
 
-/// A model that no mesh made.
+/// Returns a model that does not stem from a mesh.
 fn model() -> ConductionModel {
     let capacity = 50.0_f64;
     let share = 1.0 / capacity.sqrt();
@@ -62,7 +62,7 @@ fn get(simulation: &ThermalSimulation, name: &str) -> f64 {
     simulation.real(reference(simulation, name)).unwrap()
 }
 
-/// All real outputs.
+/// Returns all real outputs.
 fn outputs(simulation: &ThermalSimulation) -> Vec<f64> {
     let count = u32::try_from(simulation.table().references()).unwrap();
     (0..count).filter_map(|reference| simulation.real(reference).ok()).collect()
@@ -81,7 +81,8 @@ fn warm() -> ThermalSimulation {
     simulation
 }
 
-/// Fourth-order Runge-Kutta in the model's own coordinates, inputs linear over the step; patch means at the end.
+/// Integrates by the fourth-order Runge-Kutta method in the coordinates of the model, inputs linear over the step;
+/// returns patch means at the end.
 fn runge_kutta(
     model: &ConductionModel,
     start: f64,
@@ -136,7 +137,7 @@ fn one_long_step_matches_many_runge_kutta_steps() {
     }
 }
 
-/// The same inputs over time in steps of other lengths: the same temperatures and heats, to rounding.
+/// Equal inputs over time with other step lengths give the same temperatures and heats, to rounding.
 #[test]
 fn result_is_independent_of_step_length() {
     let run = |count: u32| {
@@ -153,7 +154,7 @@ fn result_is_independent_of_step_length() {
     let (one, many) = (run(1), run(10_000));
     let mut simulation = warm();
     simulation.do_step(0.0, 1.0).unwrap();
-    // Means are over the last step, and what is left of the balance is rounding.
+    // Means are over the last step, and the residual of the balance is rounding.
     let skipped = ["gas_power", "ambient_power", "energy_residual", "energy_residual_relative"];
     let skipped: Vec<usize> = skipped
         .iter()
@@ -185,7 +186,7 @@ fn input_derivative_gives_a_ramp_for_every_interpolation() {
     };
     let (ramp, hold) = (run(1), run(2));
     assert!(ramp.iter().zip(&hold).all(|(a, b)| (a - b).abs() <= 1e-12 * (1.0 + a.abs())), "{ramp:?} {hold:?}");
-    // Heat with a derivative: its integral is what is supplied.
+    // Heat with a derivative: its integral is the supplied heat.
     let mut simulation = warm();
     let heat = reference(&simulation, "casing_heat");
     simulation.set_real(heat, 10.0).unwrap();
@@ -195,18 +196,19 @@ fn input_derivative_gives_a_ramp_for_every_interpolation() {
     assert!((get(&simulation, "supplied_heat") - (10.0 * 5.0 + 2.0 * 12.5)).abs() < 1e-12);
 }
 
-/// Heat flows by another road: film coefficient times the difference of temperatures, by Simpson's rule over short steps.
+/// Computes heat flows independently: film coefficient times the difference of temperatures, by Simpson's rule over
+/// short steps.
 #[test]
 fn convective_heat_equals_film_conductance_times_difference() {
     let (model, mut simulation) = (model(), warm());
     let flow = |simulation: &ThermalSimulation| {
         ["gas_heat", "ambient_heat"].map(|name| simulation.output_derivative(reference(simulation, name), 1).unwrap())
     };
-    // At the start the temperature is uniform: h A (T_gas − T), by numbers of the model alone.
+    // At the start the temperature is uniform: h A (T_gas − T), from the numbers of the model alone.
     let expected = [model.gas_conductance() * (200.0 - 30.0), model.ambient_conductance() * (15.0 - 30.0)];
     let found = flow(&simulation);
     assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-11 * b.abs()), "{found:?} against {expected:?}");
-    // What is fast is over after a while: Simpson's rule has the rest.
+    // Fast transients have decayed after a while; Simpson's rule resolves the rest.
     simulation.do_step(0.0, 4.0).unwrap();
     let start = ["gas_heat", "ambient_heat"].map(|name| get(&simulation, name));
     let (h, mut sums) = (0.01, [0.0; 2]);
@@ -258,7 +260,7 @@ fn step_derivatives_equal_finite_differences() {
         simulation.do_step(3.0, 5.0).unwrap();
         references.map(|reference| simulation.real(reference).unwrap())
     };
-    // Small, so that the hottest place stays the hottest.
+    // A small change, so that the hottest place stays the hottest.
     let [low, high] = [-1e-3, 1e-3].map(|scale| run(&mut simulation, scale));
     run(&mut simulation, 0.0);
     let mut sensitivity = [0.0; 8];
@@ -321,7 +323,7 @@ fn saved_states_and_resets_give_the_same_bits() {
     set(&mut simulation, "ambient_temperature", 15.0);
     simulation.initialise(0.0).unwrap();
     assert_eq!(bits(&simulation), fresh);
-    // Damage is found, and changes nothing.
+    // A damaged state is detected and changes nothing.
     let before = bits(&simulation);
     let mut nan = state.clone();
     let at = nan.len() - 8;
@@ -356,7 +358,7 @@ fn steady_start_stays_steady_and_requires_cooling() {
     assert!(error.contains("no significant cooling") && error.contains("uniform"), "{error}");
 }
 
-/// Without any film heat stays: what is supplied is stored.
+/// Without films the supplied heat is stored.
 #[test]
 fn uncooled_casing_keeps_its_heat() {
     let mut simulation = ThermalSimulation::new(model()).unwrap();

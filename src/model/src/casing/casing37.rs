@@ -1,10 +1,10 @@
 //! The default casing, around rotor 37.
 //!
-//! It is ours: NASA TP-1659 describes the flow path, not the wall of the rig. Its inner contour is what a surface spline
-//! through its three rings of contact nodes is along the axis, a natural cubic spline, so that mesh and contact surface are
-//! one. The radii of the rings are such that the radial gap to the blade's leading edge, mid-chord and trailing edge is
-//! [`TIP_GAP`]; between them it follows the tip of the blade to a few hundredths of a millimetre. Beyond the rings the
-//! contour goes on straight, as the spline does.
+//! The geometry is our own design: NASA TP-1659 describes the flow path, not the wall of the rig. The inner contour
+//! is the natural cubic spline along the axis through three rings of contact nodes, so that the mesh and the contact
+//! surface coincide. The radii of the rings are chosen so that the radial gap to the leading edge, mid-chord and
+//! trailing edge of the blade is [`TIP_GAP`]; between them it follows the tip of the blade to a few hundredths of a
+//! millimetre. Beyond the rings the contour continues straight, as the spline does.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -18,14 +18,15 @@ pub const CASING37: &str = "casing37";
 
 /// Axial extent (m); the tip of the blade is at 6.4 to 34.2 mm.
 const AXIAL: [f64; 2] = [-0.038, 0.042];
-/// First and last contact ring (m): 3.8 mm before and behind the tip of the blade; the third is in the middle.
+/// Axial positions of the first and the last contact ring (m): 3.8 mm before and behind the blade tip; the third ring
+/// is in the middle.
 const RINGS: [f64; 2] = [2.6e-3, 38.0e-3];
 /// Points of the contour between two rings.
 const POINTS: u32 = 36;
 
 impl Default for CasingOptions {
-    /// casing37: steel, 4 mm thick, held at the end face of a flange of 5 mm x 10 mm at low z; a flange of 4 mm x 6 mm
-    /// at high z.
+    /// Returns casing37: steel, 4 mm thick, clamped at the end face of a flange of 5 mm x 10 mm at low z, with a
+    /// flange of 4 mm x 6 mm at high z.
     fn default() -> Self {
         let flanges = [Flange { thickness: 5e-3, height: 10e-3 }, Flange { thickness: 4e-3, height: 6e-3 }].map(Some);
         let geometry = RingGeometry { contour: casing37_contour(), thickness: 4e-3, flanges };
@@ -46,7 +47,7 @@ impl Default for CasingOptions {
     }
 }
 
-/// Inner contour of casing37.
+/// Returns the inner contour of casing37.
 pub fn casing37_contour() -> InnerContour {
     let blade = blade_mesh(MeshCounts::default()).expect("the built-in blade can be meshed");
     let contact = blade.contact_points(3).expect("the tip has three nodes");
@@ -67,7 +68,7 @@ pub fn casing37_contour() -> InnerContour {
     InnerContour::new(&points).expect("the tip of the built-in blade gives a valid contour")
 }
 
-/// Natural cubic spline through `values` at the three rings, straight beyond them.
+/// Evaluates the natural cubic spline through `values` at the three rings, straight beyond them.
 fn natural_spline(values: [f64; 3], z: f64) -> f64 {
     let [first, last] = RINGS;
     let step = 0.5 * (last - first);

@@ -1,19 +1,20 @@
-//! Fewer modes with the same static response: modes above a cut-off are replaced by what they do at rest.
+//! Modal condensation with the same static response: modes above a cut-off are replaced by their static responses.
 //!
-//! Of modes with ω² = Λ and loads F on them, those above the cut-off answer at rest by Λ⁻¹F. An orthonormal basis Q of
-//! these answers, described by the modes of QᵀΛQ, stands for them: the answer to every combination of the loads stays
-//! exact at rest, the modes below the cut-off stay as they are, and there are no more coordinates than loads above it.
+//! For modes with ω² = Λ and modal loads F, the static response of the modes above the cut-off is Λ⁻¹F. An
+//! orthonormal basis Q of these responses, expressed in the modes of QᵀΛQ, replaces them: the static response to
+//! every combination of the loads stays exact, the modes below the cut-off stay unchanged, and above it there are no
+//! more coordinates than loads.
 
 use nalgebra::DMatrix;
 
 use super::modal_form::ModalForm;
 
-/// An answer this small beside its own size, once the others are taken out of it, is round-off.
+/// A response whose remainder after orthogonalisation is below this fraction of its size is round-off.
 const DEPENDENT: f64 = 1e-10;
-/// ω² of a double mode agree to this share.
+/// Relative difference of ω² below which two modes form a double mode.
 const DOUBLE: f64 = 1e-6;
 
-/// Keep the lowest `count` modes (one fewer rather than half of a double one; rigid-body modes count) and the static
+/// Keeps the lowest `count` modes (one fewer if a double mode would be split; rigid-body modes count) and the static
 /// response of the others to `loads` (reduced coordinates × loads).
 pub fn condense(modes: &ModalForm, count: usize, loads: &DMatrix<f64>) -> ModalForm {
     let squares = &modes.squares;
@@ -21,7 +22,7 @@ pub fn condense(modes: &ModalForm, count: usize, loads: &DMatrix<f64>) -> ModalF
         return modes.clone();
     }
     let halved = count > 0 && squares[count] - squares[count - 1] < DOUBLE * squares[count];
-    // A rigid-body mode has no static response that could stand for it.
+    // A rigid-body mode has no static response that could replace it.
     let rigid = squares.iter().filter(|square| **square <= 0.0).count();
     let kept = if halved { count - 1 } else { count }.max(rigid);
     let high = modes.shapes.columns(kept, squares.len() - kept);
@@ -51,7 +52,7 @@ pub fn condense(modes: &ModalForm, count: usize, loads: &DMatrix<f64>) -> ModalF
     ModalForm { squares, shapes, condensed_from: Some(kept) }
 }
 
-/// Gram-Schmidt, repeated until a pass takes nothing away any more; dependent columns are left out.
+/// Orthonormalises vectors by Gram-Schmidt, repeated until a pass changes nothing; omits dependent columns.
 fn orthonormal(mut vectors: DMatrix<f64>) -> DMatrix<f64> {
     let mut size = 0;
     for k in 0..vectors.ncols() {

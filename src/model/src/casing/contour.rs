@@ -1,13 +1,13 @@
 //! Meridional contour r(z) of a ring: piecewise cubic through given points, without overshoot.
 //!
-//! Slopes at the points are the weighted harmonic means of Fritsch and Butland (SIAM J. Sci. Stat. Comput. 5(2), 1984),
-//! those at the ends the slopes of the outer segments. Two points give a cylinder or a cone, exactly.
+//! Slopes at inner points are the weighted harmonic means of Fritsch and Butland (SIAM J. Sci. Stat. Comput. 5(2),
+//! 1984), slopes at the ends those of the outer segments. Two points give an exact cylinder or cone.
 
 use tiprub_core::shown;
 
 use crate::{Error, Result};
 
-/// The contour of an inner surface.
+/// Contour of an inner surface.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InnerContour {
     points: Vec<[f64; 2]>,
@@ -15,10 +15,10 @@ pub struct InnerContour {
 }
 
 impl InnerContour {
-    /// Through the points (z, r) in m, by growing z.
+    /// Creates the contour through the points (z, r) in m, by ascending z.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for fewer than two points, radii that are not positive, or z that does not grow.
+    /// [`Error::Invalid`] for fewer than two points, radii that are not positive, or z that does not ascend.
     pub fn new(points: &[[f64; 2]]) -> Result<Self> {
         let refuse = |problem: String| {
             let remedy = "Give at least two points (z, r) in m with increasing z";
@@ -55,12 +55,12 @@ impl InnerContour {
         Ok(Self { points: points.to_vec(), slopes })
     }
 
-    /// First and last axial position (m).
+    /// Returns the first and the last axial position (m).
     pub fn axial(&self) -> [f64; 2] {
         [self.points[0][0], self.points[self.points.len() - 1][0]]
     }
 
-    /// Radius (m) at the axial position z (m); beyond the ends the outer polynomials go on.
+    /// Returns the radius (m) at the axial position z (m); the outer polynomials extend beyond the ends.
     pub fn radius(&self, z: f64) -> f64 {
         let (i, h, t) = self.place(z);
         let ([_, a], [_, b]) = (self.points[i], self.points[i + 1]);
@@ -68,7 +68,7 @@ impl InnerContour {
         a + (b - a) * s + h * t * rest * (rest * self.slopes[i] - t * self.slopes[i + 1])
     }
 
-    /// Slope dr/dz at the axial position z (m).
+    /// Returns the slope dr/dz at the axial position z (m).
     pub fn slope(&self, z: f64) -> f64 {
         let (i, h, t) = self.place(z);
         let secant = (self.points[i + 1][1] - self.points[i][1]) / h;
@@ -76,7 +76,7 @@ impl InnerContour {
         6.0 * t * rest * secant + rest * (rest - 2.0 * t) * self.slopes[i] + t * (t - 2.0 * rest) * self.slopes[i + 1]
     }
 
-    /// Segment, its length, and the position in it from 0 to 1.
+    /// Returns the segment, its length, and the position in it from 0 to 1.
     fn place(&self, z: f64) -> (usize, f64, f64) {
         let inner = &self.points[1..self.points.len() - 1];
         let i = inner.iter().take_while(|point| point[0] <= z).count();
@@ -85,7 +85,7 @@ impl InnerContour {
     }
 }
 
-/// Slope at a point between segments of slopes `before` and `after` and lengths `from` and `to`.
+/// Returns the slope at a point between segments of slopes `before` and `after` and lengths `from` and `to`.
 fn inner_slope(before: f64, after: f64, from: f64, to: f64) -> f64 {
     if before * after <= 0.0 {
         return 0.0;

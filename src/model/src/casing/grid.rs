@@ -9,32 +9,32 @@ use crate::mesh::Mesh;
 use crate::reduce::ContactPoint;
 use crate::{Error, Result};
 
-/// Nodes of a mesh that form rings: node `along · around + i` is the i-th of ring `along`, rings by growing z, nodes of a
-/// ring at growing angles.
+/// Nodes of a mesh that form rings: node `along · around + i` is the i-th of ring `along`, rings by ascending z,
+/// nodes of a ring by ascending angle.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GridNodes {
-    /// Nodes of a ring.
+    /// Number of nodes per ring.
     pub around: usize,
-    /// Node indices of the mesh (from 0), ring by ring; of points between nodes the node with the largest weight.
+    /// Node indices of the mesh (from 0), ring by ring; for points between nodes, the node with the largest weight.
     pub nodes: Vec<usize>,
     /// Slope dr/dz of the inner surface at each ring.
     pub slopes: Vec<f64>,
-    /// The points of the grid on the faces of the mesh; empty where all of them are nodes.
+    /// Points of the grid on the faces of the mesh; empty if all of them are nodes.
     pub points: Vec<SurfacePoint>,
 }
 
-/// Fraction of the distance between neighbours around within which a place of the grid has to be met.
+/// Tolerance of a grid position, as a fraction of the distance between neighbours on a ring.
 const TOLERANCE: f64 = 1e-3;
-/// Points with no larger weight than this at a node that can move are clamped.
+/// A point is clamped if the largest weight of its movable nodes is at most this value.
 const CLAMPED: f64 = 0.01;
 
 impl GridNodes {
-    /// Sort nodes into `along` rings by z, and the nodes of a ring by angle. Slopes are those of the parabola through
-    /// the mean radii of a ring and its neighbours.
+    /// Sorts nodes into `along` rings by z, and the nodes of a ring by angle. Slopes are those of the parabola
+    /// through the mean radii of a ring and its neighbours.
     ///
     /// # Errors
-    /// [`Error::Invalid`] when the nodes cannot be shared out evenly or do not exist. Whether they do form a grid is
-    /// checked with the ROM.
+    /// [`Error::Invalid`] if the nodes do not exist or cannot be divided evenly. The validation of the ROM checks
+    /// whether they form a grid.
     pub fn sorted(mesh: &Mesh, nodes: &[usize], along: usize) -> Result<Self> {
         if along < 2 || !nodes.len().is_multiple_of(along) || nodes.len() / along < 4 {
             return Err(Error::invalid(
@@ -52,10 +52,11 @@ impl GridNodes {
         sorted.sort_by(|a, b| mesh.nodes[*a][2].total_cmp(&mesh.nodes[*b][2]));
         let quarter = 0.25 * TAU / around as f64;
         let angle = |node: usize| mesh.nodes[node][1].atan2(mesh.nodes[node][0]);
-        // Angles from a quarter of a step before zero on, so that rounding moves no node at zero to the end of its ring.
+        // Angles start a quarter of a step before zero, so that rounding moves no node at zero to the end of its
+        // ring.
         let smallest = sorted[..around].iter().map(|node| (angle(*node) + quarter).rem_euclid(TAU)).fold(TAU, f64::min);
         for ring in sorted.chunks_mut(around) {
-            // Half a step for nodes level with the first one of the first ring.
+            // Shift that places nodes at the angle of the first node of the first ring at half a step.
             let place = |node: usize| (angle(node) - smallest + 3.0 * quarter).rem_euclid(TAU);
             ring.sort_by(|a, b| place(*a).total_cmp(&place(*b)));
         }
@@ -64,13 +65,14 @@ impl GridNodes {
         Ok(grid)
     }
 
-    /// Choose a grid on the surface whose nodes are the `set`, of which the `clamped` ones (ascending) cannot move: `along` rings, evenly from
-    /// the axial position `axial[0]` to `axial[1]` (m; the first and the last of the nodes that can move where absent), `around` points at
-    /// equal angles. Where the mesh has a node at each place these are taken: rings at the nodes nearest to their axial positions,
-    /// angles from the smallest angle on. Else angles count from zero, and points lie on the faces of the [`InnerSurface`].
+    /// Chooses a grid on the surface whose nodes are the `set`; the `clamped` ones of them (ascending) cannot move.
+    /// It has `along` rings, evenly spaced from the axial position `axial[0]` to `axial[1]` (m; by default the first
+    /// and the last of the movable nodes), and `around` points at equal angles. If the mesh has a node at each
+    /// position, these nodes are used: rings at the nodes nearest to their axial positions, angles from the smallest
+    /// angle on. Otherwise angles count from zero, and points lie on the faces of the [`InnerSurface`].
     ///
     /// # Errors
-    /// [`Error::Invalid`] for a grid that is too small, and those of [`InnerSurface`].
+    /// [`Error::Invalid`] for a grid that is too small; the errors of [`InnerSurface`].
     pub fn chosen(
         mesh: &Mesh,
         (set, clamped): (&[usize], &[usize]),
@@ -100,7 +102,7 @@ impl GridNodes {
         Ok(grid)
     }
 
-    /// The nodes of a grid, where there is one at each place and none is at two.
+    /// Returns the nodes of a grid if there is a different node at each position.
     fn nodes_at(mesh: &Mesh, nodes: &[usize], around: usize, heights: &[f64]) -> Option<Vec<usize>> {
         let angle = |node: usize| mesh.nodes[node][1].atan2(mesh.nodes[node][0]);
         let height = |node: usize| mesh.nodes[node][2];
@@ -133,7 +135,7 @@ impl GridNodes {
         (distinct.len() == chosen.len()).then_some(chosen)
     }
 
-    /// The points of a grid on the faces of the mesh, each with its node.
+    /// Returns the points of a grid on the faces of the mesh, each with its node.
     fn points_at(
         mesh: &Mesh,
         (set, clamped): (&[usize], &[usize]),
@@ -147,7 +149,7 @@ impl GridNodes {
         for &height in heights {
             for place in 0..around {
                 let mut point = surface.point(step * place as f64, height, TOLERANCE * step * radius)?;
-                // Held nodes do not move: a force at the point still goes to the others with their weights.
+                // Clamped nodes do not move; the other nodes of the face keep their weights in the force.
                 point.weights.retain(|(node, _)| clamped.binary_search(node).is_err());
                 let largest = point.weights.iter().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
                 let Some(&(node, _)) = largest.filter(|(_, weight)| weight.abs() > CLAMPED) else {
@@ -163,7 +165,7 @@ impl GridNodes {
         Ok((nodes, points))
     }
 
-    /// Position (x, y, z) of each point of the grid (m).
+    /// Returns the position (x, y, z) of each point of the grid (m).
     pub fn positions(&self, mesh: &Mesh) -> Vec<[f64; 3]> {
         if self.points.is_empty() {
             return self.nodes.iter().map(|&node| mesh.nodes[node]).collect();
@@ -171,10 +173,10 @@ impl GridNodes {
         self.points.iter().map(|point| point.position).collect()
     }
 
-    /// Check that nodes and slopes fill whole rings.
+    /// Checks that nodes and slopes fill whole rings.
     ///
     /// # Errors
-    /// [`Error::Invalid`] giving the counts.
+    /// [`Error::Invalid`] with the counts.
     pub(crate) fn validate(&self) -> Result<()> {
         let whole = self.around > 0
             && self.nodes.len().is_multiple_of(self.around)
@@ -187,17 +189,17 @@ impl GridNodes {
         Err(Error::invalid("contact nodes of the casing", problem, "Give the nodes and one slope of every ring"))
     }
 
-    /// Number of rings.
+    /// Returns the number of rings.
     pub fn along(&self) -> usize {
         self.nodes.len() / self.around
     }
 
-    /// Returns the shape of the grid, as the ROM has it.
+    /// Returns the shape of the grid for the ROM.
     pub(crate) fn shape(&self) -> ContactGrid {
         ContactGrid { around: self.around, along: self.along(), closed: true }
     }
 
-    /// The contact nodes in the cylindrical frame.
+    /// Returns the contact nodes in the cylindrical frame.
     pub(crate) fn contact_nodes(&self, mesh: &Mesh) -> Vec<ContactNode> {
         let node = |(index, [x, y, z]): (usize, [f64; 3])| {
             let meridional_slope = self.slopes[index / self.around];
@@ -211,7 +213,8 @@ impl GridNodes {
         self.positions(mesh).into_iter().enumerate().map(node).collect()
     }
 
-    /// The contact nodes before the reduction; points between nodes as patches of the nodes of their faces.
+    /// Returns the contact nodes before the reduction; points between nodes become patches of the nodes of their
+    /// faces.
     pub fn contact_points(&self) -> Vec<ContactPoint> {
         let slope = |index: usize| self.slopes[index / self.around];
         let point = |(index, node): (usize, &usize)| ContactPoint {
@@ -221,12 +224,12 @@ impl GridNodes {
         self.nodes.iter().enumerate().map(point).collect()
     }
 
-    /// Name of the contact node with the given index: `ring_1_node_1`, ...
+    /// Returns the name of the contact node with the given index: `ring_1_node_1`, ...
     pub(crate) fn name(&self, index: usize) -> String {
         format!("ring_{}_node_{}", index / self.around + 1, index % self.around + 1)
     }
 
-    /// Mean z and r of every ring.
+    /// Returns the mean z and r of every ring.
     fn rings(&self, mesh: &Mesh) -> Vec<[f64; 2]> {
         let mean = |ring: &[[f64; 3]], value: &dyn Fn([f64; 3]) -> f64| {
             ring.iter().map(|point| value(*point)).sum::<f64>() / ring.len() as f64

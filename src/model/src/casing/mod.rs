@@ -1,7 +1,7 @@
 //! Flexible casings: a parametric ring, its mesh, and its reduction with contact grid and thermal loads.
 //!
-//! [`reduce_ring`] builds and reduces a ring that follows a blade's tip contour; its default is `casing37`, around rotor
-//! 37. [`reduce_casing`] does the same for a mesh from elsewhere whose contact nodes form a grid.
+//! [`reduce_ring`] builds and reduces a ring that follows the tip contour of a blade; its default is `casing37`,
+//! around rotor 37. [`reduce_casing`] reduces any mesh whose contact nodes form a grid.
 //!
 mod casing37;
 mod condense;
@@ -28,16 +28,16 @@ use crate::progress::{Listener, ReductionStage, report};
 use crate::reduce::Reduction;
 use crate::thermal::equal_patches;
 
-/// Where a ring is held.
+/// Support of a ring.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RingSupport {
-    /// The end face at low z, flange included.
+    /// Clamped at the end face at low z, flange included.
     Low,
-    /// The end face at high z, flange included.
+    /// Clamped at the end face at high z, flange included.
     High,
-    /// Both end faces.
+    /// Clamped at both end faces.
     Both,
-    /// Nowhere: six rigid-body modes.
+    /// Unsupported: six rigid-body modes.
     Free,
 }
 
@@ -50,19 +50,20 @@ pub struct CasingOptions {
     pub geometry: RingGeometry,
     /// Numbers of elements.
     pub counts: RingCounts,
-    /// Hex20, or hex8: cheaper, but far too stiff in bending with one element through the shell.
+    /// Element kind: hex20, or hex8, which is cheaper but far too stiff in bending with one element through the
+    /// shell.
     pub kind: ElementKind,
     /// Material.
     pub material: Material,
-    /// Where it is held.
+    /// Support.
     pub support: RingSupport,
-    /// The contact nodes.
+    /// Contact rings.
     pub rings: ContactRings,
-    /// Thermal patches around and along; none where either is zero.
+    /// Thermal patches around and along; no patches if either is zero.
     pub patches: [usize; 2],
     /// Number of fixed-interface modes, see [`CasingReductionOptions`].
     pub fixed_interface_modes: usize,
-    /// Number of modes delivered as they are, see [`CasingReductionOptions`].
+    /// Number of modes that are kept unchanged, see [`CasingReductionOptions`].
     pub modes: usize,
     /// Number of modes compared with the full model.
     pub checked_modes: usize,
@@ -70,7 +71,7 @@ pub struct CasingOptions {
     pub damping_ratio: f64,
 }
 
-/// Build, reduce and check a ring.
+/// Builds, reduces and checks a ring.
 ///
 /// # Examples
 /// ```
@@ -90,7 +91,8 @@ pub struct CasingOptions {
 /// ```
 ///
 /// # Errors
-/// [`Error::Invalid`](crate::Error::Invalid) for lengths, counts and contact rings that do not fit each other, and those of [`reduce_casing`].
+/// [`Error::Invalid`](crate::Error::Invalid) for inconsistent lengths, counts and contact rings; the errors of
+/// [`reduce_casing`].
 pub fn reduce_ring(options: &CasingOptions, listener: Listener<'_>) -> Result<Reduction> {
     report(listener, ReductionStage::Mesh, 0, 1);
     let ring = supported_ring(options)?;
@@ -115,7 +117,7 @@ pub fn reduce_ring(options: &CasingOptions, listener: Listener<'_>) -> Result<Re
 /// Name of the node set that holds the clamped nodes, unless the ring is free.
 pub const CLAMPED: &str = "clamped";
 
-/// Mesh of the ring, with the clamped nodes as a set of their own.
+/// Builds the mesh of the ring, with the clamped nodes as an additional node set.
 ///
 /// # Examples
 /// ```
@@ -126,7 +128,8 @@ pub const CLAMPED: &str = "clamped";
 /// ```
 ///
 /// # Errors
-/// The errors of [`ring_mesh`]; a contact ring on a clamped face cannot be, since contact rings lie inside the casing.
+/// The errors of [`ring_mesh`]. A contact ring never lies on a clamped face, since contact rings lie inside the
+/// casing.
 pub fn supported_ring(options: &CasingOptions) -> Result<RingMesh> {
     let mut ring = ring_mesh(&options.geometry, options.counts, options.rings, options.kind)?;
     let faces: &[&str] = match options.support {

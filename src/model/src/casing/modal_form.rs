@@ -1,9 +1,10 @@
-//! A reduced pencil in its own modes, M = I and K = Λ, without loss of its static response.
+//! Modal form of a reduced pencil, M = I and K = Λ, without loss of its static response.
 //!
-//! Solved is M φ = µ K φ, whose largest eigenvalues µ = 1/ω² belong to the lowest modes: with K = LLᵀ and the orthonormal
-//! vectors v of L⁻¹ML⁻ᵀ, φ = L⁻ᵀv/√µ, and the flexibility Σ φφᵀ/ω² = L⁻ᵀ(Σ vvᵀ)L⁻¹ is K⁻¹ to the rounding of the
-//! triangular solves, soft modes beside stiff ones included. Rigid-body modes are known beforehand: they get a stiffness
-//! and lose their mass, so that they are the eigenvectors of µ = 0, and are put back as they are, with ω = 0.
+//! The problem solved is M φ = µ K φ, whose largest eigenvalues µ = 1/ω² belong to the lowest modes: with K = LLᵀ and
+//! the orthonormal vectors v of L⁻¹ML⁻ᵀ, φ = L⁻ᵀv/√µ, and the flexibility Σ φφᵀ/ω² = L⁻ᵀ(Σ vvᵀ)L⁻¹ is K⁻¹ to the
+//! rounding of the triangular solves, even for soft modes beside stiff ones. Rigid-body modes are known beforehand:
+//! they are given a stiffness and deprived of their mass, so that they are the eigenvectors of µ = 0, and are
+//! restored unchanged, with ω = 0.
 
 use nalgebra::DMatrix;
 
@@ -12,19 +13,20 @@ use crate::{Error, Result};
 /// Modes of a reduced pencil.
 #[derive(Debug, Clone)]
 pub struct ModalForm {
-    /// ω² (rad²/s²): exactly zero for the rigid-body modes, which come first; then ascending.
+    /// ω² (rad²/s²), ascending after the rigid-body modes, which come first and are exactly zero.
     pub squares: Vec<f64>,
     /// Mass-normalised modes in reduced coordinates, n × modes.
     pub shapes: DMatrix<f64>,
-    /// Number of modes that are such of the pencil itself, where the others stand for static responses only.
+    /// Number of modes that are modes of the original pencil if the others only represent static responses.
     pub condensed_from: Option<usize>,
 }
 
-/// Modes of the pencil; `rigid` holds the rigid-body motions in reduced coordinates, n × their number, in any scale.
+/// Computes the modes of the pencil; `rigid` holds the rigid-body motions in reduced coordinates, n × number of
+/// motions, in any scale.
 ///
 /// # Errors
-/// [`Error::NotPositiveDefinite`] when the mass is not positive definite, the rigid-body motions are not independent, or
-/// the structure has more of them than given.
+/// [`Error::NotPositiveDefinite`] if the mass is not positive definite, the rigid-body motions are not independent,
+/// or the structure has more of them than given.
 pub fn modal_form(stiffness: &DMatrix<f64>, mass: &DMatrix<f64>, rigid: &DMatrix<f64>) -> Result<ModalForm> {
     let (order, loose) = (stiffness.nrows(), rigid.ncols());
     let rigid = orthonormal(mass, rigid)?;
@@ -53,10 +55,10 @@ pub fn modal_form(stiffness: &DMatrix<f64>, mass: &DMatrix<f64>, rigid: &DMatrix
     Ok(ModalForm { squares, shapes: all, condensed_from: None })
 }
 
-/// The same space with columns orthonormal in the mass.
+/// Returns a basis of the same space whose columns are orthonormal with respect to the mass.
 fn orthonormal(mass: &DMatrix<f64>, vectors: &DMatrix<f64>) -> Result<DMatrix<f64>> {
     let mut vectors = vectors.clone();
-    // The second pass removes what the conditioning of the first leaves.
+    // The second pass removes the errors that are caused by the conditioning of the first.
     for _pass in 0..2 {
         if vectors.ncols() == 0 {
             break;

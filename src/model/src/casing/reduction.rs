@@ -1,8 +1,8 @@
 //! Reduction of a casing: Craig-Bampton on a grid of contact nodes, with static responses to the thermal loads.
 //!
-//! Craig-Bampton needs many fixed-interface modes to represent the casing between its contact nodes. The pencil it leaves
-//! is therefore brought to its own modes and [condensed](super::condense): modes above a cut-off give way to the static
-//! response they stand for, so that contact and heat meet the stiffness of the whole finite-element model.
+//! Craig-Bampton needs many fixed-interface modes to represent the casing between its contact nodes. The reduced
+//! pencil is therefore transformed to its modes and [condensed](super::condense): modes above a cut-off are replaced
+//! by their static response, so that contact and heat see the stiffness of the whole finite-element model.
 
 use faer::Mat;
 use nalgebra::{DMatrix, DVector};
@@ -25,7 +25,7 @@ use crate::sparse::{principal_pair, tall_product};
 use crate::thermal::patch_loads;
 use crate::{Error, Result};
 
-/// Rigid-body motions of a free structure.
+/// Number of rigid-body motions of a free structure.
 const RIGID: usize = 6;
 
 /// Options of the reduction of a casing.
@@ -35,10 +35,10 @@ pub struct CasingReductionOptions {
     pub name: String,
     /// Formulation of hex8 elements.
     pub formulation: Formulation,
-    /// Number of fixed-interface modes to reduce with; one fewer where the last would be half of a double mode.
+    /// Number of fixed-interface modes of the Craig-Bampton reduction; one fewer if a double mode would be split.
     pub fixed_interface_modes: usize,
-    /// Number of modes of the reduced pencil to deliver as they are; one fewer where the last would be half of a double
-    /// mode. Of those above only the response at rest remains, to forces on the contact nodes and to heat.
+    /// Number of modes of the reduced pencil that are kept unchanged; one fewer if a double mode would be split. The
+    /// modes above only keep their static response to forces on the contact nodes and to heat.
     pub modes: usize,
     /// Number of modes of the full model that are computed and compared with the reduced ones.
     pub checked_modes: usize,
@@ -46,11 +46,11 @@ pub struct CasingReductionOptions {
     pub damping_ratio: f64,
 }
 
-/// Reduce a mesh, made by whatever means, to a grid of contact nodes.
+/// Reduces any mesh to a grid of contact nodes.
 ///
-/// `clamped` lists nodes held in all directions; with none the casing is free and keeps six rigid-body modes. Elements
-/// outside all `patches` stay at the reference temperature; with no patches the ROM has no thermal loads. The ROM's
-/// coordinates are modes: M = I, K = Λ, frame cylindrical.
+/// `clamped` lists nodes that are clamped in all directions; if it is empty, the casing is free and keeps six
+/// rigid-body modes. Elements outside all `patches` stay at the reference temperature; without patches the ROM has no
+/// thermal loads. The coordinates of the ROM are modes: M = I, K = Λ, frame cylindrical.
 ///
 /// # Examples
 /// ```
@@ -80,8 +80,9 @@ pub struct CasingReductionOptions {
 /// ```
 ///
 /// # Errors
-/// [`Error::Invalid`](crate::Error::Invalid) for contact nodes that are clamped, repeated, on the axis or no grid, and for patches without
-/// elements or with common ones; and whatever assembly, eigenvalue iteration and the ROM's own validation refuse.
+/// [`Error::Invalid`](crate::Error::Invalid) for contact nodes that are clamped, repeated, on the axis or do not form
+/// a grid, and for patches that overlap or have no elements; the errors of assembly, eigenvalue iteration and ROM
+/// validation.
 pub fn reduce_casing(
     mesh: Mesh,
     material: &Material,
@@ -91,13 +92,14 @@ pub fn reduce_casing(
     options: &CasingReductionOptions,
     listener: Listener<'_>,
 ) -> Result<Reduction> {
-    // As for blades: the library's own threads would split sums by their number, and with it the bits of the ROM.
+    // As for blades: threads of faer would split sums by the number of threads, on which the bits of the ROM would
+    // depend.
     faer::set_global_parallelism(faer::Par::Seq);
     grid.validate()?;
     let contact = grid.contact_points();
     check_nodes(&mesh.nodes, clamped, &contact, DisplacementFrame::Cylindrical)?;
     let free = free_dofs(mesh.nodes.len(), clamped);
-    // Points between nodes become degrees of freedom of their own, in the directions of the mesh.
+    // Points between nodes become additional degrees of freedom, in the directions of the mesh.
     let coordinates = PatchCoordinates::new(&free, &mesh.nodes, &contact, DisplacementFrame::Cartesian)
         .map_err(|_| too_fine(grid))?;
     let all_loads = patch_loads(&mesh, material, patches)?;
@@ -156,20 +158,21 @@ pub fn reduce_casing(
     Ok(Reduction { fixed_interface_frequencies, ..Reduction::new(rom, &full.modes, &free, &modes.squares, model)? })
 }
 
-/// A grid whose points follow from each other.
+/// Returns the error for a grid whose points depend on each other.
 fn too_fine(grid: &GridNodes) -> Error {
     let problem = format!("the mesh is too coarse to move {} x {} points independently", grid.around, grid.along());
     Error::invalid("contact grid of the casing", problem, "Use fewer points around or fewer rings, or refine the mesh")
 }
 
-/// Rows of the contact nodes' dofs among the free ones; none is clamped.
+/// Returns the rows of the contact dofs among the free ones; none is clamped.
 fn interface_dofs(free: &[usize], contact: &[ContactPoint]) -> Vec<usize> {
     let dofs = contact.iter().flat_map(|point| (0..3).map(move |component| 3 * point.node + component));
     dofs.map(|dof| free.partition_point(|other| *other < dof)).collect()
 }
 
-/// Rigid-body motions in the coordinates of Craig-Bampton: those of the contact nodes alone, since the interior follows
-/// by the constraint modes. Rotations about the centre of the contact nodes, in units of their distance.
+/// Returns the rigid-body motions in Craig-Bampton coordinates: those of the contact nodes alone, since the
+/// constraint modes determine the interior. Rotations are about the centre of the contact nodes, in units of their
+/// distance from it.
 pub(crate) fn rigid_motions(points: &[[f64; 3]], order: usize) -> DMatrix<f64> {
     let count = points.len() as f64;
     let centre: [f64; 3] = core::array::from_fn(|i| points.iter().map(|point| point[i]).sum::<f64>() / count);
@@ -186,7 +189,7 @@ pub(crate) fn rigid_motions(points: &[[f64; 3]], order: usize) -> DMatrix<f64> {
     }
     for mut rotation in motions.columns_mut(3, 3).column_iter_mut() {
         let size = rotation.amax();
-        // A single contact node has no arm; the reduction has then failed before.
+        // A single contact node has no lever arm; the reduction has failed before in that case.
         if size > 0.0 {
             rotation /= size;
         }
@@ -194,7 +197,7 @@ pub(crate) fn rigid_motions(points: &[[f64; 3]], order: usize) -> DMatrix<f64> {
     motions
 }
 
-/// Radial, tangential and axial displacement of the contact nodes, 3·nodes × modes.
+/// Returns the radial, tangential and axial displacement of the contact nodes, 3·nodes × modes.
 fn contact_map(points: &[[f64; 3]], modes: &ModalForm) -> DMatrix<f64> {
     let mut map = modes.shapes.rows(0, 3 * points.len()).into_owned();
     for (index, &[x, y, _]) in points.iter().enumerate() {
@@ -209,7 +212,7 @@ fn contact_map(points: &[[f64; 3]], modes: &ModalForm) -> DMatrix<f64> {
     map
 }
 
-/// Unit forces on the contact nodes, then the thermal loads, in the coordinates of Craig-Bampton.
+/// Returns unit forces on the contact nodes, then the thermal loads, in Craig-Bampton coordinates.
 fn reduced_loads(grid: &GridNodes, reduced: &CraigBampton, thermal: &Mat<f64>) -> DMatrix<f64> {
     let boundary = 3 * grid.nodes.len();
     let thermal = tall_product(reduced.transformation.as_ref(), thermal.as_ref());
@@ -220,7 +223,7 @@ fn reduced_loads(grid: &GridNodes, reduced: &CraigBampton, thermal: &Mat<f64>) -
     })
 }
 
-/// Thermal loads on the modes; none on rigid-body motions, which strain nothing.
+/// Returns the thermal loads on the modes; zero on rigid-body motions, which cause no strain.
 fn thermal(loads: &DMatrix<f64>, patches: &[ThermalPatch], modes: &ModalForm) -> Option<Thermal> {
     if patches.is_empty() {
         return None;
@@ -232,7 +235,7 @@ fn thermal(loads: &DMatrix<f64>, patches: &[ThermalPatch], modes: &ModalForm) ->
     Some(Thermal { loads, patches: patches.to_vec() })
 }
 
-/// The checks with rigid-body modes at 0 Hz, where round-off of the full model has nothing to deviate from.
+/// Sets rigid-body modes to 0 Hz in the checks, without the deviation of round-off.
 pub(crate) fn without_rigid_motions(mut checks: RomChecks) -> RomChecks {
     let rigid = RIGID.min(checks.full_frequencies.len());
     checks.full_frequencies[..rigid].fill(0.0);

@@ -1,7 +1,7 @@
-//! Structured mesh of a casing ring: a shell along the contour, a flange outside it at each end.
+//! Structured mesh of a casing ring: a shell along the contour, with a flange on the outside at each end.
 //!
-//! Nodes lie on a grid of (radial, circumferential, axial) stations with twice the element counts; hex8 elements take
-//! the even ones. Radial offsets are measured from the inner contour, so that all layers run parallel to it.
+//! Nodes lie on a grid of (radial, circumferential, axial) stations with twice the element counts; hex8 elements use
+//! the even ones. Radial offsets are measured from the inner contour, so that all layers are parallel to it.
 
 use core::f64::consts::TAU;
 use std::collections::BTreeMap;
@@ -14,10 +14,10 @@ use crate::element::ElementKind;
 use crate::mesh::{Element, Mesh};
 use crate::{Error, Result};
 
-/// Axial positions closer than this share of the length are one.
+/// Axial positions closer than this fraction of the length coincide.
 const SAME: f64 = 1e-9;
 
-/// A flange: the end of the ring is thicker there.
+/// Flange: a thickened end of the ring.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Flange {
     /// Length along the axis (m).
@@ -40,11 +40,11 @@ pub struct RingGeometry {
 /// Numbers of elements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RingCounts {
-    /// Around the circumference; a multiple of the contact nodes around.
+    /// Around the circumference; a multiple of the number of contact nodes around.
     pub around: usize,
     /// Through the shell.
     pub through: usize,
-    /// Along the axis: shared out between flanges and contact rings by length, at least one to each part.
+    /// Along the axis: divided between flanges and contact rings by length, at least one for each part.
     pub along: usize,
     /// Along the height of a flange.
     pub flange: usize,
@@ -61,7 +61,7 @@ pub struct ContactRings {
     pub axial: [f64; 2],
 }
 
-/// A ring's mesh and its contact nodes.
+/// Mesh of a ring with its contact nodes.
 #[derive(Debug, Clone)]
 pub struct RingMesh {
     /// Elements of one kind; node sets `inner`, `outer`, `low_face` and `high_face` (end faces, flanges included).
@@ -71,10 +71,10 @@ pub struct RingMesh {
 }
 
 impl RingGeometry {
-    /// Check thickness and flanges.
+    /// Checks thickness and flanges.
     ///
     /// # Errors
-    /// [`Error::Invalid`] naming the length.
+    /// [`Error::Invalid`] with the length.
     pub(crate) fn validate(&self) -> Result<()> {
         let [low, high] = self.contour.axial();
         let positive = |what: &str, value: f64| {
@@ -105,11 +105,11 @@ impl RingGeometry {
     }
 }
 
-/// Mesh of a ring.
+/// Builds the mesh of a ring.
 ///
 /// # Errors
-/// [`Error::Invalid`] for lengths, counts and contact rings that do not fit each other, or another element kind than hex8
-/// and hex20.
+/// [`Error::Invalid`] for inconsistent lengths, counts and contact rings, or an element kind other than hex8 and
+/// hex20.
 pub fn ring_mesh(
     geometry: &RingGeometry,
     counts: RingCounts,
@@ -173,10 +173,10 @@ fn check_counts(counts: RingCounts, rings: ContactRings, kind: ElementKind) -> R
     Ok(())
 }
 
-/// Axial positions of the contact rings.
+/// Returns the axial positions of the contact rings.
 fn contact_positions(geometry: &RingGeometry, rings: ContactRings) -> Result<Vec<f64>> {
     let ([low, high], [first, last]) = (geometry.contour.axial(), rings.axial);
-    // Written so that a NaN is refused, too.
+    // Written so that NaN is rejected, too.
     if !(first > low && first < last && last < high) {
         let problem = {
             let [first, last, low, high] = [first, last, low, high].map(shown);
@@ -188,7 +188,7 @@ fn contact_positions(geometry: &RingGeometry, rings: ContactRings) -> Result<Vec
     Ok((0..rings.along).map(|k| if k + 1 == rings.along { last } else { first + (last - first) * share(k) }).collect())
 }
 
-/// The grid of stations.
+/// Grid of stations.
 struct StationGrid {
     /// Offsets from the inner contour (m), two per element.
     radial: Vec<f64>,
@@ -198,7 +198,7 @@ struct StationGrid {
     around: usize,
     /// Axial positions (m), two per element.
     axial: Vec<f64>,
-    /// Which axial rows of elements belong to a flange.
+    /// Flange of each axial row of elements, if any.
     flanged: Vec<Option<usize>>,
     /// Radial offsets of the two flanges, two per element.
     flange_radial: [Vec<f64>; 2],
@@ -211,7 +211,7 @@ impl StationGrid {
             geometry.flanges[0].map_or(low, |flange| low + flange.thickness),
             geometry.flanges[1].map_or(high, |flange| high - flange.thickness),
         ];
-        // The parts that a row of elements must not reach across.
+        // Positions that a row of elements must not cross.
         let mut edges = vec![low, inner[0], inner[1], high];
         edges.extend_from_slice(contact);
         edges.sort_by(f64::total_cmp);
@@ -240,7 +240,7 @@ impl StationGrid {
         Self { radial, through: counts.through, around: counts.around, axial, flanged, flange_radial }
     }
 
-    /// (radial, circumferential, axial) index of every element.
+    /// Iterates over the (radial, circumferential, axial) index of every element.
     fn cells(&self) -> impl Iterator<Item = [usize; 3]> {
         (0..self.flanged.len()).flat_map(move |k| {
             let layers = self.flanged[k].map_or(self.through, |end| (self.flange_radial[end].len() - 1) / 2);
@@ -248,7 +248,7 @@ impl StationGrid {
         })
     }
 
-    /// Station of an element's node.
+    /// Returns the station of a node of an element.
     fn place(&self, [j, i, k]: [usize; 3], natural: [f64; 3]) -> [usize; 3] {
         let base = [2 * j, 2 * i, 2 * k];
         let [radial, around, axial] = core::array::from_fn(|d| match natural[d] {
@@ -261,7 +261,7 @@ impl StationGrid {
 
     fn position(&self, geometry: &RingGeometry, [j, i, k]: [usize; 3]) -> [f64; 3] {
         let row = (k / 2).min(self.flanged.len() - 1);
-        // A station between two rows belongs to the one that reaches further out.
+        // A station between two rows belongs to the row with the larger radial extent.
         let ends = [self.flanged[row], if k % 2 == 0 && k > 0 { self.flanged[k / 2 - 1] } else { None }];
         let offset = match self.radial.get(j) {
             Some(offset) => *offset,
@@ -273,7 +273,7 @@ impl StationGrid {
         [radius * angle.cos(), radius * angle.sin(), z]
     }
 
-    /// Station of an edge between rows of elements.
+    /// Returns the station of an edge between rows of elements.
     fn station(&self, z: f64) -> usize {
         let slack = SAME * (self.axial[self.axial.len() - 1] - self.axial[0]);
         self.axial.partition_point(|station| *station < z - slack)
@@ -296,13 +296,13 @@ impl StationGrid {
     }
 }
 
-/// Rows of elements of a part of a length.
+/// Returns the number of rows of elements in a part of a length.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "positive and below the count asked for")]
 fn rows_of(part: f64, whole: f64, rows: usize) -> usize {
     ((rows as f64 * part / whole).round() as usize).max(1)
 }
 
-/// Append `count` even divisions up to `end`.
+/// Appends `count` even divisions up to `end`.
 fn divide(stations: &mut Vec<f64>, end: f64, count: usize) {
     let start = stations[stations.len() - 1];
     for i in 1..count {

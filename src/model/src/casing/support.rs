@@ -1,4 +1,4 @@
-//! What held nodes feel: the rows of the full matrices there, which a reduction leaves out, summed to force and moment.
+//! Reactions of clamped nodes: the rows of the full matrices that a reduction omits, summed to force and moment.
 
 use faer::Mat;
 use nalgebra::DMatrix;
@@ -9,8 +9,8 @@ use crate::assembly::Assembled;
 use crate::craig_bampton::CraigBampton;
 use crate::sparse::{SparseMatrix, tall_product};
 
-/// Rows of K, M and thermal loads of the held nodes, summed to three forces and three moments about the origin: over the free
-/// dofs × 6, and patches × 6.
+/// Rows of K, M and thermal loads of the clamped nodes, summed to three forces and three moments about the origin:
+/// (free dofs × 6) and (patches × 6).
 pub(super) struct HeldRows {
     stiffness: Mat<f64>,
     mass: Mat<f64>,
@@ -18,7 +18,7 @@ pub(super) struct HeldRows {
 }
 
 impl HeldRows {
-    /// Makes the rows of the `held` nodes of a model; `loads` of all dofs.
+    /// Sums the rows of the `held` nodes of a model; `loads` covers all dofs.
     pub(super) fn new(full: &Assembled, nodes: &[[f64; 3]], held: &[usize], free: &[usize], loads: &Mat<f64>) -> Self {
         let motions = motions(nodes, held);
         // K_fs r: K and M are symmetric.
@@ -33,7 +33,7 @@ impl HeldRows {
         }
     }
 
-    /// In the coordinates of the reduced model.
+    /// Transforms the rows to the coordinates of the reduced model.
     pub(super) fn reduced(&self, reduced: &CraigBampton, modes: &ModalForm) -> SupportRows {
         let seen = |rows: &Mat<f64>| {
             let rows = tall_product(reduced.transformation.as_ref(), rows.as_ref());
@@ -47,7 +47,8 @@ impl HeldRows {
     }
 }
 
-/// Rigid motions of the held nodes alone: along x, y, z, and about them through the origin; 3·nodes × 6.
+/// Returns the rigid motions of the clamped nodes alone: translations along x, y, z and rotations about these axes
+/// through the origin; 3·nodes × 6.
 fn motions(nodes: &[[f64; 3]], held: &[usize]) -> Mat<f64> {
     let mut motions = Mat::zeros(3 * nodes.len(), SUPPORT_ROWS);
     for &node in held {

@@ -1,9 +1,10 @@
 //! Heat conduction of a casing: finite elements on the mesh of its mechanical model, reduced for the thermal unit.
 //!
-//! C Ṫ + (K + s_g H_g + s_a H_a) T = heat, with the heat capacity C = ∫ρc N Nᵀ, conduction K = ∫k ∇N·∇N, and films H = ∫h N Nᵀ on
-//! the surface in the gas and on that in the air. Faces that look towards the axis are in the gas, the end faces let no heat
-//! through, all others are in the air. Heat comes in evenly over the heated surface of a patch: what is in the gas between two axial
-//! positions, as a rule the outermost contact rings; faces across a border are cut there. Patches are those of the mechanical model, so that numbers agree.
+//! C Ṫ + (K + s_g H_g + s_a H_a) T = heat, with the heat capacity C = ∫ρc N Nᵀ, conduction K = ∫k ∇N·∇N, and films H =
+//! ∫h N Nᵀ on the surface in the gas and on that in the air. Faces that face the axis are in the gas, the end faces
+//! are adiabatic, all others are in the air. Heat is distributed evenly over the heated surface of a patch, which is
+//! the part of the gas-side surface between two axial positions, usually the outermost contact rings; faces across a
+//! border are cut there. Patches are those of the mechanical model, with the same numbers.
 
 mod reduction;
 mod surfaces;
@@ -38,17 +39,18 @@ pub struct Conductor {
 }
 
 impl Conductor {
-    /// Diffusivity k/(ρc) at a density (m²/s).
+    /// Returns the diffusivity k/(ρc) at a density (m²/s).
     pub fn diffusivity(&self, density: f64) -> f64 {
         self.conductivity / (density * self.specific_heat)
     }
 
-    /// Carbon steel at 20 °C: k = 54 − 0.0333·20, c = 425 + 0.773·20 − 1.69e-3·20² + 2.22e-6·20³ (EN 1993-1-2, 3.4.1.3 and 3.4.1.2).
+    /// Returns the properties of carbon steel at 20 °C: k = 54 − 0.0333·20, c = 425 + 0.773·20 − 1.69e-3·20² +
+    /// 2.22e-6·20³ (EN 1993-1-2, 3.4.1.3 and 3.4.1.2).
     pub fn steel() -> Self {
         Self { conductivity: 53.3, specific_heat: 439.8 }
     }
 
-    /// Ti-6Al-4V, annealed, at room temperature (ASM).
+    /// Returns the properties of Ti-6Al-4V, annealed, at room temperature (ASM).
     pub fn titanium() -> Self {
         Self { conductivity: 6.7, specific_heat: 526.3 }
     }
@@ -67,17 +69,18 @@ pub struct ConductionOptions {
     pub films: [f64; 2],
     /// Axial positions (m) between which faces in the gas are heated.
     pub heated: [f64; 2],
-    /// Corner nodes of the faces that are heated; all faces in the gas where absent.
+    /// Corner nodes of the faces that are heated; all faces in the gas if absent.
     pub surface: Option<Vec<usize>>,
-    /// Number of eigenmodes, besides the uniform temperature and the responses at rest.
+    /// Number of eigenmodes, in addition to the uniform temperature and the static responses.
     pub modes: usize,
 }
 
-/// Film coefficient of the gas (W/(m² K)) where none is given: of the order of a turbulent boundary layer at the wall of a compressor.
+/// Default film coefficient of the gas (W/(m² K)): of the order of a turbulent boundary layer at the wall of a
+/// compressor.
 pub const GAS_FILM: f64 = 500.0;
-/// The same of the air outside: weak forced convection.
+/// Default film coefficient of the air outside (W/(m² K)): weak forced convection.
 pub const AMBIENT_FILM: f64 = 25.0;
-/// Eigenmodes where no number is given.
+/// Default number of eigenmodes.
 pub const MODES: usize = 20;
 
 impl ConductionOptions {
@@ -108,10 +111,10 @@ impl ConductionOptions {
     }
 }
 
-/// The full model.
+/// Full model.
 #[derive(Debug, Clone)]
 pub struct FullConduction {
-    /// C (J/K), K (W/K).
+    /// C (J/K).
     pub capacity: SparseMatrix,
     /// K (W/K).
     pub conduction: SparseMatrix,
@@ -121,7 +124,7 @@ pub struct FullConduction {
     pub wetted: Mat<f64>,
     /// ∫ N dV / V of each patch, nodes × patches.
     pub patch_means: Mat<f64>,
-    /// ∫ N dA / A of the heated surface of each patch, nodes × patches: also the load of one watt there.
+    /// ∫ N dA / A of the heated surface of each patch, nodes × patches; also the load of one watt on that patch.
     pub heat: Mat<f64>,
     /// Corner nodes of heated faces, ascending.
     pub places: Vec<usize>,
@@ -132,10 +135,10 @@ pub struct FullConduction {
 }
 
 impl FullConduction {
-    /// Assemble.
+    /// Assembles the full model.
     ///
     /// # Errors
-    /// Options that mean nothing, an unsound mesh, patches without elements or without a heated face.
+    /// Invalid options or mesh; patches without elements or without a heated face.
     pub fn new(mesh: &Mesh, patches: &[ThermalPatch], options: &ConductionOptions) -> Result<Self> {
         options.validate()?;
         mesh.validate()?;
@@ -160,12 +163,12 @@ impl FullConduction {
         })
     }
 
-    /// K + s_g H_g + s_a H_a.
+    /// Returns K + s_g H_g + s_a H_a.
     pub fn operator(&self, factors: [f64; 2]) -> SparseMatrix {
         self.conduction.plus_scaled(factors[0], &self.films[0]).plus_scaled(factors[1], &self.films[1])
     }
 
-    /// H 1: what gas and air do per kelvin, nodes × 2 (W/K).
+    /// Returns H 1, the heat from gas and air per kelvin, nodes × 2 (W/K).
     pub fn film_loads(&self) -> Mat<f64> {
         let ones = Mat::from_fn(self.capacity.order(), 1, |_, _| 1.0);
         let loads = [0, 1].map(|side| self.films[side].times(ones.as_ref()));
@@ -173,7 +176,7 @@ impl FullConduction {
     }
 }
 
-/// Neighbours of each node, as a matrix has them.
+/// Returns the pattern of the node neighbours.
 fn node_pattern(mesh: &Mesh) -> Pattern {
     let lists = neighbours(mesh);
     let mut starts = vec![0];
@@ -184,7 +187,7 @@ fn node_pattern(mesh: &Mesh) -> Pattern {
     Pattern { starts, rows: lists.concat() }
 }
 
-/// Add a dense matrix of some nodes.
+/// Adds a dense matrix of some nodes.
 fn add(pattern: &Pattern, values: &mut [f64], nodes: &[usize], entry: impl Fn(usize, usize) -> f64) {
     for (b, &column) in nodes.iter().enumerate() {
         let start = pattern.starts[column];
@@ -196,7 +199,7 @@ fn add(pattern: &Pattern, values: &mut [f64], nodes: &[usize], entry: impl Fn(us
     }
 }
 
-/// K and C.
+/// Computes K and C.
 fn volumes(mesh: &Mesh, options: &ConductionOptions, pattern: &Arc<Pattern>) -> Result<(SparseMatrix, SparseMatrix)> {
     let stored = options.density * options.conductor.specific_heat;
     let of_elements: Vec<Result<[DMatrix<f64>; 2]>> = mesh
@@ -221,7 +224,8 @@ fn volumes(mesh: &Mesh, options: &ConductionOptions, pattern: &Arc<Pattern>) -> 
     Ok((matrix(first), matrix(second)))
 }
 
-/// ∫ N dV / V of each patch; elements across its borders belong to it with the points of their mass matrix that lie in it.
+/// Computes ∫ N dV / V of each patch; elements across a border contribute the integration points of their mass matrix
+/// that lie in the patch.
 fn patch_means(mesh: &Mesh, patches: &[ThermalPatch]) -> Result<Mat<f64>> {
     let mut means = Mat::<f64>::zeros(mesh.nodes.len(), patches.len());
     let mut volumes = vec![0.0; patches.len()];

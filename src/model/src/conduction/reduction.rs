@@ -1,10 +1,11 @@
-//! From the full model of conduction to coordinates.
+//! Reduction of the full conduction model to coordinates.
 //!
-//! The basis holds the uniform temperature, so that heat is conserved; the slowest eigenmodes of K + H_g + H_a and C, for what lasts;
-//! and responses at rest to the heat of each patch and to gas and air, so that every steady state at the film coefficients given is
-//! exact. More such responses, with the gas standing still and with it four times as strong, make steady states at other factors
-//! good. Responses to heat that grows as exp(σt), at σ of ten, a hundred and a thousand times the slowest rate, make its beginning
-//! good: of what is local and young eigenmodes know little (a rational Krylov space). What is left is measured.
+//! The basis contains the uniform temperature, so that heat is conserved; the slowest eigenmodes of K + H_g + H_a and
+//! C, for slow transients; and static responses to the heat of each patch and to gas and air, so that every steady
+//! state at the given film coefficients is exact. Further static responses, without convection of the gas and with
+//! four times its convection, make steady states at other factors accurate. Responses to heat that grows as exp(σt),
+//! at σ of ten, a hundred and a thousand times the slowest rate, make the start of transients accurate, since
+//! eigenmodes represent local, fast changes poorly (a rational Krylov space). The remaining error is measured.
 
 use faer::Mat;
 use nalgebra::DMatrix;
@@ -22,44 +23,45 @@ use crate::sparse::{SparseMatrix, tall_product};
 use crate::thermal::equal_patches;
 use crate::{Error, Result};
 
-/// Inverse iterations from the uniform temperature for an estimate of the slowest rate, from above.
+/// Inverse iterations from the uniform temperature for an upper estimate of the slowest rate.
 const ITERATIONS: usize = 10;
-/// Share of the slowest rate from which rates are looked at.
+/// Fraction of the slowest rate that is used as the shift of the eigenvalue iteration.
 const BELOW: f64 = 0.98;
-/// Fraction of a vector that must remain after orthogonalisation; less means that it depends on the vectors before.
+/// Fraction of a vector that must remain after orthogonalisation; a vector with less depends on the vectors before.
 const DEPENDENT: f64 = 1e-9;
-/// Rates of growth, as multiples of the slowest rate of decay, whose responses are in the basis.
+/// Growth rates, as multiples of the slowest rate of decay, whose responses are in the basis.
 const GROWTHS: [f64; 3] = [10.0, 100.0, 1000.0];
-/// Factors of gas and air whose steady states are held against the full model.
+/// Factors of gas and air whose steady states are compared with the full model.
 const CHECKED: [[f64; 2]; 6] = [[1.0, 1.0], [0.1, 1.0], [0.3, 1.0], [3.0, 1.0], [10.0, 1.0], [1.0, 10.0]];
 
-/// A steady state of the reduced model against that of the full one.
+/// Comparison of a steady state of the reduced model with that of the full one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SteadyCheck {
     /// Factors of gas and air.
     pub factors: [f64; 2],
-    /// Largest deviation of a patch's mean temperature under heat of one patch, as a share of the largest.
+    /// Largest deviation of the mean temperature of a patch under heat of one patch, as a fraction of the largest.
     pub patches: f64,
-    /// The same of the heated surfaces.
+    /// Largest deviation of the mean temperature of a heated surface, likewise.
     pub surfaces: f64,
 }
 
 /// Result of a reduction.
 #[derive(Debug, Clone)]
 pub struct ConductionReduction {
-    /// The model.
+    /// Reduced model.
     pub model: ConductionModel,
-    /// Nodes and elements of the mesh.
+    /// Numbers of nodes and elements of the mesh.
     pub counts: [usize; 2],
     /// Areas in the gas, in the air, and heated (m²).
     pub areas: [f64; 3],
     /// 1/λ of the slowest eigenmodes of the full model (s).
     pub time_constants: Vec<f64>,
-    /// Steady states.
+    /// Checks of steady states.
     pub checks: Vec<SteadyCheck>,
 }
 
-/// The casing that `reduce_ring` reduces, for its heat: same mesh, same patches, heated between its contact rings.
+/// Reduces the heat conduction of the casing that `reduce_ring` reduces: same mesh, same patches, heated between its
+/// contact rings.
 ///
 /// # Errors
 /// The errors of [`supported_ring`] and [`reduce_conduction`].
@@ -76,8 +78,9 @@ pub fn reduce_ring_conduction(
     reduce_conduction(&ring.mesh, &patches, options, listener)
 }
 
-/// Reduce the conduction of a casing of one's own, a full ring about the z axis, with equal patches `[around, along]` over its length. The
-/// [`InnerSurface`] of the `set` of nodes (of all where absent) is heated between the axial positions `heated` (m; all of it where absent).
+/// Reduces the conduction of a user mesh, a full ring about the z axis, with equal patches `[around, along]` over its
+/// length. The [`InnerSurface`] of the `set` of nodes (all nodes if absent) is heated between the axial positions
+/// `heated` (m; everywhere if absent).
 ///
 /// # Errors
 /// The errors of [`InnerSurface::find`] and [`reduce_conduction`].
@@ -96,7 +99,7 @@ pub fn reduce_mesh_conduction(
     reduce_conduction(mesh, &patches, &options, listener)
 }
 
-/// Reduce the conduction of a mesh around the z axis.
+/// Reduces the conduction of a mesh around the z axis.
 ///
 /// # Errors
 /// The errors of [`FullConduction::new`], of the eigenvalue iteration, and of [`ConductionModel::validate`].
@@ -106,7 +109,8 @@ pub fn reduce_conduction(
     options: &ConductionOptions,
     listener: Listener<'_>,
 ) -> Result<ConductionReduction> {
-    // As for blades: the library's own threads would split sums by their number, and with it the bits of the model.
+    // As for blades: threads of faer would split sums by the number of threads, on which the bits of the model would
+    // depend.
     faer::set_global_parallelism(faer::Par::Seq);
     report(listener, ReductionStage::Assembly, 0, 1);
     let full = FullConduction::new(mesh, patches, options)?;
@@ -119,7 +123,7 @@ pub fn reduce_conduction(
     model.validate()?;
     let mut checks = Vec::new();
     for factors in CHECKED {
-        // A side without a film has no factor.
+        // The factor of a side without a film has no effect.
         if factors.iter().zip(options.films).all(|(factor, film)| film > 0.0 || (*factor - 1.0).abs() < f64::EPSILON) {
             checks.push(check(&full, &model, factors)?);
         }
@@ -134,8 +138,9 @@ pub fn reduce_conduction(
     })
 }
 
-/// The slowest eigenmodes of K + H. Rates of a casing that conducts badly stand closer together than the iteration can tell apart from
-/// zero; from just below the slowest they are far apart.
+/// Computes the slowest eigenmodes of K + H. The rates of a casing with low conductivity are so close together that
+/// the iteration cannot separate them from a shift of zero; from a shift just below the slowest one they are well
+/// separated.
 fn slowest_modes(
     capacity: &SparseMatrix,
     operator: &SparseMatrix,
@@ -153,7 +158,7 @@ fn slowest_modes(
     }
     let product = |matrix: &SparseMatrix| vector.col(0).transpose() * matrix.times(vector.as_ref()).col(0);
     let shift = BELOW * product(operator) / product(capacity);
-    // Refused where that is not below the slowest rate after all.
+    // Fails if the shift is not below the slowest rate after all.
     match operator.plus_scaled(-shift, capacity).factor(OPERATOR, NO_HOLD) {
         Ok(near) => lowest_modes(capacity, &near, shift, count, ReductionStage::FullModes, listener),
         Err(_) => found,
@@ -163,11 +168,11 @@ fn slowest_modes(
 const OPERATOR: &str = "K + H (conduction and films)";
 const NO_HOLD: &str = "Check the mesh for disconnected parts";
 
-/// C-orthonormal vectors, the uniform temperature first; nodes × coordinates.
+/// Builds C-orthonormal vectors, the uniform temperature first; nodes × coordinates.
 fn basis(full: &FullConduction, modes: &EigenModes, films: [f64; 2]) -> Result<Mat<f64>> {
     let nodes = full.capacity.order();
     let mut vectors: Vec<Mat<f64>> = vec![Mat::from_fn(nodes, 1, |_, _| 1.0), modes.shapes.clone()];
-    // With the gas standing still, air alone must carry the heat away.
+    // Without convection of the gas, the air alone must remove the heat.
     let still = [if films[1] > 0.0 { 0.0 } else { 0.05 }, 1.0];
     for factors in [[1.0, 1.0], still, [4.0, 1.0]] {
         vectors.push(response(full, factors, 0.0)?);
@@ -180,7 +185,7 @@ fn basis(full: &FullConduction, modes: &EigenModes, films: [f64; 2]) -> Result<M
     for vector in vectors.iter().flat_map(|part| (0..part.ncols()).map(move |k| part.get(.., k..k + 1))) {
         let mut column = vector.to_owned();
         let first = norm(full, &column);
-        // The second pass takes away what the rounding of the first leaves.
+        // The second pass removes the rounding errors of the first.
         for _pass in 0..2 {
             let weighted = full.capacity.times(column.as_ref());
             let before = basis.get(.., ..size);
@@ -202,8 +207,8 @@ fn norm(full: &FullConduction, column: &Mat<f64>) -> f64 {
     (column.col(0).transpose() * weighted.col(0)).max(0.0).sqrt()
 }
 
-/// Responses to a watt of each patch, and a kelvin of the gas and of the air, that grow by the rate `growth` (1/s, 0 of steady states);
-/// nodes × (patches + 2).
+/// Computes the responses to one watt in each patch and to one kelvin of the gas and of the air that grow at the rate
+/// `growth` (1/s, 0 for steady states); nodes × (patches + 2).
 fn response(full: &FullConduction, factors: [f64; 2], growth: f64) -> Result<Mat<f64>> {
     let (patches, films) = (full.heat.ncols(), full.film_loads());
     let loads = Mat::from_fn(full.capacity.order(), patches + 2, |i, k| {
@@ -231,7 +236,7 @@ fn project(
     let ones = Mat::from_fn(full.capacity.order(), 1, |_, _| 1.0);
     let heat_capacity = ones.col(0).transpose() * full.capacity.times(ones.as_ref()).col(0);
     let mut conduction = product(&full.conduction);
-    // Of a uniform temperature nothing is conducted: what is there is rounding.
+    // A uniform temperature causes no conduction; the entries are rounding errors.
     conduction.row_mut(0).fill(0.0);
     conduction.column_mut(0).fill(0.0);
     let mut heat_loads = means(&full.heat).transpose();
@@ -285,7 +290,7 @@ fn origin(mesh: &Mesh, full: &FullConduction, order: usize, options: &Conduction
     )
 }
 
-/// Steady states under a watt of each patch.
+/// Compares steady states under one watt in each patch.
 fn check(full: &FullConduction, model: &ConductionModel, factors: [f64; 2]) -> Result<SteadyCheck> {
     let patches = full.heat.ncols();
     let exact = response(full, factors, 0.0)?;

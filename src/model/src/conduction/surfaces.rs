@@ -1,4 +1,4 @@
-//! The surface of a casing: which faces are in the gas, in the air, heated; integrals over them.
+//! Surface of a casing: faces in the gas, in the air and heated faces, with integrals over them.
 
 use core::f64::consts::TAU;
 use std::collections::BTreeSet;
@@ -14,23 +14,23 @@ use crate::mesh::Mesh;
 use crate::sparse::{Pattern, SparseMatrix};
 use crate::{Error, Result};
 
-/// Axial positions closer than this share of the length are one.
+/// Axial positions closer than this fraction of the length coincide.
 const SAME: f64 = 1e-9;
 
-/// Faces by what they meet.
+/// Outer faces, grouped by the fluid around them.
 #[derive(Debug, Clone)]
 pub struct Surfaces {
-    /// In the gas, in the air.
+    /// Faces in the gas and in the air.
     sides: [Vec<InnerFace>; 2],
-    /// Faces in the gas of which some is heated.
+    /// Faces in the gas that are heated at least in part.
     heated: Vec<InnerFace>,
-    /// Axial positions between which these are heated (m).
+    /// Axial limits of the heated zone (m).
     axial: [f64; 2],
 }
 
 impl Surfaces {
-    /// Outer faces of the mesh; those in the gas are heated between the axial positions `heated` (m), faces across these in part. Where corner
-    /// nodes of a `surface` are given, only its faces are.
+    /// Finds the outer faces of the mesh; those in the gas are heated between the axial positions `heated` (m), faces
+    /// across these limits in part. If corner nodes of a `surface` are given, only its faces are heated.
     ///
     /// # Errors
     /// No face in the gas, or none that is heated.
@@ -66,7 +66,7 @@ impl Surfaces {
         Ok(surfaces)
     }
 
-    /// ∫ h N Nᵀ dA of the faces in the gas (`side` 0) or in the air (1).
+    /// Assembles ∫ h N Nᵀ dA of the faces in the gas (`side` 0) or in the air (1).
     pub(super) fn film(&self, mesh: &Mesh, pattern: &Arc<Pattern>, side: usize, film: f64) -> SparseMatrix {
         let mut values = vec![0.0; pattern.rows.len()];
         for face in &self.sides[side] {
@@ -78,7 +78,7 @@ impl Surfaces {
         SparseMatrix { pattern: Arc::clone(pattern), values }
     }
 
-    /// ∫ N dA / A of each side; zeros where a side has no face.
+    /// Returns ∫ N dA / A of each side; zeros for a side without faces.
     pub(super) fn wetted_means(&self, mesh: &Mesh) -> Mat<f64> {
         let mut means = Mat::zeros(mesh.nodes.len(), 2);
         for (side, faces) in self.sides.iter().enumerate() {
@@ -87,10 +87,10 @@ impl Surfaces {
         normalised(means)
     }
 
-    /// ∫ N dA / A of the heated surface of each patch: faces across its borders are cut there.
+    /// Returns ∫ N dA / A of the heated surface of each patch; faces across its borders are cut there.
     ///
     /// # Errors
-    /// A patch without one.
+    /// A patch without a heated surface.
     pub(super) fn heat(&self, mesh: &Mesh, patches: &[ThermalPatch]) -> Result<Mat<f64>> {
         let mut means = Mat::zeros(mesh.nodes.len(), patches.len());
         let [from, to] = self.axial;
@@ -118,7 +118,7 @@ impl Surfaces {
         )
     }
 
-    /// Corner nodes of heated faces, ascending.
+    /// Returns the corner nodes of heated faces, ascending.
     pub(super) fn places(&self, mesh: &Mesh) -> Vec<usize> {
         let nodes = self
             .heated
@@ -127,8 +127,8 @@ impl Surfaces {
         nodes.collect::<BTreeSet<_>>().into_iter().collect()
     }
 
-    /// Largest depth of an element under a heated face (m): its volume over the area of the face, times three where it ends in a corner and two
-    /// where it ends in an edge.
+    /// Returns the largest depth of an element under a heated face (m): its volume over the area of the face, times
+    /// three if the opposite end is a corner and two if it is an edge.
     ///
     /// # Errors
     /// An element without volume.
@@ -149,7 +149,7 @@ impl Surfaces {
         Ok(deepest)
     }
 
-    /// In the gas, in the air, heated (m²).
+    /// Returns the areas in the gas, in the air and heated (m²).
     pub(super) fn areas(&self, mesh: &Mesh) -> [f64; 3] {
         let part = all_round(self.axial);
         let area = |faces: &[InnerFace], part: Option<&ThermalPatch>| {
@@ -166,12 +166,12 @@ impl Surfaces {
     }
 }
 
-/// The patch all the way round between two axial positions.
+/// Returns the patch around the whole circumference between two axial positions.
 fn all_round(axial: [f64; 2]) -> ThermalPatch {
     ThermalPatch { angle: [0.0, TAU], axial }
 }
 
-/// Add ∫ N dA of faces to columns.
+/// Adds ∫ N dA of faces to columns.
 fn add_means<'a>(mesh: &Mesh, faces: impl Iterator<Item = (&'a InnerFace, usize)>, means: &mut Mat<f64>) {
     for (face, column) in faces {
         let nodes = &mesh.elements[face.element].nodes;
@@ -181,7 +181,7 @@ fn add_means<'a>(mesh: &Mesh, faces: impl Iterator<Item = (&'a InnerFace, usize)
     }
 }
 
-/// Columns that add up to one.
+/// Scales columns so that each sums to one.
 fn normalised(means: Mat<f64>) -> Mat<f64> {
     let totals: Vec<f64> = (0..means.ncols()).map(|k| means.col(k).iter().sum::<f64>()).collect();
     Mat::from_fn(means.nrows(), means.ncols(), |i, k| if totals[k] > 0.0 { means[(i, k)] / totals[k] } else { 0.0 })

@@ -1,4 +1,4 @@
-//! Meshes of the cube and of the rings, any refinement, with their node sets.
+//! Meshes of the cube and of the rings with any refinement, with their node sets.
 
 use std::collections::BTreeMap;
 
@@ -7,23 +7,24 @@ use crate::Mesh;
 use crate::element::ElementKind;
 use crate::mesh::Element;
 
-/// The paper's cube, 5 × 5 × 5 bricks; see [`cube_of`].
+/// Builds the cube of the paper, 5 × 5 × 5 bricks; see [`cube_of`].
 pub fn cube_mesh() -> Mesh {
     cube_of(CUBE_ELEMENTS)
 }
 
-/// The paper's ring of one side, 5 × 8 × 40 bricks; see [`ring_of`].
+/// Builds the ring of the paper on one side, 5 × 8 × 40 bricks; see [`ring_of`].
 pub fn ring_mesh(side: RingSide) -> Mesh {
     ring_of(side, RING_ELEMENTS)
 }
 
-/// A cube of n × n × n bricks at its starting place.
+/// Builds a cube of n × n × n bricks at its initial position.
 ///
-/// Numbering as the paper's figure 2 implies it: the n + 1 nodes of every line along z follow each other; first the whole
-/// leading face (y smallest), from left to right; then, layer by layer, the lines of the left and of the right face; then the
-/// rest. With n = 5 the corners of the left face are 1, 6, 85, 90 and those of the right one 31, 36, 91, 96 (from 1).
+/// The numbering follows figure 2 of the paper: the n + 1 nodes of every line along z are consecutive; first the
+/// whole leading face (smallest y), from left to right; then, layer by layer, the lines of the left and of the right
+/// face; then the rest. With n = 5 the corners of the left face are 1, 6, 85, 90 and those of the right one 31, 36,
+/// 91, 96 (from 1).
 ///
-/// Sets: `MASTER_LEFT`, `MASTER_RIGHT` (the faces x = ∓25 mm), and their corners `CORNERS_LEFT`, `CORNERS_RIGHT`.
+/// Sets: `MASTER_LEFT`, `MASTER_RIGHT` (the faces x = ∓25 mm), with their corners `CORNERS_LEFT`, `CORNERS_RIGHT`.
 pub fn cube_of(n: usize) -> Mesh {
     let line = n + 1;
     let lines = cube_lines(n);
@@ -57,7 +58,7 @@ pub fn cube_of(n: usize) -> Mesh {
     Mesh { nodes, elements, sets }
 }
 
-/// Lines of nodes along z in the order of their numbers, as (place along x, layer along y).
+/// Returns the lines of nodes along z in the order of their numbers, as (position along x, layer along y).
 fn cube_lines(n: usize) -> Vec<(usize, usize)> {
     let leading = (0..=n).map(|a| (a, 0));
     let faces = (1..=n).flat_map(|layer| [(0, layer), (n, layer)]);
@@ -65,12 +66,13 @@ fn cube_lines(n: usize) -> Vec<(usize, usize)> {
     leading.chain(faces).chain(inside).collect()
 }
 
-/// Coordinate of node `index` of `n` elements across the cube, exactly antisymmetric about the middle (m).
+/// Returns the coordinate of node `index` of `n` elements across the cube, exactly antisymmetric about the middle
+/// (m).
 fn centred(index: usize, n: usize) -> f64 {
     SIDE * (index as f64 - (n - index) as f64) / (2 * n) as f64
 }
 
-/// A ring of bricks: numbers of elements along radius, width (even) and arc (even).
+/// Builds a ring of bricks from the numbers of elements along radius, width (even) and arc (even).
 ///
 /// Node ((i (w + 1)) + j) (r + 1) + k with i along the arc (from y < 0 to y > 0), j along z and k along the radius.
 /// Sets: `SLAVE` (outer face; ascending numbers run through j first, then i) and `CLAMPED` (both ends).

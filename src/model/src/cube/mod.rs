@@ -1,8 +1,8 @@
 //! The cube between two rings of the paper's section 5: geometry, meshes and reductions.
 //!
-//! A cube flies along −y through two arcs that are convex towards it and clamped at both ends. The clearance between the
-//! arcs is 2 mm less than the cube is wide. Where the cube starts is not stated in the paper; here its leading face starts at
-//! y = +20 mm, 0.01 ms before the first touch at 100 m/s.
+//! A cube moves along −y through two arcs that are convex towards it and clamped at both ends. The clearance between
+//! the arcs is 2 mm less than the width of the cube. The paper does not state the initial position of the cube; here
+//! its leading face starts at y = +20 mm, 0.01 ms before the first contact at 100 m/s.
 
 mod mesh;
 mod reduction;
@@ -35,7 +35,7 @@ pub const START: f64 = 0.02;
 /// Coefficient of friction of the paper's first case.
 pub const FRICTION: f64 = 0.15;
 
-/// Left (x < 0) or right (x > 0).
+/// Side of a ring: left (x < 0) or right (x > 0).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RingSide {
     /// x < 0.
@@ -45,10 +45,10 @@ pub enum RingSide {
 }
 
 impl RingSide {
-    /// Both, left first.
+    /// Both sides, left first.
     pub const BOTH: [Self; 2] = [Self::Left, Self::Right];
 
-    /// −1 on the left, +1 on the right.
+    /// Returns −1 on the left, +1 on the right.
     pub fn sign(self) -> f64 {
         match self {
             Self::Left => -1.0,
@@ -57,12 +57,12 @@ impl RingSide {
     }
 }
 
-/// Material of the cube: E = 2.1 GPa, a hundredth of the rings'.
+/// Returns the material of the cube: E = 2.1 GPa, a hundredth of that of the rings.
 pub fn cube_material() -> Material {
     Material { name: "cube".into(), young_modulus: 2.1e9, ..ring_material() }
 }
 
-/// Material of the rings: E = 210 GPa, ν = 0.3, ρ = 7800 kg/m³.
+/// Returns the material of the rings: E = 210 GPa, ν = 0.3, ρ = 7800 kg/m³.
 pub fn ring_material() -> Material {
     Material { name: "ring".into(), young_modulus: 210e9, poisson_ratio: 0.3, density: 7800.0, expansion: 0.0 }
 }

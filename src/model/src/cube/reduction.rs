@@ -1,4 +1,4 @@
-//! The three bodies as reduced-order models.
+//! Reduced-order models of the three bodies.
 
 use super::{CUBE_ELEMENTS, RING_ELEMENTS, RingSide, cube_material, cube_of, ring_material, ring_of};
 use crate::fe_model::FeModel;
@@ -13,7 +13,7 @@ use crate::{Material, Result};
 /// Mass matrix of the finite elements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum MassMatrix {
-    /// On the nodes: diagonal.
+    /// Lumped on the nodes: diagonal.
     #[default]
     Lumped,
     /// ∫ ρ NᵀN dV.
@@ -29,11 +29,12 @@ pub struct CubeOptions {
     pub elements: usize,
     /// Mass matrix.
     pub mass: MassMatrix,
-    /// Patches along y and along z on either face; its nodes where absent.
+    /// Patches along y and along z on either face; the nodes of the faces if absent.
     pub patches: Option<[usize; 2]>,
-    /// Which modes are kept.
+    /// Kind of the modes.
     pub kind: ReductionKind,
-    /// Number of modes: with the contact held, or besides the rigid-body motions. All if absent, and the reduction is then exact.
+    /// Number of modes: with the contact held, or in addition to the rigid-body motions. All if absent, which makes
+    /// the reduction exact.
     pub modes: Option<usize>,
     /// Number of modes compared with the full model.
     pub checked_modes: usize,
@@ -59,7 +60,7 @@ impl Default for CubeOptions {
 pub struct RingOptions {
     /// Name of the structure.
     pub name: String,
-    /// Which ring.
+    /// Side of the ring.
     pub side: RingSide,
     /// Elements along radius, width and arc.
     pub elements: [usize; 3],
@@ -74,7 +75,7 @@ pub struct RingOptions {
 }
 
 impl RingOptions {
-    /// The ring of one side, as it ships.
+    /// Returns the options of the built-in ring of one side.
     pub fn new(side: RingSide) -> Self {
         Self {
             name: match side {
@@ -91,8 +92,8 @@ impl RingOptions {
     }
 }
 
-/// Mesh, reduce and check the cube; where no patches are asked for: 72 contact nodes `left_1` ... and `right_1` ..., line by line along z from the leading
-/// face on.
+/// Meshes, reduces and checks the cube. Without patches it has 72 contact nodes `left_1` ... and `right_1` ..., line
+/// by line along z from the leading face.
 ///
 /// # Errors
 /// The errors of `reduce_free_body`.
@@ -113,7 +114,7 @@ pub fn reduce_cube(options: &CubeOptions, listener: Listener<'_>) -> Result<Redu
     reduce_free_body(model, &contact, &reduction_options, listener)
 }
 
-/// Mesh, reduce and check a ring, both ends clamped.
+/// Meshes, reduces and checks a ring, both ends clamped.
 ///
 /// # Errors
 /// The errors of `reduce_panel`.
@@ -139,7 +140,7 @@ fn model(mesh: Mesh, material: &Material, mass: MassMatrix, origin: &str, listen
     if mass == MassMatrix::Lumped { model.lumped() } else { Ok(model) }
 }
 
-/// The masters of a cube's mesh: left face, then right.
+/// Returns the master nodes of the mesh of a cube: left face, then right.
 ///
 /// # Errors
 /// A mesh without the sets of [`cube_of`].
@@ -156,7 +157,8 @@ pub(crate) fn master_points(mesh: &Mesh) -> Result<Vec<ContactPoint>> {
     Ok(points)
 }
 
-/// Patches on both faces, so many along y and along z: left face, then right, named as nodes are, rows along z from the leading face on.
+/// Returns patches on both faces, `along` by `across`: left face, then right, named like nodes, rows along z from the
+/// leading face.
 fn master_patches(mesh: &Mesh, [along, across]: [usize; 2]) -> Result<Vec<ContactPoint>> {
     let directions = [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0]];
     let mut points = Vec::new();
@@ -167,8 +169,8 @@ fn master_patches(mesh: &Mesh, [along, across]: [usize; 2]) -> Result<Vec<Contac
     Ok(points)
 }
 
-/// Outer nodes of a ring's mesh as a grid, rows along the arc, in growing z; the arc runs so that the normal points to the
-/// cube.
+/// Returns the outer nodes of the mesh of a ring as a grid, rows along the arc, by ascending z; the direction of the
+/// arc makes the normal point to the cube.
 pub fn ring_grid(side: RingSide, [radial, wide, arc]: [usize; 3]) -> PanelGrid {
     let place = |i: usize| if side == RingSide::Left { arc - i } else { i };
     let node = |i: usize, j: usize| (place(i) * (wide + 1) + j) * (radial + 1) + radial;

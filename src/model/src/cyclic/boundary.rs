@@ -1,4 +1,4 @@
-//! Pairing of the two faces of a sector by a turn of one pitch.
+//! Pairing of the two faces of a sector by a rotation of one pitch.
 
 use core::f64::consts::TAU;
 
@@ -7,26 +7,26 @@ use tiprub_core::rom::MAX_SECTORS;
 use super::CyclicBoundary;
 use crate::{Error, Result};
 
-/// Fit of the two faces.
+/// Quality of the pairing of the two faces.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PairingReport {
-    /// Largest distance of a high node from its turned low node (m).
+    /// Largest distance of a high node from its rotated low node (m).
     pub largest_mismatch: f64,
     /// Median of those distances (m).
     pub typical_mismatch: f64,
     /// Index of the low node with the largest distance.
     pub worst_node: usize,
-    /// The sets were named the other way round: what was given as low is the face at the greater angle.
+    /// True if the sets were exchanged: the set given as low is the face at the greater angle.
     pub swapped: bool,
 }
 
 impl CyclicBoundary {
-    /// Pair the nodes of two faces: every high node is a low one turned by +2π/`sectors` about z, to within `tolerance`
-    /// (m). Faces that were named the other way round are exchanged, and the report says so.
+    /// Pairs the nodes of two faces: every high node is a low one rotated by +2π/`sectors` about z, to within
+    /// `tolerance` (m). Faces in reverse order are exchanged, and the report states it.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for fewer than two sectors, empty or unequal faces, nodes that are in both, on the axis or
-    /// without a partner.
+    /// [`Error::Invalid`] for fewer than two sectors, empty or unequal faces, and nodes that are in both, on the axis
+    /// or without a partner.
     pub fn pair(
         nodes: &[[f64; 3]],
         low: &[usize],
@@ -36,7 +36,7 @@ impl CyclicBoundary {
     ) -> Result<(Self, PairingReport)> {
         check_faces(nodes, low, high, sectors, tolerance)?;
         let forward = Match::of(nodes, low, high, sectors);
-        // With two sectors a turn forward is a turn backward, and nothing tells the faces apart.
+        // With two sectors, forward and backward rotation coincide, so that the faces cannot be distinguished.
         let (chosen, swapped) = if forward.worst.distance <= tolerance || sectors == 2 {
             (forward, false)
         } else {
@@ -69,28 +69,28 @@ impl CyclicBoundary {
         Ok((Self { pairs: chosen.pairs, sectors }, report))
     }
 
-    /// Check that it fits a model of `count` nodes; [`Self::pair`] gives one that does.
+    /// Checks that the pairs are valid for a model of `count` nodes; [`Self::pair`] always returns valid ones.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for fewer than two sectors, for nodes that do not exist or appear twice.
+    /// [`Error::Invalid`] for fewer than two sectors, and for nodes that do not exist or appear twice.
     pub(crate) fn validate(&self, count: usize) -> Result<()> {
         check_sectors(self.sectors)?;
         check_indices(count, self.pairs.iter().flatten())
     }
 
-    /// Angle from one sector to the next (rad).
+    /// Returns the angle from one sector to the next (rad).
     #[expect(clippy::cast_precision_loss, reason = "sectors are far fewer than 2^52")]
     pub fn pitch(&self) -> f64 {
         TAU / self.sectors as f64
     }
 
-    /// Largest nodal diameter ⌊N/2⌋.
+    /// Returns the largest nodal diameter ⌊N/2⌋.
     pub(crate) fn largest_nodal_diameter(&self) -> usize {
         self.sectors / 2
     }
 }
 
-/// A point turned by `angle` about z.
+/// Rotates a point by `angle` about z.
 pub(super) fn turned([x, y, z]: [f64; 3], angle: f64) -> [f64; 3] {
     let (sin, cos) = angle.sin_cos();
     [cos * x - sin * y, sin * x + cos * y, z]
@@ -110,7 +110,7 @@ struct Match {
 }
 
 impl Match {
-    /// Nearest high node of every low node turned by one pitch.
+    /// Finds the nearest high node of every low node rotated by one pitch.
     fn of(nodes: &[[f64; 3]], low: &[usize], high: &[usize], sectors: usize) -> Self {
         let pitch = CyclicBoundary { pairs: Vec::new(), sectors }.pitch();
         let mut by_height: Vec<usize> = high.to_vec();
@@ -132,8 +132,8 @@ impl Match {
     }
 }
 
-/// The nearest of the nodes `by_height` (ascending in z) and its distance: outward from the point's own height, until the
-/// difference in height alone is larger than the best distance.
+/// Returns the nearest of the nodes `by_height` (ascending in z) and its distance. The search starts at the height of
+/// the point and ends when the difference in height alone exceeds the smallest distance.
 fn nearest(nodes: &[[f64; 3]], by_height: &[usize], point: [f64; 3]) -> (usize, f64) {
     let middle = by_height.partition_point(|&node| nodes[node][2] < point[2]);
     let mut best = (by_height[middle.min(by_height.len() - 1)], f64::INFINITY);
@@ -209,10 +209,11 @@ fn check_faces(nodes: &[[f64; 3]], low: &[usize], high: &[usize], sectors: usize
     Ok(())
 }
 
-/// Share of the distance of neighbouring nodes of a face beyond which a mismatch is no inaccuracy of coordinates any more.
+/// Fraction of the distance of neighbouring nodes of a face above which a mismatch cannot be an inaccuracy of
+/// coordinates.
 const MISPLACED: f64 = 0.25;
 
-/// A tolerance of one's own may be wide, but not so wide that other nodes are paired than those that fit.
+/// Checks that a user-defined tolerance is not so wide that it pairs the wrong nodes.
 fn check_spacing(nodes: &[[f64; 3]], low: &[usize], worst: Worst) -> Result<()> {
     let apart = |node: usize| {
         let [x, y, z]: [f64; 3] = core::array::from_fn(|i| nodes[node][i] - nodes[worst.low][i]);

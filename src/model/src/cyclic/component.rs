@@ -1,11 +1,12 @@
-//! Reduction of one nodal diameter, and the small matrices that its checks need.
+//! Reduction of one nodal diameter, with the small matrices that its checks need.
 //!
-//! T = [Ψ Φ] with the constraint modes Ψ of the contact and the fixed-interface modes Φ; K̂ = blkdiag(K̂_cc, Ω²), M̂ = TᴴM_nT. In place of Φ stands
-//! what moves no contact of [free-interface modes](super::free_interface), where those are kept; K̂ is then full in its second block.
+//! T = [Ψ Φ] with the constraint modes Ψ of the contact and the fixed-interface modes Φ; K̂ = blkdiag(K̂_cc, Ω²), M̂ =
+//! TᴴM_nT. For [free-interface modes](super::free_interface), Φ is replaced by the parts that move no contact; the
+//! second block of K̂ is then full.
 //!
-//! Eq. 12 asks for r = x - (ω² - σ) A_n⁻¹M_n x of x = Tz for every number of modes. Split A_n⁻¹M_nT = TX + F
-//! with F orthogonal to T in A_n: then r = T(z - λXz) - λFz, λ = ω² - σ, and rᴴA_nr = dᴴÂd + λ² zᴴF̂z with d = z - λXz, Â = TᴴA_nT and
-//! F̂ = FᴴA_nF. Both terms are squares, so nothing cancels, and leaving out modes is leaving out rows of z.
+//! Eq. 12 needs r = x - (ω² - σ) A_n⁻¹M_n x of x = Tz for every number of modes. Split A_n⁻¹M_nT = TX + F with F
+//! orthogonal to T in A_n: then r = T(z - λXz) - λFz, λ = ω² - σ, and rᴴA_nr = dᴴÂd + λ² zᴴF̂z with d = z - λXz, Â =
+//! TᴴA_nT and F̂ = FᴴA_nF. Both terms are squares, so nothing cancels, and omitting modes means omitting rows of z.
 
 use faer::linalg::solvers::{Llt, Solve};
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
@@ -17,14 +18,14 @@ use super::operator::CyclicPencil;
 use crate::reduce::ReductionKind;
 use crate::{Error, Result};
 
-/// One reduced nodal diameter, with all the modes that were computed.
+/// Reduced nodal diameter with all computed modes.
 #[derive(Debug)]
 pub(super) struct Component {
-    /// Everything is real.
+    /// True if all matrices are real.
     pub real: bool,
     /// Contact dofs.
     pub contact: usize,
-    /// ω² of the modes that were computed: with the contact held, or of free-interface modes.
+    /// ω² of the computed modes: with the contact held, or of free-interface modes.
     pub squares: Vec<f64>,
     /// M̂.
     pub mass: Mat<c64>,
@@ -39,13 +40,13 @@ pub(super) struct Component {
     kind: ReductionKind,
 }
 
-/// Modes of one nodal diameter that a reduction keeps.
+/// Modes of one nodal diameter that are kept in a reduction.
 pub(super) struct ComponentModes {
     /// M̂.
     pub mass: Mat<c64>,
     /// K̂ = blkdiag(K̂_cc, Ω²).
     pub stiffness: Mat<c64>,
-    /// Ω²: with the contact held.
+    /// Ω² with the contact held.
     pub squares: Vec<f64>,
 }
 
@@ -58,19 +59,20 @@ pub(super) struct ModeQuality {
     pub residual_criterion: Vec<f64>,
 }
 
-/// Which modes are computed.
+/// Modes to compute.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum RequestedModes {
     Count(usize),
-    /// All with ω² up to this, and the next one.
+    /// All modes with ω² up to this value, and the next one.
     UpTo(f64),
 }
 
 impl Component {
-    /// Reduce to fixed-interface modes. `at_rest` has no shift, `full` is the operator of the modes with free contact.
+    /// Reduces to fixed-interface modes. `at_rest` has no shift, `full` is the operator of the modes with free
+    /// contact.
     ///
     /// # Errors
-    /// The errors of [`lowest_modes`]; [`Error::NotPositiveDefinite`] when the reduced mass is not.
+    /// The errors of [`lowest_modes`]; [`Error::NotPositiveDefinite`] if the reduced mass is not positive definite.
     pub(super) fn fixed_interface(
         at_rest: &CyclicPencil<'_>,
         full: &CyclicPencil<'_>,
@@ -84,10 +86,10 @@ impl Component {
         Self::new((at_rest, full), at_rest.constraint_modes(), inner, ReductionKind::FixedInterface)
     }
 
-    /// Reduce to modes with free contact, `found` of `full`.
+    /// Reduces to modes with free contact, the modes `found` of `full`.
     ///
     /// # Errors
-    /// The errors of [`free_interface`]; [`Error::NotPositiveDefinite`] when the reduced mass is not.
+    /// The errors of [`free_interface`]; [`Error::NotPositiveDefinite`] if the reduced mass is not positive definite.
     pub(super) fn free_interface(
         at_rest: &CyclicPencil<'_>,
         full: &CyclicPencil<'_>,
@@ -125,10 +127,10 @@ impl Component {
         Ok(Self { real: at_rest.real, contact, squares, mass, stiffness, shift, inner, defect, kind })
     }
 
-    /// The reduced model with the first `modes` modes.
+    /// Returns the reduced model with the first `modes` modes.
     ///
     /// # Errors
-    /// [`Error::NotPositiveDefinite`] when the reduced mass is not.
+    /// [`Error::NotPositiveDefinite`] if the reduced mass is not positive definite.
     pub(super) fn kept(&self, modes: usize) -> Result<ComponentModes> {
         let (contact, size) = (self.contact, self.contact + modes);
         let mut mass = self.mass.get(..size, ..size).to_owned();
@@ -136,7 +138,7 @@ impl Component {
         if self.kind == ReductionKind::FixedInterface || modes == 0 {
             return Ok(ComponentModes { mass, stiffness, squares: self.squares[..modes].to_vec() });
         }
-        // What is left of free-interface modes is described by its own modes.
+        // The contact-free parts of free-interface modes are expressed in their own modes.
         let (squares, own) =
             dense_modes(stiffness.get(contact.., contact..), mass.get(contact.., contact..), self.real)?;
         let mut turn = Mat::identity(size, size);
@@ -150,10 +152,11 @@ impl Component {
         Ok(ComponentModes { mass, stiffness, squares })
     }
 
-    /// Modes of the reduced model with the first `modes` fixed-interface modes, the lowest `count` of them, and their residuals.
+    /// Returns the lowest `count` modes of the reduced model with the first `modes` fixed-interface modes, and their
+    /// residuals.
     ///
     /// # Errors
-    /// [`Error::NotPositiveDefinite`] when the reduced mass is not.
+    /// [`Error::NotPositiveDefinite`] if the reduced mass is not positive definite.
     pub(super) fn quality(&self, modes: usize, count: usize) -> Result<ModeQuality> {
         let size = self.contact + modes;
         let (mass, stiffness) = (self.mass.get(..size, ..size), self.stiffness.get(..size, ..size));
@@ -177,7 +180,7 @@ impl Component {
     }
 }
 
-/// Modes of an operator over its first `order` rows: with free contact where these are all.
+/// Computes modes of an operator over its first `order` rows: with free contact if these are all rows.
 ///
 /// # Errors
 /// The errors of [`lowest_modes`].
@@ -198,13 +201,13 @@ pub(super) fn modes(operator: &CyclicPencil<'_>, order: usize, wanted: Requested
     }
 }
 
-/// xᴴAx of every column.
+/// Returns xᴴAx of every column.
 fn energies(matrix: &Mat<c64>, columns: MatRef<'_, c64>) -> Vec<f64> {
     let forces = matrix * columns;
     (0..columns.ncols()).map(|k| (columns.col(k).adjoint() * forces.col(k)).re.max(0.0)).collect()
 }
 
-/// ω² (ascending) and M̂-orthonormal vectors of a small Hermitian pencil.
+/// Computes ω² (ascending) and M̂-orthonormal vectors of a small Hermitian pencil.
 fn dense_modes(stiffness: MatRef<'_, c64>, mass: MatRef<'_, c64>, real: bool) -> Result<(Vec<f64>, Mat<c64>)> {
     let factor = Llt::new(mass, Side::Lower).map_err(|_| Error::NotPositiveDefinite {
         matrix: "M (reduced mass)".into(),

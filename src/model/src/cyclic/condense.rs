@@ -1,8 +1,8 @@
 //! Condensation of a sector onto its faces and contact nodes, once for all nodal diameters.
 //!
-//! With A = K - σM of the sector, interior I and boundary B = (low face, high face, contact), everything that depends on
-//! the nodal diameter happens on B: the real Schur complement S = A_BB - A_BI A_II⁻¹ A_IB is formed once, and
-//! the complex operator of nodal diameter n needs only the small factor of S_n = WᴴSW.
+//! With A = K - σM of the sector, interior I and boundary B = (low face, high face, contact), only B depends on the
+//! nodal diameter: the real Schur complement S = A_BB - A_BI A_II⁻¹ A_IB is formed once, and the complex operator of
+//! nodal diameter n needs only the small factor of S_n = WᴴSW.
 
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
@@ -13,30 +13,30 @@ use crate::eigen::positive_factor;
 use crate::progress::{Listener, ReductionStage, report};
 use crate::sparse::{Factor, SparseMatrix, principal_pair};
 
-/// Columns of A_IB solved together: wide enough for matrix products, narrow enough for memory.
+/// Columns of A_IB that are solved together: wide enough for matrix products, narrow enough for the memory.
 const PANEL: usize = 32;
-/// Panels between two reports.
+/// Number of panels between two progress reports.
 const WAVE: usize = 8;
 
-/// A sector condensed for one shift σ.
+/// Sector condensed for one shift σ.
 #[derive(Debug)]
 pub(super) struct Condensed<'a> {
     pub sector: &'a Sector,
     /// σ (rad²/s²).
     pub shift: f64,
-    /// A = K - σM, both faces.
+    /// A = K - σM, with both faces.
     pub shifted: SparseMatrix,
-    /// Factor of A_II; none where there is no interior.
+    /// Factor of A_II; `None` without an interior.
     interior: Option<Factor>,
     /// S, (2 face + contact)².
     pub schur: Mat<f64>,
 }
 
 impl<'a> Condensed<'a> {
-    /// Factor the interior and form the Schur complement.
+    /// Factors the interior and forms the Schur complement.
     ///
     /// # Errors
-    /// [`crate::Error::NotPositiveDefinite`] when the interior can move with the faces and the contact nodes held.
+    /// [`crate::Error::NotPositiveDefinite`] if the interior can move with the faces and the contact nodes held.
     pub(super) fn new(sector: &'a Sector, shift: f64, listener: Listener<'_>) -> Result<Self> {
         let shifted =
             if shift == 0.0 { sector.stiffness.clone() } else { sector.stiffness.plus_scaled(-shift, &sector.mass) };
@@ -77,7 +77,7 @@ impl<'a> Condensed<'a> {
         Mat::from_fn(boundary.len(), boundary.len(), |i, j| 0.5 * (schur[(i, j)] + schur[(j, i)]))
     }
 
-    /// A_BI A_II⁻¹ A_IB of some columns.
+    /// Returns A_BI A_II⁻¹ A_IB of some columns.
     fn panel(&self, columns: &[usize]) -> Mat<f64> {
         let interior = self.sector.parts.interior;
         let mut right = Mat::zeros(interior, columns.len());
@@ -93,14 +93,14 @@ impl<'a> Condensed<'a> {
         self.boundary_rows(right.as_ref())
     }
 
-    /// A_II⁻¹ in place.
+    /// Applies A_II⁻¹ in place.
     pub(crate) fn solve_interior(&self, right: &mut Mat<f64>) {
         if let Some(factor) = &self.interior {
             factor.solve_in_place(right.as_mut());
         }
     }
 
-    /// A_BI t.
+    /// Returns A_BI t.
     pub(crate) fn boundary_rows(&self, inner: MatRef<'_, f64>) -> Mat<f64> {
         let (interior, order) = (self.sector.parts.interior, self.shifted.order());
         let mut product = Mat::zeros(order - interior, inner.ncols());
@@ -121,7 +121,7 @@ impl<'a> Condensed<'a> {
         product
     }
 
-    /// A_IB u for the boundary displacements u.
+    /// Returns A_IB u for the boundary displacements u.
     pub(crate) fn interior_columns(&self, boundary: MatRef<'_, f64>) -> Mat<f64> {
         let interior = self.sector.parts.interior;
         let mut product = Mat::zeros(interior, boundary.ncols());
@@ -141,7 +141,7 @@ impl<'a> Condensed<'a> {
         product
     }
 
-    /// Numbers of dofs.
+    /// Returns the numbers of dofs.
     pub(super) fn parts(&self) -> DofCounts {
         self.sector.parts
     }

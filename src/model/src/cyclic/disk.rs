@@ -1,19 +1,19 @@
-//! The whole disk from the mesh of one sector.
+//! Mesh of the whole disk from the mesh of one sector.
 
 use super::{CyclicBoundary, boundary::turned};
 use crate::Result;
 use crate::mesh::{Element, Mesh};
 
-/// A whole disk.
+/// Whole disk.
 #[derive(Debug, Clone)]
 pub struct WholeDisk {
-    /// Mesh of the disk; sets hold the nodes of all sectors.
+    /// Mesh of the disk; its sets contain the nodes of all sectors.
     pub mesh: Mesh,
     /// Node of the disk for every sector and node of the sector.
     pub nodes: Vec<Vec<usize>>,
 }
 
-/// Turned copies of a sector, merged at their faces: the high face of one is the low face of the next.
+/// Merges rotated copies of a sector at their faces: the high face of one is the low face of the next.
 ///
 /// # Errors
 /// The errors of [`Mesh::validate`].

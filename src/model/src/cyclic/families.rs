@@ -1,26 +1,26 @@
-//! Which fixed-interface modes are kept: whole families, as far as they can be told apart by frequency.
+//! Selection of fixed-interface modes: whole families, as far as frequencies distinguish them.
 //!
-//! A family of the blades (first bending, first torsion, ...) has nearly the same frequency at every nodal diameter. When
-//! it is kept at some and left out at others, the wave of one blade moving alone cannot be put together any more, and the
-//! reduced blades are coupled where the real ones are not. So the modes are cut at one frequency for all nodal diameters,
-//! in a gap between families. A family of the disk rises steeply with the nodal diameter and is kept as far as
-//! it lies below; the number of modes then differs between nodal diameters.
+//! A family of the blades (first bending, first torsion, ...) has nearly the same frequency at every nodal diameter.
+//! If it is kept at some and omitted at others, the motion of one blade alone can no longer be composed from the
+//! nodal diameters, and the reduced blades are coupled where the real ones are not. So the modes are cut at one
+//! frequency for all nodal diameters, in a gap between families. A family of the disk rises steeply with the nodal
+//! diameter and is kept where it lies below; the number of modes then differs between nodal diameters.
 //!
-//! The frequencies with the contact held are computed beyond the number η asked for. The list of all of them, from all
-//! nodal diameters together, is complete up to the lowest of the highest computed ones. Cuts between neighbours in this
-//! list are compared that keep η modes per nodal diameter on average, give or take a fifth. The widest relative gap is taken
-//! when it is at least [`SMALLEST_GAP`].
+//! More frequencies with the contact held are computed than the requested number η. The merged list of all nodal
+//! diameters is complete up to the lowest of the highest computed ones. The candidates are the cuts between
+//! neighbours in this list that keep η modes per nodal diameter on average, within a fifth. The widest relative gap
+//! is chosen if it is at least [`SMALLEST_GAP`].
 
 use super::ModeSelection;
 use super::component::RequestedModes;
 
-/// Gaps narrower than this share of their frequency tell no families apart.
+/// Relative gap below which frequencies do not distinguish families.
 pub const SMALLEST_GAP: f64 = 0.005;
 
-/// The kept numbers of modes, and what to tell about them.
+/// Numbers of modes that are kept, and notes for the user.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Choice {
-    /// For every nodal diameter.
+    /// Number for every nodal diameter.
     pub counts: Vec<usize>,
     pub note: Option<String>,
 }
@@ -37,7 +37,7 @@ pub(super) fn wanted(selection: ModeSelection, available: usize) -> RequestedMod
     }
 }
 
-/// Choose from the computed ω² of every nodal diameter, ascending.
+/// Chooses from the computed ω² of every nodal diameter, ascending.
 pub(super) fn choose(selection: ModeSelection, squares: &[&[f64]]) -> Choice {
     match selection {
         ModeSelection::Count(modes) => Choice { counts: vec![modes; squares.len()], note: None },
@@ -63,7 +63,7 @@ fn whole_families(modes: usize, squares: &[&[f64]]) -> Choice {
     all.sort_by(f64::total_cmp);
     let spread = (modes / 5).max(1);
     let (least, most) = ((modes - spread).max(1) * squares.len(), (modes + spread) * squares.len());
-    // A rigid-body motion is no family.
+    // A rigid-body motion does not form a family.
     let width = |cut: usize| -> f64 { if all[cut - 1] > 0.0 { 0.5 * (all[cut] / all[cut - 1]).ln() } else { 0.0 } };
     let off = |cut: usize| cut.abs_diff(modes * squares.len());
     let widest = (least.max(1)..=most.min(all.len().saturating_sub(1)))

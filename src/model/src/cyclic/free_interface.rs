@@ -1,10 +1,12 @@
-//! Free-interface modes of one nodal diameter with exact residual flexibility: [`crate::free_interface`] for coupled sectors, free ones too.
+//! Free-interface modes of one nodal diameter with exact residual flexibility: [`crate::free_interface`] for coupled
+//! sectors, including free ones.
 //!
-//! The constraint modes Ψ span the responses at rest K_n⁻¹B to contact forces; a disk that nothing holds has its rigid-body motions among
-//! them. Of the modes Φ with free contact D = Φ − ΨΦ_c moves no contact, and is K_n-orthogonal to Ψ. It is the response at rest, with the
-//! contact held, to their inertia forces: K_hh D_h = (M_nΦ)_h Λ. Nothing of Φ − ΨΦ_c is left of a rigid-body motion, but K_hh⁻¹(M_nΦ)_h is
-//! there, and is what is wanted: a force on the contact of a free disk accelerates it, and the response to force and inertia together,
-//! Pᴴ K_n⁺ P B with P = I − M_nΦΦᴴ over the rigid-body motions (inertia relief), is then in the space.
+//! The constraint modes Ψ span the static responses K_n⁻¹B to contact forces; those of an unsupported disk include
+//! its rigid-body motions. For the modes Φ with free contact, D = Φ − ΨΦ_c moves no contact and is K_n-orthogonal to
+//! Ψ. It is the static response, with the contact held, to their inertia forces: K_hh D_h = (M_nΦ)_h Λ. For a
+//! rigid-body motion Φ − ΨΦ_c vanishes, but K_hh⁻¹(M_nΦ)_h does not, and it is what the basis needs: a force on the
+//! contact of a free disk accelerates it, and the response to force and inertia together, Pᴴ K_n⁺ P B with P = I −
+//! M_nΦΦᴴ over the rigid-body motions (inertia relief), is then in the space.
 
 use faer::{Mat, MatRef, Side, c64};
 
@@ -13,23 +15,23 @@ use super::operator::CyclicPencil;
 use crate::free_interface::LEAST_RESIDUAL;
 use crate::{Error, Result};
 
-/// An ω² below this share of the shift σ is that of a rigid-body motion.
+/// Fraction of the shift σ below which an ω² is that of a rigid-body motion.
 const RIGID: f64 = 1e-5;
 
-/// Motion with the contact held.
+/// Motions with the contact held.
 pub(super) struct Inner {
-    /// ω² of the modes it was made of.
+    /// ω² of the modes from which the motions were derived.
     pub squares: Vec<f64>,
     /// (interior, face) × modes.
     pub shapes: Mat<c64>,
-    /// K̂ of these.
+    /// K̂ of these motions.
     pub stiffness: Mat<c64>,
 }
 
 /// Returns the part of the modes `found` of `full` that moves no contact.
 ///
 /// # Errors
-/// [`Error::Invalid`] for so many modes that no residual flexibility is left.
+/// [`Error::Invalid`] for so many modes that no residual flexibility remains.
 pub(super) fn free_interface(
     at_rest: &CyclicPencil<'_>,
     full: &CyclicPencil<'_>,
@@ -53,7 +55,7 @@ pub(super) fn free_interface(
     Ok(Inner { squares: found.eigenvalues.clone(), shapes, stiffness })
 }
 
-/// K̂_cc⁻¹ less the flexibility of the modes must be positive definite beside the whole.
+/// Checks that K̂_cc⁻¹ minus the flexibility of the modes is positive definite relative to the total flexibility.
 fn check_residual(static_stiffness: &Mat<c64>, seen: &Mat<c64>, squares: &[f64]) -> Result<()> {
     let scaled = Mat::from_fn(seen.nrows(), seen.ncols(), |i, k| seen[(i, k)] / squares[k].sqrt());
     let shares = hermitian((scaled.adjoint() * (static_stiffness * &scaled)).as_ref());
@@ -68,7 +70,7 @@ fn check_residual(static_stiffness: &Mat<c64>, seen: &Mat<c64>, squares: &[f64])
     Err(Error::invalid("number of modes", problem, "Request fewer modes or refine the mesh"))
 }
 
-/// ½(A + Aᴴ).
+/// Returns ½(A + Aᴴ).
 pub(super) fn hermitian(matrix: MatRef<'_, c64>) -> Mat<c64> {
     Mat::from_fn(matrix.nrows(), matrix.ncols(), |i, j| (matrix[(i, j)] + matrix[(j, i)].conj()) * 0.5)
 }

@@ -1,9 +1,9 @@
 //! Lowest modes of one nodal diameter, K_n φ = ω² M_n φ, by block Lanczos in complex arithmetic.
 //!
-//! As [`crate::eigen`]: A_n⁻¹M_n is self-adjoint in the M_n inner product, the basis is kept M_n-orthonormal against all of
-//! itself, and the residual of every returned pair is formed explicitly. A block is made orthonormal by the Cholesky
-//! factor of its Gram matrix, twice, each time after the basis has been taken out of it; a block that is too dependent for that goes column by
-//! column.
+//! As in [`crate::eigen`], A_n⁻¹M_n is self-adjoint in the M_n inner product, the basis is kept M_n-orthonormal
+//! against all its vectors, and the residual of every returned pair is formed explicitly. A block is orthonormalised
+//! by the Cholesky factor of its Gram matrix, twice, each time after projecting out the basis; a block that is nearly
+//! dependent is orthonormalised column by column.
 
 use faer::linalg::solvers::Llt;
 use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
@@ -14,12 +14,12 @@ use crate::eigen::TOLERANCE;
 use crate::{Error, Result};
 
 const BLOCK: usize = 6;
-/// As in [`crate::eigen`].
+/// Largest accepted residual, as in [`crate::eigen`].
 const CHECKED_TOLERANCE: f64 = 1e-8;
 const DEPENDENT: f64 = 1e-13;
-/// A block whose columns are nearer to each other than this is orthonormalised column by column.
+/// Threshold of the Gram factor below which a block is orthonormalised column by column.
 const NEARLY_DEPENDENT: f64 = 1e-4;
-/// An ω² below this share of tr K / tr M is round-off of a rigid-body motion.
+/// Fraction of tr K / tr M below which an ω² is round-off of a rigid-body motion.
 const MECHANISM: f64 = 1e-14;
 
 /// Modes of one nodal diameter.
@@ -27,18 +27,18 @@ const MECHANISM: f64 = 1e-14;
 pub(super) struct ComplexModes {
     /// ω² (rad²/s²), ascending.
     pub eigenvalues: Vec<f64>,
-    /// M_n-orthonormal shapes, rows as asked for; the largest entry of each is real and positive.
+    /// M_n-orthonormal shapes, for the requested rows; the largest entry of each is real and positive.
     pub shapes: Mat<c64>,
 }
 
 impl ComplexModes {
-    /// The first `count`.
+    /// Returns the first `count` modes.
     pub(super) fn lowest(&self, count: usize) -> Self {
         Self { eigenvalues: self.eigenvalues[..count].to_vec(), shapes: self.shapes.get(.., ..count).to_owned() }
     }
 }
 
-/// A growing M-orthonormal basis Q with M Q beside it.
+/// Growing M-orthonormal basis Q, stored with M Q.
 struct LanczosBasis<'a> {
     operator: &'a CyclicPencil<'a>,
     vectors: Mat<c64>,
@@ -69,19 +69,19 @@ impl<'a> LanczosBasis<'a> {
         self.vectors.get(.., ..self.size)
     }
 
-    /// Take the basis out of `block`; returns QᴴM·block.
+    /// Projects the basis out of `block`; returns QᴴM·block.
     fn project_out(&self, block: &mut Mat<c64>) -> Mat<c64> {
         let part = self.mass_vectors.get(.., ..self.size).adjoint() * &*block;
         *block -= self.used() * &part;
         part
     }
 
-    /// Append what `block` has beyond the basis. Returns C and R of block = Q C + Q_new R.
+    /// Appends the part of `block` outside the basis. Returns C and R of block = Q C + Q_new R.
     fn append(&mut self, mut block: Mat<c64>) -> (Mat<c64>, Mat<c64>) {
         let (first, width) = (self.size, block.ncols());
         let mut coefficients = self.project_out(&mut block);
         let mut upper = Mat::<c64>::identity(width, width);
-        // Once to take out the basis, and once more to take out what the first time left.
+        // The second pass removes the rounding errors of the first.
         for last in [false, true] {
             let mut mass_block = self.operator.mass(block.as_ref());
             let fits = first + width <= self.capacity;
@@ -100,7 +100,7 @@ impl<'a> LanczosBasis<'a> {
         (coefficients + more * &upper, new * &upper)
     }
 
-    /// As [`Self::append`], column by column; what depends on the columns before is left out.
+    /// Appends as [`Self::append`] does, column by column; omits columns that depend on the previous ones.
     fn append_columns(&mut self, block: &Mat<c64>) -> (Mat<c64>, Mat<c64>) {
         let (first, width) = (self.size, block.ncols());
         let norms = column_norms(block.as_ref(), self.operator.mass(block.as_ref()).as_ref());
@@ -113,7 +113,7 @@ impl<'a> LanczosBasis<'a> {
             let mut column = block.get(.., j..j + 1).to_owned();
             let (mut before, mut norm) = (norms[j], 0.0);
             let mut mass_column = Mat::zeros(0, 0);
-            // Repeat until a pass takes nothing away any more (Kahan: once more is enough, unless it is round-off).
+            // Repeat until a pass changes nothing (Kahan: one repetition is enough, unless the vector is round-off).
             for _pass in 0..6 {
                 let part = self.project_out(&mut column);
                 for i in 0..self.size {
@@ -138,17 +138,17 @@ impl<'a> LanczosBasis<'a> {
     }
 }
 
-/// Lower factor of the Gram matrix; none when the columns are nearly dependent.
+/// Returns the lower factor of the Gram matrix; `None` if the columns are nearly dependent.
 fn gram_factor(block: MatRef<'_, c64>, mass_block: MatRef<'_, c64>) -> Option<Mat<c64>> {
     let gram = block.adjoint() * mass_block;
     let factor = Llt::new(gram.as_ref(), Side::Lower).ok()?;
     let lower = factor.L().to_owned();
-    // A NaN compares as false and goes the careful way.
+    // NaN compares as false and selects the column-by-column path.
     let independent = (0..gram.ncols()).all(|k| lower[(k, k)].re > NEARLY_DEPENDENT * gram[(k, k)].re.sqrt());
     independent.then_some(lower)
 }
 
-/// B ← B L⁻ᴴ.
+/// Computes B ← B L⁻ᴴ.
 fn divide(lower: &Mat<c64>, block: &mut Mat<c64>) {
     // Lᵀ-free form: (B L⁻ᴴ)ᴴ = L⁻¹Bᴴ.
     let mut turned = block.adjoint().to_owned();
@@ -156,16 +156,16 @@ fn divide(lower: &Mat<c64>, block: &mut Mat<c64>) {
     block.copy_from(turned.adjoint());
 }
 
-/// √(columnᴴ M column) of every column.
+/// Returns √(columnᴴ M column) of every column.
 fn column_norms(block: MatRef<'_, c64>, mass_block: MatRef<'_, c64>) -> Vec<f64> {
     (0..block.ncols()).map(|j| (block.col(j).adjoint() * mass_block.col(j)).re.max(0.0).sqrt()).collect()
 }
 
-/// The `count` lowest modes over `order` rows: all of them, or all but the contact's.
+/// Computes the `count` lowest modes over `order` rows: all rows, or all but those of the contact.
 ///
 /// # Errors
-/// [`Error::Invalid`] when more modes are asked for than there are dofs, [`Error::NotConverged`], and
-/// [`Error::NotPositiveDefinite`] for a mechanism that only round-off holds.
+/// [`Error::Invalid`] if more modes are requested than there are dofs, [`Error::NotConverged`], and
+/// [`Error::NotPositiveDefinite`] for a mechanism that is stiff only by round-off.
 pub(super) fn lowest_modes(operator: &CyclicPencil<'_>, order: usize, count: usize) -> Result<ComplexModes> {
     if count > order {
         return Err(Error::invalid(
@@ -221,7 +221,7 @@ struct ComplexRitz {
     bounds: Vec<f64>,
 }
 
-/// Largest eigenpairs of the projected operator, with residual bounds ‖R s_last‖ / θ.
+/// Computes the largest eigenpairs of the projected operator, with residual bounds ‖R s_last‖ / θ.
 fn ritz_pairs(
     projected: MatRef<'_, c64>,
     coupling: MatRef<'_, c64>,
@@ -231,7 +231,7 @@ fn ritz_pairs(
 ) -> Result<ComplexRitz> {
     let size = projected.nrows();
     let scale = projected.norm_max();
-    // The block columns are filled from the left, so of a pair of entries the later column's is the complete one.
+    // The block columns are filled from the left, so the entry of the later column is the complete one of a pair.
     let entry = |i: usize, j: usize| {
         if i < j {
             projected[(i, j)] / scale
@@ -250,10 +250,11 @@ fn ritz_pairs(
     Ok(ComplexRitz { values, vectors, bounds })
 }
 
-/// Eigenvalues (ascending) and vectors of a small Hermitian matrix given by its entries; exactly real for a real one.
+/// Computes eigenvalues (ascending) and vectors of a small Hermitian matrix given by its entries; exactly real for a
+/// real matrix.
 ///
 /// # Errors
-/// [`Error::Invalid`] when the iteration does not converge.
+/// [`Error::Invalid`] if the iteration does not converge.
 pub(super) fn hermitian_eigen(
     size: usize,
     real: bool,
@@ -270,11 +271,11 @@ pub(super) fn hermitian_eigen(
     Ok(((0..size).map(|k| eigen.S()[k].re).collect(), eigen.U().to_owned()))
 }
 
-/// Form the residual of every pair explicitly and refuse what does not hold: of a basis that has reached its capacity the bounds know
-/// nothing. `basis` is its size.
+/// Forms the residual of every pair explicitly and rejects inaccurate pairs: the bounds are meaningless for a basis
+/// that has reached its capacity. `basis` is its size.
 fn checked(operator: &CyclicPencil<'_>, thetas: &[f64], mut shapes: Mat<c64>, basis: usize) -> Result<ComplexModes> {
     let sector = operator.condensed.sector;
-    // A NaN compares as false and is refused, too.
+    // NaN compares as false and is rejected, too.
     let supported = 1.0 / thetas[0] > MECHANISM * operator.condensed.shifted.trace() / sector.mass.trace();
     if !supported {
         let held = shapes.nrows() < operator.parts().order();
@@ -299,7 +300,7 @@ fn checked(operator: &CyclicPencil<'_>, thetas: &[f64], mut shapes: Mat<c64>, ba
     })
 }
 
-/// Turn every column so that its largest entry is real and positive: a mode's phase is free.
+/// Scales every column so that its largest entry is real and positive: the phase of a mode is arbitrary.
 fn fix_phases(shapes: &mut Mat<c64>) {
     for k in 0..shapes.ncols() {
         let mut largest = c64::new(0.0, 0.0);
@@ -319,7 +320,8 @@ fn fix_phases(shapes: &mut Mat<c64>) {
     }
 }
 
-/// Entries with real and imaginary part in [-1, 1) of a fixed sequence (splitmix64), so that results repeat.
+/// Returns entries with real and imaginary part in [-1, 1) from a fixed sequence (splitmix64), so that results are
+/// reproducible.
 fn random_block(rows: usize, columns: usize, real: bool, seed: &mut u64) -> Mat<c64> {
     let mut number = || {
         *seed = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);

@@ -24,22 +24,22 @@ pub use families::SMALLEST_GAP;
 pub use quality::WHEEL_MODES;
 pub use reduction::reduce_cyclic;
 
-/// The two faces where a sector meets its neighbours.
+/// Pairing of the two faces where a sector meets its neighbours.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CyclicBoundary {
-    /// Pairs of node indices (low, high): the high node is the low one turned by +2π/sectors about z.
+    /// Pairs of node indices (low, high): the high node is the low one rotated by +2π/sectors about z.
     pub pairs: Vec<[usize; 2]>,
     /// Number of sectors.
     pub sectors: usize,
 }
 
-/// Which modes are kept.
+/// Selection of the modes to keep.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ModeSelection {
-    /// About this many per nodal diameter: those below a gap of frequency that all nodal diameters leave, so that a
-    /// family of the blades, whose frequency hardly changes with the nodal diameter, is there for all of them or for none.
-    /// A family of the disk, whose frequency rises steeply, is there as far as it lies below. The same number at every
-    /// nodal diameter, and a note in [`CyclicReduction::notes`], where there is no such gap.
+    /// About this many per nodal diameter: all modes below a frequency gap that is common to all nodal diameters. A
+    /// family of the blades, whose frequency hardly changes with the nodal diameter, is thus kept at all of them or
+    /// at none. A family of the disk, whose frequency rises steeply, is kept where it lies below. Without such a gap
+    /// the number is the same at every nodal diameter, and [`CyclicReduction::notes`] contains a note.
     Families(usize),
     /// Exactly this many at every nodal diameter.
     Count(usize),
@@ -52,7 +52,7 @@ pub enum ModeSelection {
 pub struct CyclicOptions {
     /// Name of the structure.
     pub name: String,
-    /// Which modes are kept.
+    /// Kind of the modes.
     pub kind: ReductionKind,
     /// Selection of modes.
     pub modes: ModeSelection,
@@ -62,48 +62,50 @@ pub struct CyclicOptions {
     pub damping_ratio: f64,
 }
 
-/// One nodal diameter, full and reduced.
+/// Full and reduced modes of one nodal diameter.
 #[derive(Debug, Clone)]
 pub struct NodalDiameter {
     /// Nodal diameter n.
     pub number: usize,
-    /// Frequencies of the full model (Hz), ascending. With 0 < 2n < sectors each stands for two modes of the disk.
+    /// Frequencies of the full model (Hz), ascending. With 0 < 2n < sectors each represents two modes of the disk.
     pub full_frequencies: Vec<f64>,
-    /// Frequencies of the reduced model (Hz), as many.
+    /// Frequencies of the reduced model (Hz), in the same number.
     pub reduced_frequencies: Vec<f64>,
     /// Frequency deviation (%), eq. 13.
     pub frequency_deviation: Vec<f64>,
     /// Residual convergence criterion (%), eq. 12.
     pub residual_criterion: Vec<f64>,
-    /// Frequencies with the contact held (Hz), those kept; with free-interface modes of what is left of them with the contact held.
+    /// Frequencies of the kept modes with the contact held (Hz); for free-interface modes, those of their parts that
+    /// move no contact.
     pub fixed_interface_frequencies: Vec<f64>,
-    /// Full modes as displacements (x, y, z) of every node of the first sector, mass-normalised for one sector (1/√kg).
+    /// Modes of the full model as displacements (x, y, z) of every node of the first sector, mass-normalised for one
+    /// sector (1/√kg).
     pub shapes: Vec<Vec<[Complex<f64>; 3]>>,
 }
 
-/// Quality of one number of modes per nodal diameter, over the lowest modes of the whole disk.
+/// Accuracy for one number of modes per nodal diameter, over the lowest modes of the whole disk.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ConvergenceRow {
     /// Modes per nodal diameter η.
     pub modes: usize,
     /// Number of modes of the whole disk.
     pub total_modes: usize,
-    /// Frequency deviation (%) of each of the lowest modes of the disk, double ones twice, ascending in frequency.
+    /// Frequency deviation (%) of each of the lowest modes of the disk, double modes twice, by ascending frequency.
     pub frequency_deviation: Vec<f64>,
     /// Residual convergence criterion (%) of the same modes.
     pub residual_criterion: Vec<f64>,
 }
 
-/// A reduced cyclic structure with what it came from.
+/// Reduced cyclic structure with the data of its reduction.
 #[derive(Debug, Clone)]
 pub struct CyclicReduction {
     /// The reduced-order model, checks included.
     pub rom: Rom,
-    /// One per nodal diameter 0 ..= sectors/2.
+    /// Results of each nodal diameter 0 ..= sectors/2.
     pub nodal_diameters: Vec<NodalDiameter>,
-    /// Eqs 12 and 13 against the number of modes, from none to all that were computed.
+    /// Eqs 12 and 13 against the number of modes, from none to all computed modes.
     pub convergence: Vec<ConvergenceRow>,
-    /// Degrees of freedom of one sector that are neither clamped nor follow from the other face.
+    /// Degrees of freedom of one sector that are neither clamped nor dependent on the other face.
     pub free_dofs: usize,
     /// Largest natural angular frequency of the reduced model (rad/s).
     pub largest_angular_frequency: f64,

@@ -1,7 +1,7 @@
-//! The pencil of one nodal diameter as an operator: products with M_n and A_n, solutions with A_n = K_n - σM_n.
+//! Pencil of one nodal diameter as an operator: products with M_n and A_n, solutions with A_n = K_n - σM_n.
 //!
-//! Blocks of vectors are complex, n × columns, over (interior, face, contact), or without the contact rows: those then
-//! are held. A real sparse product or solution sees real and imaginary parts as columns of their own.
+//! Blocks of vectors are complex, n × columns, over (interior, face, contact), or without the contact rows if the
+//! contact is held. Real sparse products and solutions treat real and imaginary parts as separate columns.
 
 use faer::linalg::solvers::Llt;
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
@@ -12,25 +12,25 @@ use super::sector::DofCounts;
 use crate::sparse::SparseMatrix;
 use crate::{Error, Result};
 
-/// The pencil of one nodal diameter.
+/// Pencil of one nodal diameter.
 #[derive(Debug)]
 pub(super) struct CyclicPencil<'a> {
     pub condensed: &'a Condensed<'a>,
-    /// n.
+    /// Nodal diameter n.
     pub nodal_diameter: usize,
     /// e^(2πin/N).
     pub phase: c64,
-    /// n = 0 or 2n = N: everything is real.
+    /// True for n = 0 or 2n = N, where all matrices are real.
     pub real: bool,
     /// Lower factor of S_n over (face, contact), or of its face part alone.
     lower: Mat<c64>,
-    /// Rows of `lower` that are factored.
+    /// Number of factored rows of `lower`.
     factored: usize,
     /// Columns of S_n that belong to the contact: (face + contact) × contact.
     contact_columns: Mat<c64>,
 }
 
-/// e^(2πin/N), exactly real for n = 0 and 2n = N.
+/// Returns e^(2πin/N), exactly real for n = 0 and 2n = N.
 #[expect(clippy::cast_precision_loss, reason = "sectors are far fewer than 2^52")]
 pub(super) fn phase(nodal_diameter: usize, sectors: usize) -> c64 {
     let half_turns = 2 * nodal_diameter % (2 * sectors);
@@ -45,10 +45,10 @@ pub(super) fn phase(nodal_diameter: usize, sectors: usize) -> c64 {
 }
 
 impl<'a> CyclicPencil<'a> {
-    /// Factor the boundary of nodal diameter `nodal_diameter`; with `held` for problems with held contact only.
+    /// Factors the boundary of nodal diameter `nodal_diameter`; with `held` only for problems with held contact.
     ///
     /// # Errors
-    /// [`Error::NotPositiveDefinite`] when the structure can move as a rigid body.
+    /// [`Error::NotPositiveDefinite`] if the structure can move as a rigid body.
     pub(super) fn new(condensed: &'a Condensed<'a>, nodal_diameter: usize, sectors: usize, held: bool) -> Result<Self> {
         let parts = condensed.parts();
         let phase = phase(nodal_diameter, sectors);
@@ -70,12 +70,13 @@ impl<'a> CyclicPencil<'a> {
         self.condensed.parts()
     }
 
-    /// W x as real columns: real parts, then, unless all is real, imaginary parts. Missing contact rows are zero.
+    /// Returns W x as real columns: real parts, then, unless all is real, imaginary parts. Missing contact rows are
+    /// zero.
     pub(super) fn expand(&self, x: MatRef<'_, c64>) -> Mat<f64> {
         self.expand_from(x, self.parts().interior)
     }
 
-    /// W of (inner, face, contact), with as many inner rows as told.
+    /// Returns W of (inner, face, contact), with the given number of inner rows.
     fn expand_from(&self, x: MatRef<'_, c64>, inner: usize) -> Mat<f64> {
         let (face, width) = (self.parts().face, x.ncols());
         let mut u = Mat::zeros(inner + 2 * face + self.parts().contact, if self.real { width } else { 2 * width });
@@ -96,7 +97,7 @@ impl<'a> CyclicPencil<'a> {
         u
     }
 
-    /// Wᴴ f of forces f in real columns as [`Self::expand`] makes them; the first `rows` rows.
+    /// Returns the first `rows` rows of Wᴴ f for forces f in real columns in the layout of [`Self::expand`].
     fn contract_from(&self, f: MatRef<'_, f64>, inner: usize, rows: usize) -> Mat<c64> {
         let face = self.parts().face;
         let width = if self.real { f.ncols() } else { f.ncols() / 2 };
@@ -117,17 +118,17 @@ impl<'a> CyclicPencil<'a> {
         self.contract_from(times(matrix, &self.expand(x)).as_ref(), self.parts().interior, x.nrows())
     }
 
-    /// M_n x.
+    /// Returns M_n x.
     pub(super) fn mass(&self, x: MatRef<'_, c64>) -> Mat<c64> {
         self.product(&self.condensed.sector.lean_mass, x)
     }
 
-    /// A_n x.
+    /// Returns A_n x.
     pub(super) fn shifted(&self, x: MatRef<'_, c64>) -> Mat<c64> {
         self.product(&self.condensed.shifted, x)
     }
 
-    /// A_n⁻¹ b; with the contact held where b has no contact rows.
+    /// Returns A_n⁻¹ b; with the contact held if b has no contact rows.
     pub(super) fn solve(&self, b: MatRef<'_, c64>) -> Mat<c64> {
         let parts = self.parts();
         let inner = parts.interior;
@@ -144,7 +145,7 @@ impl<'a> CyclicPencil<'a> {
         self.joined(&half, &edge)
     }
 
-    /// S_n⁻¹ in place.
+    /// Applies S_n⁻¹ in place.
     fn solve_boundary(&self, edge: &mut Mat<c64>) {
         let size = edge.nrows();
         if size == 0 {
@@ -155,8 +156,9 @@ impl<'a> CyclicPencil<'a> {
         solve_upper_triangular_in_place(lower.adjoint(), edge.as_mut(), Par::Seq);
     }
 
-    /// Constraint modes (interior, face, contact) × contact: unit displacements of the contact, everything else at rest;
-    /// and the stiffness of the contact that goes with them. Those of K when the shift is 0.
+    /// Computes the constraint modes (interior, face, contact) × contact, with unit displacements of one contact dof
+    /// while the others are held, and the corresponding stiffness of the contact. These are the constraint modes of K
+    /// if the shift is 0.
     pub(crate) fn constraint_modes(&self) -> (Mat<c64>, Mat<c64>) {
         let parts = self.parts();
         let (face, contact) = (parts.face, parts.contact);
@@ -194,7 +196,7 @@ impl<'a> CyclicPencil<'a> {
     }
 }
 
-/// S_n = WᴴSW over (face, contact).
+/// Computes S_n = WᴴSW over (face, contact).
 fn boundary_pencil(schur: &Mat<f64>, parts: DofCounts, phase: c64) -> Mat<c64> {
     let (face, size) = (parts.face, parts.face + parts.contact);
     let back = phase.conj();
@@ -220,7 +222,7 @@ pub(super) fn not_positive(nodal_diameter: usize, held: bool) -> Error {
     Error::NotPositiveDefinite { matrix: format!("K of nodal diameter {nodal_diameter}"), remedy: remedy.into() }
 }
 
-/// Product of a sparse matrix with a dense one; all its columns in few sweeps over the sparse one.
+/// Multiplies a sparse matrix by a dense one, all columns in few sweeps over the sparse matrix.
 pub(super) fn times(matrix: &SparseMatrix, dense: &Mat<f64>) -> Mat<f64> {
     let mut product = Mat::zeros(matrix.order(), dense.ncols());
     let mut first = 0;

@@ -1,4 +1,4 @@
-//! The nodal diameters in parallel, with progress told from the calling thread.
+//! Parallel execution of the nodal diameters, with progress reports from the calling thread.
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -10,10 +10,11 @@ use rayon::Yield;
 use crate::Result;
 use crate::progress::{Listener, ReductionStage, report};
 
-/// `work` for 0 .. `count` on all threads of the pool. Each is given a function to call at the end of each of its `steps` steps.
+/// Runs `work` for 0 .. `count` on all threads of the pool. Each call receives a function to be called at the end of
+/// each of its `steps` steps.
 ///
 /// # Errors
-/// That of the first index whose work failed; what had not begun by then is left.
+/// The error of the first index whose work failed; work that has not begun by then is skipped.
 pub(super) fn for_each<T: Send>(
     count: usize,
     steps: usize,
@@ -31,7 +32,7 @@ pub(super) fn for_each<T: Send>(
                 if failed_ref.load(Ordering::Relaxed) {
                     return;
                 }
-                // The receiver lives until all senders are gone.
+                // The receiver lives until all senders are dropped.
                 let result = work_ref(index, &|| sender.send(()).unwrap_or_default());
                 if result.is_err() {
                     failed_ref.store(true, Ordering::Relaxed);
@@ -42,7 +43,7 @@ pub(super) fn for_each<T: Send>(
         drop(sender);
         let mut done = 0;
         loop {
-            // A caller that is itself a thread of the pool must work, not wait.
+            // A caller that is itself a thread of the pool must work instead of waiting.
             if rayon::yield_now() == Some(Yield::Executed) {
                 done += receiver.try_iter().count();
             } else {

@@ -6,15 +6,15 @@ use super::component::Component;
 use super::{ConvergenceRow, NodalDiameter};
 use crate::Result;
 
-/// Modes of the whole disk whose convergence is followed (figs 9 and 10 of the paper).
+/// Number of modes of the whole disk whose convergence is computed (figs 9 and 10 of the paper).
 pub const WHEEL_MODES: usize = 56;
 
-/// Eq. 13 (%). A rigid-body mode has no frequency to deviate from.
+/// Returns eq. 13 (%). A rigid-body mode has no relative deviation.
 pub(super) fn deviation(full: f64, reduced: f64) -> f64 {
     if full > 0.0 { (reduced - full) / full * 100.0 } else { 0.0 }
 }
 
-/// The checks of all nodal diameters, ascending in frequency.
+/// Merges the checks of all nodal diameters, by ascending frequency.
 pub(super) fn merged(diameters: &[NodalDiameter]) -> RomChecks {
     let list = diameters.iter().flat_map(|one| {
         let number = u32::try_from(one.number).expect("the number of sectors fits into 32 bits");
@@ -31,7 +31,7 @@ pub(super) fn merged(diameters: &[NodalDiameter]) -> RomChecks {
     sorted_checks(list.collect())
 }
 
-/// One of the lowest modes of the disk: its nodal diameter and its place there.
+/// One of the lowest modes of the disk: its nodal diameter and its index there.
 #[derive(Debug, Clone, Copy)]
 struct DiskMode {
     square: f64,
@@ -39,8 +39,8 @@ struct DiskMode {
     place: usize,
 }
 
-/// The lowest modes of the disk, double ones twice. Beyond the lowest of the last computed ones of the nodal diameters
-/// the list would have holes, and ends.
+/// Lists the lowest modes of the disk, double modes twice. The list ends at the lowest of the last computed modes of
+/// all nodal diameters, since it would be incomplete above.
 fn disk_modes(full: &[&[f64]], sectors: usize) -> Vec<DiskMode> {
     let ceiling =
         full.iter().map(|list| list.last().copied().unwrap_or(f64::NEG_INFINITY)).fold(f64::INFINITY, f64::min);
@@ -56,7 +56,7 @@ fn disk_modes(full: &[&[f64]], sectors: usize) -> Vec<DiskMode> {
     modes
 }
 
-/// Eqs 12 and 13 of the lowest modes of the disk for 0, 1, 2 ... fixed-interface modes per nodal diameter.
+/// Computes eqs 12 and 13 of the lowest modes of the disk for 0, 1, 2 ... fixed-interface modes per nodal diameter.
 pub(super) fn convergence(components: &[&Component], full: &[&[f64]], sectors: usize) -> Result<Vec<ConvergenceRow>> {
     let modes = disk_modes(full, sectors);
     let most = components.iter().map(|component| component.squares.len()).min().unwrap_or(0);
@@ -72,7 +72,7 @@ pub(super) fn convergence(components: &[&Component], full: &[&[f64]], sectors: u
         let (mut frequency_deviation, mut residual_criterion) = (Vec::new(), Vec::new());
         for mode in &modes {
             let quality = &qualities[mode.nodal_diameter];
-            // A mode that the reduced model has no room for is infinitely far off.
+            // A mode that the reduced model has no coordinate for has an infinite deviation.
             let square = quality.squares.get(mode.place).copied().unwrap_or(f64::INFINITY);
             frequency_deviation.push(deviation(hertz(mode.square), hertz(square)));
             residual_criterion.push(quality.residual_criterion.get(mode.place).copied().unwrap_or(f64::INFINITY));
@@ -82,7 +82,7 @@ pub(super) fn convergence(components: &[&Component], full: &[&[f64]], sectors: u
     (0..=most).map(row).collect()
 }
 
-/// The checks of all nodal diameters in one list, ascending in frequency.
+/// Returns the checks of all nodal diameters in one list, by ascending frequency.
 fn sorted_checks(list: Vec<(u32, [f64; 4])>) -> RomChecks {
     let mut list = list;
     list.sort_by(|a, b| a.1[0].total_cmp(&b.1[0]).then(a.0.cmp(&b.0)));

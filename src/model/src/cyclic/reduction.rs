@@ -1,4 +1,4 @@
-//! From the model of one sector to a checked reduced-order model of the disk.
+//! Reduction of the model of one sector to a checked reduced-order model of the disk.
 
 use faer::{Mat, MatRef, c64};
 use nalgebra::{Complex, DMatrix};
@@ -22,16 +22,18 @@ struct DiameterReduction {
     shapes: Vec<Vec<[Complex<f64>; 3]>>,
 }
 
-/// Reduce one sector of a disk to its contact nodes or patches and modes, for every nodal diameter.
+/// Reduces one sector of a disk to its contact nodes or patches and modes, for every nodal diameter.
 ///
-/// The reduced coordinates of nodal diameter n are the radial, tangential and axial displacements of the contact nodes or patches, one by
-/// one, then the modes, those of what is left of them with the contact held where they are free-interface ones, so `contact_map` is \[I 0\]; see [`tiprub_core::rom::Harmonic`] for how they make the
-/// displacements of sector s. A disk without clamped nodes keeps its rigid-body modes, in nodal diameters 0 and 1. The bits of the
+/// The reduced coordinates of nodal diameter n are the radial, tangential and axial displacements of the contact
+/// nodes or patches, one by one, then the modes (for free-interface modes, the modes of their parts with the contact
+/// held), so `contact_map` is \[I 0\]; [`tiprub_core::rom::Harmonic`] describes how they determine the displacements
+/// of sector s. A disk without clamped nodes keeps its rigid-body modes, in nodal diameters 0 and 1. The bits of the
 /// result do not depend on the number of threads.
 ///
 /// # Errors
-/// [`crate::Error::Invalid`] for contact that is clamped, repeated, on the axis or on a face, patches that depend on each other;
-/// [`crate::Error::NotPositiveDefinite`] for parts that hang loose; and whatever the eigenvalue iteration and the ROM's validation refuse.
+/// [`crate::Error::Invalid`] for contact that is clamped, repeated, on the axis or on a face, and for patches that
+/// depend on each other; [`crate::Error::NotPositiveDefinite`] for unconnected parts; the errors of the eigenvalue
+/// iteration and of the ROM validation.
 pub fn reduce_cyclic(
     model: &FeModel,
     clamped: &[usize],
@@ -78,7 +80,7 @@ fn check_options(contact: &[ContactPoint], options: &CyclicOptions) -> Result<()
     }
 }
 
-/// Everything about one nodal diameter that needs the full model.
+/// Computes everything about one nodal diameter that needs the full model.
 fn find(
     at_rest: &Condensed<'_>,
     shifted: Option<&Condensed<'_>>,
@@ -92,7 +94,7 @@ fn find(
     let full = moving.as_ref().unwrap_or(&held);
     let checked = options.checked_modes.min(parts.order());
     let wanted = families::wanted(options.modes, parts.order() - parts.contact);
-    // The first mode in any case: it tells a mechanism from a structure.
+    // The first mode is always computed, since it distinguishes a mechanism from a structure.
     let mut modes = match (options.kind, wanted) {
         (ReductionKind::FixedInterface, _) => lanczos::lowest_modes(full, parts.order(), checked.max(1))?,
         (ReductionKind::FreeInterface, RequestedModes::Count(count)) => {
@@ -114,7 +116,7 @@ fn find(
     Ok(DiameterReduction { component, full_squares: modes.eigenvalues, shapes })
 }
 
-/// Displacements (x, y, z) of every node of the model; zero where clamped.
+/// Returns the displacements (x, y, z) of every node of the model; zero for clamped nodes.
 fn node_shapes(operator: &CyclicPencil<'_>, shapes: MatRef<'_, c64>, nodes: usize) -> Vec<Vec<[Complex<f64>; 3]>> {
     let sector = operator.condensed.sector;
     let displacements = operator.expand(shapes);
@@ -227,7 +229,7 @@ fn contact_node(model: &FeModel, point: &ContactPoint) -> ContactNode {
 
 fn harmonic(component: &Component, kept: &ComponentModes) -> Harmonic {
     let order = kept.mass.nrows();
-    // Of a real nodal diameter every imaginary part is a zero of either sign.
+    // The imaginary parts of a real nodal diameter are zeros of either sign.
     let entry = |value: c64| Complex::new(value.re, if component.real { 0.0 } else { value.im });
     let copied = |matrix: &Mat<c64>| DMatrix::from_fn(order, order, |i, j| entry(matrix[(i, j)]));
     Harmonic {

@@ -1,8 +1,9 @@
-//! The matrices of one sector, ordered and turned for cyclic symmetry.
+//! Matrices of one sector, ordered and rotated for cyclic symmetry.
 //!
-//! Free nodes stand in the order interior, low face, high face, contact. A high node has the directions of its low node
-//! turned along (u' = Rᵀu with R the turn by one pitch), a contact node has radial, tangential and axial ones. Of
-//! nodal diameter n then only the low face, interior and contact are free: with e = e^(2πin/N)
+//! Free nodes are in the order interior, low face, high face, contact. The directions of a high node are those of its
+//! low node, rotated (u' = Rᵀu with R the rotation by one pitch); the directions of a contact node are radial,
+//! tangential and axial. The free dofs of nodal diameter n are then only those of low face, interior and contact:
+//! with e = e^(2πin/N)
 //!
 //! ```text
 //! u = W x,   x = (x_I, x_L, x_C),   u_I = x_I,  u_L = x_L,  u_H = e x_L,  u_C = x_C,   K_n = WᴴKW,  M_n = WᴴMW.
@@ -30,35 +31,35 @@ pub(super) struct DofCounts {
 }
 
 impl DofCounts {
-    /// Dofs of one nodal diameter.
+    /// Returns the number of dofs of one nodal diameter.
     pub(super) fn order(self) -> usize {
         self.interior + self.face + self.contact
     }
 }
 
-/// One sector, ordered.
+/// Ordered matrices of one sector.
 #[derive(Debug)]
 pub(super) struct Sector {
     pub parts: DofCounts,
-    /// Turned stiffness, both faces.
+    /// Rotated stiffness, with both faces.
     pub stiffness: SparseMatrix,
-    /// Turned mass, with the pattern of the stiffness.
+    /// Rotated mass, with the pattern of the stiffness.
     pub mass: SparseMatrix,
-    /// The mass without its zeros: a third of the entries.
+    /// Mass without its zeros: a third of the entries.
     pub lean_mass: SparseMatrix,
-    /// Node of the model at each place of the order.
+    /// Node of the model at each position of the order.
     pub nodes: Vec<usize>,
-    /// Directions of the node at each place: columns are its three unit vectors.
+    /// Directions of the node at each position: columns are its three unit vectors.
     pub directions: Vec<Matrix3<f64>>,
-    /// Meaning of the variables of the nodes that stand for patches, if there are patches.
+    /// Meaning of the variables of the nodes that represent patches, if there are patches.
     pub patches: Option<PatchCoordinates>,
 }
 
 impl Sector {
-    /// Order and turn the matrices.
+    /// Orders and rotates the matrices.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for contact on a face, for patches that depend on each other, or when nothing is left free.
+    /// [`Error::Invalid`] for contact on a face, for patches that depend on each other, or if no node is free.
     pub(super) fn new(
         model: &FeModel,
         clamped: &[usize],
@@ -104,7 +105,8 @@ impl Sector {
     }
 }
 
-/// Clamped nodes; a face node whose partner is clamped is so, too, since both are one node of the disk.
+/// Returns the clamped nodes; a face node whose partner is clamped is clamped, too, since both are one node of the
+/// disk.
 fn held_nodes(count: usize, clamped: &[usize], boundary: &CyclicBoundary) -> Vec<bool> {
     let mut held = vec![false; count];
     for &node in clamped {
@@ -136,7 +138,7 @@ fn directions(model: &FeModel, parts: DofCounts, nodes: &[usize], pitch: f64) ->
     nodes.iter().enumerate().map(place).collect()
 }
 
-/// Both matrices for the given nodes in the given directions, with all nine entries of every pair of nodes.
+/// Returns both matrices for the given nodes in the given directions, with all nine entries of every pair of nodes.
 fn turned_pair(
     stiffness: &SparseMatrix,
     mass: &SparseMatrix,

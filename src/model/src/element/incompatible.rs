@@ -1,11 +1,12 @@
-//! Hex8 with incompatible modes: bends without locking.
+//! Hex8 with incompatible modes, which bends without locking.
 //!
-//! A trilinear brick answers bending by shear, and is too stiff in it by a factor that grows with the square of its length
-//! over its thickness. Three more shape functions 1 - ξ², 1 - η², 1 - ζ² per displacement component, whose amplitudes belong
-//! to the element alone and are eliminated in it, let its edges curve (Wilson, Taylor, Doherty, Ghaboussi 1973). Their
-//! gradients are taken with the Jacobian of the centre and scaled by det J₀/det J, so that they do no work on constant
-//! stress in a distorted element, which passes the patch test (Taylor, Beresford, Wilson, Int. J. Numer. Methods Eng. 10,
-//! 1976). For the same reason the load of a uniform temperature stays that of hex8.
+//! A trilinear brick responds to bending with shear and is too stiff by a factor that grows with the square of its
+//! length over its thickness. Three more shape functions 1 - ξ², 1 - η², 1 - ζ² per displacement component, whose
+//! amplitudes are internal to the element and eliminated there, allow its edges to curve (Wilson, Taylor, Doherty,
+//! Ghaboussi 1973). Their gradients are evaluated with the Jacobian of the centre and scaled by det J₀/det J, so that
+//! they do no work on constant stress in a distorted element, which passes the patch test (Taylor, Beresford, Wilson,
+//! Int. J. Numer. Methods Eng. 10, 1976). For the same reason the load of a uniform temperature is that of plain
+//! hex8.
 
 use nalgebra::{DMatrix, Matrix3};
 
@@ -13,31 +14,31 @@ use super::matrices::{add_stiffness, jacobian, map_point};
 use super::{ElementKind, QuadraturePoint};
 use crate::{Error, Result, material::Material};
 
-/// Nodes of the brick.
+/// Number of nodes of the brick.
 const NODES: usize = 8;
-/// Incompatible modes, which follow the nodes.
+/// Number of incompatible modes, which follow the nodes.
 const MODES: usize = 3;
 
 /// Formulation of the stiffness of hex8; other elements have one formulation only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Formulation {
-    /// Displacements as they are interpolated, full integration (C3D8).
+    /// Displacement interpolation alone, full integration (C3D8).
     #[default]
     Displacement,
     /// With incompatible modes (C3D8I).
     IncompatibleModes,
 }
 
-/// Stiffness matrix of hex8 with incompatible modes, 24 × 24 in N/m, dofs ordered (node, component).
+/// Computes the stiffness matrix of hex8 with incompatible modes, 24 × 24 in N/m, dofs ordered (node, component).
 ///
 /// # Errors
-/// [`Error::NegativeJacobian`] with `element + 1` as the element's number.
+/// [`Error::NegativeJacobian`] with `element + 1` as the element number.
 pub fn incompatible_stiffness(coordinates: &[[f64; 3]], material: &Material, element: usize) -> Result<DMatrix<f64>> {
     let kind = ElementKind::Hex8;
     let centre = jacobian(&kind.shape([0.0; 3]), coordinates);
     let central = centre.determinant();
     let broken = || Error::NegativeJacobian { element: element + 1, kind, point: 1, determinant: central };
-    // Written so that a NaN is refused, too.
+    // Written so that NaN is rejected, too.
     let inverse = if central > 0.0 { centre.try_inverse() } else { None }.ok_or_else(broken)?;
     let mut whole = DMatrix::zeros(3 * (NODES + MODES), 3 * (NODES + MODES));
     for (index, quadrature) in kind.stiffness_rule().iter().enumerate() {
@@ -57,7 +58,7 @@ pub fn incompatible_stiffness(coordinates: &[[f64; 3]], material: &Material, ele
     Ok(0.5 * (&condensed + condensed.transpose()))
 }
 
-/// Gradients of 1 - ξ², 1 - η², 1 - ζ².
+/// Returns the gradients of 1 - ξ², 1 - η², 1 - ζ².
 fn mode_gradients(quadrature: &QuadraturePoint, inverse: &Matrix3<f64>, scale: f64) -> [[f64; 3]; MODES] {
     core::array::from_fn(|mode| {
         let slope = -2.0 * quadrature.point[mode] * scale;

@@ -5,14 +5,14 @@ use nalgebra::{DMatrix, Matrix3, SMatrix};
 use super::{ElementKind, QuadraturePoint, ShapeFunctions};
 use crate::{Error, Result, material::Material};
 
-/// Shape functions at an integration point with gradients turned to physical space.
+/// Shape functions at an integration point with gradients in physical space.
 pub(super) struct Mapped {
     pub(super) shape: ShapeFunctions,
     /// Quadrature weight times Jacobian determinant (m³).
     pub(super) volume: f64,
 }
 
-/// Jacobian matrix ∂x_i/∂ξ_j.
+/// Returns the Jacobian matrix ∂x_i/∂ξ_j.
 pub(super) fn jacobian(shape: &ShapeFunctions, coordinates: &[[f64; 3]]) -> Matrix3<f64> {
     let mut matrix = Matrix3::zeros();
     for (x, gradient) in coordinates.iter().zip(&shape.gradients) {
@@ -34,7 +34,7 @@ pub(super) fn map_point(
     let mut shape = kind.shape(quadrature.point);
     let jacobian = jacobian(&shape, coordinates);
     let determinant = jacobian.determinant();
-    // The comparison is written so that a NaN coordinate is refused, too.
+    // The comparison is written so that a NaN coordinate is rejected, too.
     let inverse = if determinant > 0.0 { jacobian.try_inverse() } else { None };
     let Some(inverse) = inverse else {
         let (element, point) = (number.0 + 1, number.1 + 1);
@@ -47,12 +47,12 @@ pub(super) fn map_point(
     Ok(Mapped { shape, volume: quadrature.weight * determinant })
 }
 
-/// Stiffness matrix, 3n × 3n in N/m, dofs ordered (node, component).
+/// Computes the stiffness matrix, 3n × 3n in N/m, dofs ordered (node, component).
 ///
 /// K_ab = ∫ λ ∇N_a ∇N_bᵀ + µ ∇N_b ∇N_aᵀ + µ (∇N_a·∇N_b) I dV with Lamé's constants λ, µ.
 ///
 /// # Errors
-/// [`Error::NegativeJacobian`] with `element + 1` as the element's number.
+/// [`Error::NegativeJacobian`] with `element + 1` as the element number.
 pub fn stiffness(
     kind: ElementKind,
     coordinates: &[[f64; 3]],
@@ -69,7 +69,7 @@ pub fn stiffness(
     Ok(matrix)
 }
 
-/// Add one integration point's share to the upper triangle of a stiffness matrix.
+/// Adds the contribution of one integration point to the upper triangle of a stiffness matrix.
 pub(super) fn add_stiffness(
     matrix: &mut DMatrix<f64>,
     gradients: &[[f64; 3]],
@@ -89,10 +89,11 @@ pub(super) fn add_stiffness(
     }
 }
 
-/// Consistent mass matrix per node pair, n × n in kg; each entry holds for all three displacement components.
+/// Computes the consistent mass matrix per node pair, n × n in kg; each entry applies to all three displacement
+/// components.
 ///
 /// # Errors
-/// [`Error::NegativeJacobian`] with `element + 1` as the element's number.
+/// [`Error::NegativeJacobian`] with `element + 1` as the element number.
 pub fn consistent_mass(
     kind: ElementKind,
     coordinates: &[[f64; 3]],
@@ -113,10 +114,10 @@ pub fn consistent_mass(
     Ok(matrix)
 }
 
-/// Conduction matrix ∫ k ∇N_a·∇N_b dV, n × n in W/K, with the conductivity k in W/(m K).
+/// Computes the conduction matrix ∫ k ∇N_a·∇N_b dV, n × n in W/K, with the conductivity k in W/(m K).
 ///
 /// # Errors
-/// [`Error::NegativeJacobian`] with `element + 1` as the element's number.
+/// [`Error::NegativeJacobian`] with `element + 1` as the element number.
 pub fn conduction(
     kind: ElementKind,
     coordinates: &[[f64; 3]],
@@ -137,13 +138,14 @@ pub fn conduction(
     Ok(matrix)
 }
 
-/// Nodal forces per kelvin of a uniform temperature of the element above the reference, 3n values in N/K.
+/// Computes the nodal forces per kelvin of a uniform temperature of the element above the reference, 3n values in
+/// N/K.
 ///
-/// f_a = ∫ B_aᵀ D α (1, 1, 1, 0, 0, 0)ᵀ dV = (3λ + 2µ) α ∫ ∇N_a dV, with the rule of the stiffness, so that K αx = f holds
-/// to rounding: an element that is free to expand does so without stress.
+/// f_a = ∫ B_aᵀ D α (1, 1, 1, 0, 0, 0)ᵀ dV = (3λ + 2µ) α ∫ ∇N_a dV, with the integration rule of the stiffness, so
+/// that K αx = f holds to rounding: a freely expanding element has no stress.
 ///
 /// # Errors
-/// [`Error::NegativeJacobian`] with `element + 1` as the element's number.
+/// [`Error::NegativeJacobian`] with `element + 1` as the element number.
 pub fn thermal_load(
     kind: ElementKind,
     coordinates: &[[f64; 3]],
@@ -153,7 +155,7 @@ pub fn thermal_load(
     thermal_load_of(kind, coordinates, material, &kind.stiffness_rule(), element)
 }
 
-/// The same of some integration points only.
+/// Computes the contribution of some integration points to [`thermal_load`].
 ///
 /// # Errors
 /// The errors of [`thermal_load`].
@@ -178,10 +180,10 @@ pub(crate) fn thermal_load_of(
     Ok(load)
 }
 
-/// ∫ N_a dV over some integration points (m³), per node.
+/// Computes ∫ N_a dV over some integration points (m³), per node.
 ///
 /// # Errors
-/// [`Error::NegativeJacobian`] with `element + 1` as the element's number.
+/// [`Error::NegativeJacobian`] with `element + 1` as the element number.
 pub(crate) fn shape_integrals(
     kind: ElementKind,
     coordinates: &[[f64; 3]],
@@ -196,10 +198,11 @@ pub(crate) fn shape_integrals(
     Ok(integrals)
 }
 
-/// Lumped mass per node (kg): the consistent diagonal scaled to the element's mass (Hinton, Rock, Zienkiewicz 1976).
+/// Computes the lumped mass per node (kg): the consistent diagonal scaled to the mass of the element (Hinton, Rock,
+/// Zienkiewicz 1976).
 ///
 /// # Errors
-/// [`Error::NegativeJacobian`] with `element + 1` as the element's number.
+/// [`Error::NegativeJacobian`] with `element + 1` as the element number.
 pub(crate) fn lumped_mass(
     kind: ElementKind,
     coordinates: &[[f64; 3]],
@@ -211,10 +214,10 @@ pub(crate) fn lumped_mass(
     Ok(consistent.diagonal().iter().map(|mass| mass * scale).collect())
 }
 
-/// Small strains (εxx, εyy, εzz, γxy, γyz, γzx) at a natural point, from nodal displacements in m.
+/// Computes the small strains (εxx, εyy, εzz, γxy, γyz, γzx) at a natural point, from nodal displacements in m.
 ///
 /// # Errors
-/// [`Error::NegativeJacobian`] with `element + 1` as the element's number.
+/// [`Error::NegativeJacobian`] with `element + 1` as the element number.
 pub fn strain(
     kind: ElementKind,
     coordinates: &[[f64; 3]],
@@ -235,7 +238,7 @@ pub fn strain(
     Ok([slope[(0, 0)], slope[(1, 1)], slope[(2, 2)], shear(0, 1), shear(1, 2), shear(2, 0)])
 }
 
-/// Stresses (σxx, σyy, σzz, τxy, τyz, τzx) in Pa of the strains of [`strain`].
+/// Returns the stresses (σxx, σyy, σzz, τxy, τyz, τzx) in Pa for strains as returned by [`strain`].
 pub fn stress(material: &Material, strain: [f64; 6]) -> [f64; 6] {
     let (lambda, shear) = material.lame();
     let pressure = lambda * (strain[0] + strain[1] + strain[2]);

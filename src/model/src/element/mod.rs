@@ -1,4 +1,4 @@
-//! The six solid elements, in the node numbering of Abaqus and CalculiX.
+//! Six solid elements, in the node numbering of Abaqus and CalculiX.
 //!
 //! | kind | CalculiX | natural coordinates | stiffness rule | mass rule |
 //! |---|---|---|---|---|
@@ -9,8 +9,8 @@
 //! | [`Tet4`](ElementKind::Tet4) | C3D4 | r, s, t ≥ 0, r + s + t ≤ 1 | 1 | 4 |
 //! | [`Tet10`](ElementKind::Tet10) | C3D10 | as above | 4 | 14 |
 //!
-//! All displacement interpolation is isoparametric, without reduced integration or selective rules. Hex8 has incompatible
-//! modes as an option, see [`Formulation`].
+//! All elements are isoparametric, without reduced or selective integration. Hex8 has incompatible modes as an
+//! option, see [`Formulation`].
 
 mod incompatible;
 mod matrices;
@@ -31,7 +31,7 @@ pub use shape::ShapeFunctions;
 /// Largest number of nodes of any element.
 pub(crate) const MAX_NODES: usize = 20;
 
-/// A solid element's kind.
+/// Kind of a solid element.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ElementKind {
     /// Trilinear brick.
@@ -52,12 +52,12 @@ impl ElementKind {
     /// All kinds.
     pub const ALL: [Self; 6] = [Self::Hex8, Self::Hex20, Self::Penta6, Self::Penta15, Self::Tet4, Self::Tet10];
 
-    /// Number of nodes.
+    /// Returns the number of nodes.
     pub fn node_count(self) -> usize {
         self.natural_nodes().len()
     }
 
-    /// Name of the element type in Abaqus and CalculiX input files.
+    /// Returns the name of the element type in Abaqus and CalculiX input files.
     pub fn calculix_name(self) -> &'static str {
         match self {
             Self::Hex8 => "C3D8",
@@ -69,7 +69,7 @@ impl ElementKind {
         }
     }
 
-    /// Number of corner nodes; they come first.
+    /// Returns the number of corner nodes, which come first.
     pub fn corner_count(self) -> usize {
         match self {
             Self::Hex8 | Self::Hex20 => 8,
@@ -78,7 +78,7 @@ impl ElementKind {
         }
     }
 
-    /// The quadratic element of the same topology (itself, when it is quadratic).
+    /// Returns the quadratic element of the same topology (itself if it is quadratic).
     pub fn quadratic(self) -> Self {
         match self {
             Self::Hex8 | Self::Hex20 => Self::Hex20,
@@ -87,7 +87,7 @@ impl ElementKind {
         }
     }
 
-    /// Ends of the edges on which the mid-side nodes of the quadratic element sit, in the order of those nodes.
+    /// Returns the ends of the edges of the mid-side nodes of the quadratic element, in the order of those nodes.
     pub fn edges(self) -> &'static [[usize; 2]] {
         match self {
             Self::Hex8 | Self::Hex20 => &HEX_EDGES,
@@ -96,7 +96,7 @@ impl ElementKind {
         }
     }
 
-    /// Corner nodes of the faces, counter-clockwise seen from outside.
+    /// Returns the corner nodes of the faces, counter-clockwise seen from outside.
     pub fn faces(self) -> &'static [&'static [usize]] {
         match self {
             Self::Hex8 | Self::Hex20 => &HEX_FACES,
@@ -105,7 +105,7 @@ impl ElementKind {
         }
     }
 
-    /// Natural coordinates of the nodes.
+    /// Returns the natural coordinates of the nodes.
     pub fn natural_nodes(self) -> &'static [[f64; 3]] {
         match self {
             Self::Hex8 => &HEX_NODES[..8],

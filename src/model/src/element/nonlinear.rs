@@ -1,7 +1,7 @@
 //! Element matrices of a deformed body: large displacements, St. Venant-Kirchhoff material (total Lagrangian form).
 //!
-//! F = I + ∂u/∂X, E = (FᵀF - I)/2, S = λ tr(E) I + 2µE; all integrals run over the undeformed body with the rule of the
-//! linear stiffness (Wriggers, Nonlinear Finite Element Methods, 2008, section 4.2).
+//! F = I + ∂u/∂X, E = (FᵀF - I)/2, S = λ tr(E) I + 2µE; all integrals are over the undeformed body with the rule of
+//! the linear stiffness (Wriggers, Nonlinear Finite Element Methods, 2008, section 4.2).
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
@@ -20,7 +20,7 @@ pub struct ElementTangent {
     pub largest_strain: f64,
 }
 
-/// Deformation gradient F at a mapped point.
+/// Returns the deformation gradient F at a mapped point.
 fn deformation(mapped: &Mapped, displacements: &[[f64; 3]]) -> Matrix3<f64> {
     let mut gradient = Matrix3::identity();
     for (u, slope) in displacements.iter().zip(&mapped.shape.gradients) {
@@ -29,21 +29,22 @@ fn deformation(mapped: &Mapped, displacements: &[[f64; 3]]) -> Matrix3<f64> {
     gradient
 }
 
-/// Green strain E of a deformation gradient.
+/// Returns the Green strain E of a deformation gradient.
 fn green_strain(deformation: &Matrix3<f64>) -> Matrix3<f64> {
     0.5 * (deformation.transpose() * deformation - Matrix3::identity())
 }
 
-/// Second Piola-Kirchhoff stress S of a Green strain (Pa).
+/// Returns the second Piola-Kirchhoff stress S of a Green strain (Pa).
 fn second_stress(material: &Material, strain: &Matrix3<f64>) -> Matrix3<f64> {
     let (lambda, shear) = material.lame();
     Matrix3::identity() * (lambda * strain.trace()) + strain * (2.0 * shear)
 }
 
-/// Second Piola-Kirchhoff stresses (Sxx, Syy, Szz, Sxy, Syz, Szx) in Pa at the points of the stiffness rule.
+/// Computes the second Piola-Kirchhoff stresses (Sxx, Syy, Szz, Sxy, Syz, Szx) in Pa at the points of the stiffness
+/// rule.
 ///
 /// # Errors
-/// [`Error::NegativeJacobian`](crate::Error::NegativeJacobian) with `element + 1` as the element's number.
+/// [`Error::NegativeJacobian`](crate::Error::NegativeJacobian) with `element + 1` as the element number.
 pub fn second_stresses(
     kind: ElementKind,
     coordinates: &[[f64; 3]],
@@ -59,15 +60,16 @@ pub fn second_stresses(
     kind.stiffness_rule().iter().enumerate().map(point).collect()
 }
 
-/// Geometric (stress) stiffness per node pair, n × n in N/m; each entry holds for all three displacement components.
+/// Computes the geometric (stress) stiffness per node pair, n × n in N/m; each entry applies to all three
+/// displacement components.
 ///
 /// g_ab = ∫ ∇N_aᵀ S ∇N_b dV with `stresses` (xx, yy, zz, xy, yz, zx) in Pa at the points of the stiffness rule.
 ///
 /// # Errors
-/// [`Error::NegativeJacobian`](crate::Error::NegativeJacobian) with `element + 1` as the element's number.
+/// [`Error::NegativeJacobian`](crate::Error::NegativeJacobian) with `element + 1` as the element number.
 ///
 /// # Panics
-/// When there are not as many stresses as integration points.
+/// If the numbers of stresses and integration points differ.
 pub fn geometric_stiffness(
     kind: ElementKind,
     coordinates: &[[f64; 3]],
@@ -85,7 +87,7 @@ pub fn geometric_stiffness(
     Ok(matrix)
 }
 
-/// Add a point's part to the upper triangle of the geometric stiffness.
+/// Adds the contribution of a point to the upper triangle of the geometric stiffness.
 fn add_geometric(matrix: &mut DMatrix<f64>, mapped: &Mapped, stress: &Matrix3<f64>) {
     for b in 0..matrix.nrows() {
         let traction = stress * Vector3::from(mapped.shape.gradients[b]) * mapped.volume;
@@ -95,14 +97,13 @@ fn add_geometric(matrix: &mut DMatrix<f64>, mapped: &Mapped, stress: &Matrix3<f6
     }
 }
 
-/// Internal force and tangent stiffness of a deformed element.
+/// Computes the internal force and tangent stiffness of a deformed element.
 ///
-/// f_a = ∫ F S ∇N_a dV, and with p_a = F∇N_a
-/// K_ab = ∫ λ p_a p_bᵀ + µ p_b p_aᵀ + µ (∇N_a·∇N_b) FFᵀ + (∇N_aᵀ S ∇N_b) I dV:
-/// the linear stiffness turned and stretched by F, and the geometric stiffness.
+/// f_a = ∫ F S ∇N_a dV, and, with p_a = F∇N_a, K_ab = ∫ λ p_a p_bᵀ + µ p_b p_aᵀ + µ (∇N_a·∇N_b) FFᵀ + (∇N_aᵀ S ∇N_b)
+/// I dV: the linear stiffness rotated and stretched by F, and the geometric stiffness.
 ///
 /// # Errors
-/// [`Error::NegativeJacobian`](crate::Error::NegativeJacobian) with `element + 1` as the element's number.
+/// [`Error::NegativeJacobian`](crate::Error::NegativeJacobian) with `element + 1` as the element number.
 pub fn tangent(
     kind: ElementKind,
     coordinates: &[[f64; 3]],
@@ -138,7 +139,7 @@ pub fn tangent(
     Ok(ElementTangent { stiffness, force, largest_strain })
 }
 
-/// Add a point's part of the material stiffness to the blocks on and above the diagonal.
+/// Adds the contribution of a point to the blocks of the material stiffness on and above the diagonal.
 fn add_material(stiffness: &mut DMatrix<f64>, mapped: &Mapped, deformation: &Matrix3<f64>, material: &Material) {
     let nodes = stiffness.nrows() / 3;
     let (lambda, shear) = material.lame();

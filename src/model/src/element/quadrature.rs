@@ -6,7 +6,7 @@
 
 use super::ElementKind;
 
-/// A point of an integration rule.
+/// Point of an integration rule.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct QuadraturePoint {
     /// Natural coordinates.
@@ -23,7 +23,7 @@ const TRIANGLE_3: [([f64; 2], f64); 3] =
     [([1.0 / 6.0, 1.0 / 6.0], 1.0 / 6.0), ([2.0 / 3.0, 1.0 / 6.0], 1.0 / 6.0), ([1.0 / 6.0, 2.0 / 3.0], 1.0 / 6.0)];
 
 impl ElementKind {
-    /// Rule of the stiffness matrix.
+    /// Returns the rule of the stiffness matrix.
     pub fn stiffness_rule(self) -> Vec<QuadraturePoint> {
         match self {
             Self::Hex8 => brick(&GAUSS_2),
@@ -35,7 +35,8 @@ impl ElementKind {
         }
     }
 
-    /// Rule of the mass matrix: exact for products of shape functions over an element with constant Jacobian.
+    /// Returns the rule of the mass matrix, which is exact for products of shape functions over an element with
+    /// constant Jacobian.
     pub fn mass_rule(self) -> Vec<QuadraturePoint> {
         match self {
             Self::Hex8 | Self::Hex20 | Self::Penta6 => self.stiffness_rule(),
@@ -74,7 +75,7 @@ fn triangle_6() -> Vec<([f64; 2], f64)> {
     rule
 }
 
-/// The four points with barycentric coordinates (a, a, a, 1 - 3a) in every order.
+/// Returns the four points with barycentric coordinates (a, a, a, 1 - 3a) in every order.
 fn corner_orbit(a: f64, weight: f64) -> [QuadraturePoint; 4] {
     let b = 1.0 - 3.0 * a;
     [[a, a, a], [b, a, a], [a, b, a], [a, a, b]].map(|point| QuadraturePoint { point, weight })

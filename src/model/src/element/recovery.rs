@@ -1,8 +1,8 @@
-//! Stress at the nodes of an element, from where it is most exact.
+//! Stress at the nodes of an element, extrapolated from its most accurate points.
 //!
-//! Stresses of finite elements are most exact at the points of reduced integration (Barlow, Int. J. Numer. Methods Eng. 10, 1976).
-//! Between them the shape functions of the element's corners are laid, and these are read at the node (Hinton, Campbell, Int. J. Numer.
-//! Methods Eng. 8, 1974), which is linear in the displacements.
+//! Finite-element stresses are most accurate at the points of reduced integration (Barlow, Int. J. Numer. Methods
+//! Eng. 10, 1976). The shape functions of the element corners interpolate them, and this interpolation is evaluated
+//! at the node (Hinton, Campbell, Int. J. Numer. Methods Eng. 8, 1974); the result is linear in the displacements.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -10,11 +10,11 @@ use super::matrices::map_point;
 use super::{ElementKind, QuadraturePoint};
 use crate::{Error, Result, material::Material};
 
-/// Components of stress.
+/// Number of stress components.
 const COMPONENTS: usize = 6;
 
 impl ElementKind {
-    /// The linear element of the same topology (itself, when it is linear).
+    /// Returns the linear element of the same topology (itself if it is linear).
     fn linear(self) -> Self {
         match self {
             Self::Hex8 | Self::Hex20 => Self::Hex8,
@@ -23,7 +23,7 @@ impl ElementKind {
         }
     }
 
-    /// Points of reduced integration: as many as corners, or the middle alone where stress is constant.
+    /// Returns the points of reduced integration: as many as corners, or the middle alone if stress is constant.
     fn stress_points(self) -> Vec<QuadraturePoint> {
         match self {
             Self::Tet4 | Self::Tet10 => self.stiffness_rule(),
@@ -31,7 +31,8 @@ impl ElementKind {
         }
     }
 
-    /// Weights of the stresses at [`stress_points`](Self::stress_points) in the stress at a natural point.
+    /// Returns the weights of the stresses at [`stress_points`](Self::stress_points) in the stress at a natural
+    /// point.
     fn stress_weights(self, points: &[QuadraturePoint], at: [f64; 3]) -> Option<DVector<f64>> {
         if points.len() == 1 {
             return Some(DVector::from_element(1, 1.0));
@@ -44,11 +45,11 @@ impl ElementKind {
     }
 }
 
-/// Stresses (σxx, σyy, σzz, τxy, τyz, τzx) in Pa at a node of an element per displacement of its nodes (m), 6 × 3n, dofs ordered (node,
-/// component); `node` counts within the element.
+/// Returns the stresses (σxx, σyy, σzz, τxy, τyz, τzx) in Pa at a node of an element per displacement of its nodes
+/// (m), 6 × 3n, dofs ordered (node, component); `node` counts within the element.
 ///
 /// # Errors
-/// [`Error::NegativeJacobian`] with `element + 1` as the element's number.
+/// [`Error::NegativeJacobian`] with `element + 1` as the element number.
 pub fn nodal_stress(
     kind: ElementKind,
     coordinates: &[[f64; 3]],
@@ -70,7 +71,7 @@ pub fn nodal_stress(
                     rows[(normal, column)] += weight * lambda * slope;
                 }
                 rows[(i, column)] += weight * 2.0 * shear * slope;
-                // τxy, τyz, τzx: of each the component and the next one around.
+                // τxy, τyz, τzx: each combines a component with the next one cyclically.
                 let next = (i + 1) % 3;
                 let before = (i + 2) % 3;
                 rows[(3 + i, column)] += weight * shear * gradient[next];

@@ -12,7 +12,7 @@ pub struct ShapeFunctions {
 }
 
 impl ElementKind {
-    /// Shape functions at a natural point.
+    /// Returns the shape functions at a natural point.
     pub fn shape(self, point: [f64; 3]) -> ShapeFunctions {
         match self {
             Self::Hex8 => hex8(point),
@@ -27,7 +27,8 @@ impl ElementKind {
 
 const ZERO: ShapeFunctions = ShapeFunctions { values: [0.0; MAX_NODES], gradients: [[0.0; 3]; MAX_NODES] };
 
-/// One direction's factor of a brick function and its derivative: 1 + aξ at ends (a = ±1), 1 - ξ² mid-side (a = 0).
+/// Returns the factor of a brick function in one direction and its derivative: 1 + aξ at ends (a = ±1), 1 - ξ²
+/// mid-side (a = 0).
 fn brick_factor(node: f64, x: f64) -> (f64, f64) {
     if node == 0.0 { (1.0 - x * x, -2.0 * x) } else { (1.0 + node * x, node) }
 }

@@ -1,8 +1,8 @@
-//! Weighted graphs, their parts, and their coarser images.
+//! Weighted graphs, their subgraphs and their coarsened versions.
 
 use rayon::prelude::*;
 
-/// An undirected graph: neighbours of each vertex without itself, weights of vertices and edges.
+/// Undirected graph: neighbours of each vertex (without itself), weights of vertices and edges.
 #[derive(Debug, Clone)]
 pub(super) struct Graph {
     /// Start of each vertex's neighbours, and the end of the last one's.
@@ -10,7 +10,7 @@ pub(super) struct Graph {
     pub(super) neighbours: Vec<usize>,
     /// Weight of the edge to each neighbour.
     edge_weights: Vec<usize>,
-    /// Degrees of freedom a vertex stands for.
+    /// Number of degrees of freedom per vertex.
     pub(super) weights: Vec<usize>,
 }
 
@@ -26,7 +26,7 @@ impl Graph {
         }
     }
 
-    /// Add a neighbour of the vertex that [`Self::finish_vertex`] ends.
+    /// Adds a neighbour of the vertex that [`Self::finish_vertex`] ends.
     pub(super) fn push_neighbour(&mut self, neighbour: usize, edge_weight: usize) {
         self.neighbours.push(neighbour);
         self.edge_weights.push(edge_weight);
@@ -54,7 +54,7 @@ impl Graph {
         self.weights.iter().sum()
     }
 
-    /// Weigh every edge by what its ends have in common, so that matching pairs those that lie close.
+    /// Weights every edge by the number of common neighbours of its ends, so that matching pairs close vertices.
     pub(super) fn weigh_edges(&mut self) {
         let graph = &*self;
         let weights = (0..graph.order()).into_par_iter().flat_map_iter(|vertex| {
@@ -64,7 +64,7 @@ impl Graph {
         self.edge_weights = weights.collect();
     }
 
-    /// The subgraph of some vertices, numbered as they are given.
+    /// Returns the subgraph of some vertices, numbered in the given order.
     pub(super) fn induced(&self, vertices: &[usize]) -> Self {
         let mut position = vec![usize::MAX; self.order()];
         for (new, &old) in vertices.iter().enumerate() {
@@ -83,7 +83,7 @@ impl Graph {
         part
     }
 
-    /// The graph with pairs of vertices that a heavy edge joins made one, and the vertex each one goes into.
+    /// Merges pairs of vertices that are connected by a heavy edge, and returns the new vertex of each vertex.
     ///
     /// No vertex becomes heavier than `heaviest`.
     pub(super) fn coarser(&self, heaviest: usize, salt: usize) -> (Self, Vec<usize>) {
@@ -98,7 +98,7 @@ impl Graph {
             }
         }
         let mut coarse = Self::with_capacity(leaders.len(), self.neighbours.len() / 2);
-        // Where a neighbour of the vertex at hand stands in the list.
+        // Position of a neighbour of the current vertex in the list.
         let mut place = vec![usize::MAX; leaders.len()];
         for (number, &leader) in leaders.iter().enumerate() {
             let start = coarse.neighbours.len();
@@ -123,7 +123,7 @@ impl Graph {
         (coarse, coarse_of)
     }
 
-    /// Partner of every vertex, itself where it has none.
+    /// Returns the partner of every vertex, or the vertex itself without a partner.
     fn heavy_edge_matching(&self, heaviest: usize, salt: usize) -> Vec<usize> {
         let mut pairs = vec![usize::MAX; self.order()];
         for vertex in scrambled(self.order(), salt) {
@@ -145,7 +145,7 @@ impl Graph {
     }
 }
 
-/// Number of entries that two ascending lists share.
+/// Returns the number of common entries of two ascending lists.
 fn common(first: &[usize], second: &[usize]) -> usize {
     let (mut i, mut k, mut count) = (0, 0, 0);
     while i < first.len() && k < second.len() {
@@ -157,7 +157,7 @@ fn common(first: &[usize], second: &[usize]) -> usize {
     count
 }
 
-/// A fixed sequence without pattern (splitmix64).
+/// Returns a fixed pseudo-random number (splitmix64).
 pub(super) fn scramble(number: usize) -> u64 {
     let mut bits = (number as u64).wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -165,7 +165,7 @@ pub(super) fn scramble(number: usize) -> u64 {
     bits ^ (bits >> 31)
 }
 
-/// The numbers below `count` in an order without pattern.
+/// Returns the numbers below `count` in pseudo-random order.
 fn scrambled(count: usize, salt: usize) -> Vec<usize> {
     let mut numbers: Vec<usize> = (0..count).collect();
     numbers.sort_unstable_by_key(|&number| (scramble(salt + number), number));

@@ -1,36 +1,37 @@
-//! A small set of vertices without which a graph falls into two parts of about the same weight.
+//! Small vertex separators that divide a graph into two parts of about equal weight.
 //!
-//! Multilevel: the graph is coarsened by heavy-edge matching, the coarsest one is halved by growing regions from several
-//! seeds, and on the way back the separator is refined at every level by moving its vertices to one side, which draws
-//! their neighbours of the other side into it (C. M. Fiduccia, R. M. Mattheyses, DAC 1982, for vertex separators).
+//! Multilevel method: the graph is coarsened by heavy-edge matching, the coarsest one is halved by growing regions
+//! from several seeds, and during uncoarsening the separator is refined at every level by moving its vertices to one
+//! side, which adds their neighbours on the other side to it (C. M. Fiduccia, R. M. Mattheyses, DAC 1982, for vertex
+//! separators).
 
 use core::cmp::Reverse;
 use std::collections::{BinaryHeap, VecDeque};
 
 use super::graph::{Graph, scramble};
 
-/// Mark of the separator's vertices; those of the parts are 0 and 1.
+/// Mark of the vertices of the separator; those of the parts are 0 and 1.
 pub(super) const SEPARATOR: usize = 2;
 
-/// Coarsening ends here,
+/// Number of vertices at which coarsening ends.
 const COARSEST: usize = 40;
-/// or when a step leaves more than this share of the vertices.
+/// Coarsening also ends if a step keeps more than this fraction of the vertices.
 const STALLED: f64 = 0.95;
-/// Attempts at the coarser half of the levels,
+/// Number of attempts at the coarser half of the levels.
 const ATTEMPTS: usize = 3;
-/// which is where this many vertices of the graph have become one.
+/// Ratio of the vertices of the graph to those at which the attempts begin.
 const SHRINKAGE: usize = 30;
-/// Seeds tried on the coarsest graph.
+/// Number of seeds on the coarsest graph.
 const SEEDS: usize = 12;
 /// Refinement passes per level.
 const PASSES: usize = 8;
-/// A pass ends after this many moves without a better separator.
+/// Number of moves without a better separator after which a pass ends.
 const PATIENCE: usize = 200;
 
-/// Side (0, 1 or [`SEPARATOR`]) of every vertex.
+/// Returns the side (0, 1 or [`SEPARATOR`]) of every vertex.
 pub(super) fn separator(graph: &Graph) -> Vec<usize> {
     let heaviest = (3 * graph.total_weight()).div_ceil(2 * COARSEST);
-    // What the first coarse graphs look like matters little, so that attempts may begin at a smaller one.
+    // The first coarse graphs have little influence, so that attempts may begin at a smaller one.
     let levels = coarsened(graph, graph.order().div_ceil(SHRINKAGE).max(COARSEST), heaviest, 0);
     let middle = levels.last().map_or(graph, |(coarse, _)| coarse);
     let attempts = (0..ATTEMPTS).map(|attempt| {
@@ -42,7 +43,8 @@ pub(super) fn separator(graph: &Graph) -> Vec<usize> {
     refined(graph, &levels, best)
 }
 
-/// Coarser and coarser graphs down to about `target` vertices, each with the vertices that those of the finer one go into.
+/// Coarsens the graph repeatedly to about `target` vertices; each level has the map from the vertices of the finer
+/// one.
 fn coarsened(graph: &Graph, target: usize, heaviest: usize, salt: usize) -> Vec<(Graph, Vec<usize>)> {
     let mut levels: Vec<(Graph, Vec<usize>)> = Vec::new();
     loop {
@@ -58,7 +60,7 @@ fn coarsened(graph: &Graph, target: usize, heaviest: usize, salt: usize) -> Vec<
     }
 }
 
-/// The sides of the coarsest graph brought to the finest, better at every level.
+/// Projects the sides of the coarsest graph to the finest, with refinement at every level.
 fn refined(graph: &Graph, levels: &[(Graph, Vec<usize>)], mut sides: Vec<usize>) -> Vec<usize> {
     for (level, (_, map)) in levels.iter().enumerate().rev() {
         let finer = if level == 0 { graph } else { &levels[level - 1].0 };
@@ -70,12 +72,12 @@ fn refined(graph: &Graph, levels: &[(Graph, Vec<usize>)], mut sides: Vec<usize>)
     sides
 }
 
-/// Best of several regions grown to half of the weight.
+/// Returns the best of several regions grown to half of the weight.
 fn initial(graph: &Graph, salt: usize) -> Vec<usize> {
     let attempts = (0..SEEDS).map(|attempt| {
         #[expect(clippy::cast_possible_truncation, reason = "a remainder below the number of vertices")]
         let random = (scramble(salt * SEEDS + attempt) % graph.order() as u64) as usize;
-        // Every other one from as far out as two searches get.
+        // Every other seed is as far out as two searches reach.
         let seed = if attempt % 2 == 0 { farthest(graph, farthest(graph, random)) } else { random };
         let mut partition = Partition::new(graph, grown(graph, seed));
         partition.refine();
@@ -84,7 +86,7 @@ fn initial(graph: &Graph, salt: usize) -> Vec<usize> {
     attempts.min_by_key(|(cost, _)| *cost).map_or_else(Vec::new, |(_, sides)| sides)
 }
 
-/// Vertices in breadth-first order, what is not connected to the seed after what is.
+/// Returns the vertices in breadth-first order, those unconnected with the seed last.
 fn breadth_first(graph: &Graph, seed: usize) -> Vec<usize> {
     let mut seen = vec![false; graph.order()];
     let mut order = Vec::with_capacity(graph.order());
@@ -109,7 +111,7 @@ fn farthest(graph: &Graph, seed: usize) -> usize {
     breadth_first(graph, seed).last().copied().unwrap_or(seed)
 }
 
-/// Half of the weight around the seed on side 0, its border as separator, the rest on side 1.
+/// Puts half of the weight around the seed on side 0, its border into the separator, the rest on side 1.
 fn grown(graph: &Graph, seed: usize) -> Vec<usize> {
     let mut sides = vec![1; graph.order()];
     let (half, mut weight) = (graph.total_weight() / 2, 0);
@@ -135,11 +137,11 @@ struct Partition<'a> {
     sides: Vec<usize>,
     /// Weights of the parts and of the separator.
     weights: [usize; 3],
-    /// A part is not to become heavier.
+    /// Largest allowed weight of a part.
     heaviest: usize,
 }
 
-/// One move: the vertex, and how many neighbours it drew into the separator.
+/// A move: the vertex, and the number of neighbours that it added to the separator.
 struct Move {
     vertex: usize,
     drawn: usize,
@@ -161,13 +163,13 @@ impl<'a> Partition<'a> {
     fn cost(&self) -> (usize, u128) {
         let [first, second, middle] = self.weights;
         let overweight = first.max(second).saturating_sub(self.heaviest);
-        // middle · ((first + second) / 2)² / (first · second), with a few digits behind the point.
+        // middle · ((first + second) / 2)² / (first · second), with a few decimals.
         let [first, second, middle] = [first, second, middle].map(|weight| weight as u128);
         (overweight, 256 * middle * (first + second).pow(2) / (first * second).max(1))
     }
 
-    /// Passes to either side in turn. One that could go both ways would hold a separator where it is: only as a whole
-    /// does a plane of vertices move over a plateau.
+    /// Alternates passes to either side. A pass that could move vertices both ways would keep a separator in place: a
+    /// plane of vertices only crosses a plateau as a whole.
     fn refine(&mut self) {
         for _ in 0..PASSES {
             let before = self.cost();
@@ -179,10 +181,10 @@ impl<'a> Partition<'a> {
         }
     }
 
-    /// Move separator vertices to one side, best gain first, each at most once, and go back to the best state met.
+    /// Moves separator vertices to one side, best gain first, each at most once, and returns to the best state found.
     fn pass(&mut self, side: usize) {
         let mut locked = vec![false; self.sides.len()];
-        // By how much the separator shrinks when a vertex of it goes to that side.
+        // Decrease of the separator size if a vertex moves to that side.
         let mut gains = vec![0; self.sides.len()];
         let mut queue = Queue::new();
         for vertex in 0..self.sides.len() {
@@ -230,7 +232,7 @@ impl<'a> Partition<'a> {
         }
     }
 
-    /// The gain of a vertex of the separator, and its place in the queue.
+    /// Adds the gain of a vertex of the separator to the queue.
     fn enter(&self, vertex: usize, side: usize, gains: &mut [isize], queue: &mut Queue) {
         let far = self.graph.neighbours_of(vertex).iter().filter(|&&near| self.sides[near] == 1 - side);
         let drawn: usize = far.map(|&near| self.graph.weights[near]).sum();
@@ -238,7 +240,7 @@ impl<'a> Partition<'a> {
         queue.push((gains[vertex], Reverse(vertex)));
     }
 
-    /// The best move that keeps the balance, or betters it; what stands in the queue out of date is dropped.
+    /// Returns the best move that keeps or improves the balance; outdated entries of the queue are dropped.
     fn next(&self, queue: &mut Queue, side: usize, gains: &[isize], locked: &[bool]) -> Option<usize> {
         while let Some((gain, Reverse(vertex))) = queue.pop() {
             let after = self.weights[side] + self.graph.weights[vertex];

@@ -1,14 +1,16 @@
-//! Patches as degrees of freedom of their own: an exact change of variables u = T v of the full model.
+//! Patches as degrees of freedom: an exact change of variables u = T v of the full model.
 //!
-//! Every patch k has a node, its pivot, that gives its own displacement up for that of the patch. With the weights w, the directions R_p of
-//! node p (columns: the unit vectors of the patch's components there), pivots P and the other nodes O of patches
+//! Every patch k has a pivot, a node whose displacement is replaced by that of the patch. With the weights w, the
+//! directions R_p of node p (columns: the unit vectors of the patch components there), pivots P and the other nodes O
+//! of patches
 //!
 //! ```text
 //! R_kᵀ v_k = Σ_p w_kp R_pᵀ u_p  (k in P),   v_p = u_p  (elsewhere),   so that   u_P = R_P W_PP⁻¹ (R_Pᵀ v_P − W_PO R_Oᵀ v_O).
 //! ```
 //!
-//! With K ← TᵀKT and M ← TᵀMT the mean displacements of patches are boundary degrees of freedom as those of contact nodes are: they can be
-//! held, condensed to, turned. Forces on patches are forces on pivots. What fills up are the rows of nodes of patches and of those beside pivots.
+//! With K ← TᵀKT and M ← TᵀMT the mean displacements of patches are boundary degrees of freedom like those of contact
+//! nodes: they can be held, condensed to, and rotated. Forces on patches are forces on pivots. Fill occurs in the
+//! rows of the nodes of patches and of the neighbours of pivots.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::{Add, Mul};
@@ -22,31 +24,32 @@ use crate::contact_point::{ContactPoint, clamped_point};
 use crate::sparse::{Pattern, SparseMatrix};
 use crate::{Error, Result};
 
-/// Share of the largest weight of a patch that must be left at a pivot once the other patches are taken out: below it patches depend on
-/// each other.
+/// Fraction of the largest weight of a patch that must remain at a pivot after elimination of the other patches;
+/// below it, patches depend on each other.
 const LEAST_PIVOT: f64 = 1e-6;
-/// Entries that patches may add to the matrices: two of these take a gigabyte.
+/// Largest number of entries that patches may add to the matrices: two such matrices take a gigabyte.
 const MOST_ENTRIES: usize = 50_000_000;
 
-/// The change of variables u = T v.
+/// Change of variables u = T v.
 #[derive(Debug)]
 pub(crate) struct PatchCoordinates {
-    /// The contact, patches being nodes of their own: their pivots.
+    /// The contact, with each patch represented by its pivot.
     points: Vec<ContactPoint>,
     /// Degrees of freedom of the pivots, point by point.
     pivots: Vec<usize>,
-    /// Degrees of freedom of all nodes of the contact, ascending.
+    /// Degrees of freedom of all contact nodes, ascending.
     touched: Vec<usize>,
     /// u at the pivots from v at the touched ones.
     dependence: DMatrix<f64>,
 }
 
 impl PatchCoordinates {
-    /// Makes the coordinates of contact with patches, `None` without patches; for matrices of the degrees of freedom `free` (3·node + component,
-    /// ascending).
+    /// Creates the coordinates of contact with patches, `None` without patches, for matrices of the degrees of
+    /// freedom `free` (3·node + component, ascending).
     ///
     /// # Errors
-    /// [`Error::Invalid`] for patches that depend on each other, have a node that is not free, or have too many nodes.
+    /// [`Error::Invalid`] for patches that depend on each other, have a node that is not free, or have too many
+    /// nodes.
     pub(crate) fn new(
         free: &[usize],
         nodes: &[[f64; 3]],
@@ -80,15 +83,15 @@ impl PatchCoordinates {
         }))
     }
 
-    /// The contact as nodes alone, those that stand for patches.
+    /// Returns the contact as nodes alone, with patches represented by nodes.
     pub(crate) fn points(&self) -> &[ContactPoint] {
         &self.points
     }
 
-    /// TᵀKT and TᵀMT, of one pattern.
+    /// Returns TᵀKT and TᵀMT, with a common pattern.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for patches of more nodes than memory is meant for.
+    /// [`Error::Invalid`] for patches with more nodes than the memory limit permits.
     pub(crate) fn transformed(
         &self,
         stiffness: &SparseMatrix,
@@ -110,7 +113,8 @@ impl PatchCoordinates {
         Ok((stiffness, mass))
     }
 
-    /// The same for patches of few nodes that are spread over the mesh: only nodes of a patch and those beside its pivot are coupled.
+    /// Computes TᵀKT and TᵀMT for patches of few nodes that are spread over the mesh: only the nodes of a patch and
+    /// the neighbours of its pivot are coupled.
     pub(crate) fn transformed_sparsely(
         &self,
         stiffness: &SparseMatrix,
@@ -119,7 +123,7 @@ impl PatchCoordinates {
         let old = &stiffness.pattern;
         let mut row = vec![usize::MAX; old.order()];
         self.pivots.iter().enumerate().for_each(|(index, &dof)| row[dof] = index);
-        // What a degree of freedom of u is of those of v.
+        // Each degree of freedom of u as a combination of those of v.
         let parts: Vec<Vec<(usize, f64)>> = (0..self.pivots.len())
             .map(|pivot| {
                 let own = self.touched.iter().enumerate().map(|(j, &dof)| (dof, self.dependence[(pivot, j)]));
@@ -138,7 +142,7 @@ impl PatchCoordinates {
                 let values = [stiffness.values[entry], mass.values[entry]];
                 for &(b, share) in part(column) {
                     for &(a, other) in part(other) {
-                        // Half of each triangle, so that rounding leaves the matrices symmetric.
+                        // Half from each triangle, so that rounding leaves the matrices symmetric.
                         for place in [(b, a), (a, b)] {
                             let sums = added.entry(place).or_default();
                             sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += 0.5 * share * other * value);
@@ -192,7 +196,8 @@ impl PatchCoordinates {
         pattern
     }
 
-    /// TᵀAT: without rows and columns of pivots A is what it was, and DᵀA_P + A_PᵀD + DᵀA_PP D is added, D being the pivots' rows of T.
+    /// Computes TᵀAT: without rows and columns of pivots A is unchanged, and DᵀA_P + A_PᵀD + DᵀA_PP D is added, with
+    /// D as the rows of T of the pivots.
     fn projected(&self, matrix: &SparseMatrix, pattern: &Arc<Pattern>, near: &[usize]) -> SparseMatrix {
         let mut place = vec![usize::MAX; matrix.order()];
         near.iter().enumerate().for_each(|(index, &dof)| place[dof] = index);
@@ -234,7 +239,7 @@ impl PatchCoordinates {
         SparseMatrix { pattern: Arc::clone(pattern), values }
     }
 
-    /// u at the degrees of freedom of the pivots, from v.
+    /// Returns u at the degrees of freedom of the pivots from v.
     pub(crate) fn displaced<V: Copy + Add<Output = V> + Mul<f64, Output = V>>(
         &self,
         zero: V,
@@ -247,7 +252,7 @@ impl PatchCoordinates {
         self.pivots.iter().enumerate().map(own).collect()
     }
 
-    /// Columns of forces f on u become those on v, Tᵀf.
+    /// Transforms columns of forces f on u to forces on v, Tᵀf.
     pub(crate) fn project(&self, forces: &mut Mat<f64>) {
         for k in 0..forces.ncols() {
             let own: Vec<f64> = self.pivots.iter().map(|&dof| forces[(dof, k)]).collect();
@@ -258,7 +263,7 @@ impl PatchCoordinates {
         }
     }
 
-    /// Columns v become u = T v.
+    /// Transforms columns v to u = T v.
     pub(crate) fn restore(&self, columns: &mut Mat<f64>) {
         for k in 0..columns.ncols() {
             let own = self.displaced(0.0, |dof| columns[(dof, k)]);
@@ -267,19 +272,19 @@ impl PatchCoordinates {
     }
 }
 
-/// All three degrees of freedom of every node must be there.
+/// Checks that all three degrees of freedom of every node are free.
 fn check_free(free: &[usize], contact: &[ContactPoint]) -> Result<()> {
     let moves = |(node, _): (usize, f64)| (0..3).all(|axis| free.binary_search(&(3 * node + axis)).is_ok());
     contact.iter().find(|point| !point.weights().all(moves)).map_or(Ok(()), |point| Err(clamped_point(point)))
 }
 
-/// Places of nodes' degrees of freedom among the free ones.
+/// Returns the positions of the degrees of freedom of nodes among the free ones.
 fn dofs(free: &[usize], nodes: &[usize]) -> Vec<usize> {
     let first = |node: usize| free.partition_point(|dof| *dof < 3 * node);
     nodes.iter().flat_map(|&node| (0..3).map(move |axis| first(node) + axis)).collect()
 }
 
-/// Patches × nodes; a contact node alone has the weight one.
+/// Returns the weights, patches × nodes; a single contact node has the weight one.
 fn weights(contact: &[ContactPoint], nodes: &[usize]) -> DMatrix<f64> {
     let mut weights = DMatrix::zeros(contact.len(), nodes.len());
     for (row, point) in contact.iter().enumerate() {
@@ -290,7 +295,7 @@ fn weights(contact: &[ContactPoint], nodes: &[usize]) -> DMatrix<f64> {
     weights
 }
 
-/// Columns: the unit vectors of the components of contact displacements at a node.
+/// Returns the unit vectors of the components of contact displacements at a node as columns.
 fn directions([x, y, _]: [f64; 3], frame: DisplacementFrame) -> Matrix3<f64> {
     match frame {
         DisplacementFrame::Cartesian => Matrix3::identity(),
@@ -302,7 +307,8 @@ fn directions([x, y, _]: [f64; 3], frame: DisplacementFrame) -> Matrix3<f64> {
     }
 }
 
-/// Chooses a node for every patch by elimination with complete pivoting, so that W_PP is as well conditioned as the weights permit.
+/// Chooses a node for every patch by elimination with complete pivoting, so that W_PP is as well conditioned as the
+/// weights permit.
 fn pivots(weights: &DMatrix<f64>, contact: &[ContactPoint]) -> Result<Vec<usize>> {
     let mut left = weights.clone();
     left.row_iter_mut().for_each(|mut row| row /= row.amax());
@@ -310,7 +316,7 @@ fn pivots(weights: &DMatrix<f64>, contact: &[ContactPoint]) -> Result<Vec<usize>
     for _patch in contact {
         let open = (0..contact.len()).filter(|&row| chosen[row] == usize::MAX);
         let entries = open.flat_map(|row| (0..left.ncols()).map(move |column| (row, column)));
-        // The first of equals, so that nothing depends on rounding of what follows.
+        // The first of equal entries, so that the choice does not depend on rounding.
         let (row, column) = entries.fold((usize::MAX, 0), |best, at| match best.0 {
             usize::MAX => at,
             _ if left[at].abs() > left[best].abs() => at,
@@ -360,7 +366,8 @@ mod tests {
         ContactPoint { patch: patch.to_vec(), ..ContactPoint::at(name, patch[0].0, 0.0) }
     }
 
-    /// Two patches that share nodes, and a node: TᵀAT with T column by column, and the means of what T makes of units.
+    /// Two patches with common nodes, and a node: compares TᵀAT with T column by column, and checks the means of unit
+    /// vectors.
     #[test]
     fn the_change_of_variables_is_exact() {
         let nodes: Vec<[f64; 3]> =

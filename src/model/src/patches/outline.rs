@@ -1,4 +1,4 @@
-//! The outline of a tip: its two sides at every place along the chord.
+//! Outline of a tip: its two sides at every place along the chord.
 
 use std::collections::HashMap;
 
@@ -6,10 +6,10 @@ use super::ElementFaces;
 use crate::mesh::Mesh;
 use crate::places::Places;
 
-/// Straight parts that a curved edge is taken as.
+/// Number of straight parts that approximate a curved edge.
 const PARTS: usize = 8;
 
-/// The parabola through the ends and the mid-side node of an edge, in straight parts.
+/// Approximates the parabola through the ends and the mid-side node of an edge by straight parts.
 fn curved([first, last]: [[f64; 2]; 2], middle: [f64; 2]) -> Vec<[[f64; 2]; 2]> {
     let at = |part: usize| -> [f64; 2] {
         let s = part as f64 / PARTS as f64;
@@ -19,7 +19,7 @@ fn curved([first, last]: [[f64; 2]; 2], middle: [f64; 2]) -> Vec<[[f64; 2]; 2]> 
     (0..PARTS).map(|part| [at(part), at(part + 1)]).collect()
 }
 
-/// Edges that belong to a single face of the tip: places along the chord and across it of both ends (m).
+/// Edges that belong to a single face of the tip: positions of both ends along the chord and across it (m).
 pub(super) struct Outline(Vec<[[f64; 2]; 2]>);
 
 impl Outline {
@@ -52,7 +52,7 @@ impl Outline {
         if high > low { ((across - low) / (high - low)).clamp(0.0, 1.0) } else { 0.5 }
     }
 
-    /// Outermost crossings of the outline with a line across the chord.
+    /// Returns the outermost crossings of the outline with a line across the chord.
     fn sides(&self, along: f64) -> [f64; 2] {
         let mut found = [f64::INFINITY, f64::NEG_INFINITY];
         for [[a, low], [b, high]] in &self.0 {

@@ -1,4 +1,4 @@
-//! The tip and the root of a blade, found in its mesh.
+//! Detection of the tip and the root of a blade in its mesh.
 
 use std::collections::{BTreeSet, HashMap};
 
@@ -9,24 +9,25 @@ use crate::mesh::{Element, Mesh};
 use crate::places::Places;
 use crate::{Error, Result};
 
-/// Cosine of the largest angle between the radial direction and the outward normal of a face that faces outward: 45 degrees.
+/// Cosine of the largest angle between the radial direction and the normal of an outward face: 45 degrees.
 const OUTWARD: f64 = core::f64::consts::FRAC_1_SQRT_2;
-/// Share of the radius by which another face may lie below the tip at its axial position and still be as far out.
+/// Fraction of the radius by which another face may lie below the tip at its axial position and still count as
+/// equally far out.
 const AS_FAR_OUT: f64 = 1e-3;
 
-/// Share of the chord at which elements across it are counted: near its middle, on no line of a regular mesh.
+/// Fraction of the chord at which elements across it are counted: near its middle, on no line of a regular mesh.
 const MIDDLE: f64 = 0.4931;
 
-/// A tip found in a mesh.
+/// Tip that was found in a mesh.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FoundTip {
-    /// Nodes of the tip, with mid-side nodes, ascending.
+    /// Nodes of the tip, including mid-side nodes, ascending.
     pub nodes: Vec<usize>,
-    /// Number of its faces.
+    /// Number of faces.
     pub faces: usize,
-    /// Number of places along its chord that nodes stand at.
+    /// Number of places along the chord with nodes.
     pub places: usize,
-    /// Number of elements across its thickness, in the middle of its chord.
+    /// Number of elements across the thickness, in the middle of the chord.
     pub across: usize,
     /// Length along its chord (m).
     pub chord: f64,
@@ -36,12 +37,13 @@ pub struct FoundTip {
     pub radius: [f64; 2],
     /// Smallest and largest axial position of its nodes (m).
     pub axial: [f64; 2],
-    /// Number of outward faces elsewhere that are as far out at their axial position: within a thousandth of the radius.
+    /// Number of outward faces elsewhere that are equally far out at their axial position, within a thousandth of the
+    /// radius.
     pub elsewhere: usize,
 }
 
 impl FoundTip {
-    /// So many patches, or as many as are no narrower than elements.
+    /// Returns `patches`, or the largest number of patches that are no narrower than elements.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "far fewer elements than 2^52")]
     pub fn at_most(&self, patches: usize) -> usize {
         let elements = (self.chord / self.edge).round() as usize;
@@ -49,11 +51,11 @@ impl FoundTip {
     }
 }
 
-/// An outer face that faces away from the axis, or towards it.
+/// Outer face that faces away from the axis or towards it.
 struct TipFace<'a> {
     element: &'a Element,
     corners: &'static [usize],
-    /// Means of its corners (m).
+    /// Mean of its corners (m).
     radius: f64,
     axial: f64,
 }
@@ -64,11 +66,12 @@ impl TipFace<'_> {
     }
 }
 
-/// The outermost of all outer faces whose normals are within 45 degrees of the radial direction, and all of these that are connected with
-/// it over edges. None of their nodes may be among the `fixed` ones (ascending): clamped, or on a face to the neighbours.
+/// Finds the outermost of all outer faces whose normals are within 45 degrees of the radial direction, and all such
+/// faces connected with it by edges. None of their nodes may be `fixed` (ascending), that is clamped or on a face to
+/// a neighbouring sector.
 ///
 /// # Errors
-/// [`Error::Invalid`] for a mesh without such faces, and where they reach fixed nodes.
+/// [`Error::Invalid`] for a mesh without such faces, and if they include fixed nodes.
 pub fn find_tip(mesh: &Mesh, fixed: &[usize]) -> Result<FoundTip> {
     let faces = radial_faces(mesh, NormalDirection::Outer);
     let first = (0..faces.len()).max_by(|&a, &b| faces[a].radius.total_cmp(&faces[b].radius).then(b.cmp(&a)));
@@ -98,8 +101,9 @@ pub fn find_tip(mesh: &Mesh, fixed: &[usize]) -> Result<FoundTip> {
     Ok(FoundTip { faces: own.len(), nodes, places, across, chord, edge, radius, axial, elsewhere })
 }
 
-/// Returns the nodes of the root, mid-side ones too, ascending: of the innermost of all outer faces whose normals are within 45 degrees of the
-/// inward radial direction, and of all of these that are connected with it over edges. Empty for a mesh without such faces.
+/// Returns the nodes of the root, including mid-side ones, ascending: of the innermost of all outer faces whose
+/// normals are within 45 degrees of the inward radial direction, and of all such faces connected with it by edges.
+/// Empty for a mesh without such faces.
 pub fn find_root(mesh: &Mesh) -> Vec<usize> {
     let faces = radial_faces(mesh, NormalDirection::Inner);
     let first = (0..faces.len()).min_by(|&a, &b| faces[a].radius.total_cmp(&faces[b].radius).then(a.cmp(&b)));
@@ -108,7 +112,7 @@ pub fn find_root(mesh: &Mesh) -> Vec<usize> {
     nodes_of(&faces.iter().zip(&chosen).filter(|(_, chosen)| **chosen).map(|(face, _)| face).collect::<Vec<_>>())
 }
 
-/// Faces that a line across the chord meets in its middle; of triangles two in a layer.
+/// Counts the faces that a line across the chord crosses in its middle; for triangles, two per layer.
 fn elements_across(mesh: &Mesh, faces: &[&TipFace], places: &Places) -> usize {
     let along = |node: usize| places.share_along(mesh.nodes[node]);
     let meets = |face: &TipFace| {
@@ -121,13 +125,13 @@ fn elements_across(mesh: &Mesh, faces: &[&TipFace], places: &Places) -> usize {
     met.div_ceil(2).max(1)
 }
 
-/// Corners and mid-side nodes of faces, ascending.
+/// Returns the corners and mid-side nodes of faces, ascending.
 fn nodes_of(faces: &[&TipFace]) -> Vec<usize> {
     let of_face = |face: &&TipFace| middles(face.element, face.corners).chain(face.corner_nodes()).collect::<Vec<_>>();
     faces.iter().flat_map(of_face).collect::<BTreeSet<_>>().into_iter().collect()
 }
 
-/// Median length of the edges of faces (m).
+/// Returns the median length of the edges of faces (m).
 fn median_edge(mesh: &Mesh, faces: &[&TipFace]) -> f64 {
     let mut lengths: Vec<f64> = faces.iter().flat_map(|face| edges(face)).map(|edge| length(mesh, edge)).collect();
     lengths.sort_by(f64::total_cmp);
@@ -139,7 +143,7 @@ fn length(mesh: &Mesh, [a, b]: [usize; 2]) -> f64 {
     x.hypot(y).hypot(z)
 }
 
-/// Corners at the ends of a face's edges, ascending.
+/// Returns the corners at the ends of the edges of a face, ascending.
 fn edges(face: &TipFace) -> Vec<[usize; 2]> {
     let nodes = face.corner_nodes();
     let ends = (0..nodes.len()).map(|i| (nodes[i], nodes[(i + 1) % nodes.len()]));
@@ -155,7 +159,7 @@ fn extent(mesh: &Mesh, nodes: &[usize], of: fn([f64; 3]) -> f64) -> [f64; 2] {
     values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
 }
 
-/// Which faces are looked for: those whose normals point away from the axis, or towards it.
+/// Direction of the normals of the faces to find: away from the axis, or towards it.
 #[derive(Clone, Copy)]
 enum NormalDirection {
     Outer,
@@ -186,7 +190,7 @@ fn radial_faces(mesh: &Mesh, side: NormalDirection) -> Vec<TipFace<'_>> {
     outer.filter_map(|(element, corners)| radial_face(mesh, element, corners, side)).collect()
 }
 
-/// The face, where it faces this side. Corners run counter-clockwise seen from outside.
+/// Returns the face if it faces this direction. Corners are counter-clockwise seen from outside.
 fn radial_face<'a>(
     mesh: &Mesh,
     element: &'a Element,
@@ -209,7 +213,7 @@ fn radial_face<'a>(
     (side.sign() * radial >= OUTWARD * size).then(|| TipFace { element, corners, radius, axial: mean(&|[_, _, z]| z) })
 }
 
-/// Which faces are connected with the first one over edges.
+/// Returns which faces are connected with the first one by edges.
 fn connected(faces: &[TipFace], first: usize) -> Vec<bool> {
     let mut beside: HashMap<[usize; 2], Vec<usize>> = HashMap::new();
     for (index, face) in faces.iter().enumerate() {
@@ -225,7 +229,7 @@ fn connected(faces: &[TipFace], first: usize) -> Vec<bool> {
     chosen
 }
 
-/// Whether a face is as far out as that of the tip which is nearest along the axis.
+/// Returns whether a face is as far out as the tip face that is nearest along the axis.
 fn as_far_out(face: &TipFace, tip: &[&TipFace]) -> bool {
     let apart = |own: &TipFace| (own.axial - face.axial).abs();
     let nearest = tip.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));

@@ -1,4 +1,4 @@
-//! From a mesh as read to matrices, one material or several.
+//! Assembly of the matrices of an imported mesh with one or several materials.
 
 use std::path::Path;
 
@@ -31,7 +31,7 @@ pub(super) fn assembled(
         }
         None => {
             let of_element = file_materials(&name, &numbered, materials.is_empty())?;
-            // Only those that are used, in the order of the file.
+            // Only the materials that are used, in the order of the file.
             let (mut used, mut position) = (Vec::new(), vec![usize::MAX; materials.len()]);
             for (index, material) in materials.iter().enumerate().filter(|(index, _)| of_element.contains(index)) {
                 position[index] = used.len();
@@ -47,7 +47,8 @@ pub(super) fn assembled(
     Ok(Imported { model, node_numbers: numbered.nodes, materials, absent: Vec::new(), held, notes, warnings })
 }
 
-/// Elements without mid-side nodes bend too stiffly by tens of percent on meshes of usual size.
+/// Warns of elements without mid-side nodes, which are too stiff in bending by tens of percent on meshes of usual
+/// size.
 fn linear_element_warning(mesh: &Mesh) -> Option<String> {
     let linear = mesh.elements.iter().filter(|element| element.kind != element.kind.quadratic()).count();
     (linear > 0).then(|| {
@@ -59,7 +60,7 @@ fn linear_element_warning(mesh: &Mesh) -> Option<String> {
     })
 }
 
-/// Material index of every element, from the file.
+/// Returns the material index of every element, from the file.
 fn file_materials(name: &str, numbered: &Numbered, none: bool) -> Result<Vec<usize>> {
     let remedy = "Give a material on the command line: --material steel, or --young, --poisson and --density";
     let refuse = |problem: String| Err(Error::Read { place: name.into(), problem, remedy: remedy.into() });
@@ -108,7 +109,7 @@ fn build(
     Ok(FeModel { nodes: mesh.nodes.clone(), sets: mesh.sets.clone(), stiffness, mass, mesh: None, origin })
 }
 
-/// Some elements with their nodes, and the nodes' indices in the whole mesh.
+/// Returns some elements with their nodes, and the indices of the nodes in the whole mesh.
 fn part_of(mesh: &Mesh, elements: &[usize]) -> (Mesh, Vec<usize>) {
     let mut nodes: Vec<usize> = elements.iter().flat_map(|&element| mesh.elements[element].nodes.clone()).collect();
     nodes.sort_unstable();
@@ -136,7 +137,7 @@ fn renumbered(error: Error, number: impl Fn(usize) -> usize) -> Error {
     }
 }
 
-/// The element's number in the file instead of its place in the mesh, and which file it is.
+/// Replaces the index of the element in an error by its number in the file, and adds the file name.
 fn with_file_number(error: Error, numbers: &[u64], file: &str) -> Error {
     match error {
         Error::NegativeJacobian { element, kind, point, determinant } => Error::Read {

@@ -1,24 +1,26 @@
-//! Contact nodes out of a set: evenly along the axis, in the middle of the tip's thickness, with the contour's slope.
+//! Choice of contact nodes from a set: evenly along the axis, in the middle of the thickness of the tip, with the
+//! slope of the contour.
 
 use crate::contact_point::ContactPoint;
 use crate::places::Places;
 use crate::{Error, Result};
 
-/// A set of at most this many nodes is taken whole.
+/// Largest number of nodes of a set that is used as a whole.
 pub(crate) const TAKEN_WHOLE: usize = 12;
-/// Number of nodes chosen of a larger set: both edges and the middle.
+/// Number of nodes chosen from a larger set: both edges and the middle.
 pub(crate) const CHOSEN: usize = 3;
 
 /// Choice of the contact nodes.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct ContactChoice {
-    /// Number of nodes; if absent, all of a set of at most `TAKEN_WHOLE` nodes, and `CHOSEN` of a larger one.
+    /// Number of nodes; if absent, all nodes of a set of at most `TAKEN_WHOLE` nodes, and `CHOSEN` of a larger one.
     pub count: Option<usize>,
-    /// Their names by growing z; `tip_1`, `tip_2`, ... where empty.
+    /// Names by ascending z; `tip_1`, `tip_2`, ... if empty.
     pub names: Vec<String>,
 }
 
-/// Contact nodes of a set by growing z (of equal z: by angle), with slopes dr/dz of the set's contour.
+/// Chooses contact nodes from a set, by ascending z (for equal z by angle), with slopes dr/dz of the contour of the
+/// set.
 ///
 /// # Examples
 /// ```
@@ -44,7 +46,7 @@ pub struct ContactChoice {
 /// ```
 ///
 /// # Errors
-/// [`Error::Invalid`] for an empty set, more nodes than it has, or names that are not as many.
+/// [`Error::Invalid`] for an empty set, more nodes than the set has, or another number of names than nodes.
 pub fn choose_contact_nodes(nodes: &[[f64; 3]], set: &[usize], choice: &ContactChoice) -> Result<Vec<ContactPoint>> {
     let default = if set.len() <= TAKEN_WHOLE { set.len() } else { CHOSEN };
     let named = if choice.names.is_empty() { default } else { choice.names.len() };
@@ -68,7 +70,7 @@ pub fn choose_contact_nodes(nodes: &[[f64; 3]], set: &[usize], choice: &ContactC
 mod tests {
     use super::*;
 
-    /// Tip of a staggered blade, `through` nodes thick, on the contour r = 0.3 + 0.1 z - z².
+    /// Returns the tip of a staggered blade, `through` nodes thick, on the contour r = 0.3 + 0.1 z - z².
     fn tip(along: usize, through: usize) -> Vec<[f64; 3]> {
         let mut nodes = Vec::new();
         for i in 0..along {
@@ -76,7 +78,7 @@ mod tests {
                 let z = 0.04 * i as f64 / (along - 1) as f64;
                 let radius = 0.3 + 0.1 * z - z * z;
                 let across = if through > 1 { j as f64 / (through - 1) as f64 - 0.5 } else { 0.0 };
-                // About ±π, where angles jump.
+                // Around ±π, where angles jump.
                 let angle = core::f64::consts::PI + (0.8 * z + 0.003 * across) / radius;
                 nodes.push([radius * angle.cos(), radius * angle.sin(), z]);
             }

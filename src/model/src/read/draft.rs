@@ -1,4 +1,4 @@
-//! What every mesh format is read into first: nodes and elements by their numbers in the file, sets by name.
+//! Common intermediate form of all mesh formats: nodes and elements by their numbers in the file, sets by name.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -8,43 +8,43 @@ use crate::element::ElementKind;
 use crate::mesh::{Element, Mesh};
 use crate::{Error, Result};
 
-/// An element as read.
+/// Element as read from a file.
 #[derive(Debug, Clone)]
 pub(super) struct DraftElement {
     /// Number in the file.
     pub number: u64,
-    /// `None` for points, lines and faces, whose nodes can still make a set.
+    /// `None` for points, lines and faces, whose nodes can still form a set.
     pub kind: Option<ElementKind>,
     /// Node numbers in the file, already in the order of [`ElementKind`].
     pub nodes: Vec<u64>,
-    /// Index of the material, where one is known.
+    /// Index of the material, if known.
     pub material: Option<usize>,
-    /// Where it stands.
+    /// Line in the file.
     pub place: SourceLine,
 }
 
-/// A mesh as read.
+/// Mesh as read from a file.
 #[derive(Debug, Default)]
 pub(super) struct MeshDraft {
     /// Node numbers in the order of the file.
     pub numbers: Vec<u64>,
-    /// Their coordinates, in the file's unit.
+    /// Coordinates of the nodes, in the unit of the file.
     pub positions: Vec<[f64; 3]>,
-    /// Index of a node number.
+    /// Index for each node number.
     index: HashMap<u64, usize>,
     /// Elements in the order of the file.
     pub elements: Vec<DraftElement>,
-    /// Index of an element number.
+    /// Index for each element number.
     element_index: HashMap<u64, usize>,
     /// Node sets: numbers of nodes.
     pub node_sets: BTreeMap<String, BTreeSet<u64>>,
-    /// Things a user should know but need not act on.
+    /// Information for the user that needs no action.
     pub notes: Vec<String>,
-    /// Things that make the result differ from what the file's own code would compute.
+    /// Differences from the results of the program that the file is written for.
     pub warnings: Vec<String>,
 }
 
-/// A mesh with the numbers that its nodes and elements had in the file.
+/// Mesh with the numbers of its nodes and elements in the file.
 #[derive(Debug)]
 pub(super) struct Numbered {
     /// The mesh.
@@ -58,7 +58,7 @@ pub(super) struct Numbered {
 }
 
 impl MeshDraft {
-    /// Add a node. The same number may come again with the same coordinates.
+    /// Adds a node. A number may be repeated with the same coordinates.
     pub(crate) fn add_node(&mut self, number: u64, position: [f64; 3], place: &dyn Fn() -> SourceLine) -> Result<()> {
         if let Some(&index) = self.index.get(&number) {
             if self.positions[index].map(f64::to_bits) == position.map(f64::to_bits) {
@@ -73,7 +73,7 @@ impl MeshDraft {
         Ok(())
     }
 
-    /// Add an element.
+    /// Adds an element.
     pub(crate) fn add_element(&mut self, element: DraftElement) -> Result<()> {
         if self.element_index.insert(element.number, self.elements.len()).is_some() {
             let problem = format!("element {} is defined twice", element.number);
@@ -83,23 +83,23 @@ impl MeshDraft {
         Ok(())
     }
 
-    /// Whether there is a node of this number.
+    /// Returns whether there is a node with this number.
     pub(crate) fn has_node(&self, number: u64) -> bool {
         self.index.contains_key(&number)
     }
 
-    /// The element of this number.
+    /// Returns the element with this number.
     pub(super) fn element(&mut self, number: u64) -> Option<&mut DraftElement> {
         self.element_index.get(&number).map(|&index| &mut self.elements[index])
     }
 
-    /// Nodes of an element.
+    /// Returns the nodes of an element.
     pub(super) fn nodes_of(&self, number: u64) -> &[u64] {
         self.element_index.get(&number).map_or(&[], |&index| &self.elements[index].nodes)
     }
 
-    /// The mesh of the solid elements, coordinates times `scale`, turned so that `axis` is z; nodes of no solid element are
-    /// left out.
+    /// Returns the mesh of the solid elements, with coordinates scaled by `scale` and rotated so that `axis` is z;
+    /// nodes that belong to no solid element are omitted.
     pub(crate) fn into_mesh(
         mut self,
         scale: f64,
@@ -157,7 +157,7 @@ impl MeshDraft {
         Ok((numbered, self.notes, self.warnings))
     }
 
-    /// Two solids on the same nodes would count stiffness and mass of that place twice.
+    /// Rejects two solids on the same nodes, whose stiffness and mass would count twice.
     fn check_overlaid(&self) -> Result<()> {
         let mut first: HashMap<Vec<u64>, u64> = HashMap::with_capacity(self.elements.len());
         for element in self.elements.iter().filter(|element| element.kind.is_some()) {

@@ -4,14 +4,14 @@ use std::sync::Arc;
 
 use crate::sparse::{Pattern, SparseMatrix};
 
-/// Entries (row, column, value), indices from 0; those of one place add up.
+/// Entries (row, column, value), indices from 0; repeated entries add up.
 #[derive(Debug, Default, Clone)]
 pub(super) struct Entries {
     pub items: Vec<(usize, usize, f64)>,
 }
 
 impl Entries {
-    /// Add all entries of a matrix, rows and columns renamed.
+    /// Adds all entries of a matrix with renumbered rows and columns.
     pub(crate) fn add_matrix(&mut self, matrix: &SparseMatrix, name: impl Fn(usize) -> usize) {
         let pattern = &matrix.pattern;
         for column in 0..matrix.order() {
@@ -22,7 +22,7 @@ impl Entries {
     }
 }
 
-/// K and M on their common pattern. Both triangles must be there, with equal values.
+/// Returns K and M with a common pattern. Both triangles must be given, with equal values.
 pub(super) fn symmetric_pair(order: usize, stiffness: Entries, mass: Entries) -> (SparseMatrix, SparseMatrix) {
     let (stiffness, mass) = (by_column(order, stiffness), by_column(order, mass));
     let mut pattern = Pattern { starts: vec![0], rows: Vec::new() };
@@ -45,7 +45,7 @@ pub(super) fn symmetric_pair(order: usize, stiffness: Entries, mass: Entries) ->
     )
 }
 
-/// Sum of the entries of one row from `next` on, which moves behind them.
+/// Returns the sum of the entries of one row from `next` on, and advances `next` behind them.
 fn sum_at(column: &[(usize, f64)], next: &mut usize, row: usize) -> f64 {
     let mut sum = 0.0;
     while let Some((_, value)) = column.get(*next).filter(|entry| entry.0 == row) {
@@ -55,7 +55,7 @@ fn sum_at(column: &[(usize, f64)], next: &mut usize, row: usize) -> f64 {
     sum
 }
 
-/// Rows and values of each column, rows ascending; entries of one place stay in their order.
+/// Returns rows and values of each column, rows ascending; repeated entries keep their order.
 fn by_column(order: usize, entries: Entries) -> Vec<Vec<(usize, f64)>> {
     let mut columns = vec![Vec::new(); order];
     for (row, column, value) in entries.items {

@@ -1,7 +1,8 @@
-//! Users' own models: meshes (CalculiX/Abaqus `.inp`, Gmsh `.msh` 4.1) and matrices with a node table.
+//! User models: meshes (CalculiX/Abaqus `.inp`, Gmsh `.msh` 4.1) and matrices with a node table.
 //!
-//! Everything becomes a [`FeModel`] in SI units. Nothing is dropped in silence: what changes stiffness or mass and is not
-//! computed is refused with file, line and remedy; what is harmless is skipped and listed in [`Imported::notes`].
+//! The result is a [`FeModel`] in SI units. Nothing is dropped silently: contents that change stiffness or mass and
+//! are not supported are rejected with file, line and remedy; harmless contents are skipped and listed in
+//! [`Imported::notes`].
 
 mod assembling;
 mod contact_nodes;
@@ -38,7 +39,7 @@ pub enum Units {
 }
 
 impl Units {
-    /// Metres per unit of length.
+    /// Returns the metres per unit of length.
     pub(crate) fn length(self) -> f64 {
         match self {
             Self::Si => 1.0,
@@ -46,7 +47,7 @@ impl Units {
         }
     }
 
-    /// Factor to N/m of a stiffness, and to kg of a mass: both are 1000 for N/mm and t.
+    /// Returns the factor of a stiffness to N/m and of a mass to kg: both are 1000 for N/mm and t.
     fn matrix(self) -> f64 {
         match self {
             Self::Si => 1.0,
@@ -67,21 +68,21 @@ impl Units {
     }
 }
 
-/// Which axis of a file is the engine axis, which is z here. The others follow in turn: x, y, z becomes y, z, x with x as
-/// the engine axis.
+/// Engine axis of a file, which becomes z. The others follow cyclically: x, y, z becomes y, z, x with x as the engine
+/// axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum EngineAxis {
     /// x.
     X,
     /// y.
     Y,
-    /// z: nothing is turned.
+    /// z: no rotation.
     #[default]
     Z,
 }
 
 impl EngineAxis {
-    /// Where a component of the file stands here: 0, 1, 2 for x, y, z.
+    /// Returns the component here of a component of the file: 0, 1, 2 for x, y, z.
     fn place(self, component: usize) -> usize {
         match self {
             Self::X => (component + 2) % 3,
@@ -90,7 +91,7 @@ impl EngineAxis {
         }
     }
 
-    /// Coordinates here of a point of the file.
+    /// Returns the coordinates here of a point of the file.
     fn turned(self, point: [f64; 3]) -> [f64; 3] {
         let mut turned = [0.0; 3];
         point.iter().enumerate().for_each(|(component, &value)| turned[self.place(component)] = value);
@@ -98,35 +99,35 @@ impl EngineAxis {
     }
 }
 
-/// Interpretation of a mesh file.
+/// Options for reading a mesh file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct MeshOptions {
     /// Units of coordinates and material in the file.
     pub units: Units,
-    /// The engine axis in the file.
+    /// Engine axis in the file.
     pub axis: EngineAxis,
     /// Material of all elements (SI), instead of those in the file.
     pub material: Option<Material>,
-    /// Temperature at which tables of properties are read, in the file's unit.
+    /// Temperature at which tables of properties are evaluated, in the unit of the file.
     pub temperature: Option<f64>,
 }
 
-/// A model as read, with what a user should know of it.
+/// Imported model with notes and warnings for the user.
 #[derive(Debug, Clone)]
 pub struct Imported {
-    /// The model, SI units.
+    /// Model in SI units.
     pub model: FeModel,
     /// Number of each node in the file.
     pub node_numbers: Vec<u64>,
     /// Materials of the elements, SI; empty for matrices.
     pub materials: Vec<Material>,
-    /// Nodes that the matrices leave out: they are clamped. Ascending indices.
+    /// Nodes that the matrices omit because they are clamped. Ascending indices.
     pub absent: Vec<usize>,
-    /// Nodes that the file itself holds fixed (`*BOUNDARY`), as written: a hint, not applied.
+    /// Nodes that the file itself fixes (`*BOUNDARY`), as written: a hint, not applied.
     pub held: Vec<String>,
-    /// Harmless: what was skipped, left out or taken for granted.
+    /// Harmless notes: skipped or omitted contents and assumptions.
     pub notes: Vec<String>,
-    /// Differences that make results differ from those of the file's own program.
+    /// Differences from the results of the program that the file is written for.
     pub warnings: Vec<String>,
 }
 
@@ -151,7 +152,7 @@ fn mesh_format(path: &Path, bytes: &[u8]) -> Result<MeshFormat> {
     }
 }
 
-/// Read a mesh and assemble its matrices.
+/// Reads a mesh and assembles its matrices.
 ///
 /// # Examples
 /// ```
@@ -180,15 +181,15 @@ fn mesh_format(path: &Path, bytes: &[u8]) -> Result<MeshFormat> {
 /// ```
 ///
 /// # Errors
-/// [`Error::File`] for a file that cannot be read, [`Error::Read`] with file and line for anything in it that is not
-/// understood or not supported, [`Error::Invalid`] for a missing material, and those of assembly with the file's numbers.
+/// [`Error::File`] for a file that cannot be read, [`Error::Read`] with file and line for invalid or unsupported
+/// contents, [`Error::Invalid`] for a missing material, and the errors of assembly with the numbers of the file.
 pub fn read_mesh(path: &Path, options: &MeshOptions, listener: Listener<'_>) -> Result<Imported> {
     let bytes = source::open_file(path)?;
     let read = mesh_file(path, &bytes, options.temperature, &source::open_file)?;
     assembling::assembled(path, read, options, listener)
 }
 
-/// A mesh of either format before assembly.
+/// Mesh of either format before assembly.
 struct MeshFile {
     draft: MeshDraft,
     materials: Vec<Material>,
@@ -205,8 +206,8 @@ fn mesh_file(path: &Path, bytes: &[u8], temperature: Option<f64>, open: source::
     }
 }
 
-/// Read a mesh that is in memory, without assembling it: nodes, elements and sets, in the file's unit of length. Other
-/// files that it includes are not opened.
+/// Reads a mesh from memory without assembling it: nodes, elements and sets, in the unit of length of the file.
+/// Included files are not opened.
 ///
 /// # Examples
 /// ```

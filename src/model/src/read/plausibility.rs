@@ -1,18 +1,18 @@
-//! Whether a model can be meant: lengths, stiffness and density of things that are built.
+//! Plausibility of a model: size, stiffness and density compared with real structures.
 
 use crate::fe_model::FeModel;
 use crate::material::Material;
 
-/// Signs that the units of a model are wrong.
+/// Signs of wrong units in a model.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Plausibility {
-    /// Cannot be meant.
+    /// Impossible values.
     pub impossible: Vec<String>,
-    /// Unusual: worth a question.
+    /// Unusual values.
     pub doubtful: Vec<String>,
 }
 
-/// A range that things are in, and a wider one beyond which nothing is.
+/// Usual range of a quantity, and a wider range of possible values.
 struct PlausibleRange {
     what: &'static str,
     unit: &'static str,
@@ -20,10 +20,10 @@ struct PlausibleRange {
     possible: [f64; 2],
 }
 
-/// From a small turbocharger's blade to a large water turbine's casing.
+/// From the blade of a small turbocharger to the casing of a large water turbine.
 const SIZE: PlausibleRange =
     PlausibleRange { what: "largest dimension", unit: "m", usual: [2e-3, 8.0], possible: [1e-4, 20.0] };
-/// From rubber (1 MPa) to beyond diamond (1.2 TPa); metals and composites within.
+/// From rubber (1 MPa) to beyond diamond (1.2 TPa), including metals and composites.
 const MODULUS: PlausibleRange =
     PlausibleRange { what: "Young's modulus", unit: "Pa", usual: [1e8, 2e12], possible: [1e6, 1e13] };
 /// From foams to osmium (22600 kg/m³).
@@ -32,7 +32,7 @@ const DENSITY: PlausibleRange =
 /// √(E/ρ): about 5000 m/s for steel, titanium, nickel and aluminium.
 const WAVE: PlausibleRange =
     PlausibleRange { what: "√(E/ρ)", unit: "m/s", usual: [500.0, 20_000.0], possible: [1.0, 1e6] };
-/// Mass over the volume of the box around the model; thin structures fill little of it.
+/// Mass over the volume of the bounding box; thin structures fill little of it.
 const FILLING: PlausibleRange = PlausibleRange {
     what: "mass per volume of the bounding box",
     unit: "kg/m³",
@@ -53,7 +53,7 @@ impl Plausibility {
     }
 }
 
-/// Total mass (kg) of a model: that of a rigid motion along x.
+/// Returns the total mass (kg) of a model: that of a rigid motion along x.
 pub fn total_mass(model: &FeModel) -> f64 {
     let pattern = &model.mass.pattern;
     let entries = (0..model.nodes.len()).map(|node| 3 * node).flat_map(|column| {
@@ -62,7 +62,7 @@ pub fn total_mass(model: &FeModel) -> f64 {
     entries.map(|entry| model.mass.values[entry]).sum()
 }
 
-/// Lowest and highest coordinates (m).
+/// Returns the lowest and highest coordinates (m).
 pub fn bounding_box(nodes: &[[f64; 3]]) -> [[f64; 3]; 2] {
     nodes.iter().fold([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]], |[low, high], node| {
         [core::array::from_fn(|i| low[i].min(node[i])), core::array::from_fn(|i| high[i].max(node[i]))]

@@ -1,4 +1,4 @@
-//! Files as lines that know where they came from.
+//! Lines of files that carry their position for messages.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -6,10 +6,10 @@ use std::{fmt, io};
 
 use crate::{Error, Result};
 
-/// A line of a file, for messages.
+/// Line of a file, for messages.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct SourceLine {
-    /// Name of the file, as it was asked for.
+    /// Name of the file, as requested.
     pub file: Arc<str>,
     /// Line, from 1.
     pub line: usize,
@@ -31,10 +31,10 @@ impl SourceLine {
 /// Function that opens files; tests keep files in memory.
 pub(super) type Open<'a> = &'a dyn Fn(&Path) -> Result<Vec<u8>>;
 
-/// Largest file that is read (bytes): far beyond any mesh, far below what exhausts the machine.
+/// Largest supported file (bytes): far beyond any mesh, far below the memory of the machine.
 const LARGEST: u64 = 32 << 30;
 
-/// Read a whole file from disk. Pipes and devices are refused: they may have no end, or never begin.
+/// Reads a whole file from disk. Rejects pipes and devices, which may have no end or never begin.
 pub(super) fn open_file(path: &Path) -> Result<Vec<u8>> {
     let refuse = |problem: &str| Err(io::Error::new(io::ErrorKind::InvalidInput, problem));
     let read = std::fs::metadata(path).and_then(|metadata| {
@@ -46,29 +46,29 @@ pub(super) fn open_file(path: &Path) -> Result<Vec<u8>> {
     read.map_err(|source| Error::File { path: path.to_path_buf(), source })
 }
 
-/// An error about a whole file.
+/// Returns an error about a whole file.
 pub(super) fn about(path: &Path, problem: impl Into<String>, remedy: impl Into<String>) -> Error {
     Error::Read { place: path.display().to_string(), problem: problem.into(), remedy: remedy.into() }
 }
 
-/// Text of a file. Comments and headings come in many encodings, so that bytes which are no UTF-8 are replaced; where they
-/// matter (names of sets) the replacement character shows in every message.
+/// Returns the text of a file. Comments and headings come in many encodings, so bytes that are not UTF-8 are
+/// replaced; if they matter (names of sets), the replacement character is visible in every message.
 pub(super) fn text_of(bytes: &[u8]) -> String {
     let without_mark = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     String::from_utf8_lossy(without_mark).into_owned()
 }
 
-/// A path written in a file: relative to the directory of that file.
+/// Resolves a path in a file relative to the directory of that file.
 pub(super) fn beside(file: &Path, written: &str) -> PathBuf {
-    // Files written on Windows keep their separators.
+    // Files that were written on Windows may contain its separators.
     let written = written.trim().trim_matches(['"', '\'']).replace('\\', "/");
     file.parent().unwrap_or(Path::new("")).join(written)
 }
 
-/// A finite number, Fortran's exponent letter D included.
+/// Reads a finite number, including the Fortran exponent letter D.
 pub(super) fn number(text: &str) -> Option<f64> {
     let text = text.trim();
     let value = text.parse::<f64>().ok().or_else(|| text.replace(['d', 'D'], "e").parse().ok())?;
-    // `inf` and `nan` are words that the standard library reads.
+    // The standard library also parses `inf` and `nan`.
     value.is_finite().then_some(value)
 }

@@ -1,4 +1,4 @@
-//! Contact that is held while modes are found: nodes as they are, patches by a change of variables.
+//! Contact that is held during the computation of modes: nodes directly, patches by a change of variables.
 
 use core::f64::consts::TAU;
 
@@ -13,13 +13,13 @@ use crate::patches::PatchCoordinates;
 use crate::progress::Listener;
 use crate::sparse::SparseMatrix;
 
-/// The contact as degrees of freedom that can be held.
+/// Contact as degrees of freedom that can be held.
 #[derive(Debug)]
 pub(crate) struct HeldContact<'a> {
     nodes: &'a [[f64; 3]],
     contact: &'a [ContactPoint],
     frame: DisplacementFrame,
-    /// Where there are patches.
+    /// Change of variables if there are patches.
     patches: Option<PatchCoordinates>,
     /// Rows of the contact's dofs among the free ones, point by point.
     pub interface: Vec<usize>,
@@ -29,7 +29,7 @@ impl<'a> HeldContact<'a> {
     /// Finds the contact degrees of freedom among the free dofs (3·node + component, ascending) of a model.
     ///
     /// # Errors
-    /// Contact that is clamped; patches that depend on each other.
+    /// Clamped contact; patches that depend on each other.
     pub(crate) fn new(
         free: &[usize],
         nodes: &'a [[f64; 3]],
@@ -44,7 +44,8 @@ impl<'a> HeldContact<'a> {
         Ok(Self { nodes, contact, frame, patches, interface })
     }
 
-    /// Craig-Bampton of these matrices of the free dofs, contact displacements in the frame; its transformation is to the displacements of nodes.
+    /// Computes the Craig-Bampton reduction of these matrices of the free dofs, contact displacements in the frame;
+    /// the transformation yields displacements of nodes.
     ///
     /// # Errors
     /// The errors of [`craig_bampton_with`].
@@ -59,9 +60,10 @@ impl<'a> HeldContact<'a> {
         self.reduced(stiffness, mass, &inner, listener)
     }
 
-    /// Free-interface modes with exact residual flexibility, of a structure that may be free to move as a rigid body: `modes` are its own,
-    /// rigid ones among them. What is left of a mode φ once its contact is held is the response at rest to its inertia forces, K_ii⁻¹(Mφ)_i:
-    /// of an elastic one φ less the constraint modes, but for its scale; of a rigid one what inertia relief asks for.
+    /// Computes the free-interface modes with exact residual flexibility of a structure that may move as a rigid
+    /// body: `modes` are its modes, including rigid ones. The remainder of a mode φ with held contact is the static
+    /// response to its inertia forces, K_ii⁻¹(Mφ)_i: for an elastic mode φ minus the constraint modes, up to scale;
+    /// for a rigid mode the response that inertia relief requires.
     ///
     /// # Errors
     /// The errors of [`craig_bampton_with`].

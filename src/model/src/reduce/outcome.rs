@@ -1,4 +1,5 @@
-//! What a reduction leaves: coordinates in the frame of the contact nodes, the ROM with its origin, shapes for pictures.
+//! Results of a reduction: coordinates in the frame of the contact nodes, the ROM with its origin, shapes for
+//! figures.
 
 use faer::Mat;
 use nalgebra::DMatrix;
@@ -13,13 +14,13 @@ use crate::fe_model::FeModel;
 use crate::material::Material;
 use crate::mesh::Mesh;
 
-/// (cos θ, sin θ) of a point about the z axis.
+/// Returns (cos θ, sin θ) of a point about the z axis.
 pub(crate) fn direction([x, y, _]: [f64; 3]) -> (f64, f64) {
     let radius = x.hypot(y);
     (x / radius, y / radius)
 }
 
-/// The same reduced model with interface displacements in the given frame.
+/// Returns the reduced model with interface displacements in the given frame.
 pub(super) fn rotated(
     mut model: CraigBampton,
     nodes: &[[f64; 3]],
@@ -34,7 +35,7 @@ pub(super) fn rotated(
     for (index, point) in contact.iter().enumerate() {
         let (cos, sin) = direction(nodes[point.node]);
         let first = 3 * index;
-        // Columns: the Cartesian parts of the radial and the tangential unit vector.
+        // Columns: the Cartesian components of the radial and the tangential unit vector.
         rotation[(first, first)] = cos;
         rotation[(first + 1, first)] = sin;
         rotation[(first, first + 1)] = -sin;
@@ -91,10 +92,11 @@ pub(crate) fn description(model: &FeModel, clamped: usize) -> String {
 }
 
 impl Reduction {
-    /// Makes the result of a valid reduced model; `full` are the modes of the full model over its `free` dofs, `squares` all ω² of the reduced one.
+    /// Creates the result of a valid reduced model; `full` are the modes of the full model over its `free` dofs,
+    /// `squares` all ω² of the reduced one.
     ///
     /// # Errors
-    /// The ROM's own validation refuses.
+    /// The errors of the ROM validation.
     pub(crate) fn new(
         rom: Rom,
         full: &EigenModes,

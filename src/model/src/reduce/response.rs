@@ -1,9 +1,9 @@
-//! Static flexibility and forced response at the contact nodes beside those of the full model: what deviations of natural frequencies
-//! do not tell of contact.
+//! Static flexibility and forced response at the contact nodes, compared with the full model, since frequency
+//! deviations do not measure the accuracy of contact.
 //!
-//! With the lowest modes Φ of the full model, (K − ω²M)⁻¹B = Φ(Λ − ω²)⁻¹ΦᵀB + Y, and Y, free of these modes, is the series
-//! Σ ω²ʲ (K⁻¹M)ʲ K⁻¹(B − MΦΦᵀB), which converges below the next frequency. With V_j its terms, BᵀV_(i+j+1) = V_iᵀMV_j: twice as
-//! many terms as solutions with K.
+//! With the lowest modes Φ of the full model, (K − ω²M)⁻¹B = Φ(Λ − ω²)⁻¹ΦᵀB + Y, and Y, without these modes, is the
+//! series Σ ω²ʲ (K⁻¹M)ʲ K⁻¹(B − MΦΦᵀB), which converges below the next frequency. With its terms V_j, BᵀV_(i+j+1) =
+//! V_iᵀMV_j: twice as many terms as solutions with K.
 
 use faer::Mat;
 use nalgebra::DMatrix;
@@ -12,20 +12,21 @@ use tiprub_core::rom::{DisplacementFrame, RomChecks};
 use super::FullModes;
 use crate::sparse::{SparseMatrix, add_tall, tall_product};
 
-/// Solutions with K.
+/// Number of solutions with K.
 const TERMS: usize = 12;
-/// Largest ω², as a share of that of the last mode known: the series converges at least as its powers do.
+/// Largest ω², as a fraction of that of the last known mode: the series converges at least like powers of this
+/// fraction.
 const REACH: f64 = 0.5;
 
-/// A reduced model as it is seen at the contact nodes.
+/// Reduced model in terms of the contact nodes.
 pub(super) struct ContactResponse<'a> {
-    /// ω² of all of its modes.
+    /// ω² of all modes.
     pub squares: &'a [f64],
     /// Modes at the contact coordinates, 3·nodes × modes.
     pub shapes: DMatrix<f64>,
 }
 
-/// The checks with the deviations, of a supported structure; along the radii where the frame has such.
+/// Adds the deviations to the checks of a supported structure; along the radii if the frame has radial directions.
 pub(super) fn with_responses(
     checks: RomChecks,
     full: &FullModes,
@@ -64,25 +65,25 @@ pub(super) fn with_responses(
     }
 }
 
-/// ω² halfway between neighbouring frequencies, as far as the series reaches.
+/// Returns ω² halfway between neighbouring frequencies, as far as the series converges.
 fn between(squares: &[f64]) -> Vec<f64> {
     let most = REACH * squares.last().copied().unwrap_or(0.0);
     let middles = squares.windows(2).map(|pair| (0.5 * (pair[0].sqrt() + pair[1].sqrt())).powi(2));
     middles.filter(|square| *square <= most).collect()
 }
 
-/// Displacement at the contact coordinates per unit force, from modes seen there.
+/// Returns the displacement at the contact coordinates per unit force, from modes at these coordinates.
 fn response(shapes: &DMatrix<f64>, squares: &[f64], square: f64) -> DMatrix<f64> {
     let weighted = DMatrix::from_fn(shapes.nrows(), shapes.ncols(), |i, k| shapes[(i, k)] / (squares[k] - square));
     shapes * weighted.transpose()
 }
 
-/// The full model at the contact coordinates.
+/// Full model in terms of the contact coordinates.
 struct Moments<'a> {
     squares: &'a [f64],
     /// Lowest modes at the contact coordinates.
     shapes: DMatrix<f64>,
-    /// Moments of ω²ʲ.
+    /// Coefficients of the powers ω²ʲ.
     moments: Vec<DMatrix<f64>>,
 }
 

@@ -26,25 +26,25 @@ impl Default for MeshCounts {
     }
 }
 
-/// The blade's mesh with the structure it was made by.
+/// Mesh of the blade with its tip line.
 #[derive(Debug, Clone)]
 pub struct BladeMesh {
     /// Hex20 elements; node sets `hub`, `tip`, `leading_edge`, `trailing_edge`.
     pub mesh: Mesh,
-    /// Nodes on the tip's mid-thickness line, leading to trailing edge.
+    /// Nodes on the mid-thickness line of the tip, leading to trailing edge.
     pub tip_line: Vec<usize>,
-    /// Slope dr/dz of the tip section at each of them.
+    /// Slope dr/dz of the tip section at each of these nodes.
     pub tip_slopes: Vec<f64>,
 }
 
-/// Mesh of one blade, mirrored so that its design speed is positive about +z.
+/// Builds the mesh of one blade, mirrored so that its design speed is positive about +z.
 ///
 /// Nodes lie on a grid of twice the element counts. Each section is divided evenly along its chord and across its
-/// thickness; lines of equal division are joined over the twelve sections by natural cubic splines of z, r and θ
-/// over the mean radius, and divided evenly in it.
+/// thickness; corresponding points of the twelve sections are connected by natural cubic splines of z, r and θ over
+/// the mean radius, which are divided evenly in the mean radius.
 ///
 /// # Errors
-/// [`Error::Invalid`] when a count is zero.
+/// [`Error::Invalid`] if a count is zero.
 pub fn blade_mesh(counts: MeshCounts) -> Result<BladeMesh> {
     for (name, count) in [("chord", counts.chord), ("thickness", counts.thickness), ("span", counts.span)] {
         if count == 0 {
@@ -79,7 +79,7 @@ pub fn blade_mesh(counts: MeshCounts) -> Result<BladeMesh> {
 }
 
 impl BladeMesh {
-    /// `count` contact patches over the whole tip: `patch_1`, `patch_2`, ... from leading to trailing edge.
+    /// Returns `count` contact patches over the whole tip: `patch_1`, `patch_2`, ... from leading to trailing edge.
     ///
     /// # Errors
     /// The errors of [`contact_patches`](crate::patches::contact_patches).
@@ -87,7 +87,7 @@ impl BladeMesh {
         contact_patches(&self.mesh, self.mesh.set("tip")?, count, |index| format!("patch_{}", index + 1))
     }
 
-    /// The same in rows across the thickness, side to side: `patch_1_row_1`, `patch_2_row_1`, ...
+    /// Returns contact patches in rows across the thickness, side to side: `patch_1_row_1`, `patch_2_row_1`, ...
     ///
     /// # Errors
     /// The errors of [`tip_patches`](crate::patches::tip_patches).
@@ -96,17 +96,18 @@ impl BladeMesh {
         tip_patches(&self.mesh, self.mesh.set("tip")?, [count, rows], name)
     }
 
-    /// `count` contact nodes spread along the tip's mid-thickness line: `leading_edge`, `tip_2`, ..., `trailing_edge`,
-    /// the middle one of an odd count being `mid_chord`.
+    /// Returns `count` contact nodes spread along the mid-thickness line of the tip: `leading_edge`, `tip_2`, ...,
+    /// `trailing_edge`; the middle one of an odd count is `mid_chord`.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for fewer than two or more than the line has.
+    /// [`Error::Invalid`] for fewer than two nodes or more than the line has.
     pub fn contact_points(&self, count: usize) -> Result<Vec<ContactPoint>> {
         spread_contact(&self.tip_line, &self.tip_slopes, count)
     }
 }
 
-/// `count` contact nodes spread along a line of nodes from leading to trailing edge, with the slopes dr/dz there.
+/// Returns `count` contact nodes spread along a line of nodes from leading to trailing edge, with the slopes dr/dz
+/// there.
 pub(crate) fn spread_contact(line: &[usize], slopes: &[f64], count: usize) -> Result<Vec<ContactPoint>> {
     let available = line.len();
     if count < 2 || count > available {
@@ -138,7 +139,7 @@ fn ratio(index: usize, count: usize) -> f64 {
     index as f64 / count as f64
 }
 
-/// Plane coordinates of a grid point: `along` the chord and `across` the thickness, both 0 to 1.
+/// Returns the plane coordinates of a grid point: `along` the chord and `across` the thickness, both 0 to 1.
 fn plane_point(section: &AerofoilSection, along: f64, across: f64) -> [f64; 2] {
     let [leading, trailing] =
         section.edge_radii().map(|radius| core::f64::consts::FRAC_PI_4 * radius / section.chord());
@@ -174,7 +175,7 @@ impl SpanInterpolation {
         Self { weights: (0..=fine).map(|k| columns.iter().map(|column| column[k]).collect()).collect() }
     }
 
-    /// Cartesian coordinates at a station, mirrored in θ.
+    /// Returns Cartesian coordinates at a station, mirrored in θ.
     fn cartesian(&self, line: &[CylindricalPoint], station: usize) -> [f64; 3] {
         let mix = |pick: fn(&CylindricalPoint) -> f64| -> f64 {
             line.iter().zip(&self.weights[station]).map(|(point, weight)| weight * pick(point)).sum()
@@ -184,7 +185,7 @@ impl SpanInterpolation {
     }
 }
 
-/// Second derivatives at the knots of the natural cubic spline (Thomas algorithm).
+/// Returns the second derivatives at the knots of the natural cubic spline (Thomas algorithm).
 fn natural_spline(x: &[f64], y: &[f64]) -> Vec<f64> {
     let n = x.len();
     let (mut upper, mut right) = (vec![0.0; n], vec![0.0; n]);

@@ -1,18 +1,20 @@
-//! The blade of NASA rotor 37: geometry, mesh and reduced model.
+//! Blade of NASA rotor 37: geometry, mesh and reduced model.
 //!
-//! **Origin.** Moore and Reid, *Performance of single-stage axial-flow transonic compressor with rotor and stator aspect
-//! ratios of 1.19 and 1.26, respectively, and with design pressure ratio of 2.05*, NASA TP-1659 (1980), table IV: 12
-//! surfaces of revolution from the hub intersection to the blade tip, 100 stations each. What is embedded is a fit,
-//! [`AerofoilSection`], not the table. Over all 2400 points of the table, round edges included, it is off by at most
-//! [`FIT_DISTANCE`] (0.0094 mm) from the surface, and on the sides by [`FIT_ALONG_THETA`] (0.0165 mm) along rθ at equal z.
-//! Between the sections the table says nothing; lines of equal chord and thickness share are natural cubic splines.
+//! **Origin.** Moore and Reid, *Performance of single-stage axial-flow transonic compressor with rotor and stator
+//! aspect ratios of 1.19 and 1.26, respectively, and with design pressure ratio of 2.05*, NASA TP-1659 (1980), table
+//! IV: 12 surfaces of revolution from the hub intersection to the blade tip, 100 stations each. The program contains
+//! a fit, [`AerofoilSection`], not the table. Over all 2400 points of the table, round edges included, its distance
+//! from the surface is at most [`FIT_DISTANCE`] (0.0094 mm), and on the sides [`FIT_ALONG_THETA`] (0.0165 mm) along
+//! rθ at equal z. The table has no data between the sections; lines of equal fractions of chord and thickness are
+//! natural cubic splines.
 //!
-//! **Direction of rotation.** In the table θ grows from the leading to the trailing edge, so the rotor of the table
-//! turns towards negative θ. The mesh is mirrored (θ → -θ) so that its design speed is *positive* about +z.
+//! **Direction of rotation.** In the table θ increases from the leading to the trailing edge, so the rotor of the
+//! table turns towards negative θ. The mesh is mirrored (θ → -θ) so that its design speed is *positive* about +z.
 //!
-//! **Edges.** The geometry has round edges. The mesh ends in flat faces instead: as wide as the sides are there and
-//! π/4 of the edge radius beyond the arc's centre, which keeps the section's area (rectangle π/4 R · 2R = half disk).
-//! The first and last mesh node therefore sit about 0.21 edge radii (0.03 to 0.06 mm) behind the nose.
+//! **Edges.** The geometry has round edges. The mesh ends in flat faces instead: as wide as the distance of the sides
+//! there and π/4 of the edge radius beyond the centre of the arc, which keeps the area of the section (rectangle π/4
+//! R · 2R = half disk). The first and last mesh node are therefore about 0.21 edge radii (0.03 to 0.06 mm) inside the
+//! nose.
 
 mod blade_mesh;
 mod section;
@@ -37,34 +39,34 @@ pub const DESIGN_SPEED: f64 = 1800.0;
 /// Running tip clearance at design speed (m).
 pub const TIP_GAP: f64 = 0.356e-3;
 
-/// Largest distance of a point of the table from the fitted surface (m), error in r included.
+/// Largest distance of a point of the table from the fitted surface (m), including the error in r.
 pub const FIT_DISTANCE: f64 = 9.4e-6;
-/// Largest distance along rθ, at equal z, of a point of the table's sides from the fitted sides (m).
+/// Largest distance along rθ, at equal z, of a point on the sides of the table from the fitted sides (m).
 pub const FIT_ALONG_THETA: f64 = 16.5e-6;
 
-/// The twelve sections, hub to tip.
+/// Returns the twelve sections, hub to tip.
 pub fn sections() -> &'static [AerofoilSection] {
     &sections::SECTIONS
 }
 
-/// Watched points of a tip of patches: its edges and the middle.
+/// Number of watched points of a tip with patches: its edges and the middle.
 const WATCHED: usize = 3;
-/// Modes of a blade with patches whose places of largest stress are recovered.
+/// Number of modes of a blade with patches whose places of largest stress are recovered.
 const STRESSED: usize = 6;
 
 /// Contact nodes or patches of the tip.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TipContact {
-    /// So many nodes along the mid-thickness line, ends included (at least 2).
+    /// Number of nodes along the mid-thickness line, ends included (at least 2).
     Nodes(usize),
-    /// So many patches along the chord, over the whole thickness.
+    /// Number of patches along the chord, over the whole thickness.
     Patches(usize),
-    /// So many along the chord, in so many rows across the thickness, the outermost at its sides.
+    /// Number of patches along the chord and number of rows across the thickness, the outermost rows at the sides.
     Rows([usize; 2]),
 }
 
 impl TipContact {
-    /// So many patches along the chord, in so many rows; one row is over the whole thickness.
+    /// Creates patches from the numbers along the chord and of rows; one row covers the whole thickness.
     pub fn patches(counts: [usize; 2]) -> Self {
         match counts {
             [count, 1] => Self::Patches(count),
@@ -72,7 +74,7 @@ impl TipContact {
         }
     }
 
-    /// Nodes or patches along the chord, and rows of them across the thickness.
+    /// Returns the numbers of nodes or patches along the chord and of rows across the thickness.
     pub fn counts(self) -> [usize; 2] {
         match self {
             Self::Nodes(count) | Self::Patches(count) => [count, 1],
@@ -88,7 +90,7 @@ pub struct Rotor37Options {
     pub mesh: MeshCounts,
     /// Contact of the tip.
     pub tip: TipContact,
-    /// Which modes are kept.
+    /// Kind of the modes.
     pub kind: ReductionKind,
     /// Number of modes.
     pub modes: usize,
@@ -98,13 +100,13 @@ pub struct Rotor37Options {
     pub damping_ratio: f64,
     /// Material.
     pub material: Material,
-    /// Largest speed (rad/s) for which the effects of spin are computed; none without.
+    /// Largest speed (rad/s) for which the effects of spin are computed; no spin if absent.
     pub spin: Option<f64>,
 }
 
 impl Default for Rotor37Options {
-    /// The recommended model: nine patches along the chord in two rows, which stand at the sides of the tip. The chapter on trust has
-    /// the errors of patches, rows, modes and mesh.
+    /// Returns the recommended model: nine patches along the chord in two rows at the sides of the tip. The chapter
+    /// on trust lists the errors of patches, rows, modes and mesh.
     fn default() -> Self {
         Self {
             mesh: MeshCounts { chord: 24, thickness: 2, span: 40 },
@@ -117,13 +119,13 @@ impl Default for Rotor37Options {
 }
 
 impl Rotor37Options {
-    /// The recommended model with its patches in one row: contact is averaged over the thickness of the tip.
+    /// Returns the recommended model with its patches in one row: contact is averaged over the thickness of the tip.
     pub fn one_row() -> Self {
         let [patches, _] = Self::default().tip.counts();
         Self { tip: TipContact::Patches(patches), ..Self::default() }
     }
 
-    /// The paper's kind of model: Craig and Bampton's modes, three contact nodes.
+    /// Returns the type of model of the paper: Craig-Bampton modes, three contact nodes.
     pub fn paper() -> Self {
         Self {
             mesh: MeshCounts::default(),
@@ -138,7 +140,7 @@ impl Rotor37Options {
     }
 }
 
-/// Build, reduce and check the blade: hub section clamped, contact nodes on the tip's mid-thickness line.
+/// Builds, reduces and checks the blade: hub section clamped, contact on the tip as chosen in the options.
 ///
 /// # Examples
 /// ```
@@ -150,8 +152,8 @@ impl Rotor37Options {
 /// ```
 ///
 /// # Errors
-/// [`Error::Invalid`](crate::Error::Invalid) for counts that are too small or more contact nodes than the mesh has, and
-/// those of [`reduce_model`].
+/// [`Error::Invalid`](crate::Error::Invalid) for counts that are too small or more contact nodes than the mesh has;
+/// the errors of [`reduce_model`].
 pub fn reduce_rotor37(options: &Rotor37Options, listener: Listener<'_>) -> Result<Reduction> {
     report(listener, ReductionStage::Mesh, 0, 1);
     let blade = blade_mesh(options.mesh)?;

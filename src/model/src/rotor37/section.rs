@@ -1,15 +1,16 @@
-//! One blade section on its surface of revolution.
+//! Blade section on its surface of revolution.
 //!
 //! The surface is unrolled conformally: X = R₀ ∫ ds/r along the meridian, Y = R₀ θ, with R₀ the mean radius of the
 //! section. Lengths in that plane are those on the surface times R₀/r, so circles stay circles. In it the section is
-//! bounded by a leading- and a trailing-edge circle and, in the chord frame (origin and end in the circles' centres,
-//! abscissa u = 0..1), by the two sides v = camber(u) ± half thickness(u), cubic B-splines with common knots.
+//! bounded by a leading- and a trailing-edge circle and, in the chord frame (origin and end in the centres of the
+//! circles, abscissa u = 0..1), by the two sides v = camber(u) ± half thickness(u), cubic B-splines with common
+//! knots.
 
 /// Order of the Chebyshev series of z(X).
 const Z_TERMS: usize = 9;
 /// Order of the Chebyshev series of r(X).
 const R_TERMS: usize = 13;
-/// The B-splines live on [-`SPLINE_END`, 1 + `SPLINE_END`].
+/// The B-splines are defined on [-`SPLINE_END`, 1 + `SPLINE_END`].
 const SPLINE_END: f64 = 0.005;
 
 /// Compact description of a section; lengths in m, signs of θ as in the table of NASA TP-1659.
@@ -35,7 +36,7 @@ pub struct AerofoilSection {
     pub(super) half_thickness: &'static [f64],
 }
 
-/// A point in cylindrical coordinates (m, rad).
+/// Point in cylindrical coordinates (m, rad).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CylindricalPoint {
     /// Radius r.
@@ -47,23 +48,23 @@ pub struct CylindricalPoint {
 }
 
 impl AerofoilSection {
-    /// Distance between the centres of the edge circles in the plane.
+    /// Returns the distance between the centres of the edge circles in the plane.
     pub fn chord(&self) -> f64 {
         let [a, b] = [self.leading_edge, self.trailing_edge];
         (b[0] - a[0]).hypot(b[1] - a[1])
     }
 
-    /// Radii of the leading- and the trailing-edge circle.
+    /// Returns the radii of the leading- and the trailing-edge circle.
     pub fn edge_radii(&self) -> [f64; 2] {
         [self.leading_edge[2], self.trailing_edge[2]]
     }
 
-    /// Camber and half thickness at the chord abscissa u.
+    /// Returns camber and half thickness at the chord abscissa u.
     pub fn sides(&self, u: f64) -> [f64; 2] {
         [spline(self.knots, self.camber, u), spline(self.knots, self.half_thickness, u)]
     }
 
-    /// Plane coordinates (X, Y) of a point of the chord frame; u in chords, v in m.
+    /// Returns the plane coordinates (X, Y) of a point of the chord frame; u in chords, v in m.
     pub fn plane(&self, u: f64, v: f64) -> [f64; 2] {
         let chord = self.chord();
         let along = [0, 1].map(|i| (self.trailing_edge[i] - self.leading_edge[i]) / chord);
@@ -71,14 +72,14 @@ impl AerofoilSection {
         [self.leading_edge[0] + x * along[0] - v * along[1], self.leading_edge[1] + x * along[1] + v * along[0]]
     }
 
-    /// Point of the surface of revolution at plane coordinates.
+    /// Returns the point of the surface of revolution at plane coordinates.
     pub fn on_surface(&self, [x, y]: [f64; 2]) -> CylindricalPoint {
         let [low, high] = self.meridional_range;
         let t = (2.0 * x - low - high) / (high - low);
         CylindricalPoint { r: chebyshev(&self.r, t), theta: y / self.mean_radius, z: chebyshev(&self.z, t) }
     }
 
-    /// Plane abscissa X of the parallel circle at axial coordinate z (bisection; z grows with X).
+    /// Returns the plane abscissa X of the parallel circle at axial coordinate z (bisection; z increases with X).
     pub fn abscissa(&self, z: f64) -> f64 {
         let [mut low, mut high] = self.meridional_range;
         for _ in 0..60 {
@@ -88,19 +89,19 @@ impl AerofoilSection {
         0.5 * (low + high)
     }
 
-    /// Slope dr/dz of the surface of revolution at plane abscissa X.
+    /// Returns the slope dr/dz of the surface of revolution at plane abscissa X.
     pub(crate) fn meridional_slope(&self, x: f64) -> f64 {
         let step = 1e-4 * (self.meridional_range[1] - self.meridional_range[0]);
         let [a, b] = [x - step, x + step].map(|x| self.on_surface([x, 0.0]));
         (b.r - a.r) / (b.z - a.z)
     }
 
-    /// Mean radius R₀ of the section, the scale of its plane.
+    /// Returns the mean radius R₀ of the section, the scale of its plane.
     pub fn mean_radius(&self) -> f64 {
         self.mean_radius
     }
 
-    /// The closed outline as a polyline in the plane: `count` points per side and per edge arc.
+    /// Returns the closed outline as a polyline in the plane: `count` points per side and per edge arc.
     pub fn outline(&self, count: usize) -> Vec<[f64; 2]> {
         let feet = [1.0, -1.0].map(|side| [self.foot(side, 0.0), self.foot(side, 1.0)]);
         let mut points = Vec::with_capacity(4 * count);
@@ -119,7 +120,8 @@ impl AerofoilSection {
             }
         };
         let [leading, trailing] = self.edge_radii();
-        // One side from leading to trailing edge, round the trailing edge, back on the other side, round the leading one.
+        // One side from leading to trailing edge, around the trailing edge, back on the other side, around the
+        // leading edge.
         let graded = |i: usize| 0.5 * (1.0 - (core::f64::consts::PI * share(i)).cos());
         for i in 0..=count {
             let [u, v] = side_point(1.0, feet[0][0] + (feet[0][1] - feet[0][0]) * graded(i));
@@ -134,7 +136,8 @@ impl AerofoilSection {
         points
     }
 
-    /// Abscissa at which a side (±1) is nearest to the centre of an edge circle (at u = 0 or 1): where the arc begins.
+    /// Returns the abscissa at which a side (±1) is nearest to the centre of an edge circle (at u = 0 or 1), where
+    /// the arc begins.
     fn foot(&self, side: f64, centre: f64) -> f64 {
         let chord = self.chord();
         let distance = |u: f64| {
@@ -151,7 +154,7 @@ impl AerofoilSection {
     }
 }
 
-/// Clenshaw's recurrence for Σ c_k T_k(t).
+/// Evaluates Σ c_k T_k(t) by Clenshaw's recurrence.
 fn chebyshev(coefficients: &[f64], t: f64) -> f64 {
     let (mut next, mut after) = (0.0, 0.0);
     for &coefficient in coefficients[1..].iter().rev() {
@@ -160,7 +163,7 @@ fn chebyshev(coefficients: &[f64], t: f64) -> f64 {
     coefficients[0] + t * next - after
 }
 
-/// De Boor's algorithm for a clamped cubic B-spline; beyond the ends the last polynomial piece goes on.
+/// Evaluates a clamped cubic B-spline by de Boor's algorithm; the last polynomial piece extends beyond the ends.
 fn spline(inner: &[f64], coefficients: &[f64], u: f64) -> f64 {
     let knot = |i: usize| match i {
         0..4 => -SPLINE_END,

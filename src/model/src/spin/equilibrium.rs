@@ -1,4 +1,4 @@
-//! Static equilibrium of an elastic body that turns at a steady speed, and its stiffness there.
+//! Static equilibrium of an elastic body that rotates at a steady speed, and its stiffness there.
 
 use std::sync::Arc;
 
@@ -14,13 +14,13 @@ use crate::{Error, Result};
 
 /// Number of elements that are computed in parallel before they are added to the global matrix.
 const CHUNK: usize = 256;
-/// Newton's iteration ends when its last correction was below this share of the displacement. It converges quadratically,
-/// so the error that is left is of the order of the square of it.
+/// Newton's iteration ends when its last correction was below this fraction of the displacement. It converges
+/// quadratically, so the remaining error is of the order of its square.
 const CORRECTION: f64 = 1e-6;
-/// Corrections before it is given up.
+/// Largest number of corrections.
 const ITERATIONS: usize = 20;
 
-/// Largest strain for which a linear law between Green strain and stress is taken for an elastic solid.
+/// Largest strain for which a linear law between Green strain and stress represents an elastic solid.
 const STRAIN: f64 = 0.1;
 const APART: &str = "Give a lower largest speed, or check the units and supports";
 
@@ -28,9 +28,9 @@ const APART: &str = "Give a lower largest speed, or check the units and supports
 struct Linearised {
     /// Tangent stiffness of the elastic force.
     tangent: SparseMatrix,
-    /// The same with the spin softening -Ω²M_xy.
+    /// Tangent stiffness with the spin softening -Ω²M_xy.
     softened: SparseMatrix,
-    /// Centrifugal less internal force.
+    /// Centrifugal minus internal force.
     unbalanced: Mat<f64>,
     /// Largest centrifugal force.
     load: f64,
@@ -45,18 +45,18 @@ struct Elastic {
     largest_strain: f64,
 }
 
-/// A supported body that can be turned about the z axis.
+/// Supported body that can rotate about the z axis.
 #[derive(Debug)]
 pub struct Rotating<'a> {
     mesh: &'a Mesh,
     material: &'a Material,
     assembled: &'a Assembled,
     free: &'a [usize],
-    /// Pattern of the free dofs, and which entry of the whole matrix each of its entries is.
+    /// Pattern of the free dofs, and the index in the whole matrix of each of its entries.
     reduced: (Arc<Pattern>, Vec<usize>),
 }
 
-/// A body in static equilibrium with the centrifugal force at one speed.
+/// Body in static equilibrium with the centrifugal force at one speed.
 #[derive(Debug, Clone)]
 pub struct SpinningState {
     /// Speed Ω (rad/s).
@@ -65,7 +65,7 @@ pub struct SpinningState {
     pub displacement: Mat<f64>,
     /// Tangent stiffness of the free dofs: elasticity of the deformed body, its stress, and -Ω²M_xy (N/m).
     pub stiffness: SparseMatrix,
-    /// Newton corrections made.
+    /// Number of Newton corrections.
     pub iterations: usize,
     /// Largest unbalanced force over the largest centrifugal one.
     pub residual: f64,
@@ -74,12 +74,13 @@ pub struct SpinningState {
 }
 
 impl<'a> Rotating<'a> {
-    /// A body with its assembled matrices (all dofs) and the dofs that are not clamped, ascending.
+    /// Creates a body from its assembled matrices (all dofs) and the dofs that are not clamped, ascending.
     ///
-    /// `stiffness` is the resting one of the free dofs; the stiffness of every [`SpinningState`] shares its pattern.
+    /// `stiffness` is that of the resting structure at the free dofs; the stiffness of every [`SpinningState`] shares
+    /// its pattern.
     ///
     /// # Errors
-    /// [`Error::Invalid`] when nothing is clamped: a body that flies freely about the axis has no static equilibrium.
+    /// [`Error::Invalid`] if nothing is clamped: a free body that rotates about the axis has no static equilibrium.
     pub fn new(
         mesh: &'a Mesh,
         material: &'a Material,
@@ -96,18 +97,18 @@ impl<'a> Rotating<'a> {
         Ok(Self { mesh, material, assembled, free, reduced: (Arc::clone(&stiffness.pattern), entries) })
     }
 
-    /// The displacement of the resting body: zero.
+    /// Returns the displacement of the resting body: zero.
     pub fn at_rest(&self) -> Mat<f64> {
         Mat::zeros(self.free.len(), 1)
     }
 
-    /// Equilibrium at `speed` (rad/s) by Newton's iteration from `start` (free dofs, one column).
+    /// Computes the equilibrium at `speed` (rad/s) by Newton's iteration from `start` (free dofs, one column).
     ///
     /// Internal force (total Lagrangian, St. Venant-Kirchhoff) = Ω² ∫ρ Nᵀ(x, y, 0) at the *displaced* position (x, y).
     ///
     /// # Errors
-    /// [`Error::Invalid`] when the iteration does not converge or strains exceed 0.1, [`Error::NotPositiveDefinite`] when the
-    /// body flies apart.
+    /// [`Error::Invalid`] if the iteration does not converge or strains exceed 0.1, [`Error::NotPositiveDefinite`] if
+    /// the body is unstable.
     pub fn equilibrium(&self, speed: f64, start: Mat<f64>) -> Result<SpinningState> {
         let mut displacement = start;
         let mut correction = f64::INFINITY;
@@ -132,8 +133,9 @@ impl<'a> Rotating<'a> {
             }
             let name = format!("K (stiffness at {speed} rad/s)");
             let full = softened.factor(&name, APART);
-            // A slender body is held in place by the tension that the first step only brings about: that step, and none
-            // that may be the last, leaves the force where the body was.
+            // A slender body is stabilised by the tension that only the first step causes. Until then the spin
+            // softening is omitted, so that the force stays at the old position, and the step never ends the
+            // iteration.
             let lagging = full.is_err();
             let step = full.or_else(|_| tangent.factor(&name, APART))?.solve(unbalanced);
             displacement += &step;
@@ -171,8 +173,8 @@ impl<'a> Rotating<'a> {
         Ok(Linearised { tangent: of_free(&whole), softened: of_free(&softened), unbalanced, load, largest_strain })
     }
 
-    /// ∫ρ Nᵀ(x, y, 0) at the displaced positions, all dofs (kg·m). Positions are interpolated by the same functions as
-    /// displacements, so the integral is the consistent mass times the nodes' positions.
+    /// Returns ∫ρ Nᵀ(x, y, 0) at the displaced positions, all dofs (kg·m). Positions are interpolated by the same
+    /// functions as displacements, so the integral is the consistent mass times the positions of the nodes.
     fn centrifugal_force(&self, moved: &[[f64; 3]]) -> Vec<f64> {
         let radial = Mat::from_fn(3 * moved.len(), 1, |dof, _| match dof % 3 {
             2 => 0.0,
@@ -222,7 +224,7 @@ impl<'a> Rotating<'a> {
     }
 }
 
-/// M_xy: the mass matrix (all dofs) without its axial rows and columns.
+/// Returns M_xy: the mass matrix (all dofs) without its axial rows and columns.
 pub fn without_axial(mass: &SparseMatrix) -> SparseMatrix {
     let pattern = &mass.pattern;
     let mut values = mass.values.clone();
@@ -236,8 +238,8 @@ pub fn without_axial(mass: &SparseMatrix) -> SparseMatrix {
     SparseMatrix { pattern: Arc::clone(pattern), values }
 }
 
-/// ẑ × of every node's vector: the rows (x, y, z) of each of `free`'s nodes become (-y, x, 0). `free` are the dofs of the
-/// rows (3·node + component); a component that is not among them is zero.
+/// Returns the product ẑ × v for every node vector v: the rows (x, y, z) of each node of `free` become (-y, x, 0).
+/// `free` are the dofs of the rows (3·node + component); a component that is not among them is zero.
 pub fn turned_about_axis(free: &[usize], columns: &Mat<f64>) -> Mat<f64> {
     Mat::from_fn(free.len(), columns.ncols(), |i, k| {
         let (other, sign) = match free[i] % 3 {

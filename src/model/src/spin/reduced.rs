@@ -1,4 +1,5 @@
-//! Effects of spin in reduced coordinates: states aligned with the resting one, the fit over the speed, and its checks.
+//! Effects of spin in reduced coordinates: states aligned with the resting one, the fit over the speed, and its
+//! checks.
 
 use faer::{Mat, MatRef};
 use nalgebra::DMatrix;
@@ -11,39 +12,40 @@ use crate::reduce::full_modes;
 use crate::sparse::SparseMatrix;
 use crate::{Error, Result};
 
-/// Share of the largest speed through which the fit over the speed goes beside 0 and 1. Interpolation in Ω² from here to
-/// the largest speed leaves about the same error above and, down to half of the largest speed, below it.
+/// Intermediate speed of the fit as a fraction of the largest speed, besides 0 and 1. Interpolation in Ω² from here
+/// to the largest speed causes about the same error above and, down to half of the largest speed, below it.
 pub(crate) const MIDDLE: f64 = 0.6;
-/// Share of the largest speed at which the fit is checked: about where it is worst.
+/// Speed of the check of the fit as a fraction of the largest speed, about where the fit is worst.
 pub(crate) const CHECKED: f64 = 0.8;
-/// A spinning state is searched for this many more fixed-interface modes than the resting one has, since the order of
-/// frequencies changes with the speed.
+/// Number of additional fixed-interface modes that are computed for a spinning state, since the order of frequencies
+/// changes with the speed.
 pub(crate) const SPARE_MODES: usize = 10;
-/// Least share that every resting fixed-interface mode must have in the spinning ones.
+/// Smallest fraction of every resting fixed-interface mode that the spinning ones must contain.
 const OVERLAP: f64 = 0.5;
 
-/// Quality of the reduced model at one speed.
+/// Accuracy of the reduced model at one speed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SpinCheck {
     /// Speed Ω (rad/s).
     pub speed: f64,
     /// Natural frequencies of the full model about its equilibrium at Ω (Hz), without Coriolis force.
     pub full_frequencies: Vec<f64>,
-    /// The same of the reduced model with K₀ + Ω²K₁ + Ω⁴K₂ (Hz).
+    /// Natural frequencies of the reduced model with K₀ + Ω²K₁ + Ω⁴K₂ (Hz).
     pub reduced_frequencies: Vec<f64>,
     /// Static growth of the contact degrees of freedom in the full model (m), in the ROM's frame.
     pub full_growth: Vec<f64>,
-    /// The same of the reduced model: K(Ω)⁻¹(Ω²c + Ω⁴c₂) (m).
+    /// Static growth in the reduced model: K(Ω)⁻¹(Ω²c + Ω⁴c₂) (m).
     pub reduced_growth: Vec<f64>,
 }
 
 impl SpinCheck {
-    /// Deviation of the reduced frequencies per mode (%).
+    /// Returns the deviation of the reduced frequencies per mode (%).
     pub fn frequency_deviation(&self) -> Vec<f64> {
         self.full_frequencies.iter().zip(&self.reduced_frequencies).map(|(f, r)| (r - f) / f * 100.0).collect()
     }
 
-    /// Largest difference of the growth of a contact degree of freedom over the largest growth of any (%).
+    /// Returns the largest difference of the growth of a contact degree of freedom over the largest growth of any
+    /// (%).
     pub fn growth_deviation(&self) -> f64 {
         let largest = self.full_growth.iter().fold(0.0_f64, |worst, growth| worst.max(growth.abs()));
         let differences = self.full_growth.iter().zip(&self.reduced_growth).map(|(f, r)| (f - r).abs());
@@ -51,29 +53,29 @@ impl SpinCheck {
     }
 }
 
-/// Spin arrays of a ROM and how well they hold.
+/// Spin arrays of a ROM with their accuracy.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ReducedSpin {
-    /// The arrays.
+    /// Spin arrays.
     pub spin: Spin,
-    /// At [`CHECKED`] of the largest speed, where the fit is not exact, and at the largest, where it is.
+    /// Checks at [`CHECKED`] of the largest speed, where the fit is not exact, and at the largest, where it is.
     pub checks: Vec<SpinCheck>,
 }
 
-/// The equilibria that the spin arrays are made and checked with.
+/// Equilibria from which the spin arrays are computed and checked.
 #[derive(Debug)]
 pub(crate) struct SpinningStates {
-    /// At [`MIDDLE`] Ω: fitted.
+    /// State at [`MIDDLE`] Ω, which is fitted.
     pub middle: SpinningState,
-    /// At [`CHECKED`] Ω: checked.
+    /// State at [`CHECKED`] Ω, which is checked.
     pub checked: SpinningState,
-    /// At Ω: fitted and checked.
+    /// State at Ω, which is fitted and checked.
     pub largest: SpinningState,
 }
 
 impl SpinningStates {
-    /// Find the three equilibria up to `largest_speed` (rad/s), each from the one before, scaled by the force; `found` is
-    /// told how many there are.
+    /// Finds the three equilibria up to `largest_speed` (rad/s), each starting from the previous one, scaled by the
+    /// force; calls `found` with the number found so far.
     ///
     /// # Errors
     /// The errors of [`Rotating::equilibrium`].
@@ -93,14 +95,14 @@ impl SpinningStates {
     }
 }
 
-/// The reduced model at rest, in whose coordinates the spin arrays are.
+/// Reduced model at rest, which defines the coordinates of the spin arrays.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Resting<'a> {
-    /// The model; its first coordinates are the contact displacements.
+    /// Reduced model; its first coordinates are the contact displacements.
     pub model: &'a CraigBampton,
     /// Mass matrix of the free dofs.
     pub mass: &'a SparseMatrix,
-    /// The free dofs (3·node + component), ascending.
+    /// Free dofs (3·node + component), ascending.
     pub free: &'a [usize],
     /// Unit forces on the contact coordinates, free dofs × coordinates.
     pub contact: MatRef<'a, f64>,
@@ -108,10 +110,11 @@ pub(crate) struct Resting<'a> {
 
 /// Arrays at one speed, in the coordinates and with the mass matrix of the resting model.
 ///
-/// T = \[Ψ Φ\] of the spinning state becomes TR, R = \[I 0; BA B\]: contact displacements stay what they are; BᵀB = I
-/// picks and turns the fixed-interface modes to come closest to the resting ones (polar factor of ΦᵀMΦ₀), and
-/// A = M̂₀_mb - BᵀM̂_mb couples them to the interface as at rest. Then (TR)ᵀM(TR) = M̂₀ but for the part of the interface
-/// mass that these modes do not carry, M̂_bb - M̂_bm BBᵀM̂_mb, whose change with speed is neglected.
+/// T = \[Ψ Φ\] of the spinning state becomes TR, R = \[I 0; BA B\]: contact displacements stay unchanged; BᵀB = I
+/// selects and rotates the fixed-interface modes to be as close as possible to the resting ones (polar factor of
+/// ΦᵀMΦ₀), and A = M̂₀_mb - BᵀM̂_mb couples them to the interface as at rest. Then (TR)ᵀM(TR) = M̂₀ except for the
+/// part of the interface mass that these modes do not carry, M̂_bb - M̂_bm BBᵀM̂_mb, whose change with speed is
+/// neglected.
 struct AtSpeed {
     /// Ω² (rad²/s²).
     square: f64,
@@ -119,8 +122,8 @@ struct AtSpeed {
     basis: Mat<f64>,
     /// (RᵀK̂R - K̂₀)/Ω².
     stiffness: DMatrix<f64>,
-    /// (TR)ᵀ K(Ω) u(Ω)/Ω², one column. The model's static response to it has the contact displacements of u(Ω), since
-    /// constraint modes are K-orthogonal to what they leave of it.
+    /// (TR)ᵀ K(Ω) u(Ω)/Ω², one column. The static response of the model to it has the contact displacements of u(Ω),
+    /// since constraint modes are K-orthogonal to the remainder.
     load: DMatrix<f64>,
 }
 
@@ -149,7 +152,7 @@ impl AtSpeed {
     }
 }
 
-/// The orthonormal columns closest to those of a matrix: its polar factor.
+/// Returns the orthonormal columns closest to those of a matrix: its polar factor.
 fn closest_modes(overlap: DMatrix<f64>) -> Result<DMatrix<f64>> {
     if overlap.is_empty() {
         return Ok(overlap);
@@ -166,21 +169,21 @@ fn closest_modes(overlap: DMatrix<f64>) -> Result<DMatrix<f64>> {
     }
 }
 
-/// a and b of a + b s through the values at two s.
+/// Returns a and b of a + b s through the values at two s.
 fn line(first: (f64, &DMatrix<f64>), second: (f64, &DMatrix<f64>)) -> (DMatrix<f64>, DMatrix<f64>) {
     let slope = (second.1 - first.1) / (second.0 - first.0);
     (first.1 - &slope * first.0, slope)
 }
 
-/// Spin arrays in the coordinates of `resting`, from the reduced models about the two fitted equilibria.
+/// Computes the spin arrays in the coordinates of `resting` from the reduced models about the two fitted equilibria.
 ///
-/// Those models have the contact displacements of `resting` and at least as many modes, better [`SPARE_MODES`] more.
-/// `modes` frequencies are checked. (K(Ω) - K₀)/Ω² = K₁ + Ω²K₂ and the load over Ω², c + Ω²c₂, are straight lines in Ω²
-/// through the two speeds; G is that of the largest speed.
+/// These models have the contact displacements of `resting` and at least as many modes, preferably [`SPARE_MODES`]
+/// more. `modes` frequencies are checked. (K(Ω) - K₀)/Ω² = K₁ + Ω²K₂ and the load over Ω², c + Ω²c₂, are straight
+/// lines in Ω² through the two speeds; G is that of the largest speed.
 ///
 /// # Errors
-/// The errors of [`full_modes`]; [`Error::NotPositiveDefinite`] for an unstable reduced model; [`Error::Invalid`] when the
-/// modes change beyond recognition.
+/// The errors of [`full_modes`]; [`Error::NotPositiveDefinite`] for an unstable reduced model; [`Error::Invalid`] if
+/// the modes change too much to be identified.
 pub(crate) fn reduced_spin(
     states: &SpinningStates,
     resting: Resting<'_>,
@@ -208,7 +211,7 @@ pub(crate) fn reduced_spin(
     Ok(ReducedSpin { checks: checks.into_iter().collect::<Result<_>>()?, spin })
 }
 
-/// A state's contact coordinates, in the ROM's frame.
+/// Returns the contact coordinates of a state, in the frame of the ROM.
 fn contact_growth(state: &SpinningState, resting: Resting<'_>) -> Vec<f64> {
     let growth = resting.contact.transpose() * &state.displacement;
     (0..resting.contact.ncols()).map(|j| growth[(j, 0)]).collect()

@@ -1,9 +1,11 @@
-//! The casing of the stage, of the paper's size (section 6.1): 68,768 nodes, 44,800 bricks, 206,304 degrees of freedom.
+//! Casing of the stage in the size of the paper (section 6.1): 68,768 nodes, 44,800 bricks, 206,304 degrees of
+//! freedom.
 //!
-//! 224 bricks around × a meridional section of 200 quadrilaterals with 307 nodes: a cylindrical wall over the blades, two
-//! cells thick and 72 long; a flange of 2 × 12 cells at either end; two hooks of 1 × 4 cells that carry the liner of the
-//! blade track. Both numbers fix the perimeter: a section of Q quadrilaterals without holes has 1 + Q + B/2 nodes, so that
-//! B = 212 edges lie on its border. The casing is held at the face of its low flange.
+//! The mesh has 224 bricks around and a meridional section of 200 quadrilaterals with 307 nodes: a cylindrical wall
+//! over the blades, two cells thick and 72 long; a flange of 2 × 12 cells at either end; two hooks of 1 × 4 cells
+//! that carry the liner of the blade track. Both numbers determine the perimeter: a section of Q quadrilaterals
+//! without holes has 1 + Q + B/2 nodes, so that B = 212 edges lie on its border. The casing is clamped at the face of
+//! its low flange.
 
 use core::f64::consts::TAU;
 use std::collections::BTreeMap;
@@ -20,7 +22,7 @@ use crate::{Error, Result};
 
 /// Axial ends of the casing (m).
 const AXIAL: [f64; 2] = [-0.060, 0.060];
-/// Distance of the outer contact rings from the blade tip (m).
+/// Axial distance of the outer contact rings from the blade tip (m).
 const BEYOND: f64 = 4e-3;
 /// Thickness of the wall (m).
 const WALL: f64 = 5e-3;
@@ -32,13 +34,14 @@ const FLANGE_HEIGHT: f64 = 30e-3;
 const HOOK_HEIGHT: f64 = 10e-3;
 /// Cells through the wall, and along a flange.
 const THROUGH: usize = 2;
-/// Cells along the wall: low flange, to the low contact ring, between the outer ones, from the high one on, high flange.
+/// Cells along the wall: low flange, to the low contact ring, between the outer rings, from the high ring on, high
+/// flange.
 const ALONG: [usize; 5] = [2, 22, 24, 22, 2];
 /// Cells along the height of a flange and of a hook.
 const HEIGHTS: [usize; 2] = [12, 4];
 /// Axial cells of the two hooks: just outside the contact rings.
 const HOOKS: [usize; 2] = [22, 49];
-/// Nodes in the section of linear bricks.
+/// Number of nodes in the section of linear bricks.
 #[cfg(test)]
 const SECTION_NODES: usize = 307;
 
@@ -55,14 +58,14 @@ pub struct StageCasingOptions {
     pub formulation: Formulation,
     /// Material.
     pub material: Material,
-    /// Contact nodes around, and rings of them along the axis: 2, 3, 4 or 5, evenly from 4 mm before the blade tip to 4 mm
-    /// behind it.
+    /// Contact nodes around, and number of rings along the axis: 2, 3, 4 or 5, evenly spaced from 4 mm before the
+    /// blade tip to 4 mm behind it.
     pub contact: [usize; 2],
-    /// Thermal patches around and along; none where either is zero.
+    /// Thermal patches around and along; no patches if either is zero.
     pub patches: [usize; 2],
     /// Number of fixed-interface modes, see [`CasingReductionOptions`].
     pub fixed_interface_modes: usize,
-    /// Number of modes delivered as they are, see [`CasingReductionOptions`].
+    /// Number of modes that are kept unchanged, see [`CasingReductionOptions`].
     pub modes: usize,
     /// Number of modes compared with the full model.
     pub checked_modes: usize,
@@ -71,8 +74,8 @@ pub struct StageCasingOptions {
 }
 
 impl Default for StageCasingOptions {
-    /// Titanium, damping of the paper's casing; 28 × 3 contact nodes, which leave 14 of them to a wave of an ovalised
-    /// casing.
+    /// Returns titanium with the damping of the casing of the paper and 28 × 3 contact nodes, that is 14 around for
+    /// each wave of an ovalised casing.
     fn default() -> Self {
         Self {
             name: "stage-casing".into(),
@@ -90,16 +93,17 @@ impl Default for StageCasingOptions {
     }
 }
 
-/// Mesh and contact nodes; node sets `inner`, `flange` (face of the low flange) and [`CLAMPED`], the same.
+/// Builds the mesh and the contact nodes; node sets `inner`, `flange` (face of the low flange) and [`CLAMPED`], which
+/// equals `flange`.
 ///
 /// # Errors
-/// [`Error::Invalid`] for counts that do not fit each other.
+/// [`Error::Invalid`] for inconsistent counts.
 pub fn stage_casing_mesh(options: &StageCasingOptions) -> Result<RingMesh> {
     check(options)?;
     let section = MeridionalSection::new();
     let mut mesh = Mesh::default();
     let mut numbers = BTreeMap::new();
-    // Slice by slice, as the bandwidth of some solvers likes it.
+    // Slice by slice, which gives some solvers a small bandwidth.
     for (slice, &[along, layer]) in (0..options.around).flat_map(|slice| section.cells.iter().map(move |c| (slice, c)))
     {
         let place = |natural: &[f64; 3]| {
@@ -136,7 +140,7 @@ pub fn stage_casing_mesh(options: &StageCasingOptions) -> Result<RingMesh> {
     Ok(RingMesh { mesh, grid })
 }
 
-/// Build, reduce and check the casing of the stage.
+/// Builds, reduces and checks the casing of the stage.
 ///
 /// # Errors
 /// The errors of [`stage_casing_mesh`] and [`reduce_casing`].
@@ -190,7 +194,7 @@ fn check(options: &StageCasingOptions) -> Result<()> {
     Ok(())
 }
 
-/// The meridional section.
+/// Meridional section.
 struct MeridionalSection {
     /// (axial, radial) index of every cell.
     cells: Vec<[usize; 2]>,
@@ -225,9 +229,9 @@ impl MeridionalSection {
         Self { cells, axial, radial }
     }
 
-    /// Position of the station (around, along, radial), two of each per cell.
+    /// Returns the position of the station (around, along, radial), with two stations per cell in each direction.
     fn position(&self, [around, along, layer]: [usize; 3], cells_around: usize) -> [f64; 3] {
-        // Hooks stand in the wall, away from the flanges.
+        // Hooks are on the wall, away from the flanges.
         let hooked = HOOKS.iter().any(|&hook| (2 * hook..=2 * hook + 2).contains(&along));
         let radius = TIP_RADIUS + GAP + self.radial[usize::from(hooked)][layer];
         let angle = TAU * around as f64 / (2 * cells_around) as f64;
@@ -235,7 +239,7 @@ impl MeridionalSection {
     }
 }
 
-/// Append `count` even divisions up to `end`.
+/// Appends `count` even divisions up to `end`.
 fn divide(stations: &mut Vec<f64>, end: f64, count: usize) {
     let start = stations[stations.len() - 1];
     stations
@@ -254,7 +258,7 @@ mod tests {
         corners.sort_unstable();
         corners.dedup();
         assert_eq!((section.cells.len(), corners.len()), (200, SECTION_NODES));
-        // 224 around give what the paper gives for its casing.
+        // 224 around gives the numbers that the paper states for its casing.
         assert_eq!((200 * 224, SECTION_NODES * 224, 3 * SECTION_NODES * 224), (44_800, 68_768, 206_304));
     }
 }

@@ -1,6 +1,7 @@
 //! Shape of one sector: a bladed disk with bore, web and rim, and a twisted blade of double-circular-arc section.
 //!
-//! The flow runs along +z and the stage turns towards +θ, so that blades lean towards -θ from leading to trailing edge.
+//! The flow is along +z and the stage rotates towards +θ, so that blades lean towards -θ from leading to trailing
+//! edge.
 
 use core::f64::consts::TAU;
 
@@ -9,10 +10,10 @@ use tiprub_core::shown;
 use super::{SECTORS, TIP_AXIAL, TIP_RADIUS};
 use crate::{Error, Result};
 
-/// A blade. Pairs give the values at root and tip, between which they are linear in the radius.
+/// Blade geometry. Pairs are the values at root and tip, between which they are linear in the radius.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BladeGeometry {
-    /// Radius of the tip (m): a cylinder.
+    /// Radius of the cylindrical tip (m).
     pub tip_radius: f64,
     /// Axial positions of leading and trailing edge at the root (m).
     pub root_axial: [f64; 2],
@@ -20,24 +21,24 @@ pub struct BladeGeometry {
     pub tip_axial: [f64; 2],
     /// Angle between camber line and axis at the leading edge (rad).
     pub inlet_angle: [f64; 2],
-    /// The same at the trailing edge (rad).
+    /// Angle between camber line and axis at the trailing edge (rad).
     pub outlet_angle: [f64; 2],
     /// Largest thickness, at half the axial chord (m).
     pub thickness: [f64; 2],
     /// Thickness of the edges (m).
     pub edge_thickness: [f64; 2],
-    /// Radius of the fillet at the root (m); 0 for none.
+    /// Radius of the fillet at the root (m); 0 without a fillet.
     pub fillet: f64,
 }
 
-/// The disk under the blades, symmetric about the plane z = 0 but for the ends of the rim.
+/// Disk under the blades, symmetric about the plane z = 0 except for the ends of the rim.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DiskGeometry {
     /// Radius of the bore (m).
     pub bore_radius: f64,
-    /// Radial height of the bore's thick ring (m).
+    /// Radial height of the thick ring at the bore (m).
     pub bore_height: f64,
-    /// Axial width of that ring (m).
+    /// Axial width of this ring (m).
     pub bore_width: f64,
     /// Axial thickness of the web at the bore and at the rim (m).
     pub web_thickness: [f64; 2],
@@ -45,11 +46,11 @@ pub struct DiskGeometry {
     pub rim_thickness: f64,
     /// Axial ends of the rim (m).
     pub rim_axial: [f64; 2],
-    /// Radius of the rim's outer surface, from which the blades rise (m).
+    /// Radius of the outer surface of the rim, where the blades start (m).
     pub hub_radius: f64,
 }
 
-/// One sector of a bladed disk.
+/// Geometry of one sector of a bladed disk.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SectorGeometry {
     /// Number of sectors of the disk.
@@ -95,7 +96,7 @@ impl Default for SectorGeometry {
     }
 }
 
-/// The section of a blade at one radius.
+/// Section of a blade at one radius.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BladeSection {
     axial: [f64; 2],
@@ -107,7 +108,7 @@ pub(super) struct BladeSection {
     fillet: f64,
 }
 
-/// A point of the camber line and how far the blade's sides are from it.
+/// Point of the camber line with the distance of the sides of the blade.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct CamberPoint {
     /// Axial position (m).
@@ -119,13 +120,14 @@ pub(super) struct CamberPoint {
 }
 
 impl BladeSection {
-    /// Camber line at a share of the axial chord; outside 0..=1 it goes on straight, and so do the sides.
+    /// Returns the point of the camber line at a fraction of the axial chord; outside 0..=1 the line and the sides
+    /// continue straight.
     pub(super) fn at(&self, share: f64) -> CamberPoint {
         let [leading, trailing] = self.axial;
         let chord = trailing - leading;
         let (inside, [inlet, outlet]) = (share.clamp(0.0, 1.0), self.slopes);
         let slope = inlet + (outlet - inlet) * inside;
-        // The integral of the slope, zero at mid-chord: sections are stacked there.
+        // Integral of the slope, zero at mid-chord, where the sections are stacked.
         let height = |x: f64| inlet * x + 0.5 * (outlet - inlet) * x * x;
         let along = -chord * (height(inside) - height(0.5) + slope * (share - inside));
         let thickness = self.edge_thickness + (self.thickness - self.edge_thickness) * 4.0 * inside * (1.0 - inside);
@@ -134,7 +136,7 @@ impl BladeSection {
         CamberPoint { z: leading + chord * share, along, half: [half * slope / length, half / length] }
     }
 
-    /// Share of the axial chord at an axial position.
+    /// Returns the fraction of the axial chord at an axial position.
     pub(super) fn share(&self, z: f64) -> f64 {
         (z - self.axial[0]) / (self.axial[1] - self.axial[0])
     }
@@ -145,13 +147,13 @@ fn between([first, last]: [f64; 2], share: f64) -> f64 {
 }
 
 impl SectorGeometry {
-    /// Angle of one sector (rad).
+    /// Returns the angle of one sector (rad).
     #[expect(clippy::cast_precision_loss, reason = "numbers of sectors are small")]
     pub fn pitch(&self) -> f64 {
         TAU / self.sectors as f64
     }
 
-    /// The blade's section at a radius (m).
+    /// Returns the section of the blade at a radius (m).
     pub(super) fn section(&self, radius: f64) -> BladeSection {
         let (blade, hub) = (&self.blade, self.disk.hub_radius);
         let share = (radius - hub) / (blade.tip_radius - hub);
@@ -166,17 +168,17 @@ impl SectorGeometry {
         }
     }
 
-    /// Axial thickness of the web at a radius (m).
+    /// Returns the axial thickness of the web at a radius (m).
     pub(super) fn web(&self, radius: f64) -> f64 {
         let disk = &self.disk;
         let (low, high) = (disk.bore_radius + disk.bore_height, disk.hub_radius - disk.rim_thickness);
         between(disk.web_thickness, (radius - low) / (high - low))
     }
 
-    /// Check that the lengths make a bladed disk.
+    /// Checks that the lengths define a bladed disk.
     ///
     /// # Errors
-    /// [`Error::Invalid`] naming the length, angle or number.
+    /// [`Error::Invalid`] with the length, angle or number.
     pub(crate) fn validate(&self) -> Result<()> {
         let (blade, disk) = (&self.blade, &self.disk);
         if self.sectors < 3 {
@@ -226,12 +228,12 @@ impl SectorGeometry {
         self.validate_width()
     }
 
-    /// Shorter of the two axial reaches of the rim from z = 0 (m).
+    /// Returns the shorter of the two axial distances of the rim ends from z = 0 (m).
     fn rim_reach(&self) -> f64 {
         self.disk.rim_axial[1].min(-self.disk.rim_axial[0])
     }
 
-    /// Room between the roots of neighbouring blades, and before and behind them for the fillet.
+    /// Checks the space between the roots of neighbouring blades, and before and behind them for the fillet.
     fn validate_width(&self) -> Result<()> {
         let (root, hub) = (self.section(self.disk.hub_radius), self.disk.hub_radius);
         let widest = (0..=20).map(|i| root.at(f64::from(i) / 20.0).half[1]).fold(0.0, f64::max);
@@ -244,7 +246,7 @@ impl SectorGeometry {
     }
 }
 
-/// Beyond this angle of the camber line (rad) sections are sheared too much to be meshed.
+/// Largest angle of the camber line (rad); above it the sections are sheared too much for a mesh.
 const LARGEST_ANGLE: f64 = 1.3;
 
 const REMEDY: &str = "Give lengths in m and angles in rad of a valid bladed disk";

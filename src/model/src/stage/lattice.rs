@@ -1,9 +1,9 @@
 //! Mesh of one sector: triangles in the meridional plane, swept along the circumference into prisms.
 //!
 //! A lattice of columns (along the axis), rows (along the radius) and layers (around) has cells where the sector has
-//! material; each is cut into two prisms by a diagonal of its meridional face. The blade takes the middle layers, so that it
-//! grows out of the disk node for node, and the lowest and highest layer end in faces that differ by one pitch exactly. The
-//! cut between sectors follows the camber line at the rim and is flat at the bore.
+//! material; each cell is cut into two prisms by a diagonal of its meridional face. The blade uses the middle layers,
+//! so that its nodes coincide with those of the disk, and the lowest and highest layer end in faces that differ by
+//! exactly one pitch. The cut between sectors follows the camber line at the rim and is flat at the bore.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,10 +13,10 @@ use crate::Result;
 use crate::element::ElementKind;
 use crate::mesh::{Element, Mesh};
 
-/// A place of the lattice: row, column and layer, doubled, so that the middles of edges have whole numbers.
+/// Position in the lattice: row, column and layer, doubled, so that the middles of edges have integer numbers.
 pub(super) type LatticeIndex = [usize; 3];
 
-/// The lattice with the numbers of its parts.
+/// Lattice with the numbers of its parts.
 pub(super) struct Lattice<'a> {
     pub geometry: &'a SectorGeometry,
     pub counts: SectorCounts,
@@ -29,7 +29,7 @@ pub(super) struct Lattice<'a> {
     pub web_column: usize,
 }
 
-/// Diagonals whose lengths differ by less than this share are alike.
+/// Relative difference below which the lengths of diagonals count as equal.
 const ALIKE: f64 = 0.05;
 
 impl<'a> Lattice<'a> {
@@ -41,7 +41,7 @@ impl<'a> Lattice<'a> {
         Ok(Self { geometry: &options.geometry, counts, kind, web, rim, hub: rim + counts.rim, web_column })
     }
 
-    /// Columns and layers that have cells in a row.
+    /// Returns the columns and layers that have cells in a row.
     fn extent(&self, row: usize) -> [core::ops::Range<usize>; 2] {
         let counts = &self.counts;
         let (web, layers) = (self.web_column..self.web_column + counts.web[0], 0..counts.layers());
@@ -56,12 +56,12 @@ impl<'a> Lattice<'a> {
         }
     }
 
-    /// Rows of the whole sector.
+    /// Returns the number of rows of the whole sector.
     pub(super) fn rows(&self) -> usize {
         self.hub + self.counts.span
     }
 
-    /// Elements as places, from a row outwards.
+    /// Returns the elements as lattice positions, from a row outwards.
     fn prisms(&self, first_row: usize) -> Vec<Vec<LatticeIndex>> {
         let mut prisms = Vec::new();
         for row in first_row..self.rows() {
@@ -75,8 +75,8 @@ impl<'a> Lattice<'a> {
         prisms
     }
 
-    /// The two triangles (row, column) of a cell, counter-clockwise in the plane of z and r: cut along the shorter diagonal,
-    /// and in turns where both are alike.
+    /// Returns the two triangles (row, column) of a cell, counter-clockwise in the plane of z and r: cut along the
+    /// shorter diagonal, or alternately if both are equal.
     fn triangles(&self, row: usize, column: usize) -> [[[usize; 2]; 3]; 2] {
         let corner = |i: usize, j: usize| [row + i, column + j];
         let [a, b, c, d] = [corner(0, 0), corner(0, 1), corner(1, 1), corner(1, 0)];
@@ -93,7 +93,7 @@ impl<'a> Lattice<'a> {
         }
     }
 
-    /// Places of a prism's nodes in the order of its kind.
+    /// Returns the positions of the nodes of a prism in the order of its kind.
     fn prism(&self, corners: [[usize; 2]; 3], layer: usize) -> Vec<LatticeIndex> {
         let end = |layer: usize| corners.map(|[row, column]| [2 * row, 2 * column, 2 * layer]);
         let mut places = [end(layer), end(layer + 1)].concat();
@@ -143,15 +143,16 @@ impl<'a> Lattice<'a> {
     }
 }
 
-/// Mesh of one sector of the bladed disk.
+/// Builds the mesh of one sector of the bladed disk.
 ///
 /// # Errors
-/// [`crate::Error::Invalid`] for lengths that make no bladed disk, and numbers of elements that do not fit each other or the shape.
+/// [`crate::Error::Invalid`] for lengths that define no bladed disk, and for numbers of elements that do not match
+/// each other or the shape.
 pub fn sector_mesh(options: &SectorOptions) -> Result<SectorMesh> {
     Lattice::new(options)?.mesh(0)
 }
 
-/// Mesh of the blade alone, clamped at its root.
+/// Builds the mesh of the blade alone, clamped at its root.
 ///
 /// # Errors
 /// The errors of [`sector_mesh`].

@@ -1,4 +1,5 @@
-//! A parametric compressor stage of the paper's size (section 6.1): 56 blades on a disk, and a casing ring with flanges.
+//! Parametric compressor stage in the size of the paper (section 6.1): 56 blades on a disk, and a casing ring with
+//! flanges.
 
 pub mod casing;
 mod geometry;
@@ -12,7 +13,7 @@ pub use lattice::{blade_mesh, sector_mesh};
 pub use reduction::{StageModel, StageOptions, reduce_stage, stage_model};
 pub use sector::{SectorCounts, SectorMesh, SectorOptions};
 
-/// Blades, and sectors of the disk.
+/// Number of blades and of disk sectors.
 pub const SECTORS: usize = 56;
 /// Radius of the blade tips (m); the tip contour is a cylinder.
 pub const TIP_RADIUS: f64 = 0.35;

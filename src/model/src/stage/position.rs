@@ -1,14 +1,14 @@
-//! Where the places of a sector's lattice lie.
+//! Positions of the lattice points of a sector.
 
 use super::geometry::CamberPoint;
 use super::lattice::{Lattice, LatticeIndex};
 
-/// Linear between two values.
+/// Interpolates linearly between two values.
 fn mix(from: f64, to: f64, share: f64) -> f64 {
     from + (to - from) * share
 }
 
-/// Piecewise linear through points (x ascending).
+/// Interpolates piecewise linearly through points (x ascending).
 fn through(points: &[[f64; 2]], x: f64) -> f64 {
     let last = points.len() - 2;
     let segment = points[1..=last].iter().take_while(|point| point[0] <= x).count();
@@ -22,7 +22,7 @@ fn real(number: usize) -> f64 {
 }
 
 impl Lattice<'_> {
-    /// Cartesian coordinates of a place (m).
+    /// Returns the Cartesian coordinates of a lattice point (m).
     pub(super) fn position(&self, [row, column, layer]: LatticeIndex) -> [f64; 3] {
         let [row, column, layer] = [row, column, layer].map(|doubled| 0.5 * real(doubled));
         let radius = self.radius(row);
@@ -34,7 +34,7 @@ impl Lattice<'_> {
         [radius * theta.cos(), radius * theta.sin(), z]
     }
 
-    /// Radius of a row (m).
+    /// Returns the radius of a row (m).
     fn radius(&self, row: f64) -> f64 {
         let (disk, blade) = (&self.geometry.disk, &self.geometry.blade);
         let mut points = vec![
@@ -50,12 +50,12 @@ impl Lattice<'_> {
         through(&points, row)
     }
 
-    /// Share of the blade's layers, -1 to 1.
+    /// Returns the position across the layers of the blade, -1 to 1.
     fn across_blade(&self, layer: f64) -> f64 {
         2.0 * (layer - real(self.counts.side)) / real(self.counts.thickness) - 1.0
     }
 
-    /// (z, θ) in the blade: across the camber line, on a cylinder.
+    /// Returns (z, θ) in the blade: across the camber line, on a cylinder.
     fn in_blade(&self, radius: f64, column: f64, layer: f64) -> [f64; 2] {
         let counts = &self.counts;
         let CamberPoint { z, along, half } =
@@ -64,8 +64,8 @@ impl Lattice<'_> {
         [z + across * half[0], (along + across * half[1]) / radius]
     }
 
-    /// (z, θ) in the disk: the middle layers widen from the blade's root to their share of the pitch over the depth of the
-    /// rim, the other ones fill the sector.
+    /// Returns (z, θ) in the disk: over the depth of the rim, the middle layers widen from the root of the blade to
+    /// their fraction of the pitch; the other layers fill the sector.
     fn in_disk(&self, row: f64, radius: f64, column: f64, layer: f64) -> [f64; 2] {
         let (geometry, counts) = (self.geometry, &self.counts);
         let (disk, half_pitch) = (&geometry.disk, 0.5 * geometry.pitch());
@@ -80,21 +80,22 @@ impl Lattice<'_> {
         let [theta, share] = if across.abs() <= 1.0 {
             [across * width, across]
         } else {
-            // How far from the blade's layers to the cut.
+            // Relative distance from the layers of the blade to the cut.
             let side = (across.abs() - 1.0) * 0.5 * real(counts.thickness) / real(counts.side);
             [across.signum() * mix(width, half_pitch, side), across.signum() * (1.0 - side)]
         };
         [z + share * shift, theta + self.lean(radius) * along / disk.hub_radius]
     }
 
-    /// Share of the camber line's shape that the cut between sectors has: all at the rim, none at the bore.
+    /// Returns the fraction of the camber-line shape that the cut between sectors has: one at the rim, zero at the
+    /// bore.
     fn lean(&self, radius: f64) -> f64 {
         let disk = &self.geometry.disk;
         let share = (radius - disk.bore_radius) / (disk.hub_radius - disk.bore_radius);
         share * share * (3.0 - 2.0 * share)
     }
 
-    /// 1 beside the blade, falling to 0 at the ends of the rim, so that these are flat.
+    /// Returns 1 beside the blade, decreasing to 0 at the ends of the rim, which are thus flat.
     fn towards_end(&self, z: f64) -> f64 {
         let ([low, high], [leading, trailing]) = (self.geometry.disk.rim_axial, self.geometry.blade.root_axial);
         if z < leading {
@@ -106,7 +107,7 @@ impl Lattice<'_> {
         }
     }
 
-    /// Axial position of a column in the disk (m).
+    /// Returns the axial position of a column in the disk (m).
     fn axial(&self, row: f64, radius: f64, column: f64) -> f64 {
         let (disk, blade, counts) = (&self.geometry.disk, &self.geometry.blade, &self.counts);
         let [low, high] = disk.rim_axial;

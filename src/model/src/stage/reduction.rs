@@ -1,4 +1,4 @@
-//! The reduced-order model of the stage's bladed disk.
+//! Reduced-order model of the bladed disk of the stage.
 
 use super::lattice::sector_mesh;
 use super::sector::{SectorMesh, SectorOptions};
@@ -18,7 +18,7 @@ pub struct StageOptions {
     pub material: Material,
     /// Contact of the tip.
     pub tip: TipContact,
-    /// Which modes are kept.
+    /// Kind of the modes.
     pub kind: ReductionKind,
     /// Selection of modes.
     pub modes: ModeSelection,
@@ -43,12 +43,12 @@ impl Default for StageOptions {
 }
 
 impl StageOptions {
-    /// A coarse sector and few modes, for trials.
+    /// Returns a coarse sector and few modes, for tests and trials.
     pub fn coarse() -> Self {
         Self { sector: SectorOptions::coarse(), modes: ModeSelection::Families(8), checked_modes: 5, ..Self::default() }
     }
 
-    /// Returns the options of the reduction of its sector.
+    /// Returns the options of the reduction of the sector.
     pub fn cyclic(&self, name: impl Into<String>) -> CyclicOptions {
         CyclicOptions {
             name: name.into(),
@@ -60,25 +60,25 @@ impl StageOptions {
     }
 }
 
-/// One sector's model with everything its reduction needs.
+/// Model of one sector with the data of its reduction.
 #[derive(Debug, Clone)]
 pub struct StageModel {
-    /// Assembled, mesh included.
+    /// Assembled model, including its mesh.
     pub model: FeModel,
     /// Nodes of the bore.
     pub clamped: Vec<usize>,
     /// Contact nodes or patches, leading to trailing edge.
     pub contact: Vec<ContactPoint>,
-    /// Pairs of nodes of the faces.
+    /// Pairing of the nodes of the faces.
     pub boundary: CyclicBoundary,
-    /// Fit of the two faces.
+    /// Quality of the pairing.
     pub pairing: PairingReport,
 }
 
-/// Faces of a generated sector fit to round-off; this (m) only tells nodes apart.
+/// Tolerance of the pairing (m). Faces of a generated sector match to round-off, so it only has to distinguish nodes.
 const TOLERANCE: f64 = 1e-9;
 
-/// Mesh and assemble a sector of the stage.
+/// Meshes and assembles a sector of the stage.
 ///
 /// # Errors
 /// The errors of [`sector_mesh`] and of the assembly; more contact nodes or patches than the tip has places for.
@@ -100,7 +100,7 @@ pub fn stage_model(options: &StageOptions, listener: Listener<'_>) -> Result<Sta
     Ok(StageModel { model, clamped, contact, boundary, pairing })
 }
 
-/// Build, reduce and check the bladed disk of the stage.
+/// Builds, reduces and checks the bladed disk of the stage.
 ///
 /// # Errors
 /// The errors of [`stage_model`] and [`reduce_cyclic`].

@@ -1,4 +1,4 @@
-//! What a sector is meshed with, and its mesh.
+//! Mesh options of a sector, and its mesh.
 
 use super::geometry::SectorGeometry;
 use crate::element::ElementKind;
@@ -8,12 +8,12 @@ use crate::reduce::ContactPoint;
 use crate::rotor37::{place_name, spread_contact};
 use crate::{Error, Result};
 
-/// Numbers of elements' edges in the parts of a sector.
+/// Numbers of elements in the parts of a sector.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SectorCounts {
-    /// Columns of the blade, leading to trailing edge; even, so that there is a middle.
+    /// Columns of the blade, leading to trailing edge; even, so that there is a middle column.
     pub chord: usize,
-    /// Rows of the blade, root to tip; the first one is the fillet, where there is one.
+    /// Rows of the blade, root to tip; the first one is the fillet, if any.
     pub span: usize,
     /// Layers through the blade.
     pub thickness: usize,
@@ -23,14 +23,14 @@ pub struct SectorCounts {
     pub overhang: usize,
     /// Rows of the rim.
     pub rim: usize,
-    /// Columns and rows of the web; as many columns as those of the rim, less an even number.
+    /// Columns and rows of the web; the number of columns is that of the rim minus an even number.
     pub web: [usize; 2],
-    /// Columns of the bore's ring on either side of the web, and rows.
+    /// Columns of the ring at the bore on either side of the web, and its rows.
     pub bore: [usize; 2],
 }
 
 impl Default for SectorCounts {
-    /// 6,734 nodes with quadratic prisms.
+    /// Returns the counts of a mesh with 6,734 nodes of quadratic prisms.
     fn default() -> Self {
         Self { chord: 12, span: 18, thickness: 1, side: 2, overhang: 2, rim: 3, web: [6, 12], bore: [2, 2] }
     }
@@ -43,19 +43,19 @@ pub struct SectorOptions {
     pub geometry: SectorGeometry,
     /// Numbers of elements.
     pub counts: SectorCounts,
-    /// Penta15 or penta6.
+    /// Element kind: penta15 or penta6.
     pub kind: ElementKind,
 }
 
 impl Default for SectorOptions {
-    /// Quadratic prisms with the paper's number of nodes.
+    /// Returns quadratic prisms with the number of nodes of the paper.
     fn default() -> Self {
         Self { geometry: SectorGeometry::default(), counts: SectorCounts::default(), kind: ElementKind::Penta15 }
     }
 }
 
 impl SectorOptions {
-    /// The paper's number of elements, 3,764 quadratic prisms, with the 13,205 nodes they have.
+    /// Returns options with the number of elements of the paper, 3,764 quadratic prisms, which have 13,205 nodes.
     pub fn with_3764_elements() -> Self {
         let counts = SectorCounts {
             chord: 14,
@@ -70,8 +70,8 @@ impl SectorOptions {
         Self { counts, ..Self::default() }
     }
 
-    /// 294 nodes, for quick tests and trials: a rim that ends with the blade, a bore no wider than the
-    /// web, no fillet.
+    /// Returns options with 294 nodes, for quick tests and trials: the rim ends with the blade, the bore is no wider
+    /// than the web, and there is no fillet.
     pub fn coarse() -> Self {
         let counts =
             SectorCounts { chord: 2, span: 3, thickness: 1, side: 1, overhang: 0, rim: 1, web: [2, 2], bore: [0, 1] };
@@ -84,10 +84,10 @@ impl SectorOptions {
 }
 
 impl SectorOptions {
-    /// Check that numbers fit each other and the shape.
+    /// Checks that the numbers match each other and the shape.
     ///
     /// # Errors
-    /// [`Error::Invalid`] naming the number or length.
+    /// [`Error::Invalid`] with the number or length.
     pub(crate) fn validate(&self) -> Result<()> {
         self.geometry.validate()?;
         let (counts, geometry) = (&self.counts, &self.geometry);
@@ -113,7 +113,7 @@ impl SectorOptions {
         }
         let kind_fits = match self.kind {
             ElementKind::Penta15 => true,
-            // The middle of the thickness must be between two layers, since edges have no nodes in their middle.
+            // The middle of the thickness must be between two layers, since these edges have no mid-side nodes.
             ElementKind::Penta6 => thickness % 2 == 0,
             _ => false,
         };
@@ -149,38 +149,39 @@ fn refuse(count: &str, problem: String, remedy: &str) -> Result<()> {
 }
 
 impl SectorCounts {
-    /// Columns of the rim.
+    /// Returns the number of columns of the rim.
     pub(super) fn columns(&self) -> usize {
         self.chord + 2 * self.overhang
     }
 
-    /// Layers of the disk.
+    /// Returns the number of layers of the disk.
     pub(super) fn layers(&self) -> usize {
         self.thickness + 2 * self.side
     }
 }
 
-/// A mesh of prisms and the line along which its tip may touch.
+/// Mesh of prisms with the line of possible contact nodes on its tip.
 #[derive(Debug, Clone)]
 pub struct SectorMesh {
-    /// Node sets `CLAMPED` (the bore; the root, where there is no disk), `TIP`, `CONTACT` (leading edge, mid-chord and
-    /// trailing edge at the middle of the tip's thickness), `BLADE`, `ROOT` (of the blade), and for a sector `CYCLIC_LOW` and
-    /// `CYCLIC_HIGH`, the latter turned by +2π/sectors.
+    /// Node sets `CLAMPED` (the bore, or the root if there is no disk), `TIP`, `CONTACT` (leading edge, mid-chord and
+    /// trailing edge in the middle of the thickness of the tip), `BLADE`, `ROOT` (of the blade), and for a sector
+    /// `CYCLIC_LOW` and `CYCLIC_HIGH`, the latter rotated by +2π/sectors.
     pub mesh: Mesh,
-    /// Nodes in the middle of the tip's thickness, leading to trailing edge.
+    /// Nodes in the middle of the thickness of the tip, leading to trailing edge.
     pub tip_line: Vec<usize>,
 }
 
 impl SectorMesh {
-    /// `count` contact nodes spread along [`tip_line`](Self::tip_line), named as those of [rotor 37](crate::rotor37::BladeMesh::contact_points).
+    /// Returns `count` contact nodes spread along [`tip_line`](Self::tip_line), named like those of
+    /// [rotor 37](crate::rotor37::BladeMesh::contact_points).
     ///
     /// # Errors
-    /// [`Error::Invalid`] for fewer than two or more than the line has.
+    /// [`Error::Invalid`] for fewer than two nodes or more than the line has.
     pub fn contact_points(&self, count: usize) -> Result<Vec<ContactPoint>> {
         spread_contact(&self.tip_line, &vec![0.0; self.tip_line.len()], count)
     }
 
-    /// `count` contact patches over the whole tip, named as contact nodes are.
+    /// Returns `count` contact patches over the whole tip, named like contact nodes.
     ///
     /// # Errors
     /// The errors of [`contact_patches`].
@@ -188,7 +189,7 @@ impl SectorMesh {
         contact_patches(&self.mesh, self.mesh.set("TIP")?, count, |index| place_name(index, count))
     }
 
-    /// The same in rows across the thickness, side to side.
+    /// Returns contact patches in rows across the thickness, side to side.
     ///
     /// # Errors
     /// The errors of [`tip_patches`].

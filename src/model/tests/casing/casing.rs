@@ -1,4 +1,4 @@
-//! Casings: thermal loads, residual vectors, reduction of a ring and of a mesh from elsewhere.
+//! Casings: thermal loads, residual vectors, reduction of a ring and of an imported mesh.
 
 use std::sync::OnceLock;
 
@@ -19,7 +19,7 @@ use tiprub_model::sparse::{SparseMatrix, principal_pair};
 use tiprub_model::thermal::{equal_patches, patch_loads};
 use tiprub_model::{CasingOptions, Material, Mesh, Reduction, reduce_casing, reduce_ring};
 
-/// Displacement of the whole finite-element model at rest, all dofs × loads.
+/// Returns the static displacement of the whole finite-element model, all dofs × loads.
 pub(super) fn full_at_rest(mesh: &Mesh, material: &Material, clamped: &[usize], loads: &Mat<f64>) -> Mat<f64> {
     let assembled = assemble(mesh, material, &silent).unwrap();
     let free = free_dofs(mesh.nodes.len(), clamped);
@@ -35,7 +35,7 @@ pub(super) fn full_at_rest(mesh: &Mesh, material: &Material, clamped: &[usize], 
     all
 }
 
-/// The coarse casing, reduced once for all tests of this file.
+/// Returns the coarse casing, reduced once for all tests of this file.
 fn reduced(support: RingSupport) -> &'static Reduction {
     static REDUCTIONS: [OnceLock<Reduction>; 4] = [const { OnceLock::new() }; 4];
     let place = [RingSupport::Free, RingSupport::Low, RingSupport::High, RingSupport::Both]
@@ -44,7 +44,7 @@ fn reduced(support: RingSupport) -> &'static Reduction {
     REDUCTIONS[place.unwrap()].get_or_init(|| reduce_ring(&coarse(support), &silent).unwrap())
 }
 
-/// Radial, tangential and axial parts of the displacement of contact nodes, as in the ROM.
+/// Returns the radial, tangential and axial components of the displacement of contact nodes, as in the ROM.
 fn cylindrical(mesh: &Mesh, grid: &GridNodes, displacement: impl Fn(usize) -> f64) -> DVector<f64> {
     let parts = grid.nodes.iter().flat_map(|&node| {
         let [x, y, _] = mesh.nodes[node];
@@ -131,9 +131,10 @@ fn uniform_heating_expands_free_ring_without_stress() {
         "free growth over alpha dT R: radial off by {:.1e}, tangential {:.1e}, axial {:.1e}",
         worst[0], worst[1], worst[2]
     );
-    // Rounding of the stiffness is amplified by the softness of bending: (ω of the stiffest / of the softest mode)² is 3e6.
+    // Rounding of the stiffness is amplified by the softness of bending: (ω of the stiffest / of the softest mode)²
+    // is 3e6.
     assert!(worst.iter().all(|error| *error < 2e-9), "{worst:?}");
-    // Rigid-body modes come first, are exactly so, and are not loaded.
+    // Rigid-body modes come first, have exactly zero stiffness and are not loaded.
     let squares = rom.stiffness.diagonal();
     assert!(squares.rows(0, 6).iter().all(|square| *square == 0.0) && squares[6] > 0.0);
     assert!(rom.extras.thermal.as_ref().unwrap().loads.rows(0, 6).iter().all(|load| *load == 0.0));
@@ -166,7 +167,8 @@ fn a_free_ring_has_six_rigid_modes() {
     }
 }
 
-/// A uniform temperature is answered to rounding also where the casing is held, and so is every patch alone.
+/// The response to a uniform temperature is exact to rounding even for a supported casing, and so is that to every
+/// single patch.
 #[test]
 fn static_responses_match_the_full_model() {
     for support in [RingSupport::Low, RingSupport::High, RingSupport::Both] {
@@ -175,7 +177,7 @@ fn static_responses_match_the_full_model() {
         let patches = equal_patches(12, 2, options.geometry.contour.axial());
         let clamped = ring.mesh.set(CLAMPED).unwrap().to_vec();
         let thermal = patch_loads(&ring.mesh, &options.material, &patches).unwrap();
-        // Beside the patches: unit radial forces on three contact nodes.
+        // In addition to the patches: unit radial forces on three contact nodes.
         let nodes = [0, 30, 71];
         let mut loads = Mat::zeros(thermal.nrows(), 27);
         loads.get_mut(.., ..24).copy_from(&thermal);
@@ -205,7 +207,7 @@ fn static_responses_match_the_full_model() {
     }
 }
 
-/// The support of a casing at rest takes forces and moments of its contact nodes, and those alone: heat has none.
+/// The support of a casing at rest carries only the forces and moments on its contact nodes: heat causes none.
 #[test]
 fn static_support_reaction_balances_contact_loads() {
     for support in [RingSupport::Low, RingSupport::Both] {
@@ -235,7 +237,7 @@ fn static_support_reaction_balances_contact_loads() {
         for patch in 0..thermal.patches.len() {
             let elastic = felt(&thermal.loads.column(patch).into_owned());
             let left = &elastic - rows.thermal.column(patch);
-            // Against the force that keeps the patch from growing.
+            // Relative to the force that keeps the patch from expanding.
             worst[1] = worst[1].max(left.amax() / thermal_size(patch));
         }
         println!(
@@ -247,7 +249,7 @@ fn static_support_reaction_balances_contact_loads() {
     assert!(reduced(RingSupport::Free).rom.extras.support.is_none());
 }
 
-/// Sum of the magnitudes of the nodal forces of a patch of the coarse casing (N/K).
+/// Returns the sum of the magnitudes of the nodal forces of a patch of the coarse casing (N/K).
 fn thermal_size(patch: usize) -> f64 {
     let options = coarse(RingSupport::Low);
     let ring = supported_ring(&options).unwrap();
@@ -270,7 +272,8 @@ fn static_responses_make_loads_exact() {
     let order = stiffness.order();
     let interface = [order - 1, order - 2, order - 3, 10, 11, 12];
     let plain = craig_bampton(&stiffness, &mass, &interface, 4, &silent).unwrap();
-    // Load 1 and 2: any; 3: twice the first; 4: none; 5: inertia of a mode that is kept; 6: on the interface alone.
+    // Loads 1 and 2: arbitrary; 3: twice the first; 4: zero; 5: inertia of a mode that is kept; 6: on the interface
+    // alone.
     let mut loads = Mat::from_fn(order, 6, |i, k| ((3 * i + 5 * k) as f64).sin());
     let mode = Mat::from_fn(order, 1, |i, _| plain.transformation[(i, 7)]);
     let inertia = mass.times(mode.as_ref());
@@ -295,7 +298,7 @@ fn static_responses_make_loads_exact() {
         println!("load {}: the reduced model is off by {error:.1e} at rest", k + 1);
         assert!(error < 1e-10, "load {}: {error:e}", k + 1);
     }
-    // Without the static responses the first load is not met: the test would notice.
+    // Without the static responses the response to the first load is wrong, which the test would detect.
     let right = plain.transformation.transpose() * &loads;
     let right = DVector::from_fn(right.nrows(), |i, _| right[(i, 0)]);
     let small = plain.stiffness.clone().cholesky().unwrap().solve(&right);
@@ -325,14 +328,14 @@ fn condensing_keeps_low_modes_and_static_response() {
     };
     let (exact, found) = (flexibility(&all), flexibility(&fewer));
     assert!((&exact - &found).amax() < 1e-11 * exact.amax());
-    // Truncation alone loses some of it.
+    // Truncation alone loses part of the response.
     let cut = condense(&all, 10, &DMatrix::zeros(36, 0));
     assert!((&exact - flexibility(&cut)).amax() > 1e-6 * exact.amax());
     assert_eq!(condense(&all, 36, &loads).squares, all.squares);
 }
 
-/// Of a pencil with all modes condensing leaves what free-interface modes with residual flexibility are; with fewer fixed-interface modes the
-/// response at rest is the same and the frequencies lie above.
+/// Condensation of a pencil with all modes yields the same as free-interface modes with residual flexibility; with
+/// fewer fixed-interface modes the static response is the same and the frequencies are higher.
 #[test]
 fn condensation_equals_free_interface_reduction() {
     let (_, stiffness, mass) = box_pencil();
@@ -357,7 +360,7 @@ fn condensation_equals_free_interface_reduction() {
     );
 }
 
-/// A mesh from elsewhere: other node numbers, contact nodes as an unordered set, prisms.
+/// An imported mesh: other node numbers, contact nodes as an unordered set, prisms.
 #[test]
 fn reduction_is_independent_of_node_numbering() {
     let options = coarse(RingSupport::Low);
@@ -395,7 +398,7 @@ fn reduction_is_independent_of_node_numbering() {
     let temperatures: Vec<f64> = (0..24).map(|k| f64::from(k * k % 7)).collect();
     let (a, b) = (heated(&own, &temperatures), heated(parametric, &temperatures));
     assert!((&a - &b).amax() < 1e-9 * b.amax());
-    // Without patches there are no thermal loads, and heat does not cost coordinates.
+    // Without patches there are no thermal loads, and heat adds no coordinates.
     let cold = reduce_casing(mesh.clone(), &options.material, &clamped, &grid, &[], &settings, &silent).unwrap().rom;
     assert!(cold.extras.thermal.is_none() && cold.order() < own.order());
 
@@ -419,7 +422,7 @@ fn reduction_is_independent_of_node_numbering() {
     assert!(error.contains("71 nodes cannot be divided into 3 rings"), "{error}");
 }
 
-/// With no mode at all the static response is still that of the full model, and rigid-body modes stay.
+/// Even without modes the static response is that of the full model, and rigid-body modes are kept.
 #[test]
 fn casing_without_modes_keeps_exact_static_response() {
     let full = &reduced(RingSupport::Free).rom;

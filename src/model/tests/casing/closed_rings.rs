@@ -1,4 +1,4 @@
-//! Free rings through the casing reduction against the closed forms of thin rings: modes of the ROM by their number of waves.
+//! Casing reduction of free rings against the closed forms of thin rings: modes of the ROM by their number of waves.
 
 use crate::guide::print_row;
 use std::f64::consts::TAU;
@@ -14,7 +14,7 @@ const AROUND: usize = 24;
 /// Torsion constant of a square over the fourth power of its side (S. P. Timoshenko, J. N. Goodier, Theory of Elasticity).
 const SQUARE_TORSION: f64 = 0.140_577;
 
-/// A ring of square section, reduced to 24 × 2 contact nodes.
+/// Returns a ring of square section, reduced to 24 × 2 contact nodes.
 fn ring(side: f64) -> Rom {
     let inner = RADIUS - 0.5 * side;
     let options = CasingOptions {
@@ -29,7 +29,7 @@ fn ring(side: f64) -> Rom {
         patches: [4, 1],
         fixed_interface_modes: 48,
         modes: 30,
-        // Rigid ones: what follows looks at the ROM alone.
+        // Only the rigid-body modes: the test evaluates the ROM alone.
         checked_modes: 6,
         support: RingSupport::Free,
         ..CasingOptions::default()
@@ -37,7 +37,8 @@ fn ring(side: f64) -> Rom {
     reduce_ring(&options, &silent).unwrap().rom
 }
 
-/// Waves around with the largest amplitude of one displacement component (0 radial, 2 axial) of a mode on the first ring.
+/// Returns the number of waves with the largest amplitude of one displacement component (0 radial, 2 axial) of a mode
+/// on the first ring.
 fn waves(rom: &Rom, mode: usize, component: usize) -> (u32, f64) {
     let amplitude = |n: u32| -> f64 {
         let part = |phase: f64| -> f64 {
@@ -53,7 +54,7 @@ fn waves(rom: &Rom, mode: usize, component: usize) -> (u32, f64) {
     (0..9).map(|n| (n, amplitude(n))).max_by(|a, b| a.1.total_cmp(&b.1)).unwrap()
 }
 
-/// Angular frequencies of the pair of modes with n waves that move mostly along `component`.
+/// Returns the angular frequencies of the pair of modes with n waves that move mostly along `component`.
 fn pair(rom: &Rom, n: u32, component: usize) -> [f64; 2] {
     let other = 2 - component;
     let found: Vec<f64> = (0..rom.order())
@@ -106,7 +107,8 @@ fn reduced_free_rings_have_textbook_frequencies() {
     }
     for i in 0..deviations[0].len() {
         let [thick, thin] = [0, 1].map(|k| deviations[k][i]);
-        // Shear and rotatory inertia make it softer, with the square of n side/R; what is left is mesh and reduction.
+        // Shear and rotatory inertia reduce the frequency, with the square of n side/R; the remaining error is that
+        // of mesh and reduction.
         let limit = (4.0 * thin - thick) / 3.0;
         print_row!("number {i}: extrapolated to a thin ring {:+.3} %", 100.0 * limit);
         assert!(thick < 0.0 && (3.2..6.0).contains(&(thick / thin)), "number {i}: {thick} {thin}");

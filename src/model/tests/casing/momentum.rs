@@ -1,5 +1,6 @@
-//! Reaction of a support in motion, against the momentum of the whole finite-element mesh: integrated beside the core with the full
-//! matrices of all nodes, under the contact force that the core tells. No basis, no reduced row is shared.
+//! Reaction of a support in motion against the momentum of the whole finite-element mesh, which is integrated
+//! independently with the full matrices of all nodes under the contact force of the core. No basis and no reduced row
+//! is shared.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use tiprub_core::rom::SupportRows as Rows;
@@ -21,10 +22,11 @@ use crate::common::dense;
 const GAP: f64 = 1e-5;
 const AROUND: usize = 12;
 const ALONG: usize = 2;
-/// Patches around.
+/// Number of patches around.
 const PATCHES: usize = 3;
 
-/// A thick ring of 216 degrees of freedom held at one end face, reduced with so many fixed-interface modes, and modes.
+/// Returns a thick ring of 216 degrees of freedom, clamped at one end face, with the given numbers of fixed-interface
+/// modes and modes.
 fn ring(fixed_interface_modes: usize, modes: usize) -> CasingOptions {
     CasingOptions {
         geometry: RingGeometry {
@@ -45,18 +47,18 @@ fn ring(fixed_interface_modes: usize, modes: usize) -> CasingOptions {
     }
 }
 
-/// The whole mesh, and how its free nodes move.
+/// Whole mesh with the motion of its free nodes.
 struct MovingMesh {
     ring: RingMesh,
-    /// Of the free nodes.
+    /// Stiffness of the free nodes.
     stiffness: DMatrix<f64>,
     mass: Cholesky<f64, Dyn>,
     /// Momentum and moment of momentum about the origin of the whole mesh per velocity of its free nodes, 6 × free.
     momentum: DMatrix<f64>,
     free: Vec<usize>,
-    /// Per kelvin of each patch.
+    /// Thermal loads per kelvin of each patch.
     heat: DMatrix<f64>,
-    /// Displacement of the free nodes now and one step ago.
+    /// Displacement of the free nodes at the current and the previous step.
     now: DVector<f64>,
     before: DVector<f64>,
 }
@@ -88,14 +90,15 @@ impl MovingMesh {
         }
     }
 
-    /// At rest in the heat (K).
+    /// Sets the static displacement under the temperatures (K).
     fn rest(&mut self, temperatures: &[f64; PATCHES]) {
         let load = &self.heat * DVector::from_column_slice(temperatures);
         self.now = self.stiffness.clone().cholesky().unwrap().solve(&load);
         self.before = self.now.clone();
     }
 
-    /// One step (s) of central differences under a force on a contact node (N); returns the rate of momentum.
+    /// Performs one step (s) of central differences under a force on a contact node (N); returns the rate of
+    /// momentum.
     fn go(&mut self, step: f64, node: usize, force: [f64; 3], temperatures: &[f64; PATCHES]) -> DVector<f64> {
         let mut load = &self.heat * DVector::from_column_slice(temperatures) - &self.stiffness * &self.now;
         let first = self.free.binary_search(&(3 * self.ring.grid.nodes[node])).unwrap();
@@ -106,7 +109,7 @@ impl MovingMesh {
         &self.momentum * load
     }
 
-    /// Radial displacement of a contact node (m).
+    /// Returns the radial displacement of a contact node (m).
     fn radial(&self, node: usize) -> f64 {
         let node = self.ring.grid.nodes[node];
         let [x, y, _] = self.ring.mesh.nodes[node];
@@ -115,7 +118,7 @@ impl MovingMesh {
     }
 }
 
-/// What force and moment about the origin a unit force along an axis has.
+/// Returns the force and moment about the origin of a unit force along an axis.
 fn rigid([x, y, z]: [f64; 3], axis: usize) -> [f64; 6] {
     match axis {
         0 => [1.0, 0.0, 0.0, 0.0, z, -y],
@@ -124,25 +127,26 @@ fn rigid([x, y, z]: [f64; 3], axis: usize) -> [f64; 6] {
     }
 }
 
-/// What moves the casing.
+/// Excitation of the casing.
 #[derive(Clone, Copy)]
 struct CasingDrive {
-    /// Amplitude (m) and frequency (Hz) of the shaft, which presses a pin against the casing.
+    /// Amplitude (m) and frequency (Hz) of the motion of the shaft, which presses a pin against the casing.
     push: [f64; 2],
     /// Frequency of the pin on its spring (Hz).
     pin: f64,
-    /// At which it slides along (rad/s).
+    /// Sliding speed of the pin (rad/s).
     speed: f64,
     /// Temperatures of the patches (K).
     heat: [f64; PATCHES],
 }
 
-/// Blows that ring in all modes, on a casing that is warm.
+/// Impacts that excite all modes of a warm casing.
 const BLOWS: CasingDrive = CasingDrive { push: [3e-8, 1e4], pin: 2000.0, speed: 1e-5, heat: [0.02, 0.0, -0.01] };
-/// One soft push.
+/// Single soft push.
 const PUSH: CasingDrive = CasingDrive { push: [3e-8, 2e3], pin: 2e4, speed: 0.05, heat: [0.0; PATCHES] };
 
-/// A pin on a spring that stands before the first node of the second ring, and is pressed against it by the shaft.
+/// Creates a scene with a pin on a spring in front of the first node of the second ring, against which the shaft
+/// presses it.
 fn scene(casing: Rom, drive: CasingDrive, scheme: Scheme, step: f64) -> Scene {
     let pin = vec![models::node("pin", [models::RADIUS, 0.0, 0.04], 0.0)];
     let shape = |row: usize, _: usize| if row == 0 { 3.0 } else { 0.0 };
@@ -154,7 +158,7 @@ fn scene(casing: Rom, drive: CasingDrive, scheme: Scheme, step: f64) -> Scene {
     settings.structures[0].whirl = true;
     settings.structures[1].thermal = true;
     settings.contacts[0].gap = GAP;
-    // Blows make the tip vibrate faster than it slides, so that contact has to be able to stick.
+    // Impacts make the tip vibrate faster than it slides, so that sticking must be possible.
     (settings.contacts[0].friction, settings.contacts[0].solver) = (0.4, Solver::Coulomb);
     (settings.time.scheme, settings.time.step) = (scheme, step);
     settings.outputs.casing_forces = true;
@@ -164,7 +168,7 @@ fn scene(casing: Rom, drive: CasingDrive, scheme: Scheme, step: f64) -> Scene {
 }
 
 const ROWS: [&str; 6] = ["force_x", "force_y", "force_z", "moment_x", "moment_y", "moment_z"];
-/// How long it is looked at, and the length of means (s).
+/// Duration of the comparison; below, the length of means (s).
 const LENGTH: f64 = 4e-4;
 const MEAN: f64 = 2e-5;
 
@@ -177,14 +181,15 @@ fn start(scene: &Scene, heat: &[f64; PATCHES]) -> Simulation {
     run
 }
 
-/// How far contact force and reaction are off the rate of momentum: of the largest reaction of all steps, and of means.
+/// Deviations of contact force and reaction from the rate of momentum: relative to the largest reaction of all steps,
+/// and of means.
 #[derive(Debug, Default)]
 struct Off {
     force: f64,
     moment: f64,
     mean_force: f64,
     mean_moment: f64,
-    /// Radial displacement of the contact nodes, of the largest.
+    /// Radial displacement of the contact nodes, relative to the largest.
     moved: f64,
 }
 
@@ -198,14 +203,15 @@ impl std::fmt::Display for Off {
     }
 }
 
-/// Of a run of the core beside the mesh; `change` the rows of the support.
+/// Compares a run of the core with the mesh; `change` modifies the rows of the support.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most thousands of steps")]
 fn compare(options: &CasingOptions, drive: CasingDrive, scheme: Scheme, step: f64, change: impl Fn(&mut Rows)) -> Off {
     let (mut mesh, mut casing) = (MovingMesh::new(options), reduce_ring(options, &silent).unwrap().rom);
     change(casing.extras.support.as_mut().unwrap());
     let mut run = start(&scene(casing, drive, scheme, step), &drive.heat);
     mesh.rest(&drive.heat);
-    // Contact is on the surface, a clearance outside the pin: forces have its lever.
+    // The contact point is on the surface, outside the pin by the clearance, which determines the lever arm of
+    // forces.
     let [x, y, z] = mesh.ring.mesh.nodes[mesh.ring.grid.nodes[AROUND]];
     let out = (models::RADIUS + GAP) / x.hypot(y);
     let place = [out * x, out * y, z];
@@ -248,8 +254,8 @@ fn compare(options: &CasingOptions, drive: CasingDrive, scheme: Scheme, step: f6
     }
 }
 
-/// With all modes the core in central differences is the mesh in central differences: contact force and reaction are the momentum of
-/// the mesh in every step. No row of the support can be left out.
+/// With all modes, central differences of the core and of the mesh are identical: contact force and reaction equal
+/// the rate of momentum of the mesh in every step. No row of the support can be omitted.
 #[test]
 fn support_reaction_balances_the_momentum_of_the_mesh() {
     let options = ring(144, 1000);
@@ -275,8 +281,8 @@ fn support_reaction_balances_the_momentum_of_the_mesh() {
     }
 }
 
-/// With fewer modes the equation of the free nodes holds in the space of the modes alone: momentum is missed by what they leave of a
-/// soft push, and by the step where steps are not the mesh's own.
+/// With fewer modes the equation of the free nodes only holds in the space of the modes: the momentum error is that
+/// of modal truncation for a soft push, and that of the step if steps differ from those of the mesh.
 #[test]
 fn momentum_converges_to_the_mesh_with_more_modes() {
     let of_modes = |fixed: usize, modes: usize, change: &dyn Fn(&mut Rows)| {

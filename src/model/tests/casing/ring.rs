@@ -1,4 +1,4 @@
-//! Casing rings: frequencies against closed form and CalculiX, geometry, mesh, what is refused.
+//! Casing rings: frequencies against closed form and CalculiX, geometry, mesh, rejected input.
 
 use std::f64::consts::TAU;
 use std::sync::OnceLock;
@@ -62,7 +62,7 @@ fn thin_free_ring_has_textbook_bending_frequencies() {
         assert!((found[1] / found[0] - 1.0).abs() < 1e-6 && (found[3] / found[2] - 1.0).abs() < 1e-6, "{found:?}");
         deviations.push(deviation[0]);
     }
-    // Thickness makes it softer, with the square of h/R: shear and rotatory inertia.
+    // Thickness reduces the frequency by shear and rotatory inertia, with the square of h/R.
     assert!(deviations[2].abs() < 5e-4, "{deviations:?}");
     assert!(deviations[0] < 0.0 && (deviations[0] / deviations[1] - 4.0).abs() < 0.6, "{deviations:?}");
 }
@@ -133,7 +133,8 @@ fn reduction_keeps_double_modes_of_casing37() {
     assert!(full < 1e-9 && reduced < 1e-6);
 }
 
-/// Gap between the tip of rotor 37 and a surface through the contact rings of casing37: a natural spline along the axis.
+/// The gap between the tip of rotor 37 and a surface through the contact rings of casing37, a natural spline along
+/// the axis.
 #[test]
 fn casing37_follows_the_tip() {
     let rom = &default_casing().rom;

@@ -1,4 +1,5 @@
-//! Casings of irregular tetrahedra, whose contact grid lies between nodes, against the same casings of regular bricks.
+//! Casings of irregular tetrahedra, whose contact grid lies between nodes, against the same casings of regular
+//! bricks.
 
 use std::f64::consts::TAU;
 use std::sync::OnceLock;
@@ -20,7 +21,7 @@ use super::casing::full_at_rest;
 use crate::common::casing::{at_rest, heated};
 use crate::common::tetrahedra::TetrahedralRing;
 
-/// Round the blade of the tests.
+/// Ring around the blade of the tests.
 const RING: TetrahedralRing =
     TetrahedralRing { radius: models::RADIUS + models::GAP, thickness: 15e-3, axial: [-0.022, 0.046] };
 const RINGS: ContactRings = ContactRings { around: 12, along: 3, axial: [-0.003, 0.033] };
@@ -56,7 +57,7 @@ fn bricks(counts: [usize; 3], support: RingSupport) -> Rom {
     reduce_ring(&options, &silent).unwrap().rom
 }
 
-/// Radial displacements of the points of the grid under a radial unit force at each.
+/// Returns the radial displacements of the points of the grid under a radial unit force at each.
 fn flexibility(rom: &Rom) -> DMatrix<f64> {
     let points = rom.contact_nodes.len();
     let of_force = |point: usize| at_rest(rom, &rom.contact_map.row(3 * point).transpose());
@@ -69,21 +70,21 @@ fn worst(found: &[f64], expected: &[f64]) -> f64 {
     found.iter().zip(expected).map(|(a, b)| (a / b - 1.0).abs()).fold(0.0, f64::max)
 }
 
-/// The casing of bricks, reduced once for all tests of this file.
+/// Returns the casing of bricks, reduced once for all tests of this file.
 fn of_bricks() -> &'static Rom {
     static ROM: OnceLock<Rom> = OnceLock::new();
     ROM.get_or_init(|| bricks([72, 1, 10], RingSupport::Low))
 }
 
-/// Those of a coarse and a fine mesh of tetrahedra.
+/// Returns the casings of a coarse and a fine mesh of tetrahedra.
 fn of_mesh(mesh: usize) -> &'static Rom {
     static ROMS: [OnceLock<Rom>; 2] = [const { OnceLock::new() }; 2];
     let counts = [[36, 1, 4], [72, 1, 8]];
     ROMS[mesh].get_or_init(|| tetrahedra(counts[mesh], RingSupport::Low).rom)
 }
 
-/// Displacements are held against the largest under a unit force. At the point force itself they depend on the elements around it in any mesh: they
-/// grow without bounds with refinement.
+/// Displacements are compared relative to the largest under a unit force. At the point force itself they depend on
+/// the elements around it in any mesh, and grow without bounds with refinement.
 #[test]
 fn tetrahedral_casing_converges_to_brick_casing() {
     let reference = of_bricks();
@@ -106,7 +107,8 @@ fn tetrahedral_casing_converges_to_brick_casing() {
     }
 }
 
-/// The answer at rest to forces on the grid and to heat is that of the whole finite-element model with the same weights.
+/// The static response to forces on the grid and to heat is that of the whole finite-element model with the same
+/// weights.
 #[test]
 fn static_response_between_nodes_matches_full_model() {
     let counts = [24, 1, 4];
@@ -179,9 +181,9 @@ fn interpolation_preserves_rigid_motion_force_and_moment() {
     println!("{inside} of 500 points between nodes; {largest:?}");
     assert!(inside > 450);
     assert!(largest[..3].iter().all(|value| *value < 2e-13), "{largest:?}");
-    // Six nodes follow an arc of 15 degrees to its fourth order.
+    // Six nodes approximate an arc of 15 degrees to fourth order.
     assert!(largest[3] < 2e-5, "{largest:?}");
-    // A point at a node is this node.
+    // A point at a node coincides with it.
     let node = mesh.set("inner").unwrap()[17];
     let [x, y, z] = mesh.nodes[node];
     assert_eq!(surface.point(y.atan2(x), z, 1e-9).unwrap().weights, [(node, 1.0)]);
@@ -218,7 +220,7 @@ fn free_tetrahedral_casing_has_correct_mass_and_rigid_modes() {
     );
 }
 
-/// Normal impulse (N s), friction heat (J), and heat of each patch (J).
+/// Returns the normal impulse (N s) and the friction heat (J), which is the sum of the heat of the patches.
 fn rub(casing: Rom) -> [f64; 2] {
     let mut scene = models::bumps(models::blade(6));
     models::on_ring(&mut scene, casing, 0.01);
@@ -249,7 +251,8 @@ fn rub_on_tetrahedral_casing_matches_brick_casing() {
     assert!(worst(&found[1], &expected) < 0.03, "{found:?} {expected:?}");
 }
 
-/// What is not a full, single inner surface about the axis is refused with its place, and so are grids off it or too fine for it.
+/// A mesh without a single, full inner surface about the axis is rejected with the position of the problem, and so
+/// are grids off it or too fine for it.
 #[test]
 fn rejects_incomplete_or_multiple_inner_surfaces() {
     let counts = [24, 1, 6];
@@ -276,7 +279,7 @@ fn rejects_incomplete_or_multiple_inner_surfaces() {
     refused(&part, "inner", axial, &["not a full ring", "of 360°, with no face at 6", "Mesh the full ring"]);
     let hole = without([1.0, 1.6], [0.0, 0.02]);
     refused(&hole, "inner", axial, &["a hole at 7", "z = -0.001", "nodes on its edge", "Close the hole"]);
-    // Beside the rings of the grid a gap does no harm.
+    // A gap outside the rings of the grid has no effect.
     let set = hole.set("inner").unwrap();
     GridNodes::chosen(&hole, (set, &[]), [12, 2], Some([0.036, 0.044])).unwrap();
     let seam = RING.tetrahedra_with(counts, false);

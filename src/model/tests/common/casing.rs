@@ -1,11 +1,11 @@
-//! Casings for the tests, and what their ROMs answer at rest.
+//! Casings for the tests, and static responses of their ROMs.
 
 use nalgebra::DVector;
 use tiprub_core::Rom;
 use tiprub_model::CasingOptions;
 use tiprub_model::casing::{RingCounts, RingSupport};
 
-/// casing37 with fewer elements and modes.
+/// Returns casing37 with fewer elements and modes.
 pub fn coarse(support: RingSupport) -> CasingOptions {
     CasingOptions {
         counts: RingCounts { around: 24, through: 1, along: 8, flange: 1 },
@@ -18,7 +18,7 @@ pub fn coarse(support: RingSupport) -> CasingOptions {
     }
 }
 
-/// Displacement of the contact nodes at rest under modal forces; rigid-body modes carry none.
+/// Returns the static displacement of the contact nodes under modal forces; rigid-body modes are not loaded.
 pub fn at_rest(rom: &Rom, forces: &DVector<f64>) -> DVector<f64> {
     let stiffness = rom.stiffness.diagonal();
     let answer = forces.iter().zip(stiffness.iter()).map(|(f, k)| if *k > 0.0 { f / k } else { 0.0 });

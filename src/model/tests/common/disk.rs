@@ -1,4 +1,4 @@
-//! Coarse bladed disks: one sector of an annulus with a blade on its rim, sheared so that nothing is symmetric.
+//! Coarse bladed disks: one sector of an annulus with a blade on its rim, sheared so that it has no symmetry.
 
 use core::f64::consts::TAU;
 
@@ -13,7 +13,8 @@ use tiprub_model::{FeModel, Material};
 
 use super::{division, linear};
 
-/// Cells of the annulus in radius, around and along the axis; the blade is one cell thick and `blade` cells high.
+/// Numbers of cells of the annulus in radius, around and along the axis; the blade is one cell thick and `blade`
+/// cells high.
 #[derive(Debug, Clone, Copy)]
 pub struct CellCounts {
     pub hub: usize,
@@ -24,7 +25,7 @@ pub struct CellCounts {
 
 pub const COARSE: CellCounts = CellCounts { hub: 2, around: 3, along: 2, blade: 2 };
 
-/// A sector with its two faces as node sets LOW and HIGH, the bore as BORE and the blade's tip as TIP.
+/// Returns a sector with its two faces as node sets LOW and HIGH, the bore as BORE and the tip of the blade as TIP.
 pub fn sector(kind: ElementKind, sectors: usize, counts: CellCounts) -> Mesh {
     let pitch = TAU / sectors as f64;
     let blade_cell = counts.around / 2;
@@ -75,7 +76,7 @@ pub fn sector(kind: ElementKind, sectors: usize, counts: CellCounts) -> Mesh {
     if kind == linear(kind) { mesh } else { with_middles(mesh.quadratic(), &mesh) }
 }
 
-/// The sets of the linear mesh with the middles of edges between their nodes.
+/// Adds the mid-edge nodes between the nodes of each set of the linear mesh.
 fn with_middles(mut quadratic: Mesh, mesh: &Mesh) -> Mesh {
     for (element, old) in quadratic.elements.iter().zip(&mesh.elements) {
         for (&[a, b], &middle) in old.kind.edges().iter().zip(&element.nodes[old.nodes.len()..]) {
@@ -94,7 +95,7 @@ pub fn boundary(mesh: &Mesh, sectors: usize) -> CyclicBoundary {
     CyclicBoundary::pair(&mesh.nodes, mesh.set("LOW").unwrap(), mesh.set("HIGH").unwrap(), sectors, 1e-9).unwrap().0
 }
 
-/// Some of the tip's nodes.
+/// Returns some of the tip nodes.
 pub fn tips(mesh: &Mesh, count: usize) -> Vec<ContactPoint> {
     let tip = mesh.set("TIP").unwrap();
     let node = |i: usize| tip[i * (tip.len() - 1) / (count - 1).max(1)];
@@ -106,7 +107,7 @@ pub fn model(mesh: Mesh) -> FeModel {
     FeModel::assembled(mesh, &Material::steel(), "test sector".into(), &silent).unwrap()
 }
 
-/// (M_n, K_n, C_n) of every nodal diameter.
+/// Returns (M_n, K_n, C_n) of every nodal diameter.
 pub fn pencils(rom: &Rom) -> Vec<[DMatrix<Complex<f64>>; 3]> {
     let complex = |matrix: &DMatrix<f64>| matrix.map(|value| Complex::new(value, 0.0));
     let mut list = vec![[complex(&rom.mass), complex(&rom.stiffness), complex(&rom.contact_map)]];
@@ -114,12 +115,12 @@ pub fn pencils(rom: &Rom) -> Vec<[DMatrix<Complex<f64>>; 3]> {
     list
 }
 
-/// How often a mode of nodal diameter n is there in the disk.
+/// Returns the multiplicity of a mode of nodal diameter n in the disk.
 pub fn copies(nodal_diameter: usize, sectors: usize) -> usize {
     if nodal_diameter == 0 || 2 * nodal_diameter == sectors { 1 } else { 2 }
 }
 
-/// Of a reduction after Craig and Bampton.
+/// Returns the options of a Craig-Bampton reduction.
 pub fn options(modes: ModeSelection, checked_modes: usize) -> CyclicOptions {
     CyclicOptions {
         name: "disk".into(),

@@ -11,7 +11,7 @@ use tiprub_model::element::ElementKind;
 use tiprub_model::mesh::{Element, Mesh};
 use tiprub_model::sparse::SparseMatrix;
 
-/// How a brick of eight corners is divided into elements of a linear kind.
+/// Returns the division of a brick with eight corners into elements of a linear kind.
 pub fn division(kind: ElementKind) -> Vec<Vec<usize>> {
     match kind {
         ElementKind::Hex8 | ElementKind::Hex20 => vec![(0..8).collect()],
@@ -32,8 +32,8 @@ pub fn linear(kind: ElementKind) -> ElementKind {
     }
 }
 
-/// A box of `counts` bricks, each divided into elements of `kind`, with straight edges; `shift` moves inner nodes, in
-/// shares of a brick's edges.
+/// Returns a box of `counts` bricks, each divided into elements of `kind`, with straight edges; `shift` moves inner
+/// nodes, as a fraction of the edges of a brick.
 pub fn distorted_box(
     kind: ElementKind,
     counts: [usize; 3],
@@ -69,12 +69,12 @@ pub fn distorted_box(
     if kind == linear(kind) { mesh } else { mesh.quadratic() }
 }
 
-/// A box without distortion.
+/// Returns a box without distortion.
 pub fn straight_box(kind: ElementKind, counts: [usize; 3], size: [f64; 3]) -> Mesh {
     distorted_box(kind, counts, size, |_| [0.0; 3])
 }
 
-/// Irregular but fixed numbers in ±`amplitude`.
+/// Returns irregular but fixed numbers in ±`amplitude`.
 pub fn wobble(amplitude: f64) -> impl Fn([usize; 3]) -> [f64; 3] {
     move |[i, j, k]| {
         let phase = (i + 3 * j + 7 * k) as f64;
@@ -82,22 +82,23 @@ pub fn wobble(amplitude: f64) -> impl Fn([usize; 3]) -> [f64; 3] {
     }
 }
 
-/// Nodes at which the given coordinate has the given value.
+/// Returns the nodes at which the given coordinate has the given value.
 pub fn nodes_at(mesh: &Mesh, direction: usize, value: f64) -> Vec<usize> {
     (0..mesh.nodes.len()).filter(|&node| (mesh.nodes[node][direction] - value).abs() < 1e-9).collect()
 }
 
-/// Steel without expansion.
+/// Returns steel without thermal expansion.
 pub fn steel() -> Material {
     Material { density: 7800.0, expansion: 0.0, ..Material::steel() }
 }
 
-/// What blades of tests of spin are made of.
+/// Returns the material of the blades in tests of spin.
 pub fn blade_steel(poisson_ratio: f64) -> Material {
     Material { young_modulus: 200e9, poisson_ratio, ..Material::maraging_steel() }
 }
 
-/// Nodes of one element in physical space: the natural ones, scaled and bent by a smooth map without symmetry.
+/// Returns the nodes of one element in physical space: the natural ones, scaled and bent by a smooth map without
+/// symmetry.
 pub fn distorted_nodes(kind: ElementKind) -> Vec<[f64; 3]> {
     let map = |[x, y, z]: [f64; 3]| {
         [
@@ -109,7 +110,7 @@ pub fn distorted_nodes(kind: ElementKind) -> Vec<[f64; 3]> {
     kind.natural_nodes().iter().map(|&node| map(node)).collect()
 }
 
-/// The whole matrix.
+/// Returns the whole matrix as a dense one.
 pub fn dense(matrix: &SparseMatrix) -> DMatrix<f64> {
     let all: Vec<usize> = (0..matrix.order()).collect();
     let block = matrix.block(&all, &all);

@@ -8,7 +8,7 @@ use tiprub_model::mesh::{Element, Mesh};
 
 use super::{division, wobble};
 
-/// A cylinder without flanges.
+/// Cylinder without flanges.
 #[derive(Debug, Clone, Copy)]
 pub struct TetrahedralRing {
     pub radius: f64,
@@ -16,19 +16,19 @@ pub struct TetrahedralRing {
     pub axial: [f64; 2],
 }
 
-/// Turn of the first corner about the axis (rad): no node is at a regular angle.
+/// Angle of the first corner about the axis (rad): no node is at a regular angle.
 const TURN: f64 = 0.0837;
-/// Fraction of the edges by which corners move.
+/// Displacement of the corners as a fraction of the edges.
 const JITTER: f64 = 0.18;
 
 impl TetrahedralRing {
-    /// Tetrahedra, six to a brick; corners of bricks move along the surfaces and inside. Nodes in the middle of edges lie on the curved
-    /// surfaces. Sets: `inner`, `low` (the end face), `all`.
+    /// Returns tetrahedra, six for each brick; corners of bricks move along the surfaces and inside. Mid-edge nodes
+    /// lie on the curved surfaces. Sets: `inner`, `low` (the end face), `all`.
     pub fn tetrahedra(&self, counts: [usize; 3]) -> Mesh {
         self.tetrahedra_with(counts, true)
     }
 
-    /// The same; where the ring is not `closed`, its two ends lie on each other and share no node.
+    /// Returns tetrahedra; if the ring is not `closed`, its two ends coincide but share no node.
     pub fn tetrahedra_with(&self, [around, through, along]: [usize; 3], closed: bool) -> Mesh {
         let (columns, [low, high]) = (if closed { around } else { around + 1 }, self.axial);
         let number = |j: usize, i: usize, k: usize| j + (through + 1) * (i % columns + columns * k);
@@ -79,7 +79,7 @@ impl TetrahedralRing {
         mesh
     }
 
-    /// The same ring of quadratic bricks with nodes at regular angles.
+    /// Returns the same ring of quadratic bricks with nodes at regular angles.
     pub fn bricks(
         &self,
         [around, through, along]: [usize; 3],

@@ -1,4 +1,4 @@
-//! Walls, cylinders and lumps whose answers can be written down.
+//! Walls, cylinders and lumped bodies with closed-form solutions.
 
 use std::f64::consts::PI;
 
@@ -23,15 +23,15 @@ fn hot(model: tiprub_thermal::ConductionModel, temperature: f64) -> ThermalSimul
     simulation
 }
 
-/// Mean and gas-side temperature of a wall of thickness L that starts at 1 K and loses heat to a gas of 0 K on one side:
-/// Σ C exp(−ζ² Fo) with ζ tan ζ = Bi (Carslaw and Jaeger, Conduction of Heat in Solids, 3.11).
+/// Returns the mean and gas-side temperature of a wall of thickness L that starts at 1 K and loses heat to a gas of 0
+/// K on one side: Σ C exp(−ζ² Fo) with ζ tan ζ = Bi (Carslaw and Jaeger, Conduction of Heat in Solids, 3.11).
 fn series(biot: f64, fourier: f64) -> [f64; 2] {
     let (mut mean, mut surface) = (0.0, 0.0);
     for n in 0..60 {
         let (mut low, mut high) = (f64::from(n) * PI, f64::from(n) * PI + 0.5 * PI);
         for _ in 0..100 {
             let middle = 0.5 * (low + high);
-            // ζ sin ζ − Bi cos ζ changes its sign there, without the pole of the tangent.
+            // ζ sin ζ − Bi cos ζ changes sign there, without the pole of the tangent.
             let value = (middle * middle.sin() - biot * middle.cos()) * if n % 2 == 0 { 1.0 } else { -1.0 };
             if value < 0.0 { low = middle } else { high = middle }
         }
@@ -43,7 +43,7 @@ fn series(biot: f64, fourier: f64) -> [f64; 2] {
     [mean, surface]
 }
 
-/// Largest deviation of mean and surface from the series over the Fourier numbers given.
+/// Returns the largest deviation of mean and surface from the series over the given Fourier numbers.
 fn deviation(elements: usize, modes: usize, fouriers: &[f64]) -> f64 {
     let (thickness, biot) = (0.02, 1.0);
     let Conductor { conductivity, specific_heat } = Conductor::steel();
@@ -60,7 +60,7 @@ fn deviation(elements: usize, modes: usize, fouriers: &[f64]) -> f64 {
         worst = worst.max((get(&simulation, "temperature_mean") - mean).abs());
         worst = worst.max((get(&simulation, "gas_surface_temperature") - surface).abs());
     }
-    // Fast rates over long steps make more of rounding than it is.
+    // Fast rates over long steps amplify rounding in the relative residual.
     let residual = get(&simulation, "energy_residual_relative");
     assert!(residual.abs() < 1e-11, "{residual}");
     worst
@@ -71,17 +71,17 @@ fn wall_cooling_matches_series_solution() {
     let times = [0.1, 0.3, 1.0, 3.0];
     let meshes = [1, 2, 4, 8].map(|elements| deviation(elements, 3 * elements, &times));
     println!("wall, by elements: {meshes:?}");
-    // Quadratic elements: eigenvalues by h⁴.
+    // Quadratic elements: eigenvalues converge with h⁴.
     assert!(meshes[3] < 2e-6, "{meshes:?}");
     assert!(meshes[1] / meshes[2] > 8.0 && meshes[2] / meshes[3] > 8.0, "{meshes:?}");
     let modes = [1, 2, 4, 8].map(|modes| deviation(8, modes, &times));
     println!("wall, by modes: {modes:?}");
-    // Responses that grow are in the basis already.
+    // The basis already contains growing responses.
     assert!(modes.iter().all(|worst| *worst < 1e-4) && modes[3] < 2e-6, "{modes:?}");
 }
 
-/// A thick wall from 0 K under a constant flux q, by single steps: T = 2q/k √(αt/π) at its surface (Carslaw and Jaeger, 2.9). Elements
-/// resolve it from their diffusion time on, and steps that are shorter are warned of, once.
+/// A thick wall from 0 K under a constant flux q, in single steps: T = 2q/k √(αt/π) at its surface (Carslaw and
+/// Jaeger, 2.9). Elements resolve it from their diffusion time on; shorter steps cause one warning.
 #[test]
 fn warns_of_steps_below_the_diffusion_time_of_an_element() {
     let (thickness, elements) = (0.04, 8);
@@ -118,7 +118,7 @@ fn warns_of_steps_below_the_diffusion_time_of_an_element() {
     assert!(low[0] < -0.5 && low[4].abs() < 0.1 && low[5].abs() < 0.05, "{low:?}");
 }
 
-/// A casing without flanges: a cylinder of radii a and b, whose end faces let no heat through.
+/// Returns a casing without flanges: a cylinder of radii a and b with adiabatic end faces.
 fn cylinder(around: usize, through: usize) -> CasingOptions {
     let contour = InnerContour::new(&[[0.0, 0.05], [0.02, 0.05]]).unwrap();
     CasingOptions {
@@ -155,7 +155,7 @@ fn heat_flow_through_a_cylinder_is_logarithmic() {
         set(&mut simulation, "ambient_temperature", ambient);
         simulation.initialise(0.0).unwrap();
         simulation.do_step(0.0, 1000.0).unwrap();
-        // What comes in goes out.
+        // The heat flows in and out are equal.
         let [inside, outside] = ["gas_power", "ambient_power"].map(|name| get(&simulation, name));
         assert!((inside + outside).abs() < 1e-9 * flow, "{inside} {outside}");
         let surfaces = [gas - flow * resistances[0], ambient + flow * resistances[2]];
@@ -169,7 +169,7 @@ fn heat_flow_through_a_cylinder_is_logarithmic() {
     assert!(deviations[0] / deviations[1] > 8.0 && deviations[1] / deviations[2] > 8.0, "{deviations:?}");
 }
 
-/// At small Biot numbers the wall is a lump: what is left is of the size of the Biot number.
+/// At small Biot numbers the wall is a lumped body; the error is of the order of the Biot number.
 #[test]
 fn wall_at_small_biot_number_behaves_as_lumped_mass() {
     let thickness = 0.02;
@@ -188,7 +188,7 @@ fn wall_at_small_biot_number_behaves_as_lumped_mass() {
     }
 }
 
-/// Heat switched on for a while, then soak with the gas standing still: the decay is that of the air alone.
+/// Heating for a while, then soak-back without convection of the gas: the decay is that of the air alone.
 #[test]
 fn after_shutdown_heat_decays_exponentially_to_ambient() {
     let mesh = wall(0.02, 4);
@@ -206,10 +206,10 @@ fn after_shutdown_heat_decays_exponentially_to_ambient() {
     simulation.do_step(660.0, 120.0).unwrap();
     let after = ["stored_heat", "ambient_heat"].map(|name| get(&simulation, name));
     assert!(get(&simulation, "gas_power").abs() < 1e-12);
-    // Lumped but for Bi = h V/(A k) = 0.1 %.
+    // Lumped except for Bi = h V/(A k) = 0.1 %.
     let rate = (before[0] / after[0]).ln() / 120.0;
     assert!((rate / (air / capacity) - 1.0).abs() < 3e-3, "{rate} against {}", air / capacity);
-    // What was stored is what the air took.
+    // The loss of stored heat equals the heat to the air.
     assert!((after[0] - before[0] - (after[1] - before[1])).abs() < 1e-10 * before[0]);
     let residual = get(&simulation, "energy_residual_relative");
     assert!(residual.abs() < 1e-11, "{residual}");

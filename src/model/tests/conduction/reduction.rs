@@ -1,4 +1,5 @@
-//! The reduction of a casing against its full model: steady states, transients by another method, heat through the surfaces.
+//! Reduction of a casing against its full model: steady states, transients by another method, heat through the
+//! surfaces.
 
 use std::f64::consts::PI;
 
@@ -32,12 +33,13 @@ fn steady_states_match_full_model() {
         let most = if check.factors.iter().all(|factor| (factor - 1.0).abs() < 1e-12) { 1e-9 } else { 4e-3 };
         assert!(check.patches < most && check.surfaces < 5.0 * most, "{check:?}");
     }
-    // Patches of a ring are alike.
+    // The patches of a ring are equal.
     let means = &reduced.model.patch_means * &reduced.model.heat_loads;
     assert!((means[(0, 0)] / means[(7, 7)] - 1.0).abs() < 1e-6);
 }
 
-/// A titanium cylinder conducts so badly along itself that its slowest rates are nearly one: the smaller basis of fewer modes finds them too.
+/// A titanium cylinder conducts so badly along its axis that its slowest rates nearly coincide: the smaller basis of
+/// fewer modes also finds them.
 #[test]
 fn reduces_a_casing_with_nearly_equal_decay_rates() {
     let cylinder = CasingOptions {
@@ -104,8 +106,8 @@ fn casing_has_correct_heat_capacity_areas_and_conductance() {
     assert!((reduced.model.gas_conductance() / (500.0 * reduced.areas[0]) - 1.0).abs() < 1e-12);
 }
 
-/// The full model under heat of patch 1 by the trapezoidal rule, from 0 K: temperatures of all patches and surfaces at the times
-/// given, and heat that went through its films by their surfaces' means.
+/// Integrates the full model under heat of patch 1 by the trapezoidal rule, from 0 K; returns the temperatures of all
+/// patches and surfaces at the given times, and the heat through its films from the means of their surfaces.
 fn full_run(full: &FullConduction, times: &[f64], step: f64) -> (Vec<Vec<f64>>, f64) {
     let operator = full.operator([1.0; 2]);
     let left: SparseMatrix = full.capacity.plus_scaled(0.5 * step, &operator);
@@ -140,7 +142,7 @@ fn full_run(full: &FullConduction, times: &[f64], step: f64) -> (Vec<Vec<f64>>, 
     (results, lost)
 }
 
-/// What another method on all nodes finds, the exact step of few coordinates finds too, from its beginning on.
+/// The exact step of few coordinates agrees with another method on all nodes, from the start of the transient on.
 #[test]
 fn transients_match_the_full_model() {
     let casing = casing();
@@ -150,7 +152,7 @@ fn transients_match_the_full_model() {
     let times = [0.2, 1.0, 4.0, 16.0];
     let (coarser, _) = full_run(&full, &times, 0.02);
     let (finer, lost) = full_run(&full, &times, 0.01);
-    // Second order: what steps leave is a third of the difference.
+    // Second order: the error of the steps is a third of the difference.
     let largest = finer.iter().flatten().fold(0.0_f64, |a, b| a.max(b.abs()));
     let steps = coarser.iter().flatten().zip(finer.iter().flatten()).fold(0.0_f64, |a, (b, c)| a.max((b - c).abs()));
     let mut deviations = Vec::new();
@@ -179,7 +181,7 @@ fn transients_match_the_full_model() {
         assert!((out / lost - 1.0).abs() < 2e-4, "{out} against {lost}");
         assert!(get(&simulation, "energy_residual_relative").abs() < 1e-13);
     }
-    // Responses that grow know the beginning, modes the end: few are enough.
+    // Growing responses represent the start, modes the end: few are enough.
     assert!(deviations.iter().all(|worst| *worst < 2e-3) && deviations[2] <= 1.01 * deviations[0], "{deviations:?}");
 }
 
@@ -200,7 +202,7 @@ fn rejects_invalid_options_by_name() {
     refused(&mesh, &ConductionOptions { modes: 100_000, ..good.clone() }, "number of modes");
     let error = reduce_conduction(&mesh, &[], &good, &silent).unwrap_err().to_string();
     assert!(error.contains("patches"), "{error}");
-    // Two rows, of which one lies beyond what is heated.
+    // Two rows, one of which lies beyond the heated part.
     let casing = CasingOptions { patches: [12, 8], ..casing() };
     let error = reduce_ring_conduction(&casing, &of_casing(4), &silent).unwrap_err().to_string();
     assert!(error.contains("no heated face lies in it"), "{error}");

@@ -1,4 +1,4 @@
-//! Conduction of casings of irregular tetrahedra, whose faces lie across the borders of patches and of the heated surface.
+//! Conduction of casings of irregular tetrahedra, whose faces cross the borders of patches and of the heated surface.
 
 use std::f64::consts::PI;
 
@@ -27,7 +27,8 @@ fn sum(values: impl Iterator<Item = f64>) -> f64 {
     values.sum()
 }
 
-/// The heat of a patch goes to nodes in all, evenly over its area between its borders, wherever the faces are.
+/// The heat of a patch is complete, and evenly distributed over its area between its borders, regardless of the
+/// faces.
 #[test]
 fn patch_heat_is_distributed_within_the_patch_borders() {
     for patches in [equal_patches(5, 1, RING.axial), equal_patches(3, 2, RING.axial)] {
@@ -59,7 +60,7 @@ fn patch_heat_is_distributed_within_the_patch_borders() {
     }
 }
 
-/// The temperature that grows linearly along an axis has known means over patches, of surfaces and of volumes.
+/// A temperature that is linear along an axis has known means over patches, of surfaces and of volumes.
 #[test]
 fn patch_means_match_those_of_a_cylinder() {
     let patches = equal_patches(5, 1, RING.axial);
@@ -84,7 +85,7 @@ fn patch_means_match_those_of_a_cylinder() {
     assert!(found[1] < 0.02 && found[1] < 0.7 * found[0], "{found:?}");
 }
 
-/// Steady heat from the gas to the air: the temperature goes with the logarithm of the radius.
+/// Steady heat from the gas to the air: the temperature is logarithmic in the radius.
 #[test]
 fn radial_conduction_in_tetrahedra_is_logarithmic() {
     let (a, b, length) = (RING.radius, RING.radius + RING.thickness, RING.axial[1]);
@@ -107,7 +108,7 @@ fn radial_conduction_in_tetrahedra_is_logarithmic() {
     assert!(found[1] < 2e-3 && found[1] < 0.3 * found[0], "{found:?}");
 }
 
-/// The reduced model of tetrahedra is that of bricks whose faces end at all borders.
+/// The reduced model of tetrahedra agrees with that of bricks whose faces end at all borders.
 #[test]
 fn conduction_in_tetrahedra_matches_bricks() {
     let rings = ContactRings { around: 20, along: 2, axial: HEATED };

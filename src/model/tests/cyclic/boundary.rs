@@ -1,4 +1,4 @@
-//! Pairing of the faces of a sector, and what is refused.
+//! Pairing of the faces of a sector, and rejected input.
 
 use crate::common::disk::{COARSE, CellCounts, boundary, model, options, sector, tips};
 use tiprub_model::cyclic::{CyclicBoundary, ModeSelection, PairingReport, reduce_cyclic, whole_disk};
@@ -97,7 +97,7 @@ fn rejects_wrong_sector_count_at_any_tolerance() {
         let message = CyclicBoundary::pair(&mesh.nodes, low, high, sectors, 10.0).unwrap_err().to_string();
         assert!(message.contains("misses node") || message.contains("are both matched with"), "{sectors}: {message}");
     }
-    // One pair alone has no neighbours to be told from; a tolerance that is merely wide does no harm.
+    // A single pair has no neighbours to be confused with; a tolerance that is merely wide is harmless.
     assert!(CyclicBoundary::pair(&mesh.nodes, low, high, SECTORS, 10.0).is_ok());
 }
 
@@ -117,7 +117,7 @@ fn rejects_contact_on_cyclic_faces_and_loose_structures() {
     let other = CyclicBoundary { pairs: vec![[0, 99_999]], sectors: SECTORS };
     let error = reduce_cyclic(&model(mesh.clone()), &bore, &tips(&mesh, 2), &other, &options, &silent).unwrap_err();
     assert!(error.to_string().contains("does not exist"), "{error}");
-    // A brick that hangs on nothing.
+    // A disconnected brick.
     let mut loose = mesh.clone();
     let first = loose.nodes.len();
     loose.nodes.extend(
@@ -152,7 +152,8 @@ fn sectors_assemble_into_a_closed_disk() {
     let per_sector = mesh.nodes.len() - mesh.set("LOW").unwrap().len();
     assert_eq!(disk.mesh.nodes.len(), SECTORS * per_sector);
     assert_eq!(disk.mesh.elements.len(), SECTORS * mesh.elements.len());
-    // Every node is where the sector's own, turned, is: also those that belong to the next sector.
+    // Every node is at the rotated position of the node of the sector, including those that belong to the next
+    // sector.
     for (s, numbers) in disk.nodes.iter().enumerate() {
         let (sin, cos) = (core::f64::consts::TAU * s as f64 / SECTORS as f64).sin_cos();
         for (own, &number) in numbers.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Coupled sectors: against the whole disk, their faces, their checks, their patches.
+//! Coupled sectors: comparison with the whole disk, faces, checks, patches.
 
 #[path = "../common/mod.rs"]
 mod common;

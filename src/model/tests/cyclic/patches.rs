@@ -36,13 +36,14 @@ fn reduced(
     reduce_cyclic(&model(mesh.clone()), clamped, contact, &boundary(mesh, sectors), &options, &silent).unwrap()
 }
 
-/// Radial, tangential and axial unit vector at a node.
+/// Returns the radial, tangential and axial unit vectors at a node.
 fn directions([x, y, _]: [f64; 3]) -> [[f64; 3]; 3] {
     let radius = x.hypot(y);
     [[x / radius, y / radius, 0.0], [-y / radius, x / radius, 0.0], [0.0, 0.0, 1.0]]
 }
 
-/// Displacements of all patches of the disk by forces on those of one sector, in the disk itself and through the nodal diameters.
+/// Compares displacements of all patches of the disk under forces on those of one sector, in the disk itself and
+/// through the nodal diameters.
 #[test]
 fn static_response_to_patch_forces_matches_full_disk() {
     let force = [1.0, -0.4, 0.3, 0.2, 0.7, -0.9];
@@ -53,7 +54,7 @@ fn static_response_to_patch_forces_matches_full_disk() {
         let free = free_dofs(disk.mesh.nodes.len(), disk.mesh.set("BORE").unwrap());
         let all = model(disk.mesh.clone());
         let (stiffness, _) = principal_pair(&all.stiffness, &all.mass, &free);
-        // Over the nodes of a patch, weights in the directions of each node.
+        // Weights over the nodes of a patch, in the directions of each node.
         let spread = |s: usize, i: usize| -> Vec<(usize, f64)> {
             let of_node = |(node, weight): (usize, f64)| {
                 let node = disk.nodes[s][node];
@@ -93,7 +94,8 @@ fn static_response_to_patch_forces_matches_full_disk() {
     }
 }
 
-/// Kept modes stay those of the full model, on a held disk and on a free one, where rigid-body motions are among them.
+/// Kept modes are those of the full model, on a supported disk and on a free one, where they include rigid-body
+/// motions.
 #[test]
 fn free_interface_sector_modes_match_full_disk() {
     let sectors = 5;
@@ -111,7 +113,7 @@ fn free_interface_sector_modes_match_full_disk() {
             let first = one.full_frequencies[rigid];
             assert!(one.reduced_frequencies[..rigid].iter().all(|f| *f < 1e-4 * first), "{one:?}");
         }
-        // Modes and convergence table agree: a row with fewer modes has the first of them.
+        // The modes and the convergence table agree: a row with fewer modes contains the first of them.
         let row = &found.convergence[6];
         assert!(
             row.frequency_deviation.iter().all(|deviation| deviation.abs() < 1e-6 || clamped.is_empty()),
@@ -120,7 +122,7 @@ fn free_interface_sector_modes_match_full_disk() {
     }
 }
 
-/// Recovered shapes move the nodes of patches as the full model does: its modes are the same whatever touches.
+/// Recovered shapes move the nodes of patches as the full model does: its modes do not depend on the contact.
 #[test]
 fn patches_do_not_change_sector_mode_shapes() {
     let sectors = 5;
@@ -141,14 +143,14 @@ fn patches_do_not_change_sector_mode_shapes() {
     }
 }
 
-/// Response of a patch, m/N, with structural damping, in nodal diameter n.
+/// Returns the response of a patch, m/N, with structural damping, in nodal diameter n.
 fn receptance([mass, stiffness, map]: &[DMatrix<Complex<f64>>; 3], angular: f64) -> DMatrix<Complex<f64>> {
     let dynamic = stiffness * Complex::new(1.0, 0.01) - mass * Complex::new(angular * angular, 0.0);
     map * dynamic.lu().solve(&map.adjoint()).unwrap()
 }
 
-/// Forced responses between the second and the third frequency, against a reduction with all modes: those of free-interface modes are nearer with
-/// fewer of them, and inertia relief makes them so where the disk is free.
+/// Forced responses between the second and the third frequency against a reduction with all modes: those of
+/// free-interface modes are more accurate with fewer modes, which inertia relief also ensures for a free disk.
 #[test]
 fn free_interface_modes_converge_faster_for_patches() {
     let sectors = 5;
@@ -219,7 +221,8 @@ fn rejects_dependent_patches_and_a_patch_on_a_face() {
     assert!(refused(&twice).contains("depends on those of the other patches"));
 }
 
-/// The tip is the outermost connected face: of the sector's blade as its set names it, not the rim beside it.
+/// The tip is the outermost connected face: that of the blade of the sector as its set defines it, not the rim beside
+/// it.
 #[test]
 fn finds_the_tip_of_a_sector() {
     for kind in ElementKind::ALL {
@@ -235,7 +238,7 @@ fn finds_the_tip_of_a_sector() {
         let error = find_tip(&mesh, &tip.nodes).unwrap_err().to_string();
         assert!(error.contains("are clamped or lie on cyclic faces") && error.contains("--contact-set"), "{error}");
     }
-    // A second blade beside the first is as far out, and is told of.
+    // A second blade beside the first is equally far out and is reported.
     let one = sector(ElementKind::Hex8, 8, COARSE);
     let mut two = one.clone();
     let (sin, cos) = (TAU / 16.0).sin_cos();

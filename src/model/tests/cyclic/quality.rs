@@ -18,13 +18,13 @@ fn reduced(mesh: &Mesh, sectors: usize, clamped: bool, options: &CyclicOptions) 
     reduce_cyclic(&model(mesh.clone()), clamped, &contact, &boundary(mesh, sectors), options, &silent).unwrap()
 }
 
-/// Values of the checks as often as the disk has the modes.
+/// Repeats the values of the checks with the multiplicity of the modes in the disk.
 fn of_the_disk(checks: &RomChecks, sectors: usize, values: &[f64]) -> Vec<f64> {
     let repeated = |(&n, &value): (&u32, &f64)| vec![value; copies(n as usize, sectors)];
     checks.nodal_diameters.iter().zip(values).flat_map(repeated).collect()
 }
 
-/// The same disk reduced as one structure, with contact at all blades.
+/// Reduces the same disk as one structure, with contact at all blades.
 fn reduced_whole(mesh: &Mesh, sectors: usize, modes: usize, checked_modes: usize) -> RomChecks {
     let disk = whole_disk(mesh, &boundary(mesh, sectors)).unwrap();
     let contact: Vec<ContactPoint> = disk
@@ -81,7 +81,7 @@ fn quality_criteria_match_full_disk() {
     assert_close("deviation", &first(&checks.frequency_deviation), &disk.frequency_deviation, 1e-4, 1e-9);
     assert_close("criterion", &first(&checks.residual_criterion), &disk.residual_criterion, 1e-4, 1e-9);
     assert!(disk.residual_criterion.iter().any(|&value| value > 1e-3), "nothing to compare");
-    // Without any fixed-interface mode.
+    // Without fixed-interface modes.
     let bare = reduced_whole(&mesh, sectors, 0, 12);
     let row = &reduction.convergence[0];
     assert_close("deviation of 0", &row.frequency_deviation[..12], &bare.frequency_deviation, 1e-6, 1e-9);
@@ -131,7 +131,7 @@ fn matrices_are_hermitian_and_real_for_standing_waves() {
     }
 }
 
-/// The sector seen in a mirror that turns +θ into -θ.
+/// Returns the mirror image of the sector, which turns +θ into -θ.
 fn mirrored(mesh: &Mesh) -> Mesh {
     let mut mirrored = mesh.clone();
     mirrored.nodes.iter_mut().for_each(|node| node[1] = -node[1]);

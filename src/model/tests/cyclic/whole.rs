@@ -20,7 +20,7 @@ fn reduced(mesh: &Mesh, sectors: usize, contact: usize, options: &CyclicOptions)
     reduce_cyclic(&model(mesh.clone()), mesh.set("BORE").unwrap(), &contact, &boundary, options, &silent).unwrap()
 }
 
-/// K and M of the whole disk with its bore clamped, the free dofs, and the node of the disk for sector and node.
+/// K and M of the whole disk with its bore clamped, the free dofs, and the node of the disk for each sector and node.
 struct AssembledDisk {
     stiffness: SparseMatrix,
     mass: SparseMatrix,
@@ -37,7 +37,8 @@ fn whole(mesh: &Mesh, sectors: usize) -> AssembledDisk {
     AssembledDisk { stiffness, mass, free, nodes: disk.nodes, mesh: disk.mesh }
 }
 
-/// Frequencies of all nodal diameters as often as the disk has them, up to where every nodal diameter's list reaches.
+/// Returns the frequencies of all nodal diameters with their multiplicity in the disk, up to the end of the shortest
+/// list.
 fn disk_frequencies(reduction: &CyclicReduction, sectors: usize) -> Vec<f64> {
     let lists = reduction.nodal_diameters.iter().map(|one| one.full_frequencies.as_slice());
     let ceiling = lists.map(|list| *list.last().unwrap()).fold(f64::INFINITY, f64::min);
@@ -93,7 +94,8 @@ fn frequencies_of_fifty_six_sectors_match_full_disk() {
     assert_same_frequencies(ElementKind::Hex8, 56, CellCounts { hub: 1, along: 1, ..COARSE });
 }
 
-/// ω² of a small Hermitian pencil through the real symmetric one of twice the size, every value twice there.
+/// Returns ω² of a small Hermitian pencil through the real symmetric one of twice the size, where every value appears
+/// twice.
 fn squares([mass, stiffness, _]: &[DMatrix<Complex<f64>>; 3]) -> Vec<f64> {
     let m = mass.nrows();
     let real = |matrix: &DMatrix<Complex<f64>>| {

@@ -1,4 +1,4 @@
-//! Natural frequencies against closed forms, with the rate at which they are approached.
+//! Natural frequencies against closed forms, with their rate of convergence.
 
 use crate::common::{nodes_at, straight_box};
 use tiprub_model::assembly::{assemble, free_dofs};
@@ -8,14 +8,15 @@ use tiprub_model::progress::silent;
 use tiprub_model::reduce::full_modes;
 use tiprub_model::sparse::principal_pair;
 
-/// Without Poisson's effect the bar and beam theories hold for the solid.
+/// Without Poisson's effect, bar and beam theory are valid for the solid.
 fn material() -> Material {
     Material { name: "no_poisson".into(), young_modulus: 200e9, poisson_ratio: 0.0, density: 8000.0, expansion: 0.0 }
 }
 
 const LENGTH: f64 = 1.0;
 
-/// First frequency of longitudinal vibration of a clamped-free bar with only axial motion left, `count` bricks long.
+/// Returns the first frequency of longitudinal vibration of a clamped-free bar that can only move axially, `count`
+/// bricks long.
 fn axial_frequency(kind: ElementKind, count: usize) -> f64 {
     let side = LENGTH / count as f64;
     let mesh = straight_box(kind, [count, 1, 1], [LENGTH, side, side]);
@@ -26,8 +27,8 @@ fn axial_frequency(kind: ElementKind, count: usize) -> f64 {
     full_modes(&stiffness, &mass, false, 1, &silent).unwrap().modes.frequencies()[0]
 }
 
-/// Second order for the linear elements, fourth for the quadratic ones (error in frequency, consistent mass): the
-/// setup is axial vibration of a clamped-free bar, ν = 0, transverse motion held, f = √(E/ρ)/4L.
+/// Second order for the linear elements, fourth for the quadratic ones (error in frequency, consistent mass). The
+/// test case is axial vibration of a clamped-free bar, ν = 0, transverse motion held, f = √(E/ρ)/4L.
 #[test]
 fn axial_frequencies_converge_at_the_order_of_the_element() {
     let exact = (material().young_modulus / material().density).sqrt() / (4.0 * LENGTH);
@@ -46,7 +47,7 @@ fn axial_frequencies_converge_at_the_order_of_the_element() {
     }
 }
 
-/// Frequencies of a cantilever of square section; bending modes come in pairs, one per direction.
+/// Returns the frequencies of a cantilever of square section; bending modes come in pairs, one per direction.
 fn cantilever(kind: ElementKind, counts: [usize; 3], side: f64, modes: usize) -> Vec<f64> {
     let mesh = straight_box(kind, counts, [LENGTH, side, side]);
     let assembled = assemble(&mesh, &material(), &silent).unwrap();
@@ -65,17 +66,17 @@ fn slender_cantilever_matches_euler_bernoulli() {
         let exact = beta_length * beta_length / (core::f64::consts::TAU * LENGTH * LENGTH) * speed;
         let pair = [frequencies[2 * mode], frequencies[2 * mode + 1]];
         println!("mode {}: {pair:.4?} Hz, Euler-Bernoulli {exact:.4} Hz", mode + 1);
-        // Shear and rotary inertia, which the beam theory leaves out, lower the third mode by 0.2 % at L/h = 100.
+        // Shear and rotary inertia, which beam theory omits, lower the third mode by 0.2 % at L/h = 100.
         let allowed = [1e-4, 1e-3, 2.5e-3][mode];
         assert!(pair.iter().all(|frequency| (frequency / exact - 1.0).abs() < allowed), "{pair:?} {exact}");
-        // Round-off of the solve: machine epsilon times the stiffness matrix' condition, about 1e10 here.
+        // Round-off of the solution: machine epsilon times the condition of the stiffness matrix, about 1e10 here.
         let split = pair[1] / pair[0] - 1.0;
         assert!(split.abs() < 1e-7, "the two directions must agree, they differ by {split:e}");
     }
 }
 
-/// First bending frequency of the symmetric half of a stubby simply supported beam: axial motion held in the plane of
-/// symmetry, transverse motion at the support.
+/// Returns the first bending frequency of the symmetric half of a stubby simply supported beam: axial motion held in
+/// the plane of symmetry, transverse motion at the support.
 fn half_beam(kind: ElementKind, count: usize) -> f64 {
     let mesh = straight_box(kind, [count, count / 4, count / 4], [LENGTH, LENGTH / 4.0, LENGTH / 4.0]);
     let assembled = assemble(&mesh, &material(), &silent).unwrap();
@@ -87,8 +88,9 @@ fn half_beam(kind: ElementKind, count: usize) -> f64 {
     full_modes(&stiffness, &mass, false, 1, &silent).unwrap().modes.frequencies()[0]
 }
 
-/// Uniform refinement in bending: differences of successive frequencies shrink at order 2 and 4. The supports let the
-/// sections warp, so that no corner is singular (a clamped face in bending is, and would cap the order).
+/// Uniform refinement in bending: differences of successive frequencies decrease with order 2 and 4. The supports
+/// permit the sections to warp, so that no corner is singular (a clamped face in bending is singular and would limit
+/// the order).
 #[test]
 fn bending_frequencies_converge_at_the_order_of_the_element() {
     for (kind, expected) in [(ElementKind::Hex8, 2.0), (ElementKind::Hex20, 4.0)] {

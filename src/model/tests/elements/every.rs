@@ -1,4 +1,4 @@
-//! What every element must satisfy: interpolation, completeness, patch test, rigid-body modes, mass.
+//! Properties of every element: interpolation, completeness, patch test, rigid-body modes, mass.
 
 use crate::common::{distorted_box, distorted_nodes, steel, wobble};
 use faer::Mat;
@@ -60,7 +60,7 @@ proptest! {
     }
 }
 
-/// ∫ r^a s^b t^c over the natural domain.
+/// Returns ∫ r^a s^b t^c over the natural domain.
 fn exact_monomial(kind: ElementKind, [a, b, c]: [i32; 3]) -> f64 {
     let line = |n: i32| if n % 2 == 0 { 2.0 / f64::from(n + 1) } else { 0.0 };
     let factorial = |n: i32| (1..=n).map(f64::from).product::<f64>();
@@ -74,7 +74,7 @@ fn exact_monomial(kind: ElementKind, [a, b, c]: [i32; 3]) -> f64 {
 #[test]
 fn mass_rules_integrate_products_of_shape_functions_exactly() {
     for kind in ElementKind::ALL {
-        // Twice the degree of the shape functions: per direction for bricks and along prisms, else in total.
+        // Twice the degree of the shape functions: per direction for bricks and along prisms, otherwise in total.
         let degree = match kind {
             ElementKind::Hex8 | ElementKind::Penta6 | ElementKind::Tet4 => 2,
             _ => 4,
@@ -124,7 +124,8 @@ fn a_distorted_element_has_exactly_six_rigid_body_modes() {
     }
 }
 
-/// A linear displacement on the boundary of a distorted patch must give that field, and one stress, everywhere.
+/// A linear displacement on the boundary of a distorted patch must cause that field, and a uniform stress,
+/// everywhere.
 #[test]
 fn patch_test() {
     let gradient = [[1.1e-3, -0.4e-3, 0.7e-3], [0.3e-3, -0.8e-3, 0.5e-3], [-0.6e-3, 0.2e-3, 0.9e-3]];
@@ -199,7 +200,7 @@ fn rejects_inverted_element_and_names_it() {
     for kind in ElementKind::ALL {
         let mut mesh = distorted_box(kind, [2, 1, 1], [0.2, 0.1, 0.1], |_| [0.0; 3]);
         let last = mesh.elements.len() - 1;
-        // The node at each natural point changes places with the one at the mirrored point.
+        // The node at each natural point is exchanged with the one at the mirrored point.
         let mirrored = |[x, y, z]: [f64; 3]| if kind.corner_count() == 4 { [y, x, z] } else { [x, y, -z] };
         let places = kind.natural_nodes();
         let nodes = mesh.elements[last].nodes.clone();

@@ -1,4 +1,4 @@
-//! Hex8 with incompatible modes: patch test, rigid bodies, heat, bending where plain hex8 locks.
+//! Hex8 with incompatible modes: patch test, rigid bodies, heat, bending without the locking of plain hex8.
 
 use crate::common::{distorted_box, distorted_nodes, nodes_at, straight_box, wobble};
 use faer::Mat;
@@ -20,14 +20,14 @@ fn distorted_element_has_six_rigid_body_modes() {
     let largest = values[23];
     assert!(values[..6].iter().all(|value| value.abs() < 1e-14 * largest), "{values:?}");
     assert!(values[6..].iter().all(|value| *value > 1e-6 * largest), "{values:?}");
-    // More freedom makes it softer, in every motion.
+    // Additional freedom makes it softer in every motion.
     let softer = stiffness(KIND, &nodes, &Material::steel(), 0).unwrap() - incompatible;
     let softest = softer.symmetric_eigenvalues().min();
     assert!(softest > -1e-14 * largest, "{softest}");
     assert!(softer.norm() > 1e-3 * largest);
 }
 
-/// Forces on the nodes of a distorted patch under a linear displacement: none inside.
+/// A linear displacement of a distorted patch causes no forces on inner nodes.
 #[test]
 fn patch_test() {
     let gradient = [[1.1e-3, -0.4e-3, 0.7e-3], [0.3e-3, -0.8e-3, 0.5e-3], [-0.6e-3, 0.2e-3, 0.9e-3]];
@@ -40,7 +40,7 @@ fn patch_test() {
         });
         assembled.stiffness.times(field.as_ref())
     };
-    // The exact field leaves the modes at rest: all nodal forces are those of plain hex8, on the boundary, too.
+    // The exact field does not excite the modes: all nodal forces are those of plain hex8, on the boundary, too.
     let [plain, incompatible] = [Formulation::Displacement, Formulation::IncompatibleModes].map(forces);
     let difference = (&plain - &incompatible).norm_max() / plain.norm_max();
     assert!(difference < 1e-12, "{difference:e}");

@@ -9,7 +9,7 @@ use tiprub_model::progress::silent;
 use tiprub_model::reduce::full_modes;
 use tiprub_model::sparse::{SparseMatrix, principal_pair};
 
-/// Coordinates of an irregular element of a kind: one out of the middle of a distorted box.
+/// Returns the coordinates of an irregular element of a kind, from the middle of a distorted box.
 fn element(kind: ElementKind) -> Vec<[f64; 3]> {
     let mesh = distorted_box(kind, [3, 3, 3], [0.3, 0.2, 0.25], wobble(0.15));
     mesh.coordinates(&mesh.elements[mesh.elements.len() / 2])
@@ -80,8 +80,8 @@ fn rigid_rotation_is_stress_free_and_rotates_the_stiffness() {
     }
 }
 
-/// Patch test of the stress stiffness: under a uniform stress S a motion with the gradient H has the energy V tr(H S Hᵀ);
-/// none for a translation, σVω² for turning a bar under tension σ by ω across its axis.
+/// Patch test of the stress stiffness: under a uniform stress S a motion with the gradient H has the energy V tr(H S
+/// Hᵀ): zero for a translation, σVω² for a rotation of a bar under tension σ by ω across its axis.
 #[test]
 fn stress_stiffness_is_exact_for_linear_motions() {
     let stress = [3e8, -1e8, 2e8, 0.5e8, -0.7e8, 1.1e8];
@@ -139,7 +139,7 @@ fn tensioned_beam_frequency_matches_closed_form() {
             .iter()
             .flat_map(|&node| [3 * node + 1, 3 * node + 2])
             .collect();
-        // One node against sliding along the axis, on the neutral fibre or nearest to it.
+        // One node is held against sliding along the axis, on the neutral fibre or nearest to it.
         let middle = |node: &usize| (mesh.nodes[*node][1] - 0.5 * height).hypot(mesh.nodes[*node][2] - 0.5 * height);
         let axis = nodes_at(&mesh, 0, 0.5 * length).into_iter().min_by(|a, b| middle(a).total_cmp(&middle(b))).unwrap();
         held.push(3 * axis);

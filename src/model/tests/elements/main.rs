@@ -1,4 +1,4 @@
-//! Elements, alone and assembled, against closed forms.
+//! Single and assembled elements against closed forms.
 
 #[path = "../common/mod.rs"]
 mod common;

@@ -1,4 +1,4 @@
-//! Elimination orders: permutations, the same everywhere, and small factors.
+//! Elimination orders: permutations, reproducibility, and small factors.
 
 use faer::Mat;
 use tiprub_model::assembly::assemble;
@@ -9,7 +9,7 @@ use tiprub_model::progress::silent;
 use tiprub_model::sparse::{Pattern, SparseMatrix, SymbolicFactor};
 use tiprub_model::{Material, Mesh};
 
-/// K + M of a block of bricks with unit edges, positive definite without supports.
+/// Returns K + M of a block of bricks with unit edges, positive definite without supports.
 fn block([nx, ny, nz]: [usize; 3]) -> SparseMatrix {
     let node = |i: usize, j: usize, k: usize| (k * (ny + 1) + j) * (nx + 1) + i;
     let mut mesh = Mesh::default();
@@ -38,7 +38,7 @@ fn nested_dissection_beats_minimum_degree_on_a_block() {
         [Ordering::NestedDissection, Ordering::MinimumDegree].map(|ordering| entries(&matrix.pattern, ordering));
     println!("entries of the factor: {dissected} dissected, {minimum} by minimum degree");
     assert!((dissected as f64) < 0.75 * minimum as f64, "{dissected} against {minimum}");
-    // A matrix of this size is dissected unasked.
+    // A matrix of this size is dissected automatically.
     assert_eq!(entries(&matrix.pattern, Ordering::Automatic), dissected);
 }
 
@@ -60,7 +60,7 @@ fn every_ordering_gives_the_same_solution() {
 
 #[test]
 fn ordering_is_a_permutation_for_every_graph() {
-    // A block; two blocks that nothing joins; a diagonal; a star; a complete graph.
+    // A block; two unconnected blocks; a diagonal; a star; a complete graph.
     let arrow = |size: usize, rows: &dyn Fn(usize) -> Vec<usize>| {
         let lists: Vec<Vec<usize>> = (0..size).map(rows).collect();
         let starts = core::iter::once(0).chain(lists.iter().scan(0, |end, list| {
@@ -100,7 +100,7 @@ fn ordering_is_a_permutation_for_every_graph() {
         order.sort_unstable();
         assert!(order.iter().copied().eq(0..pattern.order()), "{name}");
     }
-    // A star has no fill when its centre comes last.
+    // A star has no fill if its centre comes last.
     let fill = entries(&star, Ordering::NestedDissection);
     assert!(fill < 2 * 500, "{fill}");
 }

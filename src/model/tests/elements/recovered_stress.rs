@@ -1,14 +1,15 @@
-//! Stress at nodes against fields whose stress is known.
+//! Stress at nodes for displacement fields with known stress.
 
 use nalgebra::DVector;
 use tiprub_model::element::{ElementKind, nodal_stress, stress};
 
 use crate::common::{distorted_box, steel, straight_box, wobble};
 
-/// Displacements whose strains (εxx, εyy, εzz, γxy, γyz, γzx) are the second.
+/// Displacements and their strains (εxx, εyy, εzz, γxy, γyz, γzx).
 type DisplacementField = fn([f64; 3]) -> ([f64; 3], [f64; 6]);
 
-/// Stress at every node of every element, against that of the strain there: largest deviation beside the largest stress.
+/// Returns the largest deviation of the stress at every node of every element from that of the known strain, relative
+/// to the largest stress.
 fn deviation(kind: ElementKind, distorted: bool, field: DisplacementField) -> f64 {
     let (counts, size) = ([2, 2, 2], [0.3, 0.2, 0.1]);
     let mesh =
@@ -43,7 +44,7 @@ fn constant_stress_is_exact_in_distorted_elements() {
     }
 }
 
-/// Bending: quadratic elements hold it, and its stress is linear over the thickness.
+/// Quadratic elements represent bending exactly, with a stress that is linear over the thickness.
 #[test]
 fn stress_of_bending_is_exact_in_quadratic_elements() {
     let field: DisplacementField = |[x, y, z]| {

@@ -1,4 +1,4 @@
-//! Damaged files: every beginning and many changed bytes of small ones end in a model or in an error, never in a panic.
+//! Damaged files: truncations and random byte changes of small files result in a model or an error, never in a panic.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ fn data(name: &str) -> Vec<u8> {
     std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/models").join(name)).unwrap()
 }
 
-/// A generator of numbers that need not be good, only many and always the same (Marsaglia's xorshift).
+/// Simple reproducible random number generator (Marsaglia's xorshift).
 struct Draws(u64);
 
 impl Draws {
@@ -24,7 +24,7 @@ impl Draws {
 
 const MESHES: [&str; 3] = ["bar.inp", "bar.msh", "bar_binary.msh"];
 
-/// Read, and assemble what could be read; whether it could.
+/// Reads a file, assembles the result, and returns whether both succeeded.
 fn tried(name: &str, bytes: &[u8]) -> bool {
     match parse_mesh(name, bytes) {
         Ok(mesh) => {
@@ -45,7 +45,7 @@ fn truncated_mesh_files_never_panic() {
         let whole = data(name);
         assert!(tried(name, &whole));
         let read = (0..whole.len()).filter(|&length| tried(name, &whole[..length])).count();
-        // Only what stands behind the elements can be missed.
+        // Only contents after the elements may be missing.
         assert!(read < whole.len() / 2, "{name}: {read} of {} beginnings are read", whole.len());
     }
 }

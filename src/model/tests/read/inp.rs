@@ -1,4 +1,4 @@
-//! The syntax of input files, and what is said of wrong ones.
+//! Syntax of input files, and the messages for invalid ones.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -9,7 +9,7 @@ use tiprub_model::progress::silent;
 use tiprub_model::read::{Imported, MeshOptions, Units, parse_mesh, read_mesh};
 use tiprub_model::{Error, Mesh};
 
-/// Two bricks beside each other, their numbers with gaps, the second record over two lines.
+/// Two adjacent bricks with gaps in their numbers, the second record over two lines.
 const NODES: &str = "10, 0.1, 0., 0.\n20, 0.11, 0., 0.\n30, 0.11, 0.01, 0.\n40, 0.1, 0.01, 0.\n\
                      50, 0.1, 0., 0.01\n60, 0.11, 0., 0.01\n70, 0.11, 0.01, 0.01\n80, 0.1, 0.01, 0.01\n\
                      110, 0.1, 0., 0.02\n120, 1.1d-1, , 0.02\n130, 0.11, 0.01, 0.02\n140, 0.1, 0.01, 2.0E-2\n";
@@ -31,7 +31,7 @@ fn sets(text: &str) -> BTreeMap<String, Vec<usize>> {
     mesh(&format!("{}{text}", deck())).sets
 }
 
-/// The files in a directory, `a.inp` read.
+/// Reads `a.inp` from a directory with these files.
 fn read(files: &[(&str, &str)], options: &MeshOptions) -> Result<Imported, Error> {
     let root: TempDir = tempfile::tempdir().unwrap();
     for (name, text) in files {
@@ -121,7 +121,7 @@ fn includes_are_resolved_relative_to_the_including_file() {
     assert!(missing.contains("a.inp:1") && missing.contains("c.inp"), "{missing}");
 }
 
-/// A few kilobytes that include one file again and again must not become gigabytes, however its path is written.
+/// Repeated includes of a few kilobytes must not expand to gigabytes, for any spelling of the path.
 #[test]
 fn rejects_repeated_includes_beyond_the_size_limit() {
     let list: String = (0..20_000).map(|_| "10, 20\n").collect();
@@ -254,7 +254,7 @@ fn rejects_unsupported_gmsh_versions_and_elements() {
 
 #[test]
 fn rejects_duplicate_elements() {
-    // The second is numbered from another corner.
+    // The second element is numbered from another corner.
     let text = deck().replace(ELEMENTS, &format!("{ELEMENTS}7, 20, 30, 40, 10, 60, 70, 80, 50\n"));
     let error = read(&[("a.inp", &text)], &MeshOptions::default()).unwrap_err().to_string();
     for part in ["a.inp:", "element 7", "element 1", "counted twice"] {

@@ -1,4 +1,4 @@
-//! Users' files: meshes and matrices, read and damaged.
+//! User files: valid and damaged meshes and matrices.
 
 #[path = "../common/mod.rs"]
 mod common;

@@ -1,4 +1,4 @@
-//! Models from matrices against the mesh that the matrices are of: CalculiX's own, Matrix Market, Abaqus text.
+//! Models from matrices against the mesh of the matrices: CalculiX, Matrix Market, Abaqus text.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -45,11 +45,12 @@ fn rom(imported: &Imported) -> Rom {
     reduce_model(model, &clamped, &contact, &options, None, &silent).unwrap().rom
 }
 
-/// Largest difference of mass and stiffness of the reduced models, as a share of the largest entry of each.
+/// Returns the largest difference of mass and stiffness of the reduced models, as a fraction of the largest entry of
+/// each.
 fn difference(a: &Rom, b: &Rom) -> f64 {
     assert_eq!(a.contact_nodes, b.contact_nodes);
     let share = |a: &nalgebra::DMatrix<f64>, b: &nalgebra::DMatrix<f64>| {
-        // A mode shape has no sign of its own.
+        // The sign of a mode shape is arbitrary.
         (a.abs() - b.abs()).amax() / a.amax()
     };
     share(&a.mass, &b.mass).max(share(&a.stiffness, &b.stiffness))
@@ -91,7 +92,7 @@ enum Triangle {
     Both,
 }
 
-/// Entries (row, column, value) of a triangle, from 1.
+/// Returns the entries (row, column, value) of a triangle, from 1.
 fn entries(
     imported: &Imported,
     mass: bool,
@@ -181,7 +182,7 @@ fn both_matrix_market_triangles_are_bit_identical() {
     }
 }
 
-/// Abaqus MATRIX INPUT text: node, dof, node, dof, value.
+/// Returns Abaqus MATRIX INPUT text: node, dof, node, dof, value.
 fn labelled(imported: &Imported, mass: bool, keep: &dyn Fn(usize) -> bool) -> String {
     let mut text = String::from("** a comment\n");
     for (row, column, value) in entries(imported, mass, Triangle::Lower, keep) {
@@ -322,7 +323,7 @@ fn detects_node_order_that_differs_from_matrix_rows() {
 fn engine_axis_option_rotates_model_and_matrices() {
     let bar = bar();
     let expected = rom(&bar);
-    // What stands along z here stands along x there, and so on: (x, y, z) there is (z, x, y) of the bar.
+    // Cyclic change of the axes: (x, y, z) in the file is (z, x, y) of the bar.
     let mut table = String::new();
     for (index, [x, y, z]) in bar.model.nodes.iter().enumerate() {
         let sets = bar.model.sets.iter().filter(|(_, nodes)| nodes.contains(&index));

@@ -43,7 +43,7 @@ fn inp_and_msh_files_give_the_same_model() {
         let (mesh, _) = input.model.mesh.as_ref().unwrap();
         assert!(mesh.elements.iter().all(|element| element.kind == kind), "{name}");
         let (other, _) = gmsh.model.mesh.as_ref().unwrap();
-        // Order of nodes and printed digits differ between the formats; the numbers do not.
+        // The formats differ in node order and printed digits, but not in the numbers.
         let at = |model: &Imported, number: u64| {
             let index = model.node_numbers.iter().position(|&node| node == number).unwrap();
             model.model.nodes[index]
@@ -112,7 +112,8 @@ fn brick_frequencies_match_calculix() {
     }
 }
 
-/// Points of the file's own code where it takes fewer than this project does: CalculiX 2.20, user's manual, 6.2.
+/// Integration points of CalculiX for elements where it uses fewer than this project: CalculiX 2.20, user's manual,
+/// 6.2.
 fn calculix_rules(kind: ElementKind) -> [Vec<QuadraturePoint>; 2] {
     let own = kind.stiffness_rule();
     let axial = 1.0 / 3.0_f64.sqrt();
@@ -123,7 +124,7 @@ fn calculix_rules(kind: ElementKind) -> [Vec<QuadraturePoint>; 2] {
     }
 }
 
-/// K and M of a model with other integration rules, by the plain formulas ∫ BᵀDB dV and ∫ ρNᵀN dV.
+/// Computes K and M of a model with other integration rules, by the formulas ∫ BᵀDB dV and ∫ ρNᵀN dV.
 fn integrated(model: &FeModel, rules: &[Vec<QuadraturePoint>; 2]) -> (SparseMatrix, SparseMatrix) {
     let (mesh, material) = model.mesh.as_ref().unwrap();
     let (lambda, mu) = material.lame();
@@ -211,7 +212,7 @@ fn engine_axis_option_rotates_the_mesh_without_mirroring() {
     for (axis, from) in [(EngineAxis::X, [1, 2, 0]), (EngineAxis::Y, [2, 0, 1])] {
         let units = Units::MillimetreTonneSecond;
         let options = MeshOptions { units, axis, material: Some(steel()), ..MeshOptions::default() };
-        // A mirrored mesh would be turned inside out, and refused.
+        // A mirrored mesh would have inverted elements and be rejected.
         let turned = read_mesh(&data("blade_hex8.inp"), &options, &silent).unwrap().model;
         for (turned, node) in turned.nodes.iter().zip(&z.nodes) {
             assert_eq!(turned.map(f64::to_bits), from.map(|component| node[component].to_bits()), "{axis:?}");

@@ -1,4 +1,4 @@
-//! The bodies of the cube between two rings: free body and open panel reduced without loss of what they must keep.
+//! Bodies of the cube between two rings: reductions of free body and open panel preserve the required properties.
 
 use crate::guide::print_row;
 use nalgebra::DMatrix;
@@ -14,7 +14,7 @@ use tiprub_model::reduce::ReductionKind;
 use tiprub_model::{FeModel, Mesh, Reduction};
 
 const MASSES: [MassMatrix; 2] = [MassMatrix::Lumped, MassMatrix::Consistent];
-/// A ring small enough for its whole spectrum.
+/// A ring small enough for a full spectrum.
 const COARSE: [usize; 3] = [2, 4, 6];
 
 fn cube(elements: usize, mass: MassMatrix, modes: Option<usize>) -> Reduction {
@@ -26,7 +26,7 @@ fn ring(side: RingSide, elements: [usize; 3], mass: MassMatrix, modes: usize, st
     reduce_cube_ring(&options, &silent).unwrap()
 }
 
-/// K and M of all dofs, dense.
+/// Returns K and M of all dofs, dense.
 fn dense(mesh: Mesh, material: &tiprub_model::Material, mass: MassMatrix) -> [DMatrix<f64>; 2] {
     let model = FeModel::assembled(mesh, material, String::new(), &silent).unwrap();
     let model = if mass == MassMatrix::Lumped { model.lumped().unwrap() } else { model };
@@ -37,7 +37,7 @@ fn dense(mesh: Mesh, material: &tiprub_model::Material, mass: MassMatrix) -> [DM
     })
 }
 
-/// C (K + s M)⁻¹ Cᵀ of a modal ROM: what contact meets at the growth rate √s.
+/// Returns C (K + s M)⁻¹ Cᵀ of a modal ROM: the contact flexibility at the growth rate √s.
 fn flexibility(rom: &Rom, shift: f64) -> DMatrix<f64> {
     let mut scaled = rom.contact_map.clone();
     for (mode, mut column) in scaled.column_iter_mut().enumerate() {
@@ -63,7 +63,7 @@ fn rigid_motion_of_free_body_is_strain_free() {
         let unit = DMatrix::from_fn(rigid.nrows(), 1, |row, _| if row % 3 == axis { 1.0 } else { 0.0 });
         let motion = rigid.clone().svd(true, true).solve(&unit, 1e-12).unwrap();
         assert!((&rigid * &motion - &unit).amax() < 1e-12);
-        // M = I: the mass of the whole cube moves, 7800 kg/m³ and 50 mm.
+        // M = I: the mass of the whole cube, 7800 kg/m³ and 50 mm.
         let mass = motion.norm_squared();
         assert!((mass / 0.975 - 1.0).abs() < 1e-12, "{mass} kg");
     }
@@ -72,7 +72,8 @@ fn rigid_motion_of_free_body_is_strain_free() {
     assert!((rom.contact_nodes[16].position[0] - 0.025).abs() < 1e-15 && rom.contact_nodes[16].name == "right_1");
 }
 
-/// With all modes both reductions are changes of coordinates: contact meets the full model at any rate.
+/// With all modes both reductions are changes of coordinates: the contact flexibility is that of the full model at
+/// any rate.
 #[test]
 fn reduction_with_all_modes_is_exact() {
     let shift = 1e9;
@@ -85,7 +86,7 @@ fn reduction_with_all_modes_is_exact() {
         let rows: Vec<usize> = nodes.iter().flat_map(|node| 3 * node..3 * node + 3).collect();
         let full = (&stiffness + shift * &inertia).cholesky().unwrap().inverse();
         equal(&flexibility(&rom, shift), &full.select_rows(&rows).select_columns(&rows), 1e-9);
-        // And some of it is lost with fewer, so that the test can fail.
+        // With fewer modes it is not, so that the test can fail.
         let truncated = cube(3, mass, Some(10)).rom;
         assert!(
             (flexibility(&truncated, shift) - full.select_rows(&rows).select_columns(&rows)).amax()
@@ -106,7 +107,7 @@ fn reduction_with_all_modes_is_exact() {
     }
 }
 
-/// Free dofs of the coarse ring, and where the rows of its grid are among them.
+/// Returns the free dofs of the coarse ring, and the rows of its grid among them.
 fn ring_rows(side: RingSide) -> (Vec<usize>, Vec<Option<usize>>) {
     let mesh = ring_of(side, COARSE);
     let clamped = mesh.set("CLAMPED").unwrap();
@@ -144,7 +145,7 @@ fn patched(kind: ReductionKind, modes: Option<usize>) -> Reduction {
     reduce_cube(&options, &silent).unwrap()
 }
 
-/// Weights of the patches of [`patched`] over all dofs, row by row as the contact map.
+/// Returns the weights of the patches of [`patched`] over all dofs, row by row like the contact map.
 fn patch_rows() -> DMatrix<f64> {
     let mesh = cube_of(4);
     let side = |set: &str| {
@@ -163,7 +164,8 @@ fn patch_rows() -> DMatrix<f64> {
     rows
 }
 
-/// Duals stand where hats have their peaks, on the edges of the face too; on a grid of linear elements that has no more nodes they are these.
+/// Duals are at the peaks of the hat functions, also on the edges of the face; on a grid of linear elements with as
+/// many nodes they coincide with the nodes.
 #[test]
 fn face_patches_include_positions_on_the_edges() {
     let rom = patched(ReductionKind::FreeInterface, Some(4)).rom;
@@ -184,7 +186,7 @@ fn face_patches_include_positions_on_the_edges() {
         let apart = node.position.iter().zip(patch.position).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(apart < 1e-13 && patch.area > 0.0, "{node:?} {patch:?}");
     }
-    // What contact meets well above the rigid motions: C (K + s M)⁻¹ Cᵀ.
+    // Contact flexibility well above the rigid-body motions: C (K + s M)⁻¹ Cᵀ.
     let [nodes, patches] = [nodes, patches].map(|rom| {
         let shift = rom.stiffness.trace() / rom.mass.trace();
         let whole = (&rom.stiffness + shift * &rom.mass).cholesky().unwrap();
@@ -193,7 +195,8 @@ fn face_patches_include_positions_on_the_edges() {
     equal(&patches, &nodes, 1e-9);
 }
 
-/// What contact forces do beside accelerating the cube, at rest in the frame that flies with it, is that of the full model with any number of modes.
+/// The elastic response of the cube to contact forces, in the frame that moves with it, is that of the full model
+/// with any number of modes.
 #[test]
 fn inertia_relief_is_exact_with_any_number_of_modes() {
     let [stiffness, inertia] = dense(cube_of(4), &cube_material(), MassMatrix::Lumped);
@@ -229,12 +232,12 @@ fn inertia_relief_is_exact_with_any_number_of_modes() {
         assert!(kept.iter().all(|deviation| deviation.abs() < 1e-6), "{kept:?}");
     }
     equal(&elastic(&patched(ReductionKind::FixedInterface, None).rom), &exact, 1e-9);
-    // Without inertia relief it is not met: the test would notice.
+    // Without inertia relief it is different, which the test would detect.
     let held = elastic(&patched(ReductionKind::FixedInterface, Some(5)).rom);
     assert!((&held - &exact).amax() > 1e-4 * exact.amax());
 }
 
-/// Forced responses of a patch between two frequencies of the cube, against the reduction with all modes.
+/// Compares forced responses of a patch between two frequencies of the cube with the reduction with all modes.
 #[test]
 fn free_cube_converges_faster_with_free_interface_modes() {
     let exact = patched(ReductionKind::FixedInterface, None).rom;
@@ -256,7 +259,7 @@ fn free_cube_converges_faster_with_free_interface_modes() {
     crate::guide::hold("cargo test -p tiprub-model --test reduction cube");
 }
 
-/// Grids run so that S_t × S_s points to the cube, and the rings mirror each other.
+/// The order of the grids makes S_t × S_s point to the cube, and the rings are mirror images.
 #[test]
 fn normals_point_to_the_cube() {
     let roms = RingSide::BOTH.map(|side| ring(side, COARSE, MassMatrix::Lumped, 12, 6).rom);

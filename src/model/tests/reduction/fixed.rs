@@ -49,7 +49,7 @@ fn lanczos_matches_dense_solver() {
 
 #[test]
 fn lanczos_finds_both_modes_of_a_double_eigenvalue() {
-    // A square section without distortion bends alike in two directions.
+    // An undistorted square section bends equally in two directions.
     let (stiffness, mass) = clamped_pencil(&straight_box(ElementKind::Hex20, [6, 2, 2], [0.3, 0.04, 0.04]));
     let frequencies = full_modes(&stiffness, &mass, false, 4, &silent).unwrap().modes.frequencies();
     assert!((frequencies[1] / frequencies[0] - 1.0).abs() < 1e-8, "{frequencies:?}");
@@ -74,7 +74,7 @@ fn free_body_has_six_rigid_modes_and_correct_elastic_modes() {
     assert!(error.to_string().contains("Clamp at least three nodes"), "{error}");
 }
 
-/// Held along one edge the body can still turn about it, whether or not round-off lets the factorisation pass.
+/// A body held along one edge can still rotate about it, whether or not round-off makes the factorisation succeed.
 #[test]
 fn rejects_hinged_body_as_a_mechanism() {
     for kind in ElementKind::ALL {
@@ -211,7 +211,7 @@ fn more_component_modes_never_make_the_reduced_model_worse() {
     assert!(last.frequency_deviation[0] < 1e-3 && last.residual_criterion[0] < 1e-2);
 }
 
-/// Eq. 12 by its own letters, with dense matrices.
+/// Evaluates eq. 12 literally, with dense matrices.
 #[test]
 fn residual_criterion_is_equation_12() {
     let (modes, mesh) = (6, distorted_box(ElementKind::Hex8, [4, 2, 2], SIZE, wobble(0.1)));
@@ -245,7 +245,7 @@ fn frame_rotates_displacements_and_keeps_frequencies() {
         (reduced_beam(10, DisplacementFrame::Cartesian), reduced_beam(10, DisplacementFrame::Cylindrical));
     let pairs = cartesian.rom.checks.reduced_frequencies.iter().zip(&cylindrical.rom.checks.reduced_frequencies);
     pairs.for_each(|(a, b)| assert!((a / b - 1.0).abs() < 1e-9));
-    // Static compliance of the second node, turned by hand.
+    // Static compliance of the second node, rotated explicitly.
     let compliance = |reduction: &Reduction| {
         let inverse = reduction.rom.stiffness.clone().cholesky().unwrap().inverse();
         inverse.view((3, 3), (3, 3)).into_owned()

@@ -1,5 +1,5 @@
-//! H. Hertz's contact of a rigid sphere with an elastic half-space: a quarter of a large block, reduced to the nodes of its surface
-//! and met by the contact solvers of the core, at rest and in an impact.
+//! Hertz contact of a rigid sphere with an elastic half-space: a quarter of a large block, reduced to the nodes of
+//! its surface and solved by the contact solvers of the core, statically and in an impact.
 
 use crate::guide::print_row;
 use nalgebra::DMatrix;
@@ -18,13 +18,14 @@ use tiprub_model::{Material, Mesh};
 use tiprub_reference::closed::impact::Hertz;
 use tiprub_test_models::{node, structure};
 
-/// Radius of the contact that is computed (m), and of the sphere.
+/// Contact radius in the computation (m); below, the radius of the sphere.
 const CONTACT: f64 = 1e-3;
 const RADIUS: f64 = 0.05;
 const APPROACH: f64 = CONTACT * CONTACT / RADIUS;
-/// Surface nodes out to here may touch, as a multiple of the contact radius.
+/// Distance within which surface nodes may touch, as a multiple of the contact radius.
 const REACH: f64 = 1.3;
-/// The block is this many radii of the contact wide and deep; its held faces make it stiffer by about 0.95/L of the force.
+/// Width and depth of the block in contact radii; its clamped faces increase its stiffness by about 0.95/L of the
+/// force.
 const EXTENT: f64 = 400.0;
 
 fn material() -> Material {
@@ -36,7 +37,7 @@ fn hertz() -> Hertz {
     Hertz { radius: RADIUS, modulus: young_modulus / (1.0 - poisson_ratio * poisson_ratio) }
 }
 
-/// Equal elements of `size` up to `fine`, then growing by a `factor` up to `length` exactly.
+/// Returns equal elements of `size` up to `fine`, then elements growing by a `factor` up to exactly `length`.
 fn graded(size: f64, fine: f64, factor: f64, length: f64) -> Vec<f64> {
     let mut places = vec![0.0];
     while places[places.len() - 1] < fine - 0.5 * size {
@@ -58,13 +59,14 @@ struct HertzBlock {
     rom: Rom,
     /// Distance of every contact node from the axis (m).
     distance: Vec<f64>,
-    /// Surface that belongs to it (m²), in the quarter.
+    /// Surface area of every contact node (m²), in the quarter.
     area: Vec<f64>,
     elements: usize,
 }
 
-/// Quarter of a block x, y ≤ L, −L ≤ z ≤ 0 with symmetry at x = 0 and y = 0 and held outside; `per_radius` elements per radius of
-/// the contact. Refined everywhere alike: twice as many elements grow by the root of the factor.
+/// Creates a quarter of a block x, y ≤ L, −L ≤ z ≤ 0 with symmetry at x = 0 and y = 0, clamped outside; `per_radius`
+/// elements per contact radius. Refinement is uniform: with twice as many elements, the growth factor is its square
+/// root.
 fn block(per_radius: usize) -> HertzBlock {
     let (size, factor) = (CONTACT / per_radius as f64, (1.17 / per_radius as f64).exp());
     let side = graded(size, REACH * CONTACT, factor, EXTENT * CONTACT);
@@ -109,7 +111,7 @@ fn block(per_radius: usize) -> HertzBlock {
     }
 }
 
-/// The first `nodes` coordinates are the displacements of the contact nodes along z.
+/// Creates a ROM whose first `nodes` coordinates are the displacements of the contact nodes along z.
 fn rom(name: &str, mass: DMatrix<f64>, stiffness: DMatrix<f64>, nodes: usize) -> Rom {
     let along_z = |row: usize, column: usize| if row % 3 == 2 && row / 3 == column { 1.0 } else { 0.0 };
     let map = DMatrix::from_fn(3 * nodes, mass.nrows(), along_z);
@@ -117,7 +119,8 @@ fn rom(name: &str, mass: DMatrix<f64>, stiffness: DMatrix<f64>, nodes: usize) ->
     structure(name, mass, stiffness, map, nodes)
 }
 
-/// A paraboloid r²/2R, as in Hertz's theory, closer by `approach` than touching; the sphere is above the block.
+/// Returns the gap of a paraboloid r²/2R, as in Hertz's theory, closer by `approach` than touching; the sphere is
+/// above the block.
 fn law(block: &HertzBlock, approach: f64) -> GapLaw {
     GapLaw::Fixed(FixedGap {
         normals: vec![[0.0, 0.0, -1.0]; block.distance.len()],
@@ -128,15 +131,16 @@ fn law(block: &HertzBlock, approach: f64) -> GapLaw {
 
 struct AtRest {
     force: f64,
-    /// From the second moment of the pressure, ∫pr²dA = 2Fa²/5, and the farthest node that touches (m).
+    /// From the second moment of the pressure, ∫pr²dA = 2Fa²/5, and the farthest node in contact (m).
     radius: [f64; 2],
-    /// Largest pressure over Hertz's, and L2 error of the profile within 0.9 a of the force found, relative.
+    /// Largest pressure relative to Hertz's, and relative L2 error of the profile within 0.9 a for the computed
+    /// force.
     pressure: [f64; 2],
     /// Largest penetration and negative force.
     violation: [f64; 2],
 }
 
-/// Settle under strong damping with the sphere held at `approach` (m).
+/// Computes the equilibrium under strong damping with the sphere held at `approach` (m).
 fn at_rest(block: &HertzBlock, model: &ModalModel, solver: Solver, approach: f64) -> AtRest {
     let settings = SystemSettings { scheme: Scheme::ModalExact, solver, ledger: true };
     let mut system = System::new(model, 1, law(block, approach), 0.0, settings);
@@ -168,8 +172,8 @@ fn at_rest(block: &HertzBlock, model: &ModalModel, solver: Solver, approach: f64
     }
 }
 
-/// Errors of the force, of the contact radius and of the pressure profile, root mean square over approaches that put the
-/// edge of the contact at every place within an element.
+/// Returns the errors of the force, of the contact radius and of the pressure profile, root mean square over
+/// approaches that put the edge of the contact at every position within an element.
 fn refine(per_radius: usize) -> ([f64; 3], String) {
     let (theory, block) = (hertz(), block(per_radius));
     let model = ModalModel::from_rom(&block.rom, 0.8).unwrap();
@@ -179,7 +183,7 @@ fn refine(per_radius: usize) -> ([f64; 3], String) {
         let approach = radius * radius / RADIUS;
         let found = at_rest(&block, &model, Solver::Lcp, approach);
         assert!(found.violation.iter().all(|size| *size <= 0.0), "{:?}", found.violation);
-        // The farthest node that touches is within one diagonal of an element.
+        // The farthest node in contact is within one diagonal of an element.
         let edge = (found.radius[1] - radius).abs() * per_radius as f64 / CONTACT;
         assert!(edge < 1.5, "edge {edge} elements off");
         let errors = [found.force / theory.force(approach) - 1.0, found.radius[0] / radius - 1.0, found.pressure[1]];
@@ -230,13 +234,13 @@ fn table(meshes: &[usize]) -> Vec<[f64; 3]> {
 fn pressed_sphere_on_block_matches_hertz() {
     let errors = table(&[2, 3, 4]);
     let [force, radius, pressure] = [0, 1, 2].map(|i| errors[0][i] / errors[2][i]);
-    // At least of first order in the size of elements.
+    // At least first order in the element size.
     assert!(force > 1.8 && radius > 1.8 && pressure > 1.8, "{errors:?}");
     assert!(errors[2][0] < 0.005 && errors[2][1] < 0.02 && errors[2][2] < 0.04, "{errors:?}");
     crate::guide::hold("cargo test -p tiprub-model --test reduction pressed");
 }
 
-/// A heavy sphere that hits the block slowly: the block follows at rest, which is what Hertz's impact supposes.
+/// A heavy sphere with a slow impact: the block responds quasi-statically, as Hertz's impact theory assumes.
 #[test]
 fn sphere_impact_on_block_matches_hertz() {
     print_row!(
@@ -262,7 +266,7 @@ fn sphere_impact_on_block_matches_hertz() {
         let settings = SystemSettings { scheme, solver: Solver::Lcp, ledger: true };
         let mut system = System::new(&model, 1, law(&block, 0.0), 0.0, settings);
         system.set_step(step);
-        // The sphere comes from above with its lowest point on the surface at time 0.
+        // The sphere moves down with its lowest point on the surface at time 0.
         system.bank_mut().set_modal_state(last, 0, 0.0, -speed * (0.25 * mass).sqrt());
         system.start(&[PrescribedMotion::default()]);
         let (mut release, mut force, mut deepest, mut impulse) = (0.0, 0.0_f64, 0.0_f64, 0.0);

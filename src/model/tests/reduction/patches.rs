@@ -18,7 +18,7 @@ use tiprub_model::{Mesh, Rotor37Options, reduce_rotor37};
 
 const SIZE: [f64; 3] = [0.3, 0.02, 0.06];
 
-/// Along z, the longer side of its tip at x = 0.3.
+/// Returns a beam whose tip, at x = 0.3, has its longer side along z.
 fn beam() -> Mesh {
     distorted_box(ElementKind::Hex20, [4, 1, 4], SIZE, wobble(0.1))
 }
@@ -59,12 +59,13 @@ fn patch_position_is_the_centre_of_its_hat_function() {
                 mean(2) / SIZE[2]
             );
         }
-        // One patch is the whole face.
+        // One patch covers the whole face.
         assert!(tip(&mesh, 1)[0].patch.len() <= nodes_at(&mesh, 0, SIZE[0]).len());
     }
 }
 
-/// Two rows stand at the sides of the tip, a third between them, and together rows are the patches over the whole of it, on boxes and on rotor 37.
+/// Two rows are at the sides of the tip, a third between them, and together rows are the patches over its whole
+/// thickness, on boxes and on rotor 37.
 #[test]
 fn rows_of_patches_sum_to_a_single_row() {
     let name = |index: usize| format!("patch_{index}");
@@ -78,7 +79,7 @@ fn rows_of_patches_sum_to_a_single_row() {
             };
             let mut across: Vec<Vec<f64>> = patches.chunks(3).map(|row| row.iter().map(place).collect()).collect();
             across.sort_by(|a, b| a[0].total_cmp(&b[0]));
-            // The tip is flat, and arcs around the axis are not quite its heights.
+            // The tip is flat, and arcs around the axis differ slightly from its heights.
             for (row, own) in across.iter().enumerate() {
                 let expected = row as f64 / (rows - 1) as f64;
                 assert!(own.iter().all(|place| (place - expected).abs() < 2e-3), "{kind:?}, {rows}: {across:?}");
@@ -90,7 +91,7 @@ fn rows_of_patches_sum_to_a_single_row() {
             assert!(error.contains(reported), "{error}");
         }
     }
-    // One linear element has nodes at its sides alone.
+    // One linear element only has nodes at its sides.
     let mesh = straight_box(ElementKind::Hex8, [2, 1, 4], SIZE);
     let set = nodes_at(&mesh, 0, SIZE[0]);
     assert!(tip_patches(&mesh, &set, [3, 2], name).is_ok());
@@ -117,7 +118,7 @@ fn rows_of_patches_sum_to_a_single_row() {
     }
 }
 
-/// Displacements at rest by forces on patches are those of the full model, with any number of modes.
+/// Static displacements under forces on patches are those of the full model, with any number of modes.
 #[test]
 fn static_responses_to_patch_forces_are_exact() {
     let mesh = beam();
@@ -165,7 +166,8 @@ fn free_interface_modes_match_full_model() {
     }
 }
 
-/// With patches held Craig-Bampton has the frequencies of the full model in the end, and its shapes are displacements of nodes.
+/// With held patches Craig-Bampton converges to the frequencies of the full model, and its shapes are displacements
+/// of nodes.
 #[test]
 fn fixed_interface_modes_with_patches_converge() {
     let mesh = straight_box(ElementKind::Hex8, [3, 1, 2], SIZE);
@@ -178,7 +180,7 @@ fn fixed_interface_modes_with_patches_converge() {
     assert!(few[0] > some[0] && few[1] > some[1] && all[0] < 1e-8 && all[1] < 1e-8, "{few:?} {some:?} {all:?}");
 }
 
-/// A structure that nothing clamps keeps its rigid-body motions and its own modes beside patches and a node.
+/// An unsupported structure keeps its rigid-body motions and its modes with patches and a node in contact.
 #[test]
 fn free_structure_with_patches_keeps_all_modes() {
     let mesh = beam();
@@ -202,7 +204,7 @@ fn free_structure_with_patches_keeps_all_modes() {
     assert!(checks.reduced_frequencies[..6].iter().all(|f| *f < 1e-3 * checks.full_frequencies[6]), "{checks:?}");
 }
 
-/// Point forces dig in as the mesh is refined; forces on patches do not.
+/// Displacements under point forces grow with mesh refinement; those under forces on patches converge.
 #[test]
 fn patch_flexibility_converges_and_point_flexibility_does_not() {
     let own = |tip: TipContact, chord: usize| -> f64 {
@@ -284,7 +286,8 @@ fn rejects_invalid_and_dependent_patches() {
     assert!(reported(&contact, ReductionKind::FreeInterface, free - 9).contains("has no residual flexibility"));
 }
 
-/// What a ROM says of its forced response is so: against dense solutions with the full matrices, between the frequencies checked.
+/// The forced-response deviation in a ROM agrees with dense solutions with the full matrices, between the checked
+/// frequencies.
 #[test]
 fn forced_response_error_matches_rom_estimate() {
     let mesh = beam();

@@ -20,7 +20,7 @@ fn column(rows: usize, entry: impl Fn(usize) -> f64) -> Mat<f64> {
     Mat::from_fn(rows, 1, |i, _| entry(i))
 }
 
-/// A rigid body at speed Ω: its Coriolis force is 2m Ω×v, its centrifugal force mΩ² times the centre's distance.
+/// A rigid body at speed Ω: its Coriolis force is 2m Ω×v, its centrifugal force mΩ² times the distance of its centre.
 #[test]
 fn spin_forces_on_rigid_body_act_at_its_centre_of_mass() {
     let (size, corner) = ([0.3, 0.04, 0.05], [0.2, -0.1, 0.4]);
@@ -42,7 +42,7 @@ fn spin_forces_on_rigid_body_act_at_its_centre_of_mass() {
             let exact = weight * [centre[0], centre[1], 0.0][i];
             assert!((total(&centrifugal, i) - exact).abs() < 1e-12 * weight, "{kind:?}: centrifugal {i}");
         }
-        // The Coriolis force does no work, whatever the motion.
+        // The Coriolis force does no work for any motion.
         let any = column(dofs, |dof| (1.7 * dof as f64).sin());
         let force = mass.times(turned_about_axis(&all, &any).as_ref());
         let power: f64 = (0..dofs).map(|dof| any[(dof, 0)] * force[(dof, 0)]).sum();
@@ -109,7 +109,7 @@ impl SpinningBody {
     }
 }
 
-/// A beam along x from the axis, as high as wide, its middle line on y = z = 0.
+/// Returns a beam along x from the axis, with a square section and its middle line on y = z = 0.
 fn beam(elements: usize, length: f64, height: f64, poisson_ratio: f64) -> SpinningBody {
     let mut mesh = straight_box(ElementKind::Hex20, [elements, 1, 1], [length, height, height]);
     mesh.nodes.iter_mut().for_each(|x| (1..3).for_each(|i| x[i] -= 0.5 * height));
@@ -117,8 +117,8 @@ fn beam(elements: usize, length: f64, height: f64, poisson_ratio: f64) -> Spinni
     SpinningBody::clamped(mesh, blade_steel(poisson_ratio), &clamped)
 }
 
-/// A thin rod stretched by 3 %: with P = E(λ³ - λ)/2 and ρΩ²x along it, (3λ⁴ - 2λ²)/8 + ρΩ²x²/2E is constant, and λ = 1 at
-/// the tip; so L = ∫dx/λ(x) from the root to the tip's new place.
+/// A thin rod stretched by 3 %: with P = E(λ³ - λ)/2 and ρΩ²x along it, (3λ⁴ - 2λ²)/8 + ρΩ²x²/2E is constant, and λ =
+/// 1 at the tip; so L = ∫dx/λ(x) from the root to the displaced tip.
 #[test]
 fn stretch_of_spinning_rod_matches_closed_form() {
     let (length, speed) = (0.5, 3.2e3);
@@ -147,8 +147,8 @@ fn stretch_of_spinning_rod_matches_closed_form() {
     assert!(state.iterations <= 8 && state.residual < 1e-9, "{} {:e}", state.iterations, state.residual);
 }
 
-/// Rotating cantilever from the axis, frequency parameters ω L² √(ρA/EI) of out-of-plane bending at η = Ω L² √(ρA/EI):
-/// Wright, Smith, Thresher, Wang, J. Appl. Mech. 49, 1982. In the plane ω² is less by Ω².
+/// Rotating cantilever from the axis, frequency parameters ω L² √(ρA/EI) of out-of-plane bending at η = Ω L²
+/// √(ρA/EI): Wright, Smith, Thresher, Wang, J. Appl. Mech. 49, 1982. In the plane ω² is smaller by Ω².
 #[test]
 fn rotating_cantilever_frequencies_match_literature() {
     let (length, height) = (1.0, 0.01);
@@ -191,7 +191,7 @@ fn rejects_invalid_spin_requests() {
     assert!(frequencies_at(&still.rom, 100.0, true).unwrap_err().to_string().contains("no spin matrices"));
 }
 
-/// A pre-twisted blade away from the axis, its root's nodes, and two contact nodes at its tip.
+/// Returns a pre-twisted blade away from the axis, its root nodes, and two contact nodes at its tip.
 fn blade() -> (Mesh, Vec<usize>, Vec<ContactPoint>) {
     let (length, root) = (0.12, 0.2);
     let mut mesh = straight_box(ElementKind::Hex20, [8, 1, 4], [length, 0.004, 0.05]);
@@ -238,8 +238,8 @@ fn options(frame: DisplacementFrame) -> ReductionOptions {
     }
 }
 
-/// What does not depend on the coordinates: frequencies and growth at any speed are the same in both frames; and the
-/// resting part of the ROM is that without spin, bit for bit.
+/// Quantities that do not depend on the coordinates: frequencies and growth at any speed are the same in both frames;
+/// and the resting part of the ROM is the same as without spin, to the last bit.
 #[test]
 fn spin_adds_arrays_without_changing_the_rest_of_the_rom() {
     let steel = blade_steel(0.3);
@@ -285,8 +285,8 @@ fn spin_works_without_component_modes() {
     assert!(checked.growth_deviation() < 1.0 && largest.growth_deviation() < 1e-6, "{}", checked.growth_deviation());
 }
 
-/// With all modes kept the reduced model about a spinning state must have the spinning state's own spectrum, but for the
-/// neglected change of the interface's residual mass, which there is none of then.
+/// With all modes kept, the reduced model about a spinning state must have the spectrum of the spinning state, except
+/// for the neglected change of the residual mass of the interface, which is zero in that case.
 #[test]
 fn all_modes_reproduce_the_fitted_speed_exactly() {
     let mesh = straight_box(ElementKind::Hex8, [4, 1, 2], [0.12, 0.006, 0.05]);
@@ -303,7 +303,7 @@ fn all_modes_reproduce_the_fitted_speed_exactly() {
         assert!(deviation.abs() < 1e-5, "{:?}", check.frequency_deviation());
     }
     assert!(check.growth_deviation() < 1e-6, "{}", check.growth_deviation());
-    // The fit is through the resting model, too.
+    // The fit includes the resting model, too.
     let (resting, _) = dense_modes(&reduction.rom.stiffness, &reduction.rom.mass).unwrap();
     let found = frequencies_at(&reduction.rom, 0.0, true).unwrap();
     for (square, frequency) in resting.iter().zip(found) {

@@ -1,4 +1,4 @@
-//! Stress that a reduced model recovers, against that of the full one and closed forms.
+//! Stress recovered by a reduced model against the full model and closed forms.
 
 use crate::common::{dense, distorted_box, nodes_at, steel, straight_box, wobble};
 use crate::guide::{self, print_row};
@@ -40,13 +40,13 @@ fn reduced(
     reduce(mesh.clone(), &steel(), &clamped, contact, &options, &silent)
 }
 
-/// The node nearest to a point.
+/// Returns the node nearest to a point.
 fn nearest(mesh: &Mesh, point: [f64; 3]) -> usize {
     let off = |node: &[f64; 3]| (0..3).map(|i| (node[i] - point[i]).powi(2)).sum::<f64>();
     (0..mesh.nodes.len()).min_by(|a, b| off(&mesh.nodes[*a]).total_cmp(&off(&mesh.nodes[*b]))).unwrap()
 }
 
-/// A cantilever pushed at its end: σxx = M y / I at half its length, whatever the number of modes.
+/// A cantilever loaded at its end: σxx = M y / I at half its length, for any number of modes.
 #[test]
 fn cantilever_bending_stress_matches_beam_theory() {
     let mesh = straight_box(ElementKind::Hex20, [12, 2, 3], SIZE);
@@ -71,7 +71,7 @@ fn cantilever_bending_stress_matches_beam_theory() {
     }
 }
 
-/// Directions turn with the place: a cylindrical frame has the same invariants, and its normal stresses along its own axes.
+/// Directions depend on the place: a cylindrical frame gives the same invariants, and normal stresses along its axes.
 #[test]
 fn stress_directions_follow_the_displacement_frame() {
     let mut mesh = distorted_box(ElementKind::Hex20, [4, 1, 3], SIZE, wobble(0.1));
@@ -109,7 +109,7 @@ fn stress_directions_follow_the_displacement_frame() {
     let (cartesian, position) = of(DisplacementFrame::Cartesian);
     let (cylindrical, place) = of(DisplacementFrame::Cylindrical);
     assert!((place[0] - position[0].hypot(position[1])).abs() < 1e-15);
-    // A patch spreads a cylindrical force along each node's own directions: nearly that force.
+    // A patch distributes a cylindrical force along the directions of each node, which is nearly that force.
     let close = |a: f64, b: f64| assert!((a - b).abs() < 2e-2 * von_mises(cartesian), "{cartesian:?} {cylindrical:?}");
     close(von_mises(cartesian), von_mises(cylindrical));
     let (cos, sin) = (place[1].cos(), place[1].sin());
@@ -120,7 +120,7 @@ fn stress_directions_follow_the_displacement_frame() {
     close(cylindrical[3], (yy - xx) * sin * cos + xy * (cos * cos - sin * sin));
 }
 
-/// Where a mode has its largest stress: bending of a cantilever at its root, away from the clamped elements.
+/// The largest stress of a mode: bending of a cantilever at its root, away from the clamped elements.
 #[test]
 fn modal_stress_points_lie_at_the_largest_stress() {
     let mesh = straight_box(ElementKind::Hex20, [12, 1, 3], SIZE);
@@ -144,7 +144,7 @@ fn modal_stress_points_lie_at_the_largest_stress() {
     assert!(reported.contains("`a`: it appears twice"), "{reported}");
 }
 
-/// Pulses of force on three patches, one after the other (N).
+/// Returns pulses of force on three patches, one after the other (N).
 fn pushed(time: f64, pulse: f64) -> DVector<f64> {
     let mut force = DVector::zeros(9);
     for patch in 0..3 {
@@ -158,8 +158,8 @@ fn pushed(time: f64, pulse: f64) -> DVector<f64> {
     force
 }
 
-/// Coordinates of modes (angular frequencies squared, shapes M-orthonormal) under forces of `loads` per unit, sample by sample: each mode
-/// exactly under forces that run linearly between samples.
+/// Computes modal coordinates (angular frequencies squared, shapes M-orthonormal) under forces of `loads` per unit,
+/// sample by sample; each mode is exact for forces that are linear between samples.
 fn driven(squares: &[f64], loads: &DMatrix<f64>, step: f64, samples: usize, pulse: f64) -> Vec<DVector<f64>> {
     let forces: Vec<DVector<f64>> = (0..=samples).map(|sample| loads * pushed(step * sample as f64, pulse)).collect();
     let mut all = vec![DVector::zeros(squares.len()); samples + 1];
@@ -169,7 +169,7 @@ fn driven(squares: &[f64], loads: &DMatrix<f64>, step: f64, samples: usize, puls
         let (mut position, mut velocity) = (0.0, 0.0);
         for sample in 0..samples {
             let (from, to) = (forces[sample][mode] / square, forces[sample + 1][mode] / square);
-            // The response at rest runs linearly; the rest is free.
+            // The static response is linear; the rest is free vibration.
             let slope = (to - from) / step;
             let (off, speed) = (position - from, velocity - slope);
             position = to + off * cos + speed / omega * sin;
@@ -180,7 +180,8 @@ fn driven(squares: &[f64], loads: &DMatrix<f64>, step: f64, samples: usize, puls
     all
 }
 
-/// Stress under the same contact forces: a reduced model against all modes of the full one, by the number of its modes.
+/// Stress under the same contact forces: a reduced model against all modes of the full one, for several numbers of
+/// modes.
 #[test]
 fn stress_converges_to_the_full_model() {
     let mesh = distorted_box(ElementKind::Hex20, [6, 1, 4], SIZE, wobble(0.1));
@@ -191,7 +192,7 @@ fn stress_converges_to_the_full_model() {
     let reference = reduced(&mesh, &tip, (ReductionKind::FreeInterface, 5), places.clone()).unwrap().rom;
     let points = &reference.extras.stress.as_ref().unwrap().points;
     let nodes: Vec<usize> = points.iter().map(|point| nearest(&mesh, point.position)).collect();
-    // The full model, its stress by the elements around each node.
+    // Full model, with the stress of the elements around each node.
     let assembled = assemble(&mesh, &steel(), &silent).unwrap();
     let (stiffness, mass) = principal_pair(&assembled.stiffness, &assembled.mass, &free);
     let (squares, shapes) = dense_modes(&dense(&stiffness), &dense(&mass)).unwrap();
@@ -237,7 +238,8 @@ fn stress_converges_to_the_full_model() {
     guide::hold("cargo test -p tiprub-model --test reduction");
 }
 
-/// Stress per displacement of the free dofs at these nodes, 6·nodes × free, and the mean of the elements around is taken here.
+/// Returns the stress per displacement of the free dofs at these nodes, 6·nodes × free, averaged here over the
+/// elements around each node.
 fn full_rows(mesh: &Mesh, material: &Material, free: &[usize], nodes: &[usize]) -> DMatrix<f64> {
     let mut rows = DMatrix::zeros(STRESSES * nodes.len(), free.len());
     for (place, node) in nodes.iter().enumerate() {
@@ -256,7 +258,7 @@ fn full_rows(mesh: &Mesh, material: &Material, free: &[usize], nodes: &[usize]) 
     rows
 }
 
-/// D(Bu − αT) per kelvin at these nodes, with u of the full matrices under the thermal load.
+/// Returns D(Bu − αT) per kelvin at these nodes, with u of the full matrices under the thermal load.
 fn full_thermal_stress(mesh: &Mesh, material: &Material, clamped: &[usize], nodes: &[usize]) -> DMatrix<f64> {
     let free = free_dofs(mesh.nodes.len(), clamped);
     let assembled = assemble(mesh, material, &silent).unwrap();
@@ -265,22 +267,22 @@ fn full_thermal_stress(mesh: &Mesh, material: &Material, clamped: &[usize], node
     let load = DVector::from_fn(free.len(), |row, _| load[(free[row], 0)]);
     let moved = dense(&stiffness).cholesky().unwrap().solve(&load);
     let strained = full_rows(mesh, material, &free, nodes) * moved;
-    // An even expansion that is held: −EαT/(1 − 2ν) in all directions.
+    // Fully constrained uniform expansion: −EαT/(1 − 2ν) in all directions.
     let held = material.young_modulus * material.expansion / (1.0 - 2.0 * material.poisson_ratio);
     DMatrix::from_fn(strained.nrows(), 1, |row, _| strained[row] - if row % STRESSES < 3 { held } else { 0.0 })
 }
 
-/// The array for heated structures is the static stress of the full model. A cantilever is free of stress away from its root, a bar held at
-/// both ends has −EαT along it, and a structure that nothing holds has none.
+/// The array for heated structures is the static stress of the full model. A cantilever is free of stress away from
+/// its root, a bar clamped at both ends has −EαT along it, and an unsupported structure has none.
 #[test]
 fn thermal_stress_of_heated_structure_matches_full_model() {
     let mesh = straight_box(ElementKind::Hex20, [12, 1, 2], SIZE);
-    // Without lateral contraction the mean over each section is −EαT, however the ends are held.
+    // Without lateral contraction the mean over each section is −EαT for any support of the ends.
     let material = Material { expansion: 12e-6, poisson_ratio: 0.0, ..steel() };
     let largest = material.young_modulus * material.expansion;
     let nodes = [[0.15, 0.0, 0.03], [0.0125, 0.02, 0.03], [0.025, 0.0, 0.0]].map(|point| nearest(&mesh, point));
     let [left, right] = [0.0, SIZE[0]].map(|x| nodes_at(&mesh, 0, x));
-    // Not on one line, so that they hold a structure that nothing else holds.
+    // Not collinear, so that they constrain an otherwise unsupported structure.
     let tip = [[0.1, 0.03], [0.2, 0.0], [0.2, 0.06]]
         .map(|[x, z]| ContactPoint::at(format!("at_{x}_{z}"), nearest(&mesh, [x, SIZE[1], z]), 0.0));
     for (clamped, along) in [(left.clone(), 0.0), ([left, right].concat(), -largest), (Vec::new(), 0.0)] {
@@ -313,8 +315,8 @@ fn thermal_stress_of_heated_structure_matches_full_model() {
     }
 }
 
-/// In a scene the stress of a warm blade is that of the full model at rest, however few modes the ROM has, and not that which the
-/// displacements have alone: −EαT/(1 − 2ν) more than none.
+/// In a scene the stress of a warm blade is that of the full model at rest for any number of modes, and not the
+/// stress of the displacements alone, which lacks −EαT/(1 − 2ν).
 #[test]
 fn stress_of_warm_blade_in_scene_matches_full_model() {
     let mut mesh = straight_box(ElementKind::Hex20, [10, 1, 2], [0.07, 0.006, 0.012]);
@@ -324,7 +326,7 @@ fn stress_of_warm_blade_in_scene_matches_full_model() {
     let contact = [ContactPoint::at("tip", middle, 0.0)];
     let (alpha, temperature) = (12e-6, 300.0);
     let material = Material { expansion: alpha, ..steel() };
-    // On the middle plane, where directions of a place are those of the mesh.
+    // On the middle plane, where the local directions are those of the mesh.
     let nodes = [[0.215, 0.0, 0.006], [0.187, 0.0, 0.006], [0.18, 0.0, -0.006]].map(|point| nearest(&mesh, point));
     assert!(nodes.iter().all(|node| mesh.nodes[*node][1].abs() < 1e-12), "{nodes:?}");
     let expected = full_thermal_stress(&mesh, &material, &clamped, &nodes) * temperature;

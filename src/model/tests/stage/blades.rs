@@ -1,4 +1,4 @@
-//! The parametric stage: counts, faces, shape, and the blade alone against CalculiX.
+//! Parametric stage: counts, faces, shape, and the blade alone against CalculiX.
 
 use tiprub_model::assembly::{assemble, free_dofs, lumped_masses};
 use tiprub_model::element::ElementKind;
@@ -113,14 +113,14 @@ fn tip_contact_is_at_mid_thickness_of_a_cylinder() {
         }
         let nodes: Vec<usize> = contact.iter().map(|point| point.node).collect();
         assert_eq!(nodes, mesh.set("CONTACT").unwrap());
-        // The stage turns towards +θ: blades lean the other way downstream.
+        // The stage rotates towards +θ: blades lean the other way downstream.
         let angle = |node: usize| mesh.nodes[node][1].atan2(mesh.nodes[node][0]);
         assert!(angle(nodes[0]) > 0.05 && angle(nodes[1]).abs() < 1e-12 && angle(nodes[2]) < -0.05);
     }
 }
 
-/// Every edge of the outer faces belongs to two of them, run through both ways: faces between cells are cut by the same
-/// diagonals, there is no gap and no node twice.
+/// Every edge of the outer faces belongs to two of them, in opposite directions: faces between cells are cut by the
+/// same diagonals, and there are no gaps and no duplicate nodes.
 #[test]
 fn mesh_has_no_gaps_or_duplicate_nodes() {
     for (name, options) in all_options() {
@@ -144,8 +144,8 @@ fn mesh_has_no_gaps_or_duplicate_nodes() {
     }
 }
 
-/// The blade's volume is the integral of thickness over the camber surface, by the midpoint rule and independently of the
-/// mesh: offsets to both sides of a curve enclose its length times the thickness.
+/// The volume of the blade is the integral of thickness over the camber surface, by the midpoint rule and
+/// independently of the mesh: offsets to both sides of a curve enclose its length times the thickness.
 #[test]
 fn blade_mass_matches_its_sections() {
     let mut options = SectorOptions::default();
@@ -267,7 +267,8 @@ fn the_disk_is_reduced_with_its_contact_nodes() {
         assert!((node.position[0] - TIP_RADIUS).abs() < 1e-15 && (node.position[2] - z).abs() < 1e-17);
         assert!(node.meridional_slope.abs() < f64::MIN_POSITIVE);
     }
-    // One blade bends at 408 Hz (coarse mesh 430 Hz); families tell themselves apart, and the disk takes part below 4.
+    // One blade bends at 408 Hz (coarse mesh 430 Hz); families are separate, and the disk takes part below 4 nodal
+    // diameters.
     let first = |n: usize| reduction.nodal_diameters[n].full_frequencies[0];
     println!("{:?}", (0..29).map(first).collect::<Vec<_>>());
     assert!((6..29).all(|n| (first(n) / first(28) - 1.0).abs() < 0.01) && first(0) < 0.85 * first(28));

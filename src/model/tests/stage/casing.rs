@@ -1,4 +1,4 @@
-//! The casing of the stage: the paper's counts, its volume, and its reduction on a coarser mesh.
+//! Casing of the stage: counts of the paper, volume, and reduction on a coarser mesh.
 
 use std::f64::consts::TAU;
 
@@ -29,7 +29,7 @@ fn default_mesh_has_the_size_of_the_paper() {
     }
 }
 
-/// Wall, flanges and hooks as annuli of 224 straight sides: the elements fill them, without gap or overlap.
+/// The elements fill wall, flanges and hooks, as annuli of 224 straight sides, without gap or overlap.
 #[test]
 fn the_elements_fill_the_section() {
     let ring = stage_casing_mesh(&StageCasingOptions::default()).unwrap();
@@ -44,7 +44,7 @@ fn the_elements_fill_the_section() {
         2.0 * annulus(outer, outer + 30e-3, 5e-3),
         annulus(outer, outer + 10e-3, 2.0 * hook),
     ];
-    // Bricks end at chords.
+    // Bricks have straight chords.
     let step = TAU / 224.0;
     let exact = parts.iter().sum::<f64>() * step.sin() / step;
     assert!((volume / exact - 1.0).abs() < 1e-11, "{volume} m³ instead of {exact} m³");

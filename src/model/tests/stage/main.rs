@@ -1,4 +1,4 @@
-//! The stage: blades and casing.
+//! Stage: blades and casing.
 
 mod blades;
 mod casing;

@@ -1,9 +1,11 @@
-//! The cube between two rings by four independent methods: tables and CSV; `lab cube` draws the paper's figures 3 to 6.
+//! Comparison of four independent methods for the cube between two rings: tables and CSV; `lab cube` draws figures 3
+//! to 6 of the paper.
 //!
-//! `cargo run --release -p tiprub-reference --example cube -- WHAT DIRECTORY [lumped|consistent]` with WHAT one of
-//! `pairs` (methods a, b, c at 100 m/s), `convergence` (in h), `outside` (a CalculiX `.dat` file, given
-//! as third argument, beside our methods; a fourth one is its contact stiffness in Pa/m, to allow for its penetration), `files` (matrices and node tables)
-//! and `table` (the flight by method b as the small table that the FMU is tested against, `tests/python/cube_reference.csv`).
+//! `cargo run --release -p tiprub-reference --example cube -- WHAT DIRECTORY [lumped|consistent]` where WHAT is
+//! `pairs` (methods a, b, c at 100 m/s), `convergence` (in h), `outside` (a CalculiX `.dat` file, given as third
+//! argument, compared with our methods; the fourth argument is its contact stiffness in Pa/m, to allow for its
+//! penetration), `files` (matrices and node tables) or `table` (the motion by method b as the small table that the
+//! FMU is tested against, `tests/python/cube_reference.csv`).
 
 mod outside;
 mod tables;
@@ -38,7 +40,7 @@ fn main() {
     }
 }
 
-/// Run a method on a scene and say how it went.
+/// Runs a method on a scene and prints a summary.
 fn run(method: CubeMethod, setting: CubeSetting, step: f64, end: f64, stride: usize) -> CubeHistory {
     let scene = CubeScene::new(setting).expect("the scene can be built");
     let run = MethodRun { step, end, stride, snapshots: vec![1e-4, 2e-4, 3e-4, 5e-4, 8e-4] };
@@ -61,11 +63,12 @@ fn save(directory: &Path, name: &str, history: &CubeHistory) {
     write_json(&directory.join(format!("{name}.json")), history).expect("a JSON file can be written");
 }
 
-/// All pairs of a, b, c over 3 ms.
+/// Runs all pairs of a, b, c over 3 ms.
 fn pairs(directory: &Path, mass: Mass) {
     let spline = CubeSetting { mass, ..CubeSetting::default() };
     let facets = CubeSetting { surface: SurfaceKind::Facets, ..spline };
-    // A consistent mass lowers the limit of central differences and has to be solved for: only the contact is followed.
+    // A consistent mass lowers the limit of central differences and requires a solution per step: only the contact is
+    // simulated.
     let (explicit, stride, end) = if mass == Mass::Lumped { (5e-7, 2, 3e-3) } else { (4e-7, 5, 1e-3) };
     let named = [
         ("a, film", run(CubeMethod::Film(Default::default()), spline, explicit, end, stride)),
@@ -81,7 +84,7 @@ fn pairs(directory: &Path, mass: Mass) {
     tables::readings(&named);
 }
 
-/// Method b at 100 m/s until the cube has left, a record every 4 µs.
+/// Runs method b at 100 m/s until the cube has left, with a record every 4 µs.
 fn table(directory: &Path) {
     let history = run(CubeMethod::Bipotential, CubeSetting::default(), 5e-7, 1e-3, 8);
     let mut text = String::from(
@@ -98,7 +101,7 @@ fn table(directory: &Path) {
     std::fs::write(directory.join("cube_reference.csv"), text).expect("a CSV file can be written");
 }
 
-/// Node tables, elements, sets and matrices of the three bodies, both masses.
+/// Writes node tables, elements, sets and matrices of the three bodies, with both masses.
 fn files(directory: &Path) {
     for mass in [Mass::Lumped, Mass::Consistent] {
         let scene = CubeScene::new(CubeSetting { mass, ..CubeSetting::default() }).expect("the scene can be built");

@@ -1,4 +1,4 @@
-//! CalculiX's displacements of node 1 beside ours, and as a table.
+//! Displacements of node 1 by CalculiX compared with ours, and as a table.
 
 use std::path::Path;
 
@@ -13,10 +13,10 @@ use tiprub_reference::surface::SurfaceKind;
 
 use super::run;
 
-/// End of the rebounds of the first touch in CalculiX's solution (s).
+/// End of the rebounds after the first contact in the solution of CalculiX (s).
 const REBOUNDED: f64 = 1.2e-4;
 
-/// Content of a CalculiX `.dat` file of the cube.
+/// Contents of a CalculiX `.dat` file of the cube.
 #[derive(Default)]
 struct CalculixResults {
     times: Vec<f64>,
@@ -54,7 +54,7 @@ fn read(path: &str) -> CalculixResults {
             theirs.displacements.push(numbers);
             continue;
         }
-        // Contact of an increment comes after its displacements.
+        // The contact results of an increment follow its displacements.
         let last = theirs.times.len() - 1;
         if node == 1 {
             theirs.pressures[last] = numbers[0];
@@ -66,9 +66,9 @@ fn read(path: &str) -> CalculixResults {
     theirs
 }
 
-/// Print how far node 1 is from CalculiX's, which has consistent mass and facets, and write its table.
-/// `stiffness` is the
-/// pressure per overclosure of its run (Pa/m): by pressure over stiffness its node lies inside the ring, which is added to u1x.
+/// Prints the difference of node 1 from CalculiX, which has consistent mass and facets, and writes its table.
+/// `stiffness` is the pressure per overclosure of its run (Pa/m): its node is inside the ring by pressure over
+/// stiffness, which is added to u1x.
 pub fn compare(directory: &Path, path: &str, stiffness: f64) {
     let CalculixResults { times, mut displacements, pressures, left } = read(path);
     let corner = calculix::area(&cube_mesh(), 0);
@@ -87,7 +87,7 @@ pub fn compare(directory: &Path, path: &str, stiffness: f64) {
         let setting = CubeSetting { surface, mass, friction, ..CubeSetting::default() };
         for method in [CubeMethod::Bipotential, CubeMethod::Augmented(Default::default())] {
             let history: CubeHistory = run(method, setting, 1e-6, end, 1);
-            // Before REBOUNDED CalculiX's node 1 still jumps on the ring.
+            // Before REBOUNDED, node 1 of CalculiX still rebounds on the ring.
             for (from, to) in [(0.0, REBOUNDED), (REBOUNDED, end), (0.0, end)] {
                 let at: Vec<f64> = (1..=200).map(|i| from + (to - from) * f64::from(i) / 200.0).collect();
                 let apart = [0, 1, 2].map(|i| {

@@ -1,4 +1,4 @@
-//! Numbers of the comparison as Markdown.
+//! Results of the comparison as Markdown.
 
 use tiprub_reference::compare::{WINDOW, agreement, asymmetry, exit_speed, relative_l2, windowed};
 use tiprub_reference::cube::history::CubeHistory;
@@ -7,13 +7,13 @@ use tiprub_reference::methods::{CubeMethod, penalty};
 
 use super::run;
 
-/// Last time of contact of node 1 (s).
+/// Returns the last time of contact of node 1 (s).
 fn released(history: &CubeHistory) -> f64 {
     let last = history.first_force().iter().rposition(|force| *force > 0.0).unwrap_or(0);
     history.times[last]
 }
 
-/// Every pair of runs.
+/// Prints every pair of runs.
 pub fn pairs(named: &[(&str, CubeHistory)], speed: f64) {
     let touching = released(&named[0].1);
     let contact = named[0].1.last_contact().unwrap_or(0.0);
@@ -73,10 +73,10 @@ pub fn readings(named: &[(&str, CubeHistory)]) {
     }
 }
 
-/// Errors over h, against the finest run of a, on the same mesh and spline.
+/// Prints errors over h relative to the finest run of a, on the same mesh and spline.
 pub fn convergence(mass: Mass) {
     let setting = CubeSetting { mass, ..CubeSetting::default() };
-    // Node 1 has left the rings by then.
+    // Node 1 has left the rings by this time.
     let end = 5e-4;
     let explicit: &[(f64, usize)] = match mass {
         Mass::Lumped => &[(8e-7, 1), (4e-7, 5), (2e-7, 10), (1e-7, 20), (5e-8, 40), (2.5e-8, 80)],

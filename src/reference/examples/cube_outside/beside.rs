@@ -1,4 +1,4 @@
-//! A table of another code beside one of our methods.
+//! Comparison of a table of another program with one of our methods.
 
 use tiprub_reference::compare::{agreement, relative_l2, windowed};
 use tiprub_reference::cube::history::CubeHistory;
@@ -12,7 +12,8 @@ use super::run;
 /// End of the contact of node 1 (s).
 const TOUCHING: f64 = 3.58e-4;
 
-/// `words`: METHOD (a, b, c) SURFACE (facets, spline) MASS (consistent, lumped) FRICTION STEP [STIFFNESS of c, N/m, and that of corners over it].
+/// Compares with `words`: METHOD (a, b, c) SURFACE (facets, spline) MASS (consistent, lumped) FRICTION STEP
+/// [STIFFNESS of c, N/m, and the ratio of that of corners to it].
 pub fn compare(path: &str, words: &[&str]) {
     let text = std::fs::read_to_string(path).expect("the table can be read");
     let [method, surface, mass, friction, step, rest @ ..] = words else { panic!("too few words") };
@@ -34,7 +35,7 @@ pub fn compare(path: &str, words: &[&str]) {
             tolerance: 1.0,
         }),
     };
-    // Recorded as often as theirs, so that both are interpolated alike.
+    // Recorded as often as the table, so that both are interpolated alike.
     let stride = (1..).find(|k| (*k as f64 + 0.5) * number(step) > theirs.step).expect("some multiple");
     let ours = run(method, setting, number(step), end + number(step), stride);
     println!("{path} / {}", words.join(" "));

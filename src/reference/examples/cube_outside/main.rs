@@ -1,6 +1,7 @@
-//! The cube between two rings beside codes of others, on finer meshes, and two questions to method a:
-//! `cube_outside beside TABLE.csv METHOD …`, `cube_outside level DIRECTORY N fast|slow STEP END` (writes a run on a mesh) and
-//! `cube_outside mesh DIRECTORY N …` (reads them), `cube_outside gaps`, `cube_outside turning`. Tables are printed as Markdown.
+//! Comparison of the cube between two rings with other programs and on finer meshes, and two questions about method
+//! a: `cube_outside beside TABLE.csv METHOD …`, `cube_outside level DIRECTORY N fast|slow STEP END` (writes a run on
+//! a mesh) and `cube_outside mesh DIRECTORY N …` (reads them), `cube_outside gaps`, `cube_outside turning`. Tables
+//! are printed as Markdown.
 
 mod beside;
 mod questions;
@@ -35,7 +36,7 @@ fn main() {
     }
 }
 
-/// Run a method on the paper's meshes.
+/// Runs a method on the meshes of the paper.
 fn run(method: CubeMethod, setting: CubeSetting, step: f64, end: f64, stride: usize) -> CubeHistory {
     let scene = CubeScene::new(setting).expect("the scene can be built");
     run_scene(&scene, method, step, end, stride)

@@ -1,4 +1,4 @@
-//! Two questions to method a: which gaps it leaves with consistent mass, and what the turning of normals does to the energy.
+//! Two questions about method a: the gaps with consistent mass, and the effect of turning normals on the energy.
 
 use tiprub_reference::cube::OUTER_RADIUS;
 use tiprub_reference::cube::history::CubeHistory;
@@ -8,7 +8,8 @@ use tiprub_reference::surface::SurfaceKind;
 
 use super::run;
 
-/// Penetration that film leaves with the paper's choice of contacts, and with the whole complementarity problem.
+/// Prints the penetration of film with the contacts chosen as in the paper, and with the whole complementarity
+/// problem.
 pub fn gaps() {
     println!(
         "| mass | surface | contacts | h (µs) | deepest (m) | speed at 0.3 ms (m/s) | CPU (s) |\n|---|---|---|---|---|---|---|"
@@ -35,8 +36,8 @@ pub fn gaps() {
     }
 }
 
-/// Gain of energy of sliding on a curved surface: at rate v² h/R per impulse, because the force of t_n acts along the
-/// normal of t_{n+1}. 50 m/s, no friction.
+/// Prints the energy gain of sliding on a curved surface: at the rate v² h/R per impulse, because the force of t_n
+/// acts along the normal of t_{n+1}. 50 m/s, no friction.
 pub fn turning() {
     println!(
         "| h (µs) | total at 2.1 ms (J) | lowest (J) | normal impulse (N·s) | v² h I/R (J) | total less that (J) |"

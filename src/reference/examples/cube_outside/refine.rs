@@ -1,4 +1,4 @@
-//! The scene on finer meshes: cube of n³ bricks, rings of n × 8n/5 × 8n.
+//! Scene on finer meshes: cube of n³ bricks, rings of n × 8n/5 × 8n.
 
 use std::path::{Path, PathBuf};
 
@@ -12,23 +12,23 @@ use tiprub_reference::methods::CubeMethod;
 
 use super::run_scene;
 
-/// Node 1 has touched until about here (s).
+/// End of the contact of node 1, approximately (s).
 const TOUCHING: f64 = 3.6e-4;
-/// The cube has touched until about here (s), at 100 m/s.
+/// End of the contact of the cube at 100 m/s, approximately (s).
 const CONTACT: f64 = 9.5e-4;
 
 fn file(directory: &Path, n: usize, case: &str) -> PathBuf {
     directory.join(format!("mesh-{n}-{case}.json"))
 }
 
-/// One run of film on the spline, lumped mass, to a file: `fast` is 100 m/s with µ = 0.15, `slow` 50 m/s without friction.
-/// `courant` is the step (s) that n = 5 would have; every record is about 4 µs long.
+/// Runs film on the spline with lumped mass and writes a file: `fast` is 100 m/s with µ = 0.15, `slow` 50 m/s without
+/// friction. `courant` is the step (s) that n = 5 would have; every record is about 4 µs long.
 pub fn level(directory: &Path, n: usize, case: &str, courant: f64, end: f64) {
     let setting = match case {
         "fast" => CubeSetting::default(),
         _ => CubeSetting { speed: 50.0, friction: 0.0, ..CubeSetting::default() },
     };
-    // As in the paper's mesh, eight to five, and even.
+    // Eight to five as in the mesh of the paper, and even.
     let (wide, arc) = (2 * ((4 * n + 2) / 5), 8 * n);
     let rings = RingSide::BOTH.map(|side| ring_of(side, [n, wide, arc]));
     let scene = CubeScene::of(setting, cube_of(n), rings, [arc, wide]).expect("the scene can be built");
@@ -60,7 +60,7 @@ pub fn table(directory: &Path, counts: &[usize]) {
 }
 
 fn print_fast(n: usize, history: &CubeHistory) {
-    // A corner of the face has a quarter of an element's face.
+    // A corner of the face has a quarter of the face area of an element.
     let area = (SIDE / n as f64).powi(2) / 4.0;
     let windows = windowed(&history.times, &history.first_force(), 2e-5, TOUCHING + 4e-5);
     let sides: Vec<f64> = history.forces.iter().map(|sides| sides[0]).collect();

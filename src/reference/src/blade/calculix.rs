@@ -1,12 +1,12 @@
-//! A blade pushed at rest as CalculiX input files, and what CalculiX says of stress at its nodes.
+//! A statically loaded blade as CalculiX input files, and the stress that CalculiX computes at its nodes.
 
 use std::fmt::Write as _;
 
 use tiprub_model::inp::calculix_input;
 use tiprub_model::{Material, Mesh, Result};
 
-/// The blade held at `clamped` under forces on nodes (N along x, y, z): displacements and CalculiX's own stress at the nodes, from 27 points of
-/// every brick.
+/// Returns the input file of the blade held at `clamped` under forces on nodes (N along x, y, z), which outputs
+/// displacements and the stress of CalculiX at the nodes, from 27 points of every brick.
 ///
 /// # Errors
 /// The errors of [`calculix_input`].
@@ -23,8 +23,9 @@ pub fn pushed(mesh: &Mesh, material: &Material, clamped: &str, forces: &[(usize,
     Ok(text)
 }
 
-/// The same blade where every node but one has these displacements (m), of bricks with 2 × 2 × 2 points: the stress of a known field, from the
-/// points where it is most exact. One node is free, since CalculiX solves nothing without an unknown.
+/// Returns the input file of the same blade with prescribed displacements (m) of all nodes but one, of bricks with 2
+/// × 2 × 2 points: the stress of a known field, from the points where it is most accurate. One node is free, since
+/// CalculiX solves no problem without unknowns.
 ///
 /// # Errors
 /// The errors of [`calculix_input`].
@@ -41,7 +42,8 @@ pub fn moved(mesh: &Mesh, material: &Material, displacements: &[[f64; 3]], free:
     Ok(text)
 }
 
-/// Values at the nodes in the last block of that name (`DISP`, `STRESS`) in a result file (`.frd`), by node.
+/// Returns the values at the nodes in the last block of that name (`DISP`, `STRESS`) in a result file (`.frd`), by
+/// node.
 pub fn results(frd: &str, block: &str, components: usize) -> Vec<(usize, Vec<f64>)> {
     let mut found = Vec::new();
     let mut open = false;

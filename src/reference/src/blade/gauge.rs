@@ -1,12 +1,13 @@
-//! Stress at a node of quadratic bricks, written from the displacements' gradient: at the 2 × 2 × 2 points, from there along straight lines to
-//! the node (eight points and eight products of straight lines: the field through them), and the mean of the elements around it.
+//! Stress at a node of quadratic bricks from the displacement gradient: evaluated at the 2 × 2 × 2 points,
+//! extrapolated trilinearly to the node, and averaged over the elements around it.
 
 use nalgebra::Matrix3;
 use tiprub_model::element::ElementKind;
 use tiprub_model::mesh::Element;
 use tiprub_model::{Error, Material, Mesh, Result};
 
-/// Components of stress at a gauge: along radius, circumference, axis; shear between the first two, the last two, the last and the first.
+/// Number of stress components at a gauge: along radius, circumference, axis; shear between the first two, the last
+/// two, the last and the first.
 pub const COMPONENTS: usize = 6;
 
 /// Stress at a node, linear in the displacements of the nodes around it.
@@ -17,10 +18,10 @@ pub struct Gauge {
 }
 
 impl Gauge {
-    /// At a node of the mesh.
+    /// Creates a gauge at a node of the mesh.
     ///
     /// # Errors
-    /// Another element than a quadratic brick around it, or none.
+    /// An element around the node that is not a quadratic brick, or no element.
     pub fn at(mesh: &Mesh, material: &Material, node: usize) -> Result<Self> {
         let around: Vec<&Element> = mesh.elements.iter().filter(|element| element.nodes.contains(&node)).collect();
         if around.is_empty() || around.iter().any(|element| element.kind != ElementKind::Hex20) {
@@ -49,7 +50,7 @@ impl Gauge {
         Ok(Self { shares })
     }
 
-    /// Stress (Pa) where node `n` is displaced by `moved(n)` (m, along x, y, z).
+    /// Returns the stress (Pa) if node `n` is displaced by `moved(n)` (m, along x, y, z).
     pub fn read(&self, moved: impl Fn(usize) -> [f64; 3]) -> [f64; COMPONENTS] {
         let mut found = [0.0; COMPONENTS];
         for (node, rows) in &self.shares {
@@ -62,7 +63,7 @@ impl Gauge {
     }
 }
 
-/// Equivalent stress of von Mises, √(3/2) times the length of the deviator.
+/// Returns the equivalent stress of von Mises, √(3/2) times the norm of the deviator.
 pub fn equivalent([rr, tt, zz, rt, tz, zr]: [f64; COMPONENTS]) -> f64 {
     let stress = Matrix3::new(rr, rt, zr, rt, tt, tz, zr, tz, zz);
     let deviator = stress - Matrix3::identity() * (stress.trace() / 3.0);
@@ -92,7 +93,7 @@ fn gradients(mesh: &Mesh, element: &Element, place: [f64; 3]) -> Result<Vec<[f64
     Ok(found)
 }
 
-/// Stress of a displacement of one node by 1 along an axis, whose shape function has this gradient.
+/// Returns the stress due to a displacement of one node by 1 along an axis, for this gradient of its shape function.
 fn unit(material: &Material, gradient: [f64; 3], axis: usize) -> Matrix3<f64> {
     let (young, poisson) = (material.young_modulus, material.poisson_ratio);
     let strain = Matrix3::from_fn(|i, j| {

@@ -1,11 +1,11 @@
-//! In time: elasticity by the trapezoidal rule, contact on velocities that close the gaps of the next midpoint (D. E. Stewart and
-//! J. C. Trinkle, Int. J. Numer. Meth. Engng 39 (1996) 2673-2691):
+//! Time integration: elasticity by the trapezoidal rule, contact on velocities that close the gaps of the next
+//! midpoint (D. E. Stewart and J. C. Trinkle, Int. J. Numer. Meth. Engng 39 (1996) 2673-2691):
 //!
 //! M(v⁺ − v) = −h K (u + h (v + v⁺)/4) + Σ p F,   u⁺ = u + h (v + v⁺)/2,   0 ≤ p ⟂ g/h + N v⁺ + r ≥ 0
 //!
-//! with gap g, its gradient N, the force row F = N − µT and the prescribed rate r at u + h v/2, t + h/2. The work of the forces over
-//! h (v + v⁺)/2 is what the energy changes by, to rounding. A = M + h²K/4 is factorised once; what tip forces do to the tip is kept.
-//! Without contact v⁺ = A⁻¹M(2v + 4u/h) − v − 4u/h.
+//! with gap g, its gradient N, the force row F = N − µT and the prescribed rate r at u + h v/2, t + h/2. The energy
+//! changes by the work of the forces over h (v + v⁺)/2, to rounding. A = M + h²K/4 is factorised once; the response
+//! of the tip to tip forces is stored. Without contact v⁺ = A⁻¹M(2v + 4u/h) − v − 4u/h.
 
 use faer::Mat;
 use nalgebra::{DMatrix, DVector};
@@ -16,7 +16,7 @@ use super::{FullBlade, Gauge, TipPart, dot, product};
 use crate::reduced::complementarity;
 use crate::reduced::rub::{BumpedCasing, Touch};
 
-/// Parts farther than this do not take part in a step (m): a hundred times what a tip moves in one.
+/// Distance above which parts do not take part in a step (m): a hundred times the motion of a tip in one step.
 const NEAR: f64 = 1e-4;
 
 /// Step size and number of steps.
@@ -24,20 +24,20 @@ const NEAR: f64 = 1e-4;
 pub struct BladeSteps {
     /// Time between samples (s).
     pub interval: f64,
-    /// Steps in it.
+    /// Number of steps per interval.
     pub division: u32,
     /// Number of samples.
     pub samples: usize,
 }
 
-/// Results of a run, sample by sample.
+/// Results of a run at the samples.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct BladeHistory {
     /// Displacements of the watched nodes, node by node along radius, circumference, axis (m).
     pub displacements: Vec<Vec<f64>>,
     /// Stress at the gauges, six components of each (Pa).
     pub stresses: Vec<Vec<f64>>,
-    /// Mean forces on the parts, part by part along radius, circumference, axis (N): of every step, not of samples.
+    /// Mean forces on the parts, part by part along radius, circumference, axis (N), over all steps.
     pub forces: Vec<Vec<f64>>,
     /// Impulse of all normal forces since the last sample (N·s).
     pub impulses: Vec<f64>,
@@ -45,20 +45,20 @@ pub struct BladeHistory {
     pub strain: Vec<f64>,
     /// Work of friction since the start (J).
     pub friction_work: Vec<f64>,
-    /// Most parts that were pushed at once.
+    /// Largest number of parts in contact at the same time.
     pub pushed: usize,
-    /// Largest |kinetic + strain energy − work of contact| beside the largest energy.
+    /// Largest |kinetic + strain energy − work of contact| relative to the largest energy.
     pub residual: f64,
 }
 
-/// A closed contact in a step.
+/// Parts that can be in contact, with their responses.
 struct PushedContact {
     parts: Vec<TipPart>,
-    /// Displacements of the parts (three rows each) per displacement of the tip's nodes.
+    /// Displacements of the parts (three rows each) per displacement of the tip nodes.
     map: DMatrix<f64>,
-    /// First row of every node of the tip.
+    /// First row of every tip node.
     nodes: Vec<usize>,
-    /// Velocities of the whole blade per impulse on the tip's nodes.
+    /// Velocities of the whole blade per impulse on the tip nodes.
     response: Mat<f64>,
     /// Velocities of the parts per impulse on them.
     flexibility: DMatrix<f64>,
@@ -92,13 +92,13 @@ impl PushedContact {
         Ok(Self { parts: parts.to_vec(), map, nodes, response, flexibility })
     }
 
-    /// Displacements or velocities of the parts, three rows each.
+    /// Returns the displacements or velocities of the parts, three rows each.
     fn seen(&self, u: &[f64]) -> DVector<f64> {
         let tip = self.nodes.iter().flat_map(|first| &u[*first..first + 3]).copied();
         &self.map * DVector::from_iterator(3 * self.nodes.len(), tip)
     }
 
-    /// Parts near the casing with their touch; `moved` are their displacements.
+    /// Returns the parts near the casing with their touch; `moved` are their displacements.
     fn near(&self, obstacle: &BumpedCasing, time: f64, moved: &DVector<f64>) -> Vec<(usize, Touch)> {
         let touch = |(index, part): (usize, &TipPart)| {
             let moved = std::array::from_fn(|i| moved[3 * index + i]);
@@ -107,7 +107,7 @@ impl PushedContact {
         self.parts.iter().enumerate().map(touch).filter(|(_, touch)| touch.gap < NEAR).collect()
     }
 
-    /// Impulses on these, by the velocities that the parts have without.
+    /// Computes the impulses on these parts from their velocities without contact.
     fn impulses(&self, near: &[(usize, Touch)], step: f64, free: &DVector<f64>) -> Option<DVector<f64>> {
         let matrix = DMatrix::from_fn(near.len(), near.len(), |i, j| {
             let ((a, first), (b, second)) = (&near[i], &near[j]);
@@ -124,7 +124,7 @@ impl PushedContact {
         complementarity::solve(&matrix, &right)
     }
 
-    /// Forces on the parts.
+    /// Returns the forces on the parts.
     fn forces(&self, near: &[(usize, Touch)], impulses: &DVector<f64>) -> DVector<f64> {
         let mut forces = DVector::zeros(3 * self.parts.len());
         for ((index, touch), impulse) in near.iter().zip(impulses.iter()) {
@@ -133,7 +133,7 @@ impl PushedContact {
         forces
     }
 
-    /// v += response of the whole blade to impulses on the parts.
+    /// Adds the response of the whole blade to impulses on the parts to v.
     fn push(&self, forces: &DVector<f64>, v: &mut [f64]) {
         let tip = self.map.tr_mul(forces);
         for (column, impulse) in tip.iter().enumerate().filter(|(_, impulse)| **impulse != 0.0) {
@@ -143,7 +143,8 @@ impl PushedContact {
 }
 
 impl FullBlade {
-    /// March from rest, with contact on `parts`; displacements of the `watched` nodes and stress at the gauges are kept.
+    /// Integrates from rest, with contact on `parts`; records displacements of the `watched` nodes and stress at the
+    /// gauges.
     ///
     /// # Errors
     /// A clamped node among these, or a contact problem that is not solved.
@@ -195,7 +196,7 @@ impl FullBlade {
         Ok(found)
     }
 
-    /// Velocity after a step without contact.
+    /// Returns the velocity after a step without contact.
     fn free(&self, factor: &Factor, u: &[f64], v: &[f64], h: f64) -> Vec<f64> {
         let past: Vec<f64> = u.iter().zip(v).map(|(u, v)| v + 4.0 / h * u).collect();
         let both: Vec<f64> = past.iter().zip(v).map(|(past, v)| past + v).collect();
@@ -217,7 +218,7 @@ impl FullBlade {
     }
 }
 
-/// Work of friction: forces along the slip of the tip over the casing.
+/// Returns the work of friction: forces along the slip of the tip over the casing.
 fn rubbed(
     parts: &[TipPart],
     obstacle: &BumpedCasing,

@@ -1,8 +1,9 @@
-//! One blade by full finite elements, without a reduction of any kind, rubbing against a rigid casing with two bumps.
+//! Full finite-element model of one blade, without any reduction, rubbing against a rigid casing with two bumps.
 //!
-//! M ü + K u = Σ p F over all nodes of the mesh, undamped. `tip` says where contact is asked for: means over patches, or points of
-//! the tip's faces. `march` goes on in time. `gauge` tells stress. Mesh, element matrices and sparse factor are those of `tiprub-model`;
-//! contact, stepping and stress share nothing with the product.
+//! M ü + K u = Σ p F over all nodes of the mesh, undamped. `tip` defines where contact is evaluated: means over
+//! patches, or points of the faces of the tip. `march` integrates in time. `gauge` recovers stress. Mesh, element
+//! matrices and sparse factor are those of `tiprub-model`; contact, stepping and stress share nothing with the
+//! product.
 
 pub mod calculix;
 mod gauge;
@@ -20,20 +21,20 @@ pub use march::{BladeHistory, BladeSteps};
 pub use pushed::PushedBlade;
 pub use tip::TipPart;
 
-/// The full model of a blade.
+/// Full model of a blade.
 #[derive(Debug, Clone)]
 pub struct FullBlade {
     nodes: Vec<[f64; 3]>,
-    /// First of the three rows of every node; none of clamped ones.
+    /// First of the three rows of every node; `None` for clamped ones.
     rows: Vec<Option<usize>>,
     stiffness: SparseMatrix,
     mass: SparseMatrix,
-    /// Nodes that move each node, with their masses (kg): the same along x, y and z.
+    /// Masses (kg) that couple each node with other nodes: the same along x, y and z.
     masses: Vec<Vec<(usize, f64)>>,
 }
 
 impl FullBlade {
-    /// Assemble; `clamped` nodes stand still.
+    /// Assembles the model; `clamped` nodes do not move.
     ///
     /// # Errors
     /// The errors of the assembly.
@@ -47,24 +48,25 @@ impl FullBlade {
         Ok(Self { nodes: model.nodes, rows, stiffness, mass, masses })
     }
 
-    /// Degrees of freedom that move.
+    /// Returns the number of free degrees of freedom.
     pub fn order(&self) -> usize {
         self.mass.order()
     }
 
-    /// Stress at the gauges under forces at rest, six components of each (Pa): node, force along x, y, z (N).
+    /// Returns the stress at the gauges under static forces, six components of each (Pa): node, force along x, y, z
+    /// (N).
     ///
     /// # Errors
-    /// A blade that is not held.
+    /// An unsupported blade.
     pub fn at_rest(&self, forces: &[(usize, [f64; 3])], gauges: &[Gauge]) -> Result<Vec<f64>> {
         let moved = self.moved(forces)?;
         Ok(gauges.iter().flat_map(|gauge| gauge.read(|node| moved[node])).collect())
     }
 
-    /// Displacements of all nodes along x, y, z under forces at rest (m): node, force along x, y, z (N).
+    /// Returns the displacements of all nodes along x, y, z under static forces (m): node, force along x, y, z (N).
     ///
     /// # Errors
-    /// A blade that is not held.
+    /// An unsupported blade.
     pub fn moved(&self, forces: &[(usize, [f64; 3])]) -> Result<Vec<[f64; 3]>> {
         let factor = self.stiffness.factor("K of the blade", "Clamp the blade and check its mesh")?;
         let mut load = Mat::zeros(self.order(), 1);
@@ -79,13 +81,13 @@ impl FullBlade {
         Ok(self.rows.iter().map(node).collect())
     }
 
-    /// Stress at the gauges.
+    /// Returns the stress at the gauges.
     fn stress(&self, gauges: &[Gauge], u: &[f64]) -> Vec<f64> {
         let moved = |node: usize| self.rows[node].map_or([0.0; 3], |first| [u[first], u[first + 1], u[first + 2]]);
         gauges.iter().flat_map(|gauge| gauge.read(moved)).collect()
     }
 
-    /// M x.
+    /// Returns M x.
     fn momentum(&self, x: &[f64]) -> Vec<f64> {
         let mut found = vec![0.0; x.len()];
         for (node, row) in self.masses.iter().enumerate() {
@@ -96,20 +98,20 @@ impl FullBlade {
         found
     }
 
-    /// M + c K.
+    /// Factors M + c K.
     fn factor(&self, c: f64) -> Result<Factor> {
         self.mass.plus_scaled(c, &self.stiffness).factor("M + c K of the blade", "Clamp the blade and check its mesh")
     }
 }
 
-/// Row of a node in the mass matrix, node by node.
+/// Returns the row of a node in the mass matrix, node by node.
 fn masses(mass: &SparseMatrix, node: usize) -> Vec<(usize, f64)> {
     let range = mass.pattern.starts[3 * node]..mass.pattern.starts[3 * node + 1];
     let entries = mass.pattern.rows[range.clone()].iter().zip(&mass.values[range]);
     entries.filter(|(row, _)| **row % 3 == 0).map(|(row, value)| (row / 3, *value)).collect()
 }
 
-/// A x of a symmetric matrix.
+/// Returns A x for a symmetric matrix.
 fn product(matrix: &SparseMatrix, x: &[f64]) -> Vec<f64> {
     let pattern = &matrix.pattern;
     let row = |row: usize| {
@@ -130,8 +132,8 @@ mod tests {
     use super::*;
     use crate::reduced::rub::BumpedCasing;
 
-    /// Points of faces see a displacement of the whole tip along the axis as it is, and slope as the tip does; nothing touches a casing
-    /// that is far away, and what touches is pushed inwards.
+    /// Points of faces follow an axial displacement of the whole tip, and have the slope of the tip; nothing touches
+    /// a casing that is far away, and parts in contact are pushed inwards.
     #[test]
     fn tip_points_follow_the_displacement_of_the_tip() {
         let blade = blade_mesh(MeshCounts { chord: 3, thickness: 1, span: 2 }).unwrap();
@@ -149,7 +151,7 @@ mod tests {
                 assert!((low - 0.02..high + 0.02).contains(&part.tip.slope), "{part:?}, {low} to {high}");
             }
         }
-        // Of three faces in a row: all nodes but the middles of the two edges between them.
+        // For three faces in a row: all nodes except the mid-side nodes of the two edges between them.
         let outline = TipPart::outline(&blade.mesh, tip);
         assert_eq!(outline.len(), tip.len() - 2, "{outline:?}");
         assert!(outline.iter().all(|part| (low - 0.02..high + 0.02).contains(&part.tip.slope)), "{outline:?}");

@@ -1,4 +1,4 @@
-//! The blade of rotor 37 pushed at rest at the leading side of its tip, for a comparison of stress with CalculiX.
+//! Static load on the leading side of the tip of the rotor 37 blade, for a comparison of stress with CalculiX.
 
 use tiprub_model::rotor37::{MeshCounts, blade_mesh};
 use tiprub_model::{Material, Mesh, Result, Rotor37Options};
@@ -8,10 +8,11 @@ use super::{FullBlade, Gauge, calculix};
 /// Force on the first of nine patches in the first of two rows (N): inwards, back along the circumference, along the axis.
 const FORCE: [f64; 3] = [-1000.0, -150.0, 0.0];
 
-/// Where its six lowest modes have their largest stress, as `tiprub reduce rotor37 --mesh 12x2x20 --contact-rows 2` finds them: nodes from 0.
+/// Places where its six lowest modes have their largest stress, as
+/// `tiprub reduce rotor37 --mesh 12x2x20 --contact-rows 2` finds them: nodes from 0.
 const PLACES: [usize; 6] = [1494, 2742, 1062, 490, 2762, 386];
 
-/// The blade and its force.
+/// Blade with its load.
 #[derive(Debug, Clone)]
 pub struct PushedBlade {
     mesh: Mesh,
@@ -22,10 +23,10 @@ pub struct PushedBlade {
 }
 
 impl PushedBlade {
-    /// 12 × 2 × 20 bricks, held at the hub.
+    /// Creates the blade with 12 × 2 × 20 bricks, clamped at the hub.
     ///
     /// # Errors
-    /// None that this mesh gives.
+    /// None for this mesh.
     pub fn new() -> Result<Self> {
         let blade = blade_mesh(MeshCounts { chord: 12, thickness: 2, span: 20 })?;
         let material = Rotor37Options::default().material;
@@ -41,15 +42,16 @@ impl PushedBlade {
         Ok(Self { forces: forces.collect(), mesh: blade.mesh, material, full })
     }
 
-    /// Where stress is asked for, by name.
+    /// Returns the places of the stress by name.
     pub fn places() -> impl Iterator<Item = (String, usize)> {
         PLACES.into_iter().enumerate().map(|(mode, node)| (format!("mode_{}", mode + 1), node))
     }
 
-    /// Displacements of the places along x, y, z (m) and stress there along radius, circumference, axis (Pa).
+    /// Returns the displacements of the places along x, y, z (m) and the stress there along radius, circumference,
+    /// axis (Pa).
     ///
     /// # Errors
-    /// None that this mesh gives.
+    /// None for this mesh.
     pub fn unit_stresses(&self) -> Result<Vec<([f64; 3], [f64; 6])>> {
         let moved = self.full.moved(&self.forces)?;
         let at = |node: usize| {
@@ -59,7 +61,7 @@ impl PushedBlade {
         PLACES.into_iter().map(at).collect()
     }
 
-    /// The same stress along x, y, z turned to radius, circumference, axis at a place.
+    /// Rotates stress along x, y, z to radius, circumference, axis at a place.
     pub fn turned(&self, node: usize, [xx, yy, zz, xy, yz, zx]: [f64; 6]) -> [f64; 6] {
         let [x, y, _] = self.mesh.nodes[node];
         let (s, c) = y.atan2(x).sin_cos();
@@ -73,10 +75,10 @@ impl PushedBlade {
         ]
     }
 
-    /// Input files: the blade pushed, and the same displacements imposed on it.
+    /// Returns the input files: the loaded blade, and the same displacements imposed on it.
     ///
     /// # Errors
-    /// None that this mesh gives.
+    /// None for this mesh.
     pub fn inputs(&self) -> Result<[String; 2]> {
         let moved = self.full.moved(&self.forces)?;
         Ok([
@@ -85,7 +87,7 @@ impl PushedBlade {
         ])
     }
 
-    /// The node farthest from all places.
+    /// Returns the node farthest from all places.
     fn far(&self) -> usize {
         let away = |node: &[f64; 3]| {
             let to = |place: usize| (0..3).map(|i| (node[i] - self.mesh.nodes[place][i]).powi(2)).sum::<f64>();

@@ -1,4 +1,4 @@
-//! Where contact is asked for: means over patches, or points of the faces.
+//! Parts of a tip at which contact is evaluated: means over patches, or points of the faces.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,12 +8,12 @@ use tiprub_model::mesh::Element;
 
 use crate::reduced::rub::RubTip;
 
-/// Something that must stay inside the casing and is pushed by one normal force.
+/// Part of a tip that must stay inside the casing and is pushed by one normal force.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TipPart {
-    /// Where it stands.
+    /// Position of the part.
     pub(super) tip: RubTip,
-    /// Nodes, their weights (sum 1), and the angle of the radial direction that their displacements are seen along (rad).
+    /// Nodes, their weights (sum 1), and the angle of the radial direction of their displacements (rad).
     pub(super) shares: Vec<(usize, f64, f64)>,
 }
 
@@ -25,7 +25,8 @@ const GAUSS: [&[f64]; 3] = [
 ];
 
 impl TipPart {
-    /// The mean over nodes with weights (sum 1), each along directions of its own, on a contour that slopes so much.
+    /// Creates the mean over nodes with weights (sum 1), each in its local directions, on a contour with the given
+    /// slope.
     pub fn mean(nodes: &[[f64; 3]], weights: impl Iterator<Item = (usize, f64)>, slope: f64) -> Self {
         let angle = |node: usize| nodes[node][1].atan2(nodes[node][0]);
         let shares: Vec<_> = weights.map(|(node, weight)| (node, weight, angle(node))).collect();
@@ -34,7 +35,8 @@ impl TipPart {
         Self { tip: RubTip { radius, angle: mean(&angle), slope }, shares }
     }
 
-    /// Gauss's points of all faces whose nodes are in the set (ascending), `each` by `each` of a face (up to 3).
+    /// Returns the Gauss points of all faces whose nodes are in the set (ascending), `each` by `each` per face (up to
+    /// 3).
     pub fn points(mesh: &Mesh, set: &[usize], each: usize) -> Vec<Self> {
         let mut found = Vec::new();
         for element in &mesh.elements {
@@ -73,8 +75,8 @@ impl TipPart {
         }
     }
 
-    /// All nodes of the outline of the faces whose nodes are in the set (ascending), ends of the tip included, on the slope of the nearest of
-    /// Gauss's points.
+    /// Returns all nodes of the outline of the faces whose nodes are in the set (ascending), ends of the tip
+    /// included, with the slope of the nearest Gauss point.
     pub fn outline(mesh: &Mesh, set: &[usize]) -> Vec<Self> {
         let mut sides: BTreeMap<[usize; 2], (usize, Option<usize>)> = BTreeMap::new();
         for element in &mesh.elements {
@@ -101,24 +103,25 @@ impl TipPart {
         nodes.into_iter().map(|node| Self::mean(&mesh.nodes, [(node, 1.0)].into_iter(), slope(node))).collect()
     }
 
-    /// Axial position (m).
+    /// Returns the axial position (m).
     fn axial(&self, mesh: &Mesh) -> f64 {
         self.shares.iter().map(|(node, weight, _)| weight * mesh.nodes[*node][2]).sum()
     }
 
-    /// With the tip's angles counted from elsewhere (rad).
+    /// Shifts the angle of the part (rad).
     #[must_use]
     pub fn turned(mut self, by: f64) -> Self {
         self.tip.angle += by;
         self
     }
 
-    /// Angle (rad).
+    /// Returns the angle (rad).
     pub fn angle(&self) -> f64 {
         self.tip.angle
     }
 
-    /// Displacements along radius, circumference and axis per displacement of a node along x, y, z: node, and the rows of the first two.
+    /// Returns the displacements along radius, circumference and axis per displacement of a node along x, y, z: node,
+    /// and three rows.
     pub(super) fn seen(&self) -> impl Iterator<Item = (usize, [[f64; 3]; 3])> {
         self.shares.iter().map(|&(node, weight, angle)| {
             let (sine, cosine) = angle.sin_cos();
@@ -132,7 +135,8 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// Natural coordinates of a point of a face of three or four corners, and their rates along its two parameters.
+/// Returns the natural coordinates of a point of a face with three or four corners, and their derivatives along its
+/// two parameters.
 fn on_face(kind: ElementKind, corners: &[usize], [a, b]: [f64; 2]) -> ([f64; 3], [[f64; 3]; 2]) {
     let at = |corner: usize| kind.natural_nodes()[corners[corner.min(corners.len() - 1)]];
     let mix = |weights: [f64; 4]| std::array::from_fn(|i| (0..4).map(|corner| weights[corner] * at(corner)[i]).sum());

@@ -1,11 +1,11 @@
-//! A block on a belt, held by a spring: stick-slip with two coefficients (J. P. den Hartog 1931).
+//! Stick-slip with two coefficients of a block on a belt, held by a spring (J. P. den Hartog 1931).
 
 /// Block, spring, belt and friction forces.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StickSlipBelt {
     /// Mass (kg).
     pub mass: f64,
-    /// Spring (N/m).
+    /// Spring stiffness (N/m).
     pub stiffness: f64,
     /// Speed of the belt (m/s).
     pub speed: f64,
@@ -16,36 +16,38 @@ pub struct StickSlipBelt {
 }
 
 impl StickSlipBelt {
-    /// ω = √(k/m) (rad/s).
+    /// Returns ω = √(k/m) (rad/s).
     pub(crate) fn omega(&self) -> f64 {
         (self.stiffness / self.mass).sqrt()
     }
 
-    /// a = (F_s − F_k)/k (m).
+    /// Returns a = (F_s − F_k)/k (m).
     pub(crate) fn offset(&self) -> f64 {
         (self.sticking - self.sliding) / self.stiffness
     }
 
-    /// Amplitude about F_k/k: √(a² + v²/ω²) (m).
+    /// Returns the amplitude about F_k/k: √(a² + v²/ω²) (m).
     pub fn amplitude(&self) -> f64 {
         self.offset().hypot(self.speed / self.omega())
     }
 
-    /// Time of sliding: (2π − 2 atan(aω/v))/ω (s).
+    /// Returns the time of sliding: (2π − 2 atan(aω/v))/ω (s).
     pub fn slide_time(&self) -> f64 {
         (std::f64::consts::TAU - 2.0 * (self.offset() * self.omega() / self.speed).atan()) / self.omega()
     }
 
-    /// Time of sticking: 2a/v (s).
+    /// Returns the time of sticking: 2a/v (s).
     pub fn stick_time(&self) -> f64 {
         2.0 * self.offset() / self.speed
     }
 }
 
-/// A block on a spring that is thrown along a belt at rest, with a flexible contact without mass: it slides, stops, sticks and slides again.
+/// Block on a spring with an initial velocity along a belt at rest, with a flexible contact without mass: it slides,
+/// stops, sticks and slides again.
 ///
-/// While it sticks, the contact node u = q + G f keeps its place and the contact's flexibility G acts as a second spring; while it slides, the
-/// friction force f has its largest value. Every part is a harmonic motion; its end is found by bisection.
+/// While it sticks, the contact node u = q + G f keeps its position and the contact flexibility G acts as a second
+/// spring; while it slides, the friction force f has its largest value. Every phase is a harmonic motion, whose end
+/// is found by bisection.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ThrownBlock {
     /// Mass (kg).
@@ -65,14 +67,14 @@ pub struct ThrownBlock {
 pub struct ThrownMotion {
     /// Displacement of the contact node at the samples (m).
     pub positions: Vec<f64>,
-    /// Kinetic and strain energy at the samples, that of the contact included (J).
+    /// Kinetic and strain energy at the samples, including that of the contact (J).
     pub energies: Vec<f64>,
-    /// Number of times that the block stops sliding.
+    /// Number of times the block stops sliding.
     pub stops: usize,
 }
 
 impl ThrownBlock {
-    /// Motion at `count` multiples of `interval` (s), to some 1e-12 of its size.
+    /// Computes the motion at `count` multiples of `interval` (s), to about 1e-12 of its size.
     pub fn motion(&self, interval: f64, count: usize) -> ThrownMotion {
         let Self { mass, omega, flexibility, friction, velocity } = *self;
         let swing = |w: f64, q: f64, v: f64, s: f64| {
@@ -89,7 +91,7 @@ impl ThrownBlock {
                 let [x, w] = swing(if sticks { stiff } else { omega }, q - rest, v, s);
                 [x + rest, w]
             };
-            // Sticking ends where the force is that of sliding, and sliding where the block stops.
+            // Sticking ends when the force reaches that of sliding, and sliding ends when the block stops.
             let left = |s: f64| if sticks { friction - (u - at(s)[0]).abs() / flexibility } else { -force * at(s)[1] };
             let (grain, end) = (1e-3 / stiff, interval * count as f64 - start);
             let mut high = grain;

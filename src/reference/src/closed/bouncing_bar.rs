@@ -1,9 +1,10 @@
-//! An elastic bar that bounces on rigid ground under gravity, for ever: exact solution.
+//! Exact solution of an elastic bar that bounces on rigid ground under gravity periodically.
 //!
-//! Problem of D. Doyen, A. Ern, S. Piperno, SIAM J. Sci. Comput. 33 (2011) 223-249. The bar falls from rest, touches with v₀ = √(2 g h₀),
-//! stays for one return of a wave, 2L/c, and leaves with +v₀ at every point and twice its own static shortening. With the data
-//! here its flight takes three periods of the elastic wave, so that it touches again in the same state, and its second contact
-//! undoes the shortening: then it rises as a rigid body and everything repeats.
+//! Problem of D. Doyen, A. Ern, S. Piperno, SIAM J. Sci. Comput. 33 (2011) 223-249. The bar falls from rest, touches
+//! with v₀ = √(2 g h₀), stays in contact for one wave return, 2L/c, and leaves with +v₀ at every point and twice its
+//! static shortening. With the data here its flight takes three periods of the elastic wave, so that it touches again
+//! in the same state, and its second contact reverses the shortening: then it rises as a rigid body and everything
+//! repeats.
 
 use std::f64::consts::PI;
 
@@ -17,7 +18,7 @@ pub const DENSITY: f64 = 1.0;
 pub const GRAVITY: f64 = 10.0;
 /// Height of the bottom at the start (m).
 pub const HEIGHT: f64 = 5.0;
-/// Everything repeats after this time (s).
+/// Period of the motion (s).
 pub const PERIOD: f64 = 16.0 / 3.0;
 /// Times of contact within the first period (s).
 pub const CONTACTS: [[f64; 2]; 2] = [[1.0, 5.0 / 3.0], [11.0 / 3.0, 13.0 / 3.0]];
@@ -25,7 +26,7 @@ pub const CONTACTS: [[f64; 2]; 2] = [[1.0, 5.0 / 3.0], [11.0 / 3.0, 13.0 / 3.0]]
 /// Terms of the series; the last one is below 1e-8 of the first.
 const TERMS: u32 = 4000;
 
-/// Speed of waves √(E/ρ) (m/s).
+/// Returns the wave speed √(E/ρ) (m/s).
 pub fn wave_speed() -> f64 {
     (YOUNG / DENSITY).sqrt()
 }
@@ -34,12 +35,13 @@ fn touch_speed() -> f64 {
     (2.0 * GRAVITY * HEIGHT).sqrt()
 }
 
-/// Displacement under its own weight, standing: −(g/c²)(Lx − x²/2).
+/// Returns the static displacement under its weight on the ground: −(g/c²)(Lx − x²/2).
 fn standing(x: f64) -> f64 {
     -GRAVITY / (YOUNG / DENSITY) * (LENGTH * x - 0.5 * x * x)
 }
 
-/// Standing on the ground since τ ago, from `initial` times the static displacement and −v₀.
+/// Returns the displacement in contact at a time τ after the touch, from `initial` times the static displacement and
+/// −v₀.
 fn in_contact(x: f64, tau: f64, initial: f64) -> f64 {
     let mut sum = standing(x);
     for n in 1..=TERMS {
@@ -54,7 +56,8 @@ fn in_contact(x: f64, tau: f64, initial: f64) -> f64 {
     sum
 }
 
-/// Flying since τ ago, from +v₀ and twice the static displacement: mean −2gL²/3c², cosine coefficients 4g/(c² k²).
+/// Returns the displacement in flight at a time τ after the release, from +v₀ and twice the static displacement: mean
+/// −2gL²/3c², cosine coefficients 4g/(c² k²).
 fn in_flight(x: f64, tau: f64) -> f64 {
     let compliance = GRAVITY / (YOUNG / DENSITY);
     let mut sum = -2.0 * compliance * LENGTH * LENGTH / 3.0 + touch_speed() * tau - 0.5 * GRAVITY * tau * tau;
@@ -65,7 +68,7 @@ fn in_flight(x: f64, tau: f64) -> f64 {
     sum
 }
 
-/// Displacement (m) at x above the bottom at a time ≥ 0 (s); the bottom is at height u(0, t).
+/// Returns the displacement (m) at x above the bottom at a time ≥ 0 (s); the bottom is at height u(0, t).
 pub fn displacement(x: f64, time: f64) -> f64 {
     let time = time.rem_euclid(PERIOD);
     let [[first, leaves], [second, ends]] = CONTACTS;
@@ -83,8 +86,8 @@ pub fn displacement(x: f64, time: f64) -> f64 {
     }
 }
 
-/// Pressure on the ground (Pa). First contact: ρcv₀ at the touch, growing at ρcg, since the static displacement has to build up
-/// from none; second contact: falling from ρcv₀ + 2ρgL at the same rate.
+/// Returns the pressure on the ground (Pa). First contact: ρcv₀ at the touch, increasing at ρcg, since the static
+/// displacement has to build up from zero; second contact: decreasing from ρcv₀ + 2ρgL at the same rate.
 pub fn pressure(time: f64) -> f64 {
     let time = time.rem_euclid(PERIOD);
     let impedance = DENSITY * wave_speed();
@@ -98,7 +101,8 @@ pub fn pressure(time: f64) -> f64 {
     }
 }
 
-/// Energy per cross-section (J/m²), constant: potential at the start, measured from the bar standing unstrained.
+/// Returns the energy per cross-section (J/m²), which is constant: potential energy at the start, relative to the
+/// unstrained bar on the ground.
 pub fn energy() -> f64 {
     DENSITY * LENGTH * GRAVITY * HEIGHT
 }

@@ -1,4 +1,4 @@
-//! Closed forms that numerical results are held against.
+//! Closed-form solutions for comparison with numerical results.
 
 pub mod belt;
 pub mod bouncing_bar;

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-/// A mass on a spring (ω), let go at rest at x = A, with a rigid stop at x = −d: what touches it stops.
+/// Mass on a spring (ω), released at rest at x = A, with a rigid, fully inelastic stop at x = −d.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DeadStop {
     /// Angular frequency without the stop (rad/s).
@@ -14,12 +14,12 @@ pub struct DeadStop {
 }
 
 impl DeadStop {
-    /// Time of the only impact: cos ωt = −d/A (s).
+    /// Returns the time of the only impact: cos ωt = −d/A (s).
     pub fn touch(&self) -> f64 {
         (-self.distance / self.amplitude).acos() / self.omega
     }
 
-    /// Position (m): A cos ωt, then −d cos ω(t − t₁), which only grazes the stop once per turn.
+    /// Returns the position (m): A cos ωt, then −d cos ω(t − t₁), which only grazes the stop once per period.
     pub fn position(&self, time: f64) -> f64 {
         let touch = self.touch();
         if time < touch {
@@ -29,13 +29,13 @@ impl DeadStop {
         }
     }
 
-    /// Share of the energy that the impact takes: 1 − d²/A².
+    /// Returns the fraction of the energy that the impact dissipates: 1 − d²/A².
     pub fn loss(&self) -> f64 {
         1.0 - (self.distance / self.amplitude).powi(2)
     }
 }
 
-/// A mass on a spring (ω) that meets a second spring at x = d: ω_c² = (k + k_c)/m while it touches.
+/// Mass on a spring (ω) that meets a second spring at x = d: ω_c² = (k + k_c)/m while it touches.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bilinear {
     /// Angular frequency away from the stop (rad/s).
@@ -44,17 +44,17 @@ pub struct Bilinear {
     pub ratio: f64,
     /// d (m).
     pub distance: f64,
-    /// Largest |x| on the free side (m), > d; equal to d it grazes.
+    /// Largest |x| on the free side (m), above d; it grazes if equal to d.
     pub amplitude: f64,
 }
 
 impl Bilinear {
-    /// ω_c (rad/s).
+    /// Returns ω_c (rad/s).
     pub(crate) fn closed_omega(&self) -> f64 {
         self.omega * (1.0 + self.ratio).sqrt()
     }
 
-    /// Middle of the swing in contact: d k_c/(k + k_c) (m).
+    /// Returns the middle of the oscillation in contact: d k_c/(k + k_c) (m).
     fn middle(&self) -> f64 {
         self.distance * self.ratio / (1.0 + self.ratio)
     }
@@ -63,23 +63,23 @@ impl Bilinear {
         self.omega * (self.amplitude * self.amplitude - self.distance * self.distance).sqrt()
     }
 
-    /// Time in contact: 2/ω_c · atan(v/(ω_c (d − x_m))) (s).
+    /// Returns the time in contact: 2/ω_c · atan(v/(ω_c (d − x_m))) (s).
     pub(crate) fn closed_time(&self) -> f64 {
         let omega = self.closed_omega();
         2.0 * (self.touch_speed() / (omega * (self.distance - self.middle()))).atan() / omega
     }
 
-    /// Time out of contact: 2/ω · (π − acos(d/A)) (s).
+    /// Returns the time out of contact: 2/ω · (π − acos(d/A)) (s).
     pub(crate) fn open_time(&self) -> f64 {
         2.0 * (PI - (self.distance / self.amplitude).acos()) / self.omega
     }
 
-    /// Period (s).
+    /// Returns the period (s).
     pub fn period(&self) -> f64 {
         self.open_time() + self.closed_time()
     }
 
-    /// Position at a time after the free extreme x = −A (m).
+    /// Returns the position at a time after the free extreme x = −A (m).
     pub fn position(&self, time: f64) -> f64 {
         let time = time.rem_euclid(self.period());
         let half = 0.5 * self.open_time();
@@ -91,14 +91,14 @@ impl Bilinear {
         self.middle() + (self.distance - self.middle()) * angle.cos() + self.touch_speed() / omega * angle.sin()
     }
 
-    /// Largest force of the stop per unit of k (m): k_c/k · (x_max − d).
+    /// Returns the largest force of the stop per unit of k (m): k_c/k · (x_max − d).
     pub fn force_per_stiffness(&self) -> f64 {
         let reach = (self.distance - self.middle()).hypot(self.touch_speed() / self.closed_omega());
         self.ratio * (self.middle() + reach - self.distance)
     }
 }
 
-/// A mass dropped on a massless spring, again and again.
+/// Mass that is dropped on a massless spring and bounces periodically.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ball {
     /// √(k/m) (rad/s).
@@ -110,32 +110,32 @@ pub struct Ball {
 }
 
 impl Ball {
-    /// Speed at which it touches: √(2gH) (m/s).
+    /// Returns the speed at the touch: √(2gH) (m/s).
     pub(crate) fn speed(&self) -> f64 {
         (2.0 * self.gravity * self.height).sqrt()
     }
 
-    /// Time of the drop: √(2H/g) (s).
+    /// Returns the time of the drop: √(2H/g) (s).
     pub fn fall(&self) -> f64 {
         (2.0 * self.height / self.gravity).sqrt()
     }
 
-    /// Time in contact: 2/ω · (π − atan(vω/g)) (s).
+    /// Returns the time in contact: 2/ω · (π − atan(vω/g)) (s).
     pub(crate) fn contact(&self) -> f64 {
         2.0 * (PI - (self.speed() * self.omega / self.gravity).atan()) / self.omega
     }
 
-    /// From one release at the top to the next (s).
+    /// Returns the time from one release at the top to the next (s).
     pub fn period(&self) -> f64 {
         2.0 * self.fall() + self.contact()
     }
 
-    /// Largest force over weight: 1 + √(1 + v²ω²/g²).
+    /// Returns the largest force over weight: 1 + √(1 + v²ω²/g²).
     pub fn force_over_weight(&self) -> f64 {
         1.0 + 1.0_f64.hypot(self.speed() * self.omega / self.gravity)
     }
 
-    /// Height (m) at a time after the release.
+    /// Returns the height (m) at a time after the release.
     pub fn position(&self, time: f64) -> f64 {
         let time = time.rem_euclid(self.period());
         let (fall, contact) = (self.fall(), self.contact());

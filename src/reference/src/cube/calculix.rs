@@ -1,7 +1,8 @@
-//! The scene as a CalculiX input file, for a comparison with a code that is not ours.
+//! Scene as a CalculiX input file, for a comparison with an independent program.
 //!
-//! CalculiX calls "slave" the side whose nodes are checked: that is the cube, the paper's master. Its contact is a penalty
-//! between those nodes and the ring's facets, its kinematics are those of large displacements.
+//! CalculiX calls the side whose nodes are checked the slave: here the cube, which is the master in the paper. Its
+//! contact is a penalty between those nodes and the facets of the ring, and its kinematics are those of large
+//! displacements.
 
 use std::fmt::Write as _;
 
@@ -10,7 +11,7 @@ use tiprub_model::{Material, Mesh};
 
 use super::{CUBE_ELEMENTS, RingSide, SIDE, cube_material, cube_mesh, ring_material, ring_mesh};
 
-/// Choices of the run.
+/// Options of the run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CalculixRun {
     /// Speed along −y (m/s).
@@ -25,13 +26,14 @@ pub struct CalculixRun {
     pub contact_stiffness: f64,
     /// Friction stress per sticking displacement (Pa/m).
     pub stick_stiffness: f64,
-    /// Finite strains (`NLGEOM`); contact follows the moved bodies without it, too.
+    /// True for finite strains (`NLGEOM`); contact follows the displaced bodies in either case.
     pub large: bool,
-    /// Contact between surfaces instead of nodes and surfaces.
+    /// True for contact between surfaces instead of nodes and surfaces.
     pub surfaces: bool,
 }
 
-/// Text of the input file: full 3D, all three bodies, implicit steps of fixed size without numerical damping.
+/// Returns the text of the input file: full 3D, all three bodies, implicit steps of fixed size without numerical
+/// damping.
 pub fn input(run: &CalculixRun) -> String {
     let mut text = String::from("*HEADING\nCube between two rings; m, kg, s, N\n");
     let bodies = [
@@ -110,7 +112,7 @@ fn write_body(text: &mut String, name: &str, mesh: &Mesh, material: &Material, f
     put(text, format_args!("*SOLID SECTION, ELSET=E_{name}, MATERIAL=M_{name}\n"));
 }
 
-/// The faces whose corners all are of a set, as a surface.
+/// Writes the faces whose corners are all in a set as a surface.
 fn write_faces(text: &mut String, name: &str, mesh: &Mesh, set: &str, first_element: usize) {
     put(text, format_args!("*SURFACE, NAME={name}, TYPE=ELEMENT\n"));
     for (index, element) in mesh.elements.iter().enumerate() {
@@ -122,8 +124,9 @@ fn write_faces(text: &mut String, name: &str, mesh: &Mesh, set: &str, first_elem
     }
 }
 
-/// Area by which CalculiX multiplies the pressure of a master (m²): a quarter of every outer face at the node, those of the leading
-/// and trailing face and of the sides with it. So said the forces that its displacements need, to 1e-3.
+/// Returns the area by which CalculiX multiplies the pressure of a master (m²): a quarter of every outer face at the
+/// node, including those of the leading and trailing face and of the sides. The forces that its displacements require
+/// confirm this to 1e-3.
 pub fn area(mesh: &Mesh, node: usize) -> f64 {
     let face = (SIDE / CUBE_ELEMENTS as f64).powi(2);
     let corner = ["CORNERS_LEFT", "CORNERS_RIGHT"].iter().any(|set| mesh.sets[*set].contains(&node));

@@ -1,4 +1,4 @@
-//! The scene's matrices and histories as files, so that other programs can be given the same mesh.
+//! Matrices and histories of the scene as files, so that other programs can use the same mesh.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -45,10 +45,10 @@ impl From<&CubeBody> for BodyFile {
 }
 
 impl BodyFile {
-    /// A model to reduce.
+    /// Converts the body to a model for reduction.
     ///
     /// # Errors
-    /// [`Error::Invalid`] when the lengths do not fit each other.
+    /// [`Error::Invalid`] for inconsistent lengths.
     pub fn fe_model(self, origin: &str) -> Result<FeModel> {
         let order = 3 * self.nodes.len();
         let sound = self.starts.len() == order + 1
@@ -73,7 +73,7 @@ impl BodyFile {
     }
 }
 
-/// Write as JSON.
+/// Writes a value as JSON.
 ///
 /// # Errors
 /// [`Error::File`].
@@ -82,10 +82,10 @@ pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
     std::fs::write(path, text).map_err(|error| file_error(path, error))
 }
 
-/// Read what [`write_json`] wrote: a [`BodyFile`] or a [`super::history::CubeHistory`].
+/// Reads a file of [`write_json`]: a [`BodyFile`] or a [`super::history::CubeHistory`].
 ///
 /// # Errors
-/// [`Error::File`], also when the contents are of another kind.
+/// [`Error::File`], also if the contents are of another kind.
 pub fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T> {
     let text = std::fs::read_to_string(path).map_err(|error| file_error(path, error))?;
     serde_json::from_str(&text).map_err(|error| file_error(path, error.into()))

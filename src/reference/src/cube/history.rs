@@ -1,4 +1,4 @@
-//! What a run leaves behind, the same for every method.
+//! Results of a run, in the same form for every method.
 
 use serde::{Deserialize, Serialize};
 
@@ -28,44 +28,45 @@ pub struct CubeHistory {
     pub forces: Vec<[f64; 2]>,
     /// Kinetic energy of all bodies (J), half a step later for schemes that store displacements only.
     pub kinetic: Vec<f64>,
-    /// Strain energy of all bodies (J), at the time of the kinetic one; their sum is what the scheme conserves without contact.
+    /// Strain energy of all bodies (J), at the time of the kinetic one; the scheme conserves their sum without
+    /// contact.
     pub strain: Vec<f64>,
     /// Velocity of the cube's centre of mass (m/s).
     pub velocity: Vec<[f64; 3]>,
-    /// Largest penetration left by each step (m).
+    /// Largest penetration after each step (m).
     pub penetration: Vec<f64>,
-    /// Displacements of all masters at the times asked for.
+    /// Displacements of all masters at the requested times.
     pub snapshots: Vec<CubeSnapshot>,
     /// Processor time of the steps (s), all threads.
     pub processor_time: f64,
-    /// Processor time of assembly-independent preparation: factors and condensed matrices (s).
+    /// Processor time of preparation other than assembly: factors and condensed matrices (s).
     pub preparation_time: f64,
-    /// Iterations of the contact solver, total.
+    /// Total number of iterations of the contact solver.
     pub iterations: usize,
 }
 
 impl CubeHistory {
-    /// Kinetic and strain energy (J).
+    /// Returns the sum of kinetic and strain energy (J).
     pub fn total(&self) -> Vec<f64> {
         self.kinetic.iter().zip(&self.strain).map(|(kinetic, strain)| kinetic + strain).collect()
     }
 
-    /// One component (0, 1, 2) of the displacement of node 1 (m).
+    /// Returns one component (0, 1, 2) of the displacement of node 1 (m).
     pub fn first(&self, component: usize) -> Vec<f64> {
         self.corners.iter().map(|corner| corner[0][component]).collect()
     }
 
-    /// Contact force on node 1 (N).
+    /// Returns the contact force on node 1 (N).
     pub fn first_force(&self) -> Vec<f64> {
         self.corner_forces.iter().map(|force| force[0]).collect()
     }
 
-    /// Last time at which the cube touches a ring (s); None if it never does.
+    /// Returns the last time at which the cube touches a ring (s); `None` if it never does.
     pub fn last_contact(&self) -> Option<f64> {
         self.forces.iter().rposition(|force| force[0] > 0.0 || force[1] > 0.0).map(|index| self.times[index])
     }
 
-    /// Table with a header: times, node 1, its force, energies, velocity; SI units.
+    /// Returns a table with a header: times, node 1, its force, energies, velocity; SI units.
     pub fn csv(&self) -> String {
         let mut text = String::from("t,u1x,u1y,u1z,lambda1,left,right,kinetic,strain,vx,vy,vz,penetration\n");
         for i in 0..self.times.len() {
@@ -93,7 +94,7 @@ impl CubeHistory {
     }
 }
 
-/// Processor time of this process so far (s), user and system; zero where the system does not tell.
+/// Returns the processor time of this process so far (s), user and system; zero if the system does not provide it.
 pub fn processor_time() -> f64 {
     let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
     // Fields 14 and 15 after the name in parentheses; in hundredths of a second on Linux.

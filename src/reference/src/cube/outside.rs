@@ -1,4 +1,4 @@
-//! Histories that codes of others wrote as tables: their node 1 beside ours.
+//! Histories that other programs wrote as tables, for comparison of node 1.
 
 use tiprub_model::{Error, Result};
 
@@ -7,11 +7,12 @@ use super::history::CubeHistory;
 /// Columns of a table, in order; lines that begin with `#` or with `t` are skipped.
 pub const COLUMNS: &str = "t,u1x,u1y,u1z,lambda1,left,vy";
 
-/// Time, displacement of node 1 (m), its mean normal force since the row before (N), the same of the whole left face, and
-/// the velocity of the cube's centre along y (m/s). What a table does not tell stays zero; a row at t = 0 is added.
+/// Reads time, displacement of node 1 (m), its mean normal force since the row before (N), that of the whole left
+/// face, and the velocity of the centre of the cube along y (m/s). Quantities that a table lacks stay zero; a row at
+/// t = 0 is added.
 ///
 /// # Errors
-/// [`Error::Invalid`] for a row that is not seven numbers, or times that do not grow.
+/// [`Error::Invalid`] for a row that is not seven numbers, or times that do not increase.
 pub fn read(text: &str, speed: f64) -> Result<CubeHistory> {
     let mut history = CubeHistory { method: "outside".into(), ..CubeHistory::default() };
     push(&mut history, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -speed]);

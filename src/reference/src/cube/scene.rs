@@ -35,13 +35,13 @@ pub struct CubeSetting {
 }
 
 impl Default for CubeSetting {
-    /// The paper's case with the spline: 100 m/s, µ = 0.15; lumped mass.
+    /// Returns the case of the paper with the spline: 100 m/s, µ = 0.15; lumped mass.
     fn default() -> Self {
         Self { speed: 100.0, friction: FRICTION, surface: SurfaceKind::Spline, mass: Mass::Lumped }
     }
 }
 
-/// A body with the matrices of all its nodes; dof 3·node + component.
+/// Body with the matrices of all its nodes; dof 3·node + component.
 #[derive(Debug, Clone)]
 pub struct CubeBody {
     /// Mesh and node sets.
@@ -59,7 +59,7 @@ pub struct CubeBody {
 }
 
 impl CubeBody {
-    /// Assemble a mesh.
+    /// Assembles a mesh.
     ///
     /// # Errors
     /// The errors of assembly; a missing set.
@@ -76,18 +76,18 @@ impl CubeBody {
         Ok(body)
     }
 
-    /// Number of dofs.
+    /// Returns the number of dofs.
     pub fn dofs(&self) -> usize {
         self.mass.order()
     }
 
-    /// Factor of M + c K without the clamped dofs.
+    /// Factors M + c K without the clamped dofs.
     pub(crate) fn factor(&self, c: f64) -> Result<Factor> {
         let (mass, stiffness) = principal_pair(&self.mass, &self.stiffness, &self.free);
         mass.plus_scaled(c, &stiffness).factor("M + cK", "Check the mesh of the scene")
     }
 
-    /// Solution with a factor for a load on all dofs; zero where clamped.
+    /// Solves with a factor for a load on all dofs; zero for clamped ones.
     pub(crate) fn solve(&self, factor: &Factor, load: &[f64]) -> Vec<f64> {
         let right = Mat::from_fn(self.free.len(), 1, |i, _| load[self.free[i]]);
         let solution = factor.solve(right);
@@ -96,7 +96,7 @@ impl CubeBody {
         all
     }
 
-    /// Rows and columns of the contact dofs of the inverse behind a factor.
+    /// Returns the rows and columns of the contact dofs of the inverse of a factored matrix.
     pub(crate) fn contact_inverse(&self, factor: &Factor) -> DMatrix<f64> {
         let mut position = vec![usize::MAX; self.dofs()];
         self.free.iter().enumerate().for_each(|(i, &dof)| position[dof] = i);
@@ -122,14 +122,14 @@ pub struct CubeScene {
     pub bodies: [CubeBody; 3],
     /// Surfaces of the left and the right ring.
     pub surfaces: [SplineSurface; 2],
-    /// Masters per side.
+    /// Number of masters per side.
     pub masters: usize,
-    /// Divisions of a ring's surface along arc and width.
+    /// Divisions of the surface of a ring along arc and width.
     divisions: [usize; 2],
 }
 
 impl CubeScene {
-    /// The paper's meshes.
+    /// Creates the scene with the meshes of the paper.
     ///
     /// # Errors
     /// The errors of assembly.
@@ -137,10 +137,10 @@ impl CubeScene {
         Self::of(setting, cube_mesh(), RingSide::BOTH.map(ring_mesh), [RING_ELEMENTS[2], RING_ELEMENTS[1]])
     }
 
-    /// Meshes of another refinement; `divisions` are those of a ring's surface along arc and width.
+    /// Creates the scene with other meshes; `divisions` are those of the surface of a ring along arc and width.
     ///
     /// # Errors
-    /// The errors of assembly; a set that a mesh lacks.
+    /// The errors of assembly; a missing set of a mesh.
     pub fn of(setting: CubeSetting, cube: Mesh, [left, right]: [Mesh; 2], divisions: [usize; 2]) -> Result<Self> {
         let masters = [cube.set("MASTER_LEFT")?, cube.set("MASTER_RIGHT")?].concat();
         let ring = |mesh: Mesh| {
@@ -158,19 +158,19 @@ impl CubeScene {
         })
     }
 
-    /// Displacements of the three bodies at the start: none.
+    /// Returns the initial displacements of the three bodies: zero.
     pub(crate) fn rest(&self) -> [Vec<f64>; 3] {
         core::array::from_fn(|body| vec![0.0; self.bodies[body].dofs()])
     }
 
-    /// Velocities at the start: the cube flies along −y.
+    /// Returns the initial velocities: the cube moves along −y.
     pub(crate) fn launch(&self) -> [Vec<f64>; 3] {
         let mut velocities = self.rest();
         velocities[0].iter_mut().skip(1).step_by(3).for_each(|v| *v = -self.setting.speed);
         velocities
     }
 
-    /// Surface parameters of the point of the undeformed ring nearest to a place.
+    /// Returns the surface parameters of the point of the undeformed ring nearest to a position.
     pub(crate) fn guess(&self, side: usize, place: [f64; 3]) -> [f64; 2] {
         let angle = place[1].atan2(CENTRE - RingSide::BOTH[side].sign() * place[0]);
         let [arc, wide] = self.divisions;

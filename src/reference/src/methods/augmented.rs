@@ -1,8 +1,9 @@
-//! Augmented Lagrangian with Newmark's method, δ = 0.5 and α = 0.25, as a commercial code does it.
+//! Augmented Lagrangian with Newmark's method, δ = 0.5 and α = 0.25, as in commercial codes.
 //!
-//! Contact is a penalty ε that is strengthened by multipliers while a node penetrates by more than a tolerance; each problem is
-//! solved by Newton's method (J. C. Simo, T. A. Laursen, Comput. Struct. 42 (1992) 97-116). Friction sticks elastically with ε and its
-//! force of the last step. Contact forces take part in the average acceleration like all others, so that nodes rebound.
+//! Contact is a penalty ε that is augmented by multipliers while a node penetrates by more than a tolerance; each
+//! problem is solved by Newton's method (J. C. Simo, T. A. Laursen, Comput. Struct. 42 (1992) 97-116). Sticking
+//! friction is elastic with ε and starts from the friction force of the last step. Contact forces take part in the
+//! average acceleration like all other forces, so that nodes rebound.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 use tiprub_model::{Error, Result};
@@ -17,37 +18,37 @@ use crate::cube::history::CubeHistory;
 use crate::cube::scene::CubeScene;
 use crate::surface::is_zero;
 
-/// Choices of this method.
+/// Options of this method.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AugmentedOptions {
     /// ε (N/m) per node.
     pub penalty: f64,
-    /// ε of a face's corner nodes over that of the other nodes.
+    /// Ratio of ε of the corner nodes of a face to that of the other nodes.
     pub corners: f64,
-    /// Largest penetration without another augmentation (m).
+    /// Largest penetration that needs no further augmentation (m).
     pub tolerance: f64,
 }
 
 impl Default for AugmentedOptions {
-    /// 24 times E·a of the cube's 10 mm elements, so that a node under 2500 N goes 5 µm deep; another augmentation beyond a
-    /// hundredth of the element.
+    /// Returns a penalty of 24 times E·a of the 10 mm elements of the cube, so that a node under 2500 N penetrates by
+    /// 5 µm, and a tolerance of a hundredth of the element.
     fn default() -> Self {
         Self { penalty: 5e8, corners: 1.0, tolerance: 1e-4 }
     }
 }
 
-/// Most augmentations and updates of geometry per step.
+/// Largest number of augmentations and updates of geometry per step.
 const UPDATES: usize = 200;
-/// Most Newton iterations per problem.
+/// Largest number of Newton iterations per problem.
 const ITERATIONS: usize = 60;
 
-/// Forces by contact, remembered from one problem to the next: (side, master, global force).
+/// Contact forces that carry over from one problem to the next: (side, master, global force).
 type Memory = Vec<(usize, usize, [f64; 3])>;
 
-/// Run the scene.
+/// Runs the scene.
 ///
 /// # Errors
-/// As [`super::Method::run`].
+/// The errors of [`super::CubeMethod::run`].
 pub(crate) fn run(scene: &CubeScene, run: &MethodRun, options: AugmentedOptions) -> Result<CubeHistory> {
     let mut recorder = Recorder::new(scene, run, "augmented");
     let h = run.step;
@@ -119,7 +120,7 @@ struct AugmentedSolution {
     penetration: f64,
 }
 
-/// Entry of a contact in a memory, in its frame.
+/// Returns the entry of a contact in a memory, in its frame.
 fn recall(memory: &Memory, contact: &RingContact) -> Vector3<f64> {
     let same = |(side, master, _): &&(usize, usize, [f64; 3])| *side == contact.side && *master == contact.master;
     memory.iter().find(same).map_or_else(Vector3::zeros, |(_, _, force)| contact.local(*force).into())
@@ -134,7 +135,7 @@ fn memory(contacts: &[RingContact], forces: &[Vector3<f64>]) -> Memory {
 }
 
 impl AugmentedProblem<'_> {
-    /// ε of a contact (N/m).
+    /// Returns ε of a contact (N/m).
     fn penalty(&self, contact: &RingContact) -> f64 {
         let cube = &self.scene.bodies[0];
         let node = cube.contact[contact.side * self.scene.masters + contact.master];
@@ -159,7 +160,7 @@ impl AugmentedProblem<'_> {
                     offset
                 })
                 .collect();
-            // Normal multipliers of the augmentation; tangential ones are the friction of the last step.
+            // Normal multipliers of the augmentation; the tangential ones are the friction of the last step.
             let given: Vec<Vector3<f64>> = contacts
                 .iter()
                 .map(|contact| {
@@ -202,7 +203,7 @@ impl AugmentedProblem<'_> {
         ))
     }
 
-    /// Forces r = P(λ − ε δ(r)) by Newton's method on the piecewise smooth law.
+    /// Computes the forces r = P(λ − ε δ(r)) by Newton's method on the piecewise smooth law.
     fn newton(
         &self,
         delassus: &DMatrix<f64>,
@@ -242,7 +243,8 @@ impl AugmentedProblem<'_> {
     }
 }
 
-/// Force of a trial force and its derivative: no tension, tangential part cut at µ times the normal one.
+/// Returns the force for a trial force and its derivative: no tension, tangential part limited to µ times the normal
+/// one.
 fn law(trial: Vector3<f64>, friction: f64) -> (Vector3<f64>, nalgebra::Matrix3<f64>) {
     let mut slope = nalgebra::Matrix3::zeros();
     if trial[0] <= 0.0 {

@@ -1,13 +1,14 @@
 //! Bi-potential method of De Saxcé and Feng, implicit in time.
 //!
-//! G. De Saxcé, Z.-Q. Feng, Mathl Comput. Modelling 28 (1998) 225-245: contact and Coulomb friction together are one inequality,
-//! solved by Uzawa's prediction r − ρ(δ + µ|δ_t| n) and its projection on Coulomb's cone. Sticking is exact. Time: the trapezoidal rule
-//! written for displacements only, with the contact force of t_n keeping the gap of t_{n+1} open,
+//! G. De Saxcé, Z.-Q. Feng, Mathl Comput. Modelling 28 (1998) 225-245: contact and Coulomb friction together are one
+//! inequality, solved by Uzawa's prediction r − ρ(δ + µ|δ_t| n) and its projection on Coulomb's cone. Sticking is
+//! exact. The time integration is the trapezoidal rule in terms of displacements only, where the contact force of t_n
+//! keeps the gap of t_{n+1} open,
 //!
 //! (M + h²/4 K)(u_{n+1} − 2u_n + u_{n−1}) = h² (C r_n − K u_n),
 //!
-//! which without contact conserves ½ vᵀMv + ½ ūᵀKū, v = (u_{n+1} − u_n)/h, ū = (u_{n+1} + u_n)/2, for every h, and lets
-//! touching points stop without bouncing. Feet, normals and weights are those of the end of the step.
+//! which without contact conserves ½ vᵀMv + ½ ūᵀKū, v = (u_{n+1} − u_n)/h, ū = (u_{n+1} + u_n)/2, for every h, and
+//! stops touching points without rebound. Feet, normals and weights are those of the end of the step.
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use tiprub_model::{Error, Result};
@@ -22,21 +23,21 @@ use crate::cube::history::CubeHistory;
 use crate::cube::scene::CubeScene;
 use crate::surface::is_zero;
 
-/// Masters closer than this to a surface take part (m).
+/// Masters closer than this to a surface are included (m).
 const MARGIN: f64 = 1e-4;
-/// Sweeps end when no reaction changes by more than this part of the largest.
+/// Sweeps end if no reaction changes by more than this fraction of the largest.
 const TOLERANCE: f64 = 1e-11;
-/// Most sweeps per contact problem.
+/// Largest number of sweeps per contact problem.
 const SWEEPS: usize = 20_000;
-/// Geometry is final when no surface point moves more than this (m).
+/// Geometry is final if no surface point moves more than this (m).
 const SETTLED: f64 = 1e-12;
-/// Most updates of the geometry per step.
+/// Largest number of updates of the geometry per step.
 const UPDATES: usize = 30;
 
-/// Run the scene.
+/// Runs the scene.
 ///
 /// # Errors
-/// As [`super::Method::run`].
+/// The errors of [`super::CubeMethod::run`].
 pub(crate) fn run(scene: &CubeScene, run: &MethodRun) -> Result<CubeHistory> {
     let mut recorder = Recorder::new(scene, run, "bipotential");
     let (h, square) = (run.step, run.step * run.step);
@@ -84,7 +85,7 @@ pub(crate) fn run(scene: &CubeScene, run: &MethodRun) -> Result<CubeHistory> {
     Ok(recorder.finish())
 }
 
-/// u_n + (u_n − u_{n−1}) + second difference.
+/// Returns u_n + (u_n − u_{n−1}) + second difference.
 fn advanced(now: &Vectors, change: &Vectors, second: &Vectors) -> Vectors {
     core::array::from_fn(|i| (0..now[i].len()).map(|dof| now[i][dof] + (change[i][dof] + second[i][dof])).collect())
 }
@@ -94,7 +95,7 @@ struct BipotentialProblem<'a> {
     operator: &'a BodyOperator,
     rest: SurfaceVectors,
     square: f64,
-    /// Reactions of the last step, to start from: (side, master, force in the frame).
+    /// Reactions of the last step as initial values: (side, master, force in the frame).
     previous: Vec<(usize, usize, [f64; 3])>,
 }
 
@@ -106,7 +107,8 @@ struct BipotentialSolution {
 }
 
 impl BipotentialProblem<'_> {
-    /// Reactions that keep the gaps of the end of the step open, from surface displacements at its start and without contact.
+    /// Computes the reactions that keep the gaps at the end of the step open, from surface displacements at its start
+    /// and without contact.
     fn solve(&mut self, start: &SurfaceVectors, free: &SurfaceVectors, step: usize) -> Result<BipotentialSolution> {
         let masters = self.scene.masters;
         let mut moved = free.clone();
@@ -116,7 +118,7 @@ impl BipotentialProblem<'_> {
             let offsets: Vec<Vector3<f64>> = contacts
                 .iter()
                 .map(|contact| {
-                    // Gap linearised about where it was evaluated; slip over the step.
+                    // Gap linearised about its evaluation point; slip over the step.
                     let at =
                         |surface: &SurfaceVectors| Vector3::from(contact.local(contact.relative(masters, surface)));
                     let (base, ahead) = (at(start), at(free));
@@ -156,8 +158,8 @@ impl BipotentialProblem<'_> {
     }
 }
 
-/// Uzawa's iteration, contact after contact, until reactions stand still. `offsets` are gap and slip without reactions.
-/// Returns the number of sweeps.
+/// Performs Uzawa's iteration, contact after contact, until reactions converge. `offsets` are gap and slip without
+/// reactions. Returns the number of sweeps.
 fn uzawa(
     delassus: &DMatrix<f64>,
     offsets: &[Vector3<f64>],
@@ -199,7 +201,7 @@ fn uzawa(
     Err(Error::invalid("contact problem of the bi-potential method", problem, "Use a smaller step"))
 }
 
-/// Projection on Coulomb's cone; the first component is the normal one.
+/// Projects a force on Coulomb's cone; the first component is the normal one.
 pub(crate) fn projected(force: Vector3<f64>, friction: f64) -> Vector3<f64> {
     let (normal, tangential) = (force[0], force.yz().norm());
     if friction * tangential <= -normal {

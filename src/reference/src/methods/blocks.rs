@@ -2,7 +2,7 @@
 
 use tiprub_model::sparse::SparseMatrix;
 
-/// The same matrix, stored by rows of blocks; clamped dofs can be left out by the caller.
+/// Symmetric matrix, stored by rows of blocks; the caller can omit clamped dofs.
 #[derive(Debug, Clone)]
 pub(super) struct BlockMatrix {
     starts: Vec<usize>,
@@ -30,7 +30,7 @@ impl BlockMatrix {
         Self { starts, columns, blocks }
     }
 
-    /// result = A x.
+    /// Computes result = A x.
     pub(super) fn times(&self, x: &[f64], result: &mut [f64]) {
         for (row, out) in result.chunks_exact_mut(3).enumerate() {
             let mut sum = [0.0; 3];

@@ -1,4 +1,5 @@
-//! Where masters meet a ring's surface: gap, frame, weights; relative displacements; forces back on the bodies.
+//! Contact between masters and the surface of a ring: gap, frame, weights; relative displacements; forces on the
+//! bodies.
 
 use crate::cube::scene::CubeScene;
 use crate::surface::{add_scaled, cross, dot, minus, scaled, unit};
@@ -9,7 +10,7 @@ pub(super) type Vectors = [Vec<f64>; 3];
 /// Vectors at the masters (left face, then right) and at the carriers of the left and the right ring.
 pub(super) type SurfaceVectors = [Vec<[f64; 3]>; 3];
 
-/// A master near or inside a ring.
+/// Master near or inside a ring.
 #[derive(Debug, Clone)]
 pub(crate) struct RingContact {
     /// 0 left, 1 right.
@@ -18,14 +19,14 @@ pub(crate) struct RingContact {
     pub master: usize,
     /// Normal out of the ring and two tangents; the last lies in the plane of z and the normal.
     pub frame: [[f64; 3]; 3],
-    /// Carriers of the ring's surface at the foot and their weights.
+    /// Carriers of the surface of the ring at the foot, with their weights.
     pub weights: Vec<(usize, f64)>,
     /// Gap (m).
     pub gap: f64,
 }
 
 impl RingContact {
-    /// Displacement of the master relative to the surface at the foot, global directions.
+    /// Returns the displacement of the master relative to the surface at the foot, in global directions.
     pub(super) fn relative(&self, masters: usize, surface: &SurfaceVectors) -> [f64; 3] {
         let mut difference = surface[0][self.side * masters + self.master];
         for &(carrier, weight) in &self.weights {
@@ -34,12 +35,12 @@ impl RingContact {
         difference
     }
 
-    /// A global vector in the frame.
+    /// Transforms a global vector to the frame.
     pub(super) fn local(&self, vector: [f64; 3]) -> [f64; 3] {
         self.frame.map(|axis| dot(axis, vector))
     }
 
-    /// A vector of the frame in global directions.
+    /// Transforms a vector of the frame to global directions.
     pub(super) fn global(&self, local: [f64; 3]) -> [f64; 3] {
         let mut vector = [0.0; 3];
         self.frame.iter().zip(local).for_each(|(axis, x)| add_scaled(&mut vector, *axis, x));
@@ -47,7 +48,7 @@ impl RingContact {
     }
 }
 
-/// Displacements of masters and carriers out of those of all dofs.
+/// Extracts the displacements of masters and carriers from those of all dofs.
 pub(super) fn surface_of(scene: &CubeScene, vectors: &Vectors) -> SurfaceVectors {
     core::array::from_fn(|index| {
         let body = &scene.bodies[index];
@@ -57,7 +58,7 @@ pub(super) fn surface_of(scene: &CubeScene, vectors: &Vectors) -> SurfaceVectors
     })
 }
 
-/// Positions of masters and carriers at rest.
+/// Returns the positions of masters and carriers at rest.
 pub(super) fn surface_at_rest(scene: &CubeScene) -> SurfaceVectors {
     core::array::from_fn(|index| {
         let body = &scene.bodies[index];
@@ -66,7 +67,7 @@ pub(super) fn surface_at_rest(scene: &CubeScene) -> SurfaceVectors {
     })
 }
 
-/// All masters with a gap below `margin` (m), left side first; `rest` are the positions at rest.
+/// Finds all masters with a gap below `margin` (m), left side first; `rest` are the positions at rest.
 pub(super) fn find(scene: &CubeScene, rest: &SurfaceVectors, moved: &SurfaceVectors, margin: f64) -> Vec<RingContact> {
     let mut contacts = Vec::new();
     for side in 0..2 {
@@ -87,7 +88,7 @@ pub(super) fn find(scene: &CubeScene, rest: &SurfaceVectors, moved: &SurfaceVect
     contacts
 }
 
-/// Forces (local frames, on the masters) as forces on masters and carriers; action and reaction.
+/// Converts forces (local frames, on the masters) to forces on masters and carriers, action and reaction.
 pub(super) fn surface_forces(scene: &CubeScene, contacts: &[RingContact], forces: &[[f64; 3]]) -> SurfaceVectors {
     let mut all: SurfaceVectors = [
         vec![[0.0; 3]; 2 * scene.masters],
@@ -104,7 +105,7 @@ pub(super) fn surface_forces(scene: &CubeScene, contacts: &[RingContact], forces
     all
 }
 
-/// Add forces on masters and carriers, times a factor, to loads on all dofs.
+/// Adds forces on masters and carriers, times a factor, to loads on all dofs.
 pub(super) fn add_to_loads(scene: &CubeScene, forces: &SurfaceVectors, factor: f64, loads: &mut Vectors) {
     for index in 0..3 {
         let body = &scene.bodies[index];

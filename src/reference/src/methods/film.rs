@@ -1,7 +1,7 @@
-//! Central differences with forward-increment Lagrange multipliers: the paper's algorithm (eqs 9 to 11).
+//! Central differences with forward-increment Lagrange multipliers: the algorithm of the paper (eqs 9 to 11).
 //!
-//! Only sliding: the direction of friction is that of the predicted displacement of the step, in which the displacement of
-//! the rings along z is left out. As in Carpenter's paper contacts whose multiplier turns out negative are let go.
+//! Sliding only: the direction of friction is that of the predicted displacement of the step, without the
+//! displacement of the rings along z. As in Carpenter's paper, contacts whose multiplier is negative are released.
 
 use nalgebra::{DMatrix, DVector};
 use tiprub_model::{Error, Result};
@@ -15,21 +15,21 @@ use super::recorder::{Recorder, StepEntry};
 use crate::cube::history::CubeHistory;
 use crate::cube::scene::CubeScene;
 
-/// Choices of this method.
+/// Options of this method.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FilmOptions {
-    /// Let contacts with a negative multiplier go and solve again for the others.
+    /// True to release contacts with a negative multiplier and solve again for the others.
     pub release_tension: bool,
-    /// Solve the whole complementarity problem instead: also masters that only the others' forces push in take part, and
-    /// those let go may come back. The paper does not.
+    /// True to solve the whole complementarity problem instead: masters that only the forces of others push in are
+    /// included, too, and released ones may return. The paper does not do this.
     pub complementary: bool,
 }
 
-/// Masters closer than this take part in the complementarity problem (m).
+/// Masters closer than this are included in the complementarity problem (m).
 const MARGIN: f64 = 1e-4;
-/// A gap below minus this (m) is a penetration in the complementarity problem.
+/// A gap below the negative of this value (m) is a penetration in the complementarity problem.
 const ROUNDING: f64 = 1e-14;
-/// Most exchanges of one contact in a complementarity problem.
+/// Largest number of exchanges of one contact in a complementarity problem.
 const EXCHANGES: usize = 10_000;
 
 impl Default for FilmOptions {
@@ -38,10 +38,10 @@ impl Default for FilmOptions {
     }
 }
 
-/// Run the scene.
+/// Runs the scene.
 ///
 /// # Errors
-/// As [`super::Method::run`].
+/// The errors of [`super::CubeMethod::run`].
 pub(crate) fn run(scene: &CubeScene, run: &MethodRun, options: FilmOptions) -> Result<CubeHistory> {
     let mut recorder = Recorder::new(scene, run, "film");
     let operator = BodyOperator::new(scene, 0.0)?;
@@ -49,7 +49,7 @@ pub(crate) fn run(scene: &CubeScene, run: &MethodRun, options: FilmOptions) -> R
     operator.check_step(scene, run.step)?;
     recorder.prepared();
     let (h, square) = (run.step, run.step * run.step);
-    // u₋₁ = u₀ − h v₀: nothing is strained or touched at the start.
+    // u₋₁ = u₀ − h v₀: initially there is neither strain nor contact.
     let mut now = scene.rest();
     let mut change: Vectors = scene.launch().map(|v| v.iter().map(|v| h * v).collect());
     for step in 0..=run.steps() {
@@ -85,7 +85,8 @@ pub(crate) fn run(scene: &CubeScene, run: &MethodRun, options: FilmOptions) -> R
                 displacements: &now,
                 cube_velocity: &velocity[0],
                 kinetic: operator.kinetic(&velocity),
-                // With u_{n+1} on one side this is what central differences conserve, together with the kinetic energy.
+                // With u_{n+1} as one factor, this energy plus the kinetic energy is conserved by central
+                // differences.
                 strain: (0..3).map(|index| 0.5 * inner(&next[index], &elastic[index])).sum(),
             });
         }
@@ -94,7 +95,7 @@ pub(crate) fn run(scene: &CubeScene, run: &MethodRun, options: FilmOptions) -> R
     Ok(recorder.finish())
 }
 
-/// Eq. 11: λ from C_Nᵀ M⁻¹ C_NT h² λ = −g; forces (normal, tangential) in the frames.
+/// Solves eq. 11: λ from C_Nᵀ M⁻¹ C_NT h² λ = −g; returns forces (normal, tangential) in the frames.
 fn multipliers(
     scene: &CubeScene,
     operator: &BodyOperator,
@@ -142,8 +143,8 @@ fn multipliers(
     Err(Error::invalid("contact problem of `film`", problem, "Use a smaller step or less friction"))
 }
 
-/// Active contacts after one exchange: the first contact that pulls or that would be inside changes sides (K. G. Murty's rule,
-/// which ends for every P-matrix). The same contacts when there is none.
+/// Returns the active contacts after one exchange: the first contact that pulls or that would penetrate changes sides
+/// (K. G. Murty's rule, which terminates for every P-matrix). Returns the same contacts if there is none.
 fn exchanged(
     active: &[usize],
     multipliers: &[f64],
@@ -169,7 +170,7 @@ fn exchanged(
     changed
 }
 
-/// Force per multiplier in the frame: the normal, and µ against the predicted sliding.
+/// Returns the force per multiplier in the frame: the normal, and µ against the predicted sliding.
 fn direction(scene: &CubeScene, contact: &RingContact, slip: &SurfaceVectors) -> [f64; 3] {
     let friction = scene.setting.friction;
     let master = slip[0][contact.side * scene.masters + contact.master];

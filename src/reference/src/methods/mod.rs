@@ -1,6 +1,6 @@
-//! Four methods for the cube between two rings, each with time stepping and contact of its own:
-//! [`film`], `bipotential`, [`augmented`] and [`penalty`]. They share the finite-element matrices, the surfaces and
-//! where a master meets a surface ([`contact`]), nothing else.
+//! Four methods for the cube between two rings with separate time stepping and contact: [`film`], `bipotential`,
+//! [`augmented`] and [`penalty`]. They share only the finite-element matrices, the surfaces and the contact search
+//! ([`contact`]).
 
 pub mod augmented;
 pub(crate) mod bipotential;
@@ -21,14 +21,15 @@ pub struct MethodRun {
     pub step: f64,
     /// End (s).
     pub end: f64,
-    /// Record every so many steps.
+    /// Number of steps between records.
     pub stride: usize,
-    /// Take the displacements of all masters at the first recorded step at or after each of these times (s), ascending.
+    /// Times at which the displacements of all masters are recorded, at the first recorded step at or after each of
+    /// them (s), ascending.
     pub snapshots: Vec<f64>,
 }
 
 impl MethodRun {
-    /// Number of steps to the end.
+    /// Returns the number of steps to the end.
     pub(crate) fn steps(&self) -> usize {
         let mut steps = 0;
         while (steps as f64 + 0.5) * self.step < self.end {
@@ -38,7 +39,7 @@ impl MethodRun {
     }
 }
 
-/// One of the methods, with a name for reports.
+/// Method, with a name for reports.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum CubeMethod {
     /// [`film`].
@@ -52,11 +53,11 @@ pub enum CubeMethod {
 }
 
 impl CubeMethod {
-    /// Run the scene.
+    /// Runs the scene.
     ///
     /// # Errors
-    /// A mass or iteration matrix that is not positive definite; a solver that does not converge; an explicit step that
-    /// is not stable.
+    /// A mass or iteration matrix that is not positive definite; a solver that does not converge; an unstable
+    /// explicit step.
     pub fn run(self, scene: &CubeScene, run: &MethodRun) -> tiprub_model::Result<CubeHistory> {
         match self {
             Self::Film(options) => film::run(scene, run, options),

@@ -1,4 +1,4 @@
-//! The three bodies as linear systems (M + c K) x = b, and what these look like from the contact surfaces.
+//! The three bodies as linear systems (M + c K) x = b, and their compliance at the contact surfaces.
 
 use nalgebra::{DMatrix, Matrix3};
 use tiprub_model::sparse::Factor;
@@ -19,7 +19,7 @@ enum Inverse {
 /// Displacements of contact points per contact force: of masters for the cube, of carriers for a ring.
 #[derive(Debug)]
 enum MethodCompliance {
-    /// The same in all three directions, and uncoupled.
+    /// Equal in all three directions, and uncoupled.
     Isotropic(DMatrix<f64>),
     Full(DMatrix<f64>),
 }
@@ -53,7 +53,7 @@ impl BodyOperator {
                 let diagonal = |dof: usize| body.mass.block(&[dof], &[dof])[(0, 0)];
                 let mut position = 0;
                 for &dof in &body.free {
-                    // Three equal masses per node: one look-up each.
+                    // Three equal masses per node: one look-up for each.
                     inverse[dof] =
                         if dof % 3 > 0 && position + 1 == dof { inverse[position] } else { 1.0 / diagonal(dof) };
                     position = dof;
@@ -84,7 +84,7 @@ impl BodyOperator {
         })
     }
 
-    /// (M + c K)⁻¹ b.
+    /// Returns (M + c K)⁻¹ b.
     pub(super) fn solve(&self, scene: &CubeScene, right: &Vectors) -> Vectors {
         core::array::from_fn(|index| match &self.inverses[index] {
             Inverse::Diagonal(inverse) => inverse.iter().zip(&right[index]).map(|(a, b)| a * b).collect(),
@@ -92,7 +92,7 @@ impl BodyOperator {
         })
     }
 
-    /// Refuse a step beyond 2/ω of the highest frequency, found by power iteration on M⁻¹K of every body (c = 0).
+    /// Rejects a step beyond 2/ω of the highest frequency, found by power iteration on M⁻¹K of every body (c = 0).
     pub(super) fn check_step(&self, scene: &CubeScene, step: f64) -> Result<()> {
         let mut vectors: Vectors = core::array::from_fn(|index| {
             let count = scene.bodies[index].dofs();
@@ -116,7 +116,7 @@ impl BodyOperator {
         Err(Error::invalid("step", problem, "Use a smaller step"))
     }
 
-    /// K u without reactions of clamps.
+    /// Returns K u without reactions of clamped dofs.
     pub(super) fn elastic(&self, u: &Vectors) -> Vectors {
         core::array::from_fn(|index| {
             let mut force = vec![0.0; u[index].len()];
@@ -126,7 +126,7 @@ impl BodyOperator {
         })
     }
 
-    /// vᵀ M w / 2.
+    /// Returns vᵀ M w / 2.
     pub(super) fn kinetic(&self, v: &Vectors) -> f64 {
         (0..3)
             .map(|index| {
@@ -137,7 +137,7 @@ impl BodyOperator {
             .sum()
     }
 
-    /// Relative displacement (local frames) of each contact per force on each, 3n × 3n.
+    /// Returns the relative displacement (local frames) of each contact per force on each, 3n × 3n.
     pub(super) fn delassus(&self, contacts: &[RingContact], masters: usize) -> DMatrix<f64> {
         let mut matrix = DMatrix::zeros(3 * contacts.len(), 3 * contacts.len());
         let frames: Vec<Matrix3<f64>> =
@@ -161,7 +161,8 @@ impl BodyOperator {
         matrix
     }
 
-    /// Displacements that contact forces cause: of the masters (left, then right) and of the carriers of both rings.
+    /// Returns the displacements that contact forces cause: of the masters (left, then right) and of the carriers of
+    /// both rings.
     pub(super) fn surface_response(&self, forces: &SurfaceVectors) -> SurfaceVectors {
         core::array::from_fn(|index| {
             let mut moved = vec![[0.0; 3]; forces[index].len()];
@@ -186,7 +187,7 @@ pub(super) fn inner(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// A⁻¹ S A⁻ᵀ with the map A⁻¹ from nodes to carriers.
+/// Returns A⁻¹ S A⁻ᵀ with the map A⁻¹ from nodes to carriers.
 fn carriers(surface: Option<&SplineSurface>, nodal: DMatrix<f64>) -> DMatrix<f64> {
     let Some(surface) = surface else { return nodal };
     let map = |matrix: &DMatrix<f64>| {

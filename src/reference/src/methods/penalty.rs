@@ -9,26 +9,26 @@ use super::recorder::{Recorder, StepEntry};
 use crate::cube::history::CubeHistory;
 use crate::cube::scene::CubeScene;
 
-/// Choices of this method.
+/// Options of this method.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PenaltyOptions {
     /// Contact stiffness ε per node (N/m).
     pub stiffness: f64,
-    /// Below this sliding speed friction is viscous (m/s).
+    /// Sliding speed below which friction is viscous (m/s).
     pub sticking_speed: f64,
 }
 
 impl Default for PenaltyOptions {
-    /// As stiff as the augmented Lagrangian's penalty; friction regularised below 0.5 m/s.
+    /// Returns the penalty of the augmented Lagrangian; friction is regularised below 0.5 m/s.
     fn default() -> Self {
         Self { stiffness: 5e8, sticking_speed: 0.5 }
     }
 }
 
-/// Run the scene.
+/// Runs the scene.
 ///
 /// # Errors
-/// As [`super::Method::run`].
+/// The errors of [`super::CubeMethod::run`].
 pub(crate) fn run(scene: &CubeScene, run: &MethodRun, options: PenaltyOptions) -> Result<CubeHistory> {
     let mut recorder = Recorder::new(scene, run, "penalty");
     let operator = BodyOperator::new(scene, 0.0)?;

@@ -1,4 +1,4 @@
-//! Fills a [`CubeHistory`] as a run goes on.
+//! Recorder that fills a [`CubeHistory`] during a run.
 
 use super::MethodRun;
 use super::contact::{RingContact, Vectors};
@@ -9,7 +9,7 @@ use crate::cube::scene::CubeScene;
 pub(super) struct StepEntry<'a> {
     pub(super) time: f64,
     pub(super) displacements: &'a Vectors,
-    /// Velocity of the cube (any consistent choice of the scheme), all dofs.
+    /// Velocity of the cube at all dofs, in any definition that is consistent with the scheme.
     pub(super) cube_velocity: &'a [f64],
     pub(super) kinetic: f64,
     pub(super) strain: f64,
@@ -25,13 +25,13 @@ pub(super) struct Recorder<'a> {
     started: f64,
     prepared: f64,
     penetration: f64,
-    /// Sums since the last record: normal forces of all masters, and how many steps.
+    /// Sums since the last record: normal forces of all masters, and the number of steps.
     forces: Vec<f64>,
     summed: usize,
 }
 
 impl<'a> Recorder<'a> {
-    /// Starts the clock of the preparation.
+    /// Starts the clock for the preparation.
     pub(super) fn new(scene: &'a CubeScene, run: &'a MethodRun, method: &str) -> Self {
         let cube = &scene.bodies[0];
         let nodes = ["CORNERS_LEFT", "CORNERS_RIGHT"].map(|set| cube.mesh.sets[set].clone()).concat();
@@ -52,7 +52,7 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// The preparation is over, the steps begin.
+    /// Ends the preparation and starts the clock of the steps.
     pub(super) fn prepared(&mut self) {
         self.prepared = processor_time();
     }
@@ -61,17 +61,17 @@ impl<'a> Recorder<'a> {
         self.history.iterations += count;
     }
 
-    /// Whether the step is to be recorded.
+    /// Returns whether the step is to be recorded.
     pub(super) fn wants(&self, step: usize) -> bool {
         step.is_multiple_of(self.run.stride)
     }
 
-    /// Keep the largest penetration of steps between records.
+    /// Keeps the largest penetration of steps between records.
     pub(super) fn note_penetration(&mut self, penetration: f64) {
         self.penetration = self.penetration.max(penetration);
     }
 
-    /// Contact forces of a step (in the frames, N); records hold their means.
+    /// Adds contact forces of a step (in the frames, N); records contain their means.
     pub(super) fn note_forces(&mut self, contacts: &[RingContact], forces: &[[f64; 3]]) {
         for (contact, force) in contacts.iter().zip(forces) {
             self.forces[contact.side * self.scene.masters + contact.master] += force[0];

@@ -1,25 +1,26 @@
 //! Newmark's average acceleration (α = ¼, δ = ½) with an augmented Lagrangian.
 //!
-//! Contact is a penalty ε on the gap at the end of the step, strengthened by multipliers while a node is deeper than a
-//! tolerance (J. C. Simo, T. A. Laursen, Comput. Struct. 42 (1992) 97-116). The forces take part in the average acceleration like all
-//! others, so that nodes rebound. Normals are those of the end of the step without contact.
+//! Contact is a penalty ε on the gap at the end of the step, augmented by multipliers while a node penetrates by more
+//! than a tolerance (J. C. Simo, T. A. Laursen, Comput. Struct. 42 (1992) 97-116). The forces take part in the
+//! average acceleration like all other forces, so that nodes rebound. Normals are those of the end of the step
+//! without contact.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::{NodeContact, ReducedMethod, ReducedScene, ReducedStep, energy, finite};
 
-/// Choices of this method.
+/// Options of this method.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NewmarkOptions {
     /// ε (N/m).
     pub penalty: f64,
-    /// Largest penetration without another augmentation (m).
+    /// Largest penetration that needs no further augmentation (m).
     pub tolerance: f64,
-    /// Nodes closer than this to the obstacle before contact acts take part (m).
+    /// Distance from the obstacle, before contact acts, below which nodes are included (m).
     pub margin: f64,
 }
 
-/// Most augmentations per step, and most Newton iterations of each.
+/// Largest number of augmentations per step; below, that of Newton iterations of each.
 const AUGMENTATIONS: usize = 200;
 const ITERATIONS: usize = 60;
 
@@ -38,7 +39,7 @@ pub struct Augmented<'a, S: ReducedScene> {
 }
 
 impl<'a, S: ReducedScene> Augmented<'a, S> {
-    /// From the scene's start with steps of `step` (s), without contact at first.
+    /// Creates a run from the start of the scene with steps of `step` (s), without contact at first.
     pub fn new(scene: &'a S, step: f64, options: NewmarkOptions) -> Self {
         let modes = scene.modes();
         let (position, velocity) = scene.start();
@@ -69,7 +70,7 @@ impl<'a, S: ReducedScene> Augmented<'a, S> {
         }
     }
 
-    /// λ = max(0, k − ε g) with k raised until no node is too deep; gaps are those at the end of the step.
+    /// Computes λ = max(0, k − ε g), increasing k until no node is too deep; gaps are those at the end of the step.
     fn multipliers(&self, group: &[NodeContact]) -> Result<(DVector<f64>, f64), String> {
         let count = group.len();
         let matrix = DMatrix::from_fn(count, count, |i, j| group[i].normal.weighted(&self.compliance, &group[j].force));
@@ -86,7 +87,8 @@ impl<'a, S: ReducedScene> Augmented<'a, S> {
         Err(format!("step {} did not converge in {AUGMENTATIONS} augmentations", self.steps))
     }
 
-    /// The piecewise linear problem of one augmentation by Newton's method: closed nodes obey (ε⁻¹ + W) λ = ε⁻¹ k − g.
+    /// Solves the piecewise linear problem of one augmentation by Newton's method: closed nodes satisfy (ε⁻¹ + W) λ =
+    /// ε⁻¹ k − g.
     fn pressed(
         &self,
         matrix: &DMatrix<f64>,

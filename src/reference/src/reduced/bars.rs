@@ -1,5 +1,5 @@
-//! Rods of linear elements with lumped mass against something rigid or each other: Carpenter's bars, the bouncing bar, and a
-//! bar that stays pressed on the ground.
+//! Rods of linear elements with lumped mass in contact with a rigid body or each other: Carpenter's bars, the
+//! bouncing bar, and a bar that stays pressed on the ground.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -8,7 +8,7 @@ use super::{NodeContact, ReducedScene, SparseRow};
 use crate::carpenter;
 use crate::closed::bouncing_bar;
 
-/// A rod or two as matrices, its one contact, and how it starts.
+/// Matrices of one or two rods, with their contact and initial state.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RodModel {
     /// Lumped mass (kg).
@@ -27,7 +27,7 @@ pub struct RodModel {
     pub velocity: DVector<f64>,
 }
 
-/// Mass per node and stiffness of a rod of `elements` elements from `first` on; EA/l and ρAl of an element.
+/// Adds the mass per node and stiffness of a rod of `elements` elements from `first` on; EA/l and ρAl of an element.
 fn add_rod(mass: &mut DMatrix<f64>, stiffness: &mut DMatrix<f64>, first: usize, elements: usize, [k, m]: [f64; 2]) {
     for element in first..first + elements {
         for (i, j, sign) in [(0, 0, 1.0), (1, 1, 1.0), (0, 1, -1.0), (1, 0, -1.0)] {
@@ -38,14 +38,15 @@ fn add_rod(mass: &mut DMatrix<f64>, stiffness: &mut DMatrix<f64>, first: usize, 
     }
 }
 
-/// Node i of `count` as a unit vector.
+/// Returns node i of `count` as a unit vector.
 fn unit(count: usize, i: usize) -> DVector<f64> {
     let mut vector = DVector::zeros(count);
     vector[i] = 1.0;
     vector
 }
 
-/// Carpenter's two bars with `elements` elements each. `end_mass`: share of their mass that the meeting nodes keep.
+/// Creates Carpenter's two bars with `elements` elements each. `end_mass` is the fraction of their mass that the
+/// contact nodes keep.
 pub fn carpenter(elements: usize, end_mass: f64) -> RodModel {
     let size = carpenter::LENGTH / elements as f64;
     let element = [carpenter::YOUNG * carpenter::AREA / size, carpenter::DENSITY * carpenter::AREA * size];
@@ -74,7 +75,7 @@ pub fn carpenter_exact(time: f64) -> f64 {
     2.0 * carpenter::SPEED * flight
 }
 
-/// The bouncing bar per unit of cross-section; node 0 is its bottom.
+/// Creates the bouncing bar per unit of cross-section; node 0 is its bottom.
 pub fn bouncing(elements: usize, end_mass: f64) -> RodModel {
     let size = bouncing_bar::LENGTH / elements as f64;
     let count = elements + 1;
@@ -94,8 +95,8 @@ pub fn bouncing(elements: usize, end_mass: f64) -> RodModel {
     }
 }
 
-/// A bar held at its top that hangs above the ground (`touching` false) or stands on it under twice its weight (true), and is
-/// shaken so gently that it never touches or never lifts off.
+/// Creates a bar that is held at its top and hangs above the ground (`touching` false) or stands on it under twice
+/// its weight (true), with an excitation so small that it never touches or never lifts off.
 pub fn shaken(elements: usize, end_mass: f64, touching: bool) -> RodModel {
     let whole = bouncing(elements, end_mass);
     let keep = |matrix: &DMatrix<f64>| matrix.view((0, 0), (elements, elements)).into_owned();
@@ -103,7 +104,7 @@ pub fn shaken(elements: usize, end_mass: f64, touching: bool) -> RodModel {
     let load = whole.load.rows(0, elements) * 2.0;
     let mut held = stiffness.clone();
     if touching {
-        // The bottom stays where it is: at rest the ground carries it.
+        // The bottom stays in place: at rest the ground supports it.
         held.row_mut(0).fill(0.0);
         held.column_mut(0).fill(0.0);
         held[(0, 0)] = 1.0;
@@ -123,7 +124,7 @@ pub fn shaken(elements: usize, end_mass: f64, touching: bool) -> RodModel {
     }
 }
 
-/// A rod in its modes.
+/// Rod in its modes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RodScene {
     modes: DampedModes,
@@ -131,13 +132,13 @@ pub struct RodScene {
     start: (Vec<f64>, Vec<f64>),
     normal: Vec<f64>,
     gap: f64,
-    /// Compare all modal amplitudes instead of the displacement of the contact.
+    /// True to compare all modal amplitudes instead of the displacement of the contact.
     whole: bool,
 }
 
 impl RodScene {
-    /// `whole`: compare all modal amplitudes (displacements weighted with the mass) instead of the contact's displacement.
-    /// `None` for a mass that is not positive.
+    /// Creates the scene. `whole`: compare all modal amplitudes (displacements weighted with the mass) instead of the
+    /// displacement of the contact. Returns `None` for a mass that is not positive.
     pub fn new(rod: &RodModel, whole: bool) -> Option<Self> {
         let modes = DampedModes::new(&rod.mass, &rod.stiffness, 0.0)?;
         Some(Self {

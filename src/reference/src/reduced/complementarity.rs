@@ -1,14 +1,14 @@
-//! 0 ≤ x ⟂ b + A x ≥ 0 by exchanging the whole set at once, and by projected relaxation where that cycles.
+//! Solution of 0 ≤ x ⟂ b + A x ≥ 0 by exchanging the whole active set, or by projected relaxation if that cycles.
 
 use nalgebra::{DMatrix, DVector};
 
-/// Exchanges before relaxation takes over.
+/// Largest number of exchanges before relaxation.
 const EXCHANGES: usize = 50;
-/// Sweeps of relaxation, and the change relative to the largest unknown at which they end.
+/// Largest number of sweeps of relaxation; below, the relative change at which they end.
 const SWEEPS: usize = 100_000;
 const SETTLED: f64 = 1e-13;
 
-/// Solve; `None` where neither way comes to an end.
+/// Solves the problem; `None` if neither method converges.
 pub(crate) fn solve(matrix: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
     let count = right.len();
     let mut closed: Vec<usize> = (0..count).filter(|i| right[*i] < 0.0).collect();
@@ -53,7 +53,7 @@ fn relax(matrix: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
 mod tests {
     use super::*;
 
-    /// Both ways fulfil all conditions, on problems whose matrices are symmetric positive definite plus a skew part.
+    /// Both methods satisfy all conditions, for matrices that are symmetric positive definite plus a skew part.
     #[test]
     fn solutions_are_complementary() {
         let mut seed = 1_u64;

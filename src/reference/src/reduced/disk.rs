@@ -1,8 +1,8 @@
-//! A disk of coupled sectors in a flexible casing under a line load, written from the pencils and the geometry alone.
+//! Disk of coupled sectors in a flexible casing under a line load, computed from the pencils and the geometry alone.
 //!
-//! Every nodal diameter's Hermitian pencil becomes a real one of twice the size for real and imaginary part; the displacement of
-//! sector s is w_n Re(C z e^(2πi n s/N)). The casing carries a `Ring` through its contact grid; blade nodes seek their closest point
-//! on it, and forces go back to the grid by the weights of that point.
+//! The Hermitian pencil of every nodal diameter becomes a real one of twice the size for real and imaginary part; the
+//! displacement of sector s is w_n Re(C z e^(2πi n s/N)). The contact grid of the casing carries a `Ring`; blade
+//! nodes find their closest point on it, and forces return to the grid with the weights of that point.
 
 use std::f64::consts::TAU;
 
@@ -23,7 +23,7 @@ pub struct Pencil {
     pub contact_map: DMatrix<Complex<f64>>,
 }
 
-/// The casing.
+/// Flexible casing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CasingModel {
     /// Mass.
@@ -32,22 +32,22 @@ pub struct CasingModel {
     pub stiffness: DMatrix<f64>,
     /// Radial, tangential, axial displacement of every grid node.
     pub contact_map: DMatrix<f64>,
-    /// Radius, angle and axial place of the grid nodes, ring by ring.
+    /// Radius, angle and axial position of the grid nodes, ring by ring.
     pub positions: Vec<[f64; 3]>,
-    /// Nodes of a ring.
+    /// Number of nodes per ring.
     pub around: usize,
     /// Modal damping ratio.
     pub damping: f64,
-    /// Amplitude (N/m), waves and phase of the line load on it.
+    /// Amplitude (N/m), number of waves and phase of its line load.
     pub load: [f64; 3],
 }
 
-/// The whole stage.
+/// Whole stage.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StageReference {
     /// Nodal diameters from 0.
     pub pencils: Vec<Pencil>,
-    /// Radius, angle and axial place of the tip nodes of sector 0.
+    /// Radius, angle and axial position of the tip nodes of sector 0.
     pub tips: Vec<[f64; 3]>,
     /// Number of sectors.
     pub sectors: usize,
@@ -59,13 +59,13 @@ pub struct StageReference {
     pub clearance: f64,
     /// Angular velocity (rad/s).
     pub speed: f64,
-    /// Coulomb coefficient.
+    /// Coulomb friction coefficient.
     pub friction: f64,
-    /// Amplitude (m), waves and phase of the lobes of the surface, and the time over which they grow (s).
+    /// Amplitude (m), number of waves and phase of the lobes of the surface, and the time over which they grow (s).
     pub lobes: [f64; 4],
 }
 
-/// A stage in its modes: those of the disk, then those of the casing.
+/// Stage in its modes: those of the disk, then those of the casing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StageScene {
     stage: StageReference,
@@ -80,11 +80,11 @@ pub struct StageScene {
     ring: Ring,
     /// Radius of the undeformed round surface at the grid nodes (m).
     radii: Vec<f64>,
-    /// Axial places of the rings (m).
+    /// Axial positions of the rings (m).
     rings: Vec<f64>,
 }
 
-/// [[Re, −Im], [Im, Re]].
+/// Returns [[Re, −Im], [Im, Re]].
 fn embedded(matrix: &DMatrix<Complex<f64>>) -> DMatrix<f64> {
     let (rows, columns) = matrix.shape();
     DMatrix::from_fn(2 * rows, 2 * columns, |i, j| {
@@ -97,13 +97,13 @@ fn embedded(matrix: &DMatrix<Complex<f64>>) -> DMatrix<f64> {
     })
 }
 
-/// Radial and tangential direction at an angle.
+/// Returns the radial and tangential directions at an angle.
 fn directions(angle: f64) -> [Vector3<f64>; 2] {
     let (sine, cosine) = angle.sin_cos();
     [Vector3::new(cosine, sine, 0.0), Vector3::new(-sine, cosine, 0.0)]
 }
 
-/// Modes of a nodal diameter, and the rows of all sectors over them.
+/// Computes the modes of a nodal diameter, and the rows of all sectors over them.
 fn diameter(stage: &StageReference, number: usize) -> Option<(DampedModes, Vec<DMatrix<f64>>)> {
     let pencil = &stage.pencils[number];
     let real = number == 0 || 2 * number == stage.sectors;
@@ -125,7 +125,7 @@ fn diameter(stage: &StageReference, number: usize) -> Option<(DampedModes, Vec<D
 }
 
 impl StageScene {
-    /// `None` for masses that are not positive definite, or a grid without a surface.
+    /// Creates the scene; `None` for masses that are not positive definite, or a grid without a surface.
     pub fn new(stage: StageReference) -> Option<Self> {
         let nodes = 3 * stage.tips.len();
         let mut modes = DampedModes { frequencies: Vec::new(), damping: Vec::new(), shapes: DMatrix::zeros(0, 0) };
@@ -169,7 +169,7 @@ impl StageScene {
         })
     }
 
-    /// Lobes that have grown by this time, and their rate, at an angle (m, m/s).
+    /// Returns the lobes at this time, and their rate, at an angle (m, m/s).
     fn lobes(&self, angle: f64, time: f64) -> [f64; 2] {
         let [amplitude, waves, phase, ramp] = self.stage.lobes;
         let shape = -amplitude * (waves * angle - phase).cos();
@@ -180,7 +180,7 @@ impl StageScene {
         [0.5 * (1.0 - turn.cos()) * shape, 0.5 * std::f64::consts::PI / ramp * turn.sin() * shape]
     }
 
-    /// Control points of the surface now.
+    /// Returns the control points of the surface at this time.
     fn control(&self, time: f64, position: &[f64]) -> Vec<Vector3<f64>> {
         let moved = |row: usize| -> f64 { self.grid[row].iter().zip(&position[self.disk..]).map(|(a, b)| a * b).sum() };
         let places = self.stage.casing.positions.iter().enumerate();
@@ -194,7 +194,7 @@ impl StageScene {
         self.ring.control(&data)
     }
 
-    /// ClosestPoint of a point in grid steps, roughly.
+    /// Returns the approximate position of a point in grid steps.
     fn guess(&self, point: Vector3<f64>) -> [f64; 2] {
         let casing = &self.stage.casing;
         let angle = point.y.atan2(point.x) - casing.positions[0][1];
@@ -204,7 +204,7 @@ impl StageScene {
         [angle.rem_euclid(TAU) / TAU * casing.around as f64, (upper - 1) as f64 + share]
     }
 
-    /// Row of the casing's modes for a direction at a place.
+    /// Returns the row of the modes of the casing for a direction at a position.
     fn casing_row(&self, weights: &DVector<f64>, direction: Vector3<f64>) -> Vec<f64> {
         let mut row = vec![0.0; self.modes.len() - self.disk];
         for (node, weight) in weights.iter().enumerate() {
@@ -234,7 +234,7 @@ impl StageScene {
         let moved: [f64; 3] = std::array::from_fn(|i| rows[i].iter().zip(position).map(|(a, b)| a * b).sum());
         let x = radial * (radius + moved[0]) + tangential * moved[1] + Vector3::z() * (axial + moved[2]);
         let guess = self.guess(x);
-        // The surface runs nearly along the circumference: radial distance and gap differ by far less than this.
+        // The surface is nearly circumferential: radial distance and gap differ by far less than this.
         let rough = self.ring.at(control, guess[0], guess[1])[0];
         if rough.xy().norm() - x.xy().norm() > within + 2e-5 {
             return None;
@@ -290,14 +290,14 @@ impl ReducedScene for StageScene {
         &self.load
     }
 
-    /// The casing in equilibrium with its load.
+    /// Returns the casing in equilibrium with its load.
     fn start(&self) -> (Vec<f64>, Vec<f64>) {
         let resting = |(load, frequency): (&f64, &f64)| if *load == 0.0 { 0.0 } else { load / (frequency * frequency) };
         let position = self.load.iter().zip(&self.modes.frequencies).map(resting).collect();
         (position, vec![0.0; self.modes.len()])
     }
 
-    /// Tip nodes of the disk: row by row, every sector.
+    /// Returns the tip nodes of the disk: row by row, every sector.
     fn observed(&self, position: &[f64]) -> Vec<f64> {
         let rows = 3 * self.stage.tips.len();
         let moved = |row: usize, sector: usize| -> f64 {
@@ -330,7 +330,8 @@ impl SplineContour {
         Some(Self { points })
     }
 
-    /// Cubic between the neighbours of z, from their values and second derivatives; the same slope goes on beyond the ends.
+    /// Returns the cubic between the neighbours of z, from their values and second derivatives; straight with the
+    /// same slope beyond the ends.
     fn radius(&self, z: f64) -> f64 {
         let inside = z.clamp(self.points[0][0], self.points[self.points.len() - 1][0]);
         let upper = self.points.iter().position(|point| inside <= point[0]).unwrap_or(1).max(1);

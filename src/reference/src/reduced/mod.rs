@@ -1,14 +1,14 @@
-//! Independent time steppers over a reduced model: modes, contact rows and a gap function, nothing else.
+//! Independent time steppers for a reduced model that consists only of modes, contact rows and a gap function.
 //!
-//! A [`ReducedScene`] says where its contact nodes stand when the modes have given amplitudes; the methods march
-//! q̈ + 2ξω q̇ + ω² q = f + Σ λ F with gap g(q, t), normal row N = ∂g/∂q and force row F = N − µT of every contact:
+//! A [`ReducedScene`] returns the positions of its contact nodes for given modal amplitudes; the methods integrate q̈ +
+//! 2ξω q̇ + ω² q = f + Σ λ F with gap g(q, t), normal row N = ∂g/∂q and force row F = N − µT of every contact:
 //!
 //! * [`moreau`]: the θ-method with θ = ½ and velocities that are complementary to impulses (exact complementarity);
-//! * [`augmented`]: Newmark's average acceleration with an augmented Lagrangian, as commercial codes do it;
-//! * [`penalty`]: central differences with springs where nodes penetrate.
+//! * [`augmented`]: Newmark's average acceleration with an augmented Lagrangian, as in commercial codes;
+//! * [`penalty`]: central differences with springs at penetrating nodes.
 //!
-//! The modes are solved for here from mass and stiffness ([`modes`]), so that nothing but the matrices is shared with
-//! what is judged.
+//! The modes are computed here from mass and stiffness ([`modes`]), so that only the matrices are shared with the
+//! tested code.
 
 pub mod augmented;
 pub mod bars;
@@ -22,19 +22,20 @@ pub mod rub;
 
 use modes::DampedModes;
 
-/// A sparse row over the modes: pieces that begin at the first mode of a body. Two rows meet where pieces begin alike.
+/// Sparse row over the modes: blocks that begin at the first mode of a body. Two rows interact where blocks have the
+/// same start.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SparseRow(pub Vec<(usize, Vec<f64>)>);
 
 impl SparseRow {
-    /// Σ row·values.
+    /// Returns Σ row·values.
     pub(crate) fn dot(&self, values: &[f64]) -> f64 {
         let piece =
             |(start, row): &(usize, Vec<f64>)| -> f64 { row.iter().zip(&values[*start..]).map(|(a, b)| a * b).sum() };
         self.0.iter().map(piece).sum()
     }
 
-    /// Σ row·weights·other.
+    /// Returns Σ row·weights·other.
     pub(crate) fn weighted(&self, weights: &[f64], other: &Self) -> f64 {
         let mut sum = 0.0;
         for (start, row) in &self.0 {
@@ -45,7 +46,7 @@ impl SparseRow {
         sum
     }
 
-    /// values += factor·row.
+    /// Computes values += factor·row.
     pub(crate) fn add_to(&self, factor: f64, values: &mut [f64]) {
         for (start, row) in &self.0 {
             values[*start..].iter_mut().zip(row).for_each(|(value, row)| *value += factor * row);
@@ -53,16 +54,16 @@ impl SparseRow {
     }
 }
 
-/// One contact node near the obstacle.
+/// Contact node near the obstacle.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NodeContact {
-    /// Which node, over the whole scene.
+    /// Index of the node in the whole scene.
     pub node: usize,
-    /// Contacts of different groups do not know of each other.
+    /// Group of the contact; contacts of different groups are uncoupled.
     pub group: usize,
     /// Gap (m).
     pub gap: f64,
-    /// Rate of the gap by prescribed motion (m/s).
+    /// Rate of the gap due to prescribed motion (m/s).
     pub rate: f64,
     /// ∂g/∂q.
     pub normal: SparseRow,
@@ -70,21 +71,21 @@ pub struct NodeContact {
     pub force: SparseRow,
 }
 
-/// A reduced model with its obstacle.
+/// Reduced model with its obstacle.
 pub trait ReducedScene {
-    /// The modes.
+    /// Returns the modes.
     fn modes(&self) -> &DampedModes;
 
-    /// The contacts with a gap of at most `within` (m) at a time (s) and modal amplitudes, groups one after the other.
+    /// Returns the contacts with a gap of at most `within` (m) at a time (s) and modal amplitudes, group after group.
     fn contacts(&self, time: f64, position: &[f64], within: f64) -> Vec<NodeContact>;
 
-    /// Modal forces beside contact.
+    /// Returns the modal forces other than contact.
     fn load(&self) -> &[f64];
 
-    /// Modal amplitudes and velocities at time 0.
+    /// Returns the modal amplitudes and velocities at time 0.
     fn start(&self) -> (Vec<f64>, Vec<f64>);
 
-    /// Displacements that are compared (m), in an order of the scene's own.
+    /// Returns the displacements that are compared (m), in an order that the scene defines.
     fn observed(&self, position: &[f64]) -> Vec<f64>;
 }
 
@@ -93,33 +94,33 @@ pub trait ReducedScene {
 pub struct ReducedStep {
     /// Multipliers of the step: node and normal force (N).
     pub forces: Vec<(usize, f64)>,
-    /// Smallest gap that was seen in the step (m).
+    /// Smallest gap in the step (m).
     pub least_gap: f64,
 }
 
-/// A method that marches a scene.
+/// Method that integrates a scene.
 pub trait ReducedMethod {
-    /// One step.
+    /// Performs one step.
     ///
     /// # Errors
-    /// The contact problem is not solved, or the state is not finite.
+    /// A contact problem that is not solved, or a state that is not finite.
     fn step(&mut self) -> Result<ReducedStep, String>;
 
-    /// Modal amplitudes and velocities at the time reached.
+    /// Returns the modal amplitudes and velocities at the current time.
     fn state(&self) -> (&[f64], &[f64]);
 
-    /// Kinetic and strain energy (J).
+    /// Returns the kinetic and strain energy (J).
     fn energy(&self) -> f64;
 }
 
-/// Kinetic and strain energy of modal amplitudes and velocities of one instant (J).
+/// Returns the kinetic and strain energy of modal amplitudes and velocities at the same time (J).
 fn energy(modes: &DampedModes, position: &[f64], velocity: &[f64]) -> f64 {
     let each = position.iter().zip(velocity).zip(&modes.frequencies);
     each.map(|((q, v), w)| 0.5 * (v * v + w * w * q * q)).sum()
 }
 
 fn finite(values: &[f64], step: u64) -> Result<(), String> {
-    // An amplitude beyond all bounds is a divergence before it is infinite.
+    // A very large amplitude counts as divergence before it is infinite.
     match values.iter().all(|value| value.abs() < 1e12) {
         true => Ok(()),
         false => Err(format!("the motion diverged in step {step}")),

@@ -13,11 +13,11 @@ pub struct DampedModes {
     pub shapes: DMatrix<f64>,
 }
 
-/// Squares of frequencies below this part of the largest are those of rigid modes.
+/// Fraction of the largest squared frequency below which a mode is a rigid-body mode.
 const RIGID: f64 = 1e-12;
 
 impl DampedModes {
-    /// Solve K φ = ω² M φ by Cholesky's factor of the mass; `None` where the mass is not positive definite.
+    /// Solves K φ = ω² M φ by Cholesky's factor of the mass; `None` if the mass is not positive definite.
     pub(crate) fn new(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>, damping: f64) -> Option<Self> {
         let lower = mass.clone().cholesky()?.l();
         let half = lower.solve_lower_triangular(stiffness)?;
@@ -35,28 +35,28 @@ impl DampedModes {
         })
     }
 
-    /// `count` copies side by side, without coupling; the shapes are those of one.
+    /// Returns `count` uncoupled copies; the shapes are those of one copy.
     #[must_use]
     pub(crate) fn repeated(self, count: usize) -> Self {
         Self { frequencies: self.frequencies.repeat(count), damping: self.damping.repeat(count), shapes: self.shapes }
     }
 
-    /// Number of modes.
+    /// Returns the number of modes.
     pub(crate) fn len(&self) -> usize {
         self.frequencies.len()
     }
 
-    /// Largest angular frequency (rad/s).
+    /// Returns the largest angular frequency (rad/s).
     pub(crate) fn largest_frequency(&self) -> f64 {
         self.frequencies.iter().fold(0.0, |largest, value| f64::max(largest, *value))
     }
 
-    /// φᵀ f of forces on the coordinates.
+    /// Returns φᵀ f for forces on the coordinates.
     pub(crate) fn force(&self, force: &DVector<f64>) -> Vec<f64> {
         (self.shapes.transpose() * force).iter().copied().collect()
     }
 
-    /// Modal amplitudes φᵀ M u of displacements or velocities of the coordinates.
+    /// Returns the modal amplitudes φᵀ M u of displacements or velocities of the coordinates.
     pub(crate) fn amplitudes(&self, mass: &DMatrix<f64>, values: &DVector<f64>) -> Vec<f64> {
         self.force(&(mass * values))
     }

@@ -1,9 +1,9 @@
 //! Time stepping of J. J. Moreau and M. Jean: velocities and impulses are complementary, impacts are inelastic.
 //!
-//! M. Jean, Comput. Methods Appl. Mech. Engrg 177 (1999) 235-257, θ = ½: with q at the middle of the step
-//! v⁺ − v = h (f − 2ξω (v + v⁺)/2 − ω² (q + q⁺)/2) + Σ p F, q⁺ = q + h (v + v⁺)/2. A contact takes part when its gap is closed at
-//! q + h v/2 and t + h/2; then 0 ≤ p ⟂ N v⁺ + rate ≥ 0. Contacts are held by velocities, so that they penetrate by what was
-//! covered in half a step before they closed.
+//! M. Jean, Comput. Methods Appl. Mech. Engrg 177 (1999) 235-257, θ = ½: with q at the middle of the step v⁺ − v = h
+//! (f − 2ξω (v + v⁺)/2 − ω² (q + q⁺)/2) + Σ p F, q⁺ = q + h (v + v⁺)/2. A contact is active if its gap is closed at q +
+//! h v/2 and t + h/2; then 0 ≤ p ⟂ N v⁺ + rate ≥ 0. Contacts are constrained by velocities, so that they penetrate by
+//! their motion in half a step before they closed.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -24,7 +24,7 @@ pub struct Moreau<'a, S: ReducedScene> {
 }
 
 impl<'a, S: ReducedScene> Moreau<'a, S> {
-    /// From the scene's start with steps of `step` (s).
+    /// Creates a run from the start of the scene with steps of `step` (s).
     pub fn new(scene: &'a S, step: f64) -> Self {
         let modes = scene.modes();
         let (position, velocity) = scene.start();
@@ -45,7 +45,7 @@ impl<'a, S: ReducedScene> Moreau<'a, S> {
         }
     }
 
-    /// Impulses of the contacts that are closed, by the velocities without them.
+    /// Computes the impulses of the closed contacts from the velocities without impulses.
     fn impulses(&self, contacts: &[NodeContact], free: &[f64]) -> Result<Vec<f64>, String> {
         let mut impulses = Vec::with_capacity(contacts.len());
         for group in contacts.chunk_by(|a, b| a.group == b.group) {

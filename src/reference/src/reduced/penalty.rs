@@ -13,7 +13,8 @@ pub struct Penalty<'a, S: ReducedScene> {
 }
 
 impl<'a, S: ReducedScene> Penalty<'a, S> {
-    /// From the scene's start with steps of `step` (s) and contact stiffness `stiffness` (N/m) per node.
+    /// Creates a run from the start of the scene with steps of `step` (s) and contact stiffness `stiffness` (N/m) per
+    /// node.
     ///
     /// # Errors
     /// A step at or beyond 2/ω_max.
@@ -60,12 +61,12 @@ impl<S: ReducedScene> ReducedMethod for Penalty<'_, S> {
         })
     }
 
-    /// The velocities are those of half a step before.
+    /// Returns amplitudes, and velocities half a step earlier.
     fn state(&self) -> (&[f64], &[f64]) {
         (&self.position, &self.velocity)
     }
 
-    /// The energy that central differences conserve: ½ v² at half a step, ½ ω² q of this and the last step.
+    /// Returns the energy that central differences conserve: ½ v² at half a step, ½ ω² q of this and the last step.
     fn energy(&self) -> f64 {
         let each = self.position.iter().zip(&self.velocity).zip(&self.scene.modes().frequencies);
         each.map(|((q, v), w)| 0.5 * (v * v + w * w * q * (q - self.step * v))).sum()

@@ -1,11 +1,12 @@
-//! A closed bicubic B-spline through a grid of data points on a ring, written from its equations with dense matrices.
+//! Closed bicubic B-spline through a grid of data points on a ring, computed from its equations with dense matrices.
 //!
-//! Control points Q fulfil (Q₋ + 4Q + Q₊)/6 = P around, cyclically, and along the axis with zero second derivative at both edges; the
-//! surface is Σ B(ξ − i) B(η − j) Q_ij with the cardinal cubic B-spline B and points mirrored beyond the edges.
+//! Control points Q satisfy (Q₋ + 4Q + Q₊)/6 = P around, cyclically, and along the axis with zero second derivative
+//! at both edges; the surface is Σ B(ξ − i) B(η − j) Q_ij with the cardinal cubic B-spline B and points mirrored
+//! beyond the edges.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
-/// Value, first and second derivative of the cardinal cubic B-spline (support −2 … 2).
+/// Returns the value, first and second derivative of the cardinal cubic B-spline (support −2 … 2).
 fn basis(x: f64) -> [f64; 3] {
     let (a, sign) = (x.abs(), x.signum());
     if a >= 2.0 {
@@ -17,10 +18,10 @@ fn basis(x: f64) -> [f64; 3] {
     }
 }
 
-/// Point, derivatives along ξ and η, and ξξ, ξη, ηη of a place.
+/// Point, derivatives along ξ and η, and ξξ, ξη, ηη at a position.
 pub(crate) type SurfaceDerivatives = [Vector3<f64>; 6];
 
-/// The interpolation problem of a grid.
+/// Interpolation problem of a grid.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Ring {
     around: usize,
@@ -30,7 +31,8 @@ pub(crate) struct Ring {
 }
 
 impl Ring {
-    /// `around` points on each of `along` rings, ring by ring; `None` for grids without a solution.
+    /// Creates the problem for `around` points on each of `along` rings, ring by ring; `None` for grids without a
+    /// solution.
     pub(crate) fn new(around: usize, along: usize) -> Option<Self> {
         let ring = DMatrix::from_fn(around, around, |i, j| match (i + around - j) % around {
             0 => 4.0 / 6.0,
@@ -48,13 +50,14 @@ impl Ring {
         Some(Self { around, along, interpolation })
     }
 
-    /// Control points of data points.
+    /// Returns the control points of data points.
     pub(crate) fn control(&self, data: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
         let columns = DMatrix::from_fn(data.len(), 3, |i, k| data[i][k]);
         (&self.interpolation * columns).row_iter().map(|row| Vector3::new(row[0], row[1], row[2])).collect()
     }
 
-    /// Control points that meet at a place in grid steps, with value and derivatives of their weight as in [`ClosestPoint`].
+    /// Returns the control points with an influence at a position in grid steps, with value and derivatives of their
+    /// weight as in [`SurfaceDerivatives`].
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_possible_wrap,
@@ -63,7 +66,7 @@ impl Ring {
     )]
     fn local(&self, xi: f64, eta: f64) -> Vec<(usize, [f64; 6])> {
         let (first, last) = (xi.floor() as i64 - 1, self.along as i64 - 1);
-        // At an edge the same patch is continued.
+        // The last patch continues beyond an edge.
         let low = (eta.floor() as i64 - 1).clamp(-1, last - 2);
         let mut found = Vec::with_capacity(24);
         for j in low..low + 4 {
@@ -85,7 +88,7 @@ impl Ring {
         found
     }
 
-    /// The surface at a place in grid steps.
+    /// Evaluates the surface at a position in grid steps.
     pub(crate) fn at(&self, control: &[Vector3<f64>], xi: f64, eta: f64) -> SurfaceDerivatives {
         let mut place = [Vector3::zeros(); 6];
         for (index, weights) in self.local(xi, eta) {
@@ -96,7 +99,7 @@ impl Ring {
         place
     }
 
-    /// Weights of the data points at a place.
+    /// Returns the weights of the data points at a position.
     pub(crate) fn weights(&self, xi: f64, eta: f64) -> DVector<f64> {
         let mut control = DVector::zeros(self.around * self.along);
         for (index, weights) in self.local(xi, eta) {
@@ -105,7 +108,7 @@ impl Ring {
         self.interpolation.tr_mul(&control)
     }
 
-    /// Closest place to a point by Newton's method from a guess; `None` where it does not settle.
+    /// Returns the closest position to a point by Newton's method from a guess; `None` if it does not converge.
     pub(crate) fn closest(
         &self,
         control: &[Vector3<f64>],
@@ -156,7 +159,7 @@ mod tests {
         let (place, [foot, a, b, ..]) = ring.closest(&control, x, [24.0, 0.6]).unwrap();
         assert!((x - foot).dot(&a).abs() < 1e-14 && (x - foot).dot(&b).abs() < 1e-14);
         assert!((place[0] - 24.5).abs() < 1e-6 && (place[1] - 0.65).abs() < 1e-6, "{place:?}");
-        // Second derivatives are those of differences.
+        // Second derivatives are compared with differences.
         let d = 1e-5;
         let [_, right, ..] = ring.at(&control, place[0] + d, place[1]);
         let [_, left, ..] = ring.at(&control, place[0] - d, place[1]);

@@ -1,15 +1,16 @@
-//! Blades without coupling rubbing against a rigid casing with two bumps, written from the geometry alone.
+//! Uncoupled blades rubbing against a rigid casing with two bumps, computed from the geometry alone.
 //!
-//! A blade node at radius r, angle θ and axial place z stands at the distance c + s(θ) − u_r + m u_z inside the casing, whose
-//! meridian runs at the slope m of the tip; s is the shape of the casing at the angle where the node is now. Divided by the length of
-//! its gradient this is the gap, and the gradient over its length the normal. Sliding follows the rotation.
+//! A blade node at radius r, angle θ and axial position z has the distance c + s(θ) − u_r + m u_z from the casing,
+//! whose meridian has the slope m of the tip; s is the shape of the casing at the current angle of the node. The gap
+//! is this distance divided by the length of its gradient, and the normal is the gradient over its length. Sliding
+//! follows the rotation.
 
 use nalgebra::DMatrix;
 
 use super::modes::DampedModes;
 use super::{NodeContact, ReducedScene, SparseRow};
 
-/// A contact node: radius (m), angle (rad), meridional slope.
+/// Contact node: radius (m), angle (rad), meridional slope.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RubTip {
     /// Radius (m).
@@ -20,20 +21,20 @@ pub struct RubTip {
     pub slope: f64,
 }
 
-/// A rigid casing with two bumps half a turn apart, and how blades pass it.
+/// Rigid casing with two bumps half a turn apart, and the motion of the blades along it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BumpedCasing {
     /// Radial clearance (m).
     pub clearance: f64,
     /// Angular velocity (rad/s).
     pub speed: f64,
-    /// Coulomb coefficient.
+    /// Coulomb friction coefficient.
     pub friction: f64,
-    /// Height of the bumps (m), their width (of half a turn) and the time over which they grow (s).
+    /// Height of the bumps (m), their width (as a fraction of half a turn) and the time over which they grow (s).
     pub bumps: [f64; 3],
 }
 
-/// A point of a tip beside the casing; directions are radial, tangential, axial.
+/// Contact state of a point of a tip at the casing; directions are radial, tangential, axial.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Touch {
     /// Gap (m).
@@ -42,12 +43,13 @@ pub(crate) struct Touch {
     pub(crate) normal: [f64; 3],
     /// Force per unit multiplier, friction included.
     pub(crate) force: [f64; 3],
-    /// Rate of the gap by rotation and growth (m/s).
+    /// Rate of the gap due to rotation and growth (m/s).
     pub(crate) rate: f64,
 }
 
 impl BumpedCasing {
-    /// Change of the casing's radius at a fixed angle, its slope and its rate of growth, with the ramp in it.
+    /// Returns the change of the radius of the casing at a fixed angle, its slope and its rate of growth, including
+    /// the ramp.
     fn shape(&self, angle: f64, time: f64) -> [f64; 3] {
         use std::f64::consts::PI;
         let [height, width, ramp] = self.bumps;
@@ -62,7 +64,7 @@ impl BumpedCasing {
         [grown * bump, grown * slope, growing * bump]
     }
 
-    /// A point of the tip displaced by `moved` (m), at a time (s).
+    /// Evaluates a point of the tip displaced by `moved` (m), at a time (s).
     pub(crate) fn meets(&self, tip: &RubTip, time: f64, [radial, tangential, axial]: [f64; 3]) -> Touch {
         let [shape, slope, growth] = self.shape(tip.angle + self.speed * time + tangential / tip.radius, time);
         let gradient = [-1.0, slope / tip.radius, tip.slope];
@@ -80,7 +82,7 @@ impl BumpedCasing {
     }
 }
 
-/// One blade's matrices and its surroundings.
+/// Matrices of one blade with its surroundings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Blades {
     /// Mass.
@@ -95,9 +97,9 @@ pub struct Blades {
     pub sectors: usize,
     /// Modal damping ratio.
     pub damping: f64,
-    /// Factor on the frequencies of each blade; empty: 1.
+    /// Factor on the frequencies of each blade; if empty, 1.
     pub frequency_factors: Vec<f64>,
-    /// Radial clearance of each blade (m); empty: that of the obstacle.
+    /// Radial clearance of each blade (m); if empty, that of the obstacle.
     pub clearances: Vec<f64>,
     /// The casing.
     pub obstacle: BumpedCasing,
@@ -114,7 +116,7 @@ pub struct BladeScene {
 }
 
 impl BladeScene {
-    /// `None` for a mass that is not positive definite.
+    /// Creates the scene; `None` for a mass that is not positive definite.
     pub fn new(blades: Blades) -> Option<Self> {
         let modes = DampedModes::new(&blades.mass, &blades.stiffness, blades.damping)?;
         let seen = &blades.contact_map * &modes.shapes;
@@ -183,7 +185,7 @@ impl ReducedScene for BladeScene {
         (vec![0.0; self.modes.len()], vec![0.0; self.modes.len()])
     }
 
-    /// Row by row, every sector.
+    /// Returns the displacements row by row, every sector.
     fn observed(&self, position: &[f64]) -> Vec<f64> {
         let rows = 0..self.rows.len();
         rows.flat_map(|row| (0..self.blades.sectors).map(move |sector| self.moved(row, sector, position))).collect()

@@ -2,8 +2,8 @@
 
 use super::{SplineSurface, SurfaceFoot, add_scaled, cross, dot, minus, scaled, unit};
 
-/// The nearest facet of the cell of the guess and its eight neighbours. Beyond an edge between facets that is convex towards
-/// the point the foot lies on the edge and the normal is that of the nearer facet.
+/// Returns the foot on the nearest facet of the cell of the guess and its eight neighbours. Beyond an edge between
+/// facets that is convex towards the point, the foot lies on the edge and the normal is that of the nearer facet.
 pub(super) fn foot(
     surface: &SplineSurface,
     point: [f64; 3],
@@ -62,7 +62,7 @@ fn on_facet(
     )
 }
 
-/// Position, derivatives along s and t, and mixed derivative of a bilinear facet.
+/// Returns position, derivatives along s and t, and mixed derivative of a bilinear facet.
 fn evaluate(corners: &[[f64; 3]; 4], [x, y]: [f64; 2]) -> ([f64; 3], [f64; 3], [f64; 3], [f64; 3]) {
     let combine = |weights: [f64; 4]| {
         let mut sum = [0.0; 3];

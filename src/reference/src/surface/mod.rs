@@ -1,7 +1,7 @@
 //! Contact surfaces over the outer nodes of a ring: a bicubic B-spline and the facets of the mesh.
 //!
-//! Both are combinations of *carriers* with local weights: of control points for the spline, of the nodes themselves for
-//! facets. Carriers follow from the nodes by a fixed linear map; forces go back by its transpose.
+//! Both are combinations of *carriers* with local weights: of control points for the spline, of the nodes themselves
+//! for facets. Carriers follow from the nodes by a fixed linear map; forces are transferred by its transpose.
 
 mod facets;
 mod spline;
@@ -9,7 +9,7 @@ mod tensor;
 
 use tensor::Tensor;
 
-/// Which surface a ring shows to the cube.
+/// Contact surface of a ring.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SurfaceKind {
     /// Bicubic uniform B-spline through the nodes, free ends and free edges (second derivative zero).
@@ -21,11 +21,11 @@ pub enum SurfaceKind {
 /// Foot of a point on the surface.
 #[derive(Debug, Clone)]
 pub struct SurfaceFoot {
-    /// Unit normal, out of the ring.
+    /// Unit normal, pointing out of the ring.
     pub normal: [f64; 3],
     /// Distance along the normal (m), negative inside the ring.
     pub gap: f64,
-    /// Carriers and their weights; these add up to one.
+    /// Carriers and their weights, which sum to one.
     pub weights: Vec<(usize, f64)>,
 }
 
@@ -35,13 +35,13 @@ pub struct SplineSurface {
     kind: SurfaceKind,
     rows: usize,
     columns: usize,
-    /// +1 when ∂S/∂s × ∂S/∂t points out of the ring, −1 otherwise.
+    /// +1 if ∂S/∂s × ∂S/∂t points out of the ring, −1 otherwise.
     orientation: f64,
     tensor: Tensor,
 }
 
 impl SplineSurface {
-    /// A surface over rows × columns nodes.
+    /// Creates a surface over rows × columns nodes.
     pub fn new(kind: SurfaceKind, rows: usize, columns: usize, orientation: f64) -> Self {
         let tensor = match kind {
             SurfaceKind::Spline => Tensor::interpolating(rows, columns),
@@ -50,23 +50,23 @@ impl SplineSurface {
         Self { kind, rows, columns, orientation, tensor }
     }
 
-    /// Number of carriers, and of nodes.
+    /// Returns the number of carriers, which equals that of nodes.
     pub fn count(&self) -> usize {
         self.rows * self.columns
     }
 
-    /// Values of the carriers from values at the nodes (any vector quantity: positions, displacements).
+    /// Returns the values of the carriers from values at the nodes (any vector quantity: positions, displacements).
     pub fn carriers(&self, nodal: &[[f64; 3]]) -> Vec<[f64; 3]> {
         self.tensor.apply(nodal)
     }
 
-    /// Forces on the nodes that do the same work as forces on the carriers.
+    /// Returns the forces on the nodes that do the same work as forces on the carriers.
     pub fn spread(&self, forces: &[[f64; 3]]) -> Vec<[f64; 3]> {
         self.tensor.apply_transposed(forces)
     }
 
-    /// Closest point of the surface with these carriers (positions, m); `guess` are parameters near it, in elements.
-    /// None beyond the ends and edges.
+    /// Returns the closest point of the surface with these carriers (positions, m); `guess` are parameters near it,
+    /// in elements. Returns `None` beyond the ends and edges.
     pub fn foot(&self, point: [f64; 3], carriers: &[[f64; 3]], guess: [f64; 2]) -> Option<SurfaceFoot> {
         match self.kind {
             SurfaceKind::Spline => spline::foot(self, point, carriers, guess),

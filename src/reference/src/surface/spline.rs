@@ -2,7 +2,7 @@
 
 use super::{SplineSurface, SurfaceFoot, add_scaled, cross, dot, minus, scaled, unit};
 
-/// Cubic basis on one segment, x from 0 to 1: values, first and second derivatives.
+/// Returns the cubic basis on one segment, x from 0 to 1: values, first and second derivatives.
 fn basis(x: f64) -> [[f64; 4]; 3] {
     let y = 1.0 - x;
     [
@@ -13,8 +13,8 @@ fn basis(x: f64) -> [[f64; 4]; 3] {
     ]
 }
 
-/// Weights of the control points along one direction, derivative by derivative; those outside the grid are folded
-/// into it: Q_{−1} = 2 Q₀ − Q₁.
+/// Weights of the control points along one direction, derivative by derivative; points outside the grid are
+/// eliminated by Q_{−1} = 2 Q₀ − Q₁.
 struct LineWeights {
     first: usize,
     weights: [[f64; 4]; 3],
@@ -61,7 +61,7 @@ fn evaluate(surface: &SplineSurface, carriers: &[[f64; 3]], [s, t]: [f64; 2]) ->
     SurfaceTerm { jets, lines }
 }
 
-/// Newton's method for (x − S)·S_s = (x − S)·S_t = 0.
+/// Solves (x − S)·S_s = (x − S)·S_t = 0 by Newton's method.
 pub(super) fn foot(
     surface: &SplineSurface,
     point: [f64; 3],
@@ -86,7 +86,7 @@ pub(super) fn foot(
             break;
         }
     }
-    // A foot beyond a free edge is none, but for rounding.
+    // A foot beyond a free edge is invalid, except for rounding.
     (0..2).all(|i| at[i] >= -1e-9 && at[i] <= ends[i] + 1e-9).then(|| {
         let found = evaluate(surface, carriers, at);
         let normal = scaled(unit(cross(found.jets[1], found.jets[2])), surface.orientation);

@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 use super::add_scaled;
 
-/// The linear map from nodes to carriers of a grid: A₁⁻¹ ⊗ A₂⁻¹.
+/// Linear map from nodes to carriers of a grid: A₁⁻¹ ⊗ A₂⁻¹.
 #[derive(Debug, Clone)]
 pub(super) struct Tensor {
     /// A₁⁻¹, rows × rows.
@@ -13,8 +13,8 @@ pub(super) struct Tensor {
     across: DMatrix<f64>,
 }
 
-/// Inverse of the matrix that takes control points to points: (Q_{i−1} + 4 Q_i + Q_{i+1})/6, and Q itself at the ends,
-/// where the second derivative Q_{−1} − 2 Q₀ + Q₁ is zero.
+/// Returns the inverse of the matrix that maps control points to points: (Q_{i−1} + 4 Q_i + Q_{i+1})/6, and Q itself
+/// at the ends, where the second derivative Q_{−1} − 2 Q₀ + Q₁ is zero.
 fn inverse(count: usize) -> DMatrix<f64> {
     let mut matrix = DMatrix::identity(count, count);
     for i in 1..count - 1 {

@@ -1,4 +1,4 @@
-//! The measures of agreement on histories made by hand.
+//! Agreement measures on synthetic histories.
 
 use tiprub_reference::compare::{agreement, asymmetry, relative_l2, sample, windowed};
 use tiprub_reference::cube::history::CubeHistory;

@@ -1,4 +1,5 @@
-//! Which contacts method a takes: the paper's (all that the prediction puts inside) or the whole complementarity problem.
+//! Choice of contacts in method a: as in the paper (all nodes that the prediction puts inside) or the whole
+//! complementarity problem.
 
 use tiprub_reference::cube::history::CubeHistory;
 use tiprub_reference::cube::scene::{CubeScene, CubeSetting, Mass};
@@ -15,7 +16,8 @@ fn deepest(history: &CubeHistory) -> f64 {
     history.penetration.iter().fold(0.0, |a: f64, x| a.max(*x))
 }
 
-/// With consistent mass a force on one node moves its neighbours: some that the prediction leaves outside are pushed in.
+/// With consistent mass a force on one node moves its neighbours: some that are outside in the prediction are pushed
+/// in.
 #[test]
 fn complementarity_prevents_penetration_with_consistent_mass() {
     let [paper, all] = [false, true].map(|complementary| run(Mass::Consistent, complementary));
@@ -26,7 +28,7 @@ fn complementarity_prevents_penetration_with_consistent_mass() {
     assert!(all.forces.iter().any(|sides| sides[0] > 1e3), "nothing touched");
 }
 
-/// With lumped mass nodes do not push each other in, so both choices of contacts are the same to rounding.
+/// With lumped mass nodes do not push each other in, so both choices of contacts agree to rounding.
 #[test]
 fn lumped_masses_need_no_complementarity() {
     let [paper, all] = [false, true].map(|complementary| run(Mass::Lumped, complementary));

@@ -1,4 +1,4 @@
-//! The cube between two rings: scene, methods, codes of others.
+//! Cube between two rings: scene, methods, other programs.
 
 mod compare;
 mod film_contacts;

@@ -1,4 +1,5 @@
-//! The four methods on the cube between two rings, kept short: they must agree with each other, be symmetric and keep the ledger.
+//! Short runs of the four methods on the cube between two rings: they must agree with each other, be symmetric and
+//! satisfy the energy balance.
 
 use tiprub_reference::compare::{agreement, asymmetry};
 use tiprub_reference::cube::history::CubeHistory;
@@ -19,7 +20,8 @@ fn run(method: CubeMethod, setting: CubeSetting, step: f64, end: f64, stride: us
 }
 
 /// Within the first 0.2 ms two rows of nodes touch; here all methods have the same mesh, mass and surface. Film and
-/// bi-potential keep gaps closed; the other two let nodes in by some micrometres, which is what keeps them apart.
+/// bi-potential keep gaps closed; the other two permit a penetration of some micrometres, which causes their
+/// difference.
 #[test]
 fn all_methods_agree_while_in_contact() {
     let (setting, end) = (CubeSetting::default(), 2e-4);
@@ -68,7 +70,7 @@ fn gaps_do_not_penetrate_and_friction_dissipates_energy() {
             assert!(deepest < 1e-8, "{} goes {deepest} m deep", history.method);
             let total = history.total();
             let lost = total[0] - total[total.len() - 1];
-            // µ times the normal forces over the distance slid, and what impacts of lumped nodes cost.
+            // µ times the normal forces over the sliding distance, plus the impact loss of lumped nodes.
             let slid: f64 = history.forces.iter().map(|sides| sides[0] + sides[1]).sum::<f64>() * step * setting.speed;
             println!(
                 "{} {surface:?} µ = {friction}: lost {lost:.3} J, friction {:.3} J",

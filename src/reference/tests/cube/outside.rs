@@ -1,5 +1,6 @@
-//! Codes of others on the cube between two rings beside methods b and c. Their meshes are the same; element matrices, contact
-//! search, normals, friction and tangents are theirs. Tables: `tests/data`, with the commands they come from.
+//! Other programs on the cube between two rings compared with methods b and c. Their meshes are the same; element
+//! matrices, contact search, normals, friction and tangents are independent. Tables: `tests/data`, with the commands
+//! that generate them.
 
 use tiprub_reference::compare::{HistoryDifference, agreement};
 use tiprub_reference::cube::history::CubeHistory;
@@ -16,7 +17,7 @@ fn table(text: &str) -> CubeHistory {
     outside::read(text, CubeSetting::default().speed).unwrap()
 }
 
-/// A method run as long as a table, and recorded as often.
+/// Runs a method as long as a table, with the same recording interval.
 fn run(method: CubeMethod, friction: f64, step: f64, theirs: &CubeHistory) -> CubeHistory {
     let stride = (1..).find(|k| (*k as f64 + 0.5) * step > theirs.step).unwrap();
     let scene = CubeScene::new(facets(friction)).unwrap();
@@ -28,7 +29,7 @@ fn spring(penalty: f64, corners: f64) -> CubeMethod {
     CubeMethod::Augmented(augmented::AugmentedOptions { penalty, corners, tolerance: 1.0 })
 }
 
-/// Compare up to two windows of force before the end of a table.
+/// Compares up to two windows of force before the end of a table.
 fn compare(name: &str, a: &CubeHistory, b: &CubeHistory, end: f64) -> HistoryDifference {
     let found = agreement(a, b, CubeSetting::default().speed, end - 4e-5, end);
     println!("{name}: {found:?}");
@@ -44,7 +45,8 @@ fn assert_within(found: &HistoryDifference, bounds: [f64; 3], name: &str) {
 /// End of the contact of node 1 (s).
 const TOUCHING: f64 = 3.58e-4;
 
-/// GetFEM's rays, normals and tangents with Newmark's method without friction against c with the same contact stiffness.
+/// Rays, normals and tangents of GetFEM with Newmark's method without friction against c with the same contact
+/// stiffness.
 #[test]
 fn agrees_with_getfem_without_friction() {
     let theirs = table(include_str!("../data/cube_getfem_newmark.csv"));
@@ -53,7 +55,7 @@ fn agrees_with_getfem_without_friction() {
     assert!(found.windows < 1e-4 && found.impulse.abs() < 1e-5 && found.left_impulse.abs() < 1e-5, "{found:?}");
 }
 
-/// The same with its Coulomb law and 5e8 N/m a node, µ = 0.15: nodes rebound from the springs, one by one.
+/// GetFEM with its Coulomb law and 5e8 N/m per node, µ = 0.15: nodes rebound from the springs, one by one.
 #[test]
 fn agrees_with_getfem_with_penalty_and_friction() {
     let theirs = table(include_str!("../data/cube_getfem_penalty.csv"));
@@ -63,7 +65,7 @@ fn agrees_with_getfem_with_penalty_and_friction() {
     assert!(found.left_impulse.abs() < 1e-3 && found.exit.abs() < 2e-5, "{found:?}");
 }
 
-/// The same with 1e11 N/m a node, so that gaps close to 20 nm, in b's time stepping, against b.
+/// GetFEM with 1e11 N/m per node, so that gaps close to 20 nm, in the time stepping of b, against b.
 #[test]
 fn bipotential_agrees_with_stiff_getfem_penalty() {
     let theirs = table(include_str!("../data/cube_getfem_held.csv"));
@@ -73,7 +75,7 @@ fn bipotential_agrees_with_stiff_getfem_penalty() {
     assert!(found.windows < 1e-3 && found.left_impulse.abs() < 5e-4, "{found:?}");
 }
 
-/// CalculiX with small strains against c with the stiffness that CalculiX has: 1e12 Pa/m over its areas.
+/// CalculiX with small strains against c with the stiffness of CalculiX: 1e12 Pa/m over its areas.
 #[test]
 fn agrees_with_calculix_for_small_strains() {
     let theirs = table(include_str!("../data/cube_calculix_small.csv"));
@@ -82,7 +84,7 @@ fn agrees_with_calculix_for_small_strains() {
     assert!(found.windows < 0.02 && found.impulse.abs() < 0.015, "{found:?}");
 }
 
-/// Finite strains with one contact stiffness: CalculiX and GetFEM agree with each other, small strains do not.
+/// Finite strains with one contact stiffness: CalculiX and GetFEM agree with each other, small strains differ.
 #[test]
 fn finite_strains_explain_the_difference_from_calculix() {
     let calculix = table(include_str!("../data/cube_calculix.csv"));

@@ -27,7 +27,8 @@ fn meshes_match_the_paper() {
         assert_eq!((ring.nodes.len(), ring.elements.len()), (41 * 9 * 6, 1600));
         assert_eq!(ring.set("SLAVE").unwrap().len(), 41 * 9);
         assert_eq!(ring.set("CLAMPED").unwrap().len(), 2 * 54);
-        // Outer face: 180 mm around x = ∓204 mm, 24 mm from the middle where it is nearest, 1 mm less than half the cube.
+        // Outer face: 180 mm around x = ∓204 mm, 24 mm from the middle at the nearest point, 1 mm less than half the
+        // cube.
         let nearest = ring.nodes.iter().map(|node| node[0].abs()).fold(f64::MAX, f64::min);
         assert!((nearest - 0.024).abs() < 1e-15 && (0.5 * SIDE - nearest - 0.001).abs() < 1e-15);
         for &node in ring.set("SLAVE").unwrap() {
@@ -68,7 +69,7 @@ fn grid(mesh: &Mesh) -> Vec<[f64; 3]> {
     mesh.set("SLAVE").unwrap().iter().map(|&node| mesh.nodes[node]).collect()
 }
 
-/// Parameters of a point by its polar angle, in elements.
+/// Returns the parameters of a point from its polar angle, in elements.
 fn guess(side: RingSide, arc: usize, wide: usize, [x, y, z]: [f64; 3]) -> [f64; 2] {
     let angle = y.atan2(CENTRE - side.sign() * x) / std::f64::consts::FRAC_PI_3;
     [(angle + 1.0) * 0.5 * arc as f64, (z / WIDTH + 0.5) * wide as f64]
@@ -107,7 +108,7 @@ fn spline_converges_to_cylinder_at_fourth_order() {
     }
 }
 
-/// An uneven surface, so that nodes on its ends and edges are met only with the right end conditions.
+/// An uneven surface, so that nodes on its ends and edges are only reproduced with the right end conditions.
 #[test]
 fn spline_interpolates_nodes_at_ends_and_edges() {
     let (rows, columns) = (7, 6);
@@ -134,7 +135,7 @@ fn facets_are_the_chords_of_the_cylinder() {
     let nodes = grid(&ring_mesh(RingSide::Left));
     let surface = SplineSurface::new(SurfaceKind::Facets, 41, 9, 1.0);
     let half = std::f64::consts::FRAC_PI_3 / 40.0;
-    // Over the middle of a facet the cylinder stands higher by its sagitta R (1 − cos(π/120)).
+    // At the middle of a facet the cylinder is higher by its sagitta R (1 − cos(π/120)).
     let point = [-CENTRE + OUTER_RADIUS * half.cos(), OUTER_RADIUS * half.sin(), 0.003];
     let foot = surface.foot(point, &surface.carriers(&nodes), guess(RingSide::Left, 40, 8, point)).unwrap();
     let sagitta = OUTER_RADIUS * (1.0 - half.cos());

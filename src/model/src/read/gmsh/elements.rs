@@ -1,4 +1,4 @@
-//! Element types of Gmsh, and their node order against that of Abaqus.
+//! Element types of Gmsh, with their node order relative to that of Abaqus.
 
 use crate::element::ElementKind;
 
@@ -9,12 +9,12 @@ pub(super) enum GmshElement {
     Solid(ElementKind, &'static [usize]),
     /// A point, line or face with this many nodes.
     LowerDimension(usize),
-    /// Not computed: name and remedy.
+    /// Unsupported element: name and remedy.
     Refused(&'static str, &'static str),
 }
 
 const FIRST: [usize; 8] = [0, 1, 2, 3, 4, 5, 6, 7];
-/// Gmsh numbers edges in another order from the fifth on: of a tetrahedron (0,3), (2,3), (1,3).
+/// Gmsh numbers the edges of a tetrahedron differently from the fifth on: (0,3), (2,3), (1,3).
 const TET10: [usize; 10] = [0, 1, 2, 3, 4, 5, 6, 7, 9, 8];
 /// Gmsh: edges (0,1) (0,3) (0,4) (1,2) (1,5) (2,3) (2,6) (3,7) (4,5) (4,7) (5,6) (6,7).
 const HEX20: [usize; 20] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15];
@@ -25,7 +25,7 @@ const INCOMPLETE: &str =
     "Mesh again with Mesh.SecondOrderIncomplete = 1: quadratic elements without face and interior nodes";
 const LOWER_ORDER: &str = "Mesh again with Mesh.ElementOrder = 2 or 1";
 
-/// Meaning of an element type (Gmsh reference manual, MSH file format).
+/// Returns the meaning of an element type (Gmsh reference manual, MSH file format).
 pub(super) fn gmsh_element(kind: i64) -> Option<GmshElement> {
     use GmshElement::{LowerDimension, Refused, Solid};
     Some(match kind {

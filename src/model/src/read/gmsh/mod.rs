@@ -1,7 +1,7 @@
 //! Gmsh meshes, MSH 4.1, text and binary.
 //!
-//! Physical groups become node sets: the nodes of their elements, of whatever dimension. Node orders of second-order
-//! elements are changed to those of Abaqus. (Format: Gmsh reference manual, MSH file format, version 4.1.)
+//! Physical groups become node sets: the nodes of their elements of any dimension. The node order of second-order
+//! elements is converted to that of Abaqus. (Format: Gmsh reference manual, MSH file format, version 4.1.)
 
 mod elements;
 mod numbers;
@@ -17,10 +17,10 @@ use super::draft::{DraftElement, MeshDraft};
 use super::source::{SourceLine, about};
 use crate::Result;
 
-/// A geometric entity: dimension and tag.
+/// Geometric entity: dimension and tag.
 type Entity = (i64, i64);
 
-/// Read a mesh.
+/// Reads a mesh.
 pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<MeshDraft> {
     let mut reader = GmshReader { names: BTreeMap::new(), groups: BTreeMap::new(), draft: MeshDraft::default() };
     let mut sections = Sections::open(path, bytes)?;
@@ -48,7 +48,7 @@ pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<MeshDraft> {
     Ok(reader.draft)
 }
 
-/// The sections of a file, one after the other.
+/// Iterator over the sections of a file.
 struct Sections<'a> {
     file: Arc<str>,
     bytes: &'a [u8],
@@ -59,7 +59,7 @@ struct Sections<'a> {
 }
 
 impl<'a> Sections<'a> {
-    /// Read `$MeshFormat`.
+    /// Reads `$MeshFormat`.
     fn open(path: &Path, bytes: &'a [u8]) -> Result<Self> {
         let file: Arc<str> = path.display().to_string().into();
         let mut sections = Self { file, bytes, next: 0, line: 1, binary: false, big_endian: false };
@@ -98,7 +98,7 @@ impl<'a> Sections<'a> {
     }
 
     fn error(&self, problem: impl Into<String>, remedy: impl Into<String>) -> crate::Error {
-        // The line just taken.
+        // The line that was just read.
         SourceLine { file: Arc::clone(&self.file), line: (self.line - 1).max(1) }.error(problem, remedy)
     }
 
@@ -120,7 +120,7 @@ impl<'a> Sections<'a> {
         line
     }
 
-    /// The bytes before the line `end`, which is left behind.
+    /// Returns the bytes before the line `end` and continues after it.
     fn skip_behind(&mut self, end: &str) -> Result<&'a [u8]> {
         let rest = self.rest();
         let Some(length) = rest.windows(end.len()).position(|window| window == end.as_bytes()) else {
@@ -133,7 +133,7 @@ impl<'a> Sections<'a> {
         Ok(inside)
     }
 
-    /// Name and numbers of the next section.
+    /// Returns the name and the numbers of the next section.
     fn next(&mut self) -> Result<Option<(String, Numbers<'a>)>> {
         while self.peek_line() == Some("") {
             self.take_line();
@@ -171,7 +171,7 @@ struct GmshReader {
 impl GmshReader {
     fn physical_names(&mut self, numbers: &mut Numbers<'_>) -> Result<()> {
         let Numbers::Text { rest, .. } = numbers else { return Ok(()) };
-        // Names may hold blanks: line by line, DIMENSION TAG "NAME".
+        // Names may contain blanks: read line by line, DIMENSION TAG "NAME".
         for line in rest.lines().map(str::trim).skip(1).filter(|line| !line.is_empty()) {
             let mut parts = line.splitn(3, ' ');
             let (dimension, tag, name) = (parts.next(), parts.next(), parts.next());
@@ -193,7 +193,7 @@ impl GmshReader {
         for (dimension, count) in (0_i64..).zip(counts) {
             for _ in 0..count {
                 let tag = numbers.int()?;
-                // A point has its place, everything else a box around it.
+                // A point has its position, all other entities have a bounding box.
                 for _ in 0..if dimension == 0 { 3 } else { 6 } {
                     numbers.real()?;
                 }
@@ -204,7 +204,7 @@ impl GmshReader {
                         numbers.int()?;
                     }
                 }
-                // A negative tag means the reversed orientation.
+                // A negative tag means reversed orientation.
                 self.groups.insert((dimension, tag), groups.into_iter().map(i64::abs).collect());
             }
         }
@@ -266,7 +266,7 @@ impl GmshReader {
         Ok(())
     }
 
-    /// Names of the physical groups of an entity; those without a name are called `surface_3` and the like.
+    /// Returns the names of the physical groups of an entity; unnamed groups have names such as `surface_3`.
     fn sets_of(&self, entity: Entity) -> Vec<String> {
         let groups = self.groups.get(&entity).map_or(&[][..], Vec::as_slice);
         let name = |tag: &i64| {

@@ -1,16 +1,16 @@
-//! Numbers of a section of a Gmsh file, one by one, from text or from bytes.
+//! Sequential reading of the numbers in a section of a Gmsh file, from text or from bytes.
 
 use std::sync::Arc;
 
 use super::super::source::SourceLine;
 use crate::{Error, Result};
 
-/// Where the numbers of one section come from.
+/// Source of the numbers of one section.
 #[derive(Debug)]
 pub(super) enum Numbers<'a> {
-    /// Words, with the line of each.
+    /// Words with the number of their line.
     Text { file: Arc<str>, rest: &'a str, line: usize },
-    /// Bytes, with the offset in the file of the next one.
+    /// Bytes with the offset of the next one in the file.
     Bytes { file: Arc<str>, rest: &'a [u8], offset: usize, big_endian: bool },
 }
 
@@ -25,7 +25,7 @@ impl<'a> Numbers<'a> {
         }
     }
 
-    /// Where we are, as a place for later messages.
+    /// Returns the current position for later messages.
     pub(super) fn place(&self) -> SourceLine {
         match self {
             Self::Text { file, line, .. } => SourceLine { file: Arc::clone(file), line: *line },
@@ -33,7 +33,7 @@ impl<'a> Numbers<'a> {
         }
     }
 
-    /// At most this many more numbers can come; what a file says of its own length is not trusted beyond that.
+    /// Returns an upper bound of the remaining numbers; larger counts in the file are not trusted.
     pub(super) fn at_most(&self) -> usize {
         match self {
             Self::Text { rest, .. } => rest.len() / 2 + 1,
@@ -68,7 +68,7 @@ impl<'a> Numbers<'a> {
         self.error("the section ends too early or contains something that is not a number", "Export the mesh again")
     }
 
-    /// An `int` of the format.
+    /// Reads an `int` of the format.
     pub(crate) fn int(&mut self) -> Result<i64> {
         let value = match self {
             Self::Text { .. } => self.word().and_then(|word| word.parse::<i32>().ok()),
@@ -77,7 +77,7 @@ impl<'a> Numbers<'a> {
         value.map(i64::from).ok_or_else(|| self.ended())
     }
 
-    /// A `size_t` of the format.
+    /// Reads a `size_t` of the format.
     pub(super) fn size(&mut self) -> Result<u64> {
         let value = match self {
             Self::Text { .. } => self.word().and_then(|word| word.parse().ok()),
@@ -86,7 +86,7 @@ impl<'a> Numbers<'a> {
         value.ok_or_else(|| self.ended())
     }
 
-    /// A `size_t` that counts things of at least `each` numbers, all of which must still come.
+    /// Reads a `size_t` that counts items of at least `each` numbers, all of which must still follow.
     pub(super) fn count(&mut self, each: usize) -> Result<usize> {
         let value = self.size()?;
         let most = self.at_most() / each.max(1) + 1;
@@ -95,7 +95,7 @@ impl<'a> Numbers<'a> {
         })
     }
 
-    /// A finite `double`.
+    /// Reads a finite `double`.
     pub(super) fn real(&mut self) -> Result<f64> {
         let value = match self {
             Self::Text { .. } => self.word().and_then(|word| word.parse().ok()),

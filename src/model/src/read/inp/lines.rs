@@ -1,4 +1,4 @@
-//! Lines of an input file: includes expanded, keywords with their parameters and data grouped.
+//! Lines of an input file: includes are expanded, and keywords are grouped with their parameters and data.
 
 use std::collections::HashSet;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -8,51 +8,52 @@ use std::sync::Arc;
 use super::super::source::{Open, SourceLine, beside, text_of};
 use crate::Result;
 
-/// Files included within each other at most this deep, and this many in all.
+/// Largest depth of nested includes; below, the largest total number of included files.
 const LARGEST_DEPTH: usize = 16;
 const LARGEST_COUNT: usize = 1000;
-/// Largest size of all included files together (bytes).
+/// Largest total size of all included files (bytes).
 const LARGEST_INCLUDED: usize = 1 << 30;
-/// Largest size of all repetitions together (bytes). A list of nodes may belong to several sets, but nodes and elements exist once. Lines in
-/// memory take up to thirty times their length in the file, so repetitions would make gigabytes of a few kilobytes.
+/// Largest total size of all repeated files (bytes). A list of nodes may belong to several sets, but nodes and
+/// elements exist once. Lines in memory take up to thirty times their length in the file, so repetitions could expand
+/// a few kilobytes to gigabytes.
 const LARGEST_REPEATED: usize = 8 << 20;
 
-/// A keyword line with what follows it.
+/// Keyword line with its data lines.
 #[derive(Debug)]
 pub(super) struct Card {
     /// Upper case, one blank between words, without the star: `SOLID SECTION`.
     pub keyword: String,
     /// Name in upper case without blanks, and value as written, if any.
     pub parameters: Vec<(String, Option<String>)>,
-    /// Where the keyword stands.
+    /// Line of the keyword.
     pub place: SourceLine,
-    /// Data lines without comments and empty ones.
+    /// Data lines, without comments and empty lines.
     pub data: Vec<DataLine>,
 }
 
-/// A line of data.
+/// Data line.
 #[derive(Debug, Clone)]
 pub(super) struct DataLine {
-    /// The line without blanks around it.
+    /// Text without leading and trailing blanks.
     pub text: String,
-    /// Where it stands.
+    /// Line in the file.
     pub place: SourceLine,
 }
 
 impl DataLine {
-    /// Values between commas; an empty last one (a comma at the end) is left out.
+    /// Iterates over the values between commas; an empty last value (a comma at the end) is omitted.
     pub(super) fn values(&self) -> impl Iterator<Item = &str> {
         self.text.trim_end_matches([',', ' ', '\t']).split(',').map(str::trim)
     }
 
-    /// Whether the record goes on in the next line.
+    /// Returns whether the record continues in the next line.
     pub(crate) fn is_continued(&self) -> bool {
         self.text.ends_with(',')
     }
 }
 
 impl Card {
-    /// Value of a parameter; an error for one that is there without a value.
+    /// Returns the value of a parameter; an error if it has no value.
     pub(super) fn parameter(&self, name: &str) -> Result<Option<&str>> {
         match self.parameters.iter().find(|(key, _)| key == name) {
             None => Ok(None),
@@ -64,7 +65,7 @@ impl Card {
         }
     }
 
-    /// Value of a parameter that must be there.
+    /// Returns the value of a required parameter.
     pub(super) fn required(&self, name: &str) -> Result<&str> {
         self.parameter(name)?.ok_or_else(|| {
             let problem = format!("*{} has no parameter {name}", self.keyword);
@@ -72,13 +73,13 @@ impl Card {
         })
     }
 
-    /// Whether a parameter is there, with a value or without.
+    /// Returns whether a parameter is given, with or without a value.
     pub(super) fn has(&self, name: &str) -> bool {
         self.parameters.iter().any(|(key, _)| key == name)
     }
 }
 
-/// All cards of a file and of the files it includes.
+/// Returns all cards of a file and of the files it includes.
 pub(super) fn cards(path: &Path, bytes: &[u8], open: Open<'_>) -> Result<Vec<Card>> {
     let mut reader = LineReader {
         open,
@@ -103,11 +104,11 @@ struct LineReader<'a> {
     cards: Vec<Card>,
     active: Vec<PathBuf>,
     count: usize,
-    /// Bytes of included files so far.
+    /// Number of bytes of included files so far.
     included: usize,
-    /// Digests of the contents of included files, which do not depend on how a path is written.
+    /// Digests of the contents of included files, which do not depend on the spelling of a path.
     known: HashSet<u64>,
-    /// Bytes of files whose contents were included before.
+    /// Number of bytes of files whose contents were included before.
     repeated: usize,
     before_first_keyword: Option<SourceLine>,
 }
@@ -116,7 +117,7 @@ impl LineReader<'_> {
     fn file(&mut self, path: PathBuf, bytes: &[u8]) -> Result<()> {
         let (text, name) = (text_of(bytes), Arc::from(path.display().to_string()));
         self.active.push(path);
-        // A keyword line that ends with a comma goes on in the next line.
+        // A keyword line that ends with a comma continues in the next line.
         let mut keyword: Option<(String, SourceLine)> = None;
         for (index, line) in text.lines().enumerate() {
             let line = line.trim();
@@ -156,7 +157,7 @@ impl LineReader<'_> {
         if card.keyword == "INCLUDE" {
             return self.include(&card);
         }
-        // *NODE, INPUT=file and *ELEMENT, INPUT=file: data lines from a file of their own.
+        // *NODE, INPUT=file and *ELEMENT, INPUT=file: data lines in a separate file.
         let elsewhere = match card.keyword.as_str() {
             "NODE" | "ELEMENT" | "NSET" | "ELSET" => card.parameter("INPUT")?.map(str::to_owned),
             _ => None,

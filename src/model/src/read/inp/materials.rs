@@ -1,18 +1,18 @@
-//! Isotropic elastic materials, with tables over temperature.
+//! Isotropic elastic materials, with temperature-dependent tables.
 
 use super::super::source::{SourceLine, number};
 use super::lines::Card;
 use crate::Result;
 use crate::material::Material;
 
-/// Values at temperatures: one row, or several with ascending temperatures.
+/// Table of values over temperature: one row, or several with ascending temperatures.
 #[derive(Debug)]
 struct TemperatureTable<const N: usize> {
     rows: Vec<([f64; N], Option<f64>)>,
     place: SourceLine,
 }
 
-/// A material as read, in the file's units.
+/// Material as read, in the units of the file.
 #[derive(Debug)]
 pub(super) struct DeckMaterial {
     name: String,
@@ -36,7 +36,7 @@ impl DeckMaterial {
         self.name.eq_ignore_ascii_case(name)
     }
 
-    /// `*ELASTIC`, `*DENSITY` or `*EXPANSION` of this material.
+    /// Reads `*ELASTIC`, `*DENSITY` or `*EXPANSION` of this material.
     pub(super) fn read(&mut self, card: &Card) -> Result<()> {
         let kind = card.parameter("TYPE")?.map(str::to_uppercase);
         if kind.as_deref().is_some_and(|kind| !matches!(kind, "ISO" | "ISOTROPIC")) || card.has("DEPENDENCIES") {
@@ -52,7 +52,7 @@ impl DeckMaterial {
         Ok(())
     }
 
-    /// The material at a temperature; without one, no property may be a table.
+    /// Returns the material at a temperature; without a temperature, no property may be a table.
     pub(super) fn at(&self, temperature: Option<f64>) -> Result<Material> {
         let missing = |keyword: &str| {
             let problem = format!("material `{}` has no *{keyword}", self.name);
@@ -86,7 +86,7 @@ impl<const N: usize> TemperatureTable<N> {
         Ok(Self { rows, place: card.place.clone() })
     }
 
-    /// Linear between the rows, constant beyond them.
+    /// Interpolates linearly between the rows, with constant values beyond them.
     fn at(&self, temperature: Option<f64>, material: &str) -> Result<[f64; N]> {
         if let [(values, _)] = self.rows.as_slice() {
             return Ok(*values);

@@ -1,8 +1,9 @@
 //! CalculiX and Abaqus input files: nodes, solid elements, sets, one isotropic material per element.
 //!
-//! Read are `*NODE`, `*ELEMENT`, `*NSET`, `*ELSET`, `*MATERIAL` with `*ELASTIC`, `*DENSITY` and `*EXPANSION`, `*SOLID SECTION`,
-//! `*INCLUDE`, and `*BOUNDARY` as a hint. Keywords that change neither stiffness nor mass are skipped and listed; those that do
-//! are refused, and so is everything unknown before the first `*STEP`. Loads and results inside steps are not read.
+//! Supported are `*NODE`, `*ELEMENT`, `*NSET`, `*ELSET`, `*MATERIAL` with `*ELASTIC`, `*DENSITY` and `*EXPANSION`,
+//! `*SOLID SECTION`, `*INCLUDE`, and `*BOUNDARY` as a hint. Keywords that change neither stiffness nor mass are
+//! skipped and listed; keywords that do, and unknown keywords before the first `*STEP`, are rejected. Loads and
+//! results inside steps are not read.
 
 mod lines;
 mod materials;
@@ -22,18 +23,18 @@ use super::source::{Open, SourceLine, number};
 use crate::Result;
 use crate::material::Material;
 
-/// Content of an input file.
+/// Contents of an input file.
 #[derive(Debug, Default)]
 pub(super) struct Deck {
     /// Nodes, elements, sets.
     pub draft: MeshDraft,
     /// Materials in the order of the file, in its units.
     pub materials: Vec<Material>,
-    /// Content of `*BOUNDARY`, for a hint: set names or node numbers, as written.
+    /// Contents of `*BOUNDARY` as a hint: set names or node numbers, as written.
     pub held: Vec<String>,
 }
 
-/// Read an input file; a table of properties over temperature is read at `temperature`.
+/// Reads an input file; temperature-dependent tables are evaluated at `temperature`.
 pub(super) fn read(path: &Path, bytes: &[u8], temperature: Option<f64>, open: Open<'_>) -> Result<Deck> {
     let mut reader = InpReader::default();
     for card in cards(path, bytes, open)? {
@@ -77,7 +78,7 @@ impl InpReader {
                 self.in_step = true;
             }
             "END STEP" => self.in_step = false,
-            // Loads and results; what changes the structure within a step, contact for one, does not at rest.
+            // Loads and results; changes of the structure within a step, such as contact, do not apply at rest.
             _ if self.in_step => {}
             "PART" => return count(&mut self.parts, card, "part"),
             "INSTANCE" => return self.instance(card),
@@ -141,7 +142,7 @@ impl InpReader {
             let node = label(values.next().unwrap_or(""), line, "a node number")?;
             let mut position = [0.0; 3];
             for x in &mut position {
-                // An empty field is zero, as in the codes that read this format.
+                // An empty field is zero, as in the programs that read this format.
                 *x = match values.next() {
                     None | Some("") => 0.0,
                     Some(text) => number(text).ok_or_else(|| {
@@ -252,7 +253,7 @@ impl InpReader {
         Ok(Deck { draft: self.draft, materials, held: self.held })
     }
 
-    /// Give every element the material of its section.
+    /// Assigns to every element the material of its section.
     fn assign_materials(&mut self) -> Result<()> {
         for section in core::mem::take(&mut self.sections) {
             let InpSection { set, material, place } = &section;
@@ -282,7 +283,7 @@ impl InpReader {
     }
 }
 
-/// Count something of which one is read, and refuse the second.
+/// Counts items of which only one is supported, and rejects the second.
 fn count(counter: &mut usize, card: &Card, what: &str) -> Result<()> {
     *counter += 1;
     if *counter == 1 {
@@ -294,7 +295,7 @@ fn count(counter: &mut usize, card: &Card, what: &str) -> Result<()> {
         .error(problem, "Merge the parts into one mesh, or export the input file without parts and assemblies"))
 }
 
-/// A number of a node or an element.
+/// Reads a number of a node or an element.
 fn label(text: &str, line: &DataLine, what: &str) -> Result<u64> {
     text.parse::<u64>()
         .ok()

@@ -1,4 +1,4 @@
-//! Node and element sets: numbers, ranges and other sets, resolved when everything is known.
+//! Node and element sets: numbers, ranges and other sets, resolved after the file is read.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,7 +7,7 @@ use super::super::source::SourceLine;
 use super::lines::Card;
 use crate::Result;
 
-/// Name without the instance in front of it: `PART-1-1.TIP` is `TIP`.
+/// Returns the name without its instance prefix: `PART-1-1.TIP` becomes `TIP`.
 pub(super) fn local_name(name: &str) -> &str {
     name.rsplit_once('.').map_or(name, |(_, local)| local).trim_matches('"')
 }
@@ -15,9 +15,9 @@ pub(super) fn local_name(name: &str) -> &str {
 #[derive(Debug)]
 enum SetMember {
     Number(u64),
-    /// A number written in a set of its own, which must exist.
+    /// A number that is listed explicitly, which must exist.
     Written(u64, SourceLine),
-    /// First, last, increment; what does not exist in between is not missed.
+    /// First, last, increment; numbers in between need not exist.
     Range(u64, u64, u64),
     Set(String, SourceLine),
 }
@@ -36,7 +36,7 @@ pub(super) struct InpSets {
 }
 
 impl NamedSets {
-    /// A member that is defined on the spot.
+    /// Adds a number that is defined together with the set.
     pub(super) fn add(&mut self, set: &str, number: u64) {
         self.entry(set).push(SetMember::Number(number));
     }
@@ -46,7 +46,7 @@ impl NamedSets {
         self.sets.entry(name).or_default()
     }
 
-    /// Data of `*NSET` or `*ELSET`.
+    /// Reads the data of `*NSET` or `*ELSET`.
     pub(super) fn read(&mut self, card: &Card, set: &str) -> Result<()> {
         let mut members = Vec::new();
         if let Some(elements) = card.parameter("ELSET")?.filter(|_| card.keyword == "NSET") {
@@ -80,7 +80,7 @@ impl NamedSets {
         Ok(())
     }
 
-    /// Numbers of the members of a set that exist.
+    /// Returns the numbers of the existing members of a set.
     pub(super) fn members(&self, set: &str, place: &SourceLine, draft: &MeshDraft) -> Result<BTreeSet<u64>> {
         let every: Vec<u64> = draft.elements.iter().map(|element| element.number).collect();
         self.resolve(local_name(set), place, &every, &|number| !draft.nodes_of(number).is_empty())
@@ -129,7 +129,7 @@ impl NamedSets {
 }
 
 impl InpSets {
-    /// Every node set, and every element set as the set of its nodes.
+    /// Converts every node set, and every element set as the set of its nodes.
     pub(crate) fn into_node_sets(self, draft: &mut MeshDraft) -> Result<()> {
         let nowhere = SourceLine { file: "".into(), line: 0 };
         let mut node_sets = BTreeMap::new();

@@ -1,23 +1,23 @@
-//! Which keywords and element types are known, and what is done with each.
+//! Known keywords and element types, and their treatment.
 
 use crate::element::ElementKind;
 
 /// Meaning of an element type.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum ElementType {
-    /// Computed as the file's own code does.
+    /// Element with the same formulation as in the program of the file.
     Solid(ElementKind),
-    /// Computed, but with the full integration of this kind instead of what the type asks for.
+    /// Element that is computed with the full integration of this kind instead of the rule of its type.
     Near(ElementKind),
-    /// Points, lines and faces: left out of the model, their sets kept.
+    /// Points, lines and faces: omitted from the model, but their sets are kept.
     LowerDimension,
-    /// Not computed; the reason and the remedy.
+    /// Unsupported element: reason and remedy.
     Refused(&'static str, &'static str),
 }
 
 const MATRICES: &str = "Use quadratic elements (C3D20, C3D15, C3D10), or give the matrices: --stiffness and --mass";
 
-/// Meaning of an element type, in upper case.
+/// Returns the meaning of an element type in upper case.
 pub(super) fn element_type(name: &str) -> ElementType {
     use ElementType::{LowerDimension, Near, Refused, Solid};
     match name {
@@ -55,11 +55,11 @@ pub(super) fn element_type(name: &str) -> ElementType {
 /// Treatment of a keyword that is not read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum UnreadKeyword {
-    /// It changes neither stiffness nor mass nor sets.
+    /// The keyword changes neither stiffness nor mass nor sets.
     Harmless,
-    /// It changes what is computed.
+    /// The keyword changes the computed model.
     Changes,
-    /// It means nothing to this reader.
+    /// The keyword is unknown.
     Unknown,
 }
 

@@ -1,4 +1,4 @@
-//! Matrix files: Matrix Market, CalculiX's matrix storage, Abaqus text.
+//! Matrix files: Matrix Market, matrix storage of CalculiX, Abaqus text.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -11,23 +11,23 @@ use crate::Result;
 /// Labels of the rows of a matrix.
 #[derive(Debug)]
 pub(super) enum Labels {
-    /// Counted from the first, so many of them.
+    /// Number of rows that are counted from the first.
     Counted(usize),
-    /// Node number and component (from 1) of each.
+    /// Node number and component (from 1) of each row.
     Named(Vec<(u64, u64)>),
 }
 
-/// A matrix as read.
+/// Matrix as read from a file.
 #[derive(Debug)]
 pub(super) struct RawMatrix {
     pub entries: Entries,
     pub labels: Labels,
 }
 
-/// Most rows of a matrix: what a header says is not trusted beyond that.
+/// Largest number of rows of a matrix; larger numbers in a header are not trusted.
 const LARGEST_ORDER: usize = 30_000_000;
 
-/// Read a matrix of any of the formats.
+/// Reads a matrix in any of the formats.
 pub(super) fn read_matrix(path: &Path, bytes: &[u8]) -> Result<RawMatrix> {
     let text = text_of(bytes);
     let file: Arc<str> = path.display().to_string().into();
@@ -62,7 +62,7 @@ fn wrong_line(line: &str, place: &SourceLine, wanted: &str) -> crate::Error {
     place.error(format!("`{line}` is not of the form {wanted}"), "Correct the line, or export the matrix again")
 }
 
-/// NIST, Matrix Market exchange formats: coordinate format.
+/// Reads the coordinate format of Matrix Market (NIST, Matrix Market exchange formats).
 fn matrix_market<'a>(path: &Path, mut lines: impl Iterator<Item = (&'a str, SourceLine)>) -> Result<RawMatrix> {
     let (header, place) = lines.next().unwrap_or(("", SourceLine { file: "".into(), line: 0 }));
     let words: Vec<String> = header.split_whitespace().skip(1).map(str::to_lowercase).collect();
@@ -114,7 +114,7 @@ fn matrix_market<'a>(path: &Path, mut lines: impl Iterator<Item = (&'a str, Sour
     Ok(RawMatrix { entries, labels: Labels::Counted(order) })
 }
 
-/// ROW COLUMN VALUE, rows and columns from 1.
+/// Reads ROW COLUMN VALUE, rows and columns from 1.
 fn entry(line: &str, place: &SourceLine) -> Result<(usize, usize, f64)> {
     let mut fields = values(line);
     let (row, column, value, rest) = (fields.next(), fields.next(), fields.next(), fields.next());
@@ -141,8 +141,8 @@ fn counted<'a>(path: &Path, lines: impl Iterator<Item = (&'a str, SourceLine)>) 
     Ok(RawMatrix { entries: Entries { items }, labels: Labels::Counted(order) })
 }
 
-/// CalculiX and Abaqus write every entry once: one that comes again is a file that was appended to. (In Matrix Market files,
-/// entries of one place add up, as its readers have it.)
+/// Rejects repeated entries: CalculiX and Abaqus write every entry once, so a repeated one means that a file was
+/// appended to. (In Matrix Market files repeated entries add up, as its readers define it.)
 fn check_repeated(path: &Path, items: &[(usize, usize, f64)], name: impl Fn(usize) -> String) -> Result<()> {
     let mut places: Vec<(usize, usize)> = items.iter().map(|&(row, column, _)| (row, column)).collect();
     places.sort_unstable();
@@ -155,7 +155,7 @@ fn check_repeated(path: &Path, items: &[(usize, usize, f64)], name: impl Fn(usiz
     }
 }
 
-/// NODE, DOF, NODE, DOF, VALUE.
+/// Reads NODE, DOF, NODE, DOF, VALUE.
 fn named<'a>(path: &Path, lines: impl Iterator<Item = (&'a str, SourceLine)>) -> Result<RawMatrix> {
     let (mut labels, mut index, mut entries) = (Vec::new(), HashMap::new(), Entries::default());
     for (line, place) in lines {
@@ -185,7 +185,7 @@ fn named<'a>(path: &Path, lines: impl Iterator<Item = (&'a str, SourceLine)>) ->
     Ok(RawMatrix { entries, labels: Labels::Named(labels) })
 }
 
-/// CalculiX's `.dof`: node.component of each row, one per line.
+/// Reads the `.dof` file of CalculiX: node.component of each row, one per line.
 pub(super) fn read_dofs(path: &Path, bytes: &[u8]) -> Result<Vec<(u64, u64)>> {
     let text = text_of(bytes);
     let file: Arc<str> = path.display().to_string().into();

@@ -1,11 +1,11 @@
-//! Models from the matrices of another code: K, M and a table of nodes.
+//! Models from the matrices of another program: K, M and a table of nodes.
 //!
-//! | format | told by | dofs of a row |
+//! | format | recognised by | dofs of a row |
 //! |---|---|---|
 //! | Matrix Market `coordinate`, `real`, `symmetric` or `general` | `%%MatrixMarket` | 3·node + component, nodes in the order of the table |
 //! | CalculiX `*FREQUENCY, SOLVER=MATRIXSTORAGE` (`.sti`, `.mas`) | `.dof` beside it | `node.component` per line of the `.dof` file |
-//! | Abaqus `*MATRIX OUTPUT, FORMAT=MATRIX INPUT` | five values a line | node and component stand in the line |
-//! | Abaqus `FORMAT=COORDINATE` | three values a line | as Matrix Market |
+//! | Abaqus `*MATRIX OUTPUT, FORMAT=MATRIX INPUT` | five values per line | node and component in the line |
+//! | Abaqus `FORMAT=COORDINATE` | three values per line | as Matrix Market |
 //!
 //! One triangle or both may be given. Dofs of clamped nodes may be missing.
 
@@ -27,30 +27,30 @@ use crate::Result;
 use crate::fe_model::FeModel;
 use crate::sparse::SparseMatrix;
 
-/// The files of a model.
+/// Files of a model.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct MatrixFiles {
     /// K.
     pub stiffness: PathBuf,
     /// M.
     pub mass: PathBuf,
-    /// Nodes: a table `node,x,y,z[,sets]`, or a mesh file whose nodes and sets are taken.
+    /// Nodes: a table `node,x,y,z[,sets]`, or a mesh file whose nodes and sets are used.
     pub nodes: PathBuf,
-    /// CalculiX's list of dofs, where it does not lie beside K with the extension `.dof`.
+    /// List of dofs of CalculiX, unless it is the file beside K with the extension `.dof`.
     pub dofs: Option<PathBuf>,
     /// Units of matrices and coordinates.
     pub units: Units,
-    /// The engine axis in the files.
+    /// Engine axis in the files.
     pub axis: EngineAxis,
-    /// Sets of nodes whose dofs the matrices leave out, for formats whose rows name no nodes.
+    /// Sets of nodes whose dofs the matrices omit, for formats whose rows do not name nodes.
     pub left_out: Vec<String>,
 }
 
-/// Read a model from matrices.
+/// Reads a model from matrices.
 ///
 /// # Errors
-/// [`Error::File`](crate::Error::File); [`Error::Read`](crate::Error::Read) with file and line, and for matrices that do not fit each other or the
-/// nodes, are not symmetric, or hold a mass that is not positive.
+/// [`Error::File`](crate::Error::File); [`Error::Read`](crate::Error::Read) with file and line, and for matrices that
+/// do not match each other or the nodes, are not symmetric, or include a mass that is not positive.
 pub fn read_matrices(files: &MatrixFiles) -> Result<Imported> {
     let table = read_nodes(&files.nodes, files.units, files.axis)?;
     let dofs = dof_file(files)?;
@@ -91,7 +91,7 @@ pub fn read_matrices(files: &MatrixFiles) -> Result<Imported> {
     })
 }
 
-/// CalculiX's `node.component` of each row.
+/// Returns `node.component` of each row as written by CalculiX.
 fn dof_file(files: &MatrixFiles) -> Result<Option<Vec<(u64, u64)>>> {
     let beside = files.stiffness.with_extension("dof");
     let path = match &files.dofs {
@@ -102,11 +102,11 @@ fn dof_file(files: &MatrixFiles) -> Result<Option<Vec<(u64, u64)>>> {
     formats::read_dofs(&path, &open_file(&path)?).map(Some)
 }
 
-/// Rows of the dofs.
+/// Dofs of the rows.
 struct DofRows<'a> {
     table: &'a NodeTable,
     index: HashMap<u64, usize>,
-    /// Nodes without those left out, in the order of the table.
+    /// Nodes without the omitted ones, in the order of the table.
     kept: Vec<usize>,
     files: &'a MatrixFiles,
 }
@@ -141,7 +141,7 @@ impl<'a> DofRows<'a> {
         Ok(3 * index + self.files.axis.place(component - 1))
     }
 
-    /// Dofs of the rows of a matrix whose rows are only counted.
+    /// Returns the dofs of the rows of a matrix whose rows are only counted.
     fn counted(&self, path: &Path, order: usize) -> Result<Vec<usize>> {
         let (all, kept) = (self.table.numbers.len(), self.kept.len());
         let nodes: Vec<usize> = if order == 3 * all {
@@ -168,7 +168,7 @@ impl<'a> DofRows<'a> {
     }
 }
 
-/// Entries of a matrix file by dofs of all nodes.
+/// Returns the entries of a matrix file by dofs of all nodes.
 fn located(path: &Path, dofs: Option<&[(u64, u64)]>, rows: &DofRows<'_>) -> Result<Entries> {
     let RawMatrix { entries, labels } = read_matrix(path, &open_file(path)?)?;
     let dof_of = match (labels, dofs) {
@@ -189,22 +189,23 @@ fn located(path: &Path, dofs: Option<&[(u64, u64)]>, rows: &DofRows<'_>) -> Resu
     Ok(Entries { items })
 }
 
-/// A diagonal as large as this stands for a dof that Abaqus holds.
+/// Size of a diagonal entry above which it represents a dof that Abaqus holds.
 const HELD: f64 = 1e35;
-/// Largest difference of entries beside the diagonal from their mirror images, as a share of the larger diagonal.
+/// Largest difference between off-diagonal entries and their mirror images, as a fraction of the larger diagonal
+/// entry.
 const ASYMMETRY: f64 = 1e-8;
 
-/// A place above the diagonal (or on it) and its mirror image.
+/// Position above the diagonal (or on it) with its mirror image.
 struct MirrorPair {
     low: usize,
     high: usize,
     /// Sums of the entries above and below the diagonal.
     sums: [f64; 2],
-    /// Whether there are any.
+    /// True if there are entries above and below the diagonal.
     given: [bool; 2],
 }
 
-/// Entries by pairs of places, in the order of rows and columns.
+/// Groups entries by pairs of positions, in the order of rows and columns.
 fn pairs(entries: &Entries, scale: f64) -> Vec<MirrorPair> {
     let place = |&(i, j, value): &(usize, usize, f64)| (i.min(j), i.max(j), usize::from(i > j), scale * value);
     let mut items: Vec<(usize, usize, usize, f64)> = entries.items.iter().map(place).collect();
@@ -222,9 +223,9 @@ fn pairs(entries: &Entries, scale: f64) -> Vec<MirrorPair> {
     pairs
 }
 
-/// Both triangles from one or from both, scaled; and the dofs that are held by a huge diagonal.
+/// Returns both triangles from one or both, scaled, and the dofs that are held by a huge diagonal entry.
 ///
-/// A file of one triangle, in the order of its own rows, names each pair of dofs once, whatever their order here.
+/// A file with one triangle, in its own row order, contains each pair of dofs once, in either order.
 fn mirrored(path: &Path, entries: Entries, order: usize, scale: f64) -> Result<(Entries, Vec<usize>)> {
     let held =
         entries.items.iter().filter(|&&(i, j, value)| i == j && value.abs() > HELD).map(|entry| entry.0).collect();
@@ -254,7 +255,7 @@ fn mirrored(path: &Path, entries: Entries, order: usize, scale: f64) -> Result<(
     Ok((Entries { items }, held))
 }
 
-/// Take held dofs out of the stiffness: they are absent.
+/// Removes held dofs from the stiffness, as if they were absent.
 fn release(stiffness: &mut SparseMatrix, held: &mut Vec<usize>) {
     held.sort_unstable();
     held.dedup();
@@ -274,7 +275,7 @@ fn diagonal(matrix: &SparseMatrix, dof: usize) -> f64 {
     found.map_or(0.0, |offset| matrix.values[range.start + offset])
 }
 
-/// Nodes without any stiffness. A node that lacks one or two directions is refused.
+/// Returns the nodes without any stiffness. A node that lacks one or two directions is rejected.
 fn absent_nodes(files: &MatrixFiles, numbers: &[u64], stiffness: &SparseMatrix) -> Result<Vec<usize>> {
     let mut absent = Vec::new();
     for (node, number) in numbers.iter().enumerate() {
@@ -315,13 +316,14 @@ fn check_mass(files: &MatrixFiles, numbers: &[u64], mass: &SparseMatrix, absent:
     Ok(())
 }
 
-/// Inertia of a motion along one axis, as a share of Σ|M|, below which there is none; a stiffness leaves round-off.
+/// Inertia of a motion along one axis, as a fraction of Σ|M|, below which there is none; a stiffness matrix yields
+/// round-off.
 const NO_INERTIA: f64 = 1e-6;
-/// Inertia along the three axes agrees to this share.
+/// Largest relative difference of the inertia along the three axes.
 const UNEQUAL: f64 = 0.01;
 
-/// A mass resists motion along each axis alike. A stiffness in its place resists none, or (with clamped nodes left out)
-/// each differently.
+/// Checks that a mass resists motion along each axis equally. A stiffness in its place resists none, or (without
+/// clamped nodes) each differently.
 fn check_inertia(path: &Path, mass: &SparseMatrix) -> Result<Option<String>> {
     let (mut inertia, mut size) = ([0.0_f64; 3], 0.0_f64);
     for column in 0..mass.order() {
@@ -346,11 +348,11 @@ fn check_inertia(path: &Path, mass: &SparseMatrix) -> Result<Option<String>> {
     }))
 }
 
-/// A rigid motion that strains the model this much, as a share of Σ|K||u|, is more than round-off of printed numbers.
+/// Strain of a rigid motion, as a fraction of Σ|K||u|, that exceeds the round-off of printed numbers.
 const STRAINED: f64 = 1e-5;
 
-/// Rigid motions must not strain a model without boundary: translations if it is tied to the ground, rotations also if the
-/// nodes do not belong to the rows.
+/// Warns if rigid motions strain a model without boundary conditions: translations if it is supported, rotations also
+/// if the nodes do not belong to the rows.
 fn rigid_motion_warning(nodes: &[[f64; 3]], stiffness: &SparseMatrix) -> Option<String> {
     let motion = |kind: usize, [x, y, z]: [f64; 3]| match kind {
         0 => [1.0, 0.0, 0.0],

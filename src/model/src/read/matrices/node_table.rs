@@ -1,4 +1,4 @@
-//! Nodes of a model that comes as matrices.
+//! Nodes of a model from matrices.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -11,7 +11,7 @@ use crate::Result;
 /// Nodes with their numbers and sets.
 #[derive(Debug)]
 pub(super) struct NodeTable {
-    /// Numbers in the order of the table; of a mesh file, ascending.
+    /// Numbers in the order of the table; for a mesh file, ascending.
     pub numbers: Vec<u64>,
     /// Coordinates (m).
     pub positions: Vec<[f64; 3]>,
@@ -20,7 +20,7 @@ pub(super) struct NodeTable {
     pub notes: Vec<String>,
 }
 
-/// Read a table `node,x,y,z[,sets]` (sets separated by blanks or semicolons), or the nodes and sets of a mesh file.
+/// Reads a table `node,x,y,z[,sets]` (sets separated by blanks or semicolons), or the nodes and sets of a mesh file.
 pub(super) fn read_nodes(path: &Path, units: Units, axis: EngineAxis) -> Result<NodeTable> {
     let bytes = open_file(path)?;
     let extension = path.extension().map(|extension| extension.to_ascii_lowercase()).unwrap_or_default();
@@ -66,7 +66,7 @@ fn of_table(path: &Path, text: &str) -> Result<NodeTable> {
             continue;
         }
         let fields: Vec<&str> = line.split(',').map(str::trim).collect();
-        // The first line may be a heading.
+        // The first line may be a header.
         if table.numbers.is_empty() && fields[0].eq_ignore_ascii_case("node") {
             continue;
         }
