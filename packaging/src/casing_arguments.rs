@@ -65,7 +65,7 @@ pub struct CasingArguments {
     /// Number of fixed-interface modes used for the reduction [default: 156].
     #[arg(long, value_name = "N")]
     pub fixed_interface_modes: Option<usize>,
-    /// Output options; a casing other than casing37 is called casing.
+    /// Output options; the default name is casing37, or `casing` for any other casing.
     #[command(flatten)]
     pub written: OutputArguments,
 }

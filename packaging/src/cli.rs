@@ -61,7 +61,7 @@ pub enum Command {
                             docs/models.md explains how to use your own models; docs/rom-file.md explains how to write \
                             a ROM from Python.")]
     Reduce(ReduceArguments),
-    /// Package a scene as .fmu files. Scene and ROM are data for one FMU library, which is built once if it is missing.
+    /// Package a scene as .fmu files. The scene and its ROMs are data for a common FMU library, which is built once if it is missing.
     #[command(after_help = "Examples:\n  tiprub package scene.toml                 both FMUs in this directory\n  \
                             tiprub package scene.toml --fmi 3 -o rub.fmu\n  \
                             tiprub package scene.toml --arrays        FMI 3 variables as arrays\n  \
@@ -89,7 +89,7 @@ pub enum Command {
                             tiprub inspect scene.toml --json\n  tiprub inspect builtin:flexible-casing"
     )]
     Inspect(InspectArguments),
-    /// Study a scene: figures, numbers and tested statements.
+    /// Study a scene: figures, numbers and checks of expected results.
     #[command(after_help = "Examples:\n  tiprub study error scene.toml\n  tiprub study stability scene.toml\n  \
                             tiprub study map scene.toml --speeds 1200:1500:61\n  tiprub study error --help\n\n\
                             DIR then contains index.html (opens offline), an SVG and a CSV per figure, and \
@@ -135,7 +135,7 @@ pub struct PackageArguments {
     /// The .fmu file, or a directory for it (always a directory with `--fmi both`).
     #[arg(long, short, value_name = "FILE|DIR", default_value = ".")]
     pub output: PathBuf,
-    /// FMI 3: write arrays. Without --arrays and --scalars, an FMU has arrays if it would otherwise have more than 300
+    /// FMI 3: write arrays. Without --arrays or --scalars, an FMU has arrays if it would otherwise have more than 300
     /// scalars.
     #[arg(long, conflicts_with = "scalars")]
     pub arrays: bool,

@@ -114,7 +114,8 @@ pub fn load(unit: LibraryUnit, arguments: &LibraryArguments, console: &Console) 
             if !arguments.library.contains(&path) {
                 continue;
             }
-            let problem = "is the library of the other FMU: scenes and heat conduction have separate libraries";
+            let problem =
+                "is the library for the other kind of FMU: scenes and heat conduction have separate libraries";
             return Err(Failure::new(path.display(), problem, format!("Give {}", unit.names().1)));
         }
         if let Some((other, _)) = found.get(&platform) {

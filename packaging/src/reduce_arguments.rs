@@ -29,7 +29,7 @@ pub struct ReduceArguments {
 /// Models that can be reduced.
 #[derive(Debug, Subcommand)]
 pub enum ModelToReduce {
-    /// Your own blades on a rigid hub, from a mesh (CalculiX/Abaqus .inp, Gmsh 4.1 .msh) or from matrices of any code.
+    /// Your own blades on a rigid hub, from a mesh (CalculiX/Abaqus .inp, Gmsh 4.1 .msh) or from matrices exported by any finite-element code.
     #[command(
         after_help = "Examples:\n  tiprub reduce blade blade.inp --clamp-set ROOT --sectors 36 --units mm-t-s\n  \
                             tiprub reduce blade blade.msh --contact-set TIP --clamp-set ROOT --material titanium --contact-patches 17\n  \

@@ -249,13 +249,16 @@ impl RomFacts {
         if forward >= USUAL_FRICTION || backward < OTHER_SENSE * forward {
             return None;
         }
-        let other =
-            if backward.is_finite() { format!("only from µ = {backward:.2}") } else { "for no friction".to_owned() };
+        let other = if backward.is_finite() {
+            format!("only at µ = {backward:.2} and above")
+        } else {
+            "at no friction coefficient".to_owned()
+        };
         let ahead = self.leading_edge().map_or(String::new(), |node| {
             format!(" With a positive `speed`, the edge at z = {:.4} m ({}) leads.", node.position[2], node.name)
         });
         Some(format!(
-            "the tip locks up from friction µ* = {forward:.2} when the rotor turns towards +θ (positive `speed`), but \
+            "the tip locks up at friction µ* = {forward:.2} and above when the rotor turns towards +θ (positive `speed`), but \
              {other} when it turns towards −θ: is the blade staggered for the opposite sense of rotation?{ahead} If \
              the other edge should lead, give a negative `speed`, or mirror the mesh"
         ))

@@ -84,7 +84,10 @@ fn of_structure(structure: &StructureSettings, rom: &Rom, found: &mut Vec<String
         found.push(format!("`{name}` is excited by engine order {}: {where_to}", excitation.order));
     }
     if !structure.initial.is_empty() {
-        found.push(format!("blades of `{name}` move at the start, with {} initial motions", structure.initial.len()));
+        found.push(format!(
+            "the blades of `{name}` are already moving at the start ({} initial motions)",
+            structure.initial.len()
+        ));
     }
     if !structure.damping_ratios.is_empty() {
         found.push(format!(
@@ -178,7 +181,7 @@ pub fn limits(scene: &Scene) -> Vec<String> {
         "Sliding friction can make the structure itself flutter; a scheme that would add numerical growth is rejected.",
         choose(
             settings.time.scheme.is_massless(),
-            "The highest modes, three per contact node, follow contact immediately and have no inertia.",
+            "The highest modes, three per contact node, respond to contact immediately and have no inertia.",
             "The mass of a contact node loses its kinetic energy at impact: an error of first order in mesh size, not in h.",
         ),
     ];
@@ -217,7 +220,7 @@ fn limits_of_flight(settings: &SceneSettings) -> [&'static str; 5] {
 fn blades(coupled: bool, stiffens: bool) -> &'static str {
     match (coupled, stiffens) {
         (true, _) => {
-            "Blades are coupled through the disk; all sectors are equal, and speed causes neither stiffening nor \
+            "Blades are coupled through the disk; all sectors are identical, and speed causes neither stiffening nor \
              Coriolis forces."
         }
         (false, true) => {

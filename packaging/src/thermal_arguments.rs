@@ -28,7 +28,7 @@ pub struct ThermalArguments {
     /// Engine axis in FILE; the other axes follow in cyclic order [default: z].
     #[arg(long, value_enum, requires = "file")]
     pub axis: Option<AxisChoice>,
-    /// The casing, as for `tiprub reduce casing`: with the same options patches are the same.
+    /// The casing, as for `tiprub reduce casing`: with the same options, the patches are the same.
     #[command(flatten)]
     pub ring: RingArguments,
     /// Conductivity (W/(m K)), instead of the material's [default: 53.3 for steel, 6.7 for titanium].

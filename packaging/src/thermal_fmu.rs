@@ -86,7 +86,7 @@ impl<'a> ThermalPackage<'a> {
                 "Conductivity, heat capacity and film coefficients do not depend on temperature; there is no radiation."
                     .into(),
                 "The end faces are adiabatic.".into(),
-                "Heat enters evenly over the heated surface of a patch: flashes of single contacts are not resolved."
+                "Heat enters evenly over the heated surface of a patch: flash temperatures of individual contacts are not resolved."
                     .into(),
             ],
             warnings: Vec::new(),

@@ -149,7 +149,7 @@ fn inspect_resources(fmu: &UnpackedFmu, measure: bool, console: &Console) -> Res
         return Err(Failure::new(
             "resources/",
             format!("token {} of the scene differs from the token in modelDescription.xml", resources.token),
-            "Package the FMU again with `tiprub package`; one of them was modified",
+            "Package the FMU again with `tiprub package`; the scene or modelDescription.xml was modified",
         ));
     }
     describe_scene(&resources.scene, measure, console).map(Some)

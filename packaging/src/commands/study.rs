@@ -65,7 +65,7 @@ fn convergence(own: &ConvergenceCommand, console: &Console) -> Result<CommandOut
             outcome.text.push_str(&format!("\n{}", estimate::errors_text(&estimate::of_rom(&rom))));
         } else {
             let warning = format!(
-                "{} contains the ROM unchanged: no error due to its modes, patches or mesh was found, for the reasons \
+                "{} contains the ROM unchanged: no error due to its modes, patches or mesh could be determined, for the reasons \
                  above",
                 path.display()
             );

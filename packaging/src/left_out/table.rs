@@ -178,7 +178,7 @@ pub static EFFECTS: &[Effect] = &[
         };
         each_rotor(scene, |one| one.initial = vec![initial]);
     }),
-    physics("damping ratios of single modes", "`structure.damping_ratios`", rotates, |scene| {
+    physics("damping ratios of individual modes", "`structure.damping_ratios`", rotates, |scene| {
         scene.settings.structures.iter().any(|one| !one.damping_ratios.is_empty())
     })
     .by(|scene| each_rotor(scene, |one| one.damping_ratios = vec![1e-3])),

@@ -135,7 +135,7 @@ fn error_study() -> NumberedFigure {
     let body = format!("<div class=\"scroll adapts\">{ERROR_PICTURE}</div>");
     let caption =
         "Error against run time of adaptive steps, fixed steps and the paper's method for a light rub of the \
-                   built-in rotor 37, measured once (docs/error-study.md of the sources). The demo does not repeat \
+                   built-in rotor 37, measured once (see docs/error-study.md in the sources). The demo does not repeat \
                    this study. To run it on this machine, use <code>tiprub study error builtin:rotor37</code>; with \
                    <code>--quick</code> it takes minutes."
             .to_owned();
@@ -250,7 +250,7 @@ fn forces(input: &ReportInput<'_>, results: &Results<'_>) -> Result<Vec<Numbered
         figures.push(NumberedFigure {
             body: plot.to_html()?,
             caption:
-                "Reaction torque of the casing on the shaft, mean over the communication step; negative values brake."
+                "Reaction torque of the casing on the shaft, mean over the communication step; negative values brake the rotor."
                     .into(),
         });
     }

@@ -222,7 +222,7 @@ fn sets_of(imported: &Imported) -> String {
     if imported.model.sets.is_empty() {
         return "the model has no sets: define groups of nodes, elements or faces in the mesh generator".into();
     }
-    format!("sets of the model with their numbers of nodes: {}", set_counts(&imported.model.sets))
+    format!("sets of the model with their node counts: {}", set_counts(&imported.model.sets))
 }
 
 fn named_set<'a>(imported: &Imported, name: Option<&'a str>, option: &str) -> Result<&'a str> {

@@ -140,7 +140,7 @@ fn time_varying_inputs_are_followed_without_delay() {
         (
             "time,speed\n0,100\n",
             &["--set", "speed=50"],
-            "--set speed: the file of --inputs also has a column for this variable",
+            "--set speed: the file given with --inputs also has a column for this variable",
         ),
     ] {
         fs::write(project.path("inputs.csv"), inputs).unwrap();

@@ -33,7 +33,8 @@ impl RomBytes {
         if self.0 <= LARGEST_ROMS {
             return Ok(());
         }
-        let problem = format!("this file brings the ROM files of the scene above the limit of {LARGEST_ROMS} bytes");
+        let problem =
+            format!("this file brings the total size of the ROM files above the limit of {LARGEST_ROMS} bytes");
         Err(Error::file(path, problem, "Use fewer structures or smaller ROMs"))
     }
 }

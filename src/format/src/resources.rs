@@ -259,7 +259,7 @@ fn parse_package(path: &Path, text: &str) -> Result<PackageFile> {
     if version != Some(i64::from(RESOURCES_FORMAT_VERSION)) {
         let found = version.map_or("none".to_owned(), |version| version.to_string());
         let problem = format!("found format_version {found}, expected {RESOURCES_FORMAT_VERSION}");
-        return Err(Error::file(path, problem, "Recreate the FMU with `tiprub package` of the same release"));
+        return Err(Error::file(path, problem, "Recreate the FMU with `tiprub package` from the same release"));
     }
     table.try_into().map_err(|error: toml::de::Error| Error::file(path, error.message(), INTACT))
 }

@@ -280,7 +280,7 @@ impl RomReader<'_> {
     fn entry<'a>(&self, metadata: &'a Metadata, key: &str) -> Result<&'a str> {
         let layout = METADATA.iter().find(|entry| entry.name == key).map_or("", |entry| entry.description);
         let value = metadata.get(key).ok_or_else(|| {
-            self.error(format!("metadata `{key}`"), "missing", format!("Add this string to the metadata: {layout}"))
+            self.error(format!("metadata `{key}`"), "missing", format!("Add it to the metadata as a string: {layout}"))
         })?;
         Ok(value)
     }

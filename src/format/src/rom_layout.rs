@@ -136,7 +136,7 @@ pub const ARRAYS: [ArrayLayout; 34] = [
         "[modes]",
         "1",
         false,
-        "Nodal diameter of each mode in the arrays of frequencies and checks; only with coupled sectors.",
+        "Nodal diameter of each mode in the arrays of frequencies, deviations and criteria; only with coupled sectors.",
     ),
     array(
         "contact_areas",
@@ -194,22 +194,22 @@ pub const ARRAYS: [ArrayLayout; 34] = [
         "[places, 6, n]",
         "Pa per unit coordinate",
         false,
-        "Stress components 11, 22, 33, 12, 23, 31 at chosen places, in the directions of a contact node at the same \
-         place. Requires `stress_positions` and `stress_names`; not supported with coupled sectors.",
+        "Stress components 11, 22, 33, 12, 23, 31 at the stress points, in the directions of a contact node at the same \
+         point. Requires `stress_positions` and `stress_names`; not supported with coupled sectors.",
     ),
     array(
         "stress_positions",
         "[places, 3]",
         "m, rad, m (cylindrical) or m (cartesian)",
         false,
-        "Undeformed positions of these places, in the same form as `contact_positions`.",
+        "Undeformed positions of the stress points, in the same form as `contact_positions`.",
     ),
     array(
         "stress_thermal",
         "[places, 6, patches]",
         "Pa/K",
         false,
-        "Static stress of the full structure at these places per kelvin of each patch, without contact: D(Bu - alpha) \
+        "Static stress of the full structure at the stress points per kelvin of each patch, without contact: D(Bu - alpha) \
          with the displacements u under the thermal load. Requires `stress_map` and `thermal_loads`; needed by scenes \
          that output the stress of a heated rotor.",
     ),
@@ -218,7 +218,7 @@ pub const ARRAYS: [ArrayLayout; 34] = [
         "[places, 6]",
         "Pa s^2",
         false,
-        "Static stress of the full structure at these places per square of the speed, without contact and stiffening. \
+        "Static stress of the full structure at the stress points per square of the speed, without contact and stiffening. \
          Requires `stress_map` and `centrifugal_load`; needed by scenes that output the stress of a rotor with \
          centrifugal growth.",
     ),
@@ -297,7 +297,7 @@ pub const METADATA: [MetadataLayout; 18] = [
          k·around + i is the i-th node of row k.",
     ),
     entry("watched_names", Some(""), "Names of the watched points, separated by commas."),
-    entry("stress_names", Some(""), "Names of the places with stress, separated by commas."),
+    entry("stress_names", Some(""), "Names of the stress points, separated by commas."),
     entry(
         "basis",
         Some("craig-bampton"),
@@ -316,7 +316,7 @@ pub const METADATA: [MetadataLayout; 18] = [
         "Known discretisation errors in a rub: relative errors of the tip displacements, for example \
          `modes=0.01,patches=0.02,rows=0.1,mesh=0.03`.",
     ),
-    entry("rub_errors_found_on", Some(""), "Description of the scene on which `rub_errors` were determined."),
+    entry("rub_errors_found_on", Some(""), "Description of the scene for which `rub_errors` were determined."),
     entry("units", Some(""), "Shapes and units as text for human readers: one line per array."),
     entry("checksum", Some(""), "SHA-256 of the content, checked if present; omit it if you write the file yourself."),
 ];

@@ -225,5 +225,5 @@ pub fn builtin_model(structure: &StructureSettings) -> Option<&str> {
 /// # Panics
 /// If an integer exceeds the range of TOML, 2⁶³ − 1, which [`SceneSettings::validate`] rejects.
 pub fn write_scene(settings: &SceneSettings) -> String {
-    toml::to_string(settings).expect("the settings consist of tables, texts, numbers and lists")
+    toml::to_string(settings).expect("the settings consist of tables, strings, numbers and lists")
 }

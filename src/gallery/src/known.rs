@@ -54,8 +54,8 @@ fn rows() -> [KnownModel; 5] {
     [
         KnownModel {
             options: format!("{stage:?}"),
-            found_on: "first 9.5 ms of the rub of the stage with friction 0.15; error of the nodes found on a mesh \
-                       with 0.7 times the elements, error of the mesh found with five patches; later, the error of \
+            found_on: "first 9.5 ms of the rub of the stage with friction 0.15; error due to the nodes determined on a mesh \
+                       with 0.7 times as many elements, error due to the mesh determined with five patches; later, the error due to \
                        the nodes is far larger",
             errors: [None, Some(0.102), None, Some(0.0068)],
         },
@@ -64,7 +64,7 @@ fn rows() -> [KnownModel; 5] {
                 "{:?}",
                 StageOptions { tip: TipContact::Rows([9, 2]), kind: ReductionKind::FreeInterface, ..stage }
             ),
-            found_on: "first 9.4 ms of the rub of the stage with friction 0.05; error of the modes found on a mesh \
+            found_on: "first 9.4 ms of the rub of the stage with friction 0.05; error due to the modes determined on a mesh \
                        with 0.7 times the elements",
             errors: [Some(0.0014), None, None, Some(0.0084)],
         },

@@ -307,7 +307,7 @@ impl<'a> InnerSurface<'a> {
             let problem = match (named.is_empty(), inner.is_empty()) {
                 (true, _) => "no outer face of the mesh has all of its corner nodes in the set".to_owned(),
                 (_, true) => {
-                    format!("none of the {} outer faces is directed towards the z axis within 45 degrees", named.len())
+                    format!("none of the {} outer faces points towards the z axis to within 45 degrees", named.len())
                 }
                 _ => format!("no face directed towards the axis lies between z = {from:.6} m and {to:.6} m"),
             };
@@ -422,7 +422,7 @@ impl<'a> InnerSurface<'a> {
                 hole.nodes.len()
             );
             let remedy = "Close the hole in the model, merge coincident nodes, add the missing faces to the set, or \
-                          give axial positions beside the hole (--contact-axial)";
+                          give axial positions clear of the hole (--contact-axial)";
             return Err(Error::invalid(WHAT, problem, remedy));
         }
         // Uses both ends: gaps between them do not move the centre.

@@ -139,8 +139,9 @@ pub fn tip_patches(
     let places = Places::new(&mesh.nodes, set);
     let stations = places.stations();
     if count == 0 || count > stations {
-        let problem =
-            format!("{count} is outside 1..={stations}, limited by the node positions of the set along the chord");
+        let problem = format!(
+            "{count} is outside the range 1 to {stations}, limited by the node positions of the set along the chord"
+        );
         return Err(Error::invalid("number of contact patches", problem, "Choose another number or refine the tip"));
     }
     if rows == 0 || count * rows > set.len() {

@@ -115,13 +115,13 @@ fn all_places(
 ) -> Result<Vec<(String, usize)>> {
     if asked.modes > modes.ncols() {
         let problem = format!("{} requested, but only {} modes were computed", asked.modes, modes.ncols());
-        return Err(Error::invalid("places of largest stress", problem, "Request fewer"));
+        return Err(Error::invalid("points of largest stress", problem, "Request fewer"));
     }
     let mut places = asked.nodes.clone();
     for (name, node) in &places {
         if *node >= mesh.nodes.len() {
             let problem = format!("node {} does not exist; the mesh has {} nodes", node + 1, mesh.nodes.len());
-            return Err(Error::invalid(format!("place of stress `{name}`"), problem, "Choose nodes of the mesh"));
+            return Err(Error::invalid(format!("stress point `{name}`"), problem, "Choose nodes of the mesh"));
         }
     }
     for (mode, node) in largest((mesh, material), free, modes, asked.modes)?.into_iter().enumerate() {
@@ -132,11 +132,7 @@ fn all_places(
     let mut names: Vec<&str> = places.iter().map(|(name, _)| name.as_str()).collect();
     names.sort_unstable();
     if let Some(pair) = names.windows(2).find(|pair| pair[0] == pair[1]) {
-        return Err(Error::invalid(
-            format!("place of stress `{}`", pair[0]),
-            "it appears twice",
-            "List each only once",
-        ));
+        return Err(Error::invalid(format!("stress point `{}`", pair[0]), "it appears twice", "List each only once"));
     }
     Ok(places)
 }
@@ -207,7 +203,7 @@ pub(crate) fn recovered_stress(
         return Err(Error::invalid(
             "stress",
             problem,
-            "Omit the places of stress, or use a mesh file with a single material",
+            "Omit the stress points, or use a mesh file with a single material",
         ));
     };
     let places = all_places((mesh, material), free, modes, &options.stress)?;

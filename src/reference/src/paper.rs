@@ -49,7 +49,7 @@ impl DenseFilm {
             );
             let delassus = normal.transpose() * &response;
             let wanted = DVector::from_iterator(penetrating.len(), penetrating.iter().map(|contact| -gap[*contact]));
-            let solution = delassus.lu().solve(&wanted).expect("a regular Delassus matrix");
+            let solution = delassus.lu().solve(&wanted).expect("a nonsingular Delassus matrix");
             corrected += response * &solution;
             for (index, contact) in penetrating.iter().enumerate() {
                 multipliers[*contact] = solution[index];
@@ -60,6 +60,6 @@ impl DenseFilm {
     }
 
     fn solve(&self, right: &DVector<f64>) -> DVector<f64> {
-        self.inertia.solve(right).expect("M/h² + D/2h is regular")
+        self.inertia.solve(right).expect("M/h² + D/2h is nonsingular")
     }
 }

@@ -50,7 +50,7 @@ pub fn run(scene: &Scene, schedule: &Schedule, given: RunInputs<'_>, progress: &
     let mut simulation = Simulation::new(&scene).map_err(in_scene)?;
     for (variable, value) in given.settings {
         if given.history.is_some_and(|history| history.holds(variable)) {
-            let problem = "the file of --inputs also has a column for this variable";
+            let problem = "the file given with --inputs also has a column for this variable";
             let remedy = "Set the variable with either --set or --inputs";
             return Err(Failure::usage(format!("--set {variable}"), problem, remedy));
         }
@@ -219,11 +219,11 @@ pub(crate) fn suggestion(name: &str, candidates: &[&str]) -> String {
     match scored.max_by(|a, b| a.0.total_cmp(&b.0)) {
         Some((score, candidate)) if score > 0.8 => format!("Did you mean `{candidate}`?"),
         _ if candidates.len() > MOST_LISTED => format!(
-            "Inputs and parameters are: {}, and {} more; use `tiprub inspect` to list those of an FMU",
+            "Available inputs and parameters: {}, and {} more; use `tiprub inspect` to list those of an FMU",
             candidates[..MOST_LISTED].join(", "),
             candidates.len() - MOST_LISTED
         ),
-        _ => format!("Inputs and parameters are: {}", candidates.join(", ")),
+        _ => format!("Available inputs and parameters: {}", candidates.join(", ")),
     }
 }
 

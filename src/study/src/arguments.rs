@@ -81,7 +81,7 @@ pub struct StabilityArguments {
     /// larger].
     #[arg(long, value_name = "FROM:TO:COUNT", value_parser = frictions, allow_hyphen_values = true)]
     pub friction: Option<NumberRange>,
-    /// Speeds (rad/s): first, last and count; negative speeds turn backwards [default: -1, 0.5, 1 and 1.5 times that of
+    /// Speeds (rad/s): first, last and count; negative values mean reverse rotation [default: -1, 0.5, 1 and 1.5 times that of
     /// the scene].
     #[arg(long, value_name = "FROM:TO:COUNT", value_parser = range, allow_hyphen_values = true)]
     pub speeds: Option<NumberRange>,
@@ -106,10 +106,10 @@ pub struct ConvergenceArguments {
     /// Scene file (TOML), or a built-in scene such as `builtin:rotor37`.
     #[arg(value_name = "SCENE")]
     pub scene: String,
-    /// Also write the ROM of the master with the errors that were found; `tiprub run` and `tiprub inspect` print them.
+    /// Also write the ROM of the master with the errors that were determined; `tiprub run` and `tiprub inspect` print them.
     #[arg(long, value_name = "FILE")]
     pub into: Option<PathBuf>,
-    /// Overwrite the file of --into if it exists.
+    /// Overwrite the --into file if it exists.
     #[arg(long, requires = "into")]
     pub force: bool,
     /// Window in which runs are compared, from the start of the experiment (s); it ends earlier if nearly identical
@@ -193,7 +193,7 @@ pub type Speeds = NumberRange;
 /// Changes of the command line to a scene.
 #[derive(Debug, Clone, Default, Args)]
 pub struct SceneOptions {
-    /// Suppress warnings with this identifier, such as `flutter`; may be repeated. An FMU does not log them.
+    /// Suppress warnings with this identifier, such as `flutter`; may be repeated. A packaged FMU does not log them either.
     #[arg(long, value_name = "ID", value_parser = topic)]
     pub silence: Vec<String>,
     /// Accept implausible values (tips faster than 1500 m/s, lengths that look like millimetres) with a warning.

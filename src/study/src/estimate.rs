@@ -190,7 +190,7 @@ fn modes(scene: &Scene, division: u32) -> std::result::Result<RefinementDirectio
     let rom = &scene.roms[master];
     let own = Truncation::of(rom).modes(rom);
     if own < 8 {
-        return Err(format!("{own} modes are too few, at least 8 are needed"));
+        return Err(format!("{own} modes are too few; at least 8 are needed"));
     }
     let mut levels = Vec::new();
     for modes in [own / 4, own / 2] {

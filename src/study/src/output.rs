@@ -67,7 +67,7 @@ fn page(study: &Study) -> String {
         let _ = write!(page, "<tr><th>{}</th><td>{}</td></tr>", escape(name), escape(value));
     }
     page.push_str("</tbody></table></section>\n<section><h2>Files</h2><table><tbody>");
-    let own = [(RESULTS, "facts, statements and results for programs")];
+    let own = [(RESULTS, "facts, statements and results in machine-readable form")];
     let more = study.files.iter().map(|(name, meaning, _)| (name.as_str(), meaning.as_str()));
     for (name, meaning) in own.into_iter().chain(more) {
         let _ = write!(page, "<tr><th><a href=\"{0}\">{0}</a></th><td>{1}</td></tr>", escape(name), escape(meaning));

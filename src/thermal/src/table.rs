@@ -236,7 +236,7 @@ fn heat(table: &mut ThermalTableBuilder) {
         let text = format!("Heat {what} since the start");
         table.output(Item::Total(index), &format!("{name}_heat"), &JOULE, Span::Total, &text);
     }
-    let text = "Heat stored minus heat stored at the start and all heat supplied since; zero except for rounding";
+    let text = "Heat stored minus the sum of the heat stored at the start and all heat supplied since; zero except for rounding";
     table.output(Item::Residual, "energy_residual", &JOULE, Span::Total, text);
     let text = "Ratio of energy_residual to the initial heat plus the sum of the absolute heat exchanged in each \
                 communication step";

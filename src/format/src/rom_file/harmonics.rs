@@ -34,7 +34,9 @@ impl RomReader<'_> {
             let held = arrays.keys().find(|name| parts(name).is_some_and(|(_, other)| other == *number));
             let problem = match largest {
                 0 => format!("nodal diameter {number}, but {sectors} sector(s) have none above 0"),
-                _ => format!("nodal diameter {number}, but {sectors} sectors have numbered arrays for 1 to {largest}"),
+                _ => format!(
+                    "nodal diameter {number}, but {sectors} sectors allow numbered arrays for 1 to {largest} only"
+                ),
             };
             let remedy = "Correct the number in the array name or metadata `sectors`; the arrays of nodal diameter 0 have no \
                  number";

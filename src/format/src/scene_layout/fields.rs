@@ -34,7 +34,7 @@ pub const FIELDS: [SceneField; 102] = [
     ),
     field(
         "silence",
-        "list of texts",
+        "list of strings",
         Some("empty"),
         "identifiers of [warnings](warnings.md)",
         "Warnings to suppress on the command line and in the log of the FMU.",
@@ -406,7 +406,7 @@ pub const FIELDS: [SceneField; 102] = [
         "text",
         Some("all nodes"),
         "needed if a structure is the master of several contacts",
-        "Prefix of the names of the contact nodes of this contact. No node may belong to two contacts.",
+        "Prefix that selects the contact nodes of this contact by name. No node may belong to two contacts.",
     ),
     field(
         "contact.gap",
@@ -430,7 +430,7 @@ pub const FIELDS: [SceneField; 102] = [
         "text",
         Some("`lcp`"),
         "`lcp`, `film`, `coulomb`",
-        "Contact solver of one step: linear complementarity over all contact nodes, the forward increment Lagrange \
+        "Contact solver used in each step: linear complementarity over all contact nodes, the forward increment Lagrange \
          multipliers of the original paper, or Coulomb friction with sticking.",
     ),
     field(
@@ -445,7 +445,7 @@ pub const FIELDS: [SceneField; 102] = [
         "table",
         Some("none"),
         "with the solver `lcp` only",
-        "Abradable coating of the slave: cells of rods that yield and harden, or that are cut. `gap` is measured to \
+        "Abradable coating of the slave: its cells yield and harden like rods, or are cut. `gap` is measured to \
          the unworn surface.",
     ),
     field(
@@ -474,7 +474,7 @@ pub const FIELDS: [SceneField; 102] = [
         "number, Pa",
         None,
         "0 to 1e13; not with `cutting`",
-        "Increase of the yield stress per plastic strain; 0 is perfectly plastic.",
+        "Increase in yield stress per unit plastic strain; 0 is perfectly plastic.",
     ),
     field(
         "contact.coating.cells_around",
@@ -503,15 +503,15 @@ pub const FIELDS: [SceneField; 102] = [
         "table",
         Some("none"),
         "instead of `modulus`, `yield_stress`, `hardening`",
-        "The tips cut the coating along their path: a cut of width b and depth a needs the tangential force u·b·a, \
-         whose work comes from the shaft.",
+        "The tips cut the coating along their path: a cut of width b and depth a requires a tangential force u·b·a, \
+         and the shaft supplies the work.",
     ),
     field(
         "contact.coating.cutting.specific_energy",
         "number, J/m³",
         None,
         "1e3 to 1e12",
-        "Cutting energy u per volume removed.",
+        "Cutting energy u per unit volume removed.",
     ),
     field(
         "contact.coating.cutting.normal_ratio",
@@ -557,7 +557,7 @@ pub const FIELDS: [SceneField; 102] = [
         Some("1e-3"),
         "1e-9 to 0.1",
         "Displacement error that `galerkin` accepts per step, as a fraction of the smallest clearance; with free \
-         masters, as a fraction of a thousandth of the smallest extent.",
+         masters, as a fraction of one thousandth of the smallest dimension of the body.",
     ),
     field(
         "time.max_internal_steps",
@@ -572,7 +572,7 @@ pub const FIELDS: [SceneField; 102] = [
         "text",
         Some("`ramp`"),
         "`ramp`, `hold`; not with a free master",
-        "Course of inputs that move or load a structure within a communication step: `ramp` reaches the new value at \
+        "How inputs that move or load a structure vary within a communication step: `ramp` reaches the new value at \
          the end of the step, `hold` applies it from the start.",
     ),
     field(
@@ -594,7 +594,7 @@ pub const FIELDS: [SceneField; 102] = [
         "whole number",
         Some("none"),
         "≤ half the number of sectors",
-        "Amplitudes of the radial tip displacement in the nodal diameters 0 to this number.",
+        "Amplitudes of the radial tip displacement for nodal diameters from 0 up to this number.",
     ),
     field("outputs.energies", "true or false", Some("true"), "", "Energy balance and its residual."),
     field(
@@ -616,7 +616,7 @@ pub const FIELDS: [SceneField; 102] = [
         "whole number",
         Some("none"),
         "1 to the number of modes; not with coupled sectors",
-        "Amplitudes of this number of modes of watched sectors, from the lowest, normalised to a modal mass of 1 kg.",
+        "Amplitudes of the lowest modes (this many) of watched sectors, normalised to a modal mass of 1 kg.",
     ),
     field(
         "outputs.tip_displacements",
@@ -645,7 +645,7 @@ pub const FIELDS: [SceneField; 102] = [
         "true or false",
         Some("false"),
         "",
-        "Mean wear depth at each circumferential position, and of each row along the axis.",
+        "Mean wear depth at each circumferential position and in each row along the axis.",
     ),
     field("outputs.wear", "true or false", Some("false"), "", "Wear depth of every coating cell."),
     field(

@@ -119,7 +119,7 @@ fn rejects_missing_nodal_diameters() {
     let more = |file: &mut Loose| drop(file.entries.insert("sectors".into(), "8".into()));
     refused(6, more, &["array `mass_4`: missing"]);
     let fewer = |file: &mut Loose| drop(file.entries.insert("sectors".into(), "4".into()));
-    refused(7, fewer, &["_3`: nodal diameter 3, but 4 sectors have numbered arrays for 1 to 2"]);
+    refused(7, fewer, &["_3`: nodal diameter 3, but 4 sectors allow numbered arrays for 1 to 2 only"]);
     let one = |file: &mut Loose| drop(file.entries.insert("sectors".into(), "1".into()));
     refused(7, one, &["nodal diameter 1, but 1 sector(s) have none above 0"]);
     let zero = |file: &mut Loose| drop(file.arrays.insert("mass_0".into(), (vec![2, 2, 2], vec![0.0; 8])));

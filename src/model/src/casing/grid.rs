@@ -186,7 +186,11 @@ impl GridNodes {
         }
         let problem =
             format!("{} nodes and {} slopes do not fit rings of {}", self.nodes.len(), self.slopes.len(), self.around);
-        Err(Error::invalid("contact nodes of the casing", problem, "Give the nodes and one slope of every ring"))
+        Err(Error::invalid(
+            "contact nodes of the casing",
+            problem,
+            "Give all nodes of every ring and one slope per ring",
+        ))
     }
 
     /// Returns the number of rings.

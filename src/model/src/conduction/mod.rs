@@ -103,8 +103,8 @@ impl ConductionOptions {
             || self.films.iter().all(|film| *film <= 0.0)
         {
             let problem = format!("{} inside and {} outside are invalid", shown(self.films[0]), shown(self.films[1]));
-            let remedy = "Give no negative value and at least one above 0: without a film there is no steady state. \
-                          The inputs gas_convection_factor and ambient_convection_factor of the FMU switch films off";
+            let remedy = "Give non-negative values, at least one of them above 0: there is no steady state without convection. \
+                          The inputs gas_convection_factor and ambient_convection_factor of the FMU can switch convection off";
             return Err(Error::invalid("thermal model, film coefficients (W/(m² K))", problem, remedy));
         }
         Ok(())

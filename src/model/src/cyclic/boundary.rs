@@ -244,7 +244,8 @@ fn check_one_to_one(pairs: &[[usize; 2]]) -> Result<()> {
         if two[0][0] == two[1][0] {
             let problem =
                 format!("nodes {} and {} are both matched with node {}", two[0][1] + 1, two[1][1] + 1, two[0][0] + 1);
-            let remedy = "Reduce the tolerance below the distance of neighbouring nodes, or merge coincident nodes";
+            let remedy =
+                "Reduce the tolerance below the distance between neighbouring nodes, or merge coincident nodes";
             return Err(Error::invalid("cyclic faces", problem, remedy));
         }
     }

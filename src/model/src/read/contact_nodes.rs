@@ -57,7 +57,11 @@ pub fn choose_contact_nodes(nodes: &[[f64; 3]], set: &[usize], choice: &ContactC
     }
     if !choice.names.is_empty() && choice.names.len() != count {
         let problem = format!("{} names for {count} contact nodes", choice.names.len());
-        return Err(Error::invalid("names of contact nodes", problem, "Give one name per node, with increasing z"));
+        return Err(Error::invalid(
+            "names of contact nodes",
+            problem,
+            "Give one name per node, in order of increasing z",
+        ));
     }
     let places = Places::new(nodes, set);
     let chosen = places.evenly(count);

@@ -113,7 +113,9 @@ pub(crate) fn spread_contact(line: &[usize], slopes: &[f64], count: usize) -> Re
     if count < 2 || count > available {
         return Err(Error::invalid(
             "number of contact nodes",
-            format!("{count} is outside 2..={available}, limited by the nodes on the mid-thickness line of the tip"),
+            format!(
+                "{count} is outside the range 2 to {available}, limited by the nodes on the mid-thickness line of the tip"
+            ),
             "Choose another number or more elements along the chord",
         ));
     }

@@ -163,7 +163,7 @@ pub fn reduce_stage_casing(options: &StageCasingOptions, listener: Listener<'_>)
         reduce_casing(ring.mesh, &options.material, &clamped, &ring.grid, &patches, &reduction_options, listener)?;
     reduction.rom.origin = format!(
         "Casing of the 56-blade stage: cylindrical wall of {:.1} mm inner radius and {:.1} mm thickness, z = {:.0} to {:.0} \
-         mm, flanges of {:.0} mm x {:.0} mm, two hooks, held at the face of the low flange: {}",
+         mm, flanges of {:.0} mm x {:.0} mm, two hooks, held at the face of the flange at the lower z: {}",
         1e3 * (TIP_RADIUS + GAP),
         1e3 * WALL,
         1e3 * AXIAL[0],

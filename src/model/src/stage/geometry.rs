@@ -190,11 +190,11 @@ impl SectorGeometry {
             "radii (0, bore, outside of the bore ring, inside of the rim, hub)",
             &[0.0, disk.bore_radius, disk.bore_radius + disk.bore_height, rim_inside, disk.hub_radius],
         )?;
-        rising("hub radius, end of the fillet, tip radius", &[disk.hub_radius, blade.tip_radius - blade.fillet])?;
+        rising("hub radius, tip radius minus fillet radius", &[disk.hub_radius, blade.tip_radius - blade.fillet])?;
         rising("axial positions of the blade edges at the tip", &blade.tip_axial)?;
         rising("axial positions of the blade edges at the root", &blade.root_axial)?;
         for [web, wide] in [[disk.web_thickness[0], disk.bore_width], [disk.web_thickness[1], 2.0 * self.rim_reach()]] {
-            rising("thickness of the web, width of bore or rim", &[0.0, web])?;
+            rising("0 and web thickness", &[0.0, web])?;
             not_above("web thickness", web, "width of the adjacent bore or rim", wide)?;
         }
         not_above(
@@ -249,7 +249,7 @@ impl SectorGeometry {
 /// Largest angle of the camber line (rad); above it the sections are sheared too much for a mesh.
 const LARGEST_ANGLE: f64 = 1.3;
 
-const REMEDY: &str = "Give lengths in m and angles in rad of a valid bladed disk";
+const REMEDY: &str = "Give the dimensions of a valid bladed disk: lengths in m, angles in rad";
 
 fn rising(what: &str, values: &[f64]) -> Result<()> {
     if values.iter().all(|value| value.is_finite()) && values.windows(2).all(|pair| pair[0] < pair[1]) {

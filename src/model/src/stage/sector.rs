@@ -109,7 +109,11 @@ impl SectorOptions {
         let columns = counts.columns();
         if web[0] % 2 != 0 || web[0] + 2 * bore[0] > columns {
             let problem = format!("{} for the web and 2 x {} for the bore, but {columns} for the rim", web[0], bore[0]);
-            return refuse("web and bore", problem, "Give an even number for the web and a total of at most the rim's");
+            return refuse(
+                "web and bore",
+                problem,
+                "Give an even number for the web and a total not exceeding the rim's",
+            );
         }
         let kind_fits = match self.kind {
             ElementKind::Penta15 => true,
@@ -126,13 +130,13 @@ impl SectorOptions {
         let longer = [disk.rim_axial[0] < blade.root_axial[0], disk.rim_axial[1] > blade.root_axial[1]];
         if longer != [overhang > 0; 2] {
             let problem = format!(
-                "{overhang} does not fit a rim over {:?} m and a root over {:?} m",
+                "{overhang} does not match the axial ranges of the rim, {:?} m, and of the root, {:?} m",
                 disk.rim_axial, blade.root_axial
             );
             return refuse(
                 "overhang",
                 problem,
-                "Give columns if the rim is longer than the root at both ends, otherwise zero",
+                "Give columns if the rim extends beyond the root at both ends, otherwise zero",
             );
         }
         if (disk.bore_width > disk.web_thickness[0]) != (bore[0] > 0) {

@@ -137,7 +137,7 @@ fn modal_stress_points_lie_at_the_largest_stress() {
     let refused =
         |places: StressPlaces| reduced(&mesh, &tip, (ReductionKind::FreeInterface, 6), places).unwrap_err().to_string();
     let reported = refused(StressPlaces { nodes: Vec::new(), modes: 7 });
-    assert!(reported.starts_with("places of largest stress: 7 requested"), "{reported}");
+    assert!(reported.starts_with("points of largest stress: 7 requested"), "{reported}");
     let reported = refused(StressPlaces { nodes: vec![("a".into(), 100_000)], modes: 0 });
     assert!(reported.contains("`a`") && reported.contains("node 100001 does not exist"), "{reported}");
     let reported = refused(StressPlaces { nodes: vec![("a".into(), 0), ("a".into(), 1)], modes: 0 });

@@ -21,7 +21,7 @@ pub fn read(text: &str, speed: f64) -> Result<CubeHistory> {
         let row = <[f64; 7]>::try_from(numbers.as_slice()).ok();
         let later = |row: &[f64; 7]| history.times.last().is_some_and(|last| row[0] > *last);
         let row = row.filter(later).ok_or_else(|| {
-            let problem = format!("line {} is not a row of seven numbers ({COLUMNS}) at a later time", index + 1);
+            let problem = format!("line {} is not a row of seven numbers ({COLUMNS}) with increasing time", index + 1);
             Error::invalid("table of another code", problem, "Write the table again")
         })?;
         push(&mut history, row);

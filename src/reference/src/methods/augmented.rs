@@ -195,9 +195,10 @@ impl AugmentedProblem<'_> {
             multipliers =
                 memory(&contacts, &forces.iter().map(|force| Vector3::new(force[0], 0.0, 0.0)).collect::<Vec<_>>());
         }
-        let problem = format!("no convergence in step {step} after {UPDATES} updates; surfaces move by {last:.1e} m");
+        let problem =
+            format!("no convergence in step {step} after {UPDATES} updates; surfaces still move by {last:.1e} m");
         Err(Error::invalid(
-            "contact problem of the augmented Lagrangian",
+            "contact problem of the augmented Lagrangian method",
             problem,
             "Use a smaller step or a larger penalty",
         ))
@@ -232,14 +233,14 @@ impl AugmentedProblem<'_> {
             let change = jacobian.lu().solve(&residual);
             forces -= change.ok_or_else(|| {
                 Error::invalid(
-                    "contact problem of the augmented Lagrangian",
+                    "contact problem of the augmented Lagrangian method",
                     "its matrix is singular",
                     "Check the scene",
                 )
             })?;
         }
         let problem = format!("Newton's method did not converge in {ITERATIONS} iterations in step {step}");
-        Err(Error::invalid("contact problem of the augmented Lagrangian", problem, "Use a smaller step"))
+        Err(Error::invalid("contact problem of the augmented Lagrangian method", problem, "Use a smaller step"))
     }
 }
 

@@ -33,7 +33,7 @@ pub(super) fn common_start(scene: &Scene, index: usize) -> Result<String, String
         };
         return Err(format!(
             "pairs select contact nodes by name, and the pair of a new node between {} and {} is undefined. Reduce the \
-             blade with more --contact-nodes, let their --contact-names start with the `nodes` of the pairs, and \
+             blade with more --contact-nodes, choose --contact-names that begin with the `nodes` prefix of their pair, and \
              compare runs",
             reported(border),
             reported(border + 1)

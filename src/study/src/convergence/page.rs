@@ -19,13 +19,13 @@ use crate::{Picture, Sheet, Statement, Study, StudyFigure, estimate};
 const SMALL: f64 = 0.05;
 
 const HOW_TO_READ: &str = "One setting is refined at a time, and all others stay as in the scene. A change is the difference between a run \
-     and the next finer run of the same direction, relative to the larger value. Changes are given for the \
+     and the next finer run in the same direction, relative to the larger value. Changes are given for the \
      displacements of all contact nodes at all communication points (L2, without rigid-body motion of free bodies), \
      the normal impulse and the friction work over the window, the largest normal force averaged over a communication \
      step, and the mean strain energy. If the changes shrink from level to level, the limit is extrapolated from the \
      three finest levels (Richardson, with the observed order, at most two). The limit gives the error of every level. \
      If the changes do not shrink, the scene is not converged in that direction or its contact is chaotic, and no \
-     limit is given. Refine the direction with the largest change at the scene's setting first. Forces of single \
+     limit is given. Refine the direction with the largest change at the scene's setting first. Forces in individual \
      internal steps are not compared, because the force of an impact grows as the step shrinks.";
 
 /// Builds the study from its results.
@@ -127,7 +127,10 @@ fn lock_up(refined: &Refined) -> Option<Statement> {
     let found = known.collect::<Vec<_>>().join(", ");
     let some = refined.lock_up.iter().any(Option::is_some);
     some.then(|| {
-        Statement::remark(format!("Friction coefficient µ* of lock-up of the closed tip, by {}", title(refined)), found)
+        Statement::remark(
+            format!("Friction coefficient µ* at which the closed tip locks up, by {}", title(refined)),
+            found,
+        )
     })
 }
 
@@ -136,7 +139,9 @@ fn title(refined: &Refined) -> String {
     let RefinementDirection { title, shorter, .. } = &refined.direction;
     match shorter {
         None => title.clone(),
-        Some(factor) => format!("{title} (at 1/{factor} of the scene's step, which is too long for a level)"),
+        Some(factor) => format!(
+            "{title} (at 1/{factor} of the scene's step, because the full step is too long for one of the levels)"
+        ),
     }
 }
 

@@ -158,7 +158,7 @@ impl<'a> Refiner<'a> {
             rom.contact_nodes.iter().flat_map(|node| node.position).fold(0.0, |most: f64, value| most.max(value.abs()));
         for (own, other) in rom.contact_nodes.iter().zip(&again.contact_nodes) {
             if own.position.iter().zip(other.position).any(|(a, b)| (a - b).abs() > SAME * size) {
-                return differs(format!("contact node `{}` is at another position", own.name));
+                return differs(format!("contact node `{}` is at a different position", own.name));
             }
         }
         let frequencies = |rom: &Rom| ModalModel::from_rom(rom, 0.0).map(|model| model.frequencies).unwrap_or_default();
@@ -397,7 +397,7 @@ impl<'a> Refiner<'a> {
 /// Explains why a ROM from a file cannot be refined; coupled sectors are chosen in whole families, which a ROM does not contain.
 pub(super) fn no_source(what: &str, rom: &Rom) -> String {
     if rom.is_cyclic() {
-        return format!("{what} are not available: of bladed disks, only the built-in one can be reduced again");
+        return format!("{what} are not available: the only bladed disk that can be reduced again is the built-in one");
     }
     format!("{what} require the mesh of the ROM: give it with --mesh FILE and the options of the reduction")
 }

@@ -121,7 +121,7 @@ fn basis<T: ComplexField<RealField = f64>>(
     let inner = eigen.eigenvectors.select_columns(&free);
     let kept = free.len().checked_sub(less).ok_or("no mode would be left at one of the nodal diameters")?;
     let held = inner.adjoint() * stiffness * &inner;
-    let moved = held.try_inverse().ok_or("the structure moves as a rigid body with its contact nodes held")?;
+    let moved = held.try_inverse().ok_or("the structure can move as a rigid body even with its contact nodes held")?;
     let statics = &inverse - &inner * (moved * inner.adjoint() * stiffness * &inverse);
     let modes = modes(&inner, mass, stiffness, kept)?;
     let mut basis = DMatrix::zeros(order, statics.ncols() + kept);
@@ -138,7 +138,7 @@ fn free_basis<T: ComplexField<RealField = f64>>(
     let (order, rows) = (mass.nrows(), map.nrows());
     let kept = order.checked_sub(rows + less).ok_or("no mode would be left at one of the nodal diameters")?;
     let flexibility =
-        stiffness.clone().try_inverse().ok_or("the structure moves as a rigid body and has no static response")?;
+        stiffness.clone().try_inverse().ok_or("the structure can move as a rigid body and has no static response")?;
     let mut basis = DMatrix::zeros(order, rows + kept);
     // Scaled to the size of modes for good conditioning.
     let responses = flexibility * map.adjoint();

@@ -179,8 +179,8 @@ fn add_summary(study: &mut Study, measured: &[(Box<dyn ErrorCase>, Measured)]) {
     let scenes: Vec<(&dyn ErrorCase, &Measured)> =
         measured.iter().map(|(case, found)| (case.as_ref(), found)).collect();
     let tables = [
-        ("summary-steps.md", "cheapest settings for an error of the steps", summary::of_steps(&scenes)),
-        ("summary-total.md", "cheapest settings for a total error", summary::in_total(&scenes)),
+        ("summary-steps.md", "cheapest settings for a given error of the steps", summary::of_steps(&scenes)),
+        ("summary-total.md", "cheapest settings for a given total error", summary::in_total(&scenes)),
         ("summary-limits.md", "differences between the references", summary::limits(&scenes)),
     ];
     for (name, meaning, table) in tables {

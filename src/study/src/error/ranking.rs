@@ -108,13 +108,17 @@ pub fn winners(case: &dyn ErrorCase, measured: &Measured, kind: ErrorKind) -> Ta
     let sizes = case.sizes();
     let what = match kind {
         ErrorKind::OfTime | ErrorKind::OfOwn => format!(
-            "{}: cheapest setting for an error of the steps alone, with {} {}",
+            "{}: cheapest setting for a given error of the steps alone, with {} {}",
             case.title(),
             sizes[case.standard()],
             case.size_name()
         ),
         ErrorKind::Total => {
-            format!("{}: cheapest setting for a total error, over all numbers of {}", case.title(), case.size_name())
+            format!(
+                "{}: cheapest setting for a given total error, over all numbers of {}",
+                case.title(),
+                case.size_name()
+            )
         }
     };
     let columns = ["error", "cheapest", case.size_name(), "step or tolerance", "time", "the paper's method", "factor"];

@@ -40,7 +40,7 @@ fn columns(error: &str) -> [&str; 8] {
 
 /// Tabulates the cheapest setting for each error of the steps. Every method is compared with the converged solution of its own equations.
 pub fn of_steps(scenes: &[(&dyn ErrorCase, &Measured)]) -> Table {
-    let mut table = Table::new("Cheapest setting for an error of the steps", columns("error of the steps"));
+    let mut table = Table::new("Cheapest setting for a given error of the steps", columns("error of the steps"));
     for &(case, measured) in scenes {
         let rows = ErrorKind::OfOwn.rows(case, measured);
         for target in TARGETS {
@@ -57,7 +57,7 @@ pub fn of_steps(scenes: &[(&dyn ErrorCase, &Measured)]) -> Table {
 
 /// Tabulates the cheapest setting for each total error: steps, and the errors of the model (modes, patches, rows, mesh, elements).
 pub fn in_total(scenes: &[(&dyn ErrorCase, &Measured)]) -> Table {
-    let mut table = Table::new("Cheapest setting for a total error", columns("total error"));
+    let mut table = Table::new("Cheapest setting for a given total error", columns("total error"));
     for &(case, measured) in scenes {
         let Some(error) = total_error(case) else { continue };
         let rows = ErrorKind::Total.rows(case, measured);
@@ -119,7 +119,7 @@ fn cells<'a>(
     let factor = any.zip(paper).map(|((_, any), (_, paper))| format!("{:.1}", paper.seconds / any.seconds));
     let first = match any {
         Some((row, _)) => [format!("`{}`", row.competitor.name()), row.competitor.setting(row.step) + &size(row)],
-        None if readable.is_empty() => ["none".into(), "below the difference of the references".into()],
+        None if readable.is_empty() => ["none".into(), "below the difference between the references".into()],
         None => ["none".into(), String::new()],
     };
     let without =

@@ -25,7 +25,7 @@ impl Total {
         let parts: Vec<&str> = all.iter().filter(|(_, finer)| *finer).map(|(name, _)| *name).collect();
         match parts.as_slice() {
             _ if self.is_total() => "total error".into(),
-            [] => "own-model error of the steps".into(),
+            [] => "error of the steps alone".into(),
             [one] => format!("error of steps and {one}"),
             [first, second, ..] => format!("error of steps, {first} and {second}"),
         }
@@ -109,7 +109,7 @@ impl Total {
     fn best(&self, title: &str) -> Table {
         let points: Vec<(f64, f64)> = self.ran().map(|(_, time, error)| (time, error)).collect();
         let mut table = Table::new(
-            format!("{title}: Pareto-optimal settings of time and {}", self.name()),
+            format!("{title}: Pareto-optimal settings for time and {}", self.name()),
             ["setting", "time", self.name().as_str()],
         );
         for (time, error) in front(&points) {
@@ -203,7 +203,7 @@ impl Total {
             let found = match self.cheapest(target, None) {
                 _ if self.hidden(target) => {
                     format!(
-                        "not measurable: the last refinement of the reference changed {:.1e}",
+                        "not measurable: the last refinement changed the reference by {:.1e}",
                         self.readable.unwrap_or(0.0)
                     )
                 }
@@ -222,7 +222,7 @@ impl Total {
             Err(why) => format!("unknown: {why}"),
         };
         all.push(Statement::remark(format!("{title}: mesh error"), found));
-        all.push(Statement::remark(format!("{title}: reference of these errors"), self.truth.clone()));
+        all.push(Statement::remark(format!("{title}: reference for these errors"), self.truth.clone()));
         all
     }
 

@@ -70,7 +70,7 @@ pub fn statement(case: &dyn ErrorCase) -> Option<Statement> {
         ),
         end <= PARTED,
         format!(
-            "a relative change of {} by {PERTURBATION:.0e} moves the nodes by {end:.1e} at the end of the window and \
+            "a relative change of {PERTURBATION:.0e} in {} changes the displacements by a relative {end:.1e} at the end of the window and \
              by {last:.1e} after {:.1} ms",
             case.perturbed(),
             1e3 * long

@@ -141,7 +141,7 @@ pub fn of_scene(
     {
         return Err(Failure::new(
             "study map",
-            format!("all angular velocities were rejected, the first one: {refusal}"),
+            format!("all angular velocities were rejected; reason for the first: {refusal}"),
             "",
         ));
     }
@@ -299,7 +299,7 @@ impl Map {
                 format!("clearance at rest{without}"),
                 if low < high { format!("{low:.4e} to {high:.4e} m") } else { format!("{low:.4e} m") },
             ),
-            (format!("intrusion of the casing beyond the tips{without}"), format!("{:.4e} m", self.intrusion)),
+            (format!("interference between casing and tips{without}"), format!("{:.4e} m", self.intrusion)),
             ("friction coefficient".into(), self.start.friction.to_string()),
             ("damping ratio".into(), self.start.damping_ratio.to_string()),
         ])

@@ -50,7 +50,7 @@ fn runs_end(map: &Map) -> Statement {
         None => format!("all {} runs", map.runs.len()),
         Some(first) => format!("{} of {} runs were rejected (grey in the map); {first}", refused.len(), map.runs.len()),
     };
-    Statement::tested("Every run reaches its end", refused.is_empty(), found)
+    Statement::tested("Every run completes", refused.is_empty(), found)
 }
 
 fn contact(map: &Map) -> Vec<Statement> {
@@ -61,7 +61,7 @@ fn contact(map: &Map) -> Vec<Statement> {
     let depth = most(|response| response.penetration);
     let sum = format!(
         "contact at {touching} of {} angular velocities; a blade is in contact for at most {:.2} % of the time (mean \
-         of all blades), the mean sum of normal forces is at most {force:.1} N, the largest force on a node is {:.0} N",
+         of all blades), the mean sum of normal forces is at most {force:.1} N, and the largest force on a node is {:.0} N",
         map.runs.len(),
         100.0 * share,
         most(|response| response.largest_force)
@@ -102,7 +102,7 @@ fn on_orders(map: &Map) -> Statement {
         )
     });
     let expected = format!(
-        "The response repeats the shape of the casing: peaks on engine orders that the casing excites have {:.0} % of \
+        "The response repeats the shape of the casing: peaks on engine orders that the casing excites account for {:.0} % of \
          the sum of squared amplitudes",
         100.0 * NEARLY_ALL
     );
@@ -183,7 +183,7 @@ pub fn stiffens(coincidences: &[Coincidence], spacing: f64) -> Option<Statement>
     let shift = strongest.map_or(0.0, |one| one.response.map_or(0.0, |place| place.0) - one.crossing.speed);
     let why = match leaving {
         Some(one) => format!(
-            "undecided: the response of engine order {} on mode {} extends beyond the range of speeds and is larger at \
+            "undecided: the response to engine order {} in mode {} extends beyond the range of speeds and is larger at \
              its end than any resonance found; ",
             one.crossing.order,
             one.crossing.mode + 1
@@ -235,7 +235,7 @@ fn scale(map: &Map) -> Option<Statement> {
         expected,
         largest <= MOST_DYNAMIC * slow,
         format!(
-            "the leading edge moves by {:.1} to {:.1} µm about its mean; the casing reaches {:.1} µm beyond the \
+            "the leading edge moves by {:.1} to {:.1} µm about its mean; the casing interferes by {:.1} µm with the \
              tips{}, its radius varies by {:.1} µm, and a slow push by this amount moves the leading edge by {:.1} µm",
             1e6 * smallest,
             1e6 * largest,

@@ -14,7 +14,7 @@ use crate::{Picture, Sheet, Statement, Study, StudyFigure, error::competitor::me
 
 const VERDICTS: [AnswerKind; 4] = [AnswerKind::Right, AnswerKind::Warned, AnswerKind::Flutter, AnswerKind::Refused];
 
-const HOW_TO_READ: &str = "Every cell shows whether a run with this friction coefficient, speed and internal step is accepted: with the \
+const HOW_TO_READ: &str = "Every cell shows whether a run with this friction coefficient, speed and internal step is accepted, together with the \
      warnings or the error message that `tiprub run` would give, but the study does not execute the run. Read a column \
      from the bottom up: the longest step for a friction coefficient is the last one before the first rejection, and \
      all longer steps are rejected. The table of largest accepted steps lists this step. An accepted step has passed \

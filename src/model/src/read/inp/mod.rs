@@ -297,8 +297,7 @@ fn count(counter: &mut usize, card: &Card, what: &str) -> Result<()> {
 
 /// Reads a number of a node or an element.
 fn label(text: &str, line: &DataLine, what: &str) -> Result<u64> {
-    text.parse::<u64>()
-        .ok()
-        .filter(|&number| number > 0)
-        .ok_or_else(|| line.place.error(format!("`{text}` is not {what} (a whole number from 1)"), "Correct the line"))
+    text.parse::<u64>().ok().filter(|&number| number > 0).ok_or_else(|| {
+        line.place.error(format!("`{text}` is not {what} (a positive whole number)"), "Correct the line")
+    })
 }

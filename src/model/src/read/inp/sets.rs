@@ -141,7 +141,7 @@ impl InpSets {
         for name in self.nodes.sets.keys() {
             let members = self.nodes.resolve(name, &nowhere, &draft.numbers, &|number| draft.has_node(number))?;
             if node_sets.get(name).is_some_and(|others| *others != members) {
-                draft.notes.push(format!("`{name}` is a node set and an element set: the node set is used"));
+                draft.notes.push(format!("`{name}` is both a node set and an element set: the node set is used"));
             }
             node_sets.insert(name.clone(), members);
         }

@@ -76,8 +76,7 @@ fn matrix_market<'a>(path: &Path, mut lines: impl Iterator<Item = (&'a str, Sour
         }
     };
     let mut lines = lines.filter(|(line, _)| !line.is_empty() && !line.starts_with('%'));
-    let (line, place) =
-        lines.next().ok_or_else(|| about(path, "the line of the sizes is missing", "Export it again"))?;
+    let (line, place) = lines.next().ok_or_else(|| about(path, "the size line is missing", "Export it again"))?;
     let sizes: Vec<usize> = values(line).filter_map(|value| value.parse().ok()).collect();
     let &[order, columns, count] = sizes.as_slice() else {
         return Err(wrong_line(line, &place, "ROWS COLUMNS ENTRIES"));
