@@ -61,7 +61,7 @@ pub fn of_speed(rom: &Rom, speed: f64, name: impl FnOnce() -> String) -> Option<
     (rom.frame == DisplacementFrame::Cylindrical && fastest > TIP_SPEED).then(|| {
         let speed_shown = shown(speed);
         let problem = format!(
-            "at speed {speed_shown} rad/s the tips move at {fastest:.0} m/s, but rotors burst above {TIP_SPEED} m/s"
+            "at a speed of {speed_shown} rad/s the tips move at {fastest:.0} m/s, but rotors burst above {TIP_SPEED} m/s"
         );
         let radians = speed * std::f64::consts::PI / 30.0;
         Slip::new(name(), problem, format!("Is the speed in rpm? {speed_shown} rpm is {radians:.6} rad/s."))
@@ -141,7 +141,7 @@ fn of_sectors(rom: &Rom) -> Option<Slip> {
     let how = if high - low > PITCHES * pitch {
         format!("its contact nodes span {:.4} rad, {:.1} times", high - low, (high - low) / pitch)
     } else if crosses_neighbour(&line, pitch) {
-        "the line through its contact nodes crosses that of the next sector at".to_owned()
+        "the line through its contact nodes crosses that of the next sector, given".to_owned()
     } else {
         return None;
     };

@@ -231,7 +231,7 @@ impl Rom {
     /// # Errors
     /// [`Error::Invalid`] with the array and the remedy.
     pub fn validate(&self) -> Result<()> {
-        let remedy = "Write the ROM again with `tiprub reduce`, or see the ROM file chapter of the user guide";
+        let remedy = "Regenerate the ROM with `tiprub reduce`, or see the ROM file chapter of the user guide";
         self.validate_shapes(remedy)?;
         for (name, matrix) in [("mass", &self.mass), ("stiffness", &self.stiffness), ("contact_map", &self.contact_map)]
         {

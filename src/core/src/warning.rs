@@ -60,20 +60,20 @@ topics! {
          matters."
         "Use less friction or more damping. A note needs no action.";
     LockUp "lock-up"
-        "Friction turns the tip into the casing faster than it yields, so the contact force grows without limit \
+        "Friction drives the tip into the casing faster than the casing deflects, so the contact force grows without limit \
          (self-locking). Clearances and energies are meaningless once this happens."
         "Use friction below µ*, a flexible casing, or a coating.";
     CuttingGrowth "cutting-growth"
         "While all contact nodes of a blade cut fresh coating, vibration is physically unstable and grows."
         "Use a larger `normal_ratio`, a smaller `specific_energy` or more damping.";
     StepGrowth "step-growth"
-        "The fixed step itself makes sliding contact grow, by more than 1 % of the displacements that contact causes."
+        "The fixed step itself makes vibration in sliding contact grow, by more than 1 % of the displacements that contact causes."
         "Use adaptive steps (`scheme = \"galerkin\"`) or a smaller `time.step`.";
     GrowthUnchecked "growth-unchecked"
         "The model has too many modes for the check of growth in sliding contact."
         "Check a ROM with fewer modes, or halve the step and compare the results.";
     OtherSense "other-sense"
-        "The direction of rotation is opposite to that at the start, and growth of contact that slides in this \
+        "The direction of rotation is opposite to that at the start, and the growth of vibration in contact that slides in this \
          direction was not checked."
         "Start one run with a speed of this sign.";
     UnresolvedModes "unresolved-modes"
@@ -81,7 +81,7 @@ topics! {
          contact forces does not."
         "Use a smaller `time.step` or adaptive steps.";
     UnresolvedFlexibility "unresolved-flexibility"
-        "The fixed step does not resolve much of the flexibility of the contact nodes, which causes errors of a few \
+        "The fixed step leaves much of the flexibility of the contact nodes unresolved, which causes errors of a few \
          per cent."
         "Use a smaller `time.step` or adaptive steps.";
     MasslessEnergy "massless-energy"
@@ -121,8 +121,8 @@ topics! {
         "Some adaptive steps of the minimum length were accepted although they missed the tolerance."
         "Use a smaller `time.step` or a larger tolerance.";
     FilmPulls "film-pulls"
-        "The solver `film` pulls at a contact node instead of pushing. The forces of single nodes are wrong by about \
-         the same amount."
+        "The solver `film` pulls at a contact node instead of pushing. The forces of individual nodes are wrong by about \
+         as much as this pull."
         "Use the solver `lcp`.";
     FilmInside "film-inside"
         "The solver `film` leaves a contact node inside the surface, by at least 5 % of its clearance (for a free \

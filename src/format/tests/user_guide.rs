@@ -147,7 +147,7 @@ fn the_chapter_on_scenes_lists_every_key() {
 
 #[test]
 fn scene_chapter_lists_all_dependencies_and_conflicts() {
-    let mut text = String::from("| what | needs or excludes | because | remedy |\n|---|---|---|---|\n");
+    let mut text = String::from("| what | relation | because | remedy |\n|---|---|---|---|\n");
     for rule in rules::all() {
         let _ = writeln!(text, "| {} |", rule.columns().join(" | "));
     }

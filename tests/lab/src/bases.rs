@@ -386,7 +386,7 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
         title: "Reduction basis of a blade".into(),
         summary: format!(
             "Rotor 37 with contact nodes or patches, reduced with fixed-interface or free-interface modes. Errors are \
-             those of the displacements of leading edge, mid-chord and trailing edge in a light rub, relative to {} \
+             in the displacements of the leading edge, mid-chord and trailing edge in a light rub, relative to {} \
              free-interface modes and steps of {:e} s.",
             size.true_modes,
             INTERVAL / f64::from(TRUE_DIVISION)

@@ -38,8 +38,7 @@ struct SideBySideRun {
 }
 
 fn refused(what: impl Into<String>, why: &str) -> Failure {
-    let remedy =
-        "Remove it from the scene, or use `tiprub study error`, which compares the schemes of tiprub with each other";
+    let remedy = "Remove the unsupported feature, or use `tiprub study error`, which compares the schemes of tiprub with each other";
     Failure::new(what.into(), why.to_owned(), remedy)
 }
 
@@ -51,7 +50,7 @@ pub(crate) fn blades_of(scene: &Scene) -> Result<BladeScene> {
     let settings = &scene.settings;
     let ([rotor], [surface], [contact]) = (&settings.structures[..], &settings.surfaces[..], &settings.contacts[..])
     else {
-        return Err(refused("structure, surface, contact", "the independent solver supports one of each"));
+        return Err(refused("structure, surface, contact", "the independent solver supports only one of each"));
     };
     let rom = &scene.roms[0];
     let unknown = [
@@ -59,7 +58,7 @@ pub(crate) fn blades_of(scene: &Scene) -> Result<BladeScene> {
         ("spin", rotor.spin == SpinSettings::default(), "spin effects"),
         ("whirl", !rotor.whirl && !rotor.axial_shift, "a moving shaft"),
         ("load", rotor.load.is_none() && !rotor.thermal, "loads"),
-        ("surface.structure", surface.structure.is_none(), "surfaces of a structure"),
+        ("surface.structure", surface.structure.is_none(), "surfaces carried by a structure"),
         ("surface.spline", surface.spline.is_none(), "surfaces through data points"),
         ("contact.coating", contact.coating.is_none(), "coatings"),
         ("contact.nodes", contact.nodes.is_none(), "a selection of contact nodes"),
@@ -181,7 +180,7 @@ pub(crate) fn study(arguments: &BesideArguments, console: &Console) -> Result<St
         (1..=most).take_while(|sample| f64::from(*sample) * interval <= experiment.stop * (1.0 + 1e-9)).count();
     let samples = u32::try_from(samples).unwrap_or(most).max(1);
     let failed =
-        |what: &str, why: String| Failure::new(what.to_owned(), why, "Choose a step with which the scene runs");
+        |what: &str, why: String| Failure::new(what.to_owned(), why, "Choose a step size at which the scene runs");
     let own = product(&scene, 1, samples).map_err(|error| failed("simulation", error.to_string()))?;
     let half =
         product(&scene, 2, samples).map_err(|error| failed("simulation with half the step", error.to_string()))?;
@@ -217,7 +216,7 @@ fn report(
     let with_mass = matches!(scene.settings.time.scheme, Scheme::CentralDifference | Scheme::ModalExact);
     let allowed = [0, 1].map(|which| MARGIN * (halved[which] + own_halved[which]) + 1e-12);
     let found = format!(
-        "displacements differ by {:.1e}, the impulse by {:.1e}; halving the step changes tiprub by {:.1e}, {:.1e} and \
+        "displacements differ by {:.1e}, the impulse by {:.1e}; halving the step changes the results of tiprub by {:.1e}, {:.1e} and \
          the independent solver by {:.1e}, {:.1e}",
         between[0], between[1], own_halved[0], own_halved[1], halved[0], halved[1]
     );
@@ -242,9 +241,10 @@ fn report(
     Study {
         name: "beside",
         title: format!("{} compared with an independent solver", scene.settings.name),
-        summary: "tiprub with the step of the scene and half of it, compared with Moreau-Jean time stepping with \
+        summary:
+            "tiprub with the step of the scene and with half that step, compared with Moreau-Jean time stepping with \
                   independent geometry, modes and contact solution at three steps."
-            .into(),
+                .into(),
         facts: vec![
             ("communication steps".into(), own.impulses.len().to_string()),
             ("scheme".into(), format!("{:?}, {:?}", scene.settings.time.scheme, scene.settings.contacts[0].solver)),

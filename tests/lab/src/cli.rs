@@ -87,14 +87,14 @@ pub enum LabCommand {
     /// Recovered stress of reduced blades in a rub, compared with the full finite-element model, for several numbers of
     /// modes.
     Stress(StudyCommon),
-    /// One blade in a coated casing that closes: wear lobes compared with blade vibrations per revolution.
+    /// One blade in a coated casing whose radius decreases: wear lobes compared with blade vibrations per revolution.
     Wear(StudyCommon),
 }
 
 /// Arguments of `lab estimates`.
 #[derive(Debug, Args)]
 pub struct EstimatesArguments {
-    /// Run only the mesh error: takes minutes instead of an hour.
+    /// Compute only the mesh error (minutes instead of an hour).
     #[arg(long)]
     pub mesh_only: bool,
     /// Options of all studies.

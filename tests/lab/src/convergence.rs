@@ -175,7 +175,7 @@ fn pairs(rows: &[ConvergenceRow], order: &[usize], sectors: usize) -> Statement 
         ),
         values.len() == MODES && order.len() >= MODES && wrong == 0,
         format!(
-            "{wrong} of {} modes violate this; {} modes are single, of nodal diameters {}",
+            "{wrong} of {} modes violate this; {} modes are unpaired (nodal diameters {})",
             values.len(),
             alone.len(),
             alone.join(", ")
@@ -213,8 +213,8 @@ fn monotone(rows: &[ConvergenceRow]) -> Statement {
     let lowest = values.copied().fold(f64::INFINITY, f64::min);
     Statement::tested(
         format!(
-            "Frequencies decrease towards those of the full model as component modes are added: none rises or falls \
-             below the full model by more than {ROUNDING:e} %"
+            "Frequencies decrease towards those of the full model as component modes are added: none rises, or falls \
+             below the full model, by more than {ROUNDING:e} %"
         ),
         rows.len() > 1 && worst < ROUNDING && lowest > -ROUNDING,
         format!("largest rise between successive numbers of modes {worst:.1e} %, lowest deviation {lowest:.1e} %"),
@@ -236,7 +236,7 @@ pub(crate) fn study(reduction: &CyclicReduction, seconds: f64, quick: bool) -> R
         "In the paper, RCC < 1 % for the 56 lowest modes with 56 or more component modes of the disk",
         match CRITERIA[1].enough(rows) {
             Some(row) => format!(
-                "here with {} or more. Geometry, mesh and contact nodes of the paper's industrial disk are not \
+                "here with {} or more. The geometry, mesh and contact nodes of the paper's industrial disk are not \
                  published, so only the order of magnitude can be compared",
                 row.total_modes
             ),
@@ -252,7 +252,7 @@ pub(crate) fn study(reduction: &CyclicReduction, seconds: f64, quick: bool) -> R
             "Craig-Bampton models of {} with increasing numbers of component modes, compared with the full \
              finite-element model.{}",
             rom.name,
-            if quick { " Quick form: a coarse mesh, for a first look only." } else { "" }
+            if quick { " Quick mode: a coarse mesh, for a first look only." } else { "" }
         ),
         facts: vec![
             ("model".into(), rom.origin.clone()),

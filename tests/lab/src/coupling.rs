@@ -44,7 +44,7 @@ struct Shaft {
 
 const SHAFTS: [Shaft; 2] = [
     Shaft { name: "heavy", mass: 30.0, damping: 1.2e3, stiffness: 3e7 },
-    Shaft { name: "without mass", mass: 0.0, damping: 150.0, stiffness: 2e6 },
+    Shaft { name: "massless", mass: 0.0, damping: 150.0, stiffness: 2e6 },
 ];
 
 /// Displacement (m) and velocity (m/s) of the shaft centre.
@@ -359,7 +359,7 @@ fn statements(runs: &CouplingRuns) -> Vec<Statement> {
         ),
         Statement::tested(
             format!(
-                "{name}: it takes at most 10 % more rub steps than finite differences, counting derivatives as steps"
+                "{name}: Newton's method takes at most 10 % more rub steps than finite differences, counting derivatives as steps"
             ),
             steps(CouplingMethod::Newton) <= 1.1 * steps(CouplingMethod::Differences),
             format!(
@@ -384,15 +384,15 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
         title: "Coupling of a rub and a shaft".into(),
         summary: format!(
             "Rotor 37 whirls in its casing on a shaft with unbalance, which a separate model integrates with the \
-             midpoint rule. The two models are coupled by four methods. Errors are those of the orbit, relative to the \
+             midpoint rule. The two models are coupled by four methods. Errors are in the orbit, relative to the \
              converged orbit with H = {FINE:e} s.{}",
-            if arguments.quick { " Quick form: blades with three modes." } else { "" }
+            if arguments.quick { " Quick mode: blades with three modes." } else { "" }
         ),
         facts: SHAFTS
             .iter()
             .map(|shaft| {
                 let Shaft { name, mass, damping, stiffness } = shaft;
-                (format!("shaft {name}"), format!("{mass} kg, {damping} N s/m, {stiffness:e} N/m"))
+                (format!("{name} shaft"), format!("{mass} kg, {damping} N s/m, {stiffness:e} N/m"))
             })
             .collect(),
         statements: all.iter().flat_map(statements).collect(),

@@ -224,7 +224,7 @@ fn groups(rubs: &[EstimatedRub], all: &[Compared], direction: usize) -> Vec<Stat
             format!("{}, group {number}", DIRECTIONS[direction]),
             format!(
                 "true error {least:.2} to {most:.2} %, estimate / true error {low:.2} to {high:.2}, {right} of {} \
-                 within a factor of {FACTOR}, {} without estimate",
+                 within a factor of {FACTOR}, {} without an estimate",
                 given.len(),
                 truths.len() - given.len()
             ),

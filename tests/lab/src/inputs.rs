@@ -278,7 +278,7 @@ fn figure(course: &InputCase, runs: &InputRuns) -> Result<StudyFigure> {
     Ok(StudyFigure {
         name: course.name,
         caption: format!(
-            "Largest normal force of a node while {} changes, against the communication step.",
+            "Largest normal force at a node while {} changes, against the communication step.",
             course.title
         ),
         picture: Picture::plot(&plot)?,
@@ -336,7 +336,7 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
              and as values that are held. The fine run uses derivatives and a communication step of {:e} s, which \
              equals the internal step.{}",
             STEPS[0],
-            if arguments.quick { " Quick form: blades with three modes, an elastic ring without a mesh." } else { "" }
+            if arguments.quick { " Quick mode: blades with three modes, an elastic ring without a mesh." } else { "" }
         ),
         facts: vec![
             ("duration of each run".into(), format!("{length} s")),

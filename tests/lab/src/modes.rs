@@ -126,8 +126,8 @@ fn shapes(mesh: &Mesh, diameters: &[NodalDiameter]) -> StudyFigure {
     StudyFigure {
         name: "shapes",
         caption:
-            "Mode shapes of one sector at the instant of its largest displacement; the next sector moves equally with \
-             a phase of 2πn/N. The colour shows the magnitude of the displacement. The file contains the first picture."
+            "Mode shapes of one sector at the instant of its largest displacement; the next sector moves in the same way with \
+             a phase shift of 2πn/N. The colour shows the magnitude of the displacement. The file contains only the first mode shape."
                 .into(),
         picture: Picture { svg: single, html },
         sheet,
@@ -180,13 +180,13 @@ fn disk_stiffens(diameters: &[NodalDiameter]) -> Statement {
     let [zero, low, high] = [first.first(), first.get(1), first.last()].map(|one| one.copied().unwrap_or(f64::NAN));
     Statement::tested(
         format!(
-            "From nodal diameter 1 upwards, the lowest frequency rises with the nodal diameter (no fall reaches {} %) \
+            "From nodal diameter 1 upwards, the lowest frequency rises with the nodal diameter (any drop is below {} %) \
              from disk-dominated to blade-dominated modes",
             100.0 * FLAT
         ),
         fall < FLAT && high > low,
         format!(
-            "{low:.1} Hz at nodal diameter 1, {high:.1} Hz at {}; largest fall between successive nodal diameters \
+            "{low:.1} Hz at nodal diameter 1, {high:.1} Hz at {}; largest drop between successive nodal diameters \
              {:.1e} %. Umbrella mode of the disk at nodal diameter 0: {zero:.1} Hz",
             first.len().saturating_sub(1),
             100.0 * fall
@@ -249,7 +249,7 @@ pub(crate) fn study(reduction: &CyclicReduction, mesh: &Mesh, speed: Option<f64>
         summary: format!(
             "Natural frequencies and mode shapes of {} for every nodal diameter.{}",
             rom.name,
-            if quick { " Quick form: a coarse mesh, for a first look only." } else { "" }
+            if quick { " Quick mode: a coarse mesh, for a first look only." } else { "" }
         ),
         facts: vec![
             ("model".into(), rom.origin.clone()),

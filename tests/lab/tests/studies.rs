@@ -207,9 +207,7 @@ fn quick_coupling_study_requires_derivatives_without_mass() {
     // decreases with H.
     assert!(found("heavy", "fixed point").iter().all(|found| found["unsolved"] == 0));
     assert!(
-        found("without mass", "fixed point")
-            .iter()
-            .all(|found| found.is_null() || found["unsolved"].as_u64() > Some(0))
+        found("massless", "fixed point").iter().all(|found| found.is_null() || found["unsolved"].as_u64() > Some(0))
     );
     let errors: Vec<f64> = found("heavy", "once").iter().map(|found| found["error"].as_f64().unwrap()).collect();
     assert!(errors.windows(2).all(|pair| pair[1] < 0.75 * pair[0]), "{errors:?}");

@@ -109,7 +109,10 @@ fn user_mesh_patch_rows_match_the_built_in_blade() {
             .replace("8.0e-5", "5.0e-7"),
     );
     let reported = project.fail("run coated.toml --stop 0.001", 1);
-    assert!(reported.contains("contact[1].coating: excludes a ROM with several rows of contact patches"), "{reported}");
+    assert!(
+        reported.contains("contact[1].coating: cannot be combined with a ROM with several rows of contact patches"),
+        "{reported}"
+    );
     for (line, reported, code) in [
         ("reduce rotor37 --contact-rows 2 --contact-nodes 3".to_owned(), "cannot be used with", 2),
         ("reduce stage --contact-rows 2 --contact-nodes 3".to_owned(), "cannot be used with", 2),

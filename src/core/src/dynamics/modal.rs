@@ -128,7 +128,7 @@ impl ModalModel {
         if !(0.0..1.0).contains(&damping_ratio) {
             return Err(Error::invalid(
                 "damping_ratio",
-                format!("{} is not in 0 ≤ ξ < 1", shown(damping_ratio)),
+                format!("{} is outside 0 ≤ ξ < 1", shown(damping_ratio)),
                 "Give the modal damping ratio as a fraction of critical damping, for example 0.005",
             ));
         }

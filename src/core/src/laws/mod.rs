@@ -56,7 +56,7 @@ pub(crate) static SOLVERS: Enumeration = Enumeration {
     name: "Solver",
     description: "Contact solver",
     items: &[
-        ("film", "Forward-increment Lagrange multipliers: equality on the nodes that penetrate in the prediction"),
+        ("film", "Forward-increment Lagrange multipliers: zero gap at the nodes that are predicted to penetrate"),
         ("lcp", "Complementarity over all contact nodes"),
         ("coulomb", "Coulomb friction with sticking"),
     ],

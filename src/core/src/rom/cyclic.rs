@@ -56,7 +56,7 @@ impl Rom {
         }
         if harmonics.len() != self.largest_nodal_diameter() {
             let problem = format!(
-                "{} harmonics above 0, but {} are required for {} sectors",
+                "{} harmonics above nodal diameter 0, but {} are required for {} sectors",
                 harmonics.len(),
                 self.largest_nodal_diameter(),
                 self.sectors
@@ -97,7 +97,7 @@ impl Rom {
             if 2 * nodal_diameter == self.sectors && imaginary > 1e-8 * largest {
                 return refuse(
                     name,
-                    format!("imaginary part {imaginary:.3e}, but arrays of the nodal diameter sectors/2 must be real"),
+                    format!("imaginary part {imaginary:.3e}, but the arrays of nodal diameter sectors/2 must be real"),
                 );
             }
         }

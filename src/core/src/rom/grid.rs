@@ -21,7 +21,7 @@ impl Rom {
         }
         let what = if patches { "patches" } else { "contact nodes without areas" };
         let problem =
-            format!("{rows} rows of {nodes} {what}; at least two rows with the same number of patches are required");
+            format!("{nodes} {what} in {rows} rows; at least two rows with the same number of patches are required");
         Err(Error::invalid("ROM metadata `contact_rows`", problem, remedy))
     }
 
@@ -55,7 +55,7 @@ impl Rom {
 }
 
 fn refuse(problem: String) -> Result<()> {
-    let remedy = "Write the ROM again with `tiprub reduce`, or see the ROM file chapter of the user guide";
+    let remedy = "Regenerate the ROM with `tiprub reduce`, or see the ROM file chapter of the user guide";
     Err(Error::invalid("ROM metadata `contact_grid`", problem, remedy))
 }
 

@@ -89,7 +89,7 @@ static PARTS: &[FeatureRule] = &[
         &[CARRIED],
         ("a structure that is the master of a contact", |at| at.carrier_touches()),
         "a structure cannot be the master of one contact and carry the surface of another",
-        "Make it the master of both contacts, and put the surfaces on the structures that it meets",
+        "Make it the master of both contacts, and put the surfaces on the structures that it can touch",
     ),
     needs(
         &[RIGID],
@@ -124,7 +124,7 @@ static PARTS: &[FeatureRule] = &[
     excludes(
         &[MERIDIAN],
         ("a surface spline", |at| at.surface().spline.is_some() || at.carrier().is_some()),
-        "a surface spline takes the normal at the closest point",
+        "a surface spline uses the normal at the closest point",
         "Remove the line",
     ),
     needs(
@@ -142,7 +142,7 @@ static PARTS: &[FeatureRule] = &[
     excludes(
         &[MODULUS, YIELD, HARDENING],
         ("`contact.coating.cutting`", |at| at.is_cut()),
-        "this key belongs to the plastic law, and the coating is cut",
+        "this key belongs to the plastic law, but this coating is cut",
         "Remove the line, or remove `cutting` to use the plastic law",
     ),
     excludes(
@@ -208,10 +208,10 @@ static VARIABLES: &[FeatureRule] = &[
 static METHODS: &[FeatureRule] = &[
     needs(
         &[COULOMB],
-        ("a scene packaged with it, or one with friction, rigid surfaces and rotors of uncoupled sectors", |at| {
+        ("a scene packaged with it, or one with friction, rigid surfaces and rotors with uncoupled sectors", |at| {
             at.may_stick()
         }),
-        "larger problems are prepared only if the scene selects this solver",
+        "the solver is set up for larger problems only if the scene selects it",
         "Package the scene with contact.solver = \"coulomb\"",
     ),
     excludes(
@@ -305,7 +305,7 @@ static METHODS: &[FeatureRule] = &[
 static PRESETS: &[FeatureRule] = &[excludes(
     &[OTHER_SCHEME, OTHER_SOLVER],
     ("`preset = \"paper\"`", |at| at.settings.preset == Preset::Paper),
-    "the preset fixes the scheme and the solver of the paper",
+    "the preset prescribes the scheme and the solver of the paper",
     "Remove the line or the preset",
 )];
 
@@ -326,7 +326,7 @@ static ROMS: &[FeatureRule] = &[
     needs(
         &[ROM_FREE],
         ("`sectors = 1`", |at| at.rom().sectors == 1 && !at.rom().is_cyclic()),
-        "a free master and the structures that it meets have a single sector",
+        "a free master and the structures that it can touch must have a single sector",
         "Use a ROM with sectors = 1",
     ),
     needs(
@@ -351,7 +351,7 @@ static ROMS: &[FeatureRule] = &[
         &[THERMAL],
         ("thermal loads in the ROM", |at| at.rom().extras.thermal.is_some()),
         "they describe the thermal expansion caused by each patch",
-        "Reduce it from a mesh of one material (a casing: with thermal patches), or remove the line",
+        "Reduce the structure from a mesh with a single material (for a casing, with thermal patches), or remove the line",
     ),
     excludes(
         &[COATING],
@@ -360,7 +360,7 @@ static ROMS: &[FeatureRule] = &[
         }),
         "the penetration of a row of cells is interpolated between two patches along the axis, and patches of \
          several rows would alternate",
-        "Reduce it with one row of patches (without --contact-rows), or remove the coating",
+        "Reduce the blade with one row of patches (without --contact-rows), or remove the coating",
     ),
     needs(
         &[PLASTIC_COATING],
@@ -369,7 +369,7 @@ static ROMS: &[FeatureRule] = &[
                 || at.master_rom().is_some_and(Rom::has_patches)
         }),
         "the force on a tip increases with the width of the contact, and contact nodes have no width",
-        "Set it to the tip thickness divided by the cosine of the stagger angle (m), or reduce the blade with \
+        "Set `contact_width` to the tip thickness divided by the cosine of the stagger angle (m), or reduce the blade with \
          --contact-patches",
     ),
     needs(
@@ -382,15 +382,15 @@ static ROMS: &[FeatureRule] = &[
     ),
     needs(
         &[HEATED_STRESS],
-        ("static thermal stress in that ROM (array `stress_thermal`)", |at| {
+        ("static thermal stress in the ROM of the rotor (array `stress_thermal`)", |at| {
             at.stressed(|own| own.thermal).all(|rom| rom.extras.stress_thermal.is_some())
         }),
-        "free thermal expansion causes no stress, which the reduced coordinates alone cannot represent",
+        "the reduced coordinates alone cannot represent that free thermal expansion is free of stress",
         "Reduce the blade again, add the array, or remove `thermal` or this line",
     ),
     needs(
         &[GROWN_STRESS],
-        ("static centrifugal stress in that ROM (array `stress_centrifugal`)", |at| {
+        ("static centrifugal stress in the ROM of the rotor (array `stress_centrifugal`)", |at| {
             at.stressed(|own| own.spin.growth).all(|rom| rom.extras.stress_centrifugal.is_some())
         }),
         "a few modes do not resolve the stress of a load that acts on the whole blade",
@@ -447,7 +447,7 @@ pub fn all() -> impl Iterator<Item = &'static FeatureRule> {
 
 impl FeatureRule {
     fn relation(&self) -> String {
-        format!("{} {}", if self.needed { "needs" } else { "excludes" }, self.other.0)
+        format!("{} {}", if self.needed { "requires" } else { "cannot be combined with" }, self.other.0)
     }
 
     /// Returns the columns in the guide: features, requirement or exclusion, reason, remedy.

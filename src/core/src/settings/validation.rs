@@ -190,7 +190,7 @@ impl InitialSettings {
         counted(format!("{at}.mode"), Some(self.mode))?;
         counted(format!("{at}.sector"), self.sector)?;
         if self.sector.is_some() && self.nodal_diameter.is_some() {
-            let remedy = "Give only one of them; a further [[structure.initial]] is added to this one";
+            let remedy = "Give only one of them; several [[structure.initial]] entries are superposed";
             return Err(Error::invalid(format!("{at}.sector"), "cannot be combined with `nodal_diameter`", remedy));
         }
         at_most(&format!("{at}.displacement"), self.displacement, ranges::POSITION)?;
@@ -277,8 +277,8 @@ impl ContactSettings {
             return Ok(());
         }
         if self.gap == 0.0 && self.sector_gaps.is_empty() {
-            let remedy = "Add the radial tip clearance to [[contact]]: number, m (> 0, up to a tenth of the radius); \
-                          only a free master has none";
+            let remedy = "Add the radial tip clearance (m) to [[contact]], above 0 and at most a tenth of the radius; \
+                          only contacts of free masters have no gap";
             return Err(Error::invalid(format!("{at}.gap"), "missing or 0", remedy));
         }
         if self.gap != 0.0 || self.sector_gaps.is_empty() {

@@ -443,7 +443,7 @@ pub(super) fn check_range(variable: &Variable, value: f64) -> Result<()> {
         return Ok(());
     }
     let problem = if value.is_finite() {
-        format!("{} is outside {} … {}", shown(value), shown(low), shown(high))
+        format!("{} is outside the range {} to {}", shown(value), shown(low), shown(high))
     } else {
         format!("{value} is not finite")
     };

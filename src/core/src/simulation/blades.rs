@@ -206,7 +206,7 @@ impl Compiled {
         Err(Error::invalid(
             format!("variable `{}rotor_temperature`", self.plan.body_prefix(&self.scene, body)),
             format!(
-                "{} K with softening {} 1/K multiplies the stiffness by {}, outside {} … {}",
+                "{} K with softening {} 1/K multiplies the stiffness by {}, outside the range {} to {}",
                 shown(temperature),
                 shown(structure.softening),
                 shown(left),

@@ -182,7 +182,7 @@ impl Simulation {
         let (touching, node) = (gaps.iter().filter(|gap| **gap < 0.0).count(), name(deepest.0));
         if self.compiled.bodies[body].translations.is_some() {
             let remedy = "Move one of the structures, because gaps follow from the contact positions in the ROMs; \
-                          check that S_t x S_s of each contact grid points to the master";
+                          check that the normal of each contact grid (direction from row to row x direction along the rows) points to the master";
             let problem = format!(
                 "{touching} contact nodes start inside the surfaces, with a maximum depth of {:.3e} m at {node}",
                 deepest.1
@@ -197,7 +197,7 @@ impl Simulation {
         refuse(
             problem,
             "Enlarge the gap, ramp up the casing shape with ramp_time (casing_ramp_time), start at another rotor \
-             angle, or change the start values of loads, temperatures and the inputs that move casing and shaft",
+             angle, or change the start values of loads, temperatures and the inputs that move the casing and the shaft",
         )
     }
 }

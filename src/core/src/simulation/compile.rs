@@ -552,7 +552,7 @@ fn check_lengths(rom: &Rom, clearances: &[f64], surface: &CompiledShape) -> Resu
         if value > SMALL * smallest {
             return Err(Error::invalid(
                 what,
-                format!("{value:.3e} m is not small compared with the radius of {smallest:.3e} m of the contact nodes"),
+                format!("{value:.3e} m is not small compared with the radius of the contact nodes, {smallest:.3e} m"),
                 "Give lengths in metres, well below a tenth of the radius",
             ));
         }

@@ -64,7 +64,7 @@ fn contradicted(rom: &Rom, [low, high]: [AxialStation; 2], rise: f64, straight: 
     Error::invalid(
         format!("ROM `{}`, array `contact_meridional_slopes`", rom.name),
         format!(
-            "nodes `{first}` and `{last}` have the slopes {} and {}, but their positions rise by {} m per m along the \
+            "nodes `{first}` and `{last}` have the slopes {} and {}, but their radii increase by {} m per m along the \
              axis",
             shown(low.slope),
             shown(high.slope),

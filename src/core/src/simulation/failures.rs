@@ -43,8 +43,8 @@ impl Simulation {
             StepFailure::NonFinite | StepFailure::Exhausted => (String::new(), String::new()),
             StepFailure::Implausible { structure, sector } => (
                 format!(
-                    "a contact node of {} is displaced by more than a tenth of its radius, is that deep inside the \
-                     casing, or meets a flank of the casing shape steeper than 45°{}",
+                    "a contact node of {} is displaced by more than a tenth of its radius, has penetrated the \
+                     casing by as much, or touches a flank of the casing shape that is steeper than 45°{}",
                     self.sector_name(structure, sector),
                     self.instability(structure)
                 ),
@@ -108,7 +108,7 @@ impl Simulation {
     ) -> (String, String) {
         (
             format!(
-                "the gap of contact node {} of {} has changed by {jump:.3e} m in two steps, but the motion of node and \
+                "the gap of contact node {} of {} has changed by {jump:.3e} m in two steps, but the motion of the node and the \
                  casing explains only {explained:.3e} m: the work of this contact cannot be determined",
                 self.compiled.node_name(structure, node),
                 self.sector_name(structure, sector)
@@ -127,7 +127,7 @@ impl Simulation {
                 self.compiled.node_name(structure, node)
             ),
             "Extend the contact grid to cover the whole range of the nodes, or move one of the structures; check that \
-             S_t x S_s of each contact grid points to the master"
+             the normal of each contact grid (direction from row to row x direction along the rows) points to the master"
                 .to_owned(),
         )
     }

@@ -30,7 +30,7 @@ impl Compiled {
             return None;
         }
         let problem = format!(
-            "{} starts at speed {} rad/s, {ratio:.2} of its first natural frequency, but has the stiffness of a rotor \
+            "{} starts at a speed of {} rad/s, {ratio:.2} times its first natural frequency, but has the stiffness of a rotor \
              at rest. Centrifugal stiffening and growth can change contact forces by tens of per cent",
             self.rotor_name(body),
             shown(speed),

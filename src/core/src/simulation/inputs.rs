@@ -293,7 +293,7 @@ impl Simulation {
         let what = || format!("variable `{}`", variable.element_name(element));
         if input.slope != 0.0 && !(end.is_finite() && beyond <= SAME_STEP * low.abs().max(high.abs())) {
             let problem = format!(
-                "with the derivative {} it reaches {} at t = {} s, outside {} … {}",
+                "with the derivative {} it reaches {} at t = {} s, outside the range {} to {}",
                 shown(input.slope),
                 shown(end),
                 shown(self.time + until),

@@ -52,8 +52,11 @@ impl Simulation {
                 if share >= least.max(DEEPER * self.warning_state.inside[structure]) {
                     self.warning_state.inside[structure] = share;
                     let problem = self.left_inside(structure, node, share);
-                    let then =
-                        if goes_on { String::new() } else { format!(". The run ends at {:.0} %", 100.0 * INSIDE) };
+                    let then = if goes_on {
+                        String::new()
+                    } else {
+                        format!(". The run ends if this reaches {:.0} %", 100.0 * INSIDE)
+                    };
                     let problem = format!("up to t = {} s, {problem}{then}", shown_time(time));
                     let remedy = self.against_pulling(structure);
                     self.note(Warning::new(Topic::FilmInside, problem, remedy));
@@ -65,7 +68,11 @@ impl Simulation {
             }
             if share >= TOLD && !std::mem::replace(&mut self.warning_state.pulls[structure], true) {
                 let problem = self.pulls(structure, node, share);
-                let then = if is_paper { String::new() } else { format!(". The run ends at {:.0} %", 100.0 * REFUSED) };
+                let then = if is_paper {
+                    String::new()
+                } else {
+                    format!(". The run ends if this reaches {:.0} %", 100.0 * REFUSED)
+                };
                 let problem = format!("up to t = {} s, {problem}{then}", shown_time(time));
                 self.note(Warning::new(Topic::FilmPulls, problem, self.against_pulling(structure)));
             }
@@ -77,7 +84,7 @@ impl Simulation {
     pub(super) fn pulls(&self, structure: usize, node: usize, share: f64) -> String {
         format!(
             "film has applied a tensile impulse at contact node {}, {:.0} % of the impulse of the most loaded node: it \
-             checks penetration only once, and keeps nodes closed that other nodes push away. The forces of individual \
+             checks for penetration only once, and keeps nodes closed even if other nodes push them away. The forces of individual \
              nodes are wrong by about the same amount",
             self.compiled.node_name(structure, node),
             100.0 * share
@@ -92,7 +99,7 @@ impl Simulation {
             ("casing", "its clearance")
         };
         format!(
-            "film has left contact node {} inside the {surface} by {:.2e} m, {} of {length}: it checks penetration \
+            "film has left contact node {} inside the {surface} by {:.2e} m, {} of {length}: it checks for penetration \
              only once, and forces on other nodes have pushed this node in",
             self.compiled.node_name(structure, node),
             share * self.system.clearance_of(structure, node),

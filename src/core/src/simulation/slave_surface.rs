@@ -223,7 +223,7 @@ fn check_radii(rom: &Rom, first: usize, points: &[[f64; 3]]) -> Result<()> {
             return Err(Error::invalid(
                 format!("ROM `{}`", rom.name),
                 format!(
-                    "node `{}` has a radius of {own:.4e} m, but tip contour and gap require {wanted:.4e} m",
+                    "node `{}` has a radius of {own:.4e} m, but the tip contour and the gap require {wanted:.4e} m",
                     node.name
                 ),
                 "Use the casing that belongs to this rotor, in metres",

@@ -33,7 +33,7 @@ impl Simulation {
             let rotor = self.compiled.rotor_name(body);
             let cuts = self.compiled.cuts(body);
             let problem = format!(
-                "{rotor} starts at speed {} rad/s with {}: the sliding law does not model sticking, which occurs below \
+                "{rotor} starts at a speed of {} rad/s with {}: the sliding law does not model sticking, which occurs below \
                  about {slow:.1e} rad/s. The run ends if friction adds energy",
                 shown(speed.value),
                 if cuts { "a coating that the blades cut" } else { "friction" },

@@ -70,7 +70,7 @@ impl Simulation {
             SimulationPhase::Created | SimulationPhase::Stepping => {
                 return Err(Error::invalid(
                     "doStep",
-                    "called outside a communication point",
+                    "called before initialisation or within a communication step",
                     "Initialise the instance first",
                 ));
             }
@@ -232,10 +232,10 @@ impl Simulation {
                 format!("contact[{}].coating.cells_around", pair + 1),
                 format!(
                     "the rotor turns {passed:.3e} rad in one internal step of {step:.3e} s at t = {} s, more than the \
-                     width of {stride:.3e} rad of its tips or coating cells: the cells in between would not wear",
+                     width of its tips or coating cells, {stride:.3e} rad: the cells in between would not wear",
                     shown_time(self.time)
                 ),
-                "Use fewer cells around, a lower speed or a smaller internal_step_max (time.step)",
+                "Use fewer cells around the circumference, a lower speed or a smaller internal_step_max (time.step)",
             ));
         }
         if turned <= scale {

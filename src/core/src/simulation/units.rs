@@ -62,7 +62,10 @@ pub static STEP_DERIVATIVES: Enumeration = Enumeration {
     description: "Result of the functions for directional derivatives",
     items: &[
         ("off", "None: calls are rejected"),
-        ("on", "Derivatives of outputs at the end of the last communication step with respect to inputs over it"),
+        (
+            "on",
+            "Derivatives of outputs at the end of the last communication step with respect to inputs during that step",
+        ),
     ],
 };
 

@@ -78,7 +78,7 @@ pub fn warning(step: f64, limit: f64) -> Option<Warning> {
         Warning::new(
             Topic::UnresolvedFlexibility,
             format!(
-                "modal-exact with an internal step of {step:.3e} s does not resolve much of the contact flexibility: \
+                "modal-exact with an internal step of {step:.3e} s leaves much of the contact flexibility unresolved: \
                  expect errors of a few per cent"
             ),
             format!("Set `time.step` below {:.2e} s", NEAR * limit),
@@ -98,7 +98,7 @@ pub fn check(step: f64, limit: f64, frequency: f64) -> Result<()> {
     Err(Error::Unstable {
         problem: format!(
             "modal-exact with an internal step of {step:.3e} s (ω_max·h = {:.4}) does not resolve modes above {:.4} \
-             kHz, which have more than half of the contact flexibility: forces, friction work and energies would be \
+             kHz, which account for more than half of the contact flexibility: forces, friction work and energies would be \
              wrong by ten per cent, and by far more with longer steps",
             frequency * step,
             1e-3 * PASSED_OVER / step / std::f64::consts::TAU

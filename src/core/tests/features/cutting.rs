@@ -230,7 +230,10 @@ fn rejects_features_incompatible_with_cutting() {
             change(scene.settings.contacts[0].coating.as_mut().unwrap().cutting.as_mut().unwrap());
         }
     };
-    refused(&coating(|c| c.modulus = 1e9), &["contact[1].coating.modulus: excludes `contact.coating.cutting`"]);
+    refused(
+        &coating(|c| c.modulus = 1e9),
+        &["contact[1].coating.modulus: cannot be combined with `contact.coating.cutting`"],
+    );
     refused(&coating(|c| c.yield_stress = 1e6), &["contact[1].coating.yield_stress: excludes"]);
     refused(&coating(|c| c.hardening = 1e6), &["contact[1].coating.hardening: excludes"]);
     refused(
@@ -242,7 +245,13 @@ fn rejects_features_incompatible_with_cutting() {
         &["contact[1].coating.cutting.normal_ratio", "between 0.05 and 20"],
     );
     let scheme = |scheme| move |scene: &mut Scene| scene.settings.time.scheme = scheme;
-    refused(&scheme(Scheme::MasslessBoundary), &["`massless-boundary` excludes `contact.coating.cutting`"]);
-    refused(&scheme(Scheme::Galerkin), &["`galerkin` excludes `contact.coating`"]);
-    refused(&|scene| scene.settings.contacts[0].solver = Solver::Coulomb, &["`coulomb` excludes a coating"]);
+    refused(
+        &scheme(Scheme::MasslessBoundary),
+        &["`massless-boundary` cannot be combined with `contact.coating.cutting`"],
+    );
+    refused(&scheme(Scheme::Galerkin), &["`galerkin` cannot be combined with `contact.coating`"]);
+    refused(
+        &|scene| scene.settings.contacts[0].solver = Solver::Coulomb,
+        &["`coulomb` cannot be combined with a coating"],
+    );
 }

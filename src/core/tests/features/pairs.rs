@@ -347,7 +347,10 @@ fn rejects_incompatible_combinations_by_name() {
     let both = several::in_one_casing(rub(6), Solver::Lcp, 0.15);
     let mut scene = both.clone();
     scene.settings.contacts[1].solver = Solver::Film;
-    refused(&scene, "contact[2].solver: needs the solver of contact[1]: all contacts of a scene use the same solver");
+    refused(
+        &scene,
+        "contact[2].solver: requires the solver of contact[1]: all contacts of a scene use the same solver",
+    );
     let mut scene = both.clone();
     scene.settings.contacts[1].coating = Some(tiprub_core::settings::CoatingSettings {
         thickness: 1e-4,
@@ -359,7 +362,7 @@ fn rejects_incompatible_combinations_by_name() {
         contact_width: Some(3e-3),
         cutting: None,
     });
-    refused(&scene, "contact[2].coating: excludes a contact that is solved together");
+    refused(&scene, "contact[2].coating: cannot be combined with a contact that is solved together");
     let mut scene = both.clone();
     scene.settings.contacts[1].slave = "front_casing".into();
     refused(&scene, "surface[1].name: `front_casing` is named by 2 contacts");
@@ -369,7 +372,7 @@ fn rejects_incompatible_combinations_by_name() {
     refused(&scene, "structure[2].name: `rear` is not part of any contact");
     let mut scene = several::split(&rub(6));
     scene.settings.contacts[1].nodes = None;
-    refused(&scene, "contact[2].master: a structure of several contacts needs `contact.nodes`");
+    refused(&scene, "contact[2].master: a structure with several contacts requires `contact.nodes`");
     scene.settings.contacts[1].nodes = Some("leading".into());
     refused(&scene, "the node `leading_edge` already belongs to contact[1]");
     scene.settings.contacts[1].nodes = Some("tip".into());
@@ -384,7 +387,7 @@ fn rejects_incompatible_combinations_by_name() {
     };
     assert!(
         message.contains(
-            "`massless-boundary` excludes several surfaces on one flexible structure: the largest stable step is unknown"
+            "`massless-boundary` cannot be combined with several surfaces on one flexible structure: the largest stable step is unknown"
         ),
         "{message}"
     );

@@ -86,9 +86,9 @@ fn rejects_stress_output_without_stress_points() {
         Simulation::new(&scene).map(|_| ()).unwrap_err().to_string()
     };
     let missing = reported(|scene| scene.roms[0].extras.stress = None);
-    assert!(missing.starts_with("outputs.stress: needs stress points in the ROM of a rotor"), "{missing}");
+    assert!(missing.starts_with("outputs.stress: requires stress points in the ROM of a rotor"), "{missing}");
     let unwatched = reported(|scene| scene.settings.outputs.watched_sectors.clear());
-    assert!(unwatched.starts_with("outputs.stress: needs `outputs.watched_sectors`"), "{unwatched}");
+    assert!(unwatched.starts_with("outputs.stress: requires `outputs.watched_sectors`"), "{unwatched}");
     let short = reported(|scene| {
         let stress = scene.roms[0].extras.stress.as_mut().unwrap();
         stress.map = stress.map.rows(0, STRESSES).into_owned();
@@ -187,7 +187,7 @@ fn statically_determinate_stress_ignores_stiffness() {
     let refused = Simulation::new(&scene).map(|_| ()).unwrap_err().to_string();
     assert!(
         refused.starts_with(
-            "outputs.stress: stress of a rotor with `structure.spin.growth` needs static centrifugal stress"
+            "outputs.stress: stress of a rotor with `structure.spin.growth` requires static centrifugal stress"
         ),
         "{refused}"
     );
@@ -203,7 +203,8 @@ fn heated_blade_stress_requires_static_thermal_stress() {
     let reported = |scene: &Scene| Simulation::new(scene).map(|_| ()).unwrap_err().to_string();
     let refused = reported(&scene);
     assert!(
-        refused.starts_with("outputs.stress: stress of a rotor with `structure.thermal` needs static thermal stress"),
+        refused
+            .starts_with("outputs.stress: stress of a rotor with `structure.thermal` requires static thermal stress"),
         "{refused}"
     );
     assert!(refused.contains("`stress_thermal`"), "{refused}");

@@ -37,7 +37,7 @@ fn rejects_meaningless_scenes_with_reason() {
         ("sector_gaps", |scene| scene.settings.contacts[0].sector_gaps = vec![1e-3]),
         ("meridian", |scene| scene.settings.contacts[0].meridian = Meridian::Cylinder),
         ("slave_heat_fraction", |scene| scene.settings.contacts[0].slave_heat_fraction = Some(0.5)),
-        ("needs the solver of contact[1]", |scene| scene.settings.contacts[1].solver = Solver::Film),
+        ("requires the solver of contact[1]", |scene| scene.settings.contacts[1].solver = Solver::Film),
         ("the position of its surface", |scene| scene.settings.surfaces[0].structure = None),
         ("shape", |scene| scene.settings.surfaces[0].shape = Shape::Lobes { amplitude: 1e-4, order: 2, phase: 0.0 }),
         ("moving", |scene| scene.settings.surfaces[0].moving = true),
@@ -47,8 +47,8 @@ fn rejects_meaningless_scenes_with_reason() {
         ("nodal_diameters", |scene| scene.settings.outputs.nodal_diameters = Some(0)),
         ("an open contact grid in its ROM", |scene| scene.roms[1].extras.grid = None),
         ("coincide", |scene| scene.roms[1].contact_nodes[1].position = scene.roms[1].contact_nodes[0].position),
-        ("velocity: needs `motion = \"free\"`", |scene| scene.settings.structures[1].velocity = [1.0, 0.0, 0.0]),
-        ("whirl: needs `motion = \"rotating\"`", |scene| scene.settings.structures[0].whirl = true),
+        ("velocity: requires `motion = \"free\"`", |scene| scene.settings.structures[1].velocity = [1.0, 0.0, 0.0]),
+        ("whirl: requires `motion = \"rotating\"`", |scene| scene.settings.structures[0].whirl = true),
         ("is not part of any contact", |scene| scene.settings.surfaces[1].structure = Some("left_plate".into())),
         ("ω_max·h", |scene| {
             (scene.settings.time.scheme, scene.settings.time.step) = (Scheme::CentralDifference, 1e-5)

@@ -46,18 +46,27 @@ fn free_master_errors_report_their_location() {
     reported("[0.0, -100.0, 0.5]", "[0.0, -100.0]", &["structure[1].velocity: ", "list of 3 numbers, m/s"]);
     reported("[0.0, -100.0, 0.5]", "[0.0, -100.0, 0.5, 7.0]", &["structure[1].velocity: ", "list of 3 numbers, m/s"]);
     reported("[0.0, -100.0, 0.5]", "[0.0, nan, 0.5]", &["structure[1].velocity"]);
-    reported("motion = \"free\"", "motion = \"rotating\"", &["structure[1].velocity: needs `motion = \"free\"`"]);
+    reported("motion = \"free\"", "motion = \"rotating\"", &["structure[1].velocity: requires `motion = \"free\"`"]);
     reported("nodes = \"left_\"", "nodes = 3", &["contact[1].nodes: found integer `3`"]);
     reported(
         "nodes = \"left_\"\n",
         "",
-        &["contact[1].master: a structure of several contacts needs `contact.nodes`", "Set `nodes` in every contact"],
+        &[
+            "contact[1].master: a structure with several contacts requires `contact.nodes`",
+            "Set `nodes` in every contact",
+        ],
     );
-    reported("nodes = \"left_\"", "nodes = \"left_\"\ngap = 1e-3", &["contact[1].gap: excludes a free master"]);
+    reported(
+        "nodes = \"left_\"",
+        "nodes = \"left_\"\ngap = 1e-3",
+        &["contact[1].gap: cannot be combined with a free master"],
+    );
     reported("rigid = true", "rigid = 1", &["surface[2].rigid: found integer `1`, expected true or false"]);
     reported("rigid = true", "rigit = true", &["surface[2].rigit: unknown key", "Did you mean `rigid`?"]);
     reported("solver = \"lcp\"", "solver = \"film\"", &["Give all contacts the same solver"]);
-    let parts = ["time.input_interpolation: excludes a scene with free masters only: such a scene has no inputs"];
+    let parts = [
+        "time.input_interpolation: cannot be combined with a scene with free masters only: such a scene has no inputs",
+    ];
     reported("[time]", "[time]\ninput_interpolation = \"hold\"", &parts);
 }
 
@@ -134,12 +143,15 @@ fn rejects_rotor_settings_on_a_stationary_structure() {
     let remedy = "set motion = \"rotating\"";
     refused(
         rotor(|s| s.spin.stiffening = true),
-        &["structure[1].spin.stiffening: needs `motion = \"rotating\"`", remedy],
+        &["structure[1].spin.stiffening: requires `motion = \"rotating\"`", remedy],
     );
-    refused(rotor(|s| s.spin.growth = true), &["structure[1].spin.growth: needs `motion = \"rotating\"`", remedy]);
-    refused(rotor(|s| s.spin.coriolis = true), &["structure[1].spin.coriolis: needs `motion = \"rotating\"`", remedy]);
-    refused(rotor(|s| s.whirl = true), &["structure[1].whirl: needs `motion = \"rotating\"`", remedy]);
-    refused(rotor(|s| s.axial_shift = true), &["structure[1].axial_shift: needs `motion = \"rotating\"`", remedy]);
+    refused(rotor(|s| s.spin.growth = true), &["structure[1].spin.growth: requires `motion = \"rotating\"`", remedy]);
+    refused(
+        rotor(|s| s.spin.coriolis = true),
+        &["structure[1].spin.coriolis: requires `motion = \"rotating\"`", remedy],
+    );
+    refused(rotor(|s| s.whirl = true), &["structure[1].whirl: requires `motion = \"rotating\"`", remedy]);
+    refused(rotor(|s| s.axial_shift = true), &["structure[1].axial_shift: requires `motion = \"rotating\"`", remedy]);
 }
 
 #[test]
@@ -149,8 +161,8 @@ fn rejects_load_or_surface_on_a_rotating_structure() {
         scene.structures[1].motion = BodyMotion::Rotating;
     };
     let remedy = "set motion = \"still\"";
-    refused(rotate, &["structure[2].load: needs `motion = \"still\"`", remedy]);
-    let parts = ["surface[1].structure: needs a structure with `motion = \"still\"`", "Name a stationary structure"];
+    refused(rotate, &["structure[2].load: requires `motion = \"still\"`", remedy]);
+    let parts = ["surface[1].structure: requires a structure with `motion = \"still\"`", "Name a stationary structure"];
     refused(|scene| scene.surfaces[0].structure = Some("rotor".into()), &parts);
     let parts = ["surface[1].structure: `rign` is not defined", "Use one of: ring"];
     refused(|scene| scene.surfaces[0].structure = Some("rign".into()), &parts);
@@ -158,7 +170,7 @@ fn rejects_load_or_surface_on_a_rotating_structure() {
         |scene| drop(scene.structures.pop()),
         &["surface[1].structure: `ring` is not defined", "Add a [[structure]] with motion = \"still\""],
     );
-    let parts = ["surface[1].structure: excludes a structure that is the master of a contact"];
+    let parts = ["surface[1].structure: cannot be combined with a structure that is the master of a contact"];
     refused(|scene| scene.contacts[0].master = "ring".into(), &parts);
 }
 
@@ -218,11 +230,12 @@ fn checks_ranges_of_coating_values() {
 
 #[test]
 fn rejects_mutually_exclusive_features() {
-    let parts = ["contact[1].solver: `film` excludes a coating", "Use solver = \"lcp\""];
+    let parts = ["contact[1].solver: `film` cannot be combined with a coating", "Use solver = \"lcp\""];
     refused(|scene| scene.contacts[0].solver = Solver::Film, &parts);
-    let parts = ["contact[1].solver: `coulomb` excludes a coating", "Use solver = \"lcp\""];
+    let parts = ["contact[1].solver: `coulomb` cannot be combined with a coating", "Use solver = \"lcp\""];
     refused(|scene| scene.contacts[0].solver = Solver::Coulomb, &parts);
-    let parts = ["time.scheme: `massless-boundary` excludes `structure.spin.coriolis`", "\"modal-exact\""];
+    let parts =
+        ["time.scheme: `massless-boundary` cannot be combined with `structure.spin.coriolis`", "\"modal-exact\""];
     refused(|scene| scene.time.scheme = Scheme::MasslessBoundary, &parts);
     // Coriolis force only.
     let mut scene = features::scene_with_every_feature();
@@ -250,10 +263,10 @@ fn cutting_coating_is_written_without_plasticity_values() {
 
 #[test]
 fn rejects_outputs_of_missing_features() {
-    let parts = ["outputs.wear: needs `contact.coating`", "Add a `coating` to the contact"];
+    let parts = ["outputs.wear: requires `contact.coating`", "Add a `coating` to the contact"];
     refused(|scene| scene.contacts[0].coating = None, &parts);
     let parts =
-        ["outputs.slave_displacement: needs `surface.structure`", "Give the surface around a rotor a `structure`"];
+        ["outputs.slave_displacement: requires `surface.structure`", "Give the surface around a rotor a `structure`"];
     let rigid = |scene: &mut SceneSettings| {
         scene.surfaces[0].structure = None;
         scene.structures.truncate(1);

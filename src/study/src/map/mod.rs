@@ -234,7 +234,7 @@ impl Map {
                  the speeds at which engine orders of the casing meet natural frequencies.{}",
                 self.setup.scene.settings.name,
                 self.runs.len(),
-                if quick { " Quick form: few, short runs, for a first look only." } else { "" }
+                if quick { " Quick mode: few, short runs, for a first look only." } else { "" }
             ),
             facts: self.facts(steps, stepping)?,
             statements: self.statements(),

@@ -110,10 +110,11 @@ pub(crate) fn study(quick: bool) -> Result<Study> {
     Ok(Study {
         name: "conjugacy",
         title: "Consistency of forces, moments and work".into(),
-        summary: "Rotors that accelerate, whirl and shift in casings that close, rotate and change shape, and a free \
+        summary:
+            "Rotors that accelerate, whirl and shift in casings that contract, rotate and change shape, and a free \
                   body between plates, with every scheme and solver: balance of forces and moments on both sides of \
                   the contacts, of torque and shaft work, and of energy."
-            .into(),
+                .into(),
         facts: vec![
             ("runs".into(), rows.len().to_string()),
             ("contacts".into(), rows.iter().map(|row| row.seen[0].contacts).sum::<usize>().to_string()),
@@ -183,7 +184,7 @@ fn statements(rows: &[ConjugacyRow]) -> Vec<Statement> {
             worst(rows, |row| row.seen[0].modal),
         ),
         Statement::tested(
-            "curvature work decreases with the step (schemes with node mass)",
+            "curvature work decreases with the step size (schemes with mass at the contact nodes)",
             curved(1) < 0.7 * curved(0),
             format!("at most {:.1e} of the total work with h, {:.1e} with h/2", curved(0), curved(1)),
         ),

@@ -56,7 +56,7 @@ impl Losses {
             format!("h = {} µs: {lost:.3} % ({without:.3} %)", 1e6 * loss.step)
         });
         Statement::tested(
-            "Without friction, the loss without curvature work is within 5 % of the limit h → 0 at every step",
+            "Without friction, the loss without curvature work is within 5 % of the limit h → 0 at every step size",
             off < 0.05,
             format!(
                 "loss (without curvature work) at {}; limit h → 0: {:.3} %; in the paper, at its step: {:.2} %",

@@ -41,7 +41,7 @@ pub(super) fn scene() -> StudyFigure {
     StudyFigure {
         name: "scene",
         caption:
-            "The cube before it enters between the two rings. Dots mark the corners of its contact faces, circles the \
+            "The cube before it enters the gap between the two rings. Dots mark the corners of its contact faces, circles the \
              hidden ones (figs 1 and 2)."
                 .into(),
         picture: Picture { html: svg.clone(), svg },
@@ -165,7 +165,7 @@ pub(super) fn agreement(pairs: &[RunPair]) -> Result<StudyFigure> {
     let plot = Plot {
         logarithmic: true,
         height: 320,
-        ..Plot::new("pair (line of the table)", "relative L2 difference (%)", series.collect())
+        ..Plot::new("pair (row of the table)", "relative L2 difference (%)", series.collect())
     };
     let mut picture = Picture::plot(&plot)?;
     picture.html.push_str(&pairs::html(pairs));

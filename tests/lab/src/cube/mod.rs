@@ -176,7 +176,7 @@ fn report(scene: &Scene, flown: &[Flown], sizes: &SizeStudy, patches: &PatchStud
             "tiprub with reduced models compared with independent methods on the full finite-element model, in {} \
              cases.{}",
             flown.len(),
-            if quick { " Quick form: the first 0.2 ms of one case." } else { "" }
+            if quick { " Quick mode: the first 0.2 ms of one case." } else { "" }
         ),
         facts: scene.roms.iter().map(|rom| (rom.name.clone(), rom.origin.clone())).collect(),
         statements,
@@ -333,7 +333,7 @@ fn slow(flown: &[Flown]) -> Result<Vec<Statement>> {
             100.0 * AT_REST
         ),
         !at_rest.is_empty() && at_rest.iter().all(|still| *still),
-        format!("kinetic and strain energy after 3 ms, of initially 1218.75 J: {}", reported.join("; ")),
+        format!("kinetic and strain energy after 3 ms (initially 1218.75 J in total): {}", reported.join("; ")),
     ));
     Ok(all)
 }

@@ -96,7 +96,7 @@ impl PatchStudy {
         let residual = self.0.iter().map(|one| one.residual).fold(0.0, f64::max);
         let mut found = vec![Statement::tested(
             format!(
-                "With patches, left and right are equal to {SYMMETRIC:e}, and the energy balance closes to \
+                "With patches, left and right agree to within {SYMMETRIC:e}, and the energy balance closes to \
                      {LEDGER:e}"
             ),
             apart.iter().all(|apart| *apart < SYMMETRIC) && residual < LEDGER,

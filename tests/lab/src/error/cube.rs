@@ -112,7 +112,7 @@ impl ErrorCase for Cube {
 
     fn description(&self) -> String {
         "A cube enters the gap between two elastic rings at 100 m/s; the gap is narrower than the cube, µ = 0.15. \
-         Errors are those of the displacements of its 72 contact nodes without the uniform motion while node 1 is in \
+         Errors are in the displacements of its 72 contact nodes (uniform motion removed) while node 1 is in \
          contact, relative to method a on the full finite-element model with a fine step. Methods on the full \
          model are compared with this solution in both figures."
             .into()

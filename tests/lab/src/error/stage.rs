@@ -47,7 +47,7 @@ pub(crate) fn stage(quick: bool, cache: &RomCache, console: &Console) -> Result<
         scene.roms[0] = disk(modes, cache, console)?;
         scene.settings.surfaces[0].ramp_time = RAMP;
         let outside = outside(&scene)
-            .ok_or_else(|| Failure::new("stage", "the disk has no positive definite mass matrix", ""))?;
+            .ok_or_else(|| Failure::new("stage", "the mass matrix of the disk is not positive definite", ""))?;
         sizes.push((modes, scene, outside));
     }
     let description = "56 coupled sectors (coarse mesh) in an elastic casing that becomes oval until the blades touch \

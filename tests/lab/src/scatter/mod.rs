@@ -268,7 +268,7 @@ fn statements(
              for 95 %"
                 .to_owned(),
             worst[0] < 0.5 && worst[1] < 3.0,
-            format!("median {:.2}, 95 % {:.2} at the worst tolerance", worst[0], worst[1]),
+            format!("median {:.2}, 95th percentile {:.2} at the worst tolerance", worst[0], worst[1]),
         ),
         Statement::tested(
             "Contact changes never add energy".to_owned(),

@@ -48,7 +48,7 @@ impl Expected {
     pub(crate) fn to_text(&self) -> String {
         let named = |lists: &[Vec<String>]| {
             let lists: Vec<String> = lists.iter().map(|words| words.join(", ")).collect();
-            format!("refusal naming {}", lists.join(" | "))
+            format!("rejection naming {}", lists.join(" | "))
         };
         match self {
             Self::Right(against) => against.clone(),

@@ -67,7 +67,7 @@ fn verdict(table: &StabilityTable, directory: &std::path::Path) -> Option<Failur
     let named = unsound[..unsound.len().min(NAMED)].join(", ");
     let more = if unsound.len() > NAMED { format!(" and {} more", unsound.len() - NAMED) } else { String::new() };
     let problem = format!(
-        "{} of {} cases are neither right nor refused as expected: {named}{more}",
+        "{} of {} cases are neither correct nor rejected as expected: {named}{more}",
         unsound.len(),
         table.rows.len()
     );
@@ -101,7 +101,7 @@ fn chosen(arguments: &LabStabilityArguments) -> Result<Vec<StabilityCase>> {
         let mut families: Vec<&str> = cases.iter().map(StabilityCase::family).chain(["judge"]).collect();
         families.sort_unstable();
         families.dedup();
-        let of = if arguments.quick { " in the quick form" } else { "" };
+        let of = if arguments.quick { " in quick mode" } else { "" };
         let problem = format!("no case{of} begins with `{prefix}`");
         return Err(Failure::usage("--case", problem, format!("Choose from {}", families.join(", "))));
     }

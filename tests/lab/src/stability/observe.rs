@@ -278,7 +278,11 @@ impl StabilityWatch {
             Check::at_most("λg", self.product, distance),
         ];
         if self.round {
-            checks.push(Check::at_most("deviation of the gap from that of the displacements", self.again, 1e-9));
+            checks.push(Check::at_most(
+                "deviation of the gap from that recomputed from the displacements",
+                self.again,
+                1e-9,
+            ));
         }
         checks
     }

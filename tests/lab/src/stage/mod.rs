@@ -251,7 +251,7 @@ fn report(setup: &StageSetup, runs: &[Vec<Run>; 3]) -> Result<Study> {
              elastic, at {} angular velocities each.{}",
             setup.scenes[0].roms[0].sectors,
             runs[0].len(),
-            if setup.quick { " Quick form: coarse meshes and few short runs, for a first look only." } else { "" }
+            if setup.quick { " Quick mode: coarse meshes and few short runs, for a first look only." } else { "" }
         ),
         facts: facts(setup, steps, stepping),
         statements,

@@ -19,7 +19,7 @@ pub(super) fn of(setup: &StageSetup, casing: StageCasing, runs: &[Run], names: &
     let shares: Vec<(f64, f64)> = runs.iter().map(|run| (run.speed, share(run))).collect();
     let shares = if runs.iter().all(|run| run.ended.is_none()) { shares } else { Vec::new() };
     let resonance = format!(
-        "contact twice per revolution also excites at four times the speed, in resonance with the first mode of nodal \
+        "contact twice per revolution also excites the blades at four times the speed, in resonance with the first mode of nodal \
          diameter 4 at {:.1} rad/s ({:.2} of the critical speed)",
         setup.second_resonance,
         setup.second_resonance / setup.critical_speed()
@@ -34,7 +34,7 @@ pub(super) fn of(setup: &StageSetup, casing: StageCasing, runs: &[Run], names: &
             "Residual penetrations (fig. 11)",
             format!(
                 "largest at any communication point of any run: {deepest} m. The solver lcp closes every gap of a step \
-                 exactly, so this is not a measurement; the chapter Validation gives the error due to the rotation of \
+                 exactly, so this value does not measure the error; the chapter Validation gives the error due to the rotation of \
                  normals within a step"
             ),
         ),
@@ -57,7 +57,7 @@ fn capital(word: &str) -> String {
 pub(crate) fn all_nodes_touch(run: &Run, names: &[String], gap: f64) -> Statement {
     let nodes = names.iter().zip(run.least.iter().zip(&run.touches));
     let reported = nodes.map(|(name, (least, touches))| {
-        format!("{} {:.3} of the clearance at rest, {touches} times in contact", name.replace('_', " "), least / gap)
+        format!("{} {:.3} of the clearance at rest, {touches} contacts", name.replace('_', " "), least / gap)
     });
     Statement::tested(
         "The clearance of each of the three nodes of blade 1 reaches zero repeatedly (fig. 11)",
@@ -106,7 +106,8 @@ pub(crate) fn prevails(shares: &[(f64, f64)], critical: f64) -> Statement {
             format!("undecided: no run at or above {critical:.1} rad/s, or some runs end early"),
         );
     }
-    let found = format!("effective amplitude of 4 relative to that of 2 (at rad/s): {}", listed(&fast));
+    let found =
+        format!("effective amplitude of nodal diameter 4 relative to that of 2 (speeds in rad/s): {}", listed(&fast));
     Statement::tested(expected, fast.iter().all(|(_, share)| *share < 1.0), found)
 }
 
@@ -117,7 +118,7 @@ pub(crate) fn becomes_negligible(shares: &[(f64, f64)], resonance: &str) -> Stat
          of their amplitudes falls from each angular velocity to the next and ends below {NEGLIGIBLE}",
         SHOWN[1], SHOWN[0]
     );
-    let found = format!("ratios (at rad/s): {}; {resonance}", listed(shares));
+    let found = format!("ratios (speeds in rad/s): {}; {resonance}", listed(shares));
     if shares.len() < 3 {
         let why = format!("undecided: fewer than three angular velocities, or runs that end early; {found}");
         return Statement::remark(expected, why);

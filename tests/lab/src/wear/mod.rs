@@ -263,7 +263,7 @@ fn figure(windows: &[WearWindow]) -> Result<StudyFigure> {
     Ok(StudyFigure {
         name: "lobes",
         caption: "Dominant order of the wear added in a window of revolutions against the tip vibrations per \
-                  revolution in it, while the casing closes."
+                  revolution in the same window, while the casing contracts."
             .into(),
         picture: Picture::plot(&Plot::new("vibrations per revolution", "lobes of the new wear", series))?,
         sheet,
@@ -281,12 +281,12 @@ fn statements(windows: &[WearWindow]) -> Vec<Statement> {
     let last = windows.iter().filter(|window| window.end == TURNS);
     vec![
         Statement::tested(
-            "While the casing closes, the number of lobes of new wear is an integer next to the tip vibrations per \
-             revolution, or next to two or three times these",
+            "While the casing contracts, the number of lobes of new wear is an integer adjacent to the number of tip vibrations per \
+             revolution, or to two or three times that number",
             !judged.is_empty() && farthest < 1.0,
             format!(
-                "differences of at most {farthest:.2} in {} windows that add at least {:.0} µm; in {once} of them next \
-                 to the tip vibrations themselves",
+                "differences of at most {farthest:.2} in {} windows that add at least {:.0} µm; {once} of them are adjacent \
+                 to the number of tip vibrations itself",
                 judged.len(),
                 1e6 * JUDGED
             ),
@@ -322,9 +322,9 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
         name: "wear",
         title: "Wear of the coating".into(),
         summary: format!(
-            "One blade of rotor 37 in a coated casing that closes by {CLOSING:e} m over {CLOSED} of {TURNS} \
+            "One blade of rotor 37 in a coated casing whose radius decreases by {CLOSING:e} m over {CLOSED} of {TURNS} \
              revolutions: wear lobes compared with tip vibrations.{}",
-            if arguments.quick { " Quick form: one speed, a coarse mesh." } else { "" }
+            if arguments.quick { " Quick mode: one speed, a coarse mesh." } else { "" }
         ),
         facts: machine::facts(),
         statements: statements(&windows),

@@ -549,11 +549,11 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
         name: "witness",
         title: "Reduced blades compared with full finite elements".into(),
         summary: format!(
-            "One blade of rotor 37, without damping, passes bumps of its casing. The reference is the full \
+            "One blade of rotor 37, without damping, passes bumps on its casing. The reference is the full \
              finite-element model with {} degrees of freedom, integrated implicitly with an independent contact \
              algorithm.{}",
             setting.full.order(),
-            if arguments.quick { " Quick form: a coarse mesh and one contact." } else { "" }
+            if arguments.quick { " Quick mode: a coarse mesh and one contact." } else { "" }
         ),
         facts: vec![
             ("mesh".into(), format!("{chord} × {thickness} × {span} quadratic bricks")),

@@ -362,7 +362,7 @@ fn figure(found: &StressResult) -> Result<StudyFigure> {
     Ok(StudyFigure {
         name: "von-mises",
         caption: format!(
-            "Von Mises stress at `{}`, the place with the largest stress, while the blade passes the bumps.",
+            "Von Mises stress at `{}`, the location of the largest stress, while the blade passes the bumps.",
             found.names[most]
         ),
         picture: Picture::plot(&Plot::new("time (ms)", "von Mises stress (MPa)", series))?,
@@ -404,7 +404,7 @@ fn statements(found: &StressResult) -> Vec<Statement> {
             "The default model gives the largest von Mises stress of the rub within 5 %",
             ships.most < 0.05,
             format!(
-                "{} at the place with the largest stress, {} at the worst place",
+                "{} at the location of the largest stress, {} at the worst location",
                 percent(ships.most),
                 percent(ships.worst)
             ),
@@ -432,12 +432,12 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
         name: "stress",
         title: "Stress of reduced blades compared with full finite elements".into(),
         summary: format!(
-            "One blade of rotor 37, without damping, passes bumps of its casing with two rows of contact patches at \
+            "One blade of rotor 37, without damping, passes bumps on its casing with two rows of contact patches at \
              its tip. The reference is the full finite-element model with {} degrees of freedom and independent time \
              integration, contact and stress recovery. Stresses are compared where six modes have their largest \
              stress.{}",
             setting.full.order(),
-            if arguments.quick { " Quick form: a coarse mesh and one contact." } else { "" }
+            if arguments.quick { " Quick mode: a coarse mesh and one contact." } else { "" }
         ),
         facts: vec![("places".into(), found.names.join(", "))],
         statements: statements(&found),

@@ -40,10 +40,12 @@ pub(super) const EXCITATION: Fact = fact("structure.excitation", "", |at| at.str
 pub(super) const INITIAL: Fact = fact("structure.initial", "", |at| !at.structure().initial.is_empty());
 pub(super) const INITIAL_SECTOR: Fact =
     fact("structure.initial.sector", "", |at| at.structure().initial.iter().any(|one| one.sector.is_some()));
-pub(super) const ROM_AROUND: Fact =
-    fact("structure.rom", "a structure around an axis", |at| at.meets(|motion| motion != BodyMotion::Free));
-pub(super) const ROM_FREE: Fact =
-    fact("structure.rom", "a free structure or one that it meets", |at| at.meets(|motion| motion == BodyMotion::Free));
+pub(super) const ROM_AROUND: Fact = fact("structure.rom", "a structure in a contact around an axis", |at| {
+    at.meets(|motion| motion != BodyMotion::Free)
+});
+pub(super) const ROM_FREE: Fact = fact("structure.rom", "a free structure or one that it can touch", |at| {
+    at.meets(|motion| motion == BodyMotion::Free)
+});
 
 pub(super) const SHAPE: Fact = fact("surface.shape", "", |at| at.surface().shape != Shape::default());
 pub(super) const MOVING: Fact = fact("surface.moving", "", |at| at.surface().moving);
@@ -61,7 +63,7 @@ pub(super) const CLOSURE: Fact = fact("surface.spline.closure", "", |at| {
 
 pub(super) const FREE_MASTER: Fact = fact("contact.master", "a free structure", |at| at.is_free());
 pub(super) const ONE_OF_SEVERAL: Fact =
-    fact("contact.master", "a structure of several contacts", |at| at.has_other_contacts());
+    fact("contact.master", "a structure with several contacts", |at| at.has_other_contacts());
 pub(super) const GAP: Fact = fact("contact.gap", "", |at| at.contact().gap != 0.0);
 pub(super) const SECTOR_GAPS: Fact = fact("contact.sector_gaps", "", |at| !at.contact().sector_gaps.is_empty());
 pub(super) const MERIDIAN: Fact = fact("contact.meridian", "", |at| at.contact().meridian != Meridian::default());

@@ -125,19 +125,19 @@ type Change = fn(&mut Scene);
 
 /// Changes that violate a rule in a scene with a rotor, and the beginning of the message.
 const OF_ROTORS: &[(&str, Change)] = &[
-    ("structure[2].whirl: needs `motion = \"rotating\"`", |scene| scene.settings.structures[1].whirl = true),
-    ("structure[1].load: needs `motion = \"still\"`", |scene| {
+    ("structure[2].whirl: requires `motion = \"rotating\"`", |scene| scene.settings.structures[1].whirl = true),
+    ("structure[1].load: requires `motion = \"still\"`", |scene| {
         scene.settings.structures[0].load = Some(LoadSettings { order: 2, amplitude: 1.0, phase: 0.0 });
     }),
-    ("structure[1].softening: needs `structure.thermal`", |scene| scene.settings.structures[0].softening = 1e-4),
-    ("structure[2].excitation: needs `motion = \"rotating\"`", |scene| {
+    ("structure[1].softening: requires `structure.thermal`", |scene| scene.settings.structures[0].softening = 1e-4),
+    ("structure[2].excitation: requires `motion = \"rotating\"`", |scene| {
         scene.settings.structures[1].excitation = Some(excitation());
     }),
-    ("time.scheme: `galerkin` excludes `structure.thermal` of a rotor", |scene| {
+    ("time.scheme: `galerkin` cannot be combined with `structure.thermal` of a rotor", |scene| {
         galerkin(&mut scene.settings);
         scene.settings.structures[0].excitation = Some(excitation());
     }),
-    ("structure[1].initial.sector: excludes a ROM whose sectors", |scene| {
+    ("structure[1].initial.sector: cannot be combined with a ROM whose sectors", |scene| {
         let one = InitialSettings {
             mode: 1,
             sector: Some(1),
@@ -149,75 +149,75 @@ const OF_ROTORS: &[(&str, Change)] = &[
         scene.settings.structures[0].initial = vec![one];
         couple(&mut scene.roms[0]);
     }),
-    ("structure[2].velocity: needs `motion = \"free\"`", |scene| {
+    ("structure[2].velocity: requires `motion = \"free\"`", |scene| {
         scene.settings.structures[1].velocity = [0.0, 1.0, 0.0];
     }),
-    ("surface[1].structure: needs a structure with", |scene| {
+    ("surface[1].structure: requires a structure with", |scene| {
         scene.settings.surfaces[0].structure = Some("master".into());
     }),
-    ("surface[1].structure: excludes a structure that is the master", |scene| {
+    ("surface[1].structure: cannot be combined with a structure that is the master", |scene| {
         scene.settings.contacts[0].master = "under".into();
     }),
-    ("surface[1].rigid: needs a free master", |scene| scene.settings.surfaces[0].rigid = true),
-    ("contact[1].master: a structure of several contacts needs", |scene| {
+    ("surface[1].rigid: requires a free master", |scene| scene.settings.surfaces[0].rigid = true),
+    ("contact[1].master: a structure with several contacts needs", |scene| {
         second(&mut scene.settings);
         scene.settings.contacts[0].nodes = None;
     }),
-    ("contact[1].meridian: excludes a surface spline", |scene| {
+    ("contact[1].meridian: cannot be combined with a surface spline", |scene| {
         scene.settings.contacts[0].meridian = Meridian::Cylinder;
     }),
-    ("contact[1].slave_heat_fraction: needs `contact.friction`", |scene| {
+    ("contact[1].slave_heat_fraction: requires `contact.friction`", |scene| {
         (scene.settings.contacts[0].friction, scene.settings.contacts[0].slave_heat_fraction) = (0.0, Some(0.5));
     }),
-    ("contact[2].coating: excludes a contact that is solved together", |scene| {
+    ("contact[2].coating: cannot be combined with a contact that is solved together", |scene| {
         second(&mut scene.settings);
         scene.settings.contacts[1].coating = coating();
     }),
-    ("contact[1].coating.modulus: excludes `contact.coating.cutting`", |scene| {
+    ("contact[1].coating.modulus: cannot be combined with `contact.coating.cutting`", |scene| {
         scene.settings.contacts[0].coating = cut().map(|cut| CoatingSettings { modulus: 2e8, ..cut });
     }),
-    ("contact[1].coating.contact_width: excludes `contact.coating.cutting`", |scene| {
+    ("contact[1].coating.contact_width: cannot be combined with `contact.coating.cutting`", |scene| {
         scene.settings.contacts[0].coating = cut().map(|cut| CoatingSettings { contact_width: Some(3e-3), ..cut });
     }),
-    ("time.scheme: `massless-boundary` excludes `contact.coating.cutting`", |scene| {
+    ("time.scheme: `massless-boundary` cannot be combined with `contact.coating.cutting`", |scene| {
         scene.settings.contacts[0].coating = cut();
         scene.settings.time.scheme = Scheme::MasslessBoundary;
     }),
-    ("outputs.support_reaction: needs `surface.structure`", |scene| {
+    ("outputs.support_reaction: requires `surface.structure`", |scene| {
         scene.settings.surfaces[0].structure = None;
         scene.settings.outputs.support_reaction = true;
     }),
-    ("outputs.support_reaction: needs support rows", |scene| {
+    ("outputs.support_reaction: requires support rows", |scene| {
         scene.settings.outputs.support_reaction = true;
     }),
-    ("time.scheme: `galerkin` excludes `outputs.support_reaction`", |scene| {
+    ("time.scheme: `galerkin` cannot be combined with `outputs.support_reaction`", |scene| {
         galerkin(&mut scene.settings);
         scene.settings.surfaces[0].structure = Some("under".into());
         scene.settings.outputs.support_reaction = true;
     }),
-    ("outputs.modal_amplitudes: excludes a rotor whose sectors", |scene| {
+    ("outputs.modal_amplitudes: cannot be combined with a rotor whose sectors", |scene| {
         scene.settings.outputs.modal_amplitudes = Some(1);
         couple(&mut scene.roms[0]);
     }),
-    ("contact[2].solver: needs the solver of contact[1]", |scene| {
+    ("contact[2].solver: requires the solver of contact[1]", |scene| {
         second(&mut scene.settings);
         scene.settings.contacts[1].solver = Solver::Film;
     }),
-    ("outputs.wear: needs `contact.coating`", |scene| scene.settings.outputs.wear = true),
-    ("outputs.stress: needs `outputs.watched_sectors`", |scene| {
+    ("outputs.wear: requires `contact.coating`", |scene| scene.settings.outputs.wear = true),
+    ("outputs.stress: requires `outputs.watched_sectors`", |scene| {
         scene.settings.outputs.stress = true;
         scene.settings.outputs.watched_sectors.clear();
     }),
-    ("outputs.stress: needs stress points in the ROM of a rotor", |scene| {
+    ("outputs.stress: requires stress points in the ROM of a rotor", |scene| {
         scene.settings.outputs.stress = true;
     }),
-    ("outputs.stress: stress of a rotor with `structure.thermal` needs static thermal stress", |scene| {
+    ("outputs.stress: stress of a rotor with `structure.thermal` requires static thermal stress", |scene| {
         stressed(scene);
         let patches = vec![ThermalPatch { angle: [0.0, 1.0], axial: [0.0, 1.0] }];
         scene.roms[0].extras.thermal = Some(Thermal { loads: DMatrix::zeros(4, 1), patches });
         scene.settings.structures[0].thermal = true;
     }),
-    ("outputs.stress: stress of a rotor with `structure.spin.growth` needs static centrifugal stress", |scene| {
+    ("outputs.stress: stress of a rotor with `structure.spin.growth` requires static centrifugal stress", |scene| {
         stressed(scene);
         let none = DMatrix::zeros(4, 4);
         scene.roms[0].extras.spin = Some(Spin {
@@ -230,106 +230,112 @@ const OF_ROTORS: &[(&str, Change)] = &[
         });
         scene.settings.structures[0].spin.growth = true;
     }),
-    ("outputs.slave_displacement: needs `surface.structure`", |scene| {
+    ("outputs.slave_displacement: requires `surface.structure`", |scene| {
         scene.settings.surfaces[0].structure = None;
         scene.settings.outputs.slave_displacement = true;
     }),
-    ("contact[1].solver: `film` excludes a coating", |scene| {
+    ("contact[1].solver: `film` cannot be combined with a coating", |scene| {
         (scene.settings.contacts[0].coating, scene.settings.contacts[0].solver) = (coating(), Solver::Film);
     }),
-    ("time.scheme: `massless-boundary` excludes `structure.spin.coriolis`", |scene| {
+    ("time.scheme: `massless-boundary` cannot be combined with `structure.spin.coriolis`", |scene| {
         scene.settings.structures[0].spin.coriolis = true;
         scene.settings.time.scheme = Scheme::MasslessBoundary;
     }),
-    ("time.scheme: `massless-boundary` excludes several surfaces", |scene| {
+    ("time.scheme: `massless-boundary` cannot be combined with several surfaces", |scene| {
         second(&mut scene.settings);
         scene.settings.time.scheme = Scheme::MasslessBoundary;
     }),
-    ("time.scheme: a scheme other than `central-difference` excludes `preset = \"paper\"`", |scene| {
+    ("time.scheme: a scheme other than `central-difference` cannot be combined with `preset = \"paper\"`", |scene| {
         scene.settings.preset = Preset::Paper;
         scene.settings.contacts[0].solver = Solver::Film;
     }),
-    ("contact[1].solver: a solver other than `film` excludes `preset = \"paper\"`", |scene| {
+    ("contact[1].solver: a solver other than `film` cannot be combined with `preset = \"paper\"`", |scene| {
         scene.settings.preset = Preset::Paper;
         scene.settings.time.scheme = Scheme::CentralDifference;
     }),
-    ("time.scheme: `galerkin` excludes `structure.spin`", |scene| {
+    ("time.scheme: `galerkin` cannot be combined with `structure.spin`", |scene| {
         galerkin(&mut scene.settings);
         scene.settings.structures[0].spin.growth = true;
     }),
-    ("time.scheme: `galerkin` excludes `contact.coating`", |scene| {
+    ("time.scheme: `galerkin` cannot be combined with `contact.coating`", |scene| {
         galerkin(&mut scene.settings);
         scene.settings.contacts[0].coating = coating();
     }),
-    ("time.scheme: `galerkin` excludes `contact.solver", |scene| {
+    ("time.scheme: `galerkin` cannot be combined with `contact.solver", |scene| {
         galerkin(&mut scene.settings);
         scene.settings.contacts[0].solver = Solver::Film;
     }),
-    ("time.scheme: `massless-boundary` excludes `contact.solver", |scene| {
+    ("time.scheme: `massless-boundary` cannot be combined with `contact.solver", |scene| {
         scene.settings.time.scheme = Scheme::MasslessBoundary;
         scene.settings.contacts[0].solver = Solver::Film;
     }),
-    ("time.scheme: `galerkin` needs a clearance", |scene| {
+    ("time.scheme: `galerkin` requires a clearance", |scene| {
         galerkin(&mut scene.settings);
         scene.settings.contacts[0].gap = 0.0;
     }),
-    ("parameter `scheme`: `massless-boundary` or `galerkin` needs more than three modes", |scene| {
+    ("parameter `scheme`: `massless-boundary` or `galerkin` requires more than three modes", |scene| {
         scene.settings.time.scheme = Scheme::MasslessBoundary;
         scene.roms[0].mass = DMatrix::identity(3, 3);
     }),
-    ("structure[1].rom: a structure around an axis needs `frame = cylindrical`", |scene| {
+    ("structure[1].rom: a structure in a contact around an axis requires `frame = cylindrical`", |scene| {
         scene.roms[0].frame = DisplacementFrame::Cartesian
     }),
-    ("structure[1].spin.growth: needs spin matrices", |scene| scene.settings.structures[0].spin.growth = true),
-    ("structure[1].frequency_factors: excludes a ROM whose sectors", |scene| {
+    ("structure[1].spin.growth: requires spin matrices", |scene| scene.settings.structures[0].spin.growth = true),
+    ("structure[1].frequency_factors: cannot be combined with a ROM whose sectors", |scene| {
         scene.settings.structures[0].frequency_factors = vec![1.0];
         couple(&mut scene.roms[0]);
     }),
-    ("structure[2].thermal: needs thermal loads", |scene| scene.settings.structures[1].thermal = true),
-    ("contact[1].coating: a coating without `cutting` needs `contact.coating.contact_width`", |scene| {
+    ("structure[2].thermal: requires thermal loads", |scene| scene.settings.structures[1].thermal = true),
+    ("contact[1].coating: a coating without `cutting` requires `contact.coating.contact_width`", |scene| {
         scene.settings.contacts[0].coating =
             coating().map(|coating| CoatingSettings { contact_width: None, ..coating });
     }),
-    ("contact[1].coating: excludes a ROM with several rows of contact patches", |scene| {
+    ("contact[1].coating: cannot be combined with a ROM with several rows of contact patches", |scene| {
         scene.settings.contacts[0].coating = coating();
         scene.roms[0].extras.rows = Some(2);
     }),
-    ("structure[2].load: needs a contact grid", |scene| {
+    ("structure[2].load: requires a contact grid", |scene| {
         scene.settings.structures[1].load = Some(LoadSettings { order: 2, amplitude: 1.0, phase: 0.0 });
         scene.roms[1].extras.grid = None;
     }),
-    ("surface[1].structure: excludes a structure whose sectors", |scene| couple(&mut scene.roms[1])),
-    ("surface[1].structure: a surface around an axis needs a contact grid", |scene| scene.roms[1].extras.grid = None),
+    ("surface[1].structure: cannot be combined with a structure whose sectors", |scene| couple(&mut scene.roms[1])),
+    ("surface[1].structure: a surface around an axis requires a contact grid", |scene| {
+        scene.roms[1].extras.grid = None
+    }),
 ];
 
 /// Changes that violate a rule in a scene with a free master, and the beginning of the message.
 const OF_FREE_MASTERS: &[(&str, Change)] = &[
-    ("structure[1].thermal: excludes `motion = \"free\"`", |scene| scene.settings.structures[0].thermal = true),
-    ("surface[1].moving: excludes a free master", |scene| scene.settings.surfaces[0].moving = true),
-    ("contact[1].gap: excludes a free master", |scene| scene.settings.contacts[0].gap = 1e-3),
-    ("contact[1].master: a free structure needs `surface.structure`", |scene| {
+    ("structure[1].thermal: cannot be combined with `motion = \"free\"`", |scene| {
+        scene.settings.structures[0].thermal = true
+    }),
+    ("surface[1].moving: cannot be combined with a free master", |scene| scene.settings.surfaces[0].moving = true),
+    ("contact[1].gap: cannot be combined with a free master", |scene| scene.settings.contacts[0].gap = 1e-3),
+    ("contact[1].master: a free structure requires `surface.structure`", |scene| {
         scene.settings.surfaces[0].structure = None;
     }),
-    ("outputs.casing_forces: excludes a scene with free masters only", |scene| {
+    ("outputs.casing_forces: cannot be combined with a scene with free masters only", |scene| {
         scene.settings.outputs.casing_forces = true;
     }),
-    ("outputs.all_sectors: excludes a scene with free masters only", |scene| scene.settings.outputs.all_sectors = true),
-    ("outputs.slave_displacement: needs `surface.structure` of a surface around an axis", |scene| {
+    ("outputs.all_sectors: cannot be combined with a scene with free masters only", |scene| {
+        scene.settings.outputs.all_sectors = true
+    }),
+    ("outputs.slave_displacement: requires `surface.structure` of a surface around an axis", |scene| {
         scene.settings.outputs.slave_displacement = true;
     }),
-    ("time.input_interpolation: excludes a scene with free masters only", |scene| {
+    ("time.input_interpolation: cannot be combined with a scene with free masters only", |scene| {
         scene.settings.time.input_interpolation = InputInterpolation::Hold;
     }),
-    ("time.scheme: `massless-boundary` excludes a free master", |scene| {
+    ("time.scheme: `massless-boundary` cannot be combined with a free master", |scene| {
         scene.settings.time.scheme = Scheme::MasslessBoundary;
     }),
-    ("structure[2].rom: a free structure or one that it meets needs `frame = cartesian`", |scene| {
+    ("structure[2].rom: a free structure or one that it can touch requires `frame = cartesian`", |scene| {
         scene.roms[1].frame = DisplacementFrame::Cylindrical;
     }),
-    ("structure[1].rom: a free structure or one that it meets needs `sectors = 1`", |scene| {
+    ("structure[1].rom: a free structure or one that it can touch requires `sectors = 1`", |scene| {
         scene.roms[0].sectors = 2;
     }),
-    ("surface[1].structure: the surface of a free master needs an open contact grid", |scene| {
+    ("surface[1].structure: the surface of a free master requires an open contact grid", |scene| {
         scene.roms[1].extras.grid = Some(ContactGrid { around: 8, along: 2, closed: true });
     }),
 ];

@@ -193,7 +193,7 @@ impl<'a> Checking<'a> {
         (self.friction != 0.0 && modes > stability::GROWTH_UP_TO).then(|| {
             let most = stability::GROWTH_UP_TO;
             let problem = format!(
-                "growth of closed, sliding contact is not checked: the model has {modes} modes, and the check supports \
+                "the growth of vibration in closed, sliding contact is not checked: the model has {modes} modes, and the check supports \
                  only {most}"
             );
             Warning::new(Topic::GrowthUnchecked, problem, remedy)
@@ -225,7 +225,7 @@ impl<'a> Checking<'a> {
             format!("vibration at {kilohertz:.4} kHz")
         };
         let problem = format!(
-            "cutting is physically unstable: with all contact nodes of a blade in fresh coating, {motion} grows by \
+            "cutting is physically unstable: with all contact nodes of a blade in fresh coating, {motion} grows at \
              {rate:.2e} 1/s"
         );
         let remedy = "Use a larger `normal_ratio`, a smaller `specific_energy` or more damping, or let the blades \
@@ -263,7 +263,7 @@ impl<'a> Checking<'a> {
                      θ = {at:.2} rad)",
                     friction = shown(self.friction)
                 );
-                let remedy = "Use less friction: where the blades add less flexibility than that, a step may have no \
+                let remedy = "Use less friction: where the blades do not add enough flexibility, a step may have no \
                               unique solution, which ends the run";
                 Warning::new(Topic::CasingSolvability, problem, remedy)
             })

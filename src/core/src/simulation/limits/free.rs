@@ -77,7 +77,7 @@ impl Compiled {
         (rigid > 0).then(|| {
             let problem = format!(
                 "with galerkin the {} highest modes respond quasi-statically to contact, so {rigid} of {} directions \
-                 of the contact nodes have no independent flexibility: contact that needs one of these directions \
+                 of the contact nodes have no independent flexibility: contact that acts in one of these directions \
                  loses energy at any tolerance",
                 model.len() - dynamic,
                 flexibility.len()
@@ -133,7 +133,7 @@ impl FlightCheck<'_> {
         if worst < ROUNDING {
             let problem = format!(
                 "with µ = {friction} the contact problem cannot be shown to have a unique solution for all contacts \
-                 that the undeformed structure meets in free flight (the symmetric part of the Delassus matrix, scaled \
+                 that the undeformed structure makes in free flight (the symmetric part of the Delassus matrix, scaled \
                  to unit diagonal, has the eigenvalue {worst:.2e})",
                 friction = shown(friction)
             );
@@ -168,7 +168,7 @@ impl FlightCheck<'_> {
             let node = self.compiled.node_name(self.body, met.nodes[jammed]);
             return Err(Error::Unstable {
                 problem: format!(
-                    "with friction_coefficient µ = {friction} and an internal step of {step:.3e} s, the contact of \
+                    "with friction_coefficient µ = {friction} and an internal step of {step:.3e} s, the contact problem of \
                      {node} alone has no unique solution in free flight: friction drives it into the surface",
                     friction = shown(friction)
                 ),

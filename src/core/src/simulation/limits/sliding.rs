@@ -289,7 +289,7 @@ impl Checking<'_> {
         let lock_up = physics.lock_up.as_ref().map(|(least, nodes)| {
             let rate = match physics.divergence {
                 0.0 => String::new(),
-                rate => format!(", at {rate:.2e} 1/s and 0 Hz"),
+                rate => format!(", growing at {rate:.2e} 1/s without oscillation"),
             };
             let contact = self.contact(nodes, sign);
             let remedy = "Use less friction, a more compliant casing, or a coating";
@@ -300,7 +300,7 @@ impl Checking<'_> {
             )
             .with_text(format!(
                 "sliding contact locks up: above µ* = {least:.3} ({contact}) the tip is driven into the casing \
-                     faster than the casing yields, and the contact force grows without limit{rate}. This instability \
+                     faster than the casing deflects, and the contact force grows without limit{rate}. This instability \
                      is a physical property of the model, so a shorter step does not help. {remedy}"
             ))
         });
@@ -308,11 +308,11 @@ impl Checking<'_> {
             let contact = self.contact(nodes, sign);
             let kilohertz = 1e-3 * found.frequency / std::f64::consts::TAU;
             let problem =
-                format!("vibration in closed contact grows by {:.2e} 1/s at {kilohertz:.4} kHz: {contact}", found.rate);
+                format!("vibration in closed contact grows at {:.2e} 1/s at {kilohertz:.4} kHz: {contact}", found.rate);
             let remedy = "Use less friction or more damping, or let contact open sooner; a shorter step does not help";
             Warning::new(Topic::Flutter, problem, remedy).with_text(format!(
-                "sliding contact is physically unstable (flutter): {contact}, vibration at {kilohertz:.4} kHz grows by \
-                 {:.2e} 1/s{} and displaces the tips by up to {:.1} % of their displacement by contact. This \
+                "sliding contact is physically unstable (flutter): {contact}, vibration at {kilohertz:.4} kHz grows at \
+                 {:.2e} 1/s{} and displaces the tips by up to {:.1} % of the displacement caused by contact. This \
                  instability is a physical property of the model. {remedy}",
                 found.rate,
                 confirmed(found, with_mass.as_ref()),
@@ -325,8 +325,8 @@ impl Checking<'_> {
 
     fn warning(&self, (step, nodes, judged): (f64, &[usize], SetGrowth), silent: Option<f64>, sign: f64) -> Warning {
         let problem = format!(
-            "the time step destabilises sliding contact: {}, growing by {:.2e} 1/s in steps of {} s, but by {:.2e} 1/s \
-             in continuous time; this may displace the tips by {:.0} % of their displacement by contact",
+            "the time step destabilises sliding contact: {}, growing at {:.2e} 1/s in steps of {} s, but at {:.2e} 1/s \
+             in continuous time; this may displace the tips by {:.0} % of the displacement caused by contact",
             self.contact(nodes, sign),
             judged.growth.stepped,
             shown(rounded(step)),
@@ -347,9 +347,9 @@ impl Checking<'_> {
         let step_remedy = if step_remedy.is_empty() { "Use".to_owned() } else { step_remedy };
         Error::Unstable {
             problem: format!(
-                "`time.step` is too long for friction: sliding contact {} grows by {:.2e} 1/s in steps of {} s, but by \
-                 {:.2e} 1/s in continuous time, and this alone may displace the tips by {:.0} % of their displacement \
-                 by contact",
+                "`time.step` is too long for friction: vibration in sliding contact {} grows at {:.2e} 1/s in steps of {} s, but at \
+                 {:.2e} 1/s in continuous time, and this alone may displace the tips by {:.0} % of the displacement \
+                 caused by contact",
                 self.contact(nodes, sign),
                 judged.growth.stepped,
                 shown(rounded(step)),

@@ -257,10 +257,10 @@ impl BodyLimits {
             None => vec![Warning::new(
                 Topic::OtherSense,
                 format!(
-                    "{rotor} now rotates opposite to its initial direction: growth of contact that slides in this \
-                     direction was not checked, because the check takes long with coupled sectors"
+                    "{rotor} now rotates opposite to its initial direction: the growth of vibration in contact that slides in this \
+                     direction was not checked, because the check takes a long time with coupled sectors"
                 ),
-                "Start once with a speed of this sign to run the check",
+                "Start a run with a speed of this sign to perform the check",
             )],
         }
     }

@@ -210,7 +210,7 @@ impl TableBuilder {
     /// Adds the choice of derivatives over communication steps.
     pub fn step_derivatives(&mut self) {
         let text = "Whether directional derivatives of the outputs at the end of the last communication step with \
-                    respect to the inputs over it are available; if on, the state at the start of each step is stored";
+                    respect to the inputs during that step are available; if on, the state at the start of each step is stored";
         self.choice(Quantity::StepDerivatives, "step_derivatives", &STEP_DERIVATIVES, 1, text);
     }
 

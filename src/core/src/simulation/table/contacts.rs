@@ -250,7 +250,7 @@ const EFFORTS: [Count; 3] = [
     ),
     (
         "missed_steps",
-        "Number of shortest galerkin steps since the start that were accepted although they miss the tolerance",
+        "Number of galerkin steps of minimum length since the start that were accepted although they missed the tolerance",
         |view| view.missed(),
     ),
 ];
@@ -275,7 +275,7 @@ pub fn internal_steps(table: &mut TableBuilder, settings: &SceneSettings) {
         Span::Total,
         None,
         if with_tolerance {
-            "Number of internal steps since the start; with galerkin of all blades together"
+            "Number of internal steps since the start; with galerkin, the total of all blades"
         } else {
             "Number of internal steps since the start"
         },

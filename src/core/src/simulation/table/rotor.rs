@@ -63,7 +63,7 @@ pub fn watched(table: &mut TableBuilder, parts: &TableFacts) -> Result<()> {
         if let Some(count) =
             parts.settings.outputs.modal_amplitudes.filter(|count| !(1..=body.rom.order()).contains(count))
         {
-            let problem = format!("{count} modes requested of {}, which has {}", parts.rotor(body), body.rom.order());
+            let problem = format!("{count} modes requested for {}, which has {}", parts.rotor(body), body.rom.order());
             return refuse("modal_amplitudes", problem, format!("Request 1 to {} modes", body.rom.order()));
         }
         table.belongs(body.index, parts.of_body(body));

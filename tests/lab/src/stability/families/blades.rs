@@ -320,7 +320,7 @@ fn temperature() -> Vec<StabilityCase> {
         let name = method.integration();
         for degrees in [1e-6, 300.0, -300.0] {
             for softening in [0.0, 4e-4] {
-                let against = "free thermal expansion; λ of the warm blade from its softened flexibility";
+                let against = "free thermal expansion; λ of the warm blade from its reduced stiffness";
                 let expected = unless(method.is_galerkin(), against, ["galerkin", "structure.thermal"]);
                 let name = format!("temperature/{degrees:e}/softening={softening}/{name}");
                 cases.add(degrees > 1.0 && softening > 0.0, name, expected, move || warm(method, degrees, softening));

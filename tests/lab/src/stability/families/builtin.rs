@@ -103,7 +103,7 @@ fn at_limit(method: StabilityMethod, factor: f64) -> CaseEnd {
         Scheme::MasslessBoundary => massless_step(&scene),
         _ => Some(2.0 / fastest),
     };
-    let Some(limit) = limit else { return CaseEnd::refused("the message names no limit") };
+    let Some(limit) = limit else { return CaseEnd::refused("the message does not state a limit") };
     let press = Press { depth: 2e-5, ..Press::new(with_step(scene, method.step(factor * limit))) };
     CaseEnd::of(press.run())
 }
@@ -123,7 +123,7 @@ fn share_of_limit(share: f64, damping: f64) -> CaseEnd {
     let limit = refusal
         .as_deref()
         .and_then(|text| text.split("stable only below ").nth(1)?.split(' ').next()?.parse::<f64>().ok());
-    let Some(limit) = limit else { return CaseEnd::refused("the message names no limit") };
+    let Some(limit) = limit else { return CaseEnd::refused("the message does not state a limit") };
     let press = Press {
         depth: 2e-5,
         hold: 12e-3 * (0.3 / damping).max(1.0),

@@ -270,7 +270,8 @@ fn bounces() -> Vec<StabilityCase> {
     for method in methods().filter(|method| method.is_galerkin()) {
         for speed in [1e-6, 1e-3, 0.1, 1.0] {
             for friction in [0.0, 0.15] {
-                let against = "contact for half a period on the flexibility of the body, impulse 2Mv, no loss";
+                let against =
+                    "contact for half a period of the mass on the flexibility of the body, impulse 2Mv, no loss";
                 // Nothing slides, and lcp models sliding only.
                 let expected = if friction > 0.0 && method.solver == Solver::Lcp {
                     Expected::either(against, ["friction has added", "not model sticking"])

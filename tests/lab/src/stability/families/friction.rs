@@ -74,7 +74,8 @@ fn sliding(model: &str, friction: f64, method: StabilityMethod, sense: f64) -> C
             // An error is correct if W loses its sign statically, or if the scheme or the contact grows.
             let message = error.to_string();
             let lost = sense > 0.0 && friction >= 0.99 * turned_limit();
-            let text = format!("static contact lost from µ = {:.3}, or the message names growth", turned_limit());
+            let text =
+                format!("static contact lost at or above µ = {:.3}, or the message reports growth", turned_limit());
             let checks = vec![Check::so(text, lost || message.contains("grows") || message.contains("film"))];
             CaseEnd { checks, ..CaseEnd::refused(message) }
         }
@@ -213,8 +214,8 @@ fn changing(method: StabilityMethod, course: &str) -> Result<Vec<Check>> {
     let bound = 1e-6 + near(&scene);
     let mut checks = watch.complementarity();
     checks.push(watch.ledger());
-    checks.push(Check::relative("deviation of the torque before", torques[0], -1.0, bound));
-    checks.push(Check::relative("deviation of the torque after", torques[1], after, bound));
+    checks.push(Check::relative("deviation of the torque before the speed change", torques[0], -1.0, bound));
+    checks.push(Check::relative("deviation of the torque after the speed change", torques[1], after, bound));
     checks.push(watch.heat(1e-6));
     checks.push(watch.impact(1e-9));
     Ok(checks)

@@ -151,7 +151,8 @@ fn sectors() -> Vec<StabilityCase> {
         }
     }
     for method in StabilityMethod::common() {
-        let expected = Expected::right("no force on the missing blade, the others bitwise as without it");
+        let expected =
+            Expected::right("no force on the missing blade, the others bitwise equal to the run with all blades");
         let name = format!("sectors/one-blade-missing/{}", method.name());
         cases.add(method.solver == Solver::Lcp, name, expected, move || missing(method));
     }
@@ -181,7 +182,7 @@ fn missing(method: StabilityMethod) -> Result<Vec<Check>> {
     Ok(vec![
         Check::so("no force on the missing blade", gone.iter().skip(5).step_by(12).all(|force| *force == 0.0)),
         Check::so(
-            "the other blades are bitwise as without it",
+            "the other blades are bitwise equal to the run with all blades",
             others.clone().all(|(_, (a, b))| a.to_bits() == b.to_bits()),
         ),
         Check::so("there is contact", others.into_iter().any(|(_, (a, _))| *a > 0.0)),

@@ -89,7 +89,7 @@ fn at(method: StabilityMethod, friction: f64, model: &str, factor: f64) -> CaseE
         }
         _ => Some(2.0 / fastest),
     };
-    let Some(limit) = limit else { return CaseEnd::refused("the message names no limit") };
+    let Some(limit) = limit else { return CaseEnd::refused("the message does not state a limit") };
     CaseEnd::of(Press::new(with_step(scene, method.step(factor * limit))).run())
 }
 

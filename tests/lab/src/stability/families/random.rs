@@ -112,7 +112,7 @@ fn checked(method: StabilityMethod, index: u64) -> Result<Vec<Check>> {
         Check::so("the blades touched", watch.contacts > 0 && finer.contacts > 0),
         // Coarse steps may be inaccurate; finer ones must come closer.
         Check::at_most(
-            "deviation of the displacements with h/4 from those with h/16, compared with h",
+            "deviation of the displacements with h/4 from those with h/16, relative to that with h",
             better.min(better / error.max(1e-9) * 0.1),
             if massless { 0.1 } else { 0.05 },
         ),

@@ -153,7 +153,7 @@ fn dragged(method: StabilityMethod, share: f64) -> Result<Vec<Check>> {
     let (reported, far) = (!simulation.take_notes().is_empty(), moved(&simulation));
     let error = far * far / (2.0 * RADIUS * GAP);
     Ok(vec![
-        Check::so("a warning is given from 5 % on", reported == (error >= 0.05)),
+        Check::so("a warning is given at 5 % and above", reported == (error >= 0.05)),
         Check::so("the displacement was reached", far >= wanted),
     ])
 }
