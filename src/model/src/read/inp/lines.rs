@@ -195,7 +195,7 @@ impl LineReader<'_> {
         }
         if self.repeated > LARGEST_REPEATED {
             let problem =
-                format!("with {}, more than {} MiB are included repeatedly", path.display(), LARGEST_REPEATED >> 20);
+                format!("with {}, more than {} MiB of the included data is duplicated", path.display(), LARGEST_REPEATED >> 20);
             return Err(place.error(problem, "Include every file only once"));
         }
         self.file(path, &bytes)
