@@ -289,7 +289,10 @@ fn statements(
                 solutions.iter().map(|one| one.several).max().unwrap_or(0)
             ),
         ),
-        Statement::remark("Time spans of random sectors in which no step was short enough".to_owned(), format!("{given_up} spans")),
+        Statement::remark(
+            "Time spans of random sectors in which no step was short enough".to_owned(),
+            format!("{given_up} spans"),
+        ),
     ]
 }
 
