@@ -244,7 +244,7 @@ pub enum StudyCommand {
                             the default map is smaller there."
     )]
     Stability(StabilityArguments),
-    /// Refine internal step, modes, contact nodes and mesh, and show the changes of displacements, impulse, friction
+    /// Refine internal step, modes, contact nodes and mesh, and show the changes in displacements, impulse, friction
     /// work, peak force and strain energy, the estimated limit, and the error of the scene.
     #[command(
         after_help = "Examples:\n  tiprub study convergence scene.toml\n  tiprub study convergence builtin:rotor37 --quick\n  \

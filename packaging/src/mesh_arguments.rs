@@ -47,7 +47,7 @@ pub struct BladeOptions {
     /// Kind of modes to keep [default: craig-bampton; free-interface with patches].
     #[arg(long, value_enum)]
     pub kind: Option<KindChoice>,
-    /// Recover stress where it is largest, away from clamped nodes, in each of this many lowest modes; requires
+    /// Recover stress where it is largest, away from clamped nodes, in each of the N lowest modes; requires
     /// a mesh of one material [default: 0].
     #[arg(long, value_name = "N", conflicts_with = "stiffness")]
     pub stress_modes: Option<usize>,

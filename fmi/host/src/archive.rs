@@ -87,7 +87,7 @@ fn check_names(entries: &[ArchiveEntry]) -> Result<()> {
         }
         if u32::try_from(entry.bytes.len()).is_err() {
             let remedy = "Reduce the model: files in an FMU must be smaller than 4 GiB";
-            return Err(Failure::new(name, "the file has 4 GiB or more", remedy));
+            return Err(Failure::new(name, "the file is 4 GiB or larger", remedy));
         }
         if !seen.insert(name) {
             return Err(Failure::new(name, "the archive contains this name twice", "Give the files different names"));

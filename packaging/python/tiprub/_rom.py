@@ -56,7 +56,7 @@ def rom(
     frame : {"cylindrical", "cartesian"}
         Directions of positions and displacements.
     damping_ratio : float
-        Modal damping ratio, from 0 to below 1.
+        Modal damping ratio, at least 0 and below 1.
     check : bool
         Let the program check the file, so that errors are raised here, before an existing file is replaced.
     **more

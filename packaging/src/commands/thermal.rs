@@ -94,7 +94,7 @@ fn facts(reduced: &ConductionReduction) -> String {
         "{}: {nodes} nodes, {elements} elements, {} coordinates, {} patches\n  \
          heat capacity {:.1} J/K; gas side {:.4} m2, {:.2} W/K; air side {:.4} m2, {:.2} W/K; heated area {:.4} m2\n  \
          slowest time constants of the full model: {} s\n  \
-         steady-state deviation from the full model (patches, heated surfaces) for factors of the film coefficients:",
+         steady-state deviation from the full model (patches, heated surfaces) with the film coefficients multiplied by:",
         model.name,
         model.order(),
         model.patches.len(),

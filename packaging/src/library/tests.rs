@@ -171,6 +171,6 @@ fn distinguishes_contact_and_thermal_libraries() {
     for (unit, bytes, other) in [(LibraryUnit::Scene, elf(62), thermal), (LibraryUnit::Thermal, conducts, scene)] {
         let found = load(unit, &arguments(&[root.path().to_path_buf()], &[]), &console).unwrap();
         assert!(found.len() == 1 && found[0].bytes == bytes, "{unit:?}");
-        assert!(load(unit, &arguments(&[other], &[]), &console).unwrap_err().problem.contains("the other FMU"));
+        assert!(load(unit, &arguments(&[other], &[]), &console).unwrap_err().problem.contains("the other kind of FMU"));
     }
 }

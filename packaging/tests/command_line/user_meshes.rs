@@ -384,7 +384,7 @@ fn conducts_heat_in_a_casing_mesh_of_the_user() {
     assert_eq!(numbers(&found["model"]), numbers(&own_facts));
     for (line, code, words) in [
         (own.replace("--material steel", ""), 2, ["material of FILE", "--conductivity"]),
-        (own.replace("INNER", "OUTER"), 1, ["none of the 144 outer faces is directed", "--contact-set"]),
+        (own.replace("INNER", "OUTER"), 1, ["none of the 144 outer faces points", "--contact-set"]),
         (own.replace("--contact-set INNER", "--axis x"), 1, ["not a full ring about the z axis", "--axis"]),
         (format!("{own} --mesh 24x1x6"), 2, ["cannot be used with", "--mesh"]),
     ] {

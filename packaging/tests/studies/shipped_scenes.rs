@@ -85,7 +85,7 @@ fn inspect_lists_the_features_of_a_built_in_scene() {
         "ring from builtin:casing37, stationary",
         "surface `casing` is flexible: carried by `ring` with ",
         "`ring` heats up: temperatures of 12 patches are inputs",
-        "friction heat is shared: 0.5 into `casing`",
+        "friction heat is shared: a fraction of 0.5 goes into `casing`",
         "24 around x 3 along",
         "heated patches            12",
     ] {

@@ -133,11 +133,11 @@ topics! {
          sign of the net work may be wrong."
         "Use a smaller `time.step` or adaptive steps.";
     ThermalStep "thermal-step"
-        "The communication step of a heat conduction unit is shorter than the diffusion time of an element, so \
+        "The communication step of a thermal FMU is shorter than the diffusion time of an element, so \
          surface temperatures rise too slowly."
-        "Use a longer communication step with the mean heat, or thinner elements.";
+        "Use a longer communication step with the heat averaged over it, or thinner elements.";
     LargeDisplacement "large-displacement"
-        "A contact node moves so far around the axis that linear gaps have an error of at least 5 % of the clearance."
+        "A contact node moves so far around the axis that the linear gap formula has an error of at least 5 % of the clearance."
         "Check the loads and the clearance. At 100 % the run ends.";
     Implausible "implausible"
         "An implausible value was accepted because the scene sets `accept_implausible = true`."

@@ -281,7 +281,7 @@ pub const METADATA: [MetadataLayout; 18] = [
          uncoupled unless the file has arrays for nodal diameters above 0.",
     ),
     entry("frame", None, "`cylindrical` or `cartesian`: directions of positions and displacements."),
-    entry("damping_ratio", Some("0"), "Modal damping ratio, from 0 to below 1; a scene may override it."),
+    entry("damping_ratio", Some("0"), "Modal damping ratio, at least 0 and below 1; a scene may override it."),
     entry("contact_names", Some("node_1,node_2,..."), "Names of the contact nodes, separated by commas."),
     entry(
         "largest_speed",

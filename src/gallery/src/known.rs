@@ -54,7 +54,7 @@ fn rows() -> [KnownModel; 5] {
     [
         KnownModel {
             options: format!("{stage:?}"),
-            found_on: "first 9.5 ms of the rub of the stage with friction 0.15; error due to the nodes determined on a mesh \
+            found_on: "the first 9.5 ms of the rub of the stage with friction 0.15; error due to the nodes determined on a mesh \
                        with 0.7 times as many elements, error due to the mesh determined with five patches; later, the error due to \
                        the nodes is far larger",
             errors: [None, Some(0.102), None, Some(0.0068)],
@@ -64,23 +64,23 @@ fn rows() -> [KnownModel; 5] {
                 "{:?}",
                 StageOptions { tip: TipContact::Rows([9, 2]), kind: ReductionKind::FreeInterface, ..stage }
             ),
-            found_on: "first 9.4 ms of the rub of the stage with friction 0.05; error due to the modes determined on a mesh \
+            found_on: "the first 9.4 ms of the rub of the stage with friction 0.05; error due to the modes determined on a mesh \
                        with 0.7 times the elements",
             errors: [Some(0.0014), None, None, Some(0.0084)],
         },
         KnownModel {
             options: format!("{one_row:?}"),
-            found_on: "light rub of rotor 37 with friction 0.15, 4.73 ms",
+            found_on: "a light rub of rotor 37 with friction 0.15, 4.73 ms",
             errors: [Some(0.0176), Some(0.0311), Some(0.274), Some(0.0557)],
         },
         KnownModel {
             options: format!("{:?}", Rotor37Options { tip: TipContact::Rows([9, 2]), ..one_row.clone() }),
-            found_on: "light rub of rotor 37 with friction 0.15, 4.73 ms",
+            found_on: "a light rub of rotor 37 with friction 0.15, 4.73 ms",
             errors: [Some(0.0191), Some(0.0204), Some(0.0046), Some(0.0485)],
         },
         KnownModel {
             options: format!("{paper:?}"),
-            found_on: "light rub of rotor 37 with friction 0.15, one revolution, three nodes compared with nine \
+            found_on: "a light rub of rotor 37 with friction 0.15, one revolution, three nodes compared with nine \
                        patches",
             errors: [Some(0.047), Some(0.34), None, None],
         },

@@ -31,7 +31,7 @@ pub struct MapArguments {
     #[arg(value_name = "SCENE", default_value = "builtin:rotor37")]
     pub scene: String,
     /// Angular velocities (rad/s): first, last and count [default: 141 values from 0.8 to 1.5 times the speed at which
-    /// twice the lowest engine order of the casing meets the first mode, up to the largest speed of the model].
+    /// twice the lowest engine order of the casing meets the first mode, but no higher than the largest speed of the model].
     #[arg(long, value_name = "FROM:TO:COUNT", value_parser = speeds)]
     pub speeds: Option<Speeds>,
     /// Number of parallel runs [default: one per processor].
@@ -41,7 +41,7 @@ pub struct MapArguments {
     /// [default: 64].
     #[arg(long, value_name = "N")]
     pub revolutions: Option<std::num::NonZero<usize>>,
-    /// Start-up revolutions before the window [default: the casing's ramp plus five decay times of the first mode, 20 to
+    /// Start-up revolutions before the window [default: the casing's ramp plus five decay times of the first mode, within 20 to
     /// 400].
     #[arg(long, value_name = "N", value_parser = transient)]
     pub transient: Option<usize>,

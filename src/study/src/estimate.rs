@@ -77,7 +77,7 @@ impl Estimate {
         let bounds = LATER.iter().find(|(name, _)| *name == direction).map_or(LATER[0].1, |(_, bounds)| *bounds);
         let left = before[0].zip(last[0]).and_then(|(before, last)| Some((before, last, ratio(before, last, bounds)?)));
         let Some((before, last, ratio)) = left else {
-            return Self::unknown(direction, "the changes of the displacements do not shrink from level to level");
+            return Self::unknown(direction, "the changes in the displacements do not shrink from level to level");
         };
         let own_first = refined.direction.levels.first().is_some_and(|level| level.own);
         let left = last / (ratio - 1.0) + if own_first { before } else { 0.0 };

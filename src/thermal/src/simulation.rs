@@ -352,7 +352,7 @@ impl ThermalSimulation {
             shown(step_size),
             self.model.element_time
         );
-        let remedy = "Use longer communication steps with the mean heat, or thinner elements: twice as many elements \
+        let remedy = "Use longer communication steps with the heat averaged over each step, or thinner elements: twice as many elements \
                       through the thickness (`tiprub thermal --mesh`) allow steps a quarter as long";
         Warning::new(Topic::ThermalStep, problem, remedy)
     }

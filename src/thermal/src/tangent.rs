@@ -132,5 +132,5 @@ impl ThermalSimulation {
 }
 
 fn refused(variable: &Variable, problem: &str) -> Error {
-    Error::invalid(format!("derivative with `{}`", variable.name), problem, "Remove it from the request")
+    Error::invalid(format!("derivative involving `{}`", variable.name), problem, "Remove it from the request")
 }

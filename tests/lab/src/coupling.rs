@@ -315,7 +315,7 @@ fn figure(runs: &CouplingRuns, name: &'static str) -> Result<StudyFigure> {
     }
     Ok(StudyFigure {
         name,
-        caption: format!("Shaft {}: largest deviation from the orbit with H = {FINE:e} s.", runs.shaft.name),
+        caption: format!("With the {} shaft: largest deviation from the orbit with H = {FINE:e} s.", runs.shaft.name),
         picture: Picture::plot(&plot)?,
         sheet,
     })

@@ -240,7 +240,7 @@ static METHODS: &[FeatureRule] = &[
     ),
     excludes(
         &[GALERKIN],
-        ("`structure.thermal` of a rotor, and `structure.excitation`", |at| {
+        ("`structure.thermal` of a rotor or `structure.excitation`", |at| {
             let loaded = |own: &StructureSettings| own.thermal && own.motion == BodyMotion::Rotating;
             at.settings.structures.iter().any(|own| loaded(own) || own.excitation.is_some())
         }),
@@ -338,7 +338,7 @@ static ROMS: &[FeatureRule] = &[
     excludes(
         &[FACTORS, STIFFENING, CORIOLIS, SOFTENING],
         COUPLED,
-        "the modes of nodal diameters assume identical sectors and do not depend on speed or temperature",
+        "nodal-diameter modes assume identical sectors and do not depend on speed or temperature",
         "Remove the line, or use a ROM of uncoupled sectors (without harmonics)",
     ),
     excludes(
@@ -359,7 +359,7 @@ static ROMS: &[FeatureRule] = &[
             at.master_rom().is_some_and(|rom| rom.rows() > 1)
         }),
         "the penetration of a row of cells is interpolated between two patches along the axis, and patches of \
-         several rows would alternate",
+         different rows would be interleaved",
         "Reduce the blade with one row of patches (without --contact-rows), or remove the coating",
     ),
     needs(
@@ -385,7 +385,7 @@ static ROMS: &[FeatureRule] = &[
         ("static thermal stress in the ROM of the rotor (array `stress_thermal`)", |at| {
             at.stressed(|own| own.thermal).all(|rom| rom.extras.stress_thermal.is_some())
         }),
-        "the reduced coordinates alone cannot represent that free thermal expansion is free of stress",
+        "the reduced coordinates alone would give stress even for free thermal expansion, which is free of stress",
         "Reduce the blade again, add the array, or remove `thermal` or this line",
     ),
     needs(

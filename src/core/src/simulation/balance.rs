@@ -30,7 +30,7 @@ impl Simulation {
         let Some((set, (who, work))) = found else { return };
         let curvature = self.system.ledgers()[set].curvature_work.value();
         let problem = format!(
-            "up to t = {} s, contact normals that rotate and surfaces that curve within internal steps have added \
+            "up to t = {} s, the rotation of contact normals and the curvature of surfaces within internal steps have added \
              {curvature:.3e} J of spurious energy (curvature work){}, compared with {work:.3e} J of net work of {who}: \
              this net work may be wrong by the same amount and may have the wrong sign",
             shown_time(time),
@@ -101,7 +101,7 @@ impl Simulation {
             ),
             Loss::Cutting => (
                 format!(
-                    "cutting forces{of} have added {given:.3e} J to tips that move backwards, where nothing is cut, \
+                    "cutting forces{of} have added {given:.3e} J to tips that move backwards, when nothing is cut, \
                      out of {exchanged:.3e} J exchanged: tips vibrate faster than they slide, and the cutting law does \
                      not model sticking"
                 ),

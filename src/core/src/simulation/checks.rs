@@ -97,7 +97,7 @@ impl Simulation {
             ),
             StepFailure::Curved(curved) => (
                 format!(
-                    "{} are displaced at the start so far around the axis that u²/2r, which linear gaps neglect, is as \
+                    "{} are displaced at the start so far around the axis that u²/2r, which the linear gap formula neglects, is as \
                      large as the clearance",
                     blades(curved.structure)
                 ),

@@ -67,7 +67,7 @@ impl Simulation {
             StepFailure::Unbalanced { set, work, exchanged } => (
                 format!(
                     "contact forces{} have added {work:.3e} J of spurious energy, out of {exchanged:.3e} J exchanged: \
-                     contact normals rotate or surfaces curve too much within an internal step (curvature work)",
+                     contact normals rotate too far, or nodes move too far along curved surfaces, within an internal step (curvature work)",
                     self.of_set(set)
                 ),
                 "Use a smaller internal step".to_owned(),

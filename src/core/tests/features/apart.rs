@@ -305,7 +305,7 @@ fn rejects_output_that_no_pair_provides() {
     Simulation::new(&scene).unwrap();
     scene.settings.outputs.slave_displacement = true;
     let reported = Simulation::new(&scene).unwrap_err().to_string();
-    assert!(reported.starts_with("outputs.slave_displacement: needs"), "{reported}");
+    assert!(reported.starts_with("outputs.slave_displacement: requires"), "{reported}");
     let place = scene.settings.surfaces.len() - 1;
     scene.settings.surfaces[place].structure = Some("ring".into());
     let (name, motion) = ("ring".into(), BodyMotion::Still);
@@ -342,9 +342,9 @@ fn messages_name_the_contact_surface_or_structure() {
         })
     };
     let refused = try_started(&fast(false)).unwrap_err().to_string();
-    assert!(refused.starts_with("`rear.speed`: at speed 7000"), "{refused}");
+    assert!(refused.starts_with("`rear.speed`: at a speed of 7000"), "{refused}");
     let mut simulation = started(&fast(true));
-    assert!(simulation.warnings().iter().any(|text| text.starts_with("`rear.speed`: at speed 7000")));
+    assert!(simulation.warnings().iter().any(|text| text.starts_with("`rear.speed`: at a speed of 7000")));
     set(&mut simulation, "front.speed", 7000.0);
     go(&mut simulation, 1e-6);
     go(&mut simulation, 1e-6);

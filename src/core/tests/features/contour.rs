@@ -28,8 +28,11 @@ fn refused(scene: &Scene, parts: &[&str]) {
 
 #[test]
 fn rejects_slopes_that_contradict_the_positions() {
-    let named =
-        ["ROM `blade`, array `contact_meridional_slopes`", "`leading_edge` and `mid_chord`", "rise by -0.2 m per m"];
+    let named = [
+        "ROM `blade`, array `contact_meridional_slopes`",
+        "`leading_edge` and `mid_chord`",
+        "increase by -0.2 m per m",
+    ];
     for scene in [tapered, on_ring] {
         Simulation::new(&scene([-0.2; 3])).unwrap();
         // A wrong sign, and an angle in degrees.
@@ -46,7 +49,7 @@ fn rejects_slopes_that_contradict_the_positions() {
 #[test]
 fn missing_slopes_default_to_a_cylinder() {
     let mut scene = tapered([0.0; 3]);
-    refused(&scene, &["slopes 0 and 0", "rise by -0.2 m per m", "meridian = \"cylinder\""]);
+    refused(&scene, &["slopes 0 and 0", "increase by -0.2 m per m", "meridian = \"cylinder\""]);
     scene.settings.contacts[0].meridian = Meridian::Cylinder;
     Simulation::new(&scene).unwrap();
     Simulation::new(&on_ring([0.0; 3])).unwrap();

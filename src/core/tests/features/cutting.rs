@@ -234,8 +234,8 @@ fn rejects_features_incompatible_with_cutting() {
         &coating(|c| c.modulus = 1e9),
         &["contact[1].coating.modulus: cannot be combined with `contact.coating.cutting`"],
     );
-    refused(&coating(|c| c.yield_stress = 1e6), &["contact[1].coating.yield_stress: excludes"]);
-    refused(&coating(|c| c.hardening = 1e6), &["contact[1].coating.hardening: excludes"]);
+    refused(&coating(|c| c.yield_stress = 1e6), &["contact[1].coating.yield_stress: cannot be combined with"]);
+    refused(&coating(|c| c.hardening = 1e6), &["contact[1].coating.hardening: cannot be combined with"]);
     refused(
         &cutting(|c| c.specific_energy = 0.0),
         &["contact[1].coating.cutting.specific_energy: 0", "between 1000 and 1e12"],

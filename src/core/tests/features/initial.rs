@@ -189,5 +189,5 @@ fn starts_and_ratios_are_checked_parameters() {
         scene(models::rich_blade(4), Scheme::MasslessBoundary, vec![InitialSettings { mode: 12, ..one }]);
     massless.settings.time.step = 5e-7;
     let error = Simulation::new(&massless).unwrap().initialise(0.0).unwrap_err().to_string();
-    assert!(error.starts_with("structure[1].initial[1].mode: mode 12, where `rotor` has 9"), "{error}");
+    assert!(error.starts_with("structure[1].initial[1].mode: mode 12, but `rotor` has only 9"), "{error}");
 }

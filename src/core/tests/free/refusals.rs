@@ -98,7 +98,7 @@ fn rejects_friction_that_jams_a_free_body() {
         // When it is pushed in, the node moves along its slip: friction against the slip pushes it in further.
         let mut simulation = Simulation::new(&with_local_mode(distance, &[(0, [1.0, 1.0, 0.0])])).unwrap();
         let error = simulation.initialise(0.0).unwrap_err().to_string();
-        assert!(error.contains("contact of left_000 alone has no unique solution"), "{error}");
+        assert!(error.contains("contact problem of left_000 alone has no unique solution"), "{error}");
         let other = started(&with_local_mode(distance, &[(0, [1.0, -1.0, 0.0])]));
         assert!(other.warnings().is_empty(), "{:?}", other.warnings());
     }

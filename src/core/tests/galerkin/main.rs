@@ -540,7 +540,9 @@ fn schemes_respect_the_step_limit_and_reject_invalid_ones() {
         while !other.advance().unwrap().finished {}
         assert!(other.do_step(other.time(), 2e-7).is_err());
         go(&mut other, 1e-7);
-        for (value, words) in [(-1, "outside 0"), (i32::MIN, "outside 0"), (i32::MAX, "outside 0")] {
+        for (value, words) in
+            [(-1, "outside the range 0"), (i32::MIN, "outside the range 0"), (i32::MAX, "outside the range 0")]
+        {
             let message = bound(&mut other, value).unwrap_err().to_string();
             assert!(message.contains("max_internal_steps") && message.contains(words), "{message}");
         }

@@ -417,7 +417,7 @@ fn rejects_too_fast_tips_unless_the_scene_accepts_them() {
         assert_eq!(refused.each_ref().map(|(outcome, _)| outcome.is_ok()), [true, true, false, false, true, false]);
         let message = refused[2].0.clone().unwrap_err();
         assert!(
-            message.starts_with("`speed` at t = 2e-6 s: at speed") && message.contains("accept_implausible"),
+            message.starts_with("`speed` at t = 2e-6 s: at a speed of") && message.contains("accept_implausible"),
             "{message}"
         );
         scene.settings.accept_implausible = true;

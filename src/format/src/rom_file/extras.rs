@@ -165,7 +165,7 @@ impl RomReader<'_> {
         let array = self.required(arrays, name, if several { 3 } else { 2 })?;
         let (places, loads) = (array.shape[0], array.shape.get(2).copied());
         let expected: Vec<usize> = [places, STRESSES].into_iter().chain(loads).collect();
-        self.shape(name, array, &expected, "six components per place")?;
+        self.shape(name, array, &expected, "six components per stress point")?;
         Ok(Some(DMatrix::from_row_slice(STRESSES * places, loads.unwrap_or(1), &array.values)))
     }
 

@@ -609,14 +609,14 @@ pub const FIELDS: [SceneField; 102] = [
         "true or false",
         Some("false"),
         "",
-        "Stress of watched sectors at the places defined in the ROM.",
+        "Stress of watched sectors at the stress points defined in the ROM.",
     ),
     field(
         "outputs.modal_amplitudes",
         "whole number",
         Some("none"),
         "1 to the number of modes; not with coupled sectors",
-        "Amplitudes of the lowest modes (this many) of watched sectors, normalised to a modal mass of 1 kg.",
+        "Number of modes, from the lowest up, whose amplitudes are output for watched sectors, normalised to a modal mass of 1 kg.",
     ),
     field(
         "outputs.tip_displacements",

@@ -153,8 +153,8 @@ fn describe(options: &CasingOptions) -> String {
     let [low, high] = options.geometry.contour.axial();
     let around = if options.name == CASING37 { " around NASA rotor 37" } else { "" };
     let support = match options.support {
-        RingSupport::Low => "held at its low end face",
-        RingSupport::High => "held at its high end face",
+        RingSupport::Low => "held at its low-z end face",
+        RingSupport::High => "held at its high-z end face",
         RingSupport::Both => "held at both end faces",
         RingSupport::Free => "free",
     };

@@ -22,7 +22,7 @@ const ITERATIONS: usize = 20;
 
 /// Largest strain for which a linear law between Green strain and stress represents an elastic solid.
 const STRAIN: f64 = 0.1;
-const APART: &str = "Give a lower largest speed, or check the units and supports";
+const APART: &str = "Reduce the largest speed, or check the units and supports";
 
 /// Forces and stiffness of the free dofs at a displacement.
 struct Linearised {

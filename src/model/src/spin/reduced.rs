@@ -164,7 +164,7 @@ fn closest_modes(overlap: DMatrix<f64>) -> Result<DMatrix<f64>> {
         _ => Err(Error::invalid(
             "fixed-interface modes under spin",
             format!("the overlap of one of them with the modes at rest is only {smallest:.2}"),
-            "Request another number of modes or a lower largest speed",
+            "Request another number of modes or reduce the largest speed",
         )),
     }
 }

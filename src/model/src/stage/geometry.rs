@@ -222,7 +222,7 @@ impl SectorGeometry {
                 &[0.0, blade.edge_thickness[end], blade.thickness[end]],
             )?;
             for angle in [blade.inlet_angle[end], blade.outlet_angle[end]] {
-                rising("angles of the camber line", &[-LARGEST_ANGLE, angle, LARGEST_ANGLE])?;
+                rising("camber-line angle between its two limits", &[-LARGEST_ANGLE, angle, LARGEST_ANGLE])?;
             }
         }
         self.validate_width()

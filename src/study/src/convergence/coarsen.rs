@@ -14,7 +14,9 @@ use tiprub_core::{
 pub fn coarsened(rom: &Rom) -> Result<Rom, String> {
     let along = along(rom)?;
     if along < 3 || along.is_multiple_of(2) {
-        return Err(format!("{along} patches along the chord cannot be halved; 3, 5, 7, ... patches can"));
+        return Err(format!(
+            "{along} patches along the chord cannot be coarsened by dropping every other patch; the number must be odd and at least 3"
+        ));
     }
     let shares = DMatrix::identity(rom.rows(), rom.rows()).kronecker(&shares(along));
     let kept = along.div_ceil(2);

@@ -222,7 +222,9 @@ pub fn measure(case: &dyn ErrorCase, case_number: usize, repetitions: usize, for
     }
     let exact = case.exact();
     let truth = exact.as_ref().or(references.last().map(|last| &last.first));
-    let Some(truth) = truth else { return Err(Failure::new(case.name(), "the scene has no model size", "")) };
+    let Some(truth) = truth else {
+        return Err(Failure::new(case.name(), "there is no model of the scene to measure", ""));
+    };
     let mut rows = Vec::new();
     for (size, own) in references.iter().enumerate() {
         for competitor in case.competitors(size) {

@@ -346,7 +346,7 @@ fn meeting(case: &dyn ErrorCase, found: &Measured) -> Vec<Statement> {
             format!("displacements differ by {full:.1e}: {who}"),
         ),
         Statement::tested(
-            format!("{title}: the error of the product falls as the number of {} grows", case.size_name()),
+            format!("{title}: the error of tiprub falls as the number of {} grows", case.size_name()),
             found.truncation.len() > 1 && found.truncation.windows(2).all(|pair| pair[1] < pair[0]),
             truncation.join(", "),
         ),

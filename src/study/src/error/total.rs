@@ -375,7 +375,7 @@ mod tests {
         assert_eq!(three.models.iter().map(|model| model.tip("")).collect::<std::collections::BTreeSet<_>>().len(), 4);
         let own = total(2, None);
         assert_eq!(own.directions()[1], ["modes", "patches", "rows", "mesh"]);
-        assert_eq!(own.name(), "own-model error of the steps");
+        assert_eq!(own.name(), "error of the steps alone");
         assert!(own.models.iter().any(|model| model.tip("patches") == "3 patches"));
     }
 }

@@ -423,7 +423,7 @@ fn stiffening_verdict_requires_a_visible_effect() {
     assert_eq!(verdict(&[above, one(6, Some((104.0, 1e-3)), Some((150.0, 2e-3)))]).unwrap().0, Some(true));
     for response in [None, Some((104.0, 1e-3))] {
         let (holds, found) = verdict(&[above, one(6, response, Some((150.0, 4e-3)))]).unwrap();
-        assert!(holds.is_none() && found.starts_with("undecided: the response of engine order 6 on mode 1"), "{found}");
+        assert!(holds.is_none() && found.starts_with("undecided: the response to engine order 6 in mode 1"), "{found}");
     }
 }
 

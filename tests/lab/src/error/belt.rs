@@ -121,7 +121,7 @@ impl ErrorCase for BeltCase {
     }
 
     fn description(&self) -> String {
-        "A block on a spring starts with a velocity along a belt at rest. Friction stops it; it sticks and slides \
+        "A block on a spring is given an initial velocity along a stationary belt. Friction stops it; it sticks and slides \
          again (the stick-slip oscillator of J. P. den Hartog, 1931, with a flexible contact). Only `coulomb` models \
          sticking. Compared with the closed-form solution."
             .into()

@@ -115,7 +115,7 @@ fn saved_within(
         if let Some(place) = after.iter().zip(expected).position(|(own, other)| own != other) {
             let [own, other] = [after[place], expected[place]].map(f64::from_bits);
             return Some(format!(
-                "{name} instance continues after {before} internal steps of communication step {} with {own:e} for \
+                "{name} instance, continued after {before} internal steps of communication step {}, gives {own:e} for \
                  output {}, not {other:e}",
                 at + 1,
                 plan.outputs[place]

@@ -289,7 +289,10 @@ fn statements(
                 solutions.iter().map(|one| one.several).max().unwrap_or(0)
             ),
         ),
-        Statement::remark("Random sectors for which no step was short enough".to_owned(), format!("{given_up} spans")),
+        Statement::remark(
+            "Time spans of random sectors in which no step was short enough".to_owned(),
+            format!("{given_up} spans"),
+        ),
     ]
 }
 
@@ -347,7 +350,7 @@ fn tables(
         ),
         table(&["degree", "µ", "problems", "initially unsolved", "finally unsolved"], &problems),
         table(
-            &["without contact, in one step", "without contact, by spans", "with a rub"],
+            &["without contact, in one step", "without contact, span by span", "with a rub"],
             &[long.map(|time| format!("{time:.3} ms")).to_vec()],
         ),
         table(&["degree", "µ", "problems", "no solution", "several"], &solutions),

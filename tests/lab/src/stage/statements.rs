@@ -33,7 +33,7 @@ pub(super) fn of(setup: &StageSetup, casing: StageCasing, runs: &[Run], names: &
         Statement::remark(
             "Residual penetrations (fig. 11)",
             format!(
-                "largest at any communication point of any run: {deepest} m. The solver lcp closes every gap of a step \
+                "largest at any communication point of any run: {deepest} m. The solver lcp closes contact gaps in each step \
                  exactly, so this value does not measure the error; the chapter Validation gives the error due to the rotation of \
                  normals within a step"
             ),

@@ -19,7 +19,7 @@ fn every_node_must_touch_repeatedly() {
     assert_eq!(holds([3, 2, 9]), Some(true));
     assert_eq!([holds([0, 12, 12]), holds([1, 12, 12])], [Some(false); 2]);
     let found = statements::all_nodes_touch(&run([0, 12, 12]), &names(), 1.0).found;
-    assert!(found.contains("leading edge 0.100 of the clearance at rest, 0 times"), "{found}");
+    assert!(found.contains("leading edge 0.100 of the clearance at rest, 0 contacts"), "{found}");
 }
 
 /// Ratios that an average over the slowest and fastest third would accept.

@@ -297,7 +297,7 @@ fn statements(windows: &[WearWindow]) -> Vec<Statement> {
             format!("at least {stiffened:.2} times the first mode"),
         ),
         Statement::remark(
-            "Final tip vibrations, nearest to the second mode without contact",
+            "Final tip vibration nearest in frequency to the second mode without contact",
             last.map(|window| format!("{:.3} times the second mode", window.swings_over_second()))
                 .collect::<Vec<_>>()
                 .join(", "),

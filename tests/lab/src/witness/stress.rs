@@ -401,7 +401,7 @@ fn statements(found: &StressResult) -> Vec<Statement> {
             ),
         ),
         Statement::tested(
-            "The default model gives the largest von Mises stress of the rub within 5 %",
+            "The default model gives the largest von Mises stress of the rub to within 5 %",
             ships.most < 0.05,
             format!(
                 "{} at the location of the largest stress, {} at the worst location",

@@ -197,7 +197,7 @@ impl SurfaceSpline {
     fn check(&self, data: &[[f64; 3]]) -> Result<()> {
         let refuse = |what: String, problem: String| {
             let remedy = "Give rings in order of increasing z, each with points at angles about z that increase by \
-                          2π/around";
+                          2π divided by the number of points per ring";
             Err(Error::invalid(what, problem, remedy))
         };
         if data.len() != self.around * self.along {

@@ -159,7 +159,7 @@ const OF_ROTORS: &[(&str, Change)] = &[
         scene.settings.contacts[0].master = "under".into();
     }),
     ("surface[1].rigid: requires a free master", |scene| scene.settings.surfaces[0].rigid = true),
-    ("contact[1].master: a structure with several contacts needs", |scene| {
+    ("contact[1].master: a structure with several contacts requires", |scene| {
         second(&mut scene.settings);
         scene.settings.contacts[0].nodes = None;
     }),

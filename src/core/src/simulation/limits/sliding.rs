@@ -289,7 +289,7 @@ impl Checking<'_> {
         let lock_up = physics.lock_up.as_ref().map(|(least, nodes)| {
             let rate = match physics.divergence {
                 0.0 => String::new(),
-                rate => format!(", growing at {rate:.2e} 1/s without oscillation"),
+                rate => format!(", at a rate of {rate:.2e} 1/s without oscillation"),
             };
             let contact = self.contact(nodes, sign);
             let remedy = "Use less friction, a more compliant casing, or a coating";
@@ -311,7 +311,7 @@ impl Checking<'_> {
                 format!("vibration in closed contact grows at {:.2e} 1/s at {kilohertz:.4} kHz: {contact}", found.rate);
             let remedy = "Use less friction or more damping, or let contact open sooner; a shorter step does not help";
             Warning::new(Topic::Flutter, problem, remedy).with_text(format!(
-                "sliding contact is physically unstable (flutter): {contact}, vibration at {kilohertz:.4} kHz grows at \
+                "sliding contact is physically unstable (flutter): with contact {contact}, vibration at {kilohertz:.4} kHz grows at \
                  {:.2e} 1/s{} and displaces the tips by up to {:.1} % of the displacement caused by contact. This \
                  instability is a physical property of the model. {remedy}",
                 found.rate,
@@ -325,7 +325,7 @@ impl Checking<'_> {
 
     fn warning(&self, (step, nodes, judged): (f64, &[usize], SetGrowth), silent: Option<f64>, sign: f64) -> Warning {
         let problem = format!(
-            "the time step destabilises sliding contact: {}, growing at {:.2e} 1/s in steps of {} s, but at {:.2e} 1/s \
+            "the time step destabilises sliding contact: {}, with vibration growing at {:.2e} 1/s in steps of {} s, but at {:.2e} 1/s \
              in continuous time; this may displace the tips by {:.0} % of the displacement caused by contact",
             self.contact(nodes, sign),
             judged.growth.stepped,
@@ -347,7 +347,7 @@ impl Checking<'_> {
         let step_remedy = if step_remedy.is_empty() { "Use".to_owned() } else { step_remedy };
         Error::Unstable {
             problem: format!(
-                "`time.step` is too long for friction: vibration in sliding contact {} grows at {:.2e} 1/s in steps of {} s, but at \
+                "`time.step` is too long for friction: vibration in contact ({}) grows at {:.2e} 1/s in steps of {} s, but at \
                  {:.2e} 1/s in continuous time, and this alone may displace the tips by {:.0} % of the displacement \
                  caused by contact",
                 self.contact(nodes, sign),

@@ -70,7 +70,7 @@ const ENERGIES: [Energy; 19] = [
         "scheme_energy",
         Span::Point,
         Quantity::Output,
-        "Energy conserved by the time scheme and used in the energy balance: kinetic plus strain energy, with a \
+        "Energy conserved by the time scheme and used in the energy balance: kinetic plus strain energy, up to a \
          difference of second order in the step",
         |view| view.conserved,
     ),
@@ -96,7 +96,7 @@ const ENERGIES: [Energy; 19] = [
         "cutting_work",
         Span::Total,
         Quantity::Output,
-        "Work for cutting the coating since the start: specific cutting energy times removed volume",
+        "Work spent on cutting the coating since the start: specific cutting energy times removed volume",
         |view| view.ledger().cutting_work.value(),
     ),
     (
@@ -155,7 +155,7 @@ const ENERGIES: [Energy; 19] = [
         "curvature_work",
         Span::Total,
         Quantity::CurvatureWork,
-        "Spurious energy added by contact forces since the start because normals rotate and surfaces curve within an \
+        "Spurious energy added by contact forces since the start because of rotating normals and surface curvature within an \
          internal step (vanishes with the step)",
         |view| view.ledger().curvature_work.value(),
     ),

@@ -82,7 +82,7 @@ impl<'a> Sections<'a> {
             _ => return Err(sections.error(format!("`{format}` is not a format line"), "Export the mesh again")),
         };
         if size != Some("8") {
-            return Err(sections.error("node numbers do not have 8 bytes", "Export it with Gmsh on a 64-bit machine"));
+            return Err(sections.error("node numbers are not 8 bytes long", "Export it with Gmsh on a 64-bit machine"));
         }
         if sections.binary {
             let one = sections.bytes.get(sections.next..sections.next + 4).unwrap_or_default();

@@ -194,8 +194,11 @@ impl LineReader<'_> {
             self.repeated = self.repeated.saturating_add(bytes.len());
         }
         if self.repeated > LARGEST_REPEATED {
-            let problem =
-                format!("with {}, more than {} MiB are included repeatedly", path.display(), LARGEST_REPEATED >> 20);
+            let problem = format!(
+                "with {}, more than {} MiB of the included data is duplicated",
+                path.display(),
+                LARGEST_REPEATED >> 20
+            );
             return Err(place.error(problem, "Include every file only once"));
         }
         self.file(path, &bytes)

@@ -240,7 +240,7 @@ impl InpReader {
             let full = name.trim_end_matches(|c: char| c.is_ascii_alphabetic());
             self.draft.warnings.push(format!(
                 "{name} is fully integrated here{}: frequencies are higher than with reduced integration",
-                if name == full { String::new() } else { format!(", as {full}") }
+                if name == full { String::new() } else { format!(", like {full}") }
             ));
         }
         if !self.skipped.is_empty() {

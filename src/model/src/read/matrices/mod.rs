@@ -241,7 +241,7 @@ fn mirrored(path: &Path, entries: Entries, order: usize, scale: f64) -> Result<(
             let (row, column) = (low + 1, high + 1);
             let problem = format!(
                 "it is not symmetric: entry ({row}, {column}) and its mirror image differ by {share:.1e} of the \
-                 diagonal (row and column count all {order} degrees of freedom)"
+                 diagonal (row and column numbers run over all {order} degrees of freedom)"
             );
             let remedy = "Export it without gyroscopic, follower-load and friction terms";
             return Err(about(path, problem, remedy));

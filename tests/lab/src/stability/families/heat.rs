@@ -101,7 +101,7 @@ impl HeatedBlades {
             Check::so("the tips touched, and all slide in one direction", touched > 100 && reversed < 0.0),
             Check::relative("deviation of the friction loss from ∫ µ λ |v| dt", booked, heat, bound),
             Check::relative(
-                "deviation of the integral of the friction power from it",
+                "deviation of the integral of the friction power from the friction heat",
                 power,
                 if galerkin { booked } else { heat },
                 1e-9,
