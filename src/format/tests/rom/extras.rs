@@ -202,7 +202,8 @@ fn rejects_patch_rows_that_do_not_match_the_patches() {
     assert_eq!(with(&rom, " 2 ").unwrap().rows(), 2);
     assert_eq!(with(&rom, "1").unwrap().extras.rows, None);
     let more = (nodes + 1).to_string();
-    for (rows, reported) in [("two", "not a whole number"), ("0", "patches in 0 rows"), (more.as_str(), "are required")] {
+    for (rows, reported) in [("two", "not a whole number"), ("0", "patches in 0 rows"), (more.as_str(), "are required")]
+    {
         let error = with(&rom, rows).unwrap_err().to_string();
         assert!(error.contains("`contact_rows`") && error.contains(reported), "{error}");
     }

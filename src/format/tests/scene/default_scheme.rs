@@ -66,7 +66,9 @@ fn chooses_fixed_steps_with_a_reason_where_galerkin_is_excluded() {
         let named = format!("{}[time]\nscheme = \"galerkin\"\n", SCENE.replace(after, &format!("{after}{text}")));
         match parse_scene(&named, "demo.toml") {
             Ok(settings) => assert!(reason.contains("elastic") && settings.time.scheme_reason.is_none()),
-            Err(error) => assert!(error.to_string().contains("cannot be combined with") && !reason.contains("elastic"), "{error}"),
+            Err(error) => {
+                assert!(error.to_string().contains("cannot be combined with") && !reason.contains("elastic"), "{error}")
+            }
         }
     }
 }

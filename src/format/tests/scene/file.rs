@@ -116,7 +116,11 @@ fn missing_keys_are_named_with_their_unit_and_range() {
         "gap = 1e-3\n",
         "",
         ":8:1",
-        &["contact[1].gap: missing", "to [[contact]]", "radial tip clearance (m) to [[contact]], above 0 and at most a tenth"],
+        &[
+            "contact[1].gap: missing",
+            "to [[contact]]",
+            "radial tip clearance (m) to [[contact]], above 0 and at most a tenth",
+        ],
     );
     refused("name = \"demo\"\n", "", "", &["name: missing", "before the first [table]"]);
     let experiment = "[experiment]\nstop = 1.0\ncommunication_step = 1e-3\n";
