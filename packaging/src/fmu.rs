@@ -221,10 +221,10 @@ pub fn contents(
 ) -> Vec<ArchiveEntry> {
     let identifier = description.identifier;
     let name = format!("documentation/{identifier}_ref.csv");
-    let reported = reference.map(|(_, steps)| {
+    let reference_csv = reference.map(|(_, steps)| {
         format!("All outputs of the default experiment, for at most its first {steps} communication steps")
     });
-    let result = reported.as_deref().map(|reported| (name.as_str(), "text/csv", "result", reported));
+    let result = reference_csv.as_deref().map(|reference_csv| (name.as_str(), "text/csv", "result", reference_csv));
     let page = (
         "documentation/index.html",
         "text/html",

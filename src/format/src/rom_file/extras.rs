@@ -266,8 +266,8 @@ pub(super) fn metadata(extras: &RomExtras) -> Vec<(&'static str, String)> {
         ("contact_grid", format!("{around},{along}{edges}"))
     });
     let watched = extras.watched.as_ref().map(|watched| ("watched_names", names(&watched.points)));
-    let reported = BASES.iter().find(|(_, basis)| *basis == extras.basis && extras.basis != ReductionBasis::default());
-    let basis = reported.map(|(name, _)| ("basis", (*name).to_owned()));
+    let entry = BASES.iter().find(|(_, basis)| *basis == extras.basis && extras.basis != ReductionBasis::default());
+    let basis = entry.map(|(name, _)| ("basis", (*name).to_owned()));
     let rows = extras.rows.map(|rows| (ROWS, rows.to_string()));
     let stress = extras.stress.as_ref().map(|stress| ("stress_names", names(&stress.points)));
     speed.into_iter().chain(grid).chain(watched).chain(stress).chain(basis).chain(rows).collect()

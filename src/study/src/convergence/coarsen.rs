@@ -60,7 +60,7 @@ fn made(
     shares: &DMatrix<f64>,
     rows: usize,
     middle: impl Fn(usize) -> usize,
-    reported: &str,
+    note: &str,
 ) -> Result<Rom, String> {
     let areas: Vec<f64> = rom.contact_nodes.iter().map(|patch| patch.area).collect();
     let weights = weighted(shares, &areas);
@@ -77,7 +77,7 @@ fn made(
     let lengths = rows as f64 / rom.rows() as f64;
     found.contact_nodes.iter_mut().for_each(|patch| patch.length *= lengths);
     found.extras.rows = Some(rows).filter(|rows| *rows > 1);
-    found.origin = format!("{}; coarsened from {} to {kept} patches{reported}", rom.origin, areas.len());
+    found.origin = format!("{}; coarsened from {} to {kept} patches{note}", rom.origin, areas.len());
     found.checks.flexibility_deviation.clear();
     found.checks.rub_errors = None;
     found.validate().map_err(|error| error.to_string())?;

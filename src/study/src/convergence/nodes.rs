@@ -27,7 +27,7 @@ pub(super) fn common_start(scene: &Scene, index: usize) -> Result<String, String
     let of = |node: &ContactNode| pairs.clone().find(|(_, contact)| claims(contact, node));
     let places: Vec<Option<usize>> = rom.contact_nodes.iter().map(|node| Some(of(node)?.0)).collect();
     if let Some(border) = places.windows(2).position(|pair| pair[0] != pair[1]) {
-        let reported = |place: usize| {
+        let describe_node = |place: usize| {
             let pair = places[place].map_or("no contact".to_owned(), |pair| format!("contact[{}]", pair + 1));
             format!("`{}` ({pair})", rom.contact_nodes[place].name)
         };
@@ -35,8 +35,8 @@ pub(super) fn common_start(scene: &Scene, index: usize) -> Result<String, String
             "pairs select contact nodes by name, and the pair of a new node between {} and {} is undefined. Reduce the \
              blade with more --contact-nodes, choose --contact-names that begin with the `nodes` prefix of their pair, and \
              compare runs",
-            reported(border),
-            reported(border + 1)
+            describe_node(border),
+            describe_node(border + 1)
         ));
     }
     let start = places.first().copied().flatten().and_then(|pair| scene.settings.contacts[pair].nodes.clone());

@@ -89,8 +89,7 @@ fn error(refined: &Refined) -> Option<Statement> {
         std::array::from_fn(|index| if errors[index].is_none() { to_finest[index] } else { None });
     let parts =
         [("", changes_text(&errors)), ("no limit found; difference from the finest level: ", changes_text(&unread))];
-    let found =
-        parts.iter().filter(|(_, reported)| !reported.is_empty()).map(|(what, reported)| format!("{what}{reported}"));
+    let found = parts.iter().filter(|(_, text)| !text.is_empty()).map(|(what, text)| format!("{what}{text}"));
     let found = found.collect::<Vec<_>>().join("; ");
     Some(Statement::remark(format!("Error of the scene due to {}", title(refined)), found))
 }
@@ -121,8 +120,8 @@ pub fn statements(found: &ConvergenceResult) -> Vec<Statement> {
 fn lock_up(refined: &Refined) -> Option<Statement> {
     let levels = refined.direction.levels.iter().zip(&refined.lock_up);
     let known = levels.map(|(level, least)| {
-        let reported = least.map_or("none".to_owned(), |least| format!("{least:.3}"));
-        format!("{} with {}", reported, value(refined, level.value))
+        let friction = least.map_or("none".to_owned(), |least| format!("{least:.3}"));
+        format!("{} with {}", friction, value(refined, level.value))
     });
     let found = known.collect::<Vec<_>>().join(", ");
     let some = refined.lock_up.iter().any(Option::is_some);

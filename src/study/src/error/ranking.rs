@@ -70,7 +70,7 @@ pub fn readable_of(case: &dyn ErrorCase, measured: &Measured, kind: ErrorKind, c
 }
 
 /// Returns the rows of competitors whose limit is known accurately enough for this error.
-pub fn that_tell<'a>(
+pub fn conclusive_rows<'a>(
     case: &dyn ErrorCase,
     measured: &Measured,
     kind: ErrorKind,
@@ -125,14 +125,14 @@ pub fn winners(case: &dyn ErrorCase, measured: &Measured, kind: ErrorKind) -> Ta
     let mut table = Table::new(what, columns);
     let readable = readable(case, measured, kind);
     for target in TARGETS {
-        let reported = that_tell(case, measured, kind, &rows, target);
-        if reported.is_empty() && cheapest(&rows, kind, None, target).is_some() {
+        let conclusive = conclusive_rows(case, measured, kind, &rows, target);
+        if conclusive.is_empty() && cheapest(&rows, kind, None, target).is_some() {
             let why = format!("not measurable: the references differ by {readable:.1e}");
             let empty = std::iter::repeat_n(String::new(), table.columns.len() - 2);
             table.rows.push([format!("{target:.0e}"), why].into_iter().chain(empty).collect());
             continue;
         }
-        let paper = cheapest(&reported, kind, Some(PAPER), target);
+        let paper = cheapest(&conclusive, kind, Some(PAPER), target);
         let text = |(row, figures): (&MeasuredRow, &Figures)| {
             let size = if kind == ErrorKind::Total {
                 format!("{} {}, ", sizes[row.size], case.size_name())
@@ -143,7 +143,7 @@ pub fn winners(case: &dyn ErrorCase, measured: &Measured, kind: ErrorKind) -> Ta
         };
         let paper_text = paper.map_or_else(|| "not reached".into(), text);
         let mut cells = vec![format!("{target:.0e}")];
-        cells.extend(match cheapest(&reported, kind, None, target) {
+        cells.extend(match cheapest(&conclusive, kind, None, target) {
             None => ["none", "", "", ""].map(String::from).into_iter().chain([paper_text, String::new()]).collect(),
             Some((row, figures)) => vec![
                 row.competitor.name(),

@@ -133,9 +133,9 @@ pub fn of_scene(
 ) -> Result<(Study, Vec<String>)> {
     let (mut map, speeds) = Map::prepare(scene, request)?;
     let steps = map.internal_steps(&speeds);
-    let reported = |done| progress(done, speeds.len(), steps);
-    reported(0);
-    map.runs = sweep::sweep(&speeds, threads, |speed| map.setup.run(*speed), reported)?;
+    let report_progress = |done| progress(done, speeds.len(), steps);
+    report_progress(0);
+    map.runs = sweep::sweep(&speeds, threads, |speed| map.setup.run(*speed), report_progress)?;
     if let (true, Some(Err(refusal))) =
         (map.answered().next().is_none(), map.runs.first().map(|run| run.outcome.as_ref().map(|_| ())))
     {

@@ -129,19 +129,19 @@ impl CyclicModel {
             return Ok(());
         }
         for diameter in &self.diameters {
-            let reported = checks.nodal_diameters.iter().zip(&checks.reduced_frequencies);
-            let reported = reported.filter(|(number, _)| usize::try_from(**number) == Ok(diameter.nodal_diameter));
+            let stored = checks.nodal_diameters.iter().zip(&checks.reduced_frequencies);
+            let stored = stored.filter(|(number, _)| usize::try_from(**number) == Ok(diameter.nodal_diameter));
             let largest = diameter.frequencies.last().map_or(0.0, |most| most / std::f64::consts::TAU);
-            for ((_, reported), found) in reported.zip(&diameter.frequencies) {
+            for ((_, stored), found) in stored.zip(&diameter.frequencies) {
                 let found = found / std::f64::consts::TAU;
-                if (found - reported).abs() > SAME_FREQUENCY * reported + RIGID_FREQUENCY * largest {
+                if (found - stored).abs() > SAME_FREQUENCY * stored + RIGID_FREQUENCY * largest {
                     return Err(Error::invalid(
                         "ROM harmonics",
                         format!(
                             "nodal diameter {} has a mode at {} Hz, but the checks stored in the ROM give {} Hz",
                             diameter.nodal_diameter,
                             shown(found),
-                            shown(*reported)
+                            shown(*stored)
                         ),
                         "Store the harmonics in the order of their nodal diameters, or regenerate the ROM with `tiprub \
                          reduce`",

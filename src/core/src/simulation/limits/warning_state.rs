@@ -78,9 +78,9 @@ impl Simulation {
         let mut uncertain_warnings: Vec<Warning> = self.compiled.slips().iter().map(Slip::warning).collect();
         uncertain_warnings.extend(self.compiled.idle_patches());
         for (body, speed) in self.speeds().into_iter().enumerate() {
-            let mut warning_state = [false; 2];
-            senses_of(parameters.speeds[body]).for_each(|sense| warning_state[sense] = true);
-            self.warning_state.senses[body] = warning_state;
+            let mut warned = [false; 2];
+            senses_of(parameters.speeds[body]).for_each(|sense| warned[sense] = true);
+            self.warning_state.senses[body] = warned;
             self.warning_state.friction[body] = self.warnings_of(body, parameters.speeds[body]).len();
             let fast = self.compiled.slip_of_speed(body, speed);
             let fastest = plausibility::fastest(self.compiled.body(body).1);
@@ -216,8 +216,8 @@ impl Simulation {
     pub fn if_reversed(&self) -> Vec<Warning> {
         let Some(limits) = &self.limits else { return Vec::new() };
         let mut found = Vec::new();
-        for (index, (body, warning_state)) in limits.bodies.iter().zip(&self.warning_state.senses).enumerate() {
-            let other = [0, 1].into_iter().filter(|sense| !warning_state[*sense] && body.senses[*sense].is_some());
+        for (index, (body, warned)) in limits.bodies.iter().zip(&self.warning_state.senses).enumerate() {
+            let other = [0, 1].into_iter().filter(|sense| !warned[*sense] && body.senses[*sense].is_some());
             let rotor = self.compiled.rotor_name(index);
             let speed = limits.parameters.speeds[index];
             found.extend(other.flat_map(|sense| body.of_sense(sense, speed, &rotor)));

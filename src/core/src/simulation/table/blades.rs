@@ -64,12 +64,11 @@ pub fn mode_damping(
     quantity: Quantity,
     name: &str,
     structure: &StructureSettings,
-    warning_state: &str,
+    owner: &str,
 ) {
     let ratios = &structure.damping_ratios;
     if !ratios.is_empty() {
-        let row =
-            table.damping(quantity, name, 0.0, &format!("Modal damping ratios of the first modes of {warning_state}"));
+        let row = table.damping(quantity, name, 0.0, &format!("Modal damping ratios of the first modes of {owner}"));
         (row.dimension, row.start) = (Some(ratios.len()), Some(StartValue::Real(ratios.clone())));
     }
 }

@@ -195,16 +195,15 @@ const PER_EXTENT: [PerExtent; 2] = [
 
 /// Adds pressure and force per length of contact patches.
 fn patches(table: &mut TableBuilder, body: &BodyFacts, sector: usize) {
-    for (name, warning_state, unit, nominal, extent) in PER_EXTENT {
+    for (name, quantity, unit, nominal, extent) in PER_EXTENT {
         let extents: Vec<f64> = body.rom.contact_nodes.iter().map(extent).collect();
         if extents.contains(&0.0) {
             continue;
         }
         let (index, count) = (body.index, extents.len());
         let list = node_list(body);
-        let text = format!(
-            "Normal contact {warning_state} at the centre of each patch ({list}), mean over the communication step"
-        );
+        let text =
+            format!("Normal contact {quantity} at the centre of each patch ({list}), mean over the communication step");
         let read = each(move |view, node| view.mean * view.normal_impulse(index, node, sector - 1) / extents[node]);
         let row = table.output(format!("blade[{sector}].{name}"), Span::Mean, Some((unit, nominal)), text, read);
         row.dimension = Some(count);
