@@ -177,7 +177,7 @@ pub fn references(case: &dyn ErrorCase, found: &Measured) -> Table {
 /// Returns the cheapest configuration for an error of the steps, if the references can resolve it.
 fn cheapest(case: &dyn ErrorCase, found: &Measured, target: f64) -> Value {
     let kind = ErrorKind::of_steps(case);
-    let rows = ranking::that_tell(case, found, kind, &kind.rows(case, found), target);
+    let rows = ranking::conclusive_rows(case, found, kind, &kind.rows(case, found), target);
     match ranking::cheapest(&rows, kind, None, target) {
         None => json!({ "error": target }),
         Some((row, figures)) => json!({

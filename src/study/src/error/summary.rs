@@ -7,7 +7,7 @@ use super::{
     case::ErrorCase,
     competitor::{Competitor, PAPER},
     measure::{Figures, Measured, MeasuredRow},
-    ranking::{self, ErrorKind, TARGETS, cheapest, that_tell},
+    ranking::{self, ErrorKind, TARGETS, cheapest, conclusive_rows},
 };
 
 /// Run that finished: its setting and its measured values.
@@ -44,7 +44,7 @@ pub fn of_steps(scenes: &[(&dyn ErrorCase, &Measured)]) -> Table {
     for &(case, measured) in scenes {
         let rows = ErrorKind::OfOwn.rows(case, measured);
         for target in TARGETS {
-            let readable = that_tell(case, measured, ErrorKind::OfOwn, &rows, target);
+            let readable = conclusive_rows(case, measured, ErrorKind::OfOwn, &rows, target);
             let cells =
                 cells(case, &readable, &rows, &|only| cheapest(&readable, ErrorKind::OfOwn, only, target), |_| {
                     String::new()
@@ -63,8 +63,8 @@ pub fn in_total(scenes: &[(&dyn ErrorCase, &Measured)]) -> Table {
         let rows = ErrorKind::Total.rows(case, measured);
         for target in TARGETS {
             let readable = match case.model_error() {
-                Some(_) => that_tell(case, measured, ErrorKind::OfOwn, &rows, target),
-                None => that_tell(case, measured, ErrorKind::Total, &rows, target),
+                Some(_) => conclusive_rows(case, measured, ErrorKind::OfOwn, &rows, target),
+                None => conclusive_rows(case, measured, ErrorKind::Total, &rows, target),
             };
             let best = |only: Option<Competitor>| {
                 let own = readable.iter().filter(|row| only.is_none_or(|competitor| row.competitor == competitor));
