@@ -106,7 +106,7 @@ fn judge_detects_every_kind_of_failure() {
         assert_eq!(verdict(name), "WRONG", "{name}");
         let reported = happened(name);
         assert!(
-            reported.contains(check) && !reported.contains("refused") && !reported.contains("not fulfilled"),
+            reported.contains(check) && !reported.contains("rejected") && !reported.contains("not fulfilled"),
             "{name}: {reported}"
         );
     }
