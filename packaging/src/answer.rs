@@ -110,7 +110,10 @@ fn clearance(recording: &Recording, found: &[Extreme], tolerance: f64) -> Answer
             let is_rounding = extreme.value.abs() < ROUNDING;
             let value = if is_rounding { 0.0 } else { extreme.value };
             let within = if is_rounding { "" } else { " within the tolerance of the adaptive steps" };
-            (Some((value, "m")), format!("smallest: tips touch{within}, first at t = {} s", six_digits(first)))
+            let impulses = recording.column("normal_impulse");
+            let is_loaded = impulses.is_none_or(|impulses| impulses.iter().any(|impulse| *impulse != 0.0));
+            let how = if is_loaded { "tips touch" } else { "tips reach the casing without a contact force" };
+            (Some((value, "m")), format!("smallest: {how}{within}, first at t = {} s", six_digits(first)))
         }
         Some(extreme) => (Some((extreme.value, "m")), format!("smallest, {}", at(extreme))),
         None => (None, "some contact nodes face no surface; use --all to list the clearance of each node".to_owned()),
@@ -192,6 +195,9 @@ mod tests {
             at(-6e-9)
         );
         assert!(!at(-6e-7).contains("touch") && at(-6e-7).contains("smallest, at t = 0.5 s"), "{}", at(-6e-7));
+        let rows: [&[f64]; 3] = [&[1e-4, 0.0], &[0.0, 0.0], &[1e-4, 0.0]];
+        let grazing = text(&lines(&recording(&["clearance_minimum", "normal_impulse"], &rows), 1e-7));
+        assert!(grazing.contains("without a contact force") && !grazing.contains("tips touch"), "{grazing}");
     }
 
     #[test]

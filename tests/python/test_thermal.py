@@ -112,4 +112,4 @@ def test_wrong_ones_are_refused_by_name(tiprub, conduction, tmp_path):
     scenes = os.environ.get("TIPRUB_LIBRARY")
     if scenes:
         error = tiprub("thermal", *CASING, "-o", tmp_path, "--library", scenes, fails=True)
-        assert "the other FMU" in str(error)
+        assert "the other kind of FMU" in str(error)

@@ -235,7 +235,7 @@ mod tests {
     fn suggests_similar_name_or_lists_all_names() {
         let names = ["speed", "friction_coefficient"];
         assert_eq!(suggestion("sped", &names), "Did you mean `speed`?");
-        assert_eq!(suggestion("xyz", &names), "Inputs and parameters are: speed, friction_coefficient");
+        assert_eq!(suggestion("xyz", &names), "Available inputs and parameters: speed, friction_coefficient");
     }
 
     #[test]

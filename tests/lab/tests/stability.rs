@@ -60,7 +60,7 @@ fn judge_detects_every_kind_of_failure() {
     let failure = stability(root.path(), &["--case", "judge/"], 1);
     let reported = failure.to_string();
     assert!(
-        reported.contains("21 of 21 cases are neither right nor refused") && reported.contains("WRONG judge/wrong"),
+        reported.contains("21 of 21 cases are neither correct nor rejected") && reported.contains("WRONG judge/wrong"),
         "{reported}"
     );
     let written = std::fs::read_to_string(root.path().join("out").join("results.json")).unwrap();
@@ -106,7 +106,7 @@ fn judge_detects_every_kind_of_failure() {
         assert_eq!(verdict(name), "WRONG", "{name}");
         let reported = happened(name);
         assert!(
-            reported.contains(check) && !reported.contains("refused") && !reported.contains("not fulfilled"),
+            reported.contains(check) && !reported.contains("rejected") && !reported.contains("not fulfilled"),
             "{name}: {reported}"
         );
     }

@@ -348,7 +348,7 @@ fn messages_name_the_contact_surface_or_structure() {
     set(&mut simulation, "front.speed", 7000.0);
     go(&mut simulation, 1e-6);
     go(&mut simulation, 1e-6);
-    assert!(simulation.take_notes().iter().any(|text| text.starts_with("`front.speed`: at speed 7000")));
+    assert!(simulation.take_notes().iter().any(|text| text.starts_with("`front.speed`: at a speed of 7000")));
     // Patches without friction cause no warning.
     let scene = two(|scene| {
         scene.settings.contacts.iter_mut().for_each(|contact| contact.friction = 0.0);

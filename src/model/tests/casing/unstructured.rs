@@ -307,7 +307,7 @@ fn rejects_incomplete_or_multiple_inner_surfaces() {
         [0.0, 0.05],
         &["from the grid point at 0.000° and z = 0.050000 m", "more than the tolerance", "to 0.046"],
     );
-    refused(&good, "low", axial, &["none of", "directed towards the z axis", "--contact-set"]);
+    refused(&good, "low", axial, &["none of", "points towards the z axis", "--contact-set"]);
     refused(&good, "inner", [0.2, 0.3], &["lies between z = 0.200000 m and 0.300000 m"]);
     let low = good.set("low").unwrap();
     let set = good.set("inner").unwrap();

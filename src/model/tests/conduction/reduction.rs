@@ -195,7 +195,7 @@ fn rejects_invalid_options_by_name() {
     let good = options([500.0, 25.0], [-1.0, 1.0], 2);
     assert!(reduce_conduction(&mesh, &whole(), &good, &silent).is_ok());
     refused(&mesh, &ConductionOptions { films: [0.0, 0.0], ..good.clone() }, "no steady state");
-    refused(&mesh, &ConductionOptions { films: [-1.0, 2.0], ..good.clone() }, "no negative value");
+    refused(&mesh, &ConductionOptions { films: [-1.0, 2.0], ..good.clone() }, "non-negative values");
     refused(&mesh, &ConductionOptions { films: [f64::NAN, 2.0], ..good.clone() }, "film coefficients");
     refused(&mesh, &ConductionOptions { density: 0.0, ..good.clone() }, "density");
     refused(&mesh, &ConductionOptions { heated: [3.0, 4.0], ..good.clone() }, "heated surface");
