@@ -444,9 +444,9 @@ fn identifier(text: &str) -> Result<String, String> {
 }
 
 /// Checks a part of a file name.
-fn model_name(text: &str) -> Result<String, String> {
+pub(crate) fn model_name(text: &str) -> Result<String, String> {
     if text.is_empty() || text.contains(['/', '\\']) || text.starts_with('.') {
-        return Err("give a plain name without a path; set the path of the ROM file with -o".into());
+        return Err("give a plain name without a path; set the path of the output file with -o".into());
     }
     Ok(text.to_owned())
 }

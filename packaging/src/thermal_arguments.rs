@@ -52,7 +52,7 @@ pub struct ThermalArguments {
     pub modes: Option<usize>,
     /// Name of the model [default: casing37_thermal; casing_thermal for another casing; for FILE, its name with
     /// _thermal].
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", value_parser = super::mesh_arguments::model_name)]
     pub name: Option<String>,
     /// FMI version of the FMU.
     #[arg(long, value_enum, default_value_t = FmiChoice::Both)]

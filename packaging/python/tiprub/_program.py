@@ -40,8 +40,11 @@ class Error(Exception):
         self.what, self.problem, self.remedy, self.exit_code = what, problem, remedy, exit_code
 
     def __str__(self) -> str:
-        sentences = [f"{self.what}: {self.problem}", self.remedy]
-        return " ".join(text.rstrip().rstrip(".") + "." for text in sentences if text)
+        def sentence(text: str) -> str:
+            text = text.rstrip()
+            return text if text.endswith(("?", "...")) else text.rstrip(".") + "."
+
+        return " ".join(sentence(text) for text in [f"{self.what}: {self.problem}", self.remedy] if text)
 
 
 class Report(dict):
@@ -131,7 +134,7 @@ def options(own: Mapping[str, Any], more: Mapping[str, Any] = MappingProxyType({
     for key in more:
         if key in own or key in INSTEAD:
             remedy = INSTEAD.get(key, "See the function's help for the keyword that does the same")
-            raise Error(f"keyword `{key}`", "is none of this function", remedy, 2)
+            raise Error(f"keyword `{key}`", "is not an argument of this function", remedy, 2)
     words = []
     for key, value in {**own, **more}.items():
         option = "--" + key.replace("_", "-")
@@ -148,7 +151,7 @@ def options(own: Mapping[str, Any], more: Mapping[str, Any] = MappingProxyType({
 def kind_of(kind: Any) -> str:
     """Check the kind of a reduction or study, which must not be an option."""
     if not isinstance(kind, str) or not kind or kind.startswith("-"):
-        raise Error("kind", f"{kind!r} is none", "See `tiprub reduce --help` or `tiprub study --help`", 2)
+        raise Error("kind", f"{kind!r} is not a kind of reduction or study", "See `tiprub reduce --help` or `tiprub study --help`", 2)
     return kind
 
 
@@ -170,7 +173,7 @@ def start_value(what: str, value: Any) -> str:
     if array.ndim == 0:
         return text(what, array.item())
     if array.ndim > 1 or array.size == 0 or array.dtype.kind not in "biuf":
-        raise Error(what, "is no row of numbers", "Give a number, or a number for each element of an array", 2)
+        raise Error(what, "is not a list of numbers", "Give a number, or a number for each element of an array", 2)
     return "[" + ",".join(text(what, one) for one in array.tolist()) + "]"
 
 
@@ -192,7 +195,7 @@ def place(what: str, value: Any) -> str:
         # A report may have no file.
         with contextlib.suppress(TypeError):
             return os.fsdecode(value)
-    raise Error(what, f"is no path (type {type(value).__name__})", "Give the path of a file or directory", 2)
+    raise Error(what, f"is not a path (type {type(value).__name__})", "Give the path of a file or directory", 2)
 
 
 @contextlib.contextmanager
@@ -253,7 +256,7 @@ def call(words: Iterable[str], files: Iterable[str] = (), quiet: bool = False) -
                 process.kill()
                 process.wait()
             elif isinstance(error, ValueError):
-                raise Error("tiprub", f"cannot be asked: {error}", "Names and values hold no zero bytes", 2) from None
+                raise Error("tiprub", f"cannot be run: {error}", "Use names and values without zero bytes", 2) from None
             elif isinstance(error, OSError):
                 raise Error(command[0], f"cannot be started: {error}", "Name the program in the environment variable TIPRUB") from error
             raise

@@ -87,7 +87,7 @@ def rom(
         try:
             content = array(key, item)
         except (TypeError, ValueError) as error:
-            raise Error(f"{path}: array `{key}`", f"is none of numbers: {error}", "Give numbers, or see docs/rom-file.md for its name") from None
+            raise Error(f"{path}: array `{key}`", f"is not an array of numbers: {error}", "Give numbers, or see docs/rom-file.md for its name") from None
         header[key] = {"dtype": "F64", "shape": list(content.shape), "data_offsets": [end, end + content.nbytes]}
         end += content.nbytes
         data.append(content.tobytes())

@@ -109,7 +109,7 @@ def scene_file(scene: Scene, directory: Union[str, "os.PathLike[str]"] = ".") ->
     try:
         content = as_text(scene, Path(place("keyword `directory`", directory)).absolute()).encode()
     except UnicodeEncodeError as error:
-        raise Error("scene", f"is no text: {error}", "Use names that are UTF-8", 2) from None
+        raise Error("scene", f"is not valid text: {error}", "Use UTF-8 names", 2) from None
     with tempfile.TemporaryDirectory(prefix="tiprub-") as own:
         path = Path(own) / "scene.toml"
         path.write_bytes(content)

@@ -95,7 +95,13 @@ pub fn within(field: &str, value: f64, low: f64, high: f64) -> Result<()> {
         return Ok(());
     }
     let kind = if value.is_finite() { "value" } else { "finite value" };
-    let remedy = format!("Give a {kind} between {} and {}", shown(low), shown(high));
+    // The smallest positive number stands for any positive value.
+    let range = if low.to_bits() == 1 {
+        format!("above 0 and at most {}", shown(high))
+    } else {
+        format!("between {} and {}", shown(low), shown(high))
+    };
+    let remedy = format!("Give a {kind} {range}");
     Err(Error::invalid(field, format!("{} is out of range", shown(value)), remedy))
 }
 

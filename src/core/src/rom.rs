@@ -336,7 +336,8 @@ impl Rom {
         for (name, matrix, sign) in matrices {
             let what = format!("ROM array `{name}`");
             if matrix.shape() != (order, order) || matrix.iter().any(|value| !value.is_finite()) {
-                let problem = format!("shape {:?} found, {order} x {order} finite values expected", matrix.shape());
+                let problem =
+                    format!("expected {order} x {order} finite values, found shape {:?} or a non-finite value", matrix.shape());
                 return Err(Error::invalid(what, problem, remedy));
             }
             entries(name, matrix, ranges::MATRIX, remedy)?;
@@ -351,7 +352,7 @@ impl Rom {
             [("centrifugal_load", &spin.centrifugal_load), ("centrifugal_load_speed4", &spin.centrifugal_load_speed4)];
         for (name, load) in loads {
             if load.len() != order || load.iter().any(|value| !value.is_finite()) {
-                let problem = format!("{} values found, {order} finite values expected", load.len());
+                let problem = format!("expected {order} finite values, found {} or a non-finite value", load.len());
                 return Err(Error::invalid(format!("ROM array `{name}`"), problem, remedy));
             }
             load.iter()
@@ -368,7 +369,8 @@ impl Rom {
         let Some(thermal) = &self.extras.thermal else { return Ok(()) };
         let expected = (self.order(), thermal.patches.len());
         if thermal.loads.shape() != expected || expected.1 == 0 || thermal.loads.iter().any(|v| !v.is_finite()) {
-            let problem = format!("shape {:?} found, {expected:?} finite values expected", thermal.loads.shape());
+            let found = thermal.loads.shape();
+            let problem = format!("expected {expected:?} finite values, found shape {found:?} or a non-finite value");
             return Err(Error::invalid("ROM array `thermal_loads`", problem, remedy));
         }
         entries("thermal_loads", &thermal.loads, ranges::THERMAL_LOAD, remedy)?;

@@ -269,7 +269,7 @@ impl RomReader<'_> {
 
     fn check_values(&self, arrays: &Arrays, name: &str) -> Result<Vec<f64>> {
         let Some(array) = arrays.get(name) else { return Ok(Vec::new()) };
-        self.shape(name, array, &[array.values.len()], "one value per mode")?;
+        self.shape(name, array, &[array.values.len()], "a vector")?;
         if let Some(index) = array.values.iter().position(|value| !value.is_finite()) {
             let problem = format!("entry {index} is {}", array.values[index]);
             return Err(self.error(format!("array `{name}`"), problem, "Omit the array if a value is unknown"));

@@ -159,12 +159,15 @@ fn choose_scheme(settings: &mut SceneSettings, roms: &[Rom], document: &Document
     }
     let why = scheme_reason.as_ref().map_or(String::new(), |reason| format!(" ({reason})"));
     let problem = format!("missing: the scheme `{}`{why} uses fixed steps", scheme.name());
-    let galerkin =
-        if scheme_reason.is_some() { "" } else { ", or use scheme = \"galerkin\", which chooses its own steps" };
+    let is_adaptive = scheme_reason.is_none() && settings.default_scheme(roms).0 == Scheme::Galerkin;
+    let galerkin = if is_adaptive { ", or use scheme = \"galerkin\", which chooses its own steps" } else { "" };
     Err(document.refusal(
         STEP,
         problem,
-        format!("Add `step = 1e-6` (s) to [time], and check it with `tiprub run --estimate`{galerkin}"),
+        format!(
+            "Add a step in s to [time], such as `step = 1e-6`, and check it with `tiprub run --estimate`; if it is too \
+             long, the error gives a shorter one{galerkin}"
+        ),
     ))
 }
 

@@ -45,8 +45,8 @@ pub enum Error {
     },
     /// The eigenvalue iteration ended before all requested pairs converged.
     #[error(
-        "only {converged} of {wanted} eigenpairs converged to {tolerance:.1e} in a Krylov basis of {basis} vectors. Ask \
-         for more modes, whose number the basis grows with, or check the mesh for parts that hang loosely together"
+        "only {converged} of {wanted} eigenpairs converged to {tolerance:.1e} in a Krylov basis of {basis} vectors. \
+         Request more modes, which enlarges the basis, and check the lengths (in m) and the mesh for loosely connected parts"
     )]
     NotConverged {
         /// Number of requested pairs.

@@ -93,9 +93,13 @@ impl Failure {
     }
 }
 
-/// Ends `text` with exactly one full stop, unless it ends in a question mark.
+/// Ends `text` with exactly one full stop, unless it ends in a question mark or an ellipsis.
 fn sentence(text: &str) -> String {
-    let text = text.trim_end().trim_end_matches('.');
+    let text = text.trim_end();
+    if text.ends_with("...") {
+        return text.to_string();
+    }
+    let text = text.trim_end_matches('.');
     if text.ends_with('?') { text.to_string() } else { format!("{text}.") }
 }
 

@@ -145,7 +145,7 @@ impl ThermalSimulation {
         let (low, high) = (variable.min.unwrap_or(f64::MIN), variable.max.unwrap_or(f64::MAX));
         if !(low..=high).contains(&value) {
             let problem = format!("{} is outside the range {} to {}", shown(value), shown(low), shown(high));
-            let remedy = "Give a value between min and max";
+            let remedy = "Give a value within this range";
             return Err(Error::invalid(format!("variable `{}`", variable.name), problem, remedy));
         }
         let state = &mut self.state;

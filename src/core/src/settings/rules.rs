@@ -360,7 +360,7 @@ static ROMS: &[FeatureRule] = &[
         }),
         "the penetration of a row of cells is interpolated between two patches along the axis, and patches of \
          different rows would be interleaved",
-        "Reduce the blade with one row of patches (without --contact-rows), or remove the coating",
+        "Reduce the blade with --contact-rows 1, or remove the coating",
     ),
     needs(
         &[PLASTIC_COATING],

@@ -447,6 +447,6 @@ pub(super) fn check_range(variable: &Variable, value: f64) -> Result<()> {
     } else {
         format!("{value} is not finite")
     };
-    let remedy = if value.is_finite() { "Give a value between min and max" } else { "Give a finite number" };
+    let remedy = if value.is_finite() { "Give a value within this range" } else { "Give a finite number" };
     Err(Error::invalid(format!("variable `{}`", variable.name), problem, remedy))
 }

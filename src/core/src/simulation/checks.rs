@@ -185,13 +185,13 @@ impl Simulation {
                           check that the normal of each contact grid (direction from row to row x direction along the rows) points to the master";
             let problem = format!(
                 "{touching} contact nodes start inside the surfaces, with a maximum depth of {:.3e} m at {node}",
-                deepest.1
+                -deepest.1
             );
             return refuse(problem, remedy);
         }
         let problem = format!(
             "{touching} contact nodes start inside the casing, with a maximum depth of {:.3e} m at {node} of sector {}",
-            deepest.1,
+            -deepest.1,
             deepest.0 % lanes + 1
         );
         refuse(

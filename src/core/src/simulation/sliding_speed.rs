@@ -34,9 +34,10 @@ impl Simulation {
             let cuts = self.compiled.cuts(body);
             let problem = format!(
                 "{rotor} starts at a speed of {} rad/s with {}: the sliding law does not model sticking, which occurs below \
-                 about {slow:.1e} rad/s. The run ends if friction adds energy",
+                 about {slow:.1e} rad/s. The run ends if {} energy",
                 shown(speed.value),
                 if cuts { "a coating that the blades cut" } else { "friction" },
+                if cuts { "friction or cutting forces add" } else { "friction adds" },
             );
             let remedy = "Trust the results only once the tips slide faster than they vibrate";
             let remedy = if cuts { remedy.to_owned() } else { format!("{remedy}, or use the solver coulomb") };

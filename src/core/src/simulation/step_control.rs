@@ -123,7 +123,7 @@ impl Simulation {
         );
         let remedy = format!(
             "Use an internal_step_max (time.step) below {} s or a larger tolerance; missed_steps counts all such steps",
-            shown(self.value_of(Quantity::StepMax, 0))
+            shown(self.value_of(Quantity::StepMax, 0).min(self.system.step_size()))
         );
         self.note(Warning::new(Topic::ToleranceMissed, problem, remedy));
     }

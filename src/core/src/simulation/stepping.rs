@@ -252,7 +252,7 @@ impl Simulation {
         Err(Error::invalid(
             what,
             format!(
-                "the rotor turns {turned:.3e} rad in one internal step of {step:.3e} s at t = {} s, and skips features \
+                "the rotor turns {turned:.3e} rad relative to the casing shape in one internal step of {step:.3e} s at t = {} s, and skips features \
                  of the casing shape that are {scale:.3e} rad wide",
                 shown_time(self.time)
             ),

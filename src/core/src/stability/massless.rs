@@ -18,7 +18,7 @@ use crate::dynamics::modal::ModalModel;
 use crate::gaps::dot;
 use crate::schemes::{ModeCoefficients, damped_frequency};
 use crate::settings::Scheme;
-use crate::stability::{OTHER_SCHEME, shorter};
+use crate::stability::{OTHER_SCHEME, rounded_down, shorter};
 use crate::warning::Topic;
 use crate::{Error, Result, Warning};
 
@@ -197,7 +197,7 @@ pub fn warning(step: f64, limit: MasslessLimit) -> Option<Warning> {
                 "with massless-boundary and an internal step of {step:.3e} s, contact that opens and closes may gain \
                  energy (visible as a decreasing `impact_loss`)"
             ),
-            format!("Set `time.step` below {:.2e} s, or a damping ratio of at least 1e-3", QUIET * limit.closed),
+            format!("Set `time.step` below {:.2e} s, or a damping ratio of at least 1e-3", rounded_down(QUIET * limit.closed)),
         )
     })
 }

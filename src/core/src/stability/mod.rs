@@ -105,6 +105,14 @@ pub fn check_step_allowed(frequency: f64, scheme: Scheme, step: f64) -> Result<(
     }
 }
 
+/// Rounds a step (s) down to three digits, as messages print it.
+pub fn rounded_down(step: f64) -> f64 {
+    let rounded = |step: f64| format!("{step:.2e}").parse().unwrap_or(step);
+    let near = rounded(step);
+    if near <= step { near } else { rounded(0.995 * step) }
+}
+
+
 /// Calls [`check_step_allowed`], and returns a warning for unresolved modes.
 ///
 /// # Errors
@@ -120,7 +128,7 @@ pub fn check_step(frequency: f64, scheme: Scheme, step: f64) -> Result<Option<Wa
                  exact, but their response to contact forces is not",
                 1e-3 * 2.0 / step / std::f64::consts::TAU
             ),
-            format!("Set `time.step` = {:.2e} s to resolve all modes", 2.0 / frequency),
+            format!("Set `time.step` = {:.2e} s to resolve all modes", rounded_down(2.0 / frequency)),
         ))),
         _ => Ok(None),
     }

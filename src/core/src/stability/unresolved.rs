@@ -20,7 +20,7 @@
 //! Steps are rejected if both ω_max h ≥ [`HIGHEST`] and the fraction exceeds [`SHARE`].
 
 use crate::dynamics::modal::ModalModel;
-use crate::stability::shorter;
+use crate::stability::{rounded_down, shorter};
 use crate::warning::Topic;
 use crate::{Error, Result, Warning};
 
@@ -81,7 +81,7 @@ pub fn warning(step: f64, limit: f64) -> Option<Warning> {
                 "modal-exact with an internal step of {step:.3e} s leaves much of the contact flexibility unresolved: \
                  expect errors of a few per cent"
             ),
-            format!("Set `time.step` below {:.2e} s", NEAR * limit),
+            format!("Set `time.step` below {:.2e} s", rounded_down(NEAR * limit)),
         )
     })
 }

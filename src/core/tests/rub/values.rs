@@ -70,7 +70,7 @@ fn rejects_inconsistent_thermal_loads() {
     ];
     for change in changes {
         let reported = heated(change).unwrap_err();
-        assert!(reported.contains("`thermal_loads`") && reported.contains("finite values expected"), "{reported}");
+        assert!(reported.contains("`thermal_loads`") && reported.contains("finite values, found"), "{reported}");
     }
 }
 

@@ -459,7 +459,7 @@ pub const FIELDS: [SceneField; 102] = [
         "contact.coating.modulus",
         "number, Pa",
         None,
-        "5e-324 to 1e13; not with `cutting`",
+        "above 0, up to 1e13; not with `cutting`",
         "Modulus of elasticity.",
     ),
     field(

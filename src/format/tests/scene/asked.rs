@@ -212,7 +212,7 @@ fn checks_ranges_of_coating_values() {
     refused(coating(|c| c.thickness = 0.11), &["contact[1].coating.thickness: 0.11", "between 1e-9 and 0.1"]);
     refused(coating(|c| c.modulus = -1.0), &["contact[1].coating.modulus: -1"]);
     refused(coating(|c| c.modulus = f64::INFINITY), &["contact[1].coating.modulus: inf"]);
-    refused(coating(|c| c.modulus = 2e13), &["contact[1].coating.modulus", "between 5e-324 and 1e13"]);
+    refused(coating(|c| c.modulus = 2e13), &["contact[1].coating.modulus", "above 0 and at most 1e13"]);
     refused(coating(|c| c.yield_stress = -1.0), &["contact[1].coating.yield_stress: -1"]);
     refused(coating(|c| c.yield_stress = f64::NAN), &["contact[1].coating.yield_stress: NaN"]);
     refused(coating(|c| c.hardening = -1.0), &["contact[1].coating.hardening: -1"]);

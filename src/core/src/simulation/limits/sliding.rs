@@ -334,7 +334,7 @@ impl Checking<'_> {
             100.0 * judged.error(f64::INFINITY),
         );
         let remedy = match silent {
-            Some(step) => format!("Set `time.step` to {} or less", shown(below(step))),
+            Some(step) => format!("Set `time.step` to {} or less", shown(stability::rounded_down(step))),
             None => "Use less friction or more damping".to_owned(),
         };
         Warning::new(Topic::StepGrowth, problem, remedy)
@@ -342,7 +342,7 @@ impl Checking<'_> {
 
     fn refusal(&self, (step, nodes, judged): (f64, &[usize], SetGrowth), accepted: Option<f64>, sign: f64) -> Error {
         let step_remedy = accepted.map_or(String::new(), |step| {
-            format!("Set `time.step` (in the FMU `internal_step_max`) to {} or less, or use", shown(below(step)))
+            format!("Set `time.step` (in the FMU `internal_step_max`) to {} or less, or use", shown(stability::rounded_down(step)))
         });
         let step_remedy = if step_remedy.is_empty() { "Use".to_owned() } else { step_remedy };
         Error::Unstable {
@@ -393,12 +393,6 @@ fn next_step(step: f64) -> f64 {
 /// Rounds a step to three digits.
 fn rounded(step: f64) -> f64 {
     format!("{step:.2e}").parse().unwrap_or(step)
-}
-
-/// Rounds a step down to three digits.
-fn below(step: f64) -> f64 {
-    let near = rounded(step);
-    if near <= step { near } else { rounded(0.995 * step) }
 }
 
 #[cfg(test)]
