@@ -116,7 +116,11 @@ pub fn load(unit: LibraryUnit, arguments: &LibraryArguments, console: &Console) 
             }
             let problem =
                 "is the library for the other kind of FMU: scenes and heat conduction have separate libraries";
-            return Err(Failure::new(path.display(), problem, format!("Give the library {} (on Linux lib{}.so)", unit.names().1, unit.names().1)));
+            return Err(Failure::new(
+                path.display(),
+                problem,
+                format!("Give the library {} (on Linux lib{}.so)", unit.names().1, unit.names().1),
+            ));
         }
         if let Some((other, _)) = found.get(&platform) {
             return Err(Failure::new(

@@ -336,8 +336,10 @@ impl Rom {
         for (name, matrix, sign) in matrices {
             let what = format!("ROM array `{name}`");
             if matrix.shape() != (order, order) || matrix.iter().any(|value| !value.is_finite()) {
-                let problem =
-                    format!("expected {order} x {order} finite values, found shape {:?} or a non-finite value", matrix.shape());
+                let problem = format!(
+                    "expected {order} x {order} finite values, found shape {:?} or a non-finite value",
+                    matrix.shape()
+                );
                 return Err(Error::invalid(what, problem, remedy));
             }
             entries(name, matrix, ranges::MATRIX, remedy)?;

@@ -197,7 +197,10 @@ pub fn warning(step: f64, limit: MasslessLimit) -> Option<Warning> {
                 "with massless-boundary and an internal step of {step:.3e} s, contact that opens and closes may gain \
                  energy (visible as a decreasing `impact_loss`)"
             ),
-            format!("Set `time.step` below {:.2e} s, or a damping ratio of at least 1e-3", rounded_down(QUIET * limit.closed)),
+            format!(
+                "Set `time.step` below {:.2e} s, or a damping ratio of at least 1e-3",
+                rounded_down(QUIET * limit.closed)
+            ),
         )
     })
 }

@@ -112,7 +112,6 @@ pub fn rounded_down(step: f64) -> f64 {
     if near <= step { near } else { rounded(0.995 * step) }
 }
 
-
 /// Calls [`check_step_allowed`], and returns a warning for unresolved modes.
 ///
 /// # Errors

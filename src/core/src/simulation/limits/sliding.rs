@@ -342,7 +342,10 @@ impl Checking<'_> {
 
     fn refusal(&self, (step, nodes, judged): (f64, &[usize], SetGrowth), accepted: Option<f64>, sign: f64) -> Error {
         let step_remedy = accepted.map_or(String::new(), |step| {
-            format!("Set `time.step` (in the FMU `internal_step_max`) to {} or less, or use", shown(stability::rounded_down(step)))
+            format!(
+                "Set `time.step` (in the FMU `internal_step_max`) to {} or less, or use",
+                shown(stability::rounded_down(step))
+            )
         });
         let step_remedy = if step_remedy.is_empty() { "Use".to_owned() } else { step_remedy };
         Error::Unstable {
