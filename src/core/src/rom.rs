@@ -215,6 +215,14 @@ pub struct Rom {
     pub extras: RomExtras,
 }
 
+/// Problem of an array with a wrong shape, or else with a value that is not finite.
+fn shape_or_value(found: (usize, usize), expected: (usize, usize)) -> String {
+    if found == expected && expected.1 > 0 {
+        return "a value is not finite".into();
+    }
+    format!("shape {found:?} found, {expected:?} expected")
+}
+
 impl Rom {
     /// Number of reduced coordinates of one sector.
     pub fn order(&self) -> usize {
@@ -336,10 +344,7 @@ impl Rom {
         for (name, matrix, sign) in matrices {
             let what = format!("ROM array `{name}`");
             if matrix.shape() != (order, order) || matrix.iter().any(|value| !value.is_finite()) {
-                let problem = format!(
-                    "expected {order} x {order} finite values, found shape {:?} or a non-finite value",
-                    matrix.shape()
-                );
+                let problem = shape_or_value(matrix.shape(), (order, order));
                 return Err(Error::invalid(what, problem, remedy));
             }
             entries(name, matrix, ranges::MATRIX, remedy)?;
@@ -354,7 +359,7 @@ impl Rom {
             [("centrifugal_load", &spin.centrifugal_load), ("centrifugal_load_speed4", &spin.centrifugal_load_speed4)];
         for (name, load) in loads {
             if load.len() != order || load.iter().any(|value| !value.is_finite()) {
-                let problem = format!("expected {order} finite values, found {} or a non-finite value", load.len());
+                let problem = shape_or_value((load.len(), 1), (order, 1));
                 return Err(Error::invalid(format!("ROM array `{name}`"), problem, remedy));
             }
             load.iter()
@@ -371,8 +376,7 @@ impl Rom {
         let Some(thermal) = &self.extras.thermal else { return Ok(()) };
         let expected = (self.order(), thermal.patches.len());
         if thermal.loads.shape() != expected || expected.1 == 0 || thermal.loads.iter().any(|v| !v.is_finite()) {
-            let found = thermal.loads.shape();
-            let problem = format!("expected {expected:?} finite values, found shape {found:?} or a non-finite value");
+            let problem = shape_or_value(thermal.loads.shape(), expected);
             return Err(Error::invalid("ROM array `thermal_loads`", problem, remedy));
         }
         entries("thermal_loads", &thermal.loads, ranges::THERMAL_LOAD, remedy)?;

@@ -105,9 +105,13 @@ pub fn check_step_allowed(frequency: f64, scheme: Scheme, step: f64) -> Result<(
     }
 }
 
-/// Rounds a step (s) down to three digits, as messages print it.
+/// Rounds a step (s) to three digits, as messages print it.
+pub fn rounded(step: f64) -> f64 {
+    format!("{step:.2e}").parse().unwrap_or(step)
+}
+
+/// Rounds a step (s) down to three digits, so that following a proposal does not repeat its message.
 pub fn rounded_down(step: f64) -> f64 {
-    let rounded = |step: f64| format!("{step:.2e}").parse().unwrap_or(step);
     let near = rounded(step);
     if near <= step { near } else { rounded(0.995 * step) }
 }

@@ -156,6 +156,7 @@ fn starts_and_ratios_are_checked_parameters() {
     set_element(&mut inside, "initial_displacement", 0, 1e-4);
     let error = inside.initialise(0.0).unwrap_err().to_string();
     assert!(error.contains("contact nodes start inside the casing"), "{error}");
+    assert!(!error.contains("depth of -"), "{error}");
     let reported = |change: fn(&mut Scene)| {
         let mut scene = given.clone();
         change(&mut scene);

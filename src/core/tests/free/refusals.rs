@@ -161,7 +161,7 @@ fn rejects_node_that_crosses_an_edge_from_behind() {
     // Its face flies 0.2 mm to 0.2 µm behind the plate.
     for depth in [2e-4, 2e-5, 2e-7] {
         let error = thrown(0.02 - depth, [0.0, -40.0, 0.0], 60).unwrap_err().to_string();
-        assert!(error.contains("contact node left_0") && error.contains("has passed the edge"), "{depth} m: {error}");
+        assert!(error.contains("contact node left_00") && error.contains("has passed the edge"), "{depth} m: {error}");
     }
     // In front of the plate there is no error, and a node that arrives from the front in the step that passes the edge
     // has an impact.

@@ -63,14 +63,15 @@ fn rejects_inconsistent_thermal_loads() {
         rom.validate().map_err(|refusal| refusal.to_string())
     };
     assert_eq!(heated(|_| {}), Ok(()));
-    let changes: [fn(&mut nalgebra::DMatrix<f64>); 3] = [
-        |loads| loads[(1, 0)] = f64::NAN,
-        |loads| *loads = loads.clone().insert_row(0, 1.0),
-        |loads| *loads = loads.clone().insert_column(0, 1.0),
+    type Change = (fn(&mut nalgebra::DMatrix<f64>), &'static str);
+    let changes: [Change; 3] = [
+        (|loads| loads[(1, 0)] = f64::NAN, "a value is not finite"),
+        (|loads| *loads = loads.clone().insert_row(0, 1.0), "expected"),
+        (|loads| *loads = loads.clone().insert_column(0, 1.0), "expected"),
     ];
-    for change in changes {
+    for (change, problem) in changes {
         let reported = heated(change).unwrap_err();
-        assert!(reported.contains("`thermal_loads`") && reported.contains("finite values, found"), "{reported}");
+        assert!(reported.contains("`thermal_loads`") && reported.contains(problem), "{reported}");
     }
 }
 

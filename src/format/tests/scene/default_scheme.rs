@@ -51,6 +51,19 @@ fn rigid_casing_defaults_to_adaptive_steps() {
     assert_eq!(parse_scene(&write_scene(&settings), "again").unwrap(), settings);
 }
 
+/// Advises adaptive steps for a missing step only where they are the default.
+#[test]
+fn missing_step_suggests_adaptive_steps_only_if_they_are_allowed() {
+    let refusal = |text: String| {
+        parse_scene(&format!("{text}[time]\nscheme = \"modal-exact\"\n"), "demo.toml").unwrap_err().to_string()
+    };
+    assert!(refusal(SCENE.to_owned()).contains("or use scheme = \"galerkin\""));
+    for (after, line, reason) in FIXED.iter().filter(|(_, line, _)| !line.contains("ring")) {
+        let found = refusal(SCENE.replace(after, &format!("{after}{line}")));
+        assert!(found.contains("time.step: missing") && !found.contains("galerkin"), "{reason}: {found}");
+    }
+}
+
 #[test]
 fn chooses_fixed_steps_with_a_reason_where_galerkin_is_excluded() {
     for (after, line, reason) in FIXED {

@@ -329,7 +329,7 @@ impl Checking<'_> {
              in continuous time; this may displace the tips by {:.0} % of the displacement caused by contact",
             self.contact(nodes, sign),
             judged.growth.stepped,
-            shown(rounded(step)),
+            shown(stability::rounded(step)),
             judged.growth.continuous.max(0.0),
             100.0 * judged.error(f64::INFINITY),
         );
@@ -355,7 +355,7 @@ impl Checking<'_> {
                  caused by contact",
                 self.contact(nodes, sign),
                 judged.growth.stepped,
-                shown(rounded(step)),
+                shown(stability::rounded(step)),
                 judged.growth.continuous,
                 100.0 * judged.error(f64::INFINITY)
             ),
@@ -391,11 +391,6 @@ fn looked_at(frequency: f64, largest: f64) -> Vec<f64> {
 /// End of the range that begins with a checked step: just below the next (s).
 fn next_step(step: f64) -> f64 {
     step * libm::exp2(1.0 / f64::from(PER_OCTAVE)) * (1.0 - 1e-6)
-}
-
-/// Rounds a step to three digits.
-fn rounded(step: f64) -> f64 {
-    format!("{step:.2e}").parse().unwrap_or(step)
 }
 
 #[cfg(test)]
