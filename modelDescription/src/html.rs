@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use quick_xml::escape::escape;
 use tiprub_core::Rom;
-use tiprub_core::rom::DisplacementFrame;
+use tiprub_core::scene::rom::DisplacementFrame;
 use tiprub_core::variables::{Causality, DataType, Span, StartValue, Variable};
 
 use crate::Description;

@@ -2,9 +2,9 @@
 
 use std::{env, path::Path};
 
+use tiprub_core::scene::method::Scheme;
 use tiprub_core::{
     Rom, Scene, Simulation,
-    settings::Scheme,
     variables::Quantity,
     warning::{self, Warning},
 };

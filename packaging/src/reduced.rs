@@ -1,7 +1,8 @@
 //! Reduced model of any kind, with all data for its files and its description.
 
 use serde_json::Value;
-use tiprub_core::{Rom, plausibility::Slip};
+use tiprub_core::Rom;
+use tiprub_core::limits::plausibility::Slip;
 use tiprub_model::{
     Material, Mesh, Reduction,
     cyclic::CyclicReduction,

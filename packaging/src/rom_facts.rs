@@ -3,11 +3,11 @@
 use std::fmt::Write as _;
 
 use serde_json::{Value, json};
+use tiprub_core::limits;
+use tiprub_core::limits::plausibility::{self, Slip};
+use tiprub_core::scene::rom::{ContactNode, DisplacementFrame};
 use tiprub_core::{
     Rom,
-    plausibility::{self, Slip},
-    rom::{ContactNode, DisplacementFrame},
-    stability,
     warning::{Topic, Warning},
 };
 use tiprub_shell::{Failure, Result};
@@ -93,7 +93,7 @@ impl RomFacts {
         let by_nodal_diameter: Vec<Vec<f64>> = structure.frequencies.iter().map(hertz).collect();
         let mut frequencies = by_nodal_diameter.concat();
         frequencies.sort_by(f64::total_cmp);
-        let limits = structure.models.iter().map(stability::central_difference_limit);
+        let limits = structure.models.iter().map(limits::central_difference_limit);
         let speed = sliding.map_or(0.0, |sliding| sliding.speed);
         let turns = |sense: f64| sense * speed >= 0.0;
         let lock_up = [1.0, -1.0].map(|sense| turns(sense).then(|| structure.lock_up(sense)).flatten());

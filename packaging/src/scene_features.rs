@@ -1,12 +1,11 @@
 //! Describes the features of a scene beyond sliding contact of a rotor in a rigid casing, and the limits of the model.
 
-use tiprub_core::{
-    Rom, Scene,
-    settings::{
-        BodyMotion, CoatingSettings, ContactSettings, CuttingSettings, InputInterpolation, Preset, SceneSettings,
-        Scheme, Solver, StructureSettings, SurfaceSettings, TOLERANCE,
-    },
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::settings::{
+    BodyMotion, CoatingSettings, ContactSettings, CuttingSettings, InputInterpolation, Preset, SceneSettings,
+    StructureSettings, SurfaceSettings, TOLERANCE,
 };
+use tiprub_core::{Rom, Scene};
 
 /// Returns one phrase for every feature that is off by default but on in the scene; empty for a plain scene.
 pub fn features(scene: &Scene) -> Vec<String> {
@@ -233,7 +232,7 @@ fn blades(coupled: bool, stiffens: bool) -> &'static str {
 #[cfg(test)]
 mod tests {
     use nalgebra::DMatrix;
-    use tiprub_core::rom::{DisplacementFrame, Harmonic, RomChecks, RomExtras};
+    use tiprub_core::scene::rom::{DisplacementFrame, Harmonic, RomChecks, RomExtras};
 
     use super::*;
     use tiprub_gallery::scene_source::ROTOR37_ONE_ROW_SCENE;

@@ -75,7 +75,7 @@ fn the_first_scene_of_the_reference_is_the_built_in_scene() {
     assert_eq!(shown.surfaces, built_in.surfaces);
     assert_eq!(shown.contacts, built_in.contacts);
     assert_eq!(shown.experiment, built_in.experiment);
-    let method = |scene: &tiprub_core::settings::SceneSettings| (scene.time.scheme, scene.time.step.to_bits());
+    let method = |scene: &tiprub_core::scene::settings::SceneSettings| (scene.time.scheme, scene.time.step.to_bits());
     assert_eq!(method(&shown), method(&built_in));
 }
 

@@ -1,7 +1,8 @@
 //! Compares rotor 37 at speed in the whole simulation with CalculiX 2.20 (nonlinear static step with centrifugal load, same mesh; the tests of the
 //! reduction document the reference values and their origin).
 
-use tiprub_core::{Scene, Simulation, settings::Shape};
+use tiprub_core::scene::settings::Shape;
+use tiprub_core::{Scene, Simulation};
 use tiprub_gallery::scene_source::rotor37_scene_with;
 use tiprub_model::{Rotor37Options, reduce_rotor37};
 

@@ -4,8 +4,10 @@ use std::path::Path;
 
 use nalgebra::DMatrix;
 use tempfile::TempDir;
-use tiprub_core::rom::{ContactGrid, ContactNode, DisplacementFrame, RomChecks, RomExtras, Thermal, ThermalPatch};
-use tiprub_core::settings::{BodyMotion, StructureSettings};
+use tiprub_core::scene::rom::{
+    ContactGrid, ContactNode, DisplacementFrame, RomChecks, RomExtras, Thermal, ThermalPatch,
+};
+use tiprub_core::scene::settings::{BodyMotion, StructureSettings};
 use tiprub_core::{Rom, Scene};
 
 /// Radius of the blade tips (m).
@@ -53,7 +55,7 @@ pub fn rom() -> Rom {
             node("trailing_edge", 0.05, 0.04),
         ],
         checks: RomChecks::default(),
-        extras: tiprub_core::rom::RomExtras::default(),
+        extras: tiprub_core::scene::rom::RomExtras::default(),
     }
 }
 

@@ -4,7 +4,7 @@
 
 use std::process::ExitCode;
 
-use tiprub_core::settings::ExperimentSettings;
+use tiprub_core::scene::settings::ExperimentSettings;
 use tiprub_fmi_host::UnpackedFmu;
 use tiprub_shell::{Failure, Result, schedule::Schedule};
 

@@ -1,6 +1,6 @@
 //! One instance of an imported FMU, driven call by call.
 
-use tiprub_core::settings::ExperimentSettings;
+use tiprub_core::scene::settings::ExperimentSettings;
 use tiprub_shell::{Failure, Result, schedule::Schedule};
 
 use super::{

@@ -1,7 +1,7 @@
 //! Synthetic table with every kind of variable, and a description with it.
 
 use nalgebra::DMatrix;
-use tiprub_core::rom::{DisplacementFrame, RomChecks};
+use tiprub_core::scene::rom::{DisplacementFrame, RomChecks};
 use tiprub_core::variables::*;
 use tiprub_core::{Rom, VariableTable};
 use tiprub_model_description::{DefaultExperiment, Description};

@@ -4,7 +4,7 @@
 use std::fs;
 use std::path::Path;
 
-use tiprub_core::settings::OutputSettings;
+use tiprub_core::scene::settings::OutputSettings;
 use tiprub_core::variables::{Causality, DataType, Span, Variable};
 use tiprub_core::{Scene, Simulation, VariableTable};
 use tiprub_model_description::{fmi2_xml, fmi3_xml, html, meaning_of_span};

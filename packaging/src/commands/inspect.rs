@@ -7,10 +7,10 @@ use std::{
 };
 
 use serde_json::{Value, json};
+use tiprub_core::limits::plausibility::Slip;
+use tiprub_core::scene::settings::{BodyMotion, ContactSettings, SceneSettings, StructureSettings};
 use tiprub_core::{
     Scene, Simulation,
-    plausibility::Slip,
-    settings::{BodyMotion, ContactSettings, SceneSettings, StructureSettings},
     variables::Causality,
     warning::{self, Warning},
 };

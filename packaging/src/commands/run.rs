@@ -3,10 +3,9 @@
 use std::{path::Path, time::Instant};
 
 use serde_json::{Map, Value, json};
-use tiprub_core::{
-    Scene, Warning,
-    settings::{ContactSettings, SceneSettings, Scheme, TOLERANCE},
-};
+use tiprub_core::scene::method::Scheme;
+use tiprub_core::scene::settings::{ContactSettings, SceneSettings, TOLERANCE};
+use tiprub_core::{Scene, Warning};
 use tiprub_gallery::scene_source;
 use tiprub_shell::{
     Failure, Result,

@@ -1,12 +1,11 @@
 //! Table of all physical effects and features of the machinery, for `tiprub inspect` and for the guide.
 
-use tiprub_core::{
-    Rom, Scene,
-    settings::{
-        BodyMotion, ContactSettings, ExcitationSettings, InitialSettings, InputInterpolation, LoadSettings, Scheme,
-        Solver, StructureSettings, SurfaceSettings,
-    },
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::settings::{
+    BodyMotion, ContactSettings, ExcitationSettings, InitialSettings, InputInterpolation, LoadSettings,
+    StructureSettings, SurfaceSettings,
 };
+use tiprub_core::{Rom, Scene};
 
 /// Topic of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -306,7 +305,7 @@ pub static EFFECTS: &[Effect] = &[
     })
     .of_rotors()
     .by(|scene| {
-        let patches = tiprub_core::settings::PatchSettings { around: 8, along: 1 };
+        let patches = tiprub_core::scene::settings::PatchSettings { around: 8, along: 1 };
         scene.settings.surfaces.iter_mut().for_each(|one| one.patches = Some(patches));
     }),
 ];

@@ -2,7 +2,8 @@
 
 use std::fmt::Write as _;
 
-use tiprub_core::settings::{SceneSettings, Scheme, TOLERANCE};
+use tiprub_core::scene::method::Scheme;
+use tiprub_core::scene::settings::{SceneSettings, TOLERANCE};
 use tiprub_core::variables::Quantity;
 use tiprub_figure::{STYLE, escape};
 use tiprub_shell::Result;

@@ -2,7 +2,8 @@
 
 use std::fmt::Write as _;
 
-use tiprub_core::{VariableTable, settings::Shape, variables::Quantity};
+use tiprub_core::scene::settings::Shape;
+use tiprub_core::{VariableTable, variables::Quantity};
 use tiprub_figure::{
     escape,
     picture::{self, MeshSurface, ProjectionFrame, ViewPoint, surface_of},
@@ -169,7 +170,7 @@ fn casing(input: &ReportInput<'_>) -> Result<Vec<NumberedFigure>> {
     let Some(surface) = settings.surfaces.iter().find(|surface| surface.name == contact.slave) else {
         return Ok(Vec::new());
     };
-    let shape = tiprub_core::gaps::shape::CompiledShape::new(&surface.shape, contact.nominal_gap())
+    let shape = tiprub_core::scene::shape::CompiledShape::new(&surface.shape, contact.nominal_gap())
         .map_err(|error| Failure::from_core("casing shape", error))?;
     let clearance = |degrees: f64| contact.nominal_gap() + shape.evaluate(degrees.to_radians()).0;
     let points = (0..=720_u32).map(|half| f64::from(half) / 2.0).map(|degrees| (degrees, 1e6 * clearance(degrees)));

@@ -1,6 +1,7 @@
 //! Rejects impossible values of an imported model, and asks about unusual ones.
 
-use tiprub_core::{Rom, plausibility::Slip};
+use tiprub_core::Rom;
+use tiprub_core::limits::plausibility::Slip;
 use tiprub_model::{
     read::{Imported, plausibility},
     reduce::ContactPoint,

@@ -3,7 +3,7 @@
 use std::{fs, process::Command};
 
 use nalgebra::DMatrix;
-use tiprub_core::rom::Spin;
+use tiprub_core::scene::rom::Spin;
 
 use crate::project::{Project, SCENE};
 

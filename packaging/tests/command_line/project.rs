@@ -8,10 +8,8 @@ use std::{
 
 use nalgebra::DMatrix;
 use tempfile::TempDir;
-use tiprub_core::{
-    Rom,
-    rom::{ContactNode, DisplacementFrame, RomChecks},
-};
+use tiprub_core::Rom;
+use tiprub_core::scene::rom::{ContactNode, DisplacementFrame, RomChecks};
 
 pub const SCENE: &str = r#"
 name = "small"
@@ -59,7 +57,7 @@ impl Project {
                 ..ContactNode::default()
             }],
             checks: RomChecks::default(),
-            extras: tiprub_core::rom::RomExtras::default(),
+            extras: tiprub_core::scene::rom::RomExtras::default(),
         };
         fs::write(root.path().join("small.rom.safetensors"), tiprub_format::write_rom(&rom)).unwrap();
         fs::write(root.path().join("scene.toml"), SCENE).unwrap();

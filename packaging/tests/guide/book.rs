@@ -147,7 +147,7 @@ fn guide_has_no_dead_links() {
     }
 }
 
-/// Paths of the sources that the pages name exist, such as `src/core/src/laws/film.rs`.
+/// Paths of the sources that the pages name exist, such as `src/core/src/contact/film.rs`.
 #[test]
 fn guide_has_no_dead_paths() {
     let roots = ["src/", "tests/", "fmi/", "packaging/", "modelDescription/", "docs/", ".ci/"];

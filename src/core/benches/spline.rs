@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use std::hint::black_box;
 use std::time::Instant;
 
-use tiprub_core::gaps::surface_spline::{ClosestPoint, Projection, SurfaceSpline};
-use tiprub_core::settings::{Closure, Interpolation};
+use tiprub_core::geometry::surface_spline::{ClosestPoint, Projection, SurfaceSpline};
+use tiprub_core::scene::settings::{Closure, Interpolation};
 
 const RADIUS: f64 = 0.25;
 const NODES: usize = 108;

@@ -7,8 +7,9 @@
 use std::time::Instant;
 
 use nalgebra::{Complex, DMatrix, DVector};
-use tiprub_core::rom::{Harmonic, Rom};
-use tiprub_core::settings::{CoatingSettings, ExperimentSettings, OutputSettings, Shape, Solver, SplineSettings};
+use tiprub_core::scene::method::Solver;
+use tiprub_core::scene::rom::{Harmonic, Rom};
+use tiprub_core::scene::settings::{CoatingSettings, ExperimentSettings, OutputSettings, Shape, SplineSettings};
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{self as models};
 

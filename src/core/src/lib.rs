@@ -7,31 +7,24 @@
 //! texts and calls for importers are derived, and steps the contact problem from one communication point to the next.
 #![forbid(unsafe_op_in_unsafe_fn)]
 
-mod cubic;
-pub mod dynamics;
+pub mod contact;
 mod error;
-pub mod galerkin;
-pub mod gaps;
-mod history;
-pub mod laws;
-mod ledger;
+pub mod geometry;
+pub mod limits;
+mod math;
+pub mod modes;
 pub mod persist;
-pub mod plausibility;
-pub mod ranges;
-pub mod rom;
-pub mod schemes;
-pub mod settings;
+pub mod scene;
 pub mod simulation;
-pub mod stability;
-mod step;
 pub mod system;
+pub mod time;
 pub mod variables;
 pub mod warning;
 
 pub use error::{Error, Result, shown, shown_time};
-pub use ledger::{Ledger, Sum};
-pub use rom::Rom;
-pub use settings::Scene;
+pub use scene::Scene;
+pub use scene::rom::Rom;
 pub use simulation::Simulation;
+pub use system::{Ledger, Sum};
 pub use variables::VariableTable;
 pub use warning::Warning;

@@ -6,7 +6,8 @@
 
 use std::collections::{BTreeMap, HashSet};
 
-use crate::{Error, Result, ranges};
+use crate::scene::ranges;
+use crate::{Error, Result};
 
 /// Value of a clearance output if there is no surface to touch (m): finite, as FMI requires, and larger than any distance in an engine. Its
 /// time derivative is then 0.

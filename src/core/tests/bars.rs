@@ -7,9 +7,9 @@ mod rods;
 
 use guide::print_row;
 use rods::{NEARLY_NONE, SCHEMES, SOLVERS, StraightRod, ascending, quiet_step};
-use tiprub_core::dynamics::modal::{ModalModel, NodePair};
-use tiprub_core::gaps::{FixedGap, GapLaw, PrescribedMotion};
-use tiprub_core::settings::{Scheme, Solver};
+use tiprub_core::geometry::{FixedGap, GapLaw, PrescribedMotion};
+use tiprub_core::modes::modal::{ModalModel, NodePair};
+use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::system::{System, SystemSettings};
 use tiprub_reference::carpenter::{self, AREA, DENSITY, GAP, LENGTH, SPEED, YOUNG};
 

@@ -9,11 +9,11 @@ mod guide;
 
 use guide::print_row;
 use nalgebra::DMatrix;
-use tiprub_core::dynamics::bank::BankOptions;
-use tiprub_core::dynamics::modal::ModalModel;
-use tiprub_core::dynamics::sectors::SectorModel;
-use tiprub_core::gaps::{FixedGap, GapLaw, PrescribedMotion};
-use tiprub_core::settings::{Scheme, Solver};
+use tiprub_core::geometry::{FixedGap, GapLaw, PrescribedMotion};
+use tiprub_core::modes::bank::BankOptions;
+use tiprub_core::modes::modal::ModalModel;
+use tiprub_core::modes::sectors::SectorModel;
+use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::system::{System, SystemSettings};
 use tiprub_reference::closed::belt::{StickSlipBelt, ThrownBlock};
 

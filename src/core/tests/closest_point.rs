@@ -12,9 +12,9 @@ mod sliding;
 use std::f64::consts::TAU;
 
 use casings::*;
-use tiprub_core::gaps::dot;
-use tiprub_core::gaps::surface_spline::{ClosestPoint, Evaluation, Projection, REACH, SurfaceSpline};
-use tiprub_core::settings::{Closure, Interpolation};
+use tiprub_core::geometry::dot;
+use tiprub_core::geometry::surface_spline::{ClosestPoint, Evaluation, Projection, REACH, SurfaceSpline};
+use tiprub_core::scene::settings::{Closure, Interpolation};
 
 /// Returns a node at a signed distance inside a point of the surface, with its closest point known by construction.
 fn node(surface: &SurfaceSpline, at: ClosestPoint, gap: f64) -> [f64; 3] {

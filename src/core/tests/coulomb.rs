@@ -4,8 +4,8 @@
 mod counting;
 
 use nalgebra::DMatrix;
-use tiprub_core::laws::active_set::ContactSolver;
-use tiprub_core::laws::de_saxce::CoulombSolver;
+use tiprub_core::contact::active_set::ContactSolver;
+use tiprub_core::contact::de_saxce::CoulombSolver;
 
 const BLADE_MODES: usize = 29;
 const CASING_MODES: usize = 24;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use tiprub_core::settings::SceneSettings;
+use tiprub_core::scene::settings::SceneSettings;
 use tiprub_core::{Rom, Scene};
 
 use crate::{Error, Result, builtin_model, parse_scene, read_file, read_rom, read_scene};

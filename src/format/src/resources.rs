@@ -6,8 +6,8 @@ use std::path::Path;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
-use tiprub_core::rom::{RomExtras, SUPPORT_ROWS, SupportRows};
-use tiprub_core::settings::{SceneSettings, SpinSettings, StructureSettings};
+use tiprub_core::scene::rom::{RomExtras, SUPPORT_ROWS, SupportRows};
+use tiprub_core::scene::settings::{SceneSettings, SpinSettings, StructureSettings};
 use tiprub_core::{Rom, Scene};
 
 use crate::load::{LARGEST_ROM, LARGEST_SCENE, RomBytes, read_bytes, text_error};

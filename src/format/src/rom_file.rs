@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 use safetensors::{Dtype, SafeTensorError, SafeTensors};
 use sha2::{Digest, Sha256};
 use tiprub_core::Rom;
-use tiprub_core::rom::{ContactNode, DisplacementFrame, RomChecks, RomExtras};
+use tiprub_core::scene::rom::{ContactNode, DisplacementFrame, RomChecks, RomExtras};
 
 mod extras;
 mod harmonics;

@@ -35,7 +35,7 @@ struct TomlNode<'a> {
 }
 
 impl<'a> Document<'a> {
-    /// Returns the error for a field that [`SceneSettings::validate`](tiprub_core::settings::SceneSettings::validate)
+    /// Returns the error for a field that [`SceneSettings::validate`](tiprub_core::scene::settings::SceneSettings::validate)
     /// names by its path, with or without indices; it has a position if the document holds exactly one such field.
     pub(crate) fn refusal(&self, path: &str, problem: String, remedy: String) -> Error {
         let bare = path.replace('`', "");

@@ -2,7 +2,8 @@
 
 use toml::de::DeTable;
 
-use tiprub_core::settings::{ADAPTIVE_STEP, Preset, SceneSettings, Scheme, Solver, StructureSettings, TimeSettings};
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::settings::{ADAPTIVE_STEP, Preset, SceneSettings, StructureSettings, TimeSettings};
 use tiprub_core::{Rom, Scene};
 
 use crate::load::BUILTIN_PREFIX;
@@ -205,7 +206,7 @@ fn apply_preset(settings: &mut SceneSettings, document: &Document) {
 ///
 /// # Examples
 /// ```
-/// # use tiprub_core::settings::StructureSettings;
+/// # use tiprub_core::scene::settings::StructureSettings;
 /// let structure = StructureSettings { rom: "builtin:rotor37".into(), ..StructureSettings::default() };
 /// assert_eq!(tiprub_format::builtin_model(&structure), Some("rotor37"));
 /// # Ok::<(), Box<dyn std::error::Error>>(())

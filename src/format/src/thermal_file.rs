@@ -4,7 +4,7 @@ use std::path::Path;
 
 use nalgebra::DMatrix;
 use safetensors::{Dtype, SafeTensors};
-use tiprub_core::rom::ThermalPatch;
+use tiprub_core::scene::rom::ThermalPatch;
 use tiprub_thermal::ConductionModel;
 
 use crate::load::{LARGEST_ROM, read_bytes};

@@ -10,8 +10,8 @@ use std::fs;
 use std::path::PathBuf;
 
 use nalgebra::{Complex, DMatrix};
-use tiprub_core::rom::{ContactNode, DisplacementFrame};
-use tiprub_core::settings::{CuttingSettings, Preset, SceneSettings, Shape, TimeSettings, rules};
+use tiprub_core::scene::rom::{ContactNode, DisplacementFrame};
+use tiprub_core::scene::settings::{CuttingSettings, Preset, SceneSettings, Shape, TimeSettings, rules};
 use tiprub_format::{ARRAYS, FIELDS, METADATA, SceneField, parse_scene, read_rom, write_scene};
 
 fn chapter(name: &str) -> PathBuf {

@@ -7,7 +7,8 @@
 
 use core::fmt::Debug;
 
-use tiprub_core::{Rom, rom::RubErrors};
+use tiprub_core::Rom;
+use tiprub_core::scene::rom::RubErrors;
 use tiprub_model::{
     Rotor37Options,
     cyclic::ModeSelection,

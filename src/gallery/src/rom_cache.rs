@@ -167,7 +167,7 @@ mod tests {
     use std::cell::Cell;
 
     use nalgebra::DMatrix;
-    use tiprub_core::rom::{ContactNode, DisplacementFrame, RomChecks, RomExtras};
+    use tiprub_core::scene::rom::{ContactNode, DisplacementFrame, RomChecks, RomExtras};
 
     use super::*;
     use tiprub_shell::Failure;

@@ -6,7 +6,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use tiprub_core::{Rom, Scene, settings::SceneSettings};
+use tiprub_core::scene::settings::SceneSettings;
+use tiprub_core::{Rom, Scene};
 use tiprub_format::builtin_model;
 use tiprub_shell::{Failure, Result, console::Console};
 

@@ -6,7 +6,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use tiprub_core::Rom;
-use tiprub_core::rom::{ContactNode, DisplacementFrame, RomExtras};
+use tiprub_core::scene::rom::{ContactNode, DisplacementFrame, RomExtras};
 
 use crate::Result;
 use crate::assembly::free_dofs;

@@ -9,7 +9,7 @@
 use faer::{Mat, Side};
 use nalgebra::{DMatrix, DVector};
 use tiprub_core::Rom;
-use tiprub_core::rom::{ContactGrid, ContactNode, DisplacementFrame, RomExtras};
+use tiprub_core::scene::rom::{ContactGrid, ContactNode, DisplacementFrame, RomExtras};
 
 use crate::assembly::free_dofs;
 use crate::craig_bampton::{CraigBampton, with_static_responses};

@@ -7,7 +7,7 @@ mod response;
 use faer::Mat;
 use nalgebra::DMatrix;
 use tiprub_core::Rom;
-use tiprub_core::rom::{DisplacementFrame, ReductionBasis, RomChecks, WatchedPoints};
+use tiprub_core::scene::rom::{DisplacementFrame, ReductionBasis, RomChecks, WatchedPoints};
 use tiprub_core::shown;
 
 use crate::assembly::{Assembled, free_dofs};
@@ -137,7 +137,7 @@ pub struct Reduction {
 /// #     modes: 4,
 /// #     checked_modes: 4,
 /// #     sectors: 1,
-/// #     frame: tiprub_core::rom::DisplacementFrame::Cylindrical,
+/// #     frame: tiprub_core::scene::rom::DisplacementFrame::Cylindrical,
 /// #     watched: Vec::new(),
 /// #     stress: Default::default(),
 /// #     damping_ratio: 0.005,
@@ -170,7 +170,7 @@ pub fn reduce(
 
 /// Reduces a model, from a mesh or from the matrices of another program, as [`reduce`] does.
 ///
-/// With a `largest_speed` (rad/s), the effects of spin up to it are added, in [`tiprub_core::rom::RomExtras::spin`],
+/// With a `largest_speed` (rad/s), the effects of spin up to it are added, in [`tiprub_core::scene::rom::RomExtras::spin`],
 /// see [`crate::spin`]; the rest of the ROM stays the same to the last bit.
 ///
 /// # Examples
@@ -195,7 +195,7 @@ pub fn reduce(
 /// #     modes: 4,
 /// #     checked_modes: 4,
 /// #     sectors: 1,
-/// #     frame: tiprub_core::rom::DisplacementFrame::Cylindrical,
+/// #     frame: tiprub_core::scene::rom::DisplacementFrame::Cylindrical,
 /// #     watched: Vec::new(),
 /// #     stress: Default::default(),
 /// #     damping_ratio: 0.005,

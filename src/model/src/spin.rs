@@ -24,7 +24,8 @@ pub(crate) use reduced::{ReducedSpin, Resting, SPARE_MODES, SpinningStates, redu
 
 use faer::Mat;
 use nalgebra::{DMatrix, DVector};
-use tiprub_core::{Rom, rom::Spin};
+use tiprub_core::Rom;
+use tiprub_core::scene::rom::Spin;
 
 use crate::craig_bampton::dense_modes;
 use crate::fe_model::FeModel;
@@ -62,7 +63,7 @@ pub(crate) fn centrifugal_load(model: &FeModel, free: &[usize]) -> Mat<f64> {
 /// #     modes: 4,
 /// #     checked_modes: 4,
 /// #     sectors: 1,
-/// #     frame: tiprub_core::rom::DisplacementFrame::Cylindrical,
+/// #     frame: tiprub_core::scene::rom::DisplacementFrame::Cylindrical,
 /// #     watched: Vec::new(),
 /// #     stress: Default::default(),
 /// #     damping_ratio: 0.005,
@@ -107,7 +108,7 @@ pub fn stiffness_at(resting: &DMatrix<f64>, spin: &Spin, speed: f64) -> DMatrix<
 /// #     modes: 4,
 /// #     checked_modes: 4,
 /// #     sectors: 1,
-/// #     frame: tiprub_core::rom::DisplacementFrame::Cylindrical,
+/// #     frame: tiprub_core::scene::rom::DisplacementFrame::Cylindrical,
 /// #     watched: Vec::new(),
 /// #     stress: Default::default(),
 /// #     damping_ratio: 0.005,
@@ -165,7 +166,7 @@ pub fn static_growth(resting: &DMatrix<f64>, spin: &Spin, speed: f64) -> Result<
 /// #     modes: 4,
 /// #     checked_modes: 4,
 /// #     sectors: 1,
-/// #     frame: tiprub_core::rom::DisplacementFrame::Cylindrical,
+/// #     frame: tiprub_core::scene::rom::DisplacementFrame::Cylindrical,
 /// #     watched: Vec::new(),
 /// #     stress: Default::default(),
 /// #     damping_ratio: 0.005,

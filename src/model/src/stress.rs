@@ -5,7 +5,7 @@
 
 use faer::Mat;
 use nalgebra::{DMatrix, Matrix3};
-use tiprub_core::rom::{ContactNode, DisplacementFrame, STRESSES, WatchedPoints, von_mises};
+use tiprub_core::scene::rom::{ContactNode, DisplacementFrame, STRESSES, WatchedPoints, von_mises};
 
 use crate::element::nodal_stress;
 use crate::fe_model::FeModel;

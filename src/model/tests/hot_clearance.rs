@@ -7,8 +7,8 @@
 use std::f64::consts::TAU;
 
 use guide::print_row;
-use tiprub_core::rom::DisplacementFrame;
-use tiprub_core::settings::StructureSettings;
+use tiprub_core::scene::rom::DisplacementFrame;
+use tiprub_core::scene::settings::StructureSettings;
 use tiprub_core::{Rom, Scene, Simulation};
 use tiprub_model::casing::{ContactRings, InnerContour, RingCounts, RingGeometry, RingSupport};
 use tiprub_model::element::ElementKind;

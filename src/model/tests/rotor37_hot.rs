@@ -2,8 +2,8 @@
 //! tip closes.
 
 use guide::print_row;
-use tiprub_core::rom::ContactNode;
-use tiprub_core::settings::{Meridian, SpinSettings};
+use tiprub_core::scene::rom::ContactNode;
+use tiprub_core::scene::settings::{Meridian, SpinSettings};
 use tiprub_core::{Rom, Scene, Simulation};
 use tiprub_model::progress::silent;
 use tiprub_model::reduce::ReductionKind;

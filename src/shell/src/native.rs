@@ -2,9 +2,9 @@
 
 use std::time::{Duration, Instant};
 
+use tiprub_core::scene::method::Scheme;
 use tiprub_core::{
     Scene, Simulation, VariableTable, Warning,
-    settings::Scheme,
     system::Effort,
     variables::{Causality, DataType, Variable},
 };

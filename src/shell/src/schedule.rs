@@ -1,6 +1,8 @@
 //! Communication points, computed from their index instead of accumulated.
 
-use tiprub_core::{Warning, ranges, settings::ExperimentSettings, shown, warning::Topic};
+use tiprub_core::scene::ranges;
+use tiprub_core::scene::settings::ExperimentSettings;
+use tiprub_core::{Warning, shown, warning::Topic};
 
 use crate::{Failure, Result};
 

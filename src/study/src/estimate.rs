@@ -6,7 +6,8 @@
 //! they hardly decrease, the error is unknown. Longer steps may be rejected: then shorter ones are tried, and the error is c₁ + c₂/(r − 1).
 
 use serde_json::{Value, json};
-use tiprub_core::{Rom, Scene, rom::RubErrors};
+use tiprub_core::scene::rom::RubErrors;
+use tiprub_core::{Rom, Scene};
 use tiprub_shell::{Result, console::Console};
 
 use crate::convergence::{

@@ -14,7 +14,8 @@ pub mod output;
 pub mod stability;
 
 use serde_json::{Value, json};
-use tiprub_core::{Scene, settings::SceneSettings};
+use tiprub_core::Scene;
+use tiprub_core::scene::settings::SceneSettings;
 use tiprub_figure::{plots::Plot, waterfall::Waterfall};
 use tiprub_shell::{Failure, Result, recording::shortest};
 

@@ -1,8 +1,9 @@
 //! Reduced-order model of heat conduction, as plain data.
 
 use nalgebra::DMatrix;
-use tiprub_core::rom::ThermalPatch;
-use tiprub_core::{Error, Result, ranges, shown};
+use tiprub_core::scene::ranges;
+use tiprub_core::scene::rom::ThermalPatch;
+use tiprub_core::{Error, Result, shown};
 
 /// Largest number of coordinates: their eigenvalue problem is dense, and solved again when a convection factor
 /// changes.

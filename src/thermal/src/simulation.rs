@@ -1,9 +1,10 @@
 //! Model with its state, which an FMU instance or the tests drive.
 
+use tiprub_core::scene::ranges;
 use tiprub_core::simulation::StepProgress;
 use tiprub_core::variables::{StartValue, VariableTable};
 use tiprub_core::warning::Topic;
-use tiprub_core::{Error, Result, Sum, Warning, ranges, shown};
+use tiprub_core::{Error, Result, Sum, Warning, shown};
 
 use crate::course::InputCourse;
 use crate::exponential::Phi;

@@ -2,10 +2,8 @@
 //! and cost against the number of modes.
 
 use serde_json::{Value, json};
-use tiprub_core::{
-    Rom, Scene,
-    settings::{Scheme, Solver},
-};
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::{Rom, Scene};
 use tiprub_figure::plots::{Plot, Series};
 use tiprub_gallery::{reduction, scene_source};
 use tiprub_model::{

@@ -3,10 +3,9 @@
 //! and Jean).
 
 use serde_json::json;
-use tiprub_core::{
-    Scene, Simulation,
-    settings::{Meridian, Preset, Scheme, Shape, Solver, SpinSettings, TOLERANCE},
-};
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::settings::{Meridian, Preset, Shape, SpinSettings, TOLERANCE};
+use tiprub_core::{Scene, Simulation};
 use tiprub_figure::plots::{Plot, Series};
 use tiprub_gallery::scene_source;
 use tiprub_reference::reduced::{

@@ -103,7 +103,8 @@ fn rubs(quick: bool, console: &Console) -> Result<Vec<EstimatedRub>> {
         let all = all.flat_map(|(depth, friction)| group.speeds.iter().map(move |speed| (depth, friction, *speed)));
         for (depth, friction, speed) in all.take(if quick { 1 } else { usize::MAX }) {
             let mut settings = base.clone();
-            settings.surfaces[0].shape = tiprub_core::settings::Shape::TwoLobe { depth, width: 0.15, phase: 0.0 };
+            settings.surfaces[0].shape =
+                tiprub_core::scene::settings::Shape::TwoLobe { depth, width: 0.15, phase: 0.0 };
             (settings.contacts[0].friction, settings.structures[0].speed) = (friction, speed);
             settings.experiment.communication_step = INTERVAL;
             settings.time.step = INTERVAL / f64::from(DIVISION);

@@ -2,10 +2,8 @@
 //! meshes, modes and steps; the limit of each sequence, and the error of the scene as built in.
 
 use serde_json::json;
-use tiprub_core::{
-    Rom, Scene,
-    settings::{SceneSettings, Shape},
-};
+use tiprub_core::scene::settings::{SceneSettings, Shape};
+use tiprub_core::{Rom, Scene};
 use tiprub_figure::{
     plots::{Plot, Series},
     table::Table,
@@ -98,7 +96,7 @@ fn standards() -> Result<Vec<Standard>> {
 
 impl Standard {
     fn scene(&self, cache: &RomCache, console: &Console) -> Result<Scene> {
-        let rom = |(index, structure): (usize, &tiprub_core::settings::StructureSettings)| -> Result<Rom> {
+        let rom = |(index, structure): (usize, &tiprub_core::scene::settings::StructureSettings)| -> Result<Rom> {
             let missing = || Failure::new(&structure.rom, "unknown built-in model", "");
             let name = tiprub_format::builtin_model(structure).ok_or_else(missing)?;
             let found = match self.other.filter(|_| index == 0) {

@@ -2,7 +2,7 @@
 
 use nalgebra::{Complex, DMatrix};
 use tiprub_core::Scene;
-use tiprub_core::rom::{DisplacementFrame, Harmonic, Rom};
+use tiprub_core::scene::rom::{DisplacementFrame, Harmonic, Rom};
 
 use crate::{SeededRandom, node, rub, structure};
 

@@ -1,8 +1,9 @@
 //! A free block of masses and springs between two plates, without reduction: every node is a contact node.
 
 use nalgebra::{DMatrix, Vector3};
-use tiprub_core::rom::{ContactGrid, Rom};
-use tiprub_core::settings::*;
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::rom::{ContactGrid, Rom};
+use tiprub_core::scene::settings::*;
 use tiprub_core::{Scene, Simulation};
 
 use crate::{node, real, structure};

@@ -14,7 +14,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use nalgebra::{DMatrix, DVector};
 use tiprub_core::Rom;
-use tiprub_core::rom::{
+use tiprub_core::scene::rom::{
     ContactGrid, ContactNode, DisplacementFrame, RomChecks, RomExtras, Spin, Thermal, ThermalPatch,
 };
 

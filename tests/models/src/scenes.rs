@@ -1,8 +1,9 @@
 //! Rotors in casings, and optional features for them.
 
-use tiprub_core::settings::{
+use tiprub_core::scene::method::Scheme;
+use tiprub_core::scene::settings::{
     BodyMotion, CoatingSettings, ContactSettings, ExperimentSettings, Meridian, OutputSettings, Preset, SceneSettings,
-    Scheme, Shape, StructureSettings, SurfaceSettings, TimeSettings,
+    Shape, StructureSettings, SurfaceSettings, TimeSettings,
 };
 use tiprub_core::{Rom, Scene};
 

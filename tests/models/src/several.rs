@@ -1,7 +1,8 @@
 //! Scenes of several structures and pairs.
 
 use tiprub_core::Scene;
-use tiprub_core::settings::{BodyMotion, Shape, Solver, StructureSettings};
+use tiprub_core::scene::method::Solver;
+use tiprub_core::scene::settings::{BodyMotion, Shape, StructureSettings};
 
 /// Assigns each of the blades' three nodes to a separate pair, all against the same casing.
 pub fn split(scene: &Scene) -> Scene {

@@ -3,7 +3,7 @@
 
 use std::ffi::c_void;
 
-use tiprub_core::settings::Scheme;
+use tiprub_core::scene::method::Scheme;
 use tiprub_core::{Scene, Simulation};
 use tiprub_fmi_host::api::Fmi3Api;
 use tiprub_tests::scene::{UnpackedResources, scene};

@@ -1,9 +1,9 @@
 //! Scenes that together cover every feature, scheme, solver, gap law and shape.
 
 use tiprub_core::Scene;
-use tiprub_core::settings::{
-    Closure, InputInterpolation, Interpolation, LoadSettings, Meridian, PatchSettings, Scheme, Shape, Solver,
-    SplineSettings,
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::settings::{
+    Closure, InputInterpolation, Interpolation, LoadSettings, Meridian, PatchSettings, Shape, SplineSettings,
 };
 use tiprub_test_models::{
     coating, disk, flexible,

@@ -12,7 +12,7 @@ use std::fmt::Write as _;
 
 use plot::{PlotLine, PlotPanel, draw};
 use sliding::{AROUND, SPEED, STEP, SlidingHistory, casing, slide};
-use tiprub_core::settings::{Closure, Interpolation};
+use tiprub_core::scene::settings::{Closure, Interpolation};
 
 const KINDS: [(&str, &str, Closure, Interpolation); 3] = [
     ("facets", "#d67018", Closure::Smooth, Interpolation::Facets),

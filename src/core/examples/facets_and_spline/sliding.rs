@@ -5,8 +5,8 @@
 
 use std::f64::consts::TAU;
 
-use tiprub_core::gaps::surface_spline::{Projection, SurfaceSpline};
-use tiprub_core::settings::{Closure, Interpolation};
+use tiprub_core::geometry::surface_spline::{Projection, SurfaceSpline};
+use tiprub_core::scene::settings::{Closure, Interpolation};
 
 /// Radius of the data points of the casing (m).
 pub const RADIUS: f64 = 0.25;

@@ -1,9 +1,9 @@
 //! Check of the energy of a run at every communication point, and the messages if it is too large.
 
 use super::{Simulation, SimulationPhase};
-use crate::ledger::Ledger;
-use crate::settings::{Scheme, Solver};
+use crate::scene::method::{Scheme, Solver};
 use crate::system::Loss;
+use crate::system::ledger::Ledger;
 use crate::warning::Topic;
 use crate::{Error, Result, Warning, shown_time};
 

@@ -5,13 +5,14 @@ use nalgebra::DVector;
 use super::compile::{Compiled, CompiledBody};
 use super::drive::Input;
 use super::{Quantity, Simulation};
-use crate::dynamics::bank::BankOptions;
-use crate::dynamics::excitation::{Excitation, most_moved};
-use crate::dynamics::modal::{ModalModel, ModalSpin};
-use crate::dynamics::sectors::Sectors;
-use crate::ranges::SOFTENED;
-use crate::rom::WatchedPoints;
-use crate::settings::{InitialSettings, Scheme, StructureSettings};
+use crate::modes::bank::BankOptions;
+use crate::modes::excitation::{Excitation, most_moved};
+use crate::modes::modal::{ModalModel, ModalSpin};
+use crate::modes::sectors::Sectors;
+use crate::scene::method::Scheme;
+use crate::scene::ranges::SOFTENED;
+use crate::scene::rom::WatchedPoints;
+use crate::scene::settings::{InitialSettings, StructureSettings};
 use crate::{Error, Result, Rom, shown, shown_time};
 
 /// Modal load per kelvin of coupled sectors, on nodal diameter 0; empty if the scene does not heat them.
@@ -124,7 +125,7 @@ impl Compiled {
         if let Some(mode) = asked.mode {
             self.check_mode(body, &format!("{at}.mode"), mode, self.fewest_modes(body, None))?;
         }
-        let row = |(name, direction): (&String, crate::settings::ForceDirection)| {
+        let row = |(name, direction): (&String, crate::scene::settings::ForceDirection)| {
             let node = rom.contact_nodes.iter().position(|node| node.name == *name);
             let names: Vec<&str> = rom.contact_nodes.iter().map(|node| node.name.as_str()).collect();
             let unknown = || {
@@ -142,7 +143,7 @@ impl Compiled {
         let parts = &self.bodies[body];
         let uncoupled = || scheme.map_or(parts.model.len(), |scheme| parts.model.dynamic_modes(scheme));
         let of_disk = parts.disk.as_ref().and_then(|disk| {
-            let count = |one: &crate::dynamics::cyclic::DiameterModes| {
+            let count = |one: &crate::modes::cyclic::DiameterModes| {
                 scheme.map_or(one.len(), |scheme| one.dynamic_modes(scheme))
             };
             disk.diameters.iter().map(count).min()
@@ -327,7 +328,7 @@ impl Simulation {
         let Some(reference) = self.compiled.references.engine_orders[body] else { return Ok(()) };
         let order = self.values[reference];
         let angle = speeds.into_iter().fold(0.0, |most: f64, speed| most.max(((order * speed - phase) * step).abs()));
-        if angle <= crate::ranges::EXCITED_ANGLE {
+        if angle <= crate::scene::ranges::EXCITED_ANGLE {
             return Ok(());
         }
         Err(Error::invalid(
@@ -337,7 +338,7 @@ impl Simulation {
                  s, more than the limit of {} rad",
                 shown(order),
                 shown_time(self.time),
-                shown(crate::ranges::EXCITED_ANGLE)
+                shown(crate::scene::ranges::EXCITED_ANGLE)
             ),
             "Use a smaller internal_step_max (time.step), a lower order, a lower speed or a phase that changes more slowly",
         ))

@@ -2,13 +2,13 @@
 
 use super::Simulation;
 use super::compile::Compiled;
-use crate::plausibility::{self, Slip};
+use crate::limits::plausibility::{self, Slip};
 use crate::system::StepFailure;
 use crate::variables::Causality;
 use crate::warning::{Topic, Warning};
 use crate::{Error, Result, shown_time};
 
-/// Extension of a surface around an axis ([`crate::gaps::surface_spline::REACH`]), and the remedy for a node beyond it.
+/// Extension of a surface around an axis ([`crate::geometry::surface_spline::REACH`]), and the remedy for a node beyond it.
 pub const OUT_OF_REACH: &str = "a quarter of the axial extent of the surface, the limit of its extrapolation along the \
                                 tangents";
 pub const OUT_OF_REACH_REMEDY: &str = "Use a casing whose contact grid covers the blade tips over their whole range of \

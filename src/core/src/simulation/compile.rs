@@ -1,18 +1,18 @@
 //! Compilation of settings into kernels: everything that is determined before the first step.
 
-use crate::dynamics::cyclic::CyclicModel;
-use crate::dynamics::modal::{ModalModel, ModalSpin};
-use crate::dynamics::rigid::{Translations, free_modes};
-use crate::dynamics::sectors::SectorModel;
-use crate::gaps::layout::Layout;
-use crate::gaps::open::{OpenGap, OpenSurface};
-use crate::gaps::shape::CompiledShape;
-use crate::gaps::surface_spline::SurfaceSpline;
-use crate::gaps::{GapLaw, RevolutionGap};
-use crate::laws::coating::{BladeTip, Coating};
-use crate::ranges::SMALL;
-use crate::rom::{ContactNode, SupportRows};
-use crate::settings::{BodyMotion, ContactSettings, Meridian, StructureSettings};
+use crate::contact::coating::{BladeTip, Coating};
+use crate::geometry::layout::Layout;
+use crate::geometry::open::{OpenGap, OpenSurface};
+use crate::geometry::surface_spline::SurfaceSpline;
+use crate::geometry::{GapLaw, RevolutionGap};
+use crate::modes::cyclic::CyclicModel;
+use crate::modes::modal::{ModalModel, ModalSpin};
+use crate::modes::rigid::{Translations, free_modes};
+use crate::modes::sectors::SectorModel;
+use crate::scene::ranges::SMALL;
+use crate::scene::rom::{ContactNode, SupportRows};
+use crate::scene::settings::{BodyMotion, ContactSettings, Meridian, StructureSettings};
+use crate::scene::shape::CompiledShape;
 use crate::system::{PairParts, StructureParts, SurfaceCarrier, System, SystemSettings, joined};
 use crate::variables::Quantity;
 use crate::{Error, Result, Rom, Scene, Warning, shown};
@@ -484,7 +484,7 @@ impl Compiled {
             if contact.sector_gaps.is_empty() { vec![contact.gap; rom.sectors] } else { contact.sector_gaps.clone() };
         let surface = CompiledShape::new(&settings.shape, contact.nominal_gap())?;
         check_lengths(rom, &clearances, &surface)?;
-        let lanes = crate::dynamics::bank::lanes(rom.sectors);
+        let lanes = crate::modes::bank::lanes(rom.sectors);
         let spline = settings.spline.is_some() || plan.carrier.is_some();
         if contact.meridian == Meridian::Contour {
             check_contour(rom, &plan.nodes, !spline)?;

@@ -2,8 +2,8 @@
 
 use super::Simulation;
 use super::compile::Compiled;
-use crate::rom::DisplacementFrame;
-use crate::settings::BodyMotion;
+use crate::scene::rom::DisplacementFrame;
+use crate::scene::settings::BodyMotion;
 use crate::warning::Topic;
 use crate::{Warning, shown};
 

@@ -2,7 +2,7 @@
 
 use crate::Scene;
 use crate::persist::fingerprint;
-use crate::settings::SceneSettings;
+use crate::scene::settings::SceneSettings;
 
 /// Hash of everything that determines the results of a scene.
 pub fn of_scene(scene: &Scene) -> u64 {

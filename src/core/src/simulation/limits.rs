@@ -8,10 +8,11 @@ mod warning_state;
 
 use super::table::has_one_friction;
 use super::{Compiled, Simulation};
-use crate::dynamics::modal::{ModalModel, fill_ratios};
-use crate::settings::{Preset, Scheme, Solver, TOLERANCE};
-use crate::stability::massless::MasslessLimit;
-use crate::stability::{self, massless};
+use crate::limits::massless::MasslessLimit;
+use crate::limits::{self, massless};
+use crate::modes::modal::{ModalModel, fill_ratios};
+use crate::scene::method::{Scheme, Solver};
+use crate::scene::settings::{Preset, TOLERANCE};
 use crate::system::System;
 use crate::variables::Quantity;
 use crate::{Error, Result, Warning};
@@ -157,11 +158,11 @@ impl Simulation {
         let stiffened = |speed: f64| self.compiled.stiffened(body, speed, coldest);
         let stiffened = speeds.into_iter().fold(1.0, |most: f64, speed| most.max(stiffened(speed)));
         let largest = self.compiled.bodies[body].largest_frequency();
-        stability::check_step_allowed(largest * self.compiled.stiffest(body) * stiffened, scheme, step)?;
+        limits::check_step_allowed(largest * self.compiled.stiffest(body) * stiffened, scheme, step)?;
         for carrier in self.compiled.carriers_of(body) {
-            stability::check_step_allowed(self.compiled.carriers[carrier].model.largest_frequency(), scheme, step)?;
+            limits::check_step_allowed(self.compiled.carriers[carrier].model.largest_frequency(), scheme, step)?;
         }
-        stability::unresolved::check(step, own.unresolved, largest)?;
+        limits::unresolved::check(step, own.unresolved, largest)?;
         if step >= own.massless.usable {
             return Err(massless::refusal(step, own.massless));
         }
@@ -186,7 +187,7 @@ impl Compiled {
         let Error::Unstable { problem, mut remedy } = error else { return error };
         let preset = self.scene.settings.preset == Preset::Paper;
         if preset {
-            remedy = remedy.replace(stability::OTHER_SCHEME, ", or remove `preset`, which fixes the scheme");
+            remedy = remedy.replace(limits::OTHER_SCHEME, ", or remove `preset`, which fixes the scheme");
         }
         let of_step = |text: &str| text.contains("`time.step`");
         let solver = self.scene.settings.contacts[0].solver;
@@ -287,12 +288,12 @@ impl Compiled {
         let casing = at.casing(expected);
         // Radially: along an inclined normal the bending of the blade would hide the compliance of the tip itself.
         let radial = |model: &ModalModel| vec![[-1.0, 0.0, 0.0]; model.contact_modes.nrows() / 3];
-        let masters = at.models.iter().map(|model| stability::unresolved::limit(model, &radial(model)));
+        let masters = at.models.iter().map(|model| limits::unresolved::limit(model, &radial(model)));
         let unresolved = self.unresolved(body, masters, parameters.scheme);
-        let resolved = stability::unresolved::check(expected, unresolved, at.largest_frequency());
+        let resolved = limits::unresolved::check(expected, unresolved, at.largest_frequency());
         let (outcome, massless) = match resolved.and_then(|()| at.massless(expected)) {
             Ok((mut more, limit)) => {
-                more.extend(stability::unresolved::warning(expected, unresolved));
+                more.extend(limits::unresolved::warning(expected, unresolved));
                 (at.warnings(expected, in_range(&casing, expected).cloned(), more), limit)
             }
             Err(error) => (Err(error), MasslessLimit::NONE),
@@ -315,7 +316,7 @@ impl Compiled {
             return f64::INFINITY;
         }
         let models = self.carriers_of(body).map(|carrier| &self.carriers[carrier].model);
-        touching.chain(models.map(stability::unresolved::limit_along_axes)).fold(f64::INFINITY, f64::min)
+        touching.chain(models.map(limits::unresolved::limit_along_axes)).fold(f64::INFINITY, f64::min)
     }
 }
 

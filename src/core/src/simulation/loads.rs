@@ -2,8 +2,8 @@
 
 use super::inputs::CarrierInputs;
 use crate::Rom;
-use crate::dynamics::modal::ModalModel;
-use crate::settings::StructureSettings;
+use crate::modes::modal::ModalModel;
+use crate::scene::settings::StructureSettings;
 
 /// Modal load of a structure by growth, per Ω² and, with stiffening, per Ω⁴; for coupled sectors on nodal diameter 0. Empty if the scene
 /// has no growth.

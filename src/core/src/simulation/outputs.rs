@@ -9,12 +9,12 @@ use super::compile::Compiled;
 use super::units::LENGTH;
 use super::window::{StepWindow, speed_of};
 use super::{Simulation, SimulationPhase};
-use crate::dynamics::sectors::Sectors;
-use crate::gaps::sector_angle;
-use crate::laws::coating::Coating;
-use crate::ledger::Ledger;
-use crate::rom::{STRESSES, von_mises};
+use crate::contact::coating::Coating;
+use crate::geometry::sector_angle;
+use crate::modes::sectors::Sectors;
+use crate::scene::rom::{STRESSES, von_mises};
 use crate::system::System;
+use crate::system::ledger::Ledger;
 use crate::variables::{Causality, NO_CLEARANCE, Quantity, Span, Variable};
 
 type Fill = dyn Fn(&OutputView, &mut [f64]) + Send + Sync;

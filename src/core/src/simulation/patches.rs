@@ -2,8 +2,8 @@
 
 use super::plan::{PairPlan, SteppingOrder};
 use crate::Scene;
-use crate::rom::ThermalPatch;
-use crate::settings::PatchSettings;
+use crate::scene::rom::ThermalPatch;
+use crate::scene::settings::PatchSettings;
 
 /// Patches for which heat is counted.
 #[derive(Debug, Clone, PartialEq)]

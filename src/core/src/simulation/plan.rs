@@ -1,7 +1,7 @@
 //! Structures, surfaces and contact pairs of a scene, resolved once from names.
 
-use crate::settings::relations::Relations;
-use crate::settings::{BodyMotion, ContactSettings, SceneSettings, StructureSettings, SurfaceSettings};
+use crate::scene::settings::relations::Relations;
+use crate::scene::settings::{BodyMotion, ContactSettings, SceneSettings, StructureSettings, SurfaceSettings};
 use crate::{Error, Result, Rom, Scene};
 
 /// A contact pair of a scene.

@@ -17,7 +17,8 @@
 //! depends on its history, so that no check at the start can predict it.
 
 use super::Simulation;
-use crate::settings::{Preset, Scheme, Solver};
+use crate::scene::method::{Scheme, Solver};
+use crate::scene::settings::Preset;
 use crate::system::StepFailure;
 use crate::warning::Topic;
 use crate::{Result, Warning, shown_time};

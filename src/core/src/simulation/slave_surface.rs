@@ -1,13 +1,13 @@
 //! Slave surface of a scene through data points, and the modes of its carrier.
 
-use crate::dynamics::modal::ModalModel;
-use crate::gaps::layout::Layout;
-use crate::gaps::shape::CompiledShape;
-use crate::gaps::spline::SplineGap;
-use crate::gaps::surface_spline::SurfaceSpline;
-use crate::gaps::wrench::cross;
-use crate::rom::{ContactNode, DisplacementFrame};
-use crate::settings::{ContactSettings, SplineSettings, SurfaceSettings};
+use crate::geometry::layout::Layout;
+use crate::geometry::spline::SplineGap;
+use crate::geometry::surface_spline::SurfaceSpline;
+use crate::geometry::wrench::cross;
+use crate::modes::modal::ModalModel;
+use crate::scene::rom::{ContactNode, DisplacementFrame};
+use crate::scene::settings::{ContactSettings, SplineSettings, SurfaceSettings};
+use crate::scene::shape::CompiledShape;
 use crate::{Error, Result, Rom};
 use nalgebra::DMatrix;
 

@@ -5,9 +5,9 @@ use nalgebra::DMatrix;
 use super::Simulation;
 use super::compile::Compiled;
 use super::limits::Parameters;
-use crate::dynamics::modal::ModalModel;
-use crate::gaps::shape::CompiledShape;
-use crate::settings::Solver;
+use crate::modes::modal::ModalModel;
+use crate::scene::method::Solver;
+use crate::scene::shape::CompiledShape;
 use crate::warning::Topic;
 use crate::{Warning, shown};
 

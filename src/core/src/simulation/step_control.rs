@@ -2,8 +2,8 @@
 
 use super::limits::Parameters;
 use super::{Communication, Simulation, SimulationPhase};
-use crate::galerkin::sector::shortest;
-use crate::settings::Scheme;
+use crate::scene::method::Scheme;
+use crate::time::galerkin::sector::shortest;
 use crate::variables::Quantity;
 use crate::warning::Topic;
 use crate::{Error, Result, Warning, shown, shown_time};

@@ -2,10 +2,11 @@
 
 use super::drive::Input;
 use super::{Communication, MOST_STEPS, Simulation, SimulationPhase, StepProgress, TIME_TOLERANCE, same_step};
-use crate::laws::coating::Coating;
+use crate::contact::coating::Coating;
+use crate::scene::ranges;
 use crate::system::StepFailure;
 use crate::warning::Topic;
-use crate::{Error, Result, Warning, ranges, shown, shown_time};
+use crate::{Error, Result, Warning, shown, shown_time};
 
 /// A run is warned of once u_θ²/2r is this fraction of the clearance.
 const CURVED_SHARE: f64 = 0.05;

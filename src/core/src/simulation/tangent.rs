@@ -7,7 +7,7 @@
 //! of inputs is then reduced. The quotient is the derivative with contacts and steps as they were in the accepted step, up to rounding.
 
 use super::{Simulation, SimulationPhase};
-use crate::settings::Scheme;
+use crate::scene::method::Scheme;
 use crate::variables::{Causality, DataType, Quantity, Variability};
 use crate::{Error, Result, shown, shown_time};
 

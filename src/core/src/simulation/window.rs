@@ -2,10 +2,10 @@
 
 use super::patches::HeatPatches;
 use super::slave_surface::Lining;
-use crate::dynamics::bank::ModalBank;
-use crate::gaps::wrench::cross;
+use crate::geometry::wrench::cross;
+use crate::modes::bank::ModalBank;
 use crate::persist::persist_fields;
-use crate::settings::OutputSettings;
+use crate::scene::settings::OutputSettings;
 use crate::system::{Structure, System};
 
 /// Sums and extremes of a master since the communication step began, `[node · lanes + lane]`.

@@ -2,10 +2,10 @@
 
 use super::Structure;
 use super::pair::{SurfaceCarrier, at_place};
-use crate::dynamics::bank::ModalBank;
-use crate::dynamics::sectors::Sectors;
-use crate::gaps::frame::PolarFrame;
-use crate::gaps::surface_spline::{ClosestPoint, SurfaceSpline};
+use crate::geometry::frame::PolarFrame;
+use crate::geometry::surface_spline::{ClosestPoint, SurfaceSpline};
+use crate::modes::bank::ModalBank;
+use crate::modes::sectors::Sectors;
 use nalgebra::DMatrix;
 
 /// Location at which a contact acts on a structure.

@@ -3,8 +3,8 @@
 use super::carrier::Spot;
 use super::pair::When;
 use super::{ContactPair, StepFailure, Structure};
-use crate::gaps::wrench::At;
-use crate::laws::ContactPrediction;
+use crate::contact::ContactPrediction;
+use crate::geometry::wrench::At;
 
 /// A contact node of one sector of a structure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -3,11 +3,11 @@
 use super::contact_view::ContactMember;
 use super::pair::When;
 use super::{Bodies, ContactEvent, ContactPair, StepFailure, Structure, System, sum_of};
-use crate::gaps::GapLaw;
-use crate::gaps::surface_spline::ClosestPoint;
-use crate::gaps::wrench::At;
-use crate::history::ContactHistory;
+use crate::geometry::GapLaw;
+use crate::geometry::surface_spline::ClosestPoint;
+use crate::geometry::wrench::At;
 use crate::persist::{Persist, StateReader, StateWriter};
+use crate::system::history::ContactHistory;
 
 /// A contact force is continued over steps up to this many times as long as the step in which it was found.
 const FORCE_REACH: f64 = 4.0;

@@ -1,11 +1,11 @@
 //! The Delassus matrix W = C_Nᵀ A⁻¹ C_NT of the contact nodes of one structure, from its flexibility over one step.
 
 use super::contact_view::ContactMember;
-use crate::dynamics::bank::ModalBank;
-use crate::dynamics::cyclic::CyclicBank;
-use crate::dynamics::dispatch::Kernel;
-use crate::dynamics::sectors::Sectors;
-use crate::gaps::dot;
+use crate::geometry::dot;
+use crate::math::simd::Kernel;
+use crate::modes::bank::ModalBank;
+use crate::modes::cyclic::CyclicBank;
+use crate::modes::sectors::Sectors;
 use nalgebra::DMatrix;
 
 /// Contacts of a structure within a group, with their directions and the position of their block in the matrix.

@@ -1,8 +1,8 @@
 //! Forces and work of a contact in a step.
 
 use super::contact_view::ContactMember;
-use crate::gaps::dot;
-use crate::gaps::wrench::Wrench;
+use crate::geometry::dot;
+use crate::geometry::wrench::Wrench;
 
 /// One active contact of the last step.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,7 +23,7 @@ pub struct ContactEvent {
     pub tangential: f64,
     /// Force on the structure (N) in the coordinates of its displacements.
     pub force: [f64; 3],
-    /// Data of the contact point, see [`GapLaw::contact_point`](crate::gaps::GapLaw::contact_point).
+    /// Data of the contact point, see [`GapLaw::contact_point`](crate::geometry::GapLaw::contact_point).
     pub point: [f64; 3],
     /// Force in fixed directions, its moment, and its point of application.
     pub wrench: Wrench,
@@ -36,7 +36,7 @@ pub struct ContactEvent {
 }
 
 impl ContactEvent {
-    pub(super) fn new(
+    pub(crate) fn new(
         at: ContactMember,
         normal: f64,
         force: [f64; 3],

@@ -5,12 +5,12 @@ use super::contact_view::{Bodies, ContactMember, ContactView};
 use super::delassus::{DelassusBlock, fill};
 use super::pair::When;
 use super::{ContactEvent, StepFailure, Structure};
-use crate::dynamics::sectors::Sectors;
-use crate::gaps::dot;
-use crate::gaps::wrench::At;
-use crate::laws::coating::Coating;
-use crate::laws::{ContactPrediction, Law, tangents};
-use crate::settings::Solver;
+use crate::contact::coating::Coating;
+use crate::contact::{ContactPrediction, Law, tangents};
+use crate::geometry::dot;
+use crate::geometry::wrench::At;
+use crate::modes::sectors::Sectors;
+use crate::scene::method::Solver;
 
 /// Nodes outside a group count as penetrating beyond this fraction of the largest gap of the group.
 const VIOLATED_FRACTION: f64 = 1e-13;

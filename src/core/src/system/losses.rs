@@ -7,9 +7,9 @@
 //! At every communication point both losses are compared with their largest values so far.
 
 use super::{ContactPair, StepFailure, System};
-use crate::ledger::Ledger;
 use crate::persist::persist_fields;
-use crate::settings::{Scheme, Solver};
+use crate::scene::method::{Scheme, Solver};
+use crate::system::ledger::Ledger;
 
 /// A contact loss that may only dissipate energy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,7 +39,7 @@ pub struct LargestLosses {
     friction: f64,
     impact: f64,
     /// Energy that cutting forces have supplied to tips that move backwards, which does not count as cutting (J).
-    pub(super) uncut: f64,
+    pub(crate) uncut: f64,
 }
 
 persist_fields!(LargestLosses { friction, impact, uncut });
@@ -61,7 +61,7 @@ impl System {
     ///
     /// # Errors
     /// [`StepFailure::Gives`] if a loss has supplied energy.
-    pub(super) fn check_losses(&mut self) -> Result<(), StepFailure> {
+    pub(crate) fn check_losses(&mut self) -> Result<(), StepFailure> {
         // Before the first step, the gap of the previous step is unknown too.
         let another_step = self.counted.witnessed > 0;
         let returns = self.settings.scheme.is_massless() || self.settings.solver == Solver::Film || another_step;

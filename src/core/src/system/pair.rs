@@ -2,12 +2,12 @@
 
 use super::Structure;
 use super::growth::ShapeGrowth;
-use crate::gaps::frame::PolarFrame;
-use crate::gaps::surface_spline::{ClosestPoint, SurfaceSpline};
-use crate::gaps::wrench::MotionIncrement;
-use crate::gaps::{GapLaw, PrescribedMotion};
-use crate::history::Two;
+use crate::geometry::frame::PolarFrame;
+use crate::geometry::surface_spline::{ClosestPoint, SurfaceSpline};
+use crate::geometry::wrench::MotionIncrement;
+use crate::geometry::{GapLaw, PrescribedMotion};
 use crate::persist::persist_fields;
+use crate::system::history::Two;
 
 /// The structure that carries the surface of a pair.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -48,16 +48,16 @@ persist_fields!(Prescribed { drive, motion });
 #[derive(Debug, Clone)]
 pub struct ContactPair {
     /// Parts of the pair.
-    pub(super) parts: PairParts,
+    pub(crate) parts: PairParts,
     /// Contact nodes of the pair.
     nodes: Vec<usize>,
     prescribed: Prescribed,
     /// Prescribed motion in the middle of the current span, and the growth of the shape, if a scheme needs them.
-    pub(super) middle: (PrescribedMotion, ShapeGrowth),
+    pub(crate) middle: (PrescribedMotion, ShapeGrowth),
 }
 
 impl ContactPair {
-    pub(super) fn new(parts: PairParts) -> Self {
+    pub(crate) fn new(parts: PairParts) -> Self {
         Self { nodes: parts.gap.members(), parts, prescribed: Prescribed::default(), middle: Default::default() }
     }
 
@@ -92,7 +92,7 @@ impl ContactPair {
     }
 
     /// The gap function, for evaluation.
-    pub(super) fn gap_mut(&mut self) -> &mut GapLaw {
+    pub(crate) fn gap_mut(&mut self) -> &mut GapLaw {
         &mut self.parts.gap
     }
 
@@ -108,7 +108,7 @@ impl ContactPair {
 
     /// Prescribed motion at the last step, or one earlier.
     #[inline(always)]
-    pub(super) fn drive(&self, when: When) -> &PrescribedMotion {
+    pub(crate) fn drive(&self, when: When) -> &PrescribedMotion {
         match when {
             When::Now => &self.prescribed.drive.now,
             When::Before => &self.prescribed.drive.before,
@@ -116,17 +116,17 @@ impl ContactPair {
     }
 
     /// Prescribed motion over the last step.
-    pub(super) fn motion(&self) -> &MotionIncrement {
+    pub(crate) fn motion(&self) -> &MotionIncrement {
         &self.prescribed.motion.now
     }
 
     /// Prescribed motion over the step before the last.
-    pub(super) fn motion_before(&self) -> &MotionIncrement {
+    pub(crate) fn motion_before(&self) -> &MotionIncrement {
         &self.prescribed.motion.before
     }
 
     /// Starts with the prescribed motion `drive`, without earlier motion.
-    pub(super) fn start(&mut self, drive: &PrescribedMotion) {
+    pub(crate) fn start(&mut self, drive: &PrescribedMotion) {
         self.prescribed = Prescribed { drive: Two::new(*drive), motion: Two::default() };
     }
 
@@ -140,35 +140,35 @@ impl ContactPair {
     }
 
     /// Scales the last change of prescribed motion by `ratio`, for another step size.
-    pub(super) fn stretch(&mut self, ratio: f64) {
+    pub(crate) fn stretch(&mut self, ratio: f64) {
         self.prescribed.motion.now = self.prescribed.motion.now.over(ratio);
     }
 
     /// Prescribed motion, as a part of the saved state.
-    pub(super) fn state(&self) -> &impl crate::persist::Persist {
+    pub(crate) fn state(&self) -> &impl crate::persist::Persist {
         &self.prescribed
     }
 
     /// Prescribed motion, to restore it.
-    pub(super) fn state_mut(&mut self) -> &mut impl crate::persist::Persist {
+    pub(crate) fn state_mut(&mut self) -> &mut impl crate::persist::Persist {
         &mut self.prescribed
     }
 
     /// Directions of the frame of a node at a rotor angle (rad); fixed directions if nothing rotates.
     #[inline(always)]
-    pub(super) fn frame(&self, index: usize, rotor_angle: f64) -> PolarFrame {
+    pub(crate) fn frame(&self, index: usize, rotor_angle: f64) -> PolarFrame {
         self.parts.gap.layout().map_or(PolarFrame::FIXED, |layout| PolarFrame::new(layout.angles[index] + rotor_angle))
     }
 
     /// Returns the surface and its carrier; `None` for a rigid surface.
     #[inline(always)]
-    pub(super) fn carried(&self) -> Option<(&SurfaceSpline, SurfaceCarrier)> {
+    pub(crate) fn carried(&self) -> Option<(&SurfaceSpline, SurfaceCarrier)> {
         let carrier = self.parts.carrier?;
         Some((self.parts.gap.spline()?, carrier))
     }
 
     /// Deforms the surface with this factor of its shape and these displacements of the rows of its carrier (m).
-    pub(super) fn bend(&mut self, factor: f64, rows: &[f64]) {
+    pub(crate) fn bend(&mut self, factor: f64, rows: &[f64]) {
         let Some(carrier) = self.parts.carrier else { return };
         let points = self.parts.gap.spline().map_or(0, |surface| surface.control_points().len());
         self.parts.gap.bend(factor, &rows[carrier.first_row..][..3 * points]);
@@ -199,7 +199,7 @@ pub enum When {
 }
 
 /// Interpolates values per row of a carrier at a place on its surface, in the directions of `frame`.
-pub(super) fn at_place(
+pub(crate) fn at_place(
     (surface, carrier): (&SurfaceSpline, SurfaceCarrier),
     place: ClosestPoint,
     frame: PolarFrame,

@@ -19,12 +19,12 @@ persist_fields!(Pulling { touched, pushed, pulled, inside });
 
 impl Pulling {
     /// Allocates data for `nodes` nodes.
-    pub(super) fn new(nodes: usize) -> Self {
+    pub(crate) fn new(nodes: usize) -> Self {
         Self { touched: 0, pushed: vec![0.0; nodes], pulled: vec![0.0; nodes], inside: vec![0.0; nodes] }
     }
 
     /// Resets the record.
-    pub(super) fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.touched = 0;
         self.pushed.fill(0.0);
         self.pulled.fill(0.0);
@@ -71,7 +71,7 @@ impl System {
     }
 
     /// Returns the node of a touching structure that was deepest inside at the end of a step, and the depth as a fraction of its clearance
-    /// ([`GapLaw::clearance`](crate::gaps::GapLaw::clearance)).
+    /// ([`GapLaw::clearance`](crate::geometry::GapLaw::clearance)).
     pub fn left_inside(&self, structure: usize) -> Option<(usize, f64)> {
         self.structures[structure].pulling.inside.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1))
     }

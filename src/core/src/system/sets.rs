@@ -15,7 +15,7 @@ pub struct StructureSets {
 
 impl StructureSets {
     /// Finds the sets; sets with contact nodes come first.
-    pub(super) fn new(structures: &[Structure], pairs: &[ContactPair]) -> Self {
+    pub(crate) fn new(structures: &[Structure], pairs: &[ContactPair]) -> Self {
         let links = pairs.iter().filter_map(|pair| Some((pair.structure(), pair.carrier()?.structure)));
         let number = joined(structures.len(), links);
         let all = 0..structures.len();

@@ -1,7 +1,7 @@
 //! Checks that the state is within the limits of small displacements.
 
 use super::{ContactPair, StepFailure, System};
-use crate::gaps::GapLaw;
+use crate::geometry::GapLaw;
 
 /// Clearances below this fraction of the radius belong to a press fit, in which errors of this size do not matter.
 pub const LEAST_CLEARANCE: f64 = 1e-4;

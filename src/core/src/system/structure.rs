@@ -1,16 +1,16 @@
 //! One structure: its modes, its contact nodes and their history, and the forces on surfaces that it carries.
 
-use crate::dynamics::bank::{BankOptions, LANES, ModalBank};
-use crate::dynamics::modal::ModalModel;
-use crate::dynamics::sectors::{SectorModel, Sectors};
-use crate::galerkin::sector::HALVINGS;
-use crate::galerkin::state::SectorState;
-use crate::gaps::{GapLaw, Geometry, PrescribedMotion, dot};
-use crate::history::ContactHistory;
+use crate::geometry::{GapLaw, Geometry, PrescribedMotion, dot};
+use crate::modes::bank::{BankOptions, LANES, ModalBank};
+use crate::modes::modal::ModalModel;
+use crate::modes::sectors::{SectorModel, Sectors};
 use crate::persist::{Persist, StateReader, StateWriter, persist_fields};
-use crate::settings::Scheme;
-use crate::system::march::Galerkin;
+use crate::scene::method::Scheme;
+use crate::system::history::ContactHistory;
 use crate::system::pulling::Pulling;
+use crate::time::galerkin::sector::HALVINGS;
+use crate::time::galerkin::state::SectorState;
+use crate::time::spans::Galerkin;
 
 /// Penetrations below this count as zero (m): the squares of the resulting values leave the range of double precision, and such
 /// small modes are set to rest.
@@ -19,25 +19,25 @@ const LEAST_PENETRATION: f64 = 1e-150;
 /// A structure of a scene. Rows of its modes are three per contact node, or three per control point of the surfaces it carries.
 #[derive(Debug, Clone)]
 pub struct Structure {
-    pub(super) modes: Sectors,
+    pub(crate) modes: Sectors,
     /// Lanes of a row of the sectors.
     lanes: usize,
     /// Pair of each contact node.
-    pub(super) pair_of: Vec<Option<usize>>,
+    pub(crate) pair_of: Vec<Option<usize>>,
     /// History of the contact nodes.
     pub(crate) history: ContactHistory,
     /// Impulses on the contact nodes, if forces may pull.
-    pub(super) pulling: Pulling,
+    pub(crate) pulling: Pulling,
     /// Smallest gap of each lane (m).
-    pub(super) lowest: Vec<f64>,
+    pub(crate) lowest: Vec<f64>,
     /// Modal contact force on its surfaces found in the last step (N·√kg⁻¹); empty if it carries none.
-    pub(super) delayed: Vec<f64>,
+    pub(crate) delayed: Vec<f64>,
     /// Step control of each sector, for adaptive steps of single sectors.
-    pub(super) step_control: StepControl,
+    pub(crate) step_control: StepControl,
     /// Tables and scratch memory for adaptive steps.
-    pub(super) galerkin: Option<Box<Galerkin>>,
+    pub(crate) galerkin: Option<Box<Galerkin>>,
     /// Smallest gaps within the last span (m), `[node · lanes + lane]`, if the scheme evaluates them; otherwise empty.
-    pub(super) lowest_in_span: Vec<f64>,
+    pub(crate) lowest_in_span: Vec<f64>,
 }
 
 /// State of adaptive steps for all sectors.
@@ -76,7 +76,7 @@ impl StepControl {
 
 impl Structure {
     /// Creates a structure with contact nodes, the pair of each node, and whether one of these pairs finds places on a surface.
-    pub(super) fn touching(
+    pub(crate) fn touching(
         model: SectorModel,
         options: BankOptions,
         pair_of: Vec<Option<usize>>,
@@ -101,7 +101,7 @@ impl Structure {
 
     /// Creates a structure that carries surfaces, whose control points the rows of `model` move; `loads`: with loads in addition
     /// to contact forces.
-    pub(super) fn carrying(model: &ModalModel, loads: bool) -> Self {
+    pub(crate) fn carrying(model: &ModalModel, loads: bool) -> Self {
         let options = BankOptions { loads, flexibility: false, ..BankOptions::default() };
         let modes = Sectors::Uncoupled(ModalBank::with_options(model, 1, options));
         let rows = modes.rows() * modes.lanes();
@@ -140,7 +140,7 @@ impl Structure {
     }
 
     /// Returns the bank of modes, if sectors are not coupled.
-    pub(super) fn bank(&self) -> Option<&ModalBank> {
+    pub(crate) fn bank(&self) -> Option<&ModalBank> {
         self.modes.uncoupled()
     }
 
@@ -194,7 +194,7 @@ impl Structure {
     }
 
     /// Reads the contacts of a sector before a span.
-    pub(super) fn read_contacts(&self, sector: usize, state: &mut SectorState) {
+    pub(crate) fn read_contacts(&self, sector: usize, state: &mut SectorState) {
         for node in 0..self.nodes() {
             let index = self.index(node, sector);
             state.multipliers[node] = self.history.multiplier[index];
@@ -213,7 +213,7 @@ impl Structure {
     }
 
     /// Writes the contacts of a sector after a span, and the smallest gap of each node during the span (m).
-    pub(super) fn write_contacts(&mut self, sector: usize, state: &SectorState, lowest: impl Fn(usize) -> f64) {
+    pub(crate) fn write_contacts(&mut self, sector: usize, state: &SectorState, lowest: impl Fn(usize) -> f64) {
         for (row, slope) in state.slopes.iter().enumerate() {
             self.step_control.slopes[row * self.lanes + sector] = *slope;
         }
@@ -231,13 +231,13 @@ impl Structure {
 
     /// Three components of a node of a sector from an array over rows.
     #[inline(always)]
-    pub(super) fn vector3(&self, rows: &[f64], node: usize, sector: usize) -> [f64; 3] {
+    pub(crate) fn vector3(&self, rows: &[f64], node: usize, sector: usize) -> [f64; 3] {
         let lanes = self.lanes;
         std::array::from_fn(|component| rows[(3 * node + component) * lanes + sector])
     }
 
     /// Starts without earlier contact, from the current modal state.
-    pub(super) fn start(&mut self) {
+    pub(crate) fn start(&mut self) {
         self.modes.recover();
         self.modes.collect_loss();
         self.delayed.fill(0.0);
@@ -251,7 +251,7 @@ impl Structure {
     }
 
     /// Uses gaps and predictions at the start as those of the previous steps.
-    pub(super) fn remember_start(&mut self) {
+    pub(crate) fn remember_start(&mut self) {
         let ContactHistory { gap, predicted, .. } = &mut self.history;
         gap.before.copy_from_slice(&gap.now);
         let rows = predicted.now.len();
@@ -285,7 +285,7 @@ impl Structure {
 
     /// Finds the gaps of the nodes of a pair whose surface has moved.
     #[inline(always)]
-    pub(super) fn find_gaps(&mut self, gap: &mut GapLaw, drive: &PrescribedMotion, moved: &[f64], warm: bool) {
+    pub(crate) fn find_gaps(&mut self, gap: &mut GapLaw, drive: &PrescribedMotion, moved: &[f64], warm: bool) {
         let ContactHistory { gap: gaps, geometry, .. } = &mut self.history;
         let before = warm.then_some(&geometry.before);
         gap.evaluate(drive, self.modes.displacement(), moved, before, &mut geometry.now, &mut gaps.now);
@@ -313,7 +313,7 @@ impl Structure {
 
     /// Returns the first sector from `first` on in which a node penetrates. NaN counts as penetrating, so that the solver reports it.
     #[inline(always)]
-    pub(super) fn touching_from(&self, first: usize) -> Option<usize> {
+    pub(crate) fn touching_from(&self, first: usize) -> Option<usize> {
         // Eight sectors per iteration, most of which are open.
         let open = |gap: &f64| *gap >= -LEAST_PENETRATION;
         let mut start = first;
@@ -339,24 +339,24 @@ impl Structure {
     }
 
     /// Converts the state to another step size under the persistent contact forces.
-    pub(super) fn carry_over(&mut self, scheme: Scheme, step: f64) {
+    pub(crate) fn carry_over(&mut self, scheme: Scheme, step: f64) {
         self.modes.resample(scheme, step, &self.history.passing.lasting);
         self.set_span(step);
     }
 
     /// Instantaneous kinetic and strain energy under the persistent contact forces (J).
-    pub(super) fn energies_now(&mut self) -> (f64, f64) {
+    pub(crate) fn energies_now(&mut self) -> (f64, f64) {
         self.modes.energies_now(&self.history.passing.lasting)
     }
 
     /// Largest displacement of a control point (m).
-    pub(super) fn largest_displacement(&self) -> f64 {
+    pub(crate) fn largest_displacement(&self) -> f64 {
         let moved = self.modes.displacement().as_chunks::<3>().0.iter();
         moved.fold(0.0, |most: f64, moved| most.max(dot(*moved, *moved))).sqrt()
     }
 
     /// Writes everything that determines the future, except the step size.
-    pub(super) fn save(&self, writer: &mut StateWriter) {
+    pub(crate) fn save(&self, writer: &mut StateWriter) {
         self.modes.save(writer);
         self.delayed.save(writer);
         self.step_control.save(writer);
@@ -365,7 +365,7 @@ impl Structure {
     }
 
     /// Reads over a saved state and rejects invalid values; stores its history in `saved`.
-    pub(super) fn check(&self, reader: &mut StateReader, saved: &mut ContactHistory) {
+    pub(crate) fn check(&self, reader: &mut StateReader, saved: &mut ContactHistory) {
         self.modes.check(reader);
         self.delayed.check(reader);
         self.step_control.check(reader);
@@ -375,7 +375,7 @@ impl Structure {
     }
 
     /// Restores a saved state, after the step size has been set.
-    pub(super) fn restore(&mut self, reader: &mut StateReader) {
+    pub(crate) fn restore(&mut self, reader: &mut StateReader) {
         self.modes.restore(reader);
         self.delayed.restore(reader);
         self.step_control.restore(reader);

@@ -6,7 +6,7 @@
 
 use super::pair::When;
 use super::{ContactEvent, StepFailure, System};
-use crate::gaps::dot;
+use crate::geometry::dot;
 
 /// Changes below this count as rounding in any model (m), because no meaningful length is as short.
 const ROUNDING: f64 = 1e-15;
@@ -20,7 +20,7 @@ impl System {
     /// # Errors
     /// [`StepFailure::Unexplained`].
     #[inline(always)]
-    pub(super) fn witness(&self, event: &ContactEvent, moved: [f64; 3], rigid: f64) -> Result<(), StepFailure> {
+    pub(crate) fn witness(&self, event: &ContactEvent, moved: [f64; 3], rigid: f64) -> Result<(), StepFailure> {
         let ContactEvent { structure, node, sector, .. } = *event;
         let of = &self.structures[structure];
         let (index, gaps) = (of.index(node, sector), &of.history.gap);
@@ -41,7 +41,7 @@ impl System {
 
     /// Returns the change of the gaps of a pair over two steps that prescribed motion explains (m): moving inputs, and rotation
     /// under the shape of the casing.
-    pub(super) fn explained_by_drive(&self, pair: usize) -> f64 {
+    pub(crate) fn explained_by_drive(&self, pair: usize) -> f64 {
         let pair = &self.pairs[pair];
         let (drive, motion) = (pair.drive(When::Now), pair.motion().since(pair.motion_before()));
         // The larger of the rotations relative to the casing and to its shape.
@@ -60,9 +60,9 @@ impl System {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dynamics::modal::ModalModel;
-    use crate::gaps::{FixedGap, GapLaw, PrescribedMotion};
-    use crate::settings::{Scheme, Solver};
+    use crate::geometry::{FixedGap, GapLaw, PrescribedMotion};
+    use crate::modes::modal::ModalModel;
+    use crate::scene::method::{Scheme, Solver};
     use crate::system::SystemSettings;
     use nalgebra::DMatrix;
 

@@ -2,9 +2,9 @@
 
 use super::pair::{When, at_place};
 use super::{ContactEvent, StepFailure, System};
-use crate::gaps::wrench::{At, MotionIncrement};
-use crate::gaps::{Geometry, dot};
-use crate::settings::Solver;
+use crate::geometry::wrench::{At, MotionIncrement};
+use crate::geometry::{Geometry, dot};
+use crate::scene::method::Solver;
 
 /// Work of one contact over a step (J).
 #[derive(Debug, Clone, Copy, Default)]
@@ -130,7 +130,7 @@ impl System {
     }
 
     /// Returns the step in which the contacts that acted over the last step were found.
-    pub(super) fn when_acted(&self) -> When {
+    pub(crate) fn when_acted(&self) -> When {
         if self.settings.scheme.acts_later() { When::Before } else { When::Now }
     }
 
@@ -240,7 +240,7 @@ impl System {
 
     /// Half the displacement of a node relative to its surface over the last two steps (m), in the directions of the node.
     #[inline(always)]
-    pub(super) fn relative_motion(&self, event: &ContactEvent, when: When) -> [f64; 3] {
+    pub(crate) fn relative_motion(&self, event: &ContactEvent, when: When) -> [f64; 3] {
         let structure = &self.structures[event.structure];
         let now = structure.vector3(structure.modes().displacement(), event.node, event.sector);
         let oldest = structure.vector3(&structure.history.passing.oldest, event.node, event.sector);

@@ -4,8 +4,8 @@
 
 use crate::guide::print_row;
 use crate::rods::{NEARLY_NONE, SCHEMES, SOLVERS, StraightRod, against_plane, orders, quiet_step, set_samples};
-use tiprub_core::gaps::PrescribedMotion;
-use tiprub_core::settings::{Scheme, Solver};
+use tiprub_core::geometry::PrescribedMotion;
+use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_reference::closed::bouncing_bar::{
     CONTACTS, DENSITY, GRAVITY, HEIGHT, LENGTH, PERIOD, YOUNG, displacement, energy, pressure,
 };

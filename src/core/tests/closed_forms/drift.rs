@@ -5,10 +5,10 @@
 
 use crate::guide::print_row;
 use crate::rods::{NEARLY_NONE, SCHEMES, StraightRod, against_plane, quiet_step, set_samples, single};
-use tiprub_core::dynamics::modal::ModalModel;
-use tiprub_core::gaps::PrescribedMotion;
+use tiprub_core::geometry::PrescribedMotion;
+use tiprub_core::modes::modal::ModalModel;
 use tiprub_core::persist::{Persist, StateReader, StateWriter};
-use tiprub_core::settings::{Scheme, Solver};
+use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::system::System;
 use tiprub_core::{Ledger, Sum};
 

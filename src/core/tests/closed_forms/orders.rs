@@ -4,9 +4,9 @@
 use crate::guide::print_row;
 use crate::rods::{SCHEMES, SOLVERS, against_plane, orders, set_samples, single};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
-use tiprub_core::dynamics::modal::ModalModel;
-use tiprub_core::gaps::PrescribedMotion;
-use tiprub_core::settings::{Scheme, Solver};
+use tiprub_core::geometry::PrescribedMotion;
+use tiprub_core::modes::modal::ModalModel;
+use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_reference::closed::oscillator::{Bilinear, DeadStop};
 
 /// A gap that never closes.

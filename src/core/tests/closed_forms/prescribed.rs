@@ -4,13 +4,14 @@
 use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
-use tiprub_core::dynamics::modal::ModalModel;
-use tiprub_core::dynamics::sectors::SectorModel;
-use tiprub_core::gaps::open::{OpenGap, OpenSurface};
-use tiprub_core::gaps::surface_spline::SurfaceSpline;
-use tiprub_core::gaps::{FixedGap, GapLaw, PrescribedMotion};
-use tiprub_core::rom::WatchedPoints;
-use tiprub_core::settings::{Interpolation, LoadSettings, Scheme, Shape, Solver, SplineSettings};
+use tiprub_core::geometry::open::{OpenGap, OpenSurface};
+use tiprub_core::geometry::surface_spline::SurfaceSpline;
+use tiprub_core::geometry::{FixedGap, GapLaw, PrescribedMotion};
+use tiprub_core::modes::modal::ModalModel;
+use tiprub_core::modes::sectors::SectorModel;
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::rom::WatchedPoints;
+use tiprub_core::scene::settings::{Interpolation, LoadSettings, Shape, SplineSettings};
 use tiprub_core::system::{PairParts, StructureParts, SurfaceCarrier, System, SystemSettings};
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{self as models, element, go, lattice, move_on, real, reference, set, started};

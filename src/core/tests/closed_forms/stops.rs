@@ -2,9 +2,9 @@
 
 use crate::guide::print_row;
 use crate::rods::{SOLVERS, against_plane, set_samples, single};
-use tiprub_core::dynamics::modal::ModalModel;
-use tiprub_core::gaps::PrescribedMotion;
-use tiprub_core::settings::{Scheme, Solver};
+use tiprub_core::geometry::PrescribedMotion;
+use tiprub_core::modes::modal::ModalModel;
+use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::system::System;
 use tiprub_reference::closed::oscillator::{Ball, Bilinear, DeadStop};
 

@@ -4,9 +4,9 @@
 
 use std::f64::consts::TAU;
 
-use tiprub_core::gaps::dot;
-use tiprub_core::gaps::surface_spline::{ClosestPoint, SurfaceSpline};
-use tiprub_core::settings::{Closure, Interpolation};
+use tiprub_core::geometry::dot;
+use tiprub_core::geometry::surface_spline::{ClosestPoint, SurfaceSpline};
+use tiprub_core::scene::settings::{Closure, Interpolation};
 pub use tiprub_test_models::SeededRandom;
 
 pub const RADIUS: f64 = 0.25;

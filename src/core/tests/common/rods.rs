@@ -3,14 +3,14 @@
 #![allow(dead_code, reason = "each test binary uses its part")]
 
 use nalgebra::DMatrix;
-use tiprub_core::dynamics::bank::BankOptions;
-use tiprub_core::dynamics::modal::ModalModel;
-use tiprub_core::dynamics::sectors::SectorModel;
-use tiprub_core::gaps::{FixedGap, GapLaw};
-use tiprub_core::rom::Rom;
-use tiprub_core::schemes::free_increment;
-use tiprub_core::settings::{Scheme, Solver};
-use tiprub_core::stability::massless::{MasslessCheck, QUIET};
+use tiprub_core::geometry::{FixedGap, GapLaw};
+use tiprub_core::limits::massless::{MasslessCheck, QUIET};
+use tiprub_core::modes::bank::BankOptions;
+use tiprub_core::modes::modal::ModalModel;
+use tiprub_core::modes::schemes::free_increment;
+use tiprub_core::modes::sectors::SectorModel;
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::rom::Rom;
 use tiprub_core::system::{System, SystemSettings};
 use tiprub_test_models::{node, structure};
 

@@ -1,6 +1,7 @@
 //! Structures that do not influence each other: each is checked and reported without the others.
 
-use tiprub_core::settings::{BodyMotion, LoadSettings, PatchSettings, Scheme, Shape, Solver, StructureSettings};
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::settings::{BodyMotion, LoadSettings, PatchSettings, Shape, StructureSettings};
 use tiprub_core::{Rom, Scene, Simulation, Warning};
 use tiprub_test_models::{
     RADIUS, coating_of, disk, go, lattice, modal, node, real, rich_blade, ring, ring_of, round, rub, saved, set,

@@ -1,8 +1,9 @@
 //! Optional features: a ledger that closes, states that continue, laws of mechanics.
 
 use crate::checks::{allocates_nothing, disturb, ledger_closes, state_continues};
-use tiprub_core::gaps::PrescribedMotion;
-use tiprub_core::settings::{LoadSettings, PatchSettings, Scheme, Shape, Solver, SplineSettings};
+use tiprub_core::geometry::PrescribedMotion;
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::settings::{LoadSettings, PatchSettings, Shape, SplineSettings};
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{self as models, coating, element, flexible, go, real, saved, set, started, try_started};
 

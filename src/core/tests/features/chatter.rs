@@ -4,7 +4,7 @@
 use std::f64::consts::TAU;
 
 use nalgebra::{Complex, ComplexField};
-use tiprub_core::settings::{CoatingSettings, CuttingSettings};
+use tiprub_core::scene::settings::{CoatingSettings, CuttingSettings};
 use tiprub_core::{Rom, Scene};
 use tiprub_test_models::{self as models, element, go, move_on, started};
 

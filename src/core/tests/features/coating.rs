@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use tiprub_core::laws::coating::{BladeTip, CoatedProblem, Coating};
-use tiprub_core::settings::CoatingSettings;
+use tiprub_core::contact::coating::{BladeTip, CoatedProblem, Coating};
+use tiprub_core::scene::settings::CoatingSettings;
 use tiprub_test_models::{self as models, go, real, started};
 
 use crate::counting::allocations_of;

@@ -1,6 +1,6 @@
 //! Slopes of the tip contour in a ROM, against its positions.
 
-use tiprub_core::settings::Meridian;
+use tiprub_core::scene::settings::Meridian;
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models as models;
 

@@ -3,7 +3,8 @@
 
 use std::f64::consts::TAU;
 
-use tiprub_core::settings::{CoatingSettings, CuttingSettings, Scheme, Shape, Solver};
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::settings::{CoatingSettings, CuttingSettings, Shape};
 use tiprub_core::{Rom, Scene};
 use tiprub_test_models::{self as models, element, go, move_on, real, started};
 

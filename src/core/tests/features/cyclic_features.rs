@@ -4,8 +4,9 @@
 use crate::checks::{allocates_nothing, disturb, ledger_closes, state_continues};
 use nalgebra::Complex;
 use proptest::prelude::*;
-use tiprub_core::rom::{Harmonic, Rom};
-use tiprub_core::settings::{LoadSettings, PatchSettings, Scheme, Shape, Solver, SplineSettings};
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::rom::{Harmonic, Rom};
+use tiprub_core::scene::settings::{LoadSettings, PatchSettings, Shape, SplineSettings};
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{
     self as models, coating,
@@ -257,7 +258,7 @@ fn a_change_of_step_keeps_the_order_of_the_scheme() {
                 bank.set_modal_state(n, mode, [amplitude, -0.5 * amplitude], [0.1 * amplitude, 0.0]);
             }
         }
-        let drive = tiprub_core::gaps::PrescribedMotion { speed: 1300.0, ..Default::default() };
+        let drive = tiprub_core::geometry::PrescribedMotion { speed: 1300.0, ..Default::default() };
         system.start(&[drive]);
         for step in steps {
             system.set_step(*step);

@@ -3,8 +3,9 @@
 use std::f64::consts::TAU;
 
 use nalgebra::Complex;
-use tiprub_core::dynamics::modal::ModalModel;
-use tiprub_core::settings::{ExcitationSettings, ForceDirection, InputInterpolation, Scheme, Solver};
+use tiprub_core::modes::modal::ModalModel;
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::settings::{ExcitationSettings, ForceDirection, InputInterpolation};
 use tiprub_core::{Rom, Scene, Simulation};
 use tiprub_test_models::{self as models, bits, disk::TestDisk, go, real, saved, set, started};
 

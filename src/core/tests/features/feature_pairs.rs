@@ -7,8 +7,9 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use nalgebra::DMatrix;
-use tiprub_core::rom::{STRESSES, SUPPORT_ROWS, SupportRows, Thermal, ThermalPatch, WatchedPoints};
-use tiprub_core::settings::{CuttingSettings, ExcitationSettings, Scheme, Solver};
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::rom::{STRESSES, SUPPORT_ROWS, SupportRows, Thermal, ThermalPatch, WatchedPoints};
+use tiprub_core::scene::settings::{CuttingSettings, ExcitationSettings};
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{self as models, bits, disk::TestDisk, go, lattice, real, saved, set, started};
 

@@ -2,9 +2,10 @@
 
 use std::f64::consts::TAU;
 
-use tiprub_core::dynamics::cyclic::CyclicModel;
-use tiprub_core::dynamics::modal::ModalModel;
-use tiprub_core::settings::{InitialSettings, Scheme};
+use tiprub_core::modes::cyclic::CyclicModel;
+use tiprub_core::modes::modal::ModalModel;
+use tiprub_core::scene::method::Scheme;
+use tiprub_core::scene::settings::InitialSettings;
 use tiprub_core::{Rom, Scene, Simulation};
 use tiprub_test_models::{self as models, disk::TestDisk, go, real, set_element, started};
 

@@ -1,6 +1,7 @@
 //! Scenes of several structures and pairs: each behaves as it does alone, and together they close the energy balance.
 
-use tiprub_core::settings::{BodyMotion, Scheme, Shape, Solver, StructureSettings};
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::settings::{BodyMotion, Shape, StructureSettings};
 use tiprub_core::variables::{Causality, DataType};
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{lattice, real, rich_blade, rub, several, spin};
@@ -117,7 +118,7 @@ fn energy_balance_of_two_rotors_in_one_casing_closes() {
         let simulation = run_closing(&scene, 80, 3.7e-4, |simulation, finished| {
             let system = simulation.system();
             // Modal forces on the ring equal those of the contacts at their points.
-            let tiprub_core::dynamics::sectors::Sectors::Uncoupled(bank) = system.structures()[2].modes() else {
+            let tiprub_core::modes::sectors::Sectors::Uncoupled(bank) = system.structures()[2].modes() else {
                 panic!("the ring is one structure")
             };
             let mut expected = vec![0.0; bank.modes()];
@@ -352,7 +353,7 @@ fn rejects_incompatible_combinations_by_name() {
         "contact[2].solver: requires the solver of contact[1]: all contacts of a scene use the same solver",
     );
     let mut scene = both.clone();
-    scene.settings.contacts[1].coating = Some(tiprub_core::settings::CoatingSettings {
+    scene.settings.contacts[1].coating = Some(tiprub_core::scene::settings::CoatingSettings {
         thickness: 1e-4,
         modulus: 2e8,
         yield_stress: 1e6,

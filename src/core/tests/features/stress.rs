@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 
 use nalgebra::DMatrix;
-use tiprub_core::rom::{STRESSES, Thermal, ThermalPatch, WatchedPoints};
-use tiprub_core::settings::Shape;
+use tiprub_core::scene::rom::{STRESSES, Thermal, ThermalPatch, WatchedPoints};
+use tiprub_core::scene::settings::Shape;
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{self as models, element, go, set, started};
 

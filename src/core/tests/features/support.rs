@@ -2,8 +2,9 @@
 //! other.
 
 use nalgebra::DMatrix;
-use tiprub_core::rom::{SUPPORT_ROWS, SupportRows};
-use tiprub_core::settings::{Scheme, Shape};
+use tiprub_core::scene::method::Scheme;
+use tiprub_core::scene::rom::{SUPPORT_ROWS, SupportRows};
+use tiprub_core::scene::settings::Shape;
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{self as models, element, go, move_on, real, set, started};
 

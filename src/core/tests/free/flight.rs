@@ -1,7 +1,8 @@
 //! Free masters: flight, impact, sliding between two surfaces; laws of mechanics, and states that continue.
 
 use lattice::*;
-use tiprub_core::settings::*;
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::settings::*;
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{element, go, lattice, real, saved, started};
 
@@ -54,7 +55,7 @@ fn displacement_limit_scales_with_the_smallest_surface() {
 
 fn largest_of_pairs(scene: &Scene) -> Vec<f64> {
     let largest = |pair: &tiprub_core::system::ContactPair| match pair.gap() {
-        tiprub_core::gaps::GapLaw::Open(gap) => gap.largest(),
+        tiprub_core::geometry::GapLaw::Open(gap) => gap.largest(),
         other => panic!("{other:?}"),
     };
     started(scene).system().pairs().iter().map(largest).collect()

@@ -4,7 +4,7 @@ use crate::counting::allocations_of;
 use crate::guide::{self, print_row};
 use lattice::*;
 use nalgebra::DMatrix;
-use tiprub_core::settings::*;
+use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::{Rom, Scene, Simulation};
 use tiprub_test_models::{bits, go, lattice, node, real, saved, started, structure};
 

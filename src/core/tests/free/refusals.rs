@@ -1,7 +1,8 @@
 //! Errors of scenes with a free master, before and during the flight.
 
 use lattice::*;
-use tiprub_core::settings::*;
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::settings::*;
 use tiprub_core::{Rom, Scene, Simulation};
 use tiprub_test_models::{go, lattice, real, started};
 

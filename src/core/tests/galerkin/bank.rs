@@ -2,7 +2,8 @@
 
 use super::{SECTORS, scene};
 use crate::guide::{self, print_row};
-use tiprub_core::settings::{Scheme, Shape};
+use tiprub_core::scene::method::Scheme;
+use tiprub_core::scene::settings::Shape;
 use tiprub_test_models::{go, real, set, started};
 
 /// Undamped, frictionless blades are squeezed by a round casing, and then vibrate against it.

@@ -2,7 +2,8 @@
 //! points.
 
 use super::{H, SECTORS, run, scene};
-use tiprub_core::settings::{Scheme, Shape};
+use tiprub_core::scene::method::Scheme;
+use tiprub_core::scene::settings::Shape;
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::disk::TestDisk;
 use tiprub_test_models::{GAP, element, go, real, set, started};

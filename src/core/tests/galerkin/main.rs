@@ -11,7 +11,8 @@ mod sticking;
 
 use counting::allocations_of;
 use guide::print_row;
-use tiprub_core::settings::{LoadSettings, OutputSettings, Scheme, Shape, SplineSettings, TimeSettings};
+use tiprub_core::scene::method::Scheme;
+use tiprub_core::scene::settings::{LoadSettings, OutputSettings, Shape, SplineSettings, TimeSettings};
 use tiprub_core::{Rom, Scene, Simulation};
 use tiprub_test_models::disk::TestDisk;
 use tiprub_test_models::{

@@ -3,7 +3,8 @@
 
 use super::{Combination, H, apart, disk_displacements, goes_on_with_the_same_bits, run, scene, scene_time, still};
 use crate::guide::{self, print_row};
-use tiprub_core::settings::{Scheme, Shape, Solver, TimeSettings};
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::settings::{Shape, TimeSettings};
 use tiprub_core::{Rom, Scene};
 use tiprub_test_models::disk::TestDisk;
 use tiprub_test_models::{GAP, RADIUS, bumps, flexible, go, modal, node, real, started};

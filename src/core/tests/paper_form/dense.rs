@@ -1,10 +1,10 @@
 //! The paper's equations with dense matrices against the modal form of the core: equal results.
 
 use nalgebra::{DMatrix, DVector};
-use tiprub_core::dynamics::modal::ModalModel;
-use tiprub_core::gaps::{FixedGap, GapLaw, PrescribedMotion, dot};
-use tiprub_core::rom::Rom;
-use tiprub_core::settings::{Scheme, Solver};
+use tiprub_core::geometry::{FixedGap, GapLaw, PrescribedMotion, dot};
+use tiprub_core::modes::modal::ModalModel;
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::rom::Rom;
 use tiprub_core::system::{System, SystemSettings};
 use tiprub_reference::paper::DenseFilm;
 use tiprub_test_models::{SeededRandom, node, structure};

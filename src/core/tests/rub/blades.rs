@@ -1,6 +1,7 @@
 //! Twelve blades in a round casing, and helpers for tests.
 
-use tiprub_core::settings::{Scheme, Shape, TimeSettings};
+use tiprub_core::scene::method::Scheme;
+use tiprub_core::scene::settings::{Shape, TimeSettings};
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{self as models, real};
 

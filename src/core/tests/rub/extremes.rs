@@ -1,7 +1,8 @@
 //! Extreme cases: each gives a correct answer or an error that states the reason.
 
 use proptest::prelude::*;
-use tiprub_core::settings::{LoadSettings, Scheme, Shape, SplineSettings};
+use tiprub_core::scene::method::Scheme;
+use tiprub_core::scene::settings::{LoadSettings, Shape, SplineSettings};
 use tiprub_core::variables::{Causality, DataType, Variability};
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{self as models, disk, go, lattice, real, reference, started};

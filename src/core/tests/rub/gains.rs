@@ -1,7 +1,7 @@
 //! Spurious energy gains end a run with a specific error: friction that feeds a vibration, impacts that gain energy,
 //! nodes that stay inside, and curvature work that changes the sign of a result.
 
-use tiprub_core::settings::{Scheme, Solver};
+use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::{Result, Scene, Simulation};
 use tiprub_test_models::{self as models, GAP, move_on, real, started};
 

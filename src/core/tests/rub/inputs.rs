@@ -1,6 +1,6 @@
 //! Inputs between communication points: inputs that move or load a structure never jump unless the scene requests it.
 
-use tiprub_core::settings::{BodyMotion, InputInterpolation, LoadSettings, Shape, StructureSettings};
+use tiprub_core::scene::settings::{BodyMotion, InputInterpolation, LoadSettings, Shape, StructureSettings};
 use tiprub_core::{Rom, Scene, Simulation};
 use tiprub_test_models::{self as models, go, real, reference, saved, set, slope, started, started_at};
 

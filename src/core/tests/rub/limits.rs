@@ -2,8 +2,9 @@
 
 use crate::blades::{crowded, energy, on_a_ring, round, with_step};
 use nalgebra::DMatrix;
-use tiprub_core::dynamics::modal::ModalModel;
-use tiprub_core::settings::{ExcitationSettings, Scheme, Solver};
+use tiprub_core::modes::modal::ModalModel;
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::settings::ExcitationSettings;
 use tiprub_core::warning::Topic;
 use tiprub_core::{Error, Scene, Simulation};
 use tiprub_test_models::{self as models, bits, disk, go, real, reference, saved, set, try_started};
@@ -340,7 +341,7 @@ fn remedies_are_compatible_with_the_preset() {
     let reported = |scene: &Scene| try_started(scene).unwrap_err().to_string();
     let plain = reported(&scene);
     assert!(plain.contains("`time.step`") && plain.contains("modal-exact"), "{plain}");
-    scene.settings.preset = tiprub_core::settings::Preset::Paper;
+    scene.settings.preset = tiprub_core::scene::settings::Preset::Paper;
     scene.settings.contacts[0].solver = Solver::Film;
     let paper = reported(&scene);
     assert!(paper.contains("remove `preset`") && !paper.contains("modal-exact"), "{paper}");

@@ -2,9 +2,10 @@
 //! ends a run if they are too large.
 
 use nalgebra::DMatrix;
-use tiprub_core::dynamics::modal::ModalModel;
-use tiprub_core::rom::DisplacementFrame;
-use tiprub_core::settings::{Preset, Scheme, Solver};
+use tiprub_core::modes::modal::ModalModel;
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::rom::DisplacementFrame;
+use tiprub_core::scene::settings::Preset;
 use tiprub_core::{Result, Scene, Simulation, Warning};
 use tiprub_test_models::{self as models, reference, saved, set, try_started};
 

@@ -3,7 +3,8 @@
 use crate::blades::{crowded, energy, on_a_ring, round, with_step};
 use nalgebra::DMatrix;
 use proptest::prelude::*;
-use tiprub_core::settings::{CoatingSettings, Scheme, Solver, SplineSettings};
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::settings::{CoatingSettings, SplineSettings};
 use tiprub_core::{Result, Scene, Simulation};
 use tiprub_test_models::{self as models, bits, go, real, reference, saved, set, try_started};
 

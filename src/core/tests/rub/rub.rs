@@ -1,7 +1,8 @@
 //! A rub of a synthetic bladed disk through the whole simulation: energy balance, states, time, steps.
 
 use tiprub_core::Simulation;
-use tiprub_core::settings::{Scheme, Shape};
+use tiprub_core::scene::method::Scheme;
+use tiprub_core::scene::settings::Shape;
 use tiprub_core::variables::Causality;
 use tiprub_test_models::{self as models, go, real, reference, saved, started};
 

@@ -1,10 +1,10 @@
 //! Spin in modal coordinates against closed forms, and in scenes whose speed changes.
 
 use nalgebra::DMatrix;
-use tiprub_core::dynamics::bank::{BankOptions, ModalBank};
-use tiprub_core::dynamics::modal::{ModalModel, ModalSpin};
-use tiprub_core::schemes::free_increment;
-use tiprub_core::settings::Scheme;
+use tiprub_core::modes::bank::{BankOptions, ModalBank};
+use tiprub_core::modes::modal::{ModalModel, ModalSpin};
+use tiprub_core::modes::schemes::free_increment;
+use tiprub_core::scene::method::Scheme;
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{self as models, real, saved, set, slope, started};
 

@@ -4,7 +4,8 @@
 use std::collections::BTreeMap;
 
 use tiprub_core::persist::fingerprint;
-use tiprub_core::settings::{LoadSettings, Scheme, Shape, Solver, SplineSettings};
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::settings::{LoadSettings, Shape, SplineSettings};
 use tiprub_core::variables::{Causality, Variability};
 use tiprub_core::{Error, Scene, Simulation};
 use tiprub_test_models::{self as models, bits, coating, disk, flexible, go, lattice, real, reference, saved, started};

@@ -6,7 +6,8 @@ use std::collections::BTreeMap;
 
 use crate::guide;
 use crate::guide::print_row;
-use tiprub_core::settings::{LoadSettings, Scheme, Solver, SplineSettings, TimeSettings};
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::settings::{LoadSettings, SplineSettings, TimeSettings};
 use tiprub_core::variables::{Causality, DataType, Variability};
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{self as models, bits, coating, disk, flexible, go, real, reference, saved, set};

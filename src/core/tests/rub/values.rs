@@ -1,7 +1,7 @@
 //! Implausible values of a scene and of a ROM: rejected by name, or questioned.
 
 use nalgebra::DMatrix;
-use tiprub_core::settings::Shape;
+use tiprub_core::scene::settings::Shape;
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{self as models, started};
 

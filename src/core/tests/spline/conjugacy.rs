@@ -1,9 +1,10 @@
 //! Consistency of forces, moments and work: the normal is the gradient of the gap, the torque is conjugate to the rotor
 //! angle, every input has its work, and the forces on master and slave are opposite.
 
-use tiprub_core::gaps::wrench::{At, MotionIncrement};
-use tiprub_core::gaps::{GapLaw, PrescribedMotion};
-use tiprub_core::settings::{PatchSettings, Scheme, Shape, Solver, SplineSettings};
+use tiprub_core::geometry::wrench::{At, MotionIncrement};
+use tiprub_core::geometry::{GapLaw, PrescribedMotion};
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::settings::{PatchSettings, Shape, SplineSettings};
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{self as models, coating, disk, flexible, real, started};
 
@@ -108,7 +109,7 @@ fn looked(
     lanes: usize,
     drive: &PrescribedMotion,
     displacement: &[f64],
-) -> (f64, [f64; 3], Vec<tiprub_core::gaps::surface_spline::ClosestPoint>) {
+) -> (f64, [f64; 3], Vec<tiprub_core::geometry::surface_spline::ClosestPoint>) {
     let mut geometry = law.geometry(lanes);
     let mut gap = vec![f64::INFINITY; law.nodes() * lanes];
     law.evaluate(drive, displacement, &[], None, &mut geometry, &mut gap);

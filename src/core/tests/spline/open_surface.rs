@@ -3,9 +3,9 @@
 #![allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 
 use crate::casings::{SeededRandom, assert_below, distance};
-use tiprub_core::gaps::dot;
-use tiprub_core::gaps::surface_spline::{ClosestPoint, Projection, SurfaceSpline};
-use tiprub_core::settings::Interpolation;
+use tiprub_core::geometry::dot;
+use tiprub_core::geometry::surface_spline::{ClosestPoint, Projection, SurfaceSpline};
+use tiprub_core::scene::settings::Interpolation;
 use tiprub_reference::surface::{SplineSurface, SurfaceKind};
 
 const KINDS: [Interpolation; 2] = [Interpolation::Spline, Interpolation::Facets];

@@ -6,9 +6,9 @@ use std::f64::consts::TAU;
 
 use crate::casings::*;
 use crate::guide::print_row;
-use tiprub_core::gaps::dot;
-use tiprub_core::gaps::surface_spline::{ClosestPoint, Evaluation, REACH, SurfaceSpline};
-use tiprub_core::settings::{Closure, Interpolation};
+use tiprub_core::geometry::dot;
+use tiprub_core::geometry::surface_spline::{ClosestPoint, Evaluation, REACH, SurfaceSpline};
+use tiprub_core::scene::settings::{Closure, Interpolation};
 
 #[test]
 fn weights_sum_to_one_and_are_the_derivative_of_the_point() {

@@ -2,7 +2,7 @@
 //! the format of the first release.
 
 use nalgebra::DMatrix;
-use tiprub_core::rom::{
+use tiprub_core::scene::rom::{
     ContactGrid, ContactNode, ReductionBasis, RomExtras, STRESSES, SUPPORT_ROWS, Spin, SupportRows, Thermal,
     ThermalPatch, WatchedPoints,
 };

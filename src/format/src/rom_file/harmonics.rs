@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use nalgebra::{Complex, DMatrix};
 use tiprub_core::Rom;
-use tiprub_core::rom::Harmonic;
+use tiprub_core::scene::rom::Harmonic;
 
 use super::{Array, Arrays, RomReader, WRITE_AGAIN, list};
 use crate::Result;

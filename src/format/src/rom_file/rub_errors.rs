@@ -1,6 +1,6 @@
 //! Rub errors of a reduction, if they have been determined.
 
-use tiprub_core::rom::RubErrors;
+use tiprub_core::scene::rom::RubErrors;
 
 use super::{Metadata, RomReader};
 use crate::{Result, suggestion};

@@ -1,6 +1,6 @@
 //! A scene that sets every optional key.
 
-use tiprub_core::settings::*;
+use tiprub_core::scene::settings::*;
 
 /// Returns a scene with one item of every kind.
 pub fn complete_scene() -> SceneSettings {

@@ -1,6 +1,6 @@
 //! A scene with features that most scenes do not use.
 
-use tiprub_core::settings::*;
+use tiprub_core::scene::settings::*;
 
 use crate::common::complete_scene;
 

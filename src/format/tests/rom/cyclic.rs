@@ -6,7 +6,7 @@ use crate::loose::{Loose, numbers};
 use nalgebra::{Complex, DMatrix};
 use proptest::prelude::*;
 use tiprub_core::Rom;
-use tiprub_core::rom::{DisplacementFrame, Harmonic, RomChecks, RomExtras};
+use tiprub_core::scene::rom::{DisplacementFrame, Harmonic, RomChecks, RomExtras};
 use tiprub_format::{read_rom, write_rom};
 use tiprub_test_models::{node, structure};
 

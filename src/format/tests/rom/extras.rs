@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use proptest::prelude::*;
 use sha2::{Digest, Sha256};
 use tiprub_core::Rom;
-use tiprub_core::rom::{
+use tiprub_core::scene::rom::{
     ContactGrid, ContactNode, DisplacementFrame, ReductionBasis, RubErrors, Spin, SupportRows, Thermal, ThermalPatch,
     WatchedPoints,
 };

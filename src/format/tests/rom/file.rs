@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 use proptest::prelude::*;
 use tiprub_core::Rom;
-use tiprub_core::rom::{ContactNode, DisplacementFrame, RomChecks};
+use tiprub_core::scene::rom::{ContactNode, DisplacementFrame, RomChecks};
 use tiprub_format::{Error, read_rom, write_rom};
 
 use crate::cyclic::disks;
@@ -44,7 +44,7 @@ fn random_rom(seed: u64, order: usize, nodes: usize, modes: usize, text: String)
             nodal_diameters: Vec::new(),
             ..RomChecks::default()
         },
-        extras: tiprub_core::rom::RomExtras::default(),
+        extras: tiprub_core::scene::rom::RomExtras::default(),
     }
 }
 

@@ -1,6 +1,7 @@
 //! Keys of flexible casings, coatings, spin and heat: written only if used, rejected where they do not fit.
 
-use tiprub_core::settings::*;
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::settings::*;
 use tiprub_format::{FIELDS, parse_scene, write_scene};
 
 use crate::common;

@@ -1,7 +1,8 @@
 //! The scheme of a scene file without one: chosen when the file is read, with the reason.
 
 use tiprub_core::Rom;
-use tiprub_core::settings::{ADAPTIVE_STEP, SceneSettings, Scheme};
+use tiprub_core::scene::method::Scheme;
+use tiprub_core::scene::settings::{ADAPTIVE_STEP, SceneSettings};
 use tiprub_format::{Error, parse_scene, read_scene, write_scene};
 use tiprub_test_models::{blade, disk::TestDisk, rich_blade};
 

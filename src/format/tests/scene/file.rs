@@ -1,7 +1,8 @@
 //! Scene files: round trips, and the message for every kind of mistake.
 
 use proptest::prelude::*;
-use tiprub_core::settings::*;
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::settings::*;
 use tiprub_format::{Error, load_settings, parse_scene, write_scene};
 
 use crate::common;

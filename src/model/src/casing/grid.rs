@@ -2,7 +2,7 @@
 
 use core::f64::consts::TAU;
 
-use tiprub_core::rom::{ContactGrid, ContactNode};
+use tiprub_core::scene::rom::{ContactGrid, ContactNode};
 
 use crate::inner_surface::{InnerSurface, SurfacePoint};
 use crate::mesh::Mesh;

@@ -2,7 +2,7 @@
 
 use faer::Mat;
 use nalgebra::DMatrix;
-use tiprub_core::rom::{SUPPORT_ROWS, SupportRows};
+use tiprub_core::scene::rom::{SUPPORT_ROWS, SupportRows};
 
 use super::modal_form::ModalForm;
 use crate::assembly::Assembled;

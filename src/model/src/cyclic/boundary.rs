@@ -2,7 +2,7 @@
 
 use core::f64::consts::TAU;
 
-use tiprub_core::rom::MAX_SECTORS;
+use tiprub_core::scene::rom::MAX_SECTORS;
 
 use super::CyclicBoundary;
 use crate::{Error, Result};

@@ -1,6 +1,6 @@
 //! Eqs 12 and 13 over all nodal diameters: the checks of the ROM, and their convergence with the number of modes.
 
-use tiprub_core::rom::RomChecks;
+use tiprub_core::scene::rom::RomChecks;
 
 use super::component::Component;
 use super::{ConvergenceRow, NodalDiameter};

@@ -3,7 +3,7 @@
 use faer::{Mat, MatRef, c64};
 use nalgebra::{Complex, DMatrix};
 use tiprub_core::Rom;
-use tiprub_core::rom::{ContactNode, DisplacementFrame, Harmonic, RomExtras};
+use tiprub_core::scene::rom::{ContactNode, DisplacementFrame, Harmonic, RomExtras};
 
 use super::component::{self, Component, ComponentModes, RequestedModes};
 use super::condense::Condensed;
@@ -26,7 +26,7 @@ struct DiameterReduction {
 ///
 /// The reduced coordinates of nodal diameter n are the radial, tangential and axial displacements of the contact
 /// nodes or patches, one by one, then the modes (for free-interface modes, the modes of their parts with the contact
-/// held), so `contact_map` is \[I 0\]; [`tiprub_core::rom::Harmonic`] describes how they determine the displacements
+/// held), so `contact_map` is \[I 0\]; [`tiprub_core::scene::rom::Harmonic`] describes how they determine the displacements
 /// of sector s. A disk without clamped nodes keeps its rigid-body modes, in nodal diameters 0 and 1. The bits of the
 /// result do not depend on the number of threads.
 ///

@@ -12,7 +12,7 @@
 use std::sync::Arc;
 
 use nalgebra::Matrix3;
-use tiprub_core::rom::DisplacementFrame;
+use tiprub_core::scene::rom::DisplacementFrame;
 
 use super::{CyclicBoundary, boundary::turned};
 use crate::assembly::free_dofs;

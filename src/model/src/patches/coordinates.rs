@@ -18,7 +18,7 @@ use std::sync::Arc;
 
 use faer::Mat;
 use nalgebra::{DMatrix, Matrix3};
-use tiprub_core::rom::DisplacementFrame;
+use tiprub_core::scene::rom::DisplacementFrame;
 
 use crate::contact_point::{ContactPoint, clamped_point};
 use crate::sparse::{Pattern, SparseMatrix};

@@ -2,7 +2,7 @@
 
 use core::f64::consts::TAU;
 
-use tiprub_core::rom::DisplacementFrame;
+use tiprub_core::scene::rom::DisplacementFrame;
 
 use super::outcome::rotated;
 use crate::Result;

@@ -4,7 +4,7 @@
 use faer::Mat;
 use nalgebra::DMatrix;
 use tiprub_core::Rom;
-use tiprub_core::rom::{ContactNode, DisplacementFrame, RomChecks, RomExtras};
+use tiprub_core::scene::rom::{ContactNode, DisplacementFrame, RomChecks, RomExtras};
 
 use super::{ContactPoint, Mode, Reduction, ReductionKind, ReductionOptions};
 use crate::Result;

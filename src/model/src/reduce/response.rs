@@ -7,7 +7,7 @@
 
 use faer::Mat;
 use nalgebra::DMatrix;
-use tiprub_core::rom::{DisplacementFrame, RomChecks};
+use tiprub_core::scene::rom::{DisplacementFrame, RomChecks};
 
 use super::FullModes;
 use crate::sparse::{SparseMatrix, add_tall, tall_product};

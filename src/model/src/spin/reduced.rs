@@ -3,7 +3,7 @@
 
 use faer::{Mat, MatRef};
 use nalgebra::DMatrix;
-use tiprub_core::rom::Spin;
+use tiprub_core::scene::rom::Spin;
 
 use super::{Rotating, SpinningState, static_growth, stiffness_at, turned_about_axis};
 use crate::craig_bampton::{CraigBampton, dense_modes};

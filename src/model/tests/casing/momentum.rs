@@ -3,8 +3,8 @@
 //! is shared.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
-use tiprub_core::rom::SupportRows as Rows;
-use tiprub_core::settings::{Scheme, Solver};
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::rom::SupportRows as Rows;
 use tiprub_core::{Rom, Scene, Simulation};
 use tiprub_model::assembly::{assemble, free_dofs};
 use tiprub_model::casing::{

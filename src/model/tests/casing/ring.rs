@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 use std::sync::OnceLock;
 
 use crate::common::casing::{coarse, heated};
-use tiprub_core::rom::ContactGrid;
+use tiprub_core::scene::rom::ContactGrid;
 use tiprub_model::casing::{
     CLAMPED, ContactRings, Flange, InnerContour, RingCounts, RingGeometry, RingSupport, casing37_contour,
     supported_ring,

@@ -1,7 +1,7 @@
 //! Checks of a cyclic reduction, choice of modes, and properties of its matrices.
 
 use crate::common::disk::{COARSE, CellCounts, boundary, copies, model, options, pencils, sector, tips};
-use tiprub_core::rom::{DisplacementFrame, RomChecks};
+use tiprub_core::scene::rom::{DisplacementFrame, RomChecks};
 use tiprub_model::Material;
 use tiprub_model::cyclic::{
     CyclicOptions, CyclicReduction, ModeSelection, SMALLEST_GAP, WHEEL_MODES, reduce_cyclic, whole_disk,

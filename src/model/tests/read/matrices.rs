@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use tempfile::TempDir;
 use tiprub_core::Rom;
-use tiprub_core::rom::DisplacementFrame;
+use tiprub_core::scene::rom::DisplacementFrame;
 use tiprub_model::progress::silent;
 use tiprub_model::read::{
     ContactChoice, EngineAxis, Imported, MatrixFiles, MeshOptions, Units, choose_contact_nodes, read_matrices,

@@ -3,7 +3,7 @@
 use crate::guide::print_row;
 use nalgebra::DMatrix;
 use tiprub_core::Rom;
-use tiprub_core::rom::DisplacementFrame;
+use tiprub_core::scene::rom::DisplacementFrame;
 use tiprub_model::cube::{
     CubeOptions, MassMatrix, RingOptions, RingSide, cube_material, cube_of, reduce_cube, reduce_cube_ring, ring_grid,
     ring_material, ring_of,

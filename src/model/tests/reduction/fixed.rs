@@ -4,7 +4,7 @@ use crate::common::{dense, distorted_box, nodes_at, steel, straight_box, wobble}
 use faer::Mat;
 use nalgebra::DMatrix;
 use proptest::prelude::*;
-use tiprub_core::rom::DisplacementFrame;
+use tiprub_core::scene::rom::DisplacementFrame;
 use tiprub_model::assembly::{assemble, free_dofs};
 use tiprub_model::craig_bampton::{craig_bampton, dense_modes};
 use tiprub_model::eigen::lowest_modes;

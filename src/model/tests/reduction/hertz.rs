@@ -4,9 +4,9 @@
 use crate::guide::print_row;
 use nalgebra::DMatrix;
 use tiprub_core::Rom;
-use tiprub_core::dynamics::modal::{ModalModel, NodePair};
-use tiprub_core::gaps::{FixedGap, GapLaw, PrescribedMotion};
-use tiprub_core::settings::{Scheme, Solver};
+use tiprub_core::geometry::{FixedGap, GapLaw, PrescribedMotion};
+use tiprub_core::modes::modal::{ModalModel, NodePair};
+use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::system::{System, SystemSettings};
 use tiprub_model::assembly::assemble_with;
 use tiprub_model::craig_bampton::craig_bampton;

@@ -4,7 +4,7 @@ use crate::guide::print_row;
 
 use crate::common::{dense, distorted_box, nodes_at, steel, straight_box, wobble};
 use nalgebra::DMatrix;
-use tiprub_core::rom::DisplacementFrame;
+use tiprub_core::scene::rom::DisplacementFrame;
 use tiprub_model::assembly::{assemble, free_dofs};
 use tiprub_model::craig_bampton::dense_modes;
 use tiprub_model::element::ElementKind;

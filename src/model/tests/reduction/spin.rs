@@ -3,7 +3,7 @@
 use crate::common::{blade_steel, distorted_box, nodes_at, straight_box, wobble};
 use faer::Mat;
 use nalgebra::DMatrix;
-use tiprub_core::rom::DisplacementFrame;
+use tiprub_core::scene::rom::DisplacementFrame;
 use tiprub_model::assembly::{Assembled, assemble, free_dofs};
 use tiprub_model::craig_bampton::dense_modes;
 use tiprub_model::element::ElementKind;

@@ -2,10 +2,8 @@
 //! with such a ROM show the effect of coarser patches.
 
 use nalgebra::{ComplexField, DMatrix};
-use tiprub_core::{
-    Rom,
-    rom::{ContactNode, DisplacementFrame, Harmonic},
-};
+use tiprub_core::Rom;
+use tiprub_core::scene::rom::{ContactNode, DisplacementFrame, Harmonic};
 
 /// Returns the ROM with every other patch along the chord, each extended by half of both neighbours.
 ///

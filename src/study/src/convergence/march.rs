@@ -3,7 +3,8 @@
 use std::iter::zip;
 
 use nalgebra::DMatrix;
-use tiprub_core::{Rom, Scene, rom::ContactNode};
+use tiprub_core::scene::rom::ContactNode;
+use tiprub_core::{Rom, Scene};
 
 use super::coarsen::{COMMON, common};
 use crate::error::{

@@ -1,7 +1,9 @@
 //! Assigns the contact nodes of a refined model to contact pairs. Pairs select nodes by the beginning of their names, but a reduction chooses new
 //! names: without this assignment, the contact would change with the refinement.
 
-use tiprub_core::{Rom, Scene, rom::ContactNode, settings::ContactSettings};
+use tiprub_core::scene::rom::ContactNode;
+use tiprub_core::scene::settings::ContactSettings;
+use tiprub_core::{Rom, Scene};
 
 /// Returns the model with the names of the contact nodes of `own`, which has as many nodes at the same places.
 pub(super) fn named_as(own: &Rom, mut again: Rom) -> Rom {

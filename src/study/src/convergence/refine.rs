@@ -1,6 +1,7 @@
 //! Directions of refinement, their levels, and the sources from which models are reduced again.
 
-use tiprub_core::{Rom, Scene, settings::Scheme};
+use tiprub_core::scene::method::Scheme;
+use tiprub_core::{Rom, Scene};
 use tiprub_gallery::rom_cache::RomCache;
 use tiprub_model::rotor37::TipContact;
 use tiprub_shell::{Result, console::Console};

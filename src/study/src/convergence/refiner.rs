@@ -1,6 +1,9 @@
 //! Creates the scenes of every level of a direction: other steps, modes, contact nodes, patches and meshes.
 
-use tiprub_core::{Rom, Scene, dynamics::modal::ModalModel, rom::DisplacementFrame, settings::TOLERANCE};
+use tiprub_core::modes::modal::ModalModel;
+use tiprub_core::scene::rom::DisplacementFrame;
+use tiprub_core::scene::settings::TOLERANCE;
+use tiprub_core::{Rom, Scene};
 use tiprub_format::builtin_model;
 use tiprub_gallery::{
     builtin::{self, ModelVariant},

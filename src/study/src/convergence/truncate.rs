@@ -2,10 +2,8 @@
 //! responses are kept. If the coordinates of the contact nodes leave no room for that, the lowest natural modes are kept.
 
 use nalgebra::{ComplexField, DMatrix};
-use tiprub_core::{
-    Rom,
-    rom::{Harmonic, ReductionBasis, RomChecks, Spin, Thermal},
-};
+use tiprub_core::Rom;
+use tiprub_core::scene::rom::{Harmonic, ReductionBasis, RomChecks, Spin, Thermal};
 
 /// Form of truncation of a ROM.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -169,7 +167,7 @@ fn modes<T: ComplexField<RealField = f64>>(
 
 #[cfg(test)]
 mod tests {
-    use tiprub_core::dynamics::modal::ModalModel;
+    use tiprub_core::modes::modal::ModalModel;
     use tiprub_model::{
         Rotor37Options, reduce_rotor37,
         rotor37::{MeshCounts, TipContact},
@@ -233,7 +231,10 @@ mod tests {
         rom.contact_map = DMatrix::from_fn(18, rom.order(), |row, column| rom.contact_map[(row % 6, column)]);
         let nodes = rom.contact_nodes.iter().cycle().take(6).enumerate();
         rom.contact_nodes = nodes
-            .map(|(number, node)| tiprub_core::rom::ContactNode { name: format!("node_{number}"), ..node.clone() })
+            .map(|(number, node)| tiprub_core::scene::rom::ContactNode {
+                name: format!("node_{number}"),
+                ..node.clone()
+            })
             .collect();
         let found = truncated(&rom, 5).unwrap();
         assert_eq!((Truncation::of(&rom), found.order()), (Truncation::Natural, 5));

@@ -1,6 +1,6 @@
 //! Competitors: every scheme with every solver of tiprub, and independent methods that share no code with it.
 
-use tiprub_core::settings::{Scheme, Solver};
+use tiprub_core::scene::method::{Scheme, Solver};
 
 /// Method that steps a scene.
 #[derive(Debug, Clone, Copy, PartialEq)]

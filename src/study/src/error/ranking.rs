@@ -1,6 +1,6 @@
 //! Ranks configurations by cost for a given error, and determines orders of convergence.
 
-use tiprub_core::settings::{Scheme, Solver};
+use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_figure::table::Table;
 
 use super::{

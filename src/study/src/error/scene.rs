@@ -1,10 +1,8 @@
 //! Runs whole scenes with [`Simulation`], in the same way as an FMU steps them.
 
-use tiprub_core::{
-    Scene, Simulation,
-    settings::{ADAPTIVE_STEP, BodyMotion, Scheme, Solver},
-    system::Structure,
-};
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::settings::{ADAPTIVE_STEP, BodyMotion};
+use tiprub_core::{Scene, Simulation, system::Structure};
 use tiprub_shell::native;
 
 use super::{

@@ -6,10 +6,8 @@
 //! one reference at the points that their tips have in common (watched points, or common patches). The time is that of the steps, so that smaller
 //! models are cheaper. The mesh does not affect the run time; its error is reported separately.
 
-use tiprub_core::{
-    Scene,
-    settings::{Scheme, Solver},
-};
+use tiprub_core::Scene;
+use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_shell::{
     Result,
     forecast::{Forecast, WorkPlan},

@@ -1,7 +1,8 @@
 //! Findings of the map: peaks, and coincidences with predicted resonances.
 
 use serde_json::{Value, json};
-use tiprub_core::{Scene, dynamics::modal::ModalModel};
+use tiprub_core::Scene;
+use tiprub_core::modes::modal::ModalModel;
 use tiprub_shell::{Failure, Result};
 
 use super::{

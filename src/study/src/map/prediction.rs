@@ -1,11 +1,9 @@
 //! Resonances predicted by linear theory: engine orders of the casing and natural frequencies in the rotating frame.
 
 use realfft::RealFftPlanner;
-use tiprub_core::{
-    Scene,
-    dynamics::{cyclic::CyclicModel, modal::ModalModel},
-    gaps::shape::CompiledShape,
-};
+use tiprub_core::Scene;
+use tiprub_core::modes::{cyclic::CyclicModel, modal::ModalModel};
+use tiprub_core::scene::shape::CompiledShape;
 use tiprub_shell::{Failure, Result};
 
 use super::start::{MapStart, master};
@@ -166,11 +164,9 @@ fn divisor(a: usize, b: usize) -> usize {
 #[cfg(test)]
 pub(super) mod tests {
     use nalgebra::DMatrix;
-    use tiprub_core::{
-        Rom,
-        rom::{ContactNode, DisplacementFrame, RomChecks, RomExtras, Spin},
-        settings::Shape,
-    };
+    use tiprub_core::Rom;
+    use tiprub_core::scene::rom::{ContactNode, DisplacementFrame, RomChecks, RomExtras, Spin};
+    use tiprub_core::scene::settings::Shape;
 
     use super::*;
 

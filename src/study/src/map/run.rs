@@ -2,7 +2,8 @@
 
 use std::time::{Duration, Instant};
 
-use tiprub_core::{Scene, Simulation, settings::Scheme, shown, system::System, variables::Quantity};
+use tiprub_core::scene::method::Scheme;
+use tiprub_core::{Scene, Simulation, shown, system::System, variables::Quantity};
 use tiprub_shell::{Failure, Result, native};
 
 use super::{

@@ -1,10 +1,7 @@
 //! Start of the runs after the start values were changed: rotating master, clearances, shape of the casing, and other excitations.
 
-use tiprub_core::{
-    Scene, Simulation,
-    settings::{BodyMotion, SceneSettings},
-    variables::Quantity,
-};
+use tiprub_core::scene::settings::{BodyMotion, SceneSettings};
+use tiprub_core::{Scene, Simulation, variables::Quantity};
 use tiprub_shell::{Failure, Result};
 
 /// Start values that the prediction and the facts depend on.

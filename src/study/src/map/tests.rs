@@ -1,4 +1,5 @@
-use tiprub_core::{Scene, rom::Spin};
+use tiprub_core::Scene;
+use tiprub_core::scene::rom::Spin;
 
 use super::prediction::tests::scene;
 use super::*;
@@ -53,7 +54,7 @@ fn meeting(scene: &Scene) -> f64 {
 #[test]
 fn soft_contact_has_the_linear_resonance() {
     let mut scene = blade37();
-    scene.settings.contacts[0].coating = Some(tiprub_core::settings::CoatingSettings {
+    scene.settings.contacts[0].coating = Some(tiprub_core::scene::settings::CoatingSettings {
         thickness: 2e-3,
         modulus: 1e3,
         yield_stress: 1e12,

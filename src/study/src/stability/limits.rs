@@ -1,9 +1,7 @@
 //! Largest internal step of every scheme and solver at the scene's own friction and speed, such that all shorter steps that were tried are accepted.
 
-use tiprub_core::{
-    dynamics::{cyclic::CyclicModel, modal::ModalModel},
-    settings::{Scheme, Solver},
-};
+use tiprub_core::modes::{cyclic::CyclicModel, modal::ModalModel};
+use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_shell::{Result, forecast::Forecast, sweep};
 
 use super::{

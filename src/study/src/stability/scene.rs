@@ -1,10 +1,7 @@
 //! Answers of the core to a scene with another friction, speed, internal step, scheme or solver: its rejection or its warnings.
 
-use tiprub_core::{
-    Scene, Simulation,
-    settings::{Scheme, Solver},
-    variables::Quantity,
-};
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::{Scene, Simulation, variables::Quantity};
 use tiprub_shell::{Failure, Result, native};
 
 use crate::error::scene::SceneRun;

@@ -1,14 +1,13 @@
 //! One structure with closed sliding contact on a round casing: growth rates, solvability, and the internal step of each scheme below which all
 //! steps are accepted, found with the same checks as in the core. Longer steps may be accepted too, because friction causes growth in bands.
 
-use tiprub_core::{
-    Result, Rom,
-    dynamics::{cyclic::CyclicModel, modal::ModalModel},
-    rom::DisplacementFrame,
-    settings::Scheme,
-    shown,
-    stability::{self, ContactDirections, Fastest, GrowthRates, judged::SetGrowth, lock_up, massless::MasslessCheck},
+use tiprub_core::limits::{
+    self, ContactDirections, Fastest, GrowthRates, judged::SetGrowth, lock_up, massless::MasslessCheck,
 };
+use tiprub_core::modes::{cyclic::CyclicModel, modal::ModalModel};
+use tiprub_core::scene::method::Scheme;
+use tiprub_core::scene::rom::DisplacementFrame;
+use tiprub_core::{Result, Rom, shown};
 
 use super::seek::{Sought, TRIED, seek};
 
@@ -168,7 +167,7 @@ impl<'a> SingleStructure<'a> {
             for nodes in self.combinations() {
                 for model in 0..self.models.len() {
                     let (seen, directions) = self.seen(model, &nodes, sense);
-                    let Some(found) = stability::growth(&seen, scheme, step, sliding.friction, &directions) else {
+                    let Some(found) = limits::growth(&seen, scheme, step, sliding.friction, &directions) else {
                         continue;
                     };
                     let own = self.physical(&seen, scheme, step, sliding.friction, &directions, &found);
@@ -218,7 +217,7 @@ impl<'a> SingleStructure<'a> {
         found: &GrowthRates,
     ) -> Fastest {
         let own = Fastest { rate: found.continuous, frequency: found.frequency };
-        let without = || stability::without_node_mass(seen, step, friction, directions);
+        let without = || limits::without_node_mass(seen, step, friction, directions);
         if scheme.acts_later() { own } else { without().unwrap_or(own) }
     }
 
@@ -291,9 +290,9 @@ impl<'a> SingleStructure<'a> {
             return f64::INFINITY;
         }
         let limit = |model: &ModalModel| match self.rom.frame {
-            DisplacementFrame::Cartesian => stability::unresolved::limit_along_axes(model),
+            DisplacementFrame::Cartesian => limits::unresolved::limit_along_axes(model),
             DisplacementFrame::Cylindrical => {
-                stability::unresolved::limit(model, &vec![[-1.0, 0.0, 0.0]; model.contact_modes.nrows() / 3])
+                limits::unresolved::limit(model, &vec![[-1.0, 0.0, 0.0]; model.contact_modes.nrows() / 3])
             }
         };
         self.models.iter().map(limit).fold(f64::INFINITY, f64::min)
@@ -320,7 +319,7 @@ impl<'a> SingleStructure<'a> {
     }
 
     fn accepts(&self, scheme: Scheme, step: f64, sliding: KnownContact) -> bool {
-        if stability::check_step_allowed(self.highest(), scheme, step).is_err() {
+        if limits::check_step_allowed(self.highest(), scheme, step).is_err() {
             return false;
         }
         if sliding.friction == 0.0 || self.rom.is_cyclic() {
@@ -329,7 +328,7 @@ impl<'a> SingleStructure<'a> {
         // Independent of the duration of contact.
         let grows = |nodes: &Vec<usize>, sense: usize| {
             let (seen, directions) = self.seen(0, nodes, sense);
-            let found = stability::growth(&seen, scheme, step, sliding.friction, &directions);
+            let found = limits::growth(&seen, scheme, step, sliding.friction, &directions);
             found.is_some_and(|found| SetGrowth::new(&seen, scheme, step, &directions, found).allowed().is_finite())
         };
         self.combinations().iter().all(|nodes| !sliding.senses().any(|sense| grows(nodes, sense)))
@@ -350,9 +349,9 @@ impl<'a> SingleStructure<'a> {
         let together: Vec<Vec<ContactDirections>> = self.models.iter().map(of).collect();
         let solvable = |friction: f64| {
             if self.rom.is_cyclic() {
-                stability::check_solvable_together(&self.models, Scheme::ModalExact, step, friction, &together).is_ok()
+                limits::check_solvable_together(&self.models, Scheme::ModalExact, step, friction, &together).is_ok()
             } else {
-                stability::check_solvable(&self.models[0], Scheme::ModalExact, step, friction, &self.closed).is_ok()
+                limits::check_solvable(&self.models[0], Scheme::ModalExact, step, friction, &self.closed).is_ok()
             }
         };
         let tried = (0..=FRICTION_STEPS).map(|step| f64::from(step) / FRICTION_STEPS_PER_UNIT);

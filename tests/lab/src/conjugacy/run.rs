@@ -1,10 +1,12 @@
 //! One scene run step by step: forces and moments on both sides, torque against shaft work, the ledger.
 
+use tiprub_core::geometry::{surface_spline::SurfaceSpline, wrench::Wrench};
+use tiprub_core::modes::sectors::Sectors;
+use tiprub_core::scene::method::Solver;
+use tiprub_core::scene::settings::{Shape, SplineSettings};
+use tiprub_core::scene::shape::CompiledShape;
 use tiprub_core::{
     Result, Scene, Simulation,
-    dynamics::sectors::Sectors,
-    gaps::{shape::CompiledShape, surface_spline::SurfaceSpline, wrench::Wrench},
-    settings::{Shape, Solver, SplineSettings},
     system::{ContactEvent, Structure, System},
 };
 
@@ -278,7 +280,7 @@ fn modal_residual(system: &System, expected: &[Vec<f64>]) -> f64 {
 fn surface_of<'a>(
     simulation: &'a Simulation,
     event: &ContactEvent,
-) -> Option<(&'a SurfaceSpline, tiprub_core::gaps::surface_spline::ClosestPoint, f64)> {
+) -> Option<(&'a SurfaceSpline, tiprub_core::geometry::surface_spline::ClosestPoint, f64)> {
     let system = simulation.system();
     let (structure, pair) = (&system.structures()[event.structure], &system.pairs()[event.pair]);
     let place = *structure.geometry().places.get(structure.index(event.node, event.sector))?;

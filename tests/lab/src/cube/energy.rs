@@ -3,10 +3,9 @@
 use std::fmt::Write as _;
 
 use serde_json::{Value, json};
-use tiprub_core::{
-    Scene,
-    settings::{Interpolation, Scheme, Solver},
-};
+use tiprub_core::Scene;
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::settings::Interpolation;
 use tiprub_shell::{Failure, Result};
 use tiprub_study::Statement;
 

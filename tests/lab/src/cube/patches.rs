@@ -2,10 +2,9 @@
 //! meshes, symmetry, energy, and GetFEM's table of the same flight.
 
 use serde_json::{Value, json};
-use tiprub_core::{
-    Rom, Scene,
-    settings::{Interpolation, Scheme, Solver},
-};
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::settings::Interpolation;
+use tiprub_core::{Rom, Scene};
 use tiprub_gallery::{reduction, rom_cache::RomCache};
 use tiprub_model::cube::{CubeOptions, MassMatrix, RingOptions, RingSide};
 use tiprub_reference::{

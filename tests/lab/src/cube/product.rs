@@ -3,11 +3,9 @@
 
 use std::time::{Duration, Instant};
 
-use tiprub_core::{
-    Result, Scene, Simulation,
-    settings::{Interpolation, Scheme, Solver, SplineSettings},
-    variables::Quantity,
-};
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::settings::{Interpolation, SplineSettings};
+use tiprub_core::{Result, Scene, Simulation, variables::Quantity};
 use tiprub_reference::cube::history::{CubeHistory, processor_time};
 
 use super::CubeFlight;

@@ -1,9 +1,8 @@
 //! Runs of the study: the product with its schemes and solvers, the reference methods, four flights.
 
-use tiprub_core::{
-    Scene,
-    settings::{Interpolation, Scheme, Solver},
-};
+use tiprub_core::Scene;
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::settings::Interpolation;
 use tiprub_reference::{
     cube::{
         history::CubeHistory,

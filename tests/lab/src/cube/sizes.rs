@@ -1,7 +1,10 @@
 //! Number of modes that the bodies need: cube and rings with more and fewer modes than the built-in models.
 
 use serde_json::{Value, json};
-use tiprub_core::{Scene, settings::Interpolation, settings::Scheme, settings::Solver};
+use tiprub_core::Scene;
+use tiprub_core::scene::method::Scheme;
+use tiprub_core::scene::method::Solver;
+use tiprub_core::scene::settings::Interpolation;
 use tiprub_gallery::{reduction, rom_cache::RomCache};
 use tiprub_model::cube::{CubeOptions, RingOptions, RingSide};
 use tiprub_reference::{compare::agreement, cube::history::CubeHistory};

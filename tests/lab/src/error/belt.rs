@@ -1,13 +1,11 @@
 //! A block on a spring, thrown along a belt at rest, that repeatedly stops and sticks; with a closed form.
 
 use nalgebra::DMatrix;
-use tiprub_core::{
-    dynamics::{bank::BankOptions, modal::ModalModel, sectors::SectorModel},
-    gaps::{FixedGap, GapLaw, PrescribedMotion},
-    settings::{Scheme, Solver},
-    stability::{self, massless},
-    system::{System, SystemSettings},
-};
+use tiprub_core::geometry::{FixedGap, GapLaw, PrescribedMotion};
+use tiprub_core::limits::{self, massless};
+use tiprub_core::modes::{bank::BankOptions, modal::ModalModel, sectors::SectorModel};
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::system::{System, SystemSettings};
 use tiprub_reference::closed::belt::ThrownBlock;
 
 use super::{
@@ -84,7 +82,7 @@ impl BeltCase {
             system.prepare_spans(step, 1.0 / f64::from(division));
         } else {
             let largest = self.model.frequencies[self.model.dynamic_modes(scheme) - 1];
-            stability::check_step(largest, scheme, step).map_err(|error| error.to_string())?;
+            limits::check_step(largest, scheme, step).map_err(|error| error.to_string())?;
             if scheme == Scheme::MasslessBoundary && step >= self.massless_limit.usable {
                 return Err(massless::refusal(step, self.massless_limit).to_string());
             }

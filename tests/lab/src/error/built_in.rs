@@ -1,10 +1,9 @@
 //! Unmodified built-in scenes: adaptive steps compared with fixed steps and the paper's method, each with the same
 //! model.
 
-use tiprub_core::{
-    Scene,
-    settings::{Preset, Scheme, Shape, Solver},
-};
+use tiprub_core::Scene;
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::settings::{Preset, Shape};
 use tiprub_gallery::{rom_cache::RomCache, scene_source};
 use tiprub_shell::{Failure, Result, console::Console};
 

@@ -1,9 +1,8 @@
 //! Cost of the communication step length H with adaptive steps, by tolerance: time and error of one rub.
 
-use tiprub_core::{
-    Scene, Simulation,
-    settings::{ADAPTIVE_STEP, Scheme, Solver},
-};
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::settings::ADAPTIVE_STEP;
+use tiprub_core::{Scene, Simulation};
 use tiprub_figure::table::Table;
 use tiprub_shell::{Failure, Result, console::Console};
 use tiprub_study::error::{case::ErrorCase, clock, measure::parts_apart, summary::rate};

@@ -4,15 +4,13 @@
 //! has no loads.
 
 use nalgebra::{DMatrix, DVector};
-use tiprub_core::{
-    dynamics::modal::ModalModel,
-    galerkin::{
-        level::{ContactModes, StepTables},
-        sector::{AcceptedStep, Effort, SectorIntegrator, StepGoal, Tables, Witness},
-        state::SectorState,
-        trial::{ForceInterpolation, Obstacle, SlidingState},
-    },
-    settings::Scheme,
+use tiprub_core::modes::modal::ModalModel;
+use tiprub_core::scene::method::Scheme;
+use tiprub_core::time::galerkin::{
+    level::{ContactModes, StepTables},
+    sector::{AcceptedStep, Effort, SectorIntegrator, StepGoal, Tables, Witness},
+    state::SectorState,
+    trial::{ForceInterpolation, Obstacle, SlidingState},
 };
 
 use super::{

@@ -1,13 +1,11 @@
 //! Rods through the core: one structure against a fixed obstacle, stepped by [`System`] without a scene.
 
 use nalgebra::{DMatrix, DVector};
-use tiprub_core::{
-    dynamics::{bank::BankOptions, modal::ModalModel, sectors::SectorModel},
-    gaps::{FixedGap, GapLaw, PrescribedMotion},
-    settings::{Scheme, Solver},
-    stability::{self, massless},
-    system::{System, SystemSettings},
-};
+use tiprub_core::geometry::{FixedGap, GapLaw, PrescribedMotion};
+use tiprub_core::limits::{self, massless};
+use tiprub_core::modes::{bank::BankOptions, modal::ModalModel, sectors::SectorModel};
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::system::{System, SystemSettings};
 use tiprub_reference::reduced::bars::RodModel;
 use tiprub_test_models::{node, structure};
 
@@ -69,7 +67,7 @@ impl CoreRod {
         perturbation: f64,
     ) -> Result<RodRun<'_>, String> {
         let step = interval / f64::from(division);
-        stability::check_step(self.model.largest_frequency(), scheme, step).map_err(|error| error.to_string())?;
+        limits::check_step(self.model.largest_frequency(), scheme, step).map_err(|error| error.to_string())?;
         if scheme == Scheme::MasslessBoundary && step >= self.massless_limit.usable {
             return Err(massless::refusal(step, self.massless_limit).to_string());
         }

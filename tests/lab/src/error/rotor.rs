@@ -1,6 +1,7 @@
 //! The paper's model: blades of rotor 37 with three contact nodes, in a light and in a heavy rub against a casing with two bumps.
 
-use tiprub_core::{Rom, settings::Shape};
+use tiprub_core::Rom;
+use tiprub_core::scene::settings::Shape;
 use tiprub_gallery::{reduction, rom_cache::RomCache, scene_source};
 use tiprub_model::{Rotor37Options, rotor37::MeshCounts};
 use tiprub_reference::reduced::rub::BladeScene;

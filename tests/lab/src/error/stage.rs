@@ -1,7 +1,8 @@
 //! Scene 6: the stage of coupled sectors in its flexible casing.
 
 use nalgebra::Complex;
-use tiprub_core::{Rom, Scene, settings::Shape};
+use tiprub_core::scene::settings::Shape;
+use tiprub_core::{Rom, Scene};
 use tiprub_gallery::{builtin::DiskModel, rom_cache::RomCache, scene_source};
 use tiprub_model::{cyclic::ModeSelection, stage::StageOptions};
 use tiprub_reference::reduced::disk::{CasingModel, Pencil, StageReference, StageScene};

@@ -1,7 +1,8 @@
 //! Free bodies thrown randomly among plates.
 
 use tiprub_core::Rom;
-use tiprub_core::settings::{Interpolation, SceneSettings, Scheme, Solver, SplineSettings};
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::settings::{Interpolation, SceneSettings, SplineSettings};
 use tiprub_test_models::{SeededRandom, lattice};
 
 use super::structures::chance;

@@ -1,7 +1,7 @@
 //! The features of a scene, with the names of the table.
 
 use tiprub_core::Scene;
-use tiprub_core::settings::{BodyMotion, InputInterpolation, Interpolation, StructureSettings, SurfaceSettings};
+use tiprub_core::scene::settings::{BodyMotion, InputInterpolation, Interpolation, StructureSettings, SurfaceSettings};
 
 /// A feature's name, and a function that returns whether a scene has it.
 type SceneFeature = (&'static str, fn(&Scene) -> bool);

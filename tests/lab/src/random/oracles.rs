@@ -1,7 +1,8 @@
 //! Properties of any scene: energy, losses, penetration, finite outputs, messages.
 
-use tiprub_core::rom::DisplacementFrame;
-use tiprub_core::settings::{ContactSettings, Scheme, Solver};
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::rom::DisplacementFrame;
+use tiprub_core::scene::settings::ContactSettings;
 use tiprub_core::warning::Topic;
 use tiprub_core::{Error, Ledger, Rom, Scene, Simulation};
 
@@ -275,7 +276,7 @@ fn promised(scene: &Scene, gap: f64) -> f64 {
     let coated = scene.settings.contacts.iter().filter_map(|contact| contact.coating.as_ref());
     let thickness = coated.map(|coating| coating.thickness).fold(0.0, f64::max);
     let tolerance = match scene.settings.time.scheme {
-        Scheme::Galerkin => scene.settings.time.tolerance.unwrap_or(tiprub_core::settings::TOLERANCE),
+        Scheme::Galerkin => scene.settings.time.tolerance.unwrap_or(tiprub_core::scene::settings::TOLERANCE),
         _ => 0.0,
     };
     let film = if solver(scene) == Solver::Film { film_inside(scene) } else { 0.0 };

@@ -1,10 +1,10 @@
 //! Random valid scenes: features, schemes, solvers and inputs by chance.
 
-use tiprub_core::settings::{
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::settings::{
     BodyMotion, Closure, CoatingSettings, ContactSettings, CuttingSettings, ExcitationSettings, ExperimentSettings,
     ForceDirection, InitialSettings, InputInterpolation, Interpolation, LoadSettings, Meridian, OutputSettings,
-    PatchSettings, Preset, SceneSettings, Scheme, Shape, Solver, SplineSettings, StructureSettings, SurfaceSettings,
-    TimeSettings,
+    PatchSettings, Preset, SceneSettings, Shape, SplineSettings, StructureSettings, SurfaceSettings, TimeSettings,
 };
 use tiprub_core::{Rom, Scene};
 use tiprub_test_models::SeededRandom;

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::DMatrix;
 use tiprub_core::Rom;
-use tiprub_core::rom::{
+use tiprub_core::scene::rom::{
     DisplacementFrame, ReductionBasis, SUPPORT_ROWS, SupportRows, Thermal, ThermalPatch, WatchedPoints,
 };
 use tiprub_test_models::disk::TestDisk;

@@ -1,7 +1,7 @@
 //! Random sectors against a wall, without a scene: energy over very many switches, contact problems without a solution.
 
 use nalgebra::DMatrix;
-use tiprub_core::galerkin::{
+use tiprub_core::time::galerkin::{
     level::{ContactModes, StepTables},
     sector::{AcceptedStep, Effort, SectorIntegrator, StepGoal, Tables, Witness},
     state::SectorState,

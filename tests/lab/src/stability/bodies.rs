@@ -1,14 +1,12 @@
 //! Free bodies with closed-form flights and impacts: masses in a row, springs between them, plates next to them.
 
 use nalgebra::DMatrix;
-use tiprub_core::{
-    Rom, Scene, Simulation,
-    rom::ContactGrid,
-    settings::{
-        BodyMotion, ContactSettings, ExperimentSettings, OutputSettings, Preset, SceneSettings, StructureSettings,
-        SurfaceSettings, TimeSettings,
-    },
+use tiprub_core::scene::rom::ContactGrid;
+use tiprub_core::scene::settings::{
+    BodyMotion, ContactSettings, ExperimentSettings, OutputSettings, Preset, SceneSettings, StructureSettings,
+    SurfaceSettings, TimeSettings,
 };
+use tiprub_core::{Rom, Scene, Simulation};
 use tiprub_test_models::{node, structure};
 
 use super::{models::StabilityMethod, observe::real};

@@ -3,16 +3,14 @@
 use std::f64::consts::TAU;
 
 use nalgebra::{Complex, DMatrix, Matrix3};
-use tiprub_core::{
-    Rom, Scene,
-    rom::{DisplacementFrame, Harmonic, RomExtras},
-    settings::{Scheme, Solver},
-};
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::rom::{DisplacementFrame, Harmonic, RomExtras};
+use tiprub_core::{Rom, Scene};
 pub(crate) use tiprub_test_models::{GAP, RADIUS, SeededRandom, bumps, rich_blade as blade, round};
 use tiprub_test_models::{node, ring, structure};
 
 /// Longest step of adaptive integration (s), the default of scenes.
-pub(crate) const LONGEST: f64 = tiprub_core::settings::ADAPTIVE_STEP;
+pub(crate) const LONGEST: f64 = tiprub_core::scene::settings::ADAPTIVE_STEP;
 /// All contact solvers with their names.
 pub(crate) const SOLVERS: [(Solver, &str); Solver::ALL.len()] =
     [(Solver::Film, "film"), (Solver::Lcp, "lcp"), (Solver::Coulomb, "coulomb")];
@@ -138,7 +136,7 @@ impl StabilityMethod {
         let mut scene = with_methods(scene, self.scheme, self.solver);
         scene.settings.time.tolerance = match self.steps {
             StepChoice::Adaptive(tolerance) => Some(tolerance),
-            StepChoice::Fixed if self.is_galerkin() => Some(tiprub_core::ranges::TOLERANCE[1]),
+            StepChoice::Fixed if self.is_galerkin() => Some(tiprub_core::scene::ranges::TOLERANCE[1]),
             StepChoice::Fixed => None,
         };
         scene
@@ -158,7 +156,7 @@ pub(crate) fn allowed(scene: &Scene) -> f64 {
         contact.sector_gaps.iter().copied().chain(contact.sector_gaps.is_empty().then_some(contact.gap))
     });
     if scene.settings.time.scheme == Scheme::Galerkin {
-        scene.settings.time.tolerance.unwrap_or(tiprub_core::settings::TOLERANCE)
+        scene.settings.time.tolerance.unwrap_or(tiprub_core::scene::settings::TOLERANCE)
             * smallest.fold(f64::INFINITY, f64::min)
     } else {
         0.0

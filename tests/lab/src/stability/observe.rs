@@ -1,9 +1,8 @@
 //! Observation of a running simulation, based on the state and not on the solver's output.
 
-use tiprub_core::{
-    Result, Scene, Simulation,
-    settings::{Scheme, Shape},
-};
+use tiprub_core::scene::method::Scheme;
+use tiprub_core::scene::settings::Shape;
+use tiprub_core::{Result, Scene, Simulation};
 
 use super::{Check, models::allowed};
 

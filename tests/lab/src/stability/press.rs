@@ -6,10 +6,8 @@
 use std::f64::consts::PI;
 
 use nalgebra::{DMatrix, DVector};
-use tiprub_core::{
-    Result, Rom, Scene, Simulation,
-    settings::{Scheme, Solver},
-};
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::{Result, Rom, Scene, Simulation};
 
 use super::{
     Check,

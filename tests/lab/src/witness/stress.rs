@@ -2,10 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 use serde_json::{Value, json};
-use tiprub_core::{
-    Rom, Simulation,
-    rom::{STRESSES, von_mises},
-};
+use tiprub_core::scene::rom::{STRESSES, von_mises};
+use tiprub_core::{Rom, Simulation};
 use tiprub_figure::plots::{Plot, Series};
 use tiprub_gallery::reduction::failure;
 use tiprub_model::{craig_bampton::dense_modes, stress::StressPlaces};

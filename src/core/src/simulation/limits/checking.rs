@@ -1,17 +1,18 @@
 //! Checks of a rotating structure for one set of parameters: solvability, growth of sliding contact, and effects of casings.
 
 use super::Parameters;
-use crate::dynamics::cyclic::CyclicModel;
-use crate::dynamics::modal::ModalModel;
-use crate::gaps::frame::PolarFrame;
-use crate::gaps::spline::SplineGap;
-use crate::gaps::{GapLaw, dot};
-use crate::settings::{Meridian, Scheme, Solver};
+use crate::geometry::frame::PolarFrame;
+use crate::geometry::spline::SplineGap;
+use crate::geometry::{GapLaw, dot};
+use crate::limits::massless::MasslessLimit;
+use crate::limits::{self, ContactDirections, massless};
+use crate::modes::cyclic::CyclicModel;
+use crate::modes::modal::ModalModel;
+use crate::scene::method::{Scheme, Solver};
+use crate::scene::settings::Meridian;
 use crate::simulation::SAME_STEP;
 use crate::simulation::compile::Compiled;
 use crate::simulation::plan::PairPlan;
-use crate::stability::massless::MasslessLimit;
-use crate::stability::{self, ContactDirections, massless};
 use crate::system::System;
 use crate::warning::Topic;
 use crate::{Result, Warning, shown};
@@ -157,7 +158,7 @@ impl<'a> Checking<'a> {
         let mut warnings = self.expected(step)?;
         for carrier in self.compiled.carriers_of(self.body) {
             let frequency = self.compiled.carriers[carrier].model.largest_frequency();
-            let warning = stability::check_step(frequency, self.parameters.scheme, step)?;
+            let warning = limits::check_step(frequency, self.parameters.scheme, step)?;
             let name = self.compiled.carrier_name(self.compiled.bodies.len() + carrier);
             warnings.extend(warning.map(|warning| warning.named(name)));
         }
@@ -170,14 +171,14 @@ impl<'a> Checking<'a> {
     fn expected(&self, step: f64) -> Result<Vec<Warning>> {
         let Parameters { scheme, step: largest, .. } = *self.parameters;
         let mut warnings: Vec<Warning> =
-            stability::check_step(self.largest_frequency(), scheme, step)?.into_iter().collect();
+            limits::check_step(self.largest_frequency(), scheme, step)?.into_iter().collect();
         warnings.extend(self.not_looked_at());
         let senses: Vec<Vec<ContactDirections>> =
             self.models.iter().map(|model| [1.0, -1.0].map(|sense| self.directions(model, sense)).into()).collect();
         if self.disk().is_some() {
-            stability::check_solvable_together(&self.models, scheme, largest, self.friction, &senses)?;
+            limits::check_solvable_together(&self.models, scheme, largest, self.friction, &senses)?;
         } else {
-            stability::check_solvable(&self.models[0], scheme, largest, self.friction, &senses[0])?;
+            limits::check_solvable(&self.models[0], scheme, largest, self.friction, &senses[0])?;
         }
         Ok(warnings)
     }
@@ -190,8 +191,8 @@ impl<'a> Checking<'a> {
             Scheme::Galerkin => "Check a ROM with fewer modes for flutter and self-locking",
             _ => "Halve the internal step and compare the results",
         };
-        (self.friction != 0.0 && modes > stability::GROWTH_UP_TO).then(|| {
-            let most = stability::GROWTH_UP_TO;
+        (self.friction != 0.0 && modes > limits::GROWTH_UP_TO).then(|| {
+            let most = limits::GROWTH_UP_TO;
             let problem = format!(
                 "the growth of vibration in closed, sliding contact is not checked: the model has {modes} modes, and the check supports \
                  only {most}"
@@ -210,7 +211,7 @@ impl<'a> Checking<'a> {
                 let directions = self.directions(model, sense);
                 let parts = directions.len() / own.nrows();
                 let all = DMatrix::identity(parts, parts).kronecker(&own);
-                let found = stability::cutting::growth(model, &directions, &all, coating.tangential_ratio())?;
+                let found = limits::cutting::growth(model, &directions, &all, coating.tangential_ratio())?;
                 (found.rate > GROWTH_NOISE / self.parameters.step).then_some((found.rate, found.frequency))
             };
             self.models.iter().filter_map(of).max_by(|a, b| a.0.total_cmp(&b.0))
@@ -269,7 +270,7 @@ impl<'a> Checking<'a> {
             })
         };
         let largest = carried.iter().map(|(_, _, modes)| modes.largest_frequency()).fold(0.0, f64::max);
-        let steps = stability::growth_steps(largest, self.parameters.step);
+        let steps = limits::growth_steps(largest, self.parameters.step);
         let ranges = steps.map(|step| (step, worst_at(step))).collect();
         with_expected(ranges, expected, worst_at(expected))
     }

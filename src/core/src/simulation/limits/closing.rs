@@ -2,8 +2,8 @@
 
 use std::f64::consts::{PI, TAU};
 
-use crate::gaps::shape::CompiledShape;
-use crate::settings::SpinSettings;
+use crate::scene::settings::SpinSettings;
+use crate::scene::shape::CompiledShape;
 use crate::simulation::compile::Compiled;
 
 /// Angles at which a shape is sampled.
@@ -74,7 +74,7 @@ fn widest(shape: &CompiledShape, gap: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::settings::Shape;
+    use crate::scene::settings::Shape;
 
     #[test]
     fn contact_arc_widths_match_the_shape() {

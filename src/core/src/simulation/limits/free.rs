@@ -9,14 +9,14 @@
 use nalgebra::DMatrix;
 
 use super::{BodyLimits, Closing, Parameters, Sense};
-use crate::dynamics::modal::ModalModel;
-use crate::dynamics::modal::fill_ratios;
-use crate::gaps::open::{OpenGap, tangent};
-use crate::gaps::{GapLaw, Geometry, dot};
-use crate::settings::{Scheme, Solver};
+use crate::geometry::open::{OpenGap, tangent};
+use crate::geometry::{GapLaw, Geometry, dot};
+use crate::limits::massless::MasslessLimit;
+use crate::limits::{self, ContactDirections};
+use crate::modes::modal::ModalModel;
+use crate::modes::modal::fill_ratios;
+use crate::scene::method::{Scheme, Solver};
 use crate::simulation::compile::Compiled;
-use crate::stability::massless::MasslessLimit;
-use crate::stability::{self, ContactDirections};
 use crate::system::System;
 use crate::warning::Topic;
 use crate::{Error, Result, Warning, shown};
@@ -42,9 +42,9 @@ impl Compiled {
     pub(super) fn free_limits(&self, body: usize, parameters: &Parameters, system: &System) -> BodyLimits {
         let (step, model) = (self.expected_step(parameters.step), &self.bodies[body].model);
         // Contacts of free bodies may act along any direction.
-        let own = std::iter::once_with(|| stability::unresolved::limit_along_axes(model));
+        let own = std::iter::once_with(|| limits::unresolved::limit_along_axes(model));
         let unresolved = self.unresolved(body, own, parameters.scheme);
-        let resolved = stability::unresolved::check(step, unresolved, model.largest_frequency());
+        let resolved = limits::unresolved::check(step, unresolved, model.largest_frequency());
         let flight = FlightCheck { compiled: self, system, body, parameters };
         // `galerkin` halves steps that it cannot solve.
         let outcome = match parameters.scheme {
@@ -100,11 +100,11 @@ impl FlightCheck<'_> {
     fn warnings(&self, step: f64) -> Result<Vec<Warning>> {
         let (compiled, scheme) = (self.compiled, self.parameters.scheme);
         let largest = compiled.bodies[self.body].model.largest_frequency();
-        let mut warnings: Vec<Warning> = stability::check_step(largest, scheme, step)?.into_iter().collect();
+        let mut warnings: Vec<Warning> = limits::check_step(largest, scheme, step)?.into_iter().collect();
         for carrier in compiled.carriers_of(self.body) {
             let name = &compiled.carrier(carrier).0.name;
             let largest = compiled.carriers[carrier].model.largest_frequency();
-            let warning = stability::check_step(largest, scheme, step)?;
+            let warning = limits::check_step(largest, scheme, step)?;
             warnings.extend(warning.map(|warning| warning.named(name)));
         }
         let friction = self.parameters.friction_of(compiled, self.body);
@@ -156,12 +156,12 @@ impl FlightCheck<'_> {
         let Parameters { scheme, damping_ratios, mode_damping, .. } = self.parameters;
         let mut model = self.compiled.bodies[self.body].model.with_nodes(&met.nodes);
         fill_ratios(&mut model.damping_ratios, damping_ratios[self.body], &mode_damping[self.body], 1);
-        let mut matrix = stability::delassus(&model, *scheme, step, friction, &met.directions);
+        let mut matrix = limits::delassus(&model, *scheme, step, friction, &met.directions);
         for carrier in self.compiled.carriers_of(self.body) {
             let Some(mut seen) = seen_by(carrier, met, laws, carriers) else { continue };
             let place = self.compiled.bodies.len() + carrier;
             fill_ratios(&mut seen.damping_ratios, damping_ratios[place], &mode_damping[place], 1);
-            matrix += stability::delassus(&seen, *scheme, step, friction, &met.directions);
+            matrix += limits::delassus(&seen, *scheme, step, friction, &met.directions);
         }
         let diagonal = matrix.diagonal();
         if let Some(jammed) = (0..met.nodes.len()).find(|member| diagonal[*member] <= 0.0) {

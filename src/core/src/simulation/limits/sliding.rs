@@ -3,11 +3,11 @@
 
 use super::checking::Checking;
 use super::in_range;
-use crate::dynamics::modal::ModalModel;
-use crate::settings::Scheme;
+use crate::limits::judged::{self, SetGrowth};
+use crate::limits::{self, ContactDirections, Fastest, lock_up};
+use crate::modes::modal::ModalModel;
+use crate::scene::method::Scheme;
 use crate::simulation::SAME_STEP;
-use crate::stability::judged::{self, SetGrowth};
-use crate::stability::{self, ContactDirections, Fastest, lock_up};
 use crate::warning::{Severity, Topic};
 use crate::{Error, Result, Warning, shown};
 
@@ -189,13 +189,13 @@ impl Checking<'_> {
             for model in 0..self.models.len() {
                 let (seen, directions) = self.closed_at(model, &nodes, sign);
                 let largest = self.parameters.step;
-                let Some(continuous) = stability::continuous(&seen, scheme, largest, self.friction, &directions) else {
+                let Some(continuous) = limits::continuous(&seen, scheme, largest, self.friction, &directions) else {
                     continue;
                 };
                 let without = if scheme.acts_later() {
                     Some(continuous)
                 } else {
-                    stability::without_node_mass(&seen, largest, self.friction, &directions)
+                    limits::without_node_mass(&seen, largest, self.friction, &directions)
                 };
                 let physical = without.unwrap_or(continuous);
                 if physical.rate > noise {
@@ -205,7 +205,7 @@ impl Checking<'_> {
                 }
                 let least = lock_up::least_friction(&seen, &directions).filter(|least| *least < self.friction);
                 least.into_iter().for_each(|least| physics.note_lock_up(least, &nodes));
-                let found = stability::stepped(&seen, scheme, expected, self.friction, &directions, continuous);
+                let found = limits::stepped(&seen, scheme, expected, self.friction, &directions, continuous);
                 let Some(growth) = found else { continue };
                 if most.as_ref().is_none_or(|most| growth.stepped > most.judged.growth.stepped) {
                     let judged = SetGrowth::new(&seen, scheme, expected, &directions, growth);
@@ -220,7 +220,7 @@ impl Checking<'_> {
     fn judged(&self, watched: &FastestGrowth, step: f64, sign: f64) -> Option<SetGrowth> {
         let (seen, directions) = self.closed_at(watched.model, &watched.nodes, sign);
         let (scheme, friction) = (self.parameters.scheme, self.friction);
-        let growth = stability::stepped(&seen, scheme, step, friction, &directions, watched.continuous)?;
+        let growth = limits::stepped(&seen, scheme, step, friction, &directions, watched.continuous)?;
         Some(SetGrowth::new(&seen, scheme, step, &directions, growth))
     }
 
@@ -329,12 +329,12 @@ impl Checking<'_> {
              in continuous time; this may displace the tips by {:.0} % of the displacement caused by contact",
             self.contact(nodes, sign),
             judged.growth.stepped,
-            shown(stability::rounded(step)),
+            shown(limits::rounded(step)),
             judged.growth.continuous.max(0.0),
             100.0 * judged.error(f64::INFINITY),
         );
         let remedy = match silent {
-            Some(step) => format!("Set `time.step` to {} or less", shown(stability::rounded_down(step))),
+            Some(step) => format!("Set `time.step` to {} or less", shown(limits::rounded_down(step))),
             None => "Use less friction or more damping".to_owned(),
         };
         Warning::new(Topic::StepGrowth, problem, remedy)
@@ -344,7 +344,7 @@ impl Checking<'_> {
         let step_remedy = accepted.map_or(String::new(), |step| {
             format!(
                 "Set `time.step` (in the FMU `internal_step_max`) to {} or less, or use",
-                shown(stability::rounded_down(step))
+                shown(limits::rounded_down(step))
             )
         });
         let step_remedy = if step_remedy.is_empty() { "Use".to_owned() } else { step_remedy };
@@ -355,7 +355,7 @@ impl Checking<'_> {
                  caused by contact",
                 self.contact(nodes, sign),
                 judged.growth.stepped,
-                shown(stability::rounded(step)),
+                shown(limits::rounded(step)),
                 judged.growth.continuous,
                 100.0 * judged.error(f64::INFINITY)
             ),

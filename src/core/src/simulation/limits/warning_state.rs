@@ -2,10 +2,10 @@
 //! way, or becomes implausibly fast.
 
 use super::{BodyLimits, Parameters, in_range, senses_of};
-use crate::plausibility::{self, Slip};
-use crate::settings::Scheme;
+use crate::limits::plausibility::{self, Slip};
+use crate::limits::{self, massless};
+use crate::scene::method::Scheme;
 use crate::simulation::Simulation;
-use crate::stability::{self, massless};
 use crate::warning::{Topic, Warning};
 
 /// A step that is longer by this factor than the reported one is reported again.
@@ -171,7 +171,7 @@ impl Simulation {
     fn warning_of_step(&self, kind: usize, of: usize, step: f64) -> Option<Warning> {
         let limits = self.limits.as_ref()?;
         let scheme = limits.parameters.scheme;
-        let unresolved = |frequency: f64| stability::check_step(frequency, scheme, step).ok().flatten();
+        let unresolved = |frequency: f64| limits::check_step(frequency, scheme, step).ok().flatten();
         match kind {
             0 => {
                 let highest = self.compiled.bodies[of].largest_frequency() * self.compiled.stiffest(of);
@@ -183,7 +183,7 @@ impl Simulation {
                 unresolved(highest).map(|text| text.named(name))
             }
             2 => massless::warning(step, limits.bodies[of].massless).map(|text| self.compiled.warning_of(of, text)),
-            3 => stability::unresolved::warning(step, limits.bodies[of].unresolved)
+            3 => limits::unresolved::warning(step, limits.bodies[of].unresolved)
                 .map(|text| self.compiled.warning_of(of, text)),
             _ => in_range(&limits.bodies[of].casing, step).cloned(),
         }

@@ -3,8 +3,8 @@
 use super::builder::TableBuilder;
 use super::features::LARGEST_TEMPERATURE;
 use super::parts::{BodyFacts, TableFacts};
-use crate::ranges;
-use crate::settings::StructureSettings;
+use crate::scene::ranges;
+use crate::scene::settings::StructureSettings;
 use crate::simulation::units::{ANGLE, FORCE, LENGTH, LINEAR_SPEED, TEMPERATURE};
 use crate::variables::{DataType, Quantity, StartValue};
 

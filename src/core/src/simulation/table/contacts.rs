@@ -3,7 +3,7 @@
 use super::builder::TableBuilder;
 use super::features;
 use super::parts::{BodyFacts, TableFacts};
-use crate::settings::{BodyMotion, SceneSettings};
+use crate::scene::settings::{BodyMotion, SceneSettings};
 use crate::simulation::outputs::{OutputView, scalar};
 use crate::simulation::units::{ENERGY, FORCE, IMPULSE, POWER, TIME};
 use crate::variables::{DataType, Quantity, Span, Variability, VariableUnit};

@@ -3,9 +3,9 @@
 use super::blades;
 use super::builder::TableBuilder;
 use super::parts::{AXES, BodyFacts, CarrierFacts, PairFacts, TableFacts, largest_length};
-use crate::laws::coating::Coating;
-use crate::ranges;
-use crate::settings::{CoatingSettings, StructureSettings};
+use crate::contact::coating::Coating;
+use crate::scene::ranges;
+use crate::scene::settings::{CoatingSettings, StructureSettings};
 use crate::simulation::outputs::{array_reader, each, scalar};
 use crate::simulation::units::{ANGLE, ENERGY, FORCE, LENGTH, LINE_LOAD, POWER, TEMPERATURE, TORQUE, VOLUME};
 use crate::variables::{DataType, Quantity, Span, StartValue, Variability};

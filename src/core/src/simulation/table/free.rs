@@ -4,7 +4,7 @@ use super::builder::TableBuilder;
 use super::parts::{AXES, BodyFacts, TableFacts};
 use super::rotor::watched_rows;
 use crate::Rom;
-use crate::ranges;
+use crate::scene::ranges;
 use crate::simulation::outputs::{each, scalar};
 use crate::simulation::units::{FORCE, LENGTH, LINEAR_SPEED};
 use crate::variables::{Quantity, Span, VariableUnit};

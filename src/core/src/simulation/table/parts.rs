@@ -1,9 +1,10 @@
 //! Properties of a scene that the variables depend on: masters, contact pairs, surface carriers.
 
-use crate::settings::{ContactSettings, Scene, SceneSettings, StructureSettings, SurfaceSettings};
+use crate::scene::ranges;
+use crate::scene::settings::{ContactSettings, Scene, SceneSettings, StructureSettings, SurfaceSettings};
 use crate::simulation::patches::HeatPatches;
 use crate::simulation::plan::{PairPlan, SteppingOrder, prefix};
-use crate::{Error, Result, Rom, ranges};
+use crate::{Error, Result, Rom};
 
 pub const AXES: [&str; 3] = ["x", "y", "z"];
 

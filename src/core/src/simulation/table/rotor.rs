@@ -3,7 +3,7 @@
 use super::builder::TableBuilder;
 use super::parts::{BodyFacts, TableFacts, refuse};
 use crate::Result;
-use crate::rom::{ContactNode, DisplacementFrame, STRESSES};
+use crate::scene::rom::{ContactNode, DisplacementFrame, STRESSES};
 use crate::simulation::outputs::{OutputReader, array_reader, each, scalar};
 use crate::simulation::units::{ANGLE, FORCE, LENGTH, LINE_LOAD, PRESSURE, STRESS};
 use crate::variables::{Quantity, Span, VariableUnit};

@@ -7,9 +7,10 @@
 use std::f64::consts::TAU;
 
 use nalgebra::{Complex, DMatrix, DVector};
-use tiprub_core::rom::{Spin, Thermal, ThermalPatch};
-use tiprub_core::settings::{
-    CoatingSettings, CuttingSettings, ExcitationSettings, ForceDirection, InitialSettings, Solver,
+use tiprub_core::scene::method::Solver;
+use tiprub_core::scene::rom::{Spin, Thermal, ThermalPatch};
+use tiprub_core::scene::settings::{
+    CoatingSettings, CuttingSettings, ExcitationSettings, ForceDirection, InitialSettings,
 };
 use tiprub_core::{Result, Rom, Scene, Simulation};
 

@@ -1,9 +1,7 @@
 //! Built-in models: rotor 37 and the coupled stage in its elastic casing, and inconsistent ROMs.
 
-use tiprub_core::{
-    Result, Rom, Scene, Simulation,
-    settings::{Scheme, Solver},
-};
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::{Result, Rom, Scene, Simulation};
 use tiprub_gallery::{builtin, rom_cache::RomCache, scene_source};
 use tiprub_shell::console::Console;
 
@@ -95,8 +93,8 @@ fn grown(method: StabilityMethod, friction: f64, step: f64) -> Result<Vec<Check>
 
 fn at_limit(method: StabilityMethod, factor: f64) -> CaseEnd {
     let Some(rom) = model("rotor37-one-row") else { return CaseEnd::refused("the model of rotor 37 is missing") };
-    let fastest = tiprub_core::dynamics::modal::ModalModel::from_rom(&rom, 0.0)
-        .map_or(f64::NAN, |model| model.largest_frequency());
+    let fastest =
+        tiprub_core::modes::modal::ModalModel::from_rom(&rom, 0.0).map_or(f64::NAN, |model| model.largest_frequency());
     let mut scene = method.on(round(rom));
     scene.settings.structures[0].damping_ratio = Some(0.3);
     let limit = match method.scheme {
@@ -202,8 +200,9 @@ fn on_stage(method: StabilityMethod, friction: f64, load: f64) -> Result<Vec<Che
     scene.settings.contacts[0].friction = friction;
     scene.settings.surfaces[0].ramp_time = 1e-3;
     if load > 1e6 {
-        scene.settings.structures[1].load =
-            scene.settings.structures[1].load.map(|old| tiprub_core::settings::LoadSettings { amplitude: load, ..old });
+        scene.settings.structures[1].load = scene.settings.structures[1]
+            .load
+            .map(|old| tiprub_core::scene::settings::LoadSettings { amplitude: load, ..old });
     }
     // High friction makes contact unstable: small steps, before the runs diverge.
     let (step, count) = if friction > 0.5 { (2.5e-7, 60) } else { (2e-6, 120) };
@@ -228,7 +227,7 @@ fn exchanged() -> Vec<StabilityCase> {
 fn harmonics(swap: bool) -> Result<Vec<Check>> {
     let tower = Tower { sectors: 8, neighbour: 1e6, ..Tower::default() };
     let mut rom = tower.rom();
-    let disk = tiprub_core::dynamics::cyclic::CyclicModel::from_rom(&rom, 0.0)?;
+    let disk = tiprub_core::modes::cyclic::CyclicModel::from_rom(&rom, 0.0)?;
     let mut all: Vec<(f64, u32)> = Vec::new();
     for (diameter, number) in disk.diameters.iter().zip(0_u32..) {
         all.extend(diameter.frequencies.iter().take(2).map(|omega| (omega / std::f64::consts::TAU, number)));

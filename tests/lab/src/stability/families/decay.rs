@@ -9,10 +9,9 @@
 use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Complex, DMatrix, DVector};
-use tiprub_core::{
-    Result, Simulation,
-    settings::{InputInterpolation, LoadSettings, Scheme, Solver},
-};
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::settings::{InputInterpolation, LoadSettings};
+use tiprub_core::{Result, Simulation};
 
 use super::super::{
     Cases, Check, Expected, StabilityCase,

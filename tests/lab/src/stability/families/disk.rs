@@ -8,11 +8,10 @@
 use std::f64::consts::TAU;
 
 use nalgebra::{Complex, DMatrix, DVector};
-use tiprub_core::{
-    Result, Rom, Scene,
-    rom::Harmonic,
-    settings::{Shape, Solver},
-};
+use tiprub_core::scene::method::Solver;
+use tiprub_core::scene::rom::Harmonic;
+use tiprub_core::scene::settings::Shape;
+use tiprub_core::{Result, Rom, Scene};
 
 use super::super::{
     Cases, Check, Expected, StabilityCase,

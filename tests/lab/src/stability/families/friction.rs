@@ -1,9 +1,8 @@
 //! Friction from 0 to 2 with every solver in both directions; speeds at rest, tiny, reversed, jumping.
 
-use tiprub_core::{
-    Result, Scene,
-    settings::{Scheme, Shape, Solver},
-};
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::settings::Shape;
+use tiprub_core::{Result, Scene};
 
 use super::super::{
     CaseEnd, Cases, Check, Expected, StabilityCase,

@@ -5,7 +5,8 @@
 
 use std::f64::consts::TAU;
 
-use tiprub_core::{Result, Simulation, settings::Solver};
+use tiprub_core::scene::method::Solver;
+use tiprub_core::{Result, Simulation};
 
 use super::super::{
     Cases, Check, Expected, StabilityCase,

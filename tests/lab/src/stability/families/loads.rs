@@ -2,10 +2,9 @@
 
 use std::f64::consts::{PI, TAU};
 
-use tiprub_core::{
-    Result, Scene, Simulation,
-    settings::{CoatingSettings, InputInterpolation, LoadSettings, Shape, Solver},
-};
+use tiprub_core::scene::method::Solver;
+use tiprub_core::scene::settings::{CoatingSettings, InputInterpolation, LoadSettings, Shape};
+use tiprub_core::{Result, Scene, Simulation};
 
 use super::super::{
     CaseEnd, Cases, Check, Expected, StabilityCase,
@@ -263,7 +262,7 @@ fn worn(mut scene: Scene, coating: CoatingSettings) -> Result<Vec<Check>> {
     let energy = real(&simulation, "wear_energy");
     let (yields, depth) = (coating.yield_stress, real(&simulation, "wear_depth_maximum"));
     let most = (yields + coating.hardening * depth / coating.thickness) * before;
-    let massless = scene.settings.time.scheme == tiprub_core::settings::Scheme::MasslessBoundary;
+    let massless = scene.settings.time.scheme == tiprub_core::scene::method::Scheme::MasslessBoundary;
     let mut checks = watch.books_of(scene.settings.time.scheme);
     if massless {
         checks.retain(|check| !check.what.contains("impact"));

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use tiprub_core::settings::Solver;
+use tiprub_core::scene::method::Solver;
 
 use super::{
     super::{CaseEnd, Check, Expected, StabilityCase, models::StabilityMethod},

@@ -1,10 +1,9 @@
 //! A hundred scenes with random parameters within their documented ranges, each compared with the laws of mechanics and
 //! a finer step.
 
-use tiprub_core::{
-    Result, Scene,
-    settings::{Scheme, Shape, Solver},
-};
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::settings::Shape;
+use tiprub_core::{Result, Scene};
 
 use super::super::{
     CaseEnd, Check, Expected, StabilityCase,

@@ -1,10 +1,8 @@
 //! Communication steps of every length, ten million undamped steps, jumps of inputs, states restored in other
 //! instances.
 
-use tiprub_core::{
-    Result, Scene, Simulation,
-    settings::{Scheme, Solver},
-};
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::{Result, Scene, Simulation};
 
 use super::{
     super::{
@@ -152,7 +150,7 @@ fn lengths(method: StabilityMethod, ratio: f64) -> Result<Vec<Check>> {
 fn short(method: StabilityMethod, length: f64) -> Result<Vec<Check>> {
     let mut scene = rub(method, STEP);
     scene.settings.surfaces[0].ramp_time = 0.0;
-    scene.settings.surfaces[0].shape = tiprub_core::settings::Shape::Circular {};
+    scene.settings.surfaces[0].shape = tiprub_core::scene::settings::Shape::Circular {};
     let (mut simulation, mut watch) = begin(&scene)?;
     for index in 0..700 {
         set(&mut simulation, "casing_radius_change", -1.1 * GAP * f64::from(index) / 700.0)?;
@@ -338,7 +336,7 @@ fn jumped(method: StabilityMethod, jump: f64) -> Result<Vec<Check>> {
     } else if method.is_galerkin() {
         pushed(&scene.roms[0], jump, 2e-6)
     } else {
-        let model = tiprub_core::dynamics::modal::ModalModel::from_rom(&scene.roms[0], 0.0)?;
+        let model = tiprub_core::modes::modal::ModalModel::from_rom(&scene.roms[0], 0.0)?;
         let compliance = |mode: usize| {
             let coefficient = model.coefficient(mode, 1.0, method.scheme, 2e-6);
             model.contact_modes[(0, mode)].powi(2) * coefficient.compliance

@@ -1,9 +1,8 @@
 //! Blade tips beyond the edge of their casing, steps that do not resolve loaded modes, and large displacements.
 
-use tiprub_core::{
-    Result, Scene, Simulation,
-    settings::{Scheme, Solver, SplineSettings},
-};
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::settings::SplineSettings;
+use tiprub_core::{Result, Scene, Simulation};
 
 use super::super::{
     Cases, Check, Expected, StabilityCase,

@@ -1,9 +1,10 @@
 //! NaN, infinities, the largest and the smallest numbers on every input and parameter, through the setters of the core and
 //! through the C ABI of packaged FMUs.
 
+use tiprub_core::scene::method::Solver;
+use tiprub_core::scene::settings::LoadSettings;
 use tiprub_core::{
     Error, Result, Scene, Simulation,
-    settings::{LoadSettings, Solver},
     variables::{Causality, DataType, Quantity, Variable},
 };
 use tiprub_fmi_host::{Session, UnpackedFmu};
@@ -398,15 +399,15 @@ fn settings() -> Vec<StabilityCase> {
         }),
         ("shape.depth", "shape", |scene, value| {
             scene.settings.surfaces[0].shape =
-                tiprub_core::settings::Shape::TwoLobe { depth: value, width: 0.15, phase: 0.0 };
+                tiprub_core::scene::settings::Shape::TwoLobe { depth: value, width: 0.15, phase: 0.0 };
         }),
         ("shape.width", "shape.width", |scene, value| {
             scene.settings.surfaces[0].shape =
-                tiprub_core::settings::Shape::TwoLobe { depth: 0.5, width: value, phase: 0.0 };
+                tiprub_core::scene::settings::Shape::TwoLobe { depth: 0.5, width: value, phase: 0.0 };
         }),
         ("shape.phase", "shape.phase", |scene, value| {
             scene.settings.surfaces[0].shape =
-                tiprub_core::settings::Shape::TwoLobe { depth: 0.4, width: 0.15, phase: value };
+                tiprub_core::scene::settings::Shape::TwoLobe { depth: 0.4, width: 0.15, phase: value };
         }),
         ("rom.mass", "mass", |scene, value| scene.roms[0].mass[(2, 2)] = value),
         ("rom.stiffness", "stiffness", |scene, value| scene.roms[0].stiffness[(2, 2)] = value),

@@ -1,0 +1,262 @@
+//! Contact laws: the forces of one group of coupled contacts for given predicted gaps and Delassus matrix. Each law has a file here, a
+//! variant of [`Law`], and, if an importer may choose it, a row of the enumeration of solvers.
+//!
+//! Each law owns its matrix, its unknowns and its state. The group fills in the Delassus matrix W = C_Nᵀ A⁻¹ C_NT along the directions of
+//! the law, poses the contacts one after the other, and calls the law's solver.
+
+pub mod active_set;
+mod coated;
+pub mod coating;
+mod coulomb;
+mod cutting;
+pub mod de_saxce;
+mod film;
+mod lcp;
+mod proximal;
+
+use nalgebra::DMatrix;
+
+use crate::contact::active_set::SolverOutcome;
+use crate::contact::coating::Coating;
+use crate::geometry::dot;
+use crate::persist::{Persist, StateReader, StateWriter};
+use crate::scene::method::Solver;
+pub use coated::Coated;
+pub use coulomb::Coulomb;
+pub use cutting::CuttingLaw;
+pub use film::Film;
+pub use lcp::Lcp;
+
+/// Gaps and compliances of contacts before their forces are known.
+pub trait ContactPrediction {
+    /// Predicted gap (m).
+    fn gap(&self) -> f64;
+    /// Gap one step earlier (m).
+    fn gap_before(&self) -> f64;
+    /// Coulomb coefficient µ (-).
+    fn friction(&self) -> f64;
+    /// Predicted slip over the step, including rigid motion (m, own directions of the node).
+    fn slip(&self) -> [f64; 3];
+    /// Contact force of the last step (N, own directions).
+    fn last_force(&self) -> [f64; 3];
+    /// Unit direction of slip (own directions); 0 without slip.
+    fn slip_direction(&self) -> [f64; 3];
+    /// Sector of the node.
+    fn sector(&self) -> usize;
+    /// Angle of the node on the casing (rad, fixed frame).
+    fn angle(&self) -> f64;
+}
+
+/// Interface of every contact law. Slices are along the columns of the Delassus matrix or have one entry per contact.
+pub trait ContactLaw {
+    /// Directions per contact in the Delassus matrix: 1 (normal, with sliding friction in the columns) or 3 (normal and tangents).
+    const DIRECTIONS: usize;
+    /// True if a contact that the solution would open or press in is checked again; the paper's rule detects once.
+    const LOOKS_AGAIN: bool;
+    /// True if the law starts from the contact forces of the last step.
+    const STARTS_FROM_FORCES: bool = false;
+    /// Begins a group of `size` contacts.
+    fn begin(&mut self, size: usize);
+    /// Delassus matrix (m/N), to be filled.
+    fn matrix(&mut self) -> &mut DMatrix<f64>;
+    /// Poses contact `contact` of the group, in order; `directions` are its rows of the matrix.
+    fn pose(&mut self, contact: usize, directions: &[[f64; 3]], at: &impl ContactPrediction);
+    /// Solves for the forces of all posed contacts.
+    fn solve(&mut self) -> SolverOutcome;
+    /// Multipliers along the columns (N).
+    fn multipliers(&self) -> &[f64];
+    /// Corrected gaps (m).
+    fn gaps(&self) -> &[f64];
+    /// Parts of the normal forces that a coating carries (N); empty without a coating.
+    fn coating_shares(&self) -> &[f64] {
+        &[]
+    }
+}
+
+/// A law with its unknowns.
+#[derive(Debug, Clone)]
+pub enum Law {
+    /// Forward-increment Lagrange multipliers: penetration detected once, equality there.
+    Film(Film),
+    /// Complementarity on all contacts.
+    Lcp(Lcp),
+    /// Complementarity with stick and slip.
+    Coulomb(Coulomb),
+    /// Complementarity on an abradable coating that is pressed in.
+    Coated(Coated),
+    /// Complementarity on an abradable coating that is cut.
+    Cutting(CuttingLaw),
+}
+
+/// Calls the same function of every law.
+macro_rules! each_law {
+    ($self:expr, $law:ident => $call:expr) => {
+        match $self {
+            Law::Film($law) => $call,
+            Law::Lcp($law) => $call,
+            Law::Coulomb($law) => $call,
+            Law::Coated($law) => $call,
+            Law::Cutting($law) => $call,
+        }
+    };
+}
+
+/// Poses all contacts of one law. Each law has its own instance: all of them inlined in their caller would exceed the instruction cache.
+#[inline(never)]
+fn pose_all<L: ContactLaw, P: ContactPrediction>(law: &mut L, rows: &[[f64; 3]], contacts: impl Iterator<Item = P>) {
+    for (contact, at) in contacts.enumerate() {
+        law.pose(contact, &rows[L::DIRECTIONS * contact..][..L::DIRECTIONS], &at);
+    }
+}
+
+fn directions<L: ContactLaw>(_: &L) -> usize {
+    L::DIRECTIONS
+}
+
+fn is_iterative<L: ContactLaw>(_: &L) -> bool {
+    L::LOOKS_AGAIN
+}
+
+fn starts_from_forces<L: ContactLaw>(_: &L) -> bool {
+    L::STARTS_FROM_FORCES
+}
+
+impl Law {
+    /// Allocates for groups of up to `contacts` contacts; on a coating for whole blades.
+    pub fn new(solver: Solver, coating: Option<Coating>, contacts: usize) -> Self {
+        match (coating, solver) {
+            (Some(coating), _) if coating.is_cut() => Self::Cutting(CuttingLaw::new(coating, contacts)),
+            (Some(coating), _) => Self::Coated(Coated::new(coating, contacts)),
+            (None, Solver::Film) => Self::Film(Film::new(contacts)),
+            (None, Solver::Lcp) => Self::Lcp(Lcp::new(contacts)),
+            (None, Solver::Coulomb) => Self::Coulomb(Coulomb::new(contacts)),
+        }
+    }
+
+    /// Returns whether [`Law::new`] would create this law for the solver; a coating has one law.
+    pub fn matches_solver(&self, solver: Solver) -> bool {
+        match self {
+            Self::Film(_) => solver == Solver::Film,
+            Self::Lcp(_) => solver == Solver::Lcp,
+            Self::Coulomb(_) => solver == Solver::Coulomb,
+            Self::Coated(_) | Self::Cutting(_) => true,
+        }
+    }
+
+    /// Returns [`ContactLaw::DIRECTIONS`].
+    #[inline(always)]
+    pub fn directions(&self) -> usize {
+        each_law!(self, law => directions(law))
+    }
+
+    /// Returns [`ContactLaw::LOOKS_AGAIN`].
+    #[inline(always)]
+    pub fn is_iterative(&self) -> bool {
+        each_law!(self, law => is_iterative(law))
+    }
+
+    /// Returns [`ContactLaw::STARTS_FROM_FORCES`].
+    pub fn starts_from_forces(&self) -> bool {
+        each_law!(self, law => starts_from_forces(law))
+    }
+
+    /// Calls [`ContactLaw::begin`].
+    #[inline(always)]
+    pub fn begin(&mut self, size: usize) {
+        each_law!(self, law => law.begin(size));
+    }
+
+    /// Calls [`ContactLaw::matrix`].
+    #[inline(always)]
+    pub fn matrix(&mut self) -> &mut DMatrix<f64> {
+        each_law!(self, law => law.matrix())
+    }
+
+    /// Calls [`ContactLaw::pose`] for all contacts; `rows` are all rows of the matrix.
+    #[inline(always)]
+    pub fn pose_all<P: ContactPrediction>(&mut self, rows: &[[f64; 3]], contacts: impl Iterator<Item = P>) {
+        each_law!(self, law => pose_all(law, rows, contacts));
+    }
+
+    /// Calls [`ContactLaw::solve`].
+    #[inline(always)]
+    pub fn solve(&mut self) -> SolverOutcome {
+        each_law!(self, law => law.solve())
+    }
+
+    /// Calls [`ContactLaw::multipliers`].
+    #[inline(always)]
+    pub fn multipliers(&self) -> &[f64] {
+        each_law!(self, law => law.multipliers())
+    }
+
+    /// Calls [`ContactLaw::gaps`].
+    #[inline(always)]
+    pub fn gaps(&self) -> &[f64] {
+        each_law!(self, law => law.gaps())
+    }
+
+    /// Calls [`ContactLaw::coating_shares`].
+    #[inline(always)]
+    pub fn coating_shares(&self) -> &[f64] {
+        each_law!(self, law => law.coating_shares())
+    }
+
+    /// Returns the coating of the law.
+    pub fn coating(&self) -> Option<&Coating> {
+        match self {
+            Self::Coated(law) => Some(law.coating()),
+            Self::Cutting(law) => Some(law.coating()),
+            _ => None,
+        }
+    }
+
+    /// Returns the coating of the law for changes of its wear.
+    pub fn coating_mut(&mut self) -> Option<&mut Coating> {
+        match self {
+            Self::Coated(law) => Some(law.coating_mut()),
+            Self::Cutting(law) => Some(law.coating_mut()),
+            _ => None,
+        }
+    }
+
+    /// Applies the wear of the last solution; returns the energy it consumes (J); for a coating that is cut this follows later.
+    pub fn commit(&mut self) -> f64 {
+        match self {
+            Self::Coated(law) => law.commit(),
+            Self::Cutting(law) => {
+                law.commit();
+                0.0
+            }
+            _ => 0.0,
+        }
+    }
+}
+
+/// The state of a law is the wear of its coating.
+impl Persist for Law {
+    fn save(&self, writer: &mut StateWriter) {
+        self.coating().into_iter().for_each(|coating| coating.save(writer));
+    }
+    fn restore(&mut self, reader: &mut StateReader) {
+        self.coating_mut().into_iter().for_each(|coating| coating.restore(reader));
+    }
+    fn check(&self, reader: &mut StateReader) {
+        self.coating().into_iter().for_each(|coating| coating.check(reader));
+    }
+}
+
+/// Returns two unit tangents; the first as near to the direction of sliding (second component) as the normal permits.
+pub fn tangents(normal: [f64; 3]) -> [[f64; 3]; 2] {
+    let start = if normal[1].abs() < 0.9 { [0.0, 1.0, 0.0] } else { [0.0, 0.0, 1.0] };
+    let along = dot(start, normal);
+    let first: [f64; 3] = std::array::from_fn(|i| start[i] - along * normal[i]);
+    let length = dot(first, first).sqrt();
+    let first = first.map(|value| value / length);
+    let second = [
+        normal[1] * first[2] - normal[2] * first[1],
+        normal[2] * first[0] - normal[0] * first[2],
+        normal[0] * first[1] - normal[1] * first[0],
+    ];
+    [first, second]
+}

@@ -1,0 +1,100 @@
+//! Contact with an abradable coating: rods that are free, elastic or yielding, and the hard casing behind the coating.
+
+use nalgebra::DMatrix;
+
+use super::{ContactLaw, ContactPrediction};
+use crate::contact::active_set::SolverOutcome;
+use crate::contact::coating::{CoatedProblem, Coating};
+
+/// A coating with its wear, and the contact problem of its blades. Groups are whole blades, whose nodes share cells.
+#[derive(Debug, Clone)]
+pub struct Coated {
+    coating: Coating,
+    problem: CoatedProblem,
+    size: usize,
+    /// Angles of the contacts on the casing (rad), predicted gaps (m), and the contacts that are initially on the hard casing.
+    angles: Vec<f64>,
+    gaps: Vec<f64>,
+    closed: Vec<bool>,
+    /// Force of coating and hard casing together (N).
+    multipliers: Vec<f64>,
+}
+
+impl Coated {
+    /// Allocates for `contacts` contacts, all of whole blades.
+    pub fn new(coating: Coating, contacts: usize) -> Self {
+        Self {
+            problem: coating.problem(contacts / coating.nodes()),
+            coating,
+            size: 0,
+            angles: vec![0.0; contacts],
+            gaps: vec![0.0; contacts],
+            closed: vec![false; contacts],
+            multipliers: vec![0.0; contacts],
+        }
+    }
+
+    /// Returns the coating.
+    pub fn coating(&self) -> &Coating {
+        &self.coating
+    }
+
+    /// Returns the coating for changes of its wear.
+    pub fn coating_mut(&mut self) -> &mut Coating {
+        &mut self.coating
+    }
+
+    /// Applies the wear of the last solution; returns the energy it consumes (J).
+    pub fn commit(&mut self) -> f64 {
+        self.coating.commit(&self.problem)
+    }
+}
+
+impl ContactLaw for Coated {
+    const DIRECTIONS: usize = 1;
+    const LOOKS_AGAIN: bool = true;
+
+    fn begin(&mut self, size: usize) {
+        self.problem.clear();
+        self.problem.monotone = true;
+        self.size = size;
+    }
+
+    fn matrix(&mut self) -> &mut DMatrix<f64> {
+        &mut self.problem.delassus
+    }
+
+    fn pose(&mut self, contact: usize, _: &[[f64; 3]], at: &impl ContactPrediction) {
+        self.angles[contact] = at.angle();
+        self.gaps[contact] = at.gap();
+        self.problem.monotone &= at.friction() == 0.0;
+        self.closed[contact] = at.gap_before() <= -self.coating.thickness();
+    }
+
+    #[inline(never)]
+    fn solve(&mut self) -> SolverOutcome {
+        let size = self.size;
+        for blade in self.angles[..size].chunks_exact(self.coating.nodes()) {
+            self.coating.locate(&mut self.problem, blade);
+        }
+        self.problem.gaps[..size].copy_from_slice(&self.gaps[..size]);
+        self.problem.closed[..size].copy_from_slice(&self.closed[..size]);
+        let outcome = self.problem.solve();
+        for contact in 0..size {
+            self.multipliers[contact] = self.problem.coating[contact] + self.problem.hard[contact];
+        }
+        outcome
+    }
+
+    fn multipliers(&self) -> &[f64] {
+        &self.multipliers[..self.size]
+    }
+
+    fn gaps(&self) -> &[f64] {
+        &self.problem.gaps[..self.size]
+    }
+
+    fn coating_shares(&self) -> &[f64] {
+        &self.problem.coating[..self.size]
+    }
+}

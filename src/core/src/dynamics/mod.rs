@@ -1,9 +1,0 @@
-//! Modal equations of motion and their time stepping.
-
-pub mod bank;
-pub mod cyclic;
-pub mod dispatch;
-pub mod excitation;
-pub mod modal;
-pub mod rigid;
-pub mod sectors;

@@ -1,0 +1,366 @@
+//! Gap functions: distances of the master nodes from the slave, as affine functions of the displacements.
+//!
+//! The gap of a node (eq. 3 of the paper) is evaluated at its predicted position and is linear in the correction of the step from there, g
+//! = g_p + n·(u − u_p). Each kind of gap function has a file here and a variant of [`GapLaw`].
+//!
+//! Displacements are those of the structure: along fixed axes, or along (r, θ, z) of a rotating sector. Contact forces have the same
+//! coordinates; [`wrench`] converts them to fixed directions.
+
+pub mod frame;
+pub mod layout;
+pub mod open;
+pub mod plane;
+pub mod revolution;
+pub mod spline;
+pub mod surface_spline;
+pub mod wrench;
+
+use crate::persist::persist_fields;
+use crate::scene::ranges::SMALL;
+use layout::Layout;
+pub use layout::sector_angle;
+use open::{OpenGap, tangent};
+pub use plane::FixedGap;
+pub use revolution::RevolutionGap;
+use spline::{SplineGap, faces_inwards};
+use surface_spline::{ClosestPoint, SurfaceSpline};
+use wrench::At;
+
+/// Prescribed motion of rotor and casing at one instant.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct PrescribedMotion {
+    /// Angle of the rotor θ_r (rad).
+    pub rotor_angle: f64,
+    /// Speed of the rotor Ω (rad/s).
+    pub speed: f64,
+    /// Offset added to every radial clearance (m).
+    pub gap_offset: f64,
+    /// Factor on the shape of the casing (-), with its ramp.
+    pub shape_factor: f64,
+    /// Rotation of the shape about +z (rad).
+    pub shape_rotation: f64,
+    /// Uniform change of the casing radius (m).
+    pub radius_change: f64,
+    /// Displacement of the shaft centre along fixed x, y and z (m): whirl and axial shift.
+    pub shaft: [f64; 3],
+    /// Velocity of the shaft centre (m/s).
+    pub shaft_velocity: [f64; 3],
+}
+
+persist_fields!(PrescribedMotion {
+    rotor_angle,
+    speed,
+    gap_offset,
+    shape_factor,
+    shape_rotation,
+    radius_change,
+    shaft,
+    shaft_velocity
+});
+
+/// Unit normals at one instant, arrays `[node · lanes + lane]`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Geometry {
+    /// Components of the unit normal, pointing from the slave to the master.
+    pub normal: [Vec<f64>; 3],
+    /// Closest points on a surface spline; empty for other surfaces.
+    pub places: Vec<ClosestPoint>,
+}
+
+persist_fields!(Geometry { normal, places });
+
+impl Geometry {
+    /// Makes room for all contact nodes and lanes of a structure, `len` in all, with closest points if one of its pairs has them.
+    pub fn new(len: usize, has_places: bool) -> Self {
+        let places = if has_places { len } else { 0 };
+        Self { normal: [vec![0.0; len], vec![0.0; len], vec![0.0; len]], places: vec![ClosestPoint::default(); places] }
+    }
+
+    /// Closest point of one node of one lane, on surfaces that have closest points.
+    #[inline(always)]
+    pub fn place_at(&self, index: usize) -> ClosestPoint {
+        self.places.get(index).copied().unwrap_or_default()
+    }
+
+    /// Unit normal of one node of one lane.
+    pub fn normal_at(&self, index: usize) -> [f64; 3] {
+        [self.normal[0][index], self.normal[1][index], self.normal[2][index]]
+    }
+}
+
+/// Gap function of a contact pair, compiled for stepping, for some contact nodes of a structure in all sectors. Arrays have the size of the
+/// structure, `[node · lanes + lane]`; a pair reads and writes the elements of its nodes.
+#[derive(Debug, Clone, PartialEq)]
+pub enum GapLaw {
+    /// Constant normals and gaps: plane obstacles and node-to-node pairs.
+    Fixed(FixedGap),
+    /// Sectors around an axis inside a rigid surface of revolution.
+    Revolution(RevolutionGap),
+    /// Sectors around an axis inside a surface through data points, rigid or carried by a structure.
+    Spline(Box<SplineGap>),
+    /// Nodes described in fixed directions against a surface through data points, rigid or carried by a structure.
+    Open(Box<OpenGap>),
+}
+
+impl GapLaw {
+    /// Number of contact nodes per sector of the structure, including those of other pairs.
+    pub fn nodes(&self) -> usize {
+        match self {
+            Self::Fixed(law) => law.gaps.len(),
+            Self::Revolution(law) => law.layout.nodes(),
+            Self::Spline(law) => law.layout.nodes(),
+            Self::Open(law) => law.positions().len(),
+        }
+    }
+
+    /// Returns the contact nodes of this pair.
+    pub fn members(&self) -> Vec<usize> {
+        match self {
+            Self::Fixed(law) => (0..law.gaps.len()).collect(),
+            Self::Revolution(law) => law.nodes.clone(),
+            Self::Spline(law) => law.nodes.clone(),
+            Self::Open(law) => law.nodes().to_vec(),
+        }
+    }
+
+    /// Returns the surface through data points that the nodes can touch.
+    #[inline(always)]
+    pub fn spline(&self) -> Option<&SurfaceSpline> {
+        match self {
+            Self::Fixed(_) | Self::Revolution(_) => None,
+            Self::Spline(law) => Some(&law.surface),
+            Self::Open(law) => Some(&law.surface.surface),
+        }
+    }
+
+    /// Returns the positions of the nodes around the axis, if there is one.
+    pub fn layout(&self) -> Option<&Layout> {
+        match self {
+            Self::Fixed(_) | Self::Open(_) => None,
+            Self::Revolution(law) => Some(&law.layout),
+            Self::Spline(law) => Some(&law.layout),
+        }
+    }
+
+    /// Returns whether a node that stays within `reach` (m, own directions) of its position cannot touch the surface while the rotor turns
+    /// from its current angle to `turned` (rad) and nothing else moves. False if this is unknown.
+    pub fn is_clear(&self, at: At<'_>, turned: f64, reach: [f64; 3]) -> bool {
+        match self {
+            Self::Fixed(law) => law.gaps[at.node] > dot(law.normals[at.node].map(f64::abs), reach),
+            Self::Revolution(law) => law.is_clear(at, turned, reach),
+            Self::Spline(_) | Self::Open(_) => false,
+        }
+    }
+
+    /// Largest difference by which the gap of a node that stays within `reach` (m, own directions) of its position may be smaller in
+    /// between than at both ends (m), while the rotor turns from its current angle to `turned` (rad) and nothing else moves.
+    pub fn approach(&self, at: At<'_>, turned: f64, reach: [f64; 3]) -> f64 {
+        match self {
+            Self::Fixed(law) => 2.0 * dot(law.normals[at.node].map(f64::abs), reach),
+            Self::Revolution(law) => law.approach(at, turned, reach),
+            Self::Spline(_) | Self::Open(_) => f64::INFINITY,
+        }
+    }
+
+    /// Lower bound on the gap (m) of a node that stays within `reach` (m, own directions) of its position, for a motion to `end` that is
+    /// linear in time while the rotor turns by `turn` relative to the shape (rad): the gap at the narrowest place and time minus the reach.
+    /// `None` if it is unknown or the node may leave the surface.
+    pub fn least(&self, at: At<'_>, end: &PrescribedMotion, turn: f64, reach: [f64; 3]) -> Option<f64> {
+        match self {
+            Self::Revolution(law) => law.least(at, end, turn, reach),
+            Self::Fixed(_) | Self::Spline(_) | Self::Open(_) => None,
+        }
+    }
+
+    /// Smallest positive radial clearance, or fixed gap (m); infinite if there is none. For open surfaces a thousandth of the smallest
+    /// extent.
+    pub fn clearance(&self) -> f64 {
+        let all = match self {
+            Self::Fixed(law) => &law.gaps,
+            Self::Revolution(law) => &law.layout.clearances,
+            Self::Spline(law) => &law.layout.clearances,
+            Self::Open(law) => return law.clearance(),
+        };
+        all.iter().copied().filter(|clearance| *clearance > 0.0).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Returns the rounding error of a gap (m) that is a distance between points far from the origin.
+    pub fn rounding(&self) -> f64 {
+        let largest = |all: &mut dyn Iterator<Item = f64>| all.fold(0.0, f64::max);
+        let far = match self {
+            Self::Fixed(_) | Self::Revolution(_) => 0.0,
+            Self::Spline(law) => largest(&mut law.layout.radii.iter().copied()),
+            // Its displacements contain the whole flight.
+            Self::Open(law) => 8.0 * largest(&mut law.positions().iter().map(|place| dot(*place, *place).sqrt())),
+        };
+        64.0 * f64::EPSILON * far
+    }
+
+    /// Angle over which the casing shape changes noticeably (rad).
+    pub fn angular_scale(&self) -> f64 {
+        match self {
+            Self::Fixed(_) | Self::Open(_) => f64::INFINITY,
+            Self::Revolution(law) => law.surface.angular_scale(),
+            Self::Spline(law) => law.angular_scale,
+        }
+    }
+
+    /// Returns normals and closest points of the nodes of a structure with this pair only, with rows of `lanes` lanes.
+    pub fn geometry(&self, lanes: usize) -> Geometry {
+        let mut geometry = Geometry::new(self.nodes() * lanes, self.spline().is_some());
+        self.prepare(lanes, &mut geometry);
+        geometry
+    }
+
+    /// Writes the constant values, with rows of `lanes` lanes.
+    pub fn prepare(&self, lanes: usize, geometry: &mut Geometry) {
+        if let Self::Fixed(law) = self {
+            law.prepare(lanes, geometry);
+        }
+    }
+
+    /// Returns gap (m), unit normal and closest point of one node displaced by `moved` (m, own directions) against the current surface; a
+    /// closest point only for surfaces through data points. For open surfaces the search starts at `guess`, if there is one.
+    pub fn gap_of_node(
+        &mut self,
+        at: At<'_>,
+        moved: [f64; 3],
+        guess: Option<ClosestPoint>,
+    ) -> (f64, [f64; 3], ClosestPoint) {
+        let (gap, normal) = match self {
+            Self::Fixed(law) => (law.gaps[at.node] + dot(law.normals[at.node], moved), law.normals[at.node]),
+            Self::Revolution(law) => law.gap_of_node(at, moved),
+            Self::Spline(law) => return law.gap_of_node(at, moved),
+            Self::Open(law) => return law.gap_of_node(at.node, moved, guess),
+        };
+        (gap, normal, ClosestPoint::default())
+    }
+
+    /// Computes gaps (m) and normals at an instant, for the displacements `[row · lanes + lane]` of the contact rows (m) and `moved` of the
+    /// control points of a surface that a structure carries. `before` is the geometry of the previous step, from which the search for
+    /// closest points starts. Gaps are infinite if there is no surface to touch; padding lanes and nodes of other pairs are not written.
+    pub fn evaluate(
+        &mut self,
+        drive: &PrescribedMotion,
+        displacement: &[f64],
+        moved: &[f64],
+        before: Option<&Geometry>,
+        geometry: &mut Geometry,
+        gap: &mut [f64],
+    ) {
+        let guess = before.map(|before| &before.places[..]);
+        match self {
+            Self::Fixed(law) => law.evaluate(displacement, gap),
+            Self::Revolution(law) => law.evaluate(drive, displacement, geometry, gap),
+            Self::Spline(law) => law.evaluate(drive, displacement, moved, guess, geometry, gap),
+            Self::Open(law) => law.evaluate(displacement, moved, guess, geometry, gap),
+        }
+    }
+
+    /// Deforms the surface to this factor of its shape, with control points displaced by `moved` (m, three per control point).
+    pub fn bend(&mut self, factor: f64, moved: &[f64]) {
+        match self {
+            Self::Fixed(_) | Self::Revolution(_) => {}
+            Self::Spline(law) => law.follow(factor, moved),
+            Self::Open(law) => law.surface.follow(moved),
+        }
+    }
+
+    /// Records that the rotor has turned by `angle` (rad), up to whole turns, since the last evaluation: the search for closest points
+    /// starts from there.
+    pub fn turn(&mut self, angle: f64) {
+        if let Self::Spline(law) = self {
+            law.turned = angle / std::f64::consts::TAU;
+        }
+    }
+
+    /// Largest change of the surface by its shape at factor 1 (m).
+    pub fn shape_size(&self) -> f64 {
+        match self {
+            Self::Fixed(_) | Self::Open(_) => 0.0,
+            Self::Revolution(law) => law.surface.largest_change(),
+            Self::Spline(law) => law.shape_size,
+        }
+    }
+
+    /// Returns the largest change of a gap (m) when the rotor turns by `angle` (rad): under the shape at `factor`, and under a surface through points
+    /// that are displaced by up to `moved` (m).
+    pub fn turned_under(&self, angle: f64, factor: f64, moved: f64) -> f64 {
+        // At most from one end of the range of a change to the other.
+        let part = |scale: f64| 2.0 * (angle / scale).min(1.0);
+        let shape = if factor == 0.0 { 0.0 } else { factor * self.shape_size() * part(self.angular_scale()) };
+        let Self::Spline(law) = self else { return shape };
+        shape + (law.ripple + moved) * part(law.surface.spacing())
+    }
+
+    /// Changes of a gap below this (m) are insignificant: a fraction of the radius, or of the extent of open surfaces, since a linear gap
+    /// neglects curvature; rounding for fixed gaps.
+    pub fn indifferent(&self, node: usize) -> f64 {
+        const CURVED: f64 = 1e-5;
+        match self {
+            Self::Fixed(law) => 1e-9 * law.gaps[node].abs(),
+            Self::Revolution(RevolutionGap { layout, .. }) => CURVED * layout.radii[node],
+            Self::Spline(law) => CURVED * law.layout.radii[node],
+            Self::Open(law) => CURVED * law.largest(),
+        }
+    }
+
+    /// Returns the first node, `node · lanes + lane`, that has left a surface around an axis.
+    pub fn out_of_reach(&self) -> Option<usize> {
+        if let Self::Spline(law) = self { law.out_of_reach } else { None }
+    }
+
+    /// Largest displacement (m) that counts as small: a tenth of the smallest radius, or of the extent of the nodes and of their open
+    /// surfaces; no limit for fixed obstacles.
+    pub fn largest_displacement(&self) -> f64 {
+        if let Self::Open(law) = self {
+            return law.largest();
+        }
+        let radii = self.layout().map(|layout| layout.radii.iter());
+        radii.map_or(f64::INFINITY, |radii| SMALL * radii.fold(f64::INFINITY, |low: f64, radius| low.min(*radius)))
+    }
+
+    /// Returns whether small displacements and a casing seen from inside can describe a contact: not deeper than a tenth of the radius, on
+    /// a flank below 45°. For open surfaces only the depth counts.
+    pub fn is_plausible(&self, node: usize, gap: f64, normal: [f64; 3]) -> bool {
+        match self {
+            Self::Fixed(_) => true,
+            Self::Revolution(law) => gap > -SMALL * law.layout.radii[node] && normal[1].abs() <= -normal[0],
+            Self::Spline(law) => gap > -SMALL * law.layout.radii[node] && faces_inwards(normal),
+            Self::Open(law) => gap > -law.largest(),
+        }
+    }
+
+    /// Prescribed velocity of the master relative to the slave (m/s), of a node displaced by `moved` (m, own directions), in the
+    /// coordinates of the displacements, whose arcs are r times angles; `index` is `node · lanes + lane`.
+    #[inline(always)]
+    pub fn sliding_velocity(&self, node: usize, index: usize, drive: &PrescribedMotion, moved: [f64; 3]) -> [f64; 3] {
+        match self {
+            Self::Fixed(law) => law.sliding[index],
+            Self::Revolution(law) => law.layout.rigid_velocity(node, index, drive, moved),
+            Self::Spline(law) => law.rigid_velocity(node, index, drive, moved),
+            // Free flight is part of the displacements.
+            Self::Open(_) => [0.0; 3],
+        }
+    }
+
+    /// Returns whether sliding may have any direction in the tangent plane, so that it turns within a step.
+    pub fn slides_anywhere(&self) -> bool {
+        matches!(self, Self::Open(_))
+    }
+
+    /// Unit slip direction of the master in the tangent plane, from the predicted relative velocity (m/s); zero without slip. On surfaces
+    /// of revolution axial slip is neglected, as in section 4.3 of the paper.
+    pub fn slip_direction(&self, velocity: [f64; 3], normal: [f64; 3]) -> [f64; 3] {
+        let candidate = match self {
+            Self::Fixed(_) | Self::Open(_) => velocity,
+            Self::Revolution(_) | Self::Spline(_) => [0.0, velocity[1], 0.0],
+        };
+        tangent(candidate, normal)
+    }
+}
+
+/// Scalar product.
+pub fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}

@@ -1,0 +1,186 @@
+//! Gaps of structures described in fixed directions: contact nodes against a surface through a contact grid.
+//!
+//! A node is at x = X + u, which includes the rigid flight, and can touch the closest point of its surface: g = (x − S)·n with n = S_t ×
+//! S_s/|S_t × S_s|. A node beyond a free edge has no surface to touch: its gap is infinite and its normal zero.
+
+use super::spline::NOTHING_TO_TOUCH;
+use super::surface_spline::{ClosestPoint, Projection, SurfaceSpline};
+use super::{Geometry, dot};
+use crate::scene::ranges::SMALL;
+
+/// [`OpenGap::clearance`] as a fraction of the largest displacement that counts as small.
+const CLEARANCE: f64 = 1e-2;
+
+/// Largest distance of a node behind a surface that is continued beyond its edge: as a fraction of the path of the node in the step, since
+/// the surface may be curved, and of the largest small displacement.
+const BEHIND_EDGE: [f64; 2] = [1e-3, 1e-6];
+
+/// A surface through the contact grid of a structure, in fixed directions.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OpenSurface {
+    /// The current surface.
+    pub surface: SurfaceSpline,
+    /// Undeformed control points (m).
+    undeformed: Vec<[f64; 3]>,
+    /// Control points in use.
+    control: Vec<[f64; 3]>,
+}
+
+impl OpenSurface {
+    /// Creates the undeformed surface.
+    pub fn new(surface: SurfaceSpline) -> Self {
+        let undeformed = surface.control_points().to_vec();
+        Self { surface, control: undeformed.clone(), undeformed }
+    }
+
+    /// Displaces the control points by `moved` (m, three per control point; empty for a rigid surface).
+    pub(super) fn follow(&mut self, moved: &[f64]) {
+        if moved.is_empty() {
+            return;
+        }
+        let (moved, _) = moved.as_chunks::<3>();
+        for ((point, undeformed), moved) in self.control.iter_mut().zip(&self.undeformed).zip(moved) {
+            *point = std::array::from_fn(|i| undeformed[i] + moved[i]);
+        }
+        self.surface.set_control_points(&self.control);
+    }
+
+    /// Longest side of the bounding box of its undeformed control points (m).
+    pub fn extent(&self) -> f64 {
+        extent(&self.undeformed)
+    }
+}
+
+/// Contact nodes described in fixed directions, facing a surface.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OpenGap {
+    /// Undeformed positions of the contact nodes of the structure (m).
+    positions: Vec<[f64; 3]>,
+    /// Contact nodes that can touch the surface.
+    nodes: Vec<usize>,
+    /// The surface.
+    pub surface: OpenSurface,
+    /// Largest displacement that counts as small (m).
+    largest: f64,
+}
+
+impl OpenGap {
+    /// Creates the gap function of `nodes` of the contact nodes at `positions` (m).
+    pub fn new(positions: Vec<[f64; 3]>, nodes: Vec<usize>, surface: OpenSurface) -> Self {
+        let smallest = surface.extent().min(extent(&positions));
+        Self { positions, nodes, surface, largest: SMALL * smallest }
+    }
+
+    /// Takes into account another pair of the same structure, whose surface has this extent (m).
+    pub fn beside(self, extent: f64) -> Self {
+        Self { largest: self.largest.min(SMALL * extent), ..self }
+    }
+
+    /// Returns the contact nodes of the pair.
+    pub fn nodes(&self) -> &[usize] {
+        &self.nodes
+    }
+
+    /// Undeformed positions of the contact nodes of the structure (m).
+    pub fn positions(&self) -> &[[f64; 3]] {
+        &self.positions
+    }
+
+    /// Largest displacement and penetration that count as small (m): a tenth of the smallest extent of the contact nodes and of their
+    /// surfaces.
+    pub fn largest(&self) -> f64 {
+        self.largest
+    }
+
+    /// Returns the point of the surface at a closest point (m).
+    pub fn contact_point(&self, place: ClosestPoint) -> [f64; 3] {
+        self.surface.surface.evaluate(place).point
+    }
+
+    /// Computes gaps (m), normals and closest points of the nodes for the displacements of the contact rows (m), for a surface whose
+    /// control points are displaced by `moved` (m; empty for a rigid surface). The search starts from `guess`, or from the nearest data
+    /// point.
+    pub fn evaluate(
+        &mut self,
+        displacement: &[f64],
+        moved: &[f64],
+        guess: Option<&[ClosestPoint]>,
+        geometry: &mut Geometry,
+        gap: &mut [f64],
+    ) {
+        self.surface.follow(moved);
+        for &node in &self.nodes {
+            let moved = std::array::from_fn(|i| displacement[3 * node + i]);
+            let (value, normal, place) = self.gap_of_node(node, moved, guess.map(|places| places[node]));
+            gap[node] = value;
+            geometry.places[node] = place;
+            for (component, value) in normal.into_iter().enumerate() {
+                geometry.normal[component][node] = value;
+            }
+        }
+    }
+
+    /// Returns gap (m), normal and closest point of one node displaced by `moved` (m) against the current surface. The caller detects a NaN
+    /// gap: the model no longer describes such a state.
+    pub(super) fn gap_of_node(
+        &self,
+        node: usize,
+        moved: [f64; 3],
+        guess: Option<ClosestPoint>,
+    ) -> (f64, [f64; 3], ClosestPoint) {
+        let surface = &self.surface.surface;
+        let point = std::array::from_fn(|i| self.positions[node][i] + moved[i]);
+        let start = guess.unwrap_or_else(|| surface.locate(point));
+        let mut found = surface.project(point, start);
+        if found == Projection::Lost {
+            found = surface.project(point, surface.locate(point));
+        }
+        match found {
+            Projection::Found { place, normal, gap, .. } => (gap, normal, place),
+            Projection::BeyondEdge { place } => (NOTHING_TO_TOUCH, [0.0; 3], place),
+            Projection::Lost => (f64::NAN, [0.0; 3], start),
+        }
+    }
+
+    /// Returns the length that replaces the clearance, which free bodies do not have: a thousandth of the smallest extent (m).
+    pub(super) fn clearance(&self) -> f64 {
+        CLEARANCE * self.largest
+    }
+
+    /// Returns whether a node with the current gap (m) was behind the surface, continued beyond its edge, before it moved by `moved`
+    /// relative to it (m).
+    pub fn was_behind(&self, moved: [f64; 3], normal: [f64; 3], gap: f64) -> bool {
+        let (approach, travel) = (dot(moved, normal), dot(moved, moved).sqrt());
+        gap - approach < -(BEHIND_EDGE[0] * travel + BEHIND_EDGE[1] * self.largest)
+    }
+
+    /// Returns whether the contact nodes have moved relative to each other by more than small displacements: displacements minus their
+    /// mean.
+    pub fn is_distorted(&self, displacement: &[f64]) -> bool {
+        let (moved, _) = displacement.as_chunks::<3>();
+        #[expect(clippy::cast_precision_loss, reason = "node counts are far below 2^52")]
+        let share = 1.0 / moved.len() as f64;
+        (0..3).any(|i| {
+            let mean = share * moved.iter().map(|moved| moved[i]).sum::<f64>();
+            moved.iter().any(|moved| (moved[i] - mean).abs() > self.largest)
+        })
+    }
+}
+
+/// Longest side of the bounding box of points (m).
+fn extent(points: &[[f64; 3]]) -> f64 {
+    let side = |i: usize| {
+        let values = || points.iter().map(|point| point[i]);
+        values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
+    };
+    (0..3).map(side).fold(0.0, f64::max)
+}
+
+/// Unit tangent along a velocity (m/s); zero without slip.
+#[inline(always)]
+pub fn tangent(velocity: [f64; 3], normal: [f64; 3]) -> [f64; 3] {
+    let along = dot(velocity, normal);
+    let tangent: [f64; 3] = std::array::from_fn(|i| velocity[i] - along * normal[i]);
+    let length = dot(tangent, tangent).sqrt();
+    if length > 0.0 { tangent.map(|value| value / length) } else { [0.0; 3] }
+}

@@ -1,0 +1,206 @@
+//! Step limit of massless-boundary, which is explicit but without the inertia of the contact nodes.
+//!
+//! Closed contact makes the residual flexibility G of the quasi-static modes a spring on the modes with inertia: K_c = Φ_nᵀ G_nn⁻¹ Φ_n.
+//! Their step q⁺ − (1 + β)q + βq⁻ = −C(Λ + K_c)q, C = diag(c), is that of the masses ½(1 + β) with dashpots, and is stable while the
+//! largest eigenvalue µ of D + X½ K_c X½ is below 4, with X = 2(1 + β)⁻¹C and D = XΛ.
+//!
+//! A flexible slave has its own D_s < 4 and X_s; several slaves under one blade have those of all their modes. With the modes of both, and
+//! U = L⁻¹[Φ_n X½, Ψ_n X_s½], G_nn = L Lᵀ, all eigenvalues are below 4 while those of the sum over modes U(4 − D)⁻¹Uᵀ are below 1. The part
+//! of the master has no eigenvalue above µ/4, so that the slave adds the largest eigenvalue of G_nn⁻¹ Ψ_n X_s(1 − D_s/4)⁻¹ Ψ_nᵀ to µ, per
+//! blade in contact.
+//!
+//! Steps may have any length up to the limit, and a mode comes closest to D = 4 at ω_d h = π: each mode counts with its worst case at steps
+//! up to h. By itself this does not reach 4, since contact does not excite modes in which it does not participate.
+
+use nalgebra::DMatrix;
+
+use crate::geometry::dot;
+use crate::limits::{OTHER_SCHEME, rounded_down, shorter};
+use crate::modes::modal::ModalModel;
+use crate::modes::schemes::{ModeCoefficients, damped_frequency};
+use crate::scene::method::Scheme;
+use crate::warning::Topic;
+use crate::{Error, Result, Warning};
+
+/// Margin below the limit.
+const MARGIN: f64 = 1e-6;
+/// Fraction of the limit up to which steps are accepted. Closed contact is stable up to the limit, but a node that opens and closes
+/// switches between two springs, which pumps energy in bands of step sizes. Twelve blades pressed on a round casing for 0.1 s with 1e-3 of
+/// damping gain no energy at 0.8 of the limit, and hundreds of times their energy at 0.85.
+const USABLE: f64 = 0.8;
+/// Fraction of the limit if closed contact is much stiffer than the modes with inertia, whose damping then has too little effect on
+/// bouncing nodes: nodes a hundred times as stiff as their base settle there with a damping ratio of 0.02, but not from 0.5 on.
+pub const USABLE_STIFF: f64 = 0.25;
+/// Ratio of the squares of the highest frequency with and without closed contact above which contact counts as stiff: at 10 a damping ratio
+/// of 0.02 brings the same nodes to rest up to 0.8 of the limit.
+const STIFF: f64 = 10.0;
+/// Ratio above which every step is rejected: at 1000 the same nodes keep bouncing at 0.2 of the limit, with meaningless forces.
+const TOO_STIFF: f64 = 300.0;
+/// Fraction of the limit up to which the same blades gain no energy without damping: at 0.5 they gain a fifth of their energy.
+pub const QUIET: f64 = 0.4;
+
+/// Step limits of the scheme (s).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MasslessLimit {
+    /// Closed contact is stable below this step.
+    pub closed: f64,
+    /// Contact that opens and closes gains hardly any energy below this step.
+    pub usable: f64,
+}
+
+impl MasslessLimit {
+    /// No limit.
+    pub const NONE: Self = Self { closed: f64::INFINITY, usable: f64::INFINITY };
+}
+
+/// Data that the limit depends on.
+#[derive(Debug, Clone)]
+pub struct MasslessCheck<'a> {
+    /// Modes of the master.
+    pub model: &'a ModalModel,
+    /// Unit normal of every contact node.
+    pub normals: Vec<[f64; 3]>,
+    /// Modes of every structure under the nodes along those normals, nodes × modes, and the structure.
+    pub slaves: Vec<(DMatrix<f64>, &'a ModalModel)>,
+}
+
+impl MasslessCheck<'_> {
+    /// Bound on the eigenvalues of the step of closed contact at all h up to `step` (s): (master, slave per blade); stable while the sum is
+    /// below 4. `None` if the residual flexibility is singular.
+    pub fn eigenvalues(&self, step: f64) -> Option<(f64, f64)> {
+        let coefficients = self.model.coefficients(Scheme::MasslessBoundary, step);
+        let dynamic = self.model.dynamic_modes(Scheme::MasslessBoundary);
+        let nodes = self.normals.len();
+        let seen = DMatrix::from_fn(nodes, self.model.len(), |node, mode| {
+            dot(self.normals[node], std::array::from_fn(|i| self.model.contact_modes[(3 * node + i, mode)]))
+        });
+        let residual = DMatrix::from_fn(nodes, nodes, |a, b| {
+            (dynamic..self.model.len())
+                .map(|mode| seen[(a, mode)] * coefficients[mode].compliance * seen[(b, mode)])
+                .sum()
+        });
+        let lower = residual.cholesky()?.l();
+        let scaled = |count: usize, entry: &dyn Fn(usize, usize) -> f64| {
+            lower.solve_lower_triangular(&DMatrix::from_fn(nodes, count, entry))
+        };
+        // D + X½ K_c X½ with K_c = (L⁻¹Φ)ᵀ(L⁻¹Φ).
+        let own: Vec<[f64; 2]> = (0..dynamic).map(|mode| worst(self.model, mode, step)).collect();
+        let half = scaled(dynamic, &|node, mode| seen[(node, mode)] * own[mode][1].sqrt())?;
+        let mut matrix = half.transpose() * &half;
+        for (mode, [kept, _]) in own.iter().enumerate() {
+            matrix[(mode, mode)] += kept;
+        }
+        let master = if dynamic == 0 { 0.0 } else { matrix.symmetric_eigenvalues().max() };
+        let mut added = DMatrix::zeros(nodes, nodes);
+        for (seen, model) in &self.slaves {
+            let own: Vec<[f64; 2]> = (0..model.len()).map(|mode| worst(model, mode, step)).collect();
+            let raised = |[kept, moved]: [f64; 2]| (moved / (1.0 - 0.25 * kept)).sqrt();
+            let half = scaled(model.len(), &|node, mode| seen[(node, mode)] * raised(own[mode]))?;
+            added += &half * half.transpose();
+        }
+        let slave = if self.slaves.is_empty() { 0.0 } else { added.symmetric_eigenvalues().max() };
+        Some((master, slave))
+    }
+
+    /// Returns the steps (s) at which closed contact becomes unstable and up to which the scheme is used, searched up to `largest`;
+    /// infinite if closed contact is stable up to there.
+    ///
+    /// # Errors
+    /// Residual flexibility that is singular along the normals.
+    pub fn limit(&self, largest: f64) -> Result<MasslessLimit> {
+        let stiffening = self.stiffening(1e-3 / self.model.largest_frequency());
+        if stiffening > TOO_STIFF {
+            return Err(Error::invalid(
+                "scheme massless-boundary",
+                format!(
+                    "closed contact raises the square of the highest frequency of the modes with inertia by a factor \
+                     of {stiffening:.3e}, so bouncing nodes gain energy with any internal step"
+                ),
+                "Use modal-exact, or a ROM with more modes or softer contact nodes",
+            ));
+        }
+        let closed = self.closed(largest)?;
+        if closed.is_infinite() {
+            return Ok(MasslessLimit::NONE);
+        }
+        let share = if stiffening > STIFF { USABLE_STIFF } else { USABLE };
+        Ok(MasslessLimit { closed, usable: share * closed })
+    }
+
+    /// Factor by which closed contact raises the square of the highest frequency of the modes with inertia, at a small step (s).
+    fn stiffening(&self, step: f64) -> f64 {
+        let coefficients = self.model.coefficients(Scheme::MasslessBoundary, step);
+        let dynamic = self.model.dynamic_modes(Scheme::MasslessBoundary);
+        let open = coefficients[..dynamic].iter().fold(0.0, |most: f64, mode| most.max(per_mass(mode, mode.kappa)));
+        self.eigenvalues(step).map_or(1.0, |(master, slave)| (master + slave) / open)
+    }
+
+    fn closed(&self, largest: f64) -> Result<f64> {
+        let unstable = |step: f64| {
+            let found = self.eigenvalues(step).map(|(master, slave)| master + slave >= 4.0 * (1.0 - MARGIN));
+            found.ok_or_else(|| {
+                Error::invalid(
+                    "scheme massless-boundary",
+                    "the quasi-static modes have no flexibility along the normal of a contact node",
+                    "Use modal-exact, or a ROM with the contact nodes as the interface of the reduction",
+                )
+            })
+        };
+        let first = 1e-3 / self.model.largest_frequency();
+        let mut high = first.min(largest);
+        while !unstable(high)? {
+            if high >= largest {
+                return Ok(f64::INFINITY);
+            }
+            high = (1.25 * high).min(largest);
+        }
+        let mut low = high / 1.25;
+        for _ in 0..40 {
+            let middle = 0.5 * (low + high);
+            *(if unstable(middle)? { &mut high } else { &mut low }) = middle;
+        }
+        Ok(high)
+    }
+}
+
+/// D and X of a mode with inertia in the worst case at steps up to `step` (s): at ω_d h = π if the step exceeds it.
+fn worst(model: &ModalModel, mode: usize, step: f64) -> [f64; 2] {
+    let damped = damped_frequency(model.frequencies[mode], model.damping_ratios[mode]);
+    let at = model.coefficient(mode, 1.0, Scheme::MasslessBoundary, step.min(std::f64::consts::PI / damped));
+    [per_mass(&at, at.kappa).min(4.0 * (1.0 - 2.0 * MARGIN)), per_mass(&at, at.delayed)]
+}
+
+/// A coefficient of the recurrence divided by its mass ½(1 + β), which damping makes smaller than 1.
+fn per_mass(mode: &ModeCoefficients, coefficient: f64) -> f64 {
+    2.0 * coefficient / (1.0 + mode.beta)
+}
+
+/// Error for a step (s) at or beyond the usable one.
+pub fn refusal(step: f64, limit: MasslessLimit) -> Error {
+    let MasslessLimit { closed, usable } = limit;
+    Error::Unstable {
+        problem: format!(
+            "the internal step of {step:.3e} s is too long for massless-boundary: closed contact on the residual \
+             flexibility of the contact nodes is stable only below {closed:.6e} s, and contact that opens and closes \
+             gains energy above {usable:.6e} s"
+        ),
+        remedy: format!("{}{OTHER_SCHEME}", shorter(usable)),
+    }
+}
+
+/// Warning for a step (s) at which contact that opens and closes gains energy unless damping dissipates it.
+pub fn warning(step: f64, limit: MasslessLimit) -> Option<Warning> {
+    (step >= QUIET * limit.closed).then(|| {
+        Warning::new(
+            Topic::MasslessEnergy,
+            format!(
+                "with massless-boundary and an internal step of {step:.3e} s, contact that opens and closes may gain \
+                 energy (visible as a decreasing `impact_loss`)"
+            ),
+            format!(
+                "Set `time.step` below {:.2e} s, or a damping ratio of at least 1e-3",
+                rounded_down(QUIET * limit.closed)
+            ),
+        )
+    })
+}

@@ -1,0 +1,9 @@
+//! Modal equations of motion and their time stepping.
+
+pub mod bank;
+pub mod cyclic;
+pub mod excitation;
+pub mod modal;
+pub mod rigid;
+pub mod schemes;
+pub mod sectors;

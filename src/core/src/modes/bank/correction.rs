@@ -1,0 +1,177 @@
+//! Forces that act on some sectors after the prediction: contact forces, delayed forces, modal loads.
+
+use super::ModalBank;
+use super::predict::{Accumulate, ModalForce};
+use crate::modes::schemes::ModeCoefficients;
+
+impl ModalBank {
+    /// Adds `correction` to the modes of one sector.
+    pub(super) fn move_modes(&mut self, sector: usize, with_loss: bool) {
+        let correction = std::mem::take(&mut self.correction);
+        self.move_each(sector, with_loss, correction.iter(), |_, correction| *correction);
+        self.correction = correction;
+    }
+
+    /// Adds c φᵀf to the modes of one sector.
+    fn respond_and_move(&mut self, sector: usize, with_loss: bool) {
+        let modal_force = std::mem::take(&mut self.modal_force);
+        self.move_each(sector, with_loss, modal_force.iter(), |k, force| k.compliance * force);
+        self.modal_force = modal_force;
+    }
+
+    #[inline(always)]
+    fn move_each<'a>(
+        &mut self,
+        sector: usize,
+        with_loss: bool,
+        values: impl Iterator<Item = &'a f64>,
+        correction: impl Fn(&ModeCoefficients, &f64) -> f64,
+    ) {
+        let (modes, width, set) = (self.modes(), self.width, self.set_of(sector));
+        let coefficients = &self.coefficients[set * modes..][..modes];
+        let (block, lane) = (sector / width * modes * width, sector % width);
+        let position = self.state.position[block..][..modes * width].chunks_exact_mut(width);
+        let increment = self.state.increment[block..][..modes * width].chunks_exact_mut(width);
+        let before = self.increment_before[block..][..modes * width].chunks_exact(width);
+        let mut loss = 0.0;
+        for ((((position, increment), before), value), coefficients) in
+            position.zip(increment).zip(before).zip(values).zip(coefficients)
+        {
+            let correction = correction(coefficients, value);
+            if with_loss {
+                let predicted = increment[lane] + before[lane];
+                loss += coefficients.loss * correction * (2.0 * predicted + correction);
+            }
+            position[lane] += correction;
+            increment[lane] += correction;
+        }
+        self.state.loss[sector] += loss;
+    }
+
+    /// Adds the displacement of the contact rows by `correction`.
+    pub(super) fn move_rows(&mut self, sector: usize) {
+        let lanes = self.lanes();
+        if lanes == 1 {
+            let (sums, matrix) = (&mut self.state.displacement, &self.contact_modes);
+            self.instruction_set.run(Accumulate { sums, matrix, values: &self.correction });
+            return;
+        }
+        for (shapes, correction) in self.contact_modes.chunks_exact(self.rows.max(1)).zip(&self.correction) {
+            for (row, shape) in shapes.iter().enumerate() {
+                self.state.displacement[row * lanes + sector] += shape * correction;
+            }
+        }
+    }
+
+    /// Writes φᵀf of one sector, for the force on its rows (N), to the scratch array `modal_force`.
+    fn project(&mut self, force: &[f64]) {
+        let (modal_force, contact_rows) = (&mut self.modal_force, &self.contact_rows);
+        self.instruction_set.run(ModalForce { modal_force, contact_rows, force });
+    }
+
+    /// Corrects one sector for the contact `force` on its rows (N), eq. 11 of the paper.
+    pub fn correct(&mut self, sector: usize, force: &[f64], with_loss: bool) {
+        self.project(force);
+        if self.coupling.is_some() {
+            self.respond(sector);
+            self.move_modes(sector, with_loss);
+        } else {
+            self.respond_and_move(sector, with_loss);
+        }
+        let lanes = self.lanes();
+        let flexibility = self.flexibility[self.set_of(sector)].as_slice();
+        self.moved.fill(0.0);
+        for (column, value) in flexibility.chunks_exact(self.rows).zip(force) {
+            for (moved, entry) in self.moved.iter_mut().zip(column) {
+                *moved += entry * value;
+            }
+        }
+        for (row, moved) in self.state.displacement.chunks_exact_mut(lanes).zip(&self.moved) {
+            row[sector] += moved;
+        }
+    }
+
+    /// Finds the displacement of the contact rows of a single structure by contact forces given as modal forces (m).
+    pub fn response_to_modal(&mut self, modal_force: &[f64], displacement: &mut [f64]) {
+        self.modal_force.copy_from_slice(modal_force);
+        self.respond(0);
+        displacement.fill(0.0);
+        let (matrix, values) = (&self.contact_modes[..], &self.correction[..]);
+        self.instruction_set.run(Accumulate { sums: displacement, matrix, values });
+    }
+
+    /// Corrects a single structure for contact forces given as modal forces, using the response of its rows to them.
+    pub fn correct_modal(&mut self, modal_force: &[f64], response: &[f64], with_loss: bool) {
+        self.modal_force.copy_from_slice(modal_force);
+        self.respond(0);
+        self.move_modes(0, with_loss);
+        for (displacement, response) in self.state.displacement.iter_mut().zip(response) {
+            *displacement += response;
+        }
+    }
+
+    /// `correction` ← T c φᵀf.
+    fn respond(&mut self, sector: usize) {
+        let (modes, set) = (self.modes(), self.set_of(sector));
+        let coefficients = &self.coefficients[set * modes..][..modes];
+        for ((correction, force), k) in self.correction.iter_mut().zip(&self.modal_force).zip(coefficients) {
+            *correction = k.compliance * force;
+        }
+        if let Some(coupling) = &mut self.coupling {
+            coupling.transform(set, &mut self.correction);
+        }
+    }
+
+    /// Applies contact forces of the previous step (`forces[row · lanes + sector]`, N) after the prediction (massless-boundary).
+    pub fn act_delayed(&mut self, forces: &[f64], with_loss: bool) {
+        let (lanes, mut force) = (self.lanes(), std::mem::take(&mut self.moved));
+        for sector in 0..self.sectors {
+            for (row, force) in force.iter_mut().enumerate() {
+                *force = forces[row * lanes + sector];
+            }
+            if force.iter().any(|force| *force != 0.0) {
+                self.project(&force);
+                self.act_delayed_modal_force(sector, with_loss);
+            }
+        }
+        self.moved = force;
+    }
+
+    /// Applies modal forces of the previous step to one sector after the prediction.
+    pub fn act_delayed_modal(&mut self, sector: usize, modal_force: &[f64], with_loss: bool) {
+        self.modal_force.copy_from_slice(modal_force);
+        self.act_delayed_modal_force(sector, with_loss);
+    }
+
+    fn act_delayed_modal_force(&mut self, sector: usize, with_loss: bool) {
+        let (modes, set) = (self.modes(), self.set_of(sector));
+        let coefficients = &self.coefficients[set * modes..][..modes];
+        for ((correction, force), k) in self.correction.iter_mut().zip(&self.modal_force).zip(coefficients) {
+            *correction = k.delayed * force;
+        }
+        self.move_modes(sector, with_loss);
+        self.move_rows(sector);
+    }
+
+    /// Returns the work of the modal loads over the last step (J), after the contact correction. A quasi-static mode follows its
+    /// current load, so over this step the previous load did the work.
+    pub fn finish_loads(&mut self) -> f64 {
+        if !self.options.loads {
+            return 0.0;
+        }
+        let mut work = 0.0;
+        for mode in 0..self.modes() {
+            let dynamic = mode < self.model.dynamic_modes(self.scheme);
+            let load = if dynamic { self.modal_load[mode] } else { self.state.modal_load_before[mode] };
+            if load != 0.0 {
+                let twice: f64 = (0..self.sectors)
+                    .map(|sector| self.index(mode, sector))
+                    .map(|index| self.state.increment[index] + self.increment_before[index])
+                    .sum();
+                work += 0.5 * load * twice;
+            }
+        }
+        self.state.modal_load_before.copy_from_slice(&self.modal_load);
+        work + self.finish_heat()
+    }
+}

@@ -1,0 +1,398 @@
+//! Modes of a disk of coupled sectors, nodal diameter by nodal diameter.
+//!
+//! Every nodal diameter n has its Hermitian pencil K_n φ = ω² M_n φ (see [`Harmonic`]). With the mass-normalised modes,
+//! z_n = Φ_n q_n, the equations are q̈ + 2ξω q̇ + ω² q = p for each complex amplitude q, and the displacement of sector s is
+//! u_s = Σ_n Re(Ψ_n q_n e^(2πi n s/N)) with the weighted contact modes Ψ_n = w_n C_n Φ_n. Virtual work gives the modal
+//! force p_n = Ψ_nᴴ Σ_s f_s e^(−2πi n s/N) of forces f_s on the sectors; its imaginary part is omitted for n = 0 and 2n = N,
+//! whose modes are real.
+
+use nalgebra::{Complex, DMatrix, SymmetricEigen};
+
+use crate::modes::modal::{ModalModel, RIGID_FRACTION, check_semidefinite, fill_ratios, real_modes};
+use crate::modes::schemes::ModeCoefficients;
+use crate::scene::method::Scheme;
+use crate::scene::rom::{Harmonic, cholesky};
+use crate::{Error, Result, Rom, shown};
+
+/// Entries of a mode shape this close to the largest count as equally large when the phase is chosen.
+const SAME_SIZE: f64 = 1e-6;
+
+/// Frequencies of one mode, computed by the reduction and from the matrices of the ROM, agree to this fraction.
+const SAME_FREQUENCY: f64 = 1e-3;
+/// Frequencies of rigid-body modes agree to this fraction of the highest frequency.
+const RIGID_FREQUENCY: f64 = 1e-5;
+
+/// Modes of one nodal diameter, mass-normalised, in the order of their frequencies.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DiameterModes {
+    /// Nodal diameter n.
+    pub nodal_diameter: usize,
+    /// Undamped angular frequencies ω (rad/s), ascending; exactly 0 for rigid-body modes.
+    pub frequencies: Vec<f64>,
+    /// Damping ratios ξ (-), one per mode.
+    pub damping_ratios: Vec<f64>,
+    /// Ψ_n = w_n C_n Φ_n, rows × modes: displacement of the contact rows of sector 0 per unit amplitude.
+    pub contact_modes: DMatrix<Complex<f64>>,
+    /// Φ_n, reduced coordinates × modes. The largest entry of every column (the first of equals) is real and positive.
+    pub shapes: DMatrix<Complex<f64>>,
+    /// Number of the highest modes that massless-boundary treats as quasi-static.
+    pub quasi_static: usize,
+}
+
+impl DiameterModes {
+    /// Number of modes.
+    pub fn len(&self) -> usize {
+        self.frequencies.len()
+    }
+
+    /// Returns whether there are no modes.
+    pub fn is_empty(&self) -> bool {
+        self.frequencies.is_empty()
+    }
+
+    /// Number of modes with inertia under a scheme; the others are the highest.
+    pub fn dynamic_modes(&self, scheme: Scheme) -> usize {
+        if scheme.is_massless() { self.len().saturating_sub(self.quasi_static) } else { self.len() }
+    }
+
+    /// Coefficients of one mode at the step size `step` (s).
+    pub fn coefficient(&self, mode: usize, scheme: Scheme, step: f64) -> ModeCoefficients {
+        let dynamic = mode < self.dynamic_modes(scheme);
+        ModeCoefficients::of_mode(scheme, dynamic, self.frequencies[mode], self.damping_ratios[mode], step)
+    }
+
+    fn new(
+        nodal_diameter: usize,
+        damping_ratio: f64,
+        weight: f64,
+        contact_map: &DMatrix<Complex<f64>>,
+        (eigenvalues, shapes): (Vec<f64>, DMatrix<Complex<f64>>),
+    ) -> Self {
+        Self {
+            nodal_diameter,
+            damping_ratios: vec![damping_ratio; eigenvalues.len()],
+            frequencies: eigenvalues.iter().map(|value| value.sqrt()).collect(),
+            contact_modes: contact_map * &shapes * Complex::new(weight, 0.0),
+            quasi_static: contact_map.nrows(),
+            shapes,
+        }
+    }
+}
+
+/// Modes of all nodal diameters 0 ..= ⌊N/2⌋ of N coupled sectors.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CyclicModel {
+    /// Number of sectors N.
+    pub sectors: usize,
+    /// Nodal diameters in ascending order, from 0.
+    pub diameters: Vec<DiameterModes>,
+}
+
+impl CyclicModel {
+    /// Solves the eigenproblem of every nodal diameter and assigns one damping ratio to all modes.
+    ///
+    /// # Errors
+    /// The ROM is invalid, or a stiffness is not positive semidefinite; the message names the array.
+    pub fn from_rom(rom: &Rom, damping_ratio: f64) -> Result<Self> {
+        let zero = ModalModel::from_rom(rom, damping_ratio)?;
+        let (sectors, complex) = (rom.sectors, |matrix: &DMatrix<f64>| matrix.map(|value| Complex::new(value, 0.0)));
+        let squares = zero.frequencies.iter().map(|frequency| frequency * frequency).collect();
+        let map = complex(&rom.contact_map);
+        let mut first =
+            DiameterModes::new(0, damping_ratio, weight(0, sectors), &map, (squares, complex(&zero.shapes)));
+        // The frequencies are not computed from their squares, which would add a rounding error.
+        first.frequencies = zero.frequencies;
+        let mut diameters = vec![first];
+        for (index, harmonic) in rom.extras.harmonics.iter().enumerate() {
+            let nodal_diameter = index + 1;
+            let suffix = format!("_{nodal_diameter}");
+            let (modes, map) = if 2 * nodal_diameter == sectors {
+                let real = |matrix: &DMatrix<Complex<f64>>| matrix.map(|value| value.re);
+                let (squares, shapes) = real_modes(&real(&harmonic.mass), &real(&harmonic.stiffness), &suffix)?;
+                ((squares, complex(&shapes)), complex(&real(&harmonic.contact_map)))
+            } else {
+                (hermitian_modes(harmonic, &suffix)?, harmonic.contact_map.clone())
+            };
+            let weight = weight(nodal_diameter, sectors);
+            diameters.push(DiameterModes::new(nodal_diameter, damping_ratio, weight, &map, modes));
+        }
+        let model = Self { sectors, diameters };
+        model.check_frequencies(rom)?;
+        Ok(model)
+    }
+
+    /// Checks that the harmonics have the frequencies that the ROM states, which detects exchanged harmonics. (The complex
+    /// conjugate of a harmonic has the same frequencies; its waves travel in the other direction.)
+    fn check_frequencies(&self, rom: &Rom) -> Result<()> {
+        let checks = &rom.checks;
+        if checks.nodal_diameters.len() != checks.reduced_frequencies.len() {
+            return Ok(());
+        }
+        for diameter in &self.diameters {
+            let stored = checks.nodal_diameters.iter().zip(&checks.reduced_frequencies);
+            let stored = stored.filter(|(number, _)| usize::try_from(**number) == Ok(diameter.nodal_diameter));
+            let largest = diameter.frequencies.last().map_or(0.0, |most| most / std::f64::consts::TAU);
+            for ((_, stored), found) in stored.zip(&diameter.frequencies) {
+                let found = found / std::f64::consts::TAU;
+                if (found - stored).abs() > SAME_FREQUENCY * stored + RIGID_FREQUENCY * largest {
+                    return Err(Error::invalid(
+                        "ROM harmonics",
+                        format!(
+                            "nodal diameter {} has a mode at {} Hz, but the checks stored in the ROM give {} Hz",
+                            diameter.nodal_diameter,
+                            shown(found),
+                            shown(*stored)
+                        ),
+                        "Store the harmonics in the order of their nodal diameters, or regenerate the ROM with `tiprub \
+                         reduce`",
+                    ));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Contact rows per sector (3 per contact node).
+    pub fn rows(&self) -> usize {
+        self.diameters[0].contact_modes.nrows()
+    }
+
+    /// Largest number of modes of a nodal diameter.
+    pub fn most_modes(&self) -> usize {
+        self.diameters.iter().map(DiameterModes::len).max().unwrap_or(0)
+    }
+
+    /// Returns whether the modes of a nodal diameter are real, so that no wave can travel.
+    pub fn is_real(&self, nodal_diameter: usize) -> bool {
+        nodal_diameter == 0 || 2 * nodal_diameter == self.sectors
+    }
+
+    /// Sets one damping ratio for all modes; the first modes of each nodal diameter have their `own`.
+    pub fn set_damping_ratio(&mut self, damping_ratio: f64, own: &[f64]) {
+        for diameter in &mut self.diameters {
+            fill_ratios(&mut diameter.damping_ratios, damping_ratio, own, 1);
+        }
+    }
+
+    /// Largest undamped angular frequency (rad/s).
+    pub fn largest_frequency(&self) -> f64 {
+        let all = self.diameters.iter().flat_map(|diameter| &diameter.frequencies);
+        all.fold(0.0, |largest, value| f64::max(largest, *value))
+    }
+
+    /// w_n: displacement of a sector per unit amplitude of a nodal diameter that moves every reduced coordinate by one.
+    pub fn weight(&self, nodal_diameter: usize) -> f64 {
+        weight(nodal_diameter, self.sectors)
+    }
+
+    /// Returns one nodal diameter as a real structure: real and imaginary parts of the amplitudes are modes, those of the
+    /// displacement pattern are contact nodes (first all real, then all imaginary parts). Contact that is closed on all sectors
+    /// decouples into these structures. A nodal diameter with real modes has only real parts.
+    pub fn paired(&self, nodal_diameter: usize) -> ModalModel {
+        let diameter = &self.diameters[nodal_diameter];
+        let (rows, modes) = diameter.contact_modes.shape();
+        let copies = if self.is_real(nodal_diameter) { 1 } else { 2 };
+        let double = |values: &[f64]| values.iter().flat_map(|value| vec![*value; copies]).collect();
+        let contact_modes = DMatrix::from_fn(copies * rows, copies * modes, |row, mode| {
+            let value = diameter.contact_modes[(row % rows, mode / copies)];
+            match (row / rows, mode % copies) {
+                (0, 0) | (1, 1) => value.re,
+                (0, _) => -value.im,
+                _ => value.im,
+            }
+        });
+        ModalModel {
+            frequencies: double(&diameter.frequencies),
+            damping_ratios: double(&diameter.damping_ratios),
+            contact_modes,
+            shapes: DMatrix::identity(copies * modes, copies * modes),
+            quasi_static: copies * diameter.quasi_static,
+        }
+    }
+}
+
+/// w_n: 1/√N for real amplitudes, √(2/N) for complex ones.
+fn weight(nodal_diameter: usize, sectors: usize) -> f64 {
+    let share = if nodal_diameter == 0 || 2 * nodal_diameter == sectors { 1.0 } else { 2.0 };
+    #[expect(clippy::cast_precision_loss, reason = "sector counts are far below 2^52")]
+    let count = sectors as f64;
+    libm::sqrt(share / count)
+}
+
+/// Eigenvalues ω² (ascending, exactly 0 for rigid-body modes) and mass-normalised modes of a Hermitian pencil.
+fn hermitian_modes(harmonic: &Harmonic, suffix: &str) -> Result<(Vec<f64>, DMatrix<Complex<f64>>)> {
+    let Harmonic { mass, stiffness, .. } = harmonic;
+    if let Some(modes) = modal_already(mass, stiffness) {
+        return Ok(modes);
+    }
+    let Some(lower) = cholesky(mass) else {
+        let what = format!("ROM array `mass{suffix}`");
+        return Err(Error::invalid(what, "not positive definite", "Regenerate the ROM"));
+    };
+    let half = lower.solve_lower_triangular(stiffness).unwrap_or_else(|| stiffness.clone());
+    let full = lower.solve_lower_triangular(&half.adjoint()).unwrap_or(half);
+    let eigen = SymmetricEigen::new((&full + full.adjoint()) * Complex::new(0.5, 0.0));
+    let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
+    order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
+    let largest = eigen.eigenvalues.amax();
+    check_semidefinite(eigen.eigenvalues[order[0]], largest, suffix)?;
+    let vectors = eigen.eigenvectors.select_columns(&order);
+    let mut shapes = lower.adjoint().solve_upper_triangular(&vectors).unwrap_or(vectors);
+    fix_phases(&mut shapes);
+    let values = order.iter().enumerate().map(|(mode, index)| {
+        let value = eigen.eigenvalues[*index];
+        if value < RIGID_FRACTION * largest { unresolved_eigenvalue(stiffness, &shapes, mode) } else { value }
+    });
+    let values = values.collect();
+    Ok((values, shapes))
+}
+
+/// Returns modes without solving the eigenproblem if the matrices are in modal coordinates (M = I, K diagonal and ascending).
+fn modal_already(
+    mass: &DMatrix<Complex<f64>>,
+    stiffness: &DMatrix<Complex<f64>>,
+) -> Option<(Vec<f64>, DMatrix<Complex<f64>>)> {
+    let order = mass.nrows();
+    let diagonal: Vec<f64> = (0..order).map(|mode| stiffness[(mode, mode)].re).collect();
+    let ascending = diagonal.windows(2).all(|pair| pair[0] <= pair[1]) && diagonal.iter().all(|value| *value >= 0.0);
+    let nothing = Complex::new(0.0, 0.0);
+    let diagonal_only = |matrix: &DMatrix<Complex<f64>>| {
+        let mut entries = matrix.iter().enumerate();
+        entries.all(
+            |(index, value)| {
+                if index % order == index / order { value.im.to_bits() == 0 } else { *value == nothing }
+            },
+        )
+    };
+    let unit = (0..order).all(|mode| mass[(mode, mode)].re.to_bits() == 1.0_f64.to_bits());
+    (ascending && unit && diagonal_only(mass) && diagonal_only(stiffness))
+        .then(|| (diagonal, DMatrix::identity(order, order)))
+}
+
+/// Returns φᴴKφ, exactly 0 for a rigid-body mode, as for real modes.
+fn unresolved_eigenvalue(stiffness: &DMatrix<Complex<f64>>, shapes: &DMatrix<Complex<f64>>, mode: usize) -> f64 {
+    let (mut quotient, mut magnitude) = (0.0, 0.0);
+    for column in 0..stiffness.ncols() {
+        for row in 0..stiffness.nrows() {
+            let term = shapes[(row, mode)].conj() * stiffness[(row, column)] * shapes[(column, mode)];
+            quotient += term.re;
+            magnitude += libm::hypot(term.re, term.im);
+        }
+    }
+    #[expect(clippy::cast_precision_loss, reason = "orders are far below 2^52")]
+    let rounding = 32.0 * f64::EPSILON * stiffness.nrows() as f64 * magnitude;
+    if quotient > rounding { quotient } else { 0.0 }
+}
+
+/// Makes the largest entry of each eigenvector real and positive, because its phase is arbitrary and numbers should be comparable.
+fn fix_phases(shapes: &mut DMatrix<Complex<f64>>) {
+    let size = |value: &Complex<f64>| libm::hypot(value.re, value.im);
+    for mut column in shapes.column_iter_mut() {
+        let largest = column.iter().fold(0.0, |most: f64, value| most.max(size(value)));
+        let Some(chosen) = column.iter().position(|value| size(value) >= (1.0 - SAME_SIZE) * largest) else { continue };
+        let turn = column[chosen].conj() / size(&column[chosen]);
+        column.iter_mut().for_each(|value| *value *= turn);
+        column[chosen].im = 0.0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn number(seed: &mut u64) -> f64 {
+        *seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        f64::from(u32::try_from(*seed >> 33).unwrap()) / f64::from(1_u32 << 30) - 1.0
+    }
+
+    fn pencil(order: usize, seed: u64) -> Harmonic {
+        let mut seed = seed;
+        let mut random =
+            |rows, columns| DMatrix::from_fn(rows, columns, |_, _| Complex::new(number(&mut seed), number(&mut seed)));
+        let (a, b, contact_map) = (random(order, order), random(order, order), random(3, order));
+        let hermitian = |matrix: DMatrix<Complex<f64>>| (&matrix + matrix.adjoint()) * Complex::new(0.5, 0.0);
+        Harmonic {
+            mass: hermitian(&a * a.adjoint() * Complex::new(0.1, 0.0) + DMatrix::identity(order, order)),
+            stiffness: hermitian(&b * b.adjoint() * Complex::new(1e6, 0.0)),
+            contact_map,
+        }
+    }
+
+    #[test]
+    fn modes_are_orthonormal_and_diagonalise_the_pencil_to_rounding() {
+        for (order, seed) in [(1, 1), (3, 2), (14, 3), (34, 4), (60, 5)] {
+            let harmonic = pencil(order, seed);
+            let (squares, shapes) = hermitian_modes(&harmonic, "_1").unwrap();
+            let size =
+                |matrix: DMatrix<Complex<f64>>| matrix.iter().fold(0.0, |most: f64, z| most.max(z.re.hypot(z.im)));
+            let error = size(shapes.adjoint() * &harmonic.mass * &shapes - DMatrix::identity(order, order));
+            let diagonal =
+                DMatrix::from_fn(order, order, |i, j| Complex::new(if i == j { squares[i] } else { 0.0 }, 0.0));
+            let off = size(shapes.adjoint() * &harmonic.stiffness * &shapes - diagonal) / squares[order - 1];
+            println!("n = {order}: orthonormality {error:.1e}, diagonality {off:.1e}");
+            assert!(error < 1e-13 && off < 1e-13, "n = {order}: {error:e}, {off:e}");
+            assert!(squares.windows(2).all(|pair| pair[0] <= pair[1]));
+        }
+    }
+
+    #[test]
+    fn phases_are_independent_of_eigenvector_choice() {
+        let mut seed = 9;
+        let mut shapes = DMatrix::from_fn(7, 5, |_, _| Complex::new(number(&mut seed), number(&mut seed)));
+        let mut turned = shapes.clone();
+        for (column, angle) in [0.3, 1.9, -2.5, 3.1, 0.0_f64].into_iter().enumerate() {
+            turned.column_mut(column).iter_mut().for_each(|value| *value *= Complex::new(angle.cos(), angle.sin()));
+        }
+        fix_phases(&mut shapes);
+        fix_phases(&mut turned);
+        let off = shapes.iter().zip(turned.iter()).fold(0.0_f64, |most, (a, b)| most.max((a - b).norm_sqr().sqrt()));
+        assert!(off < 1e-15, "{off:e}");
+    }
+
+    /// u = Ψq and p = Ψᴴf for arbitrary amplitudes and forces.
+    #[test]
+    fn paired_nodal_diameter_equals_the_complex_one() {
+        let (sectors, modes) = (5, 4);
+        let of = |nodal_diameter: usize| {
+            let Harmonic { contact_map, .. } = pencil(modes, 8);
+            let shapes = hermitian_modes(&pencil(modes, 9), "_1").unwrap();
+            DiameterModes::new(nodal_diameter, 0.01, weight(nodal_diameter, sectors), &contact_map, shapes)
+        };
+        let disk = CyclicModel { sectors, diameters: vec![of(0), of(1)] };
+        let (paired, own) = (disk.paired(1), &disk.diameters[1]);
+        let mut seed = 10;
+        let mut random =
+            |count: usize| DMatrix::from_fn(count, 1, |_, _| Complex::new(number(&mut seed), number(&mut seed)));
+        // Amplitudes as pairs; patterns with all real parts first.
+        let in_pairs = |z: &DMatrix<Complex<f64>>| z.iter().flat_map(|z| [z.re, z.im]).collect::<Vec<_>>();
+        let in_parts =
+            |z: &DMatrix<Complex<f64>>| z.iter().map(|z| z.re).chain(z.iter().map(|z| z.im)).collect::<Vec<_>>();
+        let near = |found: &DMatrix<f64>, expected: &[f64]| {
+            let off = found.iter().zip(expected).fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
+            assert!(found.len() == expected.len() && off < 1e-14, "{off:e}");
+        };
+        let (amplitudes, forces) = (random(modes), random(3));
+        let moved = &paired.contact_modes * DMatrix::from_vec(2 * modes, 1, in_pairs(&amplitudes));
+        near(&moved, &in_parts(&(&own.contact_modes * &amplitudes)));
+        let pushed = paired.contact_modes.transpose() * DMatrix::from_vec(6, 1, in_parts(&forces));
+        near(&pushed, &in_pairs(&(own.contact_modes.adjoint() * &forces)));
+        for (mode, frequency) in own.frequencies.iter().enumerate() {
+            let alike = [0, 1].map(|part| paired.frequencies[2 * mode + part].to_bits());
+            assert_eq!(alike, [frequency.to_bits(); 2]);
+        }
+        assert_eq!((paired.quasi_static, disk.paired(0).contact_modes.shape()), (2 * own.quasi_static, (3, modes)));
+    }
+
+    #[test]
+    fn a_rigid_rotation_of_a_free_pair_is_exactly_rigid() {
+        // Two masses connected by a spring of complex direction: the stiffness has rank one, so one mode is rigid.
+        let direction = [Complex::new(1.0, 0.0), Complex::new(-0.6, 0.8)];
+        let stiffness = DMatrix::from_fn(2, 2, |i, j| direction[i] * direction[j].conj() * Complex::new(3e7, 0.0));
+        let mass =
+            DMatrix::from_diagonal(&nalgebra::DVector::from_row_slice(&[2.0, 0.7])).map(|m| Complex::new(m, 0.0));
+        let harmonic = Harmonic { mass, stiffness, contact_map: DMatrix::zeros(3, 2) };
+        let (squares, _) = hermitian_modes(&harmonic, "_1").unwrap();
+        assert!(squares[0] == 0.0, "{squares:?}");
+        assert!((squares[1] / (3e7 * (1.0 / 2.0 + 1.0 / 0.7)) - 1.0).abs() < 1e-13, "{squares:?}");
+    }
+}

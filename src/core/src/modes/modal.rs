@@ -1,0 +1,433 @@
+//! Modal form of a reduced-order model: M q̈ + D q̇ + K q = f becomes q̈ + 2ξω q̇ + ω² q = φᵀf per mode.
+//!
+//! For modal damping the two forms are algebraically identical; prediction then costs O(number of modes).
+
+use nalgebra::{DMatrix, SymmetricEigen};
+
+use crate::modes::schemes::ModeCoefficients;
+use crate::scene::method::Scheme;
+use crate::{Error, Result, Rom, shown};
+
+/// Eigenvalues below this fraction of the largest are not resolved by the eigenproblem; their Rayleigh quotient is used.
+pub(super) const RIGID_FRACTION: f64 = 1e-13;
+
+/// Modes of the reduced pencil (K, M), mass-normalised.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModalModel {
+    /// Undamped angular frequencies ω (rad/s), ascending; exactly 0 for rigid-body modes.
+    pub frequencies: Vec<f64>,
+    /// Damping ratios ξ (-), one per mode.
+    pub damping_ratios: Vec<f64>,
+    /// Displacement of the contact rows per unit modal coordinate, rows × modes.
+    pub contact_modes: DMatrix<f64>,
+    /// Mass-normalised mode shapes in reduced coordinates, n × modes: reduced = shapes · modal.
+    pub shapes: DMatrix<f64>,
+    /// Number of the highest modes that massless-boundary treats as quasi-static.
+    pub quasi_static: usize,
+}
+
+/// Effects of spin in modal coordinates (see [`crate::scene::rom::Spin`]).
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModalSpin {
+    /// Speed of the stiffness that defines the modes (rad/s).
+    pub reference_speed: f64,
+    /// Temperature of the stiffness that defines the modes (K).
+    pub reference_temperature: f64,
+    /// Change of the stiffness per kelvin, −s φᵀKφ, modes²; `None` without softening.
+    pub softening: Option<DMatrix<f64>>,
+    /// φᵀK₁φ, modes².
+    pub stiffness_speed2: DMatrix<f64>,
+    /// φᵀK₂φ, modes².
+    pub stiffness_speed4: DMatrix<f64>,
+    /// φᵀGφ, modes², skew-symmetric.
+    pub coriolis: DMatrix<f64>,
+}
+
+impl ModalSpin {
+    /// Projects the spin matrices of a ROM; `reference_speed` is the speed for which `model` was computed.
+    pub fn new(spin: &crate::scene::rom::Spin, model: &ModalModel, reference_speed: f64) -> Self {
+        let shapes = &model.shapes;
+        let project = |matrix: &DMatrix<f64>| shapes.transpose() * matrix * shapes;
+        let symmetric = |matrix: &DMatrix<f64>| {
+            let projected = project(matrix);
+            (&projected + projected.transpose()) * 0.5
+        };
+        let coriolis = project(&spin.coriolis);
+        Self {
+            reference_speed,
+            reference_temperature: 0.0,
+            softening: None,
+            stiffness_speed2: symmetric(&spin.stiffness_speed2),
+            stiffness_speed4: symmetric(&spin.stiffness_speed4),
+            coriolis: (&coriolis - coriolis.transpose()) * 0.5,
+        }
+    }
+
+    /// Creates zero matrices for modes that are not coupled by spin.
+    pub fn without_spin(model: &ModalModel) -> Self {
+        let none = || DMatrix::zeros(model.len(), model.len());
+        let (reference_speed, reference_temperature, softening) = (0.0, 0.0, None);
+        let (stiffness_speed2, stiffness_speed4, coriolis) = (none(), none(), none());
+        Self { reference_speed, reference_temperature, softening, stiffness_speed2, stiffness_speed4, coriolis }
+    }
+
+    /// Adds softening: the structure loses the fraction `share` of the elastic `stiffness` of its ROM per kelvin above
+    /// `temperature`, for which the modes `model` were computed.
+    #[must_use]
+    pub fn softened(self, stiffness: &DMatrix<f64>, model: &ModalModel, share: f64, temperature: f64) -> Self {
+        let projected = model.shapes.transpose() * stiffness * &model.shapes;
+        let symmetric = (&projected + projected.transpose()) * (-0.5 * share);
+        Self { reference_temperature: temperature, softening: Some(symmetric), ..self }
+    }
+}
+
+/// Sets one ratio for all modes; the first modes have their `own`. Each value is repeated `copies` times in `ratios`.
+pub fn fill_ratios(ratios: &mut [f64], ratio: f64, own: &[f64], copies: usize) {
+    ratios.fill(ratio);
+    for (ratios, own) in ratios.chunks_mut(copies).zip(own) {
+        ratios.fill(*own);
+    }
+}
+
+impl ModalModel {
+    /// Solves the symmetric eigenproblem of the ROM's matrices and assigns one damping ratio to all modes.
+    ///
+    /// # Errors
+    /// The ROM is invalid, or a stiffness is not positive semidefinite.
+    pub fn from_rom(rom: &Rom, damping_ratio: f64) -> Result<Self> {
+        Self::at_stiffness(rom, &rom.stiffness, damping_ratio)
+    }
+
+    /// Computes the modes at a steady speed Ω (rad/s): those of K + Ω²K₁ + Ω⁴K₂ if the ROM has spin matrices.
+    ///
+    /// # Errors
+    /// The errors of [`ModalModel::from_rom`], and a speed at which the stiffness is not positive semidefinite.
+    pub fn at_speed(rom: &Rom, damping_ratio: f64, speed: f64) -> Result<Self> {
+        let Some(spin) = &rom.extras.spin else { return Self::from_rom(rom, damping_ratio) };
+        let square = speed * speed;
+        let stiffness = &rom.stiffness + &spin.stiffness_speed2 * square + &spin.stiffness_speed4 * (square * square);
+        Self::at_stiffness(rom, &stiffness, damping_ratio)
+    }
+
+    /// Computes the modes of a structure whose elastic stiffness is reduced by heat to the fraction `share`; `speed` is `None`
+    /// without stiffening.
+    ///
+    /// # Errors
+    /// The errors of [`ModalModel::at_speed`].
+    pub fn softened(rom: &Rom, damping_ratio: f64, speed: Option<f64>, share: f64) -> Result<Self> {
+        let mut stiffness = &rom.stiffness * share;
+        if let (Some(spin), Some(speed)) = (&rom.extras.spin, speed) {
+            let square = speed * speed;
+            stiffness += &spin.stiffness_speed2 * square + &spin.stiffness_speed4 * (square * square);
+        }
+        Self::at_stiffness(rom, &stiffness, damping_ratio)
+    }
+
+    fn at_stiffness(rom: &Rom, stiffness: &DMatrix<f64>, damping_ratio: f64) -> Result<Self> {
+        rom.validate()?;
+        if !(0.0..1.0).contains(&damping_ratio) {
+            return Err(Error::invalid(
+                "damping_ratio",
+                format!("{} is outside 0 ≤ ξ < 1", shown(damping_ratio)),
+                "Give the modal damping ratio as a fraction of critical damping, for example 0.005",
+            ));
+        }
+        let (eigenvalues, shapes) = real_modes(&rom.mass, stiffness, "")?;
+        let contact_modes = &rom.contact_map * &shapes;
+        Ok(Self {
+            damping_ratios: vec![damping_ratio; eigenvalues.len()],
+            frequencies: eigenvalues.iter().map(|value| value.sqrt()).collect(),
+            quasi_static: contact_modes.nrows(),
+            contact_modes,
+            shapes,
+        })
+    }
+
+    /// Returns φᵀf of a load on the reduced coordinates.
+    pub fn modal_load(&self, load: &[f64]) -> Vec<f64> {
+        self.shapes.column_iter().map(|shape| shape.iter().zip(load).map(|(a, b)| a * b).sum()).collect()
+    }
+
+    /// Number of modes with inertia under a scheme; the others are the highest.
+    pub fn dynamic_modes(&self, scheme: Scheme) -> usize {
+        if scheme.is_massless() { self.len().saturating_sub(self.quasi_static) } else { self.len() }
+    }
+
+    /// Coefficients of one mode at the step size `step` (s), with its frequency multiplied by `factor` (mistuning; 1 if tuned).
+    pub fn coefficient(&self, mode: usize, factor: f64, scheme: Scheme, step: f64) -> ModeCoefficients {
+        let (frequency, ratio) = (self.frequencies[mode] * factor, self.damping_ratios[mode]);
+        ModeCoefficients::of_mode(scheme, mode < self.dynamic_modes(scheme), frequency, ratio, step)
+    }
+
+    /// Coefficients of all modes at the step size `step` (s).
+    pub fn coefficients(&self, scheme: Scheme, step: f64) -> Vec<ModeCoefficients> {
+        (0..self.len()).map(|mode| self.coefficient(mode, 1.0, scheme, step)).collect()
+    }
+
+    /// Returns the modes with the contact rows of both models, one after the other.
+    pub fn seen_at_both(self, other: Self) -> Self {
+        let rows = (self.contact_modes.nrows(), other.contact_modes.nrows());
+        let mut contact_modes = DMatrix::zeros(rows.0 + rows.1, self.contact_modes.ncols());
+        contact_modes.rows_mut(0, rows.0).copy_from(&self.contact_modes);
+        contact_modes.rows_mut(rows.0, rows.1).copy_from(&other.contact_modes);
+        Self { contact_modes, ..self }
+    }
+
+    /// Combines several structures into one: modes concatenated, contact rows relative (master − slave).
+    ///
+    /// `pairs` lists (master structure, master node, slave) with an optional slave (structure, node); the rows of
+    /// the result are the relative displacements of the pairs, three components each.
+    ///
+    /// # Errors
+    /// A structure or node index does not exist.
+    pub fn combined(structures: &[Self], pairs: &[NodePair]) -> Result<Self> {
+        let modes = structures.iter().map(|structure| structure.frequencies.len()).sum();
+        let mut contact_modes = DMatrix::zeros(3 * pairs.len(), modes);
+        let offsets: Vec<usize> = structures
+            .iter()
+            .scan(0, |offset, structure| {
+                let start = *offset;
+                *offset += structure.frequencies.len();
+                Some(start)
+            })
+            .collect();
+        for (row, pair) in pairs.iter().enumerate() {
+            for (reference, sign) in [(Some(pair.master), 1.0), (pair.slave, -1.0)] {
+                let Some((structure, node)) = reference else { continue };
+                let source = structures.get(structure).filter(|s| 3 * node + 2 < s.contact_modes.nrows());
+                let Some(source) = source else {
+                    return Err(Error::invalid(
+                        format!("contact pair {}", row + 1),
+                        format!("structure {structure} has no contact node {node}"),
+                        "Use 0-based indices of existing structures and contact nodes",
+                    ));
+                };
+                for component in 0..3 {
+                    for mode in 0..source.frequencies.len() {
+                        contact_modes[(3 * row + component, offsets[structure] + mode)] +=
+                            sign * source.contact_modes[(3 * node + component, mode)];
+                    }
+                }
+            }
+        }
+        let mut shapes = DMatrix::zeros(structures.iter().map(|s| s.shapes.nrows()).sum(), modes);
+        let mut row = 0;
+        for (structure, offset) in structures.iter().zip(&offsets) {
+            shapes.view_mut((row, *offset), structure.shapes.shape()).copy_from(&structure.shapes);
+            row += structure.shapes.nrows();
+        }
+        Ok(Self {
+            frequencies: structures.iter().flat_map(|s| s.frequencies.iter().copied()).collect(),
+            damping_ratios: structures.iter().flat_map(|s| s.damping_ratios.iter().copied()).collect(),
+            contact_modes,
+            shapes,
+            quasi_static: 0,
+        })
+    }
+
+    /// Returns the modes with some of the contact nodes only.
+    pub fn with_nodes(&self, nodes: &[usize]) -> Self {
+        let rows: Vec<usize> = nodes.iter().flat_map(|node| 3 * node..3 * node + 3).collect();
+        Self { contact_modes: self.contact_modes.select_rows(&rows), ..self.clone() }
+    }
+
+    /// Number of modes.
+    pub fn len(&self) -> usize {
+        self.frequencies.len()
+    }
+
+    /// Returns whether there are no modes.
+    pub fn is_empty(&self) -> bool {
+        self.frequencies.is_empty()
+    }
+
+    /// Largest undamped angular frequency (rad/s).
+    pub fn largest_frequency(&self) -> f64 {
+        self.frequencies.iter().fold(0.0, |largest, value| f64::max(largest, *value))
+    }
+}
+
+/// A node of one structure and the node of another, or a rigid surface, that it can touch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct NodePair {
+    /// (structure, contact node) of the master.
+    pub master: (usize, usize),
+    /// (structure, contact node) of the slave; `None` for a rigid surface.
+    pub slave: Option<(usize, usize)>,
+}
+
+/// Eigenvalues ω² (ascending, exactly 0 for rigid-body modes) and mass-normalised modes of K φ = ω² M φ; errors name the arrays
+/// `mass` and `stiffness` with `suffix`.
+pub(super) fn real_modes(
+    mass: &DMatrix<f64>,
+    stiffness: &DMatrix<f64>,
+    suffix: &str,
+) -> Result<(Vec<f64>, DMatrix<f64>)> {
+    modal_already(mass, stiffness).map_or_else(|| generalised_modes(mass, stiffness, suffix), Ok)
+}
+
+/// Returns modes without solving the eigenproblem if the ROM is in modal coordinates (M = I, K diagonal and ascending).
+fn modal_already(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f64>)> {
+    let order = mass.nrows();
+    let diagonal: Vec<f64> = (0..order).map(|mode| stiffness[(mode, mode)]).collect();
+    let ascending =
+        diagonal.windows(2).all(|pair| pair[0] <= pair[1]) && diagonal.first().is_some_and(|low| *low >= 0.0);
+    let on_diagonal = |index: usize| index % order == index / order;
+    let is_modal = ascending
+        && stiffness.iter().enumerate().all(|(index, value)| on_diagonal(index) || *value == 0.0)
+        && mass.iter().enumerate().all(|(index, value)| {
+            let expected: f64 = if on_diagonal(index) { 1.0 } else { 0.0 };
+            value.to_bits() == expected.to_bits()
+        });
+    is_modal.then(|| (diagonal, DMatrix::identity(order, order)))
+}
+
+fn generalised_modes(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>, suffix: &str) -> Result<(Vec<f64>, DMatrix<f64>)> {
+    let Some(cholesky) = mass.clone().cholesky() else {
+        let what = format!("ROM array `mass{suffix}`");
+        return Err(Error::invalid(what, "not positive definite", "Regenerate the ROM"));
+    };
+    let lower = cholesky.l();
+    let half = lower.solve_lower_triangular(stiffness).unwrap_or_else(|| stiffness.clone());
+    let full = lower.solve_lower_triangular(&half.transpose()).unwrap_or(half);
+    let eigen = SymmetricEigen::new((&full + full.transpose()) * 0.5);
+    let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
+    order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
+    let largest = eigen.eigenvalues.amax();
+    check_semidefinite(eigen.eigenvalues[order[0]], largest, suffix)?;
+    let vectors =
+        DMatrix::from_columns(&order.iter().map(|index| eigen.eigenvectors.column(*index)).collect::<Vec<_>>());
+    let mut shapes = lower.transpose().solve_upper_triangular(&vectors).unwrap_or(vectors);
+    fix_signs(&mut shapes);
+    let values = order.iter().enumerate().map(|(mode, index)| {
+        let value = eigen.eigenvalues[*index];
+        if value < RIGID_FRACTION * largest { unresolved_eigenvalue(stiffness, &shapes, mode) } else { value }
+    });
+    let values = values.collect();
+    Ok((values, shapes))
+}
+
+/// Rejects a lowest eigenvalue of K φ = ω² M φ that is below zero by more than rounding.
+pub(super) fn check_semidefinite(smallest: f64, largest: f64, suffix: &str) -> Result<()> {
+    if smallest >= -1e-9 * largest {
+        return Ok(());
+    }
+    if !(smallest.is_finite() && largest.is_finite()) {
+        return Err(Error::invalid(
+            format!("ROM arrays `mass{suffix}` and `stiffness{suffix}`"),
+            "the natural frequencies are not finite: the entries are too large or differ by too many orders of \
+             magnitude",
+            "Check the units and regenerate the ROM",
+        ));
+    }
+    Err(Error::invalid(
+        format!("ROM array `stiffness{suffix}`"),
+        format!(
+            "not positive semidefinite: the lowest eigenvalue is {smallest:.3e} rad²/s², the largest {largest:.3e} \
+             rad²/s²"
+        ),
+        "Regenerate the ROM",
+    ))
+}
+
+/// Returns φᵀKφ of a mode far below the largest. Its error is of second order in the error of the mode shape, so that it
+/// distinguishes a soft mode from a rigid-body mode (exactly 0) wherever the stiffness matrix itself does.
+fn unresolved_eigenvalue(stiffness: &DMatrix<f64>, shapes: &DMatrix<f64>, mode: usize) -> f64 {
+    let (mut quotient, mut magnitude) = (0.0, 0.0);
+    for column in 0..stiffness.ncols() {
+        for row in 0..stiffness.nrows() {
+            let term = shapes[(row, mode)] * stiffness[(row, column)] * shapes[(column, mode)];
+            quotient += term;
+            magnitude += term.abs();
+        }
+    }
+    #[expect(clippy::cast_precision_loss, reason = "orders are far below 2^52")]
+    let rounding = 16.0 * f64::EPSILON * stiffness.nrows() as f64 * magnitude;
+    if quotient > rounding { quotient } else { 0.0 }
+}
+
+/// Makes the largest entry of each eigenvector positive, because its sign is arbitrary and saved numbers should be comparable.
+fn fix_signs(shapes: &mut DMatrix<f64>) {
+    for mut column in shapes.column_iter_mut() {
+        let largest = column.iter().copied().fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
+        if largest < 0.0 {
+            column.neg_mut();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::rom::{ContactNode, DisplacementFrame, RomChecks};
+
+    /// Random symmetric positive definite pencil.
+    fn rom(order: usize, seed: u64) -> Rom {
+        let mut state = seed;
+        let mut number = move || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            f64::from(u32::try_from(state >> 33).unwrap()) / f64::from(1_u32 << 30) - 1.0
+        };
+        let a = DMatrix::from_fn(order, order, |_, _| number());
+        let b = DMatrix::from_fn(order, order, |_, _| number());
+        Rom {
+            name: "random".into(),
+            origin: String::new(),
+            sectors: 1,
+            frame: DisplacementFrame::Cartesian,
+            mass: &a * a.transpose() * 0.1 + DMatrix::identity(order, order),
+            stiffness: &b * b.transpose() * 1e6,
+            damping_ratio: 0.0,
+            contact_map: DMatrix::identity(3, order),
+            contact_nodes: vec![ContactNode {
+                name: "n".into(),
+                position: [0.0; 3],
+                meridional_slope: 0.0,
+                ..ContactNode::default()
+            }],
+            checks: RomChecks::default(),
+            extras: crate::scene::rom::RomExtras::default(),
+        }
+    }
+
+    #[test]
+    fn soft_mode_among_very_stiff_modes_is_not_rigid() {
+        let mut rom = rom(3, 5);
+        rom.mass = DMatrix::identity(3, 3);
+        for ratio in [1e6, 1e7, 1e8, 1e9] {
+            let squares = [1.0, 4.0, ratio * ratio];
+            rom.stiffness = DMatrix::from_diagonal(&nalgebra::DVector::from_row_slice(&squares));
+            let model = ModalModel::from_rom(&rom, 0.0).unwrap();
+            for (found, expected) in model.frequencies.iter().zip([1.0, 2.0, ratio]) {
+                assert!((found / expected - 1.0).abs() < 1e-12, "ratio {ratio:e}: {:?}", model.frequencies);
+            }
+        }
+    }
+
+    #[test]
+    fn rigid_modes_are_exactly_zero() {
+        // A free chain of three masses has one rigid-body mode; without stiffness all modes are rigid.
+        let mut rom = rom(3, 6);
+        rom.mass = DMatrix::from_diagonal(&nalgebra::DVector::from_row_slice(&[1.0, 0.3, 7.0]));
+        rom.stiffness = DMatrix::from_row_slice(3, 3, &[1e9, -1e9, 0.0, -1e9, 1e9 + 3e3, -3e3, 0.0, -3e3, 3e3]);
+        let model = ModalModel::from_rom(&rom, 0.0).unwrap();
+        assert!(model.frequencies[0] == 0.0 && model.frequencies[1] > 10.0, "{:?}", model.frequencies);
+        rom.stiffness.fill(0.0);
+        assert_eq!(ModalModel::from_rom(&rom, 0.0).unwrap().frequencies, [0.0; 3]);
+    }
+
+    #[test]
+    fn modes_are_orthonormal_and_diagonalise_the_pencil_to_rounding() {
+        for (order, seed) in [(3, 1), (14, 2), (29, 3), (60, 4)] {
+            let rom = rom(order, seed);
+            let model = ModalModel::from_rom(&rom, 0.0).unwrap();
+            let identity = model.shapes.transpose() * &rom.mass * &model.shapes;
+            let error = (identity - DMatrix::identity(order, order)).amax();
+            let squares = model.shapes.transpose() * &rom.stiffness * &model.shapes;
+            let diagonal = nalgebra::DVector::from_iterator(order, model.frequencies.iter().map(|w| w * w));
+            let off = (squares - DMatrix::from_diagonal(&diagonal)).amax() / diagonal.amax();
+            println!("n = {order}: orthonormality {error:.1e}, diagonality {off:.1e}");
+            assert!(error < 1e-13 && off < 1e-13, "n = {order}: {error:e}, {off:e}");
+        }
+    }
+}

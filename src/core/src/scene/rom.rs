@@ -1,0 +1,434 @@
+//! The reduced-order model of one structure, as plain data.
+//!
+//! A ROM is the result of a Craig-Bampton (or any other linear) reduction of a finite-element model: small dense mass and stiffness
+//! matrices and the map from reduced coordinates to the displacement of the contact nodes. `sectors` identical copies of it are arranged
+//! around the axis: uncoupled (blades on a rigid hub), or coupled, with a small pencil per nodal diameter ([`Harmonic`]). `sectors = 1` is
+//! a single general structure.
+
+mod cyclic;
+mod grid;
+mod support;
+mod watched;
+
+use nalgebra::DMatrix;
+
+use crate::scene::ranges;
+use crate::{Error, Result, shown};
+pub use cyclic::Harmonic;
+pub(crate) use cyclic::cholesky;
+pub use support::{SUPPORT_ROWS, SupportRows};
+pub use watched::{STRESSES, WatchedPoints, von_mises};
+
+/// Largest number of sectors of a ROM. Bladed disks have tens to a few hundred; a damaged or malicious file must not exhaust the memory,
+/// which would end the process of the importer.
+pub const MAX_SECTORS: usize = 10_000;
+
+/// Directions of the three displacement components of a contact node.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DisplacementFrame {
+    /// (radial, tangential, axial) at the position of the node, turning with the structure.
+    Cylindrical,
+    /// (x, y, z), fixed to the structure.
+    Cartesian,
+}
+
+/// One contact node or contact patch of the first sector.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ContactNode {
+    /// Name used in variable names and plots, for example `leading_edge`.
+    pub name: String,
+    /// Undeformed position: (r, θ, z) in m, rad, m for [`DisplacementFrame::Cylindrical`], otherwise (x, y, z) in m.
+    pub position: [f64; 3],
+    /// Slope dr/dz of the tip contour in the meridional plane at this node (the casing runs parallel to it).
+    pub meridional_slope: f64,
+    /// Area that a patch represents, the integral of its weight over the tip (m²); 0 for a node.
+    pub area: f64,
+    /// Length along the chord that a patch represents, the integral of its weight along the chord (m); 0 for a node.
+    pub length: f64,
+}
+
+/// Meaning of the coordinates of a ROM besides static responses to contact.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ReductionBasis {
+    /// Modes with the contact nodes held (Craig-Bampton), or unknown.
+    #[default]
+    FixedInterface,
+    /// Modes of the structure with its supports only (MacNeal, Rubin).
+    FreeInterface,
+}
+
+/// Errors that a reduction causes in a rub: errors of the displacements of the tip (relative L2) compared with the limit of refinement.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct RubErrors {
+    /// Description of the scene on which they were measured.
+    pub found_on: String,
+    /// Error by the number of modes; `None` if unknown.
+    pub modes: Option<f64>,
+    /// Error by the number of contact patches or nodes along the chord.
+    pub patches: Option<f64>,
+    /// Error by the number of rows of patches across the thickness.
+    pub rows: Option<f64>,
+    /// Error by the mesh.
+    pub mesh: Option<f64>,
+}
+
+impl RubErrors {
+    /// Returns whether all errors are unknown.
+    pub fn is_empty(&self) -> bool {
+        [self.modes, self.patches, self.rows, self.mesh].iter().all(Option::is_none)
+    }
+}
+
+/// Agreement of the reduced model with the full one. Vectors are empty if the ROM is from another program.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct RomChecks {
+    /// Natural frequencies of the full finite-element model (Hz), ascending.
+    pub full_frequencies: Vec<f64>,
+    /// Natural frequencies of the reduced model (Hz), ascending, same modes.
+    pub reduced_frequencies: Vec<f64>,
+    /// Frequency deviation per mode (%), eq. 13 of the paper.
+    pub frequency_deviation: Vec<f64>,
+    /// Residual convergence criterion per mode (%), eq. 12 of the paper.
+    pub residual_criterion: Vec<f64>,
+    /// Nodal diameter of each mode of a structure with coupled sectors, otherwise empty. A mode with 0 < 2n < sectors represents two modes
+    /// of the whole disk.
+    pub nodal_diameters: Vec<u32>,
+    /// Deviation of the static flexibility at each contact node or patch from the full model (%).
+    pub flexibility_deviation: Vec<f64>,
+    /// Frequencies (Hz) of the forced responses that were compared, ascending.
+    pub response_frequencies: Vec<f64>,
+    /// Deviation of the forced response at the contact nodes from that of the full model at each of these frequencies (%), all contact
+    /// nodes and directions together.
+    pub response_deviation: Vec<f64>,
+    /// Errors in a rub, if they are known.
+    pub rub_errors: Option<RubErrors>,
+}
+
+/// Effects of a steady speed Ω about the z axis on one structure, in its reduced coordinates.
+///
+/// M q̈ + (D + 2ΩG) q̇ + (K + Ω²K₁ + Ω⁴K₂) q = f + Ω²c + Ω⁴c₂ in the rotating frame; K₁ contains both spin softening and centrifugal
+/// stiffening.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Spin {
+    /// K₁, n × n, symmetric (kg for physical coordinates).
+    pub stiffness_speed2: DMatrix<f64>,
+    /// K₂, n × n, symmetric (kg·s²).
+    pub stiffness_speed4: DMatrix<f64>,
+    /// G, n × n, skew-symmetric (kg): Coriolis force 2ΩG q̇.
+    pub coriolis: DMatrix<f64>,
+    /// c, n values: centrifugal force per Ω² (kg·m).
+    pub centrifugal_load: Vec<f64>,
+    /// c₂, n values (kg·m·s²). K(Ω) is the stiffness of small motions about the stretched shape, so that the load in equilibrium with this
+    /// shape is not Ω²c alone. With the stiffness K at rest instead of K(Ω), Ω²c alone is correct.
+    pub centrifugal_load_speed4: Vec<f64>,
+    /// Largest |Ω| for which K₁ and K₂ were fitted (rad/s).
+    pub largest_speed: f64,
+}
+
+/// Part of a structure with one uniform temperature.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ThermalPatch {
+    /// Start and end angle (rad), start < end ≤ start + 2π.
+    pub angle: [f64; 2],
+    /// Start and end axial position (m).
+    pub axial: [f64; 2],
+}
+
+/// Thermal loads of one structure.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Thermal {
+    /// Force on the reduced coordinates per kelvin of each patch above the reference, n × patches (N/K).
+    pub loads: DMatrix<f64>,
+    /// Positions of the patches.
+    pub patches: Vec<ThermalPatch>,
+}
+
+/// Contact nodes that form a grid: node `along · around + i` is the i-th of row `along`.
+///
+/// A closed grid is a ring around the z axis in a cylindrical frame: rows (rings) in order of increasing z, nodes of a ring at increasing
+/// angles 2π/around apart, at least 4 × 2. An open grid is a quadrilateral grid of any shape in a Cartesian frame with four free edges, at
+/// least 2 × 2; with s increasing along a row and t from row to row, contact with the surface S(s, t) through its nodes is on the side to
+/// which S_t × S_s points.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ContactGrid {
+    /// Nodes of a row: around the circumference if the grid is closed.
+    pub around: usize,
+    /// Rows: rings along the axis if the grid is closed.
+    pub along: usize,
+    /// True if the last node of a row is followed by its first.
+    pub closed: bool,
+}
+
+/// Optional data of a ROM, which only some scenes need.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct RomExtras {
+    /// Effects of spin.
+    pub spin: Option<Spin>,
+    /// Thermal loads.
+    pub thermal: Option<Thermal>,
+    /// Contact nodes as a grid through which a surface spline can be laid.
+    pub grid: Option<ContactGrid>,
+    /// Nodal diameters 1 ..= sectors/2 of coupled sectors; those of diameter 0 are the ROM's own matrices. Empty for uncoupled sectors and
+    /// single structures.
+    pub harmonics: Vec<Harmonic>,
+    /// Watched points.
+    pub watched: Option<WatchedPoints>,
+    /// Places at which stress is recovered.
+    pub stress: Option<WatchedPoints>,
+    /// Static stress of the full model at these places per kelvin of each patch, 6·places × patches (Pa/K), for the supported structure
+    /// without contact.
+    pub stress_thermal: Option<DMatrix<f64>>,
+    /// Static stress at these places per Ω² of the centrifugal load on the structure at rest, 6·places × 1 (Pa s²).
+    pub stress_centrifugal: Option<DMatrix<f64>>,
+    /// Forces on the held nodes.
+    pub support: Option<SupportRows>,
+    /// Meaning of the coordinates.
+    pub basis: ReductionBasis,
+    /// Number of rows of contact patches across the thickness of the tip, one row after the other, with equal patches along the chord;
+    /// `None` for one row, or nodes.
+    pub rows: Option<usize>,
+}
+
+/// Reduced-order model of one structure.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rom {
+    /// Name of the structure.
+    pub name: String,
+    /// Origin: mesh counts, material, reduction, in one or a few sentences.
+    pub origin: String,
+    /// Number of identical copies around the axis (1 to [`MAX_SECTORS`]); uncoupled unless there are harmonics.
+    pub sectors: usize,
+    /// Directions of the displacement components.
+    pub frame: DisplacementFrame,
+    /// Reduced mass matrix, n × n (kg for physical coordinates), symmetric positive definite.
+    pub mass: DMatrix<f64>,
+    /// Reduced stiffness matrix, n × n, symmetric positive semidefinite.
+    pub stiffness: DMatrix<f64>,
+    /// Modal damping ratio proposed by the author of the ROM; the scene may override it.
+    pub damping_ratio: f64,
+    /// Displacement of the contact nodes, 3·nodes × n; rows (node, component).
+    pub contact_map: DMatrix<f64>,
+    /// The contact nodes of the first sector.
+    pub contact_nodes: Vec<ContactNode>,
+    /// Quality of the reduction.
+    pub checks: RomChecks,
+    /// Spin, heat, contact grid: empty for most structures.
+    pub extras: RomExtras,
+}
+
+/// Problem of an array with a wrong shape, or else with a value that is not finite.
+fn shape_or_value(found: (usize, usize), expected: (usize, usize)) -> String {
+    if found == expected && expected.1 > 0 {
+        return "a value is not finite".into();
+    }
+    format!("shape {found:?} found, {expected:?} expected")
+}
+
+impl Rom {
+    /// Number of reduced coordinates of one sector.
+    pub fn order(&self) -> usize {
+        self.mass.nrows()
+    }
+
+    /// Returns whether all contact nodes are patches with an area and a length along the chord.
+    pub fn has_patches(&self) -> bool {
+        self.contact_nodes.iter().all(|node| node.area > 0.0 && node.length > 0.0)
+    }
+
+    /// Checks shapes, finiteness, symmetry and definiteness.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] with the array and the remedy.
+    pub fn validate(&self) -> Result<()> {
+        let remedy = "Regenerate the ROM with `tiprub reduce`, or see the ROM file chapter of the user guide";
+        self.validate_shapes(remedy)?;
+        for (name, matrix) in [("mass", &self.mass), ("stiffness", &self.stiffness), ("contact_map", &self.contact_map)]
+        {
+            entries(name, matrix, if name == "contact_map" { ranges::MAP } else { ranges::MATRIX }, remedy)?;
+        }
+        for (index, node) in self.contact_nodes.iter().enumerate() {
+            self.validate_place(&format!("ROM array `contact_positions`, node {}", index + 1), node, remedy)?;
+            let what = format!("ROM array `contact_meridional_slopes`, node {}", index + 1);
+            ranges::at_most(&what, node.meridional_slope, ranges::SLOPE)?;
+            for (name, value, most) in [
+                ("contact_areas", node.area, ranges::POSITION * ranges::POSITION),
+                ("contact_lengths", node.length, ranges::POSITION),
+            ] {
+                ranges::within(&format!("ROM array `{name}`, node {}", index + 1), value, 0.0, most)?;
+            }
+        }
+        self.validate_definiteness(remedy)?;
+        self.validate_spin(remedy)?;
+        self.validate_thermal(remedy)?;
+        self.validate_grid()?;
+        self.validate_rows(remedy)?;
+        self.validate_watched(remedy)?;
+        self.validate_support(remedy)?;
+        self.validate_harmonics(remedy)
+    }
+
+    fn validate_shapes(&self, remedy: &str) -> Result<()> {
+        let order = self.mass.nrows();
+        if order == 0 || self.mass.ncols() != order {
+            return Err(Error::invalid(
+                "ROM array `mass`",
+                format!("shape {:?} is empty or not square", self.mass.shape()),
+                remedy,
+            ));
+        }
+        if self.stiffness.shape() != (order, order) {
+            return Err(Error::invalid(
+                "ROM array `stiffness`",
+                format!("shape {:?} does not match `mass` ({order} x {order})", self.stiffness.shape()),
+                remedy,
+            ));
+        }
+        if self.contact_nodes.is_empty() {
+            return Err(Error::invalid("ROM array `contact_positions`", "no contact nodes", remedy));
+        }
+        if self.contact_map.shape() != (3 * self.contact_nodes.len(), order) {
+            return Err(Error::invalid(
+                "ROM array `contact_map`",
+                format!(
+                    "shape {:?} found, 3 x {} nodes by {order} coordinates expected",
+                    self.contact_map.shape(),
+                    self.contact_nodes.len()
+                ),
+                remedy,
+            ));
+        }
+        if self.sectors == 0 {
+            return Err(Error::invalid("ROM metadata `sectors`", "zero sectors", remedy));
+        }
+        if self.sectors > MAX_SECTORS {
+            return Err(Error::invalid(
+                "ROM metadata `sectors`",
+                format!("{} sectors exceed the limit of {MAX_SECTORS}", self.sectors),
+                remedy,
+            ));
+        }
+        if !(0.0..1.0).contains(&self.damping_ratio) {
+            return Err(Error::invalid(
+                "ROM metadata `damping_ratio`",
+                format!("{} is outside 0 ≤ ξ < 1", shown(self.damping_ratio)),
+                remedy,
+            ));
+        }
+        Ok(())
+    }
+
+    /// Checks that lengths are plausible for a machine in metres.
+    fn validate_place(&self, what: &str, node: &ContactNode, remedy: &str) -> Result<()> {
+        let finite = node.position.iter().all(|value| value.is_finite());
+        let radius_positive = self.frame == DisplacementFrame::Cartesian || node.position[0] > 0.0;
+        if !finite || !radius_positive {
+            let problem = format!("{:?} is not finite, or its radius is not positive", node.position);
+            return Err(Error::invalid(what, problem, remedy));
+        }
+        let mut lengths = &node.position[..];
+        if self.frame == DisplacementFrame::Cylindrical {
+            ranges::within(what, node.position[0], ranges::SMALLEST_RADIUS, ranges::POSITION)?;
+            ranges::at_most(what, node.position[1], ranges::ANGLE)?;
+            lengths = &node.position[2..];
+        }
+        lengths.iter().try_for_each(|length| ranges::at_most(what, *length, ranges::POSITION))
+    }
+
+    fn validate_spin(&self, remedy: &str) -> Result<()> {
+        let Some(spin) = &self.extras.spin else { return Ok(()) };
+        let order = self.order();
+        let matrices = [
+            ("stiffness_speed2", &spin.stiffness_speed2, 1.0),
+            ("stiffness_speed4", &spin.stiffness_speed4, 1.0),
+            ("coriolis", &spin.coriolis, -1.0),
+        ];
+        for (name, matrix, sign) in matrices {
+            let what = format!("ROM array `{name}`");
+            if matrix.shape() != (order, order) || matrix.iter().any(|value| !value.is_finite()) {
+                let problem = shape_or_value(matrix.shape(), (order, order));
+                return Err(Error::invalid(what, problem, remedy));
+            }
+            entries(name, matrix, ranges::MATRIX, remedy)?;
+            let asymmetry = (matrix - matrix.transpose() * sign).amax();
+            if asymmetry > 1e-8 * matrix.amax() {
+                let kind = if sign > 0.0 { "symmetric" } else { "skew-symmetric" };
+                let problem = format!("not {kind}: deviation {asymmetry:.3e}, largest entry {:.3e}", matrix.amax());
+                return Err(Error::invalid(what, problem, remedy));
+            }
+        }
+        let loads =
+            [("centrifugal_load", &spin.centrifugal_load), ("centrifugal_load_speed4", &spin.centrifugal_load_speed4)];
+        for (name, load) in loads {
+            if load.len() != order || load.iter().any(|value| !value.is_finite()) {
+                let problem = shape_or_value((load.len(), 1), (order, 1));
+                return Err(Error::invalid(format!("ROM array `{name}`"), problem, remedy));
+            }
+            load.iter()
+                .try_for_each(|value| ranges::at_most(&format!("ROM array `{name}`"), *value, ranges::MATRIX))?;
+        }
+        if !(spin.largest_speed.is_finite() && spin.largest_speed > 0.0) {
+            let problem = format!("{} rad/s is not a finite positive speed", shown(spin.largest_speed));
+            return Err(Error::invalid("ROM metadata `largest_speed`", problem, remedy));
+        }
+        ranges::at_most("ROM metadata `largest_speed`", spin.largest_speed, ranges::SPEED)
+    }
+
+    fn validate_thermal(&self, remedy: &str) -> Result<()> {
+        let Some(thermal) = &self.extras.thermal else { return Ok(()) };
+        let expected = (self.order(), thermal.patches.len());
+        if thermal.loads.shape() != expected || expected.1 == 0 || thermal.loads.iter().any(|v| !v.is_finite()) {
+            let problem = shape_or_value(thermal.loads.shape(), expected);
+            return Err(Error::invalid("ROM array `thermal_loads`", problem, remedy));
+        }
+        entries("thermal_loads", &thermal.loads, ranges::THERMAL_LOAD, remedy)?;
+        for (index, patch) in thermal.patches.iter().enumerate() {
+            let finite = patch.angle.iter().chain(&patch.axial).all(|value| value.is_finite());
+            let turn = patch.angle[1] - patch.angle[0];
+            let ordered =
+                turn > 0.0 && turn <= std::f64::consts::TAU * (1.0 + 1e-12) && patch.axial[0] < patch.axial[1];
+            if !(finite && ordered) {
+                return Err(Error::invalid(
+                    format!("ROM array `thermal_patches`, patch {}", index + 1),
+                    format!(
+                        "angles {:?} rad and axial positions {:?} m do not define a patch",
+                        patch.angle, patch.axial
+                    ),
+                    remedy,
+                ));
+            }
+            let what = format!("ROM array `thermal_patches`, patch {}", index + 1);
+            patch.angle.iter().try_for_each(|value| ranges::at_most(&what, *value, ranges::ANGLE))?;
+            patch.axial.iter().try_for_each(|value| ranges::at_most(&what, *value, ranges::POSITION))?;
+        }
+        Ok(())
+    }
+
+    fn validate_definiteness(&self, remedy: &str) -> Result<()> {
+        for (name, matrix) in [("mass", &self.mass), ("stiffness", &self.stiffness)] {
+            let asymmetry = (matrix - matrix.transpose()).amax();
+            if asymmetry > 1e-8 * matrix.amax() {
+                return Err(Error::invalid(
+                    format!("ROM array `{name}`"),
+                    format!("not symmetric: deviation {asymmetry:.3e}, largest entry {:.3e}", matrix.amax()),
+                    remedy,
+                ));
+            }
+        }
+        if self.mass.clone().cholesky().is_none() {
+            return Err(Error::invalid("ROM array `mass`", "not positive definite", remedy));
+        }
+        Ok(())
+    }
+}
+
+/// Checks that entries are finite, and small enough that squares do not overflow.
+fn entries(name: &str, matrix: &DMatrix<f64>, most: f64, remedy: &str) -> Result<()> {
+    let Some(index) = matrix.iter().position(|value| value.is_nan() || value.abs() > most) else { return Ok(()) };
+    let (row, column, value) = (index % matrix.nrows(), index / matrix.nrows(), matrix[index]);
+    let problem = if value.is_finite() {
+        format!("entry {} at ({row}, {column}) is outside ±{}", shown(value), shown(most))
+    } else {
+        format!("non-finite entry at ({row}, {column})")
+    };
+    Err(Error::invalid(format!("ROM array `{name}`"), problem, remedy))
+}

@@ -1,0 +1,612 @@
+//! A compiled scene with its state, which FMU instances, native runs and tests drive.
+
+mod access;
+mod balance;
+mod blades;
+mod checks;
+mod compile;
+mod contour;
+mod drive;
+mod failures;
+mod fast_rotation;
+mod fingerprint;
+mod inputs;
+mod limits;
+mod loads;
+mod outputs;
+mod patches;
+mod plan;
+mod pulling;
+mod slave_surface;
+mod sliding_speed;
+mod state;
+mod step_control;
+mod stepping;
+mod table;
+mod tangent;
+mod units;
+mod watched;
+mod window;
+
+use crate::geometry::PrescribedMotion;
+use crate::scene::ranges;
+use crate::system::{ShapeGrowth, System};
+use crate::variables::{Quantity, StartValue, VariableTable};
+use crate::{Result, Scene, Warning};
+use compile::Compiled;
+use drive::{Input, RotorAngle};
+pub use inputs::InputCourses;
+use inputs::{CarrierInputs, Inputs, PairInputs, RotorInputs};
+use tangent::StepReplay;
+use watched::WatchedGaps;
+use window::StepWindow;
+
+/// Allowed difference between communication points and the simulation's own time as a fraction of H (rounding in the importer).
+const TIME_TOLERANCE: f64 = 1e-3;
+/// Step sizes within this fraction of each other are the same step (1/60 computed in several ways).
+const SAME_STEP: f64 = 1e-9;
+/// Rounding errors of a time that may be in the difference of two times, in units of its last place.
+const TIME_ROUNDINGS: f64 = 4.0;
+
+/// Tolerance for equal internal steps of a communication step of length `length` (s) at `time` (s): a length is not known better than
+/// rounding of the times.
+fn same_step(time: f64, length: f64) -> f64 {
+    SAME_STEP.max(TIME_ROUNDINGS * f64::EPSILON * time.abs() / length)
+}
+
+/// Largest number of internal steps of one communication step.
+const MOST_STEPS: f64 = 1e9;
+
+/// Result of one call of [`Simulation::advance`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StepProgress {
+    /// Internal time reached (s).
+    pub time: f64,
+    /// True if the communication point is reached (and outputs are up to date there).
+    pub finished: bool,
+}
+
+/// Phase in the life cycle of the simulation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum SimulationPhase {
+    /// Values can be set; nothing has been computed.
+    Created,
+    /// At a communication point.
+    Ready,
+    /// Between two communication points.
+    Stepping,
+    /// A step failed; only reset and restore are possible.
+    Failed,
+}
+
+/// The current communication step (or the last one).
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Communication {
+    /// Start (s).
+    start: f64,
+    /// Length H (s).
+    length: f64,
+    /// Number of internal steps N.
+    count: u64,
+    /// Number of finished internal steps.
+    done: u64,
+    /// Number of steps tried before ([`System::steps_tried`]).
+    tried: u64,
+    /// Largest number of steps to try, 0 for any number.
+    most: u64,
+}
+
+impl Communication {
+    /// Offset of the internal point `index` from the start, from integer counts (s).
+    fn offset(&self, index: u64) -> f64 {
+        #[expect(clippy::cast_precision_loss, reason = "step counts are below 2^52")]
+        let fraction = index as f64 / self.count as f64;
+        self.length * fraction
+    }
+
+    /// Time of the internal point `index` (s); the last one is start + H exactly.
+    fn time(&self, index: u64) -> f64 {
+        if index == self.count { self.start + self.length } else { self.start + self.offset(index) }
+    }
+}
+
+/// A scene compiled into kernels, and its state.
+///
+/// Life cycle: [`Simulation::new`] → set parameters and inputs → [`Simulation::initialise`] → any number of [`Simulation::do_step`] →
+/// ([`Simulation::reset`] and again). The caller (the FMU slave) enforces the order of calls; this type only rejects meaningless ones.
+#[derive(Debug, Clone)]
+pub struct Simulation {
+    table: VariableTable,
+    /// Functions that fill the outputs, in the order of the table.
+    readers: Vec<outputs::OutputReader>,
+    compiled: Compiled,
+    system: System,
+    /// Current value of every reference; strings live in the table.
+    values: Vec<f64>,
+    /// Real outputs at the previous communication point, for derivatives.
+    previous: Vec<f64>,
+    inputs: Inputs,
+    /// Rotor angles of the masters.
+    rotors: Vec<RotorAngle>,
+    /// Prescribed motion at the end of the current internal step, per contact pair.
+    drives: Vec<PrescribedMotion>,
+    /// Rotation of the rotor relative to the shape in free flight, per contact pair (rad).
+    turns: Vec<f64>,
+    /// Fraction of the friction heat that flows into the surface carrier, per pair.
+    slave_shares: Vec<f64>,
+    window: StepWindow,
+    watched_gaps: WatchedGaps,
+    communication: Communication,
+    /// Length of the step before the last (s), 0 if there was none.
+    previous_length: f64,
+    time: f64,
+    initial_time: f64,
+    phase: SimulationPhase,
+    warnings: Vec<Warning>,
+    /// Warnings since the last [`Simulation::take_notes`].
+    notes: Vec<Warning>,
+    /// Warnings reported since the start.
+    warning_state: limits::WarningState,
+    /// Parameters for which the system was prepared.
+    prepared: Option<limits::Parameters>,
+    /// Limits for the parameters that were checked last.
+    limits: Option<limits::Limits>,
+    /// Length of every saved state (bytes).
+    state_size: usize,
+    /// State that is restored if a communication step takes too many internal steps; empty without such a bound.
+    mark: Vec<u8>,
+    /// Data for derivatives of the last communication step.
+    tangent: StepReplay,
+    /// True if the current communication step may end early.
+    partial: bool,
+    /// Largest number of internal steps tried within a communication step since the start.
+    most_tried: u64,
+    /// Energies of each set of structures that influence each other, if the ledger is kept.
+    energies: Vec<SetEnergy>,
+    /// Kinetic plus strain energy of each set at the start (J).
+    initial_energies: Vec<f64>,
+}
+
+/// Energies of structures that influence each other (J).
+#[derive(Debug, Clone, Copy, Default)]
+struct SetEnergy {
+    /// Instantaneous kinetic plus strain energy.
+    now: f64,
+    /// Energy that the scheme conserves.
+    conserved: f64,
+}
+
+impl Simulation {
+    /// Compiles a scene. Start values are set; nothing is computed yet.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// let mut simulation = Simulation::new(&scene)?;
+    /// simulation.initialise(0.0)?;
+    /// simulation.do_step(0.0, 1e-4)?;
+    /// assert_eq!(simulation.time(), 1e-4);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Invalid settings or ROM; combinations that are not supported.
+    pub fn new(scene: &Scene) -> Result<Self> {
+        let compiled = Compiled::new(scene)?;
+        let (table, readers) = table::build(scene)?;
+        let system = compiled.system()?;
+        let window = StepWindow::new(system.structures(), &compiled.patches, &compiled.scene.settings.outputs);
+        let watched_gaps = WatchedGaps::new(&compiled)?;
+        let sets = system.sets().count();
+        let (energies, initial_energies) = (vec![SetEnergy::default(); sets], vec![0.0; sets]);
+        let (bodies, pairs, carriers) = (compiled.bodies.len(), compiled.plan.pairs.len(), compiled.carriers.len());
+        let heated = |carrier: &compile::CarrierParts| CarrierInputs {
+            temperatures: vec![Input::default(); carrier.loads.thermal.len()],
+            ..CarrierInputs::default()
+        };
+        let inputs = Inputs {
+            rotors: (0..bodies).map(|body| RotorInputs::of(compiled.body(body).0)).collect(),
+            pairs: vec![PairInputs::default(); pairs],
+            carriers: compiled.carriers.iter().map(heated).collect(),
+            ..Inputs::default()
+        };
+        let mut simulation = Self {
+            readers,
+            values: vec![0.0; table.references()],
+            previous: vec![0.0; table.references()],
+            table,
+            inputs,
+            rotors: vec![RotorAngle::default(); bodies],
+            drives: vec![PrescribedMotion::default(); pairs],
+            turns: vec![0.0; pairs],
+            slave_shares: vec![1.0; pairs],
+            compiled,
+            system,
+            window,
+            watched_gaps,
+            communication: Communication::default(),
+            previous_length: 0.0,
+            time: 0.0,
+            initial_time: 0.0,
+            phase: SimulationPhase::Created,
+            warnings: Vec::new(),
+            notes: Vec::new(),
+            warning_state: limits::WarningState::new(bodies, carriers),
+            prepared: None,
+            limits: None,
+            state_size: 0,
+            mark: Vec::new(),
+            tangent: StepReplay::default(),
+            partial: false,
+            most_tried: 0,
+            energies,
+            initial_energies,
+        };
+        simulation.state_size = simulation.measured_state();
+        simulation.reset();
+        Ok(simulation)
+    }
+
+    /// Returns the variable table.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// let speed = simulation.table().find("speed").expect("a rotor has a speed");
+    /// assert_eq!(simulation.real(speed.reference)?, 1300.0);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
+    pub fn table(&self) -> &VariableTable {
+        &self.table
+    }
+
+    /// Returns the stepped system, for studies that need more than the outputs.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// assert_eq!(simulation.system().structures()[0].modes().sectors(), 2);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
+    pub fn system(&self) -> &System {
+        &self.system
+    }
+
+    /// Checks parameters against stability and solvability limits and sets the initial state.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// let damping = simulation.table().find("damping_ratio").expect("a parameter").reference;
+    /// simulation.set_real(damping, 0.01)?;
+    /// simulation.initialise(0.0)?;
+    /// assert_eq!(simulation.time(), 0.0);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Rejected parameters, with numbers and a remedy; the instance can be initialised again with other parameters.
+    pub fn initialise(&mut self, start_time: f64) -> Result<()> {
+        ranges::at_most("start time", start_time, ranges::TIME)?;
+        let parameters = self.parameters();
+        // After an error the instance must be initialised again.
+        self.phase = SimulationPhase::Created;
+        self.warnings.clear();
+        self.notes.clear();
+        self.compiled.scene.check_methods(parameters.scheme, parameters.solver)?;
+        self.check_slips()?;
+        self.follow_load_orders()?;
+        self.check_launch(parameters.scheme)?;
+        self.follow_reference_speeds(&self.references())?;
+        self.warnings = self.check_limits(&parameters)?;
+        self.warn_of_fast_rotation();
+        self.warn_of_sticking(&parameters);
+        self.warn_of_tolerance(&parameters);
+        self.begin_telling(&parameters);
+        let settings = &self.compiled.scene.settings;
+        self.warnings.retain(|warning| !settings.is_silenced(warning.topic()));
+        self.rest(&parameters);
+        self.apply_methods(&parameters);
+        self.make_room();
+        self.make_room_for_tangent();
+        self.time = start_time;
+        self.initial_time = start_time;
+        self.communication = Communication { start: start_time, count: 1, done: 1, ..Communication::default() };
+        self.previous_length = 0.0;
+        self.most_tried = 0;
+        for body in 0..self.rotors.len() {
+            self.rotors[body] = RotorAngle::new(self.value_of(Quantity::InitialAngle, body));
+        }
+        self.find_drives(0.0, start_time);
+        self.system.set_first_step(parameters.step);
+        self.inputs.start();
+        self.settle();
+        self.launch();
+        self.system.start(&self.drives);
+        self.check_initial_state()?;
+        self.check_initial_gaps()?;
+        self.window.open(self.system.structures());
+        self.compute_outputs();
+        for (initial, energy) in self.initial_energies.iter_mut().zip(&self.energies) {
+            *initial = energy.now;
+        }
+        self.check_outputs(start_time)?;
+        self.phase = SimulationPhase::Ready;
+        self.previous.copy_from_slice(&self.values);
+        Ok(())
+    }
+
+    /// Applies scheme, solver and friction of the parameters; the structures already have their damping.
+    fn apply_methods(&mut self, parameters: &limits::Parameters) {
+        self.system.set_methods(parameters.scheme, parameters.solver);
+        self.system.prepare_spans(parameters.step, parameters.tolerance);
+        self.prepared = Some(parameters.clone());
+        self.apply_friction(parameters);
+    }
+
+    /// Returns whether the tables of spans belong to the parameters.
+    fn is_prepared(&self, parameters: &limits::Parameters) -> bool {
+        let deciding = |from: &limits::Parameters| {
+            let numbers = [from.step, from.tolerance].map(f64::to_bits);
+            (numbers, from.scheme, from.solver, from.damping_ratios.clone(), from.mode_damping.clone())
+        };
+        self.prepared.as_ref().is_some_and(|prepared| deciding(prepared) == deciding(parameters))
+    }
+
+    fn apply_friction(&mut self, parameters: &limits::Parameters) {
+        for (pair, friction) in parameters.friction.iter().enumerate() {
+            self.system.set_friction(pair, *friction);
+        }
+    }
+
+    /// Returns the speeds of all masters (rad/s).
+    fn speeds(&self) -> Vec<f64> {
+        self.inputs.rotors.iter().map(|rotor| rotor.speed.value).collect()
+    }
+
+    /// Applies the numbers of nodal diameters that the parameters give to loads.
+    fn follow_load_orders(&mut self) -> Result<()> {
+        (0..self.compiled.carriers.len()).try_for_each(|carrier| {
+            let order = self.value_of(Quantity::LoadOrder, carrier);
+            self.compiled.set_load_order(carrier, order)
+        })
+    }
+
+    /// Computes the modes at the initial speeds and temperatures, one state per master, if there is stiffening or softening. If one is
+    /// rejected, all stay unchanged.
+    fn follow_reference_speeds(&mut self, states: &[[f64; 2]]) -> Result<()> {
+        let before: Vec<[f64; 2]> = self.compiled.references();
+        let differs = |body: &usize| {
+            let [speed, temperature] = [0, 1].map(|i| before[*body][i].to_bits() != states[*body][i].to_bits());
+            (self.compiled.spins(*body) && speed) || (self.compiled.softens(*body) && temperature)
+        };
+        let changed: Vec<usize> = (0..before.len()).filter(differs).collect();
+        if changed.is_empty() {
+            return Ok(());
+        }
+        let taken = changed.iter().try_for_each(|body| self.compiled.set_reference_speed(*body, states[*body]));
+        self.system = taken.and_then(|()| self.compiled.system()).inspect_err(|_| {
+            // The previous speeds were accepted before.
+            changed.iter().for_each(|body| drop(self.compiled.set_reference_speed(*body, before[*body])));
+        })?;
+        (self.limits, self.prepared) = (None, None);
+        Ok(())
+    }
+
+    /// Resets structures to rest, undeformed, with the damping of the parameters.
+    fn rest(&mut self, parameters: &limits::Parameters) {
+        let ratios = parameters.damping_ratios.iter().zip(&parameters.mode_damping);
+        for (structure, (ratio, own)) in self.system.structures_mut().iter_mut().zip(ratios) {
+            structure.modes_mut().rest();
+            structure.modes_mut().set_damping_ratio(*ratio, own);
+        }
+        self.follow_engine_orders();
+    }
+
+    /// Gives free bodies their initial velocity; called again for another length of the first step.
+    fn launch(&mut self) {
+        for (body, parts) in self.compiled.bodies.iter().enumerate() {
+            let Some(translations) = &parts.translations else { continue };
+            let velocity = [0, 1, 2].map(|axis| self.value_of(Quantity::InitialVelocity(axis), body));
+            for (mode, velocity) in translations.modal(velocity).into_iter().enumerate() {
+                self.system.structures_mut()[body].modes_mut().set_modal_state(mode, 0, 0.0, velocity);
+            }
+            // Sets the contact nodes of the previous step according to this velocity and the length of the first step.
+            self.system.structures_mut()[body].modes_mut().recover();
+        }
+        self.launch_blades();
+    }
+
+    /// Computes the static equilibrium under the initial loads.
+    fn settle(&mut self) {
+        let structures = self.system.structures_mut();
+        for body in (0..self.compiled.bodies.len()).filter(|body| self.compiled.loads_blades(*body)) {
+            let rotor = &self.inputs.rotors[body];
+            let (speed, temperature) = (rotor.speed.at(0.0), rotor.temperature_at(0.0));
+            self.compiled.settle(body, speed, temperature, structures[body].modes_mut());
+        }
+        let under = structures.iter_mut().skip(self.compiled.bodies.len());
+        for ((carrier, inputs), structure) in self.compiled.carriers.iter().zip(&self.inputs.carriers).zip(under) {
+            if carrier.loads.are_there() {
+                let mut load = vec![0.0; carrier.model.len()];
+                carrier.loads.fill(inputs, 0.0, &mut load);
+                structure.modes_mut().settle(&load);
+            }
+        }
+    }
+
+    /// Returns the warnings collected by the last [`Simulation::initialise`] (such as unresolved modes).
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// # simulation.initialise(0.0)?;
+    /// for warning in simulation.warnings() {
+    ///     println!("{warning}");
+    /// }
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
+    pub fn warnings(&self) -> &[Warning] {
+        &self.warnings
+    }
+
+    /// Returns the warnings since the start or the last call, for the actual step: another step size than the scene proposes, another sense
+    /// of rotation, tips that are too fast, other friction. Each is reported once.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// # simulation.initialise(0.0)?;
+    /// simulation.do_step(0.0, 1e-4)?;
+    /// for note in simulation.take_notes() {
+    ///     println!("{note}");
+    /// }
+    /// assert!(simulation.take_notes().is_empty());
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
+    pub fn take_notes(&mut self) -> Vec<Warning> {
+        std::mem::take(&mut self.notes)
+    }
+
+    /// Current time (s): the end of the last finished step, also of one that returned early.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// # simulation.initialise(0.0)?;
+    /// simulation.do_step(0.0, 2.5e-4)?;
+    /// assert_eq!(simulation.time(), 2.5e-4);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
+    pub fn time(&self) -> f64 {
+        self.time
+    }
+
+    fn offset_now(&self) -> f64 {
+        match self.phase {
+            SimulationPhase::Stepping => self.communication.offset(self.communication.done),
+            _ => 0.0,
+        }
+    }
+
+    fn value_of(&self, quantity: Quantity, of: usize) -> f64 {
+        let variable = self.table.with_quantity_of(quantity, of);
+        variable.map_or(0.0, |variable| self.values[variable.reference as usize])
+    }
+
+    /// Computes the prescribed motion at an offset from the start of the communication step, at the time `time`.
+    fn find_drives(&mut self, offset: f64, time: f64) {
+        for pair in 0..self.drives.len() {
+            self.drives[pair] = self.drive(pair, offset, time);
+        }
+    }
+
+    fn drive(&self, pair: usize, offset: f64, time: f64) -> PrescribedMotion {
+        let body = self.compiled.plan.pairs[pair].body;
+        let (rotor, surface) = (&self.inputs.rotors[body], &self.inputs.pairs[pair]);
+        PrescribedMotion {
+            rotor_angle: self.rotors[body].phase(&rotor.speed, offset),
+            speed: rotor.speed.at(offset),
+            gap_offset: surface.gap_offset.at(offset),
+            shape_factor: surface.shape_factor.at(offset) * self.ramp(pair, time),
+            // Exact, so that a rotation by many turns does not cancel the rotor's own.
+            shape_rotation: surface.shape_rotation.at(offset) % std::f64::consts::TAU,
+            radius_change: surface.radius_change.at(offset),
+            shaft: rotor.shaft.map(|input| input.at(offset)),
+            shaft_velocity: rotor.shaft.map(|input| input.rate()),
+        }
+    }
+
+    /// Factor on the casing shape of the first pair at the internal time reached (-), with its ramp.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// # simulation.initialise(0.0)?;
+    /// // The bumps of this casing grow in over the first millisecond.
+    /// assert_eq!(simulation.shape_factor(), 0.0);
+    /// simulation.do_step(0.0, 1e-3)?;
+    /// assert_eq!(simulation.shape_factor(), 1.0);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
+    pub fn shape_factor(&self) -> f64 {
+        let (offset, done) = (self.offset_now(), self.communication.done);
+        self.inputs.pairs[0].shape_factor.at(offset) * self.ramp(0, self.communication.time(done))
+    }
+
+    /// Grown fraction of the casing shape: ½(1 − cos(πt/T)) until T.
+    fn ramp(&self, pair: usize, time: f64) -> f64 {
+        let Some(reference) = self.compiled.references.ramp_times[pair] else { return 1.0 };
+        ShapeGrowth::share(time - self.initial_time, self.values[reference])
+    }
+
+    /// Returns the growth of the shape of a pair between two offsets and times (s).
+    fn growth(&self, pair: usize, offsets: [f64; 2], times: [f64; 2]) -> ShapeGrowth {
+        ShapeGrowth {
+            factors: offsets.map(|offset| self.inputs.pairs[pair].shape_factor.at(offset)),
+            elapsed: times.map(|time| time - self.initial_time),
+            length: self.compiled.references.ramp_times[pair].map_or(0.0, |reference| self.values[reference]),
+        }
+    }
+
+    /// Restores the state after [`Simulation::new`], with all start values.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// # simulation.initialise(0.0)?;
+    /// simulation.do_step(0.0, 1e-4)?;
+    /// simulation.reset();
+    /// simulation.initialise(0.0)?;
+    /// assert_eq!(simulation.time(), 0.0);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
+    pub fn reset(&mut self) {
+        self.values.fill(0.0);
+        self.previous.fill(0.0);
+        self.inputs.clear();
+        for variable in self.table.variables() {
+            let reference = variable.reference as usize;
+            match &variable.start {
+                Some(StartValue::Real(values)) => {
+                    self.values[reference..][..values.len()].copy_from_slice(values);
+                    for (element, value) in values.iter().enumerate() {
+                        if let Some(input) = self.inputs.get_mut(variable.quantity, variable.of, element) {
+                            input.ask(*value, 0.0);
+                            input.take();
+                        }
+                    }
+                }
+                Some(StartValue::Integer(value)) => self.values[reference] = f64::from(*value),
+                Some(StartValue::Boolean(value)) => self.values[reference] = f64::from(u8::from(*value)),
+                Some(StartValue::String(_)) | None => {}
+            }
+        }
+        self.system.structures_mut().iter_mut().for_each(|structure| structure.modes_mut().rest());
+        self.rotors.fill(RotorAngle::default());
+        self.communication = Communication::default();
+        (self.previous_length, self.most_tried) = (0.0, 0);
+        (self.time, self.initial_time) = (0.0, 0.0);
+        self.warnings.clear();
+        self.notes.clear();
+        self.tangent.renew();
+        self.phase = SimulationPhase::Created;
+    }
+}

@@ -1,0 +1,399 @@
+//! Structures and contact pairs of a scene, which make up everything that moves. One step is in `step.rs`.
+
+pub(crate) mod carrier;
+pub(crate) mod contact_view;
+pub(crate) mod continuation;
+pub(crate) mod delassus;
+pub(crate) mod event;
+pub(crate) mod failure;
+pub(crate) mod group;
+pub(crate) mod growth;
+pub(crate) mod history;
+pub(crate) mod ledger;
+pub(crate) mod losses;
+pub(crate) mod pair;
+pub(crate) mod pulling;
+pub(crate) mod sets;
+pub(crate) mod small;
+pub(crate) mod structure;
+pub(crate) mod witness;
+pub(crate) mod work;
+
+use crate::contact::coating::Coating;
+use crate::geometry::{GapLaw, PrescribedMotion};
+use crate::modes::bank::BankOptions;
+use crate::modes::modal::ModalModel;
+use crate::modes::sectors::{SectorModel, Sectors};
+use crate::persist::persist_fields;
+use crate::scene::method::{Scheme, Solver};
+use crate::system::history::Two;
+pub use crate::time::galerkin::sector::Effort;
+use crate::time::spans::coupled_set::CoupledSet;
+pub(crate) use contact_view::Bodies;
+pub use contact_view::ContactMember;
+pub use event::ContactEvent;
+pub use failure::StepFailure;
+use group::Reach;
+pub(crate) use group::{ContactGroup, GroupSolution};
+pub use growth::ShapeGrowth;
+pub use ledger::{Ledger, Sum};
+use losses::LargestLosses;
+pub use losses::Loss;
+pub use pair::{ContactPair, PairParts, SurfaceCarrier};
+pub use sets::StructureSets;
+pub(crate) use sets::joined;
+pub use small::Curved;
+pub use structure::Structure;
+
+/// A structure that is to become part of a system.
+#[derive(Debug, Clone)]
+pub enum StructureParts<'a> {
+    /// A structure with contact nodes that touch surfaces.
+    Touching(SectorModel<'a>, Box<BankOptions>),
+    /// A structure that carries surfaces, whose control points have three contact rows each; and whether it has loads in addition
+    /// to contact forces.
+    Carrying(&'a ModalModel, bool),
+}
+
+/// Scheme, solver and options of a system.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SystemSettings {
+    /// Time-stepping scheme.
+    pub scheme: Scheme,
+    /// Contact solver.
+    pub solver: Solver,
+    /// True if the damping loss is collected, without which the energy balance does not close.
+    pub ledger: bool,
+}
+
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct RunTotals {
+    /// Number of internal steps.
+    pub steps: u64,
+    /// Work of adaptive steps.
+    pub effort: Effort,
+    pub factorisations: u64,
+    /// Number of steps after which the gap two steps back belongs to steps of the current size.
+    pub witnessed: u64,
+    /// Energy balance of each set.
+    pub ledgers: Vec<Ledger>,
+    /// Largest losses of the contacts of each set so far.
+    taken: Vec<LargestLosses>,
+}
+
+persist_fields!(RunTotals { steps, effort, factorisations, witnessed, ledgers, taken });
+
+impl RunTotals {
+    /// Initial totals of a run.
+    fn new(ledgers: Vec<Ledger>) -> Self {
+        Self { taken: vec![LargestLosses::default(); ledgers.len()], ledgers, ..Self::default() }
+    }
+}
+
+/// Structures, the contact pairs between them, and the groups of contacts that can influence each other.
+#[derive(Debug, Clone)]
+pub struct System {
+    pub(crate) structures: Vec<Structure>,
+    pub(crate) pairs: Vec<ContactPair>,
+    /// Contact groups of the first sets, in the order of the sets.
+    pub(crate) groups: Vec<ContactGroup>,
+    pub(crate) sets: StructureSets,
+    /// Sets whose sectors are integrated together.
+    pub(crate) coupled_sets: Vec<CoupledSet>,
+    pub(crate) settings: SystemSettings,
+    pub(crate) events: Two<Vec<ContactEvent>>,
+    pub(crate) counted: RunTotals,
+    /// Energy of each set before a change of the step size (J).
+    mechanical: Vec<f64>,
+    /// Limit of attempted steps, beyond which no sector begins a step.
+    pub(crate) most_tried: u64,
+}
+
+impl System {
+    /// Creates a system of one structure, with all sectors at rest, and a rigid surface with friction coefficient µ. Call
+    /// [`System::set_step`] and [`System::start`] before the first step.
+    pub fn new(model: &ModalModel, sectors: usize, gap: GapLaw, friction: f64, settings: SystemSettings) -> Self {
+        Self::alone(SectorModel::Uncoupled(model, sectors), BankOptions::default(), gap, friction, settings)
+    }
+
+    /// Creates a system of one structure with coupled sectors, or with options of its modes.
+    pub fn alone(
+        model: SectorModel,
+        options: BankOptions,
+        gap: GapLaw,
+        friction: f64,
+        settings: SystemSettings,
+    ) -> Self {
+        let pair = PairParts { structure: 0, gap, carrier: None, friction, cutting: 0.0 };
+        Self::of(vec![StructureParts::Touching(model, Box::new(options))], vec![pair], Vec::new(), settings)
+    }
+
+    /// Creates a system of any number of structures and pairs; `coatings` are those of the pairs.
+    pub fn of(
+        parts: Vec<StructureParts>,
+        pairs: Vec<PairParts>,
+        mut coatings: Vec<(usize, Coating)>,
+        settings: SystemSettings,
+    ) -> Self {
+        let structures: Vec<Structure> =
+            parts.into_iter().enumerate().map(|(index, part)| made(part, index, &pairs)).collect();
+        let pairs: Vec<ContactPair> = pairs.into_iter().map(ContactPair::new).collect();
+        let group = |(reach, touching): (Reach, Vec<usize>)| {
+            let of_group = |pair: &&ContactPair| touching.contains(&pair.structure());
+            let mut carriers: Vec<usize> =
+                pairs.iter().filter(of_group).filter_map(|pair| Some(pair.carrier()?.structure)).collect();
+            carriers.sort_unstable();
+            carriers.dedup();
+            let coated = coatings.iter().position(|(pair, _)| touching.contains(&pairs[*pair].structure()));
+            let coating = coated.map(|index| coatings.swap_remove(index).1);
+            ContactGroup::new((reach, &touching, &carriers), &structures, (settings.solver, coating))
+        };
+        let sets = StructureSets::new(&structures, &pairs);
+        let groups: Vec<ContactGroup> = contact_reaches(&structures, &pairs, &sets).into_iter().map(group).collect();
+        let contacts = structures.iter().map(|structure| structure.gaps().len()).sum();
+        let room = || Vec::with_capacity(contacts);
+        let mut system = Self {
+            groups,
+            settings,
+            events: Two { now: room(), before: room() },
+            counted: RunTotals::new(vec![Ledger::default(); sets.count()]),
+            mechanical: vec![0.0; sets.count()],
+            coupled_sets: Vec::new(),
+            most_tried: u64::MAX,
+            sets,
+            structures,
+            pairs,
+        };
+        for pair in &system.pairs {
+            let structure = &mut system.structures[pair.structure()];
+            let lanes = structure.modes().lanes();
+            pair.gap().prepare(lanes, &mut structure.history.geometry.now);
+            pair.gap().prepare(lanes, &mut structure.history.geometry.before);
+        }
+        system
+    }
+
+    /// The structures.
+    pub fn structures(&self) -> &[Structure] {
+        &self.structures
+    }
+
+    /// The structures, to set loads and initial conditions before [`System::start`].
+    pub fn structures_mut(&mut self) -> &mut [Structure] {
+        &mut self.structures
+    }
+
+    /// The contact pairs.
+    pub fn pairs(&self) -> &[ContactPair] {
+        &self.pairs
+    }
+
+    /// The coating of a pair.
+    pub fn coating(&self, pair: usize) -> Option<&Coating> {
+        let structure = self.pairs[pair].structure();
+        let group = self.groups.iter().find(|group| group.structures().any(|one| one == structure))?;
+        group.law().coating()
+    }
+
+    /// Contacts whose forces acted over the last step and whose work was recorded for it: those of that step or, for schemes
+    /// whose contact forces act later, those of the previous step.
+    pub fn acted(&self) -> &[ContactEvent] {
+        if self.settings.scheme.acts_later() { &self.events.before } else { &self.events.now }
+    }
+
+    /// Active contacts of the last step.
+    pub fn events(&self) -> &[ContactEvent] {
+        &self.events.now
+    }
+
+    /// Modes of the first structure.
+    pub fn bank(&self) -> &Sectors {
+        self.structures[0].modes()
+    }
+
+    /// Modes of the first structure, to set initial conditions before [`System::start`].
+    pub fn bank_mut(&mut self) -> &mut Sectors {
+        self.structures[0].modes_mut()
+    }
+
+    /// Gap of one node of one sector of the first structure (m).
+    pub fn gap(&self, node: usize, sector: usize) -> f64 {
+        self.structures[0].gap(node, sector)
+    }
+
+    /// λ of one node of one sector of the first structure in the last step (N).
+    pub fn multiplier(&self, node: usize, sector: usize) -> f64 {
+        self.structures[0].multiplier(node, sector)
+    }
+
+    /// Gaps of all contact nodes of all structures (m); infinite in padding lanes and where there is nothing to touch.
+    pub fn gaps(&self) -> impl Iterator<Item = &f64> {
+        self.structures.iter().flat_map(Structure::gaps)
+    }
+
+    /// Time-stepping scheme.
+    pub fn scheme(&self) -> Scheme {
+        self.settings.scheme
+    }
+
+    /// Length of the internal step (s).
+    pub fn step_size(&self) -> f64 {
+        self.structures[0].modes().step()
+    }
+
+    /// Number of internal steps, or of spans if sectors are integrated with adaptive steps.
+    pub fn steps(&self) -> u64 {
+        self.counted.steps
+    }
+
+    /// Returns the work of adaptive steps, summed over all sectors.
+    pub fn effort(&self) -> &Effort {
+        &self.counted.effort
+    }
+
+    /// Number of accepted steps, summed over all sectors for adaptive steps.
+    pub fn steps_taken(&self) -> u64 {
+        if self.settings.scheme == Scheme::Galerkin { self.counted.effort.steps } else { self.counted.steps }
+    }
+
+    /// Number of attempted steps, including accepted ones.
+    pub fn steps_tried(&self) -> u64 {
+        if self.settings.scheme == Scheme::Galerkin { self.counted.effort.tried() } else { self.counted.steps }
+    }
+
+    /// Sets the limit of attempted steps ([`System::steps_tried`]), beyond which no sector begins a step.
+    pub(crate) fn allow(&mut self, most_tried: u64) {
+        self.most_tried = most_tried;
+    }
+
+    /// Number of small linear systems that the contact solver has factorised.
+    pub fn factorisations(&self) -> u64 {
+        self.counted.factorisations
+    }
+
+    /// Work and losses so far, of all structures.
+    pub fn ledger(&self) -> Ledger {
+        let mut ledgers = self.counted.ledgers.iter().copied();
+        let first = ledgers.next().unwrap_or_default();
+        ledgers.fold(first, |sum, one| sum.with(&one))
+    }
+
+    /// Work and losses so far, of each set of structures that influence each other.
+    pub fn ledgers(&self) -> &[Ledger] {
+        &self.counted.ledgers
+    }
+
+    /// Sets of structures that influence each other.
+    pub fn sets(&self) -> &StructureSets {
+        &self.sets
+    }
+
+    /// Current settings.
+    pub fn settings(&self) -> &SystemSettings {
+        &self.settings
+    }
+
+    /// Sets the friction coefficient of a pair (takes effect with the next step).
+    pub fn set_friction(&mut self, pair: usize, friction: f64) {
+        self.pairs[pair].parts.friction = friction;
+    }
+
+    /// Selects scheme and solver; only before [`System::start`]. Allocates if the solver changes.
+    pub fn set_methods(&mut self, scheme: Scheme, solver: Solver) {
+        self.settings.scheme = scheme;
+        self.settings.solver = solver;
+        self.groups.iter_mut().for_each(|group| group.set_solver(solver, &self.structures));
+    }
+
+    /// Clears history and ledger, uses the current modal state as initial state, and evaluates the gaps with the prescribed
+    /// motion `drives`, one per pair.
+    pub fn start(&mut self, drives: &[PrescribedMotion]) {
+        self.structures.iter_mut().for_each(Structure::start);
+        self.groups.iter_mut().filter_map(|group| group.law_mut().coating_mut()).for_each(Coating::reset);
+        self.events.now.clear();
+        self.events.before.clear();
+        self.pairs.iter_mut().zip(drives).for_each(|(pair, drive)| pair.start(drive));
+        self.find_gaps(false);
+        for structure in &mut self.structures {
+            structure.remember_start();
+        }
+        let initial = |set| Ledger { initial: self.mechanical_energy(set), ..Ledger::default() };
+        self.counted = RunTotals::new((0..self.sets.count()).map(initial).collect());
+    }
+
+    /// Kinetic plus strain energy of a set (J), in the form that the scheme conserves.
+    pub(crate) fn mechanical_energy(&self, set: usize) -> f64 {
+        let members = self.sets.members(set).iter();
+        let (kinetic, strain) = sum_of(members.map(|member| self.structures[*member].modes().energies()));
+        kinetic + strain
+    }
+
+    /// Kinetic and strain energy of all structures (J), in the form that the scheme conserves and the energy balance uses.
+    pub fn energies(&self) -> (f64, f64) {
+        sum_of(self.structures.iter().map(|structure| structure.modes().energies()))
+    }
+
+    /// Makes the current modal state the initial state again, for a first step of another length.
+    pub(crate) fn renew_start(&mut self) {
+        for set in 0..self.sets.count() {
+            self.counted.ledgers[set].initial = self.mechanical_energy(set);
+        }
+        // Gaps two steps back are not known yet.
+        self.counted.witnessed = 2;
+    }
+
+    /// Sets speed (rad/s) and temperature (K) of a rotor whose modes depend on them; the change of strain energy is work of the
+    /// shaft and of heat.
+    pub fn set_speed(&mut self, structure: usize, speed: f64, temperature: f64) {
+        let work = self.structures[structure].modes_mut().set_speed(speed, temperature);
+        let ledger = &mut self.counted.ledgers[self.sets.of(structure)];
+        ledger.stiffening_work.add(work);
+        ledger.turnover.add(work.abs());
+    }
+
+    /// Moves the damping loss collected in the step kernel to the ledger.
+    pub fn close_ledger(&mut self) {
+        for (index, structure) in self.structures.iter_mut().enumerate() {
+            let ledger = &mut self.counted.ledgers[self.sets.of(index)];
+            ledger.damping_loss.add(structure.modes_mut().collect_loss());
+        }
+    }
+}
+
+/// Sums of pairs of energies.
+fn sum_of(mut energies: impl Iterator<Item = (f64, f64)>) -> (f64, f64) {
+    let first = energies.next().unwrap_or_default();
+    energies.fold(first, |sum, one| (sum.0 + one.0, sum.1 + one.1))
+}
+
+fn made(part: StructureParts, index: usize, pairs: &[PairParts]) -> Structure {
+    let (model, options) = match part {
+        StructureParts::Carrying(model, loads) => return Structure::carrying(model, loads),
+        StructureParts::Touching(model, options) => (model, *options),
+    };
+    let own = || pairs.iter().enumerate().filter(|(_, pair)| pair.structure == index);
+    let nodes = own().map(|(_, pair)| pair.gap.nodes()).max().unwrap_or(0);
+    let mut pair_of = vec![None; nodes];
+    for (pair, parts) in own() {
+        parts.gap.members().into_iter().for_each(|node| pair_of[node] = Some(pair));
+    }
+    let has_places = own().any(|(_, pair)| pair.gap.spline().is_some());
+    Structure::touching(model, options, pair_of, has_places)
+}
+
+/// Finds the structures with contact nodes of each set, and how far their contacts are coupled.
+fn contact_reaches(structures: &[Structure], pairs: &[ContactPair], sets: &StructureSets) -> Vec<(Reach, Vec<usize>)> {
+    let touching = |set: usize| -> Vec<usize> {
+        let members = sets.members(set).iter().copied();
+        members.filter(|member| structures[*member].nodes() > 0).collect()
+    };
+    let reach = |members: Vec<usize>| {
+        let first = *members.first()?;
+        let carried = pairs.iter().any(|pair| members.contains(&pair.structure()) && pair.carrier().is_some());
+        // Sectors turn relative to a stationary surface; a single structure is one sector with all of its contacts.
+        let open = pairs.iter().any(|pair| pair.structure() == first && matches!(pair.gap(), GapLaw::Open(_)));
+        let coupled_sets = carried || structures[first].modes().coupled().is_some() || open;
+        Some((if coupled_sets { Reach::All } else { Reach::Sector }, members))
+    };
+    (0..sets.count()).filter_map(|set| reach(touching(set))).collect()
+}

@@ -1,0 +1,167 @@
+//! Energy ledger: kinetic + strain = initial + external work + curvature work + load work + excitation work + step changes − damping −
+//! friction − impact losses − wear work.
+//!
+//! All terms belong to the discrete equations (see [`crate::modes::schemes`]), so the residual of the balance measures rounding and
+//! programming errors, not the truncation error of the scheme.
+
+use crate::persist::persist_fields;
+
+/// Sum with Neumaier's compensation, because long runs add millions of tiny losses.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Sum {
+    total: f64,
+    compensation: f64,
+}
+
+persist_fields!(Sum { total, compensation });
+
+impl Sum {
+    /// Adds a term.
+    pub fn add(&mut self, term: f64) {
+        let sum = self.total + term;
+        self.compensation +=
+            if self.total.abs() >= term.abs() { (self.total - sum) + term } else { (term - sum) + self.total };
+        self.total = sum;
+    }
+
+    /// Returns the compensated value.
+    pub fn value(&self) -> f64 {
+        self.total + self.compensation
+    }
+}
+
+/// Work and losses since the start (J).
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Ledger {
+    /// Kinetic plus strain energy at the start.
+    pub initial: f64,
+    /// Loss by modal damping.
+    pub damping_loss: Sum,
+    /// Friction heat: µλ times the slip, which includes the rigid motion.
+    pub friction_loss: Sum,
+    /// Energy that the contact nodes lose when a gap closes within a step.
+    pub impact_loss: Sum,
+    /// Work of the coating's normal force on the approaching blades.
+    pub wear_work: Sum,
+    /// Work of cutting the coating: specific cutting energy times volume.
+    pub cutting_work: Sum,
+    /// Energy consumed by the wear of the cells, not part of the balance: ∫(Y + Kε_p) dε_p of compressed cells, and
+    /// `cutting_work`, cell by cell, of cut cells.
+    pub wear_energy: Sum,
+    /// Work of centrifugal, thermal and nodal-diameter loads.
+    pub load_work: Sum,
+    /// Work of the excitation of blades.
+    pub excitation_work: Sum,
+    /// Work of the shaft through the contacts, −∫ torque dθ_r; for obstacles at rest, the work of sliding along them.
+    pub shaft_work: Sum,
+    /// Work of the shaft on rotors whose modes depend on the speed: change of strain energy by stiffening.
+    pub stiffening_work: Sum,
+    /// Work of whirl, −∫ F·de.
+    pub whirl_work: Sum,
+    /// Work of axial shift.
+    pub shift_work: Sum,
+    /// Work of the prescribed motion of the casing along the contact normals.
+    pub casing_work: Sum,
+    /// Difference between the work of contact forces in the scheme and all other terms: normals turn and surfaces curve within a
+    /// step. It vanishes with the step length.
+    pub curvature_work: Sum,
+    /// Energy added or removed when the state is converted to another step size.
+    pub step_change: Sum,
+    /// Sum of the magnitudes of all external work, the scale of the residual.
+    pub turnover: Sum,
+    /// Sum of the magnitudes of the work that contact forces do on the structures, in both directions.
+    pub contact_work: Sum,
+}
+
+/// Lists every sum of the ledger once; a missing field is a compile error.
+macro_rules! sums_of_ledger {
+    ($count:literal: $($sum:ident),* $(,)?) => {
+        persist_fields!(Ledger { initial, $($sum),* });
+
+        impl Ledger {
+            fn sums(&mut self) -> [&mut Sum; $count] {
+                let Self { initial: _, $($sum),* } = self;
+                [$($sum),*]
+            }
+        }
+    };
+}
+
+sums_of_ledger! { 17:
+    damping_loss,
+    friction_loss,
+    impact_loss,
+    wear_work,
+    cutting_work,
+    wear_energy,
+    load_work,
+    excitation_work,
+    shaft_work,
+    stiffening_work,
+    whirl_work,
+    shift_work,
+    casing_work,
+    curvature_work,
+    step_change,
+    turnover,
+    contact_work,
+}
+
+impl Ledger {
+    /// Work of all inputs except loads (J): shaft, whirl, axial shift, moving casing.
+    pub fn external_work(&self) -> f64 {
+        let mut sum = Sum::default();
+        self.inputs().into_iter().for_each(|work| sum.add(work.value()));
+        sum.value()
+    }
+
+    fn inputs(&self) -> [Sum; 5] {
+        [self.shaft_work, self.stiffening_work, self.whirl_work, self.shift_work, self.casing_work]
+    }
+
+    /// Returns the sum of the entries of two sets of structures.
+    pub fn with(mut self, other: &Self) -> Self {
+        self.initial += other.initial;
+        let mut other = *other;
+        self.sums().into_iter().zip(other.sums()).for_each(|(sum, term)| sum.add(term.value()));
+        self
+    }
+
+    /// Residual of the energy balance (J): expected minus actual energy, where `mechanical` is the current kinetic and strain energy.
+    pub fn residual(&self, mechanical: f64) -> f64 {
+        let mut balance = Sum::default();
+        balance.add(self.initial);
+        self.inputs().into_iter().for_each(|work| balance.add(work.value()));
+        balance.add(self.curvature_work.value());
+        balance.add(self.step_change.value());
+        balance.add(-self.damping_loss.value());
+        balance.add(-self.friction_loss.value());
+        balance.add(-self.impact_loss.value());
+        balance.add(-self.wear_work.value());
+        balance.add(-self.cutting_work.value());
+        balance.add(self.load_work.value());
+        balance.add(self.excitation_work.value());
+        balance.add(-mechanical);
+        balance.value()
+    }
+
+    /// Returns the sum of all supplied and lost energy (J).
+    pub fn exchanged(&self) -> f64 {
+        let losses = [self.damping_loss, self.friction_loss, self.impact_loss, self.wear_work, self.cutting_work];
+        self.scale() + losses.iter().map(|loss| loss.value().abs()).sum::<f64>()
+    }
+
+    /// Energy supplied to vibration since the start by forces times velocities (J): work of inputs and loads and step changes,
+    /// less friction heat, damping loss and work on the coating. Impacts only dissipate energy and are left out.
+    pub fn supplied(&self) -> f64 {
+        let put_in = self.external_work() + self.load_work.value() + self.step_change.value();
+        let put_in = put_in + self.excitation_work.value();
+        let left = put_in - self.friction_loss.value() - self.damping_loss.value();
+        left - self.wear_work.value() - self.cutting_work.value()
+    }
+
+    /// Returns the scale of the residual (J): initial energy plus all exchanged external work.
+    pub fn scale(&self) -> f64 {
+        self.initial.abs() + self.turnover.value()
+    }
+}

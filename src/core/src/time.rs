@@ -1,0 +1,5 @@
+//! Time integration: recurrences with fixed steps, and the continuous Galerkin method with adaptive steps.
+
+pub mod galerkin;
+mod recurrence;
+pub(crate) mod spans;

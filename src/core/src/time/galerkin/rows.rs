@@ -1,0 +1,214 @@
+//! Mode shapes at the contact rows, arranged for sums over modes and over rows.
+
+use super::kernels::{Combine, PADDED};
+use super::level::{ContactModes, StepTables};
+use super::state::SectorState;
+use crate::math::simd::{InstructionSet, Kernel};
+use nalgebra::DMatrix;
+
+/// Data that all step lengths share.
+#[derive(Debug, Clone)]
+pub struct ContactRows {
+    /// Shapes mode by mode: all nodes of the first component, then of the second and the third, padded with zeros.
+    by_mode: Vec<f64>,
+    /// Magnitudes of `by_mode`.
+    magnitudes: Vec<f64>,
+    stride: usize,
+    /// Shapes row by row (3·node + component), padded with zeros.
+    by_row: Vec<f64>,
+    instructions: InstructionSet,
+    residual: DMatrix<f64>,
+    error_form: DMatrix<f64>,
+    /// ξω and 1/ω_d of each mode; 1/ω_d is infinite for rigid-body modes.
+    rates: Vec<[f64; 2]>,
+    /// The indices 0, 1, 2, …
+    all: Vec<usize>,
+}
+
+/// Largest phase angle of a mode over a step that resolves its motion (rad).
+const RESOLVED: f64 = 2.0;
+
+/// Coefficients of all modes and the sums over modes; allocated once.
+#[derive(Debug, Clone)]
+pub struct Sums<const N: usize> {
+    coefficients: [Vec<f64>; N],
+    /// Rows of each set: all nodes of the first component, then of the second and the third.
+    pub rows: [Vec<f64>; N],
+}
+
+impl<const N: usize> Sums<N> {
+    /// Allocates sums for `modes` modes and `nodes` contact nodes.
+    pub fn new(modes: usize, nodes: usize) -> Self {
+        Self {
+            coefficients: std::array::from_fn(|_| vec![0.0; modes]),
+            rows: std::array::from_fn(|_| vec![0.0; (3 * nodes).next_multiple_of(PADDED)]),
+        }
+    }
+
+    /// Returns the three components of a node in a set.
+    pub fn vector3(&self, set: usize, node: usize, nodes: usize) -> [f64; 3] {
+        [0, 1, 2].map(|component| self.rows[set][component * nodes + node])
+    }
+}
+
+/// `to` = `a`·q + `b`·v for all modes.
+struct Weigh<'a> {
+    tables: [&'a [f64]; 2],
+    state: [&'a [f64]; 2],
+    to: &'a mut [f64],
+}
+
+impl Kernel for Weigh<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { tables: [a, b], state: [q, v], to } = self;
+        for (to, ((a, b), (q, v))) in to.iter_mut().zip(a.iter().zip(b).zip(q.iter().zip(v))) {
+            *to = a * q + b * v;
+        }
+    }
+}
+
+impl ContactRows {
+    /// Arranges the rows of the modes of a sector.
+    pub fn new(modes: &ContactModes) -> Self {
+        let (nodes, count) = (modes.rows() / 3, modes.len());
+        let stride = modes.rows().next_multiple_of(PADDED);
+        let mut by_mode = vec![0.0; stride * count];
+        for (entries, shape) in by_mode.chunks_exact_mut(stride.max(1)).zip(modes.shapes.column_iter()) {
+            for (row, value) in shape.iter().enumerate() {
+                entries[(row % 3) * nodes + row / 3] = *value;
+            }
+        }
+        let padded = count.next_multiple_of(PADDED);
+        let mut by_row = vec![0.0; padded * modes.rows()];
+        for (entries, shapes) in by_row.chunks_exact_mut(padded.max(1)).zip(modes.shapes.row_iter()) {
+            entries.iter_mut().zip(shapes.iter()).for_each(|(entry, shape)| *entry = *shape);
+        }
+        let rates = modes.frequencies.iter().zip(&modes.damping_ratios);
+        Self {
+            magnitudes: by_mode.iter().map(|shape| shape.abs()).collect(),
+            by_mode,
+            stride,
+            by_row,
+            instructions: InstructionSet::detect(),
+            residual: modes.residual.clone(),
+            error_form: modes.error_form(),
+            rates: rates.map(|(w, ratio)| [ratio * w, 1.0 / (w * (1.0 - ratio * ratio).sqrt())]).collect(),
+            all: (0..count).collect(),
+        }
+    }
+
+    /// Residual flexibility G (m/N), rows 3·node + component.
+    pub fn residual(&self) -> &DMatrix<f64> {
+        &self.residual
+    }
+
+    /// See [`ContactModes::error_form`].
+    pub fn error_form(&self) -> &DMatrix<f64> {
+        &self.error_form
+    }
+
+    /// Sums Σ φ (A q + B q̇) for the range `points` of the points of a step.
+    pub fn free(&self, level: &StepTables, state: &SectorState, points: std::ops::Range<usize>, sums: &mut Sums<3>) {
+        for (point, to) in points.clone().zip(&mut sums.coefficients) {
+            let [a, b] = &level.modes.points[point];
+            self.instructions.run(Weigh { tables: [a, b], state: [&state.position, &state.velocity], to });
+        }
+        let [first, second, third] = &sums.coefficients;
+        let [one, two, three] = &mut sums.rows;
+        match points.len() {
+            3 => self.add_up(&self.by_mode, [first, second, third], [one, two, three]),
+            2 => self.add_up(&self.by_mode, [first, second], [one, two]),
+            _ => self.add_up(&self.by_mode, [first], [one]),
+        }
+    }
+
+    /// Returns the three components of the sum over modes at a node.
+    pub fn at_node(&self, node: usize, modes: &[f64]) -> [f64; 3] {
+        let padded = self.all.len().next_multiple_of(PADDED);
+        [0, 1, 2].map(|component| {
+            let shapes = &self.by_row[(3 * node + component) * padded..][..modes.len()];
+            shapes.iter().zip(modes).map(|(shape, mode)| shape * mode).sum()
+        })
+    }
+
+    /// Finds displacements and velocities by the modes with inertia.
+    pub fn now(&self, state: &SectorState, sums: &mut Sums<2>) {
+        let [one, two] = &mut sums.rows;
+        self.add_up(&self.by_mode, [&state.position, &state.velocity], [one, two]);
+    }
+
+    /// Adds the largest displacement of each row from rest (m) at any time without contact: the summed amplitudes of all modes.
+    pub fn add_largest_displacements(&self, state: &SectorState, sums: &mut Sums<1>) {
+        self.unresolved_amplitudes(f64::INFINITY, state, sums);
+    }
+
+    /// Sums the amplitudes of the modes that turn by more than `RESOLVED` within a step of this length (s), as displacements of the rows (m).
+    pub fn unresolved_amplitudes(&self, step: f64, state: &SectorState, sums: &mut Sums<1>) {
+        let [amplitudes] = &mut sums.coefficients;
+        let modes = self.rates.iter().zip(state.position.iter().zip(&state.velocity));
+        for (amplitude, ([rate, per_frequency], (q, v))) in amplitudes.iter_mut().zip(modes) {
+            let turned = (v + rate * q) * per_frequency;
+            *amplitude = if step < RESOLVED * per_frequency { 0.0 } else { (q * q + turned * turned).sqrt() };
+        }
+        let [one] = &mut sums.rows;
+        self.add_up(&self.magnitudes, [&sums.coefficients[0]], [one]);
+    }
+
+    /// Velocities of the rows at the end of a step without forces (m/s).
+    pub fn end_velocities(&self, level: &StepTables, state: &SectorState, sums: &mut Sums<1>) {
+        let [a, b, ..] = &level.modes.end[1];
+        let ([to], [one]) = (&mut sums.coefficients, &mut sums.rows);
+        self.instructions.run(Weigh { tables: [a, b], state: [&state.position, &state.velocity], to });
+        self.add_up(&self.by_mode, [to], [one]);
+    }
+
+    /// Computes the forces on all modes, padded to whole registers, for sets of forces on the rows `rows` (N).
+    pub fn modal_forces<const N: usize>(&self, rows: &[usize], forces: [&[f64]; N], sums: [&mut [f64]; N]) {
+        let stride = self.all.len().next_multiple_of(PADDED);
+        self.instructions.run(Combine { table: &self.by_row, stride, columns: rows, coefficients: forces, sums });
+    }
+
+    fn add_up<const N: usize>(&self, shapes: &[f64], coefficients: [&[f64]; N], sums: [&mut [f64]; N]) {
+        self.instructions.run(Combine { table: shapes, stride: self.stride, columns: &self.all, coefficients, sums });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::time::galerkin::advance::Advance;
+    use tiprub_test_models::SeededRandom;
+
+    /// Decaying vibration stays within the largest displacement; undamped vibration attains it.
+    #[test]
+    fn free_motion_bound_is_valid_and_tight() {
+        let mut random = SeededRandom(6);
+        for case in 0..200 {
+            let ratio = random.of(&[0.0, 0.02, 0.3, 0.7]);
+            let count = 1 + random.below(3);
+            let frequencies: Vec<f64> = (0..count).map(|_| random.scale(1e3, 1e4)).collect();
+            let (damping_ratios, shapes) = (vec![ratio; count], random.matrix(3, count));
+            let modes = ContactModes { frequencies, damping_ratios, shapes, residual: DMatrix::zeros(3, 3) };
+            let (rows, mut level) = (ContactRows::new(&modes), StepTables::new(&modes, 1));
+            level.set_step(&modes, 5e-6);
+            let mut state = SectorState::new(count, 1);
+            state.position.iter_mut().for_each(|q| *q = random.signed());
+            state.velocity.iter_mut().for_each(|v| *v = 3e3 * random.signed());
+            let (mut reach, mut now) = (Sums::new(count, 1), Sums::new(count, 1));
+            rows.add_largest_displacements(&state, &mut reach);
+            let (reach, mut advance) = (reach.vector3(0, 0, 1), Advance::new(count, 1));
+            let mut most = [0.0_f64; 3];
+            for _ in 0..1500 {
+                rows.now(&state, &mut now);
+                let moved = now.vector3(0, 0, 1);
+                (0..3).for_each(|row| most[row] = most[row].max(moved[row].abs()));
+                advance.freely(&level, &mut state);
+            }
+            for (most, reach) in most.into_iter().zip(reach) {
+                assert!(most <= reach * (1.0 + 1e-12), "case {case}: {most} beyond {reach}");
+                assert!(count > 1 || ratio > 0.0 || most > 0.999 * reach, "case {case}: {most} of {reach}");
+            }
+        }
+    }
+}

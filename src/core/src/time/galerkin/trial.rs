@@ -1,0 +1,578 @@
+//! Trial of one step of one sector: contact forces and gaps at the points, and the quality of the step.
+
+mod coupled;
+mod judgement;
+mod minima;
+mod obstacle;
+mod outcome;
+mod steady;
+mod sticking;
+
+use super::basis::{MOST, POINTS, TimeBasis};
+use super::compliance::{LaneCompliance, Lanes};
+use super::kernels::{Add, AddProduct, ClosingColumn, Combine, Withdraw};
+use super::level::StepTables;
+use super::rows::{ContactRows, Sums};
+use super::state::SectorState;
+use crate::contact::active_set::ContactSolver;
+use crate::math::simd::InstructionSet;
+pub use judgement::TrialResult;
+use minima::Minima;
+use nalgebra::DMatrix;
+pub use obstacle::{Obstacle, SlidingState, node_by_node};
+use steady::Steady;
+use sticking::Sticking;
+
+/// Largest number of gap evaluations in one trial.
+const PASSES: usize = 6;
+/// Negative gaps within this fraction of the largest gap count as rounding.
+const ROUNDING: f64 = 1e-13;
+
+/// Forces over a step: a polynomial through all points, or a constant force and the end alone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ForceInterpolation {
+    /// The force is a polynomial of degree s.
+    Polynomial,
+    /// The force has its value at the end of the step throughout, which is dissipative whatever opens or closes.
+    Constant,
+}
+
+impl ForceInterpolation {
+    /// Weights of the work of forces at point i: S_ik, or those of a constant force.
+    pub fn work_weights(self, basis: &TimeBasis, i: usize) -> [f64; POINTS] {
+        match self {
+            Self::Polynomial => basis.work[i],
+            Self::Constant if i == 1 => [-1.0, 1.0, 0.0, 0.0],
+            Self::Constant => [0.0; POINTS],
+        }
+    }
+}
+
+/// The three components of a node.
+pub fn vector3_at(values: &[f64], node: usize) -> [f64; 3] {
+    [values[3 * node], values[3 * node + 1], values[3 * node + 2]]
+}
+
+/// Scratch memory and results of a trial, for a fixed number of contact nodes.
+#[derive(Debug, Clone)]
+pub struct Trial {
+    lanes: Lanes,
+    /// Displacements and velocities of the rows at the start, and whether they belong to the state.
+    start: Vec<f64>,
+    velocities: Vec<f64>,
+    known: bool,
+    now: Sums<2>,
+    /// Contacts at the start.
+    start_contacts: Contacts,
+    /// Displacements of the lanes without forces after the start (m), those caused by the forces, and their sum.
+    free: Vec<f64>,
+    pushed: Vec<f64>,
+    moved: Vec<f64>,
+    gaps: Vec<f64>,
+    normals: Vec<f64>,
+    /// Normals for which the forces were found, at the displacements of the previous pass.
+    solved_normals: Vec<f64>,
+    /// Gaps without the forces, linearised at the current displacements, and gaps with the forces.
+    without: Vec<f64>,
+    with: Vec<f64>,
+    multipliers: Vec<f64>,
+    /// Directions of the forces (force per λ), and forces.
+    directions: Vec<f64>,
+    forces: Vec<f64>,
+    /// Displacements and gaps of all lanes per λ of each lane.
+    columns: Vec<f64>,
+    closing: Vec<f64>,
+    /// Compliance of the obstacle, and whether it is elastic.
+    carrier_compliance: Vec<f64>,
+    carrier_yields: bool,
+    solver: ContactSolver,
+    instructions: InstructionSet,
+    /// Unknowns of the problem: lanes.
+    members: Vec<usize>,
+    chosen: Vec<bool>,
+    /// Selected columns of a table, and their coefficients.
+    taken: Vec<usize>,
+    amounts: Vec<f64>,
+    sums: Sums<MOST>,
+    reach: (Sums<1>, Vec<f64>),
+    free_motion: FreeMotion,
+    /// Weights of the work of forces at each point.
+    work_weights: [[f64; POINTS]; POINTS],
+    /// Displacements at each point without the residual flexibility (m), if they are needed.
+    inert: [Vec<f64>; POINTS],
+    /// Negative forces at one point (N).
+    withdrawn: Vec<f64>,
+    /// Impulse errors (N·s), and their product with the error form (m²/(N·s)).
+    impulses: Vec<f64>,
+    left: Vec<f64>,
+    /// Depth of each node between the points (m), 0 if it touches at a point.
+    depths: Vec<f64>,
+    minima: Minima,
+    /// Data for contacts that may stick; and 1/h of the step (1/s), 0 if its force does not continue that of the previous step.
+    sticking: Option<Box<Sticking>>,
+    per_step: f64,
+    /// Data for steps of a higher degree; and slopes of the polynomials through the points at the end of the step (1/s).
+    steady: Option<Box<Steady>>,
+    end_slopes: [f64; POINTS],
+}
+
+/// Free motion of the contact rows over a step of degree 1.
+#[derive(Debug, Clone)]
+struct FreeMotion {
+    /// Velocities at the end (m/s).
+    end_velocities: Sums<1>,
+    /// Summed amplitudes of the modes that the step does not resolve (m).
+    unresolved_amplitudes: Sums<1>,
+    /// True if the two belong to the tried step.
+    is_known: bool,
+}
+
+/// Forces, λ, gaps and normals of the nodes at the start; the normals are those for which the forces were found.
+#[derive(Debug, Clone, PartialEq)]
+struct Contacts {
+    forces: Vec<f64>,
+    multipliers: Vec<f64>,
+    gaps: Vec<f64>,
+    normals: Vec<f64>,
+    /// Slopes of the forces over the last step (N/s), if contacts may stick.
+    slopes: Vec<f64>,
+}
+
+impl Trial {
+    /// Creates a trial for a sector with `modes` modes and `nodes` contact nodes.
+    pub fn new(modes: usize, nodes: usize) -> Self {
+        let lanes = Lanes { points: MOST, nodes };
+        let (width, three) = (|| vec![0.0; lanes.width()], || vec![0.0; 3 * lanes.width()]);
+        let rows = || vec![0.0; 3 * nodes];
+        Self {
+            lanes,
+            start: rows(),
+            velocities: rows(),
+            known: false,
+            now: Sums::new(modes, nodes),
+            start_contacts: Contacts {
+                forces: rows(),
+                multipliers: vec![0.0; nodes],
+                gaps: vec![0.0; nodes],
+                normals: rows(),
+                slopes: Vec::new(),
+            },
+            free: three(),
+            pushed: three(),
+            moved: three(),
+            gaps: width(),
+            normals: three(),
+            solved_normals: three(),
+            without: width(),
+            with: width(),
+            multipliers: width(),
+            directions: three(),
+            forces: three(),
+            columns: vec![0.0; lanes.len() * 3 * lanes.width()],
+            closing: vec![0.0; lanes.len() * lanes.width()],
+            carrier_compliance: width(),
+            carrier_yields: false,
+            solver: ContactSolver::new(lanes.len()),
+            instructions: InstructionSet::detect(),
+            members: Vec::with_capacity(lanes.len()),
+            chosen: vec![false; lanes.len()],
+            taken: Vec::with_capacity(3 * lanes.len()),
+            amounts: Vec::with_capacity(3 * lanes.len()),
+            sums: Sums::new(modes, nodes),
+            reach: (Sums::new(modes, nodes), rows()),
+            free_motion: FreeMotion {
+                end_velocities: Sums::new(modes, nodes),
+                unresolved_amplitudes: Sums::new(modes, nodes),
+                is_known: false,
+            },
+            work_weights: [[0.0; POINTS]; POINTS],
+            inert: std::array::from_fn(|_| rows()),
+            withdrawn: rows(),
+            impulses: rows(),
+            left: rows(),
+            depths: vec![0.0; nodes],
+            minima: Minima::new(modes, nodes),
+            sticking: None,
+            per_step: 0.0,
+            steady: None,
+            end_slopes: [0.0; POINTS],
+        }
+    }
+
+    /// Enables contacts that may stick. Polynomials are of degree 1.
+    #[must_use]
+    pub fn sticking(mut self) -> Self {
+        self.sticking = Some(Box::new(Sticking::new(self.lanes.nodes)));
+        self.start_contacts.slopes = vec![0.0; 3 * self.lanes.nodes];
+        self
+    }
+
+    /// Enables steps of a higher degree while no contact changes its status.
+    #[must_use]
+    pub fn steady(mut self) -> Self {
+        self.steady = Some(Box::new(Steady::new(self.lanes.len(), self.lanes.nodes)));
+        self
+    }
+
+    /// Marks the stored start values as outdated, because the state has changed.
+    pub fn forget(&mut self) {
+        self.known = false;
+    }
+
+    /// Tries a step from `state`; `precision` is the largest gap of a contact that counts as closed (m).
+    pub fn run(
+        &mut self,
+        (level, kind): (&StepTables, ForceInterpolation),
+        rows: &ContactRows,
+        state: &SectorState,
+        obstacle: &mut impl Obstacle,
+        precision: f64,
+    ) -> TrialResult {
+        let compliance = level.compliance_of(kind);
+        self.begin((level, kind), Some(rows), state);
+        self.find_gaps_at_start(rows, state, obstacle);
+        let mut verdict = TrialResult::default();
+        for pass in 0..PASSES {
+            let (lowest, largest) = self.find_gaps(obstacle);
+            let rests = self.rests();
+            if lowest.is_nan() {
+                return verdict;
+            }
+            // No contact is active or needed, or the solution also holds for the curved gaps.
+            if (rests && lowest >= 0.0) || (pass > 0 && lowest >= -precision && largest <= precision) {
+                verdict.solved = true;
+                break;
+            }
+            self.find_start(rows, state);
+            if pass + 1 == PASSES || !self.solve((compliance, rows.residual()), obstacle, &mut verdict) {
+                return verdict;
+            }
+        }
+        if kind == ForceInterpolation::Polynomial {
+            // Two points give a straight line, which cannot represent the motion in between.
+            if level.basis.degree == 1 {
+                self.find_start(rows, state);
+                let FreeMotion { end_velocities, unresolved_amplitudes, is_known } = &mut self.free_motion;
+                rows.end_velocities(level, state, end_velocities);
+                rows.unresolved_amplitudes(level.step, state, unresolved_amplitudes);
+                *is_known = true;
+            }
+            self.judge((level, rows), obstacle, &mut verdict);
+            self.check_depth(rows, state, obstacle, &mut verdict);
+        }
+        verdict
+    }
+
+    /// Corrects the depth of a step for jumps of the surfaces at its start.
+    fn check_depth(
+        &mut self,
+        rows: &ContactRows,
+        state: &SectorState,
+        obstacle: &mut impl Obstacle,
+        verdict: &mut TrialResult,
+    ) {
+        if verdict.depth > 0.0 {
+            self.find_start(rows, state);
+            verdict.depth = self.depth_without_jumps(|node, moved| Some(obstacle.gap(node, 0, moved).0));
+        }
+    }
+
+    /// Finds the gaps at the start if they are unknown.
+    fn find_gaps_at_start(&mut self, rows: &ContactRows, state: &SectorState, obstacle: &mut impl Obstacle) {
+        if !state.gaps_known {
+            self.find_start(rows, state);
+            for node in 0..self.nodes() {
+                (self.start_contacts.gaps[node], _) = obstacle.gap(node, 0, vector3_at(&self.start, node));
+            }
+        }
+    }
+
+    /// Finds the displacements and velocities of the rows at the start.
+    pub fn find_start(&mut self, rows: &ContactRows, state: &SectorState) -> &[f64] {
+        if self.known {
+            return &self.start;
+        }
+        self.known = true;
+        rows.now(state, &mut self.now);
+        let nodes = self.lanes.nodes;
+        for node in 0..nodes {
+            let [moved, velocity] = [0, 1].map(|set| self.now.vector3(set, node, nodes));
+            self.start[3 * node..3 * node + 3].copy_from_slice(&moved);
+            self.velocities[3 * node..3 * node + 3].copy_from_slice(&velocity);
+        }
+        let (matrix, y) = (rows.residual(), &mut self.start);
+        self.instructions.run(AddProduct { matrix, x: &state.forces, y });
+        &self.start
+    }
+
+    /// Returns the largest displacement of each row from rest (m) without contact.
+    pub fn largest_displacements(&mut self, rows: &ContactRows, state: &SectorState) -> &[f64] {
+        let (sums, reach) = &mut self.reach;
+        rows.add_largest_displacements(state, sums);
+        let nodes = self.lanes.nodes;
+        for (node, reach) in reach.chunks_exact_mut(3).enumerate() {
+            reach.copy_from_slice(&sums.vector3(0, node, nodes));
+        }
+        reach
+    }
+
+    /// Starts a trial: finds the displacements without forces at points 1 … s (unless the caller sets them, then `rows` is
+    /// `None`), and takes the contact state at the start as initial guess.
+    pub fn begin(
+        &mut self,
+        (level, kind): (&StepTables, ForceInterpolation),
+        rows: Option<&ContactRows>,
+        state: &SectorState,
+    ) {
+        let compliance = level.compliance_of(kind);
+        self.free_motion.is_known = false;
+        self.work_weights = std::array::from_fn(|i| kind.work_weights(&level.basis, i));
+        self.lanes = compliance.lanes();
+        let (start_contacts, lanes) = (&mut self.start_contacts, self.lanes);
+        start_contacts.forces.copy_from_slice(&state.forces);
+        start_contacts.multipliers.copy_from_slice(&state.multipliers);
+        start_contacts.gaps.copy_from_slice(&state.gaps);
+        start_contacts.normals.copy_from_slice(&state.normals);
+        start_contacts.slopes.iter_mut().zip(&state.slopes).for_each(|(slope, before)| *slope = *before);
+        self.per_step = if kind == ForceInterpolation::Polynomial { 1.0 / level.step } else { 0.0 };
+        let (nodes, stride) = (lanes.nodes, 3 * lanes.width());
+        if let Some(rows) = rows {
+            self.move_freely((level, kind), rows, state);
+        }
+        self.pushed[..stride].fill(0.0);
+        for lane in 0..lanes.len() {
+            lanes.set(&mut self.forces, lane, vector3_at(&state.forces, lanes.place(lane).1));
+        }
+        self.taken.clear();
+        self.amounts.clear();
+        for (column, force) in state.forces.iter().enumerate().filter(|(_, force)| **force != 0.0) {
+            self.taken.push(column);
+            self.amounts.push(*force);
+        }
+        if !self.taken.is_empty() {
+            if kind == ForceInterpolation::Polynomial && rows.is_some() {
+                self.combine(compliance.columns(), stride);
+                self.free[..stride].iter_mut().zip(&self.pushed).for_each(|(free, pushed)| *free += pushed);
+            }
+            self.combine(compliance.held(), stride);
+        }
+        for point in 0..lanes.points {
+            self.multipliers[point * nodes..][..nodes].copy_from_slice(&state.multipliers);
+        }
+    }
+
+    /// Finds the displacements of the rows without any force.
+    fn move_freely(
+        &mut self,
+        (level, kind): (&StepTables, ForceInterpolation),
+        rows: &ContactRows,
+        state: &SectorState,
+    ) {
+        let degree = level.basis.degree;
+        let points = if kind == ForceInterpolation::Constant { degree - 1..degree } else { 0..degree };
+        rows.free(level, state, points, &mut self.sums);
+        let (nodes, width) = (self.lanes.nodes, self.lanes.width());
+        for (point, sums) in self.sums.rows[..self.lanes.points].iter().enumerate() {
+            for component in 0..3 {
+                let target = &mut self.free[component * width + point * nodes..][..nodes];
+                target.copy_from_slice(&sums[component * nodes..][..nodes]);
+            }
+        }
+    }
+
+    /// Sums the selected columns (`taken`) of a table, multiplied by `amounts`.
+    fn combine(&mut self, table: &[f64], stride: usize) {
+        let Self { taken, amounts, pushed, instructions, .. } = self;
+        let sums = [&mut pushed[..stride]];
+        instructions.run(Combine { table, stride, columns: taken, coefficients: [amounts], sums });
+    }
+
+    /// Finds displacements and gaps under the current forces. Returns the smallest gap and the largest gap of an active contact.
+    pub fn find_gaps(&mut self, obstacle: &mut impl Obstacle) -> (f64, f64) {
+        self.move_rows();
+        let (lanes, stride) = (self.lanes, 3 * self.lanes.width());
+        let Self { moved, gaps, normals, .. } = self;
+        obstacle.gaps(lanes, &moved[..stride], &mut gaps[..lanes.width()], &mut normals[..stride]);
+        self.extremes()
+    }
+
+    /// Finds the displacements under the current forces.
+    pub fn move_rows(&mut self) {
+        let stride = 3 * self.lanes.width();
+        let Self { free, pushed, moved, .. } = self;
+        self.instructions.run(Add { a: &free[..stride], b: &pushed[..stride], to: &mut moved[..stride] });
+    }
+
+    /// Returns the smallest gap and the largest gap of an active contact.
+    pub fn extremes(&self) -> (f64, f64) {
+        let lanes = self.lanes;
+        let (mut lowest, mut largest) = (f64::INFINITY, 0.0_f64);
+        for (gap, multiplier) in self.gaps[..lanes.len()].iter().zip(&self.multipliers) {
+            lowest = if gap.is_nan() || lowest.is_nan() { f64::NAN } else { lowest.min(*gap) };
+            if *multiplier > 0.0 {
+                largest = largest.max(gap.abs());
+            }
+        }
+        (lowest, largest)
+    }
+
+    /// Solves 0 ≤ λ ⟂ g ≥ 0 at all points and nodes: first for contacts that penetrate or push, then also for those that these
+    /// forces make penetrate.
+    pub fn solve(
+        &mut self,
+        (compliance, residual): (&LaneCompliance, &DMatrix<f64>),
+        obstacle: &mut impl Obstacle,
+        verdict: &mut TrialResult,
+    ) -> bool {
+        self.keep_normals();
+        if self.sticking.is_some() {
+            return self.solve_sticking(compliance, obstacle, verdict);
+        }
+        if obstacle.turns() {
+            self.find_inert(residual);
+        }
+        let (lanes, width) = (self.lanes, self.lanes.width());
+        let Self { gaps, normals, pushed, without, .. } = self;
+        self.instructions.run(Withdraw {
+            base: gaps,
+            normals: &normals[..3 * width],
+            moved: &pushed[..3 * width],
+            to: &mut without[..width],
+        });
+        self.members.clear();
+        for lane in 0..lanes.len() {
+            self.chosen[lane] = self.gaps[lane] <= 0.0 || self.multipliers[lane] > 0.0 || self.without[lane] < 0.0;
+        }
+        self.carrier_yields = obstacle.prepare_compliance(lanes, &self.chosen, &self.normals[..3 * width]);
+        for lane in 0..lanes.len() {
+            if self.chosen[lane] {
+                self.choose(lane, compliance, obstacle);
+            }
+        }
+        loop {
+            self.pose();
+            let outcome = self.solver.lcp();
+            verdict.factorisations += outcome.factorisations;
+            if !outcome.solved || self.solver.multipliers.iter().any(|value| !value.is_finite()) {
+                return false;
+            }
+            self.multipliers[..width].fill(0.0);
+            self.taken.clear();
+            self.amounts.clear();
+            for (lane, value) in self.members.iter().zip(&self.solver.multipliers) {
+                self.multipliers[*lane] = *value;
+                if *value != 0.0 {
+                    self.taken.push(*lane);
+                    self.amounts.push(*value);
+                }
+            }
+            if !self.choose_violated(compliance, obstacle) {
+                break;
+            }
+        }
+        let columns = std::mem::take(&mut self.columns);
+        self.combine(&columns, 3 * width);
+        self.columns = columns;
+        for component in 0..3 {
+            let row = component * width;
+            let directions = self.directions[row..][..width].iter().zip(&self.multipliers);
+            let forces = self.forces[row..][..width].iter_mut();
+            forces.zip(directions).for_each(|(force, (direction, value))| *force = direction * value);
+        }
+        true
+    }
+
+    /// Stores the normals for which the next forces are found.
+    fn keep_normals(&mut self) {
+        let stride = 3 * self.lanes.width();
+        self.solved_normals[..stride].copy_from_slice(&self.normals[..stride]);
+    }
+
+    /// Finds the displacements at the points by the modes with inertia.
+    ///
+    /// The total displacements are unsuitable: without mass, nodes follow the force back and forth, much faster than they slide.
+    fn find_inert(&mut self, residual: &DMatrix<f64>) {
+        for point in 0..=self.lanes.points {
+            for node in 0..self.lanes.nodes {
+                let (force, moved) = (self.force(point, node), self.displacement(point, node));
+                for c in 0..3 {
+                    (self.withdrawn[3 * node + c], self.inert[point][3 * node + c]) = (-force[c], moved[c]);
+                }
+            }
+            let y = &mut self.inert[point];
+            self.instructions.run(AddProduct { matrix: residual, x: &self.withdrawn, y });
+        }
+    }
+
+    /// Returns the sliding distance over which a force on a node at a point does work (m).
+    fn sliding_distance(&self, point: usize, node: usize) -> [f64; 3] {
+        let terms = self.work_weights[point].iter().zip(&self.inert);
+        terms.fold([0.0; 3], |sliding_distance, (weight, inert)| {
+            std::array::from_fn(|c| sliding_distance[c] + weight * inert[3 * node + c])
+        })
+    }
+
+    /// Makes a lane an unknown, with the direction and the effect of its force.
+    fn choose(&mut self, lane: usize, compliance: &LaneCompliance, obstacle: &mut impl Obstacle) {
+        let (lanes, width) = (self.lanes, self.lanes.width());
+        let (point, node) = lanes.place(lane);
+        let sliding = SlidingState {
+            moved: lanes.vector3(&self.moved, lane),
+            velocity: vector3_at(&self.velocities, node),
+            sliding_distance: self.sliding_distance(point, node),
+            normal: lanes.vector3(&self.normals, lane),
+        };
+        let direction = obstacle.direction(node, point, &sliding);
+        lanes.set(&mut self.directions, lane, direction);
+        self.members.push(lane);
+        self.instructions.run(ClosingColumn {
+            parts: compliance.of_lane(lane),
+            direction,
+            normals: &self.normals[..3 * width],
+            column: &mut self.columns[lane * 3 * width..][..3 * width],
+            closing: &mut self.closing[lane * width..][..width],
+        });
+        if self.carrier_yields {
+            obstacle.add_normal_compliance(lane, direction, &mut self.carrier_compliance[..width]);
+            let closing = &mut self.closing[lane * width..][..width];
+            let now = self.multipliers[lane];
+            for ((carrier_compliance, closing), without) in
+                self.carrier_compliance.iter().zip(closing).zip(&mut self.without)
+            {
+                (*closing, *without) = (*closing + carrier_compliance, *without - now * carrier_compliance);
+            }
+        }
+    }
+
+    /// Assembles the problem of the members.
+    fn pose(&mut self) {
+        let width = self.lanes.width();
+        self.solver.set_size(self.members.len());
+        for (column, lane) in self.members.iter().enumerate() {
+            let closing = &self.closing[lane * width..][..width];
+            let mut entries = self.solver.delassus.column_mut(column);
+            entries.iter_mut().zip(&self.members).for_each(|(entry, row)| *entry = closing[*row]);
+            self.solver.gaps[column] = self.without[*lane];
+            self.solver.active[column] = self.multipliers[*lane] > 0.0;
+        }
+    }
+
+    /// Chooses lanes that the current forces push into a surface.
+    fn choose_violated(&mut self, compliance: &LaneCompliance, obstacle: &mut impl Obstacle) -> bool {
+        let (lanes, width) = (self.lanes, self.lanes.width());
+        let scale = self.members.iter().fold(0.0_f64, |most, lane| most.max(self.gaps[*lane].abs()));
+        let (columns, coefficients) = (&self.taken[..], [&self.amounts[..]]);
+        let sums = [&mut self.with[..width]];
+        self.instructions.run(Combine { table: &self.closing, stride: width, columns, coefficients, sums });
+        let mut found = false;
+        for lane in 0..lanes.len() {
+            let after = self.without[lane] + self.with[lane];
+            if !self.chosen[lane] && self.gaps[lane].is_finite() && after < -ROUNDING * scale {
+                self.chosen[lane] = true;
+                self.choose(lane, compliance, obstacle);
+                found = true;
+            }
+        }
+        found
+    }
+}

@@ -1,0 +1,79 @@
+//! Surfaces that a sector may touch.
+
+use crate::time::galerkin::compliance::Lanes;
+
+/// Surfaces that the nodes of a sector may touch, at the points of the tried step.
+pub trait Obstacle {
+    /// Returns gap (m; infinite if there is nothing to touch) and unit normal at a point of the step, for the node displaced by `moved` (m).
+    fn gap(&mut self, node: usize, point: usize, moved: [f64; 3]) -> (f64, [f64; 3]);
+
+    /// Finds gaps (m) and normals at all points but the first; arrays of [`Lanes`].
+    fn gaps(&mut self, lanes: Lanes, moved: &[f64], gaps: &mut [f64], normals: &mut [f64]) {
+        node_by_node(self, lanes, moved, gaps, normals);
+    }
+
+    /// Gap (m) of a node displaced by `moved` (m) at the fraction `theta` of the step; `None` if it is known at the points only.
+    fn gap_within(&self, _node: usize, _theta: f64, _moved: [f64; 3]) -> Option<f64> {
+        None
+    }
+
+    /// Returns whether sliding directions turn within a step, so that [`SlidingState::sliding_distance`] is needed.
+    fn turns(&self) -> bool {
+        false
+    }
+
+    /// Force on the node per unit of λ, including friction.
+    fn direction(&mut self, node: usize, point: usize, sliding: &SlidingState) -> [f64; 3];
+
+    /// Prepares the compliance of the obstacle at the chosen lanes with these normals. Returns false if the obstacle is rigid.
+    fn prepare_compliance(&mut self, _lanes: Lanes, _chosen: &[bool], _normals: &[f64]) -> bool {
+        false
+    }
+
+    /// Adds the displacement of the obstacle at all lanes (m, along their normals, away from the node) per λ of one lane, whose
+    /// force per λ is `direction`. Valid only after [`Obstacle::prepare_compliance`] has returned true.
+    fn add_normal_compliance(&mut self, _lane: usize, _direction: [f64; 3], _given: &mut [f64]) {}
+
+    /// Adds the displacement of the obstacle in all three directions of each lane, under a `force` on one lane (N).
+    fn add_compliance(&mut self, _lane: usize, _force: [f64; 3], _given: &mut [f64]) {}
+
+    /// Friction coefficient µ of a node that may stick.
+    fn friction(&self, _node: usize) -> f64 {
+        0.0
+    }
+
+    /// Returns the sliding (m) of a node up to a point of the step that prescribed motion and the motion of the surface cause;
+    /// the node is displaced by `moved` (m).
+    fn drift(&self, _node: usize, _point: usize, _moved: [f64; 3]) -> [f64; 3] {
+        [0.0; 3]
+    }
+}
+
+/// Sliding motion of a node at a point of the step.
+#[derive(Debug, Clone, Copy)]
+pub struct SlidingState {
+    /// Displacement of the node (m).
+    pub moved: [f64; 3],
+    /// Vibration velocity of the node at the start of the step (m/s).
+    pub velocity: [f64; 3],
+    /// Sliding distance over which a force at this point does work, Σ_k S_ik ũ_k (m), by modes with inertia; 0 unless [`Obstacle::turns`].
+    pub sliding_distance: [f64; 3],
+    /// Unit normal at the point.
+    pub normal: [f64; 3],
+}
+
+/// Evaluates [`Obstacle::gaps`] by [`Obstacle::gap`] of every lane.
+pub fn node_by_node(
+    obstacle: &mut (impl Obstacle + ?Sized),
+    lanes: Lanes,
+    moved: &[f64],
+    gaps: &mut [f64],
+    normals: &mut [f64],
+) {
+    for lane in 0..lanes.len() {
+        let (point, node) = lanes.place(lane);
+        let (gap, normal) = obstacle.gap(node, point, lanes.vector3(moved, lane));
+        gaps[lane] = gap;
+        lanes.set(normals, lane, normal);
+    }
+}

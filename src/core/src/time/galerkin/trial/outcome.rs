@@ -1,0 +1,138 @@
+//! Results of a trial: forces, gaps and displacements of the nodes at the points, and the state at the end.
+
+use super::{ForceInterpolation, Trial, vector3_at};
+use crate::time::galerkin::basis::{MOST, TimeBasis};
+use crate::time::galerkin::state::SectorState;
+use nalgebra::DMatrix;
+
+impl Trial {
+    /// Number of points at which forces are unknown: s, or 1 if the force is constant.
+    pub fn points(&self) -> usize {
+        self.lanes.points
+    }
+
+    /// Number of contact nodes.
+    pub fn nodes(&self) -> usize {
+        self.lanes.nodes
+    }
+
+    /// λ of a node at point 0 … s (N).
+    pub fn multiplier(&self, point: usize, node: usize) -> f64 {
+        if point == 0 { self.start_contacts.multipliers[node] } else { self.multipliers[self.lanes.at(point, node)] }
+    }
+
+    /// Force on a node at point 0 … s (N).
+    pub fn force(&self, point: usize, node: usize) -> [f64; 3] {
+        if point == 0 { vector3_at(&self.start_contacts.forces, node) } else { self.lane(&self.forces, point, node) }
+    }
+
+    /// Returns the gap of a node (m).
+    pub fn gap(&self, point: usize, node: usize) -> f64 {
+        if point == 0 { self.start_contacts.gaps[node] } else { self.gaps[self.lanes.at(point, node)] }
+    }
+
+    /// Gap of a node (m), 0 where there is nothing to touch (beyond a free edge), because no force does work there.
+    pub fn finite_gap(&self, point: usize, node: usize) -> f64 {
+        let gap = self.gap(point, node);
+        if gap == f64::INFINITY { 0.0 } else { gap }
+    }
+
+    /// Returns the unit normal of a node.
+    pub fn normal(&self, point: usize, node: usize) -> [f64; 3] {
+        if point == 0 { vector3_at(&self.start_contacts.normals, node) } else { self.lane(&self.normals, point, node) }
+    }
+
+    /// Unit normal for which the force of a node was found: force − λ · normal is friction.
+    fn solved_normal(&self, point: usize, node: usize) -> [f64; 3] {
+        if point == 0 {
+            vector3_at(&self.start_contacts.normals, node)
+        } else {
+            self.lane(&self.solved_normals, point, node)
+        }
+    }
+
+    /// Friction force on a node (N).
+    pub fn friction_force(&self, point: usize, node: usize) -> [f64; 3] {
+        let (force, multiplier) = (self.force(point, node), self.multiplier(point, node));
+        let normal = self.solved_normal(point, node);
+        std::array::from_fn(|c| force[c] - multiplier * normal[c])
+    }
+
+    /// Returns the displacement of a node (m); at the start only if a contact is closed.
+    pub fn displacement(&self, point: usize, node: usize) -> [f64; 3] {
+        if point == 0 { vector3_at(&self.start, node) } else { self.lane(&self.moved, point, node) }
+    }
+
+    fn lane(&self, values: &[f64], point: usize, node: usize) -> [f64; 3] {
+        self.lanes.vector3(values, self.lanes.at(point, node))
+    }
+
+    /// Returns a node that had nothing to touch at the start of the step and now penetrates.
+    pub fn entered(&self) -> Option<usize> {
+        let inside = |node: &usize| (1..=self.points()).any(|point| self.gap(point, *node) < 0.0);
+        (0..self.nodes()).find(|node| self.start_contacts.gaps[*node] == f64::INFINITY && inside(node))
+    }
+
+    /// Returns whether no contact is active.
+    pub fn rests(&self) -> bool {
+        self.multipliers[..self.lanes.len()].iter().all(|value| *value == 0.0)
+    }
+
+    /// Coefficients of θᵃ of the force on a node (N), projected on degree s − 1; `None` without a force.
+    pub fn polynomial(&self, basis: &TimeBasis, kind: ForceInterpolation, node: usize) -> Option<[[f64; 3]; MOST]> {
+        let mut sums = [[0.0; 3]; MOST];
+        if kind == ForceInterpolation::Constant {
+            sums[0] = self.force(1, node);
+            return (self.multiplier(1, node) > 0.0).then_some(sums);
+        }
+        let mut pushed = false;
+        for point in (0..basis.count()).filter(|point| self.multiplier(*point, node) > 0.0) {
+            pushed = true;
+            let force = self.force(point, node);
+            for (sum, weights) in sums.iter_mut().zip(&basis.projection) {
+                sum.iter_mut().zip(force).for_each(|(sum, force)| *sum += weights[point] * force);
+            }
+        }
+        pushed.then_some(sums)
+    }
+
+    /// ½ΔfᵀGΔf, the energy lost by the change to a constant force (J), with G of all rows (m/N).
+    pub fn dropped(&self, residual: &DMatrix<f64>, state: &SectorState) -> f64 {
+        let change = |row: usize| self.force(1, row / 3)[row % 3] - state.forces[row];
+        let rows = 0..residual.nrows();
+        0.5 * rows
+            .clone()
+            .map(|i| change(i) * rows.clone().map(|k| residual[(i, k)] * change(k)).sum::<f64>())
+            .sum::<f64>()
+    }
+
+    /// Returns the energy that contacts lose when they close under a constant force: λ times the gap before (J).
+    pub fn closed(&self) -> f64 {
+        let lost = |node: usize| self.multiplier(1, node) * (self.finite_gap(0, node) - self.finite_gap(1, node));
+        (0..self.nodes()).filter(|node| self.multiplier(1, *node) > 0.0).map(lost).sum()
+    }
+
+    /// Sets forces, gaps and normals of the state to those at the end of the step.
+    pub fn leave(&mut self, state: &mut SectorState) {
+        let points = self.points();
+        for node in 0..self.nodes() {
+            let pushes = self.multiplier(points, node) > 0.0;
+            let normal = if pushes { self.solved_normal(points, node) } else { [0.0; 3] };
+            let force = self.force(points, node);
+            state.forces[3 * node..3 * node + 3].copy_from_slice(&force);
+            state.normals[3 * node..3 * node + 3].copy_from_slice(&normal);
+            for (component, slope) in state.slopes.iter_mut().skip(3 * node).take(3).enumerate() {
+                let change = force[component] - self.start_contacts.forces[3 * node + component];
+                *slope = if points == 1 {
+                    change * self.per_step
+                } else {
+                    (0..=points).map(|point| self.end_slopes[point] * self.force(point, node)[component]).sum()
+                };
+            }
+            state.multipliers[node] = self.multiplier(points, node);
+            state.gaps[node] = self.gap(points, node);
+        }
+        state.gaps_known = true;
+        self.forget();
+    }
+}

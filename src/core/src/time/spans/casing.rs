@@ -1,0 +1,305 @@
+//! A structure that carries surfaces, during the steps of the sectors that touch them.
+
+use crate::geometry::frame::PolarFrame;
+use crate::math::simd::InstructionSet;
+use crate::modes::bank::ModalBank;
+use crate::scene::method::Scheme;
+use crate::system::carrier::Spot;
+use crate::system::pair::at_place;
+use crate::time::galerkin::basis::POINTS;
+use crate::time::galerkin::compliance::Lanes;
+use crate::time::galerkin::kernels::{Combine, PADDED};
+use crate::time::galerkin::shared_body::{Coordinates, SharedBody};
+use crate::time::galerkin::trial::ForceInterpolation;
+
+/// Tables, state and scratch memory of a structure that carries surfaces.
+#[derive(Debug, Clone)]
+pub struct CarrierIntegrator {
+    /// Index of the structure.
+    pub structure: usize,
+    /// Modes of the structure.
+    pub whole: SharedBody,
+    /// `[row][mode]` of the rows that move control points, modes padded to whole registers.
+    shapes: Vec<f64>,
+    /// `[mode][row]`, rows padded to whole registers.
+    by_mode: Vec<f64>,
+    /// The indices 0, 1, 2, … of all modes.
+    all: Vec<usize>,
+    instructions: InstructionSet,
+    /// Displacements of these rows at the points of the step (m), and velocities at its start (m/s).
+    moved: [Vec<f64>; POINTS],
+    velocity: Vec<f64>,
+    /// Displacements over which forces at each point of the accepted step do work, Σ_k S_ik u_k (m).
+    worked: [Vec<f64>; POINTS],
+    /// Weights of the work of forces at each point of the tried step.
+    pub work_weights: [[f64; POINTS]; POINTS],
+    /// δ² per squared impulse on each mode: ½ mean φ²/ω².
+    error_form: Vec<f64>,
+    impulses: Vec<f64>,
+    /// Modal components of each lane in fixed directions and along its normal; lanes on this structure, and their directions.
+    seen: [Vec<f64>; 3],
+    along: Vec<f64>,
+    obstacle: Vec<bool>,
+    frames: Vec<PolarFrame>,
+    /// Modal forces per unit of λ of one lane.
+    force: Vec<f64>,
+}
+
+impl CarrierIntegrator {
+    /// Creates an integrator with polynomials of degree `degree`, for sectors of at most these lanes.
+    pub fn new(structure: usize, bank: &ModalBank, degree: usize, lanes: Lanes) -> Self {
+        let coordinates = coordinates(bank);
+        let (modes, rows) = (bank.modes(), bank.rows());
+        let (stride, padded) = (modes.next_multiple_of(PADDED), rows.next_multiple_of(PADDED));
+        let (mut shapes, mut by_mode) = (vec![0.0; rows * stride], vec![0.0; padded * modes]);
+        for (row, mode) in (0..rows).flat_map(|row| (0..modes).map(move |mode| (row, mode))) {
+            let shape = bank.contact_row(row)[mode];
+            (shapes[row * stride + mode], by_mode[mode * padded + row]) = (shape, shape);
+        }
+        let lowest = coordinates.frequencies.iter().copied().filter(|w| *w > 0.0).fold(f64::INFINITY, f64::min);
+        #[expect(clippy::cast_precision_loss, reason = "some hundreds of rows")]
+        let of_mode = |mode: usize| {
+            let square: f64 = (0..rows).map(|row| shapes[row * stride + mode].powi(2)).sum();
+            0.5 * coordinates.inertia[mode] * square / rows as f64 / coordinates.frequencies[mode].max(lowest).powi(2)
+        };
+        Self {
+            error_form: (0..modes).map(of_mode).collect(),
+            structure,
+            shapes,
+            by_mode,
+            all: (0..modes).collect(),
+            instructions: InstructionSet::detect(),
+            moved: std::array::from_fn(|_| vec![0.0; padded]),
+            velocity: vec![0.0; padded],
+            worked: std::array::from_fn(|_| vec![0.0; padded]),
+            work_weights: [[0.0; POINTS]; POINTS],
+            impulses: vec![0.0; modes],
+            seen: std::array::from_fn(|_| vec![0.0; lanes.len() * stride]),
+            along: vec![0.0; lanes.len() * stride],
+            obstacle: vec![false; lanes.len()],
+            frames: vec![PolarFrame::FIXED; lanes.len()],
+            force: vec![0.0; stride],
+            whole: if bank.is_loaded() {
+                SharedBody::new(coordinates, degree).loaded()
+            } else {
+                SharedBody::new(coordinates, degree)
+            },
+        }
+    }
+
+    /// Displacements of the rows at a point of the step (m).
+    pub fn moved(&self, point: usize) -> &[f64] {
+        &self.moved[point]
+    }
+
+    /// Computes the rows at the points 1 … `points` of the step, under the forces there.
+    pub fn recover(&mut self, points: usize) {
+        let Self { by_mode, all, moved: [_, one, two, three], whole, instructions, .. } = self;
+        let (table, stride, columns) = (&by_mode[..], one.len(), &all[..]);
+        let [a, b, c] = [1, 2, 3].map(|point| whole.at(point));
+        match points {
+            1 => instructions.run(Combine { table, stride, columns, coefficients: [a], sums: [one] }),
+            2 => instructions.run(Combine { table, stride, columns, coefficients: [a, b], sums: [one, two] }),
+            _ => instructions.run(Combine { table, stride, columns, coefficients: [a, b, c], sums: [one, two, three] }),
+        }
+    }
+
+    /// Finds displacements and velocities of the rows at the start of a step.
+    pub fn find_start(&mut self) {
+        let Self { by_mode, all, moved: [start, ..], velocity, whole, instructions, .. } = self;
+        let (table, stride, columns) = (&by_mode[..], start.len(), &all[..]);
+        let coefficients = [whole.at(0), whole.velocity()];
+        instructions.run(Combine { table, stride, columns, coefficients, sums: [start, velocity] });
+    }
+
+    /// Velocity of a place at the start of the step (m/s), in the directions of the node.
+    pub fn velocity_at(&self, spot: Spot) -> [f64; 3] {
+        at_place(spot.surface, spot.place, spot.frame, |row| self.velocity[row])
+    }
+
+    /// Returns the displacement of a place over which a force at point i of the tried step does work (m), in the directions of the node.
+    pub fn sliding_distance_at(&self, spot: Spot, i: usize) -> [f64; 3] {
+        let (weights, moved) = (&self.work_weights[i], &self.moved);
+        let sliding_distance =
+            |row: usize| weights.iter().zip(moved).map(|(weight, moved)| weight * moved[row]).sum::<f64>();
+        at_place(spot.surface, spot.place, spot.frame, sliding_distance)
+    }
+
+    /// Displacement of a place at a point of the step (m), in the directions of the node.
+    pub fn moved_at(&self, spot: Spot, point: usize) -> [f64; 3] {
+        at_place(spot.surface, spot.place, spot.frame, |row| self.moved[point][row])
+    }
+
+    /// Returns the displacement of a place over which a force at point i of the accepted step does work (m), in the directions of the node.
+    pub fn worked_at(&self, spot: Spot, i: usize) -> [f64; 3] {
+        at_place(spot.surface, spot.place, spot.frame, |row| self.worked[i][row])
+    }
+
+    /// Computes the weighted displacements for the work of forces at the points.
+    pub fn weigh(&mut self, points: usize) {
+        let Self { worked, moved, work_weights, .. } = self;
+        for (worked, weights) in worked.iter_mut().zip(work_weights).take(points + 1) {
+            for (row, worked) in worked.iter_mut().enumerate() {
+                *worked = (0..=points).map(|k| weights[k] * moved[k][row]).sum();
+            }
+        }
+    }
+
+    /// Adds the reaction to a force on a node at a place, at point i.
+    pub fn react(&mut self, spot: Spot, i: usize, force: [f64; 3]) {
+        self.find_force(spot, force);
+        self.whole.forces_mut(i).iter_mut().zip(&self.force).for_each(|(sum, force)| *sum -= force);
+    }
+
+    /// Sets the impulses to zero.
+    pub fn clear_impulses(&mut self) {
+        self.impulses.fill(0.0);
+    }
+
+    /// Adds an impulse on a node at a place (N·s).
+    pub fn add_impulse(&mut self, spot: Spot, impulse: [f64; 3]) {
+        self.find_force(spot, impulse);
+        self.impulses.iter_mut().zip(&self.force).for_each(|(sum, force)| *sum += force);
+    }
+
+    /// Computes the modal forces of a force at a place, in the directions of the node.
+    fn find_force(&mut self, spot: Spot, force: [f64; 3]) {
+        let (around, fixed) = (Around::new(spot), spot.frame.fixed(force));
+        let rows: [usize; 48] = std::array::from_fn(|i| around.rows[i / 3] + i % 3);
+        let amounts: [f64; 48] = std::array::from_fn(|i| around.weights[i / 3] * fixed[i % 3]);
+        let (stride, columns, coefficients) =
+            (self.force.len(), &rows[..3 * around.count], [&amounts[..3 * around.count]]);
+        let sums = [&mut self.force[..]];
+        self.instructions.run(Combine { table: &self.shapes, stride, columns, coefficients, sums });
+    }
+
+    /// Displacement error caused by the impulses (m).
+    pub fn error(&self) -> f64 {
+        self.impulses.iter().zip(&self.error_form).map(|(impulse, form)| impulse * impulse * form).sum::<f64>().sqrt()
+    }
+
+    /// Removes all lanes from this structure.
+    pub fn clear_lanes(&mut self) {
+        self.obstacle.fill(false);
+    }
+
+    /// Assigns a lane of the current sector to a place, with this normal.
+    pub fn set_lane(&mut self, lane: usize, spot: Spot, normal: [f64; 3]) {
+        let padded = self.force.len();
+        (self.obstacle[lane], self.frames[lane]) = (true, spot.frame);
+        let around = Around::new(spot);
+        let window = lane * padded..(lane + 1) * padded;
+        let Self { seen, shapes, along, instructions, .. } = self;
+        let count = around.count;
+        for (component, seen) in seen.iter_mut().enumerate() {
+            let rows: [usize; 16] = std::array::from_fn(|i| around.rows[i] + component);
+            let (columns, coefficients) = (&rows[..count], [&around.weights[..count]]);
+            let sums = [&mut seen[window.clone()]];
+            instructions.run(Combine { table: shapes, stride: padded, columns, coefficients, sums });
+        }
+        let [x, y, z] = seen.each_ref().map(|seen| &seen[window.clone()]);
+        let [a, b, c] = spot.frame.fixed(normal);
+        for (mode, along) in along[window.clone()].iter_mut().enumerate() {
+            *along = a * x[mode] + b * y[mode] + c * z[mode];
+        }
+    }
+
+    /// Adds the displacement at all lanes (m, along their normals) per λ of one lane, whose force per λ is `direction`, to
+    /// `carrier_compliance`.
+    pub fn add_normal_compliance(
+        &mut self,
+        (level, kind): (usize, ForceInterpolation),
+        lanes: Lanes,
+        lane: usize,
+        direction: [f64; 3],
+        carrier_compliance: &mut [f64],
+    ) {
+        let padded = self.force.len();
+        for i in 1..=lanes.points {
+            self.move_modes((level, kind), lanes, (i, lane), direction);
+            for node in (0..lanes.nodes).filter(|node| self.obstacle[lanes.at(i, *node)]) {
+                let other = lanes.at(i, node);
+                carrier_compliance[other] += dot_of(&self.along[other * padded..][..padded], &self.force);
+            }
+        }
+    }
+
+    /// Adds the displacement in the directions of each lane under a `force` on one lane at the end of the step (N), if the end is
+    /// the only point.
+    pub fn add_compliance(
+        &mut self,
+        at: (usize, ForceInterpolation),
+        lanes: Lanes,
+        lane: usize,
+        force: [f64; 3],
+        carrier_compliance: &mut [f64],
+    ) {
+        let padded = self.force.len();
+        self.move_modes(at, lanes, (1, lane), force);
+        for other in (0..lanes.nodes).filter(|node| self.obstacle[*node]) {
+            let fixed = self.seen.each_ref().map(|seen| dot_of(&seen[other * padded..][..padded], &self.force));
+            lanes.set(carrier_compliance, other, self.frames[other].local(fixed));
+        }
+    }
+
+    /// Returns the motion of the modes at point i under a force on a lane, in the directions of the lane.
+    fn move_modes(
+        &mut self,
+        (level, kind): (usize, ForceInterpolation),
+        lanes: Lanes,
+        (i, lane): (usize, usize),
+        force: [f64; 3],
+    ) {
+        if !self.obstacle[lane] {
+            return self.force.fill(0.0);
+        }
+        let padded = self.force.len();
+        let [x, y, z] = self.seen.each_ref().map(|seen| &seen[lane * padded..][..padded]);
+        let (k, _) = lanes.place(lane);
+        let [a, b, c] = self.frames[lane].fixed(force);
+        let (influence, coordinates) = (self.whole.influence(level), self.whole.coordinates());
+        for (mode, by) in influence.iter().enumerate() {
+            let inert = coordinates.inertia[mode]
+                * if kind == ForceInterpolation::Constant { by.constant } else { by.points[i - 1][k] };
+            let soft = if i == k { coordinates.softness[mode] } else { 0.0 };
+            self.force[mode] = (inert + soft) * (a * x[mode] + b * y[mode] + c * z[mode]);
+        }
+    }
+}
+
+/// Rows of the control points that define a place, and their weights.
+struct Around {
+    rows: [usize; 16],
+    weights: [f64; 16],
+    count: usize,
+}
+
+impl Around {
+    fn new(spot: Spot) -> Self {
+        let (surface, carrier) = spot.surface;
+        let mut found = Self { rows: [0; 16], weights: [0.0; 16], count: 0 };
+        for (index, weight) in surface.weights(spot.place).iter() {
+            (found.rows[found.count], found.weights[found.count]) = (carrier.first_row + 3 * index, weight);
+            found.count += 1;
+        }
+        found
+    }
+}
+
+/// Scalar product, summed in eight parts.
+fn dot_of(a: &[f64], b: &[f64]) -> f64 {
+    let mut parts = [0.0; PADDED];
+    for (a, b) in a.as_chunks::<PADDED>().0.iter().zip(b.as_chunks::<PADDED>().0) {
+        for i in 0..PADDED {
+            parts[i] += a[i] * b[i];
+        }
+    }
+    parts.iter().sum()
+}
+
+/// Modes of a structure that carries surfaces.
+pub fn coordinates(bank: &ModalBank) -> Coordinates {
+    let model = bank.model();
+    let dynamic = model.dynamic_modes(Scheme::Galerkin);
+    Coordinates::new(&model.frequencies, &model.damping_ratios, dynamic)
+}

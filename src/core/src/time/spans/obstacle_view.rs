@@ -1,0 +1,441 @@
+//! One sector and its surfaces over a span: gaps at any time, and a record of the contacts.
+
+use super::record::{SpanRecord, SurfacePlace};
+use crate::system::carrier::Spot;
+use crate::system::pair::ContactPair;
+use crate::time::spans::casing::CarrierIntegrator;
+
+use crate::geometry::GapLaw;
+use crate::geometry::wrench::{At, MotionIncrement};
+use crate::geometry::{PrescribedMotion, dot};
+use crate::time::galerkin::basis::TimeBasis;
+use crate::time::galerkin::compliance::Lanes;
+use crate::time::galerkin::level::StepTables;
+use crate::time::galerkin::sector::{AcceptedStep, Witness};
+use crate::time::galerkin::trial::{ForceInterpolation, Obstacle, SlidingState, Trial, node_by_node, vector3_at};
+
+/// Number of contact solutions in a trial after which the sliding directions are frozen, because a node that hardly slides would
+/// change its direction in every solution.
+const SOLUTIONS: usize = 3;
+
+/// Structures that carry the surfaces of a sector, in a step of a level.
+pub struct CarriersInStep<'a> {
+    pub casings: &'a mut [CarrierIntegrator],
+    /// Index of the structure in `casings` that carries the surface of each pair.
+    pub casing_of: &'a [Option<usize>],
+    pub level: usize,
+    pub kind: ForceInterpolation,
+    pub lanes: Lanes,
+}
+
+/// A sector of a structure and the surfaces that it can touch.
+pub struct ObstacleView<'a> {
+    /// Structures that carry the surfaces, if any.
+    pub carriers: Option<CarriersInStep<'a>>,
+    pub pairs: &'a mut [ContactPair],
+    /// Pair of each node.
+    pub pair_of: &'a [Option<usize>],
+    /// Number of lanes of a row, and lane of the sector.
+    pub lanes: usize,
+    pub sector: usize,
+    pub record: &'a mut SpanRecord,
+}
+
+impl ObstacleView<'_> {
+    /// Reads a value from the structure that carries a surface, at the place of a node and at a point of the step.
+    fn on_carrier<T>(
+        &self,
+        (node, point): (usize, usize),
+        when: SurfacePlace,
+        read: impl Fn(&CarrierIntegrator, Spot) -> T,
+    ) -> Option<T> {
+        let carriers = self.carriers.as_ref()?;
+        let pair = self.pair_of[node]?;
+        let casing = carriers.casing_of[pair]?;
+        let index = node * self.lanes + self.sector;
+        let spot = self.record.spot((node, point), (pair, &self.pairs[pair]), index, when)?;
+        Some(read(&carriers.casings[casing], spot))
+    }
+
+    /// Calls `read` with the structure that carries the surface of a node, at a point of the step.
+    pub fn with_carrier_mut(&mut self, node: usize, point: usize, read: impl FnOnce(&mut CarrierIntegrator, Spot)) {
+        let (Some(carriers), Some(pair)) = (&mut self.carriers, self.pair_of[node]) else { return };
+        let Some(casing) = carriers.casing_of[pair] else { return };
+        let index = node * self.lanes + self.sector;
+        if let Some(spot) = self.record.spot((node, point), (pair, &self.pairs[pair]), index, SurfacePlace::Now) {
+            read(&mut carriers.casings[casing], spot);
+        }
+    }
+
+    /// Returns the surface carrier of a lane, and the current step.
+    fn under(&mut self, lane: usize) -> Option<(&mut CarrierIntegrator, (usize, ForceInterpolation), Lanes)> {
+        let CarriersInStep { casings, casing_of, level, kind, lanes } = self.carriers.as_mut()?;
+        let casing = self.pair_of[lanes.place(lane).1].and_then(|pair| casing_of[pair])?;
+        Some((&mut casings[casing], (*level, *kind), *lanes))
+    }
+
+    fn at<'b>(&self, node: usize, drive: &'b PrescribedMotion) -> At<'b> {
+        At { node, index: node * self.lanes + self.sector, drive }
+    }
+}
+
+impl ObstacleView<'_> {
+    /// Enters all nodes at all points as lanes, if they face one surface of revolution and the shaft does not move.
+    fn enter_lanes(&mut self, lanes: Lanes) -> Option<usize> {
+        let pair = (*self.pair_of.first()?)?;
+        let GapLaw::Revolution(law) = self.pairs[pair].gap() else { return None };
+        for (node, other) in self.pair_of.iter().enumerate() {
+            if *other != Some(pair) {
+                return None;
+            }
+            for point in 1..=lanes.points {
+                let drive = &self.record.drives[pair][point].0;
+                let at = At { node, index: node * self.lanes + self.sector, drive };
+                if !law.enter(at, lanes.at(point, node), &mut self.record.instants) {
+                    return None;
+                }
+            }
+        }
+        Some(pair)
+    }
+}
+
+impl Obstacle for ObstacleView<'_> {
+    fn gap(&mut self, node: usize, point: usize, moved: [f64; 3]) -> (f64, [f64; 3]) {
+        let Some(pair) = self.pair_of[node] else { return (f64::INFINITY, [0.0; 3]) };
+        let at = self.at(node, &self.record.drives[pair][point].0);
+        let (gap, normal, place) =
+            self.pairs[pair].gap_mut().gap_of_node(at, moved, Some(self.record.places[point][node]));
+        self.record.places[point][node] = place;
+        (gap, normal)
+    }
+
+    fn gaps(&mut self, lanes: Lanes, moved: &[f64], gaps: &mut [f64], normals: &mut [f64]) {
+        if let Some(pair) = self.record.lanes_of
+            && let GapLaw::Revolution(law) = self.pairs[pair].gap()
+        {
+            return law.of_lanes(&mut self.record.instants, moved, gaps, normals);
+        }
+        node_by_node(self, lanes, moved, gaps, normals);
+    }
+
+    fn gap_within(&self, node: usize, theta: f64, moved: [f64; 3]) -> Option<f64> {
+        let pair = self.pair_of[node]?;
+        let [from, length] = self.record.step;
+        let drive = self.record.courses[pair].at(from + length * theta).0;
+        match self.pairs[pair].gap() {
+            GapLaw::Fixed(law) => Some(law.gaps[node] + dot(law.normals[node], moved)),
+            GapLaw::Revolution(law) => Some(law.gap_of_node(self.at(node, &drive), moved).0),
+            GapLaw::Spline(_) | GapLaw::Open(_) => None,
+        }
+    }
+
+    fn direction(&mut self, node: usize, point: usize, sliding: &SlidingState) -> [f64; 3] {
+        let Some(pair) = self.pair_of[node] else { return sliding.normal };
+        let friction = self.pairs[pair].friction();
+        if friction == 0.0 {
+            return sliding.normal;
+        }
+        let gap = self.pairs[pair].gap();
+        let slip = if gap.slides_anywhere() {
+            let known = self.record.slips[point][node].filter(|_| self.record.solutions > SOLUTIONS);
+            let slip = known.unwrap_or_else(|| {
+                let carriers = self.on_carrier((node, point), SurfacePlace::Now, |casing, spot| {
+                    casing.sliding_distance_at(spot, point)
+                });
+                let carriers = carriers.unwrap_or_default();
+                std::array::from_fn(|c| sliding.sliding_distance[c] - carriers[c])
+            });
+            self.record.slips[point][node] = Some(slip);
+            slip
+        } else {
+            let at = self.at(node, &self.record.drives[pair][point].0);
+            let rigid = gap.sliding_velocity(node, at.index, at.drive, sliding.moved);
+            let carriers = self.on_carrier((node, point), SurfacePlace::Begun, |casing, spot| casing.velocity_at(spot));
+            let carriers = carriers.unwrap_or_default();
+            std::array::from_fn(|i| rigid[i] + sliding.velocity[i] - carriers[i])
+        };
+        let slip = gap.slip_direction(slip, sliding.normal);
+        std::array::from_fn(|i| sliding.normal[i] - friction * slip[i])
+    }
+
+    fn turns(&self) -> bool {
+        self.pairs.iter().any(|pair| pair.gap().slides_anywhere() && pair.friction() != 0.0)
+    }
+
+    fn prepare_compliance(&mut self, lanes: Lanes, chosen: &[bool], normals: &[f64]) -> bool {
+        self.record.solutions += 1;
+        let Some(CarriersInStep { casings, lanes: carrier_lanes, .. }) = &mut self.carriers else { return false };
+        *carrier_lanes = lanes;
+        casings.iter_mut().for_each(CarrierIntegrator::clear_lanes);
+        for lane in (0..lanes.len()).filter(|lane| chosen[*lane]) {
+            let (point, node) = lanes.place(lane);
+            let normal = lanes.vector3(normals, lane);
+            self.with_carrier_mut(node, point, |casing, spot| casing.set_lane(lane, spot, normal));
+        }
+        true
+    }
+
+    fn add_normal_compliance(&mut self, lane: usize, direction: [f64; 3], carrier_compliance: &mut [f64]) {
+        carrier_compliance.fill(0.0);
+        if let Some((casing, at, lanes)) = self.under(lane) {
+            casing.add_normal_compliance(at, lanes, lane, direction, carrier_compliance);
+        }
+    }
+
+    fn add_compliance(&mut self, lane: usize, force: [f64; 3], carrier_compliance: &mut [f64]) {
+        carrier_compliance.fill(0.0);
+        if let Some((casing, at, lanes)) = self.under(lane) {
+            casing.add_compliance(at, lanes, lane, force, carrier_compliance);
+        }
+    }
+
+    fn friction(&self, node: usize) -> f64 {
+        self.pair_of[node].map_or(0.0, |pair| self.pairs[pair].friction())
+    }
+
+    fn drift(&self, node: usize, step_point: usize, moved: [f64; 3]) -> [f64; 3] {
+        let Some(pair) = self.pair_of[node] else { return [0.0; 3] };
+        let drives = &self.record.drives[pair];
+        let ((_, before), (drive, now)) = (&drives[0], &drives[step_point]);
+        let (gap, motion) = (self.pairs[pair].gap(), now.less(before));
+        let at = self.at(node, drive);
+        let point = gap.contact_point(at, moved, self.record.places[step_point][node]);
+        let (spin, shaft) = (gap.spin_motion(at, point, &motion), gap.shaft_motion(at, point, &motion));
+        let carriers = self.on_carrier((node, step_point), SurfacePlace::Now, |casing, spot| {
+            let [now, before] = [step_point, 0].map(|instant| casing.moved_at(spot, instant));
+            std::array::from_fn(|c| now[c] - before[c])
+        });
+        let carriers: [f64; 3] = carriers.unwrap_or_default();
+        std::array::from_fn(|c| spin[c] + shaft[c] - carriers[c])
+    }
+}
+
+impl Witness for ObstacleView<'_> {
+    fn begin_step(&mut self, from: f64, length: f64, level: &StepTables, kind: ForceInterpolation) {
+        let count = if kind == ForceInterpolation::Constant { 2 } else { level.basis.count() };
+        for (drives, course) in self.record.drives.iter_mut().zip(&self.record.courses) {
+            for (point, drive) in drives[..count].iter_mut().enumerate() {
+                let theta =
+                    if kind == ForceInterpolation::Constant { [0.0, 1.0][point] } else { level.basis.points[point] };
+                *drive = course.at(from + length * theta);
+            }
+        }
+        (self.record.solutions, self.record.step) = (0, [from, length]);
+        self.record.slips.iter_mut().for_each(|slips| slips.fill(None));
+        self.record.lanes_of = self.enter_lanes(Lanes { points: count - 1, nodes: self.pair_of.len() });
+    }
+
+    fn is_clear(&self, from: f64, length: f64, reach: &[f64]) -> bool {
+        let ends = |pair: usize| [from, from + length].map(|theta| self.record.courses[pair].at(theta).0);
+        let pairs = self.pairs.iter().enumerate().filter(|(pair, _)| self.pair_of.contains(&Some(*pair)));
+        pairs.into_iter().all(|(pair, of)| {
+            self.record.courses[pair].only_turns() && {
+                let [start, end] = ends(pair);
+                of.nodes()
+                    .iter()
+                    .all(|node| of.gap().is_clear(self.at(*node, &start), end.rotor_angle, vector3_at(reach, *node)))
+            }
+        })
+    }
+
+    fn may_come_closer(&self, from: f64, length: f64, reach: &[f64]) -> bool {
+        let pairs = self.pairs.iter().enumerate().filter(|(pair, _)| self.pair_of.contains(&Some(*pair)));
+        pairs.into_iter().any(|(pair, of)| {
+            let [start, end] = [from, from + length].map(|theta| self.record.courses[pair].at(theta).0);
+            of.nodes().iter().any(|node| {
+                let (at, reach) = (self.at(*node, &start), vector3_at(reach, *node));
+                of.gap().approach(at, end.rotor_angle, reach) > self.record.tolerance
+            })
+        })
+    }
+
+    fn record_gaps(&mut self, level: &StepTables, trial: &Trial) {
+        for (node, pair) in self.pair_of.iter().enumerate() {
+            if pair.is_some() {
+                let lowest = self.lowest((trial, &level.basis), node);
+                self.record.tallies[node].lowest = lowest;
+            }
+        }
+    }
+
+    fn record_flight(&mut self, damping_loss: f64) {
+        self.record.work.damping += damping_loss;
+    }
+
+    fn record_step(&mut self, step: &AcceptedStep) {
+        self.record.work.damping += step.damping_loss;
+        self.record.work.dropped += step.dropped;
+        self.weigh_motions(step);
+        for (node, pair) in self.pair_of.iter().enumerate() {
+            let Some(pair) = *pair else { continue };
+            let points = step.trial.points();
+            self.record.tallies[node].lowest = self.lowest((step.trial, &step.level.basis), node);
+            let comes = (1..=points).find(|i| step.trial.multiplier(*i, node) > 0.0);
+            if comes.is_some_and(|i| self.was_behind(step.trial, node, pair, i)) {
+                self.record.behind_edge = Some(node);
+            }
+            if (0..=points).any(|point| step.trial.multiplier(point, node) > 0.0) {
+                self.enter(step, node, pair);
+            }
+        }
+        for places in [&mut self.record.places, &mut self.record.acted] {
+            let [first, rest @ ..] = places;
+            first.copy_from_slice(&rest[step.trial.points() - 1]);
+        }
+    }
+}
+
+/// Number of iterations of the search for the smallest gap between points by a parabola through three gaps.
+const PARABOLAS: usize = 4;
+/// Factor by which the points move closer in each iteration.
+const CLOSER: f64 = 0.25;
+
+impl ObstacleView<'_> {
+    /// Smallest gap of a node (m) so far, at the points of a step, and between them if it stays open.
+    fn lowest(&self, (trial, basis): (&Trial, &TimeBasis), node: usize) -> f64 {
+        let gaps = (1..=trial.points()).map(|point| trial.gap(point, node));
+        let lowest = gaps.fold(self.record.tallies[node].lowest, f64::min);
+        match trial.minimum(node).filter(|_| !self.has_jumped(trial, node)) {
+            Some(theta) => lowest.min(self.lowest_near((trial, basis), node, theta)),
+            _ => lowest,
+        }
+    }
+
+    /// Returns whether a held input has jumped at the start of the step and changed the gap of a node by more than the tolerance.
+    fn has_jumped(&self, trial: &Trial, node: usize) -> bool {
+        let start = self.gap_within(node, 0.0, trial.displacement(0, node));
+        start.is_some_and(|gap| (gap - trial.gap(0, node)).abs() > self.record.tolerance)
+    }
+
+    /// Smallest gap of a node (m) within a step, near `theta` if its motion is not known in parts.
+    ///
+    /// A surface of revolution and the displacements are not polynomials of time, so gaps are evaluated. Gaps to other surfaces
+    /// are a polynomial.
+    fn lowest_near(&self, (trial, basis): (&Trial, &TimeBasis), node: usize, theta: f64) -> f64 {
+        let mut lowest = f64::INFINITY;
+        let mut look = |theta: f64| {
+            let moved = trial.displacement_within(basis, node, theta);
+            let gap = self.gap_within(node, theta, moved).unwrap_or_else(|| trial.gap_within(basis, node, theta));
+            lowest = lowest.min(gap);
+            gap
+        };
+        #[expect(clippy::cast_precision_loss, reason = "few parts")]
+        let (parts, count) = (trial.parts() as f64, trial.parts());
+        #[expect(clippy::cast_precision_loss, reason = "few parts")]
+        let ends = (1..count).map(|part| part as f64 / parts);
+        let (mut theta, _) = ends.fold((theta, f64::INFINITY), |(best, least), theta| {
+            let gap = look(theta);
+            if gap < least { (theta, gap) } else { (best, least) }
+        });
+        let mut apart = if trial.parts() > 1 { 0.5 / parts } else { 0.1 };
+        for _ in 0..PARABOLAS {
+            theta = theta.clamp(apart, 1.0 - apart);
+            let [before, here, after] = [theta - apart, theta, theta + apart].map(&mut look);
+            let bend = before - 2.0 * here + after;
+            let downhill = if before < after { -1.0 } else { 1.0 };
+            let vertex = if bend > 0.0 { 0.5 * (before - after) / bend } else { downhill };
+            theta += apart * vertex.clamp(-1.0, 1.0);
+            apart *= CLOSER;
+        }
+        look(theta.clamp(0.0, 1.0));
+        lowest
+    }
+
+    /// Returns whether a node that touches at point `i` had nothing to touch before and was behind the surface, extrapolated beyond its edge.
+    fn was_behind(&self, trial: &Trial, node: usize, pair: usize, i: usize) -> bool {
+        let GapLaw::Open(open) = self.pairs[pair].gap() else { return false };
+        if trial.gap(i - 1, node).is_finite() {
+            return false;
+        }
+        let (now, before) = (trial.displacement(i, node), trial.displacement(i - 1, node));
+        let carriers = self.on_carrier((node, i), SurfacePlace::Now, |casing, spot| {
+            let [now, before] = [i, i - 1].map(|point| casing.moved_at(spot, point));
+            std::array::from_fn(|c| now[c] - before[c])
+        });
+        let carriers: [f64; 3] = carriers.unwrap_or_default();
+        open.was_behind(
+            std::array::from_fn(|c| now[c] - before[c] - carriers[c]),
+            trial.normal(i, node),
+            trial.gap(i, node),
+        )
+    }
+
+    /// Computes Σ_k S_ik of the prescribed motion of a pair at the points, for each point i of the step.
+    fn weigh_motions(&mut self, step: &AcceptedStep) {
+        let points = 0..=step.trial.points();
+        for (motions, drives) in self.record.motions.iter_mut().zip(&self.record.drives) {
+            for i in points.clone() {
+                let weights = step.kind.work_weights(&step.level.basis, i);
+                let terms = points.clone().map(|k| drives[k].1.less(&drives[0].1).over(weights[k]));
+                motions[i] = terms.fold(MotionIncrement::default(), |sum, term| sum.since(&term));
+            }
+        }
+    }
+
+    /// Records forces and work of an active node over a step. All work is linear in displacements and motion, which are weighted first.
+    fn enter(&mut self, step: &AcceptedStep, node: usize, pair: usize) {
+        let (trial, basis) = (step.trial, &step.level.basis);
+        let (mut tally, mut work) = (self.record.tallies[node], self.record.work);
+        let (drives, motions) = (&self.record.drives[pair], &self.record.motions[pair]);
+        let (gap, slides) = (self.pairs[pair].gap(), self.pairs[pair].friction() != 0.0);
+        tally.peak = tally.peak.max(trial.peak(basis, step.kind, node));
+        let mut heats = 0.0;
+        for i in (0..=trial.points()).filter(|i| trial.multiplier(*i, node) != 0.0) {
+            let normal_force = trial.multiplier(i, node);
+            let at = self.at(node, &drives[i].0);
+            let (force, normal, moved) = (trial.force(i, node), trial.normal(i, node), trial.displacement(i, node));
+            let (place, motion) = (self.record.places[i][node], &motions[i]);
+            let point = gap.contact_point(at, moved, place);
+            self.record.implausible |= !gap.is_plausible(node, trial.gap(i, node), normal);
+            // With the normal for which the force was found: the effect of its rotation since then is curvature work, not heat.
+            let tangential = if slides { trial.friction_force(i, node) } else { [0.0; 3] };
+            let wrench = gap.wrench(at, point, force);
+            let length = step.level.step
+                * if step.kind == ForceInterpolation::Constant {
+                    f64::from(u8::from(i == 1))
+                } else {
+                    basis.weights[i]
+                };
+            tally.normal += length * normal_force;
+            tally.tangential += length * dot(tangential, tangential).sqrt();
+            for c in 0..3 {
+                tally.force[c] += length * force[c];
+                tally.wrench.force[c] += length * wrench.force[c];
+                tally.wrench.moment[c] += length * wrench.moment[c];
+                tally.wrench.point[c] += length * normal_force * wrench.point[c];
+            }
+            let weights = step.kind.work_weights(basis, i);
+            let (mut there, mut open) = ([0.0; 3], 0.0);
+            for k in (0..=trial.points()).filter(|k| weights[*k] != 0.0) {
+                let displaced = trial.displacement(k, node);
+                there = std::array::from_fn(|c| there[c] + weights[k] * displaced[c]);
+                open += weights[k] * trial.finite_gap(k, node);
+            }
+            let (spin, shaft) = (gap.spin_motion(at, point, motion), gap.shaft_motion(at, point, motion));
+            let carriers = self
+                .on_carrier((node, i), SurfacePlace::Acted, |casing, spot| casing.worked_at(spot, i))
+                .unwrap_or_default();
+            there = std::array::from_fn(|c| there[c] - carriers[c]);
+            let slip: [f64; 3] = std::array::from_fn(|c| there[c] + spin[c] + shaft[c]);
+            let heat = -dot(tangential, slip);
+            work.shaft -= dot(force, spin);
+            work.whirl -= wrench.force[0] * motion.shaft[0] + wrench.force[1] * motion.shaft[1];
+            work.shift -= wrench.force[2] * motion.shaft[2];
+            work.casing += normal_force * gap.surface_motion(at, point, normal, place, motion);
+            work.heat += heat;
+            tally.heat += heat;
+            heats += heat;
+            work.closing -= normal_force * open;
+            work.exact += dot(force, there);
+            work.moved += dot(force, there).abs();
+        }
+        if heats < 0.0 && trial.sticks() {
+            // The force at the start does not belong to the slip of the step; the energy it supplies comes from earlier impact losses.
+            work.heat -= heats;
+            tally.heat -= heats;
+            work.closing += heats;
+        }
+        (self.record.tallies[node], self.record.work) = (tally, work);
+    }
+}

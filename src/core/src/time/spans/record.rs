@@ -1,0 +1,280 @@
+//! Record of one sector over a span: prescribed motion, places of nodes, and results of contacts.
+
+use crate::geometry::PrescribedMotion;
+use crate::geometry::revolution::Instants;
+use crate::geometry::surface_spline::ClosestPoint;
+use crate::geometry::wrench::{MotionIncrement, Wrench};
+use crate::system::StepFailure;
+use crate::system::carrier::Spot;
+use crate::system::growth::ShapeGrowth;
+use crate::system::pair::ContactPair;
+use crate::time::galerkin::basis::{MOST, POINTS};
+use crate::time::galerkin::compliance::Lanes;
+
+/// Prescribed motion of a pair over a span: from its start, quadratic in time through the middle and the end. This is exact
+/// because inputs are linear in time and the rotor angle is quadratic; only the shape may grow differently.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct MotionCourse {
+    before: PrescribedMotion,
+    /// Linear and quadratic part of the motion over the whole span.
+    parts: [MotionIncrement; 2],
+    growth: ShapeGrowth,
+}
+
+impl MotionCourse {
+    /// Creates the course from `before` through `middle` to `end`, over a span of length `span` (s).
+    pub fn new(
+        before: &PrescribedMotion,
+        (middle, growth): (&PrescribedMotion, ShapeGrowth),
+        end: &PrescribedMotion,
+        span: f64,
+    ) -> Self {
+        let half = MotionIncrement::between(before, middle, 0.5 * span);
+        let whole = MotionIncrement::between(before, end, span);
+        let linear = half.over(4.0).less(&whole);
+        let quadratic = whole.over(2.0).less(&half.over(4.0));
+        Self { before: *before, parts: [linear, quadratic], growth }
+    }
+
+    /// Returns whether only the rotor moves.
+    pub fn only_turns(&self) -> bool {
+        self.parts.iter().all(|part| part.casing_rests() && part.shaft.iter().all(|along| *along == 0.0))
+    }
+
+    /// Motion from the start of the span to its fraction `theta`.
+    fn motion(&self, theta: f64) -> MotionIncrement {
+        let motion = self.parts[0].over(theta).since(&self.parts[1].over(theta * theta));
+        MotionIncrement { shape_factor: self.growth.at(theta) - self.before.shape_factor, ..motion }
+    }
+
+    /// Prescribed motion at the fraction `theta` of the span.
+    pub fn at(&self, theta: f64) -> (PrescribedMotion, MotionIncrement) {
+        let motion = self.motion(theta);
+        let rate = |part: fn(&MotionIncrement) -> f64| {
+            (part(&self.parts[0]) + 2.0 * theta * part(&self.parts[1])) / self.parts[0].step
+        };
+        let before = &self.before;
+        let drive = PrescribedMotion {
+            rotor_angle: before.rotor_angle + motion.turn,
+            speed: rate(|motion| motion.turn),
+            gap_offset: before.gap_offset + before.radius_change + motion.opening,
+            radius_change: 0.0,
+            shape_factor: before.shape_factor + motion.shape_factor,
+            shape_rotation: before.shape_rotation + motion.shape_rotation,
+            shaft: std::array::from_fn(|i| before.shaft[i] + motion.shaft[i]),
+            shaft_velocity: [rate(|m| m.shaft[0]), rate(|m| m.shaft[1]), rate(|m| m.shaft[2])],
+        };
+        (drive, motion)
+    }
+}
+
+/// Contact of one node over a span.
+#[derive(Debug, Clone, Copy)]
+pub struct NodeTally {
+    /// ∫λ dt (N·s).
+    pub normal: f64,
+    /// ∫|F_t| dt (N·s).
+    pub tangential: f64,
+    /// ∫F dt in the coordinates of the displacements (N·s).
+    pub force: [f64; 3],
+    /// ∫ of force and moment in fixed directions (N·s, N·m·s), and λ-weighted ∫ of the point (m·N·s).
+    pub wrench: Wrench,
+    /// Largest λ (N), between the points as well.
+    pub peak: f64,
+    /// Friction heat (J).
+    pub heat: f64,
+    /// Smallest gap (m): at the start of the span, at the points, and between the points for nodes that stay open.
+    pub lowest: f64,
+}
+
+impl NodeTally {
+    pub const NOTHING: Self = Self {
+        normal: 0.0,
+        tangential: 0.0,
+        force: [0.0; 3],
+        wrench: Wrench { point: [0.0; 3], force: [0.0; 3], moment: [0.0; 3] },
+        peak: 0.0,
+        heat: 0.0,
+        lowest: f64::INFINITY,
+    };
+}
+
+/// Work of all contacts of a sector over a span (J).
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Worked {
+    /// Work of the shaft (J).
+    pub shaft: f64,
+    /// Work of whirl (J).
+    pub whirl: f64,
+    /// Work of axial shift (J).
+    pub shift: f64,
+    /// Work of the casing (J).
+    pub casing: f64,
+    /// Friction heat (J).
+    pub heat: f64,
+    /// Energy lost by gaps that close (J).
+    pub closing: f64,
+    /// Work on the structure, and the sum of its magnitudes (J).
+    pub exact: f64,
+    pub moved: f64,
+    /// Damping loss (J).
+    pub damping: f64,
+    /// Energy lost by changes to a constant force (J).
+    pub dropped: f64,
+}
+
+/// Selects a place of a node on the surface of a carrier.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SurfacePlace {
+    /// The place at the start of the step.
+    Begun,
+    /// The current closest point.
+    Now,
+    /// The place at which the force of the node was applied.
+    Acted,
+}
+
+/// Data that is kept from span to span, and scratch memory; allocates only on creation.
+#[derive(Debug, Clone)]
+pub struct SpanRecord {
+    /// Contact of each node over the span.
+    pub tallies: Vec<NodeTally>,
+    /// Work of all nodes over the span.
+    pub work: Worked,
+    /// Motion of each pair over the span.
+    pub courses: Vec<MotionCourse>,
+    /// Start and length of the tried step, as fractions of the span.
+    pub step: [f64; 2],
+    /// Gaps within free flight are searched if they may be smaller than at its ends by more than this (m).
+    pub tolerance: f64,
+    /// Prescribed motion at the points of the tried step, for each pair.
+    pub drives: Vec<[(PrescribedMotion, MotionIncrement); POINTS]>,
+    /// Weighted motion over which forces at each point of the accepted step do work, for each pair.
+    pub motions: Vec<[MotionIncrement; POINTS]>,
+    pub places: [Vec<ClosestPoint>; POINTS],
+    /// Places at which forces were applied to surface carriers: those of the pass before the one in which the gaps converged.
+    pub acted: [Vec<ClosestPoint>; POINTS],
+    /// Sliding of nodes along open surfaces at the points (m), where it was requested in this trial; and the number of requests.
+    pub slips: [Vec<Option<[f64; 3]>>; POINTS],
+    pub solutions: usize,
+    pub instants: Instants,
+    /// Pair to whose surface all nodes at all points are entered in `instants`.
+    pub lanes_of: Option<usize>,
+    /// True if a contact exceeds the limits of small displacements.
+    pub implausible: bool,
+    /// A node that has passed a free edge and was already behind the surface.
+    pub behind_edge: Option<usize>,
+}
+
+impl SpanRecord {
+    /// Allocates data for `nodes` nodes and `pairs` pairs, with errors of `tolerance` (m).
+    pub fn new(nodes: usize, pairs: usize, tolerance: f64) -> Self {
+        Self {
+            step: [0.0; 2],
+            tolerance,
+            tallies: vec![NodeTally::NOTHING; nodes],
+            work: Worked::default(),
+            courses: vec![MotionCourse::default(); pairs],
+            drives: vec![[<(PrescribedMotion, MotionIncrement)>::default(); POINTS]; pairs],
+            motions: vec![[MotionIncrement::default(); POINTS]; pairs],
+            places: std::array::from_fn(|_| vec![ClosestPoint::default(); nodes]),
+            acted: std::array::from_fn(|_| vec![ClosestPoint::default(); nodes]),
+            slips: std::array::from_fn(|_| vec![None; nodes]),
+            solutions: 0,
+            instants: Instants::new(Lanes { points: MOST, nodes }.width()),
+            lanes_of: None,
+            implausible: false,
+            behind_edge: None,
+        }
+    }
+
+    /// Returns the location of a node on the surface of a carrier, at a point of the step.
+    pub fn spot<'a>(
+        &self,
+        (node, point): (usize, usize),
+        (pair, of): (usize, &'a ContactPair),
+        index: usize,
+        when: SurfacePlace,
+    ) -> Option<Spot<'a>> {
+        let frame = of.frame(index, self.drives[pair][point].0.rotor_angle);
+        let place = match when {
+            SurfacePlace::Begun => self.places[0][node],
+            SurfacePlace::Now => self.places[point][node],
+            SurfacePlace::Acted => self.acted[point][node],
+        };
+        Some(Spot { surface: of.carried()?, place, frame })
+    }
+
+    /// Stores that the force on a node at a point of the step was applied at the node's current place.
+    pub fn act(&mut self, node: usize, point: usize) {
+        self.acted[point][node] = self.places[point][node];
+    }
+
+    /// Returns the failure that ends a span of this structure and sector, if any.
+    pub fn check(&self, (structure, sector): (usize, usize)) -> Result<(), StepFailure> {
+        if self.implausible {
+            return Err(StepFailure::Implausible { structure, sector });
+        }
+        self.behind_edge.map_or(Ok(()), |node| Err(StepFailure::BehindEdge { structure, node }))
+    }
+
+    /// Sets the prescribed motion of a span (s); the pairs are at its end.
+    pub fn begin_courses(&mut self, pairs: &[ContactPair], span: f64) {
+        for (course, pair) in self.courses.iter_mut().zip(pairs) {
+            *course = MotionCourse::new(pair.drive_before(), (&pair.middle.0, pair.middle.1), pair.drive_now(), span);
+        }
+    }
+
+    /// Uses the places at the start of the step as initial guess.
+    pub fn guess_start_places(&mut self) {
+        let [first, rest @ ..] = &mut self.places;
+        rest.iter_mut().for_each(|places| places.copy_from_slice(first));
+    }
+
+    /// Starts the span of a sector with these places and gaps (m) of its nodes. The search for the closest points of the first
+    /// step also starts there, because the places of earlier trials are not part of a saved state.
+    pub fn begin(&mut self, place_of: impl Fn(usize) -> ClosestPoint, gap_of: impl Fn(usize) -> f64) {
+        for (node, place) in self.places[0].iter_mut().enumerate() {
+            *place = place_of(node);
+        }
+        self.guess_start_places();
+        for (node, tally) in self.tallies.iter_mut().enumerate() {
+            *tally = NodeTally { lowest: gap_of(node), ..NodeTally::NOTHING };
+        }
+        (self.work, self.implausible, self.behind_edge) = (Worked::default(), false, None);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A rotor that accelerates on an accelerated shaft: places follow the motion at any time, velocities are its rates.
+    #[test]
+    fn prescribed_motion_is_consistent_with_its_rates() {
+        let span = 4e-5;
+        let at = |time: f64| PrescribedMotion {
+            rotor_angle: 0.3 + 1300.0 * time + 4e6 * time * time,
+            speed: 1300.0 + 8e6 * time,
+            gap_offset: 2e-4 - 3.0 * time,
+            shaft: [0.2 * time, 1e-5 - 0.1 * time + 500.0 * time * time, -0.3 * time],
+            shaft_velocity: [0.2, -0.1 + 1000.0 * time, -0.3],
+            ..PrescribedMotion::default()
+        };
+        let course = MotionCourse::new(&at(0.0), (&at(0.5 * span), ShapeGrowth::default()), &at(span), span);
+        for place in 0..=8 {
+            let theta = 0.125 * f64::from(place);
+            let (found, expected) = (course.at(theta).0, at(theta * span));
+            let pairs = [
+                (found.rotor_angle, expected.rotor_angle, 1.0),
+                (found.speed, expected.speed, 1300.0),
+                (found.gap_offset, expected.gap_offset, 1e-4),
+            ];
+            let shaft = (0..3).map(|i| (found.shaft[i], expected.shaft[i], 1e-5));
+            let velocity = (0..3).map(|i| (found.shaft_velocity[i], expected.shaft_velocity[i], 0.1));
+            for (found, expected, size) in pairs.into_iter().chain(shaft).chain(velocity) {
+                assert!((found - expected).abs() < 1e-9 * size, "θ = {theta}: {found}, {expected}");
+            }
+        }
+    }
+}
