@@ -12,12 +12,12 @@ use std::ffi::CString;
 use std::fmt;
 use std::path::Path;
 
-use tiprub_core::Warning;
-use tiprub_core::warning::Severity;
+use tiprub_cosim::warning::Severity;
+use tiprub_cosim::{CoSimulation, Diagnostic, Warning};
 
-use crate::unit::{CoSimulationUnit, Load};
+use crate::load::Load;
 
-pub(crate) use access::{AccessRequest, Value};
+pub(crate) use access::{AccessRequest, FmiValue};
 pub(crate) use phase::{ExperimentTimes, InstancePhase};
 
 /// Status of a call. The numbers are those of `fmi2Status` and `fmi3Status`; `Fatal` (4) is never returned, because in
@@ -50,34 +50,39 @@ pub(crate) struct Refusal {
     /// `Error` or `Discard`.
     pub status: FmiStatus,
     /// Problem, place and remedy.
-    pub message: String,
+    pub diagnostic: Diagnostic,
 }
 
 impl Refusal {
-    /// Creates a refusal with the status `Error`.
-    pub(crate) fn error(message: impl Into<String>) -> Self {
-        Self { status: FmiStatus::Error, message: message.into() }
+    /// Creates a refusal with the status `Error` from problem and remedy.
+    pub(crate) fn error(message: impl ToString) -> Self {
+        Diagnostic::new("", message, "").into()
     }
 
     /// Creates a refusal with the status `Discard`.
-    pub(crate) fn discard(message: impl Into<String>) -> Self {
-        Self { status: FmiStatus::Discard, message: message.into() }
+    pub(crate) fn discard(message: impl ToString) -> Self {
+        Self { status: FmiStatus::Discard, ..Self::error(message) }
     }
 }
 
-impl From<tiprub_core::Error> for Refusal {
-    fn from(error: tiprub_core::Error) -> Self {
-        match error {
-            // Nothing is lost: the importer can continue.
-            tiprub_core::Error::Exhausted { .. } => Self::discard(error.to_string()),
-            _ => Self::error(error.to_string()),
-        }
+impl From<tiprub_cosim::Error> for Refusal {
+    fn from(error: tiprub_cosim::Error) -> Self {
+        // Nothing is lost by a step that takes too long: the importer can continue.
+        let exhausted = matches!(error, tiprub_cosim::Error::Exhausted(_));
+        let status = if exhausted { FmiStatus::Discard } else { FmiStatus::Error };
+        Self { status, diagnostic: error.into_diagnostic() }
+    }
+}
+
+impl From<Diagnostic> for Refusal {
+    fn from(diagnostic: Diagnostic) -> Self {
+        Self { status: FmiStatus::Error, diagnostic }
     }
 }
 
 impl fmt::Display for Refusal {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str(&self.message)
+        self.diagnostic.fmt(formatter)
     }
 }
 
@@ -87,7 +92,7 @@ pub(crate) type Result<T, E = Refusal> = std::result::Result<T, E>;
 /// One FMU instance without its callbacks.
 pub(crate) struct Slave {
     dialect: Dialect,
-    unit: Box<dyn CoSimulationUnit>,
+    unit: Box<dyn CoSimulation>,
     token: String,
     arrays: bool,
     phase: InstancePhase,
@@ -109,7 +114,7 @@ impl Slave {
     /// # Errors
     /// Unreadable or damaged resources, a token that does not belong to them, or a model that the unit rejects.
     pub(crate) fn new(dialect: Dialect, resources: &Path, token: &str, load: Load) -> Result<Self> {
-        let loaded = load(resources).map_err(Refusal::error)?;
+        let loaded = load(resources)?;
         if loaded.token != token {
             let (name, file) = match dialect {
                 Dialect::Fmi2 => ("fmuGUID", "attribute guid"),

@@ -15,7 +15,8 @@ pub mod spline;
 pub mod surface_spline;
 pub mod wrench;
 
-use crate::persist::persist_fields;
+use tiprub_cosim::persist_fields;
+
 use crate::scene::ranges::SMALL;
 use layout::Layout;
 pub use layout::sector_angle;

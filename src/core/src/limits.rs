@@ -21,12 +21,13 @@ pub mod unresolved;
 pub use growing::{Fastest, GROWTH_UP_TO, GrowthRates, continuous, growth, growth_steps, stepped, without_node_mass};
 
 use nalgebra::DMatrix;
+use tiprub_cosim::shown;
+use tiprub_cosim::warning::Topic;
 
 use crate::geometry::dot;
 use crate::modes::modal::ModalModel;
 use crate::scene::method::Scheme;
-use crate::warning::Topic;
-use crate::{Error, Result, Warning, shown};
+use crate::{Error, Result, Warning};
 
 /// Margin below the limit ω_max h = 2 of central differences.
 const CENTRAL_MARGIN: f64 = 1e-9;
@@ -95,13 +96,13 @@ pub fn shorter(step: f64) -> String {
 pub fn check_step_allowed(frequency: f64, scheme: Scheme, step: f64) -> Result<()> {
     let product = frequency * step;
     match scheme {
-        Scheme::CentralDifference if product >= 2.0 * (1.0 - CENTRAL_MARGIN) => Err(Error::Unstable {
-            problem: format!(
+        Scheme::CentralDifference if product >= 2.0 * (1.0 - CENTRAL_MARGIN) => Err(Error::unstable(
+            format!(
                 "central-difference is unstable with an internal step of {step:.3e} s: ω_max·h = {product:.4}, but the \
                  stability limit is 2"
             ),
-            remedy: format!("{}{OTHER_SCHEME}", shorter(2.0 / frequency)),
-        }),
+            format!("{}{OTHER_SCHEME}", shorter(2.0 / frequency)),
+        )),
         _ => Ok(()),
     }
 }
@@ -218,20 +219,20 @@ fn refuse_unsolvable(solvable: impl Fn(f64) -> bool, exact: bool, step: f64, fri
             "the symmetric part of the Delassus matrix is not positive definite",
         )
     };
-    Err(Error::Unstable {
-        problem: format!(
+    Err(Error::unstable(
+        format!(
             "with friction_coefficient µ = {friction} and internal steps up to h = {step:.3e} s, the contact problem \
              {what} ({why})",
             friction = shown(friction)
         ),
-        remedy: if low >= LEAST_FRICTION {
+        if low >= LEAST_FRICTION {
             format!("Use µ below {low:.4} for this structure, or another internal step")
         } else {
             "Use no friction, fewer contact nodes or more modes: with more contacts than modes, no friction \
              coefficient is safe"
                 .to_owned()
         },
-    })
+    ))
 }
 
 /// P-matrix test: a positive definite symmetric part suffices; otherwise all principal minors decide if there are few contacts. Redundant

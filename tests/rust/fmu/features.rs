@@ -4,7 +4,7 @@
 #![allow(clippy::float_cmp, reason = "values are compared for being untouched")]
 
 use tiprub_core::scene::rom::Spin;
-use tiprub_core::{Scene, Simulation};
+use tiprub_core::{CoSimulation, Scene, Simulation};
 use tiprub_tests::scene::{PATCHES, UnpackedResources, ring, rom, scene, warm_scene};
 use tiprub_tests::{ERROR, OK, fmi2, fmi3, shipped};
 

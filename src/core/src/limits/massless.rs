@@ -13,13 +13,13 @@
 //! up to h. By itself this does not reach 4, since contact does not excite modes in which it does not participate.
 
 use nalgebra::DMatrix;
+use tiprub_cosim::warning::Topic;
 
 use crate::geometry::dot;
 use crate::limits::{OTHER_SCHEME, rounded_down, shorter};
 use crate::modes::modal::ModalModel;
 use crate::modes::schemes::{ModeCoefficients, damped_frequency};
 use crate::scene::method::Scheme;
-use crate::warning::Topic;
 use crate::{Error, Result, Warning};
 
 /// Margin below the limit.
@@ -178,14 +178,14 @@ fn per_mass(mode: &ModeCoefficients, coefficient: f64) -> f64 {
 /// Error for a step (s) at or beyond the usable one.
 pub fn refusal(step: f64, limit: MasslessLimit) -> Error {
     let MasslessLimit { closed, usable } = limit;
-    Error::Unstable {
-        problem: format!(
+    Error::unstable(
+        format!(
             "the internal step of {step:.3e} s is too long for massless-boundary: closed contact on the residual \
              flexibility of the contact nodes is stable only below {closed:.6e} s, and contact that opens and closes \
              gains energy above {usable:.6e} s"
         ),
-        remedy: format!("{}{OTHER_SCHEME}", shorter(usable)),
-    }
+        format!("{}{OTHER_SCHEME}", shorter(usable)),
+    )
 }
 
 /// Warning for a step (s) at which contact that opens and closes gains energy unless damping dissipates it.

@@ -19,9 +19,10 @@
 //!
 //! Steps are rejected if both ω_max h ≥ [`HIGHEST`] and the fraction exceeds [`SHARE`].
 
+use tiprub_cosim::warning::Topic;
+
 use crate::limits::{rounded_down, shorter};
 use crate::modes::modal::ModalModel;
-use crate::warning::Topic;
 use crate::{Error, Result, Warning};
 
 /// Steps below this ω_max h are not rejected.
@@ -95,20 +96,16 @@ pub fn check(step: f64, limit: f64, frequency: f64) -> Result<()> {
     if step < limit {
         return Ok(());
     }
-    Err(Error::Unstable {
-        problem: format!(
+    Err(Error::unstable(
+        format!(
             "modal-exact with an internal step of {step:.3e} s (ω_max·h = {:.4}) does not resolve modes above {:.4} \
              kHz, which account for more than half of the contact flexibility: forces, friction work and energies would be \
              wrong by ten per cent, and by far more with longer steps",
             frequency * step,
             1e-3 * PASSED_OVER / step / std::f64::consts::TAU
         ),
-        remedy: format!(
-            "{}, preferably below {:.3e} s, or use massless-boundary",
-            shorter(limit),
-            PASSED_OVER / frequency
-        ),
-    })
+        format!("{}, preferably below {:.3e} s, or use massless-boundary", shorter(limit), PASSED_OVER / frequency),
+    ))
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Methods that a scene may choose: time-stepping schemes and contact solvers.
 
-use crate::variables::Enumeration;
 use serde::{Deserialize, Serialize};
+use tiprub_cosim::variables::Enumeration;
 
 /// Time-stepping scheme of the modal equations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]

@@ -8,10 +8,10 @@ pub mod rules;
 mod validation;
 
 use serde::{Deserialize, Serialize};
+use tiprub_cosim::warning::Topic;
 
 use crate::Rom;
 use crate::scene::method::{Scheme, Solver};
-use crate::warning::Topic;
 pub use blades::{ExcitationSettings, ForceDirection, InitialSettings};
 pub use coating::{CoatingSettings, CuttingSettings};
 
@@ -495,7 +495,7 @@ pub struct SceneSettings {
     /// True if implausible values ([`crate::limits::plausibility`]) are warnings instead of errors.
     #[serde(default, skip_serializing_if = "is_default")]
     pub accept_implausible: bool,
-    /// Identifiers of silenced warnings ([`crate::warning::Topic::id`]).
+    /// Identifiers of silenced warnings ([`tiprub_cosim::warning::Topic::id`]).
     #[serde(default, skip_serializing_if = "is_default")]
     pub silence: Vec<String>,
     /// Flexible structures.

@@ -1,11 +1,13 @@
 //! Check of the energy of a run at every communication point, and the messages if it is too large.
 
+use tiprub_cosim::shown_time;
+use tiprub_cosim::warning::Topic;
+
 use super::{Simulation, SimulationPhase};
 use crate::scene::method::{Scheme, Solver};
 use crate::system::Loss;
 use crate::system::ledger::Ledger;
-use crate::warning::Topic;
-use crate::{Error, Result, Warning, shown_time};
+use crate::{Error, Result, Warning};
 
 /// The instantaneous energy may exceed the supplied energy by this factor. With modal-exact it is cos²(ωh/2) of the supplied energy, a
 /// quarter at ωh = 2π/3, the limit of resolution; with central differences at least 1 − (ωh/2)². Any larger energy is in modes that the
@@ -50,8 +52,8 @@ impl Simulation {
         }
         let Some(set) = (0..self.energies.len()).find(|set| !self.has_its_energy(*set)) else { return Ok(()) };
         self.phase = SimulationPhase::Failed;
-        Err(Error::Unstable {
-            problem: format!(
+        Err(Error::unstable(
+            format!(
                 "at t = {} s (last good time {} s) the kinetic and strain energy{} is {:.4e} J, but it was {:.4e} J at \
                  the start and work minus friction and damping losses supplied only {:.4e} J: modes that the internal \
                  step of {:.3e} s does not resolve have gained spurious energy",
@@ -63,8 +65,8 @@ impl Simulation {
                 self.supplied(set),
                 self.system.step_size()
             ),
-            remedy: "Use a smaller internal step (internal_step_max)".to_owned(),
-        })
+            "Use a smaller internal step (internal_step_max)",
+        ))
     }
 
     /// Returns whether structures that influence each other have no more energy than was supplied to them.

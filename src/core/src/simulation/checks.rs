@@ -1,12 +1,14 @@
 //! Checks of the start of a scene and of its outputs.
 
+use tiprub_cosim::shown_time;
+use tiprub_cosim::variables::Causality;
+use tiprub_cosim::warning::{Topic, Warning};
+
 use super::Simulation;
 use super::compile::Compiled;
 use crate::limits::plausibility::{self, Slip};
 use crate::system::StepFailure;
-use crate::variables::Causality;
-use crate::warning::{Topic, Warning};
-use crate::{Error, Result, shown_time};
+use crate::{Error, Result};
 
 /// Extension of a surface around an axis ([`crate::geometry::surface_spline::REACH`]), and the remedy for a node beyond it.
 pub const OUT_OF_REACH: &str = "a quarter of the axial extent of the surface, the limit of its extrapolation along the \
@@ -137,7 +139,7 @@ impl Simulation {
     /// # Errors
     /// An output that is not a number; the error names it. The state must not be used further.
     pub fn check_outputs(&self, time: f64) -> Result<()> {
-        for variable in self.table.variables().iter().filter(|row| row.causality == Causality::Output) {
+        for variable in self.values.table().variables().iter().filter(|row| row.causality == Causality::Output) {
             let start = variable.reference as usize;
             let values = &self.values[start..start + variable.len()];
             if let Some(element) = values.iter().position(|value| !value.is_finite()) {

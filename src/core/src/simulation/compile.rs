@@ -14,9 +14,10 @@ use crate::scene::rom::{ContactNode, SupportRows};
 use crate::scene::settings::{BodyMotion, ContactSettings, Meridian, StructureSettings};
 use crate::scene::shape::CompiledShape;
 use crate::system::{PairParts, StructureParts, SurfaceCarrier, System, SystemSettings, joined};
-use crate::variables::Quantity;
-use crate::{Error, Result, Rom, Scene, Warning, shown};
+use crate::{Error, Result, Rom, Scene, Warning};
 use nalgebra::DMatrix;
+use tiprub_cosim::shown;
+use tiprub_cosim::variables::Quantity;
 
 use super::blades::{disk_heat, expansion, softened, static_stress};
 use super::contour::check_contour;

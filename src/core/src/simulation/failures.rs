@@ -1,26 +1,24 @@
 //! Messages for failed steps: cause, place and remedy.
 
+use tiprub_cosim::shown_time;
+
 use super::checks::{OUT_OF_REACH, OUT_OF_REACH_REMEDY};
 use super::{Simulation, SimulationPhase};
+use crate::Error;
 use crate::system::{ContactPair, Curved, StepFailure};
-use crate::{Error, shown_time};
 
 impl Simulation {
     /// Returns the error of a step that should have ended at `time`; the simulation must be restored or reset afterwards.
     pub(super) fn fail(&mut self, failure: StepFailure, time: f64) -> Error {
         self.phase = SimulationPhase::Failed;
         if failure == StepFailure::NonFinite {
-            return Error::NonFinite {
-                last_good_time: self.time,
-                time,
-                remedy: "Use a smaller internal step or smaller loads".to_owned(),
-            };
+            return Error::non_finite(self.time, time, "Use a smaller internal step or smaller loads");
         }
         let (problem, remedy) = self.failure_texts(failure);
-        Error::Unstable {
-            problem: format!("at t = {} s (last good time {} s) {problem}", shown_time(time), shown_time(self.time)),
+        Error::unstable(
+            format!("at t = {} s (last good time {} s) {problem}", shown_time(time), shown_time(self.time)),
             remedy,
-        }
+        )
     }
 
     /// Returns the problem and the remedy.

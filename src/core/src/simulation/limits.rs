@@ -6,6 +6,9 @@ mod free;
 mod sliding;
 mod warning_state;
 
+use tiprub_cosim::Diagnostic;
+use tiprub_cosim::variables::Quantity;
+
 use super::table::has_one_friction;
 use super::{Compiled, Simulation};
 use crate::limits::massless::MasslessLimit;
@@ -14,7 +17,6 @@ use crate::modes::modal::{ModalModel, fill_ratios};
 use crate::scene::method::{Scheme, Solver};
 use crate::scene::settings::{Preset, TOLERANCE};
 use crate::system::System;
-use crate::variables::Quantity;
 use crate::{Error, Result, Warning};
 use checking::Checking;
 use closing::Closing;
@@ -109,7 +111,8 @@ impl Simulation {
             mode_damping: self.mode_damping(),
             step: self.value_of(Quantity::StepMax, 0),
             tolerance: self
-                .table
+                .values
+                .table()
                 .with_quantity_of(Quantity::Tolerance, 0)
                 .map_or(TOLERANCE, |row| self.values[row.reference as usize]),
             scheme: chosen(&Scheme::ALL, self.value_of(Quantity::SchemeChoice, 0)),
@@ -145,8 +148,8 @@ impl Simulation {
     /// `coldest` temperature (K) forbids. This is a lookup, so that a step does not allocate.
     pub(super) fn check_step_size(&self, body: usize, step: f64, speeds: [f64; 3], coldest: f64) -> Result<()> {
         self.is_step_allowed(body, step, speeds, coldest).map_err(|error| match self.compiled.of_preset(error) {
-            Error::Unstable { problem, remedy } => {
-                Error::Unstable { problem: self.compiled.named(body, problem), remedy }
+            Error::Unstable(Diagnostic { problem, remedy, .. }) => {
+                Error::unstable(self.compiled.named(body, problem), remedy)
             }
             other => other,
         })
@@ -184,7 +187,7 @@ impl Compiled {
 
     /// Adds a suitable remedy to an error: for a step limit adaptive steps come first, if the scene supports them.
     fn of_preset(&self, error: Error) -> Error {
-        let Error::Unstable { problem, mut remedy } = error else { return error };
+        let Error::Unstable(Diagnostic { problem, mut remedy, .. }) = error else { return error };
         let preset = self.scene.settings.preset == Preset::Paper;
         if preset {
             remedy = remedy.replace(limits::OTHER_SCHEME, ", or remove `preset`, which fixes the scheme");
@@ -198,7 +201,7 @@ impl Compiled {
             let rest = remedy[..1].to_lowercase() + &remedy[1..];
             remedy = format!("Use adaptive steps ({without}set `time.scheme = \"galerkin\"`{with}), or {rest}");
         }
-        Error::Unstable { problem, remedy }
+        Error::unstable(problem, remedy)
     }
 
     /// Largest factor on the frequencies of a structure.
@@ -374,7 +377,9 @@ impl BodyLimits {
     fn named(mut self, name: &str) -> Self {
         let texts = |texts: Vec<Warning>| texts.into_iter().map(|text| text.named(name)).collect();
         let refusal = |error: Error| match error {
-            Error::Unstable { problem, remedy } => Error::Unstable { problem: format!("{name}: {problem}"), remedy },
+            Error::Unstable(Diagnostic { problem, remedy, .. }) => {
+                Error::unstable(format!("{name}: {problem}"), remedy)
+            }
             other => other,
         };
         self.outcome = self.outcome.map(texts).map_err(refusal);

@@ -16,12 +16,14 @@
 //! At rest, "off" is the difference from the complementary forces as a fraction of the largest. The place at which film comes to rest
 //! depends on its history, so that no check at the start can predict it.
 
+use tiprub_cosim::shown_time;
+use tiprub_cosim::warning::Topic;
+
 use super::Simulation;
 use crate::scene::method::{Scheme, Solver};
 use crate::scene::settings::Preset;
 use crate::system::StepFailure;
-use crate::warning::Topic;
-use crate::{Result, Warning, shown_time};
+use crate::{Result, Warning};
 
 /// Fractions from which pulling is reported, and from which it ends a run unless the preset is `paper`.
 const TOLD: f64 = 0.03;

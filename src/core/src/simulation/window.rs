@@ -1,10 +1,11 @@
 //! Sums over one communication step: impulses, extremes, friction heat.
 
+use tiprub_cosim::persist_fields;
+
 use super::patches::HeatPatches;
 use super::slave_surface::Lining;
 use crate::geometry::wrench::cross;
 use crate::modes::bank::ModalBank;
-use crate::persist::persist_fields;
 use crate::scene::settings::OutputSettings;
 use crate::system::{Structure, System};
 

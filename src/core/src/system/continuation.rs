@@ -1,12 +1,13 @@
 //! Continues a running state: another step size, saving and restoring, and nodes that pass an edge.
 
+use tiprub_cosim::persist::{Persist, StateReader, StateWriter};
+
 use super::contact_view::ContactMember;
 use super::pair::When;
 use super::{Bodies, ContactEvent, ContactPair, StepFailure, Structure, System, sum_of};
 use crate::geometry::GapLaw;
 use crate::geometry::surface_spline::ClosestPoint;
 use crate::geometry::wrench::At;
-use crate::persist::{Persist, StateReader, StateWriter};
 use crate::system::history::ContactHistory;
 
 /// A contact force is continued over steps up to this many times as long as the step in which it was found.

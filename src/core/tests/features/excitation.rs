@@ -6,7 +6,7 @@ use nalgebra::Complex;
 use tiprub_core::modes::modal::ModalModel;
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::settings::{ExcitationSettings, ForceDirection, InputInterpolation};
-use tiprub_core::{Rom, Scene, Simulation};
+use tiprub_core::{CoSimulation, Rom, Scene, Simulation};
 use tiprub_test_models::{self as models, bits, disk::TestDisk, go, real, saved, set, started};
 
 const AMPLITUDE: f64 = 0.4;

@@ -8,8 +8,8 @@ use crate::guide;
 use crate::guide::print_row;
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::settings::{LoadSettings, SplineSettings, TimeSettings};
-use tiprub_core::variables::{Causality, DataType, Variability};
-use tiprub_core::{Scene, Simulation};
+use tiprub_core::{CoSimulation, Scene, Simulation};
+use tiprub_cosim::variables::{Causality, DataType, Variability};
 use tiprub_test_models::{self as models, bits, coating, disk, flexible, go, real, reference, saved, set};
 
 /// Communication step (s).
@@ -24,7 +24,7 @@ fn switched_on(scene: &Scene) -> Simulation {
 }
 
 fn references(simulation: &Simulation, causality: Causality) -> Vec<u32> {
-    let continuous = |row: &&tiprub_core::variables::Variable| {
+    let continuous = |row: &&tiprub_cosim::variables::Variable| {
         row.name != "energy_residual_relative"
             && row.causality == causality
             && row.kind == DataType::Real

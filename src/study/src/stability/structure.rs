@@ -7,7 +7,8 @@ use tiprub_core::limits::{
 use tiprub_core::modes::{cyclic::CyclicModel, modal::ModalModel};
 use tiprub_core::scene::method::Scheme;
 use tiprub_core::scene::rom::DisplacementFrame;
-use tiprub_core::{Result, Rom, shown};
+use tiprub_core::{CoSimulation, Result, Rom};
+use tiprub_cosim::shown;
 
 use super::seek::{Sought, TRIED, seek};
 

@@ -7,12 +7,13 @@
 //! whose modes are real.
 
 use nalgebra::{Complex, DMatrix, SymmetricEigen};
+use tiprub_cosim::shown;
 
 use crate::modes::modal::{ModalModel, RIGID_FRACTION, check_semidefinite, fill_ratios, real_modes};
 use crate::modes::schemes::ModeCoefficients;
 use crate::scene::method::Scheme;
 use crate::scene::rom::{Harmonic, cholesky};
-use crate::{Error, Result, Rom, shown};
+use crate::{Error, Result, Rom};
 
 /// Entries of a mode shape this close to the largest count as equally large when the phase is chosen.
 const SAME_SIZE: f64 = 1e-6;

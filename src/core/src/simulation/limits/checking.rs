@@ -14,9 +14,10 @@ use crate::simulation::SAME_STEP;
 use crate::simulation::compile::Compiled;
 use crate::simulation::plan::PairPlan;
 use crate::system::System;
-use crate::warning::Topic;
-use crate::{Result, Warning, shown};
+use crate::{Result, Warning};
 use nalgebra::DMatrix;
+use tiprub_cosim::shown;
+use tiprub_cosim::warning::Topic;
 
 /// Up to this number, contact nodes are checked in every combination; beyond it alone, in neighbouring pairs, and all together.
 const ALL_COMBINATIONS_UP_TO: usize = 3;

@@ -7,6 +7,8 @@
 //! and where is unknown beforehand.
 
 use nalgebra::DMatrix;
+use tiprub_cosim::shown;
+use tiprub_cosim::warning::Topic;
 
 use super::{BodyLimits, Closing, Parameters, Sense};
 use crate::geometry::open::{OpenGap, tangent};
@@ -18,8 +20,7 @@ use crate::modes::modal::fill_ratios;
 use crate::scene::method::{Scheme, Solver};
 use crate::simulation::compile::Compiled;
 use crate::system::System;
-use crate::warning::Topic;
-use crate::{Error, Result, Warning, shown};
+use crate::{Error, Result, Warning};
 
 /// Number of places at which the flight is checked, and their spacing as a fraction of the extent.
 const PLACES: u32 = 48;
@@ -166,14 +167,14 @@ impl FlightCheck<'_> {
         let diagonal = matrix.diagonal();
         if let Some(jammed) = (0..met.nodes.len()).find(|member| diagonal[*member] <= 0.0) {
             let node = self.compiled.node_name(self.body, met.nodes[jammed]);
-            return Err(Error::Unstable {
-                problem: format!(
+            return Err(Error::unstable(
+                format!(
                     "with friction_coefficient µ = {friction} and an internal step of {step:.3e} s, the contact problem of \
                      {node} alone has no unique solution in free flight: friction drives it into the surface",
                     friction = shown(friction)
                 ),
-                remedy: "Use less friction, another internal step, or the solver coulomb".to_owned(),
-            });
+                "Use less friction, another internal step, or the solver coulomb",
+            ));
         }
         let scaled = DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| {
             0.5 * (matrix[(i, j)] + matrix[(j, i)]) / (diagonal[i] * diagonal[j]).sqrt()

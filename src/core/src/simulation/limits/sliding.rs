@@ -1,6 +1,9 @@
 //! Growth of closed sliding contact: growth by the differential equations is reported in one warning; growth added by the step is rejected
 //! if it matters.
 
+use tiprub_cosim::shown;
+use tiprub_cosim::warning::{Severity, Topic};
+
 use super::checking::Checking;
 use super::in_range;
 use crate::limits::judged::{self, SetGrowth};
@@ -8,8 +11,7 @@ use crate::limits::{self, ContactDirections, Fastest, lock_up};
 use crate::modes::modal::ModalModel;
 use crate::scene::method::Scheme;
 use crate::simulation::SAME_STEP;
-use crate::warning::{Severity, Topic};
-use crate::{Error, Result, Warning, shown};
+use crate::{Error, Result, Warning};
 
 /// Growth by this factor before contact opens turns an insignificant motion, a thousandth of the clearance, into one as large as the
 /// clearance.
@@ -92,8 +94,8 @@ impl Sense {
         self.grows.iter_mut().for_each(named);
         for added in self.ranges.iter_mut().filter_map(|(_, added)| added.as_mut()) {
             named(&mut added.warning);
-            if let Error::Unstable { problem, .. } = &mut added.refusal {
-                *problem = format!("{name}: {problem}");
+            if let Error::Unstable(refusal) = &mut added.refusal {
+                refusal.problem = format!("{name}: {}", refusal.problem);
             }
         }
     }
@@ -348,8 +350,8 @@ impl Checking<'_> {
             )
         });
         let step_remedy = if step_remedy.is_empty() { "Use".to_owned() } else { step_remedy };
-        Error::Unstable {
-            problem: format!(
+        Error::unstable(
+            format!(
                 "`time.step` is too long for friction: vibration in contact ({}) grows at {:.2e} 1/s in steps of {} s, but at \
                  {:.2e} 1/s in continuous time, and this alone may displace the tips by {:.0} % of the displacement \
                  caused by contact",
@@ -359,8 +361,8 @@ impl Checking<'_> {
                 judged.growth.continuous,
                 100.0 * judged.error(f64::INFINITY)
             ),
-            remedy: format!("{step_remedy} less friction or more damping"),
-        }
+            format!("{step_remedy} less friction or more damping"),
+        )
     }
 }
 

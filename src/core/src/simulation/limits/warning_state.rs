@@ -1,12 +1,13 @@
 //! Warnings that depend on the step: reported at the start for the expected step, and again if a run takes a longer step, turns the other
 //! way, or becomes implausibly fast.
 
+use tiprub_cosim::warning::{Topic, Warning};
+
 use super::{BodyLimits, Parameters, in_range, senses_of};
 use crate::limits::plausibility::{self, Slip};
 use crate::limits::{self, massless};
 use crate::scene::method::Scheme;
 use crate::simulation::Simulation;
-use crate::warning::{Topic, Warning};
 
 /// A step that is longer by this factor than the reported one is reported again.
 const MATERIAL: f64 = 1.5;

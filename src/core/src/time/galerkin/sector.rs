@@ -1,5 +1,7 @@
 //! Integrates one sector over a span with steps that the tolerance and the energy balance allow.
 
+use tiprub_cosim::persist_fields;
+
 use super::advance::Advance;
 use super::basis::MOST;
 use super::level::{ContactModes, StepTables};
@@ -7,7 +9,6 @@ use super::march::{AdaptiveStepper, SpanStep, march};
 use super::rows::ContactRows;
 use super::state::SectorState;
 use super::trial::{ForceInterpolation, Obstacle, Trial, TrialResult};
-use crate::persist::persist_fields;
 
 /// Largest number of halvings of the span.
 pub const HALVINGS: usize = 10;

@@ -207,7 +207,18 @@ macro_rules! persist_fields {
         }
     };
 }
-pub use persist_fields;
+
+/// Returns values as bytes, one after the other.
+pub fn to_bytes(values: &[&dyn Persist]) -> Vec<u8> {
+    let write = |buffer: &mut [u8]| {
+        let mut writer = StateWriter::new(buffer);
+        values.iter().for_each(|value| value.save(&mut writer));
+        writer.written()
+    };
+    let mut bytes = vec![0; write(&mut [])];
+    write(&mut bytes);
+    bytes
+}
 
 /// FNV-1a hash of bytes, for fingerprints and checksums of saved states (not for security).
 pub fn fingerprint(bytes: &[u8], seed: u64) -> u64 {
