@@ -8,7 +8,7 @@ use thiserror::Error;
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub struct Diagnostic {
     /// File or other container of the subject, if it is known.
-    pub place: Option<String>,
+    pub place: Option<Box<str>>,
     /// Field, array, variable or argument, as written by the user; empty if the problem names it.
     pub what: String,
     /// The problem, with the value.
@@ -27,12 +27,12 @@ impl Diagnostic {
     #[must_use]
     pub fn at(self, place: impl fmt::Display) -> Self {
         let place = self.place.map_or_else(|| place.to_string(), |inner| format!("{place}: {inner}"));
-        Self { place: Some(place), ..self }
+        Self { place: Some(place.into()), ..self }
     }
 
     /// Returns place and subject, separated by a colon.
     pub fn subject(&self) -> String {
-        let parts = self.place.iter().chain([&self.what]).map(String::as_str).filter(|part| !part.is_empty());
+        let parts = self.place.as_deref().into_iter().chain([&*self.what]).filter(|part| !part.is_empty());
         parts.collect::<Vec<_>>().join(": ")
     }
 }

@@ -87,7 +87,7 @@ pub fn located(argument: impl AsRef<OsStr>, mut failure: Failure) -> Failure {
         Some(format!("{name}:{line}:{column}"))
     };
     if let Some(place) = failure.remedy.contains(&format!("`{KEY}`")).then(place).flatten() {
-        (failure.diagnostic.place, failure.diagnostic.what) = (Some(place), KEY.to_owned());
+        (failure.diagnostic.place, failure.diagnostic.what) = (Some(place.into()), KEY.to_owned());
     }
     failure
 }

@@ -285,7 +285,7 @@ impl Simulation {
             self.values.replace(before.0);
             (self.inputs, self.initial_time) = (before.1, before.2);
         }
-        outcome.or_else(|error| damaged(error))
+        outcome.or_else(damaged)
     }
 
     fn check_turning_of_all(&self, step: f64, length: f64) -> Result<()> {

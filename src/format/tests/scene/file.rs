@@ -29,7 +29,7 @@ communication_step = 1e-3
 fn refused(from: &str, to: &str, place: &str, parts: &[&str]) {
     assert_eq!(GOOD.matches(from).count(), 1, "{from:?}");
     let error = parse_scene(&GOOD.replace(from, to), "demo.toml").unwrap_err();
-    assert_eq!(error.place, Some(format!("demo.toml{place}")));
+    assert_eq!(error.place.as_deref(), Some(&*format!("demo.toml{place}")));
     let message = error.to_string();
     let start = format!("demo.toml{place}: ");
     assert!(message.starts_with(&start), "{start:?} does not start {message:?}");
