@@ -15,7 +15,7 @@ use tiprub_core::time::galerkin::{
     state::SectorState,
     surroundings::{AcceptedStep, CarriersInStep, Surroundings, Witness},
     tables::Tables,
-    trial::{ForceInterpolation, Obstacle, SlidingState},
+    trial::{ForceInterpolation, Obstacle},
 };
 
 use super::{
@@ -48,10 +48,6 @@ impl RigidObstacle {
 impl Obstacle for &mut RigidObstacle {
     fn gap(&mut self, _: usize, point: usize, moved: [f64; 3]) -> (f64, [f64; 3]) {
         (self.gap_at(self.times[point], moved[0]), NORMAL)
-    }
-
-    fn direction(&mut self, _: usize, _: usize, _: &SlidingState) -> [f64; 3] {
-        NORMAL
     }
 }
 

@@ -47,8 +47,12 @@ impl Obstacle for &mut ScatterWall {
         (self.place - moved[0], [-1.0, 0.0, 0.0])
     }
 
-    fn direction(&mut self, _: usize, _: usize, sliding: &SlidingState) -> [f64; 3] {
-        [sliding.normal[0], -self.friction, 0.0]
+    fn friction(&self, _: usize) -> f64 {
+        self.friction
+    }
+
+    fn slip_direction(&mut self, _: usize, _: usize, _: &SlidingState) -> [f64; 3] {
+        [0.0, 1.0, 0.0]
     }
 }
 

@@ -11,6 +11,7 @@ use super::state::SectorState;
 use super::surroundings::{AcceptedStep, CarriersInStep, Surroundings, Witness};
 use super::tables::Tables;
 use super::trial::{ForceInterpolation, Obstacle, Trial, TrialResult};
+use crate::scene::method::Solver;
 
 /// Largest number of gap evaluations in one trial of a single sector. The last one is exact except for curvature.
 const PASSES_OF_ONE: usize = 6;
@@ -67,24 +68,17 @@ pub struct IslandSector {
 
 impl IslandSector {
     /// Creates a sector with the modes of its tables and `nodes` contact nodes; the modes of a disk belong to the disk.
-    pub fn new(table: [usize; 2], disk: Option<(usize, usize)>, modes: usize, nodes: usize) -> Self {
+    pub fn new(table: [usize; 2], disk: Option<(usize, usize)>, [modes, nodes]: [usize; 2], solver: Solver) -> Self {
         let modes = if disk.is_some() { 0 } else { modes };
+        let state = SectorState::new(modes, nodes);
         Self {
             table,
             disk,
-            state: SectorState::new(modes, nodes),
-            trial: Trial::new(modes, nodes),
+            state: if solver.sticks() { state.sticking() } else { state },
+            trial: Trial::new(modes, nodes, solver),
             advance: Advance::new(modes, nodes),
             far: false,
         }
-    }
-
-    /// Enables contacts that may stick.
-    #[must_use]
-    pub fn sticking(mut self) -> Self {
-        self.trial = self.trial.sticking();
-        self.state = self.state.sticking();
-        self
     }
 
     /// Enables steps of a higher degree while no contact changes its status.
@@ -131,7 +125,7 @@ impl Island {
     /// Creates an island of one sector.
     pub fn of_one(tables: Tables) -> Self {
         let (modes, nodes) = (tables.modes(), tables.nodes());
-        Self::new(vec![vec![tables]], vec![IslandSector::new([0; 2], None, modes, nodes)])
+        Self::new(vec![vec![tables]], vec![IslandSector::new([0; 2], None, [modes, nodes], Solver::Lcp)])
     }
 
     /// Fills the tables for spans of length `span` (s).

@@ -120,12 +120,8 @@ impl Obstacle for ObstacleView<'_> {
         }
     }
 
-    fn direction(&mut self, node: usize, point: usize, sliding: &SlidingState) -> [f64; 3] {
-        let Some(pair) = self.pair_of[node] else { return sliding.normal };
-        let friction = self.pairs[pair].friction();
-        if friction == 0.0 {
-            return sliding.normal;
-        }
+    fn slip_direction(&mut self, node: usize, point: usize, sliding: &SlidingState) -> [f64; 3] {
+        let Some(pair) = self.pair_of[node] else { return [0.0; 3] };
         let gap = self.pairs[pair].gap();
         let slip = if gap.slides_anywhere() {
             let known = self.record.slips[point][node].filter(|_| self.record.solutions > SOLUTIONS);
@@ -145,8 +141,16 @@ impl Obstacle for ObstacleView<'_> {
             let carriers = carriers.unwrap_or_default();
             std::array::from_fn(|i| rigid[i] + sliding.velocity[i] - carriers[i])
         };
-        let slip = gap.slip_direction(slip, sliding.normal);
-        std::array::from_fn(|i| sliding.normal[i] - friction * slip[i])
+        gap.slip_direction(slip, sliding.normal)
+    }
+
+    fn sector(&self) -> usize {
+        self.sector
+    }
+
+    fn angle(&self, node: usize, point: usize, moved: [f64; 3]) -> f64 {
+        let Some(pair) = self.pair_of[node] else { return 0.0 };
+        self.pairs[pair].gap().angle_on_casing(self.at(node, &self.record.drives[pair][point].0), moved)
     }
 
     fn turns(&self) -> bool {

@@ -18,7 +18,7 @@ use crate::modes::bank::ModalBank;
 use crate::modes::coordinates::ContactModes;
 use crate::modes::cyclic::CyclicBank;
 use crate::modes::sectors::Sectors;
-use crate::scene::method::Scheme;
+use crate::scene::method::{Scheme, Solver};
 use crate::system::contact_view::ContactMember;
 use crate::system::work::ContactWork;
 use crate::system::{ContactPair, StepFailure, Structure, System};
@@ -100,13 +100,12 @@ impl Surroundings for SceneSurroundings<'_> {
 }
 
 impl SceneIsland {
-    /// Creates an island for the sectors of a structure that are uncoupled and touch rigid surfaces, for spans up to `longest` (s), with
-    /// sticking contacts or without, and errors of `tolerance` (m). `None` if the sectors are coupled.
+    /// Creates an island for the sectors of a structure that are uncoupled and touch rigid surfaces, for spans up to `longest` (s) and errors of `tolerance` (m). `None` if the sectors are coupled.
     pub fn single(
         set: usize,
         structure: usize,
         (structures, pairs): (&[Structure], &[ContactPair]),
-        (longest, sticks): (f64, bool),
+        (longest, solver): (f64, Solver),
         tolerance: f64,
     ) -> Option<Self> {
         let of = &structures[structure];
@@ -115,16 +114,17 @@ impl SceneIsland {
         let flights = kinds.iter().map(FreeFlight::new).collect();
         let tables = |kind: ContactModes| {
             let degree = kind.degree_up_to(longest);
-            if sticks { Tables::of_degree(kind, 1).steady(degree) } else { Tables::of_degree(kind, degree) }
+            if solver.sticks() { Tables::of_degree(kind, 1).steady(degree) } else { Tables::of_degree(kind, degree) }
         };
-        let sector = IslandSector::new([0; 2], None, bank.model().dynamic_modes(Scheme::Galerkin), of.nodes());
+        let size = [bank.model().dynamic_modes(Scheme::Galerkin), of.nodes()];
+        let sector = IslandSector::new([0; 2], None, size, solver);
         let own = pairs.iter().filter(|pair| pair.structure() == structure);
         let rounding = own.map(|pair| pair.gap().rounding()).fold(0.0, f64::max);
         Some(Self {
             set,
             island: Island::new(
                 vec![kinds.into_iter().map(tables).collect()],
-                vec![if sticks { sector.sticking().steady() } else { sector }],
+                vec![if solver.sticks() { sector.steady() } else { sector }],
             ),
             members: vec![Member { structure, sector: 0, record: SpanRecord::new(of.nodes(), pairs.len(), tolerance) }],
             turns: of.modes().sectors(),
@@ -134,20 +134,20 @@ impl SceneIsland {
         })
     }
 
-    /// Creates the island of a set of structures that move each other, for spans up to `longest` (s), with sticking contacts or without,
+    /// Creates the island of a set of structures that move each other, for spans up to `longest` (s)
     /// and errors of `tolerance` (m).
     pub fn coupled(
         set: usize,
         members: &[usize],
         (structures, pairs): (&[Structure], &[ContactPair]),
-        (longest, sticks): (f64, bool),
+        (longest, solver): (f64, Solver),
         tolerance: f64,
     ) -> Self {
         let touching: Vec<usize> = members.iter().copied().filter(|one| structures[*one].nodes() > 0).collect();
         let carrying: Vec<usize> = members.iter().copied().filter(|one| structures[*one].nodes() == 0).collect();
         let kinds: Vec<Vec<ContactModes>> = touching.iter().map(|one| kinds_of(structures[*one].modes())).collect();
         let banks: Vec<&ModalBank> = carrying.iter().filter_map(|one| structures[*one].bank()).collect();
-        let degree = |modes: &ContactModes| if sticks { 1 } else { modes.degree_up_to(longest) };
+        let degree = |modes: &ContactModes| if solver.sticks() { 1 } else { modes.degree_up_to(longest) };
         let carried = banks.iter().map(|bank| degree(&coordinates(bank).seen_at(&bank.model().contact_modes)));
         let degree = kinds.iter().flatten().map(degree).chain(carried).min().unwrap_or(MOST);
         let own = pairs.iter().filter(|pair| touching.contains(&pair.structure()));
@@ -168,10 +168,10 @@ impl SceneIsland {
                 let one = IslandSector::new(
                     [number, kind],
                     disk.map(|disk| (disk, sector)),
-                    kinds[number][kind].len(),
-                    of.nodes(),
+                    [kinds[number][kind].len(), of.nodes()],
+                    solver,
                 );
-                sectors.push(if sticks { one.sticking() } else { one });
+                sectors.push(one);
                 let record = SpanRecord::new(of.nodes(), pairs.len(), tolerance);
                 members.push(Member { structure, sector, record });
             }

@@ -3,7 +3,6 @@
 use super::scene_island::SceneIsland;
 use crate::geometry::PrescribedMotion;
 use crate::modes::sectors::Sectors;
-use crate::scene::method::Solver;
 use crate::system::{ContactPair, StepFailure, System};
 use crate::time::Stepper;
 
@@ -20,7 +19,7 @@ impl Galerkin {
     /// Creates tables for spans up to `longest` (s) with errors within the fraction `tolerance` of the smallest clearance of each
     /// structure or, if structures influence each other, of their set.
     pub fn new(system: &mut System, longest: f64, tolerance: f64) -> Self {
-        let sticks = system.settings.solver == Solver::Coulomb;
+        let solver = system.settings.solver;
         let (mut single, mut coupled) = (Vec::new(), Vec::new());
         for set in 0..system.sets.count() {
             let members = system.sets.members(set);
@@ -32,12 +31,12 @@ impl Galerkin {
             let is_disk = |one: &usize| system.structures[*one].modes().coupled().is_some();
             if members.iter().any(is_disk) || system.pairs.iter().filter(own).any(|pair| pair.carrier().is_some()) {
                 let tolerance = clearance(&mut system.pairs.iter().filter(own));
-                coupled.push(SceneIsland::coupled(set, members, parts, (longest, sticks), tolerance));
+                coupled.push(SceneIsland::coupled(set, members, parts, (longest, solver), tolerance));
                 continue;
             }
             for index in members.iter().copied().filter(|index| system.structures[*index].nodes() > 0) {
                 let tolerance = clearance(&mut system.pairs.iter().filter(|pair| pair.structure() == index));
-                single.extend(SceneIsland::single(set, index, parts, (longest, sticks), tolerance));
+                single.extend(SceneIsland::single(set, index, parts, (longest, solver), tolerance));
             }
         }
         single.sort_by_key(SceneIsland::first_structure);

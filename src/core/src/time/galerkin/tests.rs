@@ -85,8 +85,12 @@ impl Obstacle for &mut MovingWall {
         (self.place(self.times[point]) - moved[0], [-1.0, 0.0, 0.0])
     }
 
-    fn direction(&mut self, _: usize, _: usize, &SlidingState { normal, .. }: &SlidingState) -> [f64; 3] {
-        [normal[0], -self.friction, 0.0]
+    fn friction(&self, _: usize) -> f64 {
+        self.friction
+    }
+
+    fn slip_direction(&mut self, _: usize, _: usize, _: &SlidingState) -> [f64; 3] {
+        [0.0, 1.0, 0.0]
     }
 }
 
