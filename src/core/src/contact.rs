@@ -31,8 +31,10 @@ pub use lcp::Lcp;
 pub trait ContactPrediction {
     /// Predicted gap (m).
     fn gap(&self) -> f64;
-    /// Gap one step earlier (m).
-    fn gap_before(&self) -> f64;
+    /// Returns whether the contact was closed before, at this depth below the surface (m): the first guess.
+    fn was_closed(&self, depth: f64) -> bool;
+    /// Unit normal (own directions of the node).
+    fn normal(&self) -> [f64; 3];
     /// Coulomb coefficient µ (-).
     fn friction(&self) -> f64;
     /// Predicted slip over the step, including rigid motion (m, own directions of the node).
@@ -55,6 +57,9 @@ pub trait ContactLaw {
     const LOOKS_AGAIN: bool;
     /// True if the law starts from the contact forces of the last step.
     const STARTS_FROM_FORCES: bool = false;
+    /// Fills the rows of the Delassus matrix along which the law needs the motion of a contact, and the columns along which its multipliers
+    /// push.
+    fn fill_directions(at: &impl ContactPrediction, rows: &mut [[f64; 3]], columns: &mut [[f64; 3]]);
     /// Begins a group of `size` contacts.
     fn begin(&mut self, size: usize);
     /// Delassus matrix (m/N), to be filled.
@@ -109,6 +114,27 @@ fn pose_all<L: ContactLaw, P: ContactPrediction>(law: &mut L, rows: &[[f64; 3]],
     }
 }
 
+/// Fills row n and column n − µt of a contact that slides along t.
+#[inline(always)]
+fn fill_sliding(at: &impl ContactPrediction, rows: &mut [[f64; 3]], columns: &mut [[f64; 3]]) {
+    let (normal, friction) = (at.normal(), at.friction());
+    let slip = if friction > 0.0 { at.slip_direction() } else { [0.0; 3] };
+    rows[0] = normal;
+    columns[0] = std::array::from_fn(|i| normal[i] - friction * slip[i]);
+}
+
+/// Fills rows and columns n, t₁, t₂ of a contact whose tangential force may have any direction.
+fn fill_tangents(at: &impl ContactPrediction, rows: &mut [[f64; 3]], columns: &mut [[f64; 3]]) {
+    let normal = at.normal();
+    let [first, second] = tangents(normal);
+    rows.copy_from_slice(&[normal, first, second]);
+    columns.copy_from_slice(rows);
+}
+
+fn fill_directions<L: ContactLaw>(_: &L, at: &impl ContactPrediction, rows: &mut [[f64; 3]], columns: &mut [[f64; 3]]) {
+    L::fill_directions(at, rows, columns);
+}
+
 fn directions<L: ContactLaw>(_: &L) -> usize {
     L::DIRECTIONS
 }
@@ -158,6 +184,12 @@ impl Law {
     /// Returns [`ContactLaw::STARTS_FROM_FORCES`].
     pub fn starts_from_forces(&self) -> bool {
         each_law!(self, law => starts_from_forces(law))
+    }
+
+    /// Calls [`ContactLaw::fill_directions`].
+    #[inline(always)]
+    pub fn fill_directions(&self, at: &impl ContactPrediction, rows: &mut [[f64; 3]], columns: &mut [[f64; 3]]) {
+        each_law!(self, law => fill_directions(law, at, rows, columns));
     }
 
     /// Calls [`ContactLaw::begin`].

@@ -33,6 +33,7 @@ use tiprub_cosim::{CoSimulation, VariableValues};
 
 use crate::geometry::PrescribedMotion;
 use crate::system::{ShapeGrowth, System};
+use crate::time::TimeStepper;
 use crate::{Result, Scene, Warning};
 use compile::Compiled;
 use drive::{Input, RotorAngle};
@@ -111,6 +112,7 @@ pub struct Simulation {
     readers: Vec<outputs::OutputReader>,
     compiled: Compiled,
     system: System,
+    stepper: TimeStepper,
     /// All variables with their current values.
     values: VariableValues,
     /// Real outputs at the previous communication point, for derivatives.
@@ -185,7 +187,8 @@ impl Simulation {
     pub fn new(scene: &Scene) -> Result<Self> {
         let compiled = Compiled::new(scene)?;
         let (table, readers) = table::build(scene)?;
-        let system = compiled.system()?;
+        let mut system = compiled.system()?;
+        let stepper = TimeStepper::new(&mut system, 0.0, 0.0);
         let window = StepWindow::new(system.structures(), &compiled.patches, &compiled.scene.settings.outputs);
         let watched_gaps = WatchedGaps::new(&compiled)?;
         let sets = system.sets().count();
@@ -212,6 +215,7 @@ impl Simulation {
             slave_shares: vec![1.0; pairs],
             compiled,
             system,
+            stepper,
             window,
             watched_gaps,
             communication: Communication::default(),
@@ -254,7 +258,7 @@ impl Simulation {
     /// Applies scheme, solver and friction of the parameters; the structures already have their damping.
     fn apply_methods(&mut self, parameters: &limits::Parameters) {
         self.system.set_methods(parameters.scheme, parameters.solver);
-        self.system.prepare_spans(parameters.step, parameters.tolerance);
+        self.stepper = TimeStepper::new(&mut self.system, parameters.step, parameters.tolerance);
         self.prepared = Some(parameters.clone());
         self.apply_friction(parameters);
     }

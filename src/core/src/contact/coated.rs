@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::{ContactLaw, ContactPrediction};
+use super::{ContactLaw, ContactPrediction, fill_sliding};
 use crate::contact::active_set::SolverOutcome;
 use crate::contact::coating::{CoatedProblem, Coating};
 
@@ -54,6 +54,10 @@ impl ContactLaw for Coated {
     const DIRECTIONS: usize = 1;
     const LOOKS_AGAIN: bool = true;
 
+    fn fill_directions(at: &impl ContactPrediction, rows: &mut [[f64; 3]], columns: &mut [[f64; 3]]) {
+        fill_sliding(at, rows, columns);
+    }
+
     fn begin(&mut self, size: usize) {
         self.problem.clear();
         self.problem.monotone = true;
@@ -68,7 +72,7 @@ impl ContactLaw for Coated {
         self.angles[contact] = at.angle();
         self.gaps[contact] = at.gap();
         self.problem.monotone &= at.friction() == 0.0;
-        self.closed[contact] = at.gap_before() <= -self.coating.thickness();
+        self.closed[contact] = at.was_closed(self.coating.thickness());
     }
 
     #[inline(never)]

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::{ContactLaw, ContactPrediction};
+use super::{ContactLaw, ContactPrediction, fill_tangents};
 use crate::contact::active_set::SolverOutcome;
 use crate::contact::de_saxce::CoulombSolver;
 use crate::geometry::dot;
@@ -27,6 +27,10 @@ impl ContactLaw for Coulomb {
     const DIRECTIONS: usize = 3;
     const LOOKS_AGAIN: bool = true;
     const STARTS_FROM_FORCES: bool = true;
+
+    fn fill_directions(at: &impl ContactPrediction, rows: &mut [[f64; 3]], columns: &mut [[f64; 3]]) {
+        fill_tangents(at, rows, columns);
+    }
 
     fn begin(&mut self, size: usize) {
         self.size = size;

@@ -3,7 +3,7 @@
 
 use nalgebra::DMatrix;
 
-use super::{ContactLaw, ContactPrediction};
+use super::{ContactLaw, ContactPrediction, fill_tangents};
 use crate::contact::active_set::SolverOutcome;
 use crate::contact::coating::{BladePassage, CoatedProblem, Coating};
 use crate::geometry::dot;
@@ -86,6 +86,10 @@ impl ContactLaw for CuttingLaw {
     const DIRECTIONS: usize = 3;
     const LOOKS_AGAIN: bool = true;
 
+    fn fill_directions(at: &impl ContactPrediction, rows: &mut [[f64; 3]], columns: &mut [[f64; 3]]) {
+        fill_tangents(at, rows, columns);
+    }
+
     fn begin(&mut self, size: usize) {
         self.problem.clear();
         self.problem.monotone = false;
@@ -98,7 +102,7 @@ impl ContactLaw for CuttingLaw {
 
     fn pose(&mut self, contact: usize, directions: &[[f64; 3]], at: &impl ContactPrediction) {
         let (along, friction) = (at.slip_direction(), at.friction());
-        let (gap, closed) = (at.gap(), at.gap_before() <= -self.coating.thickness());
+        let (gap, closed) = (at.gap(), at.was_closed(self.coating.thickness()));
         let sense = dot(along, directions[1]);
         self.contacts[contact] = CuttingContact { gap, closed, friction, sense, sector: at.sector() };
         self.angles[contact] = at.angle();

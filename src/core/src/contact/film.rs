@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::{ContactLaw, ContactPrediction};
+use super::{ContactLaw, ContactPrediction, fill_sliding};
 use crate::contact::active_set::{ContactSolver, SolverOutcome};
 
 /// Penetration is detected once; neither a negative λ nor a penetration caused elsewhere is checked again.
@@ -19,6 +19,10 @@ impl Film {
 impl ContactLaw for Film {
     const DIRECTIONS: usize = 1;
     const LOOKS_AGAIN: bool = false;
+
+    fn fill_directions(at: &impl ContactPrediction, rows: &mut [[f64; 3]], columns: &mut [[f64; 3]]) {
+        fill_sliding(at, rows, columns);
+    }
 
     fn begin(&mut self, size: usize) {
         self.0.set_size(size);

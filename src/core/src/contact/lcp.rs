@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::{ContactLaw, ContactPrediction};
+use super::{ContactLaw, ContactPrediction, fill_sliding};
 use crate::contact::active_set::{ContactSolver, SolverOutcome};
 
 /// Linear complementarity, started from the closed contacts of the previous step.
@@ -20,6 +20,10 @@ impl ContactLaw for Lcp {
     const DIRECTIONS: usize = 1;
     const LOOKS_AGAIN: bool = true;
 
+    fn fill_directions(at: &impl ContactPrediction, rows: &mut [[f64; 3]], columns: &mut [[f64; 3]]) {
+        fill_sliding(at, rows, columns);
+    }
+
     fn begin(&mut self, size: usize) {
         self.0.set_size(size);
         self.0.monotone = true;
@@ -32,7 +36,7 @@ impl ContactLaw for Lcp {
     fn pose(&mut self, contact: usize, _: &[[f64; 3]], at: &impl ContactPrediction) {
         self.0.gaps[contact] = at.gap();
         // Contacts that were closed in the last step are the best guess for this one.
-        self.0.active[contact] = at.gap_before() <= 0.0;
+        self.0.active[contact] = at.was_closed(0.0);
         self.0.monotone &= at.friction() == 0.0;
     }
 

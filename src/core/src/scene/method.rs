@@ -76,6 +76,14 @@ pub enum Solver {
 }
 
 impl Solver {
+    /// Returns whether contacts may stick, so that tangential forces have any direction within the friction cone.
+    pub fn sticks(self) -> bool {
+        match self {
+            Self::Film | Self::Lcp => false,
+            Self::Coulomb => true,
+        }
+    }
+
     /// All solvers, in the order of the FMU's enumeration.
     pub const ALL: [Self; 3] = [Self::Film, Self::Lcp, Self::Coulomb];
 

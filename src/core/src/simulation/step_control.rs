@@ -7,7 +7,7 @@ use tiprub_cosim::{Diagnostic, shown, shown_time};
 use super::limits::Parameters;
 use super::{Communication, Simulation};
 use crate::scene::method::Scheme;
-use crate::time::galerkin::sector::shortest;
+use crate::time::galerkin::tables::shortest;
 use crate::{Error, Result, Warning};
 
 /// Error of the shortest steps as a fraction of the clearance per length (1/s), below which errors stop following the tolerance. A rubbing
@@ -17,7 +17,7 @@ const LEFT: f64 = 4.0;
 impl Simulation {
     /// Returns whether sectors take adaptive steps.
     pub(super) fn is_marched(&self) -> bool {
-        self.system.settings().scheme == Scheme::Galerkin
+        self.stepper.is_adaptive()
     }
 
     /// Largest number of internal steps of a communication step, 0 for any number.
@@ -38,9 +38,9 @@ impl Simulation {
     pub(super) fn allow_steps(&mut self) -> Result<()> {
         let Communication { length, done, tried, most, .. } = self.communication;
         if most == 0 {
-            self.system.allow(u64::MAX);
+            self.stepper.allow(u64::MAX);
         } else if self.is_marched() {
-            self.system.allow(tried + most);
+            self.stepper.allow(tried + most);
         } else if done >= most {
             return Err(self.exhausted(length, most));
         }

@@ -47,7 +47,7 @@ impl Simulation {
         // No errors from here on.
         self.set_out_tangent();
         if !keeps {
-            self.system.set_step(step);
+            self.stepper.set_step(&mut self.system, step);
             if self.system.steps() == 0 {
                 // Increments of the first step are the velocity times its length.
                 self.launch();

@@ -104,7 +104,7 @@ impl CoSimulation for Simulation {
             self.rotors[body] = RotorAngle::new(self.value_of(Quantity::InitialAngle, body));
         }
         self.find_drives(0.0, start_time);
-        self.system.set_first_step(parameters.step);
+        self.stepper.set_first_step(&mut self.system, parameters.step);
         self.inputs.start();
         self.settle();
         self.launch();
@@ -184,7 +184,7 @@ impl CoSimulation for Simulation {
                 angle.total(speed, offset) - angle.total(speed, 0.0) - (shape.at(offset) - shape.at(0.0));
         }
         self.find_drives(offset, time);
-        if self.system.fly(&self.drives, &self.turns, offset) {
+        if self.stepper.fly(&mut self.system, &self.drives, &self.turns, offset) {
             self.window.add(&self.system, (&self.compiled.patches, &self.compiled.linings), offset);
             self.communication.done = last;
         }
@@ -213,10 +213,10 @@ impl CoSimulation for Simulation {
         self.find_drives(offset, time);
         self.load(before);
         if self.is_marched() {
-            self.system.begin_loads();
+            self.stepper.begin_loads(&mut self.system);
             self.load(offset);
         }
-        match self.system.step(&self.drives) {
+        match self.stepper.step(&mut self.system, &self.drives) {
             Ok(()) => {}
             Err(StepFailure::Exhausted) => return Err(self.abandon_step()),
             Err(failure) => return Err(self.fail(failure, time)),

@@ -108,23 +108,6 @@ impl ContactView<'_> {
         self.pair.gap().sliding_velocity(node, index, self.pair.drive(When::Now), self.displacement())
     }
 
-    /// Unit normal of the contact.
-    #[inline(always)]
-    pub fn normal(&self) -> [f64; 3] {
-        self.structure.history.geometry.now.normal_at(self.member.index)
-    }
-
-    /// Unit direction of slip from the predicted relative velocity; 0 without sliding.
-    #[inline(always)]
-    pub fn slip_direction(&self, normal: [f64; 3]) -> [f64; 3] {
-        let (mut velocity, step) = (self.sliding(), self.structure.modes().step());
-        let moved = if self.bodies.acts_later { self.slip_of_inertia() } else { self.slip_of_deformation() };
-        for (value, moved) in velocity.iter_mut().zip(moved) {
-            *value += moved / step;
-        }
-        self.pair.gap().slip_direction(velocity, normal)
-    }
-
     /// Checks that small displacements can describe the contact.
     #[inline(always)]
     pub fn check(&self) -> Result<(), StepFailure> {
@@ -146,8 +129,12 @@ impl ContactPrediction for ContactView<'_> {
         self.structure.history.gap.now[self.member.index]
     }
     #[inline(always)]
-    fn gap_before(&self) -> f64 {
-        self.structure.history.gap.before[self.member.index]
+    fn was_closed(&self, depth: f64) -> bool {
+        self.structure.history.gap.before[self.member.index] <= -depth
+    }
+    #[inline(always)]
+    fn normal(&self) -> [f64; 3] {
+        self.structure.history.geometry.now.normal_at(self.member.index)
     }
     fn friction(&self) -> f64 {
         self.pair.friction()
@@ -160,8 +147,15 @@ impl ContactPrediction for ContactView<'_> {
     fn last_force(&self) -> [f64; 3] {
         self.structure.vector3(&self.structure.history.force.before, self.member.node, self.member.sector)
     }
+    /// From the predicted relative velocity.
+    #[inline(always)]
     fn slip_direction(&self) -> [f64; 3] {
-        ContactView::slip_direction(self, self.normal())
+        let (mut velocity, step) = (self.sliding(), self.structure.modes().step());
+        let moved = if self.bodies.acts_later { self.slip_of_inertia() } else { self.slip_of_deformation() };
+        for (value, moved) in velocity.iter_mut().zip(moved) {
+            *value += moved / step;
+        }
+        self.pair.gap().slip_direction(velocity, self.normal())
     }
     fn sector(&self) -> usize {
         self.member.sector

@@ -1,12 +1,12 @@
 //! Groups of contacts that influence each other: their Delassus matrix, their forces, and the effects on the structures.
 
 use super::carrier::Reaction;
-use super::contact_view::{Bodies, ContactMember, ContactView};
+use super::contact_view::{Bodies, ContactMember};
 use super::delassus::{DelassusBlock, fill};
 use super::pair::When;
 use super::{ContactEvent, StepFailure, Structure};
+use crate::contact::Law;
 use crate::contact::coating::Coating;
-use crate::contact::{ContactPrediction, Law, tangents};
 use crate::geometry::dot;
 use crate::geometry::wrench::At;
 use crate::modes::sectors::Sectors;
@@ -242,7 +242,7 @@ impl ContactGroup {
             let at = bodies.pose(member);
             at.check()?;
             let span = per * contact..per * (contact + 1);
-            fill_directions(&at, &mut self.rows[span.clone()], &mut self.columns[span]);
+            self.law.fill_directions(&at, &mut self.rows[span.clone()], &mut self.columns[span]);
         }
         self.law.begin(self.members.len());
         self.fill_delassus(bodies, per);
@@ -424,22 +424,6 @@ impl ContactGroup {
             found.events.push(ContactEvent::new(member, normal, force, share, (point, wrench)));
         }
     }
-}
-
-/// Sets row n and column n − µt of a contact, or n, t₁, t₂ for both if it may stick.
-#[inline(always)]
-fn fill_directions(at: &ContactView, rows: &mut [[f64; 3]], columns: &mut [[f64; 3]]) {
-    let normal = at.normal();
-    if rows.len() == 3 {
-        let [first, second] = tangents(normal);
-        rows.copy_from_slice(&[normal, first, second]);
-        columns.copy_from_slice(rows);
-        return;
-    }
-    let friction = at.friction();
-    let slip = if friction > 0.0 { at.slip_direction(normal) } else { [0.0; 3] };
-    rows[0] = normal;
-    columns[0] = std::array::from_fn(|i| normal[i] - friction * slip[i]);
 }
 
 impl GroupSide {

@@ -5,6 +5,7 @@ mod judgement;
 mod minima;
 mod obstacle;
 mod outcome;
+mod prediction;
 mod steady;
 mod sticking;
 
@@ -14,17 +15,17 @@ use super::kernels::{Add, AddProduct, ClosingColumn, Combine, Withdraw};
 use super::level::StepTables;
 use super::rows::{ContactRows, Sums};
 use super::state::SectorState;
-use crate::contact::active_set::ContactSolver;
+use crate::contact::Law;
 use crate::math::simd::InstructionSet;
+use crate::scene::method::Solver;
 pub use judgement::TrialResult;
 use minima::Minima;
 use nalgebra::DMatrix;
 pub use obstacle::{Obstacle, SlidingState, node_by_node};
+use prediction::{LanePrediction, LaneValues};
 use steady::Steady;
 use sticking::Sticking;
 
-/// Largest number of gap evaluations in one trial.
-const PASSES: usize = 6;
 /// Negative gaps within this fraction of the largest gap count as rounding.
 const ROUNDING: f64 = 1e-13;
 
@@ -76,6 +77,8 @@ pub struct Trial {
     without: Vec<f64>,
     with: Vec<f64>,
     multipliers: Vec<f64>,
+    /// Rows of the contact problem of the members: unit normals.
+    rows: Vec<[f64; 3]>,
     /// Directions of the forces (force per λ), and forces.
     directions: Vec<f64>,
     forces: Vec<f64>,
@@ -85,7 +88,7 @@ pub struct Trial {
     /// Compliance of the obstacle, and whether it is elastic.
     carrier_compliance: Vec<f64>,
     carrier_yields: bool,
-    solver: ContactSolver,
+    law: Law,
     instructions: InstructionSet,
     /// Unknowns of the problem: lanes.
     members: Vec<usize>,
@@ -139,9 +142,10 @@ struct Contacts {
 }
 
 impl Trial {
-    /// Creates a trial for a sector with `modes` modes and `nodes` contact nodes.
-    pub fn new(modes: usize, nodes: usize) -> Self {
+    /// Creates a trial for a sector with `modes` modes and `nodes` contact nodes. If contacts may stick, polynomials are of degree 1.
+    pub fn new(modes: usize, nodes: usize, solver: Solver) -> Self {
         let lanes = Lanes { points: MOST, nodes };
+        let contacts = if solver.sticks() { nodes } else { lanes.len() };
         let (width, three) = (|| vec![0.0; lanes.width()], || vec![0.0; 3 * lanes.width()]);
         let rows = || vec![0.0; 3 * nodes];
         Self {
@@ -155,7 +159,7 @@ impl Trial {
                 multipliers: vec![0.0; nodes],
                 gaps: vec![0.0; nodes],
                 normals: rows(),
-                slopes: Vec::new(),
+                slopes: if solver.sticks() { rows() } else { Vec::new() },
             },
             free: three(),
             pushed: three(),
@@ -166,13 +170,14 @@ impl Trial {
             without: width(),
             with: width(),
             multipliers: width(),
+            rows: vec![[0.0; 3]; lanes.len()],
             directions: three(),
             forces: three(),
             columns: vec![0.0; lanes.len() * 3 * lanes.width()],
             closing: vec![0.0; lanes.len() * lanes.width()],
             carrier_compliance: width(),
             carrier_yields: false,
-            solver: ContactSolver::new(lanes.len()),
+            law: Law::new(solver, None, contacts),
             instructions: InstructionSet::detect(),
             members: Vec::with_capacity(lanes.len()),
             chosen: vec![false; lanes.len()],
@@ -192,19 +197,11 @@ impl Trial {
             left: rows(),
             depths: vec![0.0; nodes],
             minima: Minima::new(modes, nodes),
-            sticking: None,
+            sticking: solver.sticks().then(|| Box::new(Sticking::new(nodes))),
             per_step: 0.0,
             steady: None,
             end_slopes: [0.0; POINTS],
         }
-    }
-
-    /// Enables contacts that may stick. Polynomials are of degree 1.
-    #[must_use]
-    pub fn sticking(mut self) -> Self {
-        self.sticking = Some(Box::new(Sticking::new(self.lanes.nodes)));
-        self.start_contacts.slopes = vec![0.0; 3 * self.lanes.nodes];
-        self
     }
 
     /// Enables steps of a higher degree while no contact changes its status.
@@ -219,48 +216,15 @@ impl Trial {
         self.known = false;
     }
 
-    /// Tries a step from `state`; `precision` is the largest gap of a contact that counts as closed (m).
-    pub fn run(
-        &mut self,
-        (level, kind): (&StepTables, ForceInterpolation),
-        rows: &ContactRows,
-        state: &SectorState,
-        obstacle: &mut impl Obstacle,
-        precision: f64,
-    ) -> TrialResult {
-        let compliance = level.compliance_of(kind);
-        self.begin((level, kind), Some(rows), state);
-        self.find_gaps_at_start(rows, state, obstacle);
-        let mut verdict = TrialResult::default();
-        for pass in 0..PASSES {
-            let (lowest, largest) = self.find_gaps(obstacle);
-            let rests = self.rests();
-            if lowest.is_nan() {
-                return verdict;
-            }
-            // No contact is active or needed, or the solution also holds for the curved gaps.
-            if (rests && lowest >= 0.0) || (pass > 0 && lowest >= -precision && largest <= precision) {
-                verdict.solved = true;
-                break;
-            }
+    /// Finds the free motion within a step of degree 1: two points give a straight line, which cannot represent it.
+    pub fn find_free_motion(&mut self, level: &StepTables, rows: &ContactRows, state: &SectorState) {
+        if level.basis.degree == 1 {
             self.find_start(rows, state);
-            if pass + 1 == PASSES || !self.solve((compliance, rows.residual()), obstacle, &mut verdict) {
-                return verdict;
-            }
+            let FreeMotion { end_velocities, unresolved_amplitudes, is_known } = &mut self.free_motion;
+            rows.end_velocities(level, state, end_velocities);
+            rows.unresolved_amplitudes(level.step, state, unresolved_amplitudes);
+            *is_known = true;
         }
-        if kind == ForceInterpolation::Polynomial {
-            // Two points give a straight line, which cannot represent the motion in between.
-            if level.basis.degree == 1 {
-                self.find_start(rows, state);
-                let FreeMotion { end_velocities, unresolved_amplitudes, is_known } = &mut self.free_motion;
-                rows.end_velocities(level, state, end_velocities);
-                rows.unresolved_amplitudes(level.step, state, unresolved_amplitudes);
-                *is_known = true;
-            }
-            self.judge((level, rows), obstacle, &mut verdict);
-            self.check_depth(rows, state, obstacle, &mut verdict);
-        }
-        verdict
     }
 
     /// Corrects the depth of a step for jumps of the surfaces at its start.
@@ -274,16 +238,6 @@ impl Trial {
         if verdict.depth > 0.0 {
             self.find_start(rows, state);
             verdict.depth = self.depth_without_jumps(|node, moved| Some(obstacle.gap(node, 0, moved).0));
-        }
-    }
-
-    /// Finds the gaps at the start if they are unknown.
-    fn find_gaps_at_start(&mut self, rows: &ContactRows, state: &SectorState, obstacle: &mut impl Obstacle) {
-        if !state.gaps_known {
-            self.find_start(rows, state);
-            for node in 0..self.nodes() {
-                (self.start_contacts.gaps[node], _) = obstacle.gap(node, 0, vector3_at(&self.start, node));
-            }
         }
     }
 
@@ -450,16 +404,16 @@ impl Trial {
             }
         }
         loop {
-            self.pose();
-            let outcome = self.solver.lcp();
+            self.pose(obstacle);
+            let outcome = self.law.solve();
             verdict.factorisations += outcome.factorisations;
-            if !outcome.solved || self.solver.multipliers.iter().any(|value| !value.is_finite()) {
+            if !outcome.solved || self.law.multipliers().iter().any(|value| !value.is_finite()) {
                 return false;
             }
             self.multipliers[..width].fill(0.0);
             self.taken.clear();
             self.amounts.clear();
-            for (lane, value) in self.members.iter().zip(&self.solver.multipliers) {
+            for (lane, value) in self.members.iter().zip(self.law.multipliers()) {
                 self.multipliers[*lane] = *value;
                 if *value != 0.0 {
                     self.taken.push(*lane);
@@ -522,7 +476,15 @@ impl Trial {
             sliding_distance: self.sliding_distance(point, node),
             normal: lanes.vector3(&self.normals, lane),
         };
-        let direction = obstacle.direction(node, point, &sliding);
+        let friction = obstacle.friction(node);
+        let slip_direction = if friction > 0.0 { obstacle.slip_direction(node, point, &sliding) } else { [0.0; 3] };
+        let Self { without, multipliers, normals, moved, .. } = &*self;
+        let values = LaneValues { lanes, without, multipliers, normals, moved };
+        let prediction = LanePrediction { slip_direction, ..values.prediction(lane, obstacle) };
+        let (mut row, mut column) = ([[0.0; 3]], [[0.0; 3]]);
+        self.law.fill_directions(&prediction, &mut row, &mut column);
+        let ([row], [direction]) = (row, column);
+        self.rows[self.members.len()] = row;
         lanes.set(&mut self.directions, lane, direction);
         self.members.push(lane);
         self.instructions.run(ClosingColumn {
@@ -545,16 +507,19 @@ impl Trial {
     }
 
     /// Assembles the problem of the members.
-    fn pose(&mut self) {
+    fn pose(&mut self, obstacle: &impl Obstacle) {
         let width = self.lanes.width();
-        self.solver.set_size(self.members.len());
+        self.law.begin(self.members.len());
+        let matrix = self.law.matrix();
         for (column, lane) in self.members.iter().enumerate() {
             let closing = &self.closing[lane * width..][..width];
-            let mut entries = self.solver.delassus.column_mut(column);
+            let mut entries = matrix.column_mut(column);
             entries.iter_mut().zip(&self.members).for_each(|(entry, row)| *entry = closing[*row]);
-            self.solver.gaps[column] = self.without[*lane];
-            self.solver.active[column] = self.multipliers[*lane] > 0.0;
         }
+        let Self { law, members, rows, lanes, without, multipliers, normals, moved, .. } = self;
+        let values = LaneValues { lanes: *lanes, without, multipliers, normals, moved };
+        let predictions = members.iter().map(|lane| values.prediction(*lane, obstacle));
+        law.pose_all(&rows[..members.len()], predictions);
     }
 
     /// Chooses lanes that the current forces push into a surface.

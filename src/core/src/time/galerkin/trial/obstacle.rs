@@ -22,8 +22,25 @@ pub trait Obstacle {
         false
     }
 
-    /// Force on the node per unit of λ, including friction.
-    fn direction(&mut self, node: usize, point: usize, sliding: &SlidingState) -> [f64; 3];
+    /// Friction coefficient µ of a node.
+    fn friction(&self, _node: usize) -> f64 {
+        0.0
+    }
+
+    /// Unit direction of slip of a node relative to the surface; 0 without slip.
+    fn slip_direction(&mut self, _node: usize, _point: usize, _sliding: &SlidingState) -> [f64; 3] {
+        [0.0; 3]
+    }
+
+    /// Sector of the nodes, on surfaces with a coating.
+    fn sector(&self) -> usize {
+        0
+    }
+
+    /// Angle on the surface (rad, fixed frame) of a node displaced by `moved` (m), on surfaces around an axis.
+    fn angle(&self, _node: usize, _point: usize, _moved: [f64; 3]) -> f64 {
+        0.0
+    }
 
     /// Prepares the compliance of the obstacle at the chosen lanes with these normals. Returns false if the obstacle is rigid.
     fn prepare_compliance(&mut self, _lanes: Lanes, _chosen: &[bool], _normals: &[f64]) -> bool {
@@ -36,11 +53,6 @@ pub trait Obstacle {
 
     /// Adds the displacement of the obstacle in all three directions of each lane, under a `force` on one lane (N).
     fn add_compliance(&mut self, _lane: usize, _force: [f64; 3], _given: &mut [f64]) {}
-
-    /// Friction coefficient µ of a node that may stick.
-    fn friction(&self, _node: usize) -> f64 {
-        0.0
-    }
 
     /// Returns the sliding (m) of a node up to a point of the step that prescribed motion and the motion of the surface cause;
     /// the node is displaced by `moved` (m).

@@ -3,9 +3,8 @@
 //! Polynomials are of degree 1, so that the slip of a node is its displacement along the surface over the step. With the gap and
 //! the slip without force, b, and the flexibility W along normal and tangents, this is the problem of [`crate::contact::de_saxce`].
 
+use super::prediction::{LanePrediction, LaneValues};
 use super::{Trial, TrialResult, vector3_at};
-use crate::contact::de_saxce::CoulombSolver;
-use crate::contact::tangents;
 use crate::geometry::dot;
 use crate::time::galerkin::basis::POINTS;
 use crate::time::galerkin::compliance::{LaneCompliance, Lanes};
@@ -19,9 +18,11 @@ const ROUNDING: f64 = 1e-11;
 /// Unknowns and scratch memory.
 #[derive(Debug, Clone)]
 pub(super) struct Sticking {
-    solver: CoulombSolver,
-    /// Normal and tangents of each node.
+    /// Normal and tangents of each node, and those of the members.
     axes: Vec<[[f64; 3]; 3]>,
+    rows: Vec<[f64; 3]>,
+    /// Slip of the members under the current forces (m).
+    slips: Vec<[f64; 3]>,
     /// Motion of all nodes relative to the surface per force along each axis of each node: columns of three rows of lanes.
     columns: Vec<f64>,
     /// Motion of the surface per force, and under the current forces.
@@ -34,8 +35,9 @@ impl Sticking {
     pub(super) fn new(nodes: usize) -> Self {
         let stride = 3 * Lanes { points: 1, nodes }.width();
         Self {
-            solver: CoulombSolver::new(nodes),
             axes: vec![[[0.0; 3]; 3]; nodes],
+            rows: vec![[0.0; 3]; 3 * nodes],
+            slips: vec![[0.0; 3]; nodes],
             columns: vec![0.0; 3 * nodes * stride],
             carrier_compliance: vec![0.0; stride],
             under: vec![0.0; stride],
@@ -94,7 +96,7 @@ impl Trial {
         }
         loop {
             self.pose_sticking(own, obstacle);
-            let outcome = own.solver.solve(self.members.len());
+            let outcome = self.law.solve();
             verdict.factorisations += outcome.factorisations;
             if !outcome.solved {
                 return false;
@@ -107,7 +109,7 @@ impl Trial {
         self.multipliers[..lanes.width()].fill(0.0);
         self.forces[..3 * lanes.width()].fill(0.0);
         for (member, lane) in self.members.iter().enumerate() {
-            let along = &own.solver.reactions[3 * member..][..3];
+            let along = &self.law.multipliers()[3 * member..][..3];
             self.multipliers[*lane] = along[0];
             let axes = &own.axes[*lane];
             let force = std::array::from_fn(|c| (0..3).map(|axis| along[axis] * axes[axis][c]).sum());
@@ -140,9 +142,11 @@ impl Trial {
         obstacle: &mut impl Obstacle,
     ) {
         let (lanes, stride) = (self.lanes, compliance.stride());
-        let normal = lanes.vector3(&self.normals, lane);
-        let [first, second] = tangents(normal);
-        own.axes[lane] = [normal, first, second];
+        let (mut axes, mut columns) = ([[0.0; 3]; 3], [[0.0; 3]; 3]);
+        let Self { without, multipliers, normals, moved, .. } = &*self;
+        let values = LaneValues { lanes, without, multipliers, normals, moved };
+        self.law.fill_directions(&values.prediction(lane, obstacle), &mut axes, &mut columns);
+        own.axes[lane] = axes;
         self.members.push(lane);
         let columns = [0, 1, 2].map(|component| 3 * (lanes.nodes + lane) + component);
         for axis in 0..3 {
@@ -165,26 +169,35 @@ impl Trial {
     fn pose_sticking(&mut self, own: &mut Sticking, obstacle: &impl Obstacle) {
         let (lanes, stride) = (self.lanes, 3 * self.lanes.width());
         for (place, lane) in self.members.iter().enumerate() {
-            let slip = self.slip(*lane, 1, obstacle);
-            let (pushed, under) = (lanes.vector3(&self.pushed, *lane), lanes.vector3(&own.under, *lane));
-            let without: [f64; 3] = std::array::from_fn(|c| slip[c] - pushed[c] - under[c]);
-            let [normal, first, second] = own.axes[*lane];
-            let free = [self.without[*lane] - dot(normal, under), dot(first, without), dot(second, without)];
-            own.solver.free[3 * place..][..3].copy_from_slice(&free);
-            own.solver.friction[place] = obstacle.friction(*lane);
-            let pushes = self.multipliers[*lane] > 0.0;
-            let force = if pushes { lanes.vector3(&self.forces, *lane) } else { [0.0; 3] };
+            own.slips[place] = self.slip(*lane, 1, obstacle);
+        }
+        let Self { law, members, without, multipliers, normals, moved, pushed, forces, .. } = self;
+        law.begin(members.len());
+        let matrix = law.matrix();
+        for (place, lane) in members.iter().enumerate() {
+            own.rows[3 * place..][..3].copy_from_slice(&own.axes[*lane]);
             for axis in 0..3 {
-                own.solver.reactions[3 * place + axis] = dot(own.axes[*lane][axis], force);
                 let column = &own.columns[(3 * lane + axis) * stride..][..stride];
-                for (row, other) in self.members.iter().enumerate() {
+                for (row, other) in members.iter().enumerate() {
                     let moved = lanes.vector3(column, *other);
                     for (along, direction) in own.axes[*other].iter().enumerate() {
-                        own.solver.delassus[(3 * row + along, 3 * place + axis)] = dot(*direction, moved);
+                        matrix[(3 * row + along, 3 * place + axis)] = dot(*direction, moved);
                     }
                 }
             }
         }
+        let values = LaneValues { lanes, without, multipliers, normals, moved };
+        let predictions = members.iter().zip(&own.slips).map(|(lane, slip)| {
+            let (pushed, under) = (lanes.vector3(pushed, *lane), lanes.vector3(&own.under, *lane));
+            let prediction = values.prediction(*lane, obstacle);
+            LanePrediction {
+                gap: prediction.gap - dot(prediction.normal, under),
+                slip: std::array::from_fn(|c| slip[c] - pushed[c] - under[c]),
+                last_force: if prediction.closed { lanes.vector3(forces, *lane) } else { [0.0; 3] },
+                ..prediction
+            }
+        });
+        law.pose_all(&own.rows, predictions);
     }
 
     /// Chooses nodes that the current forces push into a surface.
@@ -207,7 +220,7 @@ impl Trial {
             for (place, member) in self.members[..members].iter().enumerate() {
                 for axis in 0..3 {
                     let column = &own.columns[(3 * member + axis) * stride..][..stride];
-                    after += own.solver.reactions[3 * place + axis] * dot(normal, lanes.vector3(column, lane));
+                    after += self.law.multipliers()[3 * place + axis] * dot(normal, lanes.vector3(column, lane));
                 }
             }
             if after < -super::ROUNDING * scale {

@@ -1,37 +1,28 @@
 //! One sector and its surfaces over a span: gaps at any time, and a record of the contacts.
 
+use super::basis::TimeBasis;
+use super::carrier::CarrierIntegrator;
+use super::compliance::Lanes;
+use super::level::StepTables;
 use super::record::{SpanRecord, SurfacePlace};
+use super::surroundings::{AcceptedStep, CarriersInStep, Witness};
+use super::trial::{ForceInterpolation, Obstacle, SlidingState, Trial, node_by_node, vector3_at};
+use crate::geometry::wrench::{At, MotionIncrement};
+use crate::geometry::{GapLaw, PrescribedMotion, dot};
 use crate::system::carrier::Spot;
 use crate::system::pair::ContactPair;
-use crate::time::spans::casing::CarrierIntegrator;
-
-use crate::geometry::GapLaw;
-use crate::geometry::wrench::{At, MotionIncrement};
-use crate::geometry::{PrescribedMotion, dot};
-use crate::time::galerkin::basis::TimeBasis;
-use crate::time::galerkin::compliance::Lanes;
-use crate::time::galerkin::level::StepTables;
-use crate::time::galerkin::sector::{AcceptedStep, Witness};
-use crate::time::galerkin::trial::{ForceInterpolation, Obstacle, SlidingState, Trial, node_by_node, vector3_at};
+use crate::system::work::WorkingForce;
 
 /// Number of contact solutions in a trial after which the sliding directions are frozen, because a node that hardly slides would
 /// change its direction in every solution.
 const SOLUTIONS: usize = 3;
 
-/// Structures that carry the surfaces of a sector, in a step of a level.
-pub struct CarriersInStep<'a> {
-    pub casings: &'a mut [CarrierIntegrator],
-    /// Index of the structure in `casings` that carries the surface of each pair.
-    pub casing_of: &'a [Option<usize>],
-    pub level: usize,
-    pub kind: ForceInterpolation,
-    pub lanes: Lanes,
-}
-
 /// A sector of a structure and the surfaces that it can touch.
 pub struct ObstacleView<'a> {
     /// Structures that carry the surfaces, if any.
-    pub carriers: Option<CarriersInStep<'a>>,
+    pub carriers: CarriersInStep<'a>,
+    /// Index of the carrier of the surface of each pair.
+    pub carrier_of: &'a [Option<usize>],
     pub pairs: &'a mut [ContactPair],
     /// Pair of each node.
     pub pair_of: &'a [Option<usize>],
@@ -49,29 +40,28 @@ impl ObstacleView<'_> {
         when: SurfacePlace,
         read: impl Fn(&CarrierIntegrator, Spot) -> T,
     ) -> Option<T> {
-        let carriers = self.carriers.as_ref()?;
         let pair = self.pair_of[node]?;
-        let casing = carriers.casing_of[pair]?;
+        let carrier = self.carrier_of[pair]?;
         let index = node * self.lanes + self.sector;
         let spot = self.record.spot((node, point), (pair, &self.pairs[pair]), index, when)?;
-        Some(read(&carriers.casings[casing], spot))
+        Some(read(&self.carriers.carriers[carrier], spot))
     }
 
     /// Calls `read` with the structure that carries the surface of a node, at a point of the step.
-    pub fn with_carrier_mut(&mut self, node: usize, point: usize, read: impl FnOnce(&mut CarrierIntegrator, Spot)) {
-        let (Some(carriers), Some(pair)) = (&mut self.carriers, self.pair_of[node]) else { return };
-        let Some(casing) = carriers.casing_of[pair] else { return };
+    fn with_carrier_mut(&mut self, node: usize, point: usize, read: impl FnOnce(&mut CarrierIntegrator, Spot)) {
+        let Some(pair) = self.pair_of[node] else { return };
+        let Some(carrier) = self.carrier_of[pair] else { return };
         let index = node * self.lanes + self.sector;
         if let Some(spot) = self.record.spot((node, point), (pair, &self.pairs[pair]), index, SurfacePlace::Now) {
-            read(&mut carriers.casings[casing], spot);
+            read(&mut self.carriers.carriers[carrier], spot);
         }
     }
 
     /// Returns the surface carrier of a lane, and the current step.
     fn under(&mut self, lane: usize) -> Option<(&mut CarrierIntegrator, (usize, ForceInterpolation), Lanes)> {
-        let CarriersInStep { casings, casing_of, level, kind, lanes } = self.carriers.as_mut()?;
-        let casing = self.pair_of[lanes.place(lane).1].and_then(|pair| casing_of[pair])?;
-        Some((&mut casings[casing], (*level, *kind), *lanes))
+        let CarriersInStep { carriers, level, kind, lanes } = &mut self.carriers;
+        let carrier = self.pair_of[lanes.place(lane).1].and_then(|pair| self.carrier_of[pair])?;
+        Some((&mut carriers[carrier], (*level, *kind), *lanes))
     }
 
     fn at<'b>(&self, node: usize, drive: &'b PrescribedMotion) -> At<'b> {
@@ -130,12 +120,8 @@ impl Obstacle for ObstacleView<'_> {
         }
     }
 
-    fn direction(&mut self, node: usize, point: usize, sliding: &SlidingState) -> [f64; 3] {
-        let Some(pair) = self.pair_of[node] else { return sliding.normal };
-        let friction = self.pairs[pair].friction();
-        if friction == 0.0 {
-            return sliding.normal;
-        }
+    fn slip_direction(&mut self, node: usize, point: usize, sliding: &SlidingState) -> [f64; 3] {
+        let Some(pair) = self.pair_of[node] else { return [0.0; 3] };
         let gap = self.pairs[pair].gap();
         let slip = if gap.slides_anywhere() {
             let known = self.record.slips[point][node].filter(|_| self.record.solutions > SOLUTIONS);
@@ -155,8 +141,16 @@ impl Obstacle for ObstacleView<'_> {
             let carriers = carriers.unwrap_or_default();
             std::array::from_fn(|i| rigid[i] + sliding.velocity[i] - carriers[i])
         };
-        let slip = gap.slip_direction(slip, sliding.normal);
-        std::array::from_fn(|i| sliding.normal[i] - friction * slip[i])
+        gap.slip_direction(slip, sliding.normal)
+    }
+
+    fn sector(&self) -> usize {
+        self.sector
+    }
+
+    fn angle(&self, node: usize, point: usize, moved: [f64; 3]) -> f64 {
+        let Some(pair) = self.pair_of[node] else { return 0.0 };
+        self.pairs[pair].gap().angle_on_casing(self.at(node, &self.record.drives[pair][point].0), moved)
     }
 
     fn turns(&self) -> bool {
@@ -165,9 +159,11 @@ impl Obstacle for ObstacleView<'_> {
 
     fn prepare_compliance(&mut self, lanes: Lanes, chosen: &[bool], normals: &[f64]) -> bool {
         self.record.solutions += 1;
-        let Some(CarriersInStep { casings, lanes: carrier_lanes, .. }) = &mut self.carriers else { return false };
-        *carrier_lanes = lanes;
-        casings.iter_mut().for_each(CarrierIntegrator::clear_lanes);
+        if self.carriers.carriers.is_empty() {
+            return false;
+        }
+        self.carriers.lanes = lanes;
+        self.carriers.carriers.iter_mut().for_each(CarrierIntegrator::clear_lanes);
         for lane in (0..lanes.len()).filter(|lane| chosen[*lane]) {
             let (point, node) = lanes.place(lane);
             let normal = lanes.vector3(normals, lane);
@@ -259,12 +255,28 @@ impl Witness for ObstacleView<'_> {
         }
     }
 
-    fn record_flight(&mut self, damping_loss: f64) {
-        self.record.work.damping += damping_loss;
+    fn record_damping(&mut self, damping_loss: f64) {
+        self.record.damping += damping_loss;
+    }
+
+    fn closing_loss(&self) -> f64 {
+        self.record.work.closing
+    }
+
+    fn guess_start_places(&mut self) {
+        self.record.guess_start_places();
+    }
+
+    fn react(&mut self, node: usize, point: usize, force: [f64; 3]) {
+        self.record.act(node, point);
+        self.with_carrier_mut(node, point, |carrier, spot| carrier.react(spot, point, force));
+    }
+
+    fn add_impulse(&mut self, node: usize, point: usize, impulse: [f64; 3]) {
+        self.with_carrier_mut(node, point, |carrier, spot| carrier.add_impulse(spot, impulse));
     }
 
     fn record_step(&mut self, step: &AcceptedStep) {
-        self.record.work.damping += step.damping_loss;
         self.record.work.dropped += step.dropped;
         self.weigh_motions(step);
         for (node, pair) in self.pair_of.iter().enumerate() {
@@ -382,10 +394,10 @@ impl ObstacleView<'_> {
         tally.peak = tally.peak.max(trial.peak(basis, step.kind, node));
         let mut heats = 0.0;
         for i in (0..=trial.points()).filter(|i| trial.multiplier(*i, node) != 0.0) {
-            let normal_force = trial.multiplier(i, node);
+            let multiplier = trial.multiplier(i, node);
             let at = self.at(node, &drives[i].0);
             let (force, normal, moved) = (trial.force(i, node), trial.normal(i, node), trial.displacement(i, node));
-            let (place, motion) = (self.record.places[i][node], &motions[i]);
+            let place = self.record.places[i][node];
             let point = gap.contact_point(at, moved, place);
             self.record.implausible |= !gap.is_plausible(node, trial.gap(i, node), normal);
             // With the normal for which the force was found: the effect of its rotation since then is curvature work, not heat.
@@ -397,38 +409,36 @@ impl ObstacleView<'_> {
                 } else {
                     basis.weights[i]
                 };
-            tally.normal += length * normal_force;
-            tally.tangential += length * dot(tangential, tangential).sqrt();
-            for c in 0..3 {
-                tally.force[c] += length * force[c];
-                tally.wrench.force[c] += length * wrench.force[c];
-                tally.wrench.moment[c] += length * wrench.moment[c];
-                tally.wrench.point[c] += length * normal_force * wrench.point[c];
-            }
+            tally.add(length, multiplier, (force, tangential), &wrench);
             let weights = step.kind.work_weights(basis, i);
-            let (mut there, mut open) = ([0.0; 3], 0.0);
+            let (mut moved, mut open) = ([0.0; 3], 0.0);
             for k in (0..=trial.points()).filter(|k| weights[*k] != 0.0) {
                 let displaced = trial.displacement(k, node);
-                there = std::array::from_fn(|c| there[c] + weights[k] * displaced[c]);
+                moved = std::array::from_fn(|c| moved[c] + weights[k] * displaced[c]);
                 open += weights[k] * trial.finite_gap(k, node);
             }
-            let (spin, shaft) = (gap.spin_motion(at, point, motion), gap.shaft_motion(at, point, motion));
-            let carriers = self
-                .on_carrier((node, i), SurfacePlace::Acted, |casing, spot| casing.worked_at(spot, i))
-                .unwrap_or_default();
-            there = std::array::from_fn(|c| there[c] - carriers[c]);
-            let slip: [f64; 3] = std::array::from_fn(|c| there[c] + spin[c] + shaft[c]);
-            let heat = -dot(tangential, slip);
-            work.shaft -= dot(force, spin);
-            work.whirl -= wrench.force[0] * motion.shaft[0] + wrench.force[1] * motion.shaft[1];
-            work.shift -= wrench.force[2] * motion.shaft[2];
-            work.casing += normal_force * gap.surface_motion(at, point, normal, place, motion);
-            work.heat += heat;
-            tally.heat += heat;
-            heats += heat;
-            work.closing -= normal_force * open;
-            work.exact += dot(force, there);
-            work.moved += dot(force, there).abs();
+            let carried = self.on_carrier((node, i), SurfacePlace::Acted, |carrier, spot| carrier.worked_at(spot, i));
+            let carried = carried.unwrap_or_default();
+            let (fixed, motion, approach) = (wrench.force, &motions[i], -open);
+            let moved = std::array::from_fn(|c| moved[c] - carried[c]);
+            let done = WorkingForce {
+                gap,
+                at,
+                point,
+                place,
+                normal,
+                multiplier,
+                force,
+                tangential,
+                fixed,
+                motion,
+                moved,
+                approach,
+            }
+            .work();
+            tally.heat += done.heat;
+            heats += done.heat;
+            work.add(&done);
         }
         if heats < 0.0 && trial.sticks() {
             // The force at the start does not belong to the slip of the step; the energy it supplies comes from earlier impact losses.
