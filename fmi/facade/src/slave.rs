@@ -50,39 +50,40 @@ pub(crate) struct Refusal {
     /// `Error` or `Discard`.
     pub status: FmiStatus,
     /// Problem, place and remedy.
-    pub diagnostic: Diagnostic,
+    pub message: String,
 }
 
 impl Refusal {
-    /// Creates a refusal with the status `Error` from problem and remedy.
-    pub(crate) fn error(message: impl ToString) -> Self {
-        Diagnostic::new("", message, "").into()
+    /// Creates a refusal with the status `Error`.
+    pub(crate) fn error(message: impl Into<String>) -> Self {
+        Self { status: FmiStatus::Error, message: message.into() }
     }
 
     /// Creates a refusal with the status `Discard`.
-    pub(crate) fn discard(message: impl ToString) -> Self {
-        Self { status: FmiStatus::Discard, ..Self::error(message) }
+    pub(crate) fn discard(message: impl Into<String>) -> Self {
+        Self { status: FmiStatus::Discard, message: message.into() }
     }
 }
 
 impl From<tiprub_cosim::Error> for Refusal {
     fn from(error: tiprub_cosim::Error) -> Self {
-        // Nothing is lost by a step that takes too long: the importer can continue.
-        let exhausted = matches!(error, tiprub_cosim::Error::Exhausted(_));
-        let status = if exhausted { FmiStatus::Discard } else { FmiStatus::Error };
-        Self { status, diagnostic: error.into_diagnostic() }
+        match error {
+            // Nothing is lost: the importer can continue.
+            tiprub_cosim::Error::Exhausted(_) => Self::discard(error.to_string()),
+            _ => Self::error(error.to_string()),
+        }
     }
 }
 
 impl From<Diagnostic> for Refusal {
     fn from(diagnostic: Diagnostic) -> Self {
-        Self { status: FmiStatus::Error, diagnostic }
+        Self::error(diagnostic.to_string())
     }
 }
 
 impl fmt::Display for Refusal {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.diagnostic.fmt(formatter)
+        formatter.write_str(&self.message)
     }
 }
 

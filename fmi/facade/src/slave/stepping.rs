@@ -85,7 +85,7 @@ impl Slave {
     fn fail(&mut self, last_good: f64, error: tiprub_cosim::Error) -> Refusal {
         self.phase = InstancePhase::Failed { last_good };
         let mut refusal = Refusal::from(error);
-        refusal.diagnostic.remedy += ". Restore a saved state or reset the instance before the next step";
+        refusal.message += ". Restore a saved state or reset the instance before the next step";
         refusal
     }
 
