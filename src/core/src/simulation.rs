@@ -173,7 +173,7 @@ impl Simulation {
     ///
     /// # Examples
     /// ```
-    /// # use tiprub_core::Simulation;
+    /// # use tiprub_core::{CoSimulation, Simulation};
     /// # let scene = tiprub_test_models::rub(2);
     /// let mut simulation = Simulation::new(&scene)?;
     /// simulation.initialise(0.0)?;
@@ -245,7 +245,7 @@ impl Simulation {
     ///
     /// # Examples
     /// ```
-    /// # use tiprub_core::Simulation;
+    /// # use tiprub_core::{CoSimulation, Simulation};
     /// # let scene = tiprub_test_models::rub(2);
     /// # let mut simulation = Simulation::new(&scene)?;
     /// assert_eq!(simulation.system().structures()[0].modes().sectors(), 2);
@@ -393,7 +393,7 @@ impl Simulation {
     ///
     /// # Examples
     /// ```
-    /// # use tiprub_core::Simulation;
+    /// # use tiprub_core::{CoSimulation, Simulation};
     /// # let scene = tiprub_test_models::rub(2);
     /// # let mut simulation = Simulation::new(&scene)?;
     /// # simulation.initialise(0.0)?;

@@ -214,14 +214,16 @@ pub fn instantiation_token(files: &[(String, Vec<u8>)]) -> String {
 /// # for (name, bytes) in tiprub_format::resource_files(&scene, false) {
 /// #     std::fs::write(directory.path().join(name), bytes)?;
 /// # }
+/// use tiprub_core::{CoSimulation, Simulation};
+///
 /// let resources = tiprub_format::load_resources(directory.path())?;
-/// let mut simulation = tiprub_core::Simulation::new(&resources.scene)?;
+/// let mut simulation = Simulation::new(&resources.scene)?;
 /// simulation.initialise(0.0)?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
 /// # Errors
-/// A [`Diagnostic`] with the path of a file that is missing, unreadable or from another release; otherwise same as
+/// A [`Diagnostic`](tiprub_cosim::Diagnostic) with the path of a file that is missing, unreadable or from another release; otherwise same as
 /// [`parse_scene`] and [`read_rom`].
 pub fn load_resources(directory: &Path) -> Result<Resources> {
     check_directory(directory)?;

@@ -68,10 +68,7 @@ impl RomReader<'_> {
         let (arrays, metadata) = self.content(bytes)?;
         let rom = self.rom(&arrays, &metadata)?;
         self.checksum(&arrays, &metadata)?;
-        rom.validate().map_err(|error| match error {
-            tiprub_core::Error::Invalid(diagnostic) => diagnostic.at(self.origin),
-            other => self.error("ROM", other.to_string(), WRITE_AGAIN),
-        })?;
+        rom.validate().map_err(|error| error.into_diagnostic().at(self.origin))?;
         Ok(rom)
     }
 

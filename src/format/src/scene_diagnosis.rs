@@ -37,9 +37,9 @@ struct TomlNode<'a> {
 }
 
 impl<'a> Document<'a> {
-    /// Returns the error for a field that [`SceneSettings::validate`](tiprub_core::scene::settings::SceneSettings::validate)
+    /// Adds the place to the error of a field that [`SceneSettings::validate`](tiprub_core::scene::settings::SceneSettings::validate)
     /// names by its path, with or without indices; it has a position if the document holds exactly one such field.
-    pub(crate) fn refusal(&self, path: &str, problem: String, remedy: String) -> Diagnostic {
+    pub(crate) fn locate(&self, Diagnostic { what: path, problem, remedy, .. }: Diagnostic) -> Diagnostic {
         let bare = path.replace('`', "");
         let mut candidates: Vec<_> = self.places().into_iter().filter(|place| place.path == bare).collect();
         if candidates.is_empty() {
@@ -47,7 +47,7 @@ impl<'a> Document<'a> {
             candidates.retain(|place| !place.path.ends_with(']'));
         }
         let only = candidates.first().filter(|first| candidates.iter().all(|place| place.path == first.path));
-        let what = only.map_or(path, |place| &place.path);
+        let what = only.map_or(&path, |place| &place.path);
         // A missing key is reported at its table.
         let table = || {
             let (table, _) = bare.rsplit_once('.')?;

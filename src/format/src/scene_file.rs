@@ -140,12 +140,7 @@ fn parse(document: &Document) -> Result<SceneSettings> {
     if !document.holds(STEP) {
         settings.time.step = ADAPTIVE_STEP;
     }
-    settings.validate().map_err(|error| match error {
-        tiprub_core::Error::Invalid(Diagnostic { what, problem, remedy, .. }) => {
-            document.refusal(&what, problem, remedy)
-        }
-        other => document.refusal("scene", other.to_string(), "Change the settings named above".into()),
-    })?;
+    settings.validate().map_err(|error| document.locate(error.into_diagnostic()))?;
     Ok(settings)
 }
 
@@ -163,14 +158,11 @@ fn choose_scheme(settings: &mut SceneSettings, roms: &[Rom], document: &Document
     let problem = format!("missing: the scheme `{}`{why} uses fixed steps", scheme.name());
     let is_adaptive = scheme_reason.is_none() && settings.default_scheme(roms).0 == Scheme::Galerkin;
     let galerkin = if is_adaptive { ", or use scheme = \"galerkin\", which chooses its own steps" } else { "" };
-    Err(document.refusal(
-        STEP,
-        problem,
-        format!(
-            "Add a step in s to [time], such as `step = 1e-6`, and check it with `tiprub run --estimate`; if it is too \
-             long, the error gives a shorter one{galerkin}"
-        ),
-    ))
+    let remedy = format!(
+        "Add a step in s to [time], such as `step = 1e-6`, and check it with `tiprub run --estimate`; if it is too \
+         long, the error gives a shorter one{galerkin}"
+    );
+    Err(document.locate(Diagnostic::new(STEP, problem, remedy)))
 }
 
 /// Returns line and column, from 1, of the key at this path (indices from 1) in the text of a scene; `None` if it is

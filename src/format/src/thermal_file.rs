@@ -190,6 +190,6 @@ pub fn read_thermal(bytes: &[u8], origin: &str) -> Result<ConductionModel> {
         places: array("places")?,
         patches: (0..edges.nrows()).map(patch).collect(),
     };
-    model.validate().map_err(|error| refuse("thermal model".into(), error.to_string()))?;
+    model.validate().map_err(|error| error.into_diagnostic().at(origin))?;
     Ok(model)
 }

@@ -48,6 +48,7 @@ impl ThermalSimulation {
     ///
     /// # Examples
     /// ```
+    /// # use tiprub_cosim::CoSimulation;
     /// # use tiprub_thermal::ThermalSimulation;
     /// # let model = tiprub_test_models::wall();
     /// let mut simulation = ThermalSimulation::new(model)?;
@@ -90,6 +91,7 @@ impl ThermalSimulation {
     ///
     /// # Examples
     /// ```
+    /// # use tiprub_cosim::CoSimulation;
     /// # use tiprub_thermal::ThermalSimulation;
     /// # let model = tiprub_test_models::wall();
     /// # let mut simulation = ThermalSimulation::new(model)?;
@@ -105,6 +107,7 @@ impl ThermalSimulation {
     ///
     /// # Examples
     /// ```
+    /// # use tiprub_cosim::CoSimulation;
     /// # use tiprub_thermal::ThermalSimulation;
     /// # let model = tiprub_test_models::wall();
     /// # let mut simulation = ThermalSimulation::new(model)?;

@@ -125,7 +125,7 @@ impl Simulation {
     ///
     /// # Examples
     /// ```
-    /// # use tiprub_core::Simulation;
+    /// # use tiprub_core::{CoSimulation, Simulation};
     /// # let scene = tiprub_test_models::rub(2);
     /// # let mut simulation = Simulation::new(&scene)?;
     /// # simulation.initialise(0.0)?;

@@ -200,11 +200,11 @@ impl Simulation {
     }
 
     /// Returns the warnings of sliding contact in the opposite sense of rotation, which the warnings of the start omit. Empty before
-    /// [`Simulation::initialise`], and for coupled sectors, where the search takes as long again.
+    /// [`CoSimulation::initialise`](tiprub_cosim::CoSimulation::initialise), and for coupled sectors, where the search takes as long again.
     ///
     /// # Examples
     /// ```
-    /// # use tiprub_core::Simulation;
+    /// # use tiprub_core::{CoSimulation, Simulation};
     /// # let scene = tiprub_test_models::rub(2);
     /// # let mut simulation = Simulation::new(&scene)?;
     /// assert!(simulation.if_reversed().is_empty());
