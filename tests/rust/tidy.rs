@@ -158,6 +158,6 @@ fn public_entry_points_have_examples() {
         .flat_map(|(unit, text)| without_example(text).into_iter().map(move |name| format!("{unit}: {name}")))
         .collect();
     let found: usize = texts.iter().map(|(_, text)| text.matches("pub fn ").count()).sum();
-    assert!(found > 100, "{found} public functions found");
+    assert!(found > 90, "{found} public functions found");
     assert!(missing.is_empty(), "without an example: {}", missing.join(", "));
 }

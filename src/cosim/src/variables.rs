@@ -530,7 +530,7 @@ impl VariableTable {
         let row = usize::try_from(reference).ok().and_then(|index| self.rows.get(index));
         let row = *row.ok_or_else(|| {
             let remedy = "Use a value reference of its modelDescription.xml";
-            Error::invalid(format!("value reference {reference}"), "it does not exist in this FMU", remedy)
+            Error::invalid("", format!("value reference {reference} does not exist in this FMU"), remedy)
         })? as usize;
         let variable = &self.variables[row];
         Ok((variable, (reference - variable.reference) as usize))
