@@ -10,7 +10,7 @@ use tiprub_fmi_facade::Loaded;
 pub(crate) fn load(resources: &Path) -> Result<Loaded, Diagnostic> {
     let loaded = tiprub_format::load_resources(resources)?;
     let scene = loaded.scene;
-    let unit = move || -> Result<Box<dyn CoSimulation>> { Ok(Box::new(Simulation::new(&scene)?)) };
+    let unit = move || -> Result<Box<dyn CoSimulation>> { Ok(Box::new(Simulation::new(scene)?)) };
     Ok(Loaded {
         unit: Box::new(unit),
         token: loaded.token,
