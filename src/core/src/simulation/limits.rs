@@ -220,14 +220,13 @@ impl Compiled {
         (colder + added.max(0.0) / (largest * largest)).sqrt()
     }
 
-    /// Largest ω h of structures of the system without stiffening, below 2.
-    pub(super) fn largest_product(&self, structures: &[usize], step: f64) -> f64 {
+    /// Largest angular frequency of structures of the system without stiffening (rad/s).
+    pub(super) fn largest_frequency(&self, structures: &[usize]) -> f64 {
         let frequency = |structure: &usize| match self.bodies.get(*structure) {
             Some(body) => body.largest_frequency() * self.stiffest(*structure),
             None => self.carriers[*structure - self.bodies.len()].model.largest_frequency(),
         };
-        let largest = structures.iter().map(frequency).fold(0.0, f64::max);
-        (largest * step).min(2.0 * (1.0 - 1e-9))
+        structures.iter().map(frequency).fold(0.0, f64::max)
     }
 
     /// Returns the carriers of the surfaces that a structure can touch.

@@ -17,7 +17,7 @@
 //! depends on its history, so that no check at the start can predict it.
 
 use super::Simulation;
-use crate::scene::method::{Scheme, Solver};
+use crate::scene::method::Solver;
 use crate::scene::settings::Preset;
 use crate::system::StepFailure;
 use crate::warning::Topic;
@@ -122,8 +122,8 @@ impl Simulation {
         } else {
             "Use solver = \"lcp\""
         };
-        let resolved = 2.0 / highest;
-        if settings.scheme == Scheme::ModalExact && self.system.step_size() > resolved {
+        let resolved = settings.scheme.properties().resolved_up_to / highest;
+        if self.system.step_size() > resolved {
             format!(
                 "{lcp}, or set `time.step` (in the FMU `internal_step_max`) below {resolved:.2e} s to reduce the error"
             )

@@ -2,7 +2,6 @@
 
 use super::limits::Parameters;
 use super::{Communication, Simulation, SimulationPhase};
-use crate::scene::method::Scheme;
 use crate::time::galerkin::sector::shortest;
 use crate::variables::Quantity;
 use crate::warning::Topic;
@@ -15,7 +14,7 @@ const LEFT: f64 = 4.0;
 impl Simulation {
     /// Returns whether sectors take adaptive steps.
     pub(super) fn is_marched(&self) -> bool {
-        self.system.settings().scheme == Scheme::Galerkin
+        self.system.settings().scheme.properties().adaptive
     }
 
     /// Returns whether a communication step has begun and not ended.
@@ -94,7 +93,7 @@ impl Simulation {
     pub(super) fn warn_of_tolerance(&mut self, parameters: &Parameters) {
         let step = self.compiled.expected_step(parameters.step);
         let left = LEFT * shortest(step);
-        if parameters.scheme == Scheme::Galerkin && parameters.tolerance < left {
+        if parameters.scheme.properties().adaptive && parameters.tolerance < left {
             let problem = format!(
                 "the tolerance {} cannot be reached: galerkin steps are at least {} s long, a thousandth of the \
                  longest step, which causes errors of about {left:.0e} where contacts open and close",

@@ -7,7 +7,6 @@
 //! of inputs is then reduced. The quotient is the derivative with contacts and steps as they were in the accepted step, up to rounding.
 
 use super::{Simulation, SimulationPhase};
-use crate::scene::method::Scheme;
 use crate::variables::{Causality, DataType, Quantity, Variability};
 use crate::{Error, Result, shown, shown_time};
 
@@ -166,7 +165,7 @@ impl Simulation {
                 continue;
             }
             grown = true;
-            if self.system.settings().scheme != Scheme::Galerkin {
+            if !self.is_marched() {
                 let of_twin =
                     |twin: &Self| outputs.iter().map(|output| twin.values[*output as usize]).collect::<Vec<_>>();
                 let (ahead, touched) = (of_twin(twin), twin.touched());
