@@ -200,7 +200,7 @@ impl Simulation {
         let watched_gaps = WatchedGaps::new(&compiled)?;
         let sets = system.sets().count();
         let (energies, initial_energies) = (vec![SetEnergy::default(); sets], vec![0.0; sets]);
-        let (bodies, pairs, carriers) = (compiled.bodies.len(), compiled.plan.pairs.len(), compiled.carriers.len());
+        let (bodies, pairs) = (compiled.bodies.len(), compiled.plan.pairs.len());
         let heated = |carrier: &compile::CarrierParts| CarrierInputs {
             temperatures: vec![Input::default(); carrier.loads.thermal.len()],
             ..CarrierInputs::default()
@@ -232,7 +232,7 @@ impl Simulation {
             phase: SimulationPhase::Created,
             warnings: Vec::new(),
             notes: Vec::new(),
-            warning_state: limits::WarningState::new(bodies, carriers),
+            warning_state: limits::WarningState::default(),
             prepared: None,
             limits: None,
             state_size: 0,
@@ -305,11 +305,12 @@ impl Simulation {
         self.follow_load_orders()?;
         self.check_launch(parameters.scheme)?;
         self.follow_reference_speeds(&self.references())?;
-        self.warnings = self.check_limits(&parameters)?;
+        let findings = self.check_limits(&parameters)?;
+        self.warnings = findings.iter().map(|finding| self.compiled.warning(finding)).collect();
         self.warn_of_fast_rotation();
         self.warn_of_sticking(&parameters);
         self.warn_of_tolerance(&parameters);
-        self.begin_telling(&parameters);
+        self.begin_telling(&parameters, &findings);
         let settings = &self.compiled.scene.settings;
         self.warnings.retain(|warning| !settings.is_silenced(warning.topic()));
         self.rest(&parameters);

@@ -1,6 +1,7 @@
 //! Check of the energy of a run at every communication point, and the messages if it is too large.
 
 use super::{Simulation, SimulationPhase};
+use crate::limits::finding::Subject;
 use crate::scene::method::{Scheme, Solver};
 use crate::system::Loss;
 use crate::system::ledger::Ledger;
@@ -23,11 +24,11 @@ const CURVATURE_OF_ALL: f64 = 0.1;
 impl Simulation {
     /// Warns of the first curvature work that is large compared with the net work of inputs.
     pub(super) fn note_curvature(&mut self, time: f64) {
-        if self.warning_state.curvature {
-            return;
-        }
         let found = self.system.ledgers().iter().enumerate().find_map(|(set, ledger)| Some((set, misled(ledger)?)));
         let Some((set, (who, work))) = found else { return };
+        if !self.warning_state.is_first(Topic::CurvatureWork, Subject::Scene) {
+            return;
+        }
         let curvature = self.system.ledgers()[set].curvature_work.value();
         let problem = format!(
             "up to t = {} s, the rotation of contact normals and the curvature of surfaces within internal steps have added \
@@ -36,7 +37,6 @@ impl Simulation {
             shown_time(time),
             self.of_set(set)
         );
-        self.warning_state.curvature = true;
         self.note(Warning::new(Topic::CurvatureWork, problem, "Use a smaller internal step"));
     }
 

@@ -15,7 +15,7 @@ use crate::scene::settings::{BodyMotion, ContactSettings, Meridian, StructureSet
 use crate::scene::shape::CompiledShape;
 use crate::system::{PairParts, StructureParts, SurfaceCarrier, System, SystemSettings, joined};
 use crate::variables::Quantity;
-use crate::{Error, Result, Rom, Scene, Warning, shown};
+use crate::{Error, Result, Rom, Scene, shown};
 use nalgebra::DMatrix;
 
 use super::blades::{disk_heat, expansion, softened, static_stress};
@@ -246,16 +246,6 @@ impl Compiled {
     /// Returns the name of the rotating structure for messages: "the rotor", or its name if there are several masters.
     pub fn rotor_name(&self, body: usize) -> String {
         if self.bodies.len() > 1 { self.body(body).0.name.clone() } else { "the rotor".to_owned() }
-    }
-
-    /// Adds the name of a master to a text if there are several.
-    pub fn named(&self, body: usize, text: String) -> String {
-        if self.bodies.len() > 1 { format!("{}: {text}", self.body(body).0.name) } else { text }
-    }
-
-    /// Adds the name of a master to a warning if there are several.
-    pub fn warning_of(&self, body: usize, warning: Warning) -> Warning {
-        if self.bodies.len() > 1 { warning.named(&self.body(body).0.name) } else { warning }
     }
 
     /// Returns the name of a structure of the system.

@@ -213,7 +213,7 @@ impl Simulation {
         let mut bodies = std::iter::once(structure).chain(others).filter(|body| *body < self.rotors.len());
         let speed = |body: usize| self.inputs.rotors[body].speed.at(0.0);
         let found = bodies.find_map(|body| limits.grows(body, speed(body)));
-        found.map_or_else(String::new, |text| format!(". {text}"))
+        found.map_or_else(String::new, |finding| format!(". {}", self.compiled.warning(&finding)))
     }
 }
 

@@ -17,6 +17,7 @@
 //! depends on its history, so that no check at the start can predict it.
 
 use super::Simulation;
+use crate::limits::finding::Subject;
 use crate::scene::method::Solver;
 use crate::scene::settings::Preset;
 use crate::system::StepFailure;
@@ -44,14 +45,14 @@ impl Simulation {
         }
         let is_paper = self.compiled.scene.settings.preset == Preset::Paper;
         for structure in 0..self.compiled.bodies.len() {
+            let of = Subject::Body(structure);
             if let Some((node, share)) = self.system.left_inside(structure) {
                 let goes_on = is_paper || self.is_free(structure);
                 if share >= INSIDE && !goes_on {
                     return Err(self.fail(StepFailure::LeftInside { structure, node, share }, time));
                 }
                 let least = if goes_on { INSIDE } else { INSIDE_TOLD };
-                if share >= least.max(DEEPER * self.warning_state.inside[structure]) {
-                    self.warning_state.inside[structure] = share;
+                if share >= least && self.warning_state.exceeds(Topic::FilmInside, of, share, DEEPER) {
                     let problem = self.left_inside(structure, node, share);
                     let then = if goes_on {
                         String::new()
@@ -67,7 +68,7 @@ impl Simulation {
             if share >= REFUSED && !is_paper {
                 return Err(self.fail(StepFailure::Pulls { structure, node, share }, time));
             }
-            if share >= TOLD && !std::mem::replace(&mut self.warning_state.pulls[structure], true) {
+            if share >= TOLD && self.warning_state.is_first(Topic::FilmPulls, of) {
                 let problem = self.pulls(structure, node, share);
                 let then = if is_paper {
                     String::new()

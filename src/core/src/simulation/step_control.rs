@@ -2,6 +2,7 @@
 
 use super::limits::Parameters;
 use super::{Communication, Simulation, SimulationPhase};
+use crate::limits::finding::Subject;
 use crate::time::galerkin::sector::shortest;
 use crate::variables::Quantity;
 use crate::warning::Topic;
@@ -108,7 +109,7 @@ impl Simulation {
     /// Warns of the first communication step in which a shortest step missed the tolerance.
     pub(super) fn note_missed(&mut self, time: f64) {
         let effort = self.system.effort();
-        if effort.missed == 0 || std::mem::replace(&mut self.warning_state.missed, true) {
+        if effort.missed == 0 || !self.warning_state.is_first(Topic::ToleranceMissed, Subject::Scene) {
             return;
         }
         let problem = format!(

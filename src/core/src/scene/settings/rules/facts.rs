@@ -85,9 +85,8 @@ pub(super) const COULOMB: Fact = fact("contact.solver", "`coulomb`", |at| at.sol
 
 pub(super) const OTHER_SOLVER: Fact =
     fact("contact.solver", "a solver other than `film`", |at| at.contact().solver != Solver::Film);
-pub(super) const OTHER_SCHEME: Fact = fact("time.scheme", "a scheme other than `central-difference`", |at| {
-    at.settings.time.scheme != Scheme::PAPER
-});
+pub(super) const OTHER_SCHEME: Fact =
+    fact("time.scheme", "a scheme other than `central-difference`", |at| at.settings.time.scheme != Scheme::PAPER);
 pub(super) const MASSLESS: Fact =
     fact("time.scheme", "`massless-boundary`", |at| at.scheme.properties().delays_contact);
 pub(super) const GALERKIN: Fact = fact("time.scheme", "`galerkin`", |at| at.scheme.properties().adaptive);

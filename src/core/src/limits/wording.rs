@@ -1,0 +1,476 @@
+//! Words for findings: problem and remedy, with the names and the possibilities of a scene.
+
+use std::f64::consts::TAU;
+use std::fmt::{Display, Formatter};
+
+use super::finding::{ClosedContact, ErrorKind, Finding, StepGrowth, Subject, WarningKind};
+use super::{Fastest, GROWTH_UP_TO, LEAST_FRICTION, massless, unresolved};
+use crate::scene::method::{Scheme, Solver};
+use crate::warning::Severity;
+use crate::{Error, Rom, Warning, shown};
+
+/// A motion whose frequency (rad/s) is below this fraction of its rate grows without oscillation while blades cut.
+const SWINGS: f64 = 1e-3;
+/// Growth rates with and without the mass of the contact nodes that agree within this factor count as equal.
+const ALIKE: f64 = 1.25;
+
+/// Names and possibilities of a scene on which texts depend; none by default.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Context<'a> {
+    /// Name before the problem, if there are several structures.
+    pub name: Option<&'a str>,
+    /// ROM with the names of the contact nodes.
+    pub rom: Option<&'a Rom>,
+    /// True if a preset fixes the scheme.
+    pub preset: bool,
+    /// Adaptive steps, if the scene supports them.
+    pub adaptive: Option<AdaptiveSteps>,
+}
+
+/// Adaptive steps as a remedy.
+#[derive(Debug, Clone, Copy)]
+pub struct AdaptiveSteps {
+    /// Solver that must replace that of the scene.
+    pub solver: Option<Solver>,
+}
+
+impl Context<'_> {
+    fn named(&self, problem: String) -> String {
+        match self.name {
+            Some(name) => format!("{name}: {problem}"),
+            None => problem,
+        }
+    }
+
+    fn node(&self, node: usize) -> String {
+        let name = self.rom.and_then(|rom| Some(rom.contact_nodes.get(node)?.name.clone()));
+        name.unwrap_or_else(|| format!("node {}", node + 1))
+    }
+
+    fn contact(&self, contact: &ClosedContact) -> String {
+        let names = match contact.nodes.as_slice() {
+            [first, .., last] if contact.nodes.len() > 3 => format!("{} to {}", self.node(*first), self.node(*last)),
+            nodes => nodes.iter().map(|node| self.node(*node)).collect::<Vec<_>>().join(", "),
+        };
+        let sectors = if contact.all_sectors { " of all sectors" } else { "" };
+        let sense = ["+θ", "−θ"][contact.sense];
+        let frictions: Vec<String> = contact.frictions.iter().map(|friction| shown(*friction)).collect();
+        format!("closed at {names}{sectors}, sliding in {sense} with µ = {}", frictions.join(" and "))
+    }
+
+    /// Joins alternative remedies, written in lower case.
+    fn remedy<const N: usize>(&self, alternatives: [String; N]) -> String {
+        let joined = alternatives.into_iter().filter(|text| !text.is_empty()).collect::<Vec<_>>().join(", or ");
+        joined[..1].to_uppercase() + &joined[1..]
+    }
+
+    /// Returns the remedy of adaptive steps; empty if the scene does not support them.
+    fn adaptive_steps(&self) -> String {
+        let Some(AdaptiveSteps { solver }) = self.adaptive else { return String::new() };
+        let preset = if self.preset { "remove `preset`, " } else { "" };
+        let solver = solver.map_or(String::new(), |solver| format!(" and `contact.solver = \"{}\"`", solver.name()));
+        format!("use adaptive steps ({preset}set `time.scheme = \"{}\"`{solver})", Scheme::ADAPTIVE.name())
+    }
+
+    fn other_scheme(&self) -> String {
+        if self.preset {
+            "remove `preset`, which fixes the scheme".to_owned()
+        } else {
+            format!("use the scheme {}", Scheme::default().name())
+        }
+    }
+}
+
+/// Returns the remedy of a shorter step than this (s), with the names in the scene and in the FMU.
+fn shorter(step: f64) -> String {
+    format!("set `time.step` (in the FMU `internal_step_max`) below {step:.6e} s")
+}
+
+/// Rounds a step (s) to three digits.
+fn rounded(step: f64) -> f64 {
+    format!("{step:.2e}").parse().unwrap_or(step)
+}
+
+/// Rounds a step (s) down to three digits, so that following a proposal does not repeat its message.
+fn rounded_down(step: f64) -> f64 {
+    let near = rounded(step);
+    if near <= step { near } else { rounded(0.995 * step) }
+}
+
+fn kilohertz(frequency: f64) -> f64 {
+    1e-3 * frequency / TAU
+}
+
+/// Describes whether a motion that grows without the mass of the contact nodes also grows with it.
+fn confirmed(found: &Fastest, with_mass: Option<&Fastest>) -> String {
+    match with_mass {
+        Some(other) if other.rate < ALIKE * found.rate && found.rate < ALIKE * other.rate => {
+            " (the same with and without the mass of the contact nodes, so more modes will hardly change it)".to_owned()
+        }
+        Some(other) => format!(
+            " (without the mass of the contact nodes; {:.2e} 1/s with it, so more modes may change it)",
+            other.rate.max(0.0)
+        ),
+        None => String::new(),
+    }
+}
+
+impl Finding {
+    /// Returns the warning.
+    pub fn warning(&self, context: &Context) -> Warning {
+        let [problem, remedy] = self.kind.texts(self.of, context);
+        let explanation = self.kind.explanation(context, &remedy);
+        let mut warning = Warning::new(self.kind.topic(), problem, remedy);
+        if let Some(explanation) = explanation {
+            warning = warning.with_text(explanation);
+        }
+        if matches!(self.kind, WarningKind::Flutter { opens_after: Some(_), .. }) {
+            warning = warning.at_level(Severity::Note);
+        }
+        match context.name {
+            Some(name) => warning.named(name),
+            None => warning,
+        }
+    }
+}
+
+impl WarningKind {
+    /// Returns problem and remedy.
+    fn texts(&self, of: Subject, context: &Context) -> [String; 2] {
+        match self {
+            Self::UnresolvedModes { frequency, step, .. } => [
+                format!(
+                    "modes above {:.4} kHz are not resolved by the internal step of {step:.3e} s: their free motion is \
+                     exact, but their response to contact forces is not",
+                    kilohertz(unresolved::PASSED_OVER / step)
+                ),
+                format!(
+                    "Set `time.step` = {:.2e} s to resolve all modes",
+                    rounded_down(unresolved::PASSED_OVER / frequency)
+                ),
+            ],
+            Self::UnresolvedFlexibility { scheme, step, limit } => [
+                format!(
+                    "{} with an internal step of {step:.3e} s leaves much of the contact flexibility unresolved: expect \
+                     errors of a few per cent",
+                    scheme.name()
+                ),
+                format!("Set `time.step` below {:.2e} s", rounded_down(unresolved::NEAR * limit)),
+            ],
+            Self::MasslessEnergy { step, limit } => [
+                format!(
+                    "with massless-boundary and an internal step of {step:.3e} s, contact that opens and closes may \
+                     gain energy (visible as a decreasing `impact_loss`)"
+                ),
+                format!(
+                    "Set `time.step` below {:.2e} s, or a damping ratio of at least 1e-3",
+                    rounded_down(massless::QUIET * limit.closed)
+                ),
+            ],
+            Self::MasslessBlades { stable, sectors } => [
+                format!(
+                    "massless-boundary is proven stable for up to {stable:.0} blades in simultaneous contact with the \
+                     casing, not for all {sectors}"
+                ),
+                "Use a shorter `time.step` to allow more blades in contact".to_owned(),
+            ],
+            Self::LockUp { contact, friction, rate } => [
+                format!(
+                    "sliding contact locks up above µ* = {friction:.3}{}: {}",
+                    without_oscillation(*rate),
+                    context.contact(contact)
+                ),
+                "Use less friction, a more compliant casing, or a coating".to_owned(),
+            ],
+            Self::Flutter { contact, motion, opens_after, .. } => [
+                format!(
+                    "vibration in closed contact grows at {:.2e} 1/s at {:.4} kHz: {}",
+                    motion.rate,
+                    kilohertz(motion.frequency),
+                    context.contact(contact)
+                ),
+                match opens_after {
+                    Some(time) => format!(
+                        "No action is needed: contact opens after at most {time:.2e} s, before the growth matters"
+                    ),
+                    None => "Use less friction or more damping, or let contact open sooner; a shorter step does not help"
+                        .to_owned(),
+                },
+            ],
+            Self::StepGrowth(growth) => [
+                format!(
+                    "the time step destabilises sliding contact: {}, with vibration growing at {}; this may displace the \
+                     tips by {:.0} % of the displacement caused by contact",
+                    context.contact(&growth.contact),
+                    growth.rates(growth.rates.continuous.max(0.0)),
+                    100.0 * growth.error
+                ),
+                growth.silent.map_or_else(
+                    || "Use less friction or more damping".to_owned(),
+                    |step| format!("Set `time.step` to {} or less", shown(rounded_down(step))),
+                ),
+            ],
+            Self::ReversedGrowth(growth) => [
+                ErrorKind::StepGrowth(growth.clone()).with(context),
+                "Change the speed before the next step, which would otherwise end the run".to_owned(),
+            ],
+            Self::CuttingGrowth(Fastest { rate, frequency }) => {
+                // Growth without oscillation within the growth time is no vibration.
+                let motion = if *frequency < SWINGS * rate {
+                    "deflection in one direction".to_owned()
+                } else {
+                    format!("vibration at {:.4} kHz", kilohertz(*frequency))
+                };
+                [
+                    format!(
+                        "cutting is physically unstable: with all contact nodes of a blade in fresh coating, {motion} \
+                         grows at {rate:.2e} 1/s"
+                    ),
+                    "Use a larger `normal_ratio`, a smaller `specific_energy` or more damping, or let the blades leave \
+                     the coating sooner; a shorter step does not help"
+                        .to_owned(),
+                ]
+            }
+            Self::GrowthUnchecked { scheme, modes } => [
+                format!(
+                    "the growth of vibration in closed, sliding contact is not checked: the model has {modes} modes, \
+                     and the check supports only {GROWTH_UP_TO}"
+                ),
+                // Adaptive steps add no growth: any growth is a property of the equations.
+                if scheme.properties().adaptive {
+                    "Check a ROM with fewer modes for flutter and self-locking".to_owned()
+                } else {
+                    "Halve the internal step and compare the results".to_owned()
+                },
+            ],
+            Self::OtherSense => [
+                "the rotor now rotates opposite to its initial direction: the growth of vibration in contact that \
+                 slides in this direction was not checked, because the check takes a long time with coupled sectors"
+                    .to_owned(),
+                "Start a run with a speed of this sign to perform the check".to_owned(),
+            ],
+            Self::CasingSolvability { friction, step, eigenvalue, angle } => [
+                format!(
+                    "with µ = {} and an internal step of {step:.3e} s, the contribution of the casing to the Delassus \
+                     matrix is not positive semidefinite (lowest eigenvalue {eigenvalue:.2e} times the largest, at \
+                     θ = {angle:.2} rad)",
+                    shown(*friction)
+                ),
+                "Use less friction: where the blades do not add enough flexibility, a step may have no unique solution, \
+                 which ends the run"
+                    .to_owned(),
+            ],
+            Self::FlightSolvability { friction, eigenvalue } => [
+                format!(
+                    "with µ = {} the contact problem cannot be shown to have a unique solution for all contacts that \
+                     the undeformed structure makes in free flight (the symmetric part of the Delassus matrix, scaled \
+                     to unit diagonal, has the eigenvalue {eigenvalue:.2e})",
+                    shown(*friction)
+                ),
+                "Use less friction or the solver coulomb; a step whose contact problem is not solved ends the run"
+                    .to_owned(),
+            ],
+            Self::RigidContact { scheme, modes, rigid, directions } => [
+                format!(
+                    "with {} the {modes} highest modes respond quasi-statically to contact, so {rigid} of {directions} \
+                     directions of the contact nodes have no independent flexibility: contact that acts in one of these \
+                     directions loses energy at any tolerance",
+                    scheme.name()
+                ),
+                "Use a free-interface ROM, or fewer contact nodes or patches".to_owned(),
+            ],
+            Self::CoarseExcitation { scheme, turn } => {
+                let load = if matches!(of, Subject::Carrier(_)) { "load" } else { "excitation" };
+                let error = scheme.properties().resonance_error;
+                let [amplitude, frequency, times] = error.map_or([0.0; 3], |error| {
+                    [(error.amplitude)(*turn), (error.frequency)(*turn), turn / error.resolved_turn]
+                });
+                [
+                    format!(
+                        "the {load} rotates by {turn:.2} rad in one internal step: {} makes a resonance {:.0} % too large \
+                         and shifts its frequency by {:.1} %",
+                        scheme.name(),
+                        100.0 * amplitude,
+                        100.0 * frequency
+                    ),
+                    format!(
+                        "Use {}, or make internal_step_max (time.step) {times:.1} times smaller",
+                        Scheme::default().name()
+                    ),
+                ]
+            }
+        }
+    }
+
+    /// Returns the text for logs if it says more than problem and remedy.
+    fn explanation(&self, context: &Context, remedy: &str) -> Option<String> {
+        match self {
+            Self::LockUp { contact, friction, rate } => Some(format!(
+                "sliding contact locks up: above µ* = {friction:.3} ({}) the tip is driven into the casing faster than \
+                 the casing deflects, and the contact force grows without limit{}. This instability is a physical \
+                 property of the model, so a shorter step does not help. {remedy}",
+                context.contact(contact),
+                without_oscillation(*rate)
+            )),
+            Self::Flutter { contact, motion, with_mass, share, .. } => Some(format!(
+                "sliding contact is physically unstable (flutter): with contact {}, vibration at {:.4} kHz grows at \
+                 {:.2e} 1/s{} and displaces the tips by up to {:.1} % of the displacement caused by contact. This \
+                 instability is a physical property of the model. {remedy}",
+                context.contact(contact),
+                kilohertz(motion.frequency),
+                motion.rate,
+                confirmed(motion, with_mass.as_ref()),
+                100.0 * share
+            )),
+            Self::ReversedGrowth(growth) => Some(ErrorKind::StepGrowth(growth.clone()).with(context)),
+            _ => None,
+        }
+    }
+}
+
+fn without_oscillation(rate: Option<f64>) -> String {
+    rate.map_or(String::new(), |rate| format!(", at a rate of {rate:.2e} 1/s without oscillation"))
+}
+
+impl StepGrowth {
+    /// Compares the growth with that in continuous time (1/s).
+    fn rates(&self, continuous: f64) -> String {
+        format!(
+            "{:.2e} 1/s in steps of {} s, but at {continuous:.2e} 1/s in continuous time",
+            self.rates.stepped,
+            shown(rounded(self.step))
+        )
+    }
+}
+
+impl Finding<ErrorKind> {
+    /// Returns the error.
+    pub fn error(&self, context: &Context) -> Error {
+        let [problem, remedy] = self.kind.texts(context);
+        match self.kind {
+            ErrorKind::StiffContact { .. } | ErrorKind::RigidNormal => {
+                Error::invalid("scheme massless-boundary", problem, remedy)
+            }
+            _ => Error::Unstable { problem: context.named(problem), remedy },
+        }
+    }
+}
+
+impl ErrorKind {
+    /// Returns problem and remedy.
+    fn texts(&self, context: &Context) -> [String; 2] {
+        match self {
+            Self::UnstableStep { scheme, frequency, step } => {
+                let limit = scheme.properties().stable_below;
+                [
+                    format!(
+                        "{} is unstable with an internal step of {step:.3e} s: ω_max·h = {:.4}, but the stability limit \
+                         is {limit}",
+                        scheme.name(),
+                        frequency * step
+                    ),
+                    context.remedy([context.adaptive_steps(), shorter(limit / frequency), context.other_scheme()]),
+                ]
+            }
+            Self::UnresolvedContact { scheme, step, limit, frequency } => [
+                format!(
+                    "{} with an internal step of {step:.3e} s (ω_max·h = {:.4}) does not resolve modes above {:.4} \
+                     kHz, which account for more than half of the contact flexibility: forces, friction work and \
+                     energies would be wrong by ten per cent, and by far more with longer steps",
+                    scheme.name(),
+                    frequency * step,
+                    kilohertz(unresolved::PASSED_OVER / step)
+                ),
+                context.remedy([
+                    context.adaptive_steps(),
+                    format!("{}, preferably below {:.3e} s", shorter(*limit), unresolved::PASSED_OVER / frequency),
+                    "use massless-boundary".to_owned(),
+                ]),
+            ],
+            Self::Unsolvable { friction, step, solvable_below, is_proven } => {
+                let (what, why) = if *is_proven {
+                    ("has no unique solution", "a principal minor of the Delassus matrix is not positive")
+                } else {
+                    (
+                        "cannot be shown to have a unique solution",
+                        "the symmetric part of the Delassus matrix is not positive definite",
+                    )
+                };
+                [
+                    format!(
+                        "with friction_coefficient µ = {} and internal steps up to h = {step:.3e} s, the contact problem \
+                         {what} ({why})",
+                        shown(*friction)
+                    ),
+                    if *solvable_below >= LEAST_FRICTION {
+                        format!("Use µ below {solvable_below:.4} for this structure, or another internal step")
+                    } else {
+                        "Use no friction, fewer contact nodes or more modes: with more contacts than modes, no friction \
+                         coefficient is safe"
+                            .to_owned()
+                    },
+                ]
+            }
+            Self::Jammed { friction, step, node } => [
+                format!(
+                    "with friction_coefficient µ = {} and an internal step of {step:.3e} s, the contact problem of {} \
+                     alone has no unique solution in free flight: friction drives it into the surface",
+                    shown(*friction),
+                    context.node(*node)
+                ),
+                "Use less friction, another internal step, or the solver coulomb".to_owned(),
+            ],
+            Self::MasslessStep { step, limit } => [
+                format!(
+                    "the internal step of {step:.3e} s is too long for massless-boundary: closed contact on the residual \
+                     flexibility of the contact nodes is stable only below {:.6e} s, and contact that opens and closes \
+                     gains energy above {:.6e} s",
+                    limit.closed, limit.usable
+                ),
+                context.remedy([context.adaptive_steps(), shorter(limit.usable), context.other_scheme()]),
+            ],
+            Self::StiffContact { factor } => [
+                format!(
+                    "closed contact raises the square of the highest frequency of the modes with inertia by a factor of \
+                     {factor:.3e}, so bouncing nodes gain energy with any internal step"
+                ),
+                "Use modal-exact, or a ROM with more modes or softer contact nodes".to_owned(),
+            ],
+            Self::RigidNormal => [
+                "the quasi-static modes have no flexibility along the normal of a contact node".to_owned(),
+                "Use modal-exact, or a ROM with the contact nodes as the interface of the reduction".to_owned(),
+            ],
+            Self::StepGrowth(growth) => [
+                format!(
+                    "`time.step` is too long for friction: vibration in contact ({}) grows at {}, and this alone may \
+                     displace the tips by {:.0} % of the displacement caused by contact",
+                    context.contact(&growth.contact),
+                    growth.rates(growth.rates.continuous),
+                    100.0 * growth.error
+                ),
+                context.remedy([
+                    context.adaptive_steps(),
+                    growth.accepted.map_or(String::new(), |step| {
+                        let step = shown(rounded_down(step));
+                        format!("set `time.step` (in the FMU `internal_step_max`) to {step} or less")
+                    }),
+                    "use less friction or more damping".to_owned(),
+                ]),
+            ],
+        }
+    }
+
+    /// Returns the whole text without the name of the structure.
+    fn with(&self, context: &Context) -> String {
+        let [problem, remedy] = self.texts(context);
+        format!("{problem}. {remedy}")
+    }
+}
+
+impl Display for ErrorKind {
+    fn fmt(&self, out: &mut Formatter<'_>) -> std::fmt::Result {
+        out.write_str(&self.with(&Context::default()))
+    }
+}
+
+impl std::error::Error for ErrorKind {}
