@@ -232,7 +232,7 @@ impl Simulation {
             phase: SimulationPhase::Created,
             warnings: Vec::new(),
             notes: Vec::new(),
-            warning_state: limits::WarningState::default(),
+            warning_state: limits::WarningState::new(bodies),
             prepared: None,
             limits: None,
             state_size: 0,

@@ -12,7 +12,7 @@ use crate::warning::{Topic, Warning};
 const MATERIAL: f64 = 1.5;
 
 /// Warnings reported since the start.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct WarningState {
     /// Topic, part of the scene, and magnitude: the length of a step (s), an angle (rad) or a fraction.
     reported: Vec<(Topic, Subject, f64)>,
@@ -21,6 +21,11 @@ pub struct WarningState {
 }
 
 impl WarningState {
+    /// Creates the state without warnings, for a number of masters.
+    pub(in crate::simulation) fn new(bodies: usize) -> Self {
+        Self { reported: Vec::new(), fastest: vec![0.0; bodies] }
+    }
+
     /// Returns the magnitude at which a warning was last reported; 0 if it was not.
     fn magnitude(&self, topic: Topic, of: Subject) -> f64 {
         let found = self.reported.iter().find(|(known, subject, _)| (*known, *subject) == (topic, of));
@@ -48,7 +53,7 @@ impl Simulation {
     /// Marks the warnings of the start as reported, with those for the expected step.
     pub(in crate::simulation) fn begin_telling(&mut self, parameters: &Parameters, warnings: &[Finding]) {
         let expected = self.compiled.expected_step(parameters.step);
-        self.warning_state = WarningState::default();
+        self.warning_state = WarningState::new(self.rotors.len());
         for finding in warnings {
             self.warning_state.exceeds(finding.kind.topic(), finding.of, expected, 1.0);
         }
@@ -60,7 +65,7 @@ impl Simulation {
             }
             let fast = self.compiled.slip_of_speed(body, speed);
             let fastest = plausibility::fastest(self.compiled.body(body).1);
-            self.warning_state.fastest.push(if fast.is_some() { f64::INFINITY } else { fastest });
+            self.warning_state.fastest[body] = if fast.is_some() { f64::INFINITY } else { fastest };
             uncertain_warnings.extend(fast.iter().map(Slip::warning));
         }
         self.warnings.extend(uncertain_warnings);
