@@ -32,6 +32,9 @@ pub struct Finding<K = WarningKind> {
     pub kind: K,
 }
 
+/// Result of a check of a scene.
+pub type Checked<T> = Result<T, Finding<ErrorKind>>;
+
 /// Closed contact that slides in one sense.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ClosedContact {
@@ -103,8 +106,8 @@ pub enum WarningKind {
     FlightSolvability { friction: f64, eigenvalue: f64 },
     /// Quasi-static modes give no flexibility to `rigid` of the directions of contact nodes.
     RigidContact { scheme: Scheme, modes: usize, rigid: usize, directions: usize },
-    /// The load turns by this angle (rad) in one internal step.
-    CoarseExcitation { scheme: Scheme, turn: f64 },
+    /// The load turns by this angle (rad) in one internal step, too far by a factor: errors of amplitude and frequency of a resonance.
+    CoarseExcitation { scheme: Scheme, turn: f64, excess: f64, amplitude: f64, frequency: f64 },
 }
 
 impl WarningKind {

@@ -118,11 +118,12 @@ fn confirmed(found: &Fastest, with_mass: Option<&Fastest>) -> String {
 impl Finding {
     /// Returns the warning.
     pub fn warning(&self, context: &Context) -> Warning {
-        let [problem, remedy] = self.kind.texts(self.of, context);
-        let explanation = self.kind.explanation(context, &remedy);
-        let mut warning = Warning::new(self.kind.topic(), problem, remedy);
-        if let Some(explanation) = explanation {
-            warning = warning.with_text(explanation);
+        let (topic, problem) = (self.kind.topic(), self.kind.problem(self.of, context));
+        let remedy = self.kind.remedy().unwrap_or_else(|| topic.remedy().trim_end_matches('.').to_owned());
+        let text = self.kind.explanation().map(|explanation| format!("{problem}. {explanation}. {remedy}"));
+        let mut warning = Warning::new(topic, problem, remedy);
+        if let Some(text) = text {
+            warning = warning.with_text(text);
         }
         if matches!(self.kind, WarningKind::Flutter { opens_after: Some(_), .. }) {
             warning = warning.at_level(Severity::Note);
@@ -135,85 +136,46 @@ impl Finding {
 }
 
 impl WarningKind {
-    /// Returns problem and remedy.
-    fn texts(&self, of: Subject, context: &Context) -> [String; 2] {
+    fn problem(&self, of: Subject, context: &Context) -> String {
         match self {
-            Self::UnresolvedModes { frequency, step, .. } => [
-                format!(
-                    "modes above {:.4} kHz are not resolved by the internal step of {step:.3e} s: their free motion is \
-                     exact, but their response to contact forces is not",
-                    kilohertz(unresolved::PASSED_OVER / step)
-                ),
-                format!(
-                    "Set `time.step` = {:.2e} s to resolve all modes",
-                    rounded_down(unresolved::PASSED_OVER / frequency)
-                ),
-            ],
-            Self::UnresolvedFlexibility { scheme, step, limit } => [
-                format!(
-                    "{} with an internal step of {step:.3e} s leaves much of the contact flexibility unresolved: expect \
-                     errors of a few per cent",
-                    scheme.name()
-                ),
-                format!("Set `time.step` below {:.2e} s", rounded_down(unresolved::NEAR * limit)),
-            ],
-            Self::MasslessEnergy { step, limit } => [
-                format!(
-                    "with massless-boundary and an internal step of {step:.3e} s, contact that opens and closes may \
-                     gain energy (visible as a decreasing `impact_loss`)"
-                ),
-                format!(
-                    "Set `time.step` below {:.2e} s, or a damping ratio of at least 1e-3",
-                    rounded_down(massless::QUIET * limit.closed)
-                ),
-            ],
-            Self::MasslessBlades { stable, sectors } => [
-                format!(
-                    "massless-boundary is proven stable for up to {stable:.0} blades in simultaneous contact with the \
-                     casing, not for all {sectors}"
-                ),
-                "Use a shorter `time.step` to allow more blades in contact".to_owned(),
-            ],
-            Self::LockUp { contact, friction, rate } => [
-                format!(
-                    "sliding contact locks up above µ* = {friction:.3}{}: {}",
-                    without_oscillation(*rate),
-                    context.contact(contact)
-                ),
-                "Use less friction, a more compliant casing, or a coating".to_owned(),
-            ],
-            Self::Flutter { contact, motion, opens_after, .. } => [
-                format!(
-                    "vibration in closed contact grows at {:.2e} 1/s at {:.4} kHz: {}",
-                    motion.rate,
-                    kilohertz(motion.frequency),
-                    context.contact(contact)
-                ),
-                match opens_after {
-                    Some(time) => format!(
-                        "No action is needed: contact opens after at most {time:.2e} s, before the growth matters"
-                    ),
-                    None => "Use less friction or more damping, or let contact open sooner; a shorter step does not help"
-                        .to_owned(),
-                },
-            ],
-            Self::StepGrowth(growth) => [
-                format!(
-                    "the time step destabilises sliding contact: {}, with vibration growing at {}; this may displace the \
-                     tips by {:.0} % of the displacement caused by contact",
-                    context.contact(&growth.contact),
-                    growth.rates(growth.rates.continuous.max(0.0)),
-                    100.0 * growth.error
-                ),
-                growth.silent.map_or_else(
-                    || "Use less friction or more damping".to_owned(),
-                    |step| format!("Set `time.step` to {} or less", shown(rounded_down(step))),
-                ),
-            ],
-            Self::ReversedGrowth(growth) => [
-                ErrorKind::StepGrowth(growth.clone()).with(context),
-                "Change the speed before the next step, which would otherwise end the run".to_owned(),
-            ],
+            Self::UnresolvedModes { step, .. } => format!(
+                "modes above {:.4} kHz are not resolved by the internal step of {step:.3e} s: their free motion is \
+                 exact, but their response to contact forces is not",
+                kilohertz(unresolved::PASSED_OVER / step)
+            ),
+            Self::UnresolvedFlexibility { scheme, step, .. } => format!(
+                "{} with an internal step of {step:.3e} s leaves much of the contact flexibility unresolved: expect \
+                 errors of a few per cent",
+                scheme.name()
+            ),
+            Self::MasslessEnergy { step, .. } => format!(
+                "with massless-boundary and an internal step of {step:.3e} s, contact that opens and closes may gain \
+                 energy (visible as a decreasing `impact_loss`)"
+            ),
+            Self::MasslessBlades { stable, sectors } => format!(
+                "massless-boundary is proven stable for up to {stable:.0} blades in simultaneous contact with the \
+                 casing, not for all {sectors}"
+            ),
+            Self::LockUp { contact, friction, rate } => {
+                let rate =
+                    rate.map_or(String::new(), |rate| format!(", at a rate of {rate:.2e} 1/s without oscillation"));
+                format!("sliding contact locks up above µ* = {friction:.3}{rate}: {}", context.contact(contact))
+            }
+            Self::Flutter { contact, motion: Fastest { rate, frequency }, .. } => format!(
+                "vibration in closed contact grows at {rate:.2e} 1/s at {:.4} kHz: {}",
+                kilohertz(*frequency),
+                context.contact(contact)
+            ),
+            Self::StepGrowth(growth) => format!(
+                "the time step destabilises sliding contact: {}, with vibration growing at {}; this may displace the \
+                 tips by {:.0} % of the displacement caused by contact",
+                context.contact(&growth.contact),
+                growth.rates(growth.rates.continuous.max(0.0)),
+                100.0 * growth.error
+            ),
+            Self::ReversedGrowth(growth) => {
+                ErrorKind::StepGrowth(growth.clone()).of(of).error(&Context { name: None, ..*context }).to_string()
+            }
             Self::CuttingGrowth(Fastest { rate, frequency }) => {
                 // Growth without oscillation within the growth time is no vibration.
                 let motion = if *frequency < SWINGS * rate {
@@ -221,115 +183,105 @@ impl WarningKind {
                 } else {
                     format!("vibration at {:.4} kHz", kilohertz(*frequency))
                 };
-                [
-                    format!(
-                        "cutting is physically unstable: with all contact nodes of a blade in fresh coating, {motion} \
-                         grows at {rate:.2e} 1/s"
-                    ),
-                    "Use a larger `normal_ratio`, a smaller `specific_energy` or more damping, or let the blades leave \
-                     the coating sooner; a shorter step does not help"
-                        .to_owned(),
-                ]
+                format!(
+                    "cutting is physically unstable: with all contact nodes of a blade in fresh coating, {motion} grows \
+                     at {rate:.2e} 1/s"
+                )
             }
-            Self::GrowthUnchecked { scheme, modes } => [
-                format!(
-                    "the growth of vibration in closed, sliding contact is not checked: the model has {modes} modes, \
-                     and the check supports only {GROWTH_UP_TO}"
-                ),
-                // Adaptive steps add no growth: any growth is a property of the equations.
-                if scheme.properties().adaptive {
-                    "Check a ROM with fewer modes for flutter and self-locking".to_owned()
-                } else {
-                    "Halve the internal step and compare the results".to_owned()
-                },
-            ],
-            Self::OtherSense => [
-                "the rotor now rotates opposite to its initial direction: the growth of vibration in contact that \
-                 slides in this direction was not checked, because the check takes a long time with coupled sectors"
-                    .to_owned(),
-                "Start a run with a speed of this sign to perform the check".to_owned(),
-            ],
-            Self::CasingSolvability { friction, step, eigenvalue, angle } => [
-                format!(
-                    "with µ = {} and an internal step of {step:.3e} s, the contribution of the casing to the Delassus \
-                     matrix is not positive semidefinite (lowest eigenvalue {eigenvalue:.2e} times the largest, at \
-                     θ = {angle:.2} rad)",
-                    shown(*friction)
-                ),
-                "Use less friction: where the blades do not add enough flexibility, a step may have no unique solution, \
-                 which ends the run"
-                    .to_owned(),
-            ],
-            Self::FlightSolvability { friction, eigenvalue } => [
-                format!(
-                    "with µ = {} the contact problem cannot be shown to have a unique solution for all contacts that \
-                     the undeformed structure makes in free flight (the symmetric part of the Delassus matrix, scaled \
-                     to unit diagonal, has the eigenvalue {eigenvalue:.2e})",
-                    shown(*friction)
-                ),
-                "Use less friction or the solver coulomb; a step whose contact problem is not solved ends the run"
-                    .to_owned(),
-            ],
-            Self::RigidContact { scheme, modes, rigid, directions } => [
-                format!(
-                    "with {} the {modes} highest modes respond quasi-statically to contact, so {rigid} of {directions} \
-                     directions of the contact nodes have no independent flexibility: contact that acts in one of these \
-                     directions loses energy at any tolerance",
-                    scheme.name()
-                ),
-                "Use a free-interface ROM, or fewer contact nodes or patches".to_owned(),
-            ],
-            Self::CoarseExcitation { scheme, turn } => {
-                let load = if matches!(of, Subject::Carrier(_)) { "load" } else { "excitation" };
-                let error = scheme.properties().resonance_error;
-                let [amplitude, frequency, times] = error.map_or([0.0; 3], |error| {
-                    [(error.amplitude)(*turn), (error.frequency)(*turn), turn / error.resolved_turn]
-                });
-                [
-                    format!(
-                        "the {load} rotates by {turn:.2} rad in one internal step: {} makes a resonance {:.0} % too large \
-                         and shifts its frequency by {:.1} %",
-                        scheme.name(),
-                        100.0 * amplitude,
-                        100.0 * frequency
-                    ),
-                    format!(
-                        "Use {}, or make internal_step_max (time.step) {times:.1} times smaller",
-                        Scheme::default().name()
-                    ),
-                ]
-            }
+            Self::GrowthUnchecked { modes, .. } => format!(
+                "the growth of vibration in closed, sliding contact is not checked: the model has {modes} modes, and \
+                 the check supports only {GROWTH_UP_TO}"
+            ),
+            Self::OtherSense => "the rotor now rotates opposite to its initial direction: the growth of vibration in \
+                                 contact that slides in this direction was not checked, because the check takes a long \
+                                 time with coupled sectors"
+                .to_owned(),
+            Self::CasingSolvability { friction, step, eigenvalue, angle } => format!(
+                "with µ = {} and an internal step of {step:.3e} s, the contribution of the casing to the Delassus matrix \
+                 is not positive semidefinite (lowest eigenvalue {eigenvalue:.2e} times the largest, at θ = {angle:.2} \
+                 rad)",
+                shown(*friction)
+            ),
+            Self::FlightSolvability { friction, eigenvalue } => format!(
+                "with µ = {} the contact problem cannot be shown to have a unique solution for all contacts that the \
+                 undeformed structure makes in free flight (the symmetric part of the Delassus matrix, scaled to unit \
+                 diagonal, has the eigenvalue {eigenvalue:.2e})",
+                shown(*friction)
+            ),
+            Self::RigidContact { scheme, modes, rigid, directions } => format!(
+                "with {} the {modes} highest modes respond quasi-statically to contact, so {rigid} of {directions} \
+                 directions of the contact nodes have no independent flexibility: contact that acts in one of these \
+                 directions loses energy at any tolerance",
+                scheme.name()
+            ),
+            Self::CoarseExcitation { scheme, turn, amplitude, frequency, .. } => format!(
+                "the {} rotates by {turn:.2} rad in one internal step: {} makes a resonance {:.0} % too large and shifts \
+                 its frequency by {:.1} %",
+                if matches!(of, Subject::Carrier(_)) { "load" } else { "excitation" },
+                scheme.name(),
+                100.0 * amplitude,
+                100.0 * frequency
+            ),
         }
     }
 
-    /// Returns the text for logs if it says more than problem and remedy.
-    fn explanation(&self, context: &Context, remedy: &str) -> Option<String> {
+    /// Returns the remedy if it is more specific than that of the topic.
+    fn remedy(&self) -> Option<String> {
+        Some(match self {
+            Self::UnresolvedModes { frequency, .. } => {
+                let step = rounded_down(unresolved::PASSED_OVER / frequency);
+                format!("Set `time.step` = {step:.2e} s to resolve all modes")
+            }
+            Self::UnresolvedFlexibility { limit, .. } => {
+                format!("Set `time.step` below {:.2e} s", rounded_down(unresolved::NEAR * limit))
+            }
+            Self::MasslessEnergy { limit, .. } => {
+                let step = rounded_down(massless::QUIET * limit.closed);
+                format!("Set `time.step` below {step:.2e} s, or a damping ratio of at least 1e-3")
+            }
+            Self::Flutter { opens_after: Some(time), .. } => {
+                format!("No action is needed: contact opens after at most {time:.2e} s, before the growth matters")
+            }
+            Self::Flutter { .. } => {
+                "Use less friction or more damping, or let contact open sooner; a shorter step does not help".to_owned()
+            }
+            Self::StepGrowth(StepGrowth { silent: Some(step), .. }) => {
+                format!("Set `time.step` to {} or less", shown(rounded_down(*step)))
+            }
+            Self::StepGrowth(_) => "Use less friction or more damping".to_owned(),
+            Self::ReversedGrowth(_) => {
+                "Change the speed before the next step, which would otherwise end the run".to_owned()
+            }
+            // Adaptive steps add no growth: any growth is a property of the equations.
+            Self::GrowthUnchecked { scheme, .. } if scheme.properties().adaptive => {
+                "Check a ROM with fewer modes for flutter and self-locking".to_owned()
+            }
+            Self::GrowthUnchecked { .. } => "Halve the internal step and compare the results".to_owned(),
+            Self::CoarseExcitation { excess, .. } => {
+                let scheme = Scheme::default().name();
+                format!("Use {scheme}, or make internal_step_max (time.step) {excess:.1} times smaller")
+            }
+            _ => return None,
+        })
+    }
+
+    /// Returns sentences for logs that explain the problem, without the last full stop.
+    fn explanation(&self) -> Option<String> {
         match self {
-            Self::LockUp { contact, friction, rate } => Some(format!(
-                "sliding contact locks up: above µ* = {friction:.3} ({}) the tip is driven into the casing faster than \
-                 the casing deflects, and the contact force grows without limit{}. This instability is a physical \
-                 property of the model, so a shorter step does not help. {remedy}",
-                context.contact(contact),
-                without_oscillation(*rate)
+            Self::LockUp { .. } => Some(
+                "The tip is driven into the casing faster than the casing deflects, and the contact force grows without \
+                 limit. This instability is a physical property of the model, so a shorter step does not help"
+                    .to_owned(),
+            ),
+            Self::Flutter { motion, with_mass, share, .. } => Some(format!(
+                "Sliding contact is physically unstable (flutter): this motion displaces the tips by up to {:.1} % of \
+                 the displacement caused by contact{}. This instability is a physical property of the model",
+                100.0 * share,
+                confirmed(motion, with_mass.as_ref())
             )),
-            Self::Flutter { contact, motion, with_mass, share, .. } => Some(format!(
-                "sliding contact is physically unstable (flutter): with contact {}, vibration at {:.4} kHz grows at \
-                 {:.2e} 1/s{} and displaces the tips by up to {:.1} % of the displacement caused by contact. This \
-                 instability is a physical property of the model. {remedy}",
-                context.contact(contact),
-                kilohertz(motion.frequency),
-                motion.rate,
-                confirmed(motion, with_mass.as_ref()),
-                100.0 * share
-            )),
-            Self::ReversedGrowth(growth) => Some(ErrorKind::StepGrowth(growth.clone()).with(context)),
             _ => None,
         }
     }
-}
-
-fn without_oscillation(rate: Option<f64>) -> String {
-    rate.map_or(String::new(), |rate| format!(", at a rate of {rate:.2e} 1/s without oscillation"))
 }
 
 impl StepGrowth {
@@ -459,17 +411,11 @@ impl ErrorKind {
             ],
         }
     }
-
-    /// Returns the whole text without the name of the structure.
-    fn with(&self, context: &Context) -> String {
-        let [problem, remedy] = self.texts(context);
-        format!("{problem}. {remedy}")
-    }
 }
 
 impl Display for ErrorKind {
     fn fmt(&self, out: &mut Formatter<'_>) -> std::fmt::Result {
-        out.write_str(&self.with(&Context::default()))
+        self.clone().of(Subject::Scene).error(&Context::default()).fmt(out)
     }
 }
 

@@ -71,7 +71,7 @@ impl Scheme {
 }
 
 /// Facts about a time-stepping scheme.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug)]
 pub struct SchemeProperties {
     /// True if steps are as long as a tolerance allows; such steps need no limits.
     pub adaptive: bool,

@@ -24,7 +24,7 @@ impl Simulation {
     }
 
     /// Returns the problem and the remedy.
-    fn failure_texts(&self, failure: StepFailure) -> (String, String) {
+    pub(super) fn failure_texts(&self, failure: StepFailure) -> (String, String) {
         let is_free = |structure: usize| self.compiled.bodies[structure].translations.is_some();
         match failure {
             StepFailure::Implausible { structure, .. } if is_free(structure) => {
@@ -39,8 +39,9 @@ impl Simulation {
                     "Use less friction, another internal step or the solver coulomb"
                 },
             ),
-            // Reported elsewhere.
-            StepFailure::NonFinite | StepFailure::Exhausted => (String::new(), String::new()),
+            // The remedy is given elsewhere.
+            StepFailure::NonFinite => ("the displacements are not finite".to_owned(), String::new()),
+            StepFailure::Exhausted => (String::new(), String::new()),
             StepFailure::Implausible { structure, sector } => (
                 format!(
                     "a contact node of {} is displaced by more than a tenth of its radius, has penetrated the \

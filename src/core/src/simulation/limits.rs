@@ -8,7 +8,7 @@ mod warning_state;
 
 use super::table::has_one_friction;
 use super::{Compiled, Simulation};
-use crate::limits::finding::{ErrorKind, Finding, Subject, WarningKind};
+use crate::limits::finding::{Checked, ErrorKind, Finding, Subject, WarningKind};
 use crate::limits::massless::MasslessLimit;
 use crate::limits::wording::{AdaptiveSteps, Context};
 use crate::limits::{self, massless};
@@ -66,7 +66,7 @@ struct BodyLimits {
     /// The master.
     of: Subject,
     /// Warnings for the expected step, or the reason why these parameters are rejected, for any sense of slip.
-    outcome: Result<Vec<Finding>, Finding<ErrorKind>>,
+    outcome: Checked<Vec<Finding>>,
     /// Slip in +θ and in −θ; for a disk, where the check is slow, only the requested senses.
     senses: [Option<Sense>; 2],
     /// Duration of closed contact.
@@ -152,13 +152,7 @@ impl Simulation {
         self.is_step_allowed(body, step, speeds, coldest).map_err(|error| self.compiled.error(&error))
     }
 
-    fn is_step_allowed(
-        &self,
-        body: usize,
-        step: f64,
-        speeds: [f64; 3],
-        coldest: f64,
-    ) -> Result<(), Finding<ErrorKind>> {
+    fn is_step_allowed(&self, body: usize, step: f64, speeds: [f64; 3], coldest: f64) -> Checked<()> {
         let Some(limits) = &self.limits else { return Ok(()) };
         let (scheme, own) = (limits.parameters.scheme, &limits.bodies[body]);
         let stiffened = |speed: f64| self.compiled.stiffened(body, speed, coldest);
@@ -221,7 +215,7 @@ impl Compiled {
     ///
     /// # Errors
     /// A carrier that is unstable with this step.
-    fn unresolved_carriers(&self, body: usize, scheme: Scheme, step: f64) -> Result<Vec<Finding>, Finding<ErrorKind>> {
+    fn unresolved_carriers(&self, body: usize, scheme: Scheme, step: f64) -> Checked<Vec<Finding>> {
         let checked = self.carriers_of(body).map(|carrier| {
             let frequency = self.carriers[carrier].model.largest_frequency();
             let found = limits::check_step(frequency, scheme, step);
@@ -302,14 +296,9 @@ impl Compiled {
             // Adaptive steps are short enough for their contact problems and their energy: only physical effects are reported, and nothing
             // is rejected.
             return BodyLimits {
-                of,
                 outcome: Ok(at.not_looked_at().map(|kind| kind.of(of)).into_iter().collect()),
-                senses: [Some(at.physics(0, expected)), Some(at.physics(1, expected))],
-                closing: Closing::new(self, body),
-                massless: MasslessLimit::NONE,
-                casing: Vec::new(),
-                unresolved: f64::INFINITY,
-                cutting: None,
+                senses: [0, 1].map(|sense| Some(at.physics(sense, expected))),
+                ..BodyLimits::new(of, Closing::new(self, body))
             };
         }
         let casing = at.casing(expected);
@@ -361,7 +350,7 @@ impl Limits {
     }
 
     /// Returns the warnings for the expected step at these speeds (rad/s).
-    fn warnings(&self, speeds: &[f64]) -> Result<Vec<Finding>, Finding<ErrorKind>> {
+    fn warnings(&self, speeds: &[f64]) -> Checked<Vec<Finding>> {
         let mut warnings: Vec<Finding> = Vec::new();
         for (body, speed) in self.bodies.iter().zip(speeds) {
             let found = body.warnings(*speed)?;
@@ -381,8 +370,22 @@ impl Limits {
 }
 
 impl BodyLimits {
+    /// Creates limits that reject and report nothing.
+    fn new(of: Subject, closing: Closing) -> Self {
+        Self {
+            of,
+            outcome: Ok(Vec::new()),
+            senses: [Some(Sense::default()), Some(Sense::default())],
+            closing,
+            massless: MasslessLimit::NONE,
+            casing: Vec::new(),
+            unresolved: f64::INFINITY,
+            cutting: None,
+        }
+    }
+
     /// Returns the warnings for the expected step at this speed (rad/s).
-    fn warnings(&self, speed: f64) -> Result<Vec<Finding>, Finding<ErrorKind>> {
+    fn warnings(&self, speed: f64) -> Checked<Vec<Finding>> {
         let mut warnings = self.outcome.clone()?;
         warnings.extend(self.cutting.clone().map(|kind| kind.of(self.of)));
         let closed = self.closing.time(speed);

@@ -4,7 +4,7 @@ use super::Parameters;
 use crate::geometry::frame::PolarFrame;
 use crate::geometry::spline::SplineGap;
 use crate::geometry::{GapLaw, dot};
-use crate::limits::finding::{ErrorKind, Finding, Subject, WarningKind};
+use crate::limits::finding::{Checked, ErrorKind, Finding, Subject, WarningKind};
 use crate::limits::massless::MasslessLimit;
 use crate::limits::{self, ContactDirections, massless};
 use crate::modes::cyclic::CyclicModel;
@@ -163,7 +163,7 @@ impl<'a> Checking<'a> {
         step: f64,
         casing: Option<WarningKind>,
         more: Vec<WarningKind>,
-    ) -> Result<Vec<Finding>, Finding<ErrorKind>> {
+    ) -> Checked<Vec<Finding>> {
         let Parameters { scheme, step: largest, .. } = *self.parameters;
         let own = |error: ErrorKind| error.of(self.subject());
         let unresolved = limits::check_step(self.largest_frequency(), scheme, step).map_err(own)?;

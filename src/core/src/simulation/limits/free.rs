@@ -8,11 +8,10 @@
 
 use nalgebra::DMatrix;
 
-use super::{BodyLimits, Closing, Parameters, Sense};
+use super::{BodyLimits, Closing, Parameters};
 use crate::geometry::open::{OpenGap, tangent};
 use crate::geometry::{GapLaw, Geometry, dot};
-use crate::limits::finding::{ErrorKind, Finding, Subject, WarningKind};
-use crate::limits::massless::MasslessLimit;
+use crate::limits::finding::{Checked, ErrorKind, Finding, Subject, WarningKind};
 use crate::limits::{self, ContactDirections};
 use crate::modes::modal::ModalModel;
 use crate::modes::modal::fill_ratios;
@@ -53,16 +52,7 @@ impl Compiled {
             let flight = FlightCheck { compiled: self, system, body, parameters };
             resolved.map_err(|error| error.of(of)).and_then(|()| flight.warnings(step))
         };
-        BodyLimits {
-            of,
-            outcome,
-            senses: [Some(Sense::default()), Some(Sense::default())],
-            closing: Closing::of_run(self),
-            massless: MasslessLimit::NONE,
-            casing: Vec::new(),
-            unresolved,
-            cutting: None,
-        }
+        BodyLimits { outcome, unresolved, ..BodyLimits::new(of, Closing::of_run(self)) }
     }
 }
 
@@ -89,7 +79,7 @@ struct FlightCheck<'a> {
 }
 
 impl FlightCheck<'_> {
-    fn warnings(&self, step: f64) -> Result<Vec<Finding>, Finding<ErrorKind>> {
+    fn warnings(&self, step: f64) -> Checked<Vec<Finding>> {
         let (compiled, scheme, of) = (self.compiled, self.parameters.scheme, Subject::Body(self.body));
         let largest = compiled.bodies[self.body].model.largest_frequency();
         let unresolved = limits::check_step(largest, scheme, step).map_err(|error| error.of(of))?;

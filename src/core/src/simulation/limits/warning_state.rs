@@ -120,8 +120,15 @@ impl Simulation {
     /// Warns of a scheme that makes resonances too large if the load turns far in one internal step (rad).
     fn warn_of_turn(&mut self, of: Subject, turn: f64) {
         let scheme = self.system.scheme();
-        let resolved = scheme.properties().resonance_error.map_or(f64::INFINITY, |error| error.resolved_turn);
-        self.report((turn > resolved).then_some(WarningKind::CoarseExcitation { scheme, turn }), of, turn);
+        let coarse = scheme.properties().resonance_error.filter(|error| turn > error.resolved_turn);
+        let kind = coarse.map(|error| WarningKind::CoarseExcitation {
+            scheme,
+            turn,
+            excess: turn / error.resolved_turn,
+            amplitude: (error.amplitude)(turn),
+            frequency: (error.frequency)(turn),
+        });
+        self.report(kind, of, turn);
     }
 
     fn warn_of_speed(&mut self, body: usize, speed: f64) {
