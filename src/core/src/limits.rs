@@ -36,9 +36,6 @@ const MINORS_UP_TO: usize = 12;
 /// Minors and eigenvalues of a matrix with unit diagonal below this are zero up to rounding.
 const SINGULAR: f64 = 1e-10;
 
-/// Smallest friction coefficient that messages propose: no real contact has less.
-const LEAST_FRICTION: f64 = 1e-4;
-
 /// Directions of the closed contacts of one group: (normal, slip direction) per node.
 pub type ContactDirections = Vec<([f64; 3], [f64; 3])>;
 

@@ -4,13 +4,15 @@ use std::f64::consts::TAU;
 use std::fmt::{Display, Formatter};
 
 use super::finding::{ClosedContact, ErrorKind, Finding, StepGrowth, Subject, WarningKind};
-use super::{Fastest, GROWTH_UP_TO, LEAST_FRICTION, massless, unresolved};
+use super::{Fastest, GROWTH_UP_TO, massless, unresolved};
 use crate::scene::method::{Scheme, Solver};
 use crate::warning::Severity;
 use crate::{Error, Rom, Warning, shown};
 
 /// A motion whose frequency (rad/s) is below this fraction of its rate grows without oscillation while blades cut.
 const SWINGS: f64 = 1e-3;
+/// Smallest friction coefficient that messages propose: no real contact has less.
+const LEAST_FRICTION: f64 = 1e-4;
 /// Growth rates with and without the mass of the contact nodes that agree within this factor count as equal.
 const ALIKE: f64 = 1.25;
 
@@ -170,7 +172,7 @@ impl WarningKind {
                 "the time step destabilises sliding contact: {}, with vibration growing at {}; this may displace the \
                  tips by {:.0} % of the displacement caused by contact",
                 context.contact(&growth.contact),
-                growth.rates(growth.rates.continuous.max(0.0)),
+                growth.compared(growth.rates.continuous.max(0.0)),
                 100.0 * growth.error
             ),
             Self::ReversedGrowth(growth) => {
@@ -286,7 +288,7 @@ impl WarningKind {
 
 impl StepGrowth {
     /// Compares the growth with that in continuous time (1/s).
-    fn rates(&self, continuous: f64) -> String {
+    fn compared(&self, continuous: f64) -> String {
         format!(
             "{:.2e} 1/s in steps of {} s, but at {continuous:.2e} 1/s in continuous time",
             self.rates.stepped,
@@ -397,7 +399,7 @@ impl ErrorKind {
                     "`time.step` is too long for friction: vibration in contact ({}) grows at {}, and this alone may \
                      displace the tips by {:.0} % of the displacement caused by contact",
                     context.contact(&growth.contact),
-                    growth.rates(growth.rates.continuous),
+                    growth.compared(growth.rates.continuous),
                     100.0 * growth.error
                 ),
                 context.remedy([

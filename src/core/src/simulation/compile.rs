@@ -256,10 +256,12 @@ impl Compiled {
         }
     }
 
-    /// Returns the name of a structure of the system for messages: that of its rotor or casing, if there is one.
+    /// Returns the name of a surface carrier of the system for messages: "casing", or its name if there are several or if it is near a
+    /// free body.
     pub fn carrier_name(&self, structure: usize) -> &str {
+        let is_casing = self.carriers.len() == 1 && self.bodies.iter().all(|body| body.translations.is_none());
         match structure.checked_sub(self.bodies.len()) {
-            Some(carrier) if self.carriers.len() > 1 => &self.carrier(carrier).0.name,
+            Some(carrier) if !is_casing => &self.carrier(carrier).0.name,
             _ => "casing",
         }
     }
