@@ -1,6 +1,7 @@
 //! Modal equations of motion and their time stepping.
 
 pub mod bank;
+pub mod coordinates;
 pub mod cyclic;
 pub mod excitation;
 pub mod modal;

@@ -31,6 +31,7 @@ mod window;
 use crate::geometry::PrescribedMotion;
 use crate::scene::ranges;
 use crate::system::{ShapeGrowth, System};
+use crate::time::TimeStepper;
 use crate::variables::{Quantity, StartValue, VariableTable};
 use crate::{Result, Scene, Warning};
 use compile::Compiled;
@@ -121,6 +122,7 @@ pub struct Simulation {
     readers: Vec<outputs::OutputReader>,
     compiled: Compiled,
     system: System,
+    stepper: TimeStepper,
     /// Current value of every reference; strings live in the table.
     values: Vec<f64>,
     /// Real outputs at the previous communication point, for derivatives.
@@ -195,7 +197,8 @@ impl Simulation {
     pub fn new(scene: &Scene) -> Result<Self> {
         let compiled = Compiled::new(scene)?;
         let (table, readers) = table::build(scene)?;
-        let system = compiled.system()?;
+        let mut system = compiled.system()?;
+        let stepper = TimeStepper::new(&mut system, 0.0, 0.0);
         let window = StepWindow::new(system.structures(), &compiled.patches, &compiled.scene.settings.outputs);
         let watched_gaps = WatchedGaps::new(&compiled)?;
         let sets = system.sets().count();
@@ -223,6 +226,7 @@ impl Simulation {
             slave_shares: vec![1.0; pairs],
             compiled,
             system,
+            stepper,
             window,
             watched_gaps,
             communication: Communication::default(),
@@ -326,7 +330,7 @@ impl Simulation {
             self.rotors[body] = RotorAngle::new(self.value_of(Quantity::InitialAngle, body));
         }
         self.find_drives(0.0, start_time);
-        self.system.set_first_step(parameters.step);
+        self.stepper.set_first_step(&mut self.system, parameters.step);
         self.inputs.start();
         self.settle();
         self.launch();
@@ -347,7 +351,7 @@ impl Simulation {
     /// Applies scheme, solver and friction of the parameters; the structures already have their damping.
     fn apply_methods(&mut self, parameters: &limits::Parameters) {
         self.system.set_methods(parameters.scheme, parameters.solver);
-        self.system.prepare_spans(parameters.step, parameters.tolerance);
+        self.stepper = TimeStepper::new(&mut self.system, parameters.step, parameters.tolerance);
         self.prepared = Some(parameters.clone());
         self.apply_friction(parameters);
     }

@@ -4,6 +4,7 @@ pub(crate) mod carrier;
 pub(crate) mod contact_view;
 pub(crate) mod continuation;
 pub(crate) mod delassus;
+pub(crate) mod effort;
 pub(crate) mod event;
 pub(crate) mod failure;
 pub(crate) mod group;
@@ -27,10 +28,9 @@ use crate::modes::sectors::{SectorModel, Sectors};
 use crate::persist::persist_fields;
 use crate::scene::method::{Scheme, Solver};
 use crate::system::history::Two;
-pub use crate::time::galerkin::sector::Effort;
-use crate::time::spans::coupled_set::CoupledSet;
 pub(crate) use contact_view::Bodies;
 pub use contact_view::ContactMember;
+pub use effort::Effort;
 pub use event::ContactEvent;
 pub use failure::StepFailure;
 use group::Reach;
@@ -98,15 +98,11 @@ pub struct System {
     /// Contact groups of the first sets, in the order of the sets.
     pub(crate) groups: Vec<ContactGroup>,
     pub(crate) sets: StructureSets,
-    /// Sets whose sectors are integrated together.
-    pub(crate) coupled_sets: Vec<CoupledSet>,
     pub(crate) settings: SystemSettings,
     pub(crate) events: Two<Vec<ContactEvent>>,
     pub(crate) counted: RunTotals,
     /// Energy of each set before a change of the step size (J).
     mechanical: Vec<f64>,
-    /// Limit of attempted steps, beyond which no sector begins a step.
-    pub(crate) most_tried: u64,
 }
 
 impl System {
@@ -158,8 +154,6 @@ impl System {
             events: Two { now: room(), before: room() },
             counted: RunTotals::new(vec![Ledger::default(); sets.count()]),
             mechanical: vec![0.0; sets.count()],
-            coupled_sets: Vec::new(),
-            most_tried: u64::MAX,
             sets,
             structures,
             pairs,
@@ -253,17 +247,12 @@ impl System {
 
     /// Number of accepted steps, summed over all sectors for adaptive steps.
     pub fn steps_taken(&self) -> u64 {
-        if self.settings.scheme == Scheme::Galerkin { self.counted.effort.steps } else { self.counted.steps }
+        self.counted.effort.steps
     }
 
     /// Number of attempted steps, including accepted ones.
     pub fn steps_tried(&self) -> u64 {
-        if self.settings.scheme == Scheme::Galerkin { self.counted.effort.tried() } else { self.counted.steps }
-    }
-
-    /// Sets the limit of attempted steps ([`System::steps_tried`]), beyond which no sector begins a step.
-    pub(crate) fn allow(&mut self, most_tried: u64) {
-        self.most_tried = most_tried;
+        self.counted.effort.tried()
     }
 
     /// Number of small linear systems that the contact solver has factorised.
@@ -303,6 +292,34 @@ impl System {
         self.settings.scheme = scheme;
         self.settings.solver = solver;
         self.groups.iter_mut().for_each(|group| group.set_solver(solver, &self.structures));
+    }
+
+    /// Finds the gap of every node and the smallest gap of each lane. If `warm`, the search for closest points starts from those
+    /// of the previous step.
+    pub(crate) fn find_gaps(&mut self, warm: bool) {
+        for index in 0..self.pairs.len() {
+            self.pairs[index].find_gaps(&mut self.structures, warm);
+        }
+        for structure in &mut self.structures {
+            structure.find_lowest();
+        }
+    }
+
+    /// Makes the contacts of the last step those of the previous step.
+    pub(crate) fn retire_events(&mut self) {
+        self.events.shift();
+        self.events.now.clear();
+        if self.groups.iter().any(|group| group.law().starts_from_forces()) {
+            self.structures.iter_mut().for_each(|structure| structure.history.keep_forces());
+        }
+        for event in &self.events.before {
+            self.structures[event.structure].forget_force(event.node, event.sector);
+        }
+    }
+
+    /// Sets the prescribed motion of a pair in the middle of the next step, and the growth of its shape, for methods that need them.
+    pub fn set_middle(&mut self, pair: usize, drive: &PrescribedMotion, growth: ShapeGrowth) {
+        self.pairs[pair].middle = (*drive, growth);
     }
 
     /// Clears history and ledger, uses the current modal state as initial state, and evaluates the gaps with the prescribed

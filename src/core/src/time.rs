@@ -1,5 +1,116 @@
-//! Time integration: recurrences with fixed steps, and the continuous Galerkin method with adaptive steps.
+//! Time integration of a system: recurrences with fixed steps, and the continuous Galerkin method with adaptive steps.
+//!
+//! A stepper has tables and scratch memory only. Everything that determines the future is in the [`System`].
 
 pub mod galerkin;
 mod recurrence;
-pub(crate) mod spans;
+
+use crate::geometry::PrescribedMotion;
+use crate::persist::StateReader;
+use crate::scene::method::Scheme;
+use crate::system::{StepFailure, System};
+use galerkin::stepper::Galerkin;
+pub use recurrence::Recurrence;
+
+/// A method that advances a system in time.
+pub trait Stepper {
+    /// Fills the tables for internal steps of length `step` (s). Does not allocate.
+    fn set_step(&mut self, _step: f64) {}
+
+    /// Sets the largest number of attempted steps since the start of the run ([`System::steps_tried`]), beyond which no island begins a
+    /// step.
+    fn allow(&mut self, _most_tried: u64) {}
+
+    /// Advances the system by one internal step to the time described by `drives`, one per contact pair.
+    ///
+    /// # Errors
+    /// A [`StepFailure`]; the state is undefined afterwards.
+    fn step(&mut self, system: &mut System, drives: &[PrescribedMotion]) -> Result<(), StepFailure>;
+
+    /// Advances all sectors in free flight by `length` (s) to the time described by `drives`; rotors turn by `turns` relative to
+    /// the shapes (rad), with one entry of both per pair. During the flight, prescribed motion is linear in time, except that of
+    /// the rotor. Returns false, without any change, if something may come near or if blades vibrate by more than the tolerance.
+    fn fly(&mut self, _system: &mut System, _drives: &[PrescribedMotion], _turns: &[f64], _length: f64) -> bool {
+        false
+    }
+
+    /// Makes the current modal loads those at the start of the next step, if the method interpolates loads.
+    fn begin_loads(&mut self, _system: &mut System) {}
+}
+
+/// The stepper of the scheme of a system.
+#[derive(Debug, Clone)]
+pub enum TimeStepper {
+    /// Two-step recurrences with one step for all structures.
+    Recurrence(Recurrence),
+    /// Continuous Galerkin with adaptive steps of each island.
+    Galerkin(Box<Galerkin>),
+}
+
+impl TimeStepper {
+    /// Creates the stepper of a system for steps up to `longest` (s); adaptive steps have errors within the fraction `tolerance` of the
+    /// smallest clearance. Call it before [`TimeStepper::start`].
+    pub fn new(system: &mut System, longest: f64, tolerance: f64) -> Self {
+        system.structures.iter_mut().for_each(|structure| structure.lowest_in_span = Vec::new());
+        match system.settings.scheme {
+            Scheme::CentralDifference | Scheme::ModalExact | Scheme::MasslessBoundary => Self::Recurrence(Recurrence),
+            Scheme::Galerkin => Self::Galerkin(Box::new(Galerkin::new(system, longest, tolerance))),
+        }
+    }
+
+    /// Returns whether the method chooses its own steps within an internal step.
+    pub fn is_adaptive(&self) -> bool {
+        matches!(self, Self::Galerkin(_))
+    }
+
+    /// Sets the step size `step` (s) from now on; a running state is converted ([`System::set_step`]).
+    pub fn set_step(&mut self, system: &mut System, step: f64) {
+        system.set_step(step);
+        self.stepper().set_step(step);
+    }
+
+    /// Sets the step size `step` (s) without conversion of the state, before the first step.
+    pub fn set_first_step(&mut self, system: &mut System, step: f64) {
+        system.set_first_step(step);
+        self.stepper().set_step(step);
+    }
+
+    /// Restores a saved state of the system.
+    pub fn restore(&mut self, system: &mut System, reader: &mut StateReader) {
+        system.restore(reader);
+        if system.step_size() > 0.0 {
+            self.stepper().set_step(system.step_size());
+        }
+    }
+
+    /// See [`Stepper::allow`].
+    pub fn allow(&mut self, most_tried: u64) {
+        self.stepper().allow(most_tried);
+    }
+
+    /// See [`Stepper::step`].
+    ///
+    /// # Errors
+    /// A [`StepFailure`]; the state is undefined afterwards.
+    #[inline]
+    pub fn step(&mut self, system: &mut System, drives: &[PrescribedMotion]) -> Result<(), StepFailure> {
+        self.stepper().step(system, drives)
+    }
+
+    /// See [`Stepper::fly`].
+    pub fn fly(&mut self, system: &mut System, drives: &[PrescribedMotion], turns: &[f64], length: f64) -> bool {
+        self.stepper().fly(system, drives, turns, length)
+    }
+
+    /// See [`Stepper::begin_loads`].
+    pub fn begin_loads(&mut self, system: &mut System) {
+        self.stepper().begin_loads(system);
+    }
+
+    fn stepper(&mut self) -> &mut dyn Stepper {
+        match self {
+            Self::Recurrence(stepper) => stepper,
+            Self::Galerkin(stepper) => &mut **stepper,
+        }
+    }
+}

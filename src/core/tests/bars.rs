@@ -11,6 +11,7 @@ use tiprub_core::geometry::{FixedGap, GapLaw, PrescribedMotion};
 use tiprub_core::modes::modal::{ModalModel, NodePair};
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::system::{System, SystemSettings};
+use tiprub_core::time::{Recurrence, Stepper};
 use tiprub_reference::carpenter::{self, AREA, DENSITY, GAP, LENGTH, SPEED, YOUNG};
 
 const COURANT: f64 = 0.9;
@@ -69,7 +70,7 @@ fn collide(elements: usize, scheme: Scheme, solver: Solver) -> BarRun {
     while system.steps() as f64 * step < 220e-6 {
         // λ enforces the gap at t_{n+1} and acts as the force at t_n.
         let time = system.steps() as f64 * step;
-        system.step(&[PrescribedMotion::default()]).unwrap();
+        Recurrence.step(&mut system, &[PrescribedMotion::default()]).unwrap();
         let force = system.multiplier(0, 0);
         if force > 0.0 {
             touch = if touch.is_nan() { time } else { touch };

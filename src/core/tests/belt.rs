@@ -15,6 +15,7 @@ use tiprub_core::modes::modal::ModalModel;
 use tiprub_core::modes::sectors::SectorModel;
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::system::{System, SystemSettings};
+use tiprub_core::time::{Recurrence, Stepper, TimeStepper};
 use tiprub_reference::closed::belt::{StickSlipBelt, ThrownBlock};
 
 const MASS: f64 = 2.0;
@@ -61,7 +62,7 @@ fn run(scheme: Scheme, step: f64, sticking: f64, sliding: f64, steps: usize) -> 
     for _ in 0..steps {
         system.bank_mut().loads_mut()[0] = -(if stuck { sticking } else { sliding }) / MASS.sqrt();
         let before = system.bank().row(0, 0);
-        system.step(&[PrescribedMotion::default()]).unwrap();
+        Recurrence.step(&mut system, &[PrescribedMotion::default()]).unwrap();
         let now = system.bank().row(0, 0);
         let slip = now - before - BELT * step;
         stuck = slip.abs() < 1e-9 * BELT * step;
@@ -134,7 +135,7 @@ const THROWN: f64 = 0.5;
 
 /// Returns a block whose contact node has no mass, and a node without contact, whose gap defines the scale of the
 /// tolerance.
-fn by_tolerance(tolerance: f64, longest: f64) -> System {
+fn by_tolerance(tolerance: f64, longest: f64) -> (System, TimeStepper) {
     let fast = 1e5;
     let mut contact_modes = DMatrix::zeros(6, 7);
     contact_modes[(0, 0)] = 1.0 / MASS.sqrt();
@@ -155,11 +156,11 @@ fn by_tolerance(tolerance: f64, longest: f64) -> System {
     });
     let settings = SystemSettings { scheme: Scheme::Galerkin, solver: Solver::Coulomb, ledger: true };
     let mut system = System::alone(SectorModel::Uncoupled(&model, 1), BankOptions::default(), law, FRICTION, settings);
-    system.prepare_spans(longest, tolerance);
-    system.set_step(longest);
+    let mut stepper = TimeStepper::new(&mut system, longest, tolerance);
+    stepper.set_step(&mut system, longest);
     system.bank_mut().set_modal_state(0, 0, 0.0, THROWN * MASS.sqrt());
     system.start(&[PrescribedMotion::default()]);
-    system
+    (system, stepper)
 }
 
 #[test]
@@ -169,10 +170,10 @@ fn adaptive_tolerance_matches_stick_slip_closed_form() {
     let exact = block.motion(longest, count);
     print_row!("it stops {} times", exact.stops);
     for tolerance in [1e-1, 1e-2, 1e-3, 1e-4, 1e-5] {
-        let mut system = by_tolerance(tolerance, longest);
+        let (mut system, mut stepper) = by_tolerance(tolerance, longest);
         let mut worst = 0.0_f64;
         for exact in &exact.positions {
-            system.step(&[PrescribedMotion::default()]).unwrap();
+            stepper.step(&mut system, &[PrescribedMotion::default()]).unwrap();
             worst = worst.max((system.bank().row(0, 0) - exact).abs());
         }
         let (error, effort) = (worst / 1e-3, *system.effort());

@@ -13,6 +13,7 @@ use tiprub_core::limits::massless::MasslessCheck;
 use tiprub_core::modes::modal::ModalModel;
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::system::{System, SystemSettings};
+use tiprub_core::time::{Recurrence, Stepper};
 use tiprub_reference::carpenter;
 use tiprub_test_models::{node, structure};
 
@@ -55,7 +56,7 @@ fn a_bar_bounces_off_without_impact_loss() {
         let before = system.energies();
         let (mut impulse, mut touched, mut released) = (0.0, f64::NAN, 0.0);
         for index in 1..=3000 {
-            system.step(&[PrescribedMotion::default()]).unwrap();
+            Recurrence.step(&mut system, &[PrescribedMotion::default()]).unwrap();
             let force: f64 = system.events().iter().map(|event| event.normal).sum();
             impulse += force * step;
             if force > 0.0 {
@@ -98,7 +99,7 @@ fn pressed(damping_ratio: f64, share: f64) -> (f64, f64) {
     pressed.start(&[PrescribedMotion::default()]);
     let (mut most, mut last) = (0.0_f64, [f64::INFINITY, f64::NEG_INFINITY]);
     for step in 0..4000 {
-        if pressed.step(&[PrescribedMotion::default()]).is_err() {
+        if Recurrence.step(&mut pressed, &[PrescribedMotion::default()]).is_err() {
             return (f64::INFINITY, f64::INFINITY);
         }
         // Fixed obstacles have no axis, so the force is the unrotated one on the node.
@@ -234,7 +235,7 @@ fn friction_opposes_sliding_for_any_step_length() {
             let (mut system, step) = dragged(step, solver);
             let mut time = 0.0;
             while time < 1e-4 {
-                system.step(&[PrescribedMotion::default()]).unwrap();
+                Recurrence.step(&mut system, &[PrescribedMotion::default()]).unwrap();
                 time += step;
                 let event = system.events()[0];
                 assert!((event.force[1] + 0.3 * event.normal).abs() < 1e-12 * event.normal, "h = {step:e}: {event:?}");

@@ -373,7 +373,7 @@ impl Simulation {
         } else {
             self.apply_methods(&parameters);
         }
-        self.system.restore(reader);
+        self.stepper.restore(&mut self.system, reader);
         if self.phase != SimulationPhase::Created {
             self.renew_limits();
         }
@@ -407,7 +407,7 @@ impl Simulation {
         // Magic, version, scene.
         [0_u64; 3].restore(reader);
         self.read_values(reader);
-        self.system.restore(reader);
+        self.stepper.restore(&mut self.system, reader);
     }
 
     /// Reads a state without the part of the system.

@@ -3,7 +3,7 @@
 use super::limits::Parameters;
 use super::{Communication, Simulation, SimulationPhase};
 use crate::limits::finding::Subject;
-use crate::time::galerkin::sector::shortest;
+use crate::time::galerkin::tables::shortest;
 use crate::variables::Quantity;
 use crate::warning::Topic;
 use crate::{Error, Result, Warning, shown, shown_time};
@@ -15,7 +15,7 @@ const LEFT: f64 = 4.0;
 impl Simulation {
     /// Returns whether sectors take adaptive steps.
     pub(super) fn is_marched(&self) -> bool {
-        self.system.settings().scheme.properties().adaptive
+        self.stepper.is_adaptive()
     }
 
     /// Returns whether a communication step has begun and not ended.
@@ -54,9 +54,9 @@ impl Simulation {
     pub(super) fn allow_steps(&mut self) -> Result<()> {
         let Communication { length, done, tried, most, .. } = self.communication;
         if most == 0 {
-            self.system.allow(u64::MAX);
+            self.stepper.allow(u64::MAX);
         } else if self.is_marched() {
-            self.system.allow(tried + most);
+            self.stepper.allow(tried + most);
         } else if done >= most {
             return Err(self.exhausted(length, most));
         }
@@ -161,7 +161,7 @@ impl Simulation {
                 angle.total(speed, offset) - angle.total(speed, 0.0) - (shape.at(offset) - shape.at(0.0));
         }
         self.find_drives(offset, time);
-        if self.system.fly(&self.drives, &self.turns, offset) {
+        if self.stepper.fly(&mut self.system, &self.drives, &self.turns, offset) {
             self.window.add(&self.system, (&self.compiled.patches, &self.compiled.linings), offset);
             self.communication.done = last;
         }

@@ -101,7 +101,7 @@ impl Simulation {
         // No errors from here on.
         self.set_out_tangent();
         if !keeps {
-            self.system.set_step(step);
+            self.stepper.set_step(&mut self.system, step);
             if self.system.steps() == 0 {
                 // Increments of the first step are the velocity times its length.
                 self.launch();
@@ -306,10 +306,10 @@ impl Simulation {
         self.find_drives(offset, time);
         self.load(before);
         if self.is_marched() {
-            self.system.begin_loads();
+            self.stepper.begin_loads(&mut self.system);
             self.load(offset);
         }
-        match self.system.step(&self.drives) {
+        match self.stepper.step(&mut self.system, &self.drives) {
             Ok(()) => {}
             Err(StepFailure::Exhausted) => return Err(self.abandon_step()),
             Err(failure) => return Err(self.fail(failure, time)),

@@ -48,7 +48,6 @@ impl System {
                 self.counted.ledgers[set].step_change.add(change);
                 self.counted.ledgers[set].turnover.add(change.abs());
             }
-            self.coupled_sets.iter_mut().for_each(|coupled_sets| coupled_sets.set_span(step));
         } else {
             self.set_first_step(step);
         }
@@ -58,7 +57,6 @@ impl System {
     pub fn set_first_step(&mut self, step: f64) {
         let scheme = self.settings.scheme;
         self.structures.iter_mut().for_each(|structure| structure.set_step(scheme, step));
-        self.coupled_sets.iter_mut().for_each(|coupled_sets| coupled_sets.set_span(step));
     }
 
     /// Instantaneous kinetic and strain energy of all structures (J), ½q̇ᵀMq̇ and ½qᵀKq, between steps only. `each` is called
@@ -233,9 +231,6 @@ impl System {
                 structure.set_step(self.settings.scheme, step);
             }
             structure.restore(reader);
-        }
-        if step > 0.0 {
-            self.coupled_sets.iter_mut().for_each(|coupled_sets| coupled_sets.set_span(step));
         }
         self.pairs.iter_mut().for_each(|pair| pair.state_mut().restore(reader));
         self.groups.iter_mut().for_each(|group| group.law_mut().restore(reader));

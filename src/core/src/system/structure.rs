@@ -8,9 +8,6 @@ use crate::persist::{Persist, StateReader, StateWriter, persist_fields};
 use crate::scene::method::Scheme;
 use crate::system::history::ContactHistory;
 use crate::system::pulling::Pulling;
-use crate::time::galerkin::sector::HALVINGS;
-use crate::time::galerkin::state::SectorState;
-use crate::time::spans::Galerkin;
 
 /// Penetrations below this count as zero (m): the squares of the resulting values leave the range of double precision, and such
 /// small modes are set to rest.
@@ -34,8 +31,6 @@ pub struct Structure {
     pub(crate) delayed: Vec<f64>,
     /// Step control of each sector, for adaptive steps of single sectors.
     pub(crate) step_control: StepControl,
-    /// Tables and scratch memory for adaptive steps.
-    pub(crate) galerkin: Option<Box<Galerkin>>,
     /// Smallest gaps within the last span (m), `[node · lanes + lane]`, if the scheme evaluates them; otherwise empty.
     pub(crate) lowest_in_span: Vec<f64>,
 }
@@ -67,11 +62,6 @@ impl StepControl {
             normals: vec![0.0; 3 * contacts],
         }
     }
-
-    /// Returns the number of halvings of the span of a sector.
-    pub fn level_of(&self, sector: usize) -> usize {
-        usize::try_from(self.level[sector]).unwrap_or(HALVINGS).min(HALVINGS)
-    }
 }
 
 impl Structure {
@@ -91,7 +81,6 @@ impl Structure {
             lowest: vec![f64::INFINITY; modes.lanes()],
             delayed: Vec::new(),
             step_control: StepControl::new(modes.sectors(), contacts),
-            galerkin: None,
             lowest_in_span: Vec::new(),
             pair_of,
             lanes: modes.lanes(),
@@ -112,7 +101,6 @@ impl Structure {
             lowest: Vec::new(),
             delayed: vec![0.0; model.len()],
             step_control: StepControl::default(),
-            galerkin: None,
             lowest_in_span: Vec::new(),
             lanes: modes.lanes(),
             modes,
@@ -193,40 +181,11 @@ impl Structure {
         &self.delayed
     }
 
-    /// Reads the contacts of a sector before a span.
-    pub(crate) fn read_contacts(&self, sector: usize, state: &mut SectorState) {
-        for node in 0..self.nodes() {
-            let index = self.index(node, sector);
-            state.multipliers[node] = self.history.multiplier[index];
-            state.gaps[node] = self.history.gap.before[index];
-            state.normals[3 * node..3 * node + 3].copy_from_slice(&self.vector3(
-                &self.step_control.normals,
-                node,
-                sector,
-            ));
-            state.forces[3 * node..3 * node + 3].copy_from_slice(&self.vector3(&self.history.force.now, node, sector));
-        }
-        for (row, slope) in state.slopes.iter_mut().enumerate() {
-            *slope = self.step_control.slopes[row * self.lanes + sector];
-        }
-        state.gaps_known = true;
-    }
-
-    /// Writes the contacts of a sector after a span, and the smallest gap of each node during the span (m).
-    pub(crate) fn write_contacts(&mut self, sector: usize, state: &SectorState, lowest: impl Fn(usize) -> f64) {
-        for (row, slope) in state.slopes.iter().enumerate() {
-            self.step_control.slopes[row * self.lanes + sector] = *slope;
-        }
-        for node in 0..self.nodes() {
-            let index = self.index(node, sector);
-            self.history.multiplier[index] = state.multipliers[node];
-            self.lowest_in_span[index] = lowest(node);
-            for component in 0..3 {
-                let (row, of_state) = ((3 * node + component) * self.lanes + sector, 3 * node + component);
-                self.history.force.now[row] = state.forces[of_state];
-                self.step_control.normals[row] = state.normals[of_state];
-            }
-        }
+    /// Makes the current values the previous ones, before a step of a method that finds them within the step.
+    pub(crate) fn begin_span(&mut self) {
+        self.history.gap.shift();
+        self.history.geometry.shift();
+        self.modes.begin_span();
     }
 
     /// Three components of a node of a sector from an array over rows.
@@ -329,19 +288,11 @@ impl Structure {
     /// Sets the step size (s), at rest or without conversion of the state.
     pub(crate) fn set_step(&mut self, scheme: Scheme, step: f64) {
         self.modes.set_step(scheme, step);
-        self.set_span(step);
-    }
-
-    fn set_span(&mut self, span: f64) {
-        if let Some(galerkin) = &mut self.galerkin {
-            galerkin.set_span(span);
-        }
     }
 
     /// Converts the state to another step size under the persistent contact forces.
     pub(crate) fn carry_over(&mut self, scheme: Scheme, step: f64) {
         self.modes.resample(scheme, step, &self.history.passing.lasting);
-        self.set_span(step);
     }
 
     /// Instantaneous kinetic and strain energy under the persistent contact forces (J).

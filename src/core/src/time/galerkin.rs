@@ -1,24 +1,31 @@
-//! Continuous Galerkin in time of one sector: contact forces are polynomials, the modes follow them exactly, and a tolerance
-//! controls the steps.
+//! Continuous Galerkin in time: contact forces are polynomials, the modes follow them exactly, and a tolerance controls the steps.
 //!
-//! [`level`] makes tables of all modes for one step length, from the [`response`] of each mode and the points of a [`basis`].
-//! [`trial`] solves the contact problem at these points, as lanes of registers ([`compliance`], [`kernels`]), and judges the
-//! step. [`sector`] accepts it ([`advance`]) or tries a step of half the length. The surfaces are a [`trial::Obstacle`], and a
-//! [`sector::Witness`] records the steps; this module is independent of the scene. A [`flight`] lasts as long as nothing comes
-//! near.
+//! [`level`] makes tables of all modes for one step length, from the [`response`] of each mode and the points of a [`basis`]; [`tables`] has
+//! them for all lengths. [`trial`] solves the contact problem of a sector at these points, as lanes of registers ([`compliance`],
+//! [`kernels`]), and judges the step. An [`island`] accepts it ([`advance`]) or tries a step of half the length, over a [`span`]. What its
+//! sectors touch are its [`surroundings`]; up to here everything is independent of the scene. A [`scene_island`] belongs to a system, and
+//! the [`stepper`] has all of them. A [`flight`] lasts as long as nothing comes near.
 
 pub mod advance;
 pub mod basis;
+pub mod carrier;
 pub mod compliance;
+mod disk;
 pub mod flight;
+pub mod island;
 pub mod kernels;
 pub mod level;
-pub mod march;
+mod obstacle_view;
+mod record;
 pub mod response;
 pub mod rows;
-pub mod sector;
+mod scene_island;
 pub mod shared_body;
+pub mod span;
 pub mod state;
+pub mod stepper;
+pub mod surroundings;
+pub mod tables;
 #[cfg(test)]
 mod tests;
 pub mod trial;

@@ -6,6 +6,7 @@ use crate::guide::print_row;
 use crate::rods::{NEARLY_NONE, SCHEMES, SOLVERS, StraightRod, against_plane, orders, quiet_step, set_samples};
 use tiprub_core::geometry::PrescribedMotion;
 use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::time::{Recurrence, Stepper};
 use tiprub_reference::closed::bouncing_bar::{
     CONTACTS, DENSITY, GRAVITY, HEIGHT, LENGTH, PERIOD, YOUNG, displacement, energy, pressure,
 };
@@ -68,7 +69,7 @@ fn bounce(elements: usize, scheme: Scheme, solver: Solver, fraction: f64) -> Bou
     while (system.steps() as f64) * step < PERIODS as f64 * PERIOD {
         let acting = system.steps() as f64 * step + delay;
         system.bank_mut().loads_mut()[0] = weight;
-        system.step(&[PrescribedMotion::default()]).unwrap();
+        Recurrence.step(&mut system, &[PrescribedMotion::default()]).unwrap();
         let (time, force) = (system.steps() as f64 * step, system.multiplier(0, 0));
         // The series is expensive: every mesh uses the same number of samples.
         if system.steps().is_multiple_of((elements / 25) as u64) {

@@ -10,6 +10,7 @@ use tiprub_core::modes::modal::ModalModel;
 use tiprub_core::persist::{Persist, StateReader, StateWriter};
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::system::System;
+use tiprub_core::time::{Recurrence, Stepper};
 use tiprub_core::{Ledger, Sum};
 
 /// Returns a rod of 12 elements, whose contact node has mass or not as the scheme requires.
@@ -44,7 +45,7 @@ fn march(system: &mut System, steps: u64, load: Option<f64>) -> [f64; 2] {
         if let Some(load) = load {
             system.bank_mut().loads_mut()[0] = load;
         }
-        system.step(&[PrescribedMotion::default()]).unwrap();
+        Recurrence.step(system, &[PrescribedMotion::default()]).unwrap();
     };
     // The first steps find the contact that is closed from the start.
     for _ in 0..4 {
@@ -84,7 +85,7 @@ fn closed(scheme: Scheme, steps: u64) -> [f64; 2] {
     for index in 0..20_000 {
         let share = f64::from(index) / 20_000.0;
         system.bank_mut().loads_mut()[0] = 0.5 * load * share * share * (3.0 - 2.0 * share);
-        system.step(&[PrescribedMotion::default()]).unwrap();
+        Recurrence.step(&mut system, &[PrescribedMotion::default()]).unwrap();
     }
     let losses = system.ledger().impact_loss.value();
     let found = march(&mut system, steps, Some(load));

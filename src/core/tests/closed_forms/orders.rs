@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use tiprub_core::geometry::PrescribedMotion;
 use tiprub_core::modes::modal::ModalModel;
 use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::time::{Recurrence, Stepper};
 use tiprub_reference::closed::oscillator::{Bilinear, DeadStop};
 
 /// A gap that never closes.
@@ -73,7 +74,7 @@ fn smooth_error(scheme: Scheme, solver: Solver, step: f64, force: Option<(f64, f
             let load = size * (omega * system.steps() as f64 * step).cos();
             system.bank_mut().loads_mut()[..MODES.len()].fill(load);
         }
-        system.step(&[PrescribedMotion::default()]).unwrap();
+        Recurrence.step(&mut system, &[PrescribedMotion::default()]).unwrap();
         let time = system.steps() as f64 * step;
         let place: f64 = (0..MODES.len()).map(|mode| MODES[mode].1 * exact(mode, time)).sum();
         worst = worst.max((system.bank().row(0, 0) - place).abs());
@@ -188,7 +189,7 @@ impl PressedChain {
         while system.steps() as f64 * step < 0.1 {
             let time = system.steps() as f64 * step;
             system.bank_mut().loads_mut().copy_from_slice(push.as_slice());
-            system.step(&[PrescribedMotion::default()]).unwrap();
+            Recurrence.step(&mut system, &[PrescribedMotion::default()]).unwrap();
             let first: f64 =
                 (0..MASSES).map(|mode| self.model.shapes[(0, mode)] * system.bank().modal_state(mode, 0).0).sum();
             let (place, force) = (self.exact(time + step)[0], self.multiplier(time));
@@ -259,7 +260,7 @@ impl PressedMassless {
                     system.bank_mut().loads_mut()[mode] -= shape * acting;
                 }
             }
-            system.step(&[PrescribedMotion::default()]).unwrap();
+            Recurrence.step(&mut system, &[PrescribedMotion::default()]).unwrap();
             let time = system.steps() as f64 * step;
             let place = self.exact(time);
             acting = seen(&place) / 1e-5;
@@ -316,7 +317,7 @@ fn dead_error(scheme: Scheme, solver: Solver, step: f64, shift: f64, factor: f64
     set_samples(&mut system, &model, 0, swing(0.0), swing(-step));
     system.start(&[PrescribedMotion::default()]);
     while system.steps() as f64 * step < 0.085 {
-        system.step(&[PrescribedMotion::default()]).unwrap();
+        Recurrence.step(&mut system, &[PrescribedMotion::default()]).unwrap();
     }
     let time = system.steps() as f64 * step + shift;
     (system.bank().row(0, 0) - case.position(time)) / case.amplitude
@@ -334,7 +335,7 @@ fn elastic_error(solver: Solver, step: f64, shift: f64, factor: f64) -> [f64; 2]
     system.start(&[PrescribedMotion::default()]);
     let before = system.ledger().initial;
     while system.steps() as f64 * step < 4.0 * case.period() {
-        system.step(&[PrescribedMotion::default()]).unwrap();
+        Recurrence.step(&mut system, &[PrescribedMotion::default()]).unwrap();
     }
     let (time, (kinetic, strain)) = (system.steps() as f64 * step + shift, system.energies());
     let place = system.bank().modal_state(0, 0).0;

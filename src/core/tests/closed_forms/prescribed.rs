@@ -13,6 +13,7 @@ use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::rom::WatchedPoints;
 use tiprub_core::scene::settings::{Interpolation, LoadSettings, Shape, SplineSettings};
 use tiprub_core::system::{PairParts, StructureParts, SurfaceCarrier, System, SystemSettings};
+use tiprub_core::time::{Recurrence, Stepper};
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{self as models, element, go, lattice, move_on, real, reference, set, started};
 
@@ -377,7 +378,7 @@ fn friction_reduces_amplitude_equally_every_half_period() {
                 let normal = PRESS * PRESS * pressed;
                 let (mut turns, mut last) = (Vec::new(), amplitude);
                 while turns.len() < 6 {
-                    system.step(&[PrescribedMotion::default()]).unwrap();
+                    Recurrence.step(&mut system, &[PrescribedMotion::default()]).unwrap();
                     let bank = system.structures()[usize::from(plane)].modes();
                     let (now, increment) = bank.modal_state(0, 0);
                     let towards = if turns.len() % 2 == 0 { -1.0 } else { 1.0 };

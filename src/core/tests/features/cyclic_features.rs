@@ -7,6 +7,7 @@ use proptest::prelude::*;
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::rom::{Harmonic, Rom};
 use tiprub_core::scene::settings::{LoadSettings, PatchSettings, Shape, SplineSettings};
+use tiprub_core::time::{Recurrence, Stepper};
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{
     self as models, coating,
@@ -262,7 +263,7 @@ fn a_change_of_step_keeps_the_order_of_the_scheme() {
         system.start(&[drive]);
         for step in steps {
             system.set_step(*step);
-            system.step(&[drive]).unwrap();
+            Recurrence.step(&mut system, &[drive]).unwrap();
         }
         system.bank().displacement().to_vec()
     };

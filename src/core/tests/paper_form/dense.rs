@@ -6,6 +6,7 @@ use tiprub_core::modes::modal::ModalModel;
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::rom::Rom;
 use tiprub_core::system::{System, SystemSettings};
+use tiprub_core::time::{Recurrence, Stepper};
 use tiprub_reference::paper::DenseFilm;
 use tiprub_test_models::{SeededRandom, node, structure};
 
@@ -77,7 +78,7 @@ fn a_thousand_contact_steps_agree_to_rounding() {
     let gaps = DVector::from_row_slice(&gaps);
     let (mut contact_steps, mut steps, mut worst, mut scale) = (0, 0, 0.0_f64, 0.0_f64);
     while contact_steps < 1000 {
-        system.step(&[PrescribedMotion::default()]).unwrap();
+        Recurrence.step(&mut system, &[PrescribedMotion::default()]).unwrap();
         let multipliers = paper.step(&normal, &slip, &gaps);
         let ours = physical(&system, false);
         worst = worst.max((&ours - &paper.now).amax());

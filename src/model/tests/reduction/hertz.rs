@@ -8,6 +8,7 @@ use tiprub_core::geometry::{FixedGap, GapLaw, PrescribedMotion};
 use tiprub_core::modes::modal::{ModalModel, NodePair};
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::system::{System, SystemSettings};
+use tiprub_core::time::{Recurrence, Stepper};
 use tiprub_model::assembly::assemble_with;
 use tiprub_model::craig_bampton::craig_bampton;
 use tiprub_model::element::{ElementKind, Formulation};
@@ -147,7 +148,7 @@ fn at_rest(block: &HertzBlock, model: &ModalModel, solver: Solver, approach: f64
     system.set_step(0.5 / model.frequencies[0]);
     system.start(&[PrescribedMotion::default()]);
     for _ in 0..200 {
-        system.step(&[PrescribedMotion::default()]).unwrap();
+        Recurrence.step(&mut system, &[PrescribedMotion::default()]).unwrap();
     }
     let nodes = block.distance.len();
     let forces: Vec<f64> = (0..nodes).map(|node| system.multiplier(node, 0)).collect();
@@ -271,7 +272,7 @@ fn sphere_impact_on_block_matches_hertz() {
         system.start(&[PrescribedMotion::default()]);
         let (mut release, mut force, mut deepest, mut impulse) = (0.0, 0.0_f64, 0.0_f64, 0.0);
         while (system.steps() as f64) * step < 1.2 * duration {
-            system.step(&[PrescribedMotion::default()]).unwrap();
+            Recurrence.step(&mut system, &[PrescribedMotion::default()]).unwrap();
             let now: f64 = 4.0 * (0..nodes).map(|node| system.multiplier(node, 0)).sum::<f64>();
             if now > 0.0 {
                 release = system.steps() as f64 * step;

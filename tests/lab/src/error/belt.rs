@@ -6,6 +6,7 @@ use tiprub_core::limits::{self, massless};
 use tiprub_core::modes::{bank::BankOptions, modal::ModalModel, sectors::SectorModel};
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::system::{System, SystemSettings};
+use tiprub_core::time::TimeStepper;
 use tiprub_reference::closed::belt::ThrownBlock;
 
 use super::{
@@ -78,16 +79,15 @@ impl BeltCase {
         let mut system = System::alone(sector, BankOptions::default(), law, FRICTION, settings);
         let by_tolerance = scheme == Scheme::Galerkin;
         let step = if by_tolerance { INTERVAL } else { INTERVAL / f64::from(division) };
-        if by_tolerance {
-            system.prepare_spans(step, 1.0 / f64::from(division));
-        } else {
+        if !by_tolerance {
             let largest = self.model.frequencies[self.model.dynamic_modes(scheme) - 1];
             limits::check_step(largest, scheme, step).map_err(|error| error.to_string())?;
             if scheme == Scheme::MasslessBoundary && step >= self.massless_limit.usable {
                 return Err(massless::refusal(step, self.massless_limit).to_string());
             }
         }
-        system.set_step(step);
+        let mut stepper = TimeStepper::new(&mut system, step, 1.0 / f64::from(division));
+        stepper.set_step(&mut system, step);
         let velocity = BLOCK.velocity * (1.0 + perturbation) * BLOCK.mass.sqrt();
         system.bank_mut().set_modal_state(0, 0, 0.0, velocity);
         // The mode that the belt presses back, if it has inertia.
@@ -97,7 +97,7 @@ impl BeltCase {
             system.bank_mut().set_modal_state(normal, 0, amplitude, 0.0);
         }
         system.start(&[PrescribedMotion::default()]);
-        Ok(BeltRun { system, step, count: if by_tolerance { 1 } else { division } })
+        Ok(BeltRun { system, stepper, step, count: if by_tolerance { 1 } else { division } })
     }
 
     fn samples_of(&self) -> usize {
@@ -226,6 +226,7 @@ impl ErrorCase for BeltCase {
 /// A run of the block.
 struct BeltRun {
     system: System,
+    stepper: TimeStepper,
     /// Length of fixed steps, or the longest adaptive step (s), and their number per sample.
     step: f64,
     count: u32,
@@ -233,7 +234,7 @@ struct BeltRun {
 
 impl BeltRun {
     fn one(&mut self) -> Result<(), String> {
-        let stepped = self.system.step(&[PrescribedMotion::default()]);
+        let stepped = self.stepper.step(&mut self.system, &[PrescribedMotion::default()]);
         stepped.map_err(|failure| format!("step {} failed: {failure:?}", self.system.steps()))
     }
 }

@@ -4,12 +4,17 @@
 //! has no loads.
 
 use nalgebra::{DMatrix, DVector};
+use tiprub_core::modes::coordinates::ContactModes;
 use tiprub_core::modes::modal::ModalModel;
 use tiprub_core::scene::method::Scheme;
+use tiprub_core::system::Effort;
 use tiprub_core::time::galerkin::{
-    level::{ContactModes, StepTables},
-    sector::{AcceptedStep, Effort, SectorIntegrator, StepGoal, Tables, Witness},
+    island::Island,
+    level::StepTables,
+    span::StepGoal,
     state::SectorState,
+    surroundings::{AcceptedStep, CarriersInStep, Surroundings, Witness},
+    tables::Tables,
     trial::{ForceInterpolation, Obstacle, SlidingState},
 };
 
@@ -40,7 +45,7 @@ impl RigidObstacle {
     }
 }
 
-impl Obstacle for RigidObstacle {
+impl Obstacle for &mut RigidObstacle {
     fn gap(&mut self, _: usize, point: usize, moved: [f64; 3]) -> (f64, [f64; 3]) {
         (self.gap_at(self.times[point], moved[0]), NORMAL)
     }
@@ -50,7 +55,15 @@ impl Obstacle for RigidObstacle {
     }
 }
 
-impl Witness for RigidObstacle {
+impl Surroundings for RigidObstacle {
+    type Surfaces<'a> = &'a mut Self;
+
+    fn surfaces<'a>(&'a mut self, _: usize, _: CarriersInStep<'a>) -> &'a mut Self {
+        self
+    }
+}
+
+impl Witness for &mut RigidObstacle {
     fn begin_step(&mut self, from: f64, length: f64, level: &StepTables, kind: ForceInterpolation) {
         for (point, time) in self.times.iter_mut().enumerate() {
             let theta = match kind {
@@ -65,7 +78,7 @@ impl Witness for RigidObstacle {
         false
     }
 
-    fn record_flight(&mut self, _: f64) {}
+    fn record_damping(&mut self, _: f64) {}
 
     fn record_step(&mut self, step: &AcceptedStep) {
         let length = step.level.step;
@@ -91,11 +104,9 @@ impl Witness for RigidObstacle {
 pub(crate) struct RodMarch<'a> {
     rod: &'a CoreRod,
     dynamic: usize,
-    tables: Tables,
-    state: SectorState,
-    marcher: SectorIntegrator,
+    island: Island,
     ground: RigidObstacle,
-    demand: StepGoal,
+    goal: StepGoal,
     effort: Effort,
 }
 
@@ -105,7 +116,9 @@ impl<'a> RodMarch<'a> {
         let model = &rod.model;
         let dynamic = model.dynamic_modes(Scheme::Galerkin);
         let modes = modes_of(model, dynamic);
-        let mut state = SectorState::new(dynamic, 1);
+        let mut island = Island::of_one(Tables::new(modes.clone(), interval));
+        island.set_span(interval);
+        let state = &mut island.sectors[0].state;
         for mode in 0..dynamic {
             let loaded = rod.loaded(mode, 0.0)[0];
             (state.position[mode], state.velocity[mode]) = (rod.start[0][mode] - loaded, rod.start[1][mode]);
@@ -130,31 +143,31 @@ impl<'a> RodMarch<'a> {
         }
         state.gaps[0] = gap.max(0.0);
         state.normals.copy_from_slice(&NORMAL);
-        let mut tables = Tables::new(modes, interval);
-        tables.set_span(interval);
         let tolerance = tolerance * rod.length;
         let precision = (PRECISION[0] * tolerance).max(PRECISION[1] * rod.length);
         Self {
             rod,
             dynamic,
-            tables,
-            state,
-            marcher: SectorIntegrator::new(dynamic, 1),
+            island,
             ground,
-            demand: StepGoal { tolerance, precision, most: u64::MAX },
+            goal: StepGoal { tolerance, precision, most: u64::MAX },
             effort: Effort::default(),
         }
     }
 
+    fn state(&self) -> &SectorState {
+        &self.island.sectors[0].state
+    }
+
     /// Returns modal displacements and velocities, including those by loads and contact forces.
     fn modal(&self) -> [DVector<f64>; 2] {
-        let (model, time) = (&self.rod.model, self.ground.span[0]);
+        let (model, time, state) = (&self.rod.model, self.ground.span[0], self.state());
         let both = |mode: usize| {
             let [moved, speed] = self.rod.loaded(mode, time);
             if mode < self.dynamic {
-                return [self.state.position[mode] + moved, self.state.velocity[mode] + speed];
+                return [state.position[mode] + moved, state.velocity[mode] + speed];
             }
-            let force: f64 = (0..3).map(|row| model.contact_modes[(row, mode)] * self.state.forces[row]).sum();
+            let force: f64 = (0..3).map(|row| model.contact_modes[(row, mode)] * state.forces[row]).sum();
             [moved + force / model.frequencies[mode].powi(2), 0.0]
         };
         [0, 1].map(|of| DVector::from_fn(model.len(), |mode, _| both(mode)[of]))
@@ -178,8 +191,8 @@ fn modes_of(model: &ModalModel, dynamic: usize) -> ContactModes {
 
 impl TimedRun for RodMarch<'_> {
     fn advance(&mut self) -> Result<(), String> {
-        let Self { tables, state, marcher, ground, demand, effort, .. } = self;
-        let marched = marcher.march(tables, state, ground, *demand, effort);
+        let Self { island, ground, goal, effort, .. } = self;
+        let marched = island.begin(ground, *goal).integrate(effort);
         ground.span[0] += ground.span[1];
         marched.map_err(|stopped| format!("{stopped:?} at t = {} s", ground.span[0]))
     }

@@ -6,6 +6,7 @@ use tiprub_core::limits::{self, massless};
 use tiprub_core::modes::{bank::BankOptions, modal::ModalModel, sectors::SectorModel};
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::system::{System, SystemSettings};
+use tiprub_core::time::{Recurrence, Stepper};
 use tiprub_reference::reduced::bars::RodModel;
 use tiprub_test_models::{node, structure};
 
@@ -119,7 +120,7 @@ pub(crate) struct RodRun<'a> {
 impl RodRun<'_> {
     fn one(&mut self) -> Result<(), String> {
         self.system.bank_mut().loads_mut().copy_from_slice(&self.rod.load);
-        let stepped = self.system.step(&[PrescribedMotion::default()]);
+        let stepped = Recurrence.step(&mut self.system, &[PrescribedMotion::default()]);
         stepped.map_err(|failure| format!("step {} failed: {failure:?}", self.system.steps()))
     }
 

@@ -1,10 +1,15 @@
 //! Random sectors against a wall, without a scene: energy over very many switches, contact problems without a solution.
 
 use nalgebra::DMatrix;
+use tiprub_core::modes::coordinates::ContactModes;
+use tiprub_core::system::Effort;
 use tiprub_core::time::galerkin::{
-    level::{ContactModes, StepTables},
-    sector::{AcceptedStep, Effort, SectorIntegrator, StepGoal, Tables, Witness},
+    island::{Island, StepControl},
+    level::StepTables,
+    span::StepGoal,
     state::SectorState,
+    surroundings::{AcceptedStep, CarriersInStep, Surroundings, Witness},
+    tables::Tables,
     trial::{ForceInterpolation, Obstacle, SlidingState},
 };
 use tiprub_test_models::SeededRandom;
@@ -37,7 +42,7 @@ struct ScatterWall {
     dropped: f64,
 }
 
-impl Obstacle for ScatterWall {
+impl Obstacle for &mut ScatterWall {
     fn gap(&mut self, _: usize, _: usize, moved: [f64; 3]) -> (f64, [f64; 3]) {
         (self.place - moved[0], [-1.0, 0.0, 0.0])
     }
@@ -47,14 +52,22 @@ impl Obstacle for ScatterWall {
     }
 }
 
-impl Witness for ScatterWall {
+impl Surroundings for ScatterWall {
+    type Surfaces<'a> = &'a mut Self;
+
+    fn surfaces<'a>(&'a mut self, _: usize, _: CarriersInStep<'a>) -> &'a mut Self {
+        self
+    }
+}
+
+impl Witness for &mut ScatterWall {
     fn begin_step(&mut self, _: f64, _: f64, _: &StepTables, _: ForceInterpolation) {}
 
     fn is_clear(&self, _: f64, _: f64, reach: &[f64]) -> bool {
         reach.iter().step_by(3).all(|reach| *reach < self.place)
     }
 
-    fn record_flight(&mut self, _: f64) {}
+    fn record_damping(&mut self, _: f64) {}
 
     fn record_step(&mut self, step: &AcceptedStep) {
         self.dropped += step.dropped;
@@ -84,9 +97,9 @@ const MOST_TRIED: u64 = 100;
 pub(super) fn energy(tolerance: f64, switches: u64) -> Option<SectorEnergy> {
     let (span, nodes, count) = (4e-5, 2, 10);
     let modes = modes(count, nodes, 1.0, &mut SeededRandom(11));
-    let mut tables = Tables::new(modes.clone(), span);
-    tables.set_span(span);
-    let (mut state, mut marcher) = (SectorState::new(count, nodes), SectorIntegrator::new(count, nodes));
+    let mut island = Island::of_one(Tables::new(modes.clone(), span));
+    island.set_span(span);
+    let state = &mut island.sectors[0].state;
     for (mode, v) in state.velocity.iter_mut().enumerate() {
         *v = 0.5 / (mode + 1) as f64;
     }
@@ -96,14 +109,20 @@ pub(super) fn energy(tolerance: f64, switches: u64) -> Option<SectorEnergy> {
         let (kinetic, strain) = state.energies(&modes.frequencies, &modes.residual);
         kinetic + strain
     };
-    let (start, mut most, mut effort) = (energy(&state), 0.0_f64, Effort::default());
-    let demand = StepGoal { tolerance, precision: 1e-15, most: u64::MAX };
+    let (start, mut most, mut effort) = (energy(&island.sectors[0].state), 0.0_f64, Effort::default());
+    let goal = StepGoal { tolerance, precision: 1e-15, most: u64::MAX };
     // The losses of switches may end contact permanently.
     while wall.switches < switches && effort.tried() < MOST_TRIED * switches {
-        marcher.march(&tables, &mut state, &mut wall, demand, &mut effort).ok()?;
-        most = most.max(energy(&state));
+        island.begin(&mut wall, goal).integrate(&mut effort).ok()?;
+        most = most.max(energy(&island.sectors[0].state));
     }
-    Some(SectorEnergy { tolerance, switches: wall.switches, most: most / start, left: energy(&state) / start, effort })
+    Some(SectorEnergy {
+        tolerance,
+        switches: wall.switches,
+        most: most / start,
+        left: energy(&island.sectors[0].state) / start,
+        effort,
+    })
 }
 
 /// Statistics of contact problems.
@@ -134,15 +153,17 @@ pub(super) fn problems(degree: usize, friction: f64, trials: u64) -> Problems {
             continue;
         }
         tables.set_span(span);
-        let mut marcher = SectorIntegrator::new(count, nodes);
+        let mut island = Island::of_one(tables);
         for _ in 0..20 {
-            let mut state = SectorState::new(count, nodes);
+            island.control = StepControl::default();
+            let state = &mut island.sectors[0].state;
+            *state = SectorState::new(count, nodes);
             state.velocity.iter_mut().for_each(|v| *v = random.signed());
             let mut wall = ScatterWall { place: 2e-5 * random.unit(), friction, switches: 0, dropped: 0.0 };
             state.gaps.fill(wall.place);
-            let (mut effort, demand) =
+            let (mut effort, goal) =
                 (Effort::default(), StepGoal { tolerance: 1e-7, precision: 1e-13, most: u64::MAX });
-            let outcome = (0..4).try_for_each(|_| marcher.march(&tables, &mut state, &mut wall, demand, &mut effort));
+            let outcome = (0..4).try_for_each(|_| island.begin(&mut wall, goal).integrate(&mut effort));
             found.given_up += u64::from(outcome.is_err());
             found.trials += effort.trials;
             found.unsolved += effort.unsolved;

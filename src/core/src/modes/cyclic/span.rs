@@ -4,8 +4,8 @@
 use super::fourier::Synthesis;
 use super::pass::{Complexes, Gather, Recover, modal_force};
 use super::{CyclicBank, LANES};
+use crate::modes::coordinates::Coordinates;
 use crate::scene::method::Scheme;
-use crate::time::galerkin::shared_body::Coordinates;
 use nalgebra::DMatrix;
 
 /// Converts a flat array to complex lanes.

@@ -1,6 +1,6 @@
 //! Free flight over any length of time, in closed form.
 
-use super::level::ContactModes;
+use crate::modes::coordinates::ContactModes;
 
 /// Motion of a mode with angular frequency ω and damping ratio ξ < 1 over one length of time.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

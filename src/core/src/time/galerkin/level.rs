@@ -5,41 +5,14 @@ use super::compliance::{LaneCompliance, Lanes};
 use super::kernels::PADDED;
 use super::response::{ModalResponse, TERMS, by_points};
 use super::trial::ForceInterpolation;
+use crate::modes::coordinates::ContactModes;
 use nalgebra::DMatrix;
 
-/// Modes with inertia and residual flexibility of a sector at its contact rows (three per contact node).
-#[derive(Debug, Clone, PartialEq)]
-pub struct ContactModes {
-    /// Angular frequencies ω (rad/s).
-    pub frequencies: Vec<f64>,
-    /// Damping ratios ξ.
-    pub damping_ratios: Vec<f64>,
-    /// Mode shapes Φ at the contact rows, rows × modes (1/√kg).
-    pub shapes: DMatrix<f64>,
-    /// Residual flexibility G: static displacement of the rows per force on the rows that the modes do not represent, rows × rows (m/N).
-    pub residual: DMatrix<f64>,
-}
-
 impl ContactModes {
-    /// Number of modes.
-    pub fn len(&self) -> usize {
-        self.frequencies.len()
-    }
-
-    /// Returns whether there are no modes.
-    pub fn is_empty(&self) -> bool {
-        self.frequencies.is_empty()
-    }
-
     /// Returns an earlier mode with the same frequency and damping ratio: its neighbour, or the real part of its pair in a row of lanes.
     fn twin(&self, mode: usize) -> Option<usize> {
         let of = |mode: usize| [self.frequencies[mode].to_bits(), self.damping_ratios[mode].to_bits()];
         [1, PADDED].into_iter().filter_map(|back| mode.checked_sub(back)).find(|twin| of(*twin) == of(mode))
-    }
-
-    /// Number of contact rows.
-    pub fn rows(&self) -> usize {
-        self.shapes.nrows()
     }
 
     /// Writes Σ c_m φφᵀ of the contact rows to `sum`.

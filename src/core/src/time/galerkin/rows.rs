@@ -1,9 +1,10 @@
 //! Mode shapes at the contact rows, arranged for sums over modes and over rows.
 
 use super::kernels::{Combine, PADDED};
-use super::level::{ContactModes, StepTables};
+use super::level::StepTables;
 use super::state::SectorState;
 use crate::math::simd::{InstructionSet, Kernel};
+use crate::modes::coordinates::ContactModes;
 use nalgebra::DMatrix;
 
 /// Data that all step lengths share.

@@ -21,12 +21,6 @@ pub struct SectorState {
     pub slopes: Vec<f64>,
     /// True if gaps and normals are current; they are not evaluated at the end of a free flight.
     pub gaps_known: bool,
-    /// Energy bank: energy lost by contacts that opened or closed, available to later steps (J).
-    pub bank: f64,
-    /// Largest energy that has been computed (J).
-    pub largest: f64,
-    /// Level of the last step.
-    pub level: usize,
 }
 
 impl SectorState {
@@ -41,9 +35,6 @@ impl SectorState {
             normals: vec![0.0; 3 * nodes],
             slopes: Vec::new(),
             gaps_known: true,
-            bank: 0.0,
-            largest: 0.0,
-            level: 0,
         }
     }
 

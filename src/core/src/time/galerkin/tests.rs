@@ -1,9 +1,13 @@
 //! Sectors that rub a moving wall: energy, order, tolerance.
 
-use super::level::{ContactModes, StepTables};
-use super::sector::{AcceptedStep, Effort, SectorIntegrator, StepGoal, Tables, Witness};
-use super::state::SectorState;
+use super::island::Island;
+use super::level::StepTables;
+use super::span::StepGoal;
+use super::surroundings::{AcceptedStep, CarriersInStep, Surroundings, Witness};
+use super::tables::Tables;
 use super::trial::{ForceInterpolation, Obstacle, SlidingState};
+use crate::modes::coordinates::ContactModes;
+use crate::system::Effort;
 use nalgebra::DMatrix;
 
 /// Random numbers between −1 and 1.
@@ -76,7 +80,7 @@ impl MovingWall {
     }
 }
 
-impl Obstacle for MovingWall {
+impl Obstacle for &mut MovingWall {
     fn gap(&mut self, _: usize, point: usize, moved: [f64; 3]) -> (f64, [f64; 3]) {
         (self.place(self.times[point]) - moved[0], [-1.0, 0.0, 0.0])
     }
@@ -86,7 +90,15 @@ impl Obstacle for MovingWall {
     }
 }
 
-impl Witness for MovingWall {
+impl Surroundings for MovingWall {
+    type Surfaces<'a> = &'a mut Self;
+
+    fn surfaces<'a>(&'a mut self, _: usize, _: CarriersInStep<'a>) -> &'a mut Self {
+        self
+    }
+}
+
+impl Witness for &mut MovingWall {
     fn begin_step(&mut self, from: f64, length: f64, level: &StepTables, kind: ForceInterpolation) {
         for (time, point) in self.times.iter_mut().zip(level.basis.points) {
             *time = self.start + self.span * (from + length * point);
@@ -102,13 +114,12 @@ impl Witness for MovingWall {
         reach.iter().step_by(3).all(|reach| *reach < nearest)
     }
 
-    fn record_flight(&mut self, damping_loss: f64) {
+    fn record_damping(&mut self, damping_loss: f64) {
         self.damping += damping_loss;
     }
 
     fn record_step(&mut self, step: &AcceptedStep) {
         let (trial, basis) = (step.trial, &step.level.basis);
-        self.damping += step.damping_loss;
         self.dropped += step.dropped;
         for node in 0..trial.nodes() {
             for component in 0..3 {
@@ -152,10 +163,9 @@ struct TestRun {
 }
 
 fn run(modes: &ContactModes, mut wall: MovingWall, span: f64, spans: usize, tolerance: f64, speed: f64) -> TestRun {
-    let nodes = modes.rows() / 3;
-    let mut tables = Tables::new(modes.clone(), span);
-    tables.set_span(span);
-    let (mut state, mut marcher) = (SectorState::new(modes.len(), nodes), SectorIntegrator::new(modes.len(), nodes));
+    let mut island = Island::of_one(Tables::new(modes.clone(), span));
+    island.set_span(span);
+    let state = &mut island.sectors[0].state;
     for (mode, v) in state.velocity.iter_mut().enumerate() {
         *v = speed / f64::from(u32::try_from(mode + 1).unwrap());
     }
@@ -163,11 +173,12 @@ fn run(modes: &ContactModes, mut wall: MovingWall, span: f64, spans: usize, tole
     let sum = |(kinetic, strain): (f64, f64)| kinetic + strain;
     let start = sum(state.energies(&modes.frequencies, &modes.residual));
     let (mut effort, mut displacements, mut residual, mut most) = (Effort::default(), Vec::new(), 0.0_f64, start);
-    let demand = StepGoal { tolerance, precision: 1e-15, most: u64::MAX };
+    let goal = StepGoal { tolerance, precision: 1e-15, most: u64::MAX };
     let mut energy = start;
     for n in 0..spans {
         (wall.start, wall.span) = (span * f64::from(u32::try_from(n).unwrap()), span);
-        marcher.march(&tables, &mut state, &mut wall, demand, &mut effort).unwrap();
+        island.begin(&mut wall, goal).integrate(&mut effort).unwrap();
+        let state = &island.sectors[0].state;
         energy = sum(state.energies(&modes.frequencies, &modes.residual));
         most = most.max(energy);
         residual = residual.max((energy - start - wall.work + wall.damping + wall.dropped).abs() / most);

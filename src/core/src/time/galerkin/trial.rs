@@ -23,8 +23,6 @@ pub use obstacle::{Obstacle, SlidingState, node_by_node};
 use steady::Steady;
 use sticking::Sticking;
 
-/// Largest number of gap evaluations in one trial.
-const PASSES: usize = 6;
 /// Negative gaps within this fraction of the largest gap count as rounding.
 const ROUNDING: f64 = 1e-13;
 
@@ -219,48 +217,15 @@ impl Trial {
         self.known = false;
     }
 
-    /// Tries a step from `state`; `precision` is the largest gap of a contact that counts as closed (m).
-    pub fn run(
-        &mut self,
-        (level, kind): (&StepTables, ForceInterpolation),
-        rows: &ContactRows,
-        state: &SectorState,
-        obstacle: &mut impl Obstacle,
-        precision: f64,
-    ) -> TrialResult {
-        let compliance = level.compliance_of(kind);
-        self.begin((level, kind), Some(rows), state);
-        self.find_gaps_at_start(rows, state, obstacle);
-        let mut verdict = TrialResult::default();
-        for pass in 0..PASSES {
-            let (lowest, largest) = self.find_gaps(obstacle);
-            let rests = self.rests();
-            if lowest.is_nan() {
-                return verdict;
-            }
-            // No contact is active or needed, or the solution also holds for the curved gaps.
-            if (rests && lowest >= 0.0) || (pass > 0 && lowest >= -precision && largest <= precision) {
-                verdict.solved = true;
-                break;
-            }
+    /// Finds the free motion within a step of degree 1: two points give a straight line, which cannot represent it.
+    pub fn find_free_motion(&mut self, level: &StepTables, rows: &ContactRows, state: &SectorState) {
+        if level.basis.degree == 1 {
             self.find_start(rows, state);
-            if pass + 1 == PASSES || !self.solve((compliance, rows.residual()), obstacle, &mut verdict) {
-                return verdict;
-            }
+            let FreeMotion { end_velocities, unresolved_amplitudes, is_known } = &mut self.free_motion;
+            rows.end_velocities(level, state, end_velocities);
+            rows.unresolved_amplitudes(level.step, state, unresolved_amplitudes);
+            *is_known = true;
         }
-        if kind == ForceInterpolation::Polynomial {
-            // Two points give a straight line, which cannot represent the motion in between.
-            if level.basis.degree == 1 {
-                self.find_start(rows, state);
-                let FreeMotion { end_velocities, unresolved_amplitudes, is_known } = &mut self.free_motion;
-                rows.end_velocities(level, state, end_velocities);
-                rows.unresolved_amplitudes(level.step, state, unresolved_amplitudes);
-                *is_known = true;
-            }
-            self.judge((level, rows), obstacle, &mut verdict);
-            self.check_depth(rows, state, obstacle, &mut verdict);
-        }
-        verdict
     }
 
     /// Corrects the depth of a step for jumps of the surfaces at its start.
@@ -274,16 +239,6 @@ impl Trial {
         if verdict.depth > 0.0 {
             self.find_start(rows, state);
             verdict.depth = self.depth_without_jumps(|node, moved| Some(obstacle.gap(node, 0, moved).0));
-        }
-    }
-
-    /// Finds the gaps at the start if they are unknown.
-    fn find_gaps_at_start(&mut self, rows: &ContactRows, state: &SectorState, obstacle: &mut impl Obstacle) {
-        if !state.gaps_known {
-            self.find_start(rows, state);
-            for node in 0..self.nodes() {
-                (self.start_contacts.gaps[node], _) = obstacle.gap(node, 0, vector3_at(&self.start, node));
-            }
         }
     }
 

@@ -5,14 +5,14 @@
 //! contact is closed at a point, only the gaps at the points are used.
 
 use super::judgement::NEAR;
-use super::{ForceInterpolation, Obstacle, Trial};
+use super::{ForceInterpolation, Trial};
 use crate::math::cubic::{evaluate, interior_minimum};
 use crate::time::galerkin::advance::Advance;
 use crate::time::galerkin::basis::{MOST, POINTS, TimeBasis};
 use crate::time::galerkin::level::StepTables;
 use crate::time::galerkin::rows::ContactRows;
-use crate::time::galerkin::sector::{HALVINGS, Tables};
 use crate::time::galerkin::state::SectorState;
+use crate::time::galerkin::tables::{HALVINGS, Tables};
 
 /// Number of halvings of a step at whose ends the motion is followed.
 const FINER: usize = 3;
@@ -49,14 +49,6 @@ impl Minima {
 }
 
 impl Trial {
-    /// Finds gaps and displacements at the points of a step without forces.
-    pub fn glide(&mut self, level: &StepTables, rows: &ContactRows, state: &SectorState, obstacle: &mut impl Obstacle) {
-        self.begin((level, ForceInterpolation::Polynomial), Some(rows), state);
-        self.find_start(rows, state);
-        self.find_gaps_at_start(rows, state, obstacle);
-        self.find_gaps(obstacle);
-    }
-
     /// Finds nodes that may come closer between the points of a step than at them, by more than a fraction of `tolerance` (m).
     /// Returns whether there are any.
     ///

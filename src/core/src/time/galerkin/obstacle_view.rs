@@ -1,37 +1,27 @@
 //! One sector and its surfaces over a span: gaps at any time, and a record of the contacts.
 
+use super::basis::TimeBasis;
+use super::carrier::CarrierIntegrator;
+use super::compliance::Lanes;
+use super::level::StepTables;
 use super::record::{SpanRecord, SurfacePlace};
+use super::surroundings::{AcceptedStep, CarriersInStep, Witness};
+use super::trial::{ForceInterpolation, Obstacle, SlidingState, Trial, node_by_node, vector3_at};
+use crate::geometry::wrench::{At, MotionIncrement};
+use crate::geometry::{GapLaw, PrescribedMotion, dot};
 use crate::system::carrier::Spot;
 use crate::system::pair::ContactPair;
-use crate::time::spans::casing::CarrierIntegrator;
-
-use crate::geometry::GapLaw;
-use crate::geometry::wrench::{At, MotionIncrement};
-use crate::geometry::{PrescribedMotion, dot};
-use crate::time::galerkin::basis::TimeBasis;
-use crate::time::galerkin::compliance::Lanes;
-use crate::time::galerkin::level::StepTables;
-use crate::time::galerkin::sector::{AcceptedStep, Witness};
-use crate::time::galerkin::trial::{ForceInterpolation, Obstacle, SlidingState, Trial, node_by_node, vector3_at};
 
 /// Number of contact solutions in a trial after which the sliding directions are frozen, because a node that hardly slides would
 /// change its direction in every solution.
 const SOLUTIONS: usize = 3;
 
-/// Structures that carry the surfaces of a sector, in a step of a level.
-pub struct CarriersInStep<'a> {
-    pub casings: &'a mut [CarrierIntegrator],
-    /// Index of the structure in `casings` that carries the surface of each pair.
-    pub casing_of: &'a [Option<usize>],
-    pub level: usize,
-    pub kind: ForceInterpolation,
-    pub lanes: Lanes,
-}
-
 /// A sector of a structure and the surfaces that it can touch.
 pub struct ObstacleView<'a> {
     /// Structures that carry the surfaces, if any.
-    pub carriers: Option<CarriersInStep<'a>>,
+    pub carriers: CarriersInStep<'a>,
+    /// Index of the carrier of the surface of each pair.
+    pub carrier_of: &'a [Option<usize>],
     pub pairs: &'a mut [ContactPair],
     /// Pair of each node.
     pub pair_of: &'a [Option<usize>],
@@ -49,29 +39,28 @@ impl ObstacleView<'_> {
         when: SurfacePlace,
         read: impl Fn(&CarrierIntegrator, Spot) -> T,
     ) -> Option<T> {
-        let carriers = self.carriers.as_ref()?;
         let pair = self.pair_of[node]?;
-        let casing = carriers.casing_of[pair]?;
+        let carrier = self.carrier_of[pair]?;
         let index = node * self.lanes + self.sector;
         let spot = self.record.spot((node, point), (pair, &self.pairs[pair]), index, when)?;
-        Some(read(&carriers.casings[casing], spot))
+        Some(read(&self.carriers.carriers[carrier], spot))
     }
 
     /// Calls `read` with the structure that carries the surface of a node, at a point of the step.
-    pub fn with_carrier_mut(&mut self, node: usize, point: usize, read: impl FnOnce(&mut CarrierIntegrator, Spot)) {
-        let (Some(carriers), Some(pair)) = (&mut self.carriers, self.pair_of[node]) else { return };
-        let Some(casing) = carriers.casing_of[pair] else { return };
+    fn with_carrier_mut(&mut self, node: usize, point: usize, read: impl FnOnce(&mut CarrierIntegrator, Spot)) {
+        let Some(pair) = self.pair_of[node] else { return };
+        let Some(carrier) = self.carrier_of[pair] else { return };
         let index = node * self.lanes + self.sector;
         if let Some(spot) = self.record.spot((node, point), (pair, &self.pairs[pair]), index, SurfacePlace::Now) {
-            read(&mut carriers.casings[casing], spot);
+            read(&mut self.carriers.carriers[carrier], spot);
         }
     }
 
     /// Returns the surface carrier of a lane, and the current step.
     fn under(&mut self, lane: usize) -> Option<(&mut CarrierIntegrator, (usize, ForceInterpolation), Lanes)> {
-        let CarriersInStep { casings, casing_of, level, kind, lanes } = self.carriers.as_mut()?;
-        let casing = self.pair_of[lanes.place(lane).1].and_then(|pair| casing_of[pair])?;
-        Some((&mut casings[casing], (*level, *kind), *lanes))
+        let CarriersInStep { carriers, level, kind, lanes } = &mut self.carriers;
+        let carrier = self.pair_of[lanes.place(lane).1].and_then(|pair| self.carrier_of[pair])?;
+        Some((&mut carriers[carrier], (*level, *kind), *lanes))
     }
 
     fn at<'b>(&self, node: usize, drive: &'b PrescribedMotion) -> At<'b> {
@@ -165,9 +154,11 @@ impl Obstacle for ObstacleView<'_> {
 
     fn prepare_compliance(&mut self, lanes: Lanes, chosen: &[bool], normals: &[f64]) -> bool {
         self.record.solutions += 1;
-        let Some(CarriersInStep { casings, lanes: carrier_lanes, .. }) = &mut self.carriers else { return false };
-        *carrier_lanes = lanes;
-        casings.iter_mut().for_each(CarrierIntegrator::clear_lanes);
+        if self.carriers.carriers.is_empty() {
+            return false;
+        }
+        self.carriers.lanes = lanes;
+        self.carriers.carriers.iter_mut().for_each(CarrierIntegrator::clear_lanes);
         for lane in (0..lanes.len()).filter(|lane| chosen[*lane]) {
             let (point, node) = lanes.place(lane);
             let normal = lanes.vector3(normals, lane);
@@ -259,12 +250,28 @@ impl Witness for ObstacleView<'_> {
         }
     }
 
-    fn record_flight(&mut self, damping_loss: f64) {
+    fn record_damping(&mut self, damping_loss: f64) {
         self.record.work.damping += damping_loss;
     }
 
+    fn closing_loss(&self) -> f64 {
+        self.record.work.closing
+    }
+
+    fn guess_start_places(&mut self) {
+        self.record.guess_start_places();
+    }
+
+    fn react(&mut self, node: usize, point: usize, force: [f64; 3]) {
+        self.record.act(node, point);
+        self.with_carrier_mut(node, point, |carrier, spot| carrier.react(spot, point, force));
+    }
+
+    fn add_impulse(&mut self, node: usize, point: usize, impulse: [f64; 3]) {
+        self.with_carrier_mut(node, point, |carrier, spot| carrier.add_impulse(spot, impulse));
+    }
+
     fn record_step(&mut self, step: &AcceptedStep) {
-        self.record.work.damping += step.damping_loss;
         self.record.work.dropped += step.dropped;
         self.weigh_motions(step);
         for (node, pair) in self.pair_of.iter().enumerate() {

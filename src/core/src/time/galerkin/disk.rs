@@ -1,10 +1,8 @@
 //! A disk of coupled sectors, during the steps that its sectors take together.
 
+use super::basis::POINTS;
+use super::shared_body::SharedBody;
 use crate::modes::cyclic::CyclicBank;
-use crate::modes::sectors::Sectors;
-use crate::system::Structure;
-use crate::time::galerkin::basis::POINTS;
-use crate::time::galerkin::shared_body::SharedBody;
 
 /// A disk of coupled sectors.
 #[derive(Debug, Clone)]
@@ -12,10 +10,12 @@ pub struct CoupledDisk {
     /// Index of the structure.
     pub structure: usize,
     /// Modes of the disk.
-    pub whole: SharedBody,
+    pub body: SharedBody,
     /// Displacements of all contact rows at the points of the step (m), and velocities at its start (m/s), `[row][lane of sector]`.
-    pub moved: [Vec<f64>; POINTS],
-    pub velocity: Vec<f64>,
+    moved: [Vec<f64>; POINTS],
+    velocity: Vec<f64>,
+    /// Lanes of a row.
+    lanes: usize,
     /// Largest displacement of all rows of any sector per unit of a coordinate; largest displacements of the rows from rest.
     sizes: Vec<f64>,
     amplitudes: Vec<f64>,
@@ -37,28 +37,51 @@ impl CoupledDisk {
             amplitudes: vec![0.0; coordinates.inertia.len()],
             reach: vec![0.0; bank.rows()],
             error: 0.0,
-            whole: SharedBody::new(coordinates, degree),
+            lanes: bank.lanes(),
+            body: SharedBody::new(coordinates, degree),
         }
     }
 
-    /// Reads the state of the structure, before a span.
-    pub fn read(&mut self, structure: &mut Structure) {
-        let (forces, lanes, nodes) = (&structure.history.force.now, structure.lanes(), structure.nodes());
-        let Sectors::Coupled(bank) = &mut structure.modes else { return };
-        bank.read_all(self.whole.state_mut());
-        self.whole.keep_inertia();
-        let sectors = bank.sectors();
+    /// Reads the state of the structure before a span; `forces` are the contact forces on all rows (N).
+    pub fn read(&mut self, bank: &mut CyclicBank, forces: &[f64], nodes: usize) {
+        bank.read_all(self.body.state_mut());
+        self.body.keep_inertia();
+        let (sectors, lanes) = (bank.sectors(), self.lanes);
         let all = (0..sectors).flat_map(|sector| (0..nodes).map(move |node| (sector, node)));
         let force = |(sector, node): (usize, usize)| {
             (sector, node, [0, 1, 2].map(|component| forces[(3 * node + component) * lanes + sector]))
         };
         let pushing = all.map(force).filter(|(.., force)| force.iter().any(|component| *component != 0.0));
-        bank.modal_forces(pushing, self.whole.forces_mut(0));
+        bank.modal_forces(pushing, self.body.forces_mut(0));
+    }
+
+    /// Finds displacements and velocities of all rows at the start of a step.
+    pub fn find_rows(&mut self, bank: &mut CyclicBank) {
+        bank.rows_of(self.body.at(0), &mut self.moved[0]);
+        bank.rows_of(self.body.velocity(), &mut self.velocity);
+    }
+
+    /// Finds displacements of all rows at the points 1 … `points` of the step.
+    pub fn find_rows_at(&mut self, bank: &mut CyclicBank, points: usize) {
+        for point in 1..=points {
+            bank.rows_of(self.body.at(point), &mut self.moved[point]);
+        }
+    }
+
+    /// Displacement (m) and velocity (m/s) of a row of a sector at the start of the step.
+    pub fn row_at_start(&self, row: usize, sector: usize) -> [f64; 2] {
+        let place = row * self.lanes + sector;
+        [self.moved[0][place], self.velocity[place]]
+    }
+
+    /// Displacement of a node of a sector at a point of the step (m).
+    pub fn moved_at(&self, point: usize, node: usize, sector: usize) -> [f64; 3] {
+        [0, 1, 2].map(|component| self.moved[point][(3 * node + component) * self.lanes + sector])
     }
 
     /// Finds the largest displacements of the rows of any sector from rest without contact (m).
     pub fn find_reach(&mut self, bank: &CyclicBank) {
-        self.whole.amplitudes(&mut self.amplitudes);
+        self.body.amplitudes(&mut self.amplitudes);
         bank.reach(&self.amplitudes, &self.sizes, &mut self.reach);
     }
 }

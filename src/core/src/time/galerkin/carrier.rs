@@ -1,16 +1,17 @@
 //! A structure that carries surfaces, during the steps of the sectors that touch them.
 
+use super::basis::POINTS;
+use super::compliance::Lanes;
+use super::kernels::{Combine, PADDED};
+use super::shared_body::SharedBody;
+use super::trial::ForceInterpolation;
 use crate::geometry::frame::PolarFrame;
 use crate::math::simd::InstructionSet;
 use crate::modes::bank::ModalBank;
+use crate::modes::coordinates::Coordinates;
 use crate::scene::method::Scheme;
 use crate::system::carrier::Spot;
 use crate::system::pair::at_place;
-use crate::time::galerkin::basis::POINTS;
-use crate::time::galerkin::compliance::Lanes;
-use crate::time::galerkin::kernels::{Combine, PADDED};
-use crate::time::galerkin::shared_body::{Coordinates, SharedBody};
-use crate::time::galerkin::trial::ForceInterpolation;
 
 /// Tables, state and scratch memory of a structure that carries surfaces.
 #[derive(Debug, Clone)]
@@ -18,7 +19,7 @@ pub struct CarrierIntegrator {
     /// Index of the structure.
     pub structure: usize,
     /// Modes of the structure.
-    pub whole: SharedBody,
+    pub body: SharedBody,
     /// `[row][mode]` of the rows that move control points, modes padded to whole registers.
     shapes: Vec<f64>,
     /// `[mode][row]`, rows padded to whole registers.
@@ -79,7 +80,7 @@ impl CarrierIntegrator {
             obstacle: vec![false; lanes.len()],
             frames: vec![PolarFrame::FIXED; lanes.len()],
             force: vec![0.0; stride],
-            whole: if bank.is_loaded() {
+            body: if bank.is_loaded() {
                 SharedBody::new(coordinates, degree).loaded()
             } else {
                 SharedBody::new(coordinates, degree)
@@ -94,9 +95,9 @@ impl CarrierIntegrator {
 
     /// Computes the rows at the points 1 … `points` of the step, under the forces there.
     pub fn recover(&mut self, points: usize) {
-        let Self { by_mode, all, moved: [_, one, two, three], whole, instructions, .. } = self;
+        let Self { by_mode, all, moved: [_, one, two, three], body, instructions, .. } = self;
         let (table, stride, columns) = (&by_mode[..], one.len(), &all[..]);
-        let [a, b, c] = [1, 2, 3].map(|point| whole.at(point));
+        let [a, b, c] = [1, 2, 3].map(|point| body.at(point));
         match points {
             1 => instructions.run(Combine { table, stride, columns, coefficients: [a], sums: [one] }),
             2 => instructions.run(Combine { table, stride, columns, coefficients: [a, b], sums: [one, two] }),
@@ -106,9 +107,9 @@ impl CarrierIntegrator {
 
     /// Finds displacements and velocities of the rows at the start of a step.
     pub fn find_start(&mut self) {
-        let Self { by_mode, all, moved: [start, ..], velocity, whole, instructions, .. } = self;
+        let Self { by_mode, all, moved: [start, ..], velocity, body, instructions, .. } = self;
         let (table, stride, columns) = (&by_mode[..], start.len(), &all[..]);
-        let coefficients = [whole.at(0), whole.velocity()];
+        let coefficients = [body.at(0), body.velocity()];
         instructions.run(Combine { table, stride, columns, coefficients, sums: [start, velocity] });
     }
 
@@ -148,7 +149,7 @@ impl CarrierIntegrator {
     /// Adds the reaction to a force on a node at a place, at point i.
     pub fn react(&mut self, spot: Spot, i: usize, force: [f64; 3]) {
         self.find_force(spot, force);
-        self.whole.forces_mut(i).iter_mut().zip(&self.force).for_each(|(sum, force)| *sum -= force);
+        self.body.forces_mut(i).iter_mut().zip(&self.force).for_each(|(sum, force)| *sum -= force);
     }
 
     /// Sets the impulses to zero.
@@ -257,7 +258,7 @@ impl CarrierIntegrator {
         let [x, y, z] = self.seen.each_ref().map(|seen| &seen[lane * padded..][..padded]);
         let (k, _) = lanes.place(lane);
         let [a, b, c] = self.frames[lane].fixed(force);
-        let (influence, coordinates) = (self.whole.influence(level), self.whole.coordinates());
+        let (influence, coordinates) = (self.body.influence(level), self.body.coordinates());
         for (mode, by) in influence.iter().enumerate() {
             let inert = coordinates.inertia[mode]
                 * if kind == ForceInterpolation::Constant { by.constant } else { by.points[i - 1][k] };

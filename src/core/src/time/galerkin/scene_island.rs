@@ -1,0 +1,502 @@
+//! An island of a scene: the sectors and carriers that it consists of, their state, and the record of their contacts.
+
+use super::basis::MOST;
+use super::carrier::{CarrierIntegrator, coordinates};
+use super::compliance::Lanes;
+use super::disk::CoupledDisk;
+use super::flight::FreeFlight;
+use super::island::{Island, IslandSector, StepControl};
+use super::obstacle_view::ObstacleView;
+use super::record::{NodeTally, SpanRecord, Worked};
+use super::span::{StepGoal, Stopped};
+use super::state::SectorState;
+use super::surroundings::{CarriersInStep, Surroundings};
+use super::tables::{HALVINGS, Tables};
+use crate::geometry::PrescribedMotion;
+use crate::geometry::wrench::{At, Wrench};
+use crate::modes::bank::ModalBank;
+use crate::modes::coordinates::ContactModes;
+use crate::modes::cyclic::CyclicBank;
+use crate::modes::sectors::Sectors;
+use crate::scene::method::Scheme;
+use crate::system::contact_view::ContactMember;
+use crate::system::ledger::Ledger;
+use crate::system::{ContactEvent, ContactPair, StepFailure, Structure, System};
+use nalgebra::DMatrix;
+
+/// Contacts count as closed within this fraction of the tolerance.
+const PRECISION: f64 = 1e-4;
+/// Trials of several sectors end at this fraction of the closed-gap precision, because other sectors have moved since; the last pass of
+/// a single sector is exact except for curvature.
+const CLOSE: f64 = 1e-2;
+
+/// A sector of a structure in an island.
+#[derive(Debug, Clone)]
+struct Member {
+    structure: usize,
+    sector: usize,
+    record: SpanRecord,
+}
+
+/// An island of a scene. The uncoupled sectors of one structure take turns in one island, because their tables are the same.
+#[derive(Debug, Clone)]
+pub struct SceneIsland {
+    /// Set of structures to whose ledger the island belongs.
+    set: usize,
+    island: Island,
+    /// One for each sector of the island.
+    members: Vec<Member>,
+    /// Number of sectors that take turns.
+    turns: usize,
+    /// Index of the carrier of the surface of each pair.
+    carrier_of: Vec<Option<usize>>,
+    goal: StepGoal,
+    /// Free flight of each kind of a single sector.
+    flights: Vec<FreeFlight>,
+}
+
+/// Structures and pairs around an island.
+struct SceneSurroundings<'a> {
+    structures: &'a mut [Structure],
+    pairs: &'a mut [ContactPair],
+    members: &'a mut [Member],
+    carrier_of: &'a [Option<usize>],
+}
+
+impl Surroundings for SceneSurroundings<'_> {
+    type Surfaces<'a>
+        = ObstacleView<'a>
+    where
+        Self: 'a;
+
+    fn surfaces<'a>(&'a mut self, sector: usize, carriers: CarriersInStep<'a>) -> ObstacleView<'a> {
+        let Member { structure, sector, record } = &mut self.members[sector];
+        let structure = &self.structures[*structure];
+        ObstacleView {
+            carriers,
+            carrier_of: self.carrier_of,
+            pairs: self.pairs,
+            pair_of: &structure.pair_of,
+            lanes: structure.lanes(),
+            sector: *sector,
+            record,
+        }
+    }
+
+    fn bend(&mut self, carriers: &[CarrierIntegrator], point: usize) {
+        for (number, pair) in self.pairs.iter_mut().enumerate() {
+            let Some(carrier) = self.carrier_of[number].map(|carrier| &carriers[carrier]) else { continue };
+            let Some(one) = self.members.iter().find(|one| one.structure == pair.structure()) else { continue };
+            pair.bend(one.record.drives[number][point].0.shape_factor, carrier.moved(point));
+        }
+    }
+
+    fn disk(&mut self, structure: usize) -> Option<&mut CyclicBank> {
+        match &mut self.structures[structure].modes {
+            Sectors::Coupled(bank) => Some(bank),
+            Sectors::Uncoupled(_) => None,
+        }
+    }
+}
+
+impl SceneIsland {
+    /// Creates an island for the sectors of a structure that are uncoupled and touch rigid surfaces, for spans up to `longest` (s), with
+    /// sticking contacts or without, and errors of `tolerance` (m). `None` if the sectors are coupled.
+    pub fn single(
+        set: usize,
+        structure: usize,
+        (structures, pairs): (&[Structure], &[ContactPair]),
+        (longest, sticks): (f64, bool),
+        tolerance: f64,
+    ) -> Option<Self> {
+        let of = &structures[structure];
+        let bank = of.bank()?;
+        let kinds = kinds_of(of.modes());
+        let flights = kinds.iter().map(FreeFlight::new).collect();
+        let tables = |kind: ContactModes| {
+            let degree = kind.degree_up_to(longest);
+            if sticks { Tables::of_degree(kind, 1).steady(degree) } else { Tables::of_degree(kind, degree) }
+        };
+        let sector = IslandSector::new([0; 2], None, bank.model().dynamic_modes(Scheme::Galerkin), of.nodes());
+        let own = pairs.iter().filter(|pair| pair.structure() == structure);
+        let rounding = own.map(|pair| pair.gap().rounding()).fold(0.0, f64::max);
+        Some(Self {
+            set,
+            island: Island::new(
+                vec![kinds.into_iter().map(tables).collect()],
+                vec![if sticks { sector.sticking().steady() } else { sector }],
+            ),
+            members: vec![Member { structure, sector: 0, record: SpanRecord::new(of.nodes(), pairs.len(), tolerance) }],
+            turns: of.modes().sectors(),
+            carrier_of: vec![None; pairs.len()],
+            goal: StepGoal { tolerance, precision: (PRECISION * tolerance).max(rounding), most: u64::MAX },
+            flights,
+        })
+    }
+
+    /// Creates the island of a set of structures that move each other, for spans up to `longest` (s), with sticking contacts or without,
+    /// and errors of `tolerance` (m).
+    pub fn coupled(
+        set: usize,
+        members: &[usize],
+        (structures, pairs): (&[Structure], &[ContactPair]),
+        (longest, sticks): (f64, bool),
+        tolerance: f64,
+    ) -> Self {
+        let touching: Vec<usize> = members.iter().copied().filter(|one| structures[*one].nodes() > 0).collect();
+        let carrying: Vec<usize> = members.iter().copied().filter(|one| structures[*one].nodes() == 0).collect();
+        let kinds: Vec<Vec<ContactModes>> = touching.iter().map(|one| kinds_of(structures[*one].modes())).collect();
+        let banks: Vec<&ModalBank> = carrying.iter().filter_map(|one| structures[*one].bank()).collect();
+        let degree = |modes: &ContactModes| if sticks { 1 } else { modes.degree_up_to(longest) };
+        let carried = banks.iter().map(|bank| degree(&coordinates(bank).seen_at(&bank.model().contact_modes)));
+        let degree = kinds.iter().flatten().map(degree).chain(carried).min().unwrap_or(MOST);
+        let own = pairs.iter().filter(|pair| touching.contains(&pair.structure()));
+        let rounding = own.map(|pair| pair.gap().rounding()).fold(0.0, f64::max);
+        let nodes = touching.iter().map(|one| structures[*one].nodes()).max().unwrap_or(0);
+        let lanes = Lanes { points: MOST, nodes };
+        let carriers: Vec<CarrierIntegrator> =
+            carrying.iter().zip(banks).map(|(one, bank)| CarrierIntegrator::new(*one, bank, degree, lanes)).collect();
+        let place = |structure: usize| carriers.iter().position(|carrier| carrier.structure == structure);
+        let disk = |one: &usize| structures[*one].modes().coupled().map(|bank| CoupledDisk::new(*one, bank, degree));
+        let disks: Vec<CoupledDisk> = touching.iter().filter_map(disk).collect();
+        let (mut sectors, mut members) = (Vec::new(), Vec::new());
+        for (number, structure) in touching.iter().copied().enumerate() {
+            let of = &structures[structure];
+            let disk = disks.iter().position(|disk| disk.structure == structure);
+            for sector in 0..of.modes().sectors() {
+                let kind = of.bank().map_or(0, |bank| bank.set_number(sector));
+                let one = IslandSector::new(
+                    [number, kind],
+                    disk.map(|disk| (disk, sector)),
+                    kinds[number][kind].len(),
+                    of.nodes(),
+                );
+                sectors.push(if sticks { one.sticking() } else { one });
+                let record = SpanRecord::new(of.nodes(), pairs.len(), tolerance);
+                members.push(Member { structure, sector, record });
+            }
+        }
+        let made = |kinds: Vec<ContactModes>| kinds.into_iter().map(|kind| Tables::of_degree(kind, degree)).collect();
+        let carrier_of = pairs.iter().map(|pair| place(pair.carrier()?.structure)).collect();
+        let mut island = Island::new(kinds.into_iter().map(made).collect(), sectors);
+        (island.disks, island.carriers) = (disks, carriers);
+        Self {
+            set,
+            island,
+            members,
+            turns: 1,
+            carrier_of,
+            goal: StepGoal { tolerance, precision: (CLOSE * PRECISION * tolerance).max(rounding), most: u64::MAX },
+            flights: Vec::new(),
+        }
+    }
+
+    /// Returns whether the sectors take turns on rigid surfaces.
+    pub fn is_single(&self) -> bool {
+        self.island.is_single()
+    }
+
+    /// First structure of the island.
+    pub fn first_structure(&self) -> usize {
+        self.members[0].structure
+    }
+
+    /// Fills the tables for spans of length `span` (s).
+    pub fn set_span(&mut self, span: f64) {
+        self.island.set_span(span);
+    }
+
+    /// Integrates all sectors over a span (s), at whose end the pairs are.
+    ///
+    /// # Errors
+    /// [`StepFailure`]; the state is then undefined.
+    pub fn integrate(&mut self, system: &mut System, span: f64, most_tried: u64) -> Result<(), StepFailure> {
+        system.sets.members(self.set).iter().for_each(|one| system.structures[*one].begin_span());
+        self.members.iter_mut().for_each(|one| one.record.begin_courses(&system.pairs, span));
+        (0..self.turns).try_for_each(|turn| self.take_turn(turn, system, span, most_tried))
+    }
+
+    /// Integrates one sector after the other, or all together, over a span.
+    fn take_turn(&mut self, turn: usize, system: &mut System, span: f64, most_tried: u64) -> Result<(), StepFailure> {
+        self.aim(turn, &system.structures);
+        let System { structures, pairs, events, counted, .. } = system;
+        self.read(structures);
+        let goal = StepGoal { most: most_tried, ..self.goal };
+        let Self { island, members, carrier_of, .. } = &mut *self;
+        let mut surroundings = SceneSurroundings { structures, pairs, members, carrier_of };
+        let outcome = island.begin(&mut surroundings, goal).integrate(&mut counted.effort);
+        let load_work = self.write(structures);
+        self.members.iter().try_for_each(|one| one.record.check((one.structure, one.sector)))?;
+        outcome.map_err(|stopped| self.failure(stopped))?;
+        let ledger = &mut counted.ledgers[self.set];
+        if !self.island.carriers.is_empty() {
+            ledger.load_work.add(load_work);
+            ledger.turnover.add(load_work.abs());
+        }
+        for Member { structure, sector, record } in &self.members {
+            enter_work(ledger, &record.work);
+            enter_events(&structures[*structure], (*structure, *sector), record, span, &mut events.now);
+        }
+        Ok(())
+    }
+
+    /// Selects the sector whose turn it is.
+    fn aim(&mut self, turn: usize, structures: &[Structure]) {
+        if self.is_single() {
+            self.members[0].sector = turn;
+            let bank = structures[self.members[0].structure].bank();
+            self.island.sectors[0].table[1] = bank.map_or(0, |bank| bank.set_number(turn));
+        }
+    }
+
+    /// Reads the state of the structures before a span.
+    fn read(&mut self, structures: &mut [Structure]) {
+        for (one, Member { structure, sector, record }) in self.island.sectors.iter_mut().zip(&mut self.members) {
+            let structure = &structures[*structure];
+            structure.read_contacts(*sector, &mut one.state);
+            if let Some(bank) = structure.bank() {
+                bank.read_sector(*sector, &mut one.state.position, &mut one.state.velocity);
+            }
+            let (places, lanes) = (&structure.history.geometry.before, structure.lanes());
+            let gaps = &structure.history.gap.before;
+            record.begin(|node| places.place_at(node * lanes + *sector), |node| gaps[node * lanes + *sector]);
+        }
+        for disk in &mut self.island.disks {
+            let structure = &mut structures[disk.structure];
+            let nodes = structure.nodes();
+            if let Sectors::Coupled(bank) = &mut structure.modes {
+                disk.read(bank, &structure.history.force.now, nodes);
+            }
+        }
+        for carrier in &mut self.island.carriers {
+            let Some(bank) = structures[carrier.structure].bank() else { continue };
+            let dynamic = carrier.body.coordinates().inertia.iter().filter(|inertia| **inertia > 0.0).count();
+            let [position, velocity] = carrier.body.state_mut();
+            bank.read_sector(0, &mut position[..dynamic], &mut velocity[..dynamic]);
+            bank.read_loads(carrier.body.loads_mut());
+        }
+        let Member { structure, sector, .. } = self.members[0];
+        let control = &structures[structure].step_control;
+        self.island.control = StepControl {
+            bank: control.bank[sector],
+            largest: control.largest[sector],
+            level: usize::try_from(control.level[sector]).unwrap_or(HALVINGS).min(HALVINGS),
+        };
+    }
+
+    /// Writes the state to the structures and returns the work of loads during the span (J).
+    fn write(&mut self, structures: &mut [Structure]) -> f64 {
+        let mut load_work = 0.0;
+        let Island { sectors, tables, control, disks, carriers, .. } = &mut self.island;
+        for (one, Member { structure, sector, record }) in sectors.iter_mut().zip(&self.members) {
+            let structure = &mut structures[*structure];
+            structure.write_contacts(*sector, &one.state, |node| record.tallies[node].lowest);
+            let of = &mut structure.step_control;
+            (of.bank[*sector], of.largest[*sector]) = (control.bank, control.largest);
+            of.level[*sector] = control.level as u64;
+            if let (None, Sectors::Uncoupled(bank)) = (one.disk, &mut structure.modes) {
+                let (moved, state) = one.displacements(tables);
+                bank.write_sector(*sector, &state.position, &state.velocity, &state.forces, moved);
+                bank.lose(*sector, record.work.damping);
+            }
+        }
+        for disk in disks {
+            if let Sectors::Coupled(bank) = &mut structures[disk.structure].modes {
+                bank.write_all(disk.body.at(0), disk.body.velocity());
+                bank.lose(disk.body.collect_loss());
+            }
+        }
+        for carrier in carriers {
+            let structure = &mut structures[carrier.structure];
+            structure.delayed.copy_from_slice(carrier.body.forces_mut(0));
+            if let Sectors::Uncoupled(bank) = &mut structure.modes {
+                let rows = &carrier.moved(0)[..bank.rows()];
+                bank.write_all(carrier.body.at(0), carrier.body.velocity(), rows);
+                bank.lose(0, carrier.body.collect_loss());
+                bank.begin_loads();
+            }
+            load_work += carrier.body.collect_load_work();
+        }
+        load_work
+    }
+
+    /// Converts the reason why the island was not integrated to the end.
+    fn failure(&self, stopped: Stopped) -> StepFailure {
+        let Some((index, is_lost)) = self.island.failed.filter(|_| stopped == Stopped::Unsolved) else {
+            return if stopped == Stopped::Exhausted { StepFailure::Exhausted } else { StepFailure::NonFinite };
+        };
+        let Member { structure, sector, .. } = self.members[index];
+        match self.island.sectors[index].entered() {
+            // The node is far from the surface.
+            _ if is_lost => StepFailure::Implausible { structure, sector },
+            // A node that had nothing to touch before is now inside an open surface.
+            Some(node) => StepFailure::BehindEdge { structure, node },
+            None => StepFailure::Unsolved { structure, sector },
+        }
+    }
+
+    /// Returns whether no sector touches anything, vibrates by more than the tolerance or can touch during a flight to `ends`, in which
+    /// rotors turn by `turns` relative to the shapes (rad). The smallest gaps of the structure are then those during the flight.
+    pub fn is_free(&mut self, system: &mut System, ends: &[PrescribedMotion], turns: &[f64]) -> bool {
+        let System { structures, pairs, .. } = system;
+        let index = self.first_structure();
+        (0..self.turns).all(|sector| {
+            self.aim(sector, structures);
+            let structure = &mut structures[index];
+            let Some(bank) = structure.bank() else { return false };
+            let one = &mut self.island.sectors[0];
+            bank.read_sector(sector, &mut one.state.position, &mut one.state.velocity);
+            let reach = one.largest_displacements(&self.island.tables);
+            reach.iter().all(|reach| *reach <= self.goal.tolerance)
+                && (0..structure.nodes()).all(|node| {
+                    let index = structure.index(node, sector);
+                    let Some(pair) = structure.pair_of[node] else { return true };
+                    let at = At { node, index, drive: pairs[pair].drive_now() };
+                    let reach = std::array::from_fn(|component| reach[3 * node + component]);
+                    let least = pairs[pair].gap().least(at, &ends[pair], turns[pair], reach).unwrap_or(0.0);
+                    structure.lowest_in_span[index] = least;
+                    structure.history.multiplier[index] == 0.0 && least > 0.0
+                })
+        })
+    }
+
+    /// Advances all sectors in free flight by `length` (s).
+    pub fn fly(&mut self, system: &mut System, length: f64) {
+        let System { structures, counted, .. } = system;
+        let index = self.first_structure();
+        structures[index].begin_span();
+        self.flights.iter_mut().for_each(|flight| flight.set_length(length));
+        for sector in 0..self.turns {
+            self.aim(sector, structures);
+            let Sectors::Uncoupled(bank) = structures[index].modes_mut() else { continue };
+            let one = &mut self.island.sectors[0];
+            one.state.forces.fill(0.0);
+            bank.read_sector(sector, &mut one.state.position, &mut one.state.velocity);
+            let loss = self.flights[one.table[1]].take(&mut one.state.position, &mut one.state.velocity);
+            let (moved, state) = one.displacements(&self.island.tables);
+            bank.write_sector(sector, &state.position, &state.velocity, &state.forces, moved);
+            bank.lose(sector, loss);
+        }
+        structures[index].modes_mut().flush();
+        structures[index].step_control.level.fill(0);
+        counted.effort.steps += self.turns as u64;
+        counted.effort.flights += self.turns as u64;
+    }
+}
+
+/// Modes of the sectors, one entry per kind of sector.
+fn kinds_of(modes: &Sectors) -> Vec<ContactModes> {
+    match modes {
+        Sectors::Uncoupled(bank) => {
+            let count = bank.model().dynamic_modes(Scheme::Galerkin);
+            (0..bank.sets()).map(|set| modes_of(bank, set, count)).collect()
+        }
+        Sectors::Coupled(bank) => {
+            let (coordinates, shapes) = bank.coordinates_of();
+            vec![coordinates.seen_at(&shapes)]
+        }
+    }
+}
+
+/// Modes with inertia of a sector, and the flexibility of the others.
+fn modes_of(bank: &ModalBank, sector: usize, count: usize) -> ContactModes {
+    let model = bank.model();
+    let rows = model.contact_modes.nrows();
+    let mut residual = DMatrix::zeros(rows, rows);
+    for mode in count..model.len() {
+        let shape = model.contact_modes.column(mode);
+        residual.ger(bank.frequency_of(mode, sector).powi(-2), &shape, &shape, 1.0);
+    }
+    ContactModes {
+        frequencies: (0..count).map(|mode| bank.frequency_of(mode, sector)).collect(),
+        damping_ratios: model.damping_ratios[..count].to_vec(),
+        shapes: model.contact_modes.columns(0, count).into_owned(),
+        residual,
+    }
+}
+
+/// Adds the work of the contacts of a sector over a span to the ledger.
+fn enter_work(ledger: &mut Ledger, work: &Worked) {
+    let moved = work.shaft + work.whirl + work.shift + work.casing;
+    for (sum, term) in [
+        (&mut ledger.shaft_work, work.shaft),
+        (&mut ledger.whirl_work, work.whirl),
+        (&mut ledger.shift_work, work.shift),
+        (&mut ledger.casing_work, work.casing),
+        (&mut ledger.friction_loss, work.heat),
+        (&mut ledger.impact_loss, work.closing + work.dropped),
+        (&mut ledger.curvature_work, work.exact + work.heat + work.closing - moved),
+        (&mut ledger.turnover, work.shaft.abs() + work.whirl.abs() + work.shift.abs() + work.casing.abs()),
+        (&mut ledger.contact_work, work.moved),
+    ] {
+        sum.add(term);
+    }
+}
+
+/// Turns the contacts of a sector into events.
+fn enter_events(
+    structure: &Structure,
+    (index, sector): (usize, usize),
+    record: &SpanRecord,
+    span: f64,
+    events: &mut Vec<ContactEvent>,
+) {
+    for (node, pair) in structure.pair_of.iter().enumerate() {
+        let (tally, Some(pair)) = (&record.tallies[node], *pair) else { continue };
+        if tally.normal > 0.0 {
+            let member = ContactMember { structure: index, pair, node, sector, index: structure.index(node, sector) };
+            events.push(event(member, tally, span));
+        }
+    }
+}
+
+/// Creates the event of a contact from its means over the span.
+fn event(at: ContactMember, tally: &NodeTally, span: f64) -> ContactEvent {
+    let mean = |values: [f64; 3]| values.map(|value| value / span);
+    let wrench = Wrench {
+        point: tally.wrench.point.map(|value| value / tally.normal),
+        force: mean(tally.wrench.force),
+        moment: mean(tally.wrench.moment),
+    };
+    let event = ContactEvent::new(at, tally.normal / span, mean(tally.force), 0.0, ([0.0; 3], wrench));
+    ContactEvent { tangential: tally.tangential / span, peak: tally.peak, friction_heat: tally.heat, ..event }
+}
+
+impl Structure {
+    /// Reads the contacts of a sector before a span.
+    pub(crate) fn read_contacts(&self, sector: usize, state: &mut SectorState) {
+        for node in 0..self.nodes() {
+            let index = self.index(node, sector);
+            state.multipliers[node] = self.history.multiplier[index];
+            state.gaps[node] = self.history.gap.before[index];
+            state.normals[3 * node..3 * node + 3].copy_from_slice(&self.vector3(
+                &self.step_control.normals,
+                node,
+                sector,
+            ));
+            state.forces[3 * node..3 * node + 3].copy_from_slice(&self.vector3(&self.history.force.now, node, sector));
+        }
+        for (row, slope) in state.slopes.iter_mut().enumerate() {
+            *slope = self.step_control.slopes[row * self.lanes() + sector];
+        }
+        state.gaps_known = true;
+    }
+
+    /// Writes the contacts of a sector after a span, and the smallest gap of each node during the span (m).
+    pub(crate) fn write_contacts(&mut self, sector: usize, state: &SectorState, lowest: impl Fn(usize) -> f64) {
+        let lanes = self.lanes();
+        for (row, slope) in state.slopes.iter().enumerate() {
+            self.step_control.slopes[row * lanes + sector] = *slope;
+        }
+        for node in 0..self.nodes() {
+            let index = self.index(node, sector);
+            self.history.multiplier[index] = state.multipliers[node];
+            self.lowest_in_span[index] = lowest(node);
+            for component in 0..3 {
+                let (row, of_state) = ((3 * node + component) * lanes + sector, 3 * node + component);
+                self.history.force.now[row] = state.forces[of_state];
+                self.step_control.normals[row] = state.normals[of_state];
+            }
+        }
+    }
+}

@@ -1,0 +1,135 @@
+//! Integrates an island over a span with steps that the tolerance and the energy balance allow.
+
+use super::island::IslandInSpan;
+use super::surroundings::Surroundings;
+use super::tables::HALVINGS;
+use super::trial::{ForceInterpolation, TrialResult};
+use crate::system::Effort;
+
+/// The next step is twice as long if the error is below this fraction of the tolerance.
+const LENGTHEN: f64 = 1.0 / 32.0;
+/// Steps that would add to a bank that still holds energy are halved down to this level.
+const SAVED: usize = 3;
+/// The bank is full at this fraction of the largest energy so far; steps that would add to a full bank are halved down to the shortest.
+const FULL: f64 = 0.01;
+/// Shortest step that is halved because a node comes near between the points (s).
+const SHORTEST_LOOK: f64 = 2.5e-6;
+
+/// A step within a span: its level, and its start and length as fractions of the span.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SpanStep {
+    /// Number of halvings of the span.
+    pub level: usize,
+    /// Start, as a fraction of the span.
+    pub from: f64,
+    /// Length, as a fraction of the span.
+    pub length: f64,
+}
+
+/// Tolerance and limits of the steps of a sector.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StepGoal {
+    /// Largest displacement error of a step (m).
+    pub tolerance: f64,
+    /// Largest gap of a contact that counts as closed (m).
+    pub precision: f64,
+    /// Largest number of attempted steps ([`Effort::tried`]).
+    pub most: u64,
+}
+
+/// Reason why a span was not integrated to its end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stopped {
+    /// Even the shortest step has no solution of the contact problem.
+    Unsolved,
+    /// The limit of attempted steps is exceeded.
+    Exhausted,
+}
+
+impl<S: Surroundings> IslandInSpan<'_, S> {
+    /// Integrates over a span.
+    ///
+    /// # Errors
+    /// [`Stopped`]; the state is then that after the last accepted step.
+    pub fn integrate(&mut self, effort: &mut Effort) -> Result<(), Stopped> {
+        const WHOLE: u64 = 1 << HALVINGS;
+        let (goal, count, mut done) = (self.goal, self.count(), 0_u64);
+        while done < WHOLE {
+            let level = self.control().level;
+            // A shortest step may need two trials.
+            let next = count * if level == HALVINGS { 2 } else { 1 };
+            if effort.tried().saturating_add(next) > goal.most {
+                return Err(Stopped::Exhausted);
+            }
+            let units = WHOLE >> level;
+            let step = SpanStep { level, from: share(done, WHOLE), length: share(units, WHOLE) };
+            if self.fly(step) {
+                (effort.steps, effort.flights, done) = (effort.steps + count, effort.flights + count, done + units);
+                self.control().level -= usize::from(level > 0 && done.is_multiple_of(2 * units));
+                continue;
+            }
+            let (result, kind) = self.try_step(step, effort);
+            if self.is_too_long(step, kind, &result, goal.tolerance) && level < HALVINGS {
+                self.control().level += 1;
+                continue;
+            }
+            if !result.solved {
+                return Err(Stopped::Unsolved);
+            }
+            effort.missed += count * u64::from(result.misses(goal.tolerance));
+            let left = self.accept(step, kind, &result);
+            self.control().bank += left;
+            (effort.steps, done) = (effort.steps + count, done + units);
+            let even = done.is_multiple_of(2 * units);
+            if level > 0 && even && kind == ForceInterpolation::Polynomial && result.error < LENGTHEN * goal.tolerance {
+                self.control().level -= 1;
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns whether a step has no solution, misses the tolerance or a contact between its points, or needs more energy than the
+    /// bank holds or can take.
+    fn is_too_long(&mut self, step: SpanStep, kind: ForceInterpolation, result: &TrialResult, tolerance: f64) -> bool {
+        if !result.solved || kind == ForceInterpolation::Constant {
+            return !result.solved;
+        }
+        let bank = self.control().bank;
+        result.misses(tolerance)
+            || (result.near && self.length(step.level) > SHORTEST_LOOK)
+            || (result.switches && result.switched > bank)
+            || (result.switched < 0.0 && (step.level < SAVED && bank > 0.0 || self.overflows_bank(-result.switched)))
+    }
+
+    /// Returns whether the bank would exceed its limit if `paid` (J) were added. Without any energy so far there is no limit.
+    fn overflows_bank(&mut self, paid: f64) -> bool {
+        let largest = self.largest_energy();
+        largest > 0.0 && self.control().bank + paid > FULL * largest
+    }
+
+    /// Tries one step; a shortest step is tried with a constant force if the polynomial is rejected.
+    fn try_step(&mut self, step: SpanStep, effort: &mut Effort) -> (TrialResult, ForceInterpolation) {
+        let result = self.run_trial(step, ForceInterpolation::Polynomial, effort);
+        let affordable = result.solved && !(result.switches && result.switched > self.control().bank);
+        if step.level < HALVINGS || affordable {
+            return (result, ForceInterpolation::Polynomial);
+        }
+        let result = self.run_trial(step, ForceInterpolation::Constant, effort);
+        effort.constant += self.count();
+        (result, ForceInterpolation::Constant)
+    }
+
+    fn run_trial(&mut self, step: SpanStep, kind: ForceInterpolation, effort: &mut Effort) -> TrialResult {
+        let result = self.attempt(step, kind);
+        effort.trials += self.count();
+        effort.factorisations += result.factorisations as u64;
+        effort.unsolved += u64::from(!result.solved);
+        result
+    }
+}
+
+/// Returns a fraction of small integers.
+#[expect(clippy::cast_precision_loss, reason = "below 2^HALVINGS")]
+fn share(part: u64, whole: u64) -> f64 {
+    part as f64 / whole as f64
+}

@@ -1,0 +1,106 @@
+//! Adaptive steps of a whole scene: each island separately, with its own steps.
+
+use super::scene_island::SceneIsland;
+use crate::geometry::PrescribedMotion;
+use crate::modes::sectors::Sectors;
+use crate::scene::method::Solver;
+use crate::system::{ContactPair, StepFailure, System};
+use crate::time::Stepper;
+
+/// Tables and scratch memory for adaptive steps of all islands of a system.
+#[derive(Debug, Clone)]
+pub struct Galerkin {
+    /// Single sectors first, in the order of their structures.
+    islands: Vec<SceneIsland>,
+    /// Largest number of attempted steps since the start of the run.
+    most_tried: u64,
+}
+
+impl Galerkin {
+    /// Creates tables for spans up to `longest` (s) with errors within the fraction `tolerance` of the smallest clearance of each
+    /// structure or, if structures influence each other, of their set.
+    pub fn new(system: &mut System, longest: f64, tolerance: f64) -> Self {
+        let sticks = system.settings.solver == Solver::Coulomb;
+        let (mut single, mut coupled) = (Vec::new(), Vec::new());
+        for set in 0..system.sets.count() {
+            let members = system.sets.members(set);
+            let parts = (&system.structures[..], &system.pairs[..]);
+            let own = |pair: &&ContactPair| members.contains(&pair.structure());
+            let clearance = |pairs: &mut dyn Iterator<Item = &ContactPair>| {
+                tolerance * pairs.map(|pair| pair.gap().clearance()).fold(f64::INFINITY, f64::min)
+            };
+            let is_disk = |one: &usize| system.structures[*one].modes().coupled().is_some();
+            if members.iter().any(is_disk) || system.pairs.iter().filter(own).any(|pair| pair.carrier().is_some()) {
+                let tolerance = clearance(&mut system.pairs.iter().filter(own));
+                coupled.push(SceneIsland::coupled(set, members, parts, (longest, sticks), tolerance));
+                continue;
+            }
+            for index in members.iter().copied().filter(|index| system.structures[*index].nodes() > 0) {
+                let tolerance = clearance(&mut system.pairs.iter().filter(|pair| pair.structure() == index));
+                single.extend(SceneIsland::single(set, index, parts, (longest, sticks), tolerance));
+            }
+        }
+        single.sort_by_key(SceneIsland::first_structure);
+        for structure in system.structures.iter_mut().filter(|structure| structure.nodes() > 0) {
+            structure.lowest_in_span = vec![f64::INFINITY; structure.gaps().len()];
+        }
+        single.extend(coupled);
+        Self { islands: single, most_tried: u64::MAX }
+    }
+}
+
+impl Stepper for Galerkin {
+    fn set_step(&mut self, step: f64) {
+        self.islands.iter_mut().for_each(|island| island.set_span(step));
+    }
+
+    fn allow(&mut self, most_tried: u64) {
+        self.most_tried = most_tried;
+    }
+
+    fn step(&mut self, system: &mut System, drives: &[PrescribedMotion]) -> Result<(), StepFailure> {
+        let span = system.step_size();
+        for (pair, drive) in system.pairs.iter_mut().zip(drives) {
+            pair.move_to(drive, span);
+        }
+        system.events.shift();
+        system.events.now.clear();
+        let factorisations = system.counted.effort.factorisations;
+        self.islands.iter_mut().try_for_each(|island| island.integrate(system, span, self.most_tried))?;
+        system.counted.factorisations += system.counted.effort.factorisations - factorisations;
+        system.check_travel()?;
+        system.find_gaps(true);
+        for structure in &mut system.structures {
+            let ends = structure.lowest_in_span.iter_mut().zip(&structure.history.gap.now);
+            ends.for_each(|(lowest, gap)| *lowest = lowest.min(*gap));
+        }
+        system.check_edges()?;
+        system.counted.steps += 1;
+        Ok(())
+    }
+
+    fn fly(&mut self, system: &mut System, drives: &[PrescribedMotion], turns: &[f64], length: f64) -> bool {
+        let all_single =
+            self.islands.len() == system.structures.len() && self.islands.iter().all(SceneIsland::is_single);
+        if !all_single || !self.islands.iter_mut().all(|island| island.is_free(system, drives, turns)) {
+            return false;
+        }
+        for (pair, drive) in system.pairs.iter_mut().zip(drives) {
+            pair.move_to(drive, length);
+        }
+        self.islands.iter_mut().for_each(|island| island.fly(system, length));
+        system.events.now.clear();
+        system.events.before.clear();
+        system.find_gaps(true);
+        system.counted.steps += 1;
+        true
+    }
+
+    fn begin_loads(&mut self, system: &mut System) {
+        for structure in &mut system.structures {
+            if let Sectors::Uncoupled(bank) = structure.modes_mut() {
+                bank.begin_loads();
+            }
+        }
+    }
+}

@@ -1,0 +1,89 @@
+//! What an island touches: the surfaces of each of its sectors, and a record of its steps.
+
+use super::carrier::CarrierIntegrator;
+use super::compliance::Lanes;
+use super::level::StepTables;
+use super::trial::{ForceInterpolation, Obstacle, Trial};
+use crate::modes::cyclic::CyclicBank;
+
+/// A step that is accepted.
+#[derive(Debug)]
+pub struct AcceptedStep<'a> {
+    /// Tables for the length of the step.
+    pub level: &'a StepTables,
+    /// Interpolation of the contact force.
+    pub kind: ForceInterpolation,
+    /// Forces, gaps and displacements at the points of the step.
+    pub trial: &'a Trial,
+    /// ½ΔfᵀGΔf, the energy lost by the change to a constant force (J).
+    pub dropped: f64,
+}
+
+/// Records the steps of a span while it is integrated.
+pub trait Witness: Obstacle {
+    /// Called before a step of `length` from `from` (fractions of the span) is tried, with forces at the points of `level`.
+    fn begin_step(&mut self, from: f64, length: f64, level: &StepTables, kind: ForceInterpolation);
+
+    /// Returns whether nodes that stay within `reach` of their rest positions (m, three per node) cannot touch during a step of
+    /// `length` from `from` (fractions of the span).
+    fn is_clear(&self, from: f64, length: f64, reach: &[f64]) -> bool;
+
+    /// Returns whether a node that stays within `reach` may come closer during the step than at its ends, by more than the tolerance.
+    fn may_come_closer(&self, _from: f64, _length: f64, _reach: &[f64]) -> bool {
+        false
+    }
+
+    /// Called before the tried step is accepted, with gaps and displacements at its points.
+    fn record_gaps(&mut self, _level: &StepTables, _trial: &Trial) {}
+
+    /// Records the damping loss of a step (J).
+    fn record_damping(&mut self, damping_loss: f64);
+
+    /// Records an accepted step.
+    fn record_step(&mut self, step: &AcceptedStep);
+
+    /// Energy lost by gaps that closed in the recorded steps (J).
+    fn closing_loss(&self) -> f64 {
+        0.0
+    }
+
+    /// Starts the search for closest points at those of the start of the step.
+    fn guess_start_places(&mut self) {}
+
+    /// Adds the reaction to a force (N) on a node at a point of the step to the surface carrier.
+    fn react(&mut self, _node: usize, _point: usize, _force: [f64; 3]) {}
+
+    /// Adds an impulse error (N·s) on a node at a point of the step to that of the surface carrier.
+    fn add_impulse(&mut self, _node: usize, _point: usize, _impulse: [f64; 3]) {}
+}
+
+/// Surface carriers of an island, in a step of a level.
+pub struct CarriersInStep<'a> {
+    /// The carriers; empty if all surfaces are rigid.
+    pub carriers: &'a mut [CarrierIntegrator],
+    /// Level of the step.
+    pub level: usize,
+    /// Interpolation of the contact force.
+    pub kind: ForceInterpolation,
+    /// Lanes of the current contact problem.
+    pub lanes: Lanes,
+}
+
+/// Surfaces that the sectors of an island may touch.
+pub trait Surroundings {
+    /// Surfaces of one sector.
+    type Surfaces<'a>: Witness
+    where
+        Self: 'a;
+
+    /// Returns the surfaces of a sector of the island in a step.
+    fn surfaces<'a>(&'a mut self, sector: usize, carriers: CarriersInStep<'a>) -> Self::Surfaces<'a>;
+
+    /// Deforms the surfaces on carriers as at a point of the step.
+    fn bend(&mut self, _carriers: &[CarrierIntegrator], _point: usize) {}
+
+    /// Returns the modes of the structure of a disk.
+    fn disk(&mut self, _structure: usize) -> Option<&mut CyclicBank> {
+        None
+    }
+}

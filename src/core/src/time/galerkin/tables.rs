@@ -1,0 +1,101 @@
+//! Tables of a sector for steps of all lengths.
+
+use super::basis::MOST;
+use super::level::StepTables;
+use super::rows::ContactRows;
+use super::state::SectorState;
+use super::trial::ForceInterpolation;
+use crate::modes::coordinates::ContactModes;
+
+/// Largest number of halvings of the span.
+pub const HALVINGS: usize = 10;
+
+/// Tables of one kind of sector for a span that is halved repeatedly. All levels have the same degree.
+#[derive(Debug, Clone)]
+pub struct Tables {
+    /// Data that all levels share.
+    pub rows: ContactRows,
+    /// Tables for the span, half of it, a quarter, …
+    pub levels: Vec<StepTables>,
+    /// Tables of a higher degree, for steps in which no sticking contact changes its status; empty without sticking.
+    pub steady: Vec<StepTables>,
+    modes: ContactModes,
+}
+
+impl Tables {
+    /// Creates tables for spans up to `longest` (s); call [`Tables::set_span`] before the first span.
+    pub fn new(modes: ContactModes, longest: f64) -> Self {
+        let degree = modes.degree_up_to(longest);
+        Self::of_degree(modes, degree)
+    }
+
+    /// Creates tables of a degree that is known to be suitable.
+    pub fn of_degree(modes: ContactModes, degree: usize) -> Self {
+        let levels = (0..=HALVINGS).map(|_| StepTables::new(&modes, degree)).collect();
+        Self { rows: ContactRows::new(&modes), levels, steady: Vec::new(), modes }
+    }
+
+    /// Number of modes with inertia.
+    pub fn modes(&self) -> usize {
+        self.modes.len()
+    }
+
+    /// Number of contact nodes.
+    pub fn nodes(&self) -> usize {
+        self.modes.rows() / 3
+    }
+
+    /// Kinetic and strain energy of a sector (J).
+    pub fn energy(&self, state: &SectorState) -> f64 {
+        let (kinetic, strain) = state.energies(&self.modes.frequencies, self.rows.residual());
+        kinetic + strain
+    }
+
+    /// Adds tables of degree `degree` for steps in which no contact changes its status.
+    #[must_use]
+    pub fn steady(mut self, degree: usize) -> Self {
+        self.steady = (0..=HALVINGS).map(|_| StepTables::new(&self.modes, degree)).collect();
+        self
+    }
+
+    /// Tables of a level with the given number of points.
+    pub fn of_points(&self, level: usize, kind: ForceInterpolation, points: usize) -> &StepTables {
+        let steady = self
+            .steady
+            .get(level)
+            .filter(|level| kind == ForceInterpolation::Polynomial && level.basis.degree == points);
+        steady.unwrap_or(&self.levels[level])
+    }
+
+    /// Fills the tables for spans of length `span` (s). Does not allocate.
+    pub fn set_span(&mut self, span: f64) {
+        if self.levels[0].step.to_bits() == span.to_bits() {
+            return;
+        }
+        for levels in [&mut self.levels, &mut self.steady] {
+            for (halvings, level) in levels.iter_mut().enumerate() {
+                level.set_step(&self.modes, halved(span, halvings));
+                level.share = halved(1.0, halvings);
+            }
+        }
+    }
+}
+
+impl ContactModes {
+    /// Largest suitable degree for spans up to `longest` (s). Shorter spans are possible, so all lengths down to a thousandth of
+    /// the shortest step are checked.
+    pub fn degree_up_to(&self, longest: f64) -> usize {
+        let lengths = (0..2 * HALVINGS).map(|halvings| halved(longest, halvings));
+        if lengths.into_iter().all(|length| self.allows_cubics(length)) { MOST } else { MOST - 1 }
+    }
+}
+
+/// Shortest step of spans of length `span` (s).
+pub fn shortest(span: f64) -> f64 {
+    halved(span, HALVINGS)
+}
+
+/// `span` divided by 2 `halvings` times (s).
+fn halved(span: f64, halvings: usize) -> f64 {
+    libm::ldexp(span, -i32::try_from(halvings).unwrap_or(i32::MAX))
+}
