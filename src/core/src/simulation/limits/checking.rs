@@ -84,18 +84,6 @@ fn yielding_most<'a>(
     chosen
 }
 
-/// Adds the expected step, which was checked separately, as the bound of a range.
-pub(super) fn with_expected<T>(
-    mut ranges: Vec<(f64, Option<T>)>,
-    expected: f64,
-    found: Option<T>,
-) -> Vec<(f64, Option<T>)> {
-    ranges.retain(|(step, _)| (step - expected).abs() > SAME_STEP * expected);
-    ranges.push((expected, found));
-    ranges.sort_by(|a, b| b.0.total_cmp(&a.0));
-    ranges
-}
-
 /// A structure of a scene with some parameters, to be checked with all surfaces it touches.
 pub(super) struct Checking<'a> {
     pub(super) compiled: &'a Compiled,
@@ -238,12 +226,14 @@ impl<'a> Checking<'a> {
             })
         };
         let largest = carried.iter().map(|(_, _, modes)| modes.largest_frequency()).fold(0.0, f64::max);
-        let steps = limits::growth_steps(largest, self.parameters.step);
-        let ranges = steps.map(|step| (step, worst_at(step))).collect();
-        with_expected(ranges, expected, worst_at(expected))
+        let is_other = |step: &f64| (step - expected).abs() > SAME_STEP * expected;
+        let mut steps: Vec<f64> = limits::growth_steps(largest, self.parameters.step).filter(is_other).collect();
+        steps.push(expected);
+        steps.sort_by(|a, b| b.total_cmp(a));
+        steps.into_iter().map(|step| (step, worst_at(step))).collect()
     }
 
-    /// Returns the largest step of massless-boundary, and a warning if many blades in contact simultaneously may lower it.
+    /// Returns the largest step of contact whose forces act a step late, and a warning if many blades in contact simultaneously may lower it.
     pub(super) fn massless(&self, step: f64) -> Result<(Vec<WarningKind>, MasslessLimit), ErrorKind> {
         if !self.parameters.scheme.properties().delays_contact {
             return Ok((Vec::new(), MasslessLimit::NONE));

@@ -139,10 +139,7 @@ impl FlightCheck<'_> {
         if let Some(jammed) = (0..met.nodes.len()).find(|member| diagonal[*member] <= 0.0) {
             return Err(ErrorKind::Jammed { friction, step, node: met.nodes[jammed] });
         }
-        let scaled = DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| {
-            0.5 * (matrix[(i, j)] + matrix[(j, i)]) / (diagonal[i] * diagonal[j]).sqrt()
-        });
-        Ok(scaled.symmetric_eigenvalues().min())
+        Ok(limits::lowest_eigenvalue(&matrix).unwrap_or(f64::NEG_INFINITY))
     }
 }
 
