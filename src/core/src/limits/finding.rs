@@ -91,9 +91,9 @@ pub enum WarningKind {
         opens_after: Option<f64>,
     },
     /// The step makes vibration in closed contact grow.
-    StepGrowth(StepGrowth),
+    StepGrowth(Box<StepGrowth>),
     /// The next step will be rejected, because contact now slides in the other sense.
-    ReversedGrowth(StepGrowth),
+    ReversedGrowth(Box<StepGrowth>),
     /// Vibration grows while all contact nodes of a blade cut.
     CuttingGrowth(Fastest),
     /// The model has too many modes for the check of growth.
@@ -156,7 +156,7 @@ pub enum ErrorKind {
     /// The quasi-static modes have no flexibility along the normal of a contact node.
     RigidNormal,
     /// The step makes vibration in closed contact grow.
-    StepGrowth(StepGrowth),
+    StepGrowth(Box<StepGrowth>),
 }
 
 impl ErrorKind {

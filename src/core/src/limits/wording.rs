@@ -247,10 +247,10 @@ impl WarningKind {
             Self::Flutter { .. } => {
                 "Use less friction or more damping, or let contact open sooner; a shorter step does not help".to_owned()
             }
-            Self::StepGrowth(StepGrowth { silent: Some(step), .. }) => {
-                format!("Set `time.step` to {} or less", shown(rounded_down(*step)))
-            }
-            Self::StepGrowth(_) => "Use less friction or more damping".to_owned(),
+            Self::StepGrowth(growth) => growth.silent.map_or_else(
+                || "Use less friction or more damping".to_owned(),
+                |step| format!("Set `time.step` to {} or less", shown(rounded_down(step))),
+            ),
             Self::ReversedGrowth(_) => {
                 "Change the speed before the next step, which would otherwise end the run".to_owned()
             }

@@ -297,7 +297,7 @@ impl Compiled {
             // is rejected.
             return BodyLimits {
                 outcome: Ok(at.not_looked_at().map(|kind| kind.of(of)).into_iter().collect()),
-                senses: [0, 1].map(|sense| Some(at.physics(sense, expected))),
+                senses: [0, 1].map(|sense| Some(at.sense(sense, expected))),
                 ..BodyLimits::new(of, Closing::new(self, body))
             };
         }

@@ -39,21 +39,21 @@ struct Added {
     /// Durations of closed contact (s) up to which the scene is accepted, and accepted without a warning.
     allowed: f64,
     quiet: f64,
-    growth: StepGrowth,
+    growth: Box<StepGrowth>,
 }
 
 impl Sense {
-    /// Returns the growth for which a step (s) is rejected while contact stays closed for a time (s).
-    fn rejected(&self, step: f64, closed: f64) -> Option<&StepGrowth> {
-        in_range(&self.ranges, step).filter(|added| closed > added.allowed).map(|added| &added.growth)
+    /// Returns the growth for which a step (s) is rejected while contact stays closed for a time (s). Allocates only to reject.
+    fn rejected(&self, step: f64, closed: f64) -> Option<Box<StepGrowth>> {
+        in_range(&self.ranges, step).filter(|added| closed > added.allowed).map(|added| added.growth.clone())
     }
 
-    /// Rejects a step (s) that adds significant growth while contact stays closed for a time (s). Allocates only to reject.
+    /// Rejects a step (s) that adds significant growth while contact stays closed for a time (s).
     ///
     /// # Errors
     /// [`ErrorKind::StepGrowth`] with numbers.
     pub fn check(&self, step: f64, closed: f64) -> Result<(), ErrorKind> {
-        self.rejected(step, closed).map_or(Ok(()), |growth| Err(ErrorKind::StepGrowth(growth.clone())))
+        self.rejected(step, closed).map_or(Ok(()), |growth| Err(ErrorKind::StepGrowth(growth)))
     }
 
     /// Returns the warnings for the expected step.
@@ -69,7 +69,7 @@ impl Sense {
     /// Returns the warnings after a reversal, when the expected step may be rejected only later.
     pub fn warnings_after_reversal(&self, closed: f64) -> Vec<WarningKind> {
         match self.rejected(self.expected, closed) {
-            Some(growth) => vec![WarningKind::ReversedGrowth(growth.clone())],
+            Some(growth) => vec![WarningKind::ReversedGrowth(growth)],
             None => self.warnings(closed).unwrap_or_default(),
         }
     }
@@ -141,29 +141,19 @@ impl Checking<'_> {
         let sign = [1.0, -1.0][sense];
         let (watched, physics) = self.watched(expected, sign);
         let steps = looked_at(self.largest_frequency(), self.parameters.step);
-        let most = |of: &dyn Fn(&FastestGrowth) -> Option<SetGrowth>| {
-            let judged = watched.iter().filter_map(|watched| Some((watched.nodes.as_slice(), of(watched)?)));
-            judged.fold(None, |most: Option<(&[usize], SetGrowth)>, found| match most {
-                Some(known) if known.1.within(judged::TOLD) <= found.1.within(judged::TOLD) => Some(known),
-                _ => Some(found),
-            })
+        let most_at = |step: f64| {
+            let judged = watched.iter().filter_map(|one| Some((one.nodes.as_slice(), self.judged(one, step, sign)?)));
+            judged.reduce(
+                |known, found| {
+                    if known.1.within(judged::TOLD) <= found.1.within(judged::TOLD) { known } else { found }
+                },
+            )
         };
-        let at = |step: f64| most(&|watched| self.judged(watched, step, sign));
-        let looked: Vec<_> = steps.into_iter().map(|step| (step, at(step))).collect();
+        let looked: Vec<_> = steps.into_iter().map(|step| (step, most_at(step))).collect();
         Sense { ranges: self.added(&looked, sign), ..self.growth(physics, sign, expected) }
     }
 
-    /// Returns the growth of contact that slides in one sense by the differential equations, independent of the step.
-    pub(super) fn physics(&self, sense: usize, expected: f64) -> Sense {
-        if self.friction == 0.0 {
-            return Sense::default();
-        }
-        let sign = [1.0, -1.0][sense];
-        let (_, physics) = self.watched(expected, sign);
-        self.growth(physics, sign, expected)
-    }
-
-    /// Checks growth at the expected step.
+    /// Checks growth at the expected step; adaptive steps add none, and nothing has to be watched at other steps.
     fn watched(&self, expected: f64, sign: f64) -> (Vec<FastestGrowth>, Physics) {
         let (mut watched, mut physics) = (Vec::new(), Physics::default());
         let scheme = self.parameters.scheme;
@@ -242,13 +232,15 @@ impl Checking<'_> {
             if quiet.is_infinite() {
                 silent = Some(*step);
             }
-            let growth = worst.map(|(step, nodes, judged)| StepGrowth {
-                contact: self.contact(nodes, sign),
-                step,
-                rates: judged.growth,
-                error: judged.error(f64::INFINITY),
-                accepted,
-                silent,
+            let growth = worst.map(|(step, nodes, judged)| {
+                Box::new(StepGrowth {
+                    contact: self.contact(nodes, sign),
+                    step,
+                    rates: judged.growth,
+                    error: judged.error(f64::INFINITY),
+                    accepted,
+                    silent,
+                })
             });
             let is_longest = added.len() + 1 == ranges.len();
             added.push((
