@@ -32,7 +32,7 @@ pub const SHARE: f64 = 0.5;
 /// of displacements is 5.8 % of the clearance at 0.68 of the limit, 4.0 % at 0.34, 0.5 % at 0.14 and 0.1 % at 0.07.
 pub const NEAR: f64 = 0.2;
 /// Modes beyond this ωh are not resolved.
-pub const PASSED_OVER: f64 = 2.0;
+const PASSED_OVER: f64 = 2.0;
 
 /// Smallest step (s) that leaves too much unresolved of a structure whose contacts act along `directions` (per row of three of its contact
 /// modes); infinite if no mode vibrates.

@@ -60,18 +60,17 @@ impl Context<'_> {
         format!("closed at {names}{sectors}, sliding in {sense} with µ = {}", frictions.join(" and "))
     }
 
-    /// Joins alternative remedies, written in lower case.
-    fn remedy<const N: usize>(&self, alternatives: [String; N]) -> String {
-        let joined = alternatives.into_iter().filter(|text| !text.is_empty()).collect::<Vec<_>>().join(", or ");
+    /// Returns the remedy of a step that is too long: adaptive steps, if the scene supports them, or one of the alternatives, written in
+    /// lower case.
+    fn remedy_of_step<const N: usize>(&self, alternatives: [String; N]) -> String {
+        let adaptive = self.adaptive.map(|AdaptiveSteps { solver }| {
+            let preset = if self.preset { "remove `preset`, " } else { "" };
+            let solver =
+                solver.map_or(String::new(), |solver| format!(" and `contact.solver = \"{}\"`", solver.name()));
+            format!("use adaptive steps ({preset}set `time.scheme = \"{}\"`{solver})", Scheme::ADAPTIVE.name())
+        });
+        let joined = adaptive.into_iter().chain(alternatives).collect::<Vec<_>>().join(", or ");
         joined[..1].to_uppercase() + &joined[1..]
-    }
-
-    /// Returns the remedy of adaptive steps; empty if the scene does not support them.
-    fn adaptive_steps(&self) -> String {
-        let Some(AdaptiveSteps { solver }) = self.adaptive else { return String::new() };
-        let preset = if self.preset { "remove `preset`, " } else { "" };
-        let solver = solver.map_or(String::new(), |solver| format!(" and `contact.solver = \"{}\"`", solver.name()));
-        format!("use adaptive steps ({preset}set `time.scheme = \"{}\"`{solver})", Scheme::ADAPTIVE.name())
     }
 
     fn other_scheme(&self) -> String {
@@ -140,10 +139,10 @@ impl Finding {
 impl WarningKind {
     fn problem(&self, of: Subject, context: &Context) -> String {
         match self {
-            Self::UnresolvedModes { step, .. } => format!(
+            Self::UnresolvedModes { scheme, step, .. } => format!(
                 "modes above {:.4} kHz are not resolved by the internal step of {step:.3e} s: their free motion is \
                  exact, but their response to contact forces is not",
-                kilohertz(unresolved::PASSED_OVER / step)
+                kilohertz(scheme.properties().resolved_up_to / step)
             ),
             Self::UnresolvedFlexibility { scheme, step, .. } => format!(
                 "{} with an internal step of {step:.3e} s leaves much of the contact flexibility unresolved: expect \
@@ -230,8 +229,8 @@ impl WarningKind {
     /// Returns the remedy if it is more specific than that of the topic.
     fn remedy(&self) -> Option<String> {
         Some(match self {
-            Self::UnresolvedModes { frequency, .. } => {
-                let step = rounded_down(unresolved::PASSED_OVER / frequency);
+            Self::UnresolvedModes { scheme, frequency, .. } => {
+                let step = rounded_down(scheme.properties().resolved_up_to / frequency);
                 format!("Set `time.step` = {step:.2e} s to resolve all modes")
             }
             Self::UnresolvedFlexibility { limit, .. } => {
@@ -323,7 +322,7 @@ impl ErrorKind {
                         scheme.name(),
                         frequency * step
                     ),
-                    context.remedy([context.adaptive_steps(), shorter(limit / frequency), context.other_scheme()]),
+                    context.remedy_of_step([shorter(limit / frequency), context.other_scheme()]),
                 ]
             }
             Self::UnresolvedContact { scheme, step, limit, frequency } => [
@@ -333,11 +332,14 @@ impl ErrorKind {
                      energies would be wrong by ten per cent, and by far more with longer steps",
                     scheme.name(),
                     frequency * step,
-                    kilohertz(unresolved::PASSED_OVER / step)
+                    kilohertz(scheme.properties().resolved_up_to / step)
                 ),
-                context.remedy([
-                    context.adaptive_steps(),
-                    format!("{}, preferably below {:.3e} s", shorter(*limit), unresolved::PASSED_OVER / frequency),
+                context.remedy_of_step([
+                    format!(
+                        "{}, preferably below {:.3e} s",
+                        shorter(*limit),
+                        scheme.properties().resolved_up_to / frequency
+                    ),
                     "use massless-boundary".to_owned(),
                 ]),
             ],
@@ -381,7 +383,7 @@ impl ErrorKind {
                      gains energy above {:.6e} s",
                     limit.closed, limit.usable
                 ),
-                context.remedy([context.adaptive_steps(), shorter(limit.usable), context.other_scheme()]),
+                context.remedy_of_step([shorter(limit.usable), context.other_scheme()]),
             ],
             Self::StiffContact { factor } => [
                 format!(
@@ -402,14 +404,16 @@ impl ErrorKind {
                     growth.compared(growth.rates.continuous),
                     100.0 * growth.error
                 ),
-                context.remedy([
-                    context.adaptive_steps(),
-                    growth.accepted.map_or(String::new(), |step| {
+                context.remedy_of_step([growth.accepted.map_or_else(
+                    || "use less friction or more damping".to_owned(),
+                    |step| {
                         let step = shown(rounded_down(step));
-                        format!("set `time.step` (in the FMU `internal_step_max`) to {step} or less")
-                    }),
-                    "use less friction or more damping".to_owned(),
-                ]),
+                        format!(
+                            "set `time.step` (in the FMU `internal_step_max`) to {step} or less, or use less friction \
+                                 or more damping"
+                        )
+                    },
+                )]),
             ],
         }
     }

@@ -44,13 +44,13 @@ impl Scheme {
                     amplitude: |turn| turn / libm::sin(turn) - 1.0,
                     frequency: |turn| turn * turn / 24.0,
                 }),
-                ..SchemeProperties::EXACT
+                ..SchemeProperties::UNLIMITED
             },
-            Self::ModalExact => &SchemeProperties { resolved_up_to: 2.0, ..SchemeProperties::EXACT },
+            Self::ModalExact => &SchemeProperties { resolved_up_to: 2.0, ..SchemeProperties::UNLIMITED },
             Self::MasslessBoundary => {
-                &SchemeProperties { quasi_static: true, delays_contact: true, ..SchemeProperties::EXACT }
+                &SchemeProperties { quasi_static: true, delays_contact: true, ..SchemeProperties::UNLIMITED }
             }
-            Self::Galerkin => &SchemeProperties { quasi_static: true, adaptive: true, ..SchemeProperties::EXACT },
+            Self::Galerkin => &SchemeProperties { quasi_static: true, adaptive: true, ..SchemeProperties::UNLIMITED },
         }
     }
 
@@ -89,7 +89,7 @@ pub struct SchemeProperties {
 
 impl SchemeProperties {
     /// A scheme without limits whose modes all have inertia.
-    const EXACT: Self = Self {
+    const UNLIMITED: Self = Self {
         adaptive: false,
         quasi_static: false,
         delays_contact: false,
