@@ -2,41 +2,50 @@
 
 use super::pair::{When, at_place};
 use super::{ContactEvent, StepFailure, System};
+use crate::geometry::surface_spline::ClosestPoint;
 use crate::geometry::wrench::{At, MotionIncrement};
-use crate::geometry::{Geometry, dot};
+use crate::geometry::{GapLaw, Geometry, dot};
 use crate::scene::method::Solver;
+use crate::system::ledger::Ledger;
 
-/// Work of one contact over a step (J).
-#[derive(Debug, Clone, Copy, Default)]
-struct ContactWork {
-    shaft: f64,
-    whirl: f64,
-    shift: f64,
-    casing: f64,
-    heat: f64,
+/// Work of contacts over a step (J).
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ContactWork {
+    /// Work of the shaft.
+    pub shaft: f64,
+    /// Work of whirl.
+    pub whirl: f64,
+    /// Work of axial shift.
+    pub shift: f64,
+    /// Work of the casing.
+    pub casing: f64,
+    /// Friction heat.
+    pub heat: f64,
     /// Energy supplied by friction of contacts that may stick, and by cutting (≤ 0), when the tip reverses between the two steps
     /// that are averaged.
-    turned: f64,
+    pub turned: f64,
     /// Work of cutting the coating.
-    cut: f64,
+    pub cut: f64,
     /// Part of `turned` that is cutting (≤ 0), because a tip that moves backwards cuts nothing.
-    uncut: f64,
-    /// Energy lost by the node that stops at the surface (J).
-    closing: f64,
+    pub uncut: f64,
+    /// Energy lost by gaps that close.
+    pub closing: f64,
     /// Part of `closing` that a coating absorbs.
-    worn: f64,
+    pub worn: f64,
+    /// Energy lost by changes to a constant force within a step.
+    pub dropped: f64,
     /// Work in the scheme, on both structures.
-    exact: f64,
+    pub exact: f64,
     /// Magnitudes of the work of all inputs.
-    turnover: f64,
+    pub turnover: f64,
     /// Magnitude of the work on both structures.
-    moved: f64,
+    pub moved: f64,
 }
 
 impl ContactWork {
     /// Sums over the contacts of one set in one step need no compensation, unlike the sums over all steps.
     #[inline(always)]
-    fn add(&mut self, other: &Self) {
+    pub fn add(&mut self, other: &Self) {
         self.shaft += other.shaft;
         self.whirl += other.whirl;
         self.shift += other.shift;
@@ -47,6 +56,7 @@ impl ContactWork {
         self.uncut += other.uncut;
         self.closing += other.closing;
         self.worn += other.worn;
+        self.dropped += other.dropped;
         self.exact += other.exact;
         self.turnover += other.turnover;
         self.moved += other.moved;
@@ -57,12 +67,82 @@ impl ContactWork {
         self.exact + self.heat + self.cut + self.closing - (self.shaft + self.whirl + self.shift + self.casing)
     }
 
-    /// Deducts the energy that friction supplies to a tip reversed by an impact from the impact loss. The rest, of tips that
-    /// reverse while they stay closed, vanishes with the step and is part of the curvature work.
-    fn settle(&mut self) {
+    /// Adds the work to a ledger. The energy that friction supplies to a tip reversed by an impact is deducted from the impact loss; the
+    /// rest, of tips that reverse while they stay closed, vanishes with the step and is part of the curvature work.
+    pub fn enter(mut self, ledger: &mut Ledger) {
         if self.turned != 0.0 {
             self.closing = self.worn + (self.closing - self.worn + self.turned).max(0.0);
         }
+        ledger.wear_work.add(self.worn);
+        ledger.impact_loss.add(self.closing - self.worn + self.dropped);
+        ledger.friction_loss.add(self.heat);
+        ledger.cutting_work.add(self.cut);
+        ledger.shaft_work.add(self.shaft);
+        ledger.whirl_work.add(self.whirl);
+        ledger.shift_work.add(self.shift);
+        ledger.casing_work.add(self.casing);
+        ledger.curvature_work.add(self.curvature());
+        ledger.turnover.add(self.turnover);
+        ledger.contact_work.add(self.moved);
+    }
+}
+
+/// A contact force, and the motion over which it does work.
+///
+/// The work on both structures is f·u with the relative displacement u. It equals the work of inputs (force times prescribed motion) less
+/// the friction heat (friction force times slip) and the loss of the approach (λ times the decrease of the gap), except for curvature work
+/// within the step.
+#[derive(Debug, Clone, Copy)]
+pub struct WorkingForce<'a> {
+    /// Gap function of the contact, and its node.
+    pub gap: &'a GapLaw,
+    /// Node, and prescribed motion when the force acts.
+    pub at: At<'a>,
+    /// Data of the contact point ([`GapLaw::contact_point`]), and its closest point on the surface.
+    pub point: [f64; 3],
+    /// Closest point on the surface.
+    pub place: ClosestPoint,
+    /// Unit normal for which the gap was found.
+    pub normal: [f64; 3],
+    /// Multiplier λ (N).
+    pub multiplier: f64,
+    /// Force on the structure (N).
+    pub force: [f64; 3],
+    /// Part of the force that is not along the normal for which it was found (N).
+    pub tangential: [f64; 3],
+    /// Force in fixed directions (N).
+    pub fixed: [f64; 3],
+    /// Prescribed motion over which the force does work.
+    pub motion: &'a MotionIncrement,
+    /// Displacement relative to the surface over which the force does work (m).
+    pub moved: [f64; 3],
+    /// Decrease of the gap over which λ does work (m).
+    pub approach: f64,
+}
+
+impl WorkingForce<'_> {
+    /// Work of the force; friction is heat, and all of the approach is a loss.
+    #[inline(always)]
+    pub fn work(&self) -> ContactWork {
+        let spin = self.gap.spin_motion(self.at, self.point, self.motion);
+        let shaft = self.gap.shaft_motion(self.at, self.point, self.motion);
+        let surface = self.gap.surface_motion(self.at, self.point, self.normal, self.place, self.motion);
+        let slip: [f64; 3] = std::array::from_fn(|i| self.moved[i] + spin[i] + shaft[i]);
+        let ([x, y, z], across) = (self.fixed, self.motion.shaft);
+        let exact = dot(self.force, self.moved);
+        let mut work = ContactWork {
+            shaft: -dot(self.force, spin),
+            whirl: -(x * across[0] + y * across[1]),
+            shift: -z * across[2],
+            casing: self.multiplier * surface,
+            heat: -dot(self.tangential, slip),
+            closing: self.multiplier * self.approach,
+            exact,
+            moved: exact.abs(),
+            ..ContactWork::default()
+        };
+        work.turnover = work.shaft.abs() + work.whirl.abs() + work.shift.abs() + work.casing.abs();
+        work
     }
 }
 
@@ -171,61 +251,48 @@ impl System {
     }
 
     /// Adds the work of all contacts of a set in a step to its ledger.
-    fn enter(&mut self, set: usize, mut work: ContactWork) {
-        work.settle();
-        let ledger = &mut self.counted.ledgers[set];
-        ledger.wear_work.add(work.worn);
-        ledger.impact_loss.add(work.closing - work.worn);
-        ledger.friction_loss.add(work.heat);
-        ledger.cutting_work.add(work.cut);
-        ledger.shaft_work.add(work.shaft);
-        ledger.whirl_work.add(work.whirl);
-        ledger.shift_work.add(work.shift);
-        ledger.casing_work.add(work.casing);
-        ledger.curvature_work.add(work.curvature());
-        ledger.turnover.add(work.turnover);
-        ledger.contact_work.add(work.moved);
+    fn enter(&mut self, set: usize, work: ContactWork) {
+        work.enter(&mut self.counted.ledgers[set]);
         self.counted.taken[set].uncut -= work.uncut;
     }
 
-    /// The work on both structures is f·(u⁺ − u⁻)/2 with the relative displacement u. It equals the work of inputs (force times
-    /// prescribed motion) less the friction heat (friction force times slip) and the loss of the approach (λ times half the
-    /// change of gap), except for curvature work within the step. With a coating, its rods absorb the loss of the approach.
+    /// Work of a contact over a step, for which its motion over the last two steps is averaged. With a coating, its rods absorb the loss
+    /// of the approach.
     fn work_of(&self, event: &ContactEvent, moved: [f64; 3], motion: &MotionIncrement, when: When) -> ContactWork {
         let (structure, pair) = (&self.structures[event.structure], &self.pairs[event.pair]);
         let (node, index) = (event.node, structure.index(event.node, event.sector));
         let (geometry, gaps) = (self.geometry_of(event, when), &structure.history.gap);
-        let (normal, at) = (geometry.normal_at(index), At { node, index, drive: pair.drive(when) });
-        let tangential: [f64; 3] = std::array::from_fn(|i| event.force[i] - event.normal * normal[i]);
-        let spin = pair.gap().spin_motion(at, event.point, motion);
-        let shaft = pair.gap().shaft_motion(at, event.point, motion);
-        let surface = pair.gap().surface_motion(at, event.point, normal, geometry.place_at(index), motion);
-        let slip: [f64; 3] = std::array::from_fn(|i| moved[i] + spin[i] + shaft[i]);
+        let normal = geometry.normal_at(index);
         // A node that passes a free edge had no gap to close, so its motion is the approach.
         let (now, oldest) = (gaps.now[index], gaps.oldest[index]);
         let approach = if oldest.is_finite() { -0.5 * (now - oldest) } else { -dot(normal, moved) };
-        let ([x, y, z], across) = (event.wrench.force, motion.shaft);
-        let (shaft, casing) = (-dot(event.force, spin), event.normal * surface);
-        let opposed = -dot(tangential, slip);
+        let force = WorkingForce {
+            gap: pair.gap(),
+            at: At { node, index, drive: pair.drive(when) },
+            point: event.point,
+            place: geometry.place_at(index),
+            normal,
+            multiplier: event.normal,
+            force: event.force,
+            tangential: std::array::from_fn(|i| event.force[i] - event.normal * normal[i]),
+            fixed: event.wrench.force,
+            motion,
+            moved,
+            approach,
+        };
+        let work = force.work();
+        let opposed = work.heat;
         let cut = if pair.cutting() > 0.0 { opposed * share_cut(event, pair.cutting()) } else { 0.0 };
-        let (whirl, shift) = (-(x * across[0] + y * across[1]), -z * across[2]);
-        let (heat, exact) = (opposed - cut, dot(event.force, moved));
+        let heat = opposed - cut;
         let turned = if self.settings.solver == Solver::Coulomb { heat.min(0.0) } else { 0.0 };
         let uncut = cut.min(0.0);
         ContactWork {
-            shaft,
-            whirl,
-            shift,
-            casing,
             heat: heat - turned,
             turned: turned + uncut,
             cut: cut - uncut,
             uncut,
-            closing: event.normal * approach,
             worn: event.coating * approach,
-            exact,
-            turnover: shaft.abs() + whirl.abs() + shift.abs() + casing.abs(),
-            moved: exact.abs(),
+            ..work
         }
     }
 

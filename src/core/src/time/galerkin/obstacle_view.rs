@@ -11,6 +11,7 @@ use crate::geometry::wrench::{At, MotionIncrement};
 use crate::geometry::{GapLaw, PrescribedMotion, dot};
 use crate::system::carrier::Spot;
 use crate::system::pair::ContactPair;
+use crate::system::work::WorkingForce;
 
 /// Number of contact solutions in a trial after which the sliding directions are frozen, because a node that hardly slides would
 /// change its direction in every solution.
@@ -251,7 +252,7 @@ impl Witness for ObstacleView<'_> {
     }
 
     fn record_damping(&mut self, damping_loss: f64) {
-        self.record.work.damping += damping_loss;
+        self.record.damping += damping_loss;
     }
 
     fn closing_loss(&self) -> f64 {
@@ -389,10 +390,10 @@ impl ObstacleView<'_> {
         tally.peak = tally.peak.max(trial.peak(basis, step.kind, node));
         let mut heats = 0.0;
         for i in (0..=trial.points()).filter(|i| trial.multiplier(*i, node) != 0.0) {
-            let normal_force = trial.multiplier(i, node);
+            let multiplier = trial.multiplier(i, node);
             let at = self.at(node, &drives[i].0);
             let (force, normal, moved) = (trial.force(i, node), trial.normal(i, node), trial.displacement(i, node));
-            let (place, motion) = (self.record.places[i][node], &motions[i]);
+            let place = self.record.places[i][node];
             let point = gap.contact_point(at, moved, place);
             self.record.implausible |= !gap.is_plausible(node, trial.gap(i, node), normal);
             // With the normal for which the force was found: the effect of its rotation since then is curvature work, not heat.
@@ -404,38 +405,36 @@ impl ObstacleView<'_> {
                 } else {
                     basis.weights[i]
                 };
-            tally.normal += length * normal_force;
-            tally.tangential += length * dot(tangential, tangential).sqrt();
-            for c in 0..3 {
-                tally.force[c] += length * force[c];
-                tally.wrench.force[c] += length * wrench.force[c];
-                tally.wrench.moment[c] += length * wrench.moment[c];
-                tally.wrench.point[c] += length * normal_force * wrench.point[c];
-            }
+            tally.add(length, multiplier, (force, tangential), &wrench);
             let weights = step.kind.work_weights(basis, i);
-            let (mut there, mut open) = ([0.0; 3], 0.0);
+            let (mut moved, mut open) = ([0.0; 3], 0.0);
             for k in (0..=trial.points()).filter(|k| weights[*k] != 0.0) {
                 let displaced = trial.displacement(k, node);
-                there = std::array::from_fn(|c| there[c] + weights[k] * displaced[c]);
+                moved = std::array::from_fn(|c| moved[c] + weights[k] * displaced[c]);
                 open += weights[k] * trial.finite_gap(k, node);
             }
-            let (spin, shaft) = (gap.spin_motion(at, point, motion), gap.shaft_motion(at, point, motion));
-            let carriers = self
-                .on_carrier((node, i), SurfacePlace::Acted, |casing, spot| casing.worked_at(spot, i))
-                .unwrap_or_default();
-            there = std::array::from_fn(|c| there[c] - carriers[c]);
-            let slip: [f64; 3] = std::array::from_fn(|c| there[c] + spin[c] + shaft[c]);
-            let heat = -dot(tangential, slip);
-            work.shaft -= dot(force, spin);
-            work.whirl -= wrench.force[0] * motion.shaft[0] + wrench.force[1] * motion.shaft[1];
-            work.shift -= wrench.force[2] * motion.shaft[2];
-            work.casing += normal_force * gap.surface_motion(at, point, normal, place, motion);
-            work.heat += heat;
-            tally.heat += heat;
-            heats += heat;
-            work.closing -= normal_force * open;
-            work.exact += dot(force, there);
-            work.moved += dot(force, there).abs();
+            let carried = self.on_carrier((node, i), SurfacePlace::Acted, |carrier, spot| carrier.worked_at(spot, i));
+            let carried = carried.unwrap_or_default();
+            let (fixed, motion, approach) = (wrench.force, &motions[i], -open);
+            let moved = std::array::from_fn(|c| moved[c] - carried[c]);
+            let done = WorkingForce {
+                gap,
+                at,
+                point,
+                place,
+                normal,
+                multiplier,
+                force,
+                tangential,
+                fixed,
+                motion,
+                moved,
+                approach,
+            }
+            .work();
+            tally.heat += done.heat;
+            heats += done.heat;
+            work.add(&done);
         }
         if heats < 0.0 && trial.sticks() {
             // The force at the start does not belong to the slip of the step; the energy it supplies comes from earlier impact losses.

@@ -1,13 +1,15 @@
 //! Record of one sector over a span: prescribed motion, places of nodes, and results of contacts.
 
-use crate::geometry::PrescribedMotion;
 use crate::geometry::revolution::Instants;
 use crate::geometry::surface_spline::ClosestPoint;
 use crate::geometry::wrench::{MotionIncrement, Wrench};
-use crate::system::StepFailure;
+use crate::geometry::{PrescribedMotion, dot};
 use crate::system::carrier::Spot;
+use crate::system::contact_view::ContactMember;
 use crate::system::growth::ShapeGrowth;
 use crate::system::pair::ContactPair;
+use crate::system::work::ContactWork;
+use crate::system::{ContactEvent, StepFailure};
 use crate::time::galerkin::basis::{MOST, POINTS};
 use crate::time::galerkin::compliance::Lanes;
 
@@ -97,30 +99,34 @@ impl NodeTally {
         heat: 0.0,
         lowest: f64::INFINITY,
     };
-}
 
-/// Work of all contacts of a sector over a span (J).
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Worked {
-    /// Work of the shaft (J).
-    pub shaft: f64,
-    /// Work of whirl (J).
-    pub whirl: f64,
-    /// Work of axial shift (J).
-    pub shift: f64,
-    /// Work of the casing (J).
-    pub casing: f64,
-    /// Friction heat (J).
-    pub heat: f64,
-    /// Energy lost by gaps that close (J).
-    pub closing: f64,
-    /// Work on the structure, and the sum of its magnitudes (J).
-    pub exact: f64,
-    pub moved: f64,
-    /// Damping loss (J).
-    pub damping: f64,
-    /// Energy lost by changes to a constant force (J).
-    pub dropped: f64,
+    /// Adds λ, a force with its tangential part, and its wrench over a `length` of time (s).
+    pub fn add(&mut self, length: f64, multiplier: f64, (force, tangential): ([f64; 3], [f64; 3]), wrench: &Wrench) {
+        self.normal += length * multiplier;
+        self.tangential += length * dot(tangential, tangential).sqrt();
+        for c in 0..3 {
+            self.force[c] += length * force[c];
+            self.wrench.force[c] += length * wrench.force[c];
+            self.wrench.moment[c] += length * wrench.moment[c];
+            self.wrench.point[c] += length * multiplier * wrench.point[c];
+        }
+    }
+
+    /// Returns the event of a contact from its means over a span (s); `None` without contact.
+    pub fn event(&self, at: ContactMember, span: f64) -> Option<ContactEvent> {
+        if self.normal <= 0.0 {
+            return None;
+        }
+        let mean = |values: [f64; 3]| values.map(|value| value / span);
+        let wrench = Wrench {
+            point: self.wrench.point.map(|value| value / self.normal),
+            force: mean(self.wrench.force),
+            moment: mean(self.wrench.moment),
+        };
+        let event = ContactEvent::new(at, self.normal / span, mean(self.force), 0.0, ([0.0; 3], wrench));
+        let (tangential, peak, friction_heat) = (self.tangential / span, self.peak, self.heat);
+        Some(ContactEvent { tangential, peak, friction_heat, ..event })
+    }
 }
 
 /// Selects a place of a node on the surface of a carrier.
@@ -140,7 +146,9 @@ pub struct SpanRecord {
     /// Contact of each node over the span.
     pub tallies: Vec<NodeTally>,
     /// Work of all nodes over the span.
-    pub work: Worked,
+    pub work: ContactWork,
+    /// Damping loss over the span (J).
+    pub damping: f64,
     /// Motion of each pair over the span.
     pub courses: Vec<MotionCourse>,
     /// Start and length of the tried step, as fractions of the span.
@@ -173,7 +181,8 @@ impl SpanRecord {
             step: [0.0; 2],
             tolerance,
             tallies: vec![NodeTally::NOTHING; nodes],
-            work: Worked::default(),
+            work: ContactWork::default(),
+            damping: 0.0,
             courses: vec![MotionCourse::default(); pairs],
             drives: vec![[<(PrescribedMotion, MotionIncrement)>::default(); POINTS]; pairs],
             motions: vec![[MotionIncrement::default(); POINTS]; pairs],
@@ -241,7 +250,8 @@ impl SpanRecord {
         for (node, tally) in self.tallies.iter_mut().enumerate() {
             *tally = NodeTally { lowest: gap_of(node), ..NodeTally::NOTHING };
         }
-        (self.work, self.implausible, self.behind_edge) = (Worked::default(), false, None);
+        (self.work, self.damping) = (ContactWork::default(), 0.0);
+        (self.implausible, self.behind_edge) = (false, None);
     }
 }
 

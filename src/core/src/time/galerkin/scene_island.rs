@@ -7,21 +7,21 @@ use super::disk::CoupledDisk;
 use super::flight::FreeFlight;
 use super::island::{Island, IslandSector, StepControl};
 use super::obstacle_view::ObstacleView;
-use super::record::{NodeTally, SpanRecord, Worked};
+use super::record::SpanRecord;
 use super::span::{StepGoal, Stopped};
 use super::state::SectorState;
 use super::surroundings::{CarriersInStep, Surroundings};
 use super::tables::{HALVINGS, Tables};
 use crate::geometry::PrescribedMotion;
-use crate::geometry::wrench::{At, Wrench};
+use crate::geometry::wrench::At;
 use crate::modes::bank::ModalBank;
 use crate::modes::coordinates::ContactModes;
 use crate::modes::cyclic::CyclicBank;
 use crate::modes::sectors::Sectors;
 use crate::scene::method::Scheme;
 use crate::system::contact_view::ContactMember;
-use crate::system::ledger::Ledger;
-use crate::system::{ContactEvent, ContactPair, StepFailure, Structure, System};
+use crate::system::work::ContactWork;
+use crate::system::{ContactPair, StepFailure, Structure, System};
 use nalgebra::DMatrix;
 
 /// Contacts count as closed within this fraction of the tolerance.
@@ -234,8 +234,15 @@ impl SceneIsland {
             ledger.turnover.add(load_work.abs());
         }
         for Member { structure, sector, record } in &self.members {
-            enter_work(ledger, &record.work);
-            enter_events(&structures[*structure], (*structure, *sector), record, span, &mut events.now);
+            let ContactWork { shaft, whirl, shift, casing, .. } = record.work;
+            let turnover = shaft.abs() + whirl.abs() + shift.abs() + casing.abs();
+            ContactWork { turnover, ..record.work }.enter(ledger);
+            let (structure, sector, of) = (*structure, *sector, &structures[*structure]);
+            let contacts = of.pair_of.iter().zip(&record.tallies).enumerate();
+            events.now.extend(contacts.filter_map(|(node, (pair, tally))| {
+                let at = ContactMember { structure, pair: (*pair)?, node, sector, index: of.index(node, sector) };
+                tally.event(at, span)
+            }));
         }
         Ok(())
     }
@@ -297,7 +304,7 @@ impl SceneIsland {
             if let (None, Sectors::Uncoupled(bank)) = (one.disk, &mut structure.modes) {
                 let (moved, state) = one.displacements(tables);
                 bank.write_sector(*sector, &state.position, &state.velocity, &state.forces, moved);
-                bank.lose(*sector, record.work.damping);
+                bank.lose(*sector, record.damping);
             }
         }
         for disk in disks {
@@ -413,53 +420,6 @@ fn modes_of(bank: &ModalBank, sector: usize, count: usize) -> ContactModes {
         shapes: model.contact_modes.columns(0, count).into_owned(),
         residual,
     }
-}
-
-/// Adds the work of the contacts of a sector over a span to the ledger.
-fn enter_work(ledger: &mut Ledger, work: &Worked) {
-    let moved = work.shaft + work.whirl + work.shift + work.casing;
-    for (sum, term) in [
-        (&mut ledger.shaft_work, work.shaft),
-        (&mut ledger.whirl_work, work.whirl),
-        (&mut ledger.shift_work, work.shift),
-        (&mut ledger.casing_work, work.casing),
-        (&mut ledger.friction_loss, work.heat),
-        (&mut ledger.impact_loss, work.closing + work.dropped),
-        (&mut ledger.curvature_work, work.exact + work.heat + work.closing - moved),
-        (&mut ledger.turnover, work.shaft.abs() + work.whirl.abs() + work.shift.abs() + work.casing.abs()),
-        (&mut ledger.contact_work, work.moved),
-    ] {
-        sum.add(term);
-    }
-}
-
-/// Turns the contacts of a sector into events.
-fn enter_events(
-    structure: &Structure,
-    (index, sector): (usize, usize),
-    record: &SpanRecord,
-    span: f64,
-    events: &mut Vec<ContactEvent>,
-) {
-    for (node, pair) in structure.pair_of.iter().enumerate() {
-        let (tally, Some(pair)) = (&record.tallies[node], *pair) else { continue };
-        if tally.normal > 0.0 {
-            let member = ContactMember { structure: index, pair, node, sector, index: structure.index(node, sector) };
-            events.push(event(member, tally, span));
-        }
-    }
-}
-
-/// Creates the event of a contact from its means over the span.
-fn event(at: ContactMember, tally: &NodeTally, span: f64) -> ContactEvent {
-    let mean = |values: [f64; 3]| values.map(|value| value / span);
-    let wrench = Wrench {
-        point: tally.wrench.point.map(|value| value / tally.normal),
-        force: mean(tally.wrench.force),
-        moment: mean(tally.wrench.moment),
-    };
-    let event = ContactEvent::new(at, tally.normal / span, mean(tally.force), 0.0, ([0.0; 3], wrench));
-    ContactEvent { tangential: tally.tangential / span, peak: tally.peak, friction_heat: tally.heat, ..event }
 }
 
 impl Structure {
