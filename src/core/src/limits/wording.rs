@@ -62,7 +62,7 @@ impl Context<'_> {
 
     /// Returns the remedy of a step that is too long: adaptive steps, if the scene supports them, or one of the alternatives, written in
     /// lower case.
-    fn remedy_of_step<const N: usize>(&self, alternatives: [String; N]) -> String {
+    fn remedy_of_step(&self, alternatives: impl IntoIterator<Item = String>) -> String {
         let adaptive = self.adaptive.map(|AdaptiveSteps { solver }| {
             let preset = if self.preset { "remove `preset`, " } else { "" };
             let solver =
@@ -404,16 +404,16 @@ impl ErrorKind {
                     growth.compared(growth.rates.continuous),
                     100.0 * growth.error
                 ),
-                context.remedy_of_step([growth.accepted.map_or_else(
-                    || "use less friction or more damping".to_owned(),
-                    |step| {
-                        let step = shown(rounded_down(step));
-                        format!(
-                            "set `time.step` (in the FMU `internal_step_max`) to {step} or less, or use less friction \
-                                 or more damping"
-                        )
-                    },
-                )]),
+                context.remedy_of_step(
+                    growth
+                        .accepted
+                        .map(|step| {
+                            let step = shown(rounded_down(step));
+                            format!("set `time.step` (in the FMU `internal_step_max`) to {step} or less")
+                        })
+                        .into_iter()
+                        .chain(["use less friction or more damping".to_owned()]),
+                ),
             ],
         }
     }
