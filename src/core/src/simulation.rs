@@ -193,7 +193,7 @@ impl Simulation {
         let watched_gaps = WatchedGaps::new(&compiled)?;
         let sets = system.sets().count();
         let (energies, initial_energies) = (vec![SetEnergy::default(); sets], vec![0.0; sets]);
-        let (bodies, pairs, carriers) = (compiled.bodies.len(), compiled.plan.pairs.len(), compiled.carriers.len());
+        let (bodies, pairs) = (compiled.bodies.len(), compiled.plan.pairs.len());
         let heated = |carrier: &compile::CarrierParts| CarrierInputs {
             temperatures: vec![Input::default(); carrier.loads.thermal.len()],
             ..CarrierInputs::default()
@@ -225,7 +225,7 @@ impl Simulation {
             phase: SimulationPhase::Created,
             warnings: Vec::new(),
             notes: Vec::new(),
-            warning_state: limits::WarningState::new(bodies, carriers),
+            warning_state: limits::WarningState::new(bodies),
             prepared: None,
             limits: None,
             state_size: 0,

@@ -7,7 +7,6 @@ use tiprub_cosim::warning::{Topic, Warning};
 use super::Simulation;
 use super::compile::Compiled;
 use crate::limits::plausibility::{self, Slip};
-use crate::system::StepFailure;
 use crate::{Error, Result};
 
 /// Extension of a surface around an axis ([`crate::geometry::surface_spline::REACH`]), and the remedy for a node beyond it.
@@ -85,40 +84,10 @@ impl Simulation {
     /// Checks that the loads and the speed at the start displace the structures by amounts that small displacements can describe.
     pub(super) fn check_initial_state(&self) -> Result<()> {
         let Err(failure) = self.system.check_state() else { return Ok(()) };
-        let blades = |structure: usize| match self.rotors.len() {
-            1 => "the blades".to_owned(),
-            _ => format!("the blades of {}", self.compiled.structure_name(structure)),
-        };
-        let (what, remedy) = match failure {
-            StepFailure::CarrierImplausible { structure } => (
-                format!(
-                    "the {} is displaced at the start by more than a tenth of the radius of the contact nodes",
-                    self.compiled.carrier_name(structure)
-                ),
-                "Check the start values of its loads and temperatures; the model assumes small displacements",
-            ),
-            StepFailure::Curved(curved) => (
-                format!(
-                    "{} are displaced at the start so far around the axis that u²/2r, which the linear gap formula neglects, is as \
-                     large as the clearance",
-                    blades(curved.structure)
-                ),
-                "Check the start value of the speed and the loads of the ROM; the model assumes small displacements",
-            ),
-            StepFailure::Implausible { structure, .. } => (
-                format!(
-                    "{} are displaced at the start by more than a tenth of the radius of the contact nodes",
-                    blades(structure)
-                ),
-                "Check the start value of the speed and the centrifugal loads of the ROM; the model assumes small \
-                 displacements",
-            ),
-            _ => (
-                "the displacements at the start are not finite".to_owned(),
-                "Check the start values of loads, temperatures and speed",
-            ),
-        };
-        Err(Error::invalid("initial state", what, remedy))
+        let (problem, _) = self.failure_texts(failure);
+        let remedy = "Check the start values of loads, temperatures and speed, and the loads of the ROM; the model assumes \
+                      small displacements";
+        Err(Error::invalid("initial state", problem, remedy))
     }
 
     /// Checks that no output is NaN; outputs belong to `time` (s).

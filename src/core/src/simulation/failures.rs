@@ -22,7 +22,7 @@ impl Simulation {
     }
 
     /// Returns the problem and the remedy.
-    fn failure_texts(&self, failure: StepFailure) -> (String, String) {
+    pub(super) fn failure_texts(&self, failure: StepFailure) -> (String, String) {
         let is_free = |structure: usize| self.compiled.bodies[structure].translations.is_some();
         match failure {
             StepFailure::Implausible { structure, .. } if is_free(structure) => {
@@ -37,8 +37,9 @@ impl Simulation {
                     "Use less friction, another internal step or the solver coulomb"
                 },
             ),
-            // Reported elsewhere.
-            StepFailure::NonFinite | StepFailure::Exhausted => (String::new(), String::new()),
+            // The remedy is given elsewhere.
+            StepFailure::NonFinite => ("the displacements are not finite".to_owned(), String::new()),
+            StepFailure::Exhausted => (String::new(), String::new()),
             StepFailure::Implausible { structure, sector } => (
                 format!(
                     "a contact node of {} is displaced by more than a tenth of its radius, has penetrated the \
@@ -211,7 +212,7 @@ impl Simulation {
         let mut bodies = std::iter::once(structure).chain(others).filter(|body| *body < self.rotors.len());
         let speed = |body: usize| self.inputs.rotors[body].speed.at(0.0);
         let found = bodies.find_map(|body| limits.grows(body, speed(body)));
-        found.map_or_else(String::new, |text| format!(". {text}"))
+        found.map_or_else(String::new, |finding| format!(". {}", self.compiled.warning(&finding)))
     }
 }
 

@@ -6,7 +6,7 @@ use tiprub_cosim::{Diagnostic, shown, shown_time};
 
 use super::limits::Parameters;
 use super::{Communication, Simulation};
-use crate::scene::method::Scheme;
+use crate::limits::finding::Subject;
 use crate::time::galerkin::tables::shortest;
 use crate::{Error, Result, Warning};
 
@@ -77,7 +77,7 @@ impl Simulation {
     pub(super) fn warn_of_tolerance(&mut self, parameters: &Parameters) {
         let step = self.compiled.expected_step(parameters.step);
         let left = LEFT * shortest(step);
-        if parameters.scheme == Scheme::Galerkin && parameters.tolerance < left {
+        if parameters.scheme.properties().adaptive && parameters.tolerance < left {
             let problem = format!(
                 "the tolerance {} cannot be reached: galerkin steps are at least {} s long, a thousandth of the \
                  longest step, which causes errors of about {left:.0e} where contacts open and close",
@@ -92,7 +92,7 @@ impl Simulation {
     /// Warns of the first communication step in which a shortest step missed the tolerance.
     pub(super) fn note_missed(&mut self, time: f64) {
         let effort = self.system.effort();
-        if effort.missed == 0 || std::mem::replace(&mut self.warning_state.missed, true) {
+        if effort.missed == 0 || !self.warning_state.is_first(Topic::ToleranceMissed, Subject::Scene) {
             return;
         }
         let problem = format!(

@@ -6,6 +6,7 @@ use tiprub_cosim::{bounds, shown, shown_time};
 use super::drive::Input;
 use super::{Communication, MOST_STEPS, Simulation, SimulationPhase, TIME_TOLERANCE, same_step};
 use crate::contact::coating::Coating;
+use crate::limits::finding::Subject;
 use crate::{Error, Result, Warning};
 
 /// A run is warned of once u_θ²/2r is this fraction of the clearance.
@@ -265,13 +266,12 @@ impl Simulation {
     /// Warns of the first displacement of each structure that is too large for linear kinematics.
     fn note_curved(&mut self, time: f64) {
         for body in 0..self.rotors.len() {
-            if self.warning_state.curved[body] {
-                continue;
-            }
             let Some(most) = self.system.most_curved_of(body).filter(|most| most.share() >= CURVED_SHARE) else {
                 continue;
             };
-            self.warning_state.curved[body] = true;
+            if !self.warning_state.is_first(Topic::LargeDisplacement, Subject::Body(body)) {
+                continue;
+            }
             let problem = format!(
                 "at t = {} s, contact node {} of {} is displaced by {:.3e} m around the axis: gaps are linear in \
                  displacements, which neglects u²/2r = {:.2e} m, {:.0} % of the clearance",

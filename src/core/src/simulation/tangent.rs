@@ -10,7 +10,6 @@ use tiprub_cosim::variables::{Causality, Quantity};
 use tiprub_cosim::{CoSimulation, shown_time};
 
 use super::{Simulation, SimulationPhase};
-use crate::scene::method::Scheme;
 use crate::{Error, Result};
 use std::sync::Arc;
 
@@ -130,7 +129,7 @@ impl Simulation {
                 continue;
             }
             grown = true;
-            if self.system.settings().scheme != Scheme::Galerkin {
+            if !self.is_marched() {
                 let of_twin =
                     |twin: &Self| outputs.iter().map(|output| twin.values[*output as usize]).collect::<Vec<_>>();
                 let (ahead, touched) = (of_twin(twin), twin.touched());

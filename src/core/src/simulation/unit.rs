@@ -84,11 +84,12 @@ impl CoSimulation for Simulation {
         self.follow_load_orders()?;
         self.check_launch(parameters.scheme)?;
         self.follow_reference_speeds(&self.references())?;
-        self.warnings = self.check_limits(&parameters)?;
+        let findings = self.check_limits(&parameters)?;
+        self.warnings = findings.iter().map(|finding| self.compiled.warning(finding)).collect();
         self.warn_of_fast_rotation();
         self.warn_of_sticking(&parameters);
         self.warn_of_tolerance(&parameters);
-        self.begin_telling(&parameters);
+        self.begin_telling(&parameters, &findings);
         let settings = &self.compiled.scene.settings;
         self.warnings.retain(|warning| !settings.is_silenced(warning.topic()));
         self.rest(&parameters);

@@ -134,7 +134,7 @@ fn central_differences_warn_of_excitation_on_long_steps() {
         let mut run = started(&scene);
         go(&mut run, 2e-6);
         let notes = run.take_notes();
-        let found = notes.iter().any(|text| text.contains("make a resonance 2 % too large"));
+        let found = notes.iter().any(|text| text.contains("makes a resonance 2 % too large"));
         assert_eq!(found, warned, "{turn}: {notes:?}");
     }
 }
