@@ -70,6 +70,59 @@ fn lines_with(path: &Path, word: &str) -> Vec<String> {
     code.filter(|line| line.contains(word)).collect()
 }
 
+/// Modules of core, each of which imports only those before it, with the items that `lib.rs` re-exports from them; items of
+/// `tiprub-cosim` stand below all.
+const LAYERS: [(&str, &[&str]); 9] = [
+    ("math", &["CoSimulation", "Error", "Result", "VariableTable", "Warning"]),
+    ("scene", &["Scene", "Rom"]),
+    ("modes", &[]),
+    ("geometry", &[]),
+    ("contact", &[]),
+    ("system", &["Ledger"]),
+    ("time", &[]),
+    ("limits", &[]),
+    ("simulation", &["Simulation"]),
+];
+
+/// Returns the first names of all paths that begin with `crate::` in code that is not a test.
+fn crate_paths(text: &str) -> Vec<String> {
+    let code = text.split("#[cfg(test)]\nmod tests").next().unwrap_or_default();
+    let code: String = code.lines().filter(|line| !line.trim_start().starts_with("//")).collect();
+    let names = |rest: &str| -> Vec<String> {
+        let word = |text: &str| text.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect::<String>();
+        match rest.strip_prefix('{').and_then(|rest| rest.split_once('}')) {
+            Some((group, _)) => group.split(',').map(|entry| word(entry.trim())).collect(),
+            None => vec![word(rest)],
+        }
+    };
+    code.split("crate::").skip(1).flat_map(names).filter(|name| !name.is_empty()).collect()
+}
+
+#[test]
+fn modules_of_core_import_only_lower_layers() {
+    let (source, mut files) = (root().join("src/core/src"), Vec::new());
+    sources(&source, &mut files);
+    let place = |name: &str| LAYERS.iter().position(|(module, items)| *module == name || items.contains(&name));
+    let (mut upward, mut checked) = (Vec::new(), 0);
+    for path in files.iter().filter(|path| !path.components().any(|part| part.as_os_str() == "tests")) {
+        let within = path.strip_prefix(&source).expect("below the sources").with_extension("");
+        let module = within.iter().next().and_then(|name| name.to_str()).expect("a name");
+        if module == "lib" || within.ends_with("tests") {
+            continue;
+        }
+        let own = place(module).unwrap_or_else(|| panic!("{module} has no layer"));
+        for name in crate_paths(&std::fs::read_to_string(path).expect("a source file")) {
+            let other = place(&name).unwrap_or_else(|| panic!("{name} in {} has no layer", path.display()));
+            checked += 1;
+            if other > own {
+                upward.push(format!("{} imports {name}", within.display()));
+            }
+        }
+    }
+    assert!(checked > 500, "only {checked} imports found");
+    assert!(upward.is_empty(), "{upward:#?}");
+}
+
 #[test]
 fn unsafe_code_is_confined_to_the_fmi_boundary() {
     let (mut files, source) = (Vec::new(), root().join("fmi/facade/src"));
