@@ -2,7 +2,6 @@
 
 use std::{env, path::Path};
 
-use tiprub_core::scene::method::Scheme;
 use tiprub_core::{CoSimulation, Rom, Scene, Simulation};
 use tiprub_cosim::variables::Quantity;
 use tiprub_cosim::warning::{self, Warning};
@@ -169,7 +168,7 @@ impl<'a> FmuPackage<'a> {
         let variable = self.simulation.table().with_quantity(Quantity::StepMax)?;
         let most = self.simulation.real(variable.reference).ok()?;
         let whole = self.scene.settings.experiment.communication_step / most;
-        let varies = self.scene.settings.time.scheme == Scheme::Galerkin;
+        let varies = self.scene.settings.time.scheme.properties().adaptive;
         let fixed = !varies && whole.round() >= 1.0 && (whole - whole.round()).abs() <= 1e-9 * whole;
         fixed.then_some(most)
     }

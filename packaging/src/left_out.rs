@@ -84,10 +84,10 @@ fn cost(scene: &Scene, with: fn(&mut Scene), own: &SceneSizes, measure: bool) ->
 fn refusal(mut scene: Scene, error: Error) -> FeatureRefusal {
     let mut reason = reason_of(error);
     let time = &mut scene.settings.time;
-    if time.scheme != Scheme::Galerkin {
+    if !time.scheme.properties().adaptive {
         return FeatureRefusal { reason, allowed_with_fixed_steps: false };
     }
-    (time.scheme, time.tolerance) = (Scheme::ModalExact, None);
+    (time.scheme, time.tolerance) = (Scheme::default(), None);
     let with_fixed_steps = Simulation::new(&scene).map_err(reason_of);
     if let Some(other) = with_fixed_steps.as_ref().err().filter(|other| **other != reason) {
         let _ = write!(reason, ". With fixed steps, {other}");

@@ -1,6 +1,6 @@
 //! Describes the features of a scene beyond sliding contact of a rotor in a rigid casing, and the limits of the model.
 
-use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::method::Solver;
 use tiprub_core::scene::settings::{
     BodyMotion, CoatingSettings, ContactSettings, CuttingSettings, InputInterpolation, Preset, SceneSettings,
     StructureSettings, SurfaceSettings, TOLERANCE,
@@ -20,10 +20,11 @@ pub fn features(scene: &Scene) -> Vec<String> {
     for contact in &settings.contacts {
         of_contact(contact, &mut found);
     }
-    if settings.time.scheme == Scheme::MasslessBoundary {
-        found.push("the highest modes are quasi-static: contact nodes have no mass (massless-boundary)".into());
+    let scheme = settings.time.scheme;
+    if scheme.properties().quasi_static && !scheme.properties().adaptive {
+        found.push(format!("the highest modes are quasi-static: contact nodes have no mass ({})", scheme.name()));
     }
-    if settings.time.scheme == Scheme::Galerkin {
+    if scheme.properties().adaptive {
         let tolerance = settings.time.tolerance.unwrap_or(TOLERANCE);
         found.push(format!(
             "adaptive steps of every blade, with a tolerance of {tolerance:e} of the clearance; contact nodes have no \
@@ -179,7 +180,7 @@ pub fn limits(scene: &Scene) -> Vec<String> {
          instantaneous force of an impact grows as 1/h.",
         "Sliding friction can make the structure itself flutter; a scheme that would add numerical growth is rejected.",
         choose(
-            settings.time.scheme.is_massless(),
+            settings.time.scheme.properties().quasi_static,
             "The highest modes, three per contact node, respond to contact immediately and have no inertia.",
             "The mass of a contact node loses its kinetic energy at impact: an error of first order in mesh size, not in h.",
         ),
@@ -281,7 +282,7 @@ mod tests {
             scene.settings.surfaces[0].structure = Some("ring".into());
             scene.settings.structures[0].whirl = true;
             scene.settings.structures[0].spin.stiffening = true;
-            scene.settings.time.scheme = Scheme::MasslessBoundary;
+            scene.settings.time.scheme = tiprub_core::scene::method::Scheme::MasslessBoundary;
         }))
         .concat();
         for wrong in ["sticking is not modelled", "a rigid surface", "does not stiffen", "loses its kinetic energy"] {

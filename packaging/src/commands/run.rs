@@ -3,7 +3,6 @@
 use std::{path::Path, time::Instant};
 
 use serde_json::{Map, Value, json};
-use tiprub_core::scene::method::Scheme;
 use tiprub_core::scene::settings::{ContactSettings, SceneSettings, TOLERANCE};
 use tiprub_core::{Scene, Warning};
 use tiprub_gallery::scene_source;
@@ -23,7 +22,7 @@ use crate::{answer, cli::RunArguments, scene_features};
 
 /// Returns the largest gap or penetration of a closed contact with adaptive steps (m); 0 with fixed steps.
 fn allowed_error(settings: &SceneSettings, set: &[(String, String)]) -> f64 {
-    if settings.time.scheme != Scheme::Galerkin {
+    if !settings.time.scheme.properties().adaptive {
         return 0.0;
     }
     let given = set.iter().find(|(name, _)| name == "tolerance").and_then(|(_, value)| value.parse().ok());

@@ -202,7 +202,7 @@ pub static EFFECTS: &[Effect] = &[
     })
     .by(|scene| scene.settings.contacts.iter_mut().for_each(|one| one.slave_heat_fraction = Some(0.5))),
     physics("inertia of contact nodes", "a scheme other than `galerkin` and `massless-boundary`", always, |scene| {
-        !scene.settings.time.scheme.is_massless()
+        !scene.settings.time.scheme.properties().quasi_static
     }),
     physics("rebound of contact nodes", "not supported: a node stops when its gap closes", always, never),
     physics("rounded edges of the tip", "not supported: rows of patches touch at sharp edges", rotates, never),
@@ -225,8 +225,10 @@ pub static EFFECTS: &[Effect] = &[
     ),
     physics("friction in blade roots and shrouds", "not supported: include it in the damping ratios", rotates, never),
     physics("chips, and wear of the blade tip", "not supported: only a coating wears", rotates, never),
-    machinery("adaptive steps", "`time.scheme = \"galerkin\"`", |scene| scene.settings.time.scheme == Scheme::Galerkin)
-        .by(|scene| scene.settings.time.scheme = Scheme::Galerkin),
+    machinery("adaptive steps", "`time.scheme = \"galerkin\"`", |scene| {
+        scene.settings.time.scheme.properties().adaptive
+    })
+    .by(|scene| scene.settings.time.scheme = Scheme::ADAPTIVE),
     machinery("limited number of internal steps", "`time.max_internal_steps`, or adaptive steps", |scene| {
         scene.settings.bounds_steps()
     })

@@ -2,7 +2,6 @@
 
 use std::fmt::Write as _;
 
-use tiprub_core::scene::method::Scheme;
 use tiprub_core::scene::settings::{SceneSettings, TOLERANCE};
 use tiprub_cosim::variables::Quantity;
 use tiprub_figure::{STYLE, escape};
@@ -166,7 +165,7 @@ fn run_section(input: &ReportInput<'_>) -> String {
         ("computing time per simulated second", format!("{} s", rounded(stepping / simulated))),
     ];
     let settings = &input.scene.settings;
-    if settings.time.scheme == Scheme::Galerkin {
+    if settings.time.scheme.properties().adaptive {
         let tolerance = settings.time.tolerance.unwrap_or(TOLERANCE);
         rows.insert(2, ("adaptive steps", format!("tolerance {} of the clearance", scientific(tolerance))));
     } else if let Some(step) = results.last(Quantity::InternalStep) {
@@ -203,7 +202,7 @@ fn run_section(input: &ReportInput<'_>) -> String {
 
 /// Describes the motion in an internal step of a scene.
 fn step_of(settings: &SceneSettings) -> &'static str {
-    if settings.time.scheme == Scheme::Galerkin { "one blade, native" } else { "whole disk, native" }
+    if settings.time.scheme.properties().adaptive { "one blade, native" } else { "whole disk, native" }
 }
 
 /// Compares both models and methods at the end of the same run.

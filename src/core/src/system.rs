@@ -193,7 +193,7 @@ impl System {
     /// Contacts whose forces acted over the last step and whose work was recorded for it: those of that step or, for schemes
     /// whose contact forces act later, those of the previous step.
     pub fn acted(&self) -> &[ContactEvent] {
-        if self.settings.scheme.acts_later() { &self.events.before } else { &self.events.now }
+        if self.settings.scheme.properties().delays_contact { &self.events.before } else { &self.events.now }
     }
 
     /// Active contacts of the last step.

@@ -8,7 +8,6 @@ mod recurrence;
 use tiprub_cosim::persist::StateReader;
 
 use crate::geometry::PrescribedMotion;
-use crate::scene::method::Scheme;
 use crate::system::{StepFailure, System};
 use galerkin::stepper::Galerkin;
 pub use recurrence::Recurrence;
@@ -53,9 +52,10 @@ impl TimeStepper {
     /// smallest clearance. Call it before [`System::start`].
     pub fn new(system: &mut System, longest: f64, tolerance: f64) -> Self {
         system.structures.iter_mut().for_each(|structure| structure.lowest_in_span = Vec::new());
-        match system.settings.scheme {
-            Scheme::CentralDifference | Scheme::ModalExact | Scheme::MasslessBoundary => Self::Recurrence(Recurrence),
-            Scheme::Galerkin => Self::Galerkin(Box::new(Galerkin::new(system, longest, tolerance))),
+        if system.settings.scheme.properties().adaptive {
+            Self::Galerkin(Box::new(Galerkin::new(system, longest, tolerance)))
+        } else {
+            Self::Recurrence(Recurrence)
         }
     }
 

@@ -151,12 +151,12 @@ fn choose_scheme(settings: &mut SceneSettings, roms: &[Rom], document: &Document
         (settings.time.scheme, settings.time.scheme_reason) = (scheme, Some(reason));
     }
     let TimeSettings { scheme, scheme_reason, .. } = &settings.time;
-    if document.holds(STEP) || *scheme == Scheme::Galerkin {
+    if document.holds(STEP) || scheme.properties().adaptive {
         return Ok(());
     }
     let why = scheme_reason.as_ref().map_or(String::new(), |reason| format!(" ({reason})"));
     let problem = format!("missing: the scheme `{}`{why} uses fixed steps", scheme.name());
-    let is_adaptive = scheme_reason.is_none() && settings.default_scheme(roms).0 == Scheme::Galerkin;
+    let is_adaptive = scheme_reason.is_none() && settings.default_scheme(roms).0.properties().adaptive;
     let galerkin = if is_adaptive { ", or use scheme = \"galerkin\", which chooses its own steps" } else { "" };
     let remedy = format!(
         "Add a step in s to [time], such as `step = 1e-6`, and check it with `tiprub run --estimate`; if it is too \
@@ -186,7 +186,7 @@ fn apply_preset(settings: &mut SceneSettings, document: &Document) {
         return;
     }
     if !document.holds(SCHEME) {
-        settings.time.scheme = Scheme::CentralDifference;
+        settings.time.scheme = Scheme::PAPER;
     }
     for (index, contact) in settings.contacts.iter_mut().enumerate() {
         if !document.holds(&format!("contact[{}].solver", index + 1)) {

@@ -2,7 +2,6 @@
 
 use std::time::{Duration, Instant};
 
-use tiprub_core::scene::method::Scheme;
 use tiprub_core::system::Effort;
 use tiprub_core::{CoSimulation, Scene, Simulation, VariableTable, Warning};
 use tiprub_cosim::variables::{Causality, DataType, Value, Variable};
@@ -87,7 +86,7 @@ pub fn run(scene: &Scene, schedule: &Schedule, given: RunInputs<'_>, progress: &
     }
     warnings.extend(simulation.take_notes());
     let system = simulation.system();
-    let effort = (system.settings().scheme == Scheme::Galerkin).then(|| *system.effort());
+    let effort = (system.settings().scheme.properties().adaptive).then(|| *system.effort());
     Ok(NativeRun { recording, stepping, slowest, internal_steps: system.steps_taken(), effort, warnings })
 }
 

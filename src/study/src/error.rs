@@ -439,10 +439,9 @@ fn limits(case: &dyn ErrorCase, found: &Measured) -> Vec<Statement> {
     let longest = |scheme: Scheme| -> f64 {
         own(scheme).filter(standard).filter(|row| row.outcome.is_ok()).map(|row| row.step).fold(0.0, f64::max)
     };
-    let (central, exact) = (longest(Scheme::CentralDifference), longest(Scheme::ModalExact));
-    let tried: Vec<Tried> = own(Scheme::CentralDifference)
-        .map(|row| Tried { size: row.size, step: row.step, outcome: RunOutcome::of(row) })
-        .collect();
+    let (central, exact) = (longest(Scheme::PAPER), longest(Scheme::default()));
+    let tried: Vec<Tried> =
+        own(Scheme::PAPER).map(|row| Tried { size: row.size, step: row.step, outcome: RunOutcome::of(row) }).collect();
     if tried.is_empty() {
         return Vec::new();
     }

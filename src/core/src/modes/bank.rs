@@ -20,7 +20,7 @@ use tiprub_cosim::persist_fields;
 use super::excitation::{Excitation, SectorLoads};
 use super::modal::{ModalModel, ModalSpin};
 use crate::math::simd::InstructionSet;
-use crate::modes::schemes::{ModeCoefficients, Velocity, free_increment};
+use crate::modes::schemes::{ModeCoefficients, Velocity};
 use crate::scene::method::Scheme;
 use coupling::Coupling;
 use heated::HeatLoads;
@@ -308,10 +308,7 @@ impl ModalBank {
         let (frequency, ratio, step) = (self.frequency(mode, sector), self.model.damping_ratios[mode], self.step);
         let index = self.index(mode, sector);
         self.state.position[index] = position;
-        self.state.increment[index] = match self.scheme {
-            Scheme::Galerkin => velocity * step,
-            _ => free_increment(frequency, ratio, position, velocity, step),
-        };
+        self.state.increment[index] = self.scheme.increment(frequency, ratio, position, velocity, step);
     }
 
     /// Sets the static equilibrium under the modal loads `modal_load` for every sector: q = L/ω², rigid-body modes at 0.
@@ -426,7 +423,7 @@ impl ModalBank {
     pub fn energies(&self) -> (f64, f64) {
         let (mut kinetic, mut strain) = (0.0, 0.0);
         // The strain energy belongs to one time, or to two.
-        let lag = if self.scheme == Scheme::Galerkin { 0.0 } else { 1.0 };
+        let lag = self.scheme.strain_lag();
         for sector in 0..self.sectors {
             for (mode, k) in self.coefficients(sector).iter().enumerate() {
                 let (position, increment) = self.modal_state(mode, sector);

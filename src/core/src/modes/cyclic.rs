@@ -23,7 +23,7 @@ use tiprub_cosim::persist_fields;
 use super::bank::{FLUSH_BELOW, LANES, lanes};
 use super::excitation::DiskLoads;
 use crate::math::simd::InstructionSet;
-use crate::modes::schemes::{ModeCoefficients, Velocity, free_increment};
+use crate::modes::schemes::{ModeCoefficients, Velocity};
 use crate::scene::method::Scheme;
 use fourier::{Fourier, Synthesis};
 pub use model::{CyclicModel, DiameterModes};
@@ -247,10 +247,7 @@ impl CyclicBank {
         let (index, lane) = self.index(nodal_diameter, mode);
         self.state.unapplied = false;
         for part in 0..if self.model.is_real(nodal_diameter) { 1 } else { 2 } {
-            let increment = match self.scheme {
-                Scheme::Galerkin => velocity[part] * self.step,
-                _ => free_increment(frequency, ratio, position[part], velocity[part], self.step),
-            };
+            let increment = self.scheme.increment(frequency, ratio, position[part], velocity[part], self.step);
             self.state.position[index][part][lane] = position[part];
             self.state.increment[index][part][lane] = increment;
         }
@@ -301,7 +298,7 @@ impl CyclicBank {
         for (mode, (load_response, modal_load)) in self.load_response.iter_mut().zip(&self.modal_load).enumerate() {
             *load_response = self.coefficients[mode].load_compliance() * modal_load;
         }
-        let delayed = self.state.acting && self.scheme == Scheme::MasslessBoundary;
+        let delayed = self.state.acting && self.scheme.properties().delays_contact;
         match (self.state.unapplied, delayed, self.state.loss_due) {
             (false, false, false) => self.pass::<false, false, false, true>(),
             (false, false, true) => self.pass::<false, false, true, true>(),

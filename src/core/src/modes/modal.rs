@@ -149,9 +149,14 @@ impl ModalModel {
         self.shapes.column_iter().map(|shape| shape.iter().zip(load).map(|(a, b)| a * b).sum()).collect()
     }
 
+    /// Number of modes that have inertia if the highest are quasi-static.
+    pub fn inertial_modes(&self) -> usize {
+        self.len().saturating_sub(self.quasi_static)
+    }
+
     /// Number of modes with inertia under a scheme; the others are the highest.
     pub fn dynamic_modes(&self, scheme: Scheme) -> usize {
-        if scheme.is_massless() { self.len().saturating_sub(self.quasi_static) } else { self.len() }
+        if scheme.properties().quasi_static { self.inertial_modes() } else { self.len() }
     }
 
     /// Coefficients of one mode at the step size `step` (s), with its frequency multiplied by `factor` (mistuning; 1 if tuned).

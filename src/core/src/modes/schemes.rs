@@ -46,10 +46,31 @@ impl Scheme {
     pub fn harmonic_factor(self, turn: f64) -> f64 {
         const SMALL: f64 = 2e-3;
         let turn = turn.abs().min(crate::scene::ranges::EXCITED_ANGLE);
-        match self {
-            Self::ModalExact | Self::MasslessBoundary if turn > SMALL => 0.5 * turn / libm::tan(0.5 * turn),
-            _ => 1.0,
+        if self.properties().holds_loads && turn > SMALL { 0.5 * turn / libm::tan(0.5 * turn) } else { 1.0 }
+    }
+
+    /// Second part of the state of a mode with angular frequency ω (rad/s) and damping ratio ξ at a position q and velocity q̇, without force:
+    /// its increment over the last step h (s), or hq̇.
+    pub fn increment(self, frequency: f64, damping_ratio: f64, position: f64, velocity: f64, step: f64) -> f64 {
+        if self.properties().stores_velocity {
+            velocity * step
+        } else {
+            free_increment(frequency, damping_ratio, position, velocity, step)
         }
+    }
+
+    /// Coefficients of the velocity of a mode with inertia.
+    pub fn velocity(self, frequency: f64, damping_ratio: f64, step: f64) -> Velocity {
+        if self.properties().stores_velocity {
+            Velocity::of_state(step)
+        } else {
+            Velocity::new(frequency, damping_ratio, step)
+        }
+    }
+
+    /// Share of the increment by which the second position of the strain energy is earlier than the first: q (q − share · d).
+    pub fn strain_lag(self) -> f64 {
+        if self.properties().stores_velocity { 0.0 } else { 1.0 }
     }
 }
 

@@ -46,22 +46,24 @@ impl Scheme {
                 }),
                 ..SchemeProperties::UNLIMITED
             },
-            Self::ModalExact => &SchemeProperties { resolved_up_to: 2.0, ..SchemeProperties::UNLIMITED },
-            Self::MasslessBoundary => {
-                &SchemeProperties { quasi_static: true, delays_contact: true, ..SchemeProperties::UNLIMITED }
+            Self::ModalExact => {
+                &SchemeProperties { resolved_up_to: 2.0, holds_loads: true, ..SchemeProperties::UNLIMITED }
             }
-            Self::Galerkin => &SchemeProperties { quasi_static: true, adaptive: true, ..SchemeProperties::UNLIMITED },
+            Self::MasslessBoundary => &SchemeProperties {
+                quasi_static: true,
+                delays_contact: true,
+                holds_loads: true,
+                returns_impact_energy: true,
+                ..SchemeProperties::UNLIMITED
+            },
+            Self::Galerkin => &SchemeProperties {
+                quasi_static: true,
+                adaptive: true,
+                stores_velocity: true,
+                returns_impact_energy: true,
+                ..SchemeProperties::UNLIMITED
+            },
         }
-    }
-
-    /// Returns whether the highest modes, three per contact node, are quasi-static.
-    pub fn is_massless(self) -> bool {
-        self.properties().quasi_static
-    }
-
-    /// Returns whether contact forces act one step after they are found.
-    pub fn acts_later(self) -> bool {
-        self.properties().delays_contact
     }
 
     /// Name in scene files and in the FMU's enumeration.
@@ -79,6 +81,12 @@ pub struct SchemeProperties {
     pub quasi_static: bool,
     /// True if contact forces act one step after they are found.
     pub delays_contact: bool,
+    /// True if the state of a mode is (q, hq̇) at one time, otherwise (q, q − q⁻) at two.
+    pub stores_velocity: bool,
+    /// True if the recurrence takes a harmonic load as constant over a step, so that its amplitude is corrected.
+    pub holds_loads: bool,
+    /// True if impacts may return some energy of earlier impacts: forces act late, or closed contacts have small gaps.
+    pub returns_impact_energy: bool,
     /// ωh from which on free vibration is unstable; infinite if any step is stable.
     pub stable_below: f64,
     /// ωh up to which a mode responds correctly to contact forces; infinite if every accepted step resolves all modes with inertia.
@@ -93,6 +101,9 @@ impl SchemeProperties {
         adaptive: false,
         quasi_static: false,
         delays_contact: false,
+        stores_velocity: false,
+        holds_loads: false,
+        returns_impact_energy: false,
         stable_below: f64::INFINITY,
         resolved_up_to: f64::INFINITY,
         resonance_error: None,

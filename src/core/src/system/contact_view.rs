@@ -28,7 +28,7 @@ pub struct Bodies<'a> {
     /// All pairs.
     pub pairs: &'a [ContactPair],
     /// True if contact forces act one step after they are found.
-    pub acts_later: bool,
+    pub delays_contact: bool,
     /// True if losses are collected.
     pub ledger: bool,
 }
@@ -151,7 +151,7 @@ impl ContactPrediction for ContactView<'_> {
     #[inline(always)]
     fn slip_direction(&self) -> [f64; 3] {
         let (mut velocity, step) = (self.sliding(), self.structure.modes().step());
-        let moved = if self.bodies.acts_later { self.slip_of_inertia() } else { self.slip_of_deformation() };
+        let moved = if self.bodies.delays_contact { self.slip_of_inertia() } else { self.slip_of_deformation() };
         for (value, moved) in velocity.iter_mut().zip(moved) {
             *value += moved / step;
         }

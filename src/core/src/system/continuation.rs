@@ -115,7 +115,8 @@ impl System {
     ///
     /// A surface around an axis is extrapolated beyond its edge, and a node outside the extrapolation ends the run.
     pub(crate) fn check_edges(&mut self) -> Result<(), StepFailure> {
-        let bodies = Bodies { structures: &mut self.structures, pairs: &self.pairs, acts_later: false, ledger: false };
+        let bodies =
+            Bodies { structures: &mut self.structures, pairs: &self.pairs, delays_contact: false, ledger: false };
         for (number, pair) in bodies.pairs.iter().enumerate() {
             let structure = pair.structure();
             let of = &bodies.structures[structure];

@@ -9,7 +9,7 @@
 use tiprub_cosim::persist_fields;
 
 use super::{ContactPair, StepFailure, System};
-use crate::scene::method::{Scheme, Solver};
+use crate::scene::method::Solver;
 use crate::system::ledger::Ledger;
 
 /// A contact loss that may only dissipate energy.
@@ -65,8 +65,10 @@ impl System {
     pub(crate) fn check_losses(&mut self) -> Result<(), StepFailure> {
         // Before the first step, the gap of the previous step is unknown too.
         let another_step = self.counted.witnessed > 0;
-        let returns = self.settings.scheme.is_massless() || self.settings.solver == Solver::Film || another_step;
-        let pays = self.settings.scheme == Scheme::Galerkin;
+        let returns = self.settings.scheme.properties().returns_impact_energy
+            || self.settings.solver == Solver::Film
+            || another_step;
+        let pays = self.settings.scheme.properties().adaptive;
         for (set, (ledger, taken)) in self.counted.ledgers.iter().zip(&mut self.counted.taken).enumerate() {
             let [friction, impact] = taken.given(ledger, pays);
             let exchanged = ledger.scale();

@@ -220,10 +220,10 @@ impl Structure {
     }
 
     /// Predicts one step (eq. 9 of the paper). If contact forces act one step later, those of the last step act now.
-    pub(crate) fn predict(&mut self, acts_later: bool, ledger: bool) {
+    pub(crate) fn predict(&mut self, delays_contact: bool, ledger: bool) {
         self.history.shift(self.modes.displacement_before());
         self.modes.predict(ledger);
-        if acts_later {
+        if delays_contact {
             self.act_later(ledger);
             self.history.predicted.shift();
             let touching = self.history.predicted.now.len();

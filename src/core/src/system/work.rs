@@ -211,7 +211,7 @@ impl System {
 
     /// Returns the step in which the contacts that acted over the last step were found.
     pub(crate) fn when_acted(&self) -> When {
-        if self.settings.scheme.acts_later() { When::Before } else { When::Now }
+        if self.settings.scheme.properties().delays_contact { When::Before } else { When::Now }
     }
 
     /// Removes the coating that blades have cut over the last step.

@@ -13,10 +13,10 @@ pub struct Recurrence;
 
 impl Stepper for Recurrence {
     fn step(&mut self, system: &mut System, drives: &[PrescribedMotion]) -> Result<(), StepFailure> {
-        let (acts_later, ledger) = (system.settings.scheme.acts_later(), system.settings.ledger);
+        let (delays_contact, ledger) = (system.settings.scheme.properties().delays_contact, system.settings.ledger);
         // Eq. 9: predict all structures without new contact forces.
         for structure in &mut system.structures {
-            structure.predict(acts_later, ledger);
+            structure.predict(delays_contact, ledger);
         }
         system.check_travel()?;
         // Eqs 3 and 10: gaps at the predicted positions.
@@ -28,7 +28,7 @@ impl Stepper for Recurrence {
         system.check_edges()?;
         // Eq. 11: contact forces that remove the penetration, and their effects, group by group.
         system.retire_events();
-        let mut bodies = Bodies { structures: &mut system.structures, pairs: &system.pairs, acts_later, ledger };
+        let mut bodies = Bodies { structures: &mut system.structures, pairs: &system.pairs, delays_contact, ledger };
         for (group, ledger) in system.groups.iter_mut().zip(&mut system.counted.ledgers) {
             let (events, factorisations) = (&mut system.events.now, &mut system.counted.factorisations);
             group.solve(

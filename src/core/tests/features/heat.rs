@@ -136,7 +136,7 @@ fn softening_lowers_frequency_by_root_of_stiffness() {
         (false, false, Scheme::CentralDifference),
         (false, false, Scheme::MasslessBoundary),
     ] {
-        let mut given = scene(if scheme.is_massless() { models::rich_blade(1) } else { models::blade(1) });
+        let mut given = scene(if scheme.properties().quasi_static { models::rich_blade(1) } else { models::blade(1) });
         // Nothing expands.
         given.roms[0].extras.thermal.as_mut().unwrap().loads.fill(0.0);
         let structure = &mut given.settings.structures[0];
@@ -251,7 +251,7 @@ fn mistuned_blades_expand_equally() {
         (SOFTENING, false, Scheme::CentralDifference),
         (SOFTENING, true, Scheme::MasslessBoundary),
     ] {
-        let mut rom = if scheme.is_massless() { models::rich_blade(3) } else { models::blade(3) };
+        let mut rom = if scheme.properties().quasi_static { models::rich_blade(3) } else { models::blade(3) };
         rom.extras.spin = Some(models::spin(rom.order()));
         let load = heated(rom.clone()).extras.thermal.unwrap().loads;
         let free = &rom.contact_map * rom.stiffness.clone().cholesky().unwrap().solve(&load) * 250.0;
@@ -383,7 +383,7 @@ fn the_energy_balance_closes_in_a_rub_that_warms_up() {
         (structure.thermal, structure.softening) = (true, SOFTENING);
         structure.frequency_factors = vec![0.97, 1.0, 1.03, 1.0];
         (structure.spin.stiffening, structure.spin.growth) = (true, true);
-        structure.spin.coriolis = !scheme.is_massless();
+        structure.spin.coriolis = !scheme.properties().quasi_static;
         (given.settings.time.scheme, given.settings.time.step) = (scheme, 5e-7);
         let mut run = started(&given);
         let mut other = None;

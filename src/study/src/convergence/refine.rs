@@ -1,6 +1,5 @@
 //! Directions of refinement, their levels, and the sources from which models are reduced again.
 
-use tiprub_core::scene::method::Scheme;
 use tiprub_core::{Rom, Scene};
 use tiprub_gallery::rom_cache::RomCache;
 use tiprub_model::rotor37::TipContact;
@@ -99,7 +98,7 @@ impl RefinementDirection {
 
 /// Returns whether the scene uses a tolerance instead of a step.
 pub(crate) fn is_adaptive(scene: &Scene) -> bool {
-    scene.settings.time.scheme == Scheme::Galerkin
+    scene.settings.time.scheme.properties().adaptive
 }
 
 /// Returns the scene with `division` internal steps per communication step, or with the tolerance 1/`division`.

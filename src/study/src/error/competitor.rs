@@ -102,13 +102,13 @@ impl Competitor {
     /// Returns the equations that the method solves.
     pub fn family(self) -> EquationFamily {
         let Self::Core(scheme, solver) = self else { return EquationFamily::PLAIN };
-        EquationFamily { massless: scheme.is_massless(), sticking: solver == Solver::Coulomb }
+        EquationFamily { massless: scheme.properties().quasi_static, sticking: solver == Solver::Coulomb }
     }
 
     /// Returns whether the method uses a tolerance instead of a step; a division then applies to the smallest clearance instead of the sample
     /// interval.
     pub fn is_by_tolerance(self) -> bool {
-        matches!(self, Self::Core(Scheme::Galerkin, _))
+        matches!(self, Self::Core(scheme, _) if scheme.properties().adaptive)
     }
 
     /// Formats a setting: `h = 0.500 µs` for a step (s), or `tolerance 1e-3`.

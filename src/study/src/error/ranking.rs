@@ -197,7 +197,7 @@ pub fn costs(case: &dyn ErrorCase, measured: &Measured, kind: ErrorKind) -> Tabl
 /// Returns the distance by which film stays behind lcp; only if several nodes are coupled.
 pub fn floor(case: &dyn ErrorCase, found: &Measured) -> Option<Statement> {
     let errors = |solver: Solver| -> Vec<f64> {
-        let competitor = Competitor::Core(Scheme::ModalExact, solver);
+        let competitor = Competitor::Core(Scheme::default(), solver);
         let own = found.rows.iter().filter(|row| row.size == case.standard() && row.competitor == competitor);
         own.filter_map(|row| row.outcome.as_ref().ok().map(|figures| figures.of_time)).collect()
     };

@@ -178,10 +178,8 @@ impl TimedRun for SceneRun {
             let progress = self.simulation.advance().map_err(|error| error.to_string())?;
             let system = self.simulation.system();
             // Adaptive steps are not divided.
-            let step = match system.settings().scheme {
-                Scheme::Galerkin => system.step_size(),
-                _ => self.interval / f64::from(self.division),
-            };
+            let adaptive = system.settings().scheme.properties().adaptive;
+            let step = if adaptive { system.step_size() } else { self.interval / f64::from(self.division) };
             let least = system.gaps().fold(f64::INFINITY, |least: f64, gap| least.min(*gap));
             seen.add(progress.time, step, system.events().iter().map(|event| event.normal), least);
             seen.shares.resize(self.unmoved.len(), 0.0);

@@ -188,7 +188,7 @@ impl UserScene {
     /// Returns an empty work plan. Its rate is the slowest of three runs per unit of work: the scene's own method, and fixed steps with `lcp` and
     /// `coulomb`, of which most of the work consists.
     pub fn ledger(&self) -> WorkPlan {
-        let sticking = Competitor::Core(Scheme::ModalExact, Solver::Coulomb);
+        let sticking = Competitor::Core(Scheme::default(), Solver::Coulomb);
         let runs = [(self.method(), self.own_division()), (DEFAULT, self.base), (sticking, self.base)];
         WorkPlan::new(runs.into_iter().filter_map(|(method, division)| self.rate(method, division)).fold(0.0, f64::max))
     }
@@ -223,9 +223,10 @@ impl UserScene {
 /// Returns a scene's number of internal steps per communication step, or the inverse of its tolerance.
 pub(crate) fn own_division(scene: &Scene) -> u32 {
     let time = &scene.settings.time;
-    match time.scheme {
-        Scheme::Galerkin => count(1.0 / time.tolerance.unwrap_or(TOLERANCE)),
-        _ => divisions(scene.settings.experiment.communication_step, time.step),
+    if time.scheme.properties().adaptive {
+        count(1.0 / time.tolerance.unwrap_or(TOLERANCE))
+    } else {
+        divisions(scene.settings.experiment.communication_step, time.step)
     }
 }
 
@@ -233,7 +234,7 @@ pub(crate) fn own_division(scene: &Scene) -> u32 {
 /// of the longest step that the first reference accepts at its start.
 fn base(scene: &Scene, settings: &[(String, String)], interval: f64) -> Result<u32, String> {
     let own = divisions(interval, scene.settings.time.step);
-    if scene.settings.time.scheme != Scheme::Galerkin {
+    if !scene.settings.time.scheme.properties().adaptive {
         return Ok(own);
     }
     let Competitor::Core(scheme, solver) = DEFAULT else { return Ok(own) };
@@ -303,7 +304,7 @@ impl ErrorCase for UserScene {
     }
 
     fn second(&self) -> Competitor {
-        Competitor::Core(Scheme::CentralDifference, Solver::Lcp)
+        Competitor::Core(Scheme::PAPER, Solver::Lcp)
     }
 
     fn relation(&self) -> &'static str {

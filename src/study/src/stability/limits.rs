@@ -80,7 +80,7 @@ pub fn of(
     let of_scheme = |scheme: &Scheme| {
         let ask =
             |solver: Solver, step: f64| -> ScreeningResult { asked.at((*scheme, solver), step, &place).remove(0) };
-        let known = (*scheme == Scheme::CentralDifference).then(|| 2.0 / highest);
+        let known = Some(scheme.properties().stable_below / highest).filter(|step| step.is_finite());
         let sought = |solver: Solver, range: [f64; 2]| seek(range, known, |step| ask(solver, step).map(drop));
         let mut found: Vec<Usable> = Vec::new();
         for solver in Solver::ALL {

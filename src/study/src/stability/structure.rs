@@ -219,7 +219,7 @@ impl<'a> SingleStructure<'a> {
     ) -> Fastest {
         let own = Fastest { rate: found.continuous, frequency: found.frequency };
         let without = || limits::without_node_mass(seen, step, friction, directions);
-        if scheme.acts_later() { own } else { without().unwrap_or(own) }
+        if scheme.properties().delays_contact { own } else { without().unwrap_or(own) }
     }
 
     /// Returns the names of the closed nodes; for coupled sectors with the nodal diameter.
@@ -262,7 +262,7 @@ impl<'a> SingleStructure<'a> {
         let sliding = sliding.unwrap_or(KnownContact { friction: 0.0, speed: 0.0 });
         // A Cartesian ROM belongs to a free or stationary body, for which massless-boundary is not supported or not needed.
         let massless = self.rom.frame != DisplacementFrame::Cartesian;
-        let schemes = Scheme::RECURRENCES.into_iter().filter(|scheme| massless || *scheme != Scheme::MasslessBoundary);
+        let schemes = Scheme::RECURRENCES.into_iter().filter(|scheme| massless || !scheme.properties().quasi_static);
         schemes.map(|scheme| StepLimit { scheme: scheme.name(), limit: self.limit(scheme, sliding) }).collect()
     }
 
@@ -274,7 +274,8 @@ impl<'a> SingleStructure<'a> {
         };
         let accepted = |step: f64| step < usable && self.accepts(scheme, step, sliding);
         // The limit is known unless another check rejects shorter steps.
-        let exact = if scheme == Scheme::CentralDifference { 2.0 / self.highest() } else { usable };
+        let stable = scheme.properties().stable_below;
+        let exact = if stable.is_finite() { stable / self.highest() } else { usable };
         match seek([low, high], Some(exact), |step| if accepted(step) { Ok(()) } else { Err(()) }) {
             Sought::All(step) => SchemeLimit::Tried(step),
             Sought::Below(step, ()) => SchemeLimit::Below(step),
@@ -287,7 +288,7 @@ impl<'a> SingleStructure<'a> {
 
     /// Returns the steps of modal-exact (s) that resolve all modes on which contact acts; infinite for other schemes.
     fn resolved(&self, scheme: Scheme) -> f64 {
-        if scheme != Scheme::ModalExact {
+        if scheme.properties().resolved_up_to.is_infinite() {
             return f64::INFINITY;
         }
         let limit = |model: &ModalModel| match self.rom.frame {
@@ -301,7 +302,7 @@ impl<'a> SingleStructure<'a> {
 
     /// Returns the usable step of massless-boundary (s); infinite for other schemes.
     fn massless(&self, scheme: Scheme, largest: f64) -> Result<f64, String> {
-        if scheme != Scheme::MasslessBoundary {
+        if !scheme.properties().delays_contact {
             return Ok(f64::INFINITY);
         }
         let mut usable = f64::INFINITY;
@@ -350,9 +351,9 @@ impl<'a> SingleStructure<'a> {
         let together: Vec<Vec<ContactDirections>> = self.models.iter().map(of).collect();
         let solvable = |friction: f64| {
             if self.rom.is_cyclic() {
-                limits::check_solvable_together(&self.models, Scheme::ModalExact, step, friction, &together).is_ok()
+                limits::check_solvable_together(&self.models, Scheme::default(), step, friction, &together).is_ok()
             } else {
-                limits::check_solvable(&self.models[0], Scheme::ModalExact, step, friction, &self.closed).is_ok()
+                limits::check_solvable(&self.models[0], Scheme::default(), step, friction, &self.closed).is_ok()
             }
         };
         let tried = (0..=FRICTION_STEPS).map(|step| f64::from(step) / FRICTION_STEPS_PER_UNIT);

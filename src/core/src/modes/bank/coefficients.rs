@@ -15,11 +15,8 @@ impl ModalBank {
             *coefficients = self.model.coefficient(index % modes, factor, scheme, step);
             let (frequency, ratio) = (self.model.frequencies[index % modes], self.model.damping_ratios[index % modes]);
             let dynamic = index % modes < self.model.dynamic_modes(scheme);
-            self.velocities[index] = match scheme {
-                _ if !dynamic => Velocity::default(),
-                Scheme::Galerkin => Velocity::of_state(step),
-                _ => Velocity::new(factor * frequency, ratio, step),
-            };
+            self.velocities[index] =
+                if dynamic { scheme.velocity(factor * frequency, ratio, step) } else { Velocity::default() };
         }
         if !self.lane_coefficients.is_empty() {
             self.spread_coefficients();
@@ -142,7 +139,7 @@ impl ModalBank {
     /// (`forces[row · lanes + sector]`, N; none for an empty slice) and the modal loads, then uses the new coefficients.
     pub fn resample(&mut self, scheme: Scheme, new_step: f64, forces: &[f64]) {
         let dynamic = self.model.dynamic_modes(self.scheme);
-        if scheme == Scheme::Galerkin {
+        if scheme.properties().stores_velocity {
             let ratio = new_step / self.step;
             self.state.increment.iter_mut().for_each(|increment| *increment *= ratio);
             return self.set_step(scheme, new_step);

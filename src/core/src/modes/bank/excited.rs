@@ -1,8 +1,6 @@
 //! Effects of an excitation and of an initial motion on the modes of each sector.
 
 use super::ModalBank;
-use crate::modes::schemes::free_increment;
-use crate::scene::method::Scheme;
 
 impl ModalBank {
     /// Sets the engine order of the excitation, if any.
@@ -64,9 +62,6 @@ impl ModalBank {
         let (frequency, ratio, step) = (self.frequency(mode, sector), self.model.damping_ratios[mode], self.step);
         let index = self.index(mode, sector);
         self.state.position[index] += position;
-        self.state.increment[index] += match self.scheme {
-            Scheme::Galerkin => velocity * step,
-            _ => free_increment(frequency, ratio, position, velocity, step),
-        };
+        self.state.increment[index] += self.scheme.increment(frequency, ratio, position, velocity, step);
     }
 }

@@ -19,11 +19,8 @@ impl CyclicBank {
                 self.coefficients[n * self.modes + mode] = k;
                 let (frequency, ratio) = (diameter.frequencies[mode], diameter.damping_ratios[mode]);
                 let dynamic = mode < diameter.dynamic_modes(scheme);
-                self.velocities[n * self.modes + mode] = match scheme {
-                    _ if !dynamic => Velocity::default(),
-                    Scheme::Galerkin => Velocity::of_state(step),
-                    _ => Velocity::new(frequency, ratio, step),
-                };
+                self.velocities[n * self.modes + mode] =
+                    if dynamic { scheme.velocity(frequency, ratio, step) } else { Velocity::default() };
                 let (lane, lanes) = (n % LANES, &mut self.lane_coefficients[n / LANES * self.modes + mode]);
                 (lanes.beta[lane], lanes.kappa[lane], lanes.loss[lane]) = (k.beta, k.kappa, k.loss);
                 (lanes.compliance[lane], lanes.delayed[lane]) = (k.compliance, k.delayed);
@@ -76,7 +73,7 @@ impl CyclicBank {
     /// Converts the state from the current step size to `new_step` under the last contact forces (`forces[row · lanes + sector]`,
     /// N) and the modal loads, then uses the new coefficients.
     pub fn resample(&mut self, scheme: Scheme, new_step: f64, forces: &[f64]) {
-        if scheme == Scheme::Galerkin {
+        if scheme.properties().stores_velocity {
             let ratio = new_step / self.step;
             self.state.increment.as_flattened_mut().as_flattened_mut().iter_mut().for_each(|d| *d *= ratio);
             return self.set_step(scheme, new_step);

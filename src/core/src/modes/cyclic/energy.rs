@@ -1,7 +1,6 @@
 //! Energies of the modes, and their damping losses.
 
 use super::CyclicBank;
-use crate::scene::method::Scheme;
 
 impl CyclicBank {
     /// Kinetic and strain energy of the disk (J), in the form that the scheme conserves (see [`crate::modes::schemes`]).
@@ -39,7 +38,7 @@ impl CyclicBank {
     pub fn diameter_energies(&self, nodal_diameter: usize) -> (f64, f64) {
         let (mut kinetic, mut strain) = (0.0, 0.0);
         // The strain energy belongs to one time, or to two.
-        let lag = if self.scheme == Scheme::Galerkin { 0.0 } else { 1.0 };
+        let lag = self.scheme.strain_lag();
         for mode in 0..self.model.diameters[nodal_diameter].len() {
             let k = &self.coefficients[nodal_diameter * self.modes + mode];
             let (position, increment) = self.modal_state(nodal_diameter, mode);

@@ -2,8 +2,6 @@
 
 use super::{CyclicBank, LANES};
 use crate::modes::excitation::{DiskLoads, Excitation};
-use crate::modes::schemes::free_increment;
-use crate::scene::method::Scheme;
 
 impl CyclicBank {
     /// Adds an excitation.
@@ -78,10 +76,8 @@ impl CyclicBank {
         let (index, lane) = self.index(nodal_diameter, mode);
         for part in 0..if self.model.is_real(nodal_diameter) { 1 } else { 2 } {
             self.state.position[index][part][lane] += position[part];
-            self.state.increment[index][part][lane] += match self.scheme {
-                Scheme::Galerkin => velocity[part] * self.step,
-                _ => free_increment(frequency, ratio, position[part], velocity[part], self.step),
-            };
+            self.state.increment[index][part][lane] +=
+                self.scheme.increment(frequency, ratio, position[part], velocity[part], self.step);
         }
     }
 }

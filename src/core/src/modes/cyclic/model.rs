@@ -51,9 +51,14 @@ impl DiameterModes {
         self.frequencies.is_empty()
     }
 
+    /// Number of modes that have inertia if the highest are quasi-static.
+    pub fn inertial_modes(&self) -> usize {
+        self.len().saturating_sub(self.quasi_static)
+    }
+
     /// Number of modes with inertia under a scheme; the others are the highest.
     pub fn dynamic_modes(&self, scheme: Scheme) -> usize {
-        if scheme.is_massless() { self.len().saturating_sub(self.quasi_static) } else { self.len() }
+        if scheme.properties().quasi_static { self.inertial_modes() } else { self.len() }
     }
 
     /// Coefficients of one mode at the step size `step` (s).

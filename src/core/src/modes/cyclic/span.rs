@@ -5,7 +5,6 @@ use super::fourier::Synthesis;
 use super::pass::{Complexes, Gather, Recover, modal_force};
 use super::{CyclicBank, LANES};
 use crate::modes::coordinates::Coordinates;
-use crate::scene::method::Scheme;
 use nalgebra::DMatrix;
 
 /// Converts a flat array to complex lanes.
@@ -34,7 +33,7 @@ impl CyclicBank {
             Coordinates { frequencies: nothing(), damping_ratios: nothing(), inertia: nothing(), softness: nothing() };
         let mut shapes = DMatrix::zeros(self.rows, count);
         for (n, diameter) in self.model.diameters.iter().enumerate() {
-            let dynamic = diameter.dynamic_modes(Scheme::Galerkin);
+            let dynamic = diameter.inertial_modes();
             let parts = if self.model.is_real(n) { 1 } else { 2 };
             for (mode, part) in (0..diameter.len()).flat_map(|mode| (0..parts).map(move |part| (mode, part))) {
                 let place = self.place(n, mode, part);
@@ -142,7 +141,7 @@ mod tests {
         for sectors in [2, 5, 12] {
             let model = model(sectors, 2);
             let mut bank = CyclicBank::new(&model, false);
-            bank.set_step(Scheme::Galerkin, 1e-5);
+            bank.set_step(crate::scene::method::Scheme::Galerkin, 1e-5);
             let (coordinates, shapes) = bank.coordinates_of();
             let (count, lanes, rows) = (bank.coordinates(), bank.lanes(), bank.rows());
             let at: Vec<f64> =

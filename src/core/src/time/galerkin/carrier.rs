@@ -9,7 +9,6 @@ use crate::geometry::frame::PolarFrame;
 use crate::math::simd::InstructionSet;
 use crate::modes::bank::ModalBank;
 use crate::modes::coordinates::Coordinates;
-use crate::scene::method::Scheme;
 use crate::system::carrier::Spot;
 use crate::system::pair::at_place;
 
@@ -301,6 +300,6 @@ fn dot_of(a: &[f64], b: &[f64]) -> f64 {
 /// Modes of a structure that carries surfaces.
 pub fn coordinates(bank: &ModalBank) -> Coordinates {
     let model = bank.model();
-    let dynamic = model.dynamic_modes(Scheme::Galerkin);
+    let dynamic = model.inertial_modes();
     Coordinates::new(&model.frequencies, &model.damping_ratios, dynamic)
 }

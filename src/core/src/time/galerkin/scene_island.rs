@@ -18,7 +18,7 @@ use crate::modes::bank::ModalBank;
 use crate::modes::coordinates::ContactModes;
 use crate::modes::cyclic::CyclicBank;
 use crate::modes::sectors::Sectors;
-use crate::scene::method::{Scheme, Solver};
+use crate::scene::method::Solver;
 use crate::system::contact_view::ContactMember;
 use crate::system::work::ContactWork;
 use crate::system::{ContactPair, StepFailure, Structure, System};
@@ -116,7 +116,7 @@ impl SceneIsland {
             let degree = kind.degree_up_to(longest);
             if solver.sticks() { Tables::of_degree(kind, 1).steady(degree) } else { Tables::of_degree(kind, degree) }
         };
-        let size = [bank.model().dynamic_modes(Scheme::Galerkin), of.nodes()];
+        let size = [bank.model().inertial_modes(), of.nodes()];
         let sector = IslandSector::new([0; 2], None, size, solver);
         let own = pairs.iter().filter(|pair| pair.structure() == structure);
         let rounding = own.map(|pair| pair.gap().rounding()).fold(0.0, f64::max);
@@ -395,7 +395,7 @@ impl SceneIsland {
 fn kinds_of(modes: &Sectors) -> Vec<ContactModes> {
     match modes {
         Sectors::Uncoupled(bank) => {
-            let count = bank.model().dynamic_modes(Scheme::Galerkin);
+            let count = bank.model().inertial_modes();
             (0..bank.sets()).map(|set| modes_of(bank, set, count)).collect()
         }
         Sectors::Coupled(bank) => {

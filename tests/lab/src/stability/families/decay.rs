@@ -151,7 +151,7 @@ impl Released {
         // In both schemes without mass in the contact node, the highest modes have no inertia. With massless-boundary
         // the force acts on the others one step longer.
         let late = if massless { 1.0 } else { 0.0 };
-        let moving = frequencies.len() - if self.method.scheme.is_massless() { 3 } else { 0 };
+        let moving = frequencies.len() - if self.method.scheme.properties().quasi_static { 3 } else { 0 };
         let slowest = decays[..moving].iter().max_by(|a, b| a.radius.total_cmp(&b.radius));
         let Some(slowest) = slowest else { return Ok(Vec::new()) };
         let place = |n: f64, row: usize| -> f64 {
