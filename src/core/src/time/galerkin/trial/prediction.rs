@@ -1,0 +1,85 @@
+//! A lane of a trial as its contact law sees it.
+
+use super::Obstacle;
+use crate::contact::ContactPrediction;
+use crate::time::galerkin::compliance::Lanes;
+
+/// A contact node at a point of the step, before its force is known.
+pub(super) struct LanePrediction<'a, O> {
+    /// Gap without the force (m).
+    pub gap: f64,
+    /// True if the last solution of the trial, or the step before, closed the contact.
+    pub closed: bool,
+    pub normal: [f64; 3],
+    /// Displacement of the node (m).
+    pub moved: [f64; 3],
+    /// Slip over the step without the force (m).
+    pub slip: [f64; 3],
+    pub slip_direction: [f64; 3],
+    /// Force of the last solution (N).
+    pub last_force: [f64; 3],
+    pub obstacle: &'a O,
+    pub point: usize,
+    pub node: usize,
+}
+
+/// Values of all lanes before a contact problem.
+pub(super) struct LaneValues<'a> {
+    pub lanes: Lanes,
+    /// Gaps without the forces (m).
+    pub without: &'a [f64],
+    /// Multipliers of the last solution (N).
+    pub multipliers: &'a [f64],
+    pub normals: &'a [f64],
+    /// Displacements (m).
+    pub moved: &'a [f64],
+}
+
+impl LaneValues<'_> {
+    /// Returns the prediction for a lane; slip and its direction are those of a contact that does not slide.
+    pub fn prediction<'a, O: Obstacle>(&self, lane: usize, obstacle: &'a O) -> LanePrediction<'a, O> {
+        let (point, node) = self.lanes.place(lane);
+        LanePrediction {
+            gap: self.without[lane],
+            closed: self.multipliers[lane] > 0.0,
+            normal: self.lanes.vector3(self.normals, lane),
+            moved: self.lanes.vector3(self.moved, lane),
+            slip: [0.0; 3],
+            slip_direction: [0.0; 3],
+            last_force: [0.0; 3],
+            obstacle,
+            point,
+            node,
+        }
+    }
+}
+
+impl<O: Obstacle> ContactPrediction for LanePrediction<'_, O> {
+    fn gap(&self) -> f64 {
+        self.gap
+    }
+    fn was_closed(&self, _depth: f64) -> bool {
+        self.closed
+    }
+    fn normal(&self) -> [f64; 3] {
+        self.normal
+    }
+    fn friction(&self) -> f64 {
+        self.obstacle.friction(self.node)
+    }
+    fn slip(&self) -> [f64; 3] {
+        self.slip
+    }
+    fn last_force(&self) -> [f64; 3] {
+        self.last_force
+    }
+    fn slip_direction(&self) -> [f64; 3] {
+        self.slip_direction
+    }
+    fn sector(&self) -> usize {
+        self.obstacle.sector()
+    }
+    fn angle(&self) -> f64 {
+        self.obstacle.angle(self.node, self.point, self.moved)
+    }
+}
