@@ -1,5 +1,7 @@
 //! Saves and restores state as bytes. One list of fields per struct defines its size, its saving and its restoring.
 
+use crate::math::vector::Vector3;
+
 /// Writes little-endian values to a buffer.
 #[derive(Debug)]
 pub struct StateWriter<'a> {
@@ -142,6 +144,18 @@ impl Persist for bool {
         if byte > 1 {
             reader.refuse("a flag is neither 0 nor 1");
         }
+    }
+}
+
+impl Persist for Vector3 {
+    fn save(&self, writer: &mut StateWriter) {
+        self.as_slice().save(writer);
+    }
+    fn restore(&mut self, reader: &mut StateReader) {
+        self.as_mut_slice().restore(reader);
+    }
+    fn check(&self, reader: &mut StateReader) {
+        self.as_slice().check(reader);
     }
 }
 

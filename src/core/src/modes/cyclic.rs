@@ -20,6 +20,7 @@ mod tests;
 use super::bank::{FLUSH_BELOW, LANES, lanes};
 use super::excitation::DiskLoads;
 use crate::math::simd::InstructionSet;
+use crate::math::vector::Vector3;
 use crate::modes::schemes::{ModeCoefficients, Velocity, free_increment};
 use crate::persist::{Persist, StateReader, StateWriter, persist_fields};
 use crate::scene::method::Scheme;
@@ -108,7 +109,7 @@ pub struct CyclicBank {
     /// Scratch: spectrum of displacements.
     spectrum: Vec<Complexes>,
     /// Requested forces: (sector, node, force).
-    asked: Vec<(usize, usize, [f64; 3])>,
+    asked: Vec<(usize, usize, Vector3)>,
     /// Spectrum and contact nodes of the requested forces.
     asked_force: Vec<Complexes>,
     asked_nodes: Vec<bool>,

@@ -2,6 +2,7 @@
 
 use super::Structure;
 use super::pair::{SurfaceCarrier, at_place};
+use crate::geometry::Vector3;
 use crate::geometry::frame::PolarFrame;
 use crate::geometry::surface_spline::{ClosestPoint, SurfaceSpline};
 use crate::modes::bank::ModalBank;
@@ -63,7 +64,7 @@ impl Reaction {
     }
 
     /// Projects the modes on the directions of contact `member` of the group, which acts on this structure.
-    pub fn see(&mut self, of: &Structure, member: usize, spot: Spot, rows: &[[f64; 3]], columns: &[[f64; 3]]) {
+    pub fn see(&mut self, of: &Structure, member: usize, spot: Spot, rows: &[Vector3], columns: &[Vector3]) {
         self.members.push(member);
         let (bank, (surface, carrier)) = (bank(of), spot.surface);
         let modes = bank.modes();
@@ -77,7 +78,7 @@ impl Reaction {
         let [x, y, z] = &self.seen;
         for (directions, target) in [(rows, &mut self.rows), (columns, &mut self.columns)] {
             for (index, direction) in directions.iter().enumerate() {
-                let [a, b, c] = spot.frame.fixed(*direction);
+                let [a, b, c] = spot.frame.fixed(*direction).into();
                 let target = &mut target[(member * directions.len() + index) * modes..][..modes];
                 for (((value, x), y), z) in target.iter_mut().zip(x).zip(y).zip(z) {
                     *value = a * x + b * y + c * z;
@@ -139,7 +140,7 @@ impl Reaction {
     }
 
     /// Displacement of a place caused by the last [`Reaction::respond`], in the directions of the node (m).
-    pub fn responded(&self, spot: Spot) -> [f64; 3] {
+    pub fn responded(&self, spot: Spot) -> Vector3 {
         at_place(spot.surface, spot.place, spot.frame, |row| self.response[row])
     }
 

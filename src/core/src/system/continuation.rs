@@ -3,9 +3,9 @@
 use super::contact_view::ContactMember;
 use super::pair::When;
 use super::{Bodies, ContactEvent, ContactPair, StepFailure, Structure, System, sum_of};
-use crate::geometry::GapLaw;
 use crate::geometry::surface_spline::ClosestPoint;
 use crate::geometry::wrench::At;
+use crate::geometry::{GapLaw, Vector3};
 use crate::persist::{Persist, StateReader, StateWriter};
 use crate::system::history::ContactHistory;
 
@@ -270,7 +270,7 @@ impl ContactPair {
         for &node in self.nodes() {
             for sector in 0..touching.modes().sectors() {
                 let force = touching.vector3(&touching.history.passing.lasting, node, sector);
-                if force.iter().all(|value| *value == 0.0) {
+                if force == Vector3::zeros() {
                     continue;
                 }
                 let index = touching.index(node, sector);

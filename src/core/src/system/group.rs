@@ -7,7 +7,7 @@ use super::pair::When;
 use super::{ContactEvent, StepFailure, Structure};
 use crate::contact::Law;
 use crate::contact::coating::Coating;
-use crate::geometry::dot;
+use crate::geometry::Vector3;
 use crate::geometry::wrench::At;
 use crate::modes::sectors::Sectors;
 use crate::scene::method::Solver;
@@ -56,10 +56,10 @@ pub struct ContactGroup {
     law: Law,
     /// The current contacts, structure by structure and sector by sector.
     members: Vec<ContactMember>,
-    rows: Vec<[f64; 3]>,
-    columns: Vec<[f64; 3]>,
+    rows: Vec<Vector3>,
+    columns: Vec<Vector3>,
     /// Force on each member (N).
-    forces: Vec<[f64; 3]>,
+    forces: Vec<Vector3>,
     /// Contact force on the rows of one sector.
     sector_force: Vec<f64>,
 }
@@ -93,9 +93,9 @@ impl ContactGroup {
                 .collect(),
             law,
             members: Vec::with_capacity(count),
-            rows: vec![[0.0; 3]; per * count],
-            columns: vec![[0.0; 3]; per * count],
-            forces: vec![[0.0; 3]; count],
+            rows: vec![Vector3::zeros(); per * count],
+            columns: vec![Vector3::zeros(); per * count],
+            forces: vec![Vector3::zeros(); count],
             sector_force: vec![0.0; rows],
         }
     }
@@ -303,10 +303,9 @@ impl ContactGroup {
     fn find_force_vectors(&mut self, per: usize) {
         let values = self.law.multipliers();
         for (contact, force) in self.forces[..self.members.len()].iter_mut().enumerate() {
-            *force = [0.0; 3];
+            *force = Vector3::zeros();
             for along in per * contact..per * (contact + 1) {
-                let (value, direction) = (values[along], self.columns[along]);
-                *force = std::array::from_fn(|i| force[i] + value * direction[i]);
+                *force += values[along] * self.columns[along];
             }
         }
     }
@@ -343,8 +342,8 @@ impl ContactGroup {
                     let posed = bodies.pose(at);
                     let Some(spot) = posed.spot() else { continue };
                     let under = self.reactions.iter().find(|one| one.structure == spot.surface.1.structure);
-                    let moved = under.map_or([0.0; 3], |reaction| reaction.responded(spot));
-                    side.response[index] -= dot(structure.history.geometry.now.normal_at(index), moved);
+                    let moved = under.map_or(Vector3::zeros(), |reaction| reaction.responded(spot));
+                    side.response[index] -= structure.history.geometry.now.normal_at(index).dot(&moved);
                 }
             }
         }
@@ -388,7 +387,7 @@ impl ContactGroup {
             let sector = members[next].sector;
             force.fill(0.0);
             while next < members.len() && members[next].sector == sector {
-                force[3 * members[next].node..][..3].copy_from_slice(&forces[next]);
+                force[3 * members[next].node..][..3].copy_from_slice(forces[next].as_slice());
                 next += 1;
             }
             bank.correct(sector, force, ledger);
@@ -429,7 +428,7 @@ impl ContactGroup {
 impl GroupSide {
     /// Computes the change of the gaps of this structure by forces on its own members.
     #[inline(never)]
-    fn respond(&mut self, structure: &mut Structure, members: &[ContactMember], forces: &[[f64; 3]]) {
+    fn respond(&mut self, structure: &mut Structure, members: &[ContactMember], forces: &[Vector3]) {
         let nodes = structure.nodes();
         if let Sectors::Coupled(disk) = structure.modes_mut() {
             disk.ask(members.iter().zip(forces).map(|(member, force)| (member.sector, member.node, *force)));
@@ -442,10 +441,8 @@ impl GroupSide {
                     let flexibility = bank.flexibility(sector);
                     for node in 0..nodes {
                         let index = node * lanes + sector;
-                        let moved: [f64; 3] = std::array::from_fn(|i| {
-                            (0..3).map(|j| flexibility[(3 * node + i, 3 * column + j)] * force[j]).sum()
-                        });
-                        self.response[index] += dot(normals.normal_at(index), moved);
+                        let moved = flexibility.fixed_view::<3, 3>(3 * node, 3 * column) * force;
+                        self.response[index] += normals.normal_at(index).dot(&moved);
                     }
                 }
             }

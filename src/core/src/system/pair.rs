@@ -5,7 +5,7 @@ use super::growth::ShapeGrowth;
 use crate::geometry::frame::PolarFrame;
 use crate::geometry::surface_spline::{ClosestPoint, SurfaceSpline};
 use crate::geometry::wrench::MotionIncrement;
-use crate::geometry::{GapLaw, PrescribedMotion};
+use crate::geometry::{GapLaw, PrescribedMotion, Vector3};
 use crate::persist::persist_fields;
 use crate::system::history::Two;
 
@@ -204,8 +204,8 @@ pub(crate) fn at_place(
     place: ClosestPoint,
     frame: PolarFrame,
     value: impl Fn(usize) -> f64,
-) -> [f64; 3] {
-    let mut sum = [0.0; 3];
+) -> Vector3 {
+    let mut sum = Vector3::zeros();
     for (index, weight) in surface.weights(place).iter() {
         for (component, sum) in sum.iter_mut().enumerate() {
             *sum += weight * value(carrier.first_row + 3 * index + component);

@@ -1,6 +1,7 @@
 //! One structure: its modes, its contact nodes and their history, and the forces on surfaces that it carries.
 
-use crate::geometry::{GapLaw, Geometry, PrescribedMotion, dot};
+use crate::geometry::{GapLaw, Geometry, PrescribedMotion, Vector3};
+use crate::math::vector::vector3_at;
 use crate::modes::bank::{BankOptions, LANES, ModalBank};
 use crate::modes::modal::ModalModel;
 use crate::modes::sectors::{SectorModel, Sectors};
@@ -190,9 +191,9 @@ impl Structure {
 
     /// Three components of a node of a sector from an array over rows.
     #[inline(always)]
-    pub(crate) fn vector3(&self, rows: &[f64], node: usize, sector: usize) -> [f64; 3] {
-        let lanes = self.lanes;
-        std::array::from_fn(|component| rows[(3 * node + component) * lanes + sector])
+    pub(crate) fn vector3(&self, rows: &[f64], node: usize, sector: usize) -> Vector3 {
+        let value = |component: usize| rows[(3 * node + component) * self.lanes + sector];
+        Vector3::new(value(0), value(1), value(2))
     }
 
     /// Starts without earlier contact, from the current modal state.
@@ -302,8 +303,9 @@ impl Structure {
 
     /// Largest displacement of a control point (m).
     pub(crate) fn largest_displacement(&self) -> f64 {
-        let moved = self.modes.displacement().as_chunks::<3>().0.iter();
-        moved.fold(0.0, |most: f64, moved| most.max(dot(*moved, *moved))).sqrt()
+        let rows = self.modes.displacement();
+        let square = |point: usize| vector3_at(rows, point).norm_squared();
+        (0..rows.len() / 3).map(square).fold(0.0, f64::max).sqrt()
     }
 
     /// Writes everything that determines the future, except the step size.

@@ -99,7 +99,7 @@ impl CyclicBank {
         let (lanes, nodes) = (self.lanes, self.rows / 3);
         for sector in 0..self.model.sectors {
             for node in 0..nodes {
-                let force: [f64; 3] = std::array::from_fn(|i| forces[(3 * node + i) * lanes + sector]);
+                let force = [0, 1, 2].map(|i| forces[(3 * node + i) * lanes + sector]).into();
                 self.asked.push((sector, node, force));
             }
         }

@@ -58,7 +58,7 @@ fn reset_to_rest_clears_previous_loads() {
         for step in 0..5 {
             bank.loads_mut()[1] = 1e3;
             bank.predict(true);
-            bank.ask([(3, 0, [1.0, 0.3, -0.2]), (step, 1, [-2.0, 0.0, 0.5])].into_iter());
+            bank.ask([(3, 0, Vector3::new(1.0, 0.3, -0.2)), (step, 1, Vector3::new(-2.0, 0.0, 0.5))].into_iter());
             bank.act();
             assert!(bank.finish_loads() != 0.0);
         }
@@ -107,7 +107,7 @@ fn every_instruction_set_gives_the_same_bits() {
                     bank.loads_mut()[1] = 1e3;
                     bank.predict(true);
                     if step % 3 > 0 {
-                        let force = [f64::from(step).cos(), 0.3, -0.2];
+                        let force = Vector3::new(f64::from(step).cos(), 0.3, -0.2);
                         let index = usize::try_from(step).unwrap();
                         let forces = [(index % sectors, index % nodes, force), (index * 5 % sectors, 0, force)];
                         bank.ask(forces.into_iter());
@@ -139,7 +139,9 @@ fn displacements_and_modes_agree_after_contact() {
     bank.set_step(Scheme::ModalExact, 1e-4);
     for step in 0..200_usize {
         bank.predict(true);
-        bank.ask([(step % 11, step % 2, [1.0, -0.4, 0.1]), (3, 0, [0.2, 0.5, -1.0])].into_iter());
+        bank.ask(
+            [(step % 11, step % 2, Vector3::new(1.0, -0.4, 0.1)), (3, 0, Vector3::new(0.2, 0.5, -1.0))].into_iter(),
+        );
         bank.act();
         if step % 20 == 7 {
             let found = bank.displacement().to_vec();

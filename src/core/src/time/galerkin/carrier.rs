@@ -7,6 +7,7 @@ use super::shared_body::SharedBody;
 use super::trial::ForceInterpolation;
 use crate::geometry::frame::PolarFrame;
 use crate::math::simd::InstructionSet;
+use crate::math::vector::Vector3;
 use crate::modes::bank::ModalBank;
 use crate::modes::coordinates::Coordinates;
 use crate::scene::method::Scheme;
@@ -114,12 +115,12 @@ impl CarrierIntegrator {
     }
 
     /// Velocity of a place at the start of the step (m/s), in the directions of the node.
-    pub fn velocity_at(&self, spot: Spot) -> [f64; 3] {
+    pub fn velocity_at(&self, spot: Spot) -> Vector3 {
         at_place(spot.surface, spot.place, spot.frame, |row| self.velocity[row])
     }
 
     /// Returns the displacement of a place over which a force at point i of the tried step does work (m), in the directions of the node.
-    pub fn sliding_distance_at(&self, spot: Spot, i: usize) -> [f64; 3] {
+    pub fn sliding_distance_at(&self, spot: Spot, i: usize) -> Vector3 {
         let (weights, moved) = (&self.work_weights[i], &self.moved);
         let sliding_distance =
             |row: usize| weights.iter().zip(moved).map(|(weight, moved)| weight * moved[row]).sum::<f64>();
@@ -127,12 +128,12 @@ impl CarrierIntegrator {
     }
 
     /// Displacement of a place at a point of the step (m), in the directions of the node.
-    pub fn moved_at(&self, spot: Spot, point: usize) -> [f64; 3] {
+    pub fn moved_at(&self, spot: Spot, point: usize) -> Vector3 {
         at_place(spot.surface, spot.place, spot.frame, |row| self.moved[point][row])
     }
 
     /// Returns the displacement of a place over which a force at point i of the accepted step does work (m), in the directions of the node.
-    pub fn worked_at(&self, spot: Spot, i: usize) -> [f64; 3] {
+    pub fn worked_at(&self, spot: Spot, i: usize) -> Vector3 {
         at_place(spot.surface, spot.place, spot.frame, |row| self.worked[i][row])
     }
 
@@ -147,7 +148,7 @@ impl CarrierIntegrator {
     }
 
     /// Adds the reaction to a force on a node at a place, at point i.
-    pub fn react(&mut self, spot: Spot, i: usize, force: [f64; 3]) {
+    pub fn react(&mut self, spot: Spot, i: usize, force: Vector3) {
         self.find_force(spot, force);
         self.body.forces_mut(i).iter_mut().zip(&self.force).for_each(|(sum, force)| *sum -= force);
     }
@@ -158,13 +159,13 @@ impl CarrierIntegrator {
     }
 
     /// Adds an impulse on a node at a place (N·s).
-    pub fn add_impulse(&mut self, spot: Spot, impulse: [f64; 3]) {
+    pub fn add_impulse(&mut self, spot: Spot, impulse: Vector3) {
         self.find_force(spot, impulse);
         self.impulses.iter_mut().zip(&self.force).for_each(|(sum, force)| *sum += force);
     }
 
     /// Computes the modal forces of a force at a place, in the directions of the node.
-    fn find_force(&mut self, spot: Spot, force: [f64; 3]) {
+    fn find_force(&mut self, spot: Spot, force: Vector3) {
         let (around, fixed) = (Around::new(spot), spot.frame.fixed(force));
         let rows: [usize; 48] = std::array::from_fn(|i| around.rows[i / 3] + i % 3);
         let amounts: [f64; 48] = std::array::from_fn(|i| around.weights[i / 3] * fixed[i % 3]);
@@ -185,7 +186,7 @@ impl CarrierIntegrator {
     }
 
     /// Assigns a lane of the current sector to a place, with this normal.
-    pub fn set_lane(&mut self, lane: usize, spot: Spot, normal: [f64; 3]) {
+    pub fn set_lane(&mut self, lane: usize, spot: Spot, normal: Vector3) {
         let padded = self.force.len();
         (self.obstacle[lane], self.frames[lane]) = (true, spot.frame);
         let around = Around::new(spot);
@@ -199,7 +200,7 @@ impl CarrierIntegrator {
             instructions.run(Combine { table: shapes, stride: padded, columns, coefficients, sums });
         }
         let [x, y, z] = seen.each_ref().map(|seen| &seen[window.clone()]);
-        let [a, b, c] = spot.frame.fixed(normal);
+        let [a, b, c] = spot.frame.fixed(normal).into();
         for (mode, along) in along[window.clone()].iter_mut().enumerate() {
             *along = a * x[mode] + b * y[mode] + c * z[mode];
         }
@@ -212,7 +213,7 @@ impl CarrierIntegrator {
         (level, kind): (usize, ForceInterpolation),
         lanes: Lanes,
         lane: usize,
-        direction: [f64; 3],
+        direction: Vector3,
         carrier_compliance: &mut [f64],
     ) {
         let padded = self.force.len();
@@ -232,14 +233,14 @@ impl CarrierIntegrator {
         at: (usize, ForceInterpolation),
         lanes: Lanes,
         lane: usize,
-        force: [f64; 3],
+        force: Vector3,
         carrier_compliance: &mut [f64],
     ) {
         let padded = self.force.len();
         self.move_modes(at, lanes, (1, lane), force);
         for other in (0..lanes.nodes).filter(|node| self.obstacle[*node]) {
             let fixed = self.seen.each_ref().map(|seen| dot_of(&seen[other * padded..][..padded], &self.force));
-            lanes.set(carrier_compliance, other, self.frames[other].local(fixed));
+            lanes.set(carrier_compliance, other, self.frames[other].local(fixed.into()));
         }
     }
 
@@ -249,7 +250,7 @@ impl CarrierIntegrator {
         (level, kind): (usize, ForceInterpolation),
         lanes: Lanes,
         (i, lane): (usize, usize),
-        force: [f64; 3],
+        force: Vector3,
     ) {
         if !self.obstacle[lane] {
             return self.force.fill(0.0);
@@ -257,7 +258,7 @@ impl CarrierIntegrator {
         let padded = self.force.len();
         let [x, y, z] = self.seen.each_ref().map(|seen| &seen[lane * padded..][..padded]);
         let (k, _) = lanes.place(lane);
-        let [a, b, c] = self.frames[lane].fixed(force);
+        let [a, b, c] = self.frames[lane].fixed(force).into();
         let (influence, coordinates) = (self.body.influence(level), self.body.coordinates());
         for (mode, by) in influence.iter().enumerate() {
             let inert = coordinates.inertia[mode]

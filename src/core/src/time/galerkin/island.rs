@@ -378,7 +378,7 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
                 surfaces.guess_start_places();
             }
             trial.begin((level, kind), rows, state);
-            trial.find_start_gaps(state, |node, moved| surfaces.gap(node, 0, moved).0);
+            trial.find_start_gaps(state, |node, moved| surfaces.gap(node, 0, moved).distance);
         }
         if self.island.fresh {
             // Earlier forces are applied at the places of the nodes at the start of the span.
@@ -592,7 +592,7 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
             if own.depth > 0.0 {
                 let depth = if is_single {
                     trial.find_start(&tables.rows, state);
-                    trial.depth_without_jumps(|node, moved| Some(surfaces.gap(node, 0, moved).0))
+                    trial.depth_without_jumps(|node, moved| Some(surfaces.gap(node, 0, moved).distance))
                 } else {
                     trial.depth_without_jumps(|node, moved| surfaces.gap_within(node, 0.0, moved))
                 };

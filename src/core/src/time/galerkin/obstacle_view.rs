@@ -6,9 +6,10 @@ use super::compliance::Lanes;
 use super::level::StepTables;
 use super::record::{SpanRecord, SurfacePlace};
 use super::surroundings::{AcceptedStep, CarriersInStep, Witness};
-use super::trial::{ForceInterpolation, Obstacle, SlidingState, Trial, node_by_node, vector3_at};
+use super::trial::{ForceInterpolation, Obstacle, SlidingState, Trial, node_by_node};
 use crate::geometry::wrench::{At, MotionIncrement};
-use crate::geometry::{GapLaw, PrescribedMotion, dot};
+use crate::geometry::{Gap, GapLaw, PrescribedMotion, Vector3};
+use crate::math::vector::vector3_at;
 use crate::system::carrier::Spot;
 use crate::system::pair::ContactPair;
 use crate::system::work::WorkingForce;
@@ -91,13 +92,12 @@ impl ObstacleView<'_> {
 }
 
 impl Obstacle for ObstacleView<'_> {
-    fn gap(&mut self, node: usize, point: usize, moved: [f64; 3]) -> (f64, [f64; 3]) {
-        let Some(pair) = self.pair_of[node] else { return (f64::INFINITY, [0.0; 3]) };
+    fn gap(&mut self, node: usize, point: usize, moved: Vector3) -> Gap {
+        let Some(pair) = self.pair_of[node] else { return Gap::NOTHING };
         let at = self.at(node, &self.record.drives[pair][point].0);
-        let (gap, normal, place) =
-            self.pairs[pair].gap_mut().gap_of_node(at, moved, Some(self.record.places[point][node]));
-        self.record.places[point][node] = place;
-        (gap, normal)
+        let gap = self.pairs[pair].gap_mut().gap(at, moved, Some(self.record.places[point][node]));
+        self.record.places[point][node] = gap.foot;
+        gap
     }
 
     fn gaps(&mut self, lanes: Lanes, moved: &[f64], gaps: &mut [f64], normals: &mut [f64]) {
@@ -109,19 +109,19 @@ impl Obstacle for ObstacleView<'_> {
         node_by_node(self, lanes, moved, gaps, normals);
     }
 
-    fn gap_within(&self, node: usize, theta: f64, moved: [f64; 3]) -> Option<f64> {
+    fn gap_within(&self, node: usize, theta: f64, moved: Vector3) -> Option<f64> {
         let pair = self.pair_of[node]?;
         let [from, length] = self.record.step;
         let drive = self.record.courses[pair].at(from + length * theta).0;
         match self.pairs[pair].gap() {
-            GapLaw::Fixed(law) => Some(law.gaps[node] + dot(law.normals[node], moved)),
-            GapLaw::Revolution(law) => Some(law.gap_of_node(self.at(node, &drive), moved).0),
+            GapLaw::Fixed(law) => Some(law.gap(node, moved).distance),
+            GapLaw::Revolution(law) => Some(law.gap(self.at(node, &drive), moved).distance),
             GapLaw::Spline(_) | GapLaw::Open(_) => None,
         }
     }
 
-    fn slip_direction(&mut self, node: usize, point: usize, sliding: &SlidingState) -> [f64; 3] {
-        let Some(pair) = self.pair_of[node] else { return [0.0; 3] };
+    fn slip_direction(&mut self, node: usize, point: usize, sliding: &SlidingState) -> Vector3 {
+        let Some(pair) = self.pair_of[node] else { return Vector3::zeros() };
         let gap = self.pairs[pair].gap();
         let slip = if gap.slides_anywhere() {
             let known = self.record.slips[point][node].filter(|_| self.record.solutions > SOLUTIONS);
@@ -129,8 +129,7 @@ impl Obstacle for ObstacleView<'_> {
                 let carriers = self.on_carrier((node, point), SurfacePlace::Now, |casing, spot| {
                     casing.sliding_distance_at(spot, point)
                 });
-                let carriers = carriers.unwrap_or_default();
-                std::array::from_fn(|c| sliding.sliding_distance[c] - carriers[c])
+                sliding.sliding_distance - carriers.unwrap_or_default()
             });
             self.record.slips[point][node] = Some(slip);
             slip
@@ -138,8 +137,7 @@ impl Obstacle for ObstacleView<'_> {
             let at = self.at(node, &self.record.drives[pair][point].0);
             let rigid = gap.sliding_velocity(node, at.index, at.drive, sliding.moved);
             let carriers = self.on_carrier((node, point), SurfacePlace::Begun, |casing, spot| casing.velocity_at(spot));
-            let carriers = carriers.unwrap_or_default();
-            std::array::from_fn(|i| rigid[i] + sliding.velocity[i] - carriers[i])
+            rigid + sliding.velocity - carriers.unwrap_or_default()
         };
         gap.slip_direction(slip, sliding.normal)
     }
@@ -148,7 +146,7 @@ impl Obstacle for ObstacleView<'_> {
         self.sector
     }
 
-    fn angle(&self, node: usize, point: usize, moved: [f64; 3]) -> f64 {
+    fn angle(&self, node: usize, point: usize, moved: Vector3) -> f64 {
         let Some(pair) = self.pair_of[node] else { return 0.0 };
         self.pairs[pair].gap().angle_on_casing(self.at(node, &self.record.drives[pair][point].0), moved)
     }
@@ -172,14 +170,14 @@ impl Obstacle for ObstacleView<'_> {
         true
     }
 
-    fn add_normal_compliance(&mut self, lane: usize, direction: [f64; 3], carrier_compliance: &mut [f64]) {
+    fn add_normal_compliance(&mut self, lane: usize, direction: Vector3, carrier_compliance: &mut [f64]) {
         carrier_compliance.fill(0.0);
         if let Some((casing, at, lanes)) = self.under(lane) {
             casing.add_normal_compliance(at, lanes, lane, direction, carrier_compliance);
         }
     }
 
-    fn add_compliance(&mut self, lane: usize, force: [f64; 3], carrier_compliance: &mut [f64]) {
+    fn add_compliance(&mut self, lane: usize, force: Vector3, carrier_compliance: &mut [f64]) {
         carrier_compliance.fill(0.0);
         if let Some((casing, at, lanes)) = self.under(lane) {
             casing.add_compliance(at, lanes, lane, force, carrier_compliance);
@@ -190,8 +188,8 @@ impl Obstacle for ObstacleView<'_> {
         self.pair_of[node].map_or(0.0, |pair| self.pairs[pair].friction())
     }
 
-    fn drift(&self, node: usize, step_point: usize, moved: [f64; 3]) -> [f64; 3] {
-        let Some(pair) = self.pair_of[node] else { return [0.0; 3] };
+    fn drift(&self, node: usize, step_point: usize, moved: Vector3) -> Vector3 {
+        let Some(pair) = self.pair_of[node] else { return Vector3::zeros() };
         let drives = &self.record.drives[pair];
         let ((_, before), (drive, now)) = (&drives[0], &drives[step_point]);
         let (gap, motion) = (self.pairs[pair].gap(), now.less(before));
@@ -199,11 +197,9 @@ impl Obstacle for ObstacleView<'_> {
         let point = gap.contact_point(at, moved, self.record.places[step_point][node]);
         let (spin, shaft) = (gap.spin_motion(at, point, &motion), gap.shaft_motion(at, point, &motion));
         let carriers = self.on_carrier((node, step_point), SurfacePlace::Now, |casing, spot| {
-            let [now, before] = [step_point, 0].map(|instant| casing.moved_at(spot, instant));
-            std::array::from_fn(|c| now[c] - before[c])
+            casing.moved_at(spot, step_point) - casing.moved_at(spot, 0)
         });
-        let carriers: [f64; 3] = carriers.unwrap_or_default();
-        std::array::from_fn(|c| spin[c] + shaft[c] - carriers[c])
+        spin + shaft - carriers.unwrap_or_default()
     }
 }
 
@@ -267,12 +263,12 @@ impl Witness for ObstacleView<'_> {
         self.record.guess_start_places();
     }
 
-    fn react(&mut self, node: usize, point: usize, force: [f64; 3]) {
+    fn react(&mut self, node: usize, point: usize, force: Vector3) {
         self.record.act(node, point);
         self.with_carrier_mut(node, point, |carrier, spot| carrier.react(spot, point, force));
     }
 
-    fn add_impulse(&mut self, node: usize, point: usize, impulse: [f64; 3]) {
+    fn add_impulse(&mut self, node: usize, point: usize, impulse: Vector3) {
         self.with_carrier_mut(node, point, |carrier, spot| carrier.add_impulse(spot, impulse));
     }
 
@@ -360,17 +356,11 @@ impl ObstacleView<'_> {
         if trial.gap(i - 1, node).is_finite() {
             return false;
         }
-        let (now, before) = (trial.displacement(i, node), trial.displacement(i - 1, node));
+        let moved = trial.displacement(i, node) - trial.displacement(i - 1, node);
         let carriers = self.on_carrier((node, i), SurfacePlace::Now, |casing, spot| {
-            let [now, before] = [i, i - 1].map(|point| casing.moved_at(spot, point));
-            std::array::from_fn(|c| now[c] - before[c])
+            casing.moved_at(spot, i) - casing.moved_at(spot, i - 1)
         });
-        let carriers: [f64; 3] = carriers.unwrap_or_default();
-        open.was_behind(
-            std::array::from_fn(|c| now[c] - before[c] - carriers[c]),
-            trial.normal(i, node),
-            trial.gap(i, node),
-        )
+        open.was_behind(moved - carriers.unwrap_or_default(), trial.normal(i, node), trial.gap(i, node))
     }
 
     /// Computes Σ_k S_ik of the prescribed motion of a pair at the points, for each point i of the step.
@@ -401,27 +391,22 @@ impl ObstacleView<'_> {
             let point = gap.contact_point(at, moved, place);
             self.record.implausible |= !gap.is_plausible(node, trial.gap(i, node), normal);
             // With the normal for which the force was found: the effect of its rotation since then is curvature work, not heat.
-            let tangential = if slides { trial.friction_force(i, node) } else { [0.0; 3] };
+            let tangential = if slides { trial.friction_force(i, node) } else { Vector3::zeros() };
             let wrench = gap.wrench(at, point, force);
-            let length = step.level.step
+            let duration = step.level.step
                 * if step.kind == ForceInterpolation::Constant {
                     f64::from(u8::from(i == 1))
                 } else {
                     basis.weights[i]
                 };
-            tally.add(length, multiplier, (force, tangential), &wrench);
             let weights = step.kind.work_weights(basis, i);
-            let (mut moved, mut open) = ([0.0; 3], 0.0);
+            let (mut moved, mut open) = (Vector3::zeros(), 0.0);
             for k in (0..=trial.points()).filter(|k| weights[*k] != 0.0) {
-                let displaced = trial.displacement(k, node);
-                moved = std::array::from_fn(|c| moved[c] + weights[k] * displaced[c]);
+                moved += weights[k] * trial.displacement(k, node);
                 open += weights[k] * trial.finite_gap(k, node);
             }
             let carried = self.on_carrier((node, i), SurfacePlace::Acted, |carrier, spot| carrier.worked_at(spot, i));
-            let carried = carried.unwrap_or_default();
-            let (fixed, motion, approach) = (wrench.force, &motions[i], -open);
-            let moved = std::array::from_fn(|c| moved[c] - carried[c]);
-            let done = WorkingForce {
+            let acting = WorkingForce {
                 gap,
                 at,
                 point,
@@ -430,12 +415,13 @@ impl ObstacleView<'_> {
                 multiplier,
                 force,
                 tangential,
-                fixed,
-                motion,
-                moved,
-                approach,
-            }
-            .work();
+                fixed: wrench.force,
+                motion: &motions[i],
+                moved: moved - carried.unwrap_or_default(),
+                approach: -open,
+            };
+            tally.add(duration, &acting, &wrench);
+            let done = acting.work();
             tally.heat += done.heat;
             heats += done.heat;
             work.add(&done);

@@ -14,6 +14,7 @@ use super::surroundings::{CarriersInStep, Surroundings};
 use super::tables::{HALVINGS, Tables};
 use crate::geometry::PrescribedMotion;
 use crate::geometry::wrench::At;
+use crate::math::vector::vector3_at;
 use crate::modes::bank::ModalBank;
 use crate::modes::coordinates::ContactModes;
 use crate::modes::cyclic::CyclicBank;
@@ -359,7 +360,7 @@ impl SceneIsland {
                     let index = structure.index(node, sector);
                     let Some(pair) = structure.pair_of[node] else { return true };
                     let at = At { node, index, drive: pairs[pair].drive_now() };
-                    let reach = std::array::from_fn(|component| reach[3 * node + component]);
+                    let reach = vector3_at(reach, node);
                     let least = pairs[pair].gap().least(at, &ends[pair], turns[pair], reach).unwrap_or(0.0);
                     structure.lowest_in_span[index] = least;
                     structure.history.multiplier[index] == 0.0 && least > 0.0
@@ -429,12 +430,10 @@ impl Structure {
             let index = self.index(node, sector);
             state.multipliers[node] = self.history.multiplier[index];
             state.gaps[node] = self.history.gap.before[index];
-            state.normals[3 * node..3 * node + 3].copy_from_slice(&self.vector3(
-                &self.step_control.normals,
-                node,
-                sector,
-            ));
-            state.forces[3 * node..3 * node + 3].copy_from_slice(&self.vector3(&self.history.force.now, node, sector));
+            let normal = self.vector3(&self.step_control.normals, node, sector);
+            let force = self.vector3(&self.history.force.now, node, sector);
+            state.normals[3 * node..][..3].copy_from_slice(normal.as_slice());
+            state.forces[3 * node..][..3].copy_from_slice(force.as_slice());
         }
         for (row, slope) in state.slopes.iter_mut().enumerate() {
             *slope = self.step_control.slopes[row * self.lanes() + sector];
