@@ -38,6 +38,7 @@ use compile::Compiled;
 use drive::{Input, RotorAngle};
 pub use inputs::InputCourses;
 use inputs::{CarrierInputs, Inputs, PairInputs, RotorInputs};
+use std::sync::Arc;
 use tangent::StepReplay;
 use watched::WatchedGaps;
 use window::StepWindow;
@@ -179,7 +180,7 @@ struct SetEnergy {
 }
 
 impl Simulation {
-    /// Compiles a scene. Start values are set; nothing is computed yet.
+    /// Compiles a scene, which is cloned if it is given by reference. Start values are set; nothing is computed yet.
     ///
     /// # Examples
     /// ```
@@ -194,9 +195,8 @@ impl Simulation {
     ///
     /// # Errors
     /// Invalid settings or ROM; combinations that are not supported.
-    pub fn new(scene: &Scene) -> Result<Self> {
-        let compiled = Compiled::new(scene)?;
-        let (table, readers) = table::build(scene)?;
+    pub fn new(scene: impl Into<Arc<Scene>>) -> Result<Self> {
+        let (compiled, table, readers) = Compiled::new(scene.into())?;
         let mut system = compiled.system()?;
         let stepper = TimeStepper::new(&mut system, 0.0, 0.0);
         let window = StepWindow::new(system.structures(), &compiled.patches, &compiled.scene.settings.outputs);

@@ -165,6 +165,7 @@ mod tests {
     use super::*;
     use crate::limits::tests::{model, radial};
     use crate::limits::{delassus, directional_modes, secular};
+    use crate::math::vector::Vector3;
     use nalgebra::{DMatrix, DVector};
     use tiprub_test_models::SeededRandom;
 

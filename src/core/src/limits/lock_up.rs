@@ -32,6 +32,7 @@ mod tests {
     use super::*;
     use crate::limits;
     use crate::limits::tests::{model, radial};
+    use crate::math::vector::Vector3;
     use crate::scene::method::Scheme;
 
     #[test]

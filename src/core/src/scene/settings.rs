@@ -8,6 +8,7 @@ pub mod rules;
 mod validation;
 
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 use crate::Rom;
 use crate::scene::method::{Scheme, Solver};
@@ -541,4 +542,11 @@ pub struct Scene {
     pub settings: SceneSettings,
     /// One ROM per entry of `settings.structures`.
     pub roms: Vec<Rom>,
+}
+
+/// Clones the scene.
+impl From<&Scene> for Arc<Scene> {
+    fn from(scene: &Scene) -> Self {
+        Self::new(scene.clone())
+    }
 }

@@ -14,16 +14,19 @@ use crate::scene::rom::{ContactNode, SupportRows};
 use crate::scene::settings::{BodyMotion, ContactSettings, Meridian, StructureSettings};
 use crate::scene::shape::CompiledShape;
 use crate::system::{PairParts, StructureParts, SurfaceCarrier, System, SystemSettings, joined};
-use crate::variables::Quantity;
+use crate::variables::{Quantity, VariableTable};
 use crate::{Error, Result, Rom, Scene, Warning, shown};
 use nalgebra::DMatrix;
+use std::sync::Arc;
 
 use super::blades::{disk_heat, expansion, softened, static_stress};
 use super::contour::check_contour;
 use super::loads::{CarrierLoads, centrifugal};
+use super::outputs::OutputReader;
 use super::patches::HeatPatches;
 use super::plan::{PairPlan, SteppingOrder, prefix};
 use super::slave_surface::{CarrierModes, Lining, Share, spline_gap};
+use super::table;
 
 /// Largest number of contact nodes of all sectors that a flexible slave or the disk may couple: their Delassus matrix is dense.
 pub const MOST_COUPLED: usize = 2000;
@@ -37,6 +40,19 @@ pub struct ValuePlaces {
     pub ramp_times: Vec<Option<usize>>,
     /// Engine order of each excited structure.
     pub engine_orders: Vec<Option<usize>>,
+}
+
+impl ValuePlaces {
+    fn new(table: &VariableTable, plan: &SteppingOrder) -> Self {
+        let place = |quantity| table.with_quantity(quantity).map(|variable| variable.reference as usize);
+        let of = |quantity, of| Some(table.with_quantity_of(quantity, of)?.reference as usize);
+        Self {
+            step_max: place(Quantity::StepMax).unwrap_or(0),
+            input_interpolation: place(Quantity::InputInterpolation),
+            ramp_times: (0..plan.pairs.len()).map(|pair| of(Quantity::RampTime, pair)).collect(),
+            engine_orders: (0..plan.bodies.len()).map(|body| of(Quantity::ExcitationOrder, body)).collect(),
+        }
+    }
 }
 
 /// A master: a structure with contact nodes.
@@ -89,7 +105,7 @@ pub struct CarrierParts {
 /// The parts of a scene that do not change while it runs.
 #[derive(Debug, Clone)]
 pub struct Compiled {
-    pub scene: Scene,
+    pub scene: Arc<Scene>,
     pub plan: SteppingOrder,
     /// Masters, in the order of [`SteppingOrder::bodies`].
     pub bodies: Vec<CompiledBody>,
@@ -151,14 +167,16 @@ impl CompiledBody {
 }
 
 impl Compiled {
-    /// Validates the scene and solves the reduced eigenproblems.
+    /// Validates the scene, builds its variable table and solves the reduced eigenproblems.
     ///
     /// # Errors
     /// Invalid settings or ROM; ROMs without data that the scene requires.
-    pub fn new(scene: &Scene) -> Result<Self> {
+    pub fn new(scene: Arc<Scene>) -> Result<(Self, VariableTable, Vec<OutputReader>)> {
         scene.settings.validate()?;
-        let plan = SteppingOrder::new(scene)?;
-        let bodies = (0..plan.bodies.len()).map(|body| CompiledBody::new(scene, &plan, body)).collect::<Result<_>>()?;
+        let plan = SteppingOrder::new(&scene)?;
+        let (table, readers) = table::build(&scene, &plan)?;
+        let bodies =
+            (0..plan.bodies.len()).map(|body| CompiledBody::new(&scene, &plan, body)).collect::<Result<_>>()?;
         let carrier = |structure: &usize| {
             let (settings, rom) = (&scene.settings.structures[*structure], &scene.roms[*structure]);
             let load_order = settings.load.map_or(0, |load| load.order);
@@ -172,25 +190,15 @@ impl Compiled {
             Ok(CarrierParts { structure: *structure, model, load_order, loads, support })
         };
         let carriers = plan.carriers.iter().map(carrier).collect::<Result<_>>()?;
-        let (table, _) = super::table::build(scene)?;
-        let place = |quantity| table.with_quantity(quantity).map(|variable| variable.reference as usize);
-        let ramp = |pair: usize| Some(table.with_quantity_of(Quantity::RampTime, pair)?.reference as usize);
-        let order = |body: usize| Some(table.with_quantity_of(Quantity::ExcitationOrder, body)?.reference as usize);
-        let references = ValuePlaces {
-            step_max: place(Quantity::StepMax).unwrap_or(0),
-            input_interpolation: place(Quantity::InputInterpolation),
-            ramp_times: (0..plan.pairs.len()).map(ramp).collect(),
-            engine_orders: (0..plan.bodies.len()).map(order).collect(),
-        };
         let mut compiled = Self {
-            fingerprint: super::fingerprint::of_scene(scene),
-            patches: plan.pairs.iter().map(|pair| HeatPatches::new(scene, &plan, pair)).collect(),
+            fingerprint: super::fingerprint::of_scene(&scene),
+            patches: plan.pairs.iter().map(|pair| HeatPatches::new(&scene, &plan, pair)).collect(),
             linings: Vec::new(),
-            scene: scene.clone(),
+            references: ValuePlaces::new(&table, &plan),
+            scene,
             plan,
             bodies,
             carriers,
-            references,
         };
         for carrier in 0..compiled.carriers.len() {
             compiled.set_load_order(carrier, f64::from(compiled.carriers[carrier].load_order))?;
@@ -204,7 +212,7 @@ impl Compiled {
             compiled.linings =
                 (0..compiled.plan.pairs.len()).map(|pair| compiled.lining(pair)).collect::<Result<_>>()?;
         }
-        Ok(compiled)
+        Ok((compiled, table, readers))
     }
 
     /// Returns the lining between the surface of a pair and the mesh of its carrier, if the support is requested.

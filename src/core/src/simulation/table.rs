@@ -26,8 +26,8 @@ use parts::{AXES, BodyFacts, PairFacts, TableFacts, largest_length};
 ///
 /// # Errors
 /// Watched sector or nodal diameter that no ROM has; pairs that do not fit the ROMs.
-pub fn build(scene: &Scene) -> Result<(VariableTable, Vec<OutputReader>)> {
-    let parts = &TableFacts { scene, settings: &scene.settings, plan: SteppingOrder::new(scene)? };
+pub fn build(scene: &Scene, plan: &SteppingOrder) -> Result<(VariableTable, Vec<OutputReader>)> {
+    let parts = &TableFacts { scene, settings: &scene.settings, plan };
     let mut table = TableBuilder::default();
     table.time();
     inputs(&mut table, parts)?;

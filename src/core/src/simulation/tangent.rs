@@ -10,6 +10,7 @@ use super::{Simulation, SimulationPhase};
 use crate::scene::method::Scheme;
 use crate::variables::{Causality, DataType, Quantity, Variability};
 use crate::{Error, Result, shown, shown_time};
+use std::sync::Arc;
 
 /// Change of inputs as a fraction of the change that moves gaps by a clearance: 2⁻²⁰, so that sums with usual values are exact. Rounding in
 /// gaps is some 1e-7 of it, more on splines.
@@ -140,7 +141,7 @@ impl Simulation {
             Some(twin) => twin,
             None => {
                 self.tangent.follows = false;
-                Box::new(Self::new(&self.compiled.scene)?)
+                Box::new(Self::new(Arc::clone(&self.compiled.scene))?)
             }
         };
         let outcome = self.differentiate(&mut twin, (outputs, sensitivity), (inputs, seed), most);

@@ -12,7 +12,7 @@ pub const AXES: [&str; 3] = ["x", "y", "z"];
 pub struct TableFacts<'a> {
     pub scene: &'a Scene,
     pub settings: &'a SceneSettings,
-    pub plan: SteppingOrder,
+    pub plan: &'a SteppingOrder,
 }
 
 /// A master.
@@ -62,7 +62,7 @@ impl<'a> TableFacts<'a> {
             surface: &self.settings.surfaces[plan.surface],
             body: bodies[plan.body],
             carrier: plan.carrier,
-            patches: HeatPatches::new(self.scene, &self.plan, plan).as_ref().map_or(0, HeatPatches::len),
+            patches: HeatPatches::new(self.scene, self.plan, plan).as_ref().map_or(0, HeatPatches::len),
         };
         self.plan.pairs.iter().enumerate().map(pair).collect()
     }
