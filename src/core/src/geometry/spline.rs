@@ -5,7 +5,7 @@ use super::layout::Layout;
 use super::surface_spline::{ClosestPoint, Projection, SurfaceSpline};
 use super::wrench::{At, MotionIncrement};
 use super::{Gap, Geometry, PrescribedMotion, Vector3};
-use crate::math::vector::{length, vector3_at};
+use crate::math::vector::{length, strided_vector3, vector3_at};
 use crate::persist::{Persist, StateReader, StateWriter};
 
 /// Gap of a node without a surface to touch: infinite, so that it is never used as a distance.
@@ -110,7 +110,7 @@ impl SplineGap {
         // Padding lanes are infinitely far away.
         for (node, lane) in nodes.filter(|(_, lane)| self.layout.clearances[*lane].is_finite()) {
             let index = node * lanes + lane;
-            let local = [0, 1, 2].map(|component| displacement[(3 * node + component) * lanes + lane]).into();
+            let local = strided_vector3(displacement, 3 * node * lanes + lane, lanes);
             let at = At { node, index, drive };
             let (projection, frame) = self.project(at, local, guess.map(|places| places[index]));
             match projection {

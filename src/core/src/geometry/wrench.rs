@@ -63,14 +63,7 @@ impl MotionIncrement {
     /// Returns the mean of this step and the one before, like the displacements on which a force at the time in between does work; the turn
     /// of the rotor is that of this step alone, so that the mean torque times the speed is the power of the shaft.
     pub fn centred(&self, before: &Self) -> Self {
-        Self {
-            step: self.step,
-            turn: self.turn,
-            shaft: 0.5 * (self.shaft + before.shaft),
-            opening: 0.5 * (self.opening + before.opening),
-            shape_factor: 0.5 * (self.shape_factor + before.shape_factor),
-            shape_rotation: 0.5 * (self.shape_rotation + before.shape_rotation),
-        }
+        Self { step: self.step, turn: self.turn, ..self.since(before).over(0.5) }
     }
 
     /// Returns the sum of this step and the one before.

@@ -115,6 +115,8 @@ pub struct CyclicBank {
     asked_nodes: Vec<bool>,
     /// Displacements caused by the requested forces (m), `[row][lane of sector]`.
     moved: Vec<f64>,
+    /// True if the damping loss is collected.
+    with_loss: bool,
 }
 
 impl CyclicBank {
@@ -173,7 +175,13 @@ impl CyclicBank {
             shapes,
             loads,
             excitation: None,
+            with_loss: true,
         }
+    }
+
+    /// Stops collecting the damping loss, which takes time.
+    pub fn skip_losses(&mut self) {
+        self.with_loss = false;
     }
 
     /// Number of sectors.
@@ -296,7 +304,7 @@ impl CyclicBank {
 
     /// Predicts one step without contact (eq. 9 of the paper) and recovers the contact displacements of all sectors. Contact
     /// forces of the previous step that have not been applied yet are applied first.
-    pub fn predict(&mut self, with_loss: bool) {
+    pub fn predict(&mut self) {
         for (mode, (load_response, modal_load)) in self.load_response.iter_mut().zip(&self.modal_load).enumerate() {
             *load_response = self.coefficients[mode].load_compliance() * modal_load;
         }
@@ -314,7 +322,7 @@ impl CyclicBank {
         self.act_excited();
         std::mem::swap(&mut self.state.increment, &mut self.state.older);
         std::mem::swap(&mut self.state.displacement, &mut self.state.displacement_before);
-        (self.state.unapplied, self.state.acting, self.state.loss_due) = (false, false, with_loss);
+        (self.state.unapplied, self.state.acting, self.state.loss_due) = (false, false, self.with_loss);
         let values = &mut self.state.displacement;
         let (fourier, spectrum, rows, lanes) = (&self.fourier, &self.spectrum, self.rows, self.lanes);
         self.instruction_set.run(Synthesis { fourier, spectrum, rows, lanes, values });

@@ -30,8 +30,6 @@ pub struct Bodies<'a> {
     pub pairs: &'a [ContactPair],
     /// True if contact forces act one step after they are found.
     pub acts_later: bool,
-    /// True if losses are collected.
-    pub ledger: bool,
 }
 
 /// A contact member with its structure and pair, as its law sees it.
@@ -87,17 +85,17 @@ impl ContactView<'_> {
     #[inline(never)]
     fn less_of_carrier(&self, moved: Vector3) -> Vector3 {
         let Some(spot) = self.spot() else { return moved };
-        let modes = self.bodies.structures[spot.surface.1.structure].modes();
+        let modes = self.bodies.structures[spot.carrier.structure].modes();
         let (now, before) = (modes.displacement(), modes.displacement_before());
-        moved - super::pair::at_place(spot.surface, spot.place, spot.frame, |row| now[row] - before[row])
+        moved - spot.interpolate(|row| now[row] - before[row])
     }
 
     /// Location at which the contact acts on the structure that carries its surface, if any.
     #[inline(always)]
     pub fn spot(&self) -> Option<Spot<'_>> {
-        let surface = self.pair.carried()?;
-        let frame = self.pair.frame(self.member.index, self.pair.drive(When::Now).rotor_angle);
-        Some(Spot { surface, place: self.structure.history.geometry.now.places[self.member.index], frame })
+        self.pair.carrier()?;
+        let (index, rotor_angle) = (self.member.index, self.pair.drive(When::Now).rotor_angle);
+        self.pair.spot(index, self.structure.history.geometry.now.places[index], rotor_angle)
     }
 
     /// Prescribed velocity relative to the surface (m/s).

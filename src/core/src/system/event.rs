@@ -41,7 +41,8 @@ impl ContactEvent {
         normal: f64,
         force: Vector3,
         coating: f64,
-        (point, wrench): (Vector3, Wrench),
+        point: Vector3,
+        wrench: Wrench,
     ) -> Self {
         let ContactMember { structure, pair, node, sector, .. } = at;
         let square = force.dot(&force) - normal * normal;

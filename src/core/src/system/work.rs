@@ -1,6 +1,6 @@
 //! Entries of a step in the energy ledger.
 
-use super::pair::{When, at_place};
+use super::pair::When;
 use super::{ContactEvent, StepFailure, System};
 use crate::geometry::surface_spline::ClosestPoint;
 use crate::geometry::wrench::{At, MotionIncrement};
@@ -320,12 +320,11 @@ impl System {
     #[inline(never)]
     fn less_of_carrier(&self, event: &ContactEvent, when: When, moved: Vector3) -> Vector3 {
         let (pair, index) = (&self.pairs[event.pair], self.structures[event.structure].index(event.node, event.sector));
-        let Some(surface) = pair.carried() else { return moved };
-        let under = &self.structures[surface.1.structure];
-        let (now, oldest) = (under.modes().displacement(), &under.history.passing.oldest);
-        let frame = pair.frame(index, pair.drive(when).rotor_angle);
         let place = self.geometry_of(event, when).places[index];
-        moved - at_place(surface, place, frame, |row| 0.5 * (now[row] - oldest[row]))
+        let Some(spot) = pair.spot(index, place, pair.drive(when).rotor_angle) else { return moved };
+        let under = &self.structures[spot.carrier.structure];
+        let (now, oldest) = (under.modes().displacement(), &under.history.passing.oldest);
+        moved - spot.interpolate(|row| 0.5 * (now[row] - oldest[row]))
     }
 }
 

@@ -97,7 +97,8 @@ impl Advance {
     /// force on a node (N), if any.
     pub fn under(
         &mut self,
-        (level, rows): (&StepTables, &ContactRows),
+        level: &StepTables,
+        rows: &ContactRows,
         state: &mut SectorState,
         forces: impl Fn(usize) -> Option<[Vector3; MOST]>,
     ) -> f64 {

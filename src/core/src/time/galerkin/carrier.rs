@@ -4,6 +4,7 @@ use super::basis::POINTS;
 use super::compliance::Lanes;
 use super::kernels::{Combine, PADDED};
 use super::shared_body::SharedBody;
+use super::surroundings::LaneStep;
 use super::trial::ForceInterpolation;
 use crate::geometry::frame::PolarFrame;
 use crate::math::simd::InstructionSet;
@@ -12,7 +13,6 @@ use crate::modes::bank::ModalBank;
 use crate::modes::coordinates::Coordinates;
 use crate::scene::method::Scheme;
 use crate::system::carrier::Spot;
-use crate::system::pair::at_place;
 
 /// Tables, state and scratch memory of a structure that carries surfaces.
 #[derive(Debug, Clone)]
@@ -116,7 +116,7 @@ impl CarrierIntegrator {
 
     /// Velocity of a place at the start of the step (m/s), in the directions of the node.
     pub fn velocity_at(&self, spot: Spot) -> Vector3 {
-        at_place(spot.surface, spot.place, spot.frame, |row| self.velocity[row])
+        spot.interpolate(|row| self.velocity[row])
     }
 
     /// Returns the displacement of a place over which a force at point i of the tried step does work (m), in the directions of the node.
@@ -124,17 +124,17 @@ impl CarrierIntegrator {
         let (weights, moved) = (&self.work_weights[i], &self.moved);
         let sliding_distance =
             |row: usize| weights.iter().zip(moved).map(|(weight, moved)| weight * moved[row]).sum::<f64>();
-        at_place(spot.surface, spot.place, spot.frame, sliding_distance)
+        spot.interpolate(sliding_distance)
     }
 
     /// Displacement of a place at a point of the step (m), in the directions of the node.
     pub fn moved_at(&self, spot: Spot, point: usize) -> Vector3 {
-        at_place(spot.surface, spot.place, spot.frame, |row| self.moved[point][row])
+        spot.interpolate(|row| self.moved[point][row])
     }
 
     /// Returns the displacement of a place over which a force at point i of the accepted step does work (m), in the directions of the node.
     pub fn worked_at(&self, spot: Spot, i: usize) -> Vector3 {
-        at_place(spot.surface, spot.place, spot.frame, |row| self.worked[i][row])
+        spot.interpolate(|row| self.worked[i][row])
     }
 
     /// Computes the weighted displacements for the work of forces at the points.
@@ -210,15 +210,14 @@ impl CarrierIntegrator {
     /// `carrier_compliance`.
     pub fn add_normal_compliance(
         &mut self,
-        (level, kind): (usize, ForceInterpolation),
-        lanes: Lanes,
+        step: LaneStep,
         lane: usize,
         direction: Vector3,
         carrier_compliance: &mut [f64],
     ) {
-        let padded = self.force.len();
+        let (padded, lanes) = (self.force.len(), step.lanes);
         for i in 1..=lanes.points {
-            self.move_modes((level, kind), lanes, (i, lane), direction);
+            self.move_modes(step, i, lane, direction);
             for node in (0..lanes.nodes).filter(|node| self.obstacle[lanes.at(i, *node)]) {
                 let other = lanes.at(i, node);
                 carrier_compliance[other] += dot_of(&self.along[other * padded..][..padded], &self.force);
@@ -228,16 +227,9 @@ impl CarrierIntegrator {
 
     /// Adds the displacement in the directions of each lane under a `force` on one lane at the end of the step (N), if the end is
     /// the only point.
-    pub fn add_compliance(
-        &mut self,
-        at: (usize, ForceInterpolation),
-        lanes: Lanes,
-        lane: usize,
-        force: Vector3,
-        carrier_compliance: &mut [f64],
-    ) {
-        let padded = self.force.len();
-        self.move_modes(at, lanes, (1, lane), force);
+    pub fn add_compliance(&mut self, step: LaneStep, lane: usize, force: Vector3, carrier_compliance: &mut [f64]) {
+        let (padded, lanes) = (self.force.len(), step.lanes);
+        self.move_modes(step, 1, lane, force);
         for other in (0..lanes.nodes).filter(|node| self.obstacle[*node]) {
             let fixed = self.seen.each_ref().map(|seen| dot_of(&seen[other * padded..][..padded], &self.force));
             lanes.set(carrier_compliance, other, self.frames[other].local(fixed.into()));
@@ -245,13 +237,8 @@ impl CarrierIntegrator {
     }
 
     /// Returns the motion of the modes at point i under a force on a lane, in the directions of the lane.
-    fn move_modes(
-        &mut self,
-        (level, kind): (usize, ForceInterpolation),
-        lanes: Lanes,
-        (i, lane): (usize, usize),
-        force: Vector3,
-    ) {
+    fn move_modes(&mut self, step: LaneStep, i: usize, lane: usize, force: Vector3) {
+        let LaneStep { level, kind, lanes } = step;
         if !self.obstacle[lane] {
             return self.force.fill(0.0);
         }
@@ -278,10 +265,9 @@ struct Around {
 
 impl Around {
     fn new(spot: Spot) -> Self {
-        let (surface, carrier) = spot.surface;
         let mut found = Self { rows: [0; 16], weights: [0.0; 16], count: 0 };
-        for (index, weight) in surface.weights(spot.place).iter() {
-            (found.rows[found.count], found.weights[found.count]) = (carrier.first_row + 3 * index, weight);
+        for (index, weight) in spot.surface.weights(spot.place).iter() {
+            (found.rows[found.count], found.weights[found.count]) = (spot.carrier.first_row + 3 * index, weight);
             found.count += 1;
         }
         found

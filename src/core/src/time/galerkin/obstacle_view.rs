@@ -5,7 +5,7 @@ use super::carrier::CarrierIntegrator;
 use super::compliance::Lanes;
 use super::level::StepTables;
 use super::record::{SpanRecord, SurfacePlace};
-use super::surroundings::{AcceptedStep, CarriersInStep, Witness};
+use super::surroundings::{AcceptedStep, CarriersInStep, LaneStep, Witness};
 use super::trial::{ForceInterpolation, Obstacle, SlidingState, Trial, node_by_node};
 use crate::geometry::wrench::{At, MotionIncrement};
 use crate::geometry::{Gap, GapLaw, PrescribedMotion, Vector3};
@@ -37,14 +37,15 @@ impl ObstacleView<'_> {
     /// Reads a value from the structure that carries a surface, at the place of a node and at a point of the step.
     fn on_carrier<T>(
         &self,
-        (node, point): (usize, usize),
+        node: usize,
+        point: usize,
         when: SurfacePlace,
         read: impl Fn(&CarrierIntegrator, Spot) -> T,
     ) -> Option<T> {
         let pair = self.pair_of[node]?;
         let carrier = self.carrier_of[pair]?;
         let index = node * self.lanes + self.sector;
-        let spot = self.record.spot((node, point), (pair, &self.pairs[pair]), index, when)?;
+        let spot = self.record.spot(node, point, index, self.pairs, pair, when)?;
         Some(read(&self.carriers.carriers[carrier], spot))
     }
 
@@ -53,16 +54,16 @@ impl ObstacleView<'_> {
         let Some(pair) = self.pair_of[node] else { return };
         let Some(carrier) = self.carrier_of[pair] else { return };
         let index = node * self.lanes + self.sector;
-        if let Some(spot) = self.record.spot((node, point), (pair, &self.pairs[pair]), index, SurfacePlace::Now) {
+        if let Some(spot) = self.record.spot(node, point, index, self.pairs, pair, SurfacePlace::Now) {
             read(&mut self.carriers.carriers[carrier], spot);
         }
     }
 
     /// Returns the surface carrier of a lane, and the current step.
-    fn under(&mut self, lane: usize) -> Option<(&mut CarrierIntegrator, (usize, ForceInterpolation), Lanes)> {
-        let CarriersInStep { carriers, level, kind, lanes } = &mut self.carriers;
-        let carrier = self.pair_of[lanes.place(lane).1].and_then(|pair| self.carrier_of[pair])?;
-        Some((&mut carriers[carrier], (*level, *kind), *lanes))
+    fn under(&mut self, lane: usize) -> Option<(&mut CarrierIntegrator, LaneStep)> {
+        let CarriersInStep { carriers, step } = &mut self.carriers;
+        let carrier = self.pair_of[step.lanes.place(lane).1].and_then(|pair| self.carrier_of[pair])?;
+        Some((&mut carriers[carrier], *step))
     }
 
     fn at<'b>(&self, node: usize, drive: &'b PrescribedMotion) -> At<'b> {
@@ -126,9 +127,8 @@ impl Obstacle for ObstacleView<'_> {
         let slip = if gap.slides_anywhere() {
             let known = self.record.slips[point][node].filter(|_| self.record.solutions > SOLUTIONS);
             let slip = known.unwrap_or_else(|| {
-                let carriers = self.on_carrier((node, point), SurfacePlace::Now, |casing, spot| {
-                    casing.sliding_distance_at(spot, point)
-                });
+                let carriers = self
+                    .on_carrier(node, point, SurfacePlace::Now, |casing, spot| casing.sliding_distance_at(spot, point));
                 sliding.sliding_distance - carriers.unwrap_or_default()
             });
             self.record.slips[point][node] = Some(slip);
@@ -136,7 +136,7 @@ impl Obstacle for ObstacleView<'_> {
         } else {
             let at = self.at(node, &self.record.drives[pair][point].0);
             let rigid = gap.sliding_velocity(node, at.index, at.drive, sliding.moved);
-            let carriers = self.on_carrier((node, point), SurfacePlace::Begun, |casing, spot| casing.velocity_at(spot));
+            let carriers = self.on_carrier(node, point, SurfacePlace::Begun, |casing, spot| casing.velocity_at(spot));
             rigid + sliding.velocity - carriers.unwrap_or_default()
         };
         gap.slip_direction(slip, sliding.normal)
@@ -160,7 +160,7 @@ impl Obstacle for ObstacleView<'_> {
         if self.carriers.carriers.is_empty() {
             return false;
         }
-        self.carriers.lanes = lanes;
+        self.carriers.step.lanes = lanes;
         self.carriers.carriers.iter_mut().for_each(CarrierIntegrator::clear_lanes);
         for lane in (0..lanes.len()).filter(|lane| chosen[*lane]) {
             let (point, node) = lanes.place(lane);
@@ -172,15 +172,15 @@ impl Obstacle for ObstacleView<'_> {
 
     fn add_normal_compliance(&mut self, lane: usize, direction: Vector3, carrier_compliance: &mut [f64]) {
         carrier_compliance.fill(0.0);
-        if let Some((casing, at, lanes)) = self.under(lane) {
-            casing.add_normal_compliance(at, lanes, lane, direction, carrier_compliance);
+        if let Some((casing, step)) = self.under(lane) {
+            casing.add_normal_compliance(step, lane, direction, carrier_compliance);
         }
     }
 
     fn add_compliance(&mut self, lane: usize, force: Vector3, carrier_compliance: &mut [f64]) {
         carrier_compliance.fill(0.0);
-        if let Some((casing, at, lanes)) = self.under(lane) {
-            casing.add_compliance(at, lanes, lane, force, carrier_compliance);
+        if let Some((casing, step)) = self.under(lane) {
+            casing.add_compliance(step, lane, force, carrier_compliance);
         }
     }
 
@@ -196,7 +196,7 @@ impl Obstacle for ObstacleView<'_> {
         let at = self.at(node, drive);
         let point = gap.contact_point(at, moved, self.record.places[step_point][node]);
         let (spin, shaft) = (gap.spin_motion(at, point, &motion), gap.shaft_motion(at, point, &motion));
-        let carriers = self.on_carrier((node, step_point), SurfacePlace::Now, |casing, spot| {
+        let carriers = self.on_carrier(node, step_point, SurfacePlace::Now, |casing, spot| {
             casing.moved_at(spot, step_point) - casing.moved_at(spot, 0)
         });
         spin + shaft - carriers.unwrap_or_default()
@@ -245,7 +245,7 @@ impl Witness for ObstacleView<'_> {
     fn record_gaps(&mut self, level: &StepTables, trial: &Trial) {
         for (node, pair) in self.pair_of.iter().enumerate() {
             if pair.is_some() {
-                let lowest = self.lowest((trial, &level.basis), node);
+                let lowest = self.lowest(trial, &level.basis, node);
                 self.record.tallies[node].lowest = lowest;
             }
         }
@@ -278,7 +278,7 @@ impl Witness for ObstacleView<'_> {
         for (node, pair) in self.pair_of.iter().enumerate() {
             let Some(pair) = *pair else { continue };
             let points = step.trial.points();
-            self.record.tallies[node].lowest = self.lowest((step.trial, &step.level.basis), node);
+            self.record.tallies[node].lowest = self.lowest(step.trial, &step.level.basis, node);
             let comes = (1..=points).find(|i| step.trial.multiplier(*i, node) > 0.0);
             if comes.is_some_and(|i| self.was_behind(step.trial, node, pair, i)) {
                 self.record.behind_edge = Some(node);
@@ -301,11 +301,11 @@ const CLOSER: f64 = 0.25;
 
 impl ObstacleView<'_> {
     /// Smallest gap of a node (m) so far, at the points of a step, and between them if it stays open.
-    fn lowest(&self, (trial, basis): (&Trial, &TimeBasis), node: usize) -> f64 {
+    fn lowest(&self, trial: &Trial, basis: &TimeBasis, node: usize) -> f64 {
         let gaps = (1..=trial.points()).map(|point| trial.gap(point, node));
         let lowest = gaps.fold(self.record.tallies[node].lowest, f64::min);
         match trial.minimum(node).filter(|_| !self.has_jumped(trial, node)) {
-            Some(theta) => lowest.min(self.lowest_near((trial, basis), node, theta)),
+            Some(theta) => lowest.min(self.lowest_near(trial, basis, node, theta)),
             _ => lowest,
         }
     }
@@ -320,7 +320,7 @@ impl ObstacleView<'_> {
     ///
     /// A surface of revolution and the displacements are not polynomials of time, so gaps are evaluated. Gaps to other surfaces
     /// are a polynomial.
-    fn lowest_near(&self, (trial, basis): (&Trial, &TimeBasis), node: usize, theta: f64) -> f64 {
+    fn lowest_near(&self, trial: &Trial, basis: &TimeBasis, node: usize, theta: f64) -> f64 {
         let mut lowest = f64::INFINITY;
         let mut look = |theta: f64| {
             let moved = trial.displacement_within(basis, node, theta);
@@ -357,7 +357,7 @@ impl ObstacleView<'_> {
             return false;
         }
         let moved = trial.displacement(i, node) - trial.displacement(i - 1, node);
-        let carriers = self.on_carrier((node, i), SurfacePlace::Now, |casing, spot| {
+        let carriers = self.on_carrier(node, i, SurfacePlace::Now, |casing, spot| {
             casing.moved_at(spot, i) - casing.moved_at(spot, i - 1)
         });
         open.was_behind(moved - carriers.unwrap_or_default(), trial.normal(i, node), trial.gap(i, node))
@@ -405,7 +405,7 @@ impl ObstacleView<'_> {
                 moved += weights[k] * trial.displacement(k, node);
                 open += weights[k] * trial.finite_gap(k, node);
             }
-            let carried = self.on_carrier((node, i), SurfacePlace::Acted, |carrier, spot| carrier.worked_at(spot, i));
+            let carried = self.on_carrier(node, i, SurfacePlace::Acted, |carrier, spot| carrier.worked_at(spot, i));
             let acting = WorkingForce {
                 gap,
                 at,

@@ -28,7 +28,8 @@ impl MotionCourse {
     /// Creates the course from `before` through `middle` to `end`, over a span of length `span` (s).
     pub fn new(
         before: &PrescribedMotion,
-        (middle, growth): (&PrescribedMotion, ShapeGrowth),
+        middle: &PrescribedMotion,
+        growth: ShapeGrowth,
         end: &PrescribedMotion,
         span: f64,
     ) -> Self {
@@ -120,7 +121,7 @@ impl NodeTally {
             force: self.wrench.force / span,
             moment: self.wrench.moment / span,
         };
-        let event = ContactEvent::new(at, self.normal / span, self.force / span, 0.0, (ZERO, wrench));
+        let event = ContactEvent::new(at, self.normal / span, self.force / span, 0.0, ZERO, wrench);
         let (tangential, peak, friction_heat) = (self.tangential / span, self.peak, self.heat);
         Some(ContactEvent { tangential, peak, friction_heat, ..event })
     }
@@ -197,18 +198,19 @@ impl SpanRecord {
     /// Returns the location of a node on the surface of a carrier, at a point of the step.
     pub fn spot<'a>(
         &self,
-        (node, point): (usize, usize),
-        (pair, of): (usize, &'a ContactPair),
+        node: usize,
+        point: usize,
         index: usize,
+        pairs: &'a [ContactPair],
+        pair: usize,
         when: SurfacePlace,
     ) -> Option<Spot<'a>> {
-        let frame = of.frame(index, self.drives[pair][point].0.rotor_angle);
         let place = match when {
             SurfacePlace::Begun => self.places[0][node],
             SurfacePlace::Now => self.places[point][node],
             SurfacePlace::Acted => self.acted[point][node],
         };
-        Some(Spot { surface: of.carried()?, place, frame })
+        pairs[pair].spot(index, place, self.drives[pair][point].0.rotor_angle)
     }
 
     /// Stores that the force on a node at a point of the step was applied at the node's current place.
@@ -217,7 +219,7 @@ impl SpanRecord {
     }
 
     /// Returns the failure that ends a span of this structure and sector, if any.
-    pub fn check(&self, (structure, sector): (usize, usize)) -> Result<(), StepFailure> {
+    pub fn check(&self, structure: usize, sector: usize) -> Result<(), StepFailure> {
         if self.implausible {
             return Err(StepFailure::Implausible { structure, sector });
         }
@@ -227,7 +229,7 @@ impl SpanRecord {
     /// Sets the prescribed motion of a span (s); the pairs are at its end.
     pub fn begin_courses(&mut self, pairs: &[ContactPair], span: f64) {
         for (course, pair) in self.courses.iter_mut().zip(pairs) {
-            *course = MotionCourse::new(pair.drive_before(), (&pair.middle.0, pair.middle.1), pair.drive_now(), span);
+            *course = MotionCourse::new(pair.drive_before(), &pair.middle.0, pair.middle.1, pair.drive_now(), span);
         }
     }
 
@@ -268,7 +270,7 @@ mod tests {
             shaft_velocity: Vector3::new(0.2, -0.1 + 1000.0 * time, -0.3),
             ..PrescribedMotion::default()
         };
-        let course = MotionCourse::new(&at(0.0), (&at(0.5 * span), ShapeGrowth::default()), &at(span), span);
+        let course = MotionCourse::new(&at(0.0), &at(0.5 * span), ShapeGrowth::default(), &at(span), span);
         for place in 0..=8 {
             let theta = 0.125 * f64::from(place);
             let (found, expected) = (course.at(theta).0, at(theta * span));

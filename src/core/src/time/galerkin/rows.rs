@@ -4,7 +4,7 @@ use super::kernels::{Combine, PADDED};
 use super::level::StepTables;
 use super::state::SectorState;
 use crate::math::simd::{InstructionSet, Kernel};
-use crate::math::vector::Vector3;
+use crate::math::vector::{Vector3, strided_vector3};
 use crate::modes::coordinates::ContactModes;
 use nalgebra::DMatrix;
 
@@ -49,7 +49,7 @@ impl<const N: usize> Sums<N> {
 
     /// Returns the three components of a node in a set.
     pub fn vector3(&self, set: usize, node: usize, nodes: usize) -> Vector3 {
-        [0, 1, 2].map(|component| self.rows[set][component * nodes + node]).into()
+        strided_vector3(&self.rows[set], node, nodes)
     }
 }
 

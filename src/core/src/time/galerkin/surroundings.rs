@@ -62,6 +62,13 @@ pub trait Witness: Obstacle {
 pub struct CarriersInStep<'a> {
     /// The carriers; empty if all surfaces are rigid.
     pub carriers: &'a mut [CarrierIntegrator],
+    /// Tried step.
+    pub step: LaneStep,
+}
+
+/// A tried step, and the lanes of its contact problem.
+#[derive(Debug, Clone, Copy)]
+pub struct LaneStep {
     /// Level of the step.
     pub level: usize,
     /// Interpolation of the contact force.

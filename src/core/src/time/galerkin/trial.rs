@@ -17,7 +17,7 @@ use super::rows::{ContactRows, Sums};
 use super::state::SectorState;
 use crate::contact::Law;
 use crate::math::simd::InstructionSet;
-use crate::math::vector::{Vector3, vector3_at};
+use crate::math::vector::{Vector3, set_vector3_at, vector3_at};
 use crate::scene::method::Solver;
 pub use judgement::TrialResult;
 use minima::Minima;
@@ -247,8 +247,8 @@ impl Trial {
         let nodes = self.lanes.nodes;
         for node in 0..nodes {
             let [moved, velocity] = [0, 1].map(|set| self.now.vector3(set, node, nodes));
-            self.start[3 * node..3 * node + 3].copy_from_slice(moved.as_slice());
-            self.velocities[3 * node..3 * node + 3].copy_from_slice(velocity.as_slice());
+            set_vector3_at(&mut self.start, node, moved);
+            set_vector3_at(&mut self.velocities, node, velocity);
         }
         let (matrix, y) = (rows.residual(), &mut self.start);
         self.instructions.run(AddProduct { matrix, x: &state.forces, y });
@@ -260,9 +260,7 @@ impl Trial {
         let (sums, reach) = &mut self.reach;
         rows.add_largest_displacements(state, sums);
         let nodes = self.lanes.nodes;
-        for (node, reach) in reach.chunks_exact_mut(3).enumerate() {
-            reach.copy_from_slice(sums.vector3(0, node, nodes).as_slice());
-        }
+        (0..nodes).for_each(|node| set_vector3_at(reach, node, sums.vector3(0, node, nodes)));
         reach
     }
 
@@ -270,7 +268,8 @@ impl Trial {
     /// `None`), and takes the contact state at the start as initial guess.
     pub fn begin(
         &mut self,
-        (level, kind): (&StepTables, ForceInterpolation),
+        level: &StepTables,
+        kind: ForceInterpolation,
         rows: Option<&ContactRows>,
         state: &SectorState,
     ) {
@@ -287,7 +286,7 @@ impl Trial {
         self.per_step = if kind == ForceInterpolation::Polynomial { 1.0 / level.step } else { 0.0 };
         let (nodes, stride) = (lanes.nodes, 3 * lanes.width());
         if let Some(rows) = rows {
-            self.move_freely((level, kind), rows, state);
+            self.move_freely(level, kind, rows, state);
         }
         self.pushed[..stride].fill(0.0);
         for lane in 0..lanes.len() {
@@ -312,12 +311,7 @@ impl Trial {
     }
 
     /// Finds the displacements of the rows without any force.
-    fn move_freely(
-        &mut self,
-        (level, kind): (&StepTables, ForceInterpolation),
-        rows: &ContactRows,
-        state: &SectorState,
-    ) {
+    fn move_freely(&mut self, level: &StepTables, kind: ForceInterpolation, rows: &ContactRows, state: &SectorState) {
         let degree = level.basis.degree;
         let points = if kind == ForceInterpolation::Constant { degree - 1..degree } else { 0..degree };
         rows.free(level, state, points, &mut self.sums);
@@ -370,7 +364,8 @@ impl Trial {
     /// forces make penetrate.
     pub fn solve(
         &mut self,
-        (compliance, residual): (&LaneCompliance, &DMatrix<f64>),
+        compliance: &LaneCompliance,
+        residual: &DMatrix<f64>,
         obstacle: &mut impl Obstacle,
         verdict: &mut TrialResult,
     ) -> bool {
@@ -445,9 +440,8 @@ impl Trial {
         for point in 0..=self.lanes.points {
             for node in 0..self.lanes.nodes {
                 let (force, moved) = (self.force(point, node), self.displacement(point, node));
-                for c in 0..3 {
-                    (self.withdrawn[3 * node + c], self.inert[point][3 * node + c]) = (-force[c], moved[c]);
-                }
+                set_vector3_at(&mut self.withdrawn, node, -force);
+                set_vector3_at(&mut self.inert[point], node, moved);
             }
             let y = &mut self.inert[point];
             self.instructions.run(AddProduct { matrix: residual, x: &self.withdrawn, y });

@@ -58,7 +58,8 @@ impl Trial {
     /// Finds error, switches and near misses of a solved step.
     pub fn judge(
         &mut self,
-        (level, rows): (&StepTables, &ContactRows),
+        level: &StepTables,
+        rows: &ContactRows,
         obstacle: &impl Obstacle,
         verdict: &mut TrialResult,
     ) {

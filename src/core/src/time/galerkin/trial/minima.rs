@@ -111,7 +111,7 @@ impl Trial {
                 let forces = |node: usize| {
                     Some(within(&self.polynomial(basis, ForceInterpolation::Polynomial, node)?, part, parts))
                 };
-                advance.under((table, rows), &mut minima.state, forces);
+                advance.under(table, rows, &mut minima.state, forces);
             }
         }
         self.minima = minima;

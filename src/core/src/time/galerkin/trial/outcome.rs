@@ -1,7 +1,7 @@
 //! Results of a trial: forces, gaps and displacements of the nodes at the points, and the state at the end.
 
 use super::{ForceInterpolation, Trial};
-use crate::math::vector::{Vector3, vector3_at};
+use crate::math::vector::{Vector3, set_vector3_at, vector3_at};
 use crate::time::galerkin::basis::{MOST, TimeBasis};
 use crate::time::galerkin::state::SectorState;
 use nalgebra::DMatrix;
@@ -118,15 +118,14 @@ impl Trial {
             let pushes = self.multiplier(points, node) > 0.0;
             let normal = if pushes { self.solved_normal(points, node) } else { Vector3::zeros() };
             let force = self.force(points, node);
-            state.forces[3 * node..3 * node + 3].copy_from_slice(force.as_slice());
-            state.normals[3 * node..3 * node + 3].copy_from_slice(normal.as_slice());
-            for (component, slope) in state.slopes.iter_mut().skip(3 * node).take(3).enumerate() {
-                let change = force[component] - self.start_contacts.forces[3 * node + component];
-                *slope = if points == 1 {
-                    change * self.per_step
-                } else {
-                    (0..=points).map(|point| self.end_slopes[point] * self.force(point, node)[component]).sum()
+            set_vector3_at(&mut state.forces, node, force);
+            set_vector3_at(&mut state.normals, node, normal);
+            if !state.slopes.is_empty() {
+                let slope = match points {
+                    1 => (force - vector3_at(&self.start_contacts.forces, node)) * self.per_step,
+                    _ => (0..=points).map(|point| self.end_slopes[point] * self.force(point, node)).sum(),
                 };
+                set_vector3_at(&mut state.slopes, node, slope);
             }
             state.multipliers[node] = self.multiplier(points, node);
             state.gaps[node] = self.gap(points, node);

@@ -67,14 +67,14 @@ impl Trial {
         let mut verdict = TrialResult::default();
         let Some(mut own) = self.steady.take() else { return verdict };
         if self.find_status(&mut own, state, obstacle) {
-            self.begin((level, ForceInterpolation::Polynomial), Some(rows), state);
+            self.begin(level, ForceInterpolation::Polynomial, Some(rows), state);
             self.find_start(rows, state);
             self.end_slopes = level.basis.slopes_at(1.0).map(|slope| slope / level.step);
             verdict.solved = self.seek_steady(&mut own, level, obstacle, precision, &mut verdict);
         }
         self.steady = Some(own);
         if verdict.solved {
-            self.judge((level, rows), obstacle, &mut verdict);
+            self.judge(level, rows, obstacle, &mut verdict);
             self.check_depth(rows, state, obstacle, &mut verdict);
             // The energy supplied by friction at the start would have to come from the bank.
             verdict.solved = !verdict.switches;
