@@ -1,6 +1,6 @@
 //! `modelDescription.xml` of FMI 2.0 for co-simulation.
 
-use tiprub_core::variables::DataType;
+use tiprub_cosim::variables::DataType;
 
 use crate::Description;
 use crate::element::XmlElement;
@@ -42,7 +42,7 @@ fn co_simulation(description: &Description) -> XmlElement {
 }
 
 fn type_definitions(description: &Description) -> Option<XmlElement> {
-    let definition = |enumeration: &'static tiprub_core::variables::Enumeration| {
+    let definition = |enumeration: &'static tiprub_cosim::variables::Enumeration| {
         XmlElement::new("SimpleType")
             .with("name", enumeration.name)
             .with_text("description", enumeration.description)

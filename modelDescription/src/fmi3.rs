@@ -1,6 +1,6 @@
 //! `modelDescription.xml` of FMI 3.0 for co-simulation.
 
-use tiprub_core::variables::{Causality, DataType, Variability};
+use tiprub_cosim::variables::{Causality, DataType, Variability};
 
 use crate::Description;
 use crate::element::XmlElement;
@@ -45,7 +45,7 @@ fn co_simulation(description: &Description) -> XmlElement {
 }
 
 fn type_definitions(description: &Description) -> Option<XmlElement> {
-    let definition = |enumeration: &'static tiprub_core::variables::Enumeration| {
+    let definition = |enumeration: &'static tiprub_cosim::variables::Enumeration| {
         XmlElement::new("EnumerationType")
             .with("name", enumeration.name)
             .with_text("description", enumeration.description)

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use quick_xml::escape::escape;
 use tiprub_core::Rom;
 use tiprub_core::scene::rom::DisplacementFrame;
-use tiprub_core::variables::{Causality, DataType, Span, StartValue, Variable};
+use tiprub_cosim::variables::{Causality, DataType, Span, StartValue, Variable};
 
 use crate::Description;
 use crate::row::{meaning_of_span, rows, variability};

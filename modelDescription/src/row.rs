@@ -1,7 +1,7 @@
 //! Rows of the variable table in a model description: arrays as one row or as their elements.
 
 use tiprub_core::VariableTable;
-use tiprub_core::variables::{Causality, DataType, Span, StartValue, Variability, Variable};
+use tiprub_cosim::variables::{Causality, DataType, Span, StartValue, Variability, Variable};
 
 use crate::text::number;
 

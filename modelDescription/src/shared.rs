@@ -1,6 +1,6 @@
 //! Parts that both versions of the standard describe in the same way.
 
-use tiprub_core::variables::{DataType, Enumeration, Variable, VariableUnit};
+use tiprub_cosim::variables::{DataType, Enumeration, Variable, VariableUnit};
 
 use crate::Description;
 use crate::element::XmlElement;

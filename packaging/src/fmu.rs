@@ -3,11 +3,9 @@
 use std::{env, path::Path};
 
 use tiprub_core::scene::method::Scheme;
-use tiprub_core::{
-    Rom, Scene, Simulation,
-    variables::Quantity,
-    warning::{self, Warning},
-};
+use tiprub_core::{CoSimulation, Rom, Scene, Simulation};
+use tiprub_cosim::variables::Quantity;
+use tiprub_cosim::warning::{self, Warning};
 use tiprub_fmi_host::archive::{self, ArchiveEntry};
 use tiprub_model_description::{
     DefaultExperiment, Description, fmi2_xml, fmi3_terminals, fmi3_xml, html, references_manifest,

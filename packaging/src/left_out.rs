@@ -6,7 +6,8 @@ use std::fmt::Write as _;
 
 use serde_json::{Value, json};
 use tiprub_core::scene::method::Scheme;
-use tiprub_core::{Error, Scene, Simulation};
+use tiprub_core::{CoSimulation, Error, Scene, Simulation};
+use tiprub_cosim::Diagnostic;
 use tiprub_shell::{
     native::{self, RunInputs},
     schedule::Schedule,
@@ -96,7 +97,7 @@ fn refusal(mut scene: Scene, error: Error) -> FeatureRefusal {
 
 fn reason_of(error: Error) -> String {
     match error {
-        Error::Invalid { what, problem, .. } => format!("{what}: {problem}"),
+        Error::Invalid(Diagnostic { what, problem, .. }) => format!("{what}: {problem}"),
         other => other.to_string(),
     }
 }

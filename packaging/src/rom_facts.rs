@@ -3,13 +3,11 @@
 use std::fmt::Write as _;
 
 use serde_json::{Value, json};
+use tiprub_core::Rom;
 use tiprub_core::limits;
 use tiprub_core::limits::plausibility::{self, Slip};
 use tiprub_core::scene::rom::{ContactNode, DisplacementFrame};
-use tiprub_core::{
-    Rom,
-    warning::{Topic, Warning},
-};
+use tiprub_cosim::warning::{Topic, Warning};
 use tiprub_shell::{Failure, Result};
 use tiprub_study::{
     estimate,

@@ -2,6 +2,7 @@
 
 use std::{env, path::Path};
 
+use tiprub_cosim::CoSimulation;
 use tiprub_fmi_host::archive;
 use tiprub_model_description::{DefaultExperiment, Description};
 use tiprub_shell::{Failure, Result};

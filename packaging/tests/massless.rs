@@ -8,7 +8,7 @@ use tiprub_core::geometry::Vector3;
 use tiprub_core::limits::{central_difference_limit, massless::MasslessCheck};
 use tiprub_core::modes::modal::ModalModel;
 use tiprub_core::scene::method::Scheme;
-use tiprub_core::{Scene, Simulation};
+use tiprub_core::{CoSimulation, Scene, Simulation};
 use tiprub_model::{Rotor37Options, reduce_rotor37};
 
 /// Returns the displacements (m) of all contact rows at common times, the total normal impulse (N·s), and the impact loss (J).

@@ -2,7 +2,7 @@
 //! reduction document the reference values and their origin).
 
 use tiprub_core::scene::settings::Shape;
-use tiprub_core::{Scene, Simulation};
+use tiprub_core::{CoSimulation, Scene, Simulation};
 use tiprub_gallery::scene_source::rotor37_scene_with;
 use tiprub_model::{Rotor37Options, reduce_rotor37};
 

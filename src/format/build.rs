@@ -4,9 +4,10 @@
 mod digest;
 
 /// Sources of the libraries.
-const SOURCES: [&str; 7] = [
+const SOURCES: [&str; 8] = [
     "src",
     "../core/src",
+    "../cosim/src",
     "../thermal/src",
     "../../fmi/src",
     "../../fmi/facade/src",

@@ -4,8 +4,14 @@
 mod digest;
 
 /// Sources of built-in models: the reduction, its data types, the file format, and the numerical libraries.
-const SOURCES: [&str; 5] =
-    ["../model/src", "../core/src/scene/rom.rs", "../core/src/scene/rom", "../format/src/rom_file", "../../Cargo.lock"];
+const SOURCES: [&str; 6] = [
+    "../model/src",
+    "../core/src/scene/rom.rs",
+    "../core/src/scene/rom",
+    "../cosim/src/patch.rs",
+    "../format/src/rom_file",
+    "../../Cargo.lock",
+];
 
 fn main() {
     digest::set("TIPRUB_MODEL_SOURCES", &SOURCES);

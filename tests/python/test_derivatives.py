@@ -112,7 +112,7 @@ def test_what_is_refused(make):
     instance.step(0.0, H)
     assert ask()[0] == 0.0
     assert "not a continuous real output" in instance.refused(lambda: directional(instance, ["speed"], ["speed"], [1.0]))
-    assert "not a real input" in instance.refused(lambda: directional(instance, ["torque"], ["gap_offset"], [1.0]))
+    assert "not a continuous real input" in instance.refused(lambda: directional(instance, ["torque"], ["gap_offset"], [1.0]))
     assert "seed" in instance.refused(lambda: directional(instance, ["torque"], ["speed"], [float("nan")]))
     kind = "Real" if isinstance(instance, Two) else "Float64"
     assert f"not {kind}" in instance.refused(lambda: directional(instance, ["torque"], ["scheme"], [1.0]))

@@ -11,8 +11,8 @@ mod scenes;
 use std::fmt::Write as _;
 use std::fs;
 
-use tiprub_core::variables::{Causality, DataType, Variable};
-use tiprub_core::{Scene, Simulation};
+use tiprub_core::{CoSimulation, Scene, Simulation};
+use tiprub_cosim::variables::{Causality, DataType, Variable};
 use tiprub_tests::scene::UnpackedResources;
 use tiprub_tests::{OK, fmi2, fmi3, root, shipped};
 

@@ -4,11 +4,10 @@ use std::path::Path;
 
 use nalgebra::DMatrix;
 use tempfile::TempDir;
-use tiprub_core::scene::rom::{
-    ContactGrid, ContactNode, DisplacementFrame, RomChecks, RomExtras, Thermal, ThermalPatch,
-};
+use tiprub_core::scene::rom::{ContactGrid, ContactNode, DisplacementFrame, RomChecks, RomExtras, Thermal};
 use tiprub_core::scene::settings::{BodyMotion, StructureSettings};
-use tiprub_core::{Rom, Scene};
+use tiprub_core::{CoSimulation, Rom, Scene};
+use tiprub_cosim::ThermalPatch;
 
 /// Radius of the blade tips (m).
 pub const RADIUS: f64 = 0.25;

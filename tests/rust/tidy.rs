@@ -31,9 +31,11 @@ fn crate_dependencies_respect_the_layers() {
     let offline = ["faer", "rayon", "quick-xml", "zip", "clap", "plotters", "indicatif", "libloading"];
     let floors = ["tiprub-model", "tiprub-reference", "tiprub-model-description", "tiprub"];
     let files = ["tiprub-format", "tiprub-fmi", "tiprub-fmi-facade", "toml", "safetensors", "serde_json"];
-    free_of("tiprub-core", &[&offline[..], &floors, &files].concat());
-    free_of("tiprub-thermal", &[&offline[..], &floors, &files].concat());
-    free_of("tiprub-fmi-facade", &[&offline[..], &floors, &["tiprub-format", "tiprub-thermal", "tiprub-fmi"]].concat());
+    let simulations = ["tiprub-core", "tiprub-thermal", "nalgebra"];
+    free_of("tiprub-cosim", &[&offline[..], &floors, &files, &simulations].concat());
+    free_of("tiprub-core", &[&offline[..], &floors, &files, &["tiprub-thermal"]].concat());
+    free_of("tiprub-thermal", &[&offline[..], &floors, &files, &["tiprub-core"]].concat());
+    free_of("tiprub-fmi-facade", &[&offline[..], &floors, &simulations, &["tiprub-format", "tiprub-fmi"]].concat());
     free_of("tiprub-fmi", &[&offline[..], &floors].concat());
     free_of("tiprub-fmi-thermal", &[&offline[..], &floors, &["tiprub-fmi"]].concat());
     free_of("tiprub-format", &[&offline[..], &floors, &["tiprub-fmi"]].concat());
@@ -68,16 +70,70 @@ fn lines_with(path: &Path, word: &str) -> Vec<String> {
     code.filter(|line| line.contains(word)).collect()
 }
 
+/// Modules of core, each of which imports only those before it, with the items that `lib.rs` re-exports from them; items of
+/// `tiprub-cosim` stand below all.
+const LAYERS: [(&str, &[&str]); 9] = [
+    ("math", &["CoSimulation", "Error", "Result", "VariableTable", "Warning"]),
+    ("scene", &["Scene", "Rom"]),
+    ("modes", &[]),
+    ("geometry", &[]),
+    ("contact", &[]),
+    ("system", &["Ledger"]),
+    ("time", &[]),
+    ("limits", &[]),
+    ("simulation", &["Simulation"]),
+];
+
+/// Returns the first names of all paths that begin with `crate::` in code that is not a test.
+fn crate_paths(text: &str) -> Vec<String> {
+    let code = text.split("#[cfg(test)]\nmod tests").next().unwrap_or_default();
+    let code: String = code.lines().filter(|line| !line.trim_start().starts_with("//")).collect();
+    let names = |rest: &str| -> Vec<String> {
+        let word = |text: &str| text.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect::<String>();
+        match rest.strip_prefix('{').and_then(|rest| rest.split_once('}')) {
+            Some((group, _)) => group.split(',').map(|entry| word(entry.trim())).collect(),
+            None => vec![word(rest)],
+        }
+    };
+    code.split("crate::").skip(1).flat_map(names).filter(|name| !name.is_empty()).collect()
+}
+
+#[test]
+fn modules_of_core_import_only_lower_layers() {
+    let (source, mut files) = (root().join("src/core/src"), Vec::new());
+    sources(&source, &mut files);
+    let place = |name: &str| LAYERS.iter().position(|(module, items)| *module == name || items.contains(&name));
+    let (mut upward, mut checked) = (Vec::new(), 0);
+    for path in files.iter().filter(|path| !path.components().any(|part| part.as_os_str() == "tests")) {
+        let within = path.strip_prefix(&source).expect("below the sources").with_extension("");
+        let module = within.iter().next().and_then(|name| name.to_str()).expect("a name");
+        if module == "lib" || within.ends_with("tests") {
+            continue;
+        }
+        let own = place(module).unwrap_or_else(|| panic!("{module} has no layer"));
+        for name in crate_paths(&std::fs::read_to_string(path).expect("a source file")) {
+            let other = place(&name).unwrap_or_else(|| panic!("{name} in {} has no layer", path.display()));
+            checked += 1;
+            if other > own {
+                upward.push(format!("{} imports {name}", within.display()));
+            }
+        }
+    }
+    assert!(checked > 500, "only {checked} imports found");
+    assert!(upward.is_empty(), "{upward:#?}");
+}
+
 #[test]
 fn unsafe_code_is_confined_to_the_fmi_boundary() {
     let (mut files, source) = (Vec::new(), root().join("fmi/facade/src"));
     sources(&source, &mut files);
     assert!(files.len() > 10);
-    for path in files.iter().filter(|path| !path.starts_with(source.join("boundary"))) {
+    let boundary = [source.join("boundary"), source.join("boundary.rs")];
+    for path in files.iter().filter(|path| !boundary.iter().any(|place| path.starts_with(place))) {
         let blocks: Vec<_> = lines_with(path, "unsafe").into_iter().filter(|line| line.contains("unsafe {")).collect();
         assert!(blocks.is_empty(), "{}: {blocks:?}", path.display());
     }
-    for unit in ["fmi/src", "fmi/thermal/src", "src/thermal/src"] {
+    for unit in ["fmi/src", "fmi/thermal/src", "src/cosim/src", "src/thermal/src"] {
         let mut files = Vec::new();
         sources(&root().join(unit), &mut files);
         assert!(!files.is_empty() && files.iter().all(|path| lines_with(path, "unsafe {").is_empty()), "{unit}");
@@ -135,15 +191,18 @@ fn public_entry_points_have_examples() {
     let file = |path: &str| std::fs::read_to_string(root().join(path)).expect("a source file");
     let thermal = folder("src/thermal/src");
     let mut texts = vec![
-        ("Simulation", implementations(&folder("src/core/src/simulation"), "Simulation")),
+        ("CoSimulation", file("src/cosim/src/unit.rs").replace("\n    fn ", "\n    pub fn ")),
+        (
+            "Simulation",
+            implementations(&(file("src/core/src/simulation.rs") + &folder("src/core/src/simulation")), "Simulation"),
+        ),
         ("ThermalSimulation", implementations(&thermal, "ThermalSimulation")),
         ("ConductionModel", implementations(&thermal, "ConductionModel")),
     ];
     for name in ["input", "load", "resources", "rom_file", "scene_file", "thermal_file"] {
         texts.push(("format", file(&format!("src/format/src/{name}.rs"))));
     }
-    let model =
-        ["reduce", "mesh", "fe_model", "read/mod", "inp", "thermal", "assembly", "casing/mod", "casing/reduction"];
+    let model = ["reduce", "mesh", "fe_model", "read", "inp", "thermal", "assembly", "casing", "casing/reduction"];
     for name in model {
         texts.push(("model", file(&format!("src/model/src/{name}.rs"))));
     }
@@ -152,6 +211,6 @@ fn public_entry_points_have_examples() {
         .flat_map(|(unit, text)| without_example(text).into_iter().map(move |name| format!("{unit}: {name}")))
         .collect();
     let found: usize = texts.iter().map(|(_, text)| text.matches("pub fn ").count()).sum();
-    assert!(found > 100, "{found} public functions found");
+    assert!(found > 90, "{found} public functions found");
     assert!(missing.is_empty(), "without an example: {}", missing.join(", "));
 }

@@ -12,12 +12,12 @@ use std::ffi::CString;
 use std::fmt;
 use std::path::Path;
 
-use tiprub_core::Warning;
-use tiprub_core::warning::Severity;
+use tiprub_cosim::warning::Severity;
+use tiprub_cosim::{CoSimulation, Diagnostic, Warning};
 
-use crate::unit::{CoSimulationUnit, Load};
+use crate::load::Load;
 
-pub(crate) use access::{AccessRequest, Value};
+pub(crate) use access::{AccessRequest, FmiValue};
 pub(crate) use phase::{ExperimentTimes, InstancePhase};
 
 /// Status of a call. The numbers are those of `fmi2Status` and `fmi3Status`; `Fatal` (4) is never returned, because in
@@ -65,13 +65,19 @@ impl Refusal {
     }
 }
 
-impl From<tiprub_core::Error> for Refusal {
-    fn from(error: tiprub_core::Error) -> Self {
+impl From<tiprub_cosim::Error> for Refusal {
+    fn from(error: tiprub_cosim::Error) -> Self {
         match error {
             // Nothing is lost: the importer can continue.
-            tiprub_core::Error::Exhausted { .. } => Self::discard(error.to_string()),
+            tiprub_cosim::Error::Exhausted(_) => Self::discard(error.to_string()),
             _ => Self::error(error.to_string()),
         }
+    }
+}
+
+impl From<Diagnostic> for Refusal {
+    fn from(diagnostic: Diagnostic) -> Self {
+        Self::error(diagnostic.to_string())
     }
 }
 
@@ -87,7 +93,7 @@ pub(crate) type Result<T, E = Refusal> = std::result::Result<T, E>;
 /// One FMU instance without its callbacks.
 pub(crate) struct Slave {
     dialect: Dialect,
-    unit: Box<dyn CoSimulationUnit>,
+    unit: Box<dyn CoSimulation>,
     token: String,
     arrays: bool,
     phase: InstancePhase,
@@ -109,7 +115,7 @@ impl Slave {
     /// # Errors
     /// Unreadable or damaged resources, a token that does not belong to them, or a model that the unit rejects.
     pub(crate) fn new(dialect: Dialect, resources: &Path, token: &str, load: Load) -> Result<Self> {
-        let loaded = load(resources).map_err(Refusal::error)?;
+        let loaded = load(resources)?;
         if loaded.token != token {
             let (name, file) = match dialect {
                 Dialect::Fmi2 => ("fmuGUID", "attribute guid"),

@@ -37,7 +37,7 @@ impl ArchiveEntry {
 /// A name that breaks the rules above, a file that is too large, or a failed write.
 pub fn write(target: &Path, entries: &[ArchiveEntry]) -> Result<()> {
     let mut archive = std::io::Cursor::new(Vec::new());
-    write_into(&mut archive, entries).map_err(|failure| Failure { what: target.display().to_string(), ..failure })?;
+    write_into(&mut archive, entries).map_err(|failure| failure.at(target.display()))?;
     output_file::write(target, archive.into_inner())
 }
 

@@ -145,7 +145,7 @@ impl UnpackedFmu {
     /// # Errors
     /// Same as [`UnpackedFmu::open`]; an entry above its maximum size, before any is unpacked.
     pub fn open_part(path: &Path, largest: impl Fn(&str) -> Option<u64>) -> Result<Self> {
-        let in_file = |failure: Failure| Failure { what: format!("{}: {}", path.display(), failure.what), ..failure };
+        let in_file = |failure: Failure| failure.at(path.display());
         let mut archive = open_archive(path)?;
         let largest = |name: &str| if name == DESCRIPTION { Some(LARGEST_DESCRIPTION) } else { largest(name) };
         let entries = entries(&mut archive).map_err(in_file)?;

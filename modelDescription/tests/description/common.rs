@@ -2,8 +2,8 @@
 
 use nalgebra::DMatrix;
 use tiprub_core::scene::rom::{DisplacementFrame, RomChecks};
-use tiprub_core::variables::*;
 use tiprub_core::{Rom, VariableTable};
+use tiprub_cosim::variables::*;
 use tiprub_model_description::{DefaultExperiment, Description};
 use tiprub_test_models::{node, structure};
 

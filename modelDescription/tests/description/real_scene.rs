@@ -5,8 +5,8 @@ use std::fs;
 use std::path::Path;
 
 use tiprub_core::scene::settings::OutputSettings;
-use tiprub_core::variables::{Causality, DataType, Span, Variable};
-use tiprub_core::{Scene, Simulation, VariableTable};
+use tiprub_core::{CoSimulation, Scene, Simulation, VariableTable};
+use tiprub_cosim::variables::{Causality, DataType, Span, Variable};
 use tiprub_model_description::{fmi2_xml, fmi3_xml, html, meaning_of_span};
 use tiprub_test_models::started;
 

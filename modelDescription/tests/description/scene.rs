@@ -1,9 +1,10 @@
 //! Scene with every option on, small blades in a small flexible casing, and the list of options.
 
 use nalgebra::DMatrix;
-use tiprub_core::scene::rom::{SUPPORT_ROWS, SupportRows, Thermal, ThermalPatch, WatchedPoints};
+use tiprub_core::scene::rom::{SUPPORT_ROWS, SupportRows, Thermal, WatchedPoints};
 use tiprub_core::scene::settings::*;
 use tiprub_core::{Rom, Scene, VariableTable};
+use tiprub_cosim::ThermalPatch;
 use tiprub_model_description::{DefaultExperiment, Description};
 use tiprub_test_models as models;
 

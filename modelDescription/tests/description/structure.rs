@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
-use tiprub_core::variables::{Causality, DataType};
+use tiprub_cosim::variables::{Causality, DataType};
 use tiprub_model_description::{LOG_CATEGORIES, fmi2_xml, fmi3_xml, html};
 
 use crate::common;

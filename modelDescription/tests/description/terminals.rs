@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use tiprub_core::Simulation;
+use tiprub_core::{CoSimulation, Simulation};
 use tiprub_model_description::{fmi3_terminals, fmi3_xml};
 
 use crate::scene;

@@ -6,7 +6,7 @@ use std::{
 };
 
 use serde_json::json;
-use tiprub_core::{Scene, Simulation};
+use tiprub_core::{CoSimulation, Scene, Simulation};
 use tiprub_fmi_host::{ImportedRun, UnpackedFmu};
 use tiprub_gallery::{
     reduction,
@@ -150,7 +150,7 @@ fn fmu_path(directory: &Path, version: FmiVersion) -> PathBuf {
 fn import(path: &Path, label: &str, schedule: &Schedule, console: &Console) -> Result<ImportedRun> {
     let task = console.task(&format!("Importing and running {label}"), Some(schedule.count as u64));
     let fmu = UnpackedFmu::open(path)?;
-    let in_file = |failure: Failure| Failure { what: format!("{}: {}", path.display(), failure.what), ..failure };
+    let in_file = |failure: Failure| failure.at(path.display());
     fmu.simulate(schedule, &|done| task.at(done as u64)).map_err(in_file)
 }
 

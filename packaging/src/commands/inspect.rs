@@ -9,11 +9,9 @@ use std::{
 use serde_json::{Value, json};
 use tiprub_core::limits::plausibility::Slip;
 use tiprub_core::scene::settings::{BodyMotion, ContactSettings, SceneSettings, StructureSettings};
-use tiprub_core::{
-    Scene, Simulation,
-    variables::Causality,
-    warning::{self, Warning},
-};
+use tiprub_core::{CoSimulation, Scene, Simulation};
+use tiprub_cosim::variables::Causality;
+use tiprub_cosim::warning::{self, Warning};
 use tiprub_fmi_host::{UnpackedFmu, entries, open_archive};
 use tiprub_gallery::scene_source;
 use tiprub_shell::{
@@ -84,7 +82,7 @@ fn kind(path: &Path) -> Result<FileKind> {
 }
 
 fn inspect_fmu(path: &Path, measure: bool, console: &Console) -> Result<CommandOutcome> {
-    let in_file = |failure: Failure| Failure { what: format!("{}: {}", path.display(), failure.what), ..failure };
+    let in_file = |failure: Failure| failure.at(path.display());
     let files = entries(&mut open_archive(path)?).map_err(in_file)?;
     let resource = |name: &str| name.strip_prefix("resources/").and_then(tiprub_format::largest_resource);
     let fmu = UnpackedFmu::open_part(path, resource)?;

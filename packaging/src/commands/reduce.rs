@@ -4,7 +4,7 @@ use std::{fmt::Write as _, path::Path, time::Instant};
 
 use serde_json::{Value, json};
 use tiprub_core::limits::plausibility::Slip;
-use tiprub_core::warning::{self, Warning};
+use tiprub_cosim::warning::{self, Warning};
 use tiprub_gallery::{builtin, reduction};
 use tiprub_model::{
     Rotor37Options,

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use tiprub_core::scene::method::Scheme;
 use tiprub_core::scene::settings::{SceneSettings, TOLERANCE};
-use tiprub_core::variables::Quantity;
+use tiprub_cosim::variables::Quantity;
 use tiprub_figure::{STYLE, escape};
 use tiprub_shell::Result;
 use tiprub_study::estimate;

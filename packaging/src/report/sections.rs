@@ -2,8 +2,9 @@
 
 use std::fmt::Write as _;
 
+use tiprub_core::VariableTable;
 use tiprub_core::scene::settings::Shape;
-use tiprub_core::{VariableTable, variables::Quantity};
+use tiprub_cosim::variables::Quantity;
 use tiprub_figure::{
     escape,
     picture::{self, MeshSurface, ProjectionFrame, ViewPoint, surface_of},

@@ -1,6 +1,6 @@
 //! Report of a run: complete, offline, small.
 
-use tiprub_core::Simulation;
+use tiprub_core::{CoSimulation, Simulation};
 use tiprub_gallery::{reduction, scene_source::rotor37_scene_with};
 use tiprub_model::{Rotor37Options, rotor37::MeshCounts};
 use tiprub_packaging::{

@@ -10,7 +10,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 use tiprub_core::scene::method::Solver;
 use tiprub_core::scene::rom::{Harmonic, Rom};
 use tiprub_core::scene::settings::{CoatingSettings, ExperimentSettings, OutputSettings, Shape, SplineSettings};
-use tiprub_core::{Scene, Simulation};
+use tiprub_core::{CoSimulation, Scene, Simulation};
 use tiprub_test_models::{self as models};
 
 const SECTORS: usize = 36;

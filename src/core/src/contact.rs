@@ -15,11 +15,11 @@ mod lcp;
 mod proximal;
 
 use nalgebra::DMatrix;
+use tiprub_cosim::persist::{Persist, StateReader, StateWriter};
 
 use crate::contact::active_set::SolverOutcome;
 use crate::contact::coating::Coating;
 use crate::math::vector::{Vector3, tangents};
-use crate::persist::{Persist, StateReader, StateWriter};
 use crate::scene::method::Solver;
 pub use coated::Coated;
 pub use coulomb::Coulomb;

@@ -15,9 +15,10 @@ pub mod spline;
 pub mod surface_spline;
 pub mod wrench;
 
+use tiprub_cosim::persist_fields;
+
 pub use crate::math::vector::Vector3;
 use crate::math::vector::length;
-use crate::persist::persist_fields;
 use crate::scene::ranges::SMALL;
 use layout::Layout;
 pub use layout::sector_angle;
@@ -56,8 +57,8 @@ persist_fields!(PrescribedMotion {
     shape_factor,
     shape_rotation,
     radius_change,
-    shaft,
-    shaft_velocity
+    shaft.data.0,
+    shaft_velocity.data.0
 });
 
 /// Unit normals at one instant, arrays `[node · lanes + lane]`.

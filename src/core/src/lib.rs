@@ -8,23 +8,17 @@
 #![forbid(unsafe_op_in_unsafe_fn)]
 
 pub mod contact;
-mod error;
 pub mod geometry;
 pub mod limits;
 mod math;
 pub mod modes;
-pub mod persist;
 pub mod scene;
 pub mod simulation;
 pub mod system;
 pub mod time;
-pub mod variables;
-pub mod warning;
 
-pub use error::{Error, Result, shown, shown_time};
 pub use scene::Scene;
 pub use scene::rom::Rom;
 pub use simulation::Simulation;
-pub use system::{Ledger, Sum};
-pub use variables::VariableTable;
-pub use warning::Warning;
+pub use system::Ledger;
+pub use tiprub_cosim::{CoSimulation, Error, Result, VariableTable, Warning};

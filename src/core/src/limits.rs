@@ -9,6 +9,7 @@
 //!   differential equation.
 
 pub mod cutting;
+pub mod finding;
 mod growing;
 mod held;
 pub mod judged;
@@ -17,6 +18,7 @@ pub mod massless;
 pub mod plausibility;
 mod secular;
 pub mod unresolved;
+pub mod wording;
 
 pub use growing::{Fastest, GROWTH_UP_TO, GrowthRates, continuous, growth, growth_steps, stepped, without_node_mass};
 
@@ -25,18 +27,14 @@ use nalgebra::DMatrix;
 use crate::math::vector::{Vector3, vector3_at};
 use crate::modes::modal::ModalModel;
 use crate::scene::method::Scheme;
-use crate::warning::Topic;
-use crate::{Error, Result, Warning, shown};
+use finding::{ErrorKind, WarningKind};
 
-/// Margin below the limit ω_max h = 2 of central differences.
-const CENTRAL_MARGIN: f64 = 1e-9;
+/// Margin below the stability limit of a scheme.
+const STABILITY_MARGIN: f64 = 1e-9;
 /// Largest number of contact nodes for which all principal minors are computed.
 const MINORS_UP_TO: usize = 12;
 /// Minors and eigenvalues of a matrix with unit diagonal below this are zero up to rounding.
 const SINGULAR: f64 = 1e-10;
-
-/// Smallest friction coefficient that messages propose: no real contact has less.
-const LEAST_FRICTION: f64 = 1e-4;
 
 /// Directions of the closed contacts of one group: (normal, slip direction) per node.
 pub type ContactDirections = Vec<(Vector3, Vector3)>;
@@ -79,62 +77,33 @@ fn directional_modes(
     (normals, forces)
 }
 
-/// End of remedies that name another scheme, which a preset may not allow.
-pub const OTHER_SCHEME: &str = ", or use the scheme modal-exact";
-
-/// Returns the remedy of a shorter step than this (s), with the names in the scene and in the FMU.
-pub fn shorter(step: f64) -> String {
-    format!("Set `time.step` (in the FMU `internal_step_max`) below {step:.6e} s")
-}
-
-/// Rejects step sizes beyond the linear limit of the largest angular `frequency` (rad/s). Allocates only to reject.
+/// Rejects a step (s) with which free vibration of the largest angular `frequency` (rad/s) is unstable.
 ///
 /// # Errors
-/// [`Error::Unstable`] for central differences at or beyond ω_max h = 2.
-pub fn check_step_allowed(frequency: f64, scheme: Scheme, step: f64) -> Result<()> {
-    let product = frequency * step;
-    match scheme {
-        Scheme::CentralDifference if product >= 2.0 * (1.0 - CENTRAL_MARGIN) => Err(Error::Unstable {
-            problem: format!(
-                "central-difference is unstable with an internal step of {step:.3e} s: ω_max·h = {product:.4}, but the \
-                 stability limit is 2"
-            ),
-            remedy: format!("{}{OTHER_SCHEME}", shorter(2.0 / frequency)),
-        }),
-        _ => Ok(()),
+/// [`ErrorKind::UnstableStep`] at or beyond the stability limit of the scheme.
+pub fn check_step_allowed(frequency: f64, scheme: Scheme, step: f64) -> Result<(), ErrorKind> {
+    if frequency * step >= scheme.properties().stable_below * (1.0 - STABILITY_MARGIN) {
+        return Err(ErrorKind::UnstableStep { scheme, frequency, step });
     }
+    Ok(())
 }
 
-/// Rounds a step (s) to three digits, as messages print it.
-pub fn rounded(step: f64) -> f64 {
-    format!("{step:.2e}").parse().unwrap_or(step)
+/// Returns the warning of modes up to the largest angular `frequency` (rad/s) that a step (s) does not resolve.
+pub fn unresolved_modes(frequency: f64, scheme: Scheme, step: f64) -> Option<WarningKind> {
+    (frequency * step > scheme.properties().resolved_up_to).then_some(WarningKind::UnresolvedModes {
+        scheme,
+        frequency,
+        step,
+    })
 }
 
-/// Rounds a step (s) down to three digits, so that following a proposal does not repeat its message.
-pub fn rounded_down(step: f64) -> f64 {
-    let near = rounded(step);
-    if near <= step { near } else { rounded(0.995 * step) }
-}
-
-/// Calls [`check_step_allowed`], and returns a warning for unresolved modes.
+/// Calls [`check_step_allowed`] and [`unresolved_modes`].
 ///
 /// # Errors
 /// As [`check_step_allowed`].
-pub fn check_step(frequency: f64, scheme: Scheme, step: f64) -> Result<Option<Warning>> {
+pub fn check_step(frequency: f64, scheme: Scheme, step: f64) -> Result<Option<WarningKind>, ErrorKind> {
     check_step_allowed(frequency, scheme, step)?;
-    let product = frequency * step;
-    match scheme {
-        Scheme::ModalExact if product > 2.0 => Ok(Some(Warning::new(
-            Topic::UnresolvedModes,
-            format!(
-                "modes above {:.4} kHz are not resolved by the internal step of {step:.3e} s: their free motion is \
-                 exact, but their response to contact forces is not",
-                1e-3 * 2.0 / step / std::f64::consts::TAU
-            ),
-            format!("Set `time.step` = {:.2e} s to resolve all modes", rounded_down(2.0 / frequency)),
-        ))),
-        _ => Ok(None),
-    }
+    Ok(unresolved_modes(frequency, scheme, step))
 }
 
 /// Steps from the largest down at which solvability is checked: a communication step may be shorter than the internal step, and W keeps its
@@ -151,14 +120,14 @@ fn steps_to_check(frequency: f64, largest: f64) -> impl Iterator<Item = f64> {
 /// Rejects a contact problem without a unique solution at `step` or at any smaller step, in any of the `senses` of slip.
 ///
 /// # Errors
-/// [`Error::Unstable`] with µ and h.
+/// [`ErrorKind::Unsolvable`] with µ and h.
 pub fn check_solvable(
     model: &ModalModel,
     scheme: Scheme,
     step: f64,
     friction: f64,
     senses: &[ContactDirections],
-) -> Result<()> {
+) -> Result<(), ErrorKind> {
     let solvable = |friction: f64| {
         steps_to_check(model.largest_frequency(), step).all(|step| {
             let at = |directions| is_solvable(&delassus(model, scheme, step, friction, directions));
@@ -176,28 +145,33 @@ pub fn check_solvable(
 /// diameters: if their symmetric parts are positive definite so is that of W, and hence that of every subset of the contacts.
 ///
 /// # Errors
-/// [`Error::Unstable`] with µ and h.
+/// [`ErrorKind::Unsolvable`] with µ and h.
 pub fn check_solvable_together(
     diameters: &[ModalModel],
     scheme: Scheme,
     step: f64,
     friction: f64,
     senses: &[Vec<ContactDirections>],
-) -> Result<()> {
+) -> Result<(), ErrorKind> {
     let frequency = diameters.iter().fold(0.0, |most: f64, model| most.max(model.largest_frequency()));
     let solvable = |friction: f64| {
         steps_to_check(frequency, step).all(|step| {
             diameters.iter().zip(senses).all(|(model, senses)| {
-                let at = |directions| scaled(&delassus(model, scheme, step, friction, directions));
-                senses.iter().all(|directions| at(directions).is_some_and(|scaled| is_definite(&scaled)))
+                let lowest = |directions| lowest_eigenvalue(&delassus(model, scheme, step, friction, directions));
+                senses.iter().all(|directions| lowest(directions).is_some_and(|lowest| lowest > -SINGULAR))
             })
         })
     };
     refuse_unsolvable(solvable, false, step, friction)
 }
 
-/// Returns the error with the smallest friction coefficient at which solvability is lost; `exact` if it is certainly lost there.
-fn refuse_unsolvable(solvable: impl Fn(f64) -> bool, exact: bool, step: f64, friction: f64) -> Result<()> {
+/// Returns the error with the smallest friction coefficient at which solvability is lost; `is_proven` if it is certainly lost there.
+fn refuse_unsolvable(
+    solvable: impl Fn(f64) -> bool,
+    is_proven: bool,
+    step: f64,
+    friction: f64,
+) -> Result<(), ErrorKind> {
     if friction == 0.0 || solvable(friction) {
         return Ok(());
     }
@@ -209,28 +183,7 @@ fn refuse_unsolvable(solvable: impl Fn(f64) -> bool, exact: bool, step: f64, fri
         let middle = 0.5 * (low + high);
         *(if solvable(middle) { &mut low } else { &mut high }) = middle;
     }
-    let (what, why) = if exact {
-        ("has no unique solution", "a principal minor of the Delassus matrix is not positive")
-    } else {
-        (
-            "cannot be shown to have a unique solution",
-            "the symmetric part of the Delassus matrix is not positive definite",
-        )
-    };
-    Err(Error::Unstable {
-        problem: format!(
-            "with friction_coefficient µ = {friction} and internal steps up to h = {step:.3e} s, the contact problem \
-             {what} ({why})",
-            friction = shown(friction)
-        ),
-        remedy: if low >= LEAST_FRICTION {
-            format!("Use µ below {low:.4} for this structure, or another internal step")
-        } else {
-            "Use no friction, fewer contact nodes or more modes: with more contacts than modes, no friction \
-             coefficient is safe"
-                .to_owned()
-        },
-    })
+    Err(ErrorKind::Unsolvable { friction, step, solvable_below: low, is_proven })
 }
 
 /// P-matrix test: a positive definite symmetric part suffices; otherwise all principal minors decide if there are few contacts. Redundant
@@ -251,6 +204,11 @@ fn has_minors(scaled: &DMatrix<f64>) -> bool {
     })
 }
 
+/// Returns the lowest eigenvalue of the symmetric part of W with unit diagonal; `None` if a diagonal entry is not positive.
+pub fn lowest_eigenvalue(delassus: &DMatrix<f64>) -> Option<f64> {
+    Some(lowest_of_symmetric_part(&scaled(delassus)?))
+}
+
 /// W with unit diagonal; `None` if a diagonal entry is not positive, or another one not finite.
 fn scaled(delassus: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let diagonal = delassus.diagonal();
@@ -258,11 +216,6 @@ fn scaled(delassus: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let positive = diagonal.iter().all(|value| *value > 0.0);
     let scaled = positive.then(|| DMatrix::from_fn(delassus.nrows(), delassus.ncols(), entry))?;
     scaled.iter().all(|value| value.is_finite()).then_some(scaled)
-}
-
-/// Returns whether the symmetric part is positive definite, except for redundant contacts.
-fn is_definite(scaled: &DMatrix<f64>) -> bool {
-    lowest_of_symmetric_part(scaled) > -SINGULAR
 }
 
 fn lowest_of_symmetric_part(scaled: &DMatrix<f64>) -> f64 {
@@ -382,7 +335,7 @@ mod tests {
             let Some(scaled) = scaled(&matrix) else { continue };
             let minors = has_minors(&scaled);
             assert_eq!(is_solvable(&matrix), minors, "{matrix}");
-            *(match (is_definite(&scaled), minors) {
+            *(match (lowest_of_symmetric_part(&scaled) > -SINGULAR, minors) {
                 (true, _) => &mut definite,
                 (false, true) => &mut solvable,
                 (false, false) => &mut refused,

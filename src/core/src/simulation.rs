@@ -1,6 +1,5 @@
 //! A compiled scene with its state, which FMU instances, native runs and tests drive.
 
-mod access;
 mod balance;
 mod blades;
 mod checks;
@@ -24,19 +23,20 @@ mod step_control;
 mod stepping;
 mod table;
 mod tangent;
+mod unit;
 mod units;
 mod watched;
 mod window;
 
+use tiprub_cosim::variables::Quantity;
+use tiprub_cosim::{CoSimulation, VariableValues};
+
 use crate::geometry::PrescribedMotion;
-use crate::scene::ranges;
 use crate::system::{ShapeGrowth, System};
 use crate::time::TimeStepper;
-use crate::variables::{Quantity, StartValue, VariableTable};
 use crate::{Result, Scene, Warning};
 use compile::Compiled;
 use drive::{Input, RotorAngle};
-pub use inputs::InputCourses;
 use inputs::{CarrierInputs, Inputs, PairInputs, RotorInputs};
 use std::sync::Arc;
 use tangent::StepReplay;
@@ -58,15 +58,6 @@ fn same_step(time: f64, length: f64) -> f64 {
 
 /// Largest number of internal steps of one communication step.
 const MOST_STEPS: f64 = 1e9;
-
-/// Result of one call of [`Simulation::advance`].
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct StepProgress {
-    /// Internal time reached (s).
-    pub time: f64,
-    /// True if the communication point is reached (and outputs are up to date there).
-    pub finished: bool,
-}
 
 /// Phase in the life cycle of the simulation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -118,14 +109,13 @@ impl Communication {
 /// ([`Simulation::reset`] and again). The caller (the FMU slave) enforces the order of calls; this type only rejects meaningless ones.
 #[derive(Debug, Clone)]
 pub struct Simulation {
-    table: VariableTable,
     /// Functions that fill the outputs, in the order of the table.
     readers: Vec<outputs::OutputReader>,
     compiled: Compiled,
     system: System,
     stepper: TimeStepper,
-    /// Current value of every reference; strings live in the table.
-    values: Vec<f64>,
+    /// All variables with their current values.
+    values: VariableValues,
     /// Real outputs at the previous communication point, for derivatives.
     previous: Vec<f64>,
     inputs: Inputs,
@@ -184,7 +174,7 @@ impl Simulation {
     ///
     /// # Examples
     /// ```
-    /// # use tiprub_core::Simulation;
+    /// # use tiprub_core::{CoSimulation, Simulation};
     /// # let scene = tiprub_test_models::rub(2);
     /// let mut simulation = Simulation::new(&scene)?;
     /// simulation.initialise(0.0)?;
@@ -203,7 +193,7 @@ impl Simulation {
         let watched_gaps = WatchedGaps::new(&compiled)?;
         let sets = system.sets().count();
         let (energies, initial_energies) = (vec![SetEnergy::default(); sets], vec![0.0; sets]);
-        let (bodies, pairs, carriers) = (compiled.bodies.len(), compiled.plan.pairs.len(), compiled.carriers.len());
+        let (bodies, pairs) = (compiled.bodies.len(), compiled.plan.pairs.len());
         let heated = |carrier: &compile::CarrierParts| CarrierInputs {
             temperatures: vec![Input::default(); carrier.loads.thermal.len()],
             ..CarrierInputs::default()
@@ -216,9 +206,8 @@ impl Simulation {
         };
         let mut simulation = Self {
             readers,
-            values: vec![0.0; table.references()],
             previous: vec![0.0; table.references()],
-            table,
+            values: VariableValues::new(table),
             inputs,
             rotors: vec![RotorAngle::default(); bodies],
             drives: vec![PrescribedMotion::default(); pairs],
@@ -236,7 +225,7 @@ impl Simulation {
             phase: SimulationPhase::Created,
             warnings: Vec::new(),
             notes: Vec::new(),
-            warning_state: limits::WarningState::new(bodies, carriers),
+            warning_state: limits::WarningState::new(bodies),
             prepared: None,
             limits: None,
             state_size: 0,
@@ -252,26 +241,11 @@ impl Simulation {
         Ok(simulation)
     }
 
-    /// Returns the variable table.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::Simulation;
-    /// # let scene = tiprub_test_models::rub(2);
-    /// # let mut simulation = Simulation::new(&scene)?;
-    /// let speed = simulation.table().find("speed").expect("a rotor has a speed");
-    /// assert_eq!(simulation.real(speed.reference)?, 1300.0);
-    /// # Ok::<(), tiprub_core::Error>(())
-    /// ```
-    pub fn table(&self) -> &VariableTable {
-        &self.table
-    }
-
     /// Returns the stepped system, for studies that need more than the outputs.
     ///
     /// # Examples
     /// ```
-    /// # use tiprub_core::Simulation;
+    /// # use tiprub_core::{CoSimulation, Simulation};
     /// # let scene = tiprub_test_models::rub(2);
     /// # let mut simulation = Simulation::new(&scene)?;
     /// assert_eq!(simulation.system().structures()[0].modes().sectors(), 2);
@@ -279,72 +253,6 @@ impl Simulation {
     /// ```
     pub fn system(&self) -> &System {
         &self.system
-    }
-
-    /// Checks parameters against stability and solvability limits and sets the initial state.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::Simulation;
-    /// # let scene = tiprub_test_models::rub(2);
-    /// # let mut simulation = Simulation::new(&scene)?;
-    /// let damping = simulation.table().find("damping_ratio").expect("a parameter").reference;
-    /// simulation.set_real(damping, 0.01)?;
-    /// simulation.initialise(0.0)?;
-    /// assert_eq!(simulation.time(), 0.0);
-    /// # Ok::<(), tiprub_core::Error>(())
-    /// ```
-    ///
-    /// # Errors
-    /// Rejected parameters, with numbers and a remedy; the instance can be initialised again with other parameters.
-    pub fn initialise(&mut self, start_time: f64) -> Result<()> {
-        ranges::at_most("start time", start_time, ranges::TIME)?;
-        let parameters = self.parameters();
-        // After an error the instance must be initialised again.
-        self.phase = SimulationPhase::Created;
-        self.warnings.clear();
-        self.notes.clear();
-        self.compiled.scene.check_methods(parameters.scheme, parameters.solver)?;
-        self.check_slips()?;
-        self.follow_load_orders()?;
-        self.check_launch(parameters.scheme)?;
-        self.follow_reference_speeds(&self.references())?;
-        self.warnings = self.check_limits(&parameters)?;
-        self.warn_of_fast_rotation();
-        self.warn_of_sticking(&parameters);
-        self.warn_of_tolerance(&parameters);
-        self.begin_telling(&parameters);
-        let settings = &self.compiled.scene.settings;
-        self.warnings.retain(|warning| !settings.is_silenced(warning.topic()));
-        self.rest(&parameters);
-        self.apply_methods(&parameters);
-        self.make_room();
-        self.make_room_for_tangent();
-        self.time = start_time;
-        self.initial_time = start_time;
-        self.communication = Communication { start: start_time, count: 1, done: 1, ..Communication::default() };
-        self.previous_length = 0.0;
-        self.most_tried = 0;
-        for body in 0..self.rotors.len() {
-            self.rotors[body] = RotorAngle::new(self.value_of(Quantity::InitialAngle, body));
-        }
-        self.find_drives(0.0, start_time);
-        self.stepper.set_first_step(&mut self.system, parameters.step);
-        self.inputs.start();
-        self.settle();
-        self.launch();
-        self.system.start(&self.drives);
-        self.check_initial_state()?;
-        self.check_initial_gaps()?;
-        self.window.open(self.system.structures());
-        self.compute_outputs();
-        for (initial, energy) in self.initial_energies.iter_mut().zip(&self.energies) {
-            *initial = energy.now;
-        }
-        self.check_outputs(start_time)?;
-        self.phase = SimulationPhase::Ready;
-        self.previous.copy_from_slice(&self.values);
-        Ok(())
     }
 
     /// Applies scheme, solver and friction of the parameters; the structures already have their damping.
@@ -446,59 +354,6 @@ impl Simulation {
         }
     }
 
-    /// Returns the warnings collected by the last [`Simulation::initialise`] (such as unresolved modes).
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::Simulation;
-    /// # let scene = tiprub_test_models::rub(2);
-    /// # let mut simulation = Simulation::new(&scene)?;
-    /// # simulation.initialise(0.0)?;
-    /// for warning in simulation.warnings() {
-    ///     println!("{warning}");
-    /// }
-    /// # Ok::<(), tiprub_core::Error>(())
-    /// ```
-    pub fn warnings(&self) -> &[Warning] {
-        &self.warnings
-    }
-
-    /// Returns the warnings since the start or the last call, for the actual step: another step size than the scene proposes, another sense
-    /// of rotation, tips that are too fast, other friction. Each is reported once.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::Simulation;
-    /// # let scene = tiprub_test_models::rub(2);
-    /// # let mut simulation = Simulation::new(&scene)?;
-    /// # simulation.initialise(0.0)?;
-    /// simulation.do_step(0.0, 1e-4)?;
-    /// for note in simulation.take_notes() {
-    ///     println!("{note}");
-    /// }
-    /// assert!(simulation.take_notes().is_empty());
-    /// # Ok::<(), tiprub_core::Error>(())
-    /// ```
-    pub fn take_notes(&mut self) -> Vec<Warning> {
-        std::mem::take(&mut self.notes)
-    }
-
-    /// Current time (s): the end of the last finished step, also of one that returned early.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::Simulation;
-    /// # let scene = tiprub_test_models::rub(2);
-    /// # let mut simulation = Simulation::new(&scene)?;
-    /// # simulation.initialise(0.0)?;
-    /// simulation.do_step(0.0, 2.5e-4)?;
-    /// assert_eq!(simulation.time(), 2.5e-4);
-    /// # Ok::<(), tiprub_core::Error>(())
-    /// ```
-    pub fn time(&self) -> f64 {
-        self.time
-    }
-
     fn offset_now(&self) -> f64 {
         match self.phase {
             SimulationPhase::Stepping => self.communication.offset(self.communication.done),
@@ -507,7 +362,7 @@ impl Simulation {
     }
 
     fn value_of(&self, quantity: Quantity, of: usize) -> f64 {
-        let variable = self.table.with_quantity_of(quantity, of);
+        let variable = self.values.table().with_quantity_of(quantity, of);
         variable.map_or(0.0, |variable| self.values[variable.reference as usize])
     }
 
@@ -538,7 +393,7 @@ impl Simulation {
     ///
     /// # Examples
     /// ```
-    /// # use tiprub_core::Simulation;
+    /// # use tiprub_core::{CoSimulation, Simulation};
     /// # let scene = tiprub_test_models::rub(2);
     /// # let mut simulation = Simulation::new(&scene)?;
     /// # simulation.initialise(0.0)?;
@@ -566,51 +421,5 @@ impl Simulation {
             elapsed: times.map(|time| time - self.initial_time),
             length: self.compiled.references.ramp_times[pair].map_or(0.0, |reference| self.values[reference]),
         }
-    }
-
-    /// Restores the state after [`Simulation::new`], with all start values.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::Simulation;
-    /// # let scene = tiprub_test_models::rub(2);
-    /// # let mut simulation = Simulation::new(&scene)?;
-    /// # simulation.initialise(0.0)?;
-    /// simulation.do_step(0.0, 1e-4)?;
-    /// simulation.reset();
-    /// simulation.initialise(0.0)?;
-    /// assert_eq!(simulation.time(), 0.0);
-    /// # Ok::<(), tiprub_core::Error>(())
-    /// ```
-    pub fn reset(&mut self) {
-        self.values.fill(0.0);
-        self.previous.fill(0.0);
-        self.inputs.clear();
-        for variable in self.table.variables() {
-            let reference = variable.reference as usize;
-            match &variable.start {
-                Some(StartValue::Real(values)) => {
-                    self.values[reference..][..values.len()].copy_from_slice(values);
-                    for (element, value) in values.iter().enumerate() {
-                        if let Some(input) = self.inputs.get_mut(variable.quantity, variable.of, element) {
-                            input.ask(*value, 0.0);
-                            input.take();
-                        }
-                    }
-                }
-                Some(StartValue::Integer(value)) => self.values[reference] = f64::from(*value),
-                Some(StartValue::Boolean(value)) => self.values[reference] = f64::from(u8::from(*value)),
-                Some(StartValue::String(_)) | None => {}
-            }
-        }
-        self.system.structures_mut().iter_mut().for_each(|structure| structure.modes_mut().rest());
-        self.rotors.fill(RotorAngle::default());
-        self.communication = Communication::default();
-        (self.previous_length, self.most_tried) = (0.0, 0);
-        (self.time, self.initial_time) = (0.0, 0.0);
-        self.warnings.clear();
-        self.notes.clear();
-        self.tangent.renew();
-        self.phase = SimulationPhase::Created;
     }
 }

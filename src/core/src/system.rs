@@ -20,12 +20,13 @@ pub(crate) mod structure;
 pub(crate) mod witness;
 pub(crate) mod work;
 
+use tiprub_cosim::persist_fields;
+
 use crate::contact::coating::Coating;
 use crate::geometry::{GapLaw, PrescribedMotion};
 use crate::modes::bank::BankOptions;
 use crate::modes::modal::ModalModel;
 use crate::modes::sectors::{SectorModel, Sectors};
-use crate::persist::persist_fields;
 use crate::scene::method::{Scheme, Solver};
 use crate::system::history::Two;
 pub(crate) use contact_view::Bodies;
@@ -36,7 +37,7 @@ pub use failure::StepFailure;
 use group::Reach;
 pub(crate) use group::{ContactGroup, GroupSolution};
 pub use growth::ShapeGrowth;
-pub use ledger::{Ledger, Sum};
+pub use ledger::Ledger;
 use losses::LargestLosses;
 pub use losses::Loss;
 pub(crate) use pair::SearchStart;

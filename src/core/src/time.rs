@@ -5,8 +5,9 @@
 pub mod galerkin;
 mod recurrence;
 
+use tiprub_cosim::persist::StateReader;
+
 use crate::geometry::PrescribedMotion;
-use crate::persist::StateReader;
 use crate::scene::method::Scheme;
 use crate::system::{StepFailure, System};
 use galerkin::stepper::Galerkin;
@@ -49,7 +50,7 @@ pub enum TimeStepper {
 
 impl TimeStepper {
     /// Creates the stepper of a system for steps up to `longest` (s); adaptive steps have errors within the fraction `tolerance` of the
-    /// smallest clearance. Call it before [`TimeStepper::start`].
+    /// smallest clearance. Call it before [`System::start`].
     pub fn new(system: &mut System, longest: f64, tolerance: f64) -> Self {
         system.structures.iter_mut().for_each(|structure| structure.lowest_in_span = Vec::new());
         match system.settings.scheme {

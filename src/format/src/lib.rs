@@ -7,7 +7,6 @@
 #![warn(unreachable_pub)]
 #![forbid(unsafe_code)]
 
-mod error;
 mod input;
 mod load;
 mod resources;
@@ -19,7 +18,6 @@ mod scene_layout;
 mod suggestion;
 mod thermal_file;
 
-pub use error::Error;
 pub use input::{open_file, read_file};
 pub use load::{LARGEST_ROM, load_scene, load_settings};
 pub use resources::{
@@ -41,4 +39,4 @@ pub const LIBRARY_RELEASE: &str =
     concat!("tiprub library ", env!("CARGO_PKG_VERSION"), ", sources ", env!("TIPRUB_LIBRARY_SOURCES"));
 
 /// Result of this crate.
-pub(crate) type Result<T, E = Error> = core::result::Result<T, E>;
+pub(crate) type Result<T, E = tiprub_cosim::Diagnostic> = core::result::Result<T, E>;

@@ -4,8 +4,9 @@ use std::path::Path;
 
 use tiprub_core::scene::settings::SceneSettings;
 use tiprub_core::{Rom, Scene};
+use tiprub_cosim::Diagnostic;
 
-use crate::{Error, Result, builtin_model, parse_scene, read_file, read_rom, read_scene};
+use crate::{Result, builtin_model, parse_scene, read_file, read_rom, read_scene};
 
 /// Prefix of a `rom` entry that names a built-in model.
 pub(crate) const BUILTIN_PREFIX: &str = "builtin:";
@@ -35,7 +36,7 @@ impl RomBytes {
         }
         let problem =
             format!("this file brings the total size of the ROM files above the limit of {LARGEST_ROMS} bytes");
-        Err(Error::file(path, problem, "Use fewer structures or smaller ROMs"))
+        Err(file_error(path, problem, "Use fewer structures or smaller ROMs"))
     }
 }
 
@@ -58,7 +59,7 @@ impl RomBytes {
 /// ```
 ///
 /// # Errors
-/// [`Error::File`] for files that cannot be read, otherwise same as [`parse_scene`] and [`read_rom`].
+/// A [`Diagnostic`] for files that cannot be read, otherwise same as [`parse_scene`] and [`read_rom`].
 pub fn load_scene(path: &Path, builtin: &dyn Fn(&str) -> Option<Result<Rom, String>>) -> Result<Scene> {
     let directory = path.parent().unwrap_or(Path::new(""));
     let mut read = RomBytes::default();
@@ -98,18 +99,14 @@ fn scene_text(path: &Path) -> Result<String> {
 /// ```
 ///
 /// # Errors
-/// [`Error::File`] for a file that cannot be read, otherwise same as [`parse_scene`].
+/// A [`Diagnostic`] for a file that cannot be read, otherwise same as [`parse_scene`].
 pub fn load_settings(path: &Path) -> Result<SceneSettings> {
     parse_scene(&scene_text(path)?, &path.display().to_string())
 }
 
 fn builtin_rom(scene: &Path, index: usize, name: &str, answer: Option<Result<Rom, String>>) -> Result<Rom> {
-    let refuse = |problem: String, remedy: &str| Error::Scene {
-        origin: scene.display().to_string(),
-        position: None,
-        what: format!("structure[{}].rom", index + 1),
-        problem,
-        remedy: remedy.into(),
+    let refuse = |problem: String, remedy: &str| {
+        Diagnostic::new(format!("structure[{}].rom", index + 1), problem, remedy).at(scene.display())
     };
     match answer {
         Some(Ok(rom)) => rom.validate().map(|()| rom).map_err(|error| {
@@ -126,17 +123,22 @@ fn builtin_rom(scene: &Path, index: usize, name: &str, answer: Option<Result<Rom
     }
 }
 
+/// Returns the error of a file.
+pub(crate) fn file_error(path: &Path, problem: impl ToString, remedy: impl ToString) -> Diagnostic {
+    Diagnostic::new("", problem, remedy).at(path.display())
+}
+
 /// Returns the bytes of a file of at most `most` bytes; `remedy` is the remedy in the message if it cannot be read.
 pub(crate) fn read_bytes(path: &Path, most: u64, remedy: &str) -> Result<Vec<u8>> {
-    read_file(path, most).map_err(|error| Error::file(path, format!("cannot be read: {error}"), remedy))
+    read_file(path, most).map_err(|error| file_error(path, format!("cannot be read: {error}"), remedy))
 }
 
 fn read_text(path: &Path, remedy: &str) -> Result<String> {
     String::from_utf8(read_bytes(path, LARGEST_SCENE, remedy)?).map_err(|error| text_error(path, &error))
 }
 
-pub(crate) fn text_error(path: &Path, error: &std::string::FromUtf8Error) -> Error {
+pub(crate) fn text_error(path: &Path, error: &std::string::FromUtf8Error) -> Diagnostic {
     let offset = error.utf8_error().valid_up_to();
     let line = error.as_bytes()[..offset].iter().filter(|byte| **byte == b'\n').count() + 1;
-    Error::file(path, format!("invalid UTF-8 in line {line} (byte {offset})"), "Save the file as UTF-8")
+    file_error(path, format!("invalid UTF-8 in line {line} (byte {offset})"), "Save the file as UTF-8")
 }

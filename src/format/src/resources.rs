@@ -10,8 +10,8 @@ use tiprub_core::scene::rom::{RomExtras, SUPPORT_ROWS, SupportRows};
 use tiprub_core::scene::settings::{SceneSettings, SpinSettings, StructureSettings};
 use tiprub_core::{Rom, Scene};
 
-use crate::load::{LARGEST_ROM, LARGEST_SCENE, RomBytes, read_bytes, text_error};
-use crate::{Error, Result, parse_scene, read_rom, write_rom, write_scene};
+use crate::load::{LARGEST_ROM, LARGEST_SCENE, RomBytes, file_error, read_bytes, text_error};
+use crate::{Result, parse_scene, read_rom, write_rom, write_scene};
 
 /// File name of the scene inside `resources/`.
 pub const SCENE_FILE: &str = "scene.toml";
@@ -107,7 +107,7 @@ pub(crate) fn check_directory(directory: &Path) -> Result<()> {
     if directory.is_dir() {
         return Ok(());
     }
-    Err(Error::file(directory, "directory not found (the FMU's resources are expected here)", INTACT))
+    Err(file_error(directory, "directory not found (the FMU's resources are expected here)", INTACT))
 }
 
 /// Returns the ROMs of a scene as an FMU holds them: without the data that this scene does not use.
@@ -214,14 +214,16 @@ pub fn instantiation_token(files: &[(String, Vec<u8>)]) -> String {
 /// # for (name, bytes) in tiprub_format::resource_files(&scene, false) {
 /// #     std::fs::write(directory.path().join(name), bytes)?;
 /// # }
+/// use tiprub_core::{CoSimulation, Simulation};
+///
 /// let resources = tiprub_format::load_resources(directory.path())?;
-/// let mut simulation = tiprub_core::Simulation::new(&resources.scene)?;
+/// let mut simulation = Simulation::new(&resources.scene)?;
 /// simulation.initialise(0.0)?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
 /// # Errors
-/// [`Error::File`] with the path of a file that is missing, unreadable or from another release; otherwise same as
+/// A [`Diagnostic`](tiprub_cosim::Diagnostic) with the path of a file that is missing, unreadable or from another release; otherwise same as
 /// [`parse_scene`] and [`read_rom`].
 pub fn load_resources(directory: &Path) -> Result<Resources> {
     check_directory(directory)?;
@@ -233,7 +235,7 @@ pub fn load_resources(directory: &Path) -> Result<Resources> {
         let name = &structure.rom;
         if Path::new(name).file_name() != Some(name.as_ref()) || name.contains(['/', '\\']) {
             let problem = format!("structure[{}].rom = {name:?} is not a file name inside resources/", index + 1);
-            return Err(Error::file(&scene_path, problem, INTACT));
+            return Err(file_error(&scene_path, problem, INTACT));
         }
         let path = directory.join(name);
         let bytes = read_bytes(&path, LARGEST_ROM, INTACT)?;
@@ -254,12 +256,12 @@ fn read_into(directory: &Path, name: &str, files: &mut Vec<(String, Vec<u8>)>) -
 }
 
 fn parse_package(path: &Path, text: &str) -> Result<PackageFile> {
-    let table: toml::Table = toml::from_str(text).map_err(|error| Error::file(path, error.message(), INTACT))?;
+    let table: toml::Table = toml::from_str(text).map_err(|error| file_error(path, error.message(), INTACT))?;
     let version = table.get("format_version").and_then(toml::Value::as_integer);
     if version != Some(i64::from(RESOURCES_FORMAT_VERSION)) {
         let found = version.map_or("none".to_owned(), |version| version.to_string());
         let problem = format!("found format_version {found}, expected {RESOURCES_FORMAT_VERSION}");
-        return Err(Error::file(path, problem, "Recreate the FMU with `tiprub package` from the same release"));
+        return Err(file_error(path, problem, "Recreate the FMU with `tiprub package` from the same release"));
     }
-    table.try_into().map_err(|error: toml::de::Error| Error::file(path, error.message(), INTACT))
+    table.try_into().map_err(|error: toml::de::Error| file_error(path, error.message(), INTACT))
 }

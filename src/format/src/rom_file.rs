@@ -7,13 +7,14 @@ use safetensors::{Dtype, SafeTensorError, SafeTensors};
 use sha2::{Digest, Sha256};
 use tiprub_core::Rom;
 use tiprub_core::scene::rom::{ContactNode, DisplacementFrame, RomChecks, RomExtras};
+use tiprub_cosim::Diagnostic;
 
 mod extras;
 mod harmonics;
 mod rub_errors;
 
 use crate::rom_layout::{ARRAYS, METADATA, NUMBER, ROM_FORMAT, ROM_FORMAT_VERSION, units_text};
-use crate::{Error, Result, suggestion};
+use crate::{Result, suggestion};
 
 const WRITE_AGAIN: &str = "Write the ROM again; the ROM file chapter of the user guide lists the arrays and metadata";
 
@@ -38,9 +39,9 @@ pub(crate) type Metadata = BTreeMap<String, String>;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
-/// [`Error::Rom`] with `origin`, the array or metadata entry, the expected and actual value, and the remedy. A returned
+/// A [`Diagnostic`] with `origin`, the array or metadata entry, the expected and actual value, and the remedy. A returned
 /// ROM has passed [`Rom::validate`].
-/// [`Error::Rom`] naming `origin`, the array or metadata entry, expected and found, and the remedy. The ROM returned
+/// A [`Diagnostic`] naming `origin`, the array or metadata entry, expected and found, and the remedy. The ROM returned
 /// has passed [`Rom::validate`].
 pub fn read_rom(bytes: &[u8], origin: &str) -> Result<Rom> {
     RomReader { origin }.read(bytes)
@@ -67,15 +68,12 @@ impl RomReader<'_> {
         let (arrays, metadata) = self.content(bytes)?;
         let rom = self.rom(&arrays, &metadata)?;
         self.checksum(&arrays, &metadata)?;
-        rom.validate().map_err(|error| match error {
-            tiprub_core::Error::Invalid { what, problem, remedy } => self.error(what, problem, remedy),
-            other => self.error("ROM", other.to_string(), WRITE_AGAIN),
-        })?;
+        rom.validate().map_err(|error| error.into_diagnostic().at(self.origin))?;
         Ok(rom)
     }
 
-    fn error(&self, what: impl Into<String>, problem: impl Into<String>, remedy: impl Into<String>) -> Error {
-        Error::Rom { origin: self.origin.to_owned(), what: what.into(), problem: problem.into(), remedy: remedy.into() }
+    fn error(&self, what: impl ToString, problem: impl ToString, remedy: impl ToString) -> Diagnostic {
+        Diagnostic::new(what, problem, remedy).at(self.origin)
     }
 
     /// Returns arrays and metadata of the container, with names and data types checked.
@@ -116,7 +114,7 @@ impl RomReader<'_> {
         Ok((arrays, metadata))
     }
 
-    fn container_error(&self, error: &SafeTensorError, bytes: &[u8]) -> Error {
+    fn container_error(&self, error: &SafeTensorError, bytes: &[u8]) -> Diagnostic {
         let problem = match error {
             SafeTensorError::HeaderTooSmall => format!("only {} bytes, too short for a header", bytes.len()),
             SafeTensorError::HeaderTooLarge | SafeTensorError::InvalidHeaderLength => {

@@ -9,8 +9,10 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeArray, DeTable, DeValue};
 
+use tiprub_cosim::Diagnostic;
+
 use crate::scene_layout::{FIELDS, INNER_TABLES, REPEATED_TABLES, SINGLE_TABLES, header};
-use crate::{Error, suggestion};
+use crate::suggestion;
 
 /// A syntactically correct scene file.
 pub(crate) struct Document<'a> {
@@ -35,9 +37,9 @@ struct TomlNode<'a> {
 }
 
 impl<'a> Document<'a> {
-    /// Returns the error for a field that [`SceneSettings::validate`](tiprub_core::scene::settings::SceneSettings::validate)
+    /// Adds the place to the error of a field that [`SceneSettings::validate`](tiprub_core::scene::settings::SceneSettings::validate)
     /// names by its path, with or without indices; it has a position if the document holds exactly one such field.
-    pub(crate) fn refusal(&self, path: &str, problem: String, remedy: String) -> Error {
+    pub(crate) fn locate(&self, Diagnostic { what: path, problem, remedy, .. }: Diagnostic) -> Diagnostic {
         let bare = path.replace('`', "");
         let mut candidates: Vec<_> = self.places().into_iter().filter(|place| place.path == bare).collect();
         if candidates.is_empty() {
@@ -45,7 +47,7 @@ impl<'a> Document<'a> {
             candidates.retain(|place| !place.path.ends_with(']'));
         }
         let only = candidates.first().filter(|first| candidates.iter().all(|place| place.path == first.path));
-        let what = only.map_or(path, |place| &place.path);
+        let what = only.map_or(&path, |place| &place.path);
         // A missing key is reported at its table.
         let table = || {
             let (table, _) = bare.rsplit_once('.')?;
@@ -66,14 +68,8 @@ impl<'a> Document<'a> {
         Some(position(self.text, place.span.start))
     }
 
-    fn error(&self, span: Option<Range<usize>>, what: &str, problem: String, remedy: String) -> Error {
-        Error::Scene {
-            origin: self.origin.to_owned(),
-            position: span.map(|span| position(self.text, span.start)),
-            what: what.to_owned(),
-            problem,
-            remedy,
-        }
+    fn error(&self, span: Option<Range<usize>>, what: &str, problem: String, remedy: String) -> Diagnostic {
+        scene_error(self.origin, span.map(|span| position(self.text, span.start)), what, problem, remedy)
     }
 
     fn places(&self) -> Vec<TomlNode<'a>> {
@@ -113,8 +109,20 @@ fn collect_value<'a>(value: &'a Spanned<DeValue<'a>>, path: &str, fields: &str, 
     }
 }
 
+/// Returns an error at a position of a scene file: line and column, both from 1, where known.
+pub(crate) fn scene_error(
+    origin: &str,
+    position: Option<(usize, usize)>,
+    what: &str,
+    problem: impl ToString,
+    remedy: impl ToString,
+) -> Diagnostic {
+    let position = position.map(|(line, column)| format!(":{line}:{column}")).unwrap_or_default();
+    Diagnostic::new(what, problem, remedy).at(format!("{origin}{position}"))
+}
+
 /// Returns the error for a document that does not match the settings.
-pub(crate) fn diagnose(document: &Document, error: &toml::de::Error) -> Error {
+pub(crate) fn diagnose(document: &Document, error: &toml::de::Error) -> Diagnostic {
     let message = error.message();
     // The library reports a missing key at the top level with the empty span at the start of the text.
     let place = error.span().filter(|span| !span.is_empty()).and_then(|span| document.covering(&span));
@@ -135,7 +143,7 @@ pub(crate) fn diagnose(document: &Document, error: &toml::de::Error) -> Error {
     wrong_value(document, place, message)
 }
 
-fn missing(document: &Document, place: Option<TomlNode>, name: &str) -> Error {
+fn missing(document: &Document, place: Option<TomlNode>, name: &str) -> Diagnostic {
     let (path, fields) = place.as_ref().map_or(("", ""), |place| (&place.path, &place.fields));
     let join = |head: &str| if head.is_empty() { name.to_owned() } else { format!("{head}.{name}") };
     let remedy = match FIELDS.iter().find(|field| field.path == join(fields)) {
@@ -145,7 +153,7 @@ fn missing(document: &Document, place: Option<TomlNode>, name: &str) -> Error {
     document.error(place.as_ref().map(|place| place.span.clone()), &join(path), "missing".into(), remedy)
 }
 
-fn unknown_key(document: &Document, place: &TomlNode, name: &str, accepted: &[&str]) -> Error {
+fn unknown_key(document: &Document, place: &TomlNode, name: &str, accepted: &[&str]) -> Diagnostic {
     // The span covers the key itself, or (in `shape`) the table that holds it.
     let is_key = place.path.rsplit('.').next() == Some(name);
     let path = if is_key { place.path.clone() } else { format!("{}.{name}", place.path) };
@@ -160,7 +168,7 @@ fn unknown_key(document: &Document, place: &TomlNode, name: &str, accepted: &[&s
     document.error(span.or(Some(place.span.clone())), &path, "unknown key".into(), remedy)
 }
 
-fn wrong_value(document: &Document, place: TomlNode, message: &str) -> Error {
+fn wrong_value(document: &Document, place: TomlNode, message: &str) -> Diagnostic {
     let rest = message.strip_prefix("invalid type: ").or(message.strip_prefix("invalid value: "));
     let (found, expected) = rest.and_then(|rest| rest.rsplit_once(", expected ")).unzip();
     let place = match found {
@@ -182,7 +190,7 @@ fn wrong_value(document: &Document, place: TomlNode, message: &str) -> Error {
 
 /// Rejects `[contact]` instead of `[[contact]]` and vice versa. Checked before the settings are deserialised, because
 /// the library would accept a list of values instead of a table of named ones.
-pub(crate) fn check_brackets(document: &Document) -> Result<(), Error> {
+pub(crate) fn check_brackets(document: &Document) -> Result<(), Diagnostic> {
     for (key, value) in document.root {
         let name: &str = key.get_ref();
         let all_tables = |list: &DeArray| list.iter().all(|element| element.get_ref().is_table());

@@ -5,10 +5,11 @@ use toml::de::DeTable;
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::settings::{ADAPTIVE_STEP, Preset, SceneSettings, StructureSettings, TimeSettings};
 use tiprub_core::{Rom, Scene};
+use tiprub_cosim::Diagnostic;
 
+use crate::Result;
 use crate::load::BUILTIN_PREFIX;
-use crate::scene_diagnosis::{Document, check_brackets, diagnose, position};
-use crate::{Error, Result};
+use crate::scene_diagnosis::{Document, check_brackets, diagnose, position, scene_error};
 
 /// Keys that are optional in a file.
 const SCHEME: &str = "time.scheme";
@@ -51,7 +52,7 @@ const STEP: &str = "time.step";
 /// ```
 ///
 /// # Errors
-/// [`Error::Scene`] with line and column, the field path, the problem and the remedy: wrong syntax, unknown keys,
+/// A [`Diagnostic`] with line and column, the field path, the problem and the remedy: wrong syntax, unknown keys,
 /// missing keys, values of the wrong type, and everything that [`SceneSettings::validate`] rejects.
 pub fn parse_scene(text: &str, origin: &str) -> Result<SceneSettings> {
     with_document(text, origin, |document| {
@@ -96,14 +97,14 @@ pub fn parse_scene(text: &str, origin: &str) -> Result<SceneSettings> {
 /// # "#;
 /// # let blade = tiprub_test_models::blade(1);
 ///
-/// let scene = tiprub_format::read_scene(text, "bench.toml", |_index, _structure| Ok::<_, tiprub_format::Error>(blade.clone()))?;
+/// let scene = tiprub_format::read_scene(text, "bench.toml", |_index, _structure| Ok::<_, tiprub_cosim::Diagnostic>(blade.clone()))?;
 /// assert_eq!(scene.roms[0].name, blade.name);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
 /// # Errors
 /// Same as [`parse_scene`], and the errors of `rom`.
-pub fn read_scene<E: From<Error>>(
+pub fn read_scene<E: From<Diagnostic>>(
     text: &str,
     origin: &str,
     mut rom: impl FnMut(usize, &StructureSettings) -> Result<Rom, E>,
@@ -117,18 +118,16 @@ pub fn read_scene<E: From<Error>>(
     })
 }
 
-fn with_document<T, E: From<Error>>(
+fn with_document<T, E: From<Diagnostic>>(
     text: &str,
     origin: &str,
     work: impl FnOnce(&Document) -> Result<T, E>,
 ) -> Result<T, E> {
-    let root = DeTable::parse(text).map_err(|error| Error::Scene {
-        origin: origin.to_owned(),
-        position: error.span().map(|span| position(text, span.start)),
-        what: "TOML syntax".into(),
-        problem: error.message().to_owned(),
-        remedy: "Correct the file at this position; text values need quotation marks, and each key needs its own line"
-            .into(),
+    let root = DeTable::parse(text).map_err(|error| {
+        let position = error.span().map(|span| position(text, span.start));
+        let remedy =
+            "Correct the file at this position; text values need quotation marks, and each key needs its own line";
+        scene_error(origin, position, "TOML syntax", error.message(), remedy)
     })?;
     work(&Document { text, origin, root: root.get_ref() })
 }
@@ -141,10 +140,7 @@ fn parse(document: &Document) -> Result<SceneSettings> {
     if !document.holds(STEP) {
         settings.time.step = ADAPTIVE_STEP;
     }
-    settings.validate().map_err(|error| match error {
-        tiprub_core::Error::Invalid { what, problem, remedy } => document.refusal(&what, problem, remedy),
-        other => document.refusal("scene", other.to_string(), "Change the settings named above".into()),
-    })?;
+    settings.validate().map_err(|error| document.locate(error.into_diagnostic()))?;
     Ok(settings)
 }
 
@@ -162,14 +158,11 @@ fn choose_scheme(settings: &mut SceneSettings, roms: &[Rom], document: &Document
     let problem = format!("missing: the scheme `{}`{why} uses fixed steps", scheme.name());
     let is_adaptive = scheme_reason.is_none() && settings.default_scheme(roms).0 == Scheme::Galerkin;
     let galerkin = if is_adaptive { ", or use scheme = \"galerkin\", which chooses its own steps" } else { "" };
-    Err(document.refusal(
-        STEP,
-        problem,
-        format!(
-            "Add a step in s to [time], such as `step = 1e-6`, and check it with `tiprub run --estimate`; if it is too \
-             long, the error gives a shorter one{galerkin}"
-        ),
-    ))
+    let remedy = format!(
+        "Add a step in s to [time], such as `step = 1e-6`, and check it with `tiprub run --estimate`; if it is too \
+         long, the error gives a shorter one{galerkin}"
+    );
+    Err(document.locate(Diagnostic::new(STEP, problem, remedy)))
 }
 
 /// Returns line and column, from 1, of the key at this path (indices from 1) in the text of a scene; `None` if it is

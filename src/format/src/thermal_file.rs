@@ -4,13 +4,13 @@ use std::path::Path;
 
 use nalgebra::DMatrix;
 use safetensors::{Dtype, SafeTensors};
-use tiprub_core::scene::rom::ThermalPatch;
+use tiprub_cosim::{Diagnostic, ThermalPatch};
 use tiprub_thermal::ConductionModel;
 
+use crate::Result;
 use crate::load::{LARGEST_ROM, read_bytes};
 use crate::resources::{INTACT, check_directory, instantiation_token, package_file, read_package};
 use crate::rom_file::{Array, Arrays, Metadata, checksum, container, header, matrix};
-use crate::{Error, Result};
 
 /// File name of the model inside `resources/`.
 pub const THERMAL_FILE: &str = "casing.thermal.safetensors";
@@ -61,7 +61,7 @@ pub fn thermal_resource_files(model: &ConductionModel, fmi3_arrays: bool) -> Vec
 /// ```
 ///
 /// # Errors
-/// [`Error::File`] for a file that is missing, unreadable or from another release; otherwise same as [`read_thermal`].
+/// A [`Diagnostic`] for a file that is missing, unreadable or from another release; otherwise same as [`read_thermal`].
 pub fn load_thermal_resources(directory: &Path) -> Result<ThermalResources> {
     check_directory(directory)?;
     let path = directory.join(THERMAL_FILE);
@@ -128,15 +128,10 @@ pub fn write_thermal(model: &ConductionModel) -> Vec<u8> {
 /// ```
 ///
 /// # Errors
-/// [`Error::Rom`] with `origin`, the array or metadata entry, and the remedy. A returned model has passed
+/// A [`Diagnostic`] with `origin`, the array or metadata entry, and the remedy. A returned model has passed
 /// [`ConductionModel::validate`].
 pub fn read_thermal(bytes: &[u8], origin: &str) -> Result<ConductionModel> {
-    let refuse = |what: String, problem: String| Error::Rom {
-        origin: origin.to_owned(),
-        what,
-        problem,
-        remedy: WRITE_AGAIN.into(),
-    };
+    let refuse = |what: String, problem: String| Diagnostic::new(what, problem, WRITE_AGAIN).at(origin);
     let damaged =
         |error: safetensors::SafeTensorError| refuse("not a readable safetensors file".into(), error.to_string());
     let (_, header) = header(bytes).map_err(damaged)?;
@@ -195,6 +190,6 @@ pub fn read_thermal(bytes: &[u8], origin: &str) -> Result<ConductionModel> {
         places: array("places")?,
         patches: (0..edges.nrows()).map(patch).collect(),
     };
-    model.validate().map_err(|error| refuse("thermal model".into(), error.to_string()))?;
+    model.validate().map_err(|error| error.into_diagnostic().at(origin))?;
     Ok(model)
 }

@@ -89,7 +89,7 @@ fn documented_keys_match_the_settings() {
 #[test]
 fn documented_warnings_match_the_core() {
     let mut text = String::from("\n| identifier | meaning | what to do |\n|---|---|---|\n");
-    for topic in tiprub_core::warning::Topic::ALL {
+    for topic in tiprub_cosim::warning::Topic::ALL {
         let _ = writeln!(text, "| `{}` | {} | {} |", topic.id(), topic.meaning(), topic.remedy());
     }
     compare("warnings.md", "warnings", &format!("{text}\n"));

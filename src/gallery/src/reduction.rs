@@ -97,8 +97,8 @@ pub fn with_progress<T>(
 /// Converts an error of the model crate during the work called `title`.
 pub fn failure(title: &str, error: tiprub_model::Error) -> Failure {
     match error {
-        tiprub_model::Error::Invalid { what, problem, remedy } => Failure::new(what, problem, remedy),
-        tiprub_model::Error::Read { place, problem, remedy } => Failure::new(place, problem, remedy),
+        tiprub_model::Error::Invalid(diagnostic) | tiprub_model::Error::Read(diagnostic) => diagnostic.into(),
+        tiprub_model::Error::Core(error) => Failure::from_core(title, error),
         tiprub_model::Error::File { path, source } => Failure::file(&path, "cannot be read", &source),
         other => Failure::from_below(title, other),
     }

@@ -76,7 +76,7 @@ pub fn files(argument: &str) -> Vec<PathBuf> {
 }
 
 /// Adds the place of `time.step` in the scene file to a failure whose remedy names this key.
-pub fn located(argument: impl AsRef<OsStr>, failure: Failure) -> Failure {
+pub fn located(argument: impl AsRef<OsStr>, mut failure: Failure) -> Failure {
     const KEY: &str = "time.step";
     let place = || {
         let (name, text) = match source(argument.as_ref()).ok()? {
@@ -84,12 +84,12 @@ pub fn located(argument: impl AsRef<OsStr>, failure: Failure) -> Failure {
             SceneSource::File(path) => (path.display().to_string(), std::fs::read_to_string(path).ok()?),
         };
         let (line, column) = tiprub_format::position_of(&text, KEY)?;
-        Some(format!("{name}:{line}:{column}: {KEY}"))
+        Some(format!("{name}:{line}:{column}"))
     };
-    match failure.remedy.contains(&format!("`{KEY}`")).then(place).flatten() {
-        Some(what) => Failure { what, ..failure },
-        None => failure,
+    if let Some(place) = failure.remedy.contains(&format!("`{KEY}`")).then(place).flatten() {
+        (failure.diagnostic.place, failure.diagnostic.what) = (Some(place.into()), KEY.to_owned());
     }
+    failure
 }
 
 /// Source of a scene.

@@ -19,8 +19,8 @@ use std::sync::Arc;
 use faer::Mat;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
-use tiprub_core::scene::rom::ThermalPatch;
-use tiprub_core::shown;
+use tiprub_cosim::ThermalPatch;
+use tiprub_cosim::shown;
 
 use crate::assembly::neighbours;
 use crate::element::{conduction, consistent_mass, shape_integrals};

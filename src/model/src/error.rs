@@ -1,8 +1,10 @@
 //! Error type of the crate: every variant states the place, the problem and the remedy.
 
+use std::fmt;
 use std::path::PathBuf;
 
 use thiserror::Error;
+use tiprub_cosim::Diagnostic;
 
 use crate::element::ElementKind;
 
@@ -10,15 +12,8 @@ use crate::element::ElementKind;
 #[derive(Debug, Error)]
 pub enum Error {
     /// A value, set or count is out of range.
-    #[error("{what}: {problem}. {remedy}")]
-    Invalid {
-        /// The field, set or array.
-        what: String,
-        /// The problem, with the value.
-        problem: String,
-        /// The remedy.
-        remedy: String,
-    },
+    #[error(transparent)]
+    Invalid(Diagnostic),
     /// An element is inverted or degenerate.
     #[error(
         "element {element} ({}): the Jacobian determinant at integration point {point} is {determinant:.3e}, not \
@@ -62,15 +57,8 @@ pub enum Error {
     #[error(transparent)]
     Core(#[from] tiprub_core::Error),
     /// The contents of a file cannot be used.
-    #[error("{place}: {problem}. {remedy}")]
-    Read {
-        /// File and line (from 1), or byte of a binary file, or record.
-        place: String,
-        /// The problem.
-        problem: String,
-        /// The remedy.
-        remedy: String,
-    },
+    #[error(transparent)]
+    Read(Diagnostic),
     /// A file could not be read or written.
     #[error("{}: {source}", path.display())]
     File {
@@ -83,8 +71,13 @@ pub enum Error {
 
 impl Error {
     /// Shorthand for [`Error::Invalid`].
-    pub fn invalid(what: impl Into<String>, problem: impl Into<String>, remedy: impl Into<String>) -> Self {
-        Self::Invalid { what: what.into(), problem: problem.into(), remedy: remedy.into() }
+    pub fn invalid(what: impl ToString, problem: impl ToString, remedy: impl ToString) -> Self {
+        Self::Invalid(Diagnostic::new(what, problem, remedy))
+    }
+
+    /// Creates an [`Error::Read`]. The place is a file and line (from 1), a byte of a binary file, or a record.
+    pub(crate) fn read(place: impl fmt::Display, problem: impl ToString, remedy: impl ToString) -> Self {
+        Self::Read(Diagnostic::new("", problem, remedy).at(place))
     }
 }
 

@@ -9,7 +9,7 @@
 use core::f64::consts::{PI, TAU};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use tiprub_core::scene::rom::ThermalPatch;
+use tiprub_cosim::ThermalPatch;
 
 use crate::mesh::{Element, Mesh};
 use crate::patches::{face_points, on_face, points_between};

@@ -1,6 +1,6 @@
 //! Linear isotropic material.
 
-use tiprub_core::shown;
+use tiprub_cosim::shown;
 
 use crate::{Error, Result};
 

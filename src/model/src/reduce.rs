@@ -8,7 +8,7 @@ use faer::Mat;
 use nalgebra::DMatrix;
 use tiprub_core::Rom;
 use tiprub_core::scene::rom::{DisplacementFrame, ReductionBasis, RomChecks, WatchedPoints};
-use tiprub_core::shown;
+use tiprub_cosim::shown;
 
 use crate::assembly::{Assembled, free_dofs};
 use crate::contact_point::clamped_point;

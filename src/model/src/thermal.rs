@@ -10,7 +10,8 @@ use std::collections::BTreeMap;
 
 use faer::Mat;
 use nalgebra::DMatrix;
-use tiprub_core::scene::rom::{Thermal, ThermalPatch};
+use tiprub_core::scene::rom::Thermal;
+use tiprub_cosim::ThermalPatch;
 
 use crate::element::{ElementKind, QuadraturePoint, thermal_load_of};
 use crate::fe_model::FeModel;

@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 use guide::print_row;
 use tiprub_core::scene::rom::DisplacementFrame;
 use tiprub_core::scene::settings::StructureSettings;
-use tiprub_core::{Rom, Scene, Simulation};
+use tiprub_core::{CoSimulation, Rom, Scene, Simulation};
 use tiprub_model::casing::{ContactRings, InnerContour, RingCounts, RingGeometry, RingSupport};
 use tiprub_model::element::ElementKind;
 use tiprub_model::mesh::Mesh;

@@ -4,7 +4,7 @@
 use guide::print_row;
 use tiprub_core::scene::rom::ContactNode;
 use tiprub_core::scene::settings::{Meridian, SpinSettings};
-use tiprub_core::{Rom, Scene, Simulation};
+use tiprub_core::{CoSimulation, Rom, Scene, Simulation};
 use tiprub_model::progress::silent;
 use tiprub_model::reduce::ReductionKind;
 use tiprub_model::rotor37::{DESIGN_SPEED, TipContact};

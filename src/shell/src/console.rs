@@ -10,7 +10,7 @@ use std::{
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-use tiprub_core::warning::{self, Warning};
+use tiprub_cosim::warning::{self, Warning};
 
 use crate::{Failure, Result};
 
@@ -239,7 +239,7 @@ mod tests {
 
     #[test]
     fn prints_two_lines_per_topic_for_any_number_of_warnings() {
-        use tiprub_core::warning::{Severity, Topic};
+        use tiprub_cosim::warning::{Severity, Topic};
         let slow = |name: &str| Warning::new(Topic::Sticking, "too slow", "Turn faster").named(name);
         let flutter = Warning::new(Topic::Flutter, "contact grows", "Nothing to do").at_level(Severity::Note);
         let all = [slow("front"), flutter, slow("rear")];

@@ -1,7 +1,7 @@
 //! Largest and smallest values of a run, with their times.
 
 use serde_json::{Value, json};
-use tiprub_core::shown;
+use tiprub_cosim::shown;
 
 use crate::recording::Recording;
 

@@ -1,20 +1,18 @@
 //! Error type of the command line: place, problem and remedy, and the matching exit code.
 
-use std::{fmt, path::Path};
+use std::fmt;
+use std::ops::Deref;
+use std::path::Path;
 
-use tiprub_core::Warning;
+use tiprub_cosim::{Diagnostic, Warning};
 
 use crate::console::warnings_json;
 
 /// Reason why a command failed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Failure {
-    /// The file, option or scene field with the problem.
-    pub what: String,
-    /// The problem.
-    pub problem: String,
-    /// The remedy; empty if the problem already contains it.
-    pub remedy: String,
+    /// Problem with the file, option or scene field, and the remedy.
+    pub diagnostic: Diagnostic,
     /// True if the command line itself is wrong (exit code 2), false if the work failed (exit code 1).
     pub usage: bool,
     /// Warnings before the failure, which often name its cause.
@@ -30,8 +28,7 @@ pub type Result<T, E = Failure> = std::result::Result<T, E>;
 impl Failure {
     /// Creates a failure of the work: exit code 1.
     pub fn new(what: impl fmt::Display, problem: impl fmt::Display, remedy: impl fmt::Display) -> Self {
-        let (what, problem, remedy) = (what.to_string(), problem.to_string(), remedy.to_string());
-        Self { what, problem, remedy, usage: false, warnings: Vec::new() }
+        Diagnostic::new(what, problem, remedy).into()
     }
 
     /// Creates a failure of the command line: exit code 2.
@@ -51,14 +48,14 @@ impl Failure {
     }
 
     /// Creates a failure from an error of the core while handling `what`.
-    pub fn from_core(what: impl fmt::Display, error: tiprub_core::Error) -> Self {
-        match error {
-            tiprub_core::Error::Invalid { what: field, problem, remedy } => {
-                Self::new(format!("{what}: {field}"), problem, remedy)
-            }
-            tiprub_core::Error::Unstable { problem, remedy } => Self::new(what, problem, remedy),
-            other => Self::from_below(what, other),
-        }
+    pub fn from_core(what: impl fmt::Display, error: tiprub_cosim::Error) -> Self {
+        error.into_diagnostic().at(what).into()
+    }
+
+    /// Adds the file or other place that contains the subject.
+    #[must_use]
+    pub fn at(self, place: impl fmt::Display) -> Self {
+        Self { diagnostic: self.diagnostic.at(place), ..self }
     }
 
     /// Creates a failure of a file operation.
@@ -84,7 +81,7 @@ impl Failure {
     /// Returns the failure as a JSON object, for `--json`.
     pub fn to_json(&self) -> serde_json::Value {
         let mut json = serde_json::json!({
-            "error": { "what": self.what, "problem": self.problem, "remedy": self.remedy, "exit_code": self.exit_code() }
+            "error": { "what": self.subject(), "problem": self.problem, "remedy": self.remedy, "exit_code": self.exit_code() }
         });
         if !self.warnings.is_empty() {
             [json["warnings"], json["warning_details"]] = warnings_json(&self.warnings);
@@ -106,25 +103,24 @@ fn sentence(text: &str) -> String {
 impl fmt::Display for Failure {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         // File names may contain line breaks.
-        write!(out, "{}: {}", self.what.replace('\n', "\\n"), sentence(&self.problem))?;
+        write!(out, "{}: {}", self.subject().replace('\n', "\\n"), sentence(&self.problem))?;
         if self.remedy.is_empty() { Ok(()) } else { write!(out, " {}", sentence(&self.remedy)) }
     }
 }
 
 impl std::error::Error for Failure {}
 
-impl From<tiprub_format::Error> for Failure {
-    fn from(error: tiprub_format::Error) -> Self {
-        match error {
-            tiprub_format::Error::Rom { origin, what, problem, remedy } => {
-                Self::new(format!("{origin}: {what}"), problem, remedy)
-            }
-            tiprub_format::Error::Scene { origin, position, what, problem, remedy } => {
-                let place = position.map(|(line, column)| format!(":{line}:{column}")).unwrap_or_default();
-                Self::new(format!("{origin}{place}: {what}"), problem, remedy)
-            }
-            tiprub_format::Error::File { path, problem, remedy } => Self::new(path, problem, remedy),
-        }
+impl From<Diagnostic> for Failure {
+    fn from(diagnostic: Diagnostic) -> Self {
+        Self { diagnostic, usage: false, warnings: Vec::new() }
+    }
+}
+
+impl Deref for Failure {
+    type Target = Diagnostic;
+
+    fn deref(&self) -> &Diagnostic {
+        &self.diagnostic
     }
 }
 
@@ -142,7 +138,7 @@ mod tests {
     #[test]
     fn proposes_another_location_only_for_write_failures() {
         let denied = std::io::Error::from(std::io::ErrorKind::PermissionDenied);
-        let remedy = |doing| Failure::file(Path::new("a.so"), doing, &denied).remedy;
+        let remedy = |doing| Failure::file(Path::new("a.so"), doing, &denied).diagnostic.remedy;
         assert_eq!(remedy("cannot be read"), "Check the permissions");
         assert!(remedy("cannot be written").contains("another location"));
     }

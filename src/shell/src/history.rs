@@ -5,11 +5,9 @@ use std::{
     path::Path,
 };
 
-use tiprub_core::{
-    Simulation, Warning,
-    variables::{Causality, DataType, Quantity, Variability, Variable},
-    warning::Topic,
-};
+use tiprub_core::{CoSimulation, Simulation, Warning};
+use tiprub_cosim::variables::{Causality, DataType, Quantity, Variability, Variable};
+use tiprub_cosim::warning::Topic;
 
 use crate::{Failure, Result, native};
 

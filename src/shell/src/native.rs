@@ -3,11 +3,9 @@
 use std::time::{Duration, Instant};
 
 use tiprub_core::scene::method::Scheme;
-use tiprub_core::{
-    Scene, Simulation, VariableTable, Warning,
-    system::Effort,
-    variables::{Causality, DataType, Variable},
-};
+use tiprub_core::system::Effort;
+use tiprub_core::{CoSimulation, Scene, Simulation, VariableTable, Warning};
+use tiprub_cosim::variables::{Causality, DataType, Value, Variable};
 
 use crate::{Failure, Result, history::InputHistory, recording::Recording, schedule::Schedule};
 
@@ -143,7 +141,7 @@ pub fn set(simulation: &mut Simulation, name: &str, text: &str) -> Result<()> {
             DataType::Real => simulation.set_real(reference, number(&option, text)?),
             DataType::Integer => simulation.set_integer(reference, number(&option, text)?),
             DataType::Boolean => simulation.set_boolean(reference, number(&option, text)?),
-            DataType::String => simulation.set_string(reference, text),
+            DataType::String => simulation.set(reference, Value::String(text)),
             DataType::Enumeration(enumeration) => {
                 let items = enumeration.items.iter().map(|(item, _)| *item).collect::<Vec<_>>();
                 let item = items.iter().zip(1..).find(|(item, _)| **item == text).map(|(_, value)| value);

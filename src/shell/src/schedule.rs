@@ -1,8 +1,9 @@
 //! Communication points, computed from their index instead of accumulated.
 
-use tiprub_core::scene::ranges;
+use tiprub_core::Warning;
 use tiprub_core::scene::settings::ExperimentSettings;
-use tiprub_core::{Warning, shown, warning::Topic};
+use tiprub_cosim::warning::Topic;
+use tiprub_cosim::{bounds, shown};
 
 use crate::{Failure, Result};
 
@@ -39,7 +40,7 @@ impl Schedule {
                 "Give a later time in seconds",
             ));
         }
-        if !(ranges::SHORTEST_STEP..=ranges::TIME).contains(&step) {
+        if !(bounds::SHORTEST_STEP..=bounds::TIME).contains(&step) {
             return Err(Failure::usage(
                 name(step_option, "--step", "experiment.communication_step"),
                 format!("{} s is outside the range from 1e-12 s to 1e9 s", shown(step)),

@@ -3,7 +3,8 @@
 use std::{ffi::OsStr, path::PathBuf};
 
 use clap::Args;
-use tiprub_core::{Scene, warning::Topic};
+use tiprub_core::Scene;
+use tiprub_cosim::warning::Topic;
 use tiprub_gallery::{rom_cache::RomCache, scene_source};
 use tiprub_shell::console::Console;
 

@@ -1,6 +1,6 @@
 //! Course of an input over time.
 
-use tiprub_core::persist_fields;
+use tiprub_cosim::persist_fields;
 
 /// Input between communication points.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -1,14 +1,12 @@
 //! Heat conduction of a reduced-order model: all code that runs inside `doStep` of the thermal unit.
 //!
-//! Floor 0, beside the contact simulation of `tiprub-core`, from which it uses the table of variables, errors and
-//! saved bytes. A [`ConductionModel`] is plain data; a [`ThermalSimulation`] solves C Ṫ + (K + s_g H_g + s_a H_a) T =
+//! A co-simulation unit beside the contact simulation of `tiprub-core`. A [`ConductionModel`] is plain data; a [`ThermalSimulation`] solves C Ṫ + (K + s_g H_g + s_a H_a) T =
 //! heat exactly over each communication step of any length, for inputs that are linear in it. It uses no files, no
 //! threads, no clock, and prints nothing. All quantities are in SI units; temperatures are differences from a
 //! reference (K).
 #![warn(unreachable_pub)]
 #![forbid(unsafe_code)]
 
-mod access;
 mod course;
 mod exponential;
 mod model;
@@ -18,7 +16,7 @@ mod simulation;
 mod state;
 mod table;
 mod tangent;
+mod unit;
 
 pub use model::{ConductionModel, LARGEST_ORDER};
 pub use simulation::ThermalSimulation;
-pub use state::ThermalInputs;

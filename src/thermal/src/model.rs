@@ -1,9 +1,10 @@
 //! Reduced-order model of heat conduction, as plain data.
 
 use nalgebra::DMatrix;
-use tiprub_core::scene::ranges;
-use tiprub_core::scene::rom::ThermalPatch;
-use tiprub_core::{Error, Result, shown};
+use tiprub_cosim::ThermalPatch;
+use tiprub_cosim::bounds;
+use tiprub_cosim::shown;
+use tiprub_cosim::{Error, Result};
 
 /// Largest number of coordinates: their eigenvalue problem is dense, and solved again when a convection factor
 /// changes.
@@ -54,7 +55,7 @@ impl ConductionModel {
     /// ```
     /// # let model = tiprub_test_models::wall();
     /// println!("{} coordinates", model.order());
-    /// # Ok::<(), tiprub_core::Error>(())
+    /// # Ok::<(), tiprub_cosim::Error>(())
     /// ```
     pub fn order(&self) -> usize {
         self.conduction.nrows()
@@ -67,7 +68,7 @@ impl ConductionModel {
     /// # let model = tiprub_test_models::wall();
     /// // A wall of 50 J/K with a film of 0.02 1/s.
     /// assert!((model.gas_conductance() - 1.0).abs() < 1e-12);
-    /// # Ok::<(), tiprub_core::Error>(())
+    /// # Ok::<(), tiprub_cosim::Error>(())
     /// ```
     pub fn gas_conductance(&self) -> f64 {
         self.heat_capacity * self.gas_convection[(0, 0)]
@@ -79,7 +80,7 @@ impl ConductionModel {
     /// ```
     /// # let model = tiprub_test_models::wall();
     /// assert!(model.ambient_conductance() < model.gas_conductance());
-    /// # Ok::<(), tiprub_core::Error>(())
+    /// # Ok::<(), tiprub_cosim::Error>(())
     /// ```
     pub fn ambient_conductance(&self) -> f64 {
         self.heat_capacity * self.ambient_convection[(0, 0)]
@@ -93,7 +94,7 @@ impl ConductionModel {
     /// model.validate()?;
     /// let broken = tiprub_thermal::ConductionModel { heat_capacity: -1.0, ..model };
     /// assert!(broken.validate().is_err());
-    /// # Ok::<(), tiprub_core::Error>(())
+    /// # Ok::<(), tiprub_cosim::Error>(())
     /// ```
     ///
     /// # Errors
@@ -103,8 +104,8 @@ impl ConductionModel {
         if order == 0 || order > LARGEST_ORDER {
             return refuse("conduction", format!("{order} coordinates, but only 1 to {LARGEST_ORDER} are supported"));
         }
-        if patches == 0 || patches > ranges::PATCHES {
-            return refuse("patches", format!("{patches} patches, but only 1 to {} are supported", ranges::PATCHES));
+        if patches == 0 || patches > bounds::PATCHES {
+            return refuse("patches", format!("{patches} patches, but only 1 to {} are supported", bounds::PATCHES));
         }
         if !(self.heat_capacity.is_finite() && self.heat_capacity > 0.0) {
             return refuse("heat_capacity", format!("{} J/K is not positive", shown(self.heat_capacity)));
@@ -124,7 +125,7 @@ impl ConductionModel {
             if array.shape() != shape {
                 return refuse(name, format!("found shape {:?}, expected {shape:?}", array.shape()));
             }
-            if let Some(wrong) = array.iter().find(|value| value.is_nan() || value.abs() > ranges::MATRIX) {
+            if let Some(wrong) = array.iter().find(|value| value.is_nan() || value.abs() > bounds::MATRIX) {
                 return refuse(name, format!("it contains {wrong}"));
             }
         }

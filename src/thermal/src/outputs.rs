@@ -56,7 +56,7 @@ impl ThermalSimulation {
     /// Computes the values of all outputs.
     pub(crate) fn compute_outputs(&mut self) {
         for row in 0..self.items.len() {
-            let variable = &self.table.variables()[row];
+            let variable = &self.values.table().variables()[row];
             let (first, count) = (variable.reference as usize, variable.len());
             for element in 0..count {
                 if let Some(value) = self.output(self.items[row], element) {
@@ -88,7 +88,7 @@ impl ThermalSimulation {
 
     /// Returns the residual of the heat balance (J).
     fn residual(&self) -> f64 {
-        let came: f64 = self.state.totals.iter().map(tiprub_core::Sum::value).sum();
+        let came: f64 = self.state.totals.iter().map(tiprub_cosim::Sum::value).sum();
         stored(&self.operator, &self.state.coordinates) - self.state.initial_heat - came
     }
 }

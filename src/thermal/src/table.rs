@@ -2,8 +2,8 @@
 
 use std::ops::RangeInclusive;
 
-use tiprub_core::Result;
-use tiprub_core::variables::{
+use tiprub_cosim::Result;
+use tiprub_cosim::variables::{
     Causality, DataType, Enumeration, Quantity, Span, StartValue, Variability, Variable, VariableTable, VariableUnit,
 };
 

@@ -1,8 +1,8 @@
 //! Derivatives: of outputs with respect to time at a communication point, and of outputs at the end of the last step
 //! with respect to inputs over it.
 
-use tiprub_core::variables::Variable;
-use tiprub_core::{Error, Result};
+use tiprub_cosim::variables::Variable;
+use tiprub_cosim::{CoSimulation, Error, Result};
 
 use crate::exponential::Phi;
 use crate::operator::DiagonalOperator;
@@ -44,29 +44,9 @@ impl ThermalSimulation {
         }
     }
 
-    /// Computes the derivatives of outputs at the end of the last step with respect to inputs over it, in the
-    /// direction `seed`: constant changes of heat over the step, and of temperatures with their actual course. Exact.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_thermal::ThermalSimulation;
-    /// # let model = tiprub_test_models::wall();
-    /// # let mut simulation = ThermalSimulation::new(model)?;
-    /// # simulation.initialise(0.0)?;
-    /// let reference = |name: &str| simulation.table().find(name).expect("a variable").reference;
-    /// let (heat, stored) = (reference("casing_heat"), reference("stored_heat"));
-    /// simulation.do_step(0.0, 10.0)?;
-    /// let mut sensitivity = [0.0];
-    /// simulation.step_derivative(&[stored], &[heat], &[1.0], &mut sensitivity)?;
-    /// // A watt over ten seconds brings 10 J, less what the films take.
-    /// assert!(sensitivity[0] > 0.0 && sensitivity[0] < 10.0);
-    /// # Ok::<(), tiprub_core::Error>(())
-    /// ```
-    ///
-    /// # Errors
-    /// No step since initialisation; variables other than real outputs and inputs that act linearly; a seed that is
-    /// not finite.
-    pub fn step_derivative(
+    /// Implements [`tiprub_cosim::CoSimulation::step_derivative`]. Exact: constant changes of heat over the step, and of temperatures with their
+    /// actual course.
+    pub(crate) fn differentiate_step(
         &self,
         outputs: &[u32],
         inputs: &[u32],
@@ -81,10 +61,7 @@ impl ThermalSimulation {
         let mut heat = vec![0.0; self.model.patches.len()];
         let mut films = [0.0; 2];
         for (&input, &seed) in inputs.iter().zip(seed) {
-            let (variable, element) = self.table.locate(input)?;
-            if !seed.is_finite() {
-                return Err(refused(variable, "its seed is not finite"));
-            }
+            let (variable, element) = self.check_input_derivative(input, 1, seed)?;
             match self.item(variable) {
                 Item::Heat => heat[element] += seed,
                 Item::Film(index) => films[index] += seed,
@@ -95,7 +72,7 @@ impl ThermalSimulation {
         }
         let change = self.change(length, &heat, films);
         for (&output, sensitivity) in outputs.iter().zip(sensitivity) {
-            let (variable, element) = self.table.locate(output)?;
+            let (variable, element) = self.values.table().locate(output)?;
             *sensitivity = match self.item(variable) {
                 Item::Rows(first) => row_times(&self.operator, first + element, &change.coordinates),
                 Item::Hottest => row_times(&self.operator, self.hottest(), &change.coordinates),

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use nalgebra::{DMatrix, DVector};
-use tiprub_core::scene::rom::ThermalPatch;
+use tiprub_cosim::{CoSimulation, ThermalPatch};
 use tiprub_thermal::{ConductionModel, ThermalSimulation};
 
 const ORDER: usize = 7;

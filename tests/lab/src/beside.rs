@@ -5,7 +5,7 @@
 use serde_json::json;
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::settings::{Meridian, Preset, Shape, SpinSettings, TOLERANCE};
-use tiprub_core::{Scene, Simulation};
+use tiprub_core::{CoSimulation, Scene, Simulation};
 use tiprub_figure::plots::{Plot, Series};
 use tiprub_gallery::scene_source;
 use tiprub_reference::reduced::{

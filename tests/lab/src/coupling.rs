@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use nalgebra::{Matrix2, Vector2};
 use serde_json::{Value, json};
-use tiprub_core::{Scene, Simulation};
+use tiprub_core::{CoSimulation, Scene, Simulation};
 use tiprub_figure::plots::{Plot, Series};
 use tiprub_gallery::scene_source;
 use tiprub_shell::{Failure, Result, console::Console};

@@ -5,7 +5,8 @@ use std::f64::consts::{PI, TAU};
 
 use serde_json::{Value, json};
 use tiprub_core::scene::settings::{InputInterpolation, Shape};
-use tiprub_core::{Scene, Simulation, variables::Quantity};
+use tiprub_core::{CoSimulation, Scene, Simulation};
+use tiprub_cosim::variables::Quantity;
 use tiprub_figure::plots::{Plot, Series};
 use tiprub_gallery::scene_source;
 use tiprub_shell::{Failure, Result, console::Console, sweep};

@@ -20,7 +20,7 @@ mod table;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use tiprub_core::scene::method::{Scheme, Solver};
-use tiprub_core::{Error, Simulation};
+use tiprub_core::{CoSimulation, Error, Simulation};
 
 use faces::{LibraryFaces, Native};
 use march::RandomPlan;

@@ -9,7 +9,7 @@ use sectors::{Problems, SectorEnergy, Solutions};
 use serde_json::{Value, json};
 use tiprub_core::scene::method::Scheme;
 use tiprub_core::scene::settings::Shape;
-use tiprub_core::{Scene, Simulation};
+use tiprub_core::{CoSimulation, Scene, Simulation};
 use tiprub_shell::{
     Result,
     console::Console,

@@ -5,7 +5,7 @@ mod spectrum;
 use std::f64::consts::TAU;
 
 use serde_json::json;
-use tiprub_core::{Rom, Scene, Simulation};
+use tiprub_core::{CoSimulation, Rom, Scene, Simulation};
 use tiprub_figure::plots::{Plot, Series, SeriesForm};
 use tiprub_gallery::reduction;
 use tiprub_model::{

@@ -1,7 +1,7 @@
 //! A simulation driven by the names of its variables.
 
-use tiprub_core::variables::DataType;
-use tiprub_core::{Result, Scene, Simulation};
+use tiprub_core::{CoSimulation, Result, Scene, Simulation};
+use tiprub_cosim::variables::DataType;
 
 /// Returns the first reference of a variable.
 #[track_caller]

@@ -14,9 +14,8 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use nalgebra::{DMatrix, DVector};
 use tiprub_core::Rom;
-use tiprub_core::scene::rom::{
-    ContactGrid, ContactNode, DisplacementFrame, RomChecks, RomExtras, Spin, Thermal, ThermalPatch,
-};
+use tiprub_core::scene::rom::{ContactGrid, ContactNode, DisplacementFrame, RomChecks, RomExtras, Spin, Thermal};
+use tiprub_cosim::ThermalPatch;
 
 pub use drive::{
     bits, element, go, move_on, real, reference, saved, set, set_element, slope, started, started_at, try_started,

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
-use tiprub_core::scene::rom::ThermalPatch;
+use tiprub_cosim::ThermalPatch;
 use tiprub_thermal::ConductionModel;
 
 /// Returns a wall of 50 J/K with gas on one side (1 W/K) and air on the other (0.2 W/K), with one conduction mode

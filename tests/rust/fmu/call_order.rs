@@ -12,6 +12,7 @@ use std::path::PathBuf;
 use std::ptr::{null, null_mut};
 
 use tables::{FMI2, FMI2_APART, FMI3, FMI3_APART, rows};
+use tiprub_core::CoSimulation;
 use tiprub_fmi_host::api::{Fmi2Api, Fmi3Api};
 use tiprub_tests::scene::UnpackedResources;
 use tiprub_tests::{ERROR, fmi2, fmi3, shipped};

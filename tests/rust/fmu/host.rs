@@ -5,6 +5,7 @@
 
 use std::ffi::{CString, c_void};
 
+use tiprub_core::CoSimulation;
 use tiprub_fmi_host::api::Fmi3Api;
 use tiprub_tests::refusals::{count, refused, summary};
 use tiprub_tests::scene::{UnpackedResources, reference};

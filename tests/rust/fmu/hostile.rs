@@ -5,6 +5,7 @@
 
 use std::ffi::{CString, c_void};
 
+use tiprub_core::CoSimulation;
 use tiprub_fmi_host::api::{Fmi3Api, LogMessage};
 use tiprub_tests::refusals::{count, refused, summary};
 use tiprub_tests::scene::{SCENE, UnpackedResources, reference, rom};
@@ -220,13 +221,13 @@ fn rejects_invalid_arguments_of_get_and_set() {
             assert_eq!(slave.reals(&speed), [300.0], "nothing is set");
         }
         for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-            refused(slave.set_reals(&speed, &[value]), &slave.log(), "speed (value reference");
+            refused(slave.set_reals(&speed, &[value]), &slave.log(), "variable `speed`");
             refused(slave.set_derivatives(&speed, 1, &[value]), &slave.log(), "not finite");
         }
         for order in [0, 2, -1, i32::MAX] {
             refused(slave.set_derivatives(&speed, order, &[1.0]), &slave.log(), "order");
         }
-        refused(slave.set_derivatives(&[friction], 1, &[1.0]), &slave.log(), "not a continuous input");
+        refused(slave.set_derivatives(&[friction], 1, &[1.0]), &slave.log(), "not a continuous real input");
     }
     slave.expect(slave.step(0.0, 1e-4));
     summary("get and set");

@@ -3,7 +3,7 @@
 
 use std::process::Command;
 
-use tiprub_core::Simulation;
+use tiprub_core::{CoSimulation, Simulation};
 use tiprub_tests::scene::{UnpackedResources, scene};
 use tiprub_tests::{ERROR, OK, fmi2, fmi3, shipped};
 

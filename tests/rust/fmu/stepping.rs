@@ -4,7 +4,7 @@
 use std::ffi::c_void;
 
 use tiprub_core::scene::method::Scheme;
-use tiprub_core::{Scene, Simulation};
+use tiprub_core::{CoSimulation, Scene, Simulation};
 use tiprub_fmi_host::api::Fmi3Api;
 use tiprub_tests::scene::{UnpackedResources, scene};
 use tiprub_tests::{DISCARD, ERROR, OK, WARNING, fmi2, fmi3, shipped};

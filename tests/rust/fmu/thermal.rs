@@ -2,7 +2,7 @@
 //! errors. The call order is tested with that of the contact unit.
 
 use nalgebra::DMatrix;
-use tiprub_core::scene::rom::ThermalPatch;
+use tiprub_cosim::{CoSimulation, ThermalPatch};
 use tiprub_tests::scene::UnpackedResources;
 use tiprub_tests::{ERROR, fmi2, fmi3, shipped, thermal};
 use tiprub_thermal::{ConductionModel, ThermalSimulation};

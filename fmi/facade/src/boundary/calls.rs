@@ -5,7 +5,7 @@ use std::ffi::{CString, c_char};
 use super::instance::{InstanceHandle, enter, guard};
 use super::{In, Out, TextArgument};
 use crate::slave::order::CallRule;
-use crate::slave::{AccessRequest, Dialect, FmiStatus, Refusal, Result, Slave, Value};
+use crate::slave::{AccessRequest, Dialect, FmiStatus, FmiValue, Refusal, Result, Slave};
 
 /// Returns the argument names of get and set functions: references, values.
 fn arguments(dialect: Dialect) -> (&'static str, &'static str) {
@@ -16,7 +16,7 @@ fn arguments(dialect: Dialect) -> (&'static str, &'static str) {
 }
 
 /// Returns values of one type; `convert` creates the C value.
-pub(crate) fn get<T: Value, C: Copy>(
+pub(crate) fn get<T: FmiValue, C: Copy>(
     (handle, rule, type_name): (InstanceHandle, &CallRule, &'static str),
     (references, count): (In<u32>, usize),
     (values, n_values): (Out<C>, usize),
@@ -33,7 +33,7 @@ pub(crate) fn get<T: Value, C: Copy>(
 }
 
 /// Sets values of one type; `convert` creates the Rust value, or describes the problem with the C value.
-pub(crate) fn set<T: Value, C>(
+pub(crate) fn set<T: FmiValue, C>(
     (handle, rule, type_name): (InstanceHandle, &CallRule, &'static str),
     (references, count): (In<u32>, usize),
     (values, n_values): (In<C>, usize),

@@ -5,14 +5,14 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::sync::{Mutex, TryLockError};
 
-use tiprub_core::shown_time;
+use tiprub_cosim::shown_time;
 
 use super::float_environment::StandardFloats;
 use super::log::{Log, Sink};
 use super::{ImporterEnvironment, IntermediateUpdate, TextArgument, panics};
+use crate::load::Load;
 use crate::slave::order::{self, CallRule};
 use crate::slave::{Dialect, FmiStatus, InstancePhase, Refusal, Result, Slave};
-use crate::unit::Load;
 
 /// Callbacks and flags of FMI 3.0 for stepping.
 #[derive(Debug, Clone, Copy)]

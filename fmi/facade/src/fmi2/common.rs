@@ -7,10 +7,10 @@ use crate::boundary::{
     self, Fmi2Logger, ImporterEnvironment, In, InstanceHandle, Instantiation, Out, Sink, StateHandle, TextArgument,
     guard, instantiate, refuse_instantiation, release, state,
 };
+use crate::load::Load;
 use crate::location;
 use crate::slave::order::fmi2 as order;
 use crate::slave::{Dialect, ExperimentTimes, FmiStatus, Refusal};
-use crate::unit::Load;
 
 /// `fmi2CallbackFunctions`. Memory functions and `stepFinished` are never called.
 #[derive(Clone, Copy)]

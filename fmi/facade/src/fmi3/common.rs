@@ -7,10 +7,10 @@ use crate::boundary::{
     self, Callbacks, Fmi3Logger, ImporterEnvironment, In, InstanceHandle, Instantiation, IntermediateUpdate, Out, Sink,
     StateHandle, TextArgument, guard, instantiate, refuse_instantiation, release, state,
 };
+use crate::load::Load;
 use crate::location;
 use crate::slave::order::fmi3 as order;
 use crate::slave::{Dialect, ExperimentTimes, FmiStatus, Refusal};
-use crate::unit::Load;
 
 #[unsafe(no_mangle)]
 pub(super) extern "C" fn fmi3GetVersion() -> *const c_char {

@@ -6,7 +6,7 @@
 //! If the maximum number of internal steps is reached, the step returns early if the importer allows it, otherwise it
 //! is discarded.
 
-use tiprub_core::simulation::StepProgress;
+use tiprub_cosim::StepProgress;
 
 use super::Boolean;
 use crate::boundary::{Callbacks, In, InstanceHandle, IntermediateUpdate, Out, enter, guard, intermediate_update};

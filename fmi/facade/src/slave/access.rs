@@ -1,10 +1,9 @@
 //! Getting and setting variables: every request is checked completely before anything is read or written.
 
-use tiprub_core::variables::{Causality, DataType, Variability, Variable};
-use tiprub_core::{Error, shown};
+use tiprub_cosim::variables::{Causality, DataType, Variability, Variable};
+use tiprub_cosim::{CoSimulation, Diagnostic, Value};
 
 use super::{Dialect, InstancePhase, Refusal, Result, Slave};
-use crate::unit::CoSimulationUnit;
 
 /// A get or set call of the importer.
 #[derive(Debug, Clone, Copy)]
@@ -17,115 +16,72 @@ pub(crate) struct AccessRequest<'a> {
     pub values: usize,
 }
 
-/// A value of one of the types that variables have.
-pub(crate) trait Value: Sized {
-    /// Returns the problem with the value for this variable, if there is one.
-    fn problem(&self, _variable: &Variable) -> Option<String> {
-        None
-    }
-
+/// A value of one of the types that the C functions transfer.
+pub(crate) trait FmiValue: Sized {
     /// Returns the value of the independent variable, if this is its type.
     fn of_time(_time: f64) -> Option<Self> {
         None
     }
 
     /// Reads one element.
-    fn get(unit: &dyn CoSimulationUnit, reference: u32) -> tiprub_core::Result<Self>;
+    fn get(unit: &dyn CoSimulation, reference: u32) -> tiprub_cosim::Result<Self>;
 
-    /// Sets one element.
-    fn set(&self, unit: &mut dyn CoSimulationUnit, reference: u32) -> tiprub_core::Result<()>;
+    /// Returns the value for setting.
+    fn value(&self) -> Value<'_>;
 }
 
-impl Value for f64 {
-    fn problem(&self, variable: &Variable) -> Option<String> {
-        let unit = variable.unit.map_or(String::new(), |unit| format!(" {}", unit.name));
-        let (min, max) = (variable.min.unwrap_or(f64::NEG_INFINITY), variable.max.unwrap_or(f64::INFINITY));
-        if !self.is_finite() {
-            Some(format!("{self} is not finite. Set a finite number"))
-        } else if *self < min || *self > max {
-            Some(format!(
-                "{}{unit} is outside the range {} to {}{unit}. Set a value within this range",
-                shown(*self),
-                shown(min),
-                shown(max)
-            ))
-        } else {
-            None
-        }
-    }
-
+impl FmiValue for f64 {
     fn of_time(time: f64) -> Option<Self> {
         Some(time)
     }
 
-    fn get(unit: &dyn CoSimulationUnit, reference: u32) -> tiprub_core::Result<Self> {
+    fn get(unit: &dyn CoSimulation, reference: u32) -> tiprub_cosim::Result<Self> {
         unit.real(reference)
     }
 
-    fn set(&self, unit: &mut dyn CoSimulationUnit, reference: u32) -> tiprub_core::Result<()> {
-        unit.set_real(reference, *self)
+    fn value(&self) -> Value<'_> {
+        Value::Real(*self)
     }
 }
 
-impl Value for i32 {
-    fn problem(&self, variable: &Variable) -> Option<String> {
-        i64::from(*self).problem(variable)
-    }
-
-    fn get(unit: &dyn CoSimulationUnit, reference: u32) -> tiprub_core::Result<Self> {
+impl FmiValue for i32 {
+    fn get(unit: &dyn CoSimulation, reference: u32) -> tiprub_cosim::Result<Self> {
         unit.integer(reference)
     }
 
-    fn set(&self, unit: &mut dyn CoSimulationUnit, reference: u32) -> tiprub_core::Result<()> {
-        unit.set_integer(reference, *self)
+    fn value(&self) -> Value<'_> {
+        Value::Integer((*self).into())
     }
 }
 
 /// FMI 3.0 transfers integers and enumerations as 64-bit integers.
-impl Value for i64 {
-    fn problem(&self, variable: &Variable) -> Option<String> {
-        let DataType::Enumeration(enumeration) = variable.kind else { return None };
-        let item = usize::try_from(*self).ok().filter(|item| (1..=enumeration.items.len()).contains(item));
-        item.is_none().then(|| {
-            let items =
-                enumeration.items.iter().enumerate().map(|(index, (name, _))| format!("{} = {name}", index + 1));
-            format!("{self} is not an item of {}. Items: {}", enumeration.name, items.collect::<Vec<_>>().join(", "))
-        })
-    }
-
-    fn get(unit: &dyn CoSimulationUnit, reference: u32) -> tiprub_core::Result<Self> {
+impl FmiValue for i64 {
+    fn get(unit: &dyn CoSimulation, reference: u32) -> tiprub_cosim::Result<Self> {
         unit.integer(reference).map(Self::from)
     }
 
-    fn set(&self, unit: &mut dyn CoSimulationUnit, reference: u32) -> tiprub_core::Result<()> {
-        let value = i32::try_from(*self).map_err(|_| {
-            Error::invalid(
-                format!("value reference {reference}"),
-                format!("{self} is too large"),
-                "Set a 32-bit integer",
-            )
-        })?;
-        unit.set_integer(reference, value)
+    fn value(&self) -> Value<'_> {
+        Value::Integer(*self)
     }
 }
 
-impl Value for bool {
-    fn get(unit: &dyn CoSimulationUnit, reference: u32) -> tiprub_core::Result<Self> {
+impl FmiValue for bool {
+    fn get(unit: &dyn CoSimulation, reference: u32) -> tiprub_cosim::Result<Self> {
         unit.boolean(reference)
     }
 
-    fn set(&self, unit: &mut dyn CoSimulationUnit, reference: u32) -> tiprub_core::Result<()> {
-        unit.set_boolean(reference, *self)
+    fn value(&self) -> Value<'_> {
+        Value::Boolean(*self)
     }
 }
 
-impl Value for String {
-    fn get(unit: &dyn CoSimulationUnit, reference: u32) -> tiprub_core::Result<Self> {
+impl FmiValue for String {
+    fn get(unit: &dyn CoSimulation, reference: u32) -> tiprub_cosim::Result<Self> {
         unit.string(reference).map(Self::from)
     }
 
-    fn set(&self, unit: &mut dyn CoSimulationUnit, reference: u32) -> tiprub_core::Result<()> {
-        unit.set_string(reference, self)
+    fn value(&self) -> Value<'_> {
+        Value::String(self)
     }
 }
 
@@ -192,7 +148,7 @@ impl Slave {
     ///
     /// # Errors
     /// Same as [`Slave::elements`]; a value that does not exist yet; an initial state that cannot be computed.
-    pub(crate) fn read<T: Value>(&mut self, request: &AccessRequest<'_>) -> Result<Vec<T>> {
+    pub(crate) fn read<T: FmiValue>(&mut self, request: &AccessRequest<'_>) -> Result<Vec<T>> {
         let elements = self.elements(request)?;
         if matches!(self.phase, InstancePhase::Instantiated { .. }) {
             self.require_start_values(&elements)?;
@@ -203,7 +159,7 @@ impl Slave {
     }
 
     /// Returns one value; the time is that of the instance in every phase.
-    fn value<T: Value>(&self, element: u32) -> Result<T> {
+    fn value<T: FmiValue>(&self, element: u32) -> Result<T> {
         let (variable, _) = self.unit.table().locate(element)?;
         let time = (variable.causality == Causality::Independent).then(|| T::of_time(self.time())).flatten();
         time.map_or_else(|| Ok(T::get(&*self.unit, element)?), Ok)
@@ -231,14 +187,10 @@ impl Slave {
     ///
     /// # Errors
     /// Same as [`Slave::elements`]; a variable that cannot be set now; a value out of range.
-    pub(crate) fn write<T: Value>(&mut self, elements: &[u32], values: &[T]) -> Result<()> {
+    pub(crate) fn write<T: FmiValue>(&mut self, elements: &[u32], values: &[T]) -> Result<()> {
         for (&element, value) in elements.iter().zip(values) {
             let (variable, index) = self.unit.table().locate(element)?;
-            let problem = self.not_settable(variable).or_else(|| value.problem(variable));
-            if let Some(problem) = problem {
-                let name = variable.element_name(index);
-                return Err(Refusal::error(format!("{name} (value reference {element}): {problem}")));
-            }
+            self.check_settable(variable, index, value.value()).map_err(|problem| problem.at(place(element)))?;
         }
         if elements.is_empty() {
             return Ok(());
@@ -248,16 +200,16 @@ impl Slave {
     }
 
     /// Sets the values in the unit; if the unit rejects one, the previous ones are restored.
-    fn apply<T: Value>(&mut self, elements: &[u32], values: &[T]) -> Result<()> {
-        let (courses, mut former) = (self.unit.courses(), Vec::with_capacity(elements.len()));
+    fn apply<T: FmiValue>(&mut self, elements: &[u32], values: &[T]) -> Result<()> {
+        let (courses, mut former) = (self.unit.courses(), Vec::<(u32, T)>::with_capacity(elements.len()));
         for (&element, value) in elements.iter().zip(values) {
             let before = T::get(&*self.unit, element)?;
-            if let Err(error) = value.set(&mut *self.unit, element) {
+            if let Err(error) = self.unit.set(element, value.value()) {
                 for (element, before) in former.into_iter().rev() {
-                    T::set(&before, &mut *self.unit, element)?;
+                    self.unit.set(element, before.value())?;
                 }
                 // Restores derivatives and ramps in progress, which end when a value is set.
-                self.unit.restore_courses(courses);
+                self.unit.restore_courses(&courses);
                 return Err(error.into());
             }
             former.push((element, before));
@@ -266,22 +218,16 @@ impl Slave {
         Ok(())
     }
 
-    /// Returns the reason why a variable cannot be set in the present phase, if it cannot.
-    fn not_settable(&self, variable: &Variable) -> Option<String> {
-        if !variable.is_settable() || variable.variability == Variability::Constant {
-            return Some("is computed by the FMU and cannot be set. Set inputs and parameters only".into());
+    /// Checks that an element can be set to a value in the present phase.
+    fn check_settable(&self, variable: &Variable, index: usize, value: Value) -> Result<(), Diagnostic> {
+        let initialised = matches!(self.phase, InstancePhase::Stepping { .. } | InstancePhase::Updating { .. });
+        variable.check(index, value, initialised)?;
+        let continuous = variable.causality == Causality::Input && variable.variability == Variability::Continuous;
+        if continuous || !matches!(self.phase, InstancePhase::Updating { .. }) {
+            return Ok(());
         }
-        let input = variable.causality == Causality::Input;
-        match self.phase {
-            InstancePhase::Stepping { .. } if !input && variable.variability != Variability::Tunable => Some(
-                "is a fixed parameter and cannot be set after initialisation. Set it earlier, or reset the instance"
-                    .into(),
-            ),
-            InstancePhase::Updating { .. } if !input || variable.variability != Variability::Continuous => {
-                Some("is not a continuous input. Set it at a communication point".into())
-            }
-            _ => None,
-        }
+        let what = format!("variable `{}`", variable.element_name(index));
+        Err(Diagnostic::new(what, "it is not a continuous input", "Set it at a communication point"))
     }
 
     /// Sets the first time derivatives of continuous real inputs, either all or none.
@@ -290,18 +236,14 @@ impl Slave {
     /// Unknown reference, variable that is not a continuous input, order other than 1, value that is not finite.
     pub(crate) fn set_input_derivatives(&mut self, references: &[u32], orders: &[i32], values: &[f64]) -> Result<()> {
         for ((&reference, &order), value) in references.iter().zip(orders).zip(values) {
-            let what = self.check_derivative(reference, order, Causality::Input)?;
-            if !value.is_finite() {
-                return Err(Refusal::error(format!(
-                    "derivative of {what}: {value} is not finite. Set a finite number"
-                )));
-            }
+            let checked = self.unit.check_input_derivative(reference, order, *value);
+            checked.map_err(|error| error.into_diagnostic().at(place(reference)))?;
         }
         self.invalidate()?;
         let courses = self.unit.courses();
         for ((&reference, &order), &value) in references.iter().zip(orders).zip(values) {
             if let Err(error) = self.unit.set_input_derivative(reference, order, value) {
-                self.unit.restore_courses(courses);
+                self.unit.restore_courses(&courses);
                 return Err(error.into());
             }
         }
@@ -328,27 +270,16 @@ impl Slave {
     /// Unknown reference, variable that is not a continuous output, order other than 1.
     pub(crate) fn output_derivatives(&self, elements: &[u32], orders: &[i32]) -> Result<Vec<f64>> {
         let derivative = |(&element, &order): (&u32, &i32)| {
-            self.check_derivative(element, order, Causality::Output)?;
+            let (variable, index) = self.unit.table().locate(element)?;
+            let checked = variable.check_derivative(index, Causality::Output, order);
+            checked.map_err(|problem| problem.at(place(element)))?;
             Ok(self.unit.output_derivative(element, order)?)
         };
         elements.iter().zip(orders).map(derivative).collect()
     }
+}
 
-    fn check_derivative(&self, reference: u32, order: i32, causality: Causality) -> Result<String> {
-        let (variable, index) = self.unit.table().locate(reference)?;
-        let what = format!("{} (value reference {reference})", variable.element_name(index));
-        let continuous = variable.kind == DataType::Real && variable.variability == Variability::Continuous;
-        if variable.causality != causality || !continuous {
-            let wanted = if causality == Causality::Input { "input" } else { "output" };
-            return Err(Refusal::error(format!(
-                "{what} is not a continuous {wanted} of real type. Remove it from the request"
-            )));
-        }
-        if order != 1 {
-            return Err(Refusal::error(format!(
-                "{what}: derivatives of order {order} are not supported. Pass order 1"
-            )));
-        }
-        Ok(what)
-    }
+/// Names the value reference in messages about a variable.
+fn place(reference: u32) -> String {
+    format!("value reference {reference}")
 }

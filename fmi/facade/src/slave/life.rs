@@ -1,6 +1,6 @@
 //! Life cycle from instantiation to termination: initialisation, termination, reset.
 
-use tiprub_core::variables::Causality;
+use tiprub_cosim::variables::Causality;
 
 use super::{ExperimentTimes, FmiStatus, InstancePhase, Refusal, Result, Slave, logged};
 
@@ -55,8 +55,8 @@ impl Slave {
                 }
                 *before = Some(state);
             }
-            InstancePhase::Updating { fresh: fresh @ false, reached, .. } => {
-                self.unit.update_outputs(*reached)?;
+            InstancePhase::Updating { fresh: fresh @ false, .. } => {
+                self.unit.update_outputs()?;
                 *fresh = true;
             }
             _ => {}

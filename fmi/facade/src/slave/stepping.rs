@@ -1,7 +1,7 @@
 //! Communication steps: as a whole, or one internal step at a time for FMI 3.0 intermediate updates.
 
-use tiprub_core::simulation::StepProgress;
-use tiprub_core::{shown, shown_time};
+use tiprub_cosim::StepProgress;
+use tiprub_cosim::{shown, shown_time};
 
 use super::{FmiStatus, InstancePhase, Refusal, Result, Slave};
 
@@ -41,7 +41,11 @@ impl Slave {
                 )));
             }
         }
-        self.unit.begin_step(current_time, step_size, partial)?;
+        if partial {
+            self.unit.begin_partial_step(current_time, step_size)?;
+        } else {
+            self.unit.begin_step(current_time, step_size)?;
+        }
         self.collect_notes();
         #[cfg(feature = "test-panic")]
         assert!(step_size.to_bits() != PANIC_STEP_SIZE.to_bits(), "panic requested by the panic test");
@@ -63,7 +67,7 @@ impl Slave {
         };
         let progress = match self.unit.advance() {
             Ok(progress) => progress,
-            Err(error @ tiprub_core::Error::Exhausted { .. }) => {
+            Err(error @ tiprub_cosim::Error::Exhausted(_)) => {
                 match &mut self.phase {
                     InstancePhase::Updating { fresh, .. } if self.unit.is_stepping() => *fresh = false,
                     phase => *phase = InstancePhase::Stepping { stop },
@@ -78,13 +82,11 @@ impl Slave {
 
     /// Stops all stepping until a saved state is restored or the instance is reset, and returns the refusal that
     /// reports it.
-    fn fail(&mut self, last_good: f64, error: tiprub_core::Error) -> Refusal {
+    fn fail(&mut self, last_good: f64, error: tiprub_cosim::Error) -> Refusal {
         self.phase = InstancePhase::Failed { last_good };
-        let Refusal { status, message } = error.into();
-        Refusal {
-            status,
-            message: format!("{message}. Restore a saved state or reset the instance before the next step"),
-        }
+        let mut refusal = Refusal::from(error);
+        refusal.message += ". Restore a saved state or reset the instance before the next step";
+        refusal
     }
 
     /// Computes one internal step; returns `None` if the maximum number of internal steps is reached and the

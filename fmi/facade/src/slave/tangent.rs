@@ -14,7 +14,7 @@ impl Slave {
     /// Computes Σ_j ∂y_i(t+H)/∂u_j s_j of the last communication step, for each output.
     ///
     /// # Errors
-    /// Same as [`crate::CoSimulationUnit::step_derivative`].
+    /// Same as [`tiprub_cosim::CoSimulation::step_derivative`].
     pub(crate) fn directional(&mut self, outputs: &[u32], inputs: &[u32], seed: &[f64]) -> Result<Vec<f64>> {
         let mut sensitivity = vec![0.0; outputs.len()];
         self.unit.step_derivative(outputs, inputs, seed, &mut sensitivity)?;

@@ -22,10 +22,11 @@ use nalgebra::DMatrix;
 pub use problem::CoatedProblem;
 pub use rod::{Branch, RodMaterial};
 pub use tip::BladeTip;
+use tiprub_cosim::persist::{Persist, StateReader, StateWriter};
+use tiprub_cosim::shown;
 
-use crate::persist::{Persist, StateReader, StateWriter};
 use crate::scene::settings::CoatingSettings;
-use crate::{Error, Result, shown};
+use crate::{Error, Result};
 
 /// Contact nodes closer than this fraction of the axial extent are at the same place.
 const SAME_PLACE: f64 = 1e-6;

@@ -1,12 +1,13 @@
 //! Gaps to a surface through data points: closest point, normal, and the place at which the force is transferred.
 
+use tiprub_cosim::persist::{Persist, StateReader, StateWriter};
+
 use super::frame::PolarFrame;
 use super::layout::Layout;
 use super::surface_spline::{ClosestPoint, Projection, SurfaceSpline};
 use super::wrench::{At, MotionIncrement};
 use super::{Gap, Geometry, PrescribedMotion, Vector3};
 use crate::math::vector::{length, strided_vector3, vector3_at};
-use crate::persist::{Persist, StateReader, StateWriter};
 
 /// Gap of a node without a surface to touch: infinite, so that it is never used as a distance.
 pub const NOTHING_TO_TOUCH: f64 = f64::INFINITY;

@@ -41,7 +41,7 @@ pub struct MotionIncrement {
     pub shape_rotation: f64,
 }
 
-crate::persist::persist_fields!(MotionIncrement { step, turn, shaft, opening, shape_factor, shape_rotation });
+tiprub_cosim::persist_fields!(MotionIncrement { step, turn, shaft.data.0, opening, shape_factor, shape_rotation });
 
 impl MotionIncrement {
     /// Computes the change from `before` to `now`, a step of length `step` (s). Angles are known only up to whole turns: the turn of the

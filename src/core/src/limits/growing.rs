@@ -4,7 +4,7 @@ use nalgebra::Complex;
 
 use super::held::HeldContacts;
 use super::secular;
-use super::{ContactDirections, delassus, is_solvable};
+use super::{ContactDirections, is_solvable};
 use crate::modes::modal::ModalModel;
 use crate::scene::method::Scheme;
 
@@ -72,11 +72,20 @@ pub fn continuous(
     friction: f64,
     directions: &ContactDirections,
 ) -> Option<Fastest> {
-    // Beyond ω_max h = 2 the matrix would be badly balanced.
-    let unit = step.min(2.0 / model.largest_frequency());
-    let held = || HeldContacts::continuous(model, scheme, unit, friction, directions);
-    let eigenvalues = eigenvalues(&is_looked_at(model, friction).then(held)?)?;
-    let Fastest { rate, frequency } = fastest(&eigenvalues);
+    let unit = balanced(model, step);
+    let quasi_static = scheme.properties().quasi_static;
+    let held = || HeldContacts::continuous(model, quasi_static, unit, friction, directions);
+    fastest_held(&is_looked_at(model, friction).then(held)?, unit)
+}
+
+/// Time (s) up to `step` with which the matrices of the differential equations are well balanced: up to ω_max h = 2.
+fn balanced(model: &ModalModel, step: f64) -> f64 {
+    step.min(2.0 / model.largest_frequency())
+}
+
+/// Finds the fastest growth of held contacts whose rates are per `unit` (s).
+fn fastest_held(held: &HeldContacts, unit: f64) -> Option<Fastest> {
+    let Fastest { rate, frequency } = fastest(&eigenvalues(held)?);
     Some(Fastest { rate: rate / unit, frequency: frequency / unit })
 }
 
@@ -89,12 +98,13 @@ pub fn without_node_mass(
     friction: f64,
     directions: &ContactDirections,
 ) -> Option<Fastest> {
-    let scheme = Scheme::MasslessBoundary;
-    let is_limit = || is_solvable(&delassus(model, scheme, step, friction, directions));
-    if model.dynamic_modes(scheme) == 0 || !is_limit() {
+    if !is_looked_at(model, friction) {
         return None;
     }
-    continuous(model, scheme, step, friction, directions).filter(|found| found.rate.is_finite())
+    let unit = balanced(model, step);
+    let held = HeldContacts::continuous(model, true, unit, friction, directions);
+    let has_limit = !held.modes.is_empty() && held.residual.as_ref().is_some_and(is_solvable);
+    fastest_held(has_limit.then_some(&held)?, unit).filter(|found| found.rate.is_finite())
 }
 
 /// Computes [`growth`] for a known growth of the differential equations.
@@ -214,7 +224,7 @@ mod tests {
             let directions: ContactDirections =
                 (0..contacts).map(|_| (-Vector3::x(), random.of(&[1.0, -1.0]) * Vector3::y())).collect();
             let held = [
-                HeldContacts::continuous(&model, scheme, step, friction, &directions),
+                HeldContacts::continuous(&model, scheme.properties().quasi_static, step, friction, &directions),
                 HeldContacts::stepped(&model, scheme, step, friction, &directions),
             ];
             tried += 1.0;

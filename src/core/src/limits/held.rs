@@ -21,19 +21,19 @@ pub struct HeldContacts {
 }
 
 impl HeldContacts {
-    /// Creates the modes of a model under a scheme with all contacts of `directions` closed and sliding.
+    /// Creates the modes of a model, the highest of them quasi-static or not, with all contacts of `directions` closed and sliding.
     fn new(
         model: &ModalModel,
-        scheme: Scheme,
+        quasi_static: bool,
         friction: f64,
         directions: &ContactDirections,
         mode: impl Fn(usize) -> [f64; 3],
         late: f64,
     ) -> Self {
         let (normals, forces) = directional_modes(model, friction, directions);
-        let (dynamic, contacts) = (model.dynamic_modes(scheme), directions.len());
-        let fixed = model.len() - dynamic;
-        let residual = (scheme == Scheme::MasslessBoundary).then(|| {
+        let (fixed, contacts) = (if quasi_static { model.quasi_static.min(model.len()) } else { 0 }, directions.len());
+        let dynamic = model.len() - fixed;
+        let residual = quasi_static.then(|| {
             let bent = DMatrix::from_fn(contacts, fixed, |node, column| {
                 let frequency = model.frequencies[dynamic + column];
                 forces[(node, dynamic + column)] / (frequency * frequency)
@@ -49,10 +49,10 @@ impl HeldContacts {
         }
     }
 
-    /// Creates the problem of the differential equations, with s per `step` (s).
+    /// Creates the problem of the differential equations, with s per `step` (s) and the highest modes quasi-static or not.
     pub fn continuous(
         model: &ModalModel,
-        scheme: Scheme,
+        quasi_static: bool,
         step: f64,
         friction: f64,
         directions: &ContactDirections,
@@ -61,7 +61,7 @@ impl HeldContacts {
             let angle = step * model.frequencies[mode];
             [2.0 * model.damping_ratios[mode] * angle, angle * angle, step * step]
         };
-        Self::new(model, scheme, friction, directions, mode, 0.0)
+        Self::new(model, quasi_static, friction, directions, mode, 0.0)
     }
 
     /// Creates the problem of the recurrence q⁺ = q + d⁺, d⁺ = βd − κq + cφ_fᵀF, which multiplies a motion by 1 + s per step.
@@ -76,8 +76,9 @@ impl HeldContacts {
             let found = model.coefficient(mode, 1.0, scheme, step);
             [1.0 - found.beta + found.kappa, found.kappa, found.load_compliance()]
         };
-        let late = if scheme.acts_later() { 1.0 } else { 0.0 };
-        Self::new(model, scheme, friction, directions, mode, late)
+        let properties = scheme.properties();
+        let late = if properties.delays_contact { 1.0 } else { 0.0 };
+        Self::new(model, properties.quasi_static, friction, directions, mode, late)
     }
 
     /// Number of contacts.

@@ -42,7 +42,7 @@ impl SetGrowth {
     ) -> Self {
         // Contact forces that act a step late cause motions of their own, above the frequencies of all modes. So do motions that change
         // sign from step to step. With central differences the sampled frequency is higher than the frequency of the motion.
-        let is_of_step = scheme.acts_later() || growth.swing * step > ALTERNATES;
+        let is_of_step = scheme.properties().delays_contact || growth.swing * step > ALTERNATES;
         let frequency = growth.swing.min(model.largest_frequency());
         let share = if is_of_step { 1.0 } else { share_of(model, directions, frequency) };
         Self { growth, share }

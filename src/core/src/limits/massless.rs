@@ -14,13 +14,11 @@
 
 use nalgebra::DMatrix;
 
-use crate::limits::{OTHER_SCHEME, rounded_down, shorter};
+use super::finding::{ErrorKind, WarningKind};
 use crate::math::vector::{Vector3, vector3_at};
 use crate::modes::modal::ModalModel;
 use crate::modes::schemes::{ModeCoefficients, damped_frequency};
 use crate::scene::method::Scheme;
-use crate::warning::Topic;
-use crate::{Error, Result, Warning};
 
 /// Margin below the limit.
 const MARGIN: f64 = 1e-6;
@@ -106,18 +104,11 @@ impl MasslessCheck<'_> {
     /// infinite if closed contact is stable up to there.
     ///
     /// # Errors
-    /// Residual flexibility that is singular along the normals.
-    pub fn limit(&self, largest: f64) -> Result<MasslessLimit> {
+    /// Residual flexibility that is singular along the normals, or much stiffer than the modes with inertia.
+    pub fn limit(&self, largest: f64) -> Result<MasslessLimit, ErrorKind> {
         let stiffening = self.stiffening(1e-3 / self.model.largest_frequency());
         if stiffening > TOO_STIFF {
-            return Err(Error::invalid(
-                "scheme massless-boundary",
-                format!(
-                    "closed contact raises the square of the highest frequency of the modes with inertia by a factor \
-                     of {stiffening:.3e}, so bouncing nodes gain energy with any internal step"
-                ),
-                "Use modal-exact, or a ROM with more modes or softer contact nodes",
-            ));
+            return Err(ErrorKind::StiffContact { factor: stiffening });
         }
         let closed = self.closed(largest)?;
         if closed.is_infinite() {
@@ -135,16 +126,10 @@ impl MasslessCheck<'_> {
         self.eigenvalues(step).map_or(1.0, |(master, slave)| (master + slave) / open)
     }
 
-    fn closed(&self, largest: f64) -> Result<f64> {
+    fn closed(&self, largest: f64) -> Result<f64, ErrorKind> {
         let unstable = |step: f64| {
             let found = self.eigenvalues(step).map(|(master, slave)| master + slave >= 4.0 * (1.0 - MARGIN));
-            found.ok_or_else(|| {
-                Error::invalid(
-                    "scheme massless-boundary",
-                    "the quasi-static modes have no flexibility along the normal of a contact node",
-                    "Use modal-exact, or a ROM with the contact nodes as the interface of the reduction",
-                )
-            })
+            found.ok_or(ErrorKind::RigidNormal)
         };
         let first = 1e-3 / self.model.largest_frequency();
         let mut high = first.min(largest);
@@ -175,32 +160,15 @@ fn per_mass(mode: &ModeCoefficients, coefficient: f64) -> f64 {
     2.0 * coefficient / (1.0 + mode.beta)
 }
 
-/// Error for a step (s) at or beyond the usable one.
-pub fn refusal(step: f64, limit: MasslessLimit) -> Error {
-    let MasslessLimit { closed, usable } = limit;
-    Error::Unstable {
-        problem: format!(
-            "the internal step of {step:.3e} s is too long for massless-boundary: closed contact on the residual \
-             flexibility of the contact nodes is stable only below {closed:.6e} s, and contact that opens and closes \
-             gains energy above {usable:.6e} s"
-        ),
-        remedy: format!("{}{OTHER_SCHEME}", shorter(usable)),
-    }
+/// Rejects a step (s) at or beyond the usable one.
+///
+/// # Errors
+/// [`ErrorKind::MasslessStep`] with numbers.
+pub fn check(step: f64, limit: MasslessLimit) -> Result<(), ErrorKind> {
+    if step < limit.usable { Ok(()) } else { Err(ErrorKind::MasslessStep { step, limit }) }
 }
 
 /// Warning for a step (s) at which contact that opens and closes gains energy unless damping dissipates it.
-pub fn warning(step: f64, limit: MasslessLimit) -> Option<Warning> {
-    (step >= QUIET * limit.closed).then(|| {
-        Warning::new(
-            Topic::MasslessEnergy,
-            format!(
-                "with massless-boundary and an internal step of {step:.3e} s, contact that opens and closes may gain \
-                 energy (visible as a decreasing `impact_loss`)"
-            ),
-            format!(
-                "Set `time.step` below {:.2e} s, or a damping ratio of at least 1e-3",
-                rounded_down(QUIET * limit.closed)
-            ),
-        )
-    })
+pub fn warning(step: f64, limit: MasslessLimit) -> Option<WarningKind> {
+    (step >= QUIET * limit.closed).then_some(WarningKind::MasslessEnergy { step, limit })
 }

@@ -1,9 +1,11 @@
 //! Implausible values: values within their range that are probably mistakes of units, axes or sets. They are errors unless the scene
 //! accepts them (`accept_implausible`); then they are warnings.
 
+use tiprub_cosim::shown;
+use tiprub_cosim::warning::{Topic, Warning};
+
 use crate::scene::rom::DisplacementFrame;
-use crate::warning::{Topic, Warning};
-use crate::{Error, Rom, shown};
+use crate::{Error, Rom};
 
 /// Remedy for a rejected value that is intended.
 pub const IF_MEANT: &str =

@@ -19,10 +19,9 @@
 //!
 //! Steps are rejected if both ω_max h ≥ [`HIGHEST`] and the fraction exceeds [`SHARE`].
 
-use crate::limits::{rounded_down, shorter};
+use super::finding::{ErrorKind, WarningKind};
 use crate::modes::modal::ModalModel;
-use crate::warning::Topic;
-use crate::{Error, Result, Warning};
+use crate::scene::method::Scheme;
 
 /// Steps below this ω_max h are not rejected.
 pub const HIGHEST: f64 = 10.0;
@@ -31,7 +30,7 @@ pub const HIGHEST: f64 = 10.0;
 pub const SHARE: f64 = 0.5;
 /// Fraction of the limit above which errors of some per cent are reported. For rotor 37 with nine patches and 80 modes, µ = 0.15, the error
 /// of displacements is 5.8 % of the clearance at 0.68 of the limit, 4.0 % at 0.34, 0.5 % at 0.14 and 0.1 % at 0.07.
-const NEAR: f64 = 0.2;
+pub const NEAR: f64 = 0.2;
 /// Modes beyond this ωh are not resolved.
 const PASSED_OVER: f64 = 2.0;
 
@@ -73,42 +72,16 @@ pub fn limit_along_axes(model: &ModalModel) -> f64 {
 }
 
 /// Warning for a step (s) near the `limit` (s): errors grow with its square, to some four per cent at the limit.
-pub fn warning(step: f64, limit: f64) -> Option<Warning> {
-    (step >= NEAR * limit).then(|| {
-        Warning::new(
-            Topic::UnresolvedFlexibility,
-            format!(
-                "modal-exact with an internal step of {step:.3e} s leaves much of the contact flexibility unresolved: \
-                 expect errors of a few per cent"
-            ),
-            format!("Set `time.step` below {:.2e} s", rounded_down(NEAR * limit)),
-        )
-    })
+pub fn warning(scheme: Scheme, step: f64, limit: f64) -> Option<WarningKind> {
+    (step >= NEAR * limit).then_some(WarningKind::UnresolvedFlexibility { scheme, step, limit })
 }
 
-/// Rejects a step (s) at or beyond the `limit` (s) of a structure whose largest angular frequency (rad/s) is `frequency`. Allocates only to
-/// reject.
+/// Rejects a step (s) at or beyond the `limit` (s) of a structure whose largest angular frequency (rad/s) is `frequency`.
 ///
 /// # Errors
-/// [`Error::Unstable`] with numbers.
-pub fn check(step: f64, limit: f64, frequency: f64) -> Result<()> {
-    if step < limit {
-        return Ok(());
-    }
-    Err(Error::Unstable {
-        problem: format!(
-            "modal-exact with an internal step of {step:.3e} s (ω_max·h = {:.4}) does not resolve modes above {:.4} \
-             kHz, which account for more than half of the contact flexibility: forces, friction work and energies would be \
-             wrong by ten per cent, and by far more with longer steps",
-            frequency * step,
-            1e-3 * PASSED_OVER / step / std::f64::consts::TAU
-        ),
-        remedy: format!(
-            "{}, preferably below {:.3e} s, or use massless-boundary",
-            shorter(limit),
-            PASSED_OVER / frequency
-        ),
-    })
+/// [`ErrorKind::UnresolvedContact`] with numbers.
+pub fn check(scheme: Scheme, step: f64, limit: f64, frequency: f64) -> Result<(), ErrorKind> {
+    if step < limit { Ok(()) } else { Err(ErrorKind::UnresolvedContact { scheme, step, limit, frequency }) }
 }
 
 #[cfg(test)]
@@ -154,7 +127,7 @@ mod tests {
     /// Errors are proportional to the square of the step: some four per cent at the limit; a tenth of that is not reported.
     #[test]
     fn warns_above_a_fifth_of_the_limit() {
-        let near = |share: f64| warning(share * 1e-5, 1e-5).is_some();
+        let near = |share: f64| warning(Scheme::default(), share * 1e-5, 1e-5).is_some();
         assert!(near(0.21) && near(0.9) && !near(0.19));
     }
 }

@@ -14,12 +14,13 @@ mod predict;
 mod span;
 
 use nalgebra::DMatrix;
+use tiprub_cosim::persist::{Persist, StateReader, StateWriter};
+use tiprub_cosim::persist_fields;
 
 use super::excitation::{Excitation, SectorLoads};
 use super::modal::{ModalModel, ModalSpin};
 use crate::math::simd::InstructionSet;
 use crate::modes::schemes::{ModeCoefficients, Velocity, free_increment};
-use crate::persist::{Persist, StateReader, StateWriter, persist_fields};
 use crate::scene::method::Scheme;
 use coupling::Coupling;
 use heated::HeatLoads;

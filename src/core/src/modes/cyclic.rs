@@ -17,12 +17,14 @@ mod span;
 #[cfg(test)]
 mod tests;
 
+use tiprub_cosim::persist::{Persist, StateReader, StateWriter};
+use tiprub_cosim::persist_fields;
+
 use super::bank::{FLUSH_BELOW, LANES, lanes};
 use super::excitation::DiskLoads;
 use crate::math::simd::InstructionSet;
 use crate::math::vector::Vector3;
 use crate::modes::schemes::{ModeCoefficients, Velocity, free_increment};
-use crate::persist::{Persist, StateReader, StateWriter, persist_fields};
 use crate::scene::method::Scheme;
 use fourier::{Fourier, Synthesis};
 pub use model::{CyclicModel, DiameterModes};

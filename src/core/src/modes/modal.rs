@@ -3,10 +3,11 @@
 //! For modal damping the two forms are algebraically identical; prediction then costs O(number of modes).
 
 use nalgebra::{DMatrix, SymmetricEigen};
+use tiprub_cosim::shown;
 
 use crate::modes::schemes::ModeCoefficients;
 use crate::scene::method::Scheme;
-use crate::{Error, Result, Rom, shown};
+use crate::{Error, Result, Rom};
 
 /// Eigenvalues below this fraction of the largest are not resolved by the eigenproblem; their Rayleigh quotient is used.
 pub(super) const RIGID_FRACTION: f64 = 1e-13;

@@ -1,9 +1,10 @@
 //! The two kinds of sectors: uncoupled sectors and a disk of coupled sectors.
 
+use tiprub_cosim::persist::{StateReader, StateWriter};
+
 use super::bank::{BankOptions, ModalBank};
 use super::cyclic::{CyclicBank, CyclicModel};
 use super::modal::ModalModel;
-use crate::persist::{StateReader, StateWriter};
 use crate::scene::method::Scheme;
 
 /// Modes of the sectors.

@@ -1,7 +1,7 @@
 //! Methods that a scene may choose: time-stepping schemes and contact solvers.
 
-use crate::variables::Enumeration;
 use serde::{Deserialize, Serialize};
+use tiprub_cosim::variables::Enumeration;
 
 /// Time-stepping scheme of the modal equations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -28,26 +28,86 @@ impl Scheme {
     /// Schemes whose modes follow recurrences, all with one step.
     pub const RECURRENCES: [Self; 3] = [Self::CentralDifference, Self::ModalExact, Self::MasslessBoundary];
 
+    /// The paper's scheme, which the preset `paper` fixes.
+    pub const PAPER: Self = Self::CentralDifference;
+
+    /// The scheme with adaptive steps that defaults and remedies propose.
+    pub const ADAPTIVE: Self = Self::Galerkin;
+
+    /// Returns the facts about the method on which limits, checks and remedies depend.
+    pub fn properties(self) -> &'static SchemeProperties {
+        match self {
+            Self::CentralDifference => &SchemeProperties {
+                stable_below: 2.0,
+                resonance_error: Some(ResonanceError {
+                    resolved_turn: 0.245,
+                    amplitude: |turn| turn / libm::sin(turn) - 1.0,
+                    frequency: |turn| turn * turn / 24.0,
+                }),
+                ..SchemeProperties::UNLIMITED
+            },
+            Self::ModalExact => &SchemeProperties { resolved_up_to: 2.0, ..SchemeProperties::UNLIMITED },
+            Self::MasslessBoundary => {
+                &SchemeProperties { quasi_static: true, delays_contact: true, ..SchemeProperties::UNLIMITED }
+            }
+            Self::Galerkin => &SchemeProperties { quasi_static: true, adaptive: true, ..SchemeProperties::UNLIMITED },
+        }
+    }
+
     /// Returns whether the highest modes, three per contact node, are quasi-static.
     pub fn is_massless(self) -> bool {
-        match self {
-            Self::CentralDifference | Self::ModalExact => false,
-            Self::MasslessBoundary | Self::Galerkin => true,
-        }
+        self.properties().quasi_static
     }
 
     /// Returns whether contact forces act one step after they are found.
     pub fn acts_later(self) -> bool {
-        match self {
-            Self::CentralDifference | Self::ModalExact | Self::Galerkin => false,
-            Self::MasslessBoundary => true,
-        }
+        self.properties().delays_contact
     }
 
     /// Name in scene files and in the FMU's enumeration.
     pub fn name(self) -> &'static str {
         SCHEMES.items[self as usize].0
     }
+}
+
+/// Facts about a time-stepping scheme.
+#[derive(Debug)]
+pub struct SchemeProperties {
+    /// True if steps are as long as a tolerance allows; such steps need no limits.
+    pub adaptive: bool,
+    /// True if the highest modes, three per contact node, are quasi-static: contact nodes have no mass.
+    pub quasi_static: bool,
+    /// True if contact forces act one step after they are found.
+    pub delays_contact: bool,
+    /// ωh from which on free vibration is unstable; infinite if any step is stable.
+    pub stable_below: f64,
+    /// ωh up to which a mode responds correctly to contact forces; infinite if every accepted step resolves all modes with inertia.
+    pub resolved_up_to: f64,
+    /// Error of resonances that harmonic loads excite; `None` if the scheme corrects or controls it.
+    pub resonance_error: Option<ResonanceError>,
+}
+
+impl SchemeProperties {
+    /// A scheme without limits whose modes all have inertia.
+    const UNLIMITED: Self = Self {
+        adaptive: false,
+        quasi_static: false,
+        delays_contact: false,
+        stable_below: f64::INFINITY,
+        resolved_up_to: f64::INFINITY,
+        resonance_error: None,
+    };
+}
+
+/// Error of a resonance, as functions of the angle (rad) by which the load turns per step.
+#[derive(Debug, Clone, Copy)]
+pub struct ResonanceError {
+    /// Turn above which the amplitude is more than 1 % too large (rad).
+    pub resolved_turn: f64,
+    /// Fraction by which the amplitude is too large.
+    pub amplitude: fn(f64) -> f64,
+    /// Fraction by which the frequency is shifted.
+    pub frequency: fn(f64) -> f64,
 }
 
 /// The enumeration of the FMU.

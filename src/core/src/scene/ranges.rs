@@ -1,8 +1,6 @@
 //! Allowed range of every number in a scene or a ROM, in one table. Beyond it no real machine is described, and sums and squares of such
 //! numbers lose the digits of the others. Implausible values within the range are checked by [`crate::limits::plausibility`].
 
-use crate::{Error, Result, shown};
-
 /// Largest coordinate of a contact node, and largest radius (m): eight times a wind turbine.
 pub const POSITION: f64 = 1e3;
 /// Smallest radius of a contact node (m): that of a hair.
@@ -11,8 +9,6 @@ pub const SMALLEST_RADIUS: f64 = 1e-5;
 pub const SMALL: f64 = 0.1;
 /// Largest slope of a tip contour (-): 0.06° off a plane face.
 pub const SLOPE: f64 = 1e3;
-/// Largest entry of mass and stiffness matrices, including spin, in any unit of the coordinates. Squares do not overflow.
-pub const MATRIX: f64 = 1e30;
 /// Largest entry of a contact map, in any unit of the coordinates: 1/√m of a mass of 1e-30 kg.
 pub const MAP: f64 = 1e15;
 /// Largest stress of a unit coordinate (Pa): the stress of the largest strain of a contact map in diamond.
@@ -33,11 +29,6 @@ pub const LINE_LOAD: f64 = 1e12;
 pub const DEPTH: f64 = 1e12;
 /// Largest number of lobes around the circumference.
 pub const LOBES: f64 = 1e6;
-/// Largest start and stop time, and communication step (s): thirty years.
-pub const TIME: f64 = 1e9;
-/// Shortest step (s), internal or of communication. Positions of 1 m are rounded to 1e-16 m, which a step of 1e-12 s turns into velocities
-/// of 1e-4 m/s: a ten-thousandth of those of rubbing blades. Much shorter steps would turn rounding into impacts.
-pub const SHORTEST_STEP: f64 = 1e-12;
 /// Longest internal step (s): far above the period of any mode of a blade.
 pub const LONGEST_STEP: f64 = 1.0;
 /// Largest number of internal steps of one communication step.
@@ -64,8 +55,6 @@ pub const FREQUENCY_FACTORS: [f64; 2] = [0.5, 2.0];
 pub const SPLINE_AROUND: [usize; 2] = [4, 2000];
 /// Smallest and largest number of rings of data points.
 pub const SPLINE_ALONG: [usize; 2] = [2, 200];
-/// Largest number of patches: each is an output.
-pub const PATCHES: usize = 10_000;
 /// Coating thickness (m): from a few atoms, whose effect on blades that move by micrometres is lost in rounding, to a tenth of a metre;
 /// real coatings have millimetres.
 pub const THICKNESS: [f64; 2] = [1e-9, 0.1];
@@ -81,34 +70,3 @@ pub const NORMAL_RATIO: [f64; 2] = [0.05, 20.0];
 pub const CONTACT_WIDTH: [f64; 2] = [1e-6, 1.0];
 /// Largest number of cells of a coating: 80 megabytes of state.
 pub const CELLS: usize = 10_000_000;
-
-/// Largest number of values of all variables of a scene: a wear map of a thousand by a thousand cells. Each has a name and a column in
-/// results.
-pub const VALUES: usize = 1_000_000;
-
-/// Rejects a number outside `low` to `high`.
-///
-/// # Errors
-/// A number out of range; the error names `field` and the range.
-pub fn within(field: &str, value: f64, low: f64, high: f64) -> Result<()> {
-    if (low..=high).contains(&value) {
-        return Ok(());
-    }
-    let kind = if value.is_finite() { "value" } else { "finite value" };
-    // The smallest positive number stands for any positive value.
-    let range = if low.to_bits() == 1 {
-        format!("above 0 and at most {}", shown(high))
-    } else {
-        format!("between {} and {}", shown(low), shown(high))
-    };
-    let remedy = format!("Give a {kind} {range}");
-    Err(Error::invalid(field, format!("{} is out of range", shown(value)), remedy))
-}
-
-/// Rejects a number that is not finite, or whose magnitude exceeds `most`.
-///
-/// # Errors
-/// A number out of range; the error names `field` and the range.
-pub fn at_most(field: &str, value: f64, most: f64) -> Result<()> {
-    within(field, value, -most, most)
-}

@@ -11,9 +11,10 @@ mod support;
 mod watched;
 
 use nalgebra::DMatrix;
+use tiprub_cosim::{ThermalPatch, bounds, shown};
 
 use crate::scene::ranges;
-use crate::{Error, Result, shown};
+use crate::{Error, Result};
 pub use cyclic::Harmonic;
 pub(crate) use cyclic::cholesky;
 pub use support::{SUPPORT_ROWS, SupportRows};
@@ -123,15 +124,6 @@ pub struct Spin {
     pub centrifugal_load_speed4: Vec<f64>,
     /// Largest |Ω| for which K₁ and K₂ were fitted (rad/s).
     pub largest_speed: f64,
-}
-
-/// Part of a structure with one uniform temperature.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ThermalPatch {
-    /// Start and end angle (rad), start < end ≤ start + 2π.
-    pub angle: [f64; 2],
-    /// Start and end axial position (m).
-    pub axial: [f64; 2],
 }
 
 /// Thermal loads of one structure.
@@ -244,17 +236,17 @@ impl Rom {
         self.validate_shapes(remedy)?;
         for (name, matrix) in [("mass", &self.mass), ("stiffness", &self.stiffness), ("contact_map", &self.contact_map)]
         {
-            entries(name, matrix, if name == "contact_map" { ranges::MAP } else { ranges::MATRIX }, remedy)?;
+            entries(name, matrix, if name == "contact_map" { ranges::MAP } else { bounds::MATRIX }, remedy)?;
         }
         for (index, node) in self.contact_nodes.iter().enumerate() {
             self.validate_place(&format!("ROM array `contact_positions`, node {}", index + 1), node, remedy)?;
             let what = format!("ROM array `contact_meridional_slopes`, node {}", index + 1);
-            ranges::at_most(&what, node.meridional_slope, ranges::SLOPE)?;
+            bounds::at_most(&what, node.meridional_slope, ranges::SLOPE)?;
             for (name, value, most) in [
                 ("contact_areas", node.area, ranges::POSITION * ranges::POSITION),
                 ("contact_lengths", node.length, ranges::POSITION),
             ] {
-                ranges::within(&format!("ROM array `{name}`, node {}", index + 1), value, 0.0, most)?;
+                bounds::within(&format!("ROM array `{name}`, node {}", index + 1), value, 0.0, most)?;
             }
         }
         self.validate_definiteness(remedy)?;
@@ -327,11 +319,11 @@ impl Rom {
         }
         let mut lengths = &node.position[..];
         if self.frame == DisplacementFrame::Cylindrical {
-            ranges::within(what, node.position[0], ranges::SMALLEST_RADIUS, ranges::POSITION)?;
-            ranges::at_most(what, node.position[1], ranges::ANGLE)?;
+            bounds::within(what, node.position[0], ranges::SMALLEST_RADIUS, ranges::POSITION)?;
+            bounds::at_most(what, node.position[1], ranges::ANGLE)?;
             lengths = &node.position[2..];
         }
-        lengths.iter().try_for_each(|length| ranges::at_most(what, *length, ranges::POSITION))
+        lengths.iter().try_for_each(|length| bounds::at_most(what, *length, ranges::POSITION))
     }
 
     fn validate_spin(&self, remedy: &str) -> Result<()> {
@@ -348,7 +340,7 @@ impl Rom {
                 let problem = shape_or_value(matrix.shape(), (order, order));
                 return Err(Error::invalid(what, problem, remedy));
             }
-            entries(name, matrix, ranges::MATRIX, remedy)?;
+            entries(name, matrix, bounds::MATRIX, remedy)?;
             let asymmetry = (matrix - matrix.transpose() * sign).amax();
             if asymmetry > 1e-8 * matrix.amax() {
                 let kind = if sign > 0.0 { "symmetric" } else { "skew-symmetric" };
@@ -364,13 +356,13 @@ impl Rom {
                 return Err(Error::invalid(format!("ROM array `{name}`"), problem, remedy));
             }
             load.iter()
-                .try_for_each(|value| ranges::at_most(&format!("ROM array `{name}`"), *value, ranges::MATRIX))?;
+                .try_for_each(|value| bounds::at_most(&format!("ROM array `{name}`"), *value, bounds::MATRIX))?;
         }
         if !(spin.largest_speed.is_finite() && spin.largest_speed > 0.0) {
             let problem = format!("{} rad/s is not a finite positive speed", shown(spin.largest_speed));
             return Err(Error::invalid("ROM metadata `largest_speed`", problem, remedy));
         }
-        ranges::at_most("ROM metadata `largest_speed`", spin.largest_speed, ranges::SPEED)
+        bounds::at_most("ROM metadata `largest_speed`", spin.largest_speed, ranges::SPEED)
     }
 
     fn validate_thermal(&self, remedy: &str) -> Result<()> {
@@ -397,8 +389,8 @@ impl Rom {
                 ));
             }
             let what = format!("ROM array `thermal_patches`, patch {}", index + 1);
-            patch.angle.iter().try_for_each(|value| ranges::at_most(&what, *value, ranges::ANGLE))?;
-            patch.axial.iter().try_for_each(|value| ranges::at_most(&what, *value, ranges::POSITION))?;
+            patch.angle.iter().try_for_each(|value| bounds::at_most(&what, *value, ranges::ANGLE))?;
+            patch.axial.iter().try_for_each(|value| bounds::at_most(&what, *value, ranges::POSITION))?;
         }
         Ok(())
     }

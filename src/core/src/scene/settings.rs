@@ -9,10 +9,10 @@ mod validation;
 
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
+use tiprub_cosim::warning::Topic;
 
 use crate::Rom;
 use crate::scene::method::{Scheme, Solver};
-use crate::warning::Topic;
 pub use blades::{ExcitationSettings, ForceDirection, InitialSettings};
 pub use coating::{CoatingSettings, CuttingSettings};
 
@@ -496,7 +496,7 @@ pub struct SceneSettings {
     /// True if implausible values ([`crate::limits::plausibility`]) are warnings instead of errors.
     #[serde(default, skip_serializing_if = "is_default")]
     pub accept_implausible: bool,
-    /// Identifiers of silenced warnings ([`crate::warning::Topic::id`]).
+    /// Identifiers of silenced warnings ([`tiprub_cosim::warning::Topic::id`]).
     #[serde(default, skip_serializing_if = "is_default")]
     pub silence: Vec<String>,
     /// Flexible structures.
@@ -531,7 +531,7 @@ impl SceneSettings {
 
     /// Returns whether the importer may set a tolerance instead of a step.
     pub fn takes_a_tolerance(&self) -> bool {
-        self.time.tolerance.is_some() || self.time.scheme == Scheme::Galerkin
+        self.time.tolerance.is_some() || self.time.scheme.properties().adaptive
     }
 }
 

@@ -1,11 +1,14 @@
 //! Check of the energy of a run at every communication point, and the messages if it is too large.
 
+use tiprub_cosim::shown_time;
+use tiprub_cosim::warning::Topic;
+
 use super::{Simulation, SimulationPhase};
+use crate::limits::finding::Subject;
 use crate::scene::method::{Scheme, Solver};
 use crate::system::Loss;
 use crate::system::ledger::Ledger;
-use crate::warning::Topic;
-use crate::{Error, Result, Warning, shown_time};
+use crate::{Error, Result, Warning};
 
 /// The instantaneous energy may exceed the supplied energy by this factor. With modal-exact it is cos²(ωh/2) of the supplied energy, a
 /// quarter at ωh = 2π/3, the limit of resolution; with central differences at least 1 − (ωh/2)². Any larger energy is in modes that the
@@ -23,11 +26,11 @@ const CURVATURE_OF_ALL: f64 = 0.1;
 impl Simulation {
     /// Warns of the first curvature work that is large compared with the net work of inputs.
     pub(super) fn note_curvature(&mut self, time: f64) {
-        if self.warning_state.curvature {
-            return;
-        }
         let found = self.system.ledgers().iter().enumerate().find_map(|(set, ledger)| Some((set, misled(ledger)?)));
         let Some((set, (who, work))) = found else { return };
+        if !self.warning_state.is_first(Topic::CurvatureWork, Subject::Scene) {
+            return;
+        }
         let curvature = self.system.ledgers()[set].curvature_work.value();
         let problem = format!(
             "up to t = {} s, the rotation of contact normals and the curvature of surfaces within internal steps have added \
@@ -36,7 +39,6 @@ impl Simulation {
             shown_time(time),
             self.of_set(set)
         );
-        self.warning_state.curvature = true;
         self.note(Warning::new(Topic::CurvatureWork, problem, "Use a smaller internal step"));
     }
 
@@ -45,13 +47,13 @@ impl Simulation {
     /// known; that scheme has a step limit instead.
     pub(super) fn check_energy(&mut self, time: f64) -> Result<()> {
         let settings = self.system.settings();
-        if !settings.ledger || settings.scheme == Scheme::MasslessBoundary {
+        if !settings.ledger || settings.scheme.properties().delays_contact {
             return Ok(());
         }
         let Some(set) = (0..self.energies.len()).find(|set| !self.has_its_energy(*set)) else { return Ok(()) };
         self.phase = SimulationPhase::Failed;
-        Err(Error::Unstable {
-            problem: format!(
+        Err(Error::unstable(
+            format!(
                 "at t = {} s (last good time {} s) the kinetic and strain energy{} is {:.4e} J, but it was {:.4e} J at \
                  the start and work minus friction and damping losses supplied only {:.4e} J: modes that the internal \
                  step of {:.3e} s does not resolve have gained spurious energy",
@@ -63,18 +65,20 @@ impl Simulation {
                 self.supplied(set),
                 self.system.step_size()
             ),
-            remedy: "Use a smaller internal step (internal_step_max)".to_owned(),
-        })
+            "Use a smaller internal step (internal_step_max)",
+        ))
     }
 
     /// Returns whether structures that influence each other have no more energy than was supplied to them.
     fn has_its_energy(&self, set: usize) -> bool {
         let step = self.system.step_size();
-        let factor = match self.system.settings().scheme {
-            Scheme::CentralDifference => {
-                1.0 / (1.0 - self.compiled.largest_product(self.system.sets().members(set), step).powi(2) / 4.0)
-            }
-            _ => ENERGY_FACTOR,
+        let stable_below = self.system.settings().scheme.properties().stable_below;
+        let factor = if stable_below.is_finite() {
+            let frequency = self.compiled.largest_frequency(self.system.sets().members(set));
+            let share = (frequency * step / stable_below).min(1.0 - 1e-9);
+            1.0 / (1.0 - share * share)
+        } else {
+            1.0
         };
         let bound = factor.max(ENERGY_FACTOR) * (self.initial_energies[set] + self.supplied(set))
             + ENERGY_SLACK * self.system.ledgers()[set].scale();
@@ -113,17 +117,16 @@ impl Simulation {
                     "impacts{of} have added {given:.3e} J to the vibration, out of {exchanged:.3e} J of contact work, \
                      although they can only dissipate"
                 ),
-                match (settings.solver, settings.scheme) {
-                    (Solver::Film, _) => {
-                        "Use solver = \"lcp\", because film leaves nodes inside the surface for one step"
-                    }
-                    (_, Scheme::Galerkin) => "Use a smaller `tolerance`",
-                    (_, Scheme::MasslessBoundary) => {
-                        "Use a smaller internal step or more damping, or the scheme modal-exact"
-                    }
-                    _ => "Use a smaller internal step",
-                }
-                .to_owned(),
+                if settings.solver == Solver::Film {
+                    "Use solver = \"lcp\", because film leaves nodes inside the surface for one step".to_owned()
+                } else if settings.scheme.properties().adaptive {
+                    "Use a smaller `tolerance`".to_owned()
+                } else if settings.scheme.properties().delays_contact {
+                    let other = Scheme::default().name();
+                    format!("Use a smaller internal step or more damping, or the scheme {other}")
+                } else {
+                    "Use a smaller internal step".to_owned()
+                },
             ),
         }
     }

@@ -1,6 +1,7 @@
 //! Effects on blades other than contact: excitation by an engine order, heat, initial motion.
 
 use nalgebra::DVector;
+use tiprub_cosim::{shown, shown_time};
 
 use super::compile::{Compiled, CompiledBody};
 use super::drive::Input;
@@ -13,7 +14,7 @@ use crate::scene::method::Scheme;
 use crate::scene::ranges::SOFTENED;
 use crate::scene::rom::WatchedPoints;
 use crate::scene::settings::{InitialSettings, StructureSettings};
-use crate::{Error, Result, Rom, shown, shown_time};
+use crate::{Error, Result, Rom};
 
 /// Modal load per kelvin of coupled sectors, on nodal diameter 0; empty if the scene does not heat them.
 pub fn disk_heat(structure: &StructureSettings, rom: &Rom, model: &ModalModel) -> Vec<f64> {
@@ -71,7 +72,7 @@ pub fn static_stress(
         let load = modes.modal_load(&spin.centrifugal_load).into_iter().zip(&modes.frequencies);
         let moved = load.map(|(load, w)| if *w > 0.0 { load / (w * w) } else { 0.0 });
         let moved = &modes.shapes * DVector::from_iterator(modes.len(), moved);
-        Ok(beyond(growth.column_sum(), &stress.map * moved))
+        Ok::<_, Error>(beyond(growth.column_sum(), &stress.map * moved))
     });
     Ok((heat.unwrap_or_default(), growth.transpose()?.unwrap_or_default()))
 }
@@ -132,7 +133,7 @@ impl Compiled {
                 let problem = format!("`{name}` is not a contact node of the ROM");
                 Error::invalid(format!("{at}.node"), problem, format!("Use one of: {}", names.join(", ")))
             };
-            Ok(3 * node.ok_or_else(unknown)? + direction as usize)
+            node.map(|node| 3 * node + direction as usize).ok_or_else(unknown)
         };
         let row = asked.node.as_ref().zip(asked.direction).map(row).transpose()?;
         Ok(Some(Excitation { order: asked.order, mode: asked.mode.map(|mode| mode - 1), row }))
@@ -287,7 +288,7 @@ impl Simulation {
 
     /// Returns all elements of a variable; empty if it does not exist.
     fn values_of(&self, quantity: Quantity, of: usize) -> Vec<f64> {
-        let variable = self.table.with_quantity_of(quantity, of);
+        let variable = self.values.table().with_quantity_of(quantity, of);
         variable.map_or(Vec::new(), |row| self.values[row.reference as usize..][..row.len()].to_vec())
     }
 

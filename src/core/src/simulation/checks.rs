@@ -1,12 +1,13 @@
 //! Checks of the start of a scene and of its outputs.
 
+use tiprub_cosim::shown_time;
+use tiprub_cosim::variables::Causality;
+use tiprub_cosim::warning::{Topic, Warning};
+
 use super::Simulation;
 use super::compile::Compiled;
 use crate::limits::plausibility::{self, Slip};
-use crate::system::StepFailure;
-use crate::variables::Causality;
-use crate::warning::{Topic, Warning};
-use crate::{Error, Result, shown_time};
+use crate::{Error, Result};
 
 /// Extension of a surface around an axis ([`crate::geometry::surface_spline::REACH`]), and the remedy for a node beyond it.
 pub const OUT_OF_REACH: &str = "a quarter of the axial extent of the surface, the limit of its extrapolation along the \
@@ -83,47 +84,17 @@ impl Simulation {
     /// Checks that the loads and the speed at the start displace the structures by amounts that small displacements can describe.
     pub(super) fn check_initial_state(&self) -> Result<()> {
         let Err(failure) = self.system.check_state() else { return Ok(()) };
-        let blades = |structure: usize| match self.rotors.len() {
-            1 => "the blades".to_owned(),
-            _ => format!("the blades of {}", self.compiled.structure_name(structure)),
-        };
-        let (what, remedy) = match failure {
-            StepFailure::CarrierImplausible { structure } => (
-                format!(
-                    "the {} is displaced at the start by more than a tenth of the radius of the contact nodes",
-                    self.compiled.carrier_name(structure)
-                ),
-                "Check the start values of its loads and temperatures; the model assumes small displacements",
-            ),
-            StepFailure::Curved(curved) => (
-                format!(
-                    "{} are displaced at the start so far around the axis that u²/2r, which the linear gap formula neglects, is as \
-                     large as the clearance",
-                    blades(curved.structure)
-                ),
-                "Check the start value of the speed and the loads of the ROM; the model assumes small displacements",
-            ),
-            StepFailure::Implausible { structure, .. } => (
-                format!(
-                    "{} are displaced at the start by more than a tenth of the radius of the contact nodes",
-                    blades(structure)
-                ),
-                "Check the start value of the speed and the centrifugal loads of the ROM; the model assumes small \
-                 displacements",
-            ),
-            _ => (
-                "the displacements at the start are not finite".to_owned(),
-                "Check the start values of loads, temperatures and speed",
-            ),
-        };
-        Err(Error::invalid("initial state", what, remedy))
+        let (problem, _) = self.failure_texts(failure);
+        let remedy = "Check the start values of loads, temperatures and speed, and the loads of the ROM; the model assumes \
+                      small displacements";
+        Err(Error::invalid("initial state", problem, remedy))
     }
 
     /// Checks that no output is NaN; outputs belong to `time` (s).
     ///
     /// # Examples
     /// ```
-    /// # use tiprub_core::Simulation;
+    /// # use tiprub_core::{CoSimulation, Simulation};
     /// # let scene = tiprub_test_models::rub(2);
     /// # let mut simulation = Simulation::new(&scene)?;
     /// # simulation.initialise(0.0)?;
@@ -137,7 +108,7 @@ impl Simulation {
     /// # Errors
     /// An output that is not a number; the error names it. The state must not be used further.
     pub fn check_outputs(&self, time: f64) -> Result<()> {
-        for variable in self.table.variables().iter().filter(|row| row.causality == Causality::Output) {
+        for variable in self.values.table().variables().iter().filter(|row| row.causality == Causality::Output) {
             let start = variable.reference as usize;
             let values = &self.values[start..start + variable.len()];
             if let Some(element) = values.iter().position(|value| !value.is_finite()) {

@@ -14,10 +14,11 @@ use crate::scene::rom::{ContactNode, SupportRows};
 use crate::scene::settings::{BodyMotion, ContactSettings, Meridian, StructureSettings};
 use crate::scene::shape::CompiledShape;
 use crate::system::{PairParts, StructureParts, SurfaceCarrier, System, SystemSettings, joined};
-use crate::variables::{Quantity, VariableTable};
-use crate::{Error, Result, Rom, Scene, Warning, shown};
+use crate::{Error, Result, Rom, Scene};
 use nalgebra::DMatrix;
 use std::sync::Arc;
+use tiprub_cosim::shown;
+use tiprub_cosim::variables::{Quantity, VariableTable};
 
 use super::blades::{disk_heat, expansion, softened, static_stress};
 use super::contour::check_contour;
@@ -256,16 +257,6 @@ impl Compiled {
         if self.bodies.len() > 1 { self.body(body).0.name.clone() } else { "the rotor".to_owned() }
     }
 
-    /// Adds the name of a master to a text if there are several.
-    pub fn named(&self, body: usize, text: String) -> String {
-        if self.bodies.len() > 1 { format!("{}: {text}", self.body(body).0.name) } else { text }
-    }
-
-    /// Adds the name of a master to a warning if there are several.
-    pub fn warning_of(&self, body: usize, warning: Warning) -> Warning {
-        if self.bodies.len() > 1 { warning.named(&self.body(body).0.name) } else { warning }
-    }
-
     /// Returns the name of a structure of the system.
     pub fn structure_name(&self, structure: usize) -> &str {
         match structure.checked_sub(self.bodies.len()) {
@@ -274,10 +265,12 @@ impl Compiled {
         }
     }
 
-    /// Returns the name of a structure of the system for messages: that of its rotor or casing, if there is one.
+    /// Returns the name of a surface carrier of the system for messages: "casing", or its name if there are several or if it is near a
+    /// free body.
     pub fn carrier_name(&self, structure: usize) -> &str {
+        let is_casing = self.carriers.len() == 1 && self.bodies.iter().all(|body| body.translations.is_none());
         match structure.checked_sub(self.bodies.len()) {
-            Some(carrier) if self.carriers.len() > 1 => &self.carrier(carrier).0.name,
+            Some(carrier) if !is_casing => &self.carrier(carrier).0.name,
             _ => "casing",
         }
     }

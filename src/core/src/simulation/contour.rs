@@ -3,7 +3,9 @@
 //! A surface of revolution takes its normals from the slopes, a surface spline from a curve through the positions. Both must describe the
 //! same contour.
 
-use crate::{Error, Result, Rom, shown};
+use tiprub_cosim::shown;
+
+use crate::{Error, Result, Rom};
 
 /// Allowed difference between given slopes and slopes between positions (-), which turns a normal by 14 degrees. Reasons are means over
 /// patches, a tip that is not quite a surface of revolution, and fillets.

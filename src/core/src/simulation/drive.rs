@@ -1,6 +1,6 @@
 //! One input over time, and the rotor angle as the integral of another.
 
-use crate::persist::persist_fields;
+use tiprub_cosim::persist_fields;
 
 /// One real input: the line requested by the importer, and the acting line.
 ///

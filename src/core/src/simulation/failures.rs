@@ -1,30 +1,28 @@
 //! Messages for failed steps: cause, place and remedy.
 
+use tiprub_cosim::shown_time;
+
 use super::checks::{OUT_OF_REACH, OUT_OF_REACH_REMEDY};
 use super::{Simulation, SimulationPhase};
+use crate::Error;
 use crate::system::{ContactPair, Curved, StepFailure};
-use crate::{Error, shown_time};
 
 impl Simulation {
     /// Returns the error of a step that should have ended at `time`; the simulation must be restored or reset afterwards.
     pub(super) fn fail(&mut self, failure: StepFailure, time: f64) -> Error {
         self.phase = SimulationPhase::Failed;
         if failure == StepFailure::NonFinite {
-            return Error::NonFinite {
-                last_good_time: self.time,
-                time,
-                remedy: "Use a smaller internal step or smaller loads".to_owned(),
-            };
+            return Error::non_finite(self.time, time, "Use a smaller internal step or smaller loads");
         }
         let (problem, remedy) = self.failure_texts(failure);
-        Error::Unstable {
-            problem: format!("at t = {} s (last good time {} s) {problem}", shown_time(time), shown_time(self.time)),
+        Error::unstable(
+            format!("at t = {} s (last good time {} s) {problem}", shown_time(time), shown_time(self.time)),
             remedy,
-        }
+        )
     }
 
     /// Returns the problem and the remedy.
-    fn failure_texts(&self, failure: StepFailure) -> (String, String) {
+    pub(super) fn failure_texts(&self, failure: StepFailure) -> (String, String) {
         let is_free = |structure: usize| self.compiled.bodies[structure].translations.is_some();
         match failure {
             StepFailure::Implausible { structure, .. } if is_free(structure) => {
@@ -39,8 +37,9 @@ impl Simulation {
                     "Use less friction, another internal step or the solver coulomb"
                 },
             ),
-            // Reported elsewhere.
-            StepFailure::NonFinite | StepFailure::Exhausted => (String::new(), String::new()),
+            // The remedy is given elsewhere.
+            StepFailure::NonFinite => ("the displacements are not finite".to_owned(), String::new()),
+            StepFailure::Exhausted => (String::new(), String::new()),
             StepFailure::Implausible { structure, sector } => (
                 format!(
                     "a contact node of {} is displaced by more than a tenth of its radius, has penetrated the \
@@ -213,7 +212,7 @@ impl Simulation {
         let mut bodies = std::iter::once(structure).chain(others).filter(|body| *body < self.rotors.len());
         let speed = |body: usize| self.inputs.rotors[body].speed.at(0.0);
         let found = bodies.find_map(|body| limits.grows(body, speed(body)));
-        found.map_or_else(String::new, |text| format!(". {text}"))
+        found.map_or_else(String::new, |finding| format!(". {}", self.compiled.warning(&finding)))
     }
 }
 

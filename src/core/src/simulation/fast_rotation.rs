@@ -1,11 +1,13 @@
 //! Warning at the start of rotors that turn fast compared with their first natural frequency but have the stiffness at rest.
 
+use tiprub_cosim::shown;
+use tiprub_cosim::warning::Topic;
+
 use super::Simulation;
 use super::compile::Compiled;
+use crate::Warning;
 use crate::scene::rom::DisplacementFrame;
 use crate::scene::settings::BodyMotion;
-use crate::warning::Topic;
-use crate::{Warning, shown};
 
 /// Largest Ω/ω₁ without a warning. The lowest frequency rises as ω₁(Ω)² ≈ ω₁² + BΩ² (Southwell). Rotor 37 has B = 5.7 (865 Hz at rest, 1102
 /// Hz at 1800 rad/s), so at 0.2 a fifth of its stiffness is neglected.

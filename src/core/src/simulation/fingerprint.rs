@@ -1,7 +1,8 @@
 //! Hash of settings and ROMs, stored in saved states.
 
+use tiprub_cosim::persist::fingerprint;
+
 use crate::Scene;
-use crate::persist::fingerprint;
 use crate::scene::settings::SceneSettings;
 
 /// Hash of everything that determines the results of a scene.

@@ -1,10 +1,11 @@
 //! All inputs of a scene over one communication step, and their checks.
 
-use super::drive::{Input, RotorAngle};
+use tiprub_cosim::variables::{Causality, Quantity, Variable};
+use tiprub_cosim::{persist_fields, shown};
+
+use super::drive::Input;
 use super::{SAME_STEP, Simulation};
-use crate::persist::persist_fields;
-use crate::variables::{Causality, Quantity, Variable};
-use crate::{Error, Result, shown};
+use crate::{Error, Result};
 
 /// Largest factor by which ramps may become steeper because a step is shorter.
 const QUICKER: f64 = 2.0;
@@ -205,51 +206,7 @@ impl Inputs {
     }
 }
 
-/// All inputs over time at one instant, which are restored if a set of values is rejected as a whole.
-#[derive(Debug, Clone)]
-pub struct InputCourses {
-    inputs: Inputs,
-    rotors: Vec<RotorAngle>,
-}
-
 impl Simulation {
-    /// Returns the inputs over time, derivatives included.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::Simulation;
-    /// # let scene = tiprub_test_models::rub(2);
-    /// # let mut simulation = Simulation::new(&scene)?;
-    /// # simulation.initialise(0.0)?;
-    /// let speed = simulation.table().find("speed").expect("an input").reference;
-    /// let before = simulation.courses();
-    /// simulation.set_real(speed, 1310.0)?;
-    /// simulation.set_real(speed, 1300.0)?;
-    /// simulation.restore_courses(before);
-    /// # Ok::<(), tiprub_core::Error>(())
-    /// ```
-    pub fn courses(&self) -> InputCourses {
-        InputCourses { inputs: self.inputs.clone(), rotors: self.rotors.clone() }
-    }
-
-    /// Restores the courses at the same instant; [`Simulation::set_real`] restores the values as read before.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::Simulation;
-    /// # let scene = tiprub_test_models::rub(2);
-    /// # let mut simulation = Simulation::new(&scene)?;
-    /// # simulation.initialise(0.0)?;
-    /// let speed = simulation.table().find("speed").expect("an input").reference;
-    /// let before = simulation.courses();
-    /// simulation.set_input_derivative(speed, 1, 5000.0)?;
-    /// simulation.restore_courses(before);
-    /// # Ok::<(), tiprub_core::Error>(())
-    /// ```
-    pub fn restore_courses(&mut self, courses: InputCourses) {
-        (self.inputs, self.rotors) = (courses.inputs, courses.rotors);
-    }
-
     /// Returns whether new values act immediately instead of at the end of the step.
     pub(super) fn holds(&self) -> bool {
         self.compiled.references.input_interpolation.is_some_and(|reference| self.values[reference] > 1.5)
@@ -265,7 +222,7 @@ impl Simulation {
         if self.inputs.rest(step_size) {
             return Ok(());
         }
-        for variable in self.table.variables() {
+        for variable in self.values.table().variables() {
             if variable.causality != Causality::Input && variable.quantity != Quantity::GapOffset {
                 continue;
             }

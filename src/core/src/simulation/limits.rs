@@ -6,15 +6,18 @@ mod free;
 mod sliding;
 mod warning_state;
 
+use tiprub_cosim::variables::Quantity;
+
 use super::table::has_one_friction;
 use super::{Compiled, Simulation};
+use crate::limits::finding::{Checked, ErrorKind, Finding, Subject, WarningKind};
 use crate::limits::massless::MasslessLimit;
+use crate::limits::wording::{AdaptiveSteps, Context};
 use crate::limits::{self, massless};
 use crate::modes::modal::{ModalModel, fill_ratios};
 use crate::scene::method::{Scheme, Solver};
 use crate::scene::settings::{Preset, TOLERANCE};
 use crate::system::System;
-use crate::variables::Quantity;
 use crate::{Error, Result, Warning};
 use checking::Checking;
 use closing::Closing;
@@ -61,20 +64,22 @@ pub struct Limits {
 /// Limits of one master and its surfaces.
 #[derive(Debug, Clone)]
 struct BodyLimits {
+    /// The master.
+    of: Subject,
     /// Warnings for the expected step, or the reason why these parameters are rejected, for any sense of slip.
-    outcome: Result<Vec<Warning>>,
+    outcome: Checked<Vec<Finding>>,
     /// Slip in +θ and in −θ; for a disk, where the check is slow, only the requested senses.
     senses: [Option<Sense>; 2],
     /// Duration of closed contact.
     closing: Closing,
-    /// Step limits of massless-boundary; infinite for other schemes.
+    /// Step limits of closed contact whose forces act a step late; infinite for other schemes.
     massless: MasslessLimit,
     /// Largest step of each range of step sizes, descending, and the warning if the casing spoils solvability there.
-    casing: Vec<(f64, Option<Warning>)>,
-    /// Smallest step at which modal-exact does not resolve modes that contact excites; infinite for other schemes.
+    casing: Vec<(f64, Option<WarningKind>)>,
+    /// Smallest step that does not resolve modes which contact excites; infinite for schemes that need no such limit.
     unresolved: f64,
     /// Warning of growth while blades cut.
-    cutting: Option<Warning>,
+    cutting: Option<WarningKind>,
 }
 
 /// Senses of slip for a speed or its sign: both if it is 0.
@@ -109,7 +114,8 @@ impl Simulation {
             mode_damping: self.mode_damping(),
             step: self.value_of(Quantity::StepMax, 0),
             tolerance: self
-                .table
+                .values
+                .table()
                 .with_quantity_of(Quantity::Tolerance, 0)
                 .map_or(TOLERANCE, |row| self.values[row.reference as usize]),
             scheme: chosen(&Scheme::ALL, self.value_of(Quantity::SchemeChoice, 0)),
@@ -121,12 +127,13 @@ impl Simulation {
 
     /// Checks limits unless the same parameters were checked last; returns warnings. If the parameters are rejected, the previous limits
     /// stay.
-    pub(super) fn check_limits(&mut self, parameters: &Parameters) -> Result<Vec<Warning>> {
+    pub(super) fn check_limits(&mut self, parameters: &Parameters) -> Result<Vec<Finding>> {
+        let found = |limits: &Limits| limits.warnings(&parameters.speeds).map_err(|error| self.compiled.error(&error));
         if let Some(limits) = self.limits.as_ref().filter(|limits| limits.cover(parameters)) {
-            return limits.warnings(&parameters.speeds).map_err(|error| self.compiled.of_preset(error));
+            return found(limits);
         }
         let limits = self.compiled.limits(parameters, &self.system);
-        let warnings = limits.warnings(&parameters.speeds).map_err(|error| self.compiled.of_preset(error))?;
+        let warnings = found(&limits)?;
         self.limits = Some(limits);
         Ok(warnings)
     }
@@ -144,32 +151,28 @@ impl Simulation {
     /// Rejects a step size (s) whose range was found unstable, or that stiffening at one of the `speeds` of a structure (rad/s) and at its
     /// `coldest` temperature (K) forbids. This is a lookup, so that a step does not allocate.
     pub(super) fn check_step_size(&self, body: usize, step: f64, speeds: [f64; 3], coldest: f64) -> Result<()> {
-        self.is_step_allowed(body, step, speeds, coldest).map_err(|error| match self.compiled.of_preset(error) {
-            Error::Unstable { problem, remedy } => {
-                Error::Unstable { problem: self.compiled.named(body, problem), remedy }
-            }
-            other => other,
-        })
+        self.is_step_allowed(body, step, speeds, coldest).map_err(|error| self.compiled.error(&error))
     }
 
-    fn is_step_allowed(&self, body: usize, step: f64, speeds: [f64; 3], coldest: f64) -> Result<()> {
+    fn is_step_allowed(&self, body: usize, step: f64, speeds: [f64; 3], coldest: f64) -> Checked<()> {
         let Some(limits) = &self.limits else { return Ok(()) };
         let (scheme, own) = (limits.parameters.scheme, &limits.bodies[body]);
         let stiffened = |speed: f64| self.compiled.stiffened(body, speed, coldest);
         let stiffened = speeds.into_iter().fold(1.0, |most: f64, speed| most.max(stiffened(speed)));
         let largest = self.compiled.bodies[body].largest_frequency();
-        limits::check_step_allowed(largest * self.compiled.stiffest(body) * stiffened, scheme, step)?;
+        let of_body = |error: ErrorKind| error.of(own.of);
+        limits::check_step_allowed(largest * self.compiled.stiffest(body) * stiffened, scheme, step)
+            .map_err(of_body)?;
         for carrier in self.compiled.carriers_of(body) {
-            limits::check_step_allowed(self.compiled.carriers[carrier].model.largest_frequency(), scheme, step)?;
+            let frequency = self.compiled.carriers[carrier].model.largest_frequency();
+            limits::check_step_allowed(frequency, scheme, step).map_err(|error| error.of(Subject::Carrier(carrier)))?;
         }
-        limits::unresolved::check(step, own.unresolved, largest)?;
-        if step >= own.massless.usable {
-            return Err(massless::refusal(step, own.massless));
-        }
+        limits::unresolved::check(scheme, step, own.unresolved, largest).map_err(of_body)?;
+        massless::check(step, own.massless).map_err(of_body)?;
         for speed in speeds.into_iter().filter(|speed| *speed != 0.0) {
             let closed = own.closing.time(speed);
             let mut senses = senses_of(speed).filter_map(|sense| own.senses[sense].as_ref());
-            senses.try_for_each(|sense| sense.check(step, closed))?;
+            senses.try_for_each(|sense| sense.check(step, closed)).map_err(of_body)?;
         }
         Ok(())
     }
@@ -182,23 +185,46 @@ impl Compiled {
         length / (length / largest * (1.0 - super::SAME_STEP)).ceil().max(1.0)
     }
 
-    /// Adds a suitable remedy to an error: for a step limit adaptive steps come first, if the scene supports them.
-    fn of_preset(&self, error: Error) -> Error {
-        let Error::Unstable { problem, mut remedy } = error else { return error };
-        let preset = self.scene.settings.preset == Preset::Paper;
-        if preset {
-            remedy = remedy.replace(limits::OTHER_SCHEME, ", or remove `preset`, which fixes the scheme");
-        }
-        let of_step = |text: &str| text.contains("`time.step`");
-        let solver = self.scene.settings.contacts[0].solver;
-        let adaptive = if solver == Solver::Film { Solver::Lcp } else { solver };
-        if (of_step(&remedy) || of_step(&problem)) && self.scene.check_methods(Scheme::Galerkin, adaptive).is_ok() {
-            let without = if preset { "remove `preset`, " } else { "" };
-            let with = if solver == adaptive { "" } else { " and `contact.solver = \"lcp\"`" };
-            let rest = remedy[..1].to_lowercase() + &remedy[1..];
-            remedy = format!("Use adaptive steps ({without}set `time.scheme = \"galerkin\"`{with}), or {rest}");
-        }
-        Error::Unstable { problem, remedy }
+    /// Returns the names and possibilities of the scene for texts about one of its parts.
+    fn context(&self, of: Subject) -> Context<'_> {
+        let (settings, several) = (&self.scene.settings, self.bodies.len() > 1);
+        let (name, rom) = match of {
+            Subject::Scene => (None, None),
+            Subject::Body(body) | Subject::Slip { body, .. } => {
+                let (structure, rom) = self.body(body);
+                (several.then_some(structure.name.as_str()), Some(rom))
+            }
+            Subject::Carrier(carrier) => (Some(self.carrier_name(self.bodies.len() + carrier)), None),
+        };
+        let own = settings.contacts[0].solver;
+        let solver = if own == Solver::Film { Solver::Lcp } else { own };
+        let is_adaptive = self.scene.check_methods(Scheme::ADAPTIVE, solver).is_ok();
+        let adaptive = is_adaptive.then_some(AdaptiveSteps { solver: (solver != own).then_some(solver) });
+        Context { name, rom, preset: settings.preset == Preset::Paper, adaptive }
+    }
+
+    /// Returns a finding as a warning.
+    pub(super) fn warning(&self, finding: &Finding) -> Warning {
+        finding.warning(&self.context(finding.of))
+    }
+
+    /// Returns a finding as an error.
+    fn error(&self, finding: &Finding<ErrorKind>) -> Error {
+        finding.error(&self.context(finding.of))
+    }
+
+    /// Returns the warnings about carriers of the surfaces of a master whose modes a step (s) does not resolve.
+    ///
+    /// # Errors
+    /// A carrier that is unstable with this step.
+    fn unresolved_carriers(&self, body: usize, scheme: Scheme, step: f64) -> Checked<Vec<Finding>> {
+        let checked = self.carriers_of(body).map(|carrier| {
+            let frequency = self.carriers[carrier].model.largest_frequency();
+            let found = limits::check_step(frequency, scheme, step);
+            let of = Subject::Carrier(carrier);
+            found.map(|kind| kind.map(|kind| kind.of(of))).map_err(|error| error.of(of))
+        });
+        checked.filter_map(Result::transpose).collect()
     }
 
     /// Largest factor on the frequencies of a structure.
@@ -220,14 +246,13 @@ impl Compiled {
         (colder + added.max(0.0) / (largest * largest)).sqrt()
     }
 
-    /// Largest ω h of structures of the system without stiffening, below 2.
-    pub(super) fn largest_product(&self, structures: &[usize], step: f64) -> f64 {
+    /// Largest angular frequency of structures of the system without stiffening (rad/s).
+    pub(super) fn largest_frequency(&self, structures: &[usize]) -> f64 {
         let frequency = |structure: &usize| match self.bodies.get(*structure) {
             Some(body) => body.largest_frequency() * self.stiffest(*structure),
             None => self.carriers[*structure - self.bodies.len()].model.largest_frequency(),
         };
-        let largest = structures.iter().map(frequency).fold(0.0, f64::max);
-        (largest * step).min(2.0 * (1.0 - 1e-9))
+        structures.iter().map(frequency).fold(0.0, f64::max)
     }
 
     /// Returns the carriers of the surfaces that a structure can touch.
@@ -246,11 +271,7 @@ impl Compiled {
             Some(_) => self.free_limits(body, parameters, system),
             None => self.rotor_limits(body, parameters, system),
         };
-        let named = |body: usize| match self.bodies.len() {
-            1 => of(body),
-            _ => of(body).named(&self.body(body).0.name),
-        };
-        Limits { parameters: parameters.clone(), bodies: (0..self.bodies.len()).map(named).collect() }
+        Limits { parameters: parameters.clone(), bodies: (0..self.bodies.len()).map(of).collect() }
     }
 
     fn rotor_limits(&self, body: usize, parameters: &Parameters, system: &System) -> BodyLimits {
@@ -272,17 +293,14 @@ impl Compiled {
         }
         let at = Checking::new(self, system, body, models, parameters);
         let expected = self.expected_step(parameters.step);
-        if parameters.scheme == Scheme::Galerkin {
-            // `galerkin` chooses steps short enough for its contact problems and its energy: it only warns of physical effects and rejects
-            // nothing.
+        let of = at.subject();
+        if parameters.scheme.properties().adaptive {
+            // Adaptive steps are short enough for their contact problems and their energy: only physical effects are reported, and nothing
+            // is rejected.
             return BodyLimits {
-                outcome: Ok(at.not_looked_at().into_iter().collect()),
-                senses: [Some(at.physics(0, expected)), Some(at.physics(1, expected))],
-                closing: Closing::new(self, body),
-                massless: MasslessLimit::NONE,
-                casing: Vec::new(),
-                unresolved: f64::INFINITY,
-                cutting: None,
+                outcome: Ok(at.not_looked_at().map(|kind| kind.of(of)).into_iter().collect()),
+                senses: [0, 1].map(|sense| Some(at.sense(sense, expected))),
+                ..BodyLimits::new(of, Closing::new(self, body))
             };
         }
         let casing = at.casing(expected);
@@ -290,13 +308,13 @@ impl Compiled {
         let radial = |model: &ModalModel| vec![[-1.0, 0.0, 0.0]; model.contact_modes.nrows() / 3];
         let masters = at.models.iter().map(|model| limits::unresolved::limit(model, &radial(model)));
         let unresolved = self.unresolved(body, masters, parameters.scheme);
-        let resolved = limits::unresolved::check(expected, unresolved, at.largest_frequency());
+        let resolved = limits::unresolved::check(parameters.scheme, expected, unresolved, at.largest_frequency());
         let (outcome, massless) = match resolved.and_then(|()| at.massless(expected)) {
             Ok((mut more, limit)) => {
-                more.extend(limits::unresolved::warning(expected, unresolved));
+                more.extend(limits::unresolved::warning(parameters.scheme, expected, unresolved));
                 (at.warnings(expected, in_range(&casing, expected).cloned(), more), limit)
             }
-            Err(error) => (Err(error), MasslessLimit::NONE),
+            Err(error) => (Err(error.of(of)), MasslessLimit::NONE),
         };
         let mut senses = [None, None];
         // For a disk the other sense takes as long again; without friction the sense does not matter.
@@ -307,12 +325,12 @@ impl Compiled {
             }
         }
         let (closing, cutting) = (Closing::new(self, body), at.cutting());
-        BodyLimits { outcome, senses, closing, massless, casing, unresolved, cutting }
+        BodyLimits { of, outcome, senses, closing, massless, casing, unresolved, cutting }
     }
 
-    /// Smallest step at which modal-exact does not resolve modes that contact excites, of the master and of carriers.
+    /// Smallest step (s) that does not resolve modes which contact excites, of the master and of carriers.
     fn unresolved(&self, body: usize, touching: impl Iterator<Item = f64>, scheme: Scheme) -> f64 {
-        if scheme != Scheme::ModalExact {
+        if scheme.properties().resolved_up_to.is_infinite() {
             return f64::INFINITY;
         }
         let models = self.carriers_of(body).map(|carrier| &self.carriers[carrier].model);
@@ -334,55 +352,53 @@ impl Limits {
     }
 
     /// Returns the warnings for the expected step at these speeds (rad/s).
-    fn warnings(&self, speeds: &[f64]) -> Result<Vec<Warning>> {
-        let mut warnings = Vec::new();
+    fn warnings(&self, speeds: &[f64]) -> Checked<Vec<Finding>> {
+        let mut warnings: Vec<Finding> = Vec::new();
         for (body, speed) in self.bodies.iter().zip(speeds) {
-            warnings.extend(body.warnings(*speed)?);
+            let found = body.warnings(*speed)?;
+            // Masters may touch surfaces of the same carrier.
+            warnings.extend(found.into_iter().filter(|finding| !warnings.contains(finding)).collect::<Vec<_>>());
         }
         Ok(warnings)
     }
 
-    /// Returns the warning of self-excited growth of a structure that turns at a speed of this sign.
-    pub fn grows(&self, body: usize, speed: f64) -> Option<Warning> {
-        let BodyLimits { cutting, senses, .. } = &self.bodies[body];
+    /// Returns the self-excited growth of a structure that turns at a speed of this sign.
+    pub fn grows(&self, body: usize, speed: f64) -> Option<Finding> {
+        let BodyLimits { of, cutting, senses, .. } = &self.bodies[body];
         // Contact is assumed to have stayed closed for any time.
         let mut sliding = senses_of(speed).filter_map(|sense| senses[sense].as_ref()?.grows(f64::INFINITY).next());
-        cutting.clone().or_else(|| sliding.next())
+        Some(cutting.clone().or_else(|| sliding.next())?.of(*of))
     }
 }
 
 impl BodyLimits {
+    /// Creates limits that reject and report nothing.
+    fn new(of: Subject, closing: Closing) -> Self {
+        Self {
+            of,
+            outcome: Ok(Vec::new()),
+            senses: [Some(Sense::default()), Some(Sense::default())],
+            closing,
+            massless: MasslessLimit::NONE,
+            casing: Vec::new(),
+            unresolved: f64::INFINITY,
+            cutting: None,
+        }
+    }
+
     /// Returns the warnings for the expected step at this speed (rad/s).
-    fn warnings(&self, speed: f64) -> Result<Vec<Warning>> {
+    fn warnings(&self, speed: f64) -> Checked<Vec<Finding>> {
         let mut warnings = self.outcome.clone()?;
-        warnings.extend(self.cutting.clone());
+        warnings.extend(self.cutting.clone().map(|kind| kind.of(self.of)));
         let closed = self.closing.time(speed);
-        let found =
-            senses_of(speed).filter_map(|sense| self.senses[sense].as_ref()).map(|sense| sense.warnings(closed));
         // Both senses count for a rotor that starts at rest; growth in either is reported once.
-        for sense in found.collect::<Result<Vec<_>>>()? {
-            for warning in sense {
-                if !warnings.iter().any(|known| known.topic() == warning.topic()) {
-                    warnings.push(warning);
+        for sense in senses_of(speed).filter_map(|sense| self.senses[sense].as_ref()) {
+            for kind in sense.warnings(closed).map_err(|error| error.of(self.of))? {
+                if !warnings.iter().any(|known| known.of == self.of && known.kind.topic() == kind.topic()) {
+                    warnings.push(kind.of(self.of));
                 }
             }
         }
         Ok(warnings)
-    }
-
-    /// Adds the name of the structure to the texts.
-    fn named(mut self, name: &str) -> Self {
-        let texts = |texts: Vec<Warning>| texts.into_iter().map(|text| text.named(name)).collect();
-        let refusal = |error: Error| match error {
-            Error::Unstable { problem, remedy } => Error::Unstable { problem: format!("{name}: {problem}"), remedy },
-            other => other,
-        };
-        self.outcome = self.outcome.map(texts).map_err(refusal);
-        self.cutting = self.cutting.map(|text| text.named(name));
-        self.senses.iter_mut().flatten().for_each(|sense| sense.name(name));
-        for (_, text) in &mut self.casing {
-            *text = text.take().map(|text| text.named(name));
-        }
-        self
     }
 }

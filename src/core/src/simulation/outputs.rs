@@ -4,6 +4,7 @@ use std::fmt;
 use std::sync::Arc;
 
 use nalgebra::DMatrix;
+use tiprub_cosim::variables::{Causality, NO_CLEARANCE, Quantity, Span, Variable};
 
 use super::compile::Compiled;
 use super::units::LENGTH;
@@ -15,7 +16,6 @@ use crate::modes::sectors::Sectors;
 use crate::scene::rom::{STRESSES, von_mises};
 use crate::system::System;
 use crate::system::ledger::Ledger;
-use crate::variables::{Causality, NO_CLEARANCE, Quantity, Span, Variable};
 
 type Fill = dyn Fn(&OutputView, &mut [f64]) + Send + Sync;
 
@@ -64,28 +64,6 @@ pub struct OutputView<'a> {
 }
 
 impl Simulation {
-    /// Updates the outputs to the internal time reached (means cover the finished part of the step), for an importer that reads within a
-    /// communication step. At communication points they are up to date, and this does nothing.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::Simulation;
-    /// # let scene = tiprub_test_models::rub(2);
-    /// # let mut simulation = Simulation::new(&scene)?;
-    /// # simulation.initialise(0.0)?;
-    /// let angle = simulation.table().find("rotor_angle").expect("an output").reference;
-    /// simulation.begin_step(0.0, 1e-4)?;
-    /// simulation.advance()?;
-    /// simulation.update_outputs();
-    /// assert!(simulation.real(angle)? > 0.0);
-    /// # Ok::<(), tiprub_core::Error>(())
-    /// ```
-    pub fn update_outputs(&mut self) {
-        if self.phase == SimulationPhase::Stepping {
-            self.compute_outputs();
-        }
-    }
-
     /// Computes the outputs of the internal point reached.
     pub(super) fn compute_outputs(&mut self) {
         let elapsed = self.communication.offset(self.communication.done);
@@ -102,24 +80,24 @@ impl Simulation {
             }
         }
         for pair in 0..self.slave_shares.len() {
-            let variable = self.table.with_quantity_of(Quantity::HeatToSlave, pair);
+            let variable = self.values.table().with_quantity_of(Quantity::HeatToSlave, pair);
             self.slave_shares[pair] = variable.map_or(1.0, |variable| self.values[variable.reference as usize]);
         }
         self.find_watched();
-        let mut values = std::mem::take(&mut self.values);
+        let mut values = self.values.replace(Vec::new());
         let (system, window) = (&self.system, &self.window);
         let ledger = system.ledger();
         let view = OutputView { simulation: self, system, window, mean, elapsed, energies, conserved, ledger };
-        let outputs = self.table.variables().iter().filter(|variable| variable.causality == Causality::Output);
+        let outputs = self.values.table().variables().iter().filter(|variable| variable.causality == Causality::Output);
         for (variable, read) in outputs.zip(&self.readers) {
             let start = variable.reference as usize;
             (read.0)(&view, &mut values[start..start + variable.len()]);
         }
         let time = self.communication.time(self.communication.done);
-        for variable in self.table.variables().iter().filter(|row| row.causality == Causality::Independent) {
+        for variable in self.values.table().variables().iter().filter(|row| row.causality == Causality::Independent) {
             values[variable.reference as usize] = time;
         }
-        self.values = values;
+        self.values.replace(values);
     }
 }
 
@@ -356,7 +334,7 @@ impl Simulation {
     ///
     /// # Examples
     /// ```
-    /// # use tiprub_core::Simulation;
+    /// # use tiprub_core::{CoSimulation, Simulation};
     /// # let scene = tiprub_test_models::rub(2);
     /// # let mut simulation = Simulation::new(&scene)?;
     /// # simulation.initialise(0.0)?;

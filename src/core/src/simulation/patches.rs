@@ -1,8 +1,9 @@
 //! Patches of the slave surface that collect friction power.
 
+use tiprub_cosim::ThermalPatch;
+
 use super::plan::{PairPlan, SteppingOrder};
 use crate::Scene;
-use crate::scene::rom::ThermalPatch;
 use crate::scene::settings::PatchSettings;
 
 /// Patches for which heat is counted.

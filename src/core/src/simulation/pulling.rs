@@ -16,12 +16,15 @@
 //! At rest, "off" is the difference from the complementary forces as a fraction of the largest. The place at which film comes to rest
 //! depends on its history, so that no check at the start can predict it.
 
+use tiprub_cosim::shown_time;
+use tiprub_cosim::warning::Topic;
+
 use super::Simulation;
-use crate::scene::method::{Scheme, Solver};
+use crate::limits::finding::Subject;
+use crate::scene::method::Solver;
 use crate::scene::settings::Preset;
 use crate::system::StepFailure;
-use crate::warning::Topic;
-use crate::{Result, Warning, shown_time};
+use crate::{Result, Warning};
 
 /// Fractions from which pulling is reported, and from which it ends a run unless the preset is `paper`.
 const TOLD: f64 = 0.03;
@@ -44,14 +47,14 @@ impl Simulation {
         }
         let is_paper = self.compiled.scene.settings.preset == Preset::Paper;
         for structure in 0..self.compiled.bodies.len() {
+            let of = Subject::Body(structure);
             if let Some((node, share)) = self.system.left_inside(structure) {
                 let goes_on = is_paper || self.is_free(structure);
                 if share >= INSIDE && !goes_on {
                     return Err(self.fail(StepFailure::LeftInside { structure, node, share }, time));
                 }
                 let least = if goes_on { INSIDE } else { INSIDE_TOLD };
-                if share >= least.max(DEEPER * self.warning_state.inside[structure]) {
-                    self.warning_state.inside[structure] = share;
+                if share >= least && self.warning_state.exceeds(Topic::FilmInside, of, share, DEEPER) {
                     let problem = self.left_inside(structure, node, share);
                     let then = if goes_on {
                         String::new()
@@ -67,7 +70,7 @@ impl Simulation {
             if share >= REFUSED && !is_paper {
                 return Err(self.fail(StepFailure::Pulls { structure, node, share }, time));
             }
-            if share >= TOLD && !std::mem::replace(&mut self.warning_state.pulls[structure], true) {
+            if share >= TOLD && self.warning_state.is_first(Topic::FilmPulls, of) {
                 let problem = self.pulls(structure, node, share);
                 let then = if is_paper {
                     String::new()
@@ -122,8 +125,8 @@ impl Simulation {
         } else {
             "Use solver = \"lcp\""
         };
-        let resolved = 2.0 / highest;
-        if settings.scheme == Scheme::ModalExact && self.system.step_size() > resolved {
+        let resolved = settings.scheme.properties().resolved_up_to / highest;
+        if self.system.step_size() > resolved {
             format!(
                 "{lcp}, or set `time.step` (in the FMU `internal_step_max`) below {resolved:.2e} s to reduce the error"
             )

@@ -1,15 +1,16 @@
 //! Warning at the start of tips that slide more slowly than they vibrate, if the law does not model sticking.
 
 use nalgebra::DMatrix;
+use tiprub_cosim::shown;
+use tiprub_cosim::warning::Topic;
 
 use super::Simulation;
 use super::compile::Compiled;
 use super::limits::Parameters;
+use crate::Warning;
 use crate::modes::modal::ModalModel;
 use crate::scene::method::Solver;
 use crate::scene::shape::CompiledShape;
-use crate::warning::Topic;
-use crate::{Warning, shown};
 
 /// Angles at which a shape is sampled.
 const ANGLES: u32 = 720;

@@ -3,12 +3,13 @@
 //! Layout, little-endian: magic (8 bytes), format version (u64), scene fingerprint (u64), payload, FNV-1a checksum of all preceding bytes
 //! (u64).
 
-use super::access::check_range;
+use tiprub_cosim::persist::{Persist, StateReader, StateWriter, fingerprint};
+use tiprub_cosim::variables::Causality;
+use tiprub_cosim::{persist_fields, shown};
+
 use super::drive::RotorAngle;
 use super::{Communication, Inputs, MOST_STEPS, SAME_STEP, Simulation, SimulationPhase, TIME_TOLERANCE, same_step};
-use crate::persist::{Persist, StateReader, StateWriter, fingerprint, persist_fields};
-use crate::variables::{Causality, DataType, Variable};
-use crate::{Error, Result, shown};
+use crate::{Error, Result};
 
 const MAGIC: [u8; 8] = *b"tiprubST";
 const VERSION: u64 = 13;
@@ -62,49 +63,19 @@ struct Lead {
     step: f64,
 }
 
-fn damaged<T>(problem: &str) -> Result<T> {
-    Err(Error::State { problem: problem.to_owned() })
+fn damaged<T>(problem: impl std::fmt::Display) -> Result<T> {
+    Err(Error::state(problem))
 }
 
 impl Simulation {
-    /// Size of a saved state in bytes (constant for a given scene).
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::Simulation;
-    /// # let scene = tiprub_test_models::rub(2);
-    /// # let mut simulation = Simulation::new(&scene)?;
-    /// # simulation.initialise(0.0)?;
-    /// let buffer = vec![0; simulation.state_size()];
-    /// assert!(!buffer.is_empty());
-    /// # Ok::<(), tiprub_core::Error>(())
-    /// ```
-    pub fn state_size(&self) -> usize {
-        self.state_size
-    }
-
     pub(super) fn measured_state(&self) -> usize {
         let mut writer = StateWriter::new(&mut []);
         self.write(&mut writer);
         writer.written() + CHECKSUM_BYTES
     }
 
-    /// Writes everything that determines the future into `buffer` (exactly [`Simulation::state_size`] bytes).
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::Simulation;
-    /// # let scene = tiprub_test_models::rub(2);
-    /// # let mut simulation = Simulation::new(&scene)?;
-    /// # simulation.initialise(0.0)?;
-    /// let mut state = vec![0; simulation.state_size()];
-    /// simulation.save_state(&mut state)?;
-    /// # Ok::<(), tiprub_core::Error>(())
-    /// ```
-    ///
-    /// # Errors
-    /// Buffer of the wrong length.
-    pub fn save_state(&self, buffer: &mut [u8]) -> Result<()> {
+    /// Implements [`CoSimulation::save_state`].
+    pub(super) fn save_to(&self, buffer: &mut [u8]) -> Result<()> {
         self.check_size(buffer.len())?;
         let end = buffer.len() - CHECKSUM_BYTES;
         self.write(&mut StateWriter::new(&mut buffer[..end]));
@@ -113,25 +84,8 @@ impl Simulation {
         Ok(())
     }
 
-    /// Restores a saved state; nothing is changed in case of an error.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::Simulation;
-    /// # let scene = tiprub_test_models::rub(2);
-    /// # let mut simulation = Simulation::new(&scene)?;
-    /// # simulation.initialise(0.0)?;
-    /// let mut state = vec![0; simulation.state_size()];
-    /// simulation.save_state(&mut state)?;
-    /// simulation.do_step(0.0, 1e-4)?;
-    /// simulation.restore_state(&state)?;
-    /// assert_eq!(simulation.time(), 0.0);
-    /// # Ok::<(), tiprub_core::Error>(())
-    /// ```
-    ///
-    /// # Errors
-    /// Wrong length; wrong scene; damaged state: wrong checksum, or content that no valid state has.
-    pub fn restore_state(&mut self, buffer: &[u8]) -> Result<()> {
+    /// Implements [`CoSimulation::restore_state`].
+    pub(super) fn restore_checked(&mut self, buffer: &[u8]) -> Result<()> {
         self.check_size(buffer.len())?;
         let (content, checksum) = buffer.split_at(buffer.len() - CHECKSUM_BYTES);
         if content[..MAGIC.len()] != MAGIC {
@@ -142,7 +96,7 @@ impl Simulation {
         version.restore(&mut reader);
         scene.restore(&mut reader);
         if version != VERSION {
-            return damaged(&format!("it has format version {version}, but this library reads version {VERSION}"));
+            return damaged(format!("it has format version {version}, but this library reads version {VERSION}"));
         }
         if scene != self.compiled.fingerprint {
             return damaged("it belongs to a different scene or ROM");
@@ -157,11 +111,11 @@ impl Simulation {
     }
 
     fn check_size(&self, found: usize) -> Result<()> {
-        let expected = self.state_size();
+        let expected = self.state_size;
         if found == expected {
             return Ok(());
         }
-        Err(Error::State { problem: format!("it has {found} bytes, but this scene needs {expected}") })
+        damaged(format!("it has {found} bytes, but this scene needs {expected}"))
     }
 
     fn write(&self, writer: &mut StateWriter) {
@@ -196,7 +150,7 @@ impl Simulation {
             communication: Communication::default(),
             inputs: self.inputs.clone(),
             rotors: self.rotors.clone(),
-            values: self.values.clone(),
+            values: self.values.to_vec(),
             reference_speeds: vec![0.0; self.rotors.len()],
             reference_temperatures: vec![0.0; self.rotors.len()],
             step: 0.0,
@@ -269,10 +223,10 @@ impl Simulation {
 
     /// Checks that parameters and inputs could have been set, and outputs could have been read.
     fn check_values(&self, values: &[f64]) -> Result<()> {
-        for variable in self.table.variables() {
+        for variable in self.values.table().variables() {
             let values = &values[variable.reference as usize..][..variable.len()];
-            if let Some(value) = values.iter().find(|value| !is_possible(variable, **value)) {
-                return damaged(&format!("`{}` has the invalid value {}", variable.name, shown(*value)));
+            if let Some(value) = values.iter().find(|value| !variable.can_have(**value)) {
+                return damaged(format!("`{}` has the invalid value {}", variable.name, shown(*value)));
             }
         }
         Ok(())
@@ -290,14 +244,15 @@ impl Simulation {
         if !rotors.all(counts) {
             return damaged("the rotor angle is not finite");
         }
-        for variable in self.table.variables().iter().filter(|variable| variable.causality == Causality::Input) {
+        for variable in self.values.table().variables().iter().filter(|variable| variable.causality == Causality::Input)
+        {
             let (low, high) = (variable.min.unwrap_or(f64::MIN), variable.max.unwrap_or(f64::MAX));
             let rounding = SAME_STEP * low.abs().max(high.abs());
             for element in 0..variable.len() {
                 let Some(input) = lead.inputs.get_mut(variable.quantity, variable.of, element) else { continue };
                 let beyond = |offset: f64| (low - input.at(offset)).max(input.at(offset) - high);
                 if !offsets.into_iter().all(|offset| input.at(offset).is_finite() && beyond(offset) <= rounding) {
-                    return damaged(&format!("`{}` is outside its range", variable.element_name(element)));
+                    return damaged(format!("`{}` is outside its range", variable.element_name(element)));
                 }
             }
         }
@@ -307,7 +262,7 @@ impl Simulation {
     /// Prepares everything for a state that follows from its parameters and can be rejected.
     fn follow(&mut self, lead: Lead) -> Result<()> {
         let before = (
-            std::mem::replace(&mut self.values, lead.values),
+            self.values.replace(lead.values),
             std::mem::replace(&mut self.inputs, lead.inputs),
             std::mem::replace(&mut self.initial_time, lead.initial_time),
         );
@@ -327,9 +282,10 @@ impl Simulation {
             SimulationPhase::Ready | SimulationPhase::Failed => self.adopt(&references),
         };
         if outcome.is_err() {
-            (self.values, self.inputs, self.initial_time) = before;
+            self.values.replace(before.0);
+            (self.inputs, self.initial_time) = (before.1, before.2);
         }
-        outcome.or_else(|error| damaged(&error.to_string()))
+        outcome.or_else(damaged)
     }
 
     fn check_turning_of_all(&self, step: f64, length: f64) -> Result<()> {
@@ -434,29 +390,4 @@ fn take(value: &mut impl Persist, reader: &mut StateReader) {
     let mut bytes = reader.clone();
     value.check(reader);
     value.restore(&mut bytes);
-}
-
-/// Converts a value to the integer that it represents.
-fn as_integer(value: f64) -> Option<i32> {
-    #[expect(clippy::cast_possible_truncation, reason = "compared with what it was")]
-    let number = value as i32;
-    ((f64::from(number) - value).abs() == 0.0).then_some(number)
-}
-
-/// Returns whether a variable can have the value.
-fn is_possible(variable: &Variable, value: f64) -> bool {
-    let settable = variable.is_settable();
-    match variable.kind {
-        // The range of inputs is checked for their current values.
-        DataType::Real if settable && variable.causality != Causality::Input => check_range(variable, value).is_ok(),
-        DataType::Real => value.is_finite(),
-        DataType::Boolean => matches!(as_integer(value), Some(0 | 1)),
-        DataType::Enumeration(choices) if settable => {
-            let item = as_integer(value).and_then(|item| usize::try_from(item).ok());
-            item.is_some_and(|item| (1..=choices.items.len()).contains(&item))
-        }
-        DataType::Integer if settable => as_integer(value).is_some() && check_range(variable, value).is_ok(),
-        DataType::Integer | DataType::Enumeration(_) => as_integer(value).is_some(),
-        DataType::String => true,
-    }
 }

@@ -1,12 +1,14 @@
 //! Internal steps of a communication step: a bound on their number, missed tolerances, and free flight over many steps.
 
+use tiprub_cosim::variables::Quantity;
+use tiprub_cosim::warning::Topic;
+use tiprub_cosim::{Diagnostic, shown, shown_time};
+
 use super::limits::Parameters;
-use super::{Communication, Simulation, SimulationPhase};
-use crate::scene::method::Scheme;
+use super::{Communication, Simulation};
+use crate::limits::finding::Subject;
 use crate::time::galerkin::tables::shortest;
-use crate::variables::Quantity;
-use crate::warning::Topic;
-use crate::{Error, Result, Warning, shown, shown_time};
+use crate::{Error, Result, Warning};
 
 /// Error of the shortest steps as a fraction of the clearance per length (1/s), below which errors stop following the tolerance. A rubbing
 /// blade with 18 modes (`core/tests/galerkin/main.rs`) stays at 7e-7, 1.5e-7 and 7e-8 with longest steps of 80, 40 and 20 µs.
@@ -16,24 +18,6 @@ impl Simulation {
     /// Returns whether sectors take adaptive steps.
     pub(super) fn is_marched(&self) -> bool {
         self.stepper.is_adaptive()
-    }
-
-    /// Returns whether a communication step has begun and not ended.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::Simulation;
-    /// # let scene = tiprub_test_models::rub(2);
-    /// # let mut simulation = Simulation::new(&scene)?;
-    /// # simulation.initialise(0.0)?;
-    /// simulation.begin_step(0.0, 1e-4)?;
-    /// assert!(simulation.is_stepping());
-    /// while !simulation.advance()?.finished {}
-    /// assert!(!simulation.is_stepping());
-    /// # Ok::<(), tiprub_core::Error>(())
-    /// ```
-    pub fn is_stepping(&self) -> bool {
-        self.phase == SimulationPhase::Stepping
     }
 
     /// Largest number of internal steps of a communication step, 0 for any number.
@@ -70,17 +54,16 @@ impl Simulation {
         } else {
             ("", "a larger internal_step_max")
         };
-        Error::Exhausted {
-            problem: format!(
-                "the communication step of {} s from t = {} s needs more internal steps{of_whom} than max_internal_steps = \
-                 {most}, so it was discarded",
-                shown(length),
-                shown_time(self.time)
-            ),
-            remedy: format!(
-                "Repeat it with a shorter communication step, a larger max_internal_steps (0: no limit) or {other}"
-            ),
-        }
+        let problem = format!(
+            "the communication step of {} s from t = {} s needs more internal steps{of_whom} than max_internal_steps = {most}, \
+             so it was discarded",
+            shown(length),
+            shown_time(self.time)
+        );
+        let remedy = format!(
+            "Repeat it with a shorter communication step, a larger max_internal_steps (0: no limit) or {other}"
+        );
+        Error::Exhausted(Diagnostic::new("", problem, remedy))
     }
 
     /// Returns to the last state from which the run can continue, if no more steps are allowed in the middle of an internal step.
@@ -94,7 +77,7 @@ impl Simulation {
     pub(super) fn warn_of_tolerance(&mut self, parameters: &Parameters) {
         let step = self.compiled.expected_step(parameters.step);
         let left = LEFT * shortest(step);
-        if parameters.scheme == Scheme::Galerkin && parameters.tolerance < left {
+        if parameters.scheme.properties().adaptive && parameters.tolerance < left {
             let problem = format!(
                 "the tolerance {} cannot be reached: galerkin steps are at least {} s long, a thousandth of the \
                  longest step, which causes errors of about {left:.0e} where contacts open and close",
@@ -109,7 +92,7 @@ impl Simulation {
     /// Warns of the first communication step in which a shortest step missed the tolerance.
     pub(super) fn note_missed(&mut self, time: f64) {
         let effort = self.system.effort();
-        if effort.missed == 0 || std::mem::replace(&mut self.warning_state.missed, true) {
+        if effort.missed == 0 || !self.warning_state.is_first(Topic::ToleranceMissed, Subject::Scene) {
             return;
         }
         let problem = format!(
@@ -126,44 +109,5 @@ impl Simulation {
             shown(self.value_of(Quantity::StepMax, 0).min(self.system.step_size()))
         );
         self.note(Warning::new(Topic::ToleranceMissed, problem, remedy));
-    }
-
-    /// Skips all internal steps but the last after the start of a communication step, for callers that do not read internal steps, if
-    /// sectors take adaptive steps, inputs rest, and no contact can close. The last step is taken normally, so that rates at its end are
-    /// those of an internal step. Otherwise this does nothing.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::Simulation;
-    /// # let scene = tiprub_test_models::rub(2);
-    /// # let mut simulation = Simulation::new(&scene)?;
-    /// # simulation.initialise(0.0)?;
-    /// simulation.begin_step(0.0, 1e-4)?;
-    /// simulation.fly_ahead();
-    /// while !simulation.advance()?.finished {}
-    /// # Ok::<(), tiprub_core::Error>(())
-    /// ```
-    pub fn fly_ahead(&mut self) {
-        let last = self.communication.count.saturating_sub(1);
-        if !self.is_stepping() || !self.is_marched() || self.communication.done > 0 || last < 2 {
-            return;
-        }
-        let (offset, time) = (self.communication.offset(last), self.communication.time(last));
-        for pair in 0..self.drives.len() {
-            let growth = self.growth(pair, [0.0, offset], [self.communication.start, time]);
-            if growth.elapsed[0] < growth.length {
-                return;
-            }
-            let body = self.compiled.plan.pairs[pair].body;
-            let (speed, angle) = (&self.inputs.rotors[body].speed, &self.rotors[body]);
-            let shape = &self.inputs.pairs[pair].shape_rotation;
-            self.turns[pair] =
-                angle.total(speed, offset) - angle.total(speed, 0.0) - (shape.at(offset) - shape.at(0.0));
-        }
-        self.find_drives(offset, time);
-        if self.stepper.fly(&mut self.system, &self.drives, &self.turns, offset) {
-            self.window.add(&self.system, (&self.compiled.patches, &self.compiled.linings), offset);
-            self.communication.done = last;
-        }
     }
 }

@@ -1,70 +1,18 @@
 //! One communication step: begin, internal steps, end.
 
+use tiprub_cosim::warning::Topic;
+use tiprub_cosim::{bounds, shown, shown_time};
+
 use super::drive::Input;
-use super::{Communication, MOST_STEPS, Simulation, SimulationPhase, StepProgress, TIME_TOLERANCE, same_step};
+use super::{Communication, MOST_STEPS, Simulation, SimulationPhase, TIME_TOLERANCE, same_step};
 use crate::contact::coating::Coating;
-use crate::scene::ranges;
-use crate::system::StepFailure;
-use crate::warning::Topic;
-use crate::{Error, Result, Warning, shown, shown_time};
+use crate::limits::finding::Subject;
+use crate::{Error, Result, Warning};
 
 /// A run is warned of once u_θ²/2r is this fraction of the clearance.
 const CURVED_SHARE: f64 = 0.05;
 impl Simulation {
-    /// Begins a communication step of length H from the current time, which ends exactly at `current_time + step_size`.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::Simulation;
-    /// # let scene = tiprub_test_models::rub(2);
-    /// # let mut simulation = Simulation::new(&scene)?;
-    /// # simulation.initialise(0.0)?;
-    /// simulation.begin_step(0.0, 1e-4)?;
-    /// while !simulation.advance()?.finished {}
-    /// assert_eq!(simulation.time(), 1e-4);
-    /// # Ok::<(), tiprub_core::Error>(())
-    /// ```
-    ///
-    /// # Errors
-    /// Step size not positive and finite, or `current_time` further than 1e-3·H from [`Simulation::time`]; [`Error::Exhausted`] if it takes
-    /// more internal steps than allowed.
-    pub fn begin_step(&mut self, current_time: f64, step_size: f64) -> Result<()> {
-        self.begin(current_time, step_size, false)
-    }
-
-    /// Begins a communication step like [`Simulation::begin_step`], but the step may end when the allowed internal steps are used up
-    /// ([`Simulation::end_step_early`]).
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::Simulation;
-    /// # let mut scene = tiprub_test_models::rub(2);
-    /// scene.settings.time.max_internal_steps = Some(10);
-    /// let mut simulation = Simulation::new(&scene)?;
-    /// simulation.initialise(0.0)?;
-    /// simulation.begin_partial_step(0.0, 1e-4)?;
-    /// let ended_early = loop {
-    ///     match simulation.advance() {
-    ///         Ok(progress) if progress.finished => break false,
-    ///         Ok(_) => {}
-    ///         Err(tiprub_core::Error::Exhausted { .. }) => break true,
-    ///         Err(error) => return Err(error),
-    ///     }
-    /// };
-    /// if ended_early {
-    ///     simulation.end_step_early()?;
-    /// }
-    /// assert!(simulation.time() < 1e-4);
-    /// # Ok::<(), tiprub_core::Error>(())
-    /// ```
-    ///
-    /// # Errors
-    /// As [`Simulation::begin_step`].
-    pub fn begin_partial_step(&mut self, current_time: f64, step_size: f64) -> Result<()> {
-        self.begin(current_time, step_size, true)
-    }
-
-    fn begin(&mut self, current_time: f64, step_size: f64, partial: bool) -> Result<()> {
+    pub(super) fn begin(&mut self, current_time: f64, step_size: f64, partial: bool) -> Result<()> {
         match self.phase {
             SimulationPhase::Ready => {}
             SimulationPhase::Failed => return Err(failed_before()),
@@ -175,7 +123,7 @@ impl Simulation {
                 "Continue from the end of the last step, or restore a saved state",
             ));
         }
-        if step_size < ranges::SHORTEST_STEP {
+        if step_size < bounds::SHORTEST_STEP {
             return Err(Error::invalid(
                 "communicationStepSize",
                 format!(
@@ -183,7 +131,7 @@ impl Simulation {
                      motion",
                     shown(step_size),
                     shown_time(self.time),
-                    shown(ranges::SHORTEST_STEP)
+                    shown(bounds::SHORTEST_STEP)
                 ),
                 "Use a longer communication step; skip remainders that are caused by rounding in a sum of steps",
             ));
@@ -261,71 +209,9 @@ impl Simulation {
         ))
     }
 
-    /// Advances the current communication step by one internal step. Inputs may be set between calls.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::Simulation;
-    /// # let scene = tiprub_test_models::rub(2);
-    /// # let mut simulation = Simulation::new(&scene)?;
-    /// # simulation.initialise(0.0)?;
-    /// simulation.begin_step(0.0, 1e-4)?;
-    /// let mut steps = 1;
-    /// while !simulation.advance()?.finished {
-    ///     steps += 1;
-    /// }
-    /// assert_eq!(steps, 100);
-    /// # Ok::<(), tiprub_core::Error>(())
-    /// ```
-    ///
-    /// # Errors
-    /// Non-finite state; the simulation must then be reset or restored. [`Error::Exhausted`] if the allowed internal steps are used up: the
-    /// simulation is then in the state before the communication step or, if it may end early, in the state after the last finished internal
-    /// step ([`Simulation::is_stepping`]).
-    pub fn advance(&mut self) -> Result<StepProgress> {
-        if self.phase != SimulationPhase::Stepping {
-            let problem = "no communication step is in progress";
-            return Err(Error::invalid("doStep", problem, "Begin a communication step first"));
-        }
-        self.allow_steps()?;
-        if self.partial && self.communication.done > 0 && self.communication.most > 0 {
-            // The mark includes the inputs set meanwhile.
-            self.set_mark();
-        }
-        let next = self.communication.done + 1;
-        let (offset, time) = (self.communication.offset(next), self.communication.time(next));
-        let before = self.communication.offset(self.communication.done);
-        if self.is_marched() {
-            let start = self.communication.time(self.communication.done);
-            for pair in 0..self.drives.len() {
-                let middle = self.drive(pair, 0.5 * (before + offset), 0.5 * (start + time));
-                self.system.set_middle(pair, &middle, self.growth(pair, [before, offset], [start, time]));
-            }
-        }
-        self.find_drives(offset, time);
-        self.load(before);
-        if self.is_marched() {
-            self.stepper.begin_loads(&mut self.system);
-            self.load(offset);
-        }
-        match self.stepper.step(&mut self.system, &self.drives) {
-            Ok(()) => {}
-            Err(StepFailure::Exhausted) => return Err(self.abandon_step()),
-            Err(failure) => return Err(self.fail(failure, time)),
-        }
-        let places = (&self.compiled.patches[..], &self.compiled.linings[..]);
-        self.window.add(&self.system, places, self.system.step_size());
-        self.communication.done = next;
-        let finished = next == self.communication.count;
-        if finished {
-            self.finish(offset, time)?;
-        }
-        Ok(StepProgress { time, finished })
-    }
-
     /// Applies loads other than contact, and stiffening, for the step that begins at `offset`: q⁺ = a q + b q⁻ + c f uses the force at the
     /// time of q.
-    fn load(&mut self, offset: f64) {
+    pub(super) fn load(&mut self, offset: f64) {
         let hold = self.holds();
         let (scheme, step) = (self.system.scheme(), self.system.step_size());
         for body in 0..self.compiled.bodies.len() {
@@ -352,7 +238,7 @@ impl Simulation {
         }
     }
 
-    fn finish(&mut self, offset: f64, time: f64) -> Result<()> {
+    pub(super) fn finish(&mut self, offset: f64, time: f64) -> Result<()> {
         if let Err(failure) = self.system.check_state() {
             return Err(self.fail(failure, time));
         }
@@ -380,13 +266,12 @@ impl Simulation {
     /// Warns of the first displacement of each structure that is too large for linear kinematics.
     fn note_curved(&mut self, time: f64) {
         for body in 0..self.rotors.len() {
-            if self.warning_state.curved[body] {
-                continue;
-            }
             let Some(most) = self.system.most_curved_of(body).filter(|most| most.share() >= CURVED_SHARE) else {
                 continue;
             };
-            self.warning_state.curved[body] = true;
+            if !self.warning_state.is_first(Topic::LargeDisplacement, Subject::Body(body)) {
+                continue;
+            }
             let problem = format!(
                 "at t = {} s, contact node {} of {} is displaced by {:.3e} m around the axis: gaps are linear in \
                  displacements, which neglects u²/2r = {:.2e} m, {:.0} % of the clearance",
@@ -401,60 +286,6 @@ impl Simulation {
                  100 %";
             self.note(Warning::new(Topic::LargeDisplacement, problem, remedy));
         }
-    }
-
-    /// Ends the communication step before its end (early return): outputs cover the finished part.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::Simulation;
-    /// # let scene = tiprub_test_models::rub(2);
-    /// # let mut simulation = Simulation::new(&scene)?;
-    /// # simulation.initialise(0.0)?;
-    /// simulation.begin_step(0.0, 1e-4)?;
-    /// let progress = simulation.advance()?;
-    /// simulation.end_step_early()?;
-    /// assert_eq!(simulation.time(), progress.time);
-    /// # Ok::<(), tiprub_core::Error>(())
-    /// ```
-    ///
-    /// # Errors
-    /// No current step; no finished internal step; a non-finite state.
-    pub fn end_step_early(&mut self) -> Result<()> {
-        if self.phase != SimulationPhase::Stepping || self.communication.done == 0 {
-            let problem = "no internal step has been completed";
-            return Err(Error::invalid("early return", problem, "Return early only after an internal step"));
-        }
-        self.tangent.forget();
-        let done = self.communication.done;
-        let (offset, time) = (self.communication.offset(done), self.communication.time(done));
-        self.communication = Communication { length: offset, count: done, ..self.communication };
-        self.finish(offset, time)
-    }
-
-    /// Calls `begin_step`, [`Simulation::fly_ahead`], then `advance` until the end.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::Simulation;
-    /// # let scene = tiprub_test_models::rub(2);
-    /// # let mut simulation = Simulation::new(&scene)?;
-    /// # simulation.initialise(0.0)?;
-    /// let clearance = simulation.table().find("clearance_minimum").expect("an output").reference;
-    /// for step in 0..10 {
-    ///     simulation.do_step(f64::from(step) * 1e-4, 1e-4)?;
-    ///     println!("{:.3e} m", simulation.real(clearance)?);
-    /// }
-    /// # Ok::<(), tiprub_core::Error>(())
-    /// ```
-    ///
-    /// # Errors
-    /// As [`Simulation::begin_step`] and [`Simulation::advance`].
-    pub fn do_step(&mut self, current_time: f64, step_size: f64) -> Result<()> {
-        self.begin_step(current_time, step_size)?;
-        self.fly_ahead();
-        while !self.advance()?.finished {}
-        Ok(())
     }
 }
 

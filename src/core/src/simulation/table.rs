@@ -11,13 +11,15 @@ mod free;
 mod parts;
 mod rotor;
 
+use tiprub_cosim::bounds;
+use tiprub_cosim::variables::{Quantity, Span, Variability, VariableTable};
+
 use super::outputs::{OutputReader, scalar};
 use super::plan::SteppingOrder;
 use super::units::{ANGLE, ANGULAR_SPEED, FORCE, LENGTH, TIME, TORQUE};
 use crate::scene::ranges;
 use crate::scene::settings::{BodyMotion, InputInterpolation, Scene, SceneSettings, Shape};
 use crate::scene::shape::CompiledShape;
-use crate::variables::{Quantity, Span, Variability, VariableTable};
 use crate::{Result, Rom};
 use builder::{RAMPED, TableBuilder};
 use parts::{AXES, BodyFacts, PairFacts, TableFacts, largest_length};
@@ -126,7 +128,7 @@ fn parameters(table: &mut TableBuilder, parts: &TableFacts) {
         table.belongs(pair.index, parts.of_pair(pair));
         let text = "Time after the start over which the casing shape grows smoothly from round to its full amplitude";
         let ramp = table.parameter(Quantity::RampTime, "casing_ramp_time", Some(&TIME), pair.surface.ramp_time, text);
-        (ramp.min, ramp.max) = (Some(0.0), Some(ranges::TIME));
+        (ramp.min, ramp.max) = (Some(0.0), Some(bounds::TIME));
     }
     table.belongs_to_all();
     table.scene_name(settings);

@@ -6,10 +6,11 @@
 //! there the step is repeated in both directions, and impulses and gaps that do not change equally indicate a kink between them. The change
 //! of inputs is then reduced. The quotient is the derivative with contacts and steps as they were in the accepted step, up to rounding.
 
+use tiprub_cosim::variables::{Causality, Quantity};
+use tiprub_cosim::{CoSimulation, shown_time};
+
 use super::{Simulation, SimulationPhase};
-use crate::scene::method::Scheme;
-use crate::variables::{Causality, DataType, Quantity, Variability};
-use crate::{Error, Result, shown, shown_time};
+use crate::{Error, Result};
 use std::sync::Arc;
 
 /// Change of inputs as a fraction of the change that moves gaps by a clearance: 2⁻²⁰, so that sums with usual values are exact. Rounding in
@@ -61,19 +62,7 @@ impl StepReplay {
 
 impl Simulation {
     /// Returns whether derivatives over steps can be requested: the parameter `step_derivatives`.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::Simulation;
-    /// # let scene = tiprub_test_models::rub(2);
-    /// # let mut simulation = Simulation::new(&scene)?;
-    /// let derivatives = simulation.table().find("step_derivatives").expect("a parameter").reference;
-    /// assert!(!simulation.is_differentiated());
-    /// simulation.set_integer(derivatives, 2)?;
-    /// assert!(simulation.is_differentiated());
-    /// # Ok::<(), tiprub_core::Error>(())
-    /// ```
-    pub fn is_differentiated(&self) -> bool {
+    pub(super) fn is_differentiated(&self) -> bool {
         self.value_of(Quantity::StepDerivatives, 0) > 1.5
     }
 
@@ -91,38 +80,11 @@ impl Simulation {
         self.tangent.start = start;
     }
 
-    /// Computes the derivatives of `outputs` at the end of the last communication step by `inputs` over it, times `seed`: Σ_j
-    /// ∂y_i(t+H)/∂u_j s_j, written to `sensitivity`. An input here is the value that was requested before the step; contacts and internal
-    /// steps stay as they were in it.
+    /// Implements [`CoSimulation::step_derivative`].
     ///
     /// The step is repeated in a copy of the simulation, usually once with galerkin and twice with other schemes; the simulation itself is
-    /// unchanged.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::Simulation;
-    /// # let scene = tiprub_test_models::rub(2);
-    /// # let mut simulation = Simulation::new(&scene)?;
-    /// let derivatives = simulation.table().find("step_derivatives").expect("a parameter").reference;
-    /// simulation.set_integer(derivatives, 2)?;
-    /// simulation.initialise(0.0)?;
-    /// simulation.do_step(0.0, 1e-4)?;
-    /// let [speed, angle] = ["speed", "rotor_angle"].map(|name| simulation.table().find(name).expect("a variable").reference);
-    /// let mut sensitivity = [0.0];
-    /// simulation.step_derivative(&[angle], &[speed], &[1.0], &mut sensitivity)?;
-    /// // The speed acts over the whole step of 0.1 ms.
-    /// assert!((sensitivity[0] - 1e-4).abs() < 1e-9);
-    /// # Ok::<(), tiprub_core::Error>(())
-    /// ```
-    ///
-    /// # Errors
-    /// Derivatives not requested before initialisation; no finished communication step, or one in which inputs were set, which ended early,
-    /// or after which a state was restored; references of other variables than continuous real outputs and real inputs; a seed that is not
-    /// finite.
-    ///
-    /// # Panics
-    /// Slices of different lengths.
-    pub fn step_derivative(
+    /// unchanged. An input here is the value that was requested before the step; contacts and internal steps stay as they were in it.
+    pub(super) fn differentiate_step(
         &mut self,
         outputs: &[u32],
         inputs: &[u32],
@@ -167,7 +129,7 @@ impl Simulation {
                 continue;
             }
             grown = true;
-            if self.system.settings().scheme != Scheme::Galerkin {
+            if !self.is_marched() {
                 let of_twin =
                     |twin: &Self| outputs.iter().map(|output| twin.values[*output as usize]).collect::<Vec<_>>();
                 let (ahead, touched) = (of_twin(twin), twin.touched());
@@ -199,7 +161,7 @@ impl Simulation {
     }
 
     fn is_speed(&self, reference: u32) -> bool {
-        self.table.locate(reference).is_ok_and(|(variable, _)| variable.quantity == Quantity::Speed)
+        self.values.table().locate(reference).is_ok_and(|(variable, _)| variable.quantity == Quantity::Speed)
     }
 
     /// Smallest clearance of all pairs (m).
@@ -223,9 +185,11 @@ impl Simulation {
 
     /// Repeats the last communication step in `twin`, with inputs changed by `moved` times `seed`.
     fn march_again(&mut self, twin: &mut Self, inputs: &[u32], seed: &[f64], moved: f64) -> Result<()> {
-        let lost = |error: Error| Error::Unstable {
-            problem: format!("the communication step to t = {} s cannot be repeated: {error}", shown_time(self.time)),
-            remedy: "Do not request derivatives over this step".to_owned(),
+        let lost = |error: Error| {
+            Error::unstable(
+                format!("the communication step to t = {} s cannot be repeated: {error}", shown_time(self.time)),
+                "Do not request derivatives over this step",
+            )
         };
         if self.tangent.follows {
             twin.restore_from(&self.tangent.start);
@@ -235,8 +199,9 @@ impl Simulation {
         }
         self.tangent.follows = true;
         // A step that was allowed once is allowed again.
-        if let Some(bound) = twin.table.with_quantity_of(Quantity::MaxInternalSteps, 0) {
-            twin.values[bound.reference as usize] = 0.0;
+        let bound = twin.values.table().with_quantity_of(Quantity::MaxInternalSteps, 0);
+        if let Some(bound) = bound.map(|bound| bound.reference as usize) {
+            twin.values[bound] = 0.0;
         }
         for (input, seed) in inputs.iter().zip(seed) {
             twin.move_input(*input, moved * seed);
@@ -248,7 +213,7 @@ impl Simulation {
     /// Shifts the requested course of an input and keeps its slope.
     fn move_input(&mut self, reference: u32, by: f64) {
         let (hold, inputs) = (self.holds(), &mut self.inputs);
-        let Ok((variable, element)) = self.table.locate(reference) else { return };
+        let Ok((variable, element)) = self.values.table().locate(reference) else { return };
         let Some(input) = inputs.get_mut(variable.quantity, variable.of, element) else { return };
         input.value += by;
         if variable.quantity == Quantity::Speed || hold {
@@ -261,7 +226,7 @@ impl Simulation {
 
     /// Returns the change of an input for a difference: a small fraction of the change that closes the clearance.
     fn nudge(&self, reference: u32) -> f64 {
-        let Ok((variable, _)) = self.table.locate(reference) else { return f64::INFINITY };
+        let Ok((variable, _)) = self.values.table().locate(reference) else { return f64::INFINITY };
         let value = self.values[reference as usize].abs();
         let size = match variable.quantity {
             Quantity::Speed => {
@@ -291,31 +256,10 @@ impl Simulation {
             ));
         }
         for output in outputs {
-            self.check_differentiable(*output)?;
+            let (variable, element) = self.table().locate(*output)?;
+            variable.check_derivative(element, Causality::Output, 1)?;
         }
-        for (input, seed) in inputs.iter().zip(seed) {
-            let (variable, element) = self.table.locate(*input)?;
-            let what = || format!("derivative with respect to `{}`", variable.element_name(element));
-            if variable.causality != Causality::Input || variable.kind != DataType::Real {
-                let remedy = "Request derivatives with respect to real inputs only";
-                return Err(Error::invalid(what(), "the variable is not a real input", remedy));
-            }
-            if !seed.is_finite() {
-                return Err(Error::invalid(what(), format!("seed {}", shown(*seed)), "Give finite seeds"));
-            }
-        }
-        Ok(())
-    }
-
-    fn check_differentiable(&self, output: u32) -> Result<()> {
-        let (variable, element) = self.table.locate(output)?;
-        let continuous = variable.causality == Causality::Output && variable.variability == Variability::Continuous;
-        if continuous && variable.kind == DataType::Real {
-            return Ok(());
-        }
-        let remedy = "Request derivatives of continuous real outputs only";
-        let what = format!("derivative of `{}`", variable.element_name(element));
-        Err(Error::invalid(what, "the variable is not a continuous real output", remedy))
+        inputs.iter().zip(seed).try_for_each(|(input, seed)| self.check_input_derivative(*input, 1, *seed).map(drop))
     }
 }
 

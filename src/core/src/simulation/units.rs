@@ -1,6 +1,6 @@
 //! Units and enumerations of the variables.
 
-use crate::variables::{Enumeration, VariableUnit};
+use tiprub_cosim::variables::{Enumeration, VariableUnit};
 
 /// rad/s.
 pub static ANGULAR_SPEED: VariableUnit = VariableUnit {

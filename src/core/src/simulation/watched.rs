@@ -5,12 +5,13 @@
 //! the cubic with their radii and slopes (straight if a ROM has no slopes), beyond them it is straight. For a point off the contour the gap
 //! changes by its distance from the contour.
 
+use tiprub_cosim::variables::NO_CLEARANCE;
+
 use crate::geometry::layout::Layout;
 use crate::geometry::wrench::At;
 use crate::geometry::{GapLaw, RevolutionGap, Vector3};
 use crate::scene::rom::{ContactNode, WatchedPoints};
 use crate::system::{ContactPair, System};
-use crate::variables::NO_CLEARANCE;
 use crate::{Result, Rom};
 
 use super::Simulation;

@@ -1,10 +1,11 @@
 //! Sums over one communication step: impulses, extremes, friction heat.
 
+use tiprub_cosim::persist_fields;
+
 use super::patches::HeatPatches;
 use super::slave_surface::Lining;
 use crate::geometry::Vector3;
 use crate::modes::bank::ModalBank;
-use crate::persist::persist_fields;
 use crate::scene::settings::OutputSettings;
 use crate::system::{Structure, System};
 
@@ -64,9 +65,9 @@ pub struct StepWindow {
     pub normal_peak: f64,
 }
 
-persist_fields!(BodyWindow { lowest, normal_impulse, tangential_impulse, force_impulse, moment_impulse });
-persist_fields!(PairWindow { force_impulse, moment_impulse, friction_heat, patch_heat, casing_moment });
-persist_fields!(SupportWindow { moved, speeds, lining });
+persist_fields!(BodyWindow { lowest, normal_impulse, tangential_impulse, force_impulse.data.0, moment_impulse.data.0 });
+persist_fields!(PairWindow { force_impulse.data.0, moment_impulse.data.0, friction_heat, patch_heat, casing_moment });
+persist_fields!(SupportWindow { moved, speeds, lining.data.0 });
 persist_fields!(StepWindow { bodies, pairs, supports, friction_heat, normal_peak });
 
 impl StepWindow {

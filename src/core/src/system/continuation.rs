@@ -1,5 +1,7 @@
 //! Continues a running state: another step size, saving and restoring, and nodes that pass an edge.
 
+use tiprub_cosim::persist::{Persist, StateReader, StateWriter};
+
 use super::contact_view::ContactMember;
 use super::pair::When;
 use super::{Bodies, ContactEvent, ContactPair, StepFailure, Structure, System, sum_of};
@@ -7,7 +9,6 @@ use crate::geometry::surface_spline::ClosestPoint;
 use crate::geometry::wrench::At;
 use crate::geometry::{GapLaw, Vector3};
 use crate::math::vector::{set_strided_vector3, strided_vector3};
-use crate::persist::{Persist, StateReader, StateWriter};
 use crate::system::history::ContactHistory;
 
 /// A contact force is continued over steps up to this many times as long as the step in which it was found.

@@ -1,6 +1,6 @@
 //! Counters of the work of time integration.
 
-use crate::persist::persist_fields;
+use tiprub_cosim::persist_fields;
 
 /// Counters of the work of time integration.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

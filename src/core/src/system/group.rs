@@ -23,7 +23,7 @@ pub struct GroupSolution<'a> {
     /// Number of factorised small linear systems; it is increased.
     pub factorisations: &'a mut u64,
     /// Energy consumed by wear (J); it is increased.
-    pub wear_energy: &'a mut crate::Sum,
+    pub wear_energy: &'a mut tiprub_cosim::Sum,
 }
 
 /// Contact nodes of one structure in a group.

@@ -1,7 +1,9 @@
 //! Values of one structure's contact nodes: current, one step before, and the oldest that a step still needs.
 
+use tiprub_cosim::persist::{Persist, StateReader, StateWriter};
+use tiprub_cosim::persist_fields;
+
 use crate::geometry::Geometry;
-use crate::persist::{Persist, StateReader, StateWriter, persist_fields};
 
 /// A value of the last step and of the step before. Only the former is part of a saved state.
 #[derive(Debug, Clone, PartialEq, Default)]

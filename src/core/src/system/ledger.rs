@@ -4,31 +4,7 @@
 //! All terms belong to the discrete equations (see [`crate::modes::schemes`]), so the residual of the balance measures rounding and
 //! programming errors, not the truncation error of the scheme.
 
-use crate::persist::persist_fields;
-
-/// Sum with Neumaier's compensation, because long runs add millions of tiny losses.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Sum {
-    total: f64,
-    compensation: f64,
-}
-
-persist_fields!(Sum { total, compensation });
-
-impl Sum {
-    /// Adds a term.
-    pub fn add(&mut self, term: f64) {
-        let sum = self.total + term;
-        self.compensation +=
-            if self.total.abs() >= term.abs() { (self.total - sum) + term } else { (term - sum) + self.total };
-        self.total = sum;
-    }
-
-    /// Returns the compensated value.
-    pub fn value(&self) -> f64 {
-        self.total + self.compensation
-    }
-}
+use tiprub_cosim::{Sum, persist_fields};
 
 /// Work and losses since the start (J).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -6,8 +6,9 @@
 //!
 //! At every communication point both losses are compared with their largest values so far.
 
+use tiprub_cosim::persist_fields;
+
 use super::{ContactPair, StepFailure, System};
-use crate::persist::persist_fields;
 use crate::scene::method::{Scheme, Solver};
 use crate::system::ledger::Ledger;
 

@@ -1,5 +1,7 @@
 //! A contact pair: contact nodes of one structure against a surface, which another structure may carry.
 
+use tiprub_cosim::persist_fields;
+
 use super::Structure;
 use super::carrier::Spot;
 use super::growth::ShapeGrowth;
@@ -7,7 +9,6 @@ use crate::geometry::frame::PolarFrame;
 use crate::geometry::surface_spline::ClosestPoint;
 use crate::geometry::wrench::MotionIncrement;
 use crate::geometry::{GapLaw, PrescribedMotion};
-use crate::persist::persist_fields;
 use crate::system::history::Two;
 
 /// The structure that carries the surface of a pair.
@@ -146,12 +147,12 @@ impl ContactPair {
     }
 
     /// Prescribed motion, as a part of the saved state.
-    pub(crate) fn state(&self) -> &impl crate::persist::Persist {
+    pub(crate) fn state(&self) -> &impl tiprub_cosim::persist::Persist {
         &self.prescribed
     }
 
     /// Prescribed motion, to restore it.
-    pub(crate) fn state_mut(&mut self) -> &mut impl crate::persist::Persist {
+    pub(crate) fn state_mut(&mut self) -> &mut impl tiprub_cosim::persist::Persist {
         &mut self.prescribed
     }
 

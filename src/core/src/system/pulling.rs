@@ -1,7 +1,8 @@
 //! Pulling forces and penetration at contact nodes, which occur if a law checks for penetration only once and nodes push each other.
 
+use tiprub_cosim::persist_fields;
+
 use super::System;
-use crate::persist::persist_fields;
 
 /// Impulses on the contact nodes of one structure since the start, summed over all its sectors.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -1,11 +1,13 @@
 //! One structure: its modes, its contact nodes and their history, and the forces on surfaces that it carries.
 
+use tiprub_cosim::persist::{Persist, StateReader, StateWriter};
+use tiprub_cosim::persist_fields;
+
 use crate::geometry::{GapLaw, Geometry, PrescribedMotion, Vector3};
 use crate::math::vector::{set_strided_vector3, strided_vector3, vector3_at};
 use crate::modes::bank::{BankOptions, LANES, ModalBank};
 use crate::modes::modal::ModalModel;
 use crate::modes::sectors::{SectorModel, Sectors};
-use crate::persist::{Persist, StateReader, StateWriter, persist_fields};
 use crate::scene::method::Scheme;
 use crate::system::history::ContactHistory;
 use crate::system::pair::SearchStart;

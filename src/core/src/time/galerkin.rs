@@ -3,7 +3,7 @@
 //! [`level`] makes tables of all modes for one step length, from the [`response`] of each mode and the points of a [`basis`]; [`tables`] has
 //! them for all lengths. [`trial`] solves the contact problem of a sector at these points, as lanes of registers ([`compliance`],
 //! [`kernels`]), and judges the step. An [`island`] accepts it ([`advance`]) or tries a step of half the length, over a [`span`]. What its
-//! sectors touch are its [`surroundings`]; up to here everything is independent of the scene. A [`scene_island`] belongs to a system, and
+//! sectors touch are its [`surroundings`]; up to here everything is independent of the scene. A `scene_island` belongs to a system, and
 //! the [`stepper`] has all of them. A [`flight`] lasts as long as nothing comes near.
 
 pub mod advance;

@@ -5,13 +5,14 @@
 
 use crate::guide::print_row;
 use crate::rods::{NEARLY_NONE, SCHEMES, StraightRod, against_plane, quiet_step, set_samples, single};
+use tiprub_core::Ledger;
 use tiprub_core::geometry::PrescribedMotion;
 use tiprub_core::modes::modal::ModalModel;
-use tiprub_core::persist::{Persist, StateReader, StateWriter};
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::system::System;
 use tiprub_core::time::{Recurrence, Stepper};
-use tiprub_core::{Ledger, Sum};
+use tiprub_cosim::Sum;
+use tiprub_cosim::persist::{Persist, StateReader, StateWriter};
 
 /// Returns a rod of 12 elements, whose contact node has mass or not as the scheme requires.
 fn rod(scheme: Scheme) -> ModalModel {

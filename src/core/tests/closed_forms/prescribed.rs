@@ -14,7 +14,7 @@ use tiprub_core::scene::rom::WatchedPoints;
 use tiprub_core::scene::settings::{Interpolation, LoadSettings, Shape, SplineSettings};
 use tiprub_core::system::{PairParts, StructureParts, SurfaceCarrier, System, SystemSettings};
 use tiprub_core::time::{Recurrence, Stepper};
-use tiprub_core::{Scene, Simulation};
+use tiprub_core::{CoSimulation, Scene, Simulation};
 use tiprub_test_models::{self as models, element, go, lattice, move_on, real, reference, set, started};
 
 const SECTORS: usize = 5;

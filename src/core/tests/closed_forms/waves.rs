@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use nalgebra::{DMatrix, Matrix2, Vector2};
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::settings::{LoadSettings, Meridian, Shape};
-use tiprub_core::{Scene, Simulation};
+use tiprub_core::{CoSimulation, Scene, Simulation};
 use tiprub_reference::closed::chain::Chain;
 use tiprub_test_models::{
     self as models,

@@ -2,7 +2,7 @@
 
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::settings::{BodyMotion, LoadSettings, PatchSettings, Shape, StructureSettings};
-use tiprub_core::{Rom, Scene, Simulation, Warning};
+use tiprub_core::{CoSimulation, Rom, Scene, Simulation, Warning};
 use tiprub_test_models::{
     RADIUS, coating_of, disk, go, lattice, modal, node, real, rich_blade, ring, ring_of, round, rub, saved, set,
     several, started, try_started,

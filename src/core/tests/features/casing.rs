@@ -4,7 +4,7 @@ use crate::checks::{allocates_nothing, disturb, ledger_closes, state_continues};
 use tiprub_core::geometry::PrescribedMotion;
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::settings::{LoadSettings, PatchSettings, Shape, SplineSettings};
-use tiprub_core::{Scene, Simulation};
+use tiprub_core::{CoSimulation, Scene, Simulation};
 use tiprub_test_models::{self as models, coating, element, flexible, go, real, saved, set, started, try_started};
 
 /// Twelve blades that rub the two-lobe casing, with one feature added.

@@ -1,6 +1,6 @@
 //! Checks that every combination of features must pass.
 
-use tiprub_core::Simulation;
+use tiprub_core::{CoSimulation, Simulation};
 use tiprub_test_models::{bits, go, real, reference, saved, set_element};
 
 use crate::counting;

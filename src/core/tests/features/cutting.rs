@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::settings::{CoatingSettings, CuttingSettings, Shape};
-use tiprub_core::{Rom, Scene};
+use tiprub_core::{CoSimulation, Rom, Scene};
 use tiprub_test_models::{self as models, element, go, move_on, real, started};
 
 /// Specific cutting energy (J/m³), and ratio of normal to tangential force.

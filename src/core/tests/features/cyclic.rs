@@ -1,9 +1,9 @@
 //! A disk of coupled sectors stepped by nodal diameters against the equivalent single structure.
 
-use tiprub_core::Simulation;
 use tiprub_core::modes::cyclic::CyclicModel;
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::settings::InputInterpolation;
+use tiprub_core::{CoSimulation, Simulation};
 use tiprub_test_models::{
     disk::{TestDisk, with_rotor},
     real, started,

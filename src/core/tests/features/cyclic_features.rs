@@ -8,7 +8,7 @@ use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::rom::{Harmonic, Rom};
 use tiprub_core::scene::settings::{LoadSettings, PatchSettings, Shape, SplineSettings};
 use tiprub_core::time::{Recurrence, Stepper};
-use tiprub_core::{Scene, Simulation};
+use tiprub_core::{CoSimulation, Scene, Simulation};
 use tiprub_test_models::{
     self as models, coating,
     disk::{TestDisk, with_rotor},
@@ -231,7 +231,7 @@ fn reading_outputs_within_a_step_changes_nothing() {
             simulation.begin_step(simulation.time(), 5e-5).unwrap();
             while !simulation.advance().unwrap().finished {
                 if look {
-                    simulation.update_outputs();
+                    simulation.update_outputs().unwrap();
                 }
             }
         }

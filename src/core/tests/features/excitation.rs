@@ -6,7 +6,7 @@ use nalgebra::Complex;
 use tiprub_core::modes::modal::ModalModel;
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::settings::{ExcitationSettings, ForceDirection, InputInterpolation};
-use tiprub_core::{Rom, Scene, Simulation};
+use tiprub_core::{CoSimulation, Rom, Scene, Simulation};
 use tiprub_test_models::{self as models, bits, disk::TestDisk, go, real, saved, set, started};
 
 const AMPLITUDE: f64 = 0.4;
@@ -134,7 +134,7 @@ fn central_differences_warn_of_excitation_on_long_steps() {
         let mut run = started(&scene);
         go(&mut run, 2e-6);
         let notes = run.take_notes();
-        let found = notes.iter().any(|text| text.contains("make a resonance 2 % too large"));
+        let found = notes.iter().any(|text| text.contains("makes a resonance 2 % too large"));
         assert_eq!(found, warned, "{turn}: {notes:?}");
     }
 }

@@ -8,9 +8,10 @@ use std::path::Path;
 
 use nalgebra::DMatrix;
 use tiprub_core::scene::method::{Scheme, Solver};
-use tiprub_core::scene::rom::{STRESSES, SUPPORT_ROWS, SupportRows, Thermal, ThermalPatch, WatchedPoints};
+use tiprub_core::scene::rom::{STRESSES, SUPPORT_ROWS, SupportRows, Thermal, WatchedPoints};
 use tiprub_core::scene::settings::{CuttingSettings, ExcitationSettings};
-use tiprub_core::{Scene, Simulation};
+use tiprub_core::{CoSimulation, Scene, Simulation};
+use tiprub_cosim::ThermalPatch;
 use tiprub_test_models::{self as models, bits, disk::TestDisk, go, lattice, real, saved, set, started};
 
 use crate::checks::disturb;

@@ -5,9 +5,10 @@ use std::f64::consts::{PI, TAU};
 use nalgebra::{DMatrix, DVector};
 use tiprub_core::modes::modal::ModalModel;
 use tiprub_core::scene::method::Scheme;
-use tiprub_core::scene::rom::{Thermal, ThermalPatch};
+use tiprub_core::scene::rom::Thermal;
 use tiprub_core::scene::settings::{InitialSettings, InputInterpolation};
-use tiprub_core::{Rom, Scene, Simulation};
+use tiprub_core::{CoSimulation, Rom, Scene, Simulation};
+use tiprub_cosim::ThermalPatch;
 use tiprub_test_models::{self as models, bits, disk::TestDisk, go, real, saved, set, started};
 
 const SOFTENING: f64 = 4e-4;

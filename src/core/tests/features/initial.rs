@@ -6,7 +6,7 @@ use tiprub_core::modes::cyclic::CyclicModel;
 use tiprub_core::modes::modal::ModalModel;
 use tiprub_core::scene::method::Scheme;
 use tiprub_core::scene::settings::InitialSettings;
-use tiprub_core::{Rom, Scene, Simulation};
+use tiprub_core::{CoSimulation, Rom, Scene, Simulation};
 use tiprub_test_models::{self as models, disk::TestDisk, go, real, set_element, started};
 
 const NONE: InitialSettings =

@@ -2,8 +2,8 @@
 
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::settings::{BodyMotion, Shape, StructureSettings};
-use tiprub_core::variables::{Causality, DataType};
-use tiprub_core::{Scene, Simulation};
+use tiprub_core::{CoSimulation, Scene, Simulation};
+use tiprub_cosim::variables::{Causality, DataType};
 use tiprub_test_models::{lattice, real, rich_blade, rub, several, spin};
 
 const SCHEMES: [Scheme; 3] = Scheme::RECURRENCES;
@@ -24,7 +24,7 @@ fn outputs(simulation: &Simulation) -> Vec<(String, f64)> {
     let rows = simulation.table().variables().iter();
     let rows = rows.filter(|row| row.causality == Causality::Output && row.kind == DataType::Real);
     let elements = rows.flat_map(|row| (0..row.len()).map(move |element| (row, element)));
-    let value = |row: &tiprub_core::variables::Variable, element: usize| {
+    let value = |row: &tiprub_cosim::variables::Variable, element: usize| {
         simulation.real(row.reference + u32::try_from(element).unwrap()).unwrap()
     };
     elements.map(|(row, element)| (row.element_name(element), value(row, element))).collect()
@@ -308,7 +308,7 @@ fn state_rejected_by_one_rotor_changes_nothing() {
         let mut damaged = own.clone();
         damaged[at..at + 16].copy_from_slice(&[1200.0_f64.to_le_bytes(), (-1e5_f64).to_le_bytes()].concat());
         let end = damaged.len() - 8;
-        let checksum = tiprub_core::persist::fingerprint(&damaged[..end], 0);
+        let checksum = tiprub_cosim::persist::fingerprint(&damaged[..end], 0);
         damaged[end..].copy_from_slice(&checksum.to_le_bytes());
         let Err(error) = simulation.restore_state(&damaged) else {
             simulation.restore_state(&own).unwrap();

@@ -3,9 +3,10 @@
 use std::f64::consts::TAU;
 
 use nalgebra::DMatrix;
-use tiprub_core::scene::rom::{STRESSES, Thermal, ThermalPatch, WatchedPoints};
+use tiprub_core::scene::rom::{STRESSES, Thermal, WatchedPoints};
 use tiprub_core::scene::settings::Shape;
-use tiprub_core::{Scene, Simulation};
+use tiprub_core::{CoSimulation, Scene, Simulation};
+use tiprub_cosim::ThermalPatch;
 use tiprub_test_models::{self as models, element, go, set, started};
 
 /// Returns a blade whose stresses are known functions of its contact displacements, ready to rub.

@@ -3,7 +3,7 @@
 use lattice::*;
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::settings::*;
-use tiprub_core::{Scene, Simulation};
+use tiprub_core::{CoSimulation, Scene, Simulation};
 use tiprub_test_models::{element, go, lattice, real, saved, started};
 
 const SCHEMES: [Scheme; 2] = [Scheme::CentralDifference, Scheme::ModalExact];

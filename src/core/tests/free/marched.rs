@@ -5,7 +5,7 @@ use crate::guide::{self, print_row};
 use lattice::*;
 use nalgebra::DMatrix;
 use tiprub_core::scene::method::{Scheme, Solver};
-use tiprub_core::{Rom, Scene, Simulation};
+use tiprub_core::{CoSimulation, Rom, Scene, Simulation};
 use tiprub_test_models::{bits, go, lattice, node, real, saved, started, structure};
 
 /// Communication step (s).

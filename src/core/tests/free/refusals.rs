@@ -3,7 +3,7 @@
 use lattice::*;
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::settings::*;
-use tiprub_core::{Rom, Scene, Simulation};
+use tiprub_core::{CoSimulation, Rom, Scene, Simulation};
 use tiprub_test_models::{go, lattice, real, started};
 
 #[test]

@@ -10,7 +10,7 @@
 
 use nalgebra::{DMatrix, DVector, Vector3};
 use tiprub_core::scene::settings::Shape;
-use tiprub_core::{Rom, Scene, Simulation};
+use tiprub_core::{CoSimulation, Rom, Scene, Simulation};
 use tiprub_test_models::{self as models, set, set_element};
 
 const SECTORS: usize = 3;

@@ -2,7 +2,7 @@
 
 use tiprub_core::scene::method::Scheme;
 use tiprub_core::scene::settings::{Shape, TimeSettings};
-use tiprub_core::{Scene, Simulation};
+use tiprub_core::{CoSimulation, Scene, Simulation};
 use tiprub_test_models::{self as models, real};
 
 /// Returns twelve blades in a round casing, without friction.

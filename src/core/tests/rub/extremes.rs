@@ -4,8 +4,8 @@ use proptest::prelude::*;
 use tiprub_core::geometry::Vector3;
 use tiprub_core::scene::method::Scheme;
 use tiprub_core::scene::settings::{LoadSettings, Shape, SplineSettings};
-use tiprub_core::variables::{Causality, DataType, Variability};
-use tiprub_core::{Scene, Simulation};
+use tiprub_core::{CoSimulation, Scene, Simulation};
+use tiprub_cosim::variables::{Causality, DataType, Variability};
 use tiprub_test_models::{self as models, disk, go, lattice, real, reference, started};
 
 use crate::blades::refusal;

@@ -2,7 +2,7 @@
 //! nodes that stay inside, and curvature work that changes the sign of a result.
 
 use tiprub_core::scene::method::{Scheme, Solver};
-use tiprub_core::{Result, Scene, Simulation};
+use tiprub_core::{CoSimulation, Result, Scene, Simulation};
 use tiprub_test_models::{self as models, GAP, move_on, real, started};
 
 /// Communication step (s).

@@ -1,7 +1,7 @@
 //! Inputs between communication points: inputs that move or load a structure never jump unless the scene requests it.
 
 use tiprub_core::scene::settings::{BodyMotion, InputInterpolation, LoadSettings, Shape, StructureSettings};
-use tiprub_core::{Rom, Scene, Simulation};
+use tiprub_core::{CoSimulation, Rom, Scene, Simulation};
 use tiprub_test_models::{self as models, go, real, reference, saved, set, slope, started, started_at};
 
 const STEP: f64 = 1e-6;
@@ -376,7 +376,7 @@ fn interpolation_choice_exists_only_with_ramped_inputs() {
     // The choice of the scene file can be read and selected again.
     assert!(has(&held(scene)));
     for row in Simulation::new(&rich()).unwrap().table().variables() {
-        let moves = row.causality == tiprub_core::variables::Causality::Input || row.name == "gap_offset";
+        let moves = row.causality == tiprub_cosim::variables::Causality::Input || row.name == "gap_offset";
         let says = row.description.contains("reached at the end of the communication step")
             || row.description.contains("constant over a");
         assert_eq!(moves, says, "{}: {}", row.name, row.description);
@@ -448,6 +448,6 @@ fn early_return_equals_a_shorter_communication_step() {
     }
     // Means cover the completed part, however often they are read.
     let before = outputs(&simulation);
-    simulation.update_outputs();
+    simulation.update_outputs().unwrap();
     assert_eq!(before, outputs(&simulation));
 }

@@ -5,8 +5,8 @@ use nalgebra::DMatrix;
 use tiprub_core::modes::modal::ModalModel;
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::settings::ExcitationSettings;
-use tiprub_core::warning::Topic;
-use tiprub_core::{Error, Scene, Simulation};
+use tiprub_core::{CoSimulation, Error, Scene, Simulation};
+use tiprub_cosim::warning::Topic;
 use tiprub_test_models::{self as models, bits, disk, go, real, reference, saved, set, try_started};
 
 /// Returns the largest usable step that an error contains (s).
@@ -307,8 +307,8 @@ fn rejected_steps_suggest_adaptive_steps_first() {
         let mut scene = with_step(round(Scheme::CentralDifference), 1e-3);
         scene.roms[0] = models::rich_blade(12);
         change(&mut scene);
-        let Err(Error::Unstable { remedy, .. }) = try_started(&scene).map(drop) else { panic!("accepted") };
-        remedy
+        let Err(Error::Unstable(diagnostic)) = try_started(&scene).map(drop) else { panic!("accepted") };
+        diagnostic.remedy
     };
     let adaptive = "Use adaptive steps (set `time.scheme = \"galerkin\"`), or set `time.step` (in the FMU";
     for scheme in Scheme::RECURRENCES {

@@ -6,7 +6,7 @@ use tiprub_core::modes::modal::ModalModel;
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::rom::DisplacementFrame;
 use tiprub_core::scene::settings::Preset;
-use tiprub_core::{Result, Scene, Simulation, Warning};
+use tiprub_core::{CoSimulation, Result, Scene, Simulation, Warning};
 use tiprub_test_models::{self as models, reference, saved, set, try_started};
 
 /// Depth by which the casing closes on the tips (m).

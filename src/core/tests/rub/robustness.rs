@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use proptest::prelude::*;
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::settings::{CoatingSettings, SplineSettings};
-use tiprub_core::{Result, Scene, Simulation};
+use tiprub_core::{CoSimulation, Result, Scene, Simulation};
 use tiprub_test_models::{self as models, bits, go, real, reference, saved, set, try_started};
 
 /// Returns a blade that stiffens with the speed by 3Ω².

@@ -1,9 +1,9 @@
 //! A rub of a synthetic bladed disk through the whole simulation: energy balance, states, time, steps.
 
-use tiprub_core::Simulation;
 use tiprub_core::scene::method::Scheme;
 use tiprub_core::scene::settings::Shape;
-use tiprub_core::variables::Causality;
+use tiprub_core::{CoSimulation, Simulation};
+use tiprub_cosim::variables::Causality;
 use tiprub_test_models::{self as models, go, real, reference, saved, started};
 
 fn run(simulation: &mut Simulation, steps: u32, length: f64) {

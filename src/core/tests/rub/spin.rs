@@ -5,7 +5,7 @@ use tiprub_core::modes::bank::{BankOptions, ModalBank};
 use tiprub_core::modes::modal::{ModalModel, ModalSpin};
 use tiprub_core::modes::schemes::free_increment;
 use tiprub_core::scene::method::Scheme;
-use tiprub_core::{Scene, Simulation};
+use tiprub_core::{CoSimulation, Scene, Simulation};
 use tiprub_test_models::{self as models, real, saved, set, slope, started};
 
 use crate::inputs::{held, spinning_rom, whirling};

@@ -8,8 +8,8 @@ use crate::guide;
 use crate::guide::print_row;
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::settings::{LoadSettings, SplineSettings, TimeSettings};
-use tiprub_core::variables::{Causality, DataType, Variability};
-use tiprub_core::{Scene, Simulation};
+use tiprub_core::{CoSimulation, Scene, Simulation};
+use tiprub_cosim::variables::{Causality, DataType, Variability};
 use tiprub_test_models::{self as models, bits, coating, disk, flexible, go, real, reference, saved, set};
 
 /// Communication step (s).
@@ -24,7 +24,7 @@ fn switched_on(scene: &Scene) -> Simulation {
 }
 
 fn references(simulation: &Simulation, causality: Causality) -> Vec<u32> {
-    let continuous = |row: &&tiprub_core::variables::Variable| {
+    let continuous = |row: &&tiprub_cosim::variables::Variable| {
         row.name != "energy_residual_relative"
             && row.causality == causality
             && row.kind == DataType::Real
@@ -299,8 +299,8 @@ fn rejects_variables_without_derivatives() {
     let (friction, steps) = (reference(on, "friction_coefficient"), reference(on, "internal_steps"));
     assert!(ask(on, speed, speed, 1.0).contains("not a continuous real output"));
     assert!(ask(on, steps, speed, 1.0).contains("`internal_steps`"));
-    assert!(ask(on, torque, friction, 1.0).contains("not a real input"));
-    assert!(ask(on, torque, speed, f64::NAN).contains("seed"));
+    assert!(ask(on, torque, friction, 1.0).contains("not a continuous real input"));
+    assert!(ask(on, torque, speed, f64::NAN).contains("not finite"));
     assert!(ask(on, u32::MAX, speed, 1.0).contains("does not exist"));
     // A step that is not complete.
     on.begin_partial_step(on.time(), H).unwrap();

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 use tiprub_core::scene::settings::Shape;
-use tiprub_core::{Scene, Simulation};
+use tiprub_core::{CoSimulation, Scene, Simulation};
 use tiprub_test_models::{self as models, started};
 
 use crate::blades::refusal;

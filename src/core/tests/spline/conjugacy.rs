@@ -5,7 +5,7 @@ use tiprub_core::geometry::wrench::{At, MotionIncrement};
 use tiprub_core::geometry::{GapLaw, PrescribedMotion, Vector3};
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::settings::{PatchSettings, Shape, SplineSettings};
-use tiprub_core::{Scene, Simulation};
+use tiprub_core::{CoSimulation, Scene, Simulation};
 use tiprub_test_models::{self as models, coating, disk, flexible, real, started};
 
 fn set(simulation: &mut Simulation, name: &str, value: f64, slope: f64) {

@@ -4,8 +4,9 @@
 use nalgebra::DMatrix;
 use tiprub_core::scene::rom::{
     ContactGrid, ContactNode, ReductionBasis, RomExtras, STRESSES, SUPPORT_ROWS, Spin, SupportRows, Thermal,
-    ThermalPatch, WatchedPoints,
+    WatchedPoints,
 };
+use tiprub_cosim::ThermalPatch;
 
 use super::{Array, Arrays, Metadata, RomReader, WRITE_AGAIN, list, matrix, names};
 use crate::rom_layout::{

@@ -6,9 +6,9 @@ use proptest::prelude::*;
 use sha2::{Digest, Sha256};
 use tiprub_core::Rom;
 use tiprub_core::scene::rom::{
-    ContactGrid, ContactNode, DisplacementFrame, ReductionBasis, RubErrors, Spin, SupportRows, Thermal, ThermalPatch,
-    WatchedPoints,
+    ContactGrid, ContactNode, DisplacementFrame, ReductionBasis, RubErrors, Spin, SupportRows, Thermal, WatchedPoints,
 };
+use tiprub_cosim::ThermalPatch;
 use tiprub_format::{read_rom, write_rom};
 use tiprub_test_models::{node, structure};
 

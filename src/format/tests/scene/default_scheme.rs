@@ -3,7 +3,8 @@
 use tiprub_core::Rom;
 use tiprub_core::scene::method::Scheme;
 use tiprub_core::scene::settings::{ADAPTIVE_STEP, SceneSettings};
-use tiprub_format::{Error, parse_scene, read_scene, write_scene};
+use tiprub_cosim::Diagnostic;
+use tiprub_format::{parse_scene, read_scene, write_scene};
 use tiprub_test_models::{blade, disk::TestDisk, rich_blade};
 
 /// Without a table `[time]`.
@@ -27,7 +28,7 @@ const COATING: &str = "coating = { thickness = 2e-3, modulus = 1e9, yield_stress
 const RING: &str = "[[structure]]\nname = \"ring\"\nrom = \"ring.safetensors\"\nmotion = \"still\"\n";
 
 /// Returns the scene with lines inserted after others, and with fixed steps where it needs them.
-fn scene(after: &str, line: &str, step: bool) -> Result<SceneSettings, Error> {
+fn scene(after: &str, line: &str, step: bool) -> Result<SceneSettings, Diagnostic> {
     assert_eq!(SCENE.matches(after).count(), 1, "{after:?}");
     let time = if step { "[time]\nstep = 1e-6\n" } else { "" };
     parse_scene(&(SCENE.replace(after, &format!("{after}{line}")) + time), "demo.toml")
@@ -109,7 +110,7 @@ fn explicit_schemes_have_no_reason_and_may_require_a_step() {
 fn default_scheme_depends_on_the_rom() {
     let choice = |rom: Rom| {
         let text = format!("{SCENE}[time]\nstep = 1e-6\n");
-        let scene = read_scene::<Error>(&text, "demo.toml", |_, _| Ok(rom.clone())).unwrap();
+        let scene = read_scene::<Diagnostic>(&text, "demo.toml", |_, _| Ok(rom.clone())).unwrap();
         (scene.settings.time.scheme, scene.settings.time.scheme_reason.unwrap())
     };
     assert_eq!(choice(rich_blade(4)).0, Scheme::Galerkin);
@@ -118,6 +119,6 @@ fn default_scheme_depends_on_the_rom() {
     let (scheme, reason) = choice(TestDisk::random(6, 1, 4, 0.1, 1).cyclic());
     assert!(scheme == Scheme::ModalExact && reason.contains("the sectors of `rotor` are coupled"), "{reason}");
     // A missing step is detected only with the ROM.
-    let refusal = read_scene::<Error>(SCENE, "demo.toml", |_, _| Ok(blade(4))).unwrap_err().to_string();
+    let refusal = read_scene::<Diagnostic>(SCENE, "demo.toml", |_, _| Ok(blade(4))).unwrap_err().to_string();
     assert!(refusal.contains("time.step: missing") && refusal.contains("three modes per contact node"), "{refusal}");
 }

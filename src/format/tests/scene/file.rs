@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::settings::*;
-use tiprub_format::{Error, load_settings, parse_scene, write_scene};
+use tiprub_format::{load_settings, parse_scene, write_scene};
 
 use crate::common;
 
@@ -29,7 +29,7 @@ communication_step = 1e-3
 fn refused(from: &str, to: &str, place: &str, parts: &[&str]) {
     assert_eq!(GOOD.matches(from).count(), 1, "{from:?}");
     let error = parse_scene(&GOOD.replace(from, to), "demo.toml").unwrap_err();
-    assert!(matches!(error, Error::Scene { .. }));
+    assert_eq!(error.place.as_deref(), Some(&*format!("demo.toml{place}")));
     let message = error.to_string();
     let start = format!("demo.toml{place}: ");
     assert!(message.starts_with(&start), "{start:?} does not start {message:?}");

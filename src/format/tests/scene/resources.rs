@@ -4,9 +4,10 @@ use std::fs;
 use std::path::Path;
 
 use nalgebra::DMatrix;
-use tiprub_core::scene::rom::{ContactGrid, ContactNode, DisplacementFrame, RomExtras, Spin, Thermal, ThermalPatch};
+use tiprub_core::scene::rom::{ContactGrid, ContactNode, DisplacementFrame, RomExtras, Spin, Thermal};
 use tiprub_core::scene::settings::{BodyMotion, LoadSettings, SpinSettings, StructureSettings};
 use tiprub_core::{Rom, Scene};
+use tiprub_cosim::ThermalPatch;
 use tiprub_format::{
     instantiation_token, load_resources, load_scene, read_rom, resource_files, write_rom, write_scene,
 };

@@ -3,7 +3,7 @@
 //! Slopes at inner points are the weighted harmonic means of Fritsch and Butland (SIAM J. Sci. Stat. Comput. 5(2),
 //! 1984), slopes at the ends those of the outer segments. Two points give an exact cylinder or cone.
 
-use tiprub_core::shown;
+use tiprub_cosim::shown;
 
 use crate::{Error, Result};
 

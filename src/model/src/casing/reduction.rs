@@ -7,7 +7,8 @@
 use faer::Mat;
 use nalgebra::{DMatrix, DVector};
 use tiprub_core::Rom;
-use tiprub_core::scene::rom::{DisplacementFrame, RomChecks, RomExtras, Thermal, ThermalPatch};
+use tiprub_core::scene::rom::{DisplacementFrame, RomChecks, RomExtras, Thermal};
+use tiprub_cosim::ThermalPatch;
 
 use super::condense::condense;
 use super::grid::GridNodes;

@@ -6,7 +6,7 @@
 use core::f64::consts::TAU;
 use std::collections::BTreeMap;
 
-use tiprub_core::shown;
+use tiprub_cosim::shown;
 
 use super::contour::InnerContour;
 use super::grid::GridNodes;

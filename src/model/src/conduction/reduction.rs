@@ -9,7 +9,7 @@
 
 use faer::Mat;
 use nalgebra::DMatrix;
-use tiprub_core::scene::rom::ThermalPatch;
+use tiprub_cosim::ThermalPatch;
 use tiprub_thermal::ConductionModel;
 
 use super::{ConductionOptions, FullConduction};

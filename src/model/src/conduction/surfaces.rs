@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use faer::Mat;
-use tiprub_core::scene::rom::ThermalPatch;
+use tiprub_cosim::ThermalPatch;
 
 use super::add;
 use crate::element::{ElementKind, consistent_mass};

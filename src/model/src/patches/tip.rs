@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeSet, HashMap};
 
-use tiprub_core::shown;
+use tiprub_cosim::shown;
 
 use super::middles;
 use crate::mesh::{Element, Mesh};

@@ -63,7 +63,7 @@ fn linear_element_warning(mesh: &Mesh) -> Option<String> {
 /// Returns the material index of every element, from the file.
 fn file_materials(name: &str, numbered: &Numbered, none: bool) -> Result<Vec<usize>> {
     let remedy = "Give a material on the command line: --material steel, or --young, --poisson and --density";
-    let refuse = |problem: String| Err(Error::Read { place: name.into(), problem, remedy: remedy.into() });
+    let refuse = |problem: String| Err(Error::read(name, problem, remedy));
     if none {
         return refuse("the file has no material".into());
     }
@@ -140,16 +140,16 @@ fn renumbered(error: Error, number: impl Fn(usize) -> usize) -> Error {
 /// Replaces the index of the element in an error by its number in the file, and adds the file name.
 fn with_file_number(error: Error, numbers: &[u64], file: &str) -> Error {
     match error {
-        Error::NegativeJacobian { element, kind, point, determinant } => Error::Read {
-            place: file.into(),
-            problem: format!(
+        Error::NegativeJacobian { element, kind, point, determinant } => {
+            let problem = format!(
                 "element {} ({}) is inverted or degenerate: its Jacobian determinant at integration point {point} is \
                  {determinant:.3e}",
                 numbers[element - 1],
                 kind.calculix_name()
-            ),
-            remedy: "Remesh this region; quadratic elements fold where the mesh is too coarse for the curvature".into(),
-        },
+            );
+            let remedy = "Remesh this region; quadratic elements fold where the mesh is too coarse for the curvature";
+            Error::read(file, problem, remedy)
+        }
         other => other,
     }
 }

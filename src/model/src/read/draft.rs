@@ -117,7 +117,7 @@ impl MeshDraft {
         if solids().next().is_none() {
             let problem = "the file has no solid elements (tetrahedra, prisms, bricks)";
             let remedy = "Mesh the volume and export its elements: shells and faces are not supported";
-            return Err(Error::Read { place: what.into(), problem: problem.into(), remedy: remedy.into() });
+            return Err(Error::read(what, problem, remedy));
         }
         self.check_overlaid()?;
         let kept: Vec<usize> = (0..self.numbers.len()).filter(|&index| used[index]).collect();

@@ -97,7 +97,7 @@ impl<'a> Sections<'a> {
         Ok(sections)
     }
 
-    fn error(&self, problem: impl Into<String>, remedy: impl Into<String>) -> crate::Error {
+    fn error(&self, problem: impl ToString, remedy: impl ToString) -> crate::Error {
         // The line that was just read.
         SourceLine { file: Arc::clone(&self.file), line: (self.line - 1).max(1) }.error(problem, remedy)
     }

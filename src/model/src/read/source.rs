@@ -23,8 +23,8 @@ impl fmt::Display for SourceLine {
 
 impl SourceLine {
     /// Returns an error at this line.
-    pub(super) fn error(&self, problem: impl Into<String>, remedy: impl Into<String>) -> Error {
-        Error::Read { place: self.to_string(), problem: problem.into(), remedy: remedy.into() }
+    pub(super) fn error(&self, problem: impl ToString, remedy: impl ToString) -> Error {
+        Error::read(self, problem, remedy)
     }
 }
 
@@ -47,8 +47,8 @@ pub(super) fn open_file(path: &Path) -> Result<Vec<u8>> {
 }
 
 /// Returns an error about a whole file.
-pub(super) fn about(path: &Path, problem: impl Into<String>, remedy: impl Into<String>) -> Error {
-    Error::Read { place: path.display().to_string(), problem: problem.into(), remedy: remedy.into() }
+pub(super) fn about(path: &Path, problem: impl ToString, remedy: impl ToString) -> Error {
+    Error::read(path.display(), problem, remedy)
 }
 
 /// Returns the text of a file. Comments and headings come in many encodings, so bytes that are not UTF-8 are

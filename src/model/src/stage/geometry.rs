@@ -5,7 +5,7 @@
 
 use core::f64::consts::TAU;
 
-use tiprub_core::shown;
+use tiprub_cosim::shown;
 
 use super::{SECTORS, TIP_AXIAL, TIP_RADIUS};
 use crate::{Error, Result};

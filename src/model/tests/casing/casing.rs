@@ -6,7 +6,7 @@ use crate::common::casing::{at_rest, coarse, heated};
 use crate::common::{distorted_box, nodes_at, wobble};
 use faer::Mat;
 use nalgebra::{DMatrix, DVector};
-use tiprub_core::scene::rom::ThermalPatch;
+use tiprub_cosim::ThermalPatch;
 use tiprub_model::assembly::{assemble, free_dofs};
 use tiprub_model::casing::{
     CLAMPED, CasingReductionOptions, GridNodes, ModalForm, RingSupport, condense, modal_form, supported_ring,

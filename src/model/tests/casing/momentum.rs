@@ -5,7 +5,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::rom::SupportRows as Rows;
-use tiprub_core::{Rom, Scene, Simulation};
+use tiprub_core::{CoSimulation, Rom, Scene, Simulation};
 use tiprub_model::assembly::{assemble, free_dofs};
 use tiprub_model::casing::{
     CLAMPED, ContactRings, InnerContour, RingCounts, RingGeometry, RingMesh, RingSupport, supported_ring,

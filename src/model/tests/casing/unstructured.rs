@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 use faer::Mat;
 use nalgebra::{DMatrix, DVector};
 use tiprub_core::scene::settings::StructureSettings;
-use tiprub_core::{Rom, Simulation};
+use tiprub_core::{CoSimulation, Rom, Simulation};
 use tiprub_model::casing::{CasingReductionOptions, ContactRings, GridNodes, RingSupport};
 use tiprub_model::element::{Formulation, consistent_mass};
 use tiprub_model::inner_surface::InnerSurface;

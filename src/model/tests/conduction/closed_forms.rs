@@ -2,6 +2,7 @@
 
 use std::f64::consts::PI;
 
+use tiprub_core::CoSimulation;
 use tiprub_model::casing::{ContactRings, InnerContour, RingCounts, RingGeometry};
 use tiprub_model::conduction::{
     ConductionOptions, ConductionReduction, Conductor, reduce_conduction, reduce_ring_conduction,

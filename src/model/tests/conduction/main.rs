@@ -10,7 +10,8 @@ mod unstructured;
 
 use std::f64::consts::PI;
 
-use tiprub_core::scene::rom::ThermalPatch;
+use tiprub_core::CoSimulation;
+use tiprub_cosim::ThermalPatch;
 use tiprub_model::Mesh;
 use tiprub_model::conduction::{ConductionOptions, Conductor};
 use tiprub_model::element::ElementKind;

@@ -4,6 +4,7 @@
 use std::f64::consts::PI;
 
 use faer::Mat;
+use tiprub_core::CoSimulation;
 use tiprub_model::casing::{ContactRings, InnerContour, RingCounts, RingGeometry, RingSupport, supported_ring};
 use tiprub_model::conduction::{
     ConductionOptions, Conductor, FullConduction, reduce_conduction, reduce_ring_conduction,

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use tiprub_core::scene::rom::ThermalPatch;
+use tiprub_cosim::ThermalPatch;
 use tiprub_model::CasingOptions;
 use tiprub_model::casing::{ContactRings, RingSupport};
 use tiprub_model::conduction::Conductor;

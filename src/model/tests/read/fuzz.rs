@@ -31,8 +31,9 @@ fn tried(name: &str, bytes: &[u8]) -> bool {
             let _ = FeModel::assembled(mesh, &Material::steel(), String::new(), &silent);
             true
         }
-        Err(Error::Read { place, problem, remedy }) => {
-            assert!(place.contains(name) && !problem.is_empty() && !remedy.is_empty(), "{place}: {problem}. {remedy}");
+        Err(Error::Read(error)) => {
+            let place = error.place.as_deref().unwrap_or_default();
+            assert!(place.contains(name) && !error.problem.is_empty() && !error.remedy.is_empty(), "{error}");
             false
         }
         Err(other) => panic!("{name}: {other}"),

@@ -223,7 +223,7 @@ fn engine_axis_option_rotates_the_mesh_without_mirroring() {
 #[test]
 fn rejects_mesh_without_material() {
     let error = read_mesh(&data("blade_hex8.inp"), &MeshOptions::default(), &silent).unwrap_err();
-    assert!(matches!(&error, Error::Read { remedy, .. } if remedy.contains("--material")), "{error}");
+    assert!(matches!(&error, Error::Read(read) if read.remedy.contains("--material")), "{error}");
 }
 
 #[test]

@@ -3,8 +3,8 @@
 use crate::common::{dense, distorted_box, nodes_at, steel, straight_box, wobble};
 use crate::guide::{self, print_row};
 use nalgebra::{DMatrix, DVector};
-use tiprub_core::Simulation;
 use tiprub_core::scene::rom::{DisplacementFrame, STRESSES, von_mises};
+use tiprub_core::{CoSimulation, Simulation};
 use tiprub_model::assembly::{assemble, free_dofs};
 use tiprub_model::craig_bampton::dense_modes;
 use tiprub_model::element::{ElementKind, nodal_stress};

@@ -1,7 +1,7 @@
 //! Presents the changes between refinements as plots, tables and files.
 
 use serde_json::{Value, json};
-use tiprub_core::shown;
+use tiprub_cosim::shown;
 use tiprub_figure::{
     plots::{Plot, Series},
     table::Table,

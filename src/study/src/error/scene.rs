@@ -2,7 +2,7 @@
 
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::settings::{ADAPTIVE_STEP, BodyMotion};
-use tiprub_core::{Scene, Simulation, system::Structure};
+use tiprub_core::{CoSimulation, Scene, Simulation, system::Structure};
 use tiprub_shell::native;
 
 use super::{

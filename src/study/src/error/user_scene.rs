@@ -1,8 +1,9 @@
 //! Makes any scene a case of the error study: all schemes and solvers of tiprub at steps around the scene's own step.
 
+use tiprub_core::Scene;
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::settings::TOLERANCE;
-use tiprub_core::{Scene, shown};
+use tiprub_cosim::shown;
 use tiprub_shell::{Failure, Result, console::Console, forecast::WorkPlan, schedule::Schedule};
 
 use super::{

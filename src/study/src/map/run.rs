@@ -3,7 +3,10 @@
 use std::time::{Duration, Instant};
 
 use tiprub_core::scene::method::Scheme;
-use tiprub_core::{Scene, Simulation, shown, system::System, variables::Quantity};
+use tiprub_core::system::System;
+use tiprub_core::{CoSimulation, Scene, Simulation};
+use tiprub_cosim::shown;
+use tiprub_cosim::variables::Quantity;
 use tiprub_shell::{Failure, Result, native};
 
 use super::{
@@ -346,7 +349,7 @@ impl March<'_> {
             factor,
             internal_steps: self.internal_steps,
             stepping,
-            warnings: tiprub_core::warning::texts(self.simulation.warnings()),
+            warnings: tiprub_cosim::warning::texts(self.simulation.warnings()),
         })
     }
 }

@@ -1,7 +1,8 @@
 //! Start of the runs after the start values were changed: rotating master, clearances, shape of the casing, and other excitations.
 
 use tiprub_core::scene::settings::{BodyMotion, SceneSettings};
-use tiprub_core::{Scene, Simulation, variables::Quantity};
+use tiprub_core::{CoSimulation, Scene, Simulation};
+use tiprub_cosim::variables::Quantity;
 use tiprub_shell::{Failure, Result};
 
 /// Start values that the prediction and the facts depend on.

@@ -1,7 +1,7 @@
 //! Presents the answers as pictures, tables and files.
 
 use serde_json::{Value, json};
-use tiprub_core::shown;
+use tiprub_cosim::shown;
 use tiprub_figure::{
     cells::{Cell, CellKind, CellPanel, Cells},
     plots::{Plot, Series},

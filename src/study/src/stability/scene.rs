@@ -1,7 +1,8 @@
 //! Answers of the core to a scene with another friction, speed, internal step, scheme or solver: its rejection or its warnings.
 
 use tiprub_core::scene::method::{Scheme, Solver};
-use tiprub_core::{Scene, Simulation, variables::Quantity};
+use tiprub_core::{CoSimulation, Scene, Simulation};
+use tiprub_cosim::variables::Quantity;
 use tiprub_shell::{Failure, Result, native};
 
 use crate::error::scene::SceneRun;
@@ -105,7 +106,7 @@ impl StabilityScene<'_> {
             .and_then(|()| set(simulation, Quantity::Speed, place.speed))
             .and_then(|()| simulation.initialise(self.scene.settings.experiment.start))
             .map_err(|error| error.to_string())?;
-        Ok(tiprub_core::warning::texts(simulation.warnings()))
+        Ok(tiprub_cosim::warning::texts(simulation.warnings()))
     }
 }
 

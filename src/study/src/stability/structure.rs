@@ -8,7 +8,8 @@ use tiprub_core::limits::{
 use tiprub_core::modes::{cyclic::CyclicModel, modal::ModalModel};
 use tiprub_core::scene::method::Scheme;
 use tiprub_core::scene::rom::DisplacementFrame;
-use tiprub_core::{Result, Rom, shown};
+use tiprub_core::{Result, Rom};
+use tiprub_cosim::shown;
 
 use super::seek::{Sought, TRIED, seek};
 
@@ -371,7 +372,7 @@ fn closed_contacts(rom: &Rom, slip_sign: f64) -> ContactDirections {
 
 #[cfg(test)]
 mod tests {
-    use tiprub_core::Simulation;
+    use tiprub_core::{CoSimulation, Simulation};
     use tiprub_gallery::scene_source;
     use tiprub_model::{
         cyclic::ModeSelection,

@@ -1,5 +1,6 @@
 //! One scene run step by step: forces and moments on both sides, torque against shaft work, the ledger.
 
+use tiprub_core::CoSimulation;
 use tiprub_core::geometry::{Vector3, frame::PolarFrame, surface_spline::SurfaceSpline, wrench::Wrench};
 use tiprub_core::modes::sectors::Sectors;
 use tiprub_core::scene::method::Solver;

@@ -5,7 +5,8 @@ use std::time::{Duration, Instant};
 
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::settings::{Interpolation, SplineSettings};
-use tiprub_core::{Result, Scene, Simulation, variables::Quantity};
+use tiprub_core::{CoSimulation, Result, Scene, Simulation};
+use tiprub_cosim::variables::Quantity;
 use tiprub_reference::cube::history::{CubeHistory, processor_time};
 
 use super::CubeFlight;

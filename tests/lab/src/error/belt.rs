@@ -82,8 +82,8 @@ impl BeltCase {
         if !by_tolerance {
             let largest = self.model.frequencies[self.model.dynamic_modes(scheme) - 1];
             limits::check_step(largest, scheme, step).map_err(|error| error.to_string())?;
-            if scheme == Scheme::MasslessBoundary && step >= self.massless_limit.usable {
-                return Err(massless::refusal(step, self.massless_limit).to_string());
+            if scheme == Scheme::MasslessBoundary {
+                massless::check(step, self.massless_limit).map_err(|error| error.to_string())?;
             }
         }
         let mut stepper = TimeStepper::new(&mut system, step, 1.0 / f64::from(division));

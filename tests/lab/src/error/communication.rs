@@ -2,7 +2,7 @@
 
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::settings::ADAPTIVE_STEP;
-use tiprub_core::{Scene, Simulation};
+use tiprub_core::{CoSimulation, Scene, Simulation};
 use tiprub_figure::table::Table;
 use tiprub_shell::{Failure, Result, console::Console};
 use tiprub_study::error::{case::ErrorCase, clock, measure::parts_apart, summary::rate};

@@ -69,8 +69,8 @@ impl CoreRod {
     ) -> Result<RodRun<'_>, String> {
         let step = interval / f64::from(division);
         limits::check_step(self.model.largest_frequency(), scheme, step).map_err(|error| error.to_string())?;
-        if scheme == Scheme::MasslessBoundary && step >= self.massless_limit.usable {
-            return Err(massless::refusal(step, self.massless_limit).to_string());
+        if scheme == Scheme::MasslessBoundary {
+            massless::check(step, self.massless_limit).map_err(|error| error.to_string())?;
         }
         let gap = self.gap * (1.0 + perturbation);
         let law = GapLaw::Fixed(FixedGap { normals: vec![NORMAL], gaps: vec![gap], sliding: vec![Vector3::zeros()] });

@@ -1,7 +1,7 @@
 //! Courses of inputs over time: waves that close the clearance within a few periods.
 
-use tiprub_core::Simulation;
-use tiprub_core::variables::{Causality, DataType};
+use tiprub_core::{CoSimulation, Simulation};
+use tiprub_cosim::variables::{Causality, DataType};
 
 use super::scenes::{RandomScene, numbers};
 

@@ -1,7 +1,7 @@
 //! A scene stepped through its communication steps, natively or through the C interface of an FMU.
 
-use tiprub_core::variables::{Causality, DataType};
-use tiprub_core::{Error, Simulation};
+use tiprub_core::{CoSimulation, Error, Simulation};
+use tiprub_cosim::variables::{Causality, DataType};
 use tiprub_tests::{OK, WARNING, fmi2, fmi3};
 
 use super::inputs::{RandomInput, courses};

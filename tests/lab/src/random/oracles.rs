@@ -3,8 +3,9 @@
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::rom::DisplacementFrame;
 use tiprub_core::scene::settings::ContactSettings;
-use tiprub_core::warning::Topic;
-use tiprub_core::{Error, Ledger, Rom, Scene, Simulation};
+use tiprub_core::{CoSimulation, Error, Ledger, Rom, Scene, Simulation};
+use tiprub_cosim::Diagnostic;
+use tiprub_cosim::warning::Topic;
 
 use super::scenes::RandomScene;
 use super::structures::largest_frequency;
@@ -139,7 +140,7 @@ impl OracleWatch {
     /// Creates the watch of a simulation that has not started.
     pub(crate) fn new(trial: &RandomScene, simulation: &Simulation) -> Self {
         let table = simulation.table();
-        let grows = |row: &&tiprub_core::variables::Variable| {
+        let grows = |row: &&tiprub_cosim::variables::Variable| {
             GROWING.contains(&row.name.rsplit('.').next().unwrap_or_default())
         };
         let growing = table.variables().iter().filter(grows).map(|row| Growing {
@@ -352,12 +353,10 @@ fn infinite(simulation: &Simulation) -> Option<String> {
 pub(crate) fn names(error: &Error) -> Option<Finding> {
     let finding = |problem: &str| Some(Finding { oracle: "message", text: format!("{problem}: {error}") });
     let (what, problem, remedy) = match error {
-        Error::Invalid { what, problem, remedy } => (what.as_str(), problem, remedy),
-        Error::Unstable { problem, remedy } | Error::Exhausted { problem, remedy } => ("run", problem, remedy),
-        Error::NonFinite { .. } => return finding("the state became non-finite"),
-        Error::UnknownReference { .. } | Error::State { .. } => {
-            return finding("it is an unexpected kind of error for a scene");
-        }
+        Error::Invalid(Diagnostic { what, problem, remedy, .. }) => (what.as_str(), problem, remedy),
+        Error::Unstable(diagnostic) | Error::Exhausted(diagnostic) => ("run", &diagnostic.problem, &diagnostic.remedy),
+        Error::NonFinite(_) => return finding("the state became non-finite"),
+        Error::State(_) => return finding("it is an unexpected kind of error for a scene"),
     };
     if what.trim().is_empty() || problem.trim().is_empty() {
         return finding("it does not name the place or the problem");

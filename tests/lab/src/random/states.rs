@@ -1,7 +1,7 @@
 //! Saved states at random points, restored in the same and in other instances; derivatives over steps, which must have
 //! no side effects.
 
-use tiprub_core::Simulation;
+use tiprub_core::{CoSimulation, Simulation};
 use tiprub_test_models::SeededRandom;
 
 use super::march::{OutputRecord, RandomPlan};
@@ -162,7 +162,7 @@ pub(crate) fn differentiated(trial: &RandomScene, plan: &RandomPlan, record: &Ou
         .variables()
         .iter()
         .filter(|row| plan.outputs.contains(&row.reference) && row.len() == 1)
-        .filter(|row| row.variability == tiprub_core::variables::Variability::Continuous)
+        .filter(|row| row.variability == tiprub_cosim::variables::Variability::Continuous)
         .map(|row| row.reference)
         .take(5)
         .collect();

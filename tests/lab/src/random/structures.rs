@@ -4,9 +4,8 @@ use std::f64::consts::TAU;
 
 use nalgebra::DMatrix;
 use tiprub_core::Rom;
-use tiprub_core::scene::rom::{
-    DisplacementFrame, ReductionBasis, SUPPORT_ROWS, SupportRows, Thermal, ThermalPatch, WatchedPoints,
-};
+use tiprub_core::scene::rom::{DisplacementFrame, ReductionBasis, SUPPORT_ROWS, SupportRows, Thermal, WatchedPoints};
+use tiprub_cosim::ThermalPatch;
 use tiprub_test_models::disk::TestDisk;
 use tiprub_test_models::{RADIUS, SeededRandom, modal, node, ring_of, spin};
 

@@ -1,8 +1,8 @@
 //! Long missions: communication steps far longer than those of a rub, most of them without contact.
 
 use super::H;
-use tiprub_core::Simulation;
 use tiprub_core::scene::method::Scheme;
+use tiprub_core::{CoSimulation, Simulation};
 use tiprub_study::error::clock;
 use tiprub_test_models::{bumps, rich_blade};
 

@@ -2,7 +2,7 @@
 
 use tiprub_core::scene::method::Scheme;
 use tiprub_core::scene::settings::Shape;
-use tiprub_core::{Result, Scene, Simulation};
+use tiprub_core::{CoSimulation, Result, Scene, Simulation};
 
 use super::{Check, models::allowed};
 

@@ -1,6 +1,7 @@
 //! One run of the stage: clearances and amplitudes of the blades over time.
 
-use tiprub_core::{Scene, Simulation, variables::Quantity};
+use tiprub_core::{CoSimulation, Scene, Simulation};
+use tiprub_cosim::variables::Quantity;
 
 use super::{CLOSED, StageCasing, StageSetup};
 
@@ -190,6 +191,6 @@ pub(super) fn march(setup: &StageSetup, scene: &Scene, casing: StageCasing, spee
         }
         run.stepping += clock.elapsed();
     }
-    run.warnings = tiprub_core::warning::texts(simulation.warnings());
+    run.warnings = tiprub_cosim::warning::texts(simulation.warnings());
     Ok(run)
 }

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use serde_json::{Value, json};
 use tiprub_core::scene::rom::{STRESSES, von_mises};
-use tiprub_core::{Rom, Simulation};
+use tiprub_core::{CoSimulation, Rom, Simulation};
 use tiprub_figure::plots::{Plot, Series};
 use tiprub_gallery::reduction::failure;
 use tiprub_model::{craig_bampton::dense_modes, stress::StressPlaces};
@@ -184,7 +184,7 @@ fn run(scene: &tiprub_core::Scene, samples: usize) -> tiprub_core::Result<Stress
     simulation.initialise(0.0)?;
     let names = ["radial", "tangential", "axial", "radial_tangential", "tangential_axial", "axial_radial", "von_mises"];
     let rows = names.map(|name| simulation.table().find(&format!("blade[1].{name}_stress")));
-    let count = rows[0].map_or(0, tiprub_core::variables::Variable::len);
+    let count = rows[0].map_or(0, tiprub_cosim::variables::Variable::len);
     let rows = rows.map(|row| row.map_or(0, |row| row.reference));
     let mut reported = StressHistory { displacements: Vec::new(), stresses: Vec::new(), equivalents: Vec::new() };
     for sample in 0..samples {

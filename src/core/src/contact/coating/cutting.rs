@@ -6,8 +6,9 @@
 //! depth of the part ahead does not. The path of one step may lie in two cells, each with its fraction of the path. Forces therefore do not
 //! depend on the width of cells.
 
+use tiprub_cosim::persist::{Persist, StateReader, StateWriter};
+
 use super::{Branch, CellContact, CellRow, CoatedProblem, Coating, RodMaterial, place};
-use crate::persist::{Persist, StateReader, StateWriter};
 use crate::scene::settings::CuttingSettings;
 
 /// Edge of one row of a blade that cuts.
@@ -21,7 +22,7 @@ struct Edge {
     sense: f64,
 }
 
-crate::persist::persist_fields!(Edge { cell, ahead, sense });
+tiprub_cosim::persist_fields!(Edge { cell, ahead, sense });
 
 /// Material removed from a cell in a step.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -7,12 +7,13 @@
 //! whose modes are real.
 
 use nalgebra::{Complex, DMatrix, SymmetricEigen};
+use tiprub_cosim::shown;
 
 use crate::modes::modal::{ModalModel, RIGID_FRACTION, check_semidefinite, fill_ratios, real_modes};
 use crate::modes::schemes::ModeCoefficients;
 use crate::scene::method::Scheme;
 use crate::scene::rom::{Harmonic, cholesky};
-use crate::{Error, Result, Rom, shown};
+use crate::{Error, Result, Rom};
 
 /// Entries of a mode shape this close to the largest count as equally large when the phase is chosen.
 const SAME_SIZE: f64 = 1e-6;
@@ -97,7 +98,7 @@ impl CyclicModel {
     pub fn from_rom(rom: &Rom, damping_ratio: f64) -> Result<Self> {
         let zero = ModalModel::from_rom(rom, damping_ratio)?;
         let (sectors, complex) = (rom.sectors, |matrix: &DMatrix<f64>| matrix.map(|value| Complex::new(value, 0.0)));
-        let squares = zero.frequencies.iter().map(|frequency| frequency * frequency).collect();
+        let squares: Vec<f64> = zero.frequencies.iter().map(|frequency| frequency * frequency).collect();
         let map = complex(&rom.contact_map);
         let mut first = DiameterModes::new(0, damping_ratio, weight(0, sectors), &map, &squares, complex(&zero.shapes));
         // The frequencies are not computed from their squares, which would add a rounding error.

@@ -11,10 +11,11 @@
 //! sector s turned by +2π/N about z; n > 0 is a wave e^(i n 2π s/N).
 
 use nalgebra::{Complex, DMatrix};
+use tiprub_cosim::{bounds, shown};
 
 use super::Rom;
 use crate::scene::ranges;
-use crate::{Error, Result, shown};
+use crate::{Error, Result};
 
 /// Reduced matrices of one nodal diameter above 0 (those of diameter 0 are the ROM's own).
 #[derive(Debug, Clone, PartialEq)]
@@ -89,7 +90,7 @@ impl Rom {
                 return refuse(name, format!("non-finite entry at ({row}, {column})"));
             }
             let largest = largest_entry(matrix);
-            let most = if name == "contact_map" { ranges::MAP } else { ranges::MATRIX };
+            let most = if name == "contact_map" { ranges::MAP } else { bounds::MATRIX };
             if largest > most {
                 return refuse(name, format!("an entry of magnitude {} exceeds {}", shown(largest), shown(most)));
             }

@@ -1,6 +1,7 @@
 //! Force and moment of the support of a structure on its held nodes.
 
 use nalgebra::DMatrix;
+use tiprub_cosim::bounds;
 
 use super::{Rom, entries};
 use crate::scene::ranges;
@@ -29,8 +30,8 @@ impl Rom {
         let Some(support) = &self.extras.support else { return Ok(()) };
         let patches = self.extras.thermal.as_ref().map_or(0, |thermal| thermal.patches.len());
         for (name, matrix, columns, most) in [
-            ("support_stiffness", &support.stiffness, self.order(), ranges::MATRIX),
-            ("support_mass", &support.mass, self.order(), ranges::MATRIX),
+            ("support_stiffness", &support.stiffness, self.order(), bounds::MATRIX),
+            ("support_mass", &support.mass, self.order(), bounds::MATRIX),
             ("support_thermal", &support.thermal, patches, ranges::THERMAL_LOAD),
         ] {
             if matrix.shape() != (SUPPORT_ROWS, columns) {

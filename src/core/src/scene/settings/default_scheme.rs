@@ -12,9 +12,9 @@ impl SceneSettings {
     /// `roms` has one ROM per structure, or is empty before they are known.
     pub fn default_scheme(&self, roms: &[Rom]) -> (Scheme, String) {
         let rules_out = |scheme: Scheme| self.excluded_method(roms, scheme);
-        match self.fixed_step_reason(roms).or_else(|| rules_out(Scheme::Galerkin)) {
-            None => (Scheme::Galerkin, "the default for rigid surfaces: adaptive steps within `time.tolerance`".into()),
-            Some(reason) => (Scheme::ModalExact, format!("the default with fixed steps, because {reason}")),
+        match self.fixed_step_reason(roms).or_else(|| rules_out(Scheme::ADAPTIVE)) {
+            None => (Scheme::ADAPTIVE, "the default for rigid surfaces: adaptive steps within `time.tolerance`".into()),
+            Some(reason) => (Scheme::default(), format!("the default with fixed steps, because {reason}")),
         }
     }
 

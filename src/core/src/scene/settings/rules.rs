@@ -6,6 +6,8 @@ mod place;
 #[cfg(test)]
 mod tests;
 
+use tiprub_cosim::Diagnostic;
+
 use super::relations::Relations;
 use super::{BodyMotion, Preset, Scene, SceneSettings, SpinSettings, StructureSettings};
 use crate::scene::method::{Scheme, Solver};
@@ -474,7 +476,7 @@ impl SceneSettings {
     pub(super) fn excluded_method(&self, roms: &[Rom], scheme: Scheme) -> Option<String> {
         let relations = Relations::of(self);
         let refusal = check(METHODS, ScenePlace { roms, scheme, ..self.place(&relations) }, path).err()?;
-        let Error::Invalid { problem, .. } = refusal else { return None };
+        let Error::Invalid(Diagnostic { problem, .. }) = refusal else { return None };
         Some(problem)
     }
 

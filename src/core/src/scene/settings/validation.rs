@@ -4,14 +4,17 @@ mod pairs;
 
 use std::collections::HashSet;
 
+use tiprub_cosim::bounds::{at_most, within};
+use tiprub_cosim::warning::Topic;
+use tiprub_cosim::{bounds, shown};
+
 use super::relations::{Relations, structure};
 use super::{
     BodyMotion, CoatingSettings, ContactSettings, ExcitationSettings, InitialSettings, SceneSettings, Shape,
     SplineSettings, StructureSettings, SurfaceSettings,
 };
-use crate::scene::ranges::{self, at_most, within};
-use crate::warning::Topic;
-use crate::{Error, Result, shown};
+use crate::scene::ranges;
+use crate::{Error, Result};
 
 impl SceneSettings {
     /// Checks every value against its documented range, and the names for consistency.
@@ -65,11 +68,11 @@ impl SceneSettings {
             within("time.tolerance", tolerance, ranges::TOLERANCE[0], ranges::TOLERANCE[1])?;
         }
         let experiment = &self.experiment;
-        at_most("experiment.start", experiment.start, ranges::TIME)?;
-        at_most("experiment.stop", experiment.stop, ranges::TIME)?;
+        at_most("experiment.start", experiment.start, bounds::TIME)?;
+        at_most("experiment.stop", experiment.stop, bounds::TIME)?;
         let length = experiment.communication_step;
-        within("experiment.communication_step", length, ranges::SHORTEST_STEP, ranges::TIME)?;
-        within("time.step", self.time.step, ranges::SHORTEST_STEP, ranges::LONGEST_STEP)?;
+        within("experiment.communication_step", length, bounds::SHORTEST_STEP, bounds::TIME)?;
+        within("time.step", self.time.step, bounds::SHORTEST_STEP, ranges::LONGEST_STEP)?;
         if !(self.experiment.stop.is_finite() && self.experiment.stop > self.experiment.start) {
             return Err(Error::invalid(
                 "experiment.stop",
@@ -202,7 +205,7 @@ impl InitialSettings {
 impl SurfaceSettings {
     /// Checks a surface; `known` are the scene and the names of its structures.
     fn validate(&self, known: (&SceneSettings, &HashSet<&str>), at: &str) -> Result<()> {
-        within(&format!("{at}.ramp_time"), self.ramp_time, 0.0, ranges::TIME)?;
+        within(&format!("{at}.ramp_time"), self.ramp_time, 0.0, bounds::TIME)?;
         self.validate_carrier(known, at)?;
         if let Some(SplineSettings { around, along, .. }) = self.spline {
             let ([least_around, most_around], [least_along, most_along]) =
@@ -211,9 +214,9 @@ impl SurfaceSettings {
             count(&format!("{at}.spline.along"), along, least_along, most_along)?;
         }
         if let Some(patches) = self.patches {
-            count(&format!("{at}.patches.around"), patches.around, 1, ranges::PATCHES)?;
-            count(&format!("{at}.patches.along"), patches.along, 1, ranges::PATCHES)?;
-            product(&format!("{at}.patches"), "patches", patches.around, patches.along, ranges::PATCHES)?;
+            count(&format!("{at}.patches.around"), patches.around, 1, bounds::PATCHES)?;
+            count(&format!("{at}.patches.along"), patches.along, 1, bounds::PATCHES)?;
+            product(&format!("{at}.patches"), "patches", patches.around, patches.along, bounds::PATCHES)?;
         }
         self.validate_shape(at)
     }

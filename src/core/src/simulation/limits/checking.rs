@@ -4,19 +4,19 @@ use super::Parameters;
 use crate::geometry::frame::PolarFrame;
 use crate::geometry::spline::SplineGap;
 use crate::geometry::{GapLaw, Vector3};
+use crate::limits::finding::{Checked, ErrorKind, Finding, Subject, WarningKind};
 use crate::limits::massless::MasslessLimit;
 use crate::limits::{self, ContactDirections, massless};
 use crate::math::vector::vector3_at;
 use crate::modes::cyclic::CyclicModel;
 use crate::modes::modal::ModalModel;
+use crate::modes::schemes::ModeCoefficients;
 use crate::scene::method::{Scheme, Solver};
 use crate::scene::settings::Meridian;
 use crate::simulation::SAME_STEP;
 use crate::simulation::compile::Compiled;
 use crate::simulation::plan::PairPlan;
 use crate::system::System;
-use crate::warning::Topic;
-use crate::{Result, Warning, shown};
 use nalgebra::DMatrix;
 
 /// Up to this number, contact nodes are checked in every combination; beyond it alone, in neighbouring pairs, and all together.
@@ -60,8 +60,7 @@ fn lowest_ratio(
     step: f64,
     friction: f64,
 ) -> f64 {
-    let scheme = if scheme == Scheme::MasslessBoundary { Scheme::ModalExact } else { scheme };
-    let compliance: Vec<f64> = modes.coefficients(scheme, step).iter().map(|mode| mode.compliance).collect();
+    let compliance: Vec<f64> = modes.coefficients(scheme, step).iter().map(ModeCoefficients::load_compliance).collect();
     let forces = normals - tangents * friction;
     let weighted = DMatrix::from_fn(forces.nrows(), forces.ncols(), |i, mode| forces[(i, mode)] * compliance[mode]);
     let matrix = normals * weighted.transpose();
@@ -84,18 +83,6 @@ fn yielding_most<'a>(
         }
     }
     chosen
-}
-
-/// Adds the expected step, which was checked separately, as the bound of a range.
-pub(super) fn with_expected<T>(
-    mut ranges: Vec<(f64, Option<T>)>,
-    expected: f64,
-    found: Option<T>,
-) -> Vec<(f64, Option<T>)> {
-    ranges.retain(|(step, _)| (step - expected).abs() > SAME_STEP * expected);
-    ranges.push((expected, found));
-    ranges.sort_by(|a, b| b.0.total_cmp(&a.0));
-    ranges
 }
 
 /// A structure of a scene with some parameters, to be checked with all surfaces it touches.
@@ -154,56 +141,44 @@ impl<'a> Checking<'a> {
         self.compiled.plan.pairs_of(self.body).filter_map(carried).collect()
     }
 
-    /// Returns all warnings at the expected step, for any sense of slip; `casing` and `more` come last.
-    pub(super) fn warnings(&self, step: f64, casing: Option<Warning>, more: Vec<Warning>) -> Result<Vec<Warning>> {
-        let mut warnings = self.expected(step)?;
-        for carrier in self.compiled.carriers_of(self.body) {
-            let frequency = self.compiled.carriers[carrier].model.largest_frequency();
-            let warning = limits::check_step(frequency, self.parameters.scheme, step)?;
-            let name = self.compiled.carrier_name(self.compiled.bodies.len() + carrier);
-            warnings.extend(warning.map(|warning| warning.named(name)));
-        }
-        warnings.extend(casing);
-        warnings.extend(more);
-        Ok(warnings)
+    /// Returns the subject of findings about the structure.
+    pub(super) fn subject(&self) -> Subject {
+        Subject::Body(self.body)
     }
 
-    /// Checks the rotor at the expected step; returns warnings.
-    fn expected(&self, step: f64) -> Result<Vec<Warning>> {
+    /// Returns all warnings at the expected step (s), for any sense of slip; `casing` and `more` come last.
+    pub(super) fn warnings(
+        &self,
+        step: f64,
+        casing: Option<WarningKind>,
+        more: Vec<WarningKind>,
+    ) -> Checked<Vec<Finding>> {
         let Parameters { scheme, step: largest, .. } = *self.parameters;
-        let mut warnings: Vec<Warning> =
-            limits::check_step(self.largest_frequency(), scheme, step)?.into_iter().collect();
-        warnings.extend(self.not_looked_at());
+        let own = |error: ErrorKind| error.of(self.subject());
+        let unresolved = limits::check_step(self.largest_frequency(), scheme, step).map_err(own)?;
         let senses: Vec<Vec<ContactDirections>> =
             self.models.iter().map(|model| [1.0, -1.0].map(|sense| self.directions(model, sense)).into()).collect();
         if self.disk().is_some() {
-            limits::check_solvable_together(&self.models, scheme, largest, self.friction, &senses)?;
+            limits::check_solvable_together(&self.models, scheme, largest, self.friction, &senses)
         } else {
-            limits::check_solvable(&self.models[0], scheme, largest, self.friction, &senses[0])?;
+            limits::check_solvable(&self.models[0], scheme, largest, self.friction, &senses[0])
         }
-        Ok(warnings)
+        .map_err(own)?;
+        let of_carriers = self.compiled.unresolved_carriers(self.body, scheme, step)?;
+        let first = unresolved.into_iter().chain(self.not_looked_at()).map(|kind| kind.of(self.subject()));
+        let last = casing.into_iter().chain(more).map(|kind| kind.of(self.subject()));
+        Ok(first.chain(of_carriers).chain(last).collect())
     }
 
     /// Returns the warning that growth is not checked, if there are more modes than its eigenproblems are solved for.
-    pub(super) fn not_looked_at(&self) -> Option<Warning> {
+    pub(super) fn not_looked_at(&self) -> Option<WarningKind> {
         let modes = self.models.iter().map(ModalModel::len).max().unwrap_or(0);
-        // `galerkin` adds no growth at any step: any growth is a property of the equations.
-        let remedy = match self.parameters.scheme {
-            Scheme::Galerkin => "Check a ROM with fewer modes for flutter and self-locking",
-            _ => "Halve the internal step and compare the results",
-        };
-        (self.friction != 0.0 && modes > limits::GROWTH_UP_TO).then(|| {
-            let most = limits::GROWTH_UP_TO;
-            let problem = format!(
-                "the growth of vibration in closed, sliding contact is not checked: the model has {modes} modes, and the check supports \
-                 only {most}"
-            );
-            Warning::new(Topic::GrowthUnchecked, problem, remedy)
-        })
+        (self.friction != 0.0 && modes > limits::GROWTH_UP_TO)
+            .then_some(WarningKind::GrowthUnchecked { scheme: self.parameters.scheme, modes })
     }
 
     /// Returns the warning of vibration that grows while all contact nodes of a blade cut, sliding in either sense.
-    pub(super) fn cutting(&self) -> Option<Warning> {
+    pub(super) fn cutting(&self) -> Option<WarningKind> {
         let (pair, _) = self.compiled.plan.pairs_of(self.body).next()?;
         let coating = self.system.coating(pair)?;
         let own = coating.cut_stiffness()?;
@@ -213,31 +188,17 @@ impl<'a> Checking<'a> {
                 let parts = directions.len() / own.nrows();
                 let all = DMatrix::identity(parts, parts).kronecker(&own);
                 let found = limits::cutting::growth(model, &directions, &all, coating.tangential_ratio())?;
-                (found.rate > GROWTH_NOISE / self.parameters.step).then_some((found.rate, found.frequency))
+                (found.rate > GROWTH_NOISE / self.parameters.step).then_some(found)
             };
-            self.models.iter().filter_map(of).max_by(|a, b| a.0.total_cmp(&b.0))
+            self.models.iter().filter_map(of).max_by(|a, b| a.rate.total_cmp(&b.rate))
         };
         let both = [1.0, -1.0].into_iter().filter_map(growth);
-        let (rate, frequency) = both.max_by(|a, b| a.0.total_cmp(&b.0))?;
-        let kilohertz = 1e-3 * frequency / std::f64::consts::TAU;
-        // Growth without oscillation within the growth time is no vibration.
-        let motion = if frequency < 1e-3 * rate {
-            "deflection in one direction".to_owned()
-        } else {
-            format!("vibration at {kilohertz:.4} kHz")
-        };
-        let problem = format!(
-            "cutting is physically unstable: with all contact nodes of a blade in fresh coating, {motion} grows at \
-             {rate:.2e} 1/s"
-        );
-        let remedy = "Use a larger `normal_ratio`, a smaller `specific_energy` or more damping, or let the blades \
-                      leave the coating sooner; a shorter step does not help";
-        Some(Warning::new(Topic::CuttingGrowth, problem, remedy))
+        both.max_by(|a, b| a.rate.total_cmp(&b.rate)).map(WarningKind::CuttingGrowth)
     }
 
     /// Checks whether the compliance of the structures under the surfaces spoils the solvability of the contact problem, at the expected
     /// step and at all others.
-    pub(super) fn casing(&self, expected: f64) -> Vec<(f64, Option<Warning>)> {
+    pub(super) fn casing(&self, expected: f64) -> Vec<(f64, Option<WarningKind>)> {
         let carried = self.carried();
         if self.friction == 0.0 || carried.is_empty() || self.parameters.solver == Solver::Coulomb {
             return Vec::new();
@@ -258,27 +219,24 @@ impl<'a> Checking<'a> {
                     }
                 }
             }
-            (worst < -1e-9).then(|| {
-                let problem = format!(
-                    "with µ = {friction} and an internal step of {step:.3e} s, the contribution of the casing to the \
-                     Delassus matrix is not positive semidefinite (lowest eigenvalue {worst:.2e} times the largest, at \
-                     θ = {at:.2} rad)",
-                    friction = shown(self.friction)
-                );
-                let remedy = "Use less friction: where the blades do not add enough flexibility, a step may have no \
-                              unique solution, which ends the run";
-                Warning::new(Topic::CasingSolvability, problem, remedy)
+            (worst < -1e-9).then_some(WarningKind::CasingSolvability {
+                friction: self.friction,
+                step,
+                eigenvalue: worst,
+                angle: at,
             })
         };
         let largest = carried.iter().map(|(_, _, modes)| modes.largest_frequency()).fold(0.0, f64::max);
-        let steps = limits::growth_steps(largest, self.parameters.step);
-        let ranges = steps.map(|step| (step, worst_at(step))).collect();
-        with_expected(ranges, expected, worst_at(expected))
+        let is_other = |step: &f64| (step - expected).abs() > SAME_STEP * expected;
+        let mut steps: Vec<f64> = limits::growth_steps(largest, self.parameters.step).filter(is_other).collect();
+        steps.push(expected);
+        steps.sort_by(|a, b| b.total_cmp(a));
+        steps.into_iter().map(|step| (step, worst_at(step))).collect()
     }
 
-    /// Returns the largest step of massless-boundary, and a warning if many blades in contact simultaneously may lower it.
-    pub(super) fn massless(&self, step: f64) -> Result<(Vec<Warning>, MasslessLimit)> {
-        if self.parameters.scheme != Scheme::MasslessBoundary {
+    /// Returns the largest step of contact whose forces act a step late, and a warning if many blades in contact simultaneously may lower it.
+    pub(super) fn massless(&self, step: f64) -> Result<(Vec<WarningKind>, MasslessLimit), ErrorKind> {
+        if !self.parameters.scheme.properties().delays_contact {
             return Ok((Vec::new(), MasslessLimit::NONE));
         }
         // Each surface has its own carrier: several surfaces of one carrier are rejected.
@@ -304,22 +262,13 @@ impl<'a> Checking<'a> {
             let found = check.eigenvalues(step).unwrap_or(worst);
             worst = (found.0.max(worst.0), found.1.max(worst.1));
         }
-        if step >= limit.usable {
-            return Err(massless::refusal(step, limit));
-        }
-        let mut warnings: Vec<Warning> = massless::warning(step, limit).into_iter().collect();
+        massless::check(step, limit)?;
         let sectors = self.compiled.body(self.body).1.sectors;
-        let sectors = f64::from(u32::try_from(sectors).unwrap_or(u32::MAX));
+        let all = f64::from(u32::try_from(sectors).unwrap_or(u32::MAX));
         let (master, slave) = worst;
-        if master + sectors * slave >= 4.0 {
-            let problem = format!(
-                "massless-boundary is proven stable for up to {:.0} blades in simultaneous contact with the casing, \
-                 not for all {sectors}",
-                ((4.0 - master) / slave).floor()
-            );
-            let remedy = "Use a shorter `time.step` to allow more blades in contact";
-            warnings.push(Warning::new(Topic::MasslessBlades, problem, remedy));
-        }
+        let some = (master + all * slave >= 4.0)
+            .then(|| WarningKind::MasslessBlades { stable: ((4.0 - master) / slave).floor(), sectors });
+        let warnings = massless::warning(step, limit).into_iter().chain(some).collect();
         Ok((warnings, limit))
     }
 

@@ -8,10 +8,10 @@
 
 use nalgebra::DMatrix;
 
-use super::{BodyLimits, Closing, Parameters, Sense};
+use super::{BodyLimits, Closing, Parameters};
 use crate::geometry::open::{OpenGap, tangent};
 use crate::geometry::{GapLaw, Geometry, Vector3};
-use crate::limits::massless::MasslessLimit;
+use crate::limits::finding::{Checked, ErrorKind, Finding, Subject, WarningKind};
 use crate::limits::{self, ContactDirections};
 use crate::math::vector::length;
 use crate::modes::modal::ModalModel;
@@ -19,8 +19,6 @@ use crate::modes::modal::fill_ratios;
 use crate::scene::method::{Scheme, Solver};
 use crate::simulation::compile::Compiled;
 use crate::system::System;
-use crate::warning::Topic;
-use crate::{Error, Result, Warning, shown};
 
 /// Number of places at which the flight is checked, and their spacing as a fraction of the extent.
 const PLACES: u32 = 48;
@@ -42,51 +40,35 @@ struct NodesInside {
 impl Compiled {
     pub(super) fn free_limits(&self, body: usize, parameters: &Parameters, system: &System) -> BodyLimits {
         let (step, model) = (self.expected_step(parameters.step), &self.bodies[body].model);
+        let of = Subject::Body(body);
         // Contacts of free bodies may act along any direction.
         let own = std::iter::once_with(|| limits::unresolved::limit_along_axes(model));
         let unresolved = self.unresolved(body, own, parameters.scheme);
-        let resolved = limits::unresolved::check(step, unresolved, model.largest_frequency());
-        let flight = FlightCheck { compiled: self, system, body, parameters };
-        // `galerkin` halves steps that it cannot solve.
-        let outcome = match parameters.scheme {
-            Scheme::Galerkin => Ok(self.rigid_directions(body, model).into_iter().collect()),
-            _ => resolved.and_then(|()| flight.warnings(step)),
+        // Adaptive steps that cannot be solved are halved.
+        let outcome = if parameters.scheme.properties().adaptive {
+            let rigid = rigid_directions(model, parameters.scheme);
+            Ok(rigid.into_iter().map(|kind| kind.of(of)).collect())
+        } else {
+            let resolved = limits::unresolved::check(parameters.scheme, step, unresolved, model.largest_frequency());
+            let flight = FlightCheck { compiled: self, system, body, parameters };
+            resolved.map_err(|error| error.of(of)).and_then(|()| flight.warnings(step))
         };
-        BodyLimits {
-            outcome,
-            senses: [Some(Sense::default()), Some(Sense::default())],
-            closing: Closing::of_run(self),
-            massless: MasslessLimit::NONE,
-            casing: Vec::new(),
-            unresolved: if parameters.scheme == Scheme::Galerkin { f64::INFINITY } else { unresolved },
-            cutting: None,
-        }
+        BodyLimits { outcome, unresolved, ..BodyLimits::new(of, Closing::of_run(self)) }
     }
 }
 
-impl Compiled {
-    /// Returns a warning if contact nodes without mass are rigid in some directions because of modes that follow contact immediately. Such
-    /// nodes need flexibility of their own, since they cannot yield when they are pressed together.
-    fn rigid_directions(&self, body: usize, model: &ModalModel) -> Option<Warning> {
-        let dynamic = model.dynamic_modes(Scheme::Galerkin);
-        let mut shapes = model.contact_modes.columns_range(dynamic..).into_owned();
-        for (mut shape, frequency) in shapes.column_iter_mut().zip(&model.frequencies[dynamic..]) {
-            shape /= *frequency;
-        }
-        let flexibility = (&shapes * shapes.transpose()).symmetric_eigenvalues();
-        let rigid = flexibility.iter().filter(|value| **value <= RIGID * flexibility.max()).count();
-        (rigid > 0).then(|| {
-            let problem = format!(
-                "with galerkin the {} highest modes respond quasi-statically to contact, so {rigid} of {} directions \
-                 of the contact nodes have no independent flexibility: contact that acts in one of these directions \
-                 loses energy at any tolerance",
-                model.len() - dynamic,
-                flexibility.len()
-            );
-            let remedy = "Use a free-interface ROM, or fewer contact nodes or patches";
-            Warning::new(Topic::RigidContact, problem, remedy).named(self.structure_name(body))
-        })
+/// Returns a warning if contact nodes without mass are rigid in some directions because of modes that follow contact immediately. Such
+/// nodes need flexibility of their own, since they cannot yield when they are pressed together.
+fn rigid_directions(model: &ModalModel, scheme: Scheme) -> Option<WarningKind> {
+    let dynamic = model.dynamic_modes(scheme);
+    let mut shapes = model.contact_modes.columns_range(dynamic..).into_owned();
+    for (mut shape, frequency) in shapes.column_iter_mut().zip(&model.frequencies[dynamic..]) {
+        shape /= *frequency;
     }
+    let flexibility = (&shapes * shapes.transpose()).symmetric_eigenvalues();
+    let rigid = flexibility.iter().filter(|value| **value <= RIGID * flexibility.max()).count();
+    let (modes, directions) = (model.len() - dynamic, flexibility.len());
+    (rigid > 0).then_some(WarningKind::RigidContact { scheme, modes, rigid, directions })
 }
 
 /// Check of a free body before its flight.
@@ -98,16 +80,12 @@ struct FlightCheck<'a> {
 }
 
 impl FlightCheck<'_> {
-    fn warnings(&self, step: f64) -> Result<Vec<Warning>> {
-        let (compiled, scheme) = (self.compiled, self.parameters.scheme);
+    fn warnings(&self, step: f64) -> Checked<Vec<Finding>> {
+        let (compiled, scheme, of) = (self.compiled, self.parameters.scheme, Subject::Body(self.body));
         let largest = compiled.bodies[self.body].model.largest_frequency();
-        let mut warnings: Vec<Warning> = limits::check_step(largest, scheme, step)?.into_iter().collect();
-        for carrier in compiled.carriers_of(self.body) {
-            let name = &compiled.carrier(carrier).0.name;
-            let largest = compiled.carriers[carrier].model.largest_frequency();
-            let warning = limits::check_step(largest, scheme, step)?;
-            warnings.extend(warning.map(|warning| warning.named(name)));
-        }
+        let unresolved = limits::check_step(largest, scheme, step).map_err(|error| error.of(of))?;
+        let mut warnings: Vec<Finding> = unresolved.into_iter().map(|kind| kind.of(of)).collect();
+        warnings.extend(compiled.unresolved_carriers(self.body, scheme, step)?);
         let friction = self.parameters.friction_of(compiled, self.body);
         if friction == 0.0 || self.parameters.solver == Solver::Coulomb {
             return Ok(warnings);
@@ -128,19 +106,13 @@ impl FlightCheck<'_> {
         let mut worst = 0.0_f64;
         for met in flight(&mut laws, self.parameters.velocities[self.body].into(), &frictions, friction) {
             for part in STEPS {
-                worst = worst.min(self.solvability(&met, friction, &laws, &carriers, part * step)?);
+                worst = worst.min(
+                    self.solvability(&met, friction, &laws, &carriers, part * step).map_err(|error| error.of(of))?,
+                );
             }
         }
         if worst < ROUNDING {
-            let problem = format!(
-                "with µ = {friction} the contact problem cannot be shown to have a unique solution for all contacts \
-                 that the undeformed structure makes in free flight (the symmetric part of the Delassus matrix, scaled \
-                 to unit diagonal, has the eigenvalue {worst:.2e})",
-                friction = shown(friction)
-            );
-            let remedy =
-                "Use less friction or the solver coulomb; a step whose contact problem is not solved ends the run";
-            warnings.push(Warning::new(Topic::FlightSolvability, problem, remedy));
+            warnings.push(WarningKind::FlightSolvability { friction, eigenvalue: worst }.of(of));
         }
         Ok(warnings)
     }
@@ -153,7 +125,7 @@ impl FlightCheck<'_> {
         laws: &[OpenGap],
         carriers: &[Option<(usize, ModalModel)>],
         step: f64,
-    ) -> Result<f64> {
+    ) -> Result<f64, ErrorKind> {
         let Parameters { scheme, damping_ratios, mode_damping, .. } = self.parameters;
         let mut model = self.compiled.bodies[self.body].model.with_nodes(&met.nodes);
         fill_ratios(&mut model.damping_ratios, damping_ratios[self.body], &mode_damping[self.body], 1);
@@ -166,20 +138,9 @@ impl FlightCheck<'_> {
         }
         let diagonal = matrix.diagonal();
         if let Some(jammed) = (0..met.nodes.len()).find(|member| diagonal[*member] <= 0.0) {
-            let node = self.compiled.node_name(self.body, met.nodes[jammed]);
-            return Err(Error::Unstable {
-                problem: format!(
-                    "with friction_coefficient µ = {friction} and an internal step of {step:.3e} s, the contact problem of \
-                     {node} alone has no unique solution in free flight: friction drives it into the surface",
-                    friction = shown(friction)
-                ),
-                remedy: "Use less friction, another internal step, or the solver coulomb".to_owned(),
-            });
+            return Err(ErrorKind::Jammed { friction, step, node: met.nodes[jammed] });
         }
-        let scaled = DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| {
-            0.5 * (matrix[(i, j)] + matrix[(j, i)]) / (diagonal[i] * diagonal[j]).sqrt()
-        });
-        Ok(scaled.symmetric_eigenvalues().min())
+        Ok(limits::lowest_eigenvalue(&matrix).unwrap_or(f64::NEG_INFINITY))
     }
 }
 

@@ -3,13 +3,11 @@
 
 use super::checking::Checking;
 use super::in_range;
+use crate::limits::finding::{ClosedContact, ErrorKind, StepGrowth, WarningKind};
 use crate::limits::judged::{self, SetGrowth};
 use crate::limits::{self, ContactDirections, Fastest, lock_up};
 use crate::modes::modal::ModalModel;
-use crate::scene::method::Scheme;
 use crate::simulation::SAME_STEP;
-use crate::warning::{Severity, Topic};
-use crate::{Error, Result, Warning, shown};
 
 /// Growth by this factor before contact opens turns an insignificant motion, a thousandth of the clearance, into one as large as the
 /// clearance.
@@ -20,16 +18,12 @@ const SWINGS: f64 = 0.1;
 /// beyond the resolution of all modes and are judged by the longest of these.
 const PER_OCTAVE: i32 = 4;
 const OCTAVES: i32 = 13;
-/// Growth rates with and without the mass of the contact nodes that agree within this factor count as equal.
-const ALIKE: f64 = 1.25;
 
 /// Contact that slides in one sense.
 #[derive(Debug, Clone, Default)]
 pub struct Sense {
-    /// Warnings of growth by the differential equations.
-    grows: Vec<Warning>,
-    /// Rate of flutter (1/s), 0 without.
-    rate: f64,
+    /// Growth by the differential equations.
+    grows: Vec<WarningKind>,
     /// Expected step (s).
     expected: f64,
     /// Largest step of each range of step sizes (s), descending, and the growth it adds.
@@ -45,57 +39,51 @@ struct Added {
     /// Durations of closed contact (s) up to which the scene is accepted, and accepted without a warning.
     allowed: f64,
     quiet: f64,
-    refusal: Error,
-    warning: Warning,
+    growth: Box<StepGrowth>,
 }
 
 impl Sense {
-    /// Rejects a step (s) that adds significant growth while contact stays closed for a time (s). Allocates only to reject.
+    /// Returns the growth for which a step (s) is rejected while contact stays closed for a time (s). Allocates only to reject.
+    fn rejected(&self, step: f64, closed: f64) -> Option<Box<StepGrowth>> {
+        in_range(&self.ranges, step).filter(|added| closed > added.allowed).map(|added| added.growth.clone())
+    }
+
+    /// Rejects a step (s) that adds significant growth while contact stays closed for a time (s).
     ///
     /// # Errors
-    /// [`Error::Unstable`] with numbers.
-    pub fn check(&self, step: f64, closed: f64) -> Result<()> {
-        match in_range(&self.ranges, step).filter(|added| closed > added.allowed) {
-            Some(added) => Err(added.refusal.clone()),
-            None => Ok(()),
-        }
+    /// [`ErrorKind::StepGrowth`] with numbers.
+    pub fn check(&self, step: f64, closed: f64) -> Result<(), ErrorKind> {
+        self.rejected(step, closed).map_or(Ok(()), |growth| Err(ErrorKind::StepGrowth(growth)))
     }
 
     /// Returns the warnings for the expected step.
     ///
     /// # Errors
     /// As [`Sense::check`].
-    pub fn warnings(&self, closed: f64) -> Result<Vec<Warning>> {
+    pub fn warnings(&self, closed: f64) -> Result<Vec<WarningKind>, ErrorKind> {
         self.check(self.expected, closed)?;
         let added = in_range(&self.ranges, self.expected).filter(|added| closed > added.quiet);
-        Ok(self.grows(closed).chain(added.map(|added| added.warning.clone())).collect())
+        Ok(self.grows(closed).chain(added.map(|added| WarningKind::StepGrowth(added.growth.clone()))).collect())
     }
 
-    /// Returns the warnings of growth by the differential equations; flutter is a note if contact closes for a time (s) that is too short for it to
-    /// matter.
-    pub fn grows(&self, closed: f64) -> impl Iterator<Item = Warning> {
-        let opens_before = self.rate * closed < MATTERS.ln();
-        self.grows.iter().map(move |warning| match warning.topic() {
-            Topic::Flutter if opens_before => warning
-                .clone()
-                .with_remedy(format!(
-                    "No action is needed: contact opens after at most {closed:.2e} s, before the growth matters"
-                ))
-                .at_level(Severity::Note),
-            _ => warning.clone(),
-        })
-    }
-
-    /// Puts the name of the structure before all texts.
-    pub fn name(&mut self, name: &str) {
-        let named = |warning: &mut Warning| *warning = warning.clone().named(name);
-        self.grows.iter_mut().for_each(named);
-        for added in self.ranges.iter_mut().filter_map(|(_, added)| added.as_mut()) {
-            named(&mut added.warning);
-            if let Error::Unstable { problem, .. } = &mut added.refusal {
-                *problem = format!("{name}: {problem}");
-            }
+    /// Returns the warnings after a reversal, when the expected step may be rejected only later.
+    pub fn warnings_after_reversal(&self, closed: f64) -> Vec<WarningKind> {
+        match self.rejected(self.expected, closed) {
+            Some(growth) => vec![WarningKind::ReversedGrowth(growth)],
+            None => self.warnings(closed).unwrap_or_default(),
         }
+    }
+
+    /// Returns the growth by the differential equations, with the time after which contact opens (s) if contact that closes for a time (s)
+    /// opens before flutter matters.
+    pub fn grows(&self, closed: f64) -> impl Iterator<Item = WarningKind> {
+        self.grows.iter().map(move |kind| {
+            let mut kind = kind.clone();
+            if let WarningKind::Flutter { motion, opens_after, .. } = &mut kind {
+                *opens_after = (motion.rate * closed < MATTERS.ln()).then_some(closed);
+            }
+            kind
+        })
     }
 }
 
@@ -153,36 +141,23 @@ impl Checking<'_> {
         let sign = [1.0, -1.0][sense];
         let (watched, physics) = self.watched(expected, sign);
         let steps = looked_at(self.largest_frequency(), self.parameters.step);
-        let most = |of: &dyn Fn(&FastestGrowth) -> Option<SetGrowth>| {
-            let judged = watched.iter().filter_map(|watched| Some((watched.nodes.as_slice(), of(watched)?)));
-            judged.fold(None, |most: Option<(&[usize], SetGrowth)>, found| match most {
-                Some(known) if known.1.within(judged::TOLD) <= found.1.within(judged::TOLD) => Some(known),
-                _ => Some(found),
-            })
+        let most_at = |step: f64| {
+            let judged = watched.iter().filter_map(|one| Some((one.nodes.as_slice(), self.judged(one, step, sign)?)));
+            judged.reduce(
+                |known, found| {
+                    if known.1.within(judged::TOLD) <= found.1.within(judged::TOLD) { known } else { found }
+                },
+            )
         };
-        let at = |step: f64| most(&|watched| self.judged(watched, step, sign));
-        let looked: Vec<_> = steps.into_iter().map(|step| (step, at(step))).collect();
-        Sense { ranges: self.added(&looked, sign), ..self.growth(&physics, sign, expected) }
+        let looked: Vec<_> = steps.into_iter().map(|step| (step, most_at(step))).collect();
+        Sense { ranges: self.added(&looked, sign), ..self.growth(physics, sign, expected) }
     }
 
-    /// Returns the growth of contact that slides in one sense by the differential equations, independent of the step.
-    pub(super) fn physics(&self, sense: usize, expected: f64) -> Sense {
-        if self.friction == 0.0 {
-            return Sense::default();
-        }
-        let sign = [1.0, -1.0][sense];
-        let (_, physics) = self.watched(expected, sign);
-        self.growth(&physics, sign, expected)
-    }
-
-    /// Checks growth at the expected step.
+    /// Checks growth at the expected step; adaptive steps add none, and nothing has to be watched at other steps.
     fn watched(&self, expected: f64, sign: f64) -> (Vec<FastestGrowth>, Physics) {
         let (mut watched, mut physics) = (Vec::new(), Physics::default());
-        // `galerkin` has the same equations as `massless-boundary`.
-        let scheme = match self.parameters.scheme {
-            Scheme::Galerkin => Scheme::MasslessBoundary,
-            scheme => scheme,
-        };
+        let scheme = self.parameters.scheme;
+        let properties = scheme.properties();
         let noise = 1e-7 / self.parameters.step;
         for nodes in self.combinations() {
             let mut most: Option<FastestGrowth> = None;
@@ -192,19 +167,22 @@ impl Checking<'_> {
                 let Some(continuous) = limits::continuous(&seen, scheme, largest, self.friction, &directions) else {
                     continue;
                 };
-                let without = if scheme.acts_later() {
-                    Some(continuous)
+                let without = if properties.quasi_static {
+                    None
                 } else {
                     limits::without_node_mass(&seen, largest, self.friction, &directions)
                 };
                 let physical = without.unwrap_or(continuous);
                 if physical.rate > noise {
-                    let with_mass = without.filter(|_| !scheme.acts_later()).map(|_| continuous);
+                    let with_mass = without.map(|_| continuous);
                     let share = judged::share_of(&seen, &directions, physical.frequency);
                     physics.add(Flutter { found: physical, nodes: nodes.clone(), with_mass, share });
                 }
                 let least = lock_up::least_friction(&seen, &directions).filter(|least| *least < self.friction);
                 least.into_iter().for_each(|least| physics.note_lock_up(least, &nodes));
+                if properties.adaptive {
+                    continue;
+                }
                 let found = limits::stepped(&seen, scheme, expected, self.friction, &directions, continuous);
                 let Some(growth) = found else { continue };
                 if most.as_ref().is_none_or(|most| growth.stepped > most.judged.growth.stepped) {
@@ -254,127 +232,50 @@ impl Checking<'_> {
             if quiet.is_infinite() {
                 silent = Some(*step);
             }
-            let text = worst.map(|worst| Added {
-                allowed,
-                quiet,
-                refusal: self.refusal(worst, accepted, sign),
-                warning: self.warning(worst, silent, sign),
+            let growth = worst.map(|(step, nodes, judged)| {
+                Box::new(StepGrowth {
+                    contact: self.contact(nodes, sign),
+                    step,
+                    rates: judged.growth,
+                    error: judged.error(f64::INFINITY),
+                    accepted,
+                    silent,
+                })
             });
             let is_longest = added.len() + 1 == ranges.len();
-            added.push((if is_longest { f64::INFINITY } else { next_step(*step) }, text));
+            added.push((
+                if is_longest { f64::INFINITY } else { next_step(*step) },
+                growth.map(|growth| Added { allowed, quiet, growth }),
+            ));
         }
         added.reverse();
         added
     }
 
-    /// Describes the contact for messages.
-    fn contact(&self, nodes: &[usize], sign: f64) -> String {
-        let all = &self.compiled.body(self.body).1.contact_nodes;
-        let names: Vec<&str> = nodes.iter().map(|node| all[self.nodes[*node]].name.as_str()).collect();
-        let names = match names.as_slice() {
-            [first, .., last] if names.len() > 3 => format!("{first} to {last}"),
-            names => names.join(", "),
-        };
-        let where_closed = if self.disk().is_some() { " of all sectors" } else { "" };
-        let mut frictions: Vec<f64> = nodes.iter().map(|node| self.friction_at(self.nodes[*node])).collect();
+    fn contact(&self, nodes: &[usize], sign: f64) -> ClosedContact {
+        let nodes: Vec<usize> = nodes.iter().map(|node| self.nodes[*node]).collect();
+        let mut frictions: Vec<f64> = nodes.iter().map(|node| self.friction_at(*node)).collect();
         frictions.sort_by(f64::total_cmp);
         frictions.dedup();
-        let frictions: Vec<String> = frictions.into_iter().map(|friction| shown(friction).to_string()).collect();
-        let sense = if sign > 0.0 { "+θ" } else { "−θ" };
-        format!("closed at {names}{where_closed}, sliding in {sense} with µ = {}", frictions.join(" and "))
+        ClosedContact { nodes, all_sectors: self.disk().is_some(), sense: usize::from(sign < 0.0), frictions }
     }
 
-    /// Returns warnings of growth by the differential equations.
-    fn growth(&self, physics: &Physics, sign: f64, expected: f64) -> Sense {
-        let lock_up = physics.lock_up.as_ref().map(|(least, nodes)| {
-            let rate = match physics.divergence {
-                0.0 => String::new(),
-                rate => format!(", at a rate of {rate:.2e} 1/s without oscillation"),
-            };
-            let contact = self.contact(nodes, sign);
-            let remedy = "Use less friction, a more compliant casing, or a coating";
-            Warning::new(
-                Topic::LockUp,
-                format!("sliding contact locks up above µ* = {least:.3}{rate}: {contact}"),
-                remedy,
-            )
-            .with_text(format!(
-                "sliding contact locks up: above µ* = {least:.3} ({contact}) the tip is driven into the casing \
-                     faster than the casing deflects, and the contact force grows without limit{rate}. This instability \
-                     is a physical property of the model, so a shorter step does not help. {remedy}"
-            ))
+    /// Returns the warnings of growth by the differential equations.
+    fn growth(&self, physics: Physics, sign: f64, expected: f64) -> Sense {
+        let rate = Some(physics.divergence).filter(|rate| *rate != 0.0);
+        let lock_up = physics.lock_up.map(|(friction, nodes)| WarningKind::LockUp {
+            contact: self.contact(&nodes, sign),
+            friction,
+            rate,
         });
-        let flutter = physics.flutter.as_ref().map(|Flutter { found, nodes, with_mass, share }| {
-            let contact = self.contact(nodes, sign);
-            let kilohertz = 1e-3 * found.frequency / std::f64::consts::TAU;
-            let problem =
-                format!("vibration in closed contact grows at {:.2e} 1/s at {kilohertz:.4} kHz: {contact}", found.rate);
-            let remedy = "Use less friction or more damping, or let contact open sooner; a shorter step does not help";
-            Warning::new(Topic::Flutter, problem, remedy).with_text(format!(
-                "sliding contact is physically unstable (flutter): with contact {contact}, vibration at {kilohertz:.4} kHz grows at \
-                 {:.2e} 1/s{} and displaces the tips by up to {:.1} % of the displacement caused by contact. This \
-                 instability is a physical property of the model. {remedy}",
-                found.rate,
-                confirmed(found, with_mass.as_ref()),
-                100.0 * share
-            ))
+        let flutter = physics.flutter.map(|Flutter { found, nodes, with_mass, share }| WarningKind::Flutter {
+            contact: self.contact(&nodes, sign),
+            motion: found,
+            with_mass,
+            share,
+            opens_after: None,
         });
-        let rate = physics.flutter.as_ref().map_or(0.0, |flutter| flutter.found.rate);
-        Sense { grows: lock_up.into_iter().chain(flutter).collect(), rate, expected, ranges: Vec::new() }
-    }
-
-    fn warning(&self, (step, nodes, judged): (f64, &[usize], SetGrowth), silent: Option<f64>, sign: f64) -> Warning {
-        let problem = format!(
-            "the time step destabilises sliding contact: {}, with vibration growing at {:.2e} 1/s in steps of {} s, but at {:.2e} 1/s \
-             in continuous time; this may displace the tips by {:.0} % of the displacement caused by contact",
-            self.contact(nodes, sign),
-            judged.growth.stepped,
-            shown(limits::rounded(step)),
-            judged.growth.continuous.max(0.0),
-            100.0 * judged.error(f64::INFINITY),
-        );
-        let remedy = match silent {
-            Some(step) => format!("Set `time.step` to {} or less", shown(limits::rounded_down(step))),
-            None => "Use less friction or more damping".to_owned(),
-        };
-        Warning::new(Topic::StepGrowth, problem, remedy)
-    }
-
-    fn refusal(&self, (step, nodes, judged): (f64, &[usize], SetGrowth), accepted: Option<f64>, sign: f64) -> Error {
-        let step_remedy = accepted.map_or(String::new(), |step| {
-            format!(
-                "Set `time.step` (in the FMU `internal_step_max`) to {} or less, or use",
-                shown(limits::rounded_down(step))
-            )
-        });
-        let step_remedy = if step_remedy.is_empty() { "Use".to_owned() } else { step_remedy };
-        Error::Unstable {
-            problem: format!(
-                "`time.step` is too long for friction: vibration in contact ({}) grows at {:.2e} 1/s in steps of {} s, but at \
-                 {:.2e} 1/s in continuous time, and this alone may displace the tips by {:.0} % of the displacement \
-                 caused by contact",
-                self.contact(nodes, sign),
-                judged.growth.stepped,
-                shown(limits::rounded(step)),
-                judged.growth.continuous,
-                100.0 * judged.error(f64::INFINITY)
-            ),
-            remedy: format!("{step_remedy} less friction or more damping"),
-        }
-    }
-}
-
-/// Describes whether a motion that grows without the mass of the contact nodes also grows with it.
-fn confirmed(found: &Fastest, with_mass: Option<&Fastest>) -> String {
-    match with_mass {
-        Some(other) if other.rate < ALIKE * found.rate && found.rate < ALIKE * other.rate => {
-            " (the same with and without the mass of the contact nodes, so more modes will hardly change it)".to_owned()
-        }
-        Some(other) => format!(
-            " (without the mass of the contact nodes; {:.2e} 1/s with it, so more modes may change it)",
-            other.rate.max(0.0)
-        ),
-        None => String::new(),
+        Sense { grows: lock_up.into_iter().chain(flutter).collect(), expected, ranges: Vec::new() }
     }
 }
 
@@ -396,16 +297,22 @@ fn next_step(step: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Warning;
+    use crate::limits::finding::Subject;
+    use crate::limits::wording::Context;
+    use tiprub_cosim::warning::Severity;
 
     #[test]
     fn flutter_is_only_a_note_if_contact_opens_before_growth() {
-        let flutter =
-            Warning::new(Topic::Flutter, "grows", "Use less friction").with_text("It grows. Use less friction");
-        let lock_up = Warning::new(Topic::LockUp, "locks up", "Use less friction");
-        let sense = Sense { grows: vec![lock_up, flutter], rate: 1e3, ..Sense::default() };
+        let contact = ClosedContact { nodes: vec![0], all_sectors: false, sense: 0, frictions: vec![0.5] };
+        let lock_up = WarningKind::LockUp { contact: contact.clone(), friction: 0.4, rate: None };
+        let motion = Fastest { rate: 1e3, frequency: 1e4 };
+        let flutter = WarningKind::Flutter { contact, motion, with_mass: None, share: 1.0, opens_after: None };
+        let sense = Sense { grows: vec![lock_up, flutter], ..Sense::default() };
         // ln 1000 = 6.9 at 1000 1/s.
         for (closed, level) in [(6e-3, Severity::Note), (7e-3, Severity::Warning), (f64::INFINITY, Severity::Warning)] {
-            let found: Vec<Warning> = sense.grows(closed).collect();
+            let rendered = |kind: WarningKind| kind.of(Subject::Scene).warning(&Context::default());
+            let found: Vec<Warning> = sense.grows(closed).map(rendered).collect();
             assert_eq!(found[0].level(), Severity::Warning, "self-locking is never a note");
             assert_eq!(found[1].level(), level, "{closed} s");
             for text in [&found[1].lines()[1], &*found[1]] {

@@ -1,12 +1,13 @@
 //! Rows of effects on blades other than contact: excitation, heat, initial motion; and of damping by modes.
 
+use tiprub_cosim::variables::{DataType, Quantity, StartValue};
+
 use super::builder::TableBuilder;
 use super::features::LARGEST_TEMPERATURE;
 use super::parts::{BodyFacts, TableFacts};
 use crate::scene::ranges;
 use crate::scene::settings::StructureSettings;
 use crate::simulation::units::{ANGLE, FORCE, LENGTH, LINEAR_SPEED, TEMPERATURE};
-use crate::variables::{DataType, Quantity, StartValue};
 
 /// Adds excitation and temperature.
 pub fn inputs(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts) {

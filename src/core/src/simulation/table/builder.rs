@@ -1,16 +1,18 @@
 //! Rows of the variable table, and the rows that every scene has.
 
+use tiprub_cosim::bounds::SHORTEST_STEP;
+use tiprub_cosim::variables::{
+    Causality, DataType, Enumeration, Quantity, Span, StartValue, Variability, Variable, VariableTable, VariableUnit,
+};
+
 use crate::Result;
 use crate::scene::method::SCHEMES;
 use crate::scene::method::SOLVERS;
 use crate::scene::ranges;
-use crate::scene::ranges::{DAMPING, FRICTION, LONGEST_STEP, SHORTEST_STEP, TURNED};
+use crate::scene::ranges::{DAMPING, FRICTION, LONGEST_STEP, TURNED};
 use crate::scene::settings::{ContactSettings, SceneSettings, TOLERANCE};
 use crate::simulation::outputs::OutputReader;
 use crate::simulation::units::{ANGLE, INPUT_INTERPOLATIONS, STEP_DERIVATIVES, TIME};
-use crate::variables::{
-    Causality, DataType, Enumeration, Quantity, Span, StartValue, Variability, Variable, VariableTable, VariableUnit,
-};
 
 /// Description of inputs that would cause an impact if they jumped.
 pub const RAMPED: &str = "; reached at the end of the communication step (see input_interpolation)";

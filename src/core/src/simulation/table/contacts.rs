@@ -1,12 +1,13 @@
 //! Outputs that every scene has.
 
+use tiprub_cosim::variables::{DataType, Quantity, Span, Variability, VariableUnit};
+
 use super::builder::TableBuilder;
 use super::features;
 use super::parts::{BodyFacts, TableFacts};
 use crate::scene::settings::{BodyMotion, SceneSettings};
 use crate::simulation::outputs::{OutputView, scalar};
 use crate::simulation::units::{ENERGY, FORCE, IMPULSE, POWER, TIME};
-use crate::variables::{DataType, Quantity, Span, Variability, VariableUnit};
 
 pub fn smallest_clearance(table: &mut TableBuilder, unit: Option<(&'static VariableUnit, f64)>, text: &str) {
     let read = scalar(|view| view.lowest());

@@ -1,5 +1,7 @@
 //! Rows that only some scenes have.
 
+use tiprub_cosim::variables::{DataType, Quantity, Span, StartValue, Variability};
+
 use super::blades;
 use super::builder::TableBuilder;
 use super::parts::{AXES, BodyFacts, CarrierFacts, PairFacts, TableFacts, largest_length};
@@ -8,7 +10,6 @@ use crate::scene::ranges;
 use crate::scene::settings::{CoatingSettings, StructureSettings};
 use crate::simulation::outputs::{array_reader, each, scalar};
 use crate::simulation::units::{ANGLE, ENERGY, FORCE, LENGTH, LINE_LOAD, POWER, TEMPERATURE, TORQUE, VOLUME};
-use crate::variables::{DataType, Quantity, Span, StartValue, Variability};
 
 /// A linear expansion does not describe temperatures beyond this (K).
 pub const LARGEST_TEMPERATURE: f64 = 3000.0;

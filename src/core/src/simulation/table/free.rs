@@ -1,5 +1,7 @@
 //! Rows of free bodies.
 
+use tiprub_cosim::variables::{Quantity, Span, VariableUnit};
+
 use super::builder::TableBuilder;
 use super::parts::{AXES, BodyFacts, TableFacts};
 use super::rotor::watched_rows;
@@ -7,7 +9,6 @@ use crate::Rom;
 use crate::scene::ranges;
 use crate::simulation::outputs::{each, scalar};
 use crate::simulation::units::{FORCE, LENGTH, LINEAR_SPEED};
-use crate::variables::{Quantity, Span, VariableUnit};
 
 /// Adds the initial velocity.
 pub fn velocity(table: &mut TableBuilder, body: &BodyFacts) {

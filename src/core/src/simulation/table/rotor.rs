@@ -1,12 +1,13 @@
 //! Outputs of a rotor, one row each with its reader.
 
+use tiprub_cosim::variables::{Quantity, Span, VariableUnit};
+
 use super::builder::TableBuilder;
 use super::parts::{BodyFacts, TableFacts, refuse};
 use crate::Result;
 use crate::scene::rom::{ContactNode, DisplacementFrame, STRESSES};
 use crate::simulation::outputs::{OutputReader, array_reader, each, scalar};
 use crate::simulation::units::{ANGLE, FORCE, LENGTH, LINE_LOAD, PRESSURE, STRESS};
-use crate::variables::{Quantity, Span, VariableUnit};
 
 pub fn angle(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts) {
     let index = body.index;

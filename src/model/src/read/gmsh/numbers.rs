@@ -16,12 +16,10 @@ pub(super) enum Numbers<'a> {
 
 impl<'a> Numbers<'a> {
     /// Returns an error at the current number.
-    pub(super) fn error(&self, problem: impl Into<String>, remedy: impl Into<String>) -> Error {
+    pub(super) fn error(&self, problem: impl ToString, remedy: impl ToString) -> Error {
         match self {
             Self::Text { file, line, .. } => SourceLine { file: Arc::clone(file), line: *line }.error(problem, remedy),
-            Self::Bytes { file, offset, .. } => {
-                Error::Read { place: format!("{file}, byte {offset}"), problem: problem.into(), remedy: remedy.into() }
-            }
+            Self::Bytes { file, offset, .. } => Error::read(format_args!("{file}, byte {offset}"), problem, remedy),
         }
     }
 

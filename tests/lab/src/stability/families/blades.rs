@@ -8,11 +8,12 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Complex, DMatrix, DVector};
 use tiprub_core::scene::method::Solver;
-use tiprub_core::scene::rom::{Spin, Thermal, ThermalPatch};
+use tiprub_core::scene::rom::{Spin, Thermal};
 use tiprub_core::scene::settings::{
     CoatingSettings, CuttingSettings, ExcitationSettings, ForceDirection, InitialSettings,
 };
-use tiprub_core::{Result, Rom, Scene, Simulation};
+use tiprub_core::{CoSimulation, Result, Rom, Scene, Simulation};
+use tiprub_cosim::ThermalPatch;
 
 use super::super::{
     Cases, Check, Expected, StabilityCase,

@@ -1,7 +1,7 @@
 //! Built-in models: rotor 37 and the coupled stage in its elastic casing, and inconsistent ROMs.
 
 use tiprub_core::scene::method::{Scheme, Solver};
-use tiprub_core::{Result, Rom, Scene, Simulation};
+use tiprub_core::{CoSimulation, Result, Rom, Scene, Simulation};
 use tiprub_gallery::{builtin, rom_cache::RomCache, scene_source};
 use tiprub_shell::console::Console;
 

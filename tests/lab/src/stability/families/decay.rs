@@ -11,7 +11,7 @@ use std::f64::consts::{PI, TAU};
 use nalgebra::{Complex, DMatrix, DVector};
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::settings::{InputInterpolation, LoadSettings};
-use tiprub_core::{Result, Simulation};
+use tiprub_core::{CoSimulation, Result, Simulation};
 
 use super::super::{
     Cases, Check, Expected, StabilityCase,

@@ -1,7 +1,7 @@
 //! Single free bodies, also against one plate: flights, impacts, rebounds, from almost at rest to far too fast.
 
 use tiprub_core::scene::method::{Scheme, Solver};
-use tiprub_core::{Result, Simulation};
+use tiprub_core::{CoSimulation, Result, Simulation};
 
 use super::super::{
     CaseEnd, Cases, Check, Expected, StabilityCase,

@@ -2,7 +2,7 @@
 
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::settings::Shape;
-use tiprub_core::{Result, Scene};
+use tiprub_core::{CoSimulation, Result, Scene};
 
 use super::super::{
     CaseEnd, Cases, Check, Expected, StabilityCase,

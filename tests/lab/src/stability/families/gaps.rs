@@ -1,7 +1,7 @@
 //! Clearances from zero to too large, coincident contact nodes, numbers of sectors, amplitudes down to denormals.
 
 use tiprub_core::scene::method::Solver;
-use tiprub_core::{Result, Scene, Simulation};
+use tiprub_core::{CoSimulation, Result, Scene, Simulation};
 
 use super::super::{
     CaseEnd, Cases, Check, Expected, StabilityCase,

@@ -6,7 +6,7 @@
 use std::f64::consts::TAU;
 
 use tiprub_core::scene::method::Solver;
-use tiprub_core::{Result, Simulation};
+use tiprub_core::{CoSimulation, Result, Simulation};
 
 use super::super::{
     Cases, Check, Expected, StabilityCase,

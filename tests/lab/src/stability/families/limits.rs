@@ -1,7 +1,7 @@
 //! Step sizes around the limits of the schemes, and stiffness that spans many orders of magnitude.
 
 use tiprub_core::scene::method::{Scheme, Solver};
-use tiprub_core::{Scene, Simulation};
+use tiprub_core::{CoSimulation, Scene, Simulation};
 
 use super::super::{
     CaseEnd, Expected, StabilityCase,

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use tiprub_core::scene::method::Solver;
 use tiprub_core::scene::settings::{CoatingSettings, InputInterpolation, LoadSettings, Shape};
-use tiprub_core::{Result, Scene, Simulation};
+use tiprub_core::{CoSimulation, Result, Scene, Simulation};
 
 use super::super::{
     CaseEnd, Cases, Check, Expected, StabilityCase,

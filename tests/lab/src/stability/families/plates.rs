@@ -1,7 +1,7 @@
 //! Free bodies among plates: balances of momentum and energy, left and right, edges, rejected starts.
 
-use tiprub_core::Result;
 use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::{CoSimulation, Result};
 
 use super::{
     super::{

@@ -2,7 +2,7 @@
 //! instances.
 
 use tiprub_core::scene::method::{Scheme, Solver};
-use tiprub_core::{Result, Scene, Simulation};
+use tiprub_core::{CoSimulation, Result, Scene, Simulation};
 
 use super::{
     super::{

@@ -2,7 +2,7 @@
 
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::settings::SplineSettings;
-use tiprub_core::{Result, Scene, Simulation};
+use tiprub_core::{CoSimulation, Result, Scene, Simulation};
 
 use super::super::{
     Cases, Check, Expected, StabilityCase,
@@ -52,7 +52,7 @@ fn over_the_edge(method: StabilityMethod, shift: f64) -> Result<Vec<Check>> {
             set(&mut simulation, "axial_shift", shift * (x / 300.0).sin())?;
             watch.step(&mut simulation, length)?;
         }
-        Ok((watch.impulse, real(&simulation, "impact_loss"), watch))
+        Ok::<_, tiprub_core::Error>((watch.impulse, real(&simulation, "impact_loss"), watch))
     };
     let (impulse, loss, watch) = run(Some(SplineSettings::default()))?;
     let (expected, expected_loss, _) = run(None)?;

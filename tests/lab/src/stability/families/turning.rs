@@ -9,7 +9,7 @@ use std::f64::consts::{PI, TAU};
 use nalgebra::Complex;
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::settings::{LoadSettings, Shape};
-use tiprub_core::{Result, Scene, Simulation};
+use tiprub_core::{CoSimulation, Result, Scene, Simulation};
 
 use super::{
     super::{

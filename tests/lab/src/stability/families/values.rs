@@ -3,10 +3,8 @@
 
 use tiprub_core::scene::method::Solver;
 use tiprub_core::scene::settings::LoadSettings;
-use tiprub_core::{
-    Error, Result, Scene, Simulation,
-    variables::{Causality, DataType, Quantity, Variable},
-};
+use tiprub_core::{CoSimulation, Error, Result, Scene, Simulation};
+use tiprub_cosim::variables::{Causality, DataType, Quantity, Variable};
 use tiprub_fmi_host::{Session, UnpackedFmu};
 
 use super::super::{
@@ -113,7 +111,7 @@ fn of_variable(scene: &'static str, variable: &Variable, text: &str, value: f64)
     for (when, during) in [("start", false), ("run", true)] {
         if during
             && variable.causality == Causality::Parameter
-            && variable.variability == tiprub_core::variables::Variability::Fixed
+            && variable.variability == tiprub_cosim::variables::Variability::Fixed
         {
             continue;
         }

@@ -85,14 +85,13 @@ pub(super) const COULOMB: Fact = fact("contact.solver", "`coulomb`", |at| at.sol
 
 pub(super) const OTHER_SOLVER: Fact =
     fact("contact.solver", "a solver other than `film`", |at| at.contact().solver != Solver::Film);
-pub(super) const OTHER_SCHEME: Fact = fact("time.scheme", "a scheme other than `central-difference`", |at| {
-    at.settings.time.scheme != Scheme::CentralDifference
-});
+pub(super) const OTHER_SCHEME: Fact =
+    fact("time.scheme", "a scheme other than `central-difference`", |at| at.settings.time.scheme != Scheme::PAPER);
 pub(super) const MASSLESS: Fact =
-    fact("time.scheme", "`massless-boundary`", |at| at.scheme == Scheme::MasslessBoundary);
-pub(super) const GALERKIN: Fact = fact("time.scheme", "`galerkin`", |at| at.scheme == Scheme::Galerkin);
+    fact("time.scheme", "`massless-boundary`", |at| at.scheme.properties().delays_contact);
+pub(super) const GALERKIN: Fact = fact("time.scheme", "`galerkin`", |at| at.scheme.properties().adaptive);
 pub(super) const QUASI_STATIC: Fact =
-    fact("time.scheme", "`massless-boundary` or `galerkin`", |at| at.scheme.is_massless());
+    fact("time.scheme", "`massless-boundary` or `galerkin`", |at| at.scheme.properties().quasi_static);
 pub(super) const INTERPOLATION: Fact =
     fact("time.input_interpolation", "", |at| at.settings.time.input_interpolation != InputInterpolation::default());
 pub(super) const OTHER_SECTORS: Fact = fact("outputs.watched_sectors", "a sector other than 1", |at| {

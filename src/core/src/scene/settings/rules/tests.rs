@@ -1,9 +1,9 @@
 use nalgebra::{Complex, DMatrix};
+use tiprub_cosim::ThermalPatch;
 
 use super::all;
 use crate::scene::rom::{
-    ContactGrid, ContactNode, DisplacementFrame, Harmonic, RomChecks, RomExtras, Spin, Thermal, ThermalPatch,
-    WatchedPoints,
+    ContactGrid, ContactNode, DisplacementFrame, Harmonic, RomChecks, RomExtras, Spin, Thermal, WatchedPoints,
 };
 use crate::scene::settings::*;
 use crate::{Rom, Scene};

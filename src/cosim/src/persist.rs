@@ -1,7 +1,5 @@
 //! Saves and restores state as bytes. One list of fields per struct defines its size, its saving and its restoring.
 
-use crate::math::vector::Vector3;
-
 /// Writes little-endian values to a buffer.
 #[derive(Debug)]
 pub struct StateWriter<'a> {
@@ -147,18 +145,6 @@ impl Persist for bool {
     }
 }
 
-impl Persist for Vector3 {
-    fn save(&self, writer: &mut StateWriter) {
-        self.as_slice().save(writer);
-    }
-    fn restore(&mut self, reader: &mut StateReader) {
-        self.as_mut_slice().restore(reader);
-    }
-    fn check(&self, reader: &mut StateReader) {
-        self.as_slice().check(reader);
-    }
-}
-
 impl<T: Persist> Persist for [T] {
     fn save(&self, writer: &mut StateWriter) {
         for value in self {
@@ -201,27 +187,37 @@ impl<T: Persist, const N: usize> Persist for [T; N] {
     }
 }
 
-/// Implements [`Persist`] for a struct from the list of its fields; a missing field is a compile error.
+/// Implements [`Persist`] for a struct from the list of its fields; a missing field is a compile error. `field.part` saves this part of a
+/// field, such as the components of a vector: `force.data.0`.
 #[macro_export]
 macro_rules! persist_fields {
-    ($name:ident { $($field:ident),+ $(,)? }) => {
+    ($name:ident { $($field:ident $(. $part:tt)*),+ $(,)? }) => {
         impl $crate::persist::Persist for $name {
             fn save(&self, writer: &mut $crate::persist::StateWriter) {
-                let Self { $($field),+ } = self;
-                $($crate::persist::Persist::save($field, writer);)+
+                let Self { $($field: _),+ } = self;
+                $($crate::persist::Persist::save(&self.$field$(.$part)*, writer);)+
             }
             fn restore(&mut self, reader: &mut $crate::persist::StateReader) {
-                let Self { $($field),+ } = self;
-                $($crate::persist::Persist::restore($field, reader);)+
+                $($crate::persist::Persist::restore(&mut self.$field$(.$part)*, reader);)+
             }
             fn check(&self, reader: &mut $crate::persist::StateReader) {
-                let Self { $($field),+ } = self;
-                $($crate::persist::Persist::check($field, reader);)+
+                $($crate::persist::Persist::check(&self.$field$(.$part)*, reader);)+
             }
         }
     };
 }
-pub use persist_fields;
+
+/// Returns values as bytes, one after the other.
+pub fn to_bytes(values: &[&dyn Persist]) -> Vec<u8> {
+    let write = |buffer: &mut [u8]| {
+        let mut writer = StateWriter::new(buffer);
+        values.iter().for_each(|value| value.save(&mut writer));
+        writer.written()
+    };
+    let mut bytes = vec![0; write(&mut [])];
+    write(&mut bytes);
+    bytes
+}
 
 /// FNV-1a hash of bytes, for fingerprints and checksums of saved states (not for security).
 pub fn fingerprint(bytes: &[u8], seed: u64) -> u64 {

@@ -6,8 +6,7 @@
 
 use std::collections::{BTreeMap, HashSet};
 
-use crate::scene::ranges;
-use crate::{Error, Result};
+use crate::{Diagnostic, Error, Result, bounds, shown};
 
 /// Value of a clearance output if there is no surface to touch (m): finite, as FMI requires, and larger than any distance in an engine. Its
 /// time derivative is then 0.
@@ -56,6 +55,58 @@ pub enum DataType {
     String,
     /// One item of an enumeration, as i32 starting at 1.
     Enumeration(&'static Enumeration),
+}
+
+impl DataType {
+    /// Returns the type that values have: items of enumerations are integers.
+    fn of_values(self) -> Self {
+        if let Self::Enumeration(_) = self { Self::Integer } else { self }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Real => "real",
+            Self::Integer => "integer",
+            Self::Boolean => "boolean",
+            Self::String => "string",
+            Self::Enumeration(_) => "enumeration",
+        }
+    }
+}
+
+/// Value to which a variable is set.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Value<'a> {
+    /// A real number.
+    Real(f64),
+    /// An integer or an item of an enumeration.
+    Integer(i64),
+    /// A truth value.
+    Boolean(bool),
+    /// A text.
+    String(&'a str),
+}
+
+impl Value<'_> {
+    fn kind(self) -> DataType {
+        match self {
+            Self::Real(_) => DataType::Real,
+            Self::Integer(_) => DataType::Integer,
+            Self::Boolean(_) => DataType::Boolean,
+            Self::String(_) => DataType::String,
+        }
+    }
+
+    /// Returns the number by which the value is stored; texts have none.
+    #[expect(clippy::cast_precision_loss, reason = "integers are checked to have 32 bits")]
+    pub fn number(self) -> f64 {
+        match self {
+            Self::Real(value) => value,
+            Self::Integer(value) => value as f64,
+            Self::Boolean(value) => f64::from(u8::from(value)),
+            Self::String(_) => f64::NAN,
+        }
+    }
 }
 
 /// An enumeration type definition.
@@ -292,7 +343,106 @@ impl Variable {
 
     /// Returns whether an importer may set it before initialisation ends.
     pub fn is_settable(&self) -> bool {
-        matches!(self.causality, Causality::Input | Causality::Parameter)
+        matches!(self.causality, Causality::Input | Causality::Parameter) && self.variability != Variability::Constant
+    }
+
+    /// Returns the subject of messages about an element.
+    fn subject(&self, element: usize) -> String {
+        format!("variable `{}`", self.element_name(element))
+    }
+
+    /// Checks the type of a variable; items of enumerations are integers.
+    pub(crate) fn check_type(&self, element: usize, wanted: DataType) -> Result<(), Diagnostic> {
+        if self.kind.of_values() == wanted {
+            return Ok(());
+        }
+        let problem = format!("its type is {}, not {}", self.kind.name(), wanted.name());
+        let remedy = "Call the function for the variable's type in modelDescription.xml";
+        Err(Diagnostic::new(self.subject(element), problem, remedy))
+    }
+
+    /// Checks that an element may be set to a value now.
+    ///
+    /// # Errors
+    /// A value of another type or out of range, a variable that is computed, or a fixed parameter after initialisation.
+    pub fn check(&self, element: usize, value: Value, initialised: bool) -> Result<(), Diagnostic> {
+        self.check_type(element, value.kind())?;
+        if !self.is_settable() {
+            let remedy = "Set inputs and parameters only";
+            return Err(Diagnostic::new(self.subject(element), "it is computed and cannot be set", remedy));
+        }
+        if initialised && self.causality == Causality::Parameter && self.variability == Variability::Fixed {
+            let problem = "a fixed parameter cannot be set after initialisation";
+            let remedy = "Set it before initialisation ends, or reset the instance first";
+            return Err(Diagnostic::new(self.subject(element), problem, remedy));
+        }
+        self.check_range(element, value)
+    }
+
+    /// Checks that a value is finite, in the range of the variable, or one of its items.
+    fn check_range(&self, element: usize, value: Value) -> Result<(), Diagnostic> {
+        let (low, high) = (self.min.unwrap_or(f64::MIN), self.max.unwrap_or(f64::MAX));
+        let number = value.number();
+        let (problem, remedy) = match (value, self.kind) {
+            (Value::Integer(value), DataType::Enumeration(choices)) => {
+                if usize::try_from(value).is_ok_and(|item| (1..=choices.items.len()).contains(&item)) {
+                    return Ok(());
+                }
+                let items =
+                    choices.items.iter().enumerate().map(|(index, (name, _))| format!("{} = {name}", index + 1));
+                let remedy = format!("Use one of: {}", items.collect::<Vec<_>>().join(", "));
+                (format!("{value} is not an item of {}", choices.name), remedy)
+            }
+            (Value::Integer(value), _) if i32::try_from(value).is_err() => {
+                (format!("{value} is too large"), "Set a 32-bit integer".into())
+            }
+            (Value::Boolean(_), _) => return Ok(()),
+            (Value::String(_), _) => ("string variables cannot be set".into(), "Remove the call".into()),
+            _ if (low..=high).contains(&number) => return Ok(()),
+            _ if !number.is_finite() => (format!("{number} is not finite"), "Set a finite number".into()),
+            _ => {
+                let unit = self.unit.map_or(String::new(), |unit| format!(" {}", unit.name));
+                let range = format!("{} to {}{unit}", shown(low), shown(high));
+                let problem = format!("{}{unit} is outside the range {range}", shown(number));
+                (problem, "Set a value within this range".into())
+            }
+        };
+        Err(Diagnostic::new(self.subject(element), problem, remedy))
+    }
+
+    /// Checks that a derivative of an input or output may be set or requested.
+    ///
+    /// # Errors
+    /// A variable of another role or type, or one that is not continuous; an order other than 1.
+    pub fn check_derivative(&self, element: usize, causality: Causality, order: i32) -> Result<(), Diagnostic> {
+        let what = || format!("derivative of `{}`", self.element_name(element));
+        let continuous = self.kind == DataType::Real && self.variability == Variability::Continuous;
+        if self.causality != causality || !continuous {
+            let role = if causality == Causality::Input { "input" } else { "output" };
+            let problem = format!("the variable is not a continuous real {role}");
+            return Err(Diagnostic::new(what(), problem, "Remove it from the request"));
+        }
+        if order != 1 {
+            let remedy = "Use order 1, because inputs are linear in time";
+            return Err(Diagnostic::new(what(), format!("order {order} is not supported"), remedy));
+        }
+        Ok(())
+    }
+
+    /// Returns whether a saved state can contain the value. The range of inputs is that of their current values, not of the set ones.
+    pub fn can_have(&self, value: f64) -> bool {
+        let in_range = |value| !self.is_settable() || self.check_range(0, value).is_ok();
+        #[expect(clippy::cast_possible_truncation, reason = "compared with the value")]
+        let integer = Some(value as i32).filter(|number| (f64::from(*number) - value).abs() == 0.0);
+        match self.kind {
+            DataType::Real if self.causality == Causality::Input => value.is_finite(),
+            DataType::Real => value.is_finite() && in_range(Value::Real(value)),
+            DataType::Boolean => matches!(integer, Some(0 | 1)),
+            DataType::Integer | DataType::Enumeration(_) => {
+                integer.is_some_and(|number| in_range(Value::Integer(number.into())))
+            }
+            DataType::String => true,
+        }
     }
 }
 
@@ -309,7 +459,7 @@ pub struct VariableTable {
 /// Rejects more values than any reader supports.
 fn check_count(variables: &[Variable]) -> Result<()> {
     let count = variables.iter().fold(0, |sum: usize, variable| sum.saturating_add(variable.len()));
-    let Some(largest) = variables.iter().max_by_key(|variable| variable.len()).filter(|_| count > ranges::VALUES)
+    let Some(largest) = variables.iter().max_by_key(|variable| variable.len()).filter(|_| count > bounds::VALUES)
     else {
         return Ok(());
     };
@@ -317,7 +467,7 @@ fn check_count(variables: &[Variable]) -> Result<()> {
         "scene",
         format!(
             "the variables have {count} values, which exceeds the limit of {}; `{}` alone has {}",
-            ranges::VALUES,
+            bounds::VALUES,
             largest.name,
             largest.len()
         ),
@@ -329,7 +479,7 @@ impl VariableTable {
     /// Creates a table from rows whose references are consecutive, starting at 0.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if references are not consecutive, a name occurs twice, or there are more than [`ranges::VALUES`] values.
+    /// [`Error::Invalid`] if references are not consecutive, a name occurs twice, or there are more than [`bounds::VALUES`] values.
     pub fn new(variables: Vec<Variable>) -> Result<Self> {
         check_count(&variables)?;
         let (mut rows, mut names) = (Vec::new(), HashSet::with_capacity(variables.len()));
@@ -375,10 +525,13 @@ impl VariableTable {
     /// Row and element index of a value reference.
     ///
     /// # Errors
-    /// [`Error::UnknownReference`].
+    /// [`Error::Invalid`] for an unknown reference.
     pub fn locate(&self, reference: u32) -> Result<(&Variable, usize)> {
         let row = usize::try_from(reference).ok().and_then(|index| self.rows.get(index));
-        let row = *row.ok_or(Error::UnknownReference { reference })? as usize;
+        let row = *row.ok_or_else(|| {
+            let remedy = "Use a value reference of its modelDescription.xml";
+            Error::invalid("", format!("value reference {reference} does not exist in this FMU"), remedy)
+        })? as usize;
         let variable = &self.variables[row];
         Ok((variable, (reference - variable.reference) as usize))
     }

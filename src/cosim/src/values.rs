@@ -1,0 +1,104 @@
+//! Variables together with their current values.
+
+use std::ops::{Deref, DerefMut};
+
+use crate::Result;
+use crate::variables::{DataType, StartValue, Variable, VariableTable};
+
+/// Variables of a unit with their current values, which it dereferences to: one number per value reference.
+///
+/// Integers, items and truth values are stored as numbers; texts are constants of the table.
+#[derive(Debug, Clone)]
+pub struct VariableValues {
+    table: VariableTable,
+    values: Vec<f64>,
+}
+
+impl VariableValues {
+    /// Creates the store with all start values.
+    pub fn new(table: VariableTable) -> Self {
+        let mut store = Self { values: vec![0.0; table.references()], table };
+        store.reset();
+        store
+    }
+
+    /// Returns the variables.
+    pub fn table(&self) -> &VariableTable {
+        &self.table
+    }
+
+    /// Replaces all values and returns the previous ones.
+    pub fn replace(&mut self, values: Vec<f64>) -> Vec<f64> {
+        std::mem::replace(&mut self.values, values)
+    }
+
+    /// Sets all start values; values without one are 0.
+    pub fn reset(&mut self) {
+        self.values.fill(0.0);
+        for variable in self.table.variables() {
+            let values = &mut self.values[variable.reference as usize..];
+            match &variable.start {
+                Some(StartValue::Real(start)) => values[..start.len()].copy_from_slice(start),
+                Some(StartValue::Integer(start)) => values[0] = f64::from(*start),
+                Some(StartValue::Boolean(start)) => values[0] = f64::from(u8::from(*start)),
+                Some(StartValue::String(_)) | None => {}
+            }
+        }
+    }
+
+    fn stored(&self, reference: u32, wanted: DataType) -> Result<(&Variable, f64)> {
+        let (variable, element) = self.table.locate(reference)?;
+        variable.check_type(element, wanted)?;
+        Ok((variable, self.values[reference as usize]))
+    }
+
+    /// Returns one element of a real variable.
+    ///
+    /// # Errors
+    /// Unknown reference, or a variable of another type.
+    pub fn real(&self, reference: u32) -> Result<f64> {
+        Ok(self.stored(reference, DataType::Real)?.1)
+    }
+
+    /// Returns an integer or an item of an enumeration.
+    ///
+    /// # Errors
+    /// Same as [`VariableValues::real`].
+    pub fn integer(&self, reference: u32) -> Result<i32> {
+        #[expect(clippy::cast_possible_truncation, reason = "integers are stored as the i32 they were set from")]
+        self.stored(reference, DataType::Integer).map(|(_, value)| value as i32)
+    }
+
+    /// Returns a truth value.
+    ///
+    /// # Errors
+    /// Same as [`VariableValues::real`].
+    pub fn boolean(&self, reference: u32) -> Result<bool> {
+        Ok(self.stored(reference, DataType::Boolean)?.1 != 0.0)
+    }
+
+    /// Returns a text.
+    ///
+    /// # Errors
+    /// Same as [`VariableValues::real`].
+    pub fn string(&self, reference: u32) -> Result<&str> {
+        match &self.stored(reference, DataType::String)?.0.start {
+            Some(StartValue::String(text)) => Ok(text),
+            _ => Ok(""),
+        }
+    }
+}
+
+impl Deref for VariableValues {
+    type Target = [f64];
+
+    fn deref(&self) -> &[f64] {
+        &self.values
+    }
+}
+
+impl DerefMut for VariableValues {
+    fn deref_mut(&mut self) -> &mut [f64] {
+        &mut self.values
+    }
+}
