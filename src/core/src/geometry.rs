@@ -18,7 +18,7 @@ pub mod wrench;
 use tiprub_cosim::persist_fields;
 
 pub use crate::math::vector::Vector3;
-use crate::math::vector::length;
+use crate::math::vector::{ZERO, length};
 use crate::scene::ranges::SMALL;
 use layout::Layout;
 pub use layout::sector_angle;
@@ -109,11 +109,8 @@ pub struct Gap {
 
 impl Gap {
     /// Gap of a node without a surface.
-    pub const NOTHING: Self = Self {
-        distance: NOTHING_TO_TOUCH,
-        normal: Vector3::new(0.0, 0.0, 0.0),
-        foot: ClosestPoint { patch: [0; 2], s: 0.0, t: 0.0 },
-    };
+    pub const NOTHING: Self =
+        Self { distance: NOTHING_TO_TOUCH, normal: ZERO, foot: ClosestPoint { patch: [0; 2], s: 0.0, t: 0.0 } };
 }
 
 /// Gap function of a contact pair, compiled for stepping, for some contact nodes of a structure in all sectors. Arrays have the size of the

@@ -3,6 +3,9 @@
 /// A vector in space, along fixed directions or along those of a node.
 pub type Vector3 = nalgebra::Vector3<f64>;
 
+/// The zero vector, for constants.
+pub const ZERO: Vector3 = Vector3::new(0.0, 0.0, 0.0);
+
 /// Returns the Euclidean length. Unlike `norm`, it takes the square root of the processor.
 #[inline(always)]
 pub fn length(vector: Vector3) -> f64 {

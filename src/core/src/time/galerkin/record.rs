@@ -4,7 +4,7 @@ use crate::geometry::revolution::Instants;
 use crate::geometry::surface_spline::ClosestPoint;
 use crate::geometry::wrench::{MotionIncrement, Wrench};
 use crate::geometry::{PrescribedMotion, Vector3};
-use crate::math::vector::length;
+use crate::math::vector::{ZERO, length};
 use crate::system::carrier::Spot;
 use crate::system::contact_view::ContactMember;
 use crate::system::growth::ShapeGrowth;
@@ -68,8 +68,6 @@ impl MotionCourse {
         (drive, motion)
     }
 }
-
-const ZERO: Vector3 = Vector3::new(0.0, 0.0, 0.0);
 
 /// Contact of one node over a span.
 #[derive(Debug, Clone, Copy)]
