@@ -4,6 +4,7 @@
 mod guide;
 
 use guide::print_row;
+use tiprub_core::geometry::Vector3;
 use tiprub_core::limits::{central_difference_limit, massless::MasslessCheck};
 use tiprub_core::modes::modal::ModalModel;
 use tiprub_core::scene::method::Scheme;
@@ -40,7 +41,7 @@ fn massless_contact_nodes_agree_and_allow_longer_steps() {
     let model = ModalModel::from_rom(&rom, rom.damping_ratio).unwrap();
     let normals = rom.contact_nodes.iter().map(|node| {
         let length = (1.0 + node.meridional_slope * node.meridional_slope).sqrt();
-        [-1.0 / length, 0.0, node.meridional_slope / length]
+        Vector3::new(-1.0 / length, 0.0, node.meridional_slope / length)
     });
     let check = MasslessCheck { model: &model, normals: normals.collect(), slaves: Vec::new() };
     let (limit, central) = (check.limit(1e-3).unwrap().closed, central_difference_limit(&model));

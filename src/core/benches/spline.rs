@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use std::hint::black_box;
 use std::time::Instant;
 
+use tiprub_core::geometry::Vector3;
 use tiprub_core::geometry::surface_spline::{ClosestPoint, Projection, SurfaceSpline};
 use tiprub_core::scene::settings::{Closure, Interpolation};
 
@@ -38,11 +39,11 @@ fn projections(surface: &SurfaceSpline, h: f64, advanced: bool) -> f64 {
         let z = -0.02 + 0.02 * (index % 3) as f64;
         let r = RADIUS - 0.25 * z - 1e-3 + 1e-4 * (12_000.0 * time + phase).sin();
         let angle = angle + 4e-4 * (9_000.0 * time + 2.0 * phase).sin();
-        [r * angle.cos(), r * angle.sin(), z]
+        Vector3::new(r * angle.cos(), r * angle.sin(), z)
     };
     let turns = if advanced { SPEED * h / TAU } else { 0.0 };
     let mut places: Vec<ClosestPoint> = (0..NODES).map(|index| surface.locate(node(index, 0))).collect();
-    let mut points = vec![[0.0; 3]; NODES];
+    let mut points = vec![Vector3::zeros(); NODES];
     let mut times = Vec::new();
     for step in 0..STEPS {
         points.iter_mut().enumerate().for_each(|(index, point)| *point = node(index, step));
@@ -51,9 +52,9 @@ fn projections(surface: &SurfaceSpline, h: f64, advanced: bool) -> f64 {
         for (point, place) in points.iter().zip(&mut places) {
             let guess = if advanced { surface.advance(*place, turns) } else { *place };
             match surface.project(*point, guess) {
-                Projection::Found { place: found, gap, .. } => {
-                    sum += gap;
-                    *place = found;
+                Projection::Found { gap, .. } => {
+                    sum += gap.distance;
+                    *place = gap.foot;
                 }
                 other => panic!("{other:?}"),
             }
@@ -90,7 +91,8 @@ fn main() {
     println!("project, free ends: {time:.0} ns per node");
     let time = projections(&of(Closure::Smooth, Interpolation::Facets), 1e-7, true);
     println!("project, facets: {time:.0} ns per node");
-    let places: Vec<ClosestPoint> = (0..NODES).map(|index| spline.locate(points[(index * 7) % points.len()])).collect();
+    let places: Vec<ClosestPoint> =
+        (0..NODES).map(|index| spline.locate(points[(index * 7) % points.len()].into())).collect();
     let time = per_call(NODES, |index| {
         black_box(spline.evaluate(black_box(places[index])));
     });
@@ -100,14 +102,14 @@ fn main() {
     });
     println!("weights: {time:.0} ns");
     let time = per_call(NODES, |index| {
-        black_box(spline.locate(black_box(points[index])));
+        black_box(spline.locate(black_box(points[index].into())));
     });
     println!("locate: {time:.0} ns");
     let mut moved = spline.clone();
     let control = spline.control_points().to_vec();
     let time = per_call(50, |_| moved.set_control_points(black_box(&control)));
     println!("set_control_points, {} points: {time:.0} ns", control.len());
-    let mut values = points.clone();
+    let mut values = control.clone();
     let time = per_call(20, |_| spline.interpolate(black_box(&mut values)));
     println!("interpolate, {} points: {time:.0} ns", values.len());
 }

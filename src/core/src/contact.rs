@@ -19,7 +19,7 @@ use tiprub_cosim::persist::{Persist, StateReader, StateWriter};
 
 use crate::contact::active_set::SolverOutcome;
 use crate::contact::coating::Coating;
-use crate::geometry::dot;
+use crate::math::vector::{Vector3, tangents};
 use crate::scene::method::Solver;
 pub use coated::Coated;
 pub use coulomb::Coulomb;
@@ -34,15 +34,15 @@ pub trait ContactPrediction {
     /// Returns whether the contact was closed before, at this depth below the surface (m): the first guess.
     fn was_closed(&self, depth: f64) -> bool;
     /// Unit normal (own directions of the node).
-    fn normal(&self) -> [f64; 3];
+    fn normal(&self) -> Vector3;
     /// Coulomb coefficient µ (-).
     fn friction(&self) -> f64;
     /// Predicted slip over the step, including rigid motion (m, own directions of the node).
-    fn slip(&self) -> [f64; 3];
+    fn slip(&self) -> Vector3;
     /// Contact force of the last step (N, own directions).
-    fn last_force(&self) -> [f64; 3];
+    fn last_force(&self) -> Vector3;
     /// Unit direction of slip (own directions); 0 without slip.
-    fn slip_direction(&self) -> [f64; 3];
+    fn slip_direction(&self) -> Vector3;
     /// Sector of the node.
     fn sector(&self) -> usize;
     /// Angle of the node on the casing (rad, fixed frame).
@@ -59,13 +59,13 @@ pub trait ContactLaw {
     const STARTS_FROM_FORCES: bool = false;
     /// Fills the rows of the Delassus matrix along which the law needs the motion of a contact, and the columns along which its multipliers
     /// push.
-    fn fill_directions(at: &impl ContactPrediction, rows: &mut [[f64; 3]], columns: &mut [[f64; 3]]);
+    fn fill_directions(at: &impl ContactPrediction, rows: &mut [Vector3], columns: &mut [Vector3]);
     /// Begins a group of `size` contacts.
     fn begin(&mut self, size: usize);
     /// Delassus matrix (m/N), to be filled.
     fn matrix(&mut self) -> &mut DMatrix<f64>;
     /// Poses contact `contact` of the group, in order; `directions` are its rows of the matrix.
-    fn pose(&mut self, contact: usize, directions: &[[f64; 3]], at: &impl ContactPrediction);
+    fn pose(&mut self, contact: usize, directions: &[Vector3], at: &impl ContactPrediction);
     /// Solves for the forces of all posed contacts.
     fn solve(&mut self) -> SolverOutcome;
     /// Multipliers along the columns (N).
@@ -108,7 +108,7 @@ macro_rules! each_law {
 
 /// Poses all contacts of one law. Each law has its own instance: all of them inlined in their caller would exceed the instruction cache.
 #[inline(never)]
-fn pose_all<L: ContactLaw, P: ContactPrediction>(law: &mut L, rows: &[[f64; 3]], contacts: impl Iterator<Item = P>) {
+fn pose_all<L: ContactLaw, P: ContactPrediction>(law: &mut L, rows: &[Vector3], contacts: impl Iterator<Item = P>) {
     for (contact, at) in contacts.enumerate() {
         law.pose(contact, &rows[L::DIRECTIONS * contact..][..L::DIRECTIONS], &at);
     }
@@ -116,22 +116,22 @@ fn pose_all<L: ContactLaw, P: ContactPrediction>(law: &mut L, rows: &[[f64; 3]],
 
 /// Fills row n and column n − µt of a contact that slides along t.
 #[inline(always)]
-fn fill_sliding(at: &impl ContactPrediction, rows: &mut [[f64; 3]], columns: &mut [[f64; 3]]) {
+fn fill_sliding(at: &impl ContactPrediction, rows: &mut [Vector3], columns: &mut [Vector3]) {
     let (normal, friction) = (at.normal(), at.friction());
-    let slip = if friction > 0.0 { at.slip_direction() } else { [0.0; 3] };
+    let slip = if friction > 0.0 { at.slip_direction() } else { Vector3::zeros() };
     rows[0] = normal;
-    columns[0] = std::array::from_fn(|i| normal[i] - friction * slip[i]);
+    columns[0] = normal - friction * slip;
 }
 
 /// Fills rows and columns n, t₁, t₂ of a contact whose tangential force may have any direction.
-fn fill_tangents(at: &impl ContactPrediction, rows: &mut [[f64; 3]], columns: &mut [[f64; 3]]) {
+fn fill_tangents(at: &impl ContactPrediction, rows: &mut [Vector3], columns: &mut [Vector3]) {
     let normal = at.normal();
     let [first, second] = tangents(normal);
     rows.copy_from_slice(&[normal, first, second]);
     columns.copy_from_slice(rows);
 }
 
-fn fill_directions<L: ContactLaw>(_: &L, at: &impl ContactPrediction, rows: &mut [[f64; 3]], columns: &mut [[f64; 3]]) {
+fn fill_directions<L: ContactLaw>(_: &L, at: &impl ContactPrediction, rows: &mut [Vector3], columns: &mut [Vector3]) {
     L::fill_directions(at, rows, columns);
 }
 
@@ -188,7 +188,7 @@ impl Law {
 
     /// Calls [`ContactLaw::fill_directions`].
     #[inline(always)]
-    pub fn fill_directions(&self, at: &impl ContactPrediction, rows: &mut [[f64; 3]], columns: &mut [[f64; 3]]) {
+    pub fn fill_directions(&self, at: &impl ContactPrediction, rows: &mut [Vector3], columns: &mut [Vector3]) {
         each_law!(self, law => fill_directions(law, at, rows, columns));
     }
 
@@ -206,7 +206,7 @@ impl Law {
 
     /// Calls [`ContactLaw::pose`] for all contacts; `rows` are all rows of the matrix.
     #[inline(always)]
-    pub fn pose_all<P: ContactPrediction>(&mut self, rows: &[[f64; 3]], contacts: impl Iterator<Item = P>) {
+    pub fn pose_all<P: ContactPrediction>(&mut self, rows: &[Vector3], contacts: impl Iterator<Item = P>) {
         each_law!(self, law => pose_all(law, rows, contacts));
     }
 
@@ -276,19 +276,4 @@ impl Persist for Law {
     fn check(&self, reader: &mut StateReader) {
         self.coating().into_iter().for_each(|coating| coating.check(reader));
     }
-}
-
-/// Returns two unit tangents; the first as near to the direction of sliding (second component) as the normal permits.
-pub fn tangents(normal: [f64; 3]) -> [[f64; 3]; 2] {
-    let start = if normal[1].abs() < 0.9 { [0.0, 1.0, 0.0] } else { [0.0, 0.0, 1.0] };
-    let along = dot(start, normal);
-    let first: [f64; 3] = std::array::from_fn(|i| start[i] - along * normal[i]);
-    let length = dot(first, first).sqrt();
-    let first = first.map(|value| value / length);
-    let second = [
-        normal[1] * first[2] - normal[2] * first[1],
-        normal[2] * first[0] - normal[0] * first[2],
-        normal[0] * first[1] - normal[1] * first[0],
-    ];
-    [first, second]
 }

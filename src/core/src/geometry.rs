@@ -17,13 +17,15 @@ pub mod wrench;
 
 use tiprub_cosim::persist_fields;
 
+pub use crate::math::vector::Vector3;
+use crate::math::vector::{ZERO, length};
 use crate::scene::ranges::SMALL;
 use layout::Layout;
 pub use layout::sector_angle;
 use open::{OpenGap, tangent};
 pub use plane::FixedGap;
 pub use revolution::RevolutionGap;
-use spline::{SplineGap, faces_inwards};
+use spline::{NOTHING_TO_TOUCH, SplineGap, faces_inwards};
 use surface_spline::{ClosestPoint, SurfaceSpline};
 use wrench::At;
 
@@ -43,9 +45,9 @@ pub struct PrescribedMotion {
     /// Uniform change of the casing radius (m).
     pub radius_change: f64,
     /// Displacement of the shaft centre along fixed x, y and z (m): whirl and axial shift.
-    pub shaft: [f64; 3],
+    pub shaft: Vector3,
     /// Velocity of the shaft centre (m/s).
-    pub shaft_velocity: [f64; 3],
+    pub shaft_velocity: Vector3,
 }
 
 persist_fields!(PrescribedMotion {
@@ -55,8 +57,8 @@ persist_fields!(PrescribedMotion {
     shape_factor,
     shape_rotation,
     radius_change,
-    shaft,
-    shaft_velocity
+    shaft.data.0,
+    shaft_velocity.data.0
 });
 
 /// Unit normals at one instant, arrays `[node · lanes + lane]`.
@@ -84,9 +86,31 @@ impl Geometry {
     }
 
     /// Unit normal of one node of one lane.
-    pub fn normal_at(&self, index: usize) -> [f64; 3] {
-        [self.normal[0][index], self.normal[1][index], self.normal[2][index]]
+    pub fn normal_at(&self, index: usize) -> Vector3 {
+        Vector3::new(self.normal[0][index], self.normal[1][index], self.normal[2][index])
     }
+
+    /// Sets the unit normal of one node of one lane.
+    fn set_normal(&mut self, index: usize, normal: Vector3) {
+        self.normal.iter_mut().zip(&normal).for_each(|(values, value)| values[index] = *value);
+    }
+}
+
+/// Gap of a node to the closest point of a surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gap {
+    /// Distance along the normal (m): negative inside the surface, infinite if there is nothing to touch, NaN if there is no closest point.
+    pub distance: f64,
+    /// Unit normal, pointing from the slave to the master.
+    pub normal: Vector3,
+    /// Closest point on a surface through data points; the default for other surfaces.
+    pub foot: ClosestPoint,
+}
+
+impl Gap {
+    /// Gap of a node without a surface.
+    pub const NOTHING: Self =
+        Self { distance: NOTHING_TO_TOUCH, normal: ZERO, foot: ClosestPoint { patch: [0; 2], s: 0.0, t: 0.0 } };
 }
 
 /// Gap function of a contact pair, compiled for stepping, for some contact nodes of a structure in all sectors. Arrays have the size of the
@@ -145,9 +169,9 @@ impl GapLaw {
 
     /// Returns whether a node that stays within `reach` (m, own directions) of its position cannot touch the surface while the rotor turns
     /// from its current angle to `turned` (rad) and nothing else moves. False if this is unknown.
-    pub fn is_clear(&self, at: At<'_>, turned: f64, reach: [f64; 3]) -> bool {
+    pub fn is_clear(&self, at: At<'_>, turned: f64, reach: Vector3) -> bool {
         match self {
-            Self::Fixed(law) => law.gaps[at.node] > dot(law.normals[at.node].map(f64::abs), reach),
+            Self::Fixed(law) => law.gaps[at.node] > law.normals[at.node].abs().dot(&reach),
             Self::Revolution(law) => law.is_clear(at, turned, reach),
             Self::Spline(_) | Self::Open(_) => false,
         }
@@ -155,9 +179,9 @@ impl GapLaw {
 
     /// Largest difference by which the gap of a node that stays within `reach` (m, own directions) of its position may be smaller in
     /// between than at both ends (m), while the rotor turns from its current angle to `turned` (rad) and nothing else moves.
-    pub fn approach(&self, at: At<'_>, turned: f64, reach: [f64; 3]) -> f64 {
+    pub fn approach(&self, at: At<'_>, turned: f64, reach: Vector3) -> f64 {
         match self {
-            Self::Fixed(law) => 2.0 * dot(law.normals[at.node].map(f64::abs), reach),
+            Self::Fixed(law) => 2.0 * law.normals[at.node].abs().dot(&reach),
             Self::Revolution(law) => law.approach(at, turned, reach),
             Self::Spline(_) | Self::Open(_) => f64::INFINITY,
         }
@@ -166,7 +190,7 @@ impl GapLaw {
     /// Lower bound on the gap (m) of a node that stays within `reach` (m, own directions) of its position, for a motion to `end` that is
     /// linear in time while the rotor turns by `turn` relative to the shape (rad): the gap at the narrowest place and time minus the reach.
     /// `None` if it is unknown or the node may leave the surface.
-    pub fn least(&self, at: At<'_>, end: &PrescribedMotion, turn: f64, reach: [f64; 3]) -> Option<f64> {
+    pub fn least(&self, at: At<'_>, end: &PrescribedMotion, turn: f64, reach: Vector3) -> Option<f64> {
         match self {
             Self::Revolution(law) => law.least(at, end, turn, reach),
             Self::Fixed(_) | Self::Spline(_) | Self::Open(_) => None,
@@ -192,7 +216,7 @@ impl GapLaw {
             Self::Fixed(_) | Self::Revolution(_) => 0.0,
             Self::Spline(law) => largest(&mut law.layout.radii.iter().copied()),
             // Its displacements contain the whole flight.
-            Self::Open(law) => 8.0 * largest(&mut law.positions().iter().map(|place| dot(*place, *place).sqrt())),
+            Self::Open(law) => 8.0 * largest(&mut law.positions().iter().map(|place| length(*place))),
         };
         64.0 * f64::EPSILON * far
     }
@@ -220,21 +244,15 @@ impl GapLaw {
         }
     }
 
-    /// Returns gap (m), unit normal and closest point of one node displaced by `moved` (m, own directions) against the current surface; a
-    /// closest point only for surfaces through data points. For open surfaces the search starts at `guess`, if there is one.
-    pub fn gap_of_node(
-        &mut self,
-        at: At<'_>,
-        moved: [f64; 3],
-        guess: Option<ClosestPoint>,
-    ) -> (f64, [f64; 3], ClosestPoint) {
-        let (gap, normal) = match self {
-            Self::Fixed(law) => (law.gaps[at.node] + dot(law.normals[at.node], moved), law.normals[at.node]),
-            Self::Revolution(law) => law.gap_of_node(at, moved),
-            Self::Spline(law) => return law.gap_of_node(at, moved),
-            Self::Open(law) => return law.gap_of_node(at.node, moved, guess),
-        };
-        (gap, normal, ClosestPoint::default())
+    /// Returns the gap of one node displaced by `moved` (m, own directions) to the current surface. For open surfaces the search starts at
+    /// `guess`, if there is one.
+    pub fn gap(&mut self, at: At<'_>, moved: Vector3, guess: Option<ClosestPoint>) -> Gap {
+        match self {
+            Self::Fixed(law) => law.gap(at.node, moved),
+            Self::Revolution(law) => law.gap(at, moved),
+            Self::Spline(law) => law.gap(at, moved),
+            Self::Open(law) => law.gap(at.node, moved, guess),
+        }
     }
 
     /// Computes gaps (m) and normals at an instant, for the displacements `[row · lanes + lane]` of the contact rows (m) and `moved` of the
@@ -323,7 +341,7 @@ impl GapLaw {
 
     /// Returns whether small displacements and a casing seen from inside can describe a contact: not deeper than a tenth of the radius, on
     /// a flank below 45°. For open surfaces only the depth counts.
-    pub fn is_plausible(&self, node: usize, gap: f64, normal: [f64; 3]) -> bool {
+    pub fn is_plausible(&self, node: usize, gap: f64, normal: Vector3) -> bool {
         match self {
             Self::Fixed(_) => true,
             Self::Revolution(law) => gap > -SMALL * law.layout.radii[node] && normal[1].abs() <= -normal[0],
@@ -335,13 +353,13 @@ impl GapLaw {
     /// Prescribed velocity of the master relative to the slave (m/s), of a node displaced by `moved` (m, own directions), in the
     /// coordinates of the displacements, whose arcs are r times angles; `index` is `node · lanes + lane`.
     #[inline(always)]
-    pub fn sliding_velocity(&self, node: usize, index: usize, drive: &PrescribedMotion, moved: [f64; 3]) -> [f64; 3] {
+    pub fn sliding_velocity(&self, node: usize, index: usize, drive: &PrescribedMotion, moved: Vector3) -> Vector3 {
         match self {
             Self::Fixed(law) => law.sliding[index],
             Self::Revolution(law) => law.layout.rigid_velocity(node, index, drive, moved),
             Self::Spline(law) => law.rigid_velocity(node, index, drive, moved),
             // Free flight is part of the displacements.
-            Self::Open(_) => [0.0; 3],
+            Self::Open(_) => Vector3::zeros(),
         }
     }
 
@@ -352,16 +370,11 @@ impl GapLaw {
 
     /// Unit slip direction of the master in the tangent plane, from the predicted relative velocity (m/s); zero without slip. On surfaces
     /// of revolution axial slip is neglected, as in section 4.3 of the paper.
-    pub fn slip_direction(&self, velocity: [f64; 3], normal: [f64; 3]) -> [f64; 3] {
+    pub fn slip_direction(&self, velocity: Vector3, normal: Vector3) -> Vector3 {
         let candidate = match self {
             Self::Fixed(_) | Self::Open(_) => velocity,
-            Self::Revolution(_) | Self::Spline(_) => [0.0, velocity[1], 0.0],
+            Self::Revolution(_) | Self::Spline(_) => Vector3::new(0.0, velocity[1], 0.0),
         };
         tangent(candidate, normal)
     }
-}
-
-/// Scalar product.
-pub fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }

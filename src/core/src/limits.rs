@@ -24,7 +24,7 @@ pub use growing::{Fastest, GROWTH_UP_TO, GrowthRates, continuous, growth, growth
 
 use nalgebra::DMatrix;
 
-use crate::geometry::dot;
+use crate::math::vector::{Vector3, vector3_at};
 use crate::modes::modal::ModalModel;
 use crate::scene::method::Scheme;
 use finding::{ErrorKind, WarningKind};
@@ -37,7 +37,7 @@ const MINORS_UP_TO: usize = 12;
 const SINGULAR: f64 = 1e-10;
 
 /// Directions of the closed contacts of one group: (normal, slip direction) per node.
-pub type ContactDirections = Vec<([f64; 3], [f64; 3])>;
+pub type ContactDirections = Vec<(Vector3, Vector3)>;
 
 /// Largest step (s) that central differences allow: 2/ω_max; infinite without a vibrating mode.
 pub fn central_difference_limit(model: &ModalModel) -> f64 {
@@ -64,16 +64,15 @@ fn directional_modes(
     friction: f64,
     directions: &ContactDirections,
 ) -> (DMatrix<f64>, DMatrix<f64>) {
-    let project = |along: &dyn Fn(usize) -> [f64; 3]| {
+    let project = |along: &dyn Fn(usize) -> Vector3| {
         DMatrix::from_fn(directions.len(), model.len(), |node, mode| {
-            let shape = std::array::from_fn(|i| model.contact_modes[(3 * node + i, mode)]);
-            dot(along(node), shape)
+            along(node).dot(&vector3_at(model.contact_modes.column(mode).as_slice(), node))
         })
     };
     let normals = project(&|node| directions[node].0);
     let forces = project(&|node| {
         let (normal, slip) = directions[node];
-        std::array::from_fn(|i| normal[i] - friction * slip[i])
+        normal - friction * slip
     });
     (normals, forces)
 }
@@ -241,7 +240,7 @@ mod tests {
     }
 
     pub fn radial() -> ContactDirections {
-        vec![([-1.0, 0.0, 0.0], [0.0, 1.0, 0.0])]
+        vec![(-Vector3::x(), Vector3::y())]
     }
 
     #[test]
@@ -286,7 +285,7 @@ mod tests {
             shapes: DMatrix::identity(nodes, nodes),
             quasi_static: 0,
         };
-        let closed = |nodes: usize| vec![vec![([-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]); nodes]];
+        let closed = |nodes: usize| vec![vec![(-Vector3::x(), Vector3::y()); nodes]];
         let alone = |nodes: usize, friction: f64| {
             check_solvable(&pressed(nodes), Scheme::ModalExact, step, friction, &closed(nodes))
         };

@@ -1,4 +1,5 @@
-//! Mathematics without mechanics: polynomials and processor-specific kernels.
+//! Mathematics without mechanics: vectors, polynomials and processor-specific kernels.
 
 pub(crate) mod cubic;
 pub(crate) mod simd;
+pub(crate) mod vector;

@@ -384,8 +384,8 @@ impl Simulation {
             // Exact, so that a rotation by many turns does not cancel the rotor's own.
             shape_rotation: surface.shape_rotation.at(offset) % std::f64::consts::TAU,
             radius_change: surface.radius_change.at(offset),
-            shaft: rotor.shaft.map(|input| input.at(offset)),
-            shaft_velocity: rotor.shaft.map(|input| input.rate()),
+            shaft: rotor.shaft.map(|input| input.at(offset)).into(),
+            shaft_velocity: rotor.shaft.map(|input| input.rate()).into(),
         }
     }
 

@@ -40,6 +40,7 @@ pub use growth::ShapeGrowth;
 pub use ledger::Ledger;
 use losses::LargestLosses;
 pub use losses::Loss;
+pub(crate) use pair::SearchStart;
 pub use pair::{ContactPair, PairParts, SurfaceCarrier};
 pub use sets::StructureSets;
 pub(crate) use sets::joined;
@@ -132,8 +133,11 @@ impl System {
         mut coatings: Vec<(usize, Coating)>,
         settings: SystemSettings,
     ) -> Self {
-        let structures: Vec<Structure> =
+        let mut structures: Vec<Structure> =
             parts.into_iter().enumerate().map(|(index, part)| made(part, index, &pairs)).collect();
+        if !settings.ledger {
+            structures.iter_mut().for_each(|structure| structure.modes.skip_losses());
+        }
         let pairs: Vec<ContactPair> = pairs.into_iter().map(ContactPair::new).collect();
         let group = |(reach, touching): (Reach, Vec<usize>)| {
             let of_group = |pair: &&ContactPair| touching.contains(&pair.structure());
@@ -143,7 +147,7 @@ impl System {
             carriers.dedup();
             let coated = coatings.iter().position(|(pair, _)| touching.contains(&pairs[*pair].structure()));
             let coating = coated.map(|index| coatings.swap_remove(index).1);
-            ContactGroup::new((reach, &touching, &carriers), &structures, (settings.solver, coating))
+            ContactGroup::new(reach, &touching, &carriers, &structures, settings.solver, coating)
         };
         let sets = StructureSets::new(&structures, &pairs);
         let groups: Vec<ContactGroup> = contact_reaches(&structures, &pairs, &sets).into_iter().map(group).collect();
@@ -297,9 +301,9 @@ impl System {
 
     /// Finds the gap of every node and the smallest gap of each lane. If `warm`, the search for closest points starts from those
     /// of the previous step.
-    pub(crate) fn find_gaps(&mut self, warm: bool) {
+    pub(crate) fn find_gaps(&mut self, start: SearchStart) {
         for index in 0..self.pairs.len() {
-            self.pairs[index].find_gaps(&mut self.structures, warm);
+            self.pairs[index].find_gaps(&mut self.structures, start);
         }
         for structure in &mut self.structures {
             structure.find_lowest();
@@ -331,7 +335,7 @@ impl System {
         self.events.now.clear();
         self.events.before.clear();
         self.pairs.iter_mut().zip(drives).for_each(|(pair, drive)| pair.start(drive));
-        self.find_gaps(false);
+        self.find_gaps(SearchStart::Positions);
         for structure in &mut self.structures {
             structure.remember_start();
         }

@@ -9,7 +9,7 @@ mod guide;
 
 use guide::print_row;
 use nalgebra::DMatrix;
-use tiprub_core::geometry::{FixedGap, GapLaw, PrescribedMotion};
+use tiprub_core::geometry::{FixedGap, GapLaw, PrescribedMotion, Vector3};
 use tiprub_core::modes::bank::BankOptions;
 use tiprub_core::modes::modal::ModalModel;
 use tiprub_core::modes::sectors::SectorModel;
@@ -33,10 +33,10 @@ fn block(scheme: Scheme, step: f64) -> System {
         quasi_static: 0,
     };
     let law = GapLaw::Fixed(FixedGap {
-        normals: vec![[0.0, 0.0, 1.0]],
+        normals: vec![Vector3::z()],
         gaps: vec![0.0],
         // The belt runs towards +x, so the block slides backwards on it.
-        sliding: vec![[-BELT, 0.0, 0.0]],
+        sliding: vec![-BELT * Vector3::x()],
     });
     let settings = SystemSettings { scheme, solver: Solver::Coulomb, ledger: true };
     let bank = BankOptions { loads: true, ..BankOptions::default() };
@@ -150,9 +150,9 @@ fn by_tolerance(tolerance: f64, longest: f64) -> (System, TimeStepper) {
         quasi_static: 6,
     };
     let law = GapLaw::Fixed(FixedGap {
-        normals: vec![[0.0, 0.0, 1.0]; 2],
+        normals: vec![Vector3::z(); 2],
         gaps: vec![-FLEXIBILITY * FORCE / FRICTION, 1e-3],
-        sliding: vec![[0.0; 3]; 2],
+        sliding: vec![Vector3::zeros(); 2],
     });
     let settings = SystemSettings { scheme: Scheme::Galerkin, solver: Solver::Coulomb, ledger: true };
     let mut system = System::alone(SectorModel::Uncoupled(&model, 1), BankOptions::default(), law, FRICTION, settings);

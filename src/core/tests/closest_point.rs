@@ -12,23 +12,20 @@ mod sliding;
 use std::f64::consts::TAU;
 
 use casings::*;
-use tiprub_core::geometry::dot;
+use tiprub_core::geometry::Vector3;
 use tiprub_core::geometry::surface_spline::{ClosestPoint, Evaluation, Projection, REACH, SurfaceSpline};
 use tiprub_core::scene::settings::{Closure, Interpolation};
 
 /// Returns a node at a signed distance inside a point of the surface, with its closest point known by construction.
-fn node(surface: &SurfaceSpline, at: ClosestPoint, gap: f64) -> [f64; 3] {
+fn node(surface: &SurfaceSpline, at: ClosestPoint, gap: f64) -> Vector3 {
     let Evaluation { point, d_s, d_t, .. } = surface.evaluate(at);
-    let cross =
-        [d_t[1] * d_s[2] - d_t[2] * d_s[1], d_t[2] * d_s[0] - d_t[0] * d_s[2], d_t[0] * d_s[1] - d_t[1] * d_s[0]];
-    let length = dot(cross, cross).sqrt();
-    std::array::from_fn(|i| point[i] + gap * cross[i] / length)
+    point + gap * d_t.cross(&d_s).normalize()
 }
 
 #[track_caller]
-fn found(projection: Projection) -> (ClosestPoint, [f64; 3], [f64; 3], f64) {
+fn found(projection: Projection) -> (ClosestPoint, Vector3, Vector3, f64) {
     match projection {
-        Projection::Found { place, point, normal, gap } => (place, point, normal, gap),
+        Projection::Found { gap, point } => (gap.foot, point, gap.normal, gap.distance),
         other => panic!("{other:?}"),
     }
 }
@@ -46,14 +43,14 @@ fn finds_the_closest_point_from_any_start() {
                 let x = node(&surface, at, gap);
                 for _ in 0..20 {
                     let (place, point, normal, value) = found(surface.project(x, anywhere(&mut random, &surface)));
-                    let r: [f64; 3] = std::array::from_fn(|i| x[i] - point[i]);
+                    let r = x - point;
                     let evaluation = surface.evaluate(place);
                     for tangent in [evaluation.d_s, evaluation.d_t] {
-                        gradient = gradient.max(dot(r, tangent).abs() / dot(tangent, tangent).sqrt());
+                        gradient = gradient.max(r.dot(&tangent).abs() / tangent.norm());
                     }
                     away = away.max(distance(point, surface.evaluate(at).point));
                     offset = offset.max((value - gap).abs());
-                    assert!((dot(normal, normal) - 1.0).abs() < 4.0 * EPS);
+                    assert!((normal.norm_squared() - 1.0).abs() < 4.0 * EPS);
                     assert!(normal[0] * x[0] + normal[1] * x[1] < -0.9 * RADIUS, "the normal points to the axis");
                 }
             }
@@ -66,7 +63,7 @@ fn finds_the_closest_point_from_any_start() {
 }
 
 /// Returns the smallest distance over a fine sampling.
-fn brute_force(surface: &SurfaceSpline, x: [f64; 3], per_patch: usize) -> f64 {
+fn brute_force(surface: &SurfaceSpline, x: Vector3, per_patch: usize) -> f64 {
     let mut least = f64::INFINITY;
     for p in 0..surface.around() {
         for q in 0..surface.along() - 1 {
@@ -147,7 +144,7 @@ fn projection_started_on_opposite_side_converges() {
                 let guess = place(p, 1, s, 0.5);
                 let across = surface.evaluate(guess).point;
                 let scale = (RADIUS - 1e-3) / RADIUS;
-                let x = [-scale * across[0], -scale * across[1], across[2]];
+                let x = Vector3::new(-scale * across[0], -scale * across[1], across[2]);
                 let (_, point, _, _) = found(surface.project(x, guess));
                 let direct = found(surface.project(x, surface.locate(x))).1;
                 assert!((distance(point, x) - distance(direct, x)).abs() < 1e-15, "{around}, {guess:?}");
@@ -176,7 +173,7 @@ fn inner_ring_corner_of_facets_is_not_an_edge() {
     let surface = SurfaceSpline::new(&points, 12, 3, Closure::Smooth, Interpolation::Facets).unwrap();
     let corner = surface.evaluate(place(3, 1, 0.0, 0.0)).point;
     for (aside, ring) in [(-1e-5, 0), (1e-5, 1)] {
-        let x = [1.004 * corner[0], 1.004 * corner[1], corner[2] + aside];
+        let x = Vector3::new(1.004 * corner[0], 1.004 * corner[1], corner[2] + aside);
         for guess in [place(3, 0, 0.5, 0.5), place(2, 1, 0.5, 0.5), place(9, 0, 0.1, 0.0)] {
             let (at, point, _, gap) = found(surface.project(x, guess));
             assert!(distance(point, corner) < 1e-15 && gap < 0.0 && at.patch[1] == ring, "{gap} at {at:?}");
@@ -209,11 +206,10 @@ fn projection_succeeds_only_within_the_axial_extension() {
                 }
                 // The surface continues along the tangent of the edge.
                 let (first, last) = (surface.evaluate(edge), surface.evaluate(beyond));
-                let tangent: [f64; 3] = std::array::from_fn(|i| first.point[i] + (out - t) * first.d_t[i]);
+                let tangent = first.point + (out - t) * first.d_t;
                 assert!(distance(tangent, last.point) < 4e-16 && distance(first.d_t, last.d_t) < 4e-16);
                 // Further out the point is lost, and it is found again from the last one.
-                let tangent = last.d_t;
-                let gone: [f64; 3] = std::array::from_fn(|i| x[i] + outwards * (reach + 1e-6) * tangent[i]);
+                let gone = x + outwards * (reach + 1e-6) * last.d_t;
                 let Projection::BeyondEdge { place: last } = surface.project(gone, guess) else {
                     panic!("{:?} is out of reach", surface.project(gone, guess));
                 };
@@ -234,23 +230,23 @@ fn facets_project_to_flats_and_corners() {
     // Inside a convex polygon the nearest of two flats is closest, never the corner between them.
     let surface = facets(round);
     let corner = surface.evaluate(place(3, 0, 0.0, 0.5)).point;
-    let inwards = [-corner[0] / RADIUS, -corner[1] / RADIUS, 0.0];
+    let inwards = Vector3::new(-corner[0] / RADIUS, -corner[1] / RADIUS, 0.0);
     let half = TAU / 24.0;
     for guess in 0..around {
-        let x: [f64; 3] = std::array::from_fn(|i| corner[i] + 1e-3 * inwards[i]);
+        let x = corner + 1e-3 * inwards;
         let (at, _, normal, gap) = found(surface.project(x, place(guess, 1, 0.2, 0.9)));
         assert!((gap - 1e-3 * half.cos()).abs() < 4e-16, "{gap}");
-        assert!((dot(normal, inwards) - half.cos()).abs() < 4e-15 && at.patch[0].abs_diff(2) <= 1);
+        assert!((normal.dot(&inwards) - half.cos()).abs() < 4e-15 && at.patch[0].abs_diff(2) <= 1);
         // Outside, the corner is the closest point.
-        let x: [f64; 3] = std::array::from_fn(|i| corner[i] - 1e-3 * inwards[i]);
+        let x = corner - 1e-3 * inwards;
         let (at, point, normal, gap) = found(surface.project(x, place(guess, 1, 0.2, 0.9)));
         assert!(distance(point, corner) < 1e-15 && (gap + 1e-3 * half.cos()).abs() < 4e-16, "{gap} at {at:?}");
-        assert!((dot(normal, inwards) - half.cos()).abs() < 4e-15);
+        assert!((normal.dot(&inwards) - half.cos()).abs() < 4e-15);
     }
     // Turned slightly around the corner, the facet on that side faces the node more directly.
-    let tangent = [-inwards[1], inwards[0], 0.0];
+    let tangent = Vector3::new(-inwards[1], inwards[0], 0.0);
     for side in [-1.0, 1.0] {
-        let x: [f64; 3] = std::array::from_fn(|i| corner[i] - 1e-3 * inwards[i] - side * 1e-4 * tangent[i]);
+        let x = corner - 1e-3 * inwards - side * 1e-4 * tangent;
         let (at, point, _, _) = found(surface.project(x, place(8, 1, 0.2, 0.9)));
         assert!(distance(point, corner) < 1e-15);
         assert_eq!(at.patch[0], if side > 0.0 { 3 } else { 2 });
@@ -258,11 +254,11 @@ fn facets_project_to_flats_and_corners() {
     // A ridge towards the axis: inside, its edge is closest over a whole wedge.
     let surface = facets(|angle, _| if (angle - 0.3 - TAU / 4.0).abs() < 1e-9 { 0.75 * RADIUS } else { RADIUS });
     let ridge = surface.evaluate(place(3, 1, 0.0, 0.5)).point;
-    let x = [0.99 * ridge[0], 0.99 * ridge[1], ridge[2]];
+    let x = Vector3::new(0.99 * ridge[0], 0.99 * ridge[1], ridge[2]);
     for guess in [1, 2, 3, 4] {
         let (_, point, normal, gap) = found(surface.project(x, place(guess, 0, 0.6, 0.2)));
         assert!(distance(point, ridge) < 1e-15, "{point:?} {ridge:?}");
-        assert!(gap > 0.0 && gap < distance(x, ridge) && dot(normal, ridge) < 0.0);
+        assert!(gap > 0.0 && gap < distance(x, ridge) && normal.dot(&ridge) < 0.0);
     }
 }
 
@@ -284,7 +280,7 @@ fn initial_guess_from_angle_and_axial_position_is_close() {
                 (turned.patch[0] as f64 + turned.s - expected).abs() < 1e-9 && turned.t.to_bits() == at.t.to_bits()
             );
         }
-        let nowhere = surface.locate([f64::NAN, 0.1, f64::NAN]);
+        let nowhere = surface.locate(Vector3::new(f64::NAN, 0.1, f64::NAN));
         surface.evaluate(nowhere);
     }
 }
@@ -294,22 +290,23 @@ fn unprojectable_nodes_are_reported_without_panic() {
     for (surface, _) in every_surface() {
         let start = place(0, 0, 0.5, 0.5);
         for x in [[f64::NAN, 0.0, 0.0], [0.1, f64::INFINITY, 0.0], [0.1, 0.1, f64::NEG_INFINITY]] {
-            assert_eq!(surface.project(x, start), Projection::Lost);
+            assert_eq!(surface.project(x.into(), start), Projection::Lost);
         }
-        assert_eq!(surface.project([0.2, 0.1, 0.0], place(0, 0, f64::NAN, 0.5)), Projection::Lost);
+        let inside = Vector3::new(0.2, 0.1, 0.0);
+        assert_eq!(surface.project(inside, place(0, 0, f64::NAN, 0.5)), Projection::Lost);
         let x = node(&surface, start, 1e-4);
         for (s, t) in [(7.3, 0.5), (0.5, -40.0), (f64::INFINITY, f64::NEG_INFINITY), (1.01, 1.01)] {
             let gap = found(surface.project(x, place(0, 0, s, t))).3;
             assert!((gap - 1e-4).abs() < 4e-16, "started from a place that is none: {gap:e}");
         }
         let mut folded = surface.clone();
-        folded.set_control_points(&vec![[0.1, 0.2, 0.3]; surface.around() * surface.along()]);
-        assert_eq!(folded.project([0.2, 0.1, 0.0], start), Projection::Lost);
-        folded.set_control_points(&vec![[f64::NAN; 3]; surface.around() * surface.along()]);
-        assert_eq!(folded.project([0.2, 0.1, 0.0], start), Projection::Lost);
+        folded.set_control_points(&vec![Vector3::new(0.1, 0.2, 0.3); surface.around() * surface.along()]);
+        assert_eq!(folded.project(inside, start), Projection::Lost);
+        folded.set_control_points(&vec![Vector3::repeat(f64::NAN); surface.around() * surface.along()]);
+        assert_eq!(folded.project(inside, start), Projection::Lost);
         // Far away and on the axis either a point is found or the node is over an edge.
         for x in [[1e6, 0.0, 0.0], [0.0, 0.0, 0.0], [-1e-300, 0.0, 0.0], [1.0, 2.0, -1e9], [1e200, 1e200, 0.0]] {
-            surface.project(x, start);
+            surface.project(x.into(), start);
         }
     }
 }
@@ -325,7 +322,7 @@ fn warm_start_finds_the_same_solution() {
         for step in 0..2500 {
             let (angle, z) = (TAU * f64::from(step) * turn - 0.1, 0.02 * (0.01 * f64::from(step)).sin());
             let r = lobed(angle - 0.3, z) - 4e-4 + 5e-4 * (0.3 * f64::from(step)).sin();
-            let x = [r * angle.cos(), r * angle.sin(), z];
+            let x = Vector3::new(r * angle.cos(), r * angle.sin(), z);
             let warm = found(surface.project(x, surface.advance(guess, turn)));
             let located = found(surface.project(x, surface.locate(x)));
             let cold = found(surface.project(x, ClosestPoint { t: 0.5, ..anywhere(&mut random, &surface) }));
@@ -373,7 +370,7 @@ fn facets_kick_a_sliding_node_and_splines_do_not() {
 #[test]
 fn allocates_only_during_construction() {
     for (mut surface, points) in every_surface() {
-        let mut values = points.clone();
+        let mut values = surface.control_points().to_vec();
         let mut random = SeededRandom(12);
         let starts: Vec<ClosestPoint> = (0..50).map(|_| anywhere(&mut random, &surface)).collect();
         let allocations = counting::allocations_of(|| {
@@ -382,10 +379,10 @@ fn allocates_only_during_construction() {
             surface.transfer(&mut values);
             surface.set_data(&points).unwrap();
             for start in &starts {
-                let x = surface.evaluate(*start).point.map(|value| 0.998 * value);
+                let x = 0.998 * surface.evaluate(*start).point;
                 for guess in [*start, starts[0], surface.locate(x), surface.advance(*start, 0.01)] {
-                    if let Projection::Found { place, .. } = surface.project(x, guess) {
-                        values[0][0] += surface.weights(place).values[0];
+                    if let Projection::Found { gap, .. } = surface.project(x, guess) {
+                        values[0][0] += surface.weights(gap.foot).values[0];
                     }
                 }
             }

@@ -8,7 +8,7 @@ mod rods;
 use guide::print_row;
 use nalgebra::DMatrix;
 use rods::{NEARLY_NONE, StraightRod};
-use tiprub_core::geometry::{FixedGap, GapLaw, PrescribedMotion};
+use tiprub_core::geometry::{FixedGap, GapLaw, PrescribedMotion, Vector3};
 use tiprub_core::limits::massless::MasslessCheck;
 use tiprub_core::modes::modal::ModalModel;
 use tiprub_core::scene::method::{Scheme, Solver};
@@ -32,7 +32,8 @@ fn bar(elements: usize, kept: f64) -> StraightRod {
 }
 
 fn system(model: &ModalModel, scheme: Scheme, step: f64) -> System {
-    let law = GapLaw::Fixed(FixedGap { normals: vec![[-1.0, 0.0, 0.0]], gaps: vec![GAP], sliding: vec![[0.0; 3]] });
+    let law =
+        GapLaw::Fixed(FixedGap { normals: vec![-Vector3::x()], gaps: vec![GAP], sliding: vec![Vector3::zeros()] });
     let settings = SystemSettings { scheme, solver: Solver::Lcp, ledger: true };
     let mut system = System::new(model, 1, law, 0.0, settings);
     system.set_step(step);
@@ -89,10 +90,10 @@ fn a_bar_bounces_off_without_impact_loss() {
 fn pressed(damping_ratio: f64, share: f64) -> (f64, f64) {
     let mut model = bar(12, NEARLY_NONE).clamped_model();
     model.damping_ratios.fill(damping_ratio);
-    let check = MasslessCheck { model: &model, normals: vec![[-1.0, 0.0, 0.0]], slaves: Vec::new() };
+    let check = MasslessCheck { model: &model, normals: vec![-Vector3::x()], slaves: Vec::new() };
     let limit = check.limit(1.0).unwrap().closed;
     print_row!("ξ = {damping_ratio}: limit {limit:.3e} s, {:.2} of 2/ω_max", limit * model.largest_frequency() / 2.0);
-    let law = FixedGap { normals: vec![[-1.0, 0.0, 0.0]], gaps: vec![-1e-4], sliding: vec![[0.0; 3]] };
+    let law = FixedGap { normals: vec![-Vector3::x()], gaps: vec![-1e-4], sliding: vec![Vector3::zeros()] };
     let settings = SystemSettings { scheme: Scheme::MasslessBoundary, solver: Solver::Lcp, ledger: true };
     let mut pressed = System::new(&model, 1, GapLaw::Fixed(law), 0.0, settings);
     pressed.set_step(share * limit);
@@ -136,7 +137,7 @@ fn step_limit_accounts_for_damping() {
             shapes: DMatrix::identity(4, 4),
             quasi_static: 3,
         };
-        let check = MasslessCheck { model: &model, normals: vec![[-1.0, 0.0, 0.0]], slaves: Vec::new() };
+        let check = MasslessCheck { model: &model, normals: vec![-Vector3::x()], slaves: Vec::new() };
         let limit = check.limit(1.0).unwrap().closed;
         let radius = |step: f64| {
             let mode = model.coefficient(0, 1.0, Scheme::MasslessBoundary, step);
@@ -185,7 +186,7 @@ fn step_limit_accounts_for_slave_flexibility() {
             // Residual flexibility along the normal: (1000/1000)² = 1.
             let master = model(vec![own, 1e3, 1e3, 1e3], [1.0, 0.0, 0.0, 0.0], 3);
             let other = model(vec![slave], [seen, 0.0, 0.0, 0.0], 0);
-            let check = |slaves| MasslessCheck { model: &master, normals: vec![[-1.0, 0.0, 0.0]], slaves };
+            let check = |slaves| MasslessCheck { model: &master, normals: vec![-Vector3::x()], slaves };
             let flexible = check(vec![(DMatrix::from_element(1, 1, seen), &other)]);
             let (limit, alone) =
                 (flexible.limit(100.0).unwrap().closed, check(Vec::new()).limit(100.0).unwrap().closed);
@@ -218,8 +219,8 @@ fn dragged(step: f64, solver: Solver) -> (System, f64) {
     let mass = DMatrix::from_diagonal(&nalgebra::DVector::from_vec(vec![light, light, 1.0, 1.0]));
     let rom = structure("dragged", mass, stiffness, map, vec![node("end", [0.0; 3], 0.0)]);
     let model = ModalModel { quasi_static: 2, ..ModalModel::from_rom(&rom, 0.0).unwrap() };
-    let sliding = vec![[0.0, 1.0, 0.0]];
-    let law = FixedGap { normals: vec![[-1.0, 0.0, 0.0]], gaps: vec![-1e-4], sliding };
+    let sliding = vec![Vector3::y()];
+    let law = FixedGap { normals: vec![-Vector3::x()], gaps: vec![-1e-4], sliding };
     let settings = SystemSettings { scheme: Scheme::MasslessBoundary, solver, ledger: true };
     let mut system = System::new(&model, 1, GapLaw::Fixed(law), 0.3, settings);
     system.set_step(step);

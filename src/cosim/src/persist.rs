@@ -187,22 +187,21 @@ impl<T: Persist, const N: usize> Persist for [T; N] {
     }
 }
 
-/// Implements [`Persist`] for a struct from the list of its fields; a missing field is a compile error.
+/// Implements [`Persist`] for a struct from the list of its fields; a missing field is a compile error. `field.part` saves this part of a
+/// field, such as the components of a vector: `force.data.0`.
 #[macro_export]
 macro_rules! persist_fields {
-    ($name:ident { $($field:ident),+ $(,)? }) => {
+    ($name:ident { $($field:ident $(. $part:tt)*),+ $(,)? }) => {
         impl $crate::persist::Persist for $name {
             fn save(&self, writer: &mut $crate::persist::StateWriter) {
-                let Self { $($field),+ } = self;
-                $($crate::persist::Persist::save($field, writer);)+
+                let Self { $($field: _),+ } = self;
+                $($crate::persist::Persist::save(&self.$field$(.$part)*, writer);)+
             }
             fn restore(&mut self, reader: &mut $crate::persist::StateReader) {
-                let Self { $($field),+ } = self;
-                $($crate::persist::Persist::restore($field, reader);)+
+                $($crate::persist::Persist::restore(&mut self.$field$(.$part)*, reader);)+
             }
             fn check(&self, reader: &mut $crate::persist::StateReader) {
-                let Self { $($field),+ } = self;
-                $($crate::persist::Persist::check($field, reader);)+
+                $($crate::persist::Persist::check(&self.$field$(.$part)*, reader);)+
             }
         }
     };

@@ -5,6 +5,7 @@
 
 use std::f64::consts::TAU;
 
+use tiprub_core::geometry::Vector3;
 use tiprub_core::geometry::surface_spline::{Projection, SurfaceSpline};
 use tiprub_core::scene::settings::{Closure, Interpolation};
 
@@ -67,20 +68,18 @@ pub fn slide(surface: &SurfaceSpline) -> SlidingHistory {
     let turn = (TAU / (SPEED * STEP)).floor() as usize;
     let mut history = SlidingHistory { angle: Vec::with_capacity(turn), force: Vec::with_capacity(turn) };
     let (mut displacement, mut before) = (-INTERFERENCE, -INTERFERENCE);
-    let mut guess = surface.locate([RADIUS, 0.0, 0.01]);
+    let mut guess = surface.locate(Vector3::new(RADIUS, 0.0, 0.01));
     for step in 0..2 * turn {
         let angle = SPEED * STEP * step as f64;
         let (sine, cosine) = libm::sincos(angle);
         let predicted = ((2.0 - stiffness) * displacement - (1.0 - damping) * before) / divisor;
         let radius = RADIUS + INTERFERENCE + predicted;
-        let projection = surface.project([radius * cosine, radius * sine, 0.01], guess);
-        let Projection::Found { place, normal, gap, .. } = projection else {
-            panic!("the node has left the casing: {projection:?}")
-        };
-        let radial = normal[0] * cosine + normal[1] * sine;
-        let force = (-gap / (radial * radial * compliance)).max(0.0);
+        let projection = surface.project(Vector3::new(radius * cosine, radius * sine, 0.01), guess);
+        let Projection::Found { gap, .. } = projection else { panic!("the node has left the casing: {projection:?}") };
+        let radial = gap.normal[0] * cosine + gap.normal[1] * sine;
+        let force = (-gap.distance / (radial * radial * compliance)).max(0.0);
         (before, displacement) = (displacement, predicted + compliance * force * radial);
-        guess = surface.advance(place, SPEED * STEP / TAU);
+        guess = surface.advance(gap.foot, SPEED * STEP / TAU);
         if step >= turn {
             history.angle.push((angle - SPEED * STEP * turn as f64).to_degrees());
             history.force.push(force);

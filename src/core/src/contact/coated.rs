@@ -5,6 +5,7 @@ use nalgebra::DMatrix;
 use super::{ContactLaw, ContactPrediction, fill_sliding};
 use crate::contact::active_set::SolverOutcome;
 use crate::contact::coating::{CoatedProblem, Coating};
+use crate::math::vector::Vector3;
 
 /// A coating with its wear, and the contact problem of its blades. Groups are whole blades, whose nodes share cells.
 #[derive(Debug, Clone)]
@@ -54,7 +55,7 @@ impl ContactLaw for Coated {
     const DIRECTIONS: usize = 1;
     const LOOKS_AGAIN: bool = true;
 
-    fn fill_directions(at: &impl ContactPrediction, rows: &mut [[f64; 3]], columns: &mut [[f64; 3]]) {
+    fn fill_directions(at: &impl ContactPrediction, rows: &mut [Vector3], columns: &mut [Vector3]) {
         fill_sliding(at, rows, columns);
     }
 
@@ -68,7 +69,7 @@ impl ContactLaw for Coated {
         &mut self.problem.delassus
     }
 
-    fn pose(&mut self, contact: usize, _: &[[f64; 3]], at: &impl ContactPrediction) {
+    fn pose(&mut self, contact: usize, _: &[Vector3], at: &impl ContactPrediction) {
         self.angles[contact] = at.angle();
         self.gaps[contact] = at.gap();
         self.problem.monotone &= at.friction() == 0.0;

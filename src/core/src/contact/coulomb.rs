@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use super::{ContactLaw, ContactPrediction, fill_tangents};
 use crate::contact::active_set::SolverOutcome;
 use crate::contact::de_saxce::CoulombSolver;
-use crate::geometry::dot;
+use crate::math::vector::Vector3;
 
 /// Coulomb friction, started from the forces of the last step.
 #[derive(Debug, Clone)]
@@ -28,7 +28,7 @@ impl ContactLaw for Coulomb {
     const LOOKS_AGAIN: bool = true;
     const STARTS_FROM_FORCES: bool = true;
 
-    fn fill_directions(at: &impl ContactPrediction, rows: &mut [[f64; 3]], columns: &mut [[f64; 3]]) {
+    fn fill_directions(at: &impl ContactPrediction, rows: &mut [Vector3], columns: &mut [Vector3]) {
         fill_tangents(at, rows, columns);
     }
 
@@ -40,12 +40,12 @@ impl ContactLaw for Coulomb {
         &mut self.solver.delassus
     }
 
-    fn pose(&mut self, contact: usize, directions: &[[f64; 3]], at: &impl ContactPrediction) {
+    fn pose(&mut self, contact: usize, directions: &[Vector3], at: &impl ContactPrediction) {
         let (slip, last) = (at.slip(), at.last_force());
         self.solver.friction[contact] = at.friction();
         for (along, direction) in directions.iter().enumerate() {
-            self.solver.free[3 * contact + along] = dot(*direction, slip);
-            self.solver.reactions[3 * contact + along] = dot(*direction, last);
+            self.solver.free[3 * contact + along] = direction.dot(&slip);
+            self.solver.reactions[3 * contact + along] = direction.dot(&last);
         }
         self.solver.free[3 * contact] = at.gap();
     }

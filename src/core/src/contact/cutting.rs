@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 use super::{ContactLaw, ContactPrediction, fill_tangents};
 use crate::contact::active_set::SolverOutcome;
 use crate::contact::coating::{BladePassage, CoatedProblem, Coating};
-use crate::geometry::dot;
+use crate::math::vector::Vector3;
 
 /// A coating with its cuts, and the contact problem of its blades. Groups are whole blades, whose nodes share cells.
 #[derive(Debug, Clone)]
@@ -86,7 +86,7 @@ impl ContactLaw for CuttingLaw {
     const DIRECTIONS: usize = 3;
     const LOOKS_AGAIN: bool = true;
 
-    fn fill_directions(at: &impl ContactPrediction, rows: &mut [[f64; 3]], columns: &mut [[f64; 3]]) {
+    fn fill_directions(at: &impl ContactPrediction, rows: &mut [Vector3], columns: &mut [Vector3]) {
         fill_tangents(at, rows, columns);
     }
 
@@ -100,13 +100,13 @@ impl ContactLaw for CuttingLaw {
         &mut self.matrix
     }
 
-    fn pose(&mut self, contact: usize, directions: &[[f64; 3]], at: &impl ContactPrediction) {
+    fn pose(&mut self, contact: usize, directions: &[Vector3], at: &impl ContactPrediction) {
         let (along, friction) = (at.slip_direction(), at.friction());
         let (gap, closed) = (at.gap(), at.was_closed(self.coating.thickness()));
-        let sense = dot(along, directions[1]);
+        let sense = along.dot(&directions[1]);
         self.contacts[contact] = CuttingContact { gap, closed, friction, sense, sector: at.sector() };
         self.angles[contact] = at.angle();
-        self.slid[contact] = sense * dot(along, at.slip());
+        self.slid[contact] = sense * along.dot(&at.slip());
     }
 
     #[inline(never)]

@@ -4,6 +4,7 @@ use nalgebra::DMatrix;
 
 use super::{ContactLaw, ContactPrediction, fill_sliding};
 use crate::contact::active_set::{ContactSolver, SolverOutcome};
+use crate::math::vector::Vector3;
 
 /// Linear complementarity, started from the closed contacts of the previous step.
 #[derive(Debug, Clone)]
@@ -20,7 +21,7 @@ impl ContactLaw for Lcp {
     const DIRECTIONS: usize = 1;
     const LOOKS_AGAIN: bool = true;
 
-    fn fill_directions(at: &impl ContactPrediction, rows: &mut [[f64; 3]], columns: &mut [[f64; 3]]) {
+    fn fill_directions(at: &impl ContactPrediction, rows: &mut [Vector3], columns: &mut [Vector3]) {
         fill_sliding(at, rows, columns);
     }
 
@@ -33,7 +34,7 @@ impl ContactLaw for Lcp {
         &mut self.0.delassus
     }
 
-    fn pose(&mut self, contact: usize, _: &[[f64; 3]], at: &impl ContactPrediction) {
+    fn pose(&mut self, contact: usize, _: &[Vector3], at: &impl ContactPrediction) {
         self.0.gaps[contact] = at.gap();
         // Contacts that were closed in the last step are the best guess for this one.
         self.0.active[contact] = at.was_closed(0.0);

@@ -1,5 +1,7 @@
 //! Radial, tangential and axial directions, and conversion of vectors to them.
 
+use crate::math::vector::Vector3;
+
 /// Radial and tangential direction at an angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PolarFrame {
@@ -18,12 +20,12 @@ impl PolarFrame {
     }
 
     /// Returns the (radial, tangential, axial) components of a vector given in fixed directions.
-    pub fn local(self, v: [f64; 3]) -> [f64; 3] {
-        [v[0] * self.cosine + v[1] * self.sine, v[1] * self.cosine - v[0] * self.sine, v[2]]
+    pub fn local(self, v: Vector3) -> Vector3 {
+        Vector3::new(v[0] * self.cosine + v[1] * self.sine, v[1] * self.cosine - v[0] * self.sine, v[2])
     }
 
     /// Returns the fixed components of a vector given as (radial, tangential, axial).
-    pub fn fixed(self, v: [f64; 3]) -> [f64; 3] {
-        [v[0] * self.cosine - v[1] * self.sine, v[0] * self.sine + v[1] * self.cosine, v[2]]
+    pub fn fixed(self, v: Vector3) -> Vector3 {
+        Vector3::new(v[0] * self.cosine - v[1] * self.sine, v[0] * self.sine + v[1] * self.cosine, v[2])
     }
 }

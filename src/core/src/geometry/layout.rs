@@ -1,7 +1,7 @@
 //! Positions of the contact nodes of all sectors around the axis, and their rigid motion.
 
-use super::PrescribedMotion;
 use super::frame::PolarFrame;
+use super::{PrescribedMotion, Vector3};
 use crate::{Error, Result, Rom};
 
 /// Contact nodes of equally spaced sectors; arrays that differ by sector are `[node · lanes + lane]`.
@@ -70,30 +70,24 @@ impl Layout {
     /// Velocity by the motion of the rotor (m/s) of a node displaced by `moved` (m), in the coordinates of its displacements: r Ω around,
     /// since a displacement around is an arc of the undeformed radius r, plus the motion of the shaft centre.
     #[inline(always)]
-    pub fn rigid_velocity(&self, node: usize, index: usize, drive: &PrescribedMotion, moved: [f64; 3]) -> [f64; 3] {
+    pub fn rigid_velocity(&self, node: usize, index: usize, drive: &PrescribedMotion, moved: Vector3) -> Vector3 {
         let spin = drive.speed * self.radii[node];
         if drive.shaft_velocity[0] == 0.0 && drive.shaft_velocity[1] == 0.0 {
-            return [0.0, spin, drive.shaft_velocity[2]];
+            return Vector3::new(0.0, spin, drive.shaft_velocity[2]);
         }
-        let [x, y, z] = self.shaft_motion(node, index, drive.rotor_angle, moved, drive.shaft_velocity);
-        [x, spin + y, z]
+        let shaft = self.shaft_motion(node, index, drive.rotor_angle, moved, drive.shaft_velocity);
+        Vector3::new(shaft[0], spin + shaft[1], shaft[2])
     }
 
     /// Displacement or velocity `shaft` of the shaft centre in fixed directions, converted to the coordinates of the displacements of a
     /// node displaced by `moved` (m).
-    pub fn shaft_motion(
-        &self,
-        node: usize,
-        index: usize,
-        rotor_angle: f64,
-        moved: [f64; 3],
-        shaft: [f64; 3],
-    ) -> [f64; 3] {
+    pub fn shaft_motion(&self, node: usize, index: usize, rotor_angle: f64, moved: Vector3, shaft: Vector3) -> Vector3 {
         if shaft.iter().all(|along| *along == 0.0) {
             return shaft;
         }
-        let [outwards, around, along] = self.displaced_frame(node, index, rotor_angle, moved[1]).local(shaft);
-        [outwards, around / (1.0 + moved[0] * self.per_radius[node]), along]
+        let mut shaft = self.displaced_frame(node, index, rotor_angle, moved[1]).local(shaft);
+        shaft[1] /= 1.0 + moved[0] * self.per_radius[node];
+        shaft
     }
 
     /// Directions at a node that is displaced by an arc `around` (m), at a rotor angle (rad).

@@ -3,9 +3,9 @@
 //! A node is at x = X + u, which includes the rigid flight, and can touch the closest point of its surface: g = (x − S)·n with n = S_t ×
 //! S_s/|S_t × S_s|. A node beyond a free edge has no surface to touch: its gap is infinite and its normal zero.
 
-use super::spline::NOTHING_TO_TOUCH;
 use super::surface_spline::{ClosestPoint, Projection, SurfaceSpline};
-use super::{Geometry, dot};
+use super::{Gap, Geometry, Vector3};
+use crate::math::vector::{length, tangential, vector3_at};
 use crate::scene::ranges::SMALL;
 
 /// [`OpenGap::clearance`] as a fraction of the largest displacement that counts as small.
@@ -21,9 +21,9 @@ pub struct OpenSurface {
     /// The current surface.
     pub surface: SurfaceSpline,
     /// Undeformed control points (m).
-    undeformed: Vec<[f64; 3]>,
+    undeformed: Vec<Vector3>,
     /// Control points in use.
-    control: Vec<[f64; 3]>,
+    control: Vec<Vector3>,
 }
 
 impl OpenSurface {
@@ -38,9 +38,8 @@ impl OpenSurface {
         if moved.is_empty() {
             return;
         }
-        let (moved, _) = moved.as_chunks::<3>();
-        for ((point, undeformed), moved) in self.control.iter_mut().zip(&self.undeformed).zip(moved) {
-            *point = std::array::from_fn(|i| undeformed[i] + moved[i]);
+        for (index, (point, undeformed)) in self.control.iter_mut().zip(&self.undeformed).enumerate() {
+            *point = undeformed + vector3_at(moved, index);
         }
         self.surface.set_control_points(&self.control);
     }
@@ -55,7 +54,7 @@ impl OpenSurface {
 #[derive(Debug, Clone, PartialEq)]
 pub struct OpenGap {
     /// Undeformed positions of the contact nodes of the structure (m).
-    positions: Vec<[f64; 3]>,
+    positions: Vec<Vector3>,
     /// Contact nodes that can touch the surface.
     nodes: Vec<usize>,
     /// The surface.
@@ -66,7 +65,7 @@ pub struct OpenGap {
 
 impl OpenGap {
     /// Creates the gap function of `nodes` of the contact nodes at `positions` (m).
-    pub fn new(positions: Vec<[f64; 3]>, nodes: Vec<usize>, surface: OpenSurface) -> Self {
+    pub fn new(positions: Vec<Vector3>, nodes: Vec<usize>, surface: OpenSurface) -> Self {
         let smallest = surface.extent().min(extent(&positions));
         Self { positions, nodes, surface, largest: SMALL * smallest }
     }
@@ -82,7 +81,7 @@ impl OpenGap {
     }
 
     /// Undeformed positions of the contact nodes of the structure (m).
-    pub fn positions(&self) -> &[[f64; 3]] {
+    pub fn positions(&self) -> &[Vector3] {
         &self.positions
     }
 
@@ -93,7 +92,7 @@ impl OpenGap {
     }
 
     /// Returns the point of the surface at a closest point (m).
-    pub fn contact_point(&self, place: ClosestPoint) -> [f64; 3] {
+    pub fn contact_point(&self, place: ClosestPoint) -> Vector3 {
         self.surface.surface.evaluate(place).point
     }
 
@@ -110,35 +109,26 @@ impl OpenGap {
     ) {
         self.surface.follow(moved);
         for &node in &self.nodes {
-            let moved = std::array::from_fn(|i| displacement[3 * node + i]);
-            let (value, normal, place) = self.gap_of_node(node, moved, guess.map(|places| places[node]));
-            gap[node] = value;
-            geometry.places[node] = place;
-            for (component, value) in normal.into_iter().enumerate() {
-                geometry.normal[component][node] = value;
-            }
+            let found = self.gap(node, vector3_at(displacement, node), guess.map(|places| places[node]));
+            (gap[node], geometry.places[node]) = (found.distance, found.foot);
+            geometry.set_normal(node, found.normal);
         }
     }
 
-    /// Returns gap (m), normal and closest point of one node displaced by `moved` (m) against the current surface. The caller detects a NaN
-    /// gap: the model no longer describes such a state.
-    pub(super) fn gap_of_node(
-        &self,
-        node: usize,
-        moved: [f64; 3],
-        guess: Option<ClosestPoint>,
-    ) -> (f64, [f64; 3], ClosestPoint) {
+    /// Returns the gap of one node displaced by `moved` (m) to the current surface. The caller detects a NaN gap: the model no longer
+    /// describes such a state.
+    pub(super) fn gap(&self, node: usize, moved: Vector3, guess: Option<ClosestPoint>) -> Gap {
         let surface = &self.surface.surface;
-        let point = std::array::from_fn(|i| self.positions[node][i] + moved[i]);
+        let point = self.positions[node] + moved;
         let start = guess.unwrap_or_else(|| surface.locate(point));
         let mut found = surface.project(point, start);
         if found == Projection::Lost {
             found = surface.project(point, surface.locate(point));
         }
         match found {
-            Projection::Found { place, normal, gap, .. } => (gap, normal, place),
-            Projection::BeyondEdge { place } => (NOTHING_TO_TOUCH, [0.0; 3], place),
-            Projection::Lost => (f64::NAN, [0.0; 3], start),
+            Projection::Found { gap, .. } => gap,
+            Projection::BeyondEdge { place } => Gap { foot: place, ..Gap::NOTHING },
+            Projection::Lost => Gap { distance: f64::NAN, foot: start, ..Gap::NOTHING },
         }
     }
 
@@ -149,8 +139,8 @@ impl OpenGap {
 
     /// Returns whether a node with the current gap (m) was behind the surface, continued beyond its edge, before it moved by `moved`
     /// relative to it (m).
-    pub fn was_behind(&self, moved: [f64; 3], normal: [f64; 3], gap: f64) -> bool {
-        let (approach, travel) = (dot(moved, normal), dot(moved, moved).sqrt());
+    pub fn was_behind(&self, moved: Vector3, normal: Vector3, gap: f64) -> bool {
+        let (approach, travel) = (moved.dot(&normal), length(moved));
         gap - approach < -(BEHIND_EDGE[0] * travel + BEHIND_EDGE[1] * self.largest)
     }
 
@@ -168,7 +158,7 @@ impl OpenGap {
 }
 
 /// Longest side of the bounding box of points (m).
-fn extent(points: &[[f64; 3]]) -> f64 {
+fn extent(points: &[Vector3]) -> f64 {
     let side = |i: usize| {
         let values = || points.iter().map(|point| point[i]);
         values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
@@ -178,9 +168,8 @@ fn extent(points: &[[f64; 3]]) -> f64 {
 
 /// Unit tangent along a velocity (m/s); zero without slip.
 #[inline(always)]
-pub fn tangent(velocity: [f64; 3], normal: [f64; 3]) -> [f64; 3] {
-    let along = dot(velocity, normal);
-    let tangent: [f64; 3] = std::array::from_fn(|i| velocity[i] - along * normal[i]);
-    let length = dot(tangent, tangent).sqrt();
-    if length > 0.0 { tangent.map(|value| value / length) } else { [0.0; 3] }
+pub fn tangent(velocity: Vector3, normal: Vector3) -> Vector3 {
+    let along = tangential(velocity, normal);
+    let speed = length(along);
+    if speed > 0.0 { along / speed } else { Vector3::zeros() }
 }

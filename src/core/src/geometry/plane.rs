@@ -1,32 +1,38 @@
 //! Plane obstacles and node-to-node pairs, with constant normals.
 
-use super::{Geometry, dot};
+use super::surface_spline::ClosestPoint;
+use super::{Gap, Geometry, Vector3};
+use crate::math::vector::vector3_at;
 
 /// Constant normals, gaps and sliding velocities of one group of contacts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FixedGap {
     /// Unit normal of each contact, from the slave to the master.
-    pub normals: Vec<[f64; 3]>,
+    pub normals: Vec<Vector3>,
     /// Initial gap of each contact (m).
     pub gaps: Vec<f64>,
     /// Prescribed velocity of the master relative to the slave (m/s), on top of the deformation.
-    pub sliding: Vec<[f64; 3]>,
+    pub sliding: Vec<Vector3>,
 }
 
 impl FixedGap {
+    /// Returns the gap of one node displaced by `moved` (m).
+    pub fn gap(&self, node: usize, moved: Vector3) -> Gap {
+        let normal = self.normals[node];
+        Gap { distance: self.gaps[node] + normal.dot(&moved), normal, foot: ClosestPoint::default() }
+    }
+
     /// Computes gaps (m) for the displacements of the contact rows of one structure (m).
     pub(super) fn evaluate(&self, displacement: &[f64], gap: &mut [f64]) {
         for (node, (normal, initial)) in self.normals.iter().zip(&self.gaps).enumerate() {
-            gap[node] = initial + dot(*normal, std::array::from_fn(|i| displacement[3 * node + i]));
+            gap[node] = initial + normal.dot(&vector3_at(displacement, node));
         }
     }
 
     /// Writes the normals, with rows of `lanes` lanes.
     pub(super) fn prepare(&self, lanes: usize, geometry: &mut Geometry) {
         for (node, normal) in self.normals.iter().enumerate() {
-            for component in 0..3 {
-                geometry.normal[component][node * lanes] = normal[component];
-            }
+            geometry.set_normal(node * lanes, *normal);
         }
     }
 }

@@ -12,9 +12,11 @@
 
 use super::frame::PolarFrame;
 use super::layout::Layout;
+use super::surface_spline::ClosestPoint;
 use super::wrench::{At, MotionIncrement};
-use super::{Geometry, PrescribedMotion};
+use super::{Gap, Geometry, PrescribedMotion, Vector3};
 use crate::math::simd::{InstructionSet, Kernel};
+use crate::math::vector::length;
 use crate::scene::settings::Meridian;
 use crate::scene::shape::CompiledShape;
 use crate::{Result, Rom};
@@ -108,7 +110,7 @@ impl RevolutionGap {
 impl RevolutionGap {
     /// Returns the displacement of the surface along the normal by its prescribed motion (m), at a node displaced by `moved` (m) whose normal has the
     /// radial part `facing`: n_r/(n_r N) times the outward displacement.
-    pub fn surface_motion(&self, at: At<'_>, moved: [f64; 3], facing: f64, motion: &MotionIncrement) -> f64 {
+    pub fn surface_motion(&self, at: At<'_>, moved: Vector3, facing: f64, motion: &MotionIncrement) -> f64 {
         if motion.casing_rests() {
             return 0.0;
         }
@@ -123,8 +125,8 @@ impl RevolutionGap {
         facing / tilt * (motion.opening + motion.shape_factor * shape - turned)
     }
 
-    /// Returns gap (m) and unit normal of one node displaced by `moved` (m).
-    pub fn gap_of_node(&self, at: At<'_>, moved: [f64; 3]) -> (f64, [f64; 3]) {
+    /// Returns the gap of one node displaced by `moved` (m).
+    pub fn gap(&self, at: At<'_>, moved: Vector3) -> Gap {
         let (node, drive, radius) = (at.node, at.drive, self.layout.radii[at.node]);
         let (slope, per_radius) = (self.slopes[node], self.layout.per_radius[node]);
         let angle = self.angle(at, moved);
@@ -142,13 +144,14 @@ impl RevolutionGap {
             true => [-cosine - per_arc * sine, (1.0 + moved[0] * per_radius) * (per_arc * cosine - sine), slope],
             false => [-1.0, drive.shape_factor * steepness * per_radius, slope],
         };
-        let per_length = 1.0 / super::dot(gradient, gradient).sqrt();
+        let gradient = Vector3::from(gradient);
+        let per_length = 1.0 / length(gradient);
         let open = clearance + drive.shape_factor * shape - moved[0] - shifted + slope * (moved[2] + along);
-        (open * per_length, gradient.map(|one| one * per_length))
+        Gap { distance: open * per_length, normal: gradient * per_length, foot: ClosestPoint::default() }
     }
 
     /// See [`super::GapLaw::is_clear`].
-    pub(super) fn is_clear(&self, at: At<'_>, turned: f64, reach: [f64; 3]) -> bool {
+    pub(super) fn is_clear(&self, at: At<'_>, turned: f64, reach: Vector3) -> bool {
         let (node, drive) = (at.node, at.drive);
         let seen = self.layout.angles[at.index] - drive.shape_rotation;
         let (from, to) = (seen + drive.rotor_angle.min(turned), seen + drive.rotor_angle.max(turned));
@@ -161,7 +164,7 @@ impl RevolutionGap {
     }
 
     /// See [`super::GapLaw::approach`].
-    pub(super) fn approach(&self, at: At<'_>, turned: f64, reach: [f64; 3]) -> f64 {
+    pub(super) fn approach(&self, at: At<'_>, turned: f64, reach: Vector3) -> f64 {
         let (node, drive) = (at.node, at.drive);
         let seen = self.layout.angles[at.index] - drive.shape_rotation;
         let (from, to) = (seen + drive.rotor_angle.min(turned), seen + drive.rotor_angle.max(turned));
@@ -172,7 +175,7 @@ impl RevolutionGap {
     }
 
     /// See [`super::GapLaw::least`].
-    pub(super) fn least(&self, at: At<'_>, end: &PrescribedMotion, turn: f64, reach: [f64; 3]) -> Option<f64> {
+    pub(super) fn least(&self, at: At<'_>, end: &PrescribedMotion, turn: f64, reach: Vector3) -> Option<f64> {
         let (node, start) = (at.node, at.drive);
         let factors = [start.shape_factor, end.shape_factor];
         let round = self.surface == CompiledShape::Circular || factors.iter().all(|one| *one == 0.0);
@@ -189,7 +192,7 @@ impl RevolutionGap {
     }
 
     /// Angle of a displaced node about the shaft centre (rad).
-    fn angle(&self, at: At<'_>, moved: [f64; 3]) -> f64 {
+    fn angle(&self, at: At<'_>, moved: Vector3) -> f64 {
         self.layout.angles[at.index] + at.drive.rotor_angle + moved[1] * self.layout.per_radius[at.node]
     }
 
@@ -198,12 +201,12 @@ impl RevolutionGap {
         if !self.shaft_moves {
             return [0.0; 2];
         }
-        let [outwards, sideways, _] = PolarFrame::new(angle).local(drive.shaft);
-        [outwards, sideways]
+        let shaft = PolarFrame::new(angle).local(drive.shaft);
+        [shaft[0], shaft[1]]
     }
 
     /// Angle of the position of a displaced node on the casing (rad), in the fixed frame.
-    pub fn angle_on_casing(&self, at: At<'_>, moved: [f64; 3]) -> f64 {
+    pub fn angle_on_casing(&self, at: At<'_>, moved: Vector3) -> f64 {
         let angle = self.angle(at, moved);
         let [outwards, sideways] = self.shaft_offset(angle, at.drive);
         angle + libm::atan2(sideways, self.layout.radii[at.node] + moved[0] + outwards)
@@ -419,9 +422,9 @@ mod tests {
         assert_eq!((gaps.clone(), normals.clone()), run(InstructionSet::Baseline));
         for lane in 0..6 {
             let three = |values: &[f64]| [0, 1, 2].map(|component| values[component * width + lane]);
-            let (gap, normal) = law(InstructionSet::Baseline).gap_of_node(at(lane), three(&moved));
+            let Gap { distance: gap, normal, .. } = law(InstructionSet::Baseline).gap(at(lane), three(&moved).into());
             assert!((gaps[lane] - gap).abs() < 1e-18, "{lane}: {} {gap}", gaps[lane]);
-            assert!(three(&normals).iter().zip(normal).all(|(a, b)| (a - b).abs() < 1e-15), "{lane}");
+            assert!(three(&normals).iter().zip(&normal).all(|(a, b)| (a - b).abs() < 1e-15), "{lane}");
         }
         assert!(!law(InstructionSet::Baseline).with_moving_shaft(true).enter(at(0), 0, &mut Instants::new(width)));
     }

@@ -6,7 +6,8 @@ use super::frame::PolarFrame;
 use super::layout::Layout;
 use super::surface_spline::{ClosestPoint, Projection, SurfaceSpline};
 use super::wrench::{At, MotionIncrement};
-use super::{Geometry, PrescribedMotion, dot};
+use super::{Gap, Geometry, PrescribedMotion, Vector3};
+use crate::math::vector::{length, strided_vector3, vector3_at};
 
 /// Gap of a node without a surface to touch: infinite, so that it is never used as a distance.
 pub const NOTHING_TO_TOUCH: f64 = f64::INFINITY;
@@ -25,9 +26,9 @@ pub struct SplineGap {
     /// The current surface.
     pub surface: SurfaceSpline,
     /// Control points of the round surface (m).
-    pub round: Vec<[f64; 3]>,
+    pub round: Vec<Vector3>,
     /// Displacement of the data points by the shape at factor 1 (m); empty for a round surface.
-    pub shape: Vec<[f64; 3]>,
+    pub shape: Vec<Vector3>,
     /// Angle over which the shape changes noticeably (rad).
     pub angular_scale: f64,
     /// Largest change of a control point by the shape at factor 1 (m).
@@ -35,7 +36,7 @@ pub struct SplineGap {
     /// Deviation of a ring through this number of points from a circle (m).
     pub ripple: f64,
     /// Control points in use.
-    control: Vec<[f64; 3]>,
+    control: Vec<Vector3>,
     factor: f64,
     /// Revolutions of the rotor over the current step.
     pub turned: f64,
@@ -50,11 +51,11 @@ impl SplineGap {
         layout: Layout,
         nominal_clearance: f64,
         surface: SurfaceSpline,
-        shape: Vec<[f64; 3]>,
+        shape: Vec<Vector3>,
         angular_scale: f64,
     ) -> Self {
         let round = surface.control_points().to_vec();
-        let largest = shape.iter().fold(0.0, |most: f64, change| most.max(dot(*change, *change)));
+        let largest = shape.iter().fold(0.0, |most: f64, change| most.max(change.dot(change)));
         let radius = layout.radii.iter().fold(0.0, |most: f64, radius| most.max(*radius));
         Self {
             shape_size: largest.sqrt(),
@@ -83,15 +84,10 @@ impl SplineGap {
         self.factor = factor;
         self.control.copy_from_slice(&self.round);
         for (point, shape) in self.control.iter_mut().zip(&self.shape) {
-            for component in 0..3 {
-                point[component] += factor * shape[component];
-            }
+            *point += factor * shape;
         }
-        let (moved, _) = moved.as_chunks::<3>();
-        for (point, moved) in self.control.iter_mut().zip(moved) {
-            for component in 0..3 {
-                point[component] += moved[component];
-            }
+        for (index, point) in self.control.iter_mut().enumerate().take(moved.len() / 3) {
+            *point += vector3_at(moved, index);
         }
         self.surface.set_control_points(&self.control);
     }
@@ -115,17 +111,13 @@ impl SplineGap {
         // Padding lanes are infinitely far away.
         for (node, lane) in nodes.filter(|(_, lane)| self.layout.clearances[*lane].is_finite()) {
             let index = node * lanes + lane;
-            let local: [f64; 3] = std::array::from_fn(|component| displacement[(3 * node + component) * lanes + lane]);
+            let local = strided_vector3(displacement, 3 * node * lanes + lane, lanes);
             let at = At { node, index, drive };
             let (projection, frame) = self.project(at, local, guess.map(|places| places[index]));
             match projection {
-                Projection::Found { place, normal, gap: found, .. } => {
-                    gap[index] = found;
-                    let normal = frame.local(normal);
-                    for component in 0..3 {
-                        geometry.normal[component][index] = normal[component];
-                    }
-                    geometry.places[index] = place;
+                Projection::Found { gap: found, .. } => {
+                    (gap[index], geometry.places[index]) = (found.distance, found.foot);
+                    geometry.set_normal(index, frame.local(found.normal));
                 }
                 Projection::BeyondEdge { place } => {
                     gap[index] = NOTHING_TO_TOUCH;
@@ -141,13 +133,11 @@ impl SplineGap {
     /// Returns the closest point of a node displaced by `moved` (m), searched from its previous place or from its angle, and the directions
     /// of the node.
     #[inline(always)]
-    fn project(&self, at: At<'_>, moved: [f64; 3], guess: Option<ClosestPoint>) -> (Projection, PolarFrame) {
+    fn project(&self, at: At<'_>, moved: Vector3, guess: Option<ClosestPoint>) -> (Projection, PolarFrame) {
         let angle = self.layout.angles[at.index] + at.drive.rotor_angle - at.drive.shape_rotation;
         let frame = PolarFrame::new(angle);
-        let [radial, tangential, axial] = self.shaft_offset(angle, at.drive);
         let arm = self.arm(at.node, at.index % self.layout.lanes, at.drive, moved);
-        let place = [arm[0] + radial, arm[1] + tangential, arm[2] + axial];
-        let point = frame.fixed(place);
+        let point = frame.fixed(arm + self.shaft_offset(angle, at.drive));
         let start = guess.map_or_else(|| self.surface.locate(point), |place| self.surface.advance(place, self.turned));
         (self.surface.project(point, start), frame)
     }
@@ -158,57 +148,52 @@ impl SplineGap {
     }
 
     /// Gap (m) of one node displaced by `moved` (m) to the current surface; infinite beyond its edges.
-    pub fn gap_of_one(&self, at: At<'_>, moved: [f64; 3]) -> f64 {
+    pub fn gap_of_one(&self, at: At<'_>, moved: Vector3) -> f64 {
         match self.project(at, moved, None).0 {
-            Projection::Found { gap, .. } => gap,
+            Projection::Found { gap, .. } => gap.distance,
             Projection::BeyondEdge { .. } => NOTHING_TO_TOUCH,
             Projection::Lost => f64::NAN,
         }
     }
 
-    /// Returns gap (m), unit normal and closest point of one node displaced by `moved` (m); the surface is rigid.
-    pub(super) fn gap_of_node(&mut self, at: At<'_>, moved: [f64; 3]) -> (f64, [f64; 3], ClosestPoint) {
+    /// Returns the gap of one node displaced by `moved` (m); the surface is rigid.
+    pub(super) fn gap(&mut self, at: At<'_>, moved: Vector3) -> Gap {
         self.follow(at.drive.shape_factor, &[]);
+        let inwards = Gap { normal: -Vector3::x(), ..Gap::NOTHING };
         match self.project(at, moved, None) {
-            (Projection::Found { place, normal, gap, .. }, frame) => (gap, frame.local(normal), place),
-            (Projection::BeyondEdge { place }, _) => (NOTHING_TO_TOUCH, [-1.0, 0.0, 0.0], place),
-            (Projection::Lost, _) => (f64::NAN, [-1.0, 0.0, 0.0], ClosestPoint::default()),
+            (Projection::Found { gap, .. }, frame) => Gap { normal: frame.local(gap.normal), ..gap },
+            (Projection::BeyondEdge { place }, _) => Gap { foot: place, ..inwards },
+            (Projection::Lost, _) => Gap { distance: f64::NAN, ..inwards },
         }
     }
 
     /// Displacement of the shaft centre along the directions of a node at `angle` from the shape (m).
-    fn shaft_offset(&self, angle: f64, drive: &PrescribedMotion) -> [f64; 3] {
-        let [x, y, z] = drive.shaft;
-        if x == 0.0 && y == 0.0 {
-            [0.0, 0.0, z]
-        } else {
-            PolarFrame::new(angle + drive.shape_rotation).local([x, y, z])
-        }
+    fn shaft_offset(&self, angle: f64, drive: &PrescribedMotion) -> Vector3 {
+        // Spares the sine and the cosine of a shaft that does not whirl.
+        let whirls = drive.shaft[0] != 0.0 || drive.shaft[1] != 0.0;
+        if whirls { PolarFrame::new(angle + drive.shape_rotation).local(drive.shaft) } else { drive.shaft }
     }
 
     /// Position of a node displaced by `moved` from the shaft centre (m, own directions); additional clearance, which the surface does not
     /// contain, moves it inwards.
     #[inline(always)]
-    pub fn arm(&self, node: usize, lane: usize, drive: &PrescribedMotion, moved: [f64; 3]) -> [f64; 3] {
+    pub fn arm(&self, node: usize, lane: usize, drive: &PrescribedMotion, moved: Vector3) -> Vector3 {
         let clearance = self.layout.clearances[lane] - self.nominal_clearance + drive.gap_offset + drive.radius_change;
-        [self.layout.radii[node] - clearance + moved[0], moved[1], self.layout.axial[node] + moved[2]]
+        Vector3::new(self.layout.radii[node] - clearance + moved[0], moved[1], self.layout.axial[node] + moved[2])
     }
 
     /// Velocity by the motion of the rotor (m/s) of a node displaced by `moved` (m), in its own directions: Ω × (x − e) + ė.
-    pub fn rigid_velocity(&self, node: usize, index: usize, drive: &PrescribedMotion, moved: [f64; 3]) -> [f64; 3] {
-        let [outwards, around, _] = self.arm(node, index % self.layout.lanes, drive, moved);
-        let [x, y, z] = drive.shaft_velocity;
-        let [radial, tangential, axial] =
-            if x == 0.0 && y == 0.0 { [0.0, 0.0, z] } else { self.frame(index, drive.rotor_angle).local([x, y, z]) };
-        [radial - drive.speed * around, tangential + drive.speed * outwards, axial]
+    pub fn rigid_velocity(&self, node: usize, index: usize, drive: &PrescribedMotion, moved: Vector3) -> Vector3 {
+        let (arm, shaft) = (self.arm(node, index % self.layout.lanes, drive, moved), drive.shaft_velocity);
+        let whirls = shaft[0] != 0.0 || shaft[1] != 0.0;
+        let shaft = if whirls { self.frame(index, drive.rotor_angle).local(shaft) } else { shaft };
+        Vector3::new(shaft[0] - drive.speed * arm[1], shaft[1] + drive.speed * arm[0], shaft[2])
     }
 
     /// Position of the contact point at `place` from the shaft centre (m), in the directions of the node.
-    pub fn contact_arm(&self, index: usize, drive: &PrescribedMotion, place: ClosestPoint) -> [f64; 3] {
+    pub fn contact_arm(&self, index: usize, drive: &PrescribedMotion, place: ClosestPoint) -> Vector3 {
         let angle = self.layout.angles[index] + drive.rotor_angle - drive.shape_rotation;
-        let point = PolarFrame::new(angle).local(self.surface.evaluate(place).point);
-        let shaft = self.shaft_offset(angle, drive);
-        std::array::from_fn(|i| point[i] - shaft[i])
+        PolarFrame::new(angle).local(self.surface.evaluate(place).point) - self.shaft_offset(angle, drive)
     }
 
     /// Returns the displacement of the surface along `normal` by its prescribed motion (m), at a contact point `arm` from the shaft centre
@@ -216,8 +201,8 @@ impl SplineGap {
     pub fn surface_motion(
         &self,
         at: At<'_>,
-        arm: [f64; 3],
-        normal: [f64; 3],
+        arm: Vector3,
+        normal: Vector3,
         place: ClosestPoint,
         motion: &MotionIncrement,
     ) -> f64 {
@@ -225,24 +210,24 @@ impl SplineGap {
             return 0.0;
         }
         let angle = self.layout.angles[at.index] + at.drive.rotor_angle - at.drive.shape_rotation;
-        let mut grown = [0.0; 3];
+        let mut grown = Vector3::zeros();
         if motion.shape_factor != 0.0 && !self.shape.is_empty() {
             for (index, weight) in self.surface.weights(place).iter() {
-                grown = std::array::from_fn(|i| grown[i] + motion.shape_factor * weight * self.shape[index][i]);
+                grown += motion.shape_factor * weight * self.shape[index];
             }
         }
         let grown = PolarFrame::new(angle).local(grown);
-        let shaft = self.shaft_offset(angle, at.drive);
-        let turned = [-(arm[1] + shaft[1]), arm[0] + shaft[0], 0.0].map(|arm| motion.shape_rotation * arm);
-        normal[0] * motion.opening + dot(normal, grown) + dot(normal, turned)
+        let arm = arm + self.shaft_offset(angle, at.drive);
+        let turned = motion.shape_rotation * Vector3::new(-arm[1], arm[0], 0.0);
+        normal[0] * motion.opening + normal.dot(&grown) + normal.dot(&turned)
     }
 
     /// Angle of the position of a displaced node on the casing (rad), in the fixed frame.
-    pub fn angle_on_casing(&self, at: At<'_>, moved: [f64; 3]) -> f64 {
+    pub fn angle_on_casing(&self, at: At<'_>, moved: Vector3) -> f64 {
         let angle = self.layout.angles[at.index] + at.drive.rotor_angle;
         let arm = self.arm(at.node, at.index % self.layout.lanes, at.drive, moved);
-        let shaft = PolarFrame::new(angle).local(at.drive.shaft);
-        angle + libm::atan2(arm[1] + shaft[1], arm[0] + shaft[0])
+        let arm = arm + PolarFrame::new(angle).local(at.drive.shaft);
+        angle + libm::atan2(arm[1], arm[0])
     }
 
     /// Radial, tangential and axial directions of a node at a rotor angle (rad), in the fixed frame.
@@ -252,9 +237,8 @@ impl SplineGap {
 }
 
 /// Returns whether a normal in the directions of a node is that of a casing seen from inside, on a flank below 45°.
-pub fn faces_inwards(normal: [f64; 3]) -> bool {
-    let sideways = dot([0.0, normal[1], normal[2]], [0.0, normal[1], normal[2]]).sqrt();
-    sideways <= -normal[0]
+pub fn faces_inwards(normal: Vector3) -> bool {
+    length(Vector3::new(0.0, normal[1], normal[2])) <= -normal[0]
 }
 
 impl Persist for ClosestPoint {

@@ -29,6 +29,7 @@ mod projection;
 pub use patch::{Evaluation, Weights};
 pub use projection::Projection;
 
+use crate::math::vector::Vector3;
 use crate::scene::settings::{Closure, Interpolation};
 use crate::{Error, Result};
 use interpolation::InterpolationRow;
@@ -85,7 +86,7 @@ pub struct SurfaceSpline {
     /// Interpolation problems around and along.
     lines: [InterpolationRow; 2],
     /// Control points (m), one per data point.
-    control: Vec<[f64; 3]>,
+    control: Vec<Vector3>,
     /// Control points with phantoms and repetitions, (along + 2) rings of (around + 3), so that a patch is a window of
     /// 4 × 4; three coordinates and a zero.
     mesh: Vec<[f64; 4]>,
@@ -94,7 +95,7 @@ pub struct SurfaceSpline {
     /// Mean axial position of each ring (m), undeformed.
     rings: Vec<f64>,
     /// Data points of an open surface (m), undeformed.
-    data: Vec<[f64; 3]>,
+    data: Vec<Vector3>,
 }
 
 impl SurfaceSpline {
@@ -163,11 +164,11 @@ impl SurfaceSpline {
             reach: if ends == Ends::Open { EDGE_TOLERANCE } else { REACH * real(along - 1) },
             interpolation,
             lines,
-            control: vec![[0.0; 3]; around * along],
+            control: vec![Vector3::zeros(); around * along],
             mesh: vec![[0.0; 4]; (around + 3) * (along + 2)],
             first_angle: 0.0,
             rings: vec![0.0; along],
-            data: if ends == Ends::Open { data.to_vec() } else { Vec::new() },
+            data: vec![Vector3::zeros(); if ends == Ends::Open { data.len() } else { 0 }],
         };
         surface.set_data(data)?;
         Ok(surface)
@@ -179,15 +180,13 @@ impl SurfaceSpline {
     /// As [`SurfaceSpline::new`]; the surface is then unchanged.
     pub fn set_data(&mut self, data: &[[f64; 3]]) -> Result<()> {
         self.check(data)?;
-        if self.ends == Ends::Open {
-            self.data.copy_from_slice(data);
-        }
+        self.data.iter_mut().zip(data).for_each(|(own, data)| *own = (*data).into());
         self.first_angle = libm::atan2(data[0][1], data[0][0]);
         for (ring, points) in self.rings.iter_mut().zip(data.chunks(self.around)) {
             *ring = mean_axial(points);
         }
         let mut control = std::mem::take(&mut self.control);
-        control.copy_from_slice(data);
+        control.iter_mut().zip(data).for_each(|(point, data)| *point = (*data).into());
         self.interpolate(&mut control);
         self.control = control;
         self.fill_mesh();
@@ -235,13 +234,13 @@ impl SurfaceSpline {
     ///
     /// # Panics
     /// Wrong number of points.
-    pub fn set_control_points(&mut self, control: &[[f64; 3]]) {
+    pub fn set_control_points(&mut self, control: &[Vector3]) {
         self.control.copy_from_slice(control);
         self.fill_mesh();
     }
 
     /// Control points (m), with index `along · around + i` like the data points.
-    pub fn control_points(&self) -> &[[f64; 3]] {
+    pub fn control_points(&self) -> &[Vector3] {
         &self.control
     }
 
@@ -278,7 +277,7 @@ impl SurfaceSpline {
 
     /// Returns a place at about the angle and the axial position of a point (m), on the edge for points beyond it, or the nearest data
     /// point of an open surface: the start for [`SurfaceSpline::project`] without a place from the last step.
-    pub fn locate(&self, point: [f64; 3]) -> ClosestPoint {
+    pub fn locate(&self, point: Vector3) -> ClosestPoint {
         if self.ends == Ends::Open {
             return self.nearest_data_point(point);
         }
@@ -289,9 +288,9 @@ impl SurfaceSpline {
         ClosestPoint { patch: [p, q], s, t: if t.is_finite() { t.clamp(0.0, 1.0) } else { 0.0 } }
     }
 
-    fn nearest_data_point(&self, point: [f64; 3]) -> ClosestPoint {
-        let square = |data: &[f64; 3]| (0..3).map(|i| (point[i] - data[i]) * (point[i] - data[i])).sum::<f64>();
-        let nearest = self.data.iter().map(square).enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
+    fn nearest_data_point(&self, point: Vector3) -> ClosestPoint {
+        let nearest = self.data.iter().map(|data| (point - data).norm_squared()).enumerate();
+        let nearest = nearest.min_by(|a, b| a.1.total_cmp(&b.1));
         let index = nearest.map_or(0, |(index, _)| index);
         let (p, q) = (index % self.around, index / self.around);
         let patch = [p.min(self.around - 2), q.min(self.along - 2)];
@@ -315,8 +314,8 @@ impl SurfaceSpline {
         let (around, width) = (self.around, self.around + 3);
         for (ring, points) in self.control.chunks_exact(around).enumerate() {
             let row = &mut self.mesh[(ring + 1) * width..(ring + 2) * width];
-            for (slot, [x, y, z]) in row[1..=around].iter_mut().zip(points) {
-                *slot = [*x, *y, *z, 0.0];
+            for (slot, point) in row[1..=around].iter_mut().zip(points) {
+                *slot = point.push(0.0).into();
             }
             let ends = match (self.interpolation, self.ends) {
                 (_, Ends::Open) => {

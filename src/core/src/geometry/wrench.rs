@@ -11,17 +11,17 @@
 
 use super::frame::PolarFrame;
 use super::surface_spline::ClosestPoint;
-use super::{GapLaw, PrescribedMotion};
+use super::{GapLaw, PrescribedMotion, Vector3};
 
 /// A contact force on the master in fixed directions.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Wrench {
     /// Point of action (m), from the middle of the casing or the origin.
-    pub point: [f64; 3],
+    pub point: Vector3,
     /// Force along fixed x, y, z (N).
-    pub force: [f64; 3],
+    pub force: Vector3,
     /// Moment (N·m) about the shaft centre, which moves with whirl and axial shift, or about the origin.
-    pub moment: [f64; 3],
+    pub moment: Vector3,
 }
 
 /// Change of the prescribed inputs over a step.
@@ -32,7 +32,7 @@ pub struct MotionIncrement {
     /// Rotation of the rotor over the step (rad).
     pub turn: f64,
     /// Displacement of the shaft centre along fixed x, y, z (m).
-    pub shaft: [f64; 3],
+    pub shaft: Vector3,
     /// Change of the clearance of round surfaces (m).
     pub opening: f64,
     /// Change of the factor on the shape (-).
@@ -41,7 +41,7 @@ pub struct MotionIncrement {
     pub shape_rotation: f64,
 }
 
-tiprub_cosim::persist_fields!(MotionIncrement { step, turn, shaft, opening, shape_factor, shape_rotation });
+tiprub_cosim::persist_fields!(MotionIncrement { step, turn, shaft.data.0, opening, shape_factor, shape_rotation });
 
 impl MotionIncrement {
     /// Computes the change from `before` to `now`, a step of length `step` (s). Angles are known only up to whole turns: the turn of the
@@ -53,7 +53,7 @@ impl MotionIncrement {
         Self {
             step,
             turn: turned - full * libm::round((turned - now.speed * step) / full),
-            shaft: std::array::from_fn(|i| now.shaft[i] - before.shaft[i]),
+            shaft: now.shaft - before.shaft,
             opening: now.gap_offset - before.gap_offset + (now.radius_change - before.radius_change),
             shape_factor: now.shape_factor - before.shape_factor,
             shape_rotation: rotated - full * libm::round(rotated / full),
@@ -63,14 +63,7 @@ impl MotionIncrement {
     /// Returns the mean of this step and the one before, like the displacements on which a force at the time in between does work; the turn
     /// of the rotor is that of this step alone, so that the mean torque times the speed is the power of the shaft.
     pub fn centred(&self, before: &Self) -> Self {
-        Self {
-            step: self.step,
-            turn: self.turn,
-            shaft: std::array::from_fn(|i| 0.5 * (self.shaft[i] + before.shaft[i])),
-            opening: 0.5 * (self.opening + before.opening),
-            shape_factor: 0.5 * (self.shape_factor + before.shape_factor),
-            shape_rotation: 0.5 * (self.shape_rotation + before.shape_rotation),
-        }
+        Self { step: self.step, turn: self.turn, ..self.since(before).over(0.5) }
     }
 
     /// Returns the sum of this step and the one before.
@@ -78,7 +71,7 @@ impl MotionIncrement {
         Self {
             step: self.step + before.step,
             turn: self.turn + before.turn,
-            shaft: std::array::from_fn(|i| self.shaft[i] + before.shaft[i]),
+            shaft: self.shaft + before.shaft,
             opening: self.opening + before.opening,
             shape_factor: self.shape_factor + before.shape_factor,
             shape_rotation: self.shape_rotation + before.shape_rotation,
@@ -100,7 +93,7 @@ impl MotionIncrement {
         Self {
             step: ratio * self.step,
             turn: ratio * self.turn,
-            shaft: self.shaft.map(|value| ratio * value),
+            shaft: ratio * self.shaft,
             opening: ratio * self.opening,
             shape_factor: ratio * self.shape_factor,
             shape_rotation: ratio * self.shape_rotation,
@@ -123,7 +116,7 @@ impl GapLaw {
     /// Returns the data that determine the contact point of a node displaced by `moved` (m, own directions) with the closest point `place`:
     /// the displacement itself on surfaces of revolution, otherwise the point relative to the shaft centre or the origin (m).
     #[inline(always)]
-    pub fn contact_point(&self, at: At<'_>, moved: [f64; 3], place: ClosestPoint) -> [f64; 3] {
+    pub fn contact_point(&self, at: At<'_>, moved: Vector3, place: ClosestPoint) -> Vector3 {
         match self {
             Self::Fixed(_) | Self::Revolution(_) => moved,
             Self::Spline(law) => law.contact_arm(at.index, at.drive, place),
@@ -134,18 +127,18 @@ impl GapLaw {
     /// Returns the wrench of a `force` on the master (N, in the coordinates of its displacements) at a contact point found by
     /// [`GapLaw::contact_point`].
     #[inline(always)]
-    pub fn wrench(&self, at: At<'_>, point: [f64; 3], force: [f64; 3]) -> Wrench {
+    pub fn wrench(&self, at: At<'_>, point: Vector3, force: Vector3) -> Wrench {
         let At { node, index, drive } = at;
         match self {
             Self::Fixed(_) => Wrench { force, ..Wrench::default() },
-            Self::Open(_) => Wrench { point, force, moment: cross(point, force) },
+            Self::Open(_) => Wrench { point, force, moment: point.cross(&force) },
             Self::Spline(law) => around(law.frame(index, drive.rotor_angle), drive, point, force),
             Self::Revolution(law) => {
-                let (layout, [radial, tangential, axial]) = (&law.layout, point);
-                let frame = layout.displaced_frame(node, index, drive.rotor_angle, tangential);
-                let stretch = 1.0 + radial * layout.per_radius[node];
-                let arm = [layout.radii[node] + radial, 0.0, layout.axial[node] + axial];
-                let mut wrench = around(frame, drive, arm, [force[0], force[1] / stretch, force[2]]);
+                let layout = &law.layout;
+                let frame = layout.displaced_frame(node, index, drive.rotor_angle, point[1]);
+                let stretch = 1.0 + point[0] * layout.per_radius[node];
+                let arm = Vector3::new(layout.radii[node] + point[0], 0.0, layout.axial[node] + point[2]);
+                let mut wrench = around(frame, drive, arm, Vector3::new(force[0], force[1] / stretch, force[2]));
                 wrench.moment[2] = layout.radii[node] * force[1];
                 wrench
             }
@@ -155,25 +148,21 @@ impl GapLaw {
     /// Displacement over a step (m) with the rotor, or along fixed obstacles with prescribed sliding, in the coordinates of the
     /// displacements of a node with this contact point.
     #[inline(always)]
-    pub fn spin_motion(&self, at: At<'_>, point: [f64; 3], motion: &MotionIncrement) -> [f64; 3] {
+    pub fn spin_motion(&self, at: At<'_>, point: Vector3, motion: &MotionIncrement) -> Vector3 {
         match self {
-            Self::Fixed(law) => law.sliding[at.index].map(|velocity| velocity * motion.step),
-            Self::Open(_) => [0.0; 3],
-            Self::Revolution(law) => [0.0, law.layout.radii[at.node] * motion.turn, 0.0],
-            Self::Spline(_) => [-motion.turn * point[1], motion.turn * point[0], 0.0],
+            Self::Fixed(law) => law.sliding[at.index] * motion.step,
+            Self::Open(_) => Vector3::zeros(),
+            Self::Revolution(law) => Vector3::new(0.0, law.layout.radii[at.node] * motion.turn, 0.0),
+            Self::Spline(_) => Vector3::new(-motion.turn * point[1], motion.turn * point[0], 0.0),
         }
     }
 
     /// Displacement over a step (m) with the shaft centre, in the same coordinates.
     #[inline(always)]
-    pub fn shaft_motion(
-        &self,
-        At { node, index, drive }: At<'_>,
-        point: [f64; 3],
-        motion: &MotionIncrement,
-    ) -> [f64; 3] {
+    pub fn shaft_motion(&self, at: At<'_>, point: Vector3, motion: &MotionIncrement) -> Vector3 {
+        let At { node, index, drive } = at;
         match self {
-            Self::Fixed(_) | Self::Open(_) => [0.0; 3],
+            Self::Fixed(_) | Self::Open(_) => Vector3::zeros(),
             Self::Revolution(law) => law.layout.shaft_motion(node, index, drive.rotor_angle, point, motion.shaft),
             Self::Spline(law) => law.frame(index, drive.rotor_angle).local(motion.shaft),
         }
@@ -184,8 +173,8 @@ impl GapLaw {
     pub fn surface_motion(
         &self,
         at: At<'_>,
-        point: [f64; 3],
-        normal: [f64; 3],
+        point: Vector3,
+        normal: Vector3,
         place: ClosestPoint,
         motion: &MotionIncrement,
     ) -> f64 {
@@ -197,7 +186,7 @@ impl GapLaw {
     }
 
     /// Angle of the position of a node displaced by `moved` (m, own directions) on the casing (rad), in the fixed frame.
-    pub fn angle_on_casing(&self, at: At<'_>, moved: [f64; 3]) -> f64 {
+    pub fn angle_on_casing(&self, at: At<'_>, moved: Vector3) -> f64 {
         match self {
             Self::Fixed(_) | Self::Open(_) => 0.0,
             Self::Revolution(law) => law.angle_on_casing(at, moved),
@@ -208,16 +197,6 @@ impl GapLaw {
 
 /// Returns the wrench of a force at `arm` from the shaft centre, both in the directions of `frame`.
 #[inline(always)]
-fn around(frame: PolarFrame, drive: &PrescribedMotion, arm: [f64; 3], force: [f64; 3]) -> Wrench {
-    let point = frame.fixed(arm);
-    Wrench {
-        point: std::array::from_fn(|i| point[i] + drive.shaft[i]),
-        force: frame.fixed(force),
-        moment: frame.fixed(cross(arm, force)),
-    }
-}
-
-/// Vector product.
-pub(crate) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+fn around(frame: PolarFrame, drive: &PrescribedMotion, arm: Vector3, force: Vector3) -> Wrench {
+    Wrench { point: frame.fixed(arm) + drive.shaft, force: frame.fixed(force), moment: frame.fixed(arm.cross(&force)) }
 }

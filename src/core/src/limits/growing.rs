@@ -175,6 +175,7 @@ mod tests {
     use super::*;
     use crate::limits::tests::{model, radial};
     use crate::limits::{delassus, directional_modes, secular};
+    use crate::math::vector::Vector3;
     use nalgebra::{DMatrix, DVector};
     use tiprub_test_models::SeededRandom;
 
@@ -221,7 +222,7 @@ mod tests {
             let friction = random.scale(0.01, 3.0);
             let step = random.scale(0.05, 1.9) / model.largest_frequency();
             let directions: ContactDirections =
-                (0..contacts).map(|_| ([-1.0, 0.0, 0.0], [0.0, random.of(&[1.0, -1.0]), 0.0])).collect();
+                (0..contacts).map(|_| (-Vector3::x(), random.of(&[1.0, -1.0]) * Vector3::y())).collect();
             let held = [
                 HeldContacts::continuous(&model, scheme.properties().quasi_static, step, friction, &directions),
                 HeldContacts::stepped(&model, scheme, step, friction, &directions),

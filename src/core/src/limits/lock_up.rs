@@ -32,6 +32,7 @@ mod tests {
     use super::*;
     use crate::limits;
     use crate::limits::tests::{model, radial};
+    use crate::math::vector::Vector3;
     use crate::scene::method::Scheme;
 
     #[test]
@@ -42,7 +43,7 @@ mod tests {
         let along = 1e-4 + 0.81e-10;
         let across = 0.5e-4 - 0.9 * 2.0 * 1e-10;
         let own = |directions: &ContactDirections| least_friction(&model, directions).unwrap();
-        let other = vec![([-1.0, 0.0, 0.0], [0.0, -1.0, 0.0])];
+        let other = vec![(-Vector3::x(), -Vector3::y())];
         let (locking, never) = if own(&other).is_finite() { (other, radial()) } else { (radial(), other) };
         let least = own(&locking);
         assert!((least / (along / across) - 1.0).abs() < 1e-12 && own(&never).is_infinite(), "{least}");

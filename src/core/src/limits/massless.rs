@@ -15,7 +15,7 @@
 use nalgebra::DMatrix;
 
 use super::finding::{ErrorKind, WarningKind};
-use crate::geometry::dot;
+use crate::math::vector::{Vector3, vector3_at};
 use crate::modes::modal::ModalModel;
 use crate::modes::schemes::{ModeCoefficients, damped_frequency};
 use crate::scene::method::Scheme;
@@ -57,7 +57,7 @@ pub struct MasslessCheck<'a> {
     /// Modes of the master.
     pub model: &'a ModalModel,
     /// Unit normal of every contact node.
-    pub normals: Vec<[f64; 3]>,
+    pub normals: Vec<Vector3>,
     /// Modes of every structure under the nodes along those normals, nodes × modes, and the structure.
     pub slaves: Vec<(DMatrix<f64>, &'a ModalModel)>,
 }
@@ -70,7 +70,7 @@ impl MasslessCheck<'_> {
         let dynamic = self.model.dynamic_modes(Scheme::MasslessBoundary);
         let nodes = self.normals.len();
         let seen = DMatrix::from_fn(nodes, self.model.len(), |node, mode| {
-            dot(self.normals[node], std::array::from_fn(|i| self.model.contact_modes[(3 * node + i, mode)]))
+            self.normals[node].dot(&vector3_at(self.model.contact_modes.column(mode).as_slice(), node))
         });
         let residual = DMatrix::from_fn(nodes, nodes, |a, b| {
             (dynamic..self.model.len())

@@ -133,6 +133,8 @@ pub struct ModalBank {
     coefficients: Vec<ModeCoefficients>,
     /// Velocity coefficients, `[set][mode]`; quasi-static modes have none.
     velocities: Vec<Velocity>,
+    /// True if the damping loss is collected.
+    with_loss: bool,
     lane_coefficients: Vec<BankCoefficients>,
     /// G per set: displacement of the contact rows per unit force held for one step (m/N), rows × rows.
     flexibility: Vec<DMatrix<f64>>,
@@ -186,6 +188,7 @@ impl ModalBank {
             contact_rows: model.contact_modes.transpose().as_slice().to_vec(),
             coefficients: vec![ModeCoefficients::default(); sets * modes],
             velocities: vec![Velocity::default(); sets * modes],
+            with_loss: true,
             lane_coefficients: vec![BankCoefficients::default(); if special { state_len } else { 0 }],
             flexibility: vec![DMatrix::zeros(rows, rows); if options.flexibility { sets } else { 0 }],
             scheme: Scheme::default(),
@@ -214,6 +217,11 @@ impl ModalBank {
             options,
             model: model.clone(),
         }
+    }
+
+    /// Stops collecting the damping loss, which takes time.
+    pub fn skip_losses(&mut self) {
+        self.with_loss = false;
     }
 
     /// Number of sectors.
@@ -374,11 +382,11 @@ impl ModalBank {
     }
 
     /// Predicts one step without contact (eq. 9 of the paper) and recovers the contact displacements.
-    pub fn predict(&mut self, with_loss: bool) {
+    pub fn predict(&mut self) {
         std::mem::swap(&mut self.state.increment, &mut self.increment_before);
         std::mem::swap(&mut self.state.displacement, &mut self.state.displacement_before);
         let instruction_set = self.instruction_set;
-        match (self.width, with_loss, self.lane_coefficients.is_empty()) {
+        match (self.width, self.with_loss, self.lane_coefficients.is_empty()) {
             (1, true, true) => instruction_set.run(Predict::<1, true, false>(self)),
             (1, false, true) => instruction_set.run(Predict::<1, false, false>(self)),
             (_, true, true) => instruction_set.run(Predict::<LANES, true, false>(self)),
@@ -389,17 +397,17 @@ impl ModalBank {
             (_, false, false) => instruction_set.run(Predict::<LANES, false, true>(self)),
         }
         if self.coupling.as_ref().is_some_and(Coupling::is_active) {
-            self.couple(with_loss);
+            self.couple();
         }
         if self.excitation.is_some() {
-            self.act_excited(with_loss);
+            self.act_excited();
         }
         if self.heat.is_some() {
-            self.act_expanded(with_loss);
+            self.act_expanded();
         }
     }
 
-    fn couple(&mut self, with_loss: bool) {
+    fn couple(&mut self) {
         let Some(mut coupling) = self.coupling.take() else { return };
         for sector in 0..self.sectors {
             for mode in 0..self.modes() {
@@ -413,7 +421,7 @@ impl ModalBank {
             let [position, increment] = &self.gathered;
             coupling.couple(self.set_of(sector), self.coefficients(sector), position, increment, &mut correction);
             self.correction = correction;
-            self.move_modes(sector, with_loss);
+            self.move_modes(sector);
             self.move_rows(sector);
         }
         self.coupling = Some(coupling);
@@ -537,7 +545,7 @@ mod tests {
             }
         }
         for _ in 0..500 {
-            bank.predict(false);
+            bank.predict();
             let (kinetic, strain) = bank.energies_now(&[]);
             assert!((kinetic + strain - expected).abs() < 1e-10 * expected && kinetic >= 0.0 && strain >= 0.0);
         }
@@ -552,7 +560,7 @@ mod tests {
         let terms =
             modal_load.iter().zip(&model.frequencies).skip(1).map(|(load, frequency)| 0.5 * (load / frequency).powi(2));
         let at_rest: f64 = terms.sum();
-        bank.predict(false);
+        bank.predict();
         let (kinetic, strain) = bank.energies_now(&[]);
         assert!(kinetic < 1e-20 * at_rest && (strain - at_rest).abs() < 1e-12 * at_rest, "{kinetic:e}, {strain:e}");
 
@@ -611,8 +619,8 @@ mod tests {
             bank.set_speed(500.0, 0.0);
             for _ in 0..5 {
                 bank.loads_mut().copy_from_slice(&[1.0, -2.0, 30.0, 4e3]);
-                bank.predict(true);
-                bank.correct(sectors - 1, &[3.0, -2.0, 5.0], true);
+                bank.predict();
+                bank.correct(sectors - 1, &[3.0, -2.0, 5.0]);
                 assert!(bank.finish_loads() != 0.0);
             }
             bank.rest();
@@ -621,7 +629,7 @@ mod tests {
             assert!(bank.displacement().iter().chain(bank.displacement_before()).all(|value| *value == 0.0));
             // Neither another step length nor a load moves an unloaded structure.
             bank.resample(scheme, 7e-6, &[]);
-            bank.predict(true);
+            bank.predict();
             assert_eq!((bank.finish_loads(), bank.energies_now(&[])), (0.0, (0.0, 0.0)), "{scheme:?}");
             // The stiffness is again that of the reference speed: a mode of 1000 rad/s.
             bank.set_modal_state(1, 0, 1.0, 0.0);
@@ -643,7 +651,7 @@ mod tests {
         assert!((sum(bank.energies_now(&[])) / expected - 1.0).abs() < 1e-12, "{expected} J");
         // The energy that the undamped scheme conserves is constant from the start.
         let at_first = sum(bank.energies());
-        bank.predict(true);
+        bank.predict();
         assert!((sum(bank.energies()) / at_first - 1.0).abs() < 1e-12);
     }
 
@@ -664,8 +672,8 @@ mod tests {
             bank.set_step(Scheme::ModalExact, 1e-6);
             let force: Vec<f64> = (0..15).map(|row| f64::from(row).cos()).collect();
             for step in 0..500 {
-                bank.predict(true);
-                bank.correct(step % 13, &force, true);
+                bank.predict();
+                bank.correct(step % 13, &force);
             }
             let state = &bank.state;
             let all = [&state.position, &state.increment, &state.displacement, &state.loss];

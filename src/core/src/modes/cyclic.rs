@@ -23,6 +23,7 @@ use tiprub_cosim::persist_fields;
 use super::bank::{FLUSH_BELOW, LANES, lanes};
 use super::excitation::DiskLoads;
 use crate::math::simd::InstructionSet;
+use crate::math::vector::Vector3;
 use crate::modes::schemes::{ModeCoefficients, Velocity};
 use crate::scene::method::Scheme;
 use fourier::{Fourier, Synthesis};
@@ -110,12 +111,14 @@ pub struct CyclicBank {
     /// Scratch: spectrum of displacements.
     spectrum: Vec<Complexes>,
     /// Requested forces: (sector, node, force).
-    asked: Vec<(usize, usize, [f64; 3])>,
+    asked: Vec<(usize, usize, Vector3)>,
     /// Spectrum and contact nodes of the requested forces.
     asked_force: Vec<Complexes>,
     asked_nodes: Vec<bool>,
     /// Displacements caused by the requested forces (m), `[row][lane of sector]`.
     moved: Vec<f64>,
+    /// True if the damping loss is collected.
+    with_loss: bool,
 }
 
 impl CyclicBank {
@@ -174,7 +177,13 @@ impl CyclicBank {
             shapes,
             loads,
             excitation: None,
+            with_loss: true,
         }
+    }
+
+    /// Stops collecting the damping loss, which takes time.
+    pub fn skip_losses(&mut self) {
+        self.with_loss = false;
     }
 
     /// Number of sectors.
@@ -294,7 +303,7 @@ impl CyclicBank {
 
     /// Predicts one step without contact (eq. 9 of the paper) and recovers the contact displacements of all sectors. Contact
     /// forces of the previous step that have not been applied yet are applied first.
-    pub fn predict(&mut self, with_loss: bool) {
+    pub fn predict(&mut self) {
         for (mode, (load_response, modal_load)) in self.load_response.iter_mut().zip(&self.modal_load).enumerate() {
             *load_response = self.coefficients[mode].load_compliance() * modal_load;
         }
@@ -312,7 +321,7 @@ impl CyclicBank {
         self.act_excited();
         std::mem::swap(&mut self.state.increment, &mut self.state.older);
         std::mem::swap(&mut self.state.displacement, &mut self.state.displacement_before);
-        (self.state.unapplied, self.state.acting, self.state.loss_due) = (false, false, with_loss);
+        (self.state.unapplied, self.state.acting, self.state.loss_due) = (false, false, self.with_loss);
         let values = &mut self.state.displacement;
         let (fourier, spectrum, rows, lanes) = (&self.fourier, &self.spectrum, self.rows, self.lanes);
         self.instruction_set.run(Synthesis { fourier, spectrum, rows, lanes, values });

@@ -93,7 +93,9 @@ impl Sectors {
         /// Makes the current displacements the previous ones.
         begin_span[mut]();
         /// Predicts one step without contact (eq. 9 of the paper) and recovers the contact displacements.
-        predict[mut](with_loss: bool);
+        predict[mut]();
+        /// Stops collecting the damping loss, which takes time.
+        skip_losses[mut]();
         /// Kinetic and strain energy of all sectors (J), in the form that the scheme conserves.
         energies[]() -> (f64, f64);
         /// Instantaneous kinetic and strain energy of all sectors (J), under the persistent contact forces

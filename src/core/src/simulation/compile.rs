@@ -503,7 +503,7 @@ impl Compiled {
 
     fn open_gap(&self, plan: &PairPlan) -> Result<GapLaw> {
         let rom = self.body(plan.body).1;
-        let positions = rom.contact_nodes.iter().map(|node| node.position).collect();
+        let positions = rom.contact_nodes.iter().map(|node| node.position.into()).collect();
         let mut gap = OpenGap::new(positions, plan.nodes.clone(), self.open_surface(plan)?);
         for (_, other) in self.plan.pairs_of(plan.body) {
             gap = gap.beside(self.open_surface(other)?.extent());

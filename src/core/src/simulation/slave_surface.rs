@@ -1,9 +1,10 @@
 //! Slave surface of a scene through data points, and the modes of its carrier.
 
+use crate::geometry::Vector3;
+use crate::geometry::frame::PolarFrame;
 use crate::geometry::layout::Layout;
 use crate::geometry::spline::SplineGap;
 use crate::geometry::surface_spline::SurfaceSpline;
-use crate::geometry::wrench::cross;
 use crate::modes::modal::ModalModel;
 use crate::scene::rom::{ContactNode, DisplacementFrame};
 use crate::scene::settings::{ContactSettings, SplineSettings, SurfaceSettings};
@@ -61,8 +62,8 @@ pub fn spline_gap(
     }
     let spline = SurfaceSpline::new(&round, grid.around, grid.rings.len(), settings.closure, settings.interpolation)?;
     let shape = CompiledShape::new(&surface.shape, clearance)?;
-    let mut change = data(&grid, |_, angle| shape.evaluate(angle).0);
-    change.iter_mut().for_each(|point| point[2] = 0.0);
+    let change = data(&grid, |_, angle| shape.evaluate(angle).0);
+    let mut change: Vec<_> = change.iter().map(|[x, y, _]| Vector3::new(*x, *y, 0.0)).collect();
     if shape == CompiledShape::Circular {
         change.clear();
     } else {
@@ -80,11 +81,11 @@ impl CarrierModes<'_> {
         let nodes = surface.control_points().len();
         let mut model = self.model.clone();
         model.contact_modes = DMatrix::zeros(3 * nodes, model.len());
-        let mut points = vec![[0.0; 3]; nodes];
+        let mut points = vec![Vector3::zeros(); nodes];
         for mode in 0..model.len() {
             for (node, point) in points.iter_mut().enumerate() {
                 let row = 3 * (first + node);
-                let own = std::array::from_fn(|component| self.model.contact_modes[(row + component, mode)]);
+                let own = self.model.contact_modes.fixed_view::<3, 1>(row, mode).into_owned();
                 *point = along_axes(self.rom, first + node, own);
             }
             surface.interpolate(&mut points);
@@ -101,13 +102,11 @@ impl CarrierModes<'_> {
 }
 
 /// Converts a displacement of a contact node to the axes x, y, z.
-fn along_axes(rom: &Rom, node: usize, own: [f64; 3]) -> [f64; 3] {
-    if rom.frame == DisplacementFrame::Cartesian {
-        return own;
+fn along_axes(rom: &Rom, node: usize, own: Vector3) -> Vector3 {
+    match rom.frame {
+        DisplacementFrame::Cartesian => own,
+        DisplacementFrame::Cylindrical => PolarFrame::new(rom.contact_nodes[node].position[1]).fixed(own),
     }
-    let [radial, tangential, axial] = own;
-    let (sine, cosine) = libm::sincos(rom.contact_nodes[node].position[1]);
-    [radial * cosine - tangential * sine, radial * sine + tangential * cosine, axial]
 }
 
 /// Part of a contact grid that a surface uses.
@@ -209,10 +208,10 @@ impl Lining {
     }
 
     /// Additional moment (N·m) of a force (N) at a point of the surface compared with the same force on the mesh.
-    pub fn moment(&self, point: [f64; 3], force: [f64; 3]) -> [f64; 3] {
+    pub fn moment(&self, point: Vector3, force: Vector3) -> Vector3 {
         let radius = libm::hypot(point[0], point[1]);
         let share = self.thickness(point[2]) / radius;
-        cross([share * point[0], share * point[1], 0.0], force)
+        Vector3::new(share * point[0], share * point[1], 0.0).cross(&force)
     }
 }
 

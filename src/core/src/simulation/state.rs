@@ -301,7 +301,7 @@ impl Simulation {
         moments.into_iter().all(|(pair, offset)| {
             let drive = self.drive(pair, offset, time);
             let single = [drive.speed, drive.gap_offset, drive.shape_factor, drive.shape_rotation, drive.radius_change];
-            let mut all = single.into_iter().chain(drive.shaft).chain(drive.shaft_velocity);
+            let mut all = single.iter().chain(&drive.shaft).chain(&drive.shaft_velocity);
             all.all(|value| value.abs() <= LARGEST)
         })
     }

@@ -9,7 +9,7 @@ use tiprub_cosim::variables::NO_CLEARANCE;
 
 use crate::geometry::layout::Layout;
 use crate::geometry::wrench::At;
-use crate::geometry::{GapLaw, RevolutionGap};
+use crate::geometry::{GapLaw, RevolutionGap, Vector3};
 use crate::scene::rom::{ContactNode, WatchedPoints};
 use crate::system::{ContactPair, System};
 use crate::{Result, Rom};
@@ -93,7 +93,7 @@ impl WatchedGaps {
                 for index in 0..facing.points.len() {
                     let (body, point) = (facing.body, facing.points[index]);
                     let moved = [0, 1, 2].map(|axis| simulation.watched_row(body, 3 * point + axis, sector));
-                    let gap = facing.gap(pair, (point, sector), moved);
+                    let gap = facing.gap(pair, (point, sector), moved.into());
                     self.clearances[body][point * self.sectors.len() + place] = gap.min(NO_CLEARANCE);
                 }
             }
@@ -113,14 +113,14 @@ impl WatchedPair {
     }
 
     /// Gap (m) of a point of a sector displaced by `moved` (m).
-    fn gap(&mut self, pair: &ContactPair, (point, sector): (usize, usize), moved: [f64; 3]) -> f64 {
+    fn gap(&mut self, pair: &ContactPair, (point, sector): (usize, usize), moved: Vector3) -> f64 {
         let (drive, lanes) = (pair.drive_now(), self.law.layout().map_or(1, |layout| layout.lanes));
         let (outwards, longer) = self.raised[point];
         let at = At { node: point, index: point * lanes + sector, drive };
-        let moved = [moved[0] + outwards, moved[1] / longer, moved[2]];
+        let moved = Vector3::new(moved[0] + outwards, moved[1] / longer, moved[2]);
         match &mut self.law {
             GapLaw::Spline(law) => law.gap_of_one(at, moved),
-            law => law.gap_of_node(at, moved, None).0,
+            law => law.gap(at, moved, None).distance,
         }
     }
 }

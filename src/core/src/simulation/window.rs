@@ -4,7 +4,7 @@ use tiprub_cosim::persist_fields;
 
 use super::patches::HeatPatches;
 use super::slave_surface::Lining;
-use crate::geometry::wrench::cross;
+use crate::geometry::Vector3;
 use crate::modes::bank::ModalBank;
 use crate::scene::settings::OutputSettings;
 use crate::system::{Structure, System};
@@ -19,18 +19,18 @@ pub struct BodyWindow {
     /// ∫µλ dt per node (N·s).
     pub tangential_impulse: Vec<f64>,
     /// ∫F dt along fixed x, y, z (N·s).
-    pub force_impulse: [f64; 3],
+    pub force_impulse: Vector3,
     /// ∫M dt about fixed x, y, z (N·m·s): through the centre of the shaft, or about the origin if there is no rotation.
-    pub moment_impulse: [f64; 3],
+    pub moment_impulse: Vector3,
 }
 
 /// Sums and extremes of a contact pair.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PairWindow {
     /// ∫F dt on the master, along x, y, z (N·s).
-    pub force_impulse: [f64; 3],
+    pub force_impulse: Vector3,
     /// ∫M dt (N·m·s), about the same point as for the structure.
-    pub moment_impulse: [f64; 3],
+    pub moment_impulse: Vector3,
     /// Friction heat (J).
     pub friction_heat: f64,
     /// Friction heat per patch (J); empty if the scene has no patches.
@@ -47,7 +47,7 @@ pub struct SupportWindow {
     /// Velocity when the communication step began.
     pub speeds: Vec<f64>,
     /// ∫M dt of the contact forces on the master, beyond that of the same forces on the mesh (N·m·s).
-    pub lining: [f64; 3],
+    pub lining: Vector3,
 }
 
 /// Sums and extremes since the communication step began.
@@ -65,9 +65,9 @@ pub struct StepWindow {
     pub normal_peak: f64,
 }
 
-persist_fields!(BodyWindow { lowest, normal_impulse, tangential_impulse, force_impulse, moment_impulse });
-persist_fields!(PairWindow { force_impulse, moment_impulse, friction_heat, patch_heat, casing_moment });
-persist_fields!(SupportWindow { moved, speeds, lining });
+persist_fields!(BodyWindow { lowest, normal_impulse, tangential_impulse, force_impulse.data.0, moment_impulse.data.0 });
+persist_fields!(PairWindow { force_impulse.data.0, moment_impulse.data.0, friction_heat, patch_heat, casing_moment });
+persist_fields!(SupportWindow { moved, speeds, lining.data.0 });
 persist_fields!(StepWindow { bodies, pairs, supports, friction_heat, normal_peak });
 
 impl StepWindow {
@@ -79,20 +79,20 @@ impl StepWindow {
                 lowest: vec![f64::INFINITY; len],
                 normal_impulse: vec![0.0; len],
                 tangential_impulse: vec![0.0; len],
-                force_impulse: [0.0; 3],
-                moment_impulse: [0.0; 3],
+                force_impulse: Vector3::zeros(),
+                moment_impulse: Vector3::zeros(),
             }
         };
         let pair = |patches: &Option<HeatPatches>| PairWindow {
-            force_impulse: [0.0; 3],
-            moment_impulse: [0.0; 3],
+            force_impulse: Vector3::zeros(),
+            moment_impulse: Vector3::zeros(),
             friction_heat: 0.0,
             patch_heat: vec![0.0; patches.as_ref().map_or(0, HeatPatches::len)],
             casing_moment: vec![0.0; if outputs.casing_forces { 3 } else { 0 }],
         };
         let support = |structure: &Structure| {
             let modes = structure.modes().uncoupled().map_or(0, ModalBank::modes);
-            SupportWindow { moved: vec![0.0; modes], speeds: vec![0.0; modes], lining: [0.0; 3] }
+            SupportWindow { moved: vec![0.0; modes], speeds: vec![0.0; modes], lining: Vector3::zeros() }
         };
         let carriers = structures.iter().filter(|structure| outputs.support_reaction && structure.nodes() == 0);
         Self {
@@ -110,10 +110,10 @@ impl StepWindow {
             body.lowest.copy_from_slice(structure.gaps());
             body.normal_impulse.fill(0.0);
             body.tangential_impulse.fill(0.0);
-            (body.force_impulse, body.moment_impulse) = ([0.0; 3], [0.0; 3]);
+            (body.force_impulse, body.moment_impulse) = (Vector3::zeros(), Vector3::zeros());
         }
         for pair in &mut self.pairs {
-            (pair.force_impulse, pair.moment_impulse) = ([0.0; 3], [0.0; 3]);
+            (pair.force_impulse, pair.moment_impulse) = (Vector3::zeros(), Vector3::zeros());
             pair.friction_heat = 0.0;
             pair.patch_heat.fill(0.0);
             pair.casing_moment.fill(0.0);
@@ -121,7 +121,7 @@ impl StepWindow {
         let carriers = structures.iter().filter(|structure| structure.nodes() == 0);
         for (support, structure) in self.supports.iter_mut().zip(carriers) {
             support.moved.fill(0.0);
-            support.lining = [0.0; 3];
+            support.lining = Vector3::zeros();
             for (mode, speed) in support.speeds.iter_mut().enumerate() {
                 *speed = speed_of(structure, mode);
             }
@@ -158,21 +158,20 @@ impl StepWindow {
                 (&mut pair.force_impulse, event.wrench.force),
                 (&mut pair.moment_impulse, event.wrench.moment),
             ] {
-                *sum = std::array::from_fn(|i| sum[i] + step * term[i]);
+                *sum += step * term;
             }
             if !pair.casing_moment.is_empty() {
-                let moment = cross(event.wrench.point, event.wrench.force);
-                pair.casing_moment.iter_mut().zip(moment).for_each(|(sum, term)| *sum += step * term);
+                let moment = event.wrench.point.cross(&event.wrench.force);
+                pair.casing_moment.iter_mut().zip(&moment).for_each(|(sum, term)| *sum += step * term);
             }
             if let Some(lining) = linings.get(event.pair).and_then(Option::as_ref) {
                 let moment = lining.moment(event.wrench.point, event.wrench.force);
-                let sum = &mut self.supports[lining.carrier].lining;
-                *sum = std::array::from_fn(|i| sum[i] + step * moment[i]);
+                self.supports[lining.carrier].lining += step * moment;
             }
             self.friction_heat += event.friction_heat;
             pair.friction_heat += event.friction_heat;
             if let Some(patches) = &patches[event.pair] {
-                let [x, y, z] = event.wrench.point;
+                let [x, y, z] = event.wrench.point.into();
                 pair.patch_heat[patches.find(libm::atan2(y, x), z)] += event.friction_heat;
             }
         }

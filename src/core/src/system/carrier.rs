@@ -1,7 +1,8 @@
 //! Effect of a group of contacts on the structure that carries their surfaces, computed with its modes contact by contact.
 
 use super::Structure;
-use super::pair::{SurfaceCarrier, at_place};
+use super::pair::SurfaceCarrier;
+use crate::geometry::Vector3;
 use crate::geometry::frame::PolarFrame;
 use crate::geometry::surface_spline::{ClosestPoint, SurfaceSpline};
 use crate::modes::bank::ModalBank;
@@ -11,12 +12,26 @@ use nalgebra::DMatrix;
 /// Location at which a contact acts on a structure.
 #[derive(Debug, Clone, Copy)]
 pub struct Spot<'a> {
-    /// The surface, and the structure that carries it.
-    pub surface: (&'a SurfaceSpline, SurfaceCarrier),
+    /// The surface.
+    pub surface: &'a SurfaceSpline,
+    /// The structure that carries the surface.
+    pub carrier: SurfaceCarrier,
     /// Place on the surface.
     pub place: ClosestPoint,
     /// Directions of the contact node.
     pub frame: PolarFrame,
+}
+
+impl Spot<'_> {
+    /// Interpolates values per row of the carrier, in the directions of the contact node.
+    pub fn interpolate(&self, value: impl Fn(usize) -> f64) -> Vector3 {
+        let mut sum = Vector3::zeros();
+        for (index, weight) in self.surface.weights(self.place).iter() {
+            let row = self.carrier.first_row + 3 * index;
+            sum += weight * Vector3::new(value(row), value(row + 1), value(row + 2));
+        }
+        self.frame.local(sum)
+    }
 }
 
 /// Scratch memory of a group for one structure that carries surfaces.
@@ -63,21 +78,21 @@ impl Reaction {
     }
 
     /// Projects the modes on the directions of contact `member` of the group, which acts on this structure.
-    pub fn see(&mut self, of: &Structure, member: usize, spot: Spot, rows: &[[f64; 3]], columns: &[[f64; 3]]) {
+    pub fn see(&mut self, of: &Structure, member: usize, spot: Spot, rows: &[Vector3], columns: &[Vector3]) {
         self.members.push(member);
-        let (bank, (surface, carrier)) = (bank(of), spot.surface);
+        let bank = bank(of);
         let modes = bank.modes();
         for (component, seen) in self.seen.iter_mut().enumerate() {
             seen.fill(0.0);
-            for (index, weight) in surface.weights(spot.place).iter() {
-                let shapes = bank.contact_row(carrier.first_row + 3 * index + component);
+            for (index, weight) in spot.surface.weights(spot.place).iter() {
+                let shapes = bank.contact_row(spot.carrier.first_row + 3 * index + component);
                 seen.iter_mut().zip(shapes).for_each(|(sum, shape)| *sum += weight * shape);
             }
         }
         let [x, y, z] = &self.seen;
         for (directions, target) in [(rows, &mut self.rows), (columns, &mut self.columns)] {
             for (index, direction) in directions.iter().enumerate() {
-                let [a, b, c] = spot.frame.fixed(*direction);
+                let [a, b, c] = spot.frame.fixed(*direction).into();
                 let target = &mut target[(member * directions.len() + index) * modes..][..modes];
                 for (((value, x), y), z) in target.iter_mut().zip(x).zip(y).zip(z) {
                     *value = a * x + b * y + c * z;
@@ -139,15 +154,15 @@ impl Reaction {
     }
 
     /// Displacement of a place caused by the last [`Reaction::respond`], in the directions of the node (m).
-    pub fn responded(&self, spot: Spot) -> [f64; 3] {
-        at_place(spot.surface, spot.place, spot.frame, |row| self.response[row])
+    pub fn responded(&self, spot: Spot) -> Vector3 {
+        spot.interpolate(|row| self.response[row])
     }
 
     /// Applies the forces of the solution passed to the last [`Reaction::respond`].
-    pub fn apply(&self, of: &mut Structure, ledger: bool) {
+    pub fn apply(&self, of: &mut Structure) {
         of.delayed.copy_from_slice(&self.force);
         if let (false, Sectors::Uncoupled(bank)) = (self.members.is_empty(), of.modes_mut()) {
-            bank.correct_modal(&self.force, &self.response, ledger);
+            bank.correct_modal(&self.force, &self.response);
         }
     }
 }

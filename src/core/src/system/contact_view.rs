@@ -4,6 +4,7 @@ use super::carrier::Spot;
 use super::pair::When;
 use super::{ContactPair, StepFailure, Structure};
 use crate::contact::ContactPrediction;
+use crate::geometry::Vector3;
 use crate::geometry::wrench::At;
 
 /// A contact node of one sector of a structure.
@@ -29,8 +30,6 @@ pub struct Bodies<'a> {
     pub pairs: &'a [ContactPair],
     /// True if contact forces act one step after they are found.
     pub delays_contact: bool,
-    /// True if losses are collected.
-    pub ledger: bool,
 }
 
 /// A contact member with its structure and pair, as its law sees it.
@@ -57,53 +56,51 @@ impl Bodies<'_> {
 impl ContactView<'_> {
     /// Predicted displacement of the node (m), in its own directions.
     #[inline(always)]
-    fn displacement(&self) -> [f64; 3] {
+    fn displacement(&self) -> Vector3 {
         self.structure.vector3(self.structure.modes().displacement(), self.member.node, self.member.sector)
     }
 
     /// Displacement relative to the surface over the step including the prediction (m), without rigid motion.
     #[inline(always)]
-    pub fn slip_of_deformation(&self) -> [f64; 3] {
+    pub fn slip_of_deformation(&self) -> Vector3 {
         let modes = self.structure.modes();
         self.slip_between(modes.displacement(), modes.displacement_before())
     }
 
     /// Relative displacement by the modes with inertia only. If contact forces act later, a prediction lacks the forces that
     /// deform quasi-static modes, however short the step is; its slip divided by h would grow without bounds.
-    fn slip_of_inertia(&self) -> [f64; 3] {
+    fn slip_of_inertia(&self) -> Vector3 {
         let predicted = &self.structure.history.predicted;
         self.slip_between(&predicted.now, &predicted.before)
     }
 
     #[inline(always)]
-    fn slip_between(&self, now: &[f64], before: &[f64]) -> [f64; 3] {
+    fn slip_between(&self, now: &[f64], before: &[f64]) -> Vector3 {
         let ContactMember { node, sector, .. } = self.member;
-        let (now, before) = (self.structure.vector3(now, node, sector), self.structure.vector3(before, node, sector));
-        let moved: [f64; 3] = std::array::from_fn(|i| now[i] - before[i]);
+        let moved = self.structure.vector3(now, node, sector) - self.structure.vector3(before, node, sector);
         if self.pair.carrier().is_none() { moved } else { self.less_of_carrier(moved) }
     }
 
     /// Not inlined, because contacts on rigid surfaces never call it.
     #[inline(never)]
-    fn less_of_carrier(&self, moved: [f64; 3]) -> [f64; 3] {
+    fn less_of_carrier(&self, moved: Vector3) -> Vector3 {
         let Some(spot) = self.spot() else { return moved };
-        let modes = self.bodies.structures[spot.surface.1.structure].modes();
+        let modes = self.bodies.structures[spot.carrier.structure].modes();
         let (now, before) = (modes.displacement(), modes.displacement_before());
-        let carried = super::pair::at_place(spot.surface, spot.place, spot.frame, |row| now[row] - before[row]);
-        std::array::from_fn(|i| moved[i] - carried[i])
+        moved - spot.interpolate(|row| now[row] - before[row])
     }
 
     /// Location at which the contact acts on the structure that carries its surface, if any.
     #[inline(always)]
     pub fn spot(&self) -> Option<Spot<'_>> {
-        let surface = self.pair.carried()?;
-        let frame = self.pair.frame(self.member.index, self.pair.drive(When::Now).rotor_angle);
-        Some(Spot { surface, place: self.structure.history.geometry.now.places[self.member.index], frame })
+        self.pair.carrier()?;
+        let (index, rotor_angle) = (self.member.index, self.pair.drive(When::Now).rotor_angle);
+        self.pair.spot(index, self.structure.history.geometry.now.places[index], rotor_angle)
     }
 
     /// Prescribed velocity relative to the surface (m/s).
     #[inline(always)]
-    fn sliding(&self) -> [f64; 3] {
+    fn sliding(&self) -> Vector3 {
         let ContactMember { node, index, .. } = self.member;
         self.pair.gap().sliding_velocity(node, index, self.pair.drive(When::Now), self.displacement())
     }
@@ -133,28 +130,23 @@ impl ContactPrediction for ContactView<'_> {
         self.structure.history.gap.before[self.member.index] <= -depth
     }
     #[inline(always)]
-    fn normal(&self) -> [f64; 3] {
+    fn normal(&self) -> Vector3 {
         self.structure.history.geometry.now.normal_at(self.member.index)
     }
     fn friction(&self) -> f64 {
         self.pair.friction()
     }
-    fn slip(&self) -> [f64; 3] {
-        let (sliding, step) = (self.sliding(), self.structure.modes().step());
-        let moved = self.slip_of_deformation();
-        std::array::from_fn(|i| sliding[i] * step + moved[i])
+    fn slip(&self) -> Vector3 {
+        self.sliding() * self.structure.modes().step() + self.slip_of_deformation()
     }
-    fn last_force(&self) -> [f64; 3] {
+    fn last_force(&self) -> Vector3 {
         self.structure.vector3(&self.structure.history.force.before, self.member.node, self.member.sector)
     }
     /// From the predicted relative velocity.
     #[inline(always)]
-    fn slip_direction(&self) -> [f64; 3] {
-        let (mut velocity, step) = (self.sliding(), self.structure.modes().step());
+    fn slip_direction(&self) -> Vector3 {
         let moved = if self.bodies.delays_contact { self.slip_of_inertia() } else { self.slip_of_deformation() };
-        for (value, moved) in velocity.iter_mut().zip(moved) {
-            *value += moved / step;
-        }
+        let velocity = self.sliding() + moved / self.structure.modes().step();
         self.pair.gap().slip_direction(velocity, self.normal())
     }
     fn sector(&self) -> usize {

@@ -5,9 +5,10 @@ use tiprub_cosim::persist::{Persist, StateReader, StateWriter};
 use super::contact_view::ContactMember;
 use super::pair::When;
 use super::{Bodies, ContactEvent, ContactPair, StepFailure, Structure, System, sum_of};
-use crate::geometry::GapLaw;
 use crate::geometry::surface_spline::ClosestPoint;
 use crate::geometry::wrench::At;
+use crate::geometry::{GapLaw, Vector3};
+use crate::math::vector::{set_strided_vector3, strided_vector3};
 use crate::system::history::ContactHistory;
 
 /// A contact force is continued over steps up to this many times as long as the step in which it was found.
@@ -85,10 +86,9 @@ impl System {
             let closed = CLOSED * self.pairs[event.pair].gap().indifferent(event.node);
             let ContactHistory { gap, force, passing, .. } = &mut structure.history;
             if gap.before[index] <= closed && gap.now[index] <= closed {
-                for component in 0..3 {
-                    let row = (3 * event.node + component) * lanes + event.sector;
-                    passing.lasting[row] = reach * reach * force.now[row];
-                }
+                let first = 3 * event.node * lanes + event.sector;
+                let force = strided_vector3(&force.now, first, lanes);
+                set_strided_vector3(&mut passing.lasting, first, lanes, reach * reach * force);
             }
         }
         for pair in &self.pairs {
@@ -115,8 +115,7 @@ impl System {
     ///
     /// A surface around an axis is extrapolated beyond its edge, and a node outside the extrapolation ends the run.
     pub(crate) fn check_edges(&mut self) -> Result<(), StepFailure> {
-        let bodies =
-            Bodies { structures: &mut self.structures, pairs: &self.pairs, delays_contact: false, ledger: false };
+        let bodies = Bodies { structures: &mut self.structures, pairs: &self.pairs, delays_contact: false };
         for (number, pair) in bodies.pairs.iter().enumerate() {
             let structure = pair.structure();
             let of = &bodies.structures[structure];
@@ -255,7 +254,7 @@ impl System {
                         let wrench = of.gap().wrench(At { node, index, drive: of.drive(When::Now) }, point, force);
                         let at = ContactMember { structure: number, pair, node, sector, index };
                         let coating = history.coating_force[index];
-                        self.events.now.push(ContactEvent::new(at, normal, force, coating, (point, wrench)));
+                        self.events.now.push(ContactEvent::new(at, normal, force, coating, point, wrench));
                     }
                 }
             }
@@ -266,13 +265,13 @@ impl System {
 impl ContactPair {
     /// Also applies persistent contact forces to the structure that carries the surface.
     fn spread_lasting(&self, structures: &mut [Structure]) {
-        let Some((surface, carrier)) = self.carried() else { return };
+        let (Some(surface), Some(carrier)) = (self.gap().spline(), self.carrier()) else { return };
         let Ok([touching, under]) = structures.get_disjoint_mut([self.structure(), carrier.structure]) else { return };
         let rotor_angle = self.drive(When::Now).rotor_angle;
         for &node in self.nodes() {
             for sector in 0..touching.modes().sectors() {
                 let force = touching.vector3(&touching.history.passing.lasting, node, sector);
-                if force.iter().all(|value| *value == 0.0) {
+                if force == Vector3::zeros() {
                     continue;
                 }
                 let index = touching.index(node, sector);

@@ -1,8 +1,8 @@
 //! The Delassus matrix W = C_Nᵀ A⁻¹ C_NT of the contact nodes of one structure, from its flexibility over one step.
 
 use super::contact_view::ContactMember;
-use crate::geometry::dot;
 use crate::math::simd::Kernel;
+use crate::math::vector::Vector3;
 use crate::modes::bank::ModalBank;
 use crate::modes::cyclic::CyclicBank;
 use crate::modes::sectors::Sectors;
@@ -13,9 +13,9 @@ pub struct DelassusBlock<'a> {
     /// The contacts.
     pub members: &'a [ContactMember],
     /// Directions of the rows, `per` for each contact.
-    pub rows: &'a [[f64; 3]],
+    pub rows: &'a [Vector3],
     /// Directions of the columns, `per` for each contact.
-    pub columns: &'a [[f64; 3]],
+    pub columns: &'a [Vector3],
     /// Directions per contact.
     pub per: usize,
     /// Index of the first contact of the block within the group.
@@ -64,12 +64,10 @@ fn fill_sectors(matrix: &mut DMatrix<f64>, bank: &ModalBank, block: &DelassusBlo
             for (other, row) in block.members.iter().enumerate() {
                 let at = 3 * row.node;
                 let same = row.sector == sector;
-                let moved: [f64; 3] = std::array::from_fn(|i| {
-                    let i = at + i;
-                    first[i] * direction[0] + second[i] * direction[1] + third[i] * direction[2]
-                });
+                let value = |i: usize| first[i] * direction[0] + second[i] * direction[1] + third[i] * direction[2];
+                let moved = Vector3::new(value(at), value(at + 1), value(at + 2));
                 for across in per * other..per * (other + 1) {
-                    let value = if same { dot(block.rows[across], moved) } else { 0.0 };
+                    let value = if same { block.rows[across].dot(&moved) } else { 0.0 };
                     matrix[(start + across, start + along)] = value;
                 }
             }
@@ -101,10 +99,10 @@ impl<const PER: usize> Kernel for FillDisk<'_, PER> {
                     for i in 0..4 {
                         moved[i] = first[i] * direction[0] + second[i] * direction[1] + third[i] * direction[2];
                     }
-                    let moved = [moved[0], moved[1], moved[2]];
+                    let moved = Vector3::new(moved[0], moved[1], moved[2]);
                     let target = &mut targets[along * leading + start + PER * other..][..PER];
                     for (value, row) in target.iter_mut().zip(across) {
-                        *value = dot(*row, moved);
+                        *value = row.dot(&moved);
                     }
                 }
             }
@@ -116,8 +114,8 @@ impl<const PER: usize> Kernel for FillDisk<'_, PER> {
 fn fill_sector<const PER: usize>(
     matrix: &mut DMatrix<f64>,
     flexibility: &[f64],
-    rows: &[[f64; 3]],
-    columns: &[[f64; 3]],
+    rows: &[Vector3],
+    columns: &[Vector3],
 ) {
     let components = 3 * columns.len() / PER;
     let leading = matrix.nrows();
@@ -129,10 +127,10 @@ fn fill_sector<const PER: usize>(
         let nodes = first.as_chunks::<3>().0.iter().zip(second.as_chunks::<3>().0).zip(third.as_chunks::<3>().0);
         let targets = target.as_chunks_mut::<PER>().0.iter_mut().zip(rows.as_chunks::<PER>().0);
         for (((first, second), third), (target, rows)) in nodes.zip(targets) {
-            let moved: [f64; 3] =
-                std::array::from_fn(|i| first[i] * direction[0] + second[i] * direction[1] + third[i] * direction[2]);
+            let [first, second, third] = [first, second, third].map(|column| Vector3::from(*column));
+            let moved = first * direction[0] + second * direction[1] + third * direction[2];
             for (value, row) in target.iter_mut().zip(rows) {
-                *value = dot(*row, moved);
+                *value = row.dot(&moved);
             }
         }
     }

@@ -1,7 +1,7 @@
 //! Forces and work of a contact in a step.
 
 use super::contact_view::ContactMember;
-use crate::geometry::dot;
+use crate::geometry::Vector3;
 use crate::geometry::wrench::Wrench;
 
 /// One active contact of the last step.
@@ -22,9 +22,9 @@ pub struct ContactEvent {
     /// Magnitude of the tangential force (N): friction µλ against slip, less if the contact sticks, 0 without slip; cutting force included.
     pub tangential: f64,
     /// Force on the structure (N) in the coordinates of its displacements.
-    pub force: [f64; 3],
+    pub force: Vector3,
     /// Data of the contact point, see [`GapLaw::contact_point`](crate::geometry::GapLaw::contact_point).
-    pub point: [f64; 3],
+    pub point: Vector3,
     /// Force in fixed directions, its moment, and its point of application.
     pub wrench: Wrench,
     /// Part of λ that a coating carries (N).
@@ -39,12 +39,13 @@ impl ContactEvent {
     pub(crate) fn new(
         at: ContactMember,
         normal: f64,
-        force: [f64; 3],
+        force: Vector3,
         coating: f64,
-        (point, wrench): ([f64; 3], Wrench),
+        point: Vector3,
+        wrench: Wrench,
     ) -> Self {
         let ContactMember { structure, pair, node, sector, .. } = at;
-        let square = dot(force, force) - normal * normal;
+        let square = force.dot(&force) - normal * normal;
         // Rounding errors of a frictionless contact do not count as friction.
         let tangential = if square > 1e-14 * normal * normal { square.sqrt() } else { 0.0 };
         Self {

@@ -7,8 +7,9 @@ use super::pair::When;
 use super::{ContactEvent, StepFailure, Structure};
 use crate::contact::Law;
 use crate::contact::coating::Coating;
-use crate::geometry::dot;
+use crate::geometry::Vector3;
 use crate::geometry::wrench::At;
+use crate::math::vector::{set_strided_vector3, set_vector3_at};
 use crate::modes::sectors::Sectors;
 use crate::scene::method::Solver;
 
@@ -56,10 +57,10 @@ pub struct ContactGroup {
     law: Law,
     /// The current contacts, structure by structure and sector by sector.
     members: Vec<ContactMember>,
-    rows: Vec<[f64; 3]>,
-    columns: Vec<[f64; 3]>,
+    rows: Vec<Vector3>,
+    columns: Vec<Vector3>,
     /// Force on each member (N).
-    forces: Vec<[f64; 3]>,
+    forces: Vec<Vector3>,
     /// Contact force on the rows of one sector.
     sector_force: Vec<f64>,
 }
@@ -67,9 +68,12 @@ pub struct ContactGroup {
 impl ContactGroup {
     /// Creates a group of the contacts of the structures `touching`, whose surfaces the structures `carriers` carry.
     pub fn new(
-        (reach, touching, carriers): (Reach, &[usize], &[usize]),
+        reach: Reach,
+        touching: &[usize],
+        carriers: &[usize],
         structures: &[Structure],
-        (solver, coating): (Solver, Option<Coating>),
+        solver: Solver,
+        coating: Option<Coating>,
     ) -> Self {
         let contacts = |structure: &usize| {
             let structure = &structures[*structure];
@@ -93,9 +97,9 @@ impl ContactGroup {
                 .collect(),
             law,
             members: Vec::with_capacity(count),
-            rows: vec![[0.0; 3]; per * count],
-            columns: vec![[0.0; 3]; per * count],
-            forces: vec![[0.0; 3]; count],
+            rows: vec![Vector3::zeros(); per * count],
+            columns: vec![Vector3::zeros(); per * count],
+            forces: vec![Vector3::zeros(); count],
             sector_force: vec![0.0; rows],
         }
     }
@@ -120,7 +124,7 @@ impl ContactGroup {
         if !self.law.matches_solver(solver) {
             let touching: Vec<usize> = self.structures().collect();
             let carriers: Vec<usize> = self.reactions.iter().map(|reaction| reaction.structure).collect();
-            *self = Self::new((self.reach, &touching, &carriers), structures, (solver, None));
+            *self = Self::new(self.reach, &touching, &carriers, structures, solver, None);
         }
     }
 
@@ -289,7 +293,7 @@ impl ContactGroup {
             for (contact, &member) in self.members.iter().enumerate() {
                 let posed = bodies.pose(member);
                 let Some(spot) = posed.spot() else { continue };
-                if spot.surface.1.structure == reaction.structure {
+                if spot.carrier.structure == reaction.structure {
                     let span = per * contact..per * (contact + 1);
                     reaction.see(of, contact, spot, &self.rows[span.clone()], &self.columns[span]);
                 }
@@ -303,10 +307,9 @@ impl ContactGroup {
     fn find_force_vectors(&mut self, per: usize) {
         let values = self.law.multipliers();
         for (contact, force) in self.forces[..self.members.len()].iter_mut().enumerate() {
-            *force = [0.0; 3];
+            *force = Vector3::zeros();
             for along in per * contact..per * (contact + 1) {
-                let (value, direction) = (values[along], self.columns[along]);
-                *force = std::array::from_fn(|i| force[i] + value * direction[i]);
+                *force += values[along] * self.columns[along];
             }
         }
     }
@@ -342,9 +345,9 @@ impl ContactGroup {
                     let at = ContactMember { structure: side.structure, pair, node, sector, index };
                     let posed = bodies.pose(at);
                     let Some(spot) = posed.spot() else { continue };
-                    let under = self.reactions.iter().find(|one| one.structure == spot.surface.1.structure);
-                    let moved = under.map_or([0.0; 3], |reaction| reaction.responded(spot));
-                    side.response[index] -= dot(structure.history.geometry.now.normal_at(index), moved);
+                    let under = self.reactions.iter().find(|one| one.structure == spot.carrier.structure);
+                    let moved = under.map_or(Vector3::zeros(), |reaction| reaction.responded(spot));
+                    side.response[index] -= structure.history.geometry.now.normal_at(index).dot(&moved);
                 }
             }
         }
@@ -362,10 +365,10 @@ impl ContactGroup {
         self.record(bodies, found);
         for side in 0..self.sides.len() {
             let span = self.sides[side].span.clone();
-            self.act(&mut bodies.structures[self.sides[side].structure], span, bodies.ledger);
+            self.act(&mut bodies.structures[self.sides[side].structure], span);
         }
         for reaction in &self.reactions {
-            reaction.apply(&mut bodies.structures[reaction.structure], bodies.ledger);
+            reaction.apply(&mut bodies.structures[reaction.structure]);
         }
         if self.law.coating().is_some() {
             found.wear_energy.add(self.law.commit());
@@ -374,7 +377,7 @@ impl ContactGroup {
 
     /// Applies the solution to a structure with contact nodes.
     #[inline(always)]
-    fn act(&mut self, structure: &mut Structure, span: std::ops::Range<usize>, ledger: bool) {
+    fn act(&mut self, structure: &mut Structure, span: std::ops::Range<usize>) {
         let bank = match structure.modes_mut() {
             Sectors::Uncoupled(bank) => bank,
             // The disk already has the forces of the request.
@@ -388,10 +391,10 @@ impl ContactGroup {
             let sector = members[next].sector;
             force.fill(0.0);
             while next < members.len() && members[next].sector == sector {
-                force[3 * members[next].node..][..3].copy_from_slice(&forces[next]);
+                set_vector3_at(force, members[next].node, forces[next]);
                 next += 1;
             }
-            bank.correct(sector, force, ledger);
+            bank.correct(sector, force);
         }
     }
 
@@ -417,11 +420,10 @@ impl ContactGroup {
             let point = gap.contact_point(at, moved, of.history.geometry.now.place_at(index));
             let wrench = gap.wrench(at, point, force);
             let lanes = of.lanes();
-            for component in 0..3 {
-                let row = (3 * node + component) * lanes + sector;
-                (of.history.force.now[row], of.history.points[row]) = (force[component], point[component]);
-            }
-            found.events.push(ContactEvent::new(member, normal, force, share, (point, wrench)));
+            let first = 3 * node * lanes + sector;
+            set_strided_vector3(&mut of.history.force.now, first, lanes, force);
+            set_strided_vector3(&mut of.history.points, first, lanes, point);
+            found.events.push(ContactEvent::new(member, normal, force, share, point, wrench));
         }
     }
 }
@@ -429,7 +431,7 @@ impl ContactGroup {
 impl GroupSide {
     /// Computes the change of the gaps of this structure by forces on its own members.
     #[inline(never)]
-    fn respond(&mut self, structure: &mut Structure, members: &[ContactMember], forces: &[[f64; 3]]) {
+    fn respond(&mut self, structure: &mut Structure, members: &[ContactMember], forces: &[Vector3]) {
         let nodes = structure.nodes();
         if let Sectors::Coupled(disk) = structure.modes_mut() {
             disk.ask(members.iter().zip(forces).map(|(member, force)| (member.sector, member.node, *force)));
@@ -442,10 +444,8 @@ impl GroupSide {
                     let flexibility = bank.flexibility(sector);
                     for node in 0..nodes {
                         let index = node * lanes + sector;
-                        let moved: [f64; 3] = std::array::from_fn(|i| {
-                            (0..3).map(|j| flexibility[(3 * node + i, 3 * column + j)] * force[j]).sum()
-                        });
-                        self.response[index] += dot(normals.normal_at(index), moved);
+                        let moved = flexibility.fixed_view::<3, 3>(3 * node, 3 * column) * force;
+                        self.response[index] += normals.normal_at(index).dot(&moved);
                     }
                 }
             }

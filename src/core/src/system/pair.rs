@@ -3,9 +3,10 @@
 use tiprub_cosim::persist_fields;
 
 use super::Structure;
+use super::carrier::Spot;
 use super::growth::ShapeGrowth;
 use crate::geometry::frame::PolarFrame;
-use crate::geometry::surface_spline::{ClosestPoint, SurfaceSpline};
+use crate::geometry::surface_spline::ClosestPoint;
 use crate::geometry::wrench::MotionIncrement;
 use crate::geometry::{GapLaw, PrescribedMotion};
 use crate::system::history::Two;
@@ -161,11 +162,12 @@ impl ContactPair {
         self.parts.gap.layout().map_or(PolarFrame::FIXED, |layout| PolarFrame::new(layout.angles[index] + rotor_angle))
     }
 
-    /// Returns the surface and its carrier; `None` for a rigid surface.
+    /// Returns the location at which a contact of the node at `index` acts on the carrier of the surface, at a rotor angle (rad); `None`
+    /// for a rigid surface.
     #[inline(always)]
-    pub(crate) fn carried(&self) -> Option<(&SurfaceSpline, SurfaceCarrier)> {
+    pub(crate) fn spot(&self, index: usize, place: ClosestPoint, rotor_angle: f64) -> Option<Spot<'_>> {
         let carrier = self.parts.carrier?;
-        Some((self.parts.gap.spline()?, carrier))
+        Some(Spot { surface: self.parts.gap.spline()?, carrier, place, frame: self.frame(index, rotor_angle) })
     }
 
     /// Deforms the surface with this factor of its shape and these displacements of the rows of its carrier (m).
@@ -175,19 +177,27 @@ impl ContactPair {
         self.parts.gap.bend(factor, &rows[carrier.first_row..][..3 * points]);
     }
 
-    /// Finds the gaps of the nodes at the current displacements. If `warm`, the search for closest points starts from those of
-    /// the previous step.
-    pub(crate) fn find_gaps(&mut self, structures: &mut [Structure], warm: bool) {
+    /// Finds the gaps of the nodes at the current displacements. The search for closest points begins at `start`.
+    pub(crate) fn find_gaps(&mut self, structures: &mut [Structure], start: SearchStart) {
         let Self { parts: PairParts { structure, gap, carrier, .. }, prescribed, .. } = self;
         let drive = &prescribed.drive.now;
-        let Some(carrier) = carrier else { return structures[*structure].find_gaps(gap, drive, &[], warm) };
+        let Some(carrier) = carrier else { return structures[*structure].find_gaps(gap, drive, &[], start) };
         let points = gap.spline().map_or(0, |surface| surface.control_points().len());
         let Ok([structure, under]) = structures.get_disjoint_mut([*structure, carrier.structure]) else {
             unreachable!("a structure does not carry the surface that it touches")
         };
         let moved = &under.modes().displacement()[carrier.first_row..][..3 * points];
-        structure.find_gaps(gap, drive, moved, warm);
+        structure.find_gaps(gap, drive, moved, start);
     }
+}
+
+/// Start of the search for closest points.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum SearchStart {
+    /// The closest points of the previous step.
+    PreviousStep,
+    /// The positions of the nodes.
+    Positions,
 }
 
 /// Selects one of two times.
@@ -197,20 +207,4 @@ pub enum When {
     Now,
     /// One step earlier.
     Before,
-}
-
-/// Interpolates values per row of a carrier at a place on its surface, in the directions of `frame`.
-pub(crate) fn at_place(
-    (surface, carrier): (&SurfaceSpline, SurfaceCarrier),
-    place: ClosestPoint,
-    frame: PolarFrame,
-    value: impl Fn(usize) -> f64,
-) -> [f64; 3] {
-    let mut sum = [0.0; 3];
-    for (index, weight) in surface.weights(place).iter() {
-        for (component, sum) in sum.iter_mut().enumerate() {
-            *sum += weight * value(carrier.first_row + 3 * index + component);
-        }
-    }
-    frame.local(sum)
 }

@@ -3,12 +3,14 @@
 use tiprub_cosim::persist::{Persist, StateReader, StateWriter};
 use tiprub_cosim::persist_fields;
 
-use crate::geometry::{GapLaw, Geometry, PrescribedMotion, dot};
+use crate::geometry::{GapLaw, Geometry, PrescribedMotion, Vector3};
+use crate::math::vector::{set_strided_vector3, strided_vector3, vector3_at};
 use crate::modes::bank::{BankOptions, LANES, ModalBank};
 use crate::modes::modal::ModalModel;
 use crate::modes::sectors::{SectorModel, Sectors};
 use crate::scene::method::Scheme;
 use crate::system::history::ContactHistory;
+use crate::system::pair::SearchStart;
 use crate::system::pulling::Pulling;
 
 /// Penetrations below this count as zero (m): the squares of the resulting values leave the range of double precision, and such
@@ -192,9 +194,8 @@ impl Structure {
 
     /// Three components of a node of a sector from an array over rows.
     #[inline(always)]
-    pub(crate) fn vector3(&self, rows: &[f64], node: usize, sector: usize) -> [f64; 3] {
-        let lanes = self.lanes;
-        std::array::from_fn(|component| rows[(3 * node + component) * lanes + sector])
+    pub(crate) fn vector3(&self, rows: &[f64], node: usize, sector: usize) -> Vector3 {
+        strided_vector3(rows, 3 * node * self.lanes + sector, self.lanes)
     }
 
     /// Starts without earlier contact, from the current modal state.
@@ -220,11 +221,11 @@ impl Structure {
     }
 
     /// Predicts one step (eq. 9 of the paper). If contact forces act one step later, those of the last step act now.
-    pub(crate) fn predict(&mut self, delays_contact: bool, ledger: bool) {
+    pub(crate) fn predict(&mut self, scheme: Scheme) {
         self.history.shift(self.modes.displacement_before());
-        self.modes.predict(ledger);
-        if delays_contact {
-            self.act_later(ledger);
+        self.modes.predict();
+        if scheme.properties().delays_contact {
+            self.act_later();
             self.history.predicted.shift();
             let touching = self.history.predicted.now.len();
             self.history.predicted.now.copy_from_slice(&self.modes.displacement()[..touching]);
@@ -233,22 +234,22 @@ impl Structure {
     }
 
     /// Applies the contact forces of the last step to the modes with inertia.
-    fn act_later(&mut self, ledger: bool) {
+    fn act_later(&mut self) {
         // A disk of coupled sectors keeps its forces until it predicts.
         let Sectors::Uncoupled(bank) = &mut self.modes else { return };
         if self.delayed.iter().any(|force| *force != 0.0) {
-            bank.act_delayed_modal(0, &self.delayed, ledger);
+            bank.act_delayed_modal(0, &self.delayed);
         }
         if !self.pair_of.is_empty() {
-            bank.act_delayed(&self.history.force.now, ledger);
+            bank.act_delayed(&self.history.force.now);
         }
     }
 
     /// Finds the gaps of the nodes of a pair whose surface has moved.
     #[inline(always)]
-    pub(crate) fn find_gaps(&mut self, gap: &mut GapLaw, drive: &PrescribedMotion, moved: &[f64], warm: bool) {
+    pub(crate) fn find_gaps(&mut self, gap: &mut GapLaw, drive: &PrescribedMotion, moved: &[f64], start: SearchStart) {
         let ContactHistory { gap: gaps, geometry, .. } = &mut self.history;
-        let before = warm.then_some(&geometry.before);
+        let before = (start == SearchStart::PreviousStep).then_some(&geometry.before);
         gap.evaluate(drive, self.modes.displacement(), moved, before, &mut geometry.now, &mut gaps.now);
     }
 
@@ -257,9 +258,7 @@ impl Structure {
         let (index, lanes) = (self.index(node, sector), self.lanes);
         self.history.multiplier[index] = 0.0;
         self.history.coating_force[index] = 0.0;
-        for component in 0..3 {
-            self.history.force.now[(3 * node + component) * lanes + sector] = 0.0;
-        }
+        set_strided_vector3(&mut self.history.force.now, 3 * node * lanes + sector, lanes, Vector3::zeros());
     }
 
     /// Finds the smallest gap of each lane; NaN is kept.
@@ -304,8 +303,9 @@ impl Structure {
 
     /// Largest displacement of a control point (m).
     pub(crate) fn largest_displacement(&self) -> f64 {
-        let moved = self.modes.displacement().as_chunks::<3>().0.iter();
-        moved.fold(0.0, |most: f64, moved| most.max(dot(*moved, *moved))).sqrt()
+        let rows = self.modes.displacement();
+        let square = |point: usize| vector3_at(rows, point).norm_squared();
+        (0..rows.len() / 3).map(square).fold(0.0, f64::max).sqrt()
     }
 
     /// Writes everything that determines the future, except the step size.

@@ -6,7 +6,7 @@
 
 use super::pair::When;
 use super::{ContactEvent, StepFailure, System};
-use crate::geometry::dot;
+use crate::math::vector::{Vector3, length};
 
 /// Changes below this count as rounding in any model (m), because no meaningful length is as short.
 const ROUNDING: f64 = 1e-15;
@@ -20,7 +20,7 @@ impl System {
     /// # Errors
     /// [`StepFailure::Unexplained`].
     #[inline(always)]
-    pub(crate) fn witness(&self, event: &ContactEvent, moved: [f64; 3], rigid: f64) -> Result<(), StepFailure> {
+    pub(crate) fn witness(&self, event: &ContactEvent, moved: Vector3, rigid: f64) -> Result<(), StepFailure> {
         let ContactEvent { structure, node, sector, .. } = *event;
         let of = &self.structures[structure];
         let (index, gaps) = (of.index(node, sector), &of.history.gap);
@@ -31,7 +31,7 @@ impl System {
         }
         // Rounding and the linear gap within a step; `moved` is half of the motion over two steps.
         let own = self.pairs[event.pair].gap().indifferent(node) + ROUNDING;
-        let explained = rigid + (2.0 * FACTOR * dot(moved, moved).sqrt() + own);
+        let explained = rigid + (2.0 * FACTOR * length(moved) + own);
         let jump = (gap - oldest).abs();
         if jump.is_nan() || explained.is_nan() || jump > explained {
             return Err(StepFailure::Unexplained { structure, node, sector, jump, explained });
@@ -52,7 +52,7 @@ impl System {
         let carrier = pair.carrier().filter(|_| pair.gap().layout().is_some());
         let carried = carrier.map_or(0.0, |carrier| self.structures[carrier.structure].largest_displacement());
         let turning = pair.gap().turned_under(turned, factor, carried);
-        let shifted = dot(motion.shaft, motion.shaft).sqrt();
+        let shifted = length(motion.shaft);
         FACTOR * (shifted + turned * off_centre + motion.opening.abs() + shape + turning)
     }
 }
@@ -76,7 +76,7 @@ mod tests {
             shapes: DMatrix::identity(1, 1),
             quasi_static: 0,
         };
-        let law = FixedGap { normals: vec![[-1.0, 0.0, 0.0]], gaps: vec![1e-4], sliding: vec![[0.0; 3]] };
+        let law = FixedGap { normals: vec![-Vector3::x()], gaps: vec![1e-4], sliding: vec![Vector3::zeros()] };
         let (scheme, solver) = (Scheme::ModalExact, Solver::Lcp);
         let settings = SystemSettings { scheme, solver, ledger: true };
         let mut system = System::new(&model, 1, GapLaw::Fixed(law), 0.0, settings);

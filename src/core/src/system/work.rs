@@ -1,10 +1,10 @@
 //! Entries of a step in the energy ledger.
 
-use super::pair::{When, at_place};
+use super::pair::When;
 use super::{ContactEvent, StepFailure, System};
 use crate::geometry::surface_spline::ClosestPoint;
 use crate::geometry::wrench::{At, MotionIncrement};
-use crate::geometry::{GapLaw, Geometry, dot};
+use crate::geometry::{GapLaw, Geometry, Vector3};
 use crate::scene::method::Solver;
 use crate::system::ledger::Ledger;
 
@@ -99,23 +99,23 @@ pub struct WorkingForce<'a> {
     /// Node, and prescribed motion when the force acts.
     pub at: At<'a>,
     /// Data of the contact point ([`GapLaw::contact_point`]), and its closest point on the surface.
-    pub point: [f64; 3],
+    pub point: Vector3,
     /// Closest point on the surface.
     pub place: ClosestPoint,
     /// Unit normal for which the gap was found.
-    pub normal: [f64; 3],
+    pub normal: Vector3,
     /// Multiplier λ (N).
     pub multiplier: f64,
     /// Force on the structure (N).
-    pub force: [f64; 3],
+    pub force: Vector3,
     /// Part of the force that is not along the normal for which it was found (N).
-    pub tangential: [f64; 3],
+    pub tangential: Vector3,
     /// Force in fixed directions (N).
-    pub fixed: [f64; 3],
+    pub fixed: Vector3,
     /// Prescribed motion over which the force does work.
     pub motion: &'a MotionIncrement,
     /// Displacement relative to the surface over which the force does work (m).
-    pub moved: [f64; 3],
+    pub moved: Vector3,
     /// Decrease of the gap over which λ does work (m).
     pub approach: f64,
 }
@@ -127,15 +127,15 @@ impl WorkingForce<'_> {
         let spin = self.gap.spin_motion(self.at, self.point, self.motion);
         let shaft = self.gap.shaft_motion(self.at, self.point, self.motion);
         let surface = self.gap.surface_motion(self.at, self.point, self.normal, self.place, self.motion);
-        let slip: [f64; 3] = std::array::from_fn(|i| self.moved[i] + spin[i] + shaft[i]);
-        let ([x, y, z], across) = (self.fixed, self.motion.shaft);
-        let exact = dot(self.force, self.moved);
+        let slip = self.moved + spin + shaft;
+        let (fixed, across) = (self.fixed, self.motion.shaft);
+        let exact = self.force.dot(&self.moved);
         let mut work = ContactWork {
-            shaft: -dot(self.force, spin),
-            whirl: -(x * across[0] + y * across[1]),
-            shift: -z * across[2],
+            shaft: -self.force.dot(&spin),
+            whirl: -(fixed[0] * across[0] + fixed[1] * across[1]),
+            shift: -fixed[2] * across[2],
             casing: self.multiplier * surface,
-            heat: -dot(self.tangential, slip),
+            heat: -self.tangential.dot(&slip),
             closing: self.multiplier * self.approach,
             exact,
             moved: exact.abs(),
@@ -258,14 +258,14 @@ impl System {
 
     /// Work of a contact over a step, for which its motion over the last two steps is averaged. With a coating, its rods absorb the loss
     /// of the approach.
-    fn work_of(&self, event: &ContactEvent, moved: [f64; 3], motion: &MotionIncrement, when: When) -> ContactWork {
+    fn work_of(&self, event: &ContactEvent, moved: Vector3, motion: &MotionIncrement, when: When) -> ContactWork {
         let (structure, pair) = (&self.structures[event.structure], &self.pairs[event.pair]);
         let (node, index) = (event.node, structure.index(event.node, event.sector));
         let (geometry, gaps) = (self.geometry_of(event, when), &structure.history.gap);
         let normal = geometry.normal_at(index);
         // A node that passes a free edge had no gap to close, so its motion is the approach.
         let (now, oldest) = (gaps.now[index], gaps.oldest[index]);
-        let approach = if oldest.is_finite() { -0.5 * (now - oldest) } else { -dot(normal, moved) };
+        let approach = if oldest.is_finite() { -0.5 * (now - oldest) } else { -normal.dot(&moved) };
         let force = WorkingForce {
             gap: pair.gap(),
             at: At { node, index, drive: pair.drive(when) },
@@ -274,7 +274,7 @@ impl System {
             normal,
             multiplier: event.normal,
             force: event.force,
-            tangential: std::array::from_fn(|i| event.force[i] - event.normal * normal[i]),
+            tangential: event.force - event.normal * normal,
             fixed: event.wrench.force,
             motion,
             moved,
@@ -307,26 +307,24 @@ impl System {
 
     /// Half the displacement of a node relative to its surface over the last two steps (m), in the directions of the node.
     #[inline(always)]
-    pub(crate) fn relative_motion(&self, event: &ContactEvent, when: When) -> [f64; 3] {
+    pub(crate) fn relative_motion(&self, event: &ContactEvent, when: When) -> Vector3 {
         let structure = &self.structures[event.structure];
         let now = structure.vector3(structure.modes().displacement(), event.node, event.sector);
         let oldest = structure.vector3(&structure.history.passing.oldest, event.node, event.sector);
-        let moved: [f64; 3] = std::array::from_fn(|i| 0.5 * (now[i] - oldest[i]));
+        let moved = 0.5 * (now - oldest);
         let pair = &self.pairs[event.pair];
         if pair.carrier().is_none() { moved } else { self.less_of_carrier(event, when, moved) }
     }
 
     /// Not inlined, because contacts on rigid surfaces never call it.
     #[inline(never)]
-    fn less_of_carrier(&self, event: &ContactEvent, when: When, moved: [f64; 3]) -> [f64; 3] {
+    fn less_of_carrier(&self, event: &ContactEvent, when: When, moved: Vector3) -> Vector3 {
         let (pair, index) = (&self.pairs[event.pair], self.structures[event.structure].index(event.node, event.sector));
-        let Some(surface) = pair.carried() else { return moved };
-        let under = &self.structures[surface.1.structure];
-        let (now, oldest) = (under.modes().displacement(), &under.history.passing.oldest);
-        let frame = pair.frame(index, pair.drive(when).rotor_angle);
         let place = self.geometry_of(event, when).places[index];
-        let carried = at_place(surface, place, frame, |row| 0.5 * (now[row] - oldest[row]));
-        std::array::from_fn(|i| moved[i] - carried[i])
+        let Some(spot) = pair.spot(index, place, pair.drive(when).rotor_angle) else { return moved };
+        let under = &self.structures[spot.carrier.structure];
+        let (now, oldest) = (under.modes().displacement(), &under.history.passing.oldest);
+        moved - spot.interpolate(|row| 0.5 * (now[row] - oldest[row]))
     }
 }
 

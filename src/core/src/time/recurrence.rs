@@ -2,7 +2,7 @@
 
 use super::Stepper;
 use crate::geometry::PrescribedMotion;
-use crate::system::{Bodies, GroupSolution, StepFailure, System};
+use crate::system::{Bodies, GroupSolution, SearchStart, StepFailure, System};
 
 /// Denormals are flushed every this many steps.
 const FLUSH_EVERY: u64 = 512;
@@ -13,10 +13,10 @@ pub struct Recurrence;
 
 impl Stepper for Recurrence {
     fn step(&mut self, system: &mut System, drives: &[PrescribedMotion]) -> Result<(), StepFailure> {
-        let (delays_contact, ledger) = (system.settings.scheme.properties().delays_contact, system.settings.ledger);
+        let scheme = system.settings.scheme;
         // Eq. 9: predict all structures without new contact forces.
         for structure in &mut system.structures {
-            structure.predict(delays_contact, ledger);
+            structure.predict(scheme);
         }
         system.check_travel()?;
         // Eqs 3 and 10: gaps at the predicted positions.
@@ -24,11 +24,13 @@ impl Stepper for Recurrence {
         for (pair, drive) in system.pairs.iter_mut().zip(drives) {
             pair.move_to(drive, step);
         }
-        system.find_gaps(true);
+        system.find_gaps(SearchStart::PreviousStep);
         system.check_edges()?;
         // Eq. 11: contact forces that remove the penetration, and their effects, group by group.
         system.retire_events();
-        let mut bodies = Bodies { structures: &mut system.structures, pairs: &system.pairs, delays_contact, ledger };
+        let (structures, pairs, delays_contact) =
+            (&mut system.structures[..], &system.pairs[..], scheme.properties().delays_contact);
+        let mut bodies = Bodies { structures, pairs, delays_contact };
         for (group, ledger) in system.groups.iter_mut().zip(&mut system.counted.ledgers) {
             let (events, factorisations) = (&mut system.events.now, &mut system.counted.factorisations);
             group.solve(

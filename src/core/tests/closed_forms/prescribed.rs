@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use nalgebra::{DMatrix, DVector};
 use tiprub_core::geometry::open::{OpenGap, OpenSurface};
 use tiprub_core::geometry::surface_spline::SurfaceSpline;
-use tiprub_core::geometry::{FixedGap, GapLaw, PrescribedMotion};
+use tiprub_core::geometry::{FixedGap, GapLaw, PrescribedMotion, Vector3};
 use tiprub_core::modes::modal::ModalModel;
 use tiprub_core::modes::sectors::SectorModel;
 use tiprub_core::scene::method::{Scheme, Solver};
@@ -328,7 +328,7 @@ fn swinging_blade(scheme: Scheme, friction: f64, settings: SystemSettings) -> Sy
     let modes = [(SWING, 0, 1.0), (PRESS, 2, 1.0), (1e4, 0, 1e4 * SOFT.sqrt()), (1e4, 2, 1e4 * SOFT.sqrt())];
     let delayed = scheme == Scheme::MasslessBoundary;
     let model = if delayed { masses(&modes, 3, 2) } else { masses(&modes[..2], 3, 0) };
-    let law = FixedGap { normals: vec![[0.0, 0.0, 1.0]], gaps: vec![-DEPTH], sliding: vec![[0.0; 3]] };
+    let law = FixedGap { normals: vec![Vector3::z()], gaps: vec![-DEPTH], sliding: vec![Vector3::zeros()] };
     System::new(&model, 1, GapLaw::Fixed(law), friction, settings)
 }
 
@@ -341,7 +341,7 @@ fn swinging_plane(scheme: Scheme, friction: f64, settings: SystemSettings) -> Sy
         (0..16).map(|index| [0.05 * f64::from(index / 4) - 0.075, 0.05 * f64::from(index % 4) - 0.075, 0.0]).collect();
     let surface = SurfaceSpline::open(&grid, 4, 4, Interpolation::Spline).unwrap();
     let plane = masses(&[(SWING, 0, 1.0)], 48, 0);
-    let positions = vec![[0.0, 0.0, -DEPTH], [0.1, 0.0, 0.0]];
+    let positions = vec![-DEPTH * Vector3::z(), 0.1 * Vector3::x()];
     let gap = GapLaw::Open(Box::new(OpenGap::new(positions, vec![0], OpenSurface::new(surface))));
     let touching = StructureParts::Touching(SectorModel::Uncoupled(&model, 1), Box::default());
     let carrier = Some(SurfaceCarrier { structure: 1, first_row: 0 });

@@ -4,7 +4,7 @@
 
 use std::f64::consts::TAU;
 
-use tiprub_core::geometry::dot;
+use tiprub_core::geometry::Vector3;
 use tiprub_core::geometry::surface_spline::{ClosestPoint, SurfaceSpline};
 use tiprub_core::scene::settings::{Closure, Interpolation};
 pub use tiprub_test_models::SeededRandom;
@@ -83,9 +83,8 @@ pub fn spline(points: &[[f64; 3]], around: usize, along: usize) -> SurfaceSpline
     SurfaceSpline::new(points, around, along, Closure::Smooth, Interpolation::Spline).unwrap()
 }
 
-pub fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
-    let apart: [f64; 3] = std::array::from_fn(|i| a[i] - b[i]);
-    dot(apart, apart).sqrt()
+pub fn distance(a: impl Into<Vector3>, b: impl Into<Vector3>) -> f64 {
+    (a.into() - b.into()).norm()
 }
 
 pub fn place(p: usize, q: usize, s: f64, t: f64) -> ClosestPoint {

@@ -3,7 +3,7 @@
 #![allow(dead_code, reason = "each test binary uses its part")]
 
 use nalgebra::DMatrix;
-use tiprub_core::geometry::{FixedGap, GapLaw};
+use tiprub_core::geometry::{FixedGap, GapLaw, Vector3};
 use tiprub_core::limits::massless::{MasslessCheck, QUIET};
 use tiprub_core::modes::bank::BankOptions;
 use tiprub_core::modes::modal::ModalModel;
@@ -103,7 +103,7 @@ pub fn single(modes: &[(f64, f64)], quasi_static: usize) -> ModalModel {
 
 /// Returns one node against a plane normal to x; `normal` is +1 if the plane is below it, −1 if it is above.
 pub fn against_plane(model: &ModalModel, methods: (Scheme, Solver), normal: f64, gap: f64, loads: bool) -> System {
-    let law = FixedGap { normals: vec![[normal, 0.0, 0.0]], gaps: vec![gap], sliding: vec![[0.0; 3]] };
+    let law = FixedGap { normals: vec![normal * Vector3::x()], gaps: vec![gap], sliding: vec![Vector3::zeros()] };
     let settings = SystemSettings { scheme: methods.0, solver: methods.1, ledger: true };
     let bank = BankOptions { loads, ..BankOptions::default() };
     System::alone(SectorModel::Uncoupled(model, 1), bank, GapLaw::Fixed(law), 0.0, settings)
@@ -119,7 +119,7 @@ pub fn set_samples(system: &mut System, model: &ModalModel, mode: usize, now: f6
 
 /// Returns the step of massless-boundary, at most `largest` (s), at which opening and closing contact gains no energy.
 pub fn quiet_step(model: &ModalModel, largest: f64) -> f64 {
-    let check = MasslessCheck { model, normals: vec![[1.0, 0.0, 0.0]], slaves: Vec::new() };
+    let check = MasslessCheck { model, normals: vec![Vector3::x()], slaves: Vec::new() };
     let limit = check.limit(1e3 * largest).unwrap();
     (0.95 * (QUIET * limit.closed).min(limit.usable)).min(largest)
 }

@@ -320,7 +320,7 @@ fn rejects_output_that_no_pair_provides() {
 /// Messages identify the item by its number or its name.
 #[test]
 fn messages_name_the_contact_surface_or_structure() {
-    let reported = |change: fn(&mut Scene)| Simulation::new(&two(change)).unwrap_err().to_string();
+    let reported = |change: fn(&mut Scene)| Simulation::new(two(change)).unwrap_err().to_string();
     for (beginning, change) in [
         ("contact[2].gap: ", (|scene| scene.settings.contacts[1].gap = 0.03) as fn(&mut Scene)),
         ("contact[2].sector_gaps: ", |scene| scene.settings.contacts[1].sector_gaps = vec![1e-4; 2]),

@@ -1,7 +1,7 @@
 //! The paper's equations with dense matrices against the modal form of the core: equal results.
 
 use nalgebra::{DMatrix, DVector};
-use tiprub_core::geometry::{FixedGap, GapLaw, PrescribedMotion, dot};
+use tiprub_core::geometry::{FixedGap, GapLaw, PrescribedMotion, Vector3};
 use tiprub_core::modes::modal::ModalModel;
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::rom::Rom;
@@ -32,11 +32,11 @@ fn a_thousand_contact_steps_agree_to_rounding() {
     let rom = rom(&mut numbers);
     let model = ModalModel::from_rom(&rom, DAMPING).unwrap();
     let step = 0.2 / model.largest_frequency();
-    let normals = vec![[0.6, 0.0, 0.8]; CONTACTS];
-    let tangent = [0.0, 1.0, 0.0];
+    let normals = vec![Vector3::new(0.6, 0.0, 0.8); CONTACTS];
+    let tangent = Vector3::y();
     // Sliding so fast that vibration does not turn the slip direction by even a rounding error: the case that the paper
     // assumes.
-    let sliding = vec![[0.0, 1e18, 0.0]; CONTACTS];
+    let sliding = vec![1e18 * tangent; CONTACTS];
     // Two nodes are pressed against the obstacle at rest, one touches intermittently.
     let gaps = [-1e-4, 0.1e-4, -0.5e-4];
     let law = GapLaw::Fixed(FixedGap { normals: normals.clone(), gaps: gaps.to_vec(), sliding });
@@ -68,13 +68,13 @@ fn a_thousand_contact_steps_agree_to_rounding() {
         physical(&system, false),
         physical(&system, true),
     );
-    let direction = |node: usize| -> [f64; 3] { std::array::from_fn(|i| normals[node][i] - FRICTION * tangent[i]) };
-    let column = |vector: &dyn Fn(usize) -> [f64; 3]| {
+    let direction = |node: usize| normals[node] - FRICTION * tangent;
+    let column = |vector: &dyn Fn(usize) -> Vector3| {
         DMatrix::from_fn(ORDER, CONTACTS, |row, node| if row / 3 == node { vector(node)[row % 3] } else { 0.0 })
     };
     let normal = column(&|node| normals[node]);
     let slip = column(&direction);
-    assert!(dot(normals[0], tangent).abs() < 1e-15);
+    assert!(normals[0].dot(&tangent).abs() < 1e-15);
     let gaps = DVector::from_row_slice(&gaps);
     let (mut contact_steps, mut steps, mut worst, mut scale) = (0, 0, 0.0_f64, 0.0_f64);
     while contact_steps < 1000 {

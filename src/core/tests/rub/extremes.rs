@@ -1,6 +1,7 @@
 //! Extreme cases: each gives a correct answer or an error that states the reason.
 
 use proptest::prelude::*;
+use tiprub_core::geometry::Vector3;
 use tiprub_core::scene::method::Scheme;
 use tiprub_core::scene::settings::{LoadSettings, Shape, SplineSettings};
 use tiprub_core::{CoSimulation, Scene, Simulation};
@@ -363,11 +364,15 @@ fn rejects_flanks_steeper_than_45_degrees() {
         for (degrees, answered) in [(0.0_f64, true), (44.9, true), (45.1, false), (80.0, false), (100.0, false)] {
             for sense in [1.0, -1.0] {
                 let (sine, cosine) = degrees.to_radians().sin_cos();
-                assert_eq!(law.is_plausible(0, -1e-6, [-cosine, sense * sine, 0.0]), answered, "{kind}, {degrees}°");
+                assert_eq!(
+                    law.is_plausible(0, -1e-6, Vector3::new(-cosine, sense * sine, 0.0)),
+                    answered,
+                    "{kind}, {degrees}°"
+                );
             }
         }
         // A tenth of the radius deep.
-        let normal = [-1.0, 0.0, 0.0];
+        let normal = -Vector3::x();
         assert!(law.is_plausible(0, -0.0249, normal) && !law.is_plausible(0, -0.0251, normal), "{kind}");
     }
     // A node moves around the circumference and meets a tooth where its height is the clearance, 0.356 mm: 60 % of the

@@ -85,9 +85,9 @@ fn forces_and_torque_are_in_the_fixed_frame() {
         for event in simulation.system().events() {
             let [r, theta, _] = nodes[event.node].position;
             // Contact point of the step: the circumferential displacement is an arc of the undeformed radius.
-            let [outwards, around, _] = event.point;
+            let [outwards, around, _] = event.point.into();
             let theta = theta + std::f64::consts::TAU * event.sector as f64 / 12.0 + angle + around / r;
-            let [radial, conjugate, axial] = event.force;
+            let [radial, conjugate, axial] = event.force.into();
             let (tangential, r) = (conjugate * r / (r + outwards), r + outwards);
             let (fx, fy) =
                 (radial * theta.cos() - tangential * theta.sin(), radial * theta.sin() + tangential * theta.cos());

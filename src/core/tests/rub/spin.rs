@@ -83,7 +83,7 @@ fn whirl_has_the_closed_form_frequency() {
                 let mut bank = bank(scheme, stiffening, coriolis);
                 bank.set_step(scheme, step);
                 start(&mut bank, rate);
-                (0..steps).for_each(|_| bank.predict(true));
+                (0..steps).for_each(|_| bank.predict());
                 distance(&bank, rate * f64::from(steps) * step)
             };
             let (coarse, fine) = (error(4e-6, 5000), error(2e-6, 10_000));
@@ -95,7 +95,7 @@ fn whirl_has_the_closed_form_frequency() {
             let mut bank = bank(scheme, stiffening, coriolis);
             start(&mut bank, rate);
             let before = energy(&bank);
-            (0..1_000_000).for_each(|_| bank.predict(true));
+            (0..1_000_000).for_each(|_| bank.predict());
             let drift = energy(&bank) / before - 1.0;
             assert!(drift.abs() < 1e-9, "{scheme:?}: {drift:e}");
         }
@@ -113,7 +113,7 @@ fn whirl_continues_across_step_size_changes() {
             // Changes to longer steps are more frequent than changes back, so that their effects do not cancel.
             bank.resample(Scheme::ModalExact, [4e-7, 8e-7, 1.6e-6][block % 3], &[]);
             for _ in 0..5 {
-                bank.predict(true);
+                bank.predict();
                 time += bank.step();
             }
             alone = alone.max(distance(&bank, rate * time));

@@ -2,7 +2,7 @@
 //! angle, every input has its work, and the forces on master and slave are opposite.
 
 use tiprub_core::geometry::wrench::{At, MotionIncrement};
-use tiprub_core::geometry::{GapLaw, PrescribedMotion};
+use tiprub_core::geometry::{GapLaw, PrescribedMotion, Vector3};
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::settings::{PatchSettings, Shape, SplineSettings};
 use tiprub_core::{CoSimulation, Scene, Simulation};
@@ -109,7 +109,7 @@ fn looked(
     lanes: usize,
     drive: &PrescribedMotion,
     displacement: &[f64],
-) -> (f64, [f64; 3], Vec<tiprub_core::geometry::surface_spline::ClosestPoint>) {
+) -> (f64, Vector3, Vec<tiprub_core::geometry::surface_spline::ClosestPoint>) {
     let mut geometry = law.geometry(lanes);
     let mut gap = vec![f64::INFINITY; law.nodes() * lanes];
     law.evaluate(drive, displacement, &[], None, &mut geometry, &mut gap);
@@ -128,7 +128,7 @@ fn normals_and_motions_are_the_derivatives_of_the_gap() {
             rotor_angle: 1.4,
             shape_factor: 1.3,
             shape_rotation: 0.05,
-            shaft: [4e-4, -3e-4, 2e-4],
+            shaft: Vector3::new(4e-4, -3e-4, 2e-4),
             ..PrescribedMotion::default()
         };
         // At a gap of zero the length of the gradient is irrelevant.
@@ -136,20 +136,17 @@ fn normals_and_motions_are_the_derivatives_of_the_gap() {
         let drive = PrescribedMotion { radius_change: gap / normal[0], ..drive };
         let (gap, normal, places) = looked(&mut law, lanes, &drive, &displacement);
         let at = At { node: 0, index: 0, drive: &drive };
-        let moved = [0, 1, 2].map(|component| displacement[component * lanes]);
+        let moved = [0, 1, 2].map(|component| displacement[component * lanes]).into();
         let point = law.contact_point(at, moved, places.get(at.index).copied().unwrap_or_default());
         // The work of any force on a moving shaft is equal in both coordinates.
-        let (force, shaft) = ([0.3, -0.7, 0.4], [2e-4, 5e-4, -3e-4]);
-        let work = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let (force, shaft) = (Vector3::new(0.3, -0.7, 0.4), Vector3::new(2e-4, 5e-4, -3e-4));
         let own = law.shaft_motion(at, point, &MotionIncrement { shaft, ..MotionIncrement::default() });
         let acting = law.wrench(at, point, force);
-        let (own, fixed) = (work(force, own), work(acting.force, shaft));
+        let (own, fixed) = (force.dot(&own), acting.force.dot(&shaft));
         assert!((own / fixed - 1.0).abs() < 1e-12, "{}: {own:e} {fixed:e}", feature.0);
         // The moment is that of the force at the contact point, about the shaft centre.
-        let ([x, y, z], [fx, fy, fz]) = (std::array::from_fn(|i| acting.point[i] - drive.shaft[i]), acting.force);
-        for (reported, found) in acting.moment.into_iter().zip([y * fz - z * fy, z * fx - x * fz, x * fy - y * fx]) {
-            assert!((reported - found).abs() < 1e-12, "{}: {:?}, {found}", feature.0, acting.moment);
-        }
+        let found = (acting.point - drive.shaft).cross(&acting.force);
+        assert!((acting.moment - found).amax() < 1e-12, "{}: {:?}, {found:?}", feature.0, acting.moment);
         let wrench = law.wrench(at, point, normal);
         let surface = |motion: MotionIncrement| {
             -law.surface_motion(at, point, normal, places.get(at.index).copied().unwrap_or_default(), &motion)
@@ -202,7 +199,7 @@ fn friction_heat_goes_to_the_patch_facing_the_node() {
                 let undisplaced = node[1]
                     + std::f64::consts::TAU * event.sector as f64 / 12.0
                     + system.pairs()[0].drive_now().rotor_angle;
-                let ([u, v, _], [x, y, _]) = (event.point, system.pairs()[0].drive_now().shaft);
+                let ([u, v, _], [x, y, _]) = (event.point.into(), system.pairs()[0].drive_now().shaft.into());
                 let angle = undisplaced + v / node[0];
                 let place = [(node[0] + u) * angle.cos() + x, (node[0] + u) * angle.sin() + y];
                 // Quarters, starting at θ = 0.

@@ -3,7 +3,7 @@
 #![allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 
 use crate::casings::{SeededRandom, assert_below, distance};
-use tiprub_core::geometry::dot;
+use tiprub_core::geometry::Vector3;
 use tiprub_core::geometry::surface_spline::{ClosestPoint, Projection, SurfaceSpline};
 use tiprub_core::scene::settings::Interpolation;
 use tiprub_reference::surface::{SplineSurface, SurfaceKind};
@@ -57,17 +57,17 @@ fn interpolation_and_forces_do_equal_work() {
                 let weights = surface.weights(place);
                 partition = partition.max((weights.iter().map(|(_, weight)| weight).sum::<f64>() - 1.0).abs());
                 // Work of a force at the point on displacements of the data points, in both forms.
-                let (force, mut forces) = (random.vector(1.0), vec![[0.0; 3]; around * along]);
-                let moved: Vec<[f64; 3]> = (0..around * along).map(|_| random.vector(1.0)).collect();
+                let (force, mut forces) = (Vector3::from(random.vector(1.0)), vec![Vector3::zeros(); around * along]);
+                let moved: Vec<Vector3> = (0..around * along).map(|_| random.vector(1.0).into()).collect();
                 let mut control = moved.clone();
                 surface.interpolate(&mut control);
                 let mut direct = 0.0;
                 for (index, weight) in weights.iter() {
-                    direct += weight * dot(force, control[index]);
-                    forces[index] = force.map(|value| weight * value);
+                    direct += weight * force.dot(&control[index]);
+                    forces[index] = weight * force;
                 }
                 surface.transfer(&mut forces);
-                let back: f64 = forces.iter().zip(&moved).map(|(force, moved)| dot(*force, *moved)).sum();
+                let back: f64 = forces.iter().zip(&moved).map(|(force, moved)| force.dot(moved)).sum();
                 work = work.max((direct - back).abs());
             }
         }
@@ -87,12 +87,12 @@ fn the_second_derivative_vanishes_across_all_four_edges() {
             let x = 0.2 * f64::from(index);
             for q in 0..along - 1 {
                 for (p, s) in [(0, 0.0), (around - 2, 1.0)] {
-                    off = off.max(distance(surface.evaluate(place(p, q, s, x)).d_ss, [0.0; 3]));
+                    off = off.max(surface.evaluate(place(p, q, s, x)).d_ss.norm());
                 }
             }
             for p in 0..around - 1 {
                 for (q, t) in [(0, 0.0), (along - 2, 1.0)] {
-                    off = off.max(distance(surface.evaluate(place(p, q, x, t)).d_tt, [0.0; 3]));
+                    off = off.max(surface.evaluate(place(p, q, x, t)).d_tt.norm());
                 }
             }
         }
@@ -143,20 +143,20 @@ fn closest_points_and_gaps_match_the_reference() {
         for _ in 0..3000 {
             let start = place(random.below(around - 1), random.below(along - 1), random.unit(), random.unit());
             let foot = surface.evaluate(start);
-            let Projection::Found { normal, .. } = surface.project(foot.point, start) else { panic!("on the surface") };
+            let Projection::Found { gap, .. } = surface.project(foot.point, start) else { panic!("on the surface") };
             let height = random.within(-1e-3, 1e-3);
-            let x: [f64; 3] = std::array::from_fn(|i| foot.point[i] + height * normal[i]);
+            let x = foot.point + height * gap.normal;
             let cold = surface.locate(x);
-            let Projection::Found { place, normal, gap, .. } = surface.project(x, cold) else { continue };
-            let [s, t] = parameters(place);
-            let Some(theirs) = other.foot(x, &carriers, [t, s]) else { continue };
+            let Projection::Found { gap, .. } = surface.project(x, cold) else { continue };
+            let [s, t] = parameters(gap.foot);
+            let Some(theirs) = other.foot(x.into(), &carriers, [t, s]) else { continue };
             found += 1;
-            gaps = gaps.max((gap - theirs.gap).abs());
+            gaps = gaps.max((gap.distance - theirs.gap).abs());
             // On a crease between facets both normals are correct.
             let on_crease =
-                kind == Interpolation::Facets && [place.s, place.t].iter().any(|x| *x < 1e-9 || *x > 1.0 - 1e-9);
+                kind == Interpolation::Facets && [gap.foot.s, gap.foot.t].iter().any(|x| *x < 1e-9 || *x > 1.0 - 1e-9);
             if !on_crease {
-                normals = normals.max(distance(normal, theirs.normal));
+                normals = normals.max(distance(gap.normal, theirs.normal));
             }
         }
         println!("{kind:?}: {found} of 3000 places");
@@ -173,10 +173,10 @@ fn normal_direction_follows_grid_orientation() {
     for kind in KINDS {
         let surface = SurfaceSpline::open(&points, 4, 3, kind).unwrap();
         for z in [-0.2, 0.3] {
-            let x = [1.3, 0.8, z];
-            let Projection::Found { point, normal, gap, .. } = surface.project(x, surface.locate(x)) else { panic!() };
-            assert!(distance(point, [1.3, 0.8, 0.0]) < 1e-14 && distance(normal, [0.0, 0.0, -1.0]) < 1e-15);
-            assert!((gap + z).abs() < 1e-15, "{gap}");
+            let x = Vector3::new(1.3, 0.8, z);
+            let Projection::Found { point, gap } = surface.project(x, surface.locate(x)) else { panic!() };
+            assert!(distance(point, [1.3, 0.8, 0.0]) < 1e-14 && distance(gap.normal, -Vector3::z()) < 1e-15);
+            assert!((gap.distance + z).abs() < 1e-15, "{gap:?}");
         }
     }
 }
@@ -187,17 +187,19 @@ fn nodes_beyond_any_edge_are_off_the_surface() {
     for kind in KINDS {
         let surface = SurfaceSpline::open(&points, 4, 3, kind).unwrap();
         let beyond =
-            |x: [f64; 3], start: ClosestPoint| matches!(surface.project(x, start), Projection::BeyondEdge { .. });
+            |x: Vector3, start: ClosestPoint| matches!(surface.project(x, start), Projection::BeyondEdge { .. });
         for (x, y) in
             [(-0.1, 1.0), (3.1, 1.0), (1.5, -0.1), (1.5, 2.1), (-0.1, -0.1), (3.2, 2.2), (40.0, 1.0), (1.0, -70.0)]
         {
-            for start in [surface.locate([x, y, 0.1]), place(1, 1, 0.5, 0.5)] {
-                assert!(beyond([x, y, 0.1], start), "{kind:?}: ({x}, {y}) from {start:?}");
+            let node = Vector3::new(x, y, 0.1);
+            for start in [surface.locate(node), place(1, 1, 0.5, 0.5)] {
+                assert!(beyond(node, start), "{kind:?}: ({x}, {y}) from {start:?}");
             }
         }
         // A point exactly on an edge is still on the surface.
         for (x, y) in [(0.0, 1.0), (3.0, 0.4), (1.2, 0.0), (2.9, 2.0), (0.0, 0.0), (3.0, 2.0)] {
-            assert!(!beyond([x, y, 0.1], surface.locate([x, y, 0.1])), "{kind:?}: ({x}, {y})");
+            let node = Vector3::new(x, y, 0.1);
+            assert!(!beyond(node, surface.locate(node)), "{kind:?}: ({x}, {y})");
         }
     }
 }
@@ -206,18 +208,17 @@ fn nodes_beyond_any_edge_are_off_the_surface() {
 fn warm_starts_follow_a_node_across_the_surface_and_off_it() {
     for kind in KINDS {
         let (surface, points) = open(9, 41, kind);
-        let (first, last) = (points[4], points[40 * 9 + 4]);
-        let along = |x: f64, i: usize| first[i] + x * (last[i] - first[i]);
+        let [first, last] = [4, 40 * 9 + 4].map(|index| Vector3::from(points[index]));
         let mut place = surface.locate(first);
         let (mut found, mut left) = (0, 0);
         for step in 0..2000 {
             let x = -0.5 + f64::from(step) * 1e-3;
-            let point = [along(x, 0), along(x, 1), along(x, 2) + 2e-3];
+            let point = first + x * (last - first) + 2e-3 * Vector3::z();
             let cold = surface.project(point, surface.locate(point));
             match (surface.project(point, place), cold) {
-                (Projection::Found { place: next, gap, .. }, Projection::Found { gap: cold, .. }) => {
-                    assert!((gap - cold).abs() < 1e-14, "{kind:?} at {x}: {gap} and {cold}");
-                    (place, found) = (next, found + 1);
+                (Projection::Found { gap, .. }, Projection::Found { gap: cold, .. }) => {
+                    assert!((gap.distance - cold.distance).abs() < 1e-14, "{kind:?} at {x}: {gap:?} and {cold:?}");
+                    (place, found) = (gap.foot, found + 1);
                 }
                 (Projection::BeyondEdge { place: next }, Projection::BeyondEdge { .. }) => {
                     (place, left) = (next, left + 1);
@@ -236,16 +237,18 @@ fn projects_onto_distant_surfaces() {
         let mut random = SeededRandom(23);
         let mut off = 0.0_f64;
         for _ in 0..2000 {
-            let x = random.vector(30.0);
+            let x = Vector3::from(random.vector(30.0));
             match surface.project(x, surface.locate(x)) {
                 Projection::Lost => panic!("{kind:?}: lost {x:?}"),
                 Projection::BeyondEdge { .. } => {}
                 // On a crease between facets the node is not on the normal.
-                Projection::Found { point, gap, .. } if kind == Interpolation::Facets => {
-                    assert!(gap.abs() <= distance(x, point) * (1.0 + 1e-14), "{gap} m, {} m", distance(x, point));
-                }
-                Projection::Found { point, gap, .. } => {
-                    off = off.max((distance(x, point) - gap.abs()).abs() / gap.abs())
+                Projection::Found { point, gap } => {
+                    let (gap, distance) = (gap.distance.abs(), distance(x, point));
+                    if kind == Interpolation::Facets {
+                        assert!(gap <= distance * (1.0 + 1e-14), "{gap} m, {distance} m");
+                    } else {
+                        off = off.max((distance - gap).abs() / gap);
+                    }
                 }
             }
         }

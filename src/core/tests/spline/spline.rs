@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 
 use crate::casings::*;
 use crate::guide::print_row;
-use tiprub_core::geometry::dot;
+use tiprub_core::geometry::Vector3;
 use tiprub_core::geometry::surface_spline::{ClosestPoint, Evaluation, REACH, SurfaceSpline};
 use tiprub_core::scene::settings::{Closure, Interpolation};
 
@@ -19,10 +19,7 @@ fn weights_sum_to_one_and_are_the_derivative_of_the_point() {
             let place = anywhere(&mut random, &surface);
             let weights = surface.weights(place);
             unity = unity.max((weights.values[..weights.len].iter().sum::<f64>() - 1.0).abs());
-            let mut sum = [0.0; 3];
-            for (index, weight) in weights.iter() {
-                sum = std::array::from_fn(|i| sum[i] + weight * surface.control_points()[index][i]);
-            }
+            let sum: Vector3 = weights.iter().map(|(index, weight)| weight * surface.control_points()[index]).sum();
             derivative = derivative.max(distance(sum, surface.evaluate(place).point) / RADIUS);
             let mut indices = weights.indices[..weights.len].to_vec();
             indices.sort_unstable();
@@ -61,11 +58,11 @@ fn a_patch_is_the_matrix_form_of_equation_7() {
     for _ in 0..2000 {
         let (p, q, s, t) = (random.below(around), 1 + random.below(along - 3), random.unit(), random.unit());
         let (a, b) = (basis(s), basis(t));
-        let mut point = [0.0; 3];
+        let mut point = Vector3::zeros();
         for i in 0..4 {
             for j in 0..4 {
                 let control = surface.control_points()[(q + j - 1) * around + (p + i + around - 1) % around];
-                point = std::array::from_fn(|c| point[c] + a[i] * b[j] * control[c]);
+                point += a[i] * b[j] * control;
             }
         }
         error = error.max(distance(point, surface.evaluate(place(p, q, s, t)).point) / RADIUS);
@@ -92,7 +89,7 @@ fn surface_interpolates_its_data() {
     assert_below("interpolation of the data, relative", error, 8.0 * EPS);
 }
 
-fn derivatives(evaluation: &Evaluation) -> [[f64; 3]; 6] {
+fn derivatives(evaluation: &Evaluation) -> [Vector3; 6] {
     let Evaluation { point, d_s, d_t, d_ss, d_st, d_tt } = *evaluation;
     [point, d_s, d_t, d_ss, d_st, d_tt]
 }
@@ -137,7 +134,7 @@ fn second_derivative_vanishes_at_edges_and_free_ends() {
             for s in [0.0, 0.4, 0.9] {
                 for (q, t) in [(0, 0.0), (last, 1.0)] {
                     let second = surface.evaluate(place(p, q, s, t)).d_tt;
-                    edge = edge.max(dot(second, second).sqrt() / RADIUS);
+                    edge = edge.max(second.norm() / RADIUS);
                 }
             }
         }
@@ -156,10 +153,9 @@ fn second_derivative_vanishes_at_edges_and_free_ends() {
         let [first, last] = ends.map(|end| surface.evaluate(end));
         seam = seam.max(distance(first.point, last.point) / RADIUS);
         for second in [first.d_ss, last.d_ss] {
-            seam = seam.max(dot(second, second).sqrt() / RADIUS);
+            seam = seam.max(second.norm() / RADIUS);
         }
-        let cosine = dot(first.d_s, last.d_s) / (dot(first.d_s, first.d_s) * dot(last.d_s, last.d_s)).sqrt();
-        kink = kink.max(cosine.acos());
+        kink = kink.max(first.d_s.angle(&last.d_s));
     }
     assert_below("gap of the seam and S_ss there, free ends, relative", seam, 8.0 * EPS);
     println!("kink of the seam with free ends, 36 points: {:.3}°", kink.to_degrees());
@@ -180,8 +176,7 @@ fn beyond_the_edges() -> ([f64; 3], f64) {
                 let out = place(p, q, 0.4, t + outwards * REACH * (surface.along() - 1) as f64);
                 let points = surface.control_points();
                 let terms = surface.weights(out);
-                let sum = |i: usize| terms.iter().map(|(index, weight)| weight * points[index][i]).sum::<f64>();
-                let sum = std::array::from_fn(sum);
+                let sum: Vector3 = terms.iter().map(|(index, weight)| weight * points[index]).sum();
                 weights = weights.max(distance(sum, surface.evaluate(out).point) / RADIUS);
             }
         }
@@ -204,19 +199,13 @@ fn derivatives_match_the_surface_point() {
             let point =
                 |i: f64, j: f64| surface.evaluate(ClosestPoint { s: at.s + i * step, t: at.t + j * step, ..at }).point;
             // Third derivatives are constant along a parameter, so two step sizes eliminate the truncation error.
-            let first = |one: [f64; 3], other: [f64; 3], two: [f64; 3], opposite: [f64; 3]| -> [f64; 3] {
-                std::array::from_fn(|c| (8.0 * (one[c] - other[c]) - (two[c] - opposite[c])) / (12.0 * step))
+            let first = |one: Vector3, other: Vector3, two: Vector3, opposite: Vector3| {
+                (8.0 * (one - other) - (two - opposite)) / (12.0 * step)
             };
-            let second = |one: [f64; 3], other: [f64; 3]| -> [f64; 3] {
-                std::array::from_fn(|c| (one[c] - 2.0 * point(0.0, 0.0)[c] + other[c]) / (step * step))
-            };
-            let mixed: [f64; 3] = std::array::from_fn(|c| {
-                let far = |k: f64| {
-                    (point(k, k)[c] - point(k, -k)[c] - point(-k, k)[c] + point(-k, -k)[c])
-                        / (4.0 * k * k * step * step)
-                };
-                (4.0 * far(1.0) - far(2.0)) / 3.0
-            });
+            let second = |one: Vector3, other: Vector3| (one - 2.0 * point(0.0, 0.0) + other) / (step * step);
+            let far =
+                |k: f64| (point(k, k) - point(k, -k) - point(-k, k) + point(-k, -k)) / (4.0 * k * k * step * step);
+            let mixed = (4.0 * far(1.0) - far(2.0)) / 3.0;
             let expected = [
                 surface.evaluate(at).point,
                 first(point(1.0, 0.0), point(-1.0, 0.0), point(2.0, 0.0), point(-2.0, 0.0)),
@@ -240,27 +229,27 @@ fn virtual_work_is_the_same_on_the_surface_and_on_the_data() {
     for (surface, _) in every_surface() {
         let count = surface.around() * surface.along();
         for _ in 0..20 {
-            let displacement: Vec<[f64; 3]> = (0..count).map(|_| random.vector(1.0)).collect();
+            let displacement: Vec<Vector3> = (0..count).map(|_| random.vector(1.0).into()).collect();
             let mut control = displacement.clone();
             surface.interpolate(&mut control);
             let mut moved = surface.clone();
             moved.set_control_points(&control);
-            let (mut forces, mut work, mut size) = (vec![[0.0; 3]; count], 0.0, 0.0);
+            let (mut forces, mut work, mut size) = (vec![Vector3::zeros(); count], 0.0, 0.0);
             for index in 0..30 {
-                let (mut place, force) = (anywhere(&mut random, &surface), random.vector(1.0));
+                let (mut place, force) = (anywhere(&mut random, &surface), Vector3::from(random.vector(1.0)));
                 if index % 3 == 0 && place.patch[1] == 0 {
                     // Before the first ring.
                     place.t *= -REACH * (surface.along() - 1) as f64;
                 }
-                let done = dot(force, moved.evaluate(place).point);
+                let done = force.dot(&moved.evaluate(place).point);
                 work += done;
                 size += done.abs();
                 for (index, weight) in surface.weights(place).iter() {
-                    forces[index] = std::array::from_fn(|i| forces[index][i] + weight * force[i]);
+                    forces[index] += weight * force;
                 }
             }
             surface.transfer(&mut forces);
-            let on_data: f64 = forces.iter().zip(&displacement).map(|(force, by)| dot(*force, *by)).sum();
+            let on_data: f64 = forces.iter().zip(&displacement).map(|(force, by)| force.dot(by)).sum();
             worst = worst.max((on_data - work).abs() / size);
         }
     }
@@ -276,7 +265,7 @@ fn control_points_are_linear_in_the_data() {
         let mut control = surface.control_points().to_vec();
         let mut moved = points.clone();
         for (mode, amplitude) in modes.iter().zip(amplitudes) {
-            let mut image = mode.clone();
+            let mut image: Vec<Vector3> = mode.iter().map(|moved| (*moved).into()).collect();
             surface.interpolate(&mut image);
             for index in 0..points.len() {
                 for i in 0..3 {

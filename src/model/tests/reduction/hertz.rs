@@ -4,7 +4,7 @@
 use crate::guide::print_row;
 use nalgebra::DMatrix;
 use tiprub_core::Rom;
-use tiprub_core::geometry::{FixedGap, GapLaw, PrescribedMotion};
+use tiprub_core::geometry::{FixedGap, GapLaw, PrescribedMotion, Vector3};
 use tiprub_core::modes::modal::{ModalModel, NodePair};
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::system::{System, SystemSettings};
@@ -124,9 +124,9 @@ fn rom(name: &str, mass: DMatrix<f64>, stiffness: DMatrix<f64>, nodes: usize) ->
 /// above the block.
 fn law(block: &HertzBlock, approach: f64) -> GapLaw {
     GapLaw::Fixed(FixedGap {
-        normals: vec![[0.0, 0.0, -1.0]; block.distance.len()],
+        normals: vec![-Vector3::z(); block.distance.len()],
         gaps: block.distance.iter().map(|r| r * r / (2.0 * RADIUS) - approach).collect(),
-        sliding: vec![[0.0; 3]; block.distance.len()],
+        sliding: vec![Vector3::zeros(); block.distance.len()],
     })
 }
 

@@ -1,6 +1,7 @@
 //! One structure with closed sliding contact on a round casing: growth rates, solvability, and the internal step of each scheme below which all
 //! steps are accepted, found with the same checks as in the core. Longer steps may be accepted too, because friction causes growth in bands.
 
+use tiprub_core::geometry::Vector3;
 use tiprub_core::limits::{
     self, ContactDirections, Fastest, GrowthRates, judged::SetGrowth, lock_up, massless::MasslessCheck,
 };
@@ -150,7 +151,7 @@ impl<'a> SingleStructure<'a> {
 
     /// Returns the structure with radial normals, independent of the slope of the contour.
     pub fn radial(mut self) -> Self {
-        self.closed.iter_mut().flatten().for_each(|(normal, _)| *normal = [-1.0, 0.0, 0.0]);
+        self.closed.iter_mut().flatten().for_each(|(normal, _)| *normal = -Vector3::x());
         self
     }
 
@@ -365,8 +366,7 @@ impl<'a> SingleStructure<'a> {
 fn closed_contacts(rom: &Rom, slip_sign: f64) -> ContactDirections {
     let directions = rom.contact_nodes.iter().map(|node| {
         let length = node.meridional_slope.hypot(1.0);
-        let normal = [-1.0 / length, 0.0, node.meridional_slope / length];
-        (normal, [0.0, slip_sign, 0.0])
+        (Vector3::new(-1.0 / length, 0.0, node.meridional_slope / length), slip_sign * Vector3::y())
     });
     directions.collect()
 }

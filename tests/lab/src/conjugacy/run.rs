@@ -1,7 +1,7 @@
 //! One scene run step by step: forces and moments on both sides, torque against shaft work, the ledger.
 
 use tiprub_core::CoSimulation;
-use tiprub_core::geometry::{surface_spline::SurfaceSpline, wrench::Wrench};
+use tiprub_core::geometry::{Vector3, frame::PolarFrame, surface_spline::SurfaceSpline, wrench::Wrench};
 use tiprub_core::modes::sectors::Sectors;
 use tiprub_core::scene::method::Solver;
 use tiprub_core::scene::settings::{Shape, SplineSettings};
@@ -215,45 +215,45 @@ fn look(scene: &Scene, simulation: &Simulation, seen: &mut ConjugacyRun) {
         return;
     }
     seen.contacts += events.len();
-    let (mut force, mut moment, mut scale, mut axis) = ([0.0; 3], [0.0; 3], 0.0, 0.0);
+    let (mut force, mut moment, mut scale, mut axis) = (Vector3::zeros(), Vector3::zeros(), 0.0, 0.0);
     for event in events {
         let Wrench { point, force: own, .. } = event.wrench;
-        add(&mut force, 1.0, own);
-        let own_moment = cross(point, own);
-        add(&mut moment, 1.0, own_moment);
-        scale += own.iter().map(|value| value * value).sum::<f64>().sqrt();
+        let own_moment = point.cross(&own);
+        force += own;
+        moment += own_moment;
+        scale += own.norm();
         axis += own_moment[2];
     }
-    let [slave_force, slave_moment, modal] = reaction(scene, simulation);
+    let (slave_force, slave_moment, modal) = reaction(scene, simulation);
     seen.axis_moment = worse(seen.axis_moment, axis.abs() / (RADIUS * scale));
     for i in 0..3 {
         seen.force = worse(seen.force, (force[i] + slave_force[i]).abs() / scale);
         seen.moment = worse(seen.moment, (moment[i] + slave_moment[i]).abs() / (RADIUS * scale));
     }
-    seen.modal = worse(seen.modal, modal[0]);
+    seen.modal = worse(seen.modal, modal);
 }
 
 /// Returns force and moment on the touched surface, with its positions: the control points of surfaces through data
-/// points, the casing's radius at the angle of the contact for a surface of revolution. The third vector contains the
+/// points, the casing's radius at the angle of the contact for a surface of revolution. The third value is the
 /// error of modal forces.
-fn reaction(scene: &Scene, simulation: &Simulation) -> [[f64; 3]; 3] {
+fn reaction(scene: &Scene, simulation: &Simulation) -> (Vector3, Vector3, f64) {
     let system = simulation.system();
-    let (mut force, mut moment) = ([0.0; 3], [0.0; 3]);
+    let (mut force, mut moment) = (Vector3::zeros(), Vector3::zeros());
     let zeros = |structure: &Structure| vec![0.0; structure.contact_force().len()];
     let mut expected: Vec<Vec<f64>> = system.structures().iter().map(zeros).collect();
     for event in system.events() {
         let Some((surface, place, rotation)) = surface_of(simulation, event) else {
             let point = on_revolution(scene, simulation, event);
-            add(&mut force, -1.0, event.wrench.force);
-            add(&mut moment, -1.0, cross(point, event.wrench.force));
+            force -= event.wrench.force;
+            moment -= point.cross(&event.wrench.force);
             continue;
         };
         let carrier = system.pairs()[event.pair].carrier();
         for (index, weight) in surface.weights(place).iter() {
-            let point = turned(surface.control_points()[index], rotation);
-            let acts = event.wrench.force.map(|value| -weight * value);
-            add(&mut force, 1.0, acts);
-            add(&mut moment, 1.0, cross(point, acts));
+            let point = PolarFrame::new(rotation).fixed(surface.control_points()[index]);
+            let acts = -weight * event.wrench.force;
+            force += acts;
+            moment += point.cross(&acts);
             let Some(carrier) = carrier else { continue };
             if let Sectors::Uncoupled(bank) = system.structures()[carrier.structure].modes() {
                 for (component, value) in acts.iter().enumerate() {
@@ -264,7 +264,7 @@ fn reaction(scene: &Scene, simulation: &Simulation) -> [[f64; 3]; 3] {
             }
         }
     }
-    [force, moment, [modal_residual(system, &expected), 0.0, 0.0]]
+    (force, moment, modal_residual(system, &expected))
 }
 
 fn modal_residual(system: &System, expected: &[Vec<f64>]) -> f64 {
@@ -289,8 +289,8 @@ fn surface_of<'a>(
 }
 
 /// Returns the point of the casing of revolution at the angle of a contact (m).
-fn on_revolution(scene: &Scene, simulation: &Simulation, event: &ContactEvent) -> [f64; 3] {
-    let [x, y, z] = event.wrench.point;
+fn on_revolution(scene: &Scene, simulation: &Simulation, event: &ContactEvent) -> Vector3 {
+    let [x, y, z] = event.wrench.point.into();
     let (settings, drive) = (&scene.settings, simulation.system().pairs()[event.pair].drive_now());
     let node = &scene.roms[0].contact_nodes[event.node];
     let angle = y.atan2(x);
@@ -301,18 +301,5 @@ fn on_revolution(scene: &Scene, simulation: &Simulation, event: &ContactEvent) -
         + drive.radius_change
         + drive.shape_factor * shape
         + node.meridional_slope * (z - node.position[2]);
-    [radius * angle.cos(), radius * angle.sin(), z]
-}
-
-fn turned([x, y, z]: [f64; 3], angle: f64) -> [f64; 3] {
-    let (sine, cosine) = angle.sin_cos();
-    [x * cosine - y * sine, x * sine + y * cosine, z]
-}
-
-fn add(sum: &mut [f64; 3], factor: f64, term: [f64; 3]) {
-    *sum = std::array::from_fn(|i| sum[i] + factor * term[i]);
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    Vector3::new(radius * angle.cos(), radius * angle.sin(), z)
 }

@@ -1,7 +1,7 @@
 //! A block on a spring, thrown along a belt at rest, that repeatedly stops and sticks; with a closed form.
 
 use nalgebra::DMatrix;
-use tiprub_core::geometry::{FixedGap, GapLaw, PrescribedMotion};
+use tiprub_core::geometry::{FixedGap, GapLaw, PrescribedMotion, Vector3};
 use tiprub_core::limits::{self, massless};
 use tiprub_core::modes::{bank::BankOptions, modal::ModalModel, sectors::SectorModel};
 use tiprub_core::scene::method::{Scheme, Solver};
@@ -26,7 +26,7 @@ const FAST: f64 = 1e5;
 /// Contact nodes: the one on the belt, and the one with the clearance.
 const NODES: usize = 2;
 /// Outward normal of the belt.
-const NORMAL: [f64; 3] = [0.0, 0.0, 1.0];
+const NORMAL: Vector3 = Vector3::new(0.0, 0.0, 1.0);
 /// Time between samples (s), and their numbers: full study, quick form.
 const INTERVAL: f64 = 2e-3;
 const SAMPLES: [usize; 2] = [500, 100];
@@ -72,7 +72,7 @@ impl BeltCase {
         let law = GapLaw::Fixed(FixedGap {
             normals: vec![NORMAL; NODES],
             gaps: vec![-Self::pressed(), CLEARANCE],
-            sliding: vec![[0.0; 3]; NODES],
+            sliding: vec![Vector3::zeros(); NODES],
         });
         let settings = SystemSettings { scheme, solver, ledger: true };
         let sector = SectorModel::Uncoupled(&self.model, 1);

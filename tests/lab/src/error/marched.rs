@@ -4,6 +4,7 @@
 //! has no loads.
 
 use nalgebra::{DMatrix, DVector};
+use tiprub_core::geometry::{Gap, Vector3};
 use tiprub_core::modes::coordinates::ContactModes;
 use tiprub_core::modes::modal::ModalModel;
 use tiprub_core::scene::method::Scheme;
@@ -46,8 +47,8 @@ impl RigidObstacle {
 }
 
 impl Obstacle for &mut RigidObstacle {
-    fn gap(&mut self, _: usize, point: usize, moved: [f64; 3]) -> (f64, [f64; 3]) {
-        (self.gap_at(self.times[point], moved[0]), NORMAL)
+    fn gap(&mut self, _: usize, point: usize, moved: Vector3) -> Gap {
+        Gap { distance: self.gap_at(self.times[point], moved[0]), normal: NORMAL, ..Gap::NOTHING }
     }
 }
 
@@ -138,7 +139,7 @@ impl<'a> RodMarch<'a> {
             state.forces[0] = state.multipliers[0] * NORMAL[0];
         }
         state.gaps[0] = gap.max(0.0);
-        state.normals.copy_from_slice(&NORMAL);
+        state.normals.copy_from_slice(NORMAL.as_slice());
         let tolerance = tolerance * rod.length;
         let precision = (PRECISION[0] * tolerance).max(PRECISION[1] * rod.length);
         Self {

@@ -1,7 +1,7 @@
 //! Rods through the core: one structure against a fixed obstacle, stepped by [`System`] without a scene.
 
 use nalgebra::{DMatrix, DVector};
-use tiprub_core::geometry::{FixedGap, GapLaw, PrescribedMotion};
+use tiprub_core::geometry::{FixedGap, GapLaw, PrescribedMotion, Vector3};
 use tiprub_core::limits::{self, massless};
 use tiprub_core::modes::{bank::BankOptions, modal::ModalModel, sectors::SectorModel};
 use tiprub_core::scene::method::{Scheme, Solver};
@@ -13,7 +13,7 @@ use tiprub_test_models::{node, structure};
 use super::run::{StepExtremes, TimedRun};
 
 /// Normal of the only contact: the structure's first direction closes the gap.
-pub(super) const NORMAL: [f64; 3] = [-1.0, 0.0, 0.0];
+pub(super) const NORMAL: Vector3 = Vector3::new(-1.0, 0.0, 0.0);
 
 /// A rod prepared for the core.
 #[derive(Debug, Clone)]
@@ -73,7 +73,7 @@ impl CoreRod {
             massless::check(step, self.massless_limit).map_err(|error| error.to_string())?;
         }
         let gap = self.gap * (1.0 + perturbation);
-        let law = GapLaw::Fixed(FixedGap { normals: vec![NORMAL], gaps: vec![gap], sliding: vec![[0.0; 3]] });
+        let law = GapLaw::Fixed(FixedGap { normals: vec![NORMAL], gaps: vec![gap], sliding: vec![Vector3::zeros()] });
         let settings = SystemSettings { scheme, solver, ledger: true };
         let bank = BankOptions { loads: true, ..BankOptions::default() };
         let mut system = System::alone(SectorModel::Uncoupled(&self.model, 1), bank, law, 0.0, settings);

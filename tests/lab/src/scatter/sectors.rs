@@ -1,6 +1,7 @@
 //! Random sectors against a wall, without a scene: energy over very many switches, contact problems without a solution.
 
 use nalgebra::DMatrix;
+use tiprub_core::geometry::{Gap, Vector3};
 use tiprub_core::modes::coordinates::ContactModes;
 use tiprub_core::system::Effort;
 use tiprub_core::time::galerkin::{
@@ -43,16 +44,16 @@ struct ScatterWall {
 }
 
 impl Obstacle for &mut ScatterWall {
-    fn gap(&mut self, _: usize, _: usize, moved: [f64; 3]) -> (f64, [f64; 3]) {
-        (self.place - moved[0], [-1.0, 0.0, 0.0])
+    fn gap(&mut self, _: usize, _: usize, moved: Vector3) -> Gap {
+        Gap { distance: self.place - moved[0], normal: -Vector3::x(), ..Gap::NOTHING }
     }
 
     fn friction(&self, _: usize) -> f64 {
         self.friction
     }
 
-    fn slip_direction(&mut self, _: usize, _: usize, _: &SlidingState) -> [f64; 3] {
-        [0.0, 1.0, 0.0]
+    fn slip_direction(&mut self, _: usize, _: usize, _: &SlidingState) -> Vector3 {
+        Vector3::y()
     }
 }
 

@@ -4,7 +4,7 @@
 
 use super::foot::{FootPoint, HeldBound, noise};
 use super::{ClosestPoint, Ends, SurfaceSpline};
-use crate::geometry::dot;
+use crate::math::vector::Vector3;
 use crate::scene::settings::Interpolation;
 
 /// The eight neighbouring sheets.
@@ -15,7 +15,7 @@ impl SurfaceSpline {
     ///
     /// A sheet across a crease at the distance b along this one can only contain a closer point if b < |r| tan(φ/2) for a fold of angle φ:
     /// b ≤ 2|r| covers folds up to 126°.
-    pub(super) fn search_sheets(&self, x: [f64; 3], start: FootPoint) -> Option<FootPoint> {
+    pub(super) fn search_sheets(&self, x: Vector3, start: FootPoint) -> Option<FootPoint> {
         let rounding = self.rounding(x, &start);
         let mut best = start;
         // Every round lowers f, and a start on the opposite side has to cross half the facets.
@@ -71,9 +71,9 @@ impl SurfaceSpline {
     }
 
     /// Returns, for a point on a crease, the sheet whose normal is nearest to the direction of the node.
-    fn face_squarely(&self, x: [f64; 3], foot: FootPoint) -> FootPoint {
+    fn face_squarely(&self, x: Vector3, foot: FootPoint) -> FootPoint {
         let mut best = foot;
-        let squareness = |foot: &FootPoint| dot(foot.residual, foot.normal()).abs();
+        let squareness = |foot: &FootPoint| foot.residual.dot(&foot.normal()).abs();
         for sides in NEIGHBOURS {
             let stays = |axis: usize| {
                 matches!((sides[axis], foot.held[axis]), (0, _) | (-1, HeldBound::Low) | (1, HeldBound::High))

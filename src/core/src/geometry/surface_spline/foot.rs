@@ -3,7 +3,8 @@
 //! f = ½|x − S|², r = x − S: gradient −(S_s·r, S_t·r), Hessian [S_s·S_s − r·S_ss, S_s·S_t − r·S_st; …].
 
 use super::{ClosestPoint, Evaluation, Projection, SurfaceSpline};
-use crate::geometry::dot;
+use crate::geometry::Gap;
+use crate::math::vector::{Vector3, length};
 
 /// The surface is degenerate if its tangents are closer to parallel than this (squared sine).
 pub(super) const DEGENERATE: f64 = 1e-24;
@@ -27,7 +28,7 @@ pub(super) struct FootPoint {
     pub place: ClosestPoint,
     pub evaluation: Evaluation,
     /// x − S.
-    pub residual: [f64; 3],
+    pub residual: Vector3,
     /// ½|x − S|².
     pub half_square: f64,
     pub held: [HeldBound; 2],
@@ -37,33 +38,33 @@ pub(super) struct FootPoint {
 pub(super) type Room = [[f64; 2]; 2];
 
 impl FootPoint {
-    pub fn at(surface: &SurfaceSpline, x: [f64; 3], place: ClosestPoint) -> Self {
+    pub fn at(surface: &SurfaceSpline, x: Vector3, place: ClosestPoint) -> Self {
         Self::seen(x, place, surface.evaluate(place))
     }
 
     #[inline(always)]
-    pub fn seen(x: [f64; 3], place: ClosestPoint, evaluation: Evaluation) -> Self {
-        let residual: [f64; 3] = std::array::from_fn(|i| x[i] - evaluation.point[i]);
-        Self { place, evaluation, residual, half_square: 0.5 * dot(residual, residual), held: [HeldBound::No; 2] }
+    pub fn seen(x: Vector3, place: ClosestPoint, evaluation: Evaluation) -> Self {
+        let residual = x - evaluation.point;
+        Self { place, evaluation, residual, half_square: 0.5 * residual.dot(&residual), held: [HeldBound::No; 2] }
     }
 
     #[inline]
     pub fn gradient(&self) -> [f64; 2] {
-        [-dot(self.residual, self.evaluation.d_s), -dot(self.residual, self.evaluation.d_t)]
+        [-self.residual.dot(&self.evaluation.d_s), -self.residual.dot(&self.evaluation.d_t)]
     }
 
     /// First fundamental form [S_s·S_s, S_s·S_t, S_t·S_t].
     #[inline]
     pub fn metric(&self) -> [f64; 3] {
         let Evaluation { d_s, d_t, .. } = &self.evaluation;
-        [dot(*d_s, *d_s), dot(*d_s, *d_t), dot(*d_t, *d_t)]
+        [d_s.dot(d_s), d_s.dot(d_t), d_t.dot(d_t)]
     }
 
     /// Second derivatives of f [ss, st, tt] and their determinant.
     #[inline]
     pub fn hessian(&self, metric: [f64; 3]) -> ([f64; 3], f64) {
         let Evaluation { d_ss, d_st, d_tt, .. } = &self.evaluation;
-        let bend = [dot(self.residual, *d_ss), dot(self.residual, *d_st), dot(self.residual, *d_tt)];
+        let bend = [d_ss, d_st, d_tt].map(|second| self.residual.dot(second));
         let hessian: [f64; 3] = std::array::from_fn(|i| metric[i] - bend[i]);
         (hessian, hessian[0] * hessian[2] - hessian[1] * hessian[1])
     }
@@ -132,17 +133,16 @@ impl FootPoint {
 
     /// Unit normal S_t × S_s/|S_t × S_s|: around × axial points away from the axis.
     #[inline]
-    pub fn normal(&self) -> [f64; 3] {
-        let ([a, b, c], [d, e, f]) = (self.evaluation.d_t, self.evaluation.d_s);
-        let cross = [b * f - c * e, c * d - a * f, a * e - b * d];
-        let per_length = 1.0 / dot(cross, cross).sqrt();
-        cross.map(|value| value * per_length)
+    pub fn normal(&self) -> Vector3 {
+        let across = self.evaluation.d_t.cross(&self.evaluation.d_s);
+        across * (1.0 / length(across))
     }
 
     #[inline]
     pub fn found(&self) -> Projection {
         let normal = self.normal();
-        Projection::Found { place: self.place, point: self.evaluation.point, normal, gap: dot(self.residual, normal) }
+        let gap = Gap { distance: self.residual.dot(&normal), normal, foot: self.place };
+        Projection::Found { gap, point: self.evaluation.point }
     }
 }
 

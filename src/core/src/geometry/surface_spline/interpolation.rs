@@ -5,6 +5,7 @@
 //! place.
 
 use super::SurfaceSpline;
+use crate::math::vector::Vector3;
 
 /// Interpolation problem of one row of data points.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,7 +41,7 @@ impl InterpolationRow {
         diagonal[0] -= CORNER[0];
         diagonal[count - 1] -= CORNER[1] * MIRROR;
         let mut line = Self { kind: RowEnds::Facets, pivots: pivots(&diagonal) };
-        let mut image = vec![[0.0; 3]; count];
+        let mut image = vec![Vector3::zeros(); count];
         (image[0][0], image[count - 1][0]) = (CORNER[0], CORNER[1]);
         line.solve_tridiagonal(&mut image, 0, 1);
         let scale = 1.0 + image[0][0] + MIRROR * image[count - 1][0];
@@ -59,7 +60,7 @@ impl InterpolationRow {
     }
 
     /// Converts data points to control points, at `start`, `start + stride`, …
-    pub fn interpolate(&self, values: &mut [[f64; 3]], start: usize, stride: usize) {
+    pub fn interpolate(&self, values: &mut [Vector3], start: usize, stride: usize) {
         match &self.kind {
             RowEnds::Facets => {}
             RowEnds::Closed { correction } => self.solve_closed(correction, values, start, stride),
@@ -67,11 +68,11 @@ impl InterpolationRow {
                 let inner = start + stride;
                 let unknowns = self.pivots.len();
                 for index in 0..unknowns {
-                    values[inner + index * stride] = values[inner + index * stride].map(|value| 6.0 * value);
+                    values[inner + index * stride] *= 6.0;
                 }
                 if unknowns > 0 {
-                    subtract(values, inner, start);
-                    subtract(values, inner + (unknowns - 1) * stride, start + last * stride);
+                    values[inner] -= values[start];
+                    values[inner + (unknowns - 1) * stride] -= values[start + last * stride];
                 }
                 self.solve_tridiagonal(values, inner, stride);
             }
@@ -79,7 +80,7 @@ impl InterpolationRow {
     }
 
     /// Converts forces on control points to forces on data points: the transpose of [`InterpolationRow::interpolate`].
-    pub fn transfer(&self, forces: &mut [[f64; 3]], start: usize, stride: usize) {
+    pub fn transfer(&self, forces: &mut [Vector3], start: usize, stride: usize) {
         match &self.kind {
             RowEnds::Facets => {}
             RowEnds::Closed { correction } => self.solve_closed(correction, forces, start, stride),
@@ -88,38 +89,38 @@ impl InterpolationRow {
                 let unknowns = self.pivots.len();
                 self.solve_tridiagonal(forces, inner, stride);
                 if unknowns > 0 {
-                    subtract(forces, start, inner);
-                    subtract(forces, start + last * stride, inner + (unknowns - 1) * stride);
+                    forces[start] -= forces[inner];
+                    forces[start + last * stride] -= forces[inner + (unknowns - 1) * stride];
                 }
                 for index in 0..unknowns {
-                    forces[inner + index * stride] = forces[inner + index * stride].map(|value| 6.0 * value);
+                    forces[inner + index * stride] *= 6.0;
                 }
             }
         }
     }
 
-    fn solve_closed(&self, correction: &[f64], values: &mut [[f64; 3]], start: usize, stride: usize) {
+    fn solve_closed(&self, correction: &[f64], values: &mut [Vector3], start: usize, stride: usize) {
         let last = start + (self.pivots.len() - 1) * stride;
         self.solve_tridiagonal(values, start, stride);
-        let share: [f64; 3] = std::array::from_fn(|i| values[start][i] + MIRROR * values[last][i]);
+        let share = values[start] + MIRROR * values[last];
         for (index, factor) in correction.iter().enumerate() {
             let value = &mut values[start + index * stride];
-            *value = std::array::from_fn(|i| 6.0 * (value[i] - factor * share[i]));
+            *value = 6.0 * (*value - *factor * share);
         }
     }
 
     /// Solves a tridiagonal system with off-diagonals 1 by the Thomas algorithm.
-    fn solve_tridiagonal(&self, values: &mut [[f64; 3]], start: usize, stride: usize) {
-        let mut before = [0.0; 3];
+    fn solve_tridiagonal(&self, values: &mut [Vector3], start: usize, stride: usize) {
+        let mut before = Vector3::zeros();
         for (index, pivot) in self.pivots.iter().enumerate() {
             let value = &mut values[start + index * stride];
-            *value = std::array::from_fn(|i| (value[i] - before[i]) * pivot);
+            *value = (*value - before) * *pivot;
             before = *value;
         }
-        let mut after = [0.0; 3];
+        let mut after = Vector3::zeros();
         for (index, pivot) in self.pivots.iter().enumerate().rev() {
             let value = &mut values[start + index * stride];
-            *value = std::array::from_fn(|i| value[i] - pivot * after[i]);
+            *value -= *pivot * after;
             after = *value;
         }
     }
@@ -137,17 +138,13 @@ fn pivots(diagonal: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-fn subtract(values: &mut [[f64; 3]], from: usize, what: usize) {
-    values[from] = std::array::from_fn(|i| values[from][i] - values[what][i]);
-}
-
 impl SurfaceSpline {
     /// Solves the interpolation problem in place: around × along data points, or their displacements (the map is linear), become control
     /// points, or their displacements.
     ///
     /// # Panics
     /// Wrong number of values.
-    pub fn interpolate(&self, values: &mut [[f64; 3]]) {
+    pub fn interpolate(&self, values: &mut [Vector3]) {
         assert_eq!(values.len(), self.around * self.along, "one value per data point");
         (0..self.along).for_each(|ring| self.lines[0].interpolate(values, ring * self.around, 1));
         (0..self.around).for_each(|column| self.lines[1].interpolate(values, column, self.around));
@@ -158,7 +155,7 @@ impl SurfaceSpline {
     ///
     /// # Panics
     /// Wrong number of values.
-    pub fn transfer(&self, forces: &mut [[f64; 3]]) {
+    pub fn transfer(&self, forces: &mut [Vector3]) {
         assert_eq!(forces.len(), self.around * self.along, "one force per control point");
         (0..self.around).for_each(|column| self.lines[1].transfer(forces, column, self.around));
         (0..self.along).for_each(|ring| self.lines[0].transfer(forces, ring * self.around, 1));

@@ -1,23 +1,24 @@
 //! One patch: point, derivatives, and the weights of the control points.
 
 use super::{ClosestPoint, Ends, SurfaceSpline};
+use crate::math::vector::Vector3;
 use crate::scene::settings::Interpolation;
 
 /// Point and derivatives with respect to the parameters of the patch (all in m).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Evaluation {
     /// S.
-    pub point: [f64; 3],
+    pub point: Vector3,
     /// ∂S/∂s, around.
-    pub d_s: [f64; 3],
+    pub d_s: Vector3,
     /// ∂S/∂t, along the axis.
-    pub d_t: [f64; 3],
+    pub d_t: Vector3,
     /// ∂²S/∂s².
-    pub d_ss: [f64; 3],
+    pub d_ss: Vector3,
     /// ∂²S/∂s∂t.
-    pub d_st: [f64; 3],
+    pub d_st: Vector3,
     /// ∂²S/∂t².
-    pub d_tt: [f64; 3],
+    pub d_tt: Vector3,
 }
 
 /// Control points that influence a place: S = Σ `values[k]` · Q of `indices[k]`, k < `len`, for every Q.
@@ -80,8 +81,8 @@ fn combine(weights: &[f64; 4], points: &[[f64; 4]; 4]) -> [f64; 4] {
 }
 
 #[inline(always)]
-fn sum_of_three(value: [f64; 4]) -> [f64; 3] {
-    [value[0], value[1], value[2]]
+fn sum_of_three(value: [f64; 4]) -> Vector3 {
+    Vector3::new(value[0], value[1], value[2])
 }
 
 /// Independent control points that replace a window of four in one direction, with their weights.
@@ -144,15 +145,15 @@ impl SurfaceSpline {
                 rows[order][ring] = combine(&around[order], window);
             }
         }
-        let second =
-            |along: &[f64; 4], rows: &[[f64; 4]; 4]| if SECOND { sum_of_three(combine(along, rows)) } else { [0.0; 3] };
+        let sum = |t: usize, s: usize| sum_of_three(combine(&along[t], &rows[s]));
+        let second = |t: usize, s: usize| if SECOND { sum(t, s) } else { Vector3::zeros() };
         Evaluation {
-            point: sum_of_three(combine(&along[0], &rows[0])),
-            d_s: sum_of_three(combine(&along[0], &rows[1])),
-            d_t: sum_of_three(combine(&along[1], &rows[0])),
-            d_ss: second(&along[0], &rows[2]),
-            d_st: second(&along[1], &rows[1]),
-            d_tt: second(&along[2], &rows[0]),
+            point: sum(0, 0),
+            d_s: sum(0, 1),
+            d_t: sum(1, 0),
+            d_ss: second(0, 2),
+            d_st: second(1, 1),
+            d_tt: second(2, 0),
         }
     }
 
@@ -164,12 +165,12 @@ impl SurfaceSpline {
         let (a, b, c, d) = (at(0), at(1), at(width), at(width + 1));
         let r = 1.0 - s;
         Evaluation {
-            point: std::array::from_fn(|i| (1.0 - t) * (r * a[i] + s * b[i]) + t * (r * c[i] + s * d[i])),
-            d_s: std::array::from_fn(|i| (1.0 - t) * (b[i] - a[i]) + t * (d[i] - c[i])),
-            d_t: std::array::from_fn(|i| r * (c[i] - a[i]) + s * (d[i] - b[i])),
-            d_ss: [0.0; 3],
-            d_st: std::array::from_fn(|i| (d[i] - c[i]) - (b[i] - a[i])),
-            d_tt: [0.0; 3],
+            point: (1.0 - t) * (r * a + s * b) + t * (r * c + s * d),
+            d_s: (1.0 - t) * (b - a) + t * (d - c),
+            d_t: r * (c - a) + s * (d - b),
+            d_ss: Vector3::zeros(),
+            d_st: (d - c) - (b - a),
+            d_tt: Vector3::zeros(),
         }
     }
 

@@ -7,7 +7,8 @@
 
 use super::foot::{CONVEX, DEGENERATE, FootPoint, HeldBound, Room, noise, solve};
 use super::{ClosestPoint, EDGE_TOLERANCE, Ends, SurfaceSpline};
-use crate::geometry::dot;
+use crate::geometry::Gap;
+use crate::math::vector::{Vector3, length};
 use crate::scene::settings::Interpolation;
 
 /// Result of a projection.
@@ -15,15 +16,11 @@ use crate::scene::settings::Interpolation;
 pub enum Projection {
     /// The closest point lies on the surface.
     Found {
-        /// Place of the closest point; start of the next projection of this node.
-        place: ClosestPoint,
+        /// (x − S)·n, with the unit normal from the casing towards the axis. On a crease it is that of the facet whose normal is nearest
+        /// to the direction of the node. The next projection of this node starts at the foot.
+        gap: Gap,
         /// The closest point S (m).
-        point: [f64; 3],
-        /// Unit normal from the casing towards the axis. On a crease it is that of the facet whose normal is nearest to the direction of
-        /// the node.
-        normal: [f64; 3],
-        /// (x − S)·n (m), negative outside the casing.
-        gap: f64,
+        point: Vector3,
     },
     /// The node has left the surface: in z beyond the extension of the last ring, or over any of the four edges of an open surface.
     BeyondEdge {
@@ -51,7 +48,7 @@ impl SurfaceSpline {
     ///
     /// # Panics
     /// If the patch of the guess does not exist.
-    pub fn project(&self, x: [f64; 3], guess: ClosestPoint) -> Projection {
+    pub fn project(&self, x: Vector3, guess: ClosestPoint) -> Projection {
         if let Some(projection) = self.project_nearby(x, guess) {
             return projection;
         }
@@ -79,7 +76,7 @@ impl SurfaceSpline {
     /// Takes a Newton step that stays in its patch, then corrections with the same Hessian until the next one is within the tolerance:
     /// sufficient for nearly every projection of a run. Returns `None` in all other cases.
     #[inline]
-    fn project_nearby(&self, x: [f64; 3], guess: ClosestPoint) -> Option<Projection> {
+    fn project_nearby(&self, x: Vector3, guess: ClosestPoint) -> Option<Projection> {
         if self.interpolation == Interpolation::Facets {
             return None;
         }
@@ -184,8 +181,8 @@ impl SurfaceSpline {
     /// Rounding of the coordinates of x − S (m), and of the place of S. A node inside a casing is near the surface and about as far from
     /// the axis. A node that faces an open surface may be anywhere, and so may the surface: rounding of the tangents, which is that of the
     /// coordinates over a patch, moves the closest point in proportion to the distance.
-    pub(super) fn rounding(&self, x: [f64; 3], foot: &FootPoint) -> f64 {
-        let size = dot(x, x).sqrt();
+    pub(super) fn rounding(&self, x: Vector3, foot: &FootPoint) -> f64 {
+        let size = length(x);
         if self.ends != Ends::Open {
             return ROUNDING * size;
         }
@@ -194,7 +191,7 @@ impl SurfaceSpline {
     }
 
     /// Finds the minimum of f on the sheet of `start`.
-    pub(super) fn descend(&self, x: [f64; 3], start: ClosestPoint) -> Option<FootPoint> {
+    pub(super) fn descend(&self, x: Vector3, start: ClosestPoint) -> Option<FootPoint> {
         let longest = (0.125 * super::real(self.around)).max(1.0);
         let mut foot = FootPoint::at(self, x, start);
         let rounding = self.rounding(x, &foot);
@@ -221,7 +218,7 @@ impl SurfaceSpline {
     #[inline]
     fn search_line(
         &self,
-        x: [f64; 3],
+        x: Vector3,
         from: &FootPoint,
         step: [f64; 2],
         room: &Room,
@@ -266,13 +263,12 @@ mod tests {
             let patch = [random.below(24), random.below(3)];
             let mut within = || random.within(0.1, 0.9);
             let guess = ClosestPoint { patch, s: within(), t: within() };
-            let foot = FootPoint::at(&surface, [0.0; 3], guess);
-            let (normal, moved) = (foot.normal(), random.vector(2e-4));
-            let x = std::array::from_fn(|i| foot.evaluation.point[i] + 3e-4 * normal[i] + moved[i]);
+            let foot = FootPoint::at(&surface, Vector3::zeros(), guess);
+            let x = foot.evaluation.point + 3e-4 * foot.normal() + Vector3::from(random.vector(2e-4));
             let Some(Projection::Found { gap, .. }) = surface.project_nearby(x, guess) else { panic!("{guess:?}") };
             let slowly = surface.descend(x, guess).unwrap().found();
             let Projection::Found { gap: expected, .. } = slowly else { panic!("{slowly:?}") };
-            assert!((gap - expected).abs() < 1e-16, "{gap:e}, {expected:e}");
+            assert!((gap.distance - expected.distance).abs() < 1e-16, "{gap:?}, {expected:?}");
         }
     }
 }

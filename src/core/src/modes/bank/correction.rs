@@ -6,16 +6,16 @@ use crate::modes::schemes::ModeCoefficients;
 
 impl ModalBank {
     /// Adds `correction` to the modes of one sector.
-    pub(super) fn move_modes(&mut self, sector: usize, with_loss: bool) {
+    pub(super) fn move_modes(&mut self, sector: usize) {
         let correction = std::mem::take(&mut self.correction);
-        self.move_each(sector, with_loss, correction.iter(), |_, correction| *correction);
+        self.move_each(sector, correction.iter(), |_, correction| *correction);
         self.correction = correction;
     }
 
     /// Adds c φᵀf to the modes of one sector.
-    fn respond_and_move(&mut self, sector: usize, with_loss: bool) {
+    fn respond_and_move(&mut self, sector: usize) {
         let modal_force = std::mem::take(&mut self.modal_force);
-        self.move_each(sector, with_loss, modal_force.iter(), |k, force| k.compliance * force);
+        self.move_each(sector, modal_force.iter(), |k, force| k.compliance * force);
         self.modal_force = modal_force;
     }
 
@@ -23,7 +23,6 @@ impl ModalBank {
     fn move_each<'a>(
         &mut self,
         sector: usize,
-        with_loss: bool,
         values: impl Iterator<Item = &'a f64>,
         correction: impl Fn(&ModeCoefficients, &f64) -> f64,
     ) {
@@ -38,7 +37,7 @@ impl ModalBank {
             position.zip(increment).zip(before).zip(values).zip(coefficients)
         {
             let correction = correction(coefficients, value);
-            if with_loss {
+            if self.with_loss {
                 let predicted = increment[lane] + before[lane];
                 loss += coefficients.loss * correction * (2.0 * predicted + correction);
             }
@@ -70,13 +69,13 @@ impl ModalBank {
     }
 
     /// Corrects one sector for the contact `force` on its rows (N), eq. 11 of the paper.
-    pub fn correct(&mut self, sector: usize, force: &[f64], with_loss: bool) {
+    pub fn correct(&mut self, sector: usize, force: &[f64]) {
         self.project(force);
         if self.coupling.is_some() {
             self.respond(sector);
-            self.move_modes(sector, with_loss);
+            self.move_modes(sector);
         } else {
-            self.respond_and_move(sector, with_loss);
+            self.respond_and_move(sector);
         }
         let lanes = self.lanes();
         let flexibility = self.flexibility[self.set_of(sector)].as_slice();
@@ -101,10 +100,10 @@ impl ModalBank {
     }
 
     /// Corrects a single structure for contact forces given as modal forces, using the response of its rows to them.
-    pub fn correct_modal(&mut self, modal_force: &[f64], response: &[f64], with_loss: bool) {
+    pub fn correct_modal(&mut self, modal_force: &[f64], response: &[f64]) {
         self.modal_force.copy_from_slice(modal_force);
         self.respond(0);
-        self.move_modes(0, with_loss);
+        self.move_modes(0);
         for (displacement, response) in self.state.displacement.iter_mut().zip(response) {
             *displacement += response;
         }
@@ -123,7 +122,7 @@ impl ModalBank {
     }
 
     /// Applies contact forces of the previous step (`forces[row · lanes + sector]`, N) after the prediction (massless-boundary).
-    pub fn act_delayed(&mut self, forces: &[f64], with_loss: bool) {
+    pub fn act_delayed(&mut self, forces: &[f64]) {
         let (lanes, mut force) = (self.lanes(), std::mem::take(&mut self.moved));
         for sector in 0..self.sectors {
             for (row, force) in force.iter_mut().enumerate() {
@@ -131,25 +130,25 @@ impl ModalBank {
             }
             if force.iter().any(|force| *force != 0.0) {
                 self.project(&force);
-                self.act_delayed_modal_force(sector, with_loss);
+                self.act_delayed_modal_force(sector);
             }
         }
         self.moved = force;
     }
 
     /// Applies modal forces of the previous step to one sector after the prediction.
-    pub fn act_delayed_modal(&mut self, sector: usize, modal_force: &[f64], with_loss: bool) {
+    pub fn act_delayed_modal(&mut self, sector: usize, modal_force: &[f64]) {
         self.modal_force.copy_from_slice(modal_force);
-        self.act_delayed_modal_force(sector, with_loss);
+        self.act_delayed_modal_force(sector);
     }
 
-    fn act_delayed_modal_force(&mut self, sector: usize, with_loss: bool) {
+    fn act_delayed_modal_force(&mut self, sector: usize) {
         let (modes, set) = (self.modes(), self.set_of(sector));
         let coefficients = &self.coefficients[set * modes..][..modes];
         for ((correction, force), k) in self.correction.iter_mut().zip(&self.modal_force).zip(coefficients) {
             *correction = k.delayed * force;
         }
-        self.move_modes(sector, with_loss);
+        self.move_modes(sector);
         self.move_rows(sector);
     }
 

@@ -18,16 +18,16 @@ impl ModalBank {
     }
 
     /// Adds the effect of the excitation to the predicted step.
-    pub(super) fn act_excited(&mut self, with_loss: bool) {
+    pub(super) fn act_excited(&mut self) {
         let Some(loads) = self.excitation.take() else { return };
         for (sector, force) in loads.now.iter().enumerate().filter(|(_, force)| **force != 0.0) {
-            self.act_on_modes(sector, &loads.load, *force, with_loss);
+            self.act_on_modes(sector, &loads.load, *force);
         }
         self.excitation = Some(loads);
     }
 
     /// Adds the effect of `factor` times prescribed modal loads to the predicted step of one sector.
-    pub(super) fn act_on_modes(&mut self, sector: usize, loads: &[f64], factor: f64, with_loss: bool) {
+    pub(super) fn act_on_modes(&mut self, sector: usize, loads: &[f64], factor: f64) {
         let (modes, set) = (self.modes(), self.set_of(sector));
         let coefficients = &self.coefficients[set * modes..][..modes];
         for ((correction, load), k) in self.correction.iter_mut().zip(loads).zip(coefficients) {
@@ -36,7 +36,7 @@ impl ModalBank {
         if let Some(coupling) = &mut self.coupling {
             coupling.transform(set, &mut self.correction);
         }
-        self.move_modes(sector, with_loss);
+        self.move_modes(sector);
         self.move_rows(sector);
     }
 

@@ -80,10 +80,10 @@ impl ModalBank {
     }
 
     /// Adds the additional thermal loads of mistuned sectors to the predicted step.
-    pub(super) fn act_expanded(&mut self, with_loss: bool) {
+    pub(super) fn act_expanded(&mut self) {
         let Some(heat) = self.heat.take() else { return };
         for (sector, excess) in heat.excess.iter().enumerate().filter(|(_, excess)| **excess != 0.0) {
-            self.act_on_modes(sector, &heat.now, *excess, with_loss);
+            self.act_on_modes(sector, &heat.now, *excess);
         }
         self.heat = Some(heat);
     }

@@ -3,6 +3,7 @@
 use super::fourier::Synthesis;
 use super::pass::{Gather, modal_force};
 use super::{Complexes, CyclicBank, CyclicCoefficients, LANES, NOTHING};
+use crate::math::vector::strided_vector3;
 use crate::modes::schemes::{Velocity, resample};
 use crate::scene::method::Scheme;
 
@@ -96,7 +97,7 @@ impl CyclicBank {
         let (lanes, nodes) = (self.lanes, self.rows / 3);
         for sector in 0..self.model.sectors {
             for node in 0..nodes {
-                let force: [f64; 3] = std::array::from_fn(|i| forces[(3 * node + i) * lanes + sector]);
+                let force = strided_vector3(forces, 3 * node * lanes + sector, lanes);
                 self.asked.push((sector, node, force));
             }
         }

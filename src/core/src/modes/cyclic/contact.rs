@@ -3,6 +3,7 @@
 use super::fourier::Synthesis;
 use super::pass::{Gather, SpectralResponse, modal_force};
 use super::{CyclicBank, LANES};
+use crate::math::vector::Vector3;
 
 impl CyclicBank {
     /// Displacement at the contact node `row` of a sector per unit force at the contact node `column` of the sector that lies
@@ -14,9 +15,9 @@ impl CyclicBank {
     }
 
     /// Computes the effect of contact forces (sector, node, force in N) on the predicted step; [`CyclicBank::moved`] returns the result.
-    pub fn ask(&mut self, forces: impl Iterator<Item = (usize, usize, [f64; 3])>) {
+    pub fn ask(&mut self, forces: impl Iterator<Item = (usize, usize, Vector3)>) {
         self.asked.clear();
-        self.asked.extend(forces.filter(|(.., force)| force.iter().any(|component| *component != 0.0)));
+        self.asked.extend(forces.filter(|(.., force)| *force != Vector3::zeros()));
         self.asked_nodes.fill(false);
         for (_, node, _) in &self.asked {
             self.asked_nodes[*node] = true;

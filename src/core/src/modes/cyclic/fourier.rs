@@ -6,6 +6,7 @@
 //! and over odd n also give sectors N/2 ± s, and a quarter is enough.
 
 use crate::math::simd::Kernel;
+use crate::math::vector::Vector3;
 use crate::modes::bank::LANES;
 
 /// Rows that are transformed together.
@@ -57,11 +58,11 @@ impl Fourier {
 
     /// Adds the three components of a force on one sector to the spectrum Σ_s f_s e^(−2πins/N), rows `first` to `first + 2` of `rows`.
     #[inline(always)]
-    pub fn add(&self, sector: usize, first: usize, rows: usize, force: [f64; 3], spectrum: &mut [[[f64; LANES]; 2]]) {
+    pub fn add(&self, sector: usize, first: usize, rows: usize, force: Vector3, spectrum: &mut [[[f64; LANES]; 2]]) {
         let blocks = self.blocks();
         for (block, [cosines, sines]) in self.analysis[sector * blocks..][..blocks].iter().enumerate() {
             let targets = &mut spectrum[block * rows + first..][..3];
-            for ([real, imaginary], force) in targets.iter_mut().zip(force) {
+            for ([real, imaginary], force) in targets.iter_mut().zip(&force) {
                 for lane in 0..LANES {
                     real[lane] += force * cosines[lane];
                     imaginary[lane] += force * sines[lane];
@@ -237,7 +238,7 @@ mod tests {
             let mut again = vec![[[0.0; LANES]; 2]; fourier.blocks() * rows];
             for sector in 0..sectors {
                 for node in 0..2 {
-                    let force = std::array::from_fn(|i| values[(3 * node + i) * lanes + sector]);
+                    let force = [0, 1, 2].map(|i| values[(3 * node + i) * lanes + sector]).into();
                     fourier.add(sector, 3 * node, rows, force, &mut again);
                 }
             }

@@ -72,7 +72,8 @@ impl DiameterModes {
         damping_ratio: f64,
         weight: f64,
         contact_map: &DMatrix<Complex<f64>>,
-        (eigenvalues, shapes): (Vec<f64>, DMatrix<Complex<f64>>),
+        eigenvalues: &[f64],
+        shapes: DMatrix<Complex<f64>>,
     ) -> Self {
         Self {
             nodal_diameter,
@@ -102,10 +103,9 @@ impl CyclicModel {
     pub fn from_rom(rom: &Rom, damping_ratio: f64) -> Result<Self> {
         let zero = ModalModel::from_rom(rom, damping_ratio)?;
         let (sectors, complex) = (rom.sectors, |matrix: &DMatrix<f64>| matrix.map(|value| Complex::new(value, 0.0)));
-        let squares = zero.frequencies.iter().map(|frequency| frequency * frequency).collect();
+        let squares: Vec<f64> = zero.frequencies.iter().map(|frequency| frequency * frequency).collect();
         let map = complex(&rom.contact_map);
-        let mut first =
-            DiameterModes::new(0, damping_ratio, weight(0, sectors), &map, (squares, complex(&zero.shapes)));
+        let mut first = DiameterModes::new(0, damping_ratio, weight(0, sectors), &map, &squares, complex(&zero.shapes));
         // The frequencies are not computed from their squares, which would add a rounding error.
         first.frequencies = zero.frequencies;
         let mut diameters = vec![first];
@@ -120,7 +120,7 @@ impl CyclicModel {
                 (hermitian_modes(harmonic, &suffix)?, harmonic.contact_map.clone())
             };
             let weight = weight(nodal_diameter, sectors);
-            diameters.push(DiameterModes::new(nodal_diameter, damping_ratio, weight, &map, modes));
+            diameters.push(DiameterModes::new(nodal_diameter, damping_ratio, weight, &map, &modes.0, modes.1));
         }
         let model = Self { sectors, diameters };
         model.check_frequencies(rom)?;
@@ -362,7 +362,7 @@ mod tests {
         let of = |nodal_diameter: usize| {
             let Harmonic { contact_map, .. } = pencil(modes, 8);
             let shapes = hermitian_modes(&pencil(modes, 9), "_1").unwrap();
-            DiameterModes::new(nodal_diameter, 0.01, weight(nodal_diameter, sectors), &contact_map, shapes)
+            DiameterModes::new(nodal_diameter, 0.01, weight(nodal_diameter, sectors), &contact_map, &shapes.0, shapes.1)
         };
         let disk = CyclicModel { sectors, diameters: vec![of(0), of(1)] };
         let (paired, own) = (disk.paired(1), &disk.diameters[1]);

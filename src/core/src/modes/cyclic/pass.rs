@@ -6,6 +6,7 @@
 
 use super::fourier::Fourier;
 use crate::math::simd::Kernel;
+use crate::math::vector::Vector3;
 use crate::modes::bank::LANES;
 
 /// One complex value per lane: real and imaginary parts.
@@ -295,7 +296,7 @@ pub struct Gather<'a> {
     pub fourier: &'a Fourier,
     pub rows: usize,
     /// (sector, node, force).
-    pub forces: &'a [(usize, usize, [f64; 3])],
+    pub forces: &'a [(usize, usize, Vector3)],
     pub spectrum: &'a mut [Complexes],
 }
 

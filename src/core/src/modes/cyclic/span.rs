@@ -4,6 +4,7 @@
 use super::fourier::Synthesis;
 use super::pass::{Complexes, Gather, Recover, modal_force};
 use super::{CyclicBank, LANES};
+use crate::math::vector::Vector3;
 use crate::modes::coordinates::Coordinates;
 use nalgebra::DMatrix;
 
@@ -84,7 +85,7 @@ impl CyclicBank {
     }
 
     /// Computes the forces on all coordinates that contact forces (sector, node, N) cause.
-    pub fn modal_forces(&mut self, forces: impl Iterator<Item = (usize, usize, [f64; 3])>, to: &mut [f64]) {
+    pub fn modal_forces(&mut self, forces: impl Iterator<Item = (usize, usize, Vector3)>, to: &mut [f64]) {
         self.asked.clear();
         self.asked.extend(forces);
         if self.asked.is_empty() {
@@ -161,7 +162,7 @@ mod tests {
                 assert!((seen - values[row * lanes]).abs() < 1e-12 * (1.0 + seen.abs()));
             }
             let force = |sector: usize, node: usize| {
-                [0, 1, 2].map(|c| (sector as f64 + 2.3 * node as f64 + f64::from(c)).cos())
+                Vector3::from([0, 1, 2].map(|c| (sector as f64 + 2.3 * node as f64 + f64::from(c)).cos()))
             };
             let all: Vec<_> =
                 (0..sectors).flat_map(|s| (0..rows / 3).map(move |node| (s, node, force(s, node)))).collect();

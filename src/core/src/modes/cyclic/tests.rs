@@ -43,7 +43,7 @@ fn instantaneous_energy_matches_the_motion() {
     }
     let none = vec![0.0; bank.rows() * bank.lanes()];
     for _ in 0..200 {
-        bank.predict(false);
+        bank.predict();
         let (kinetic, strain) = bank.energies_now(&none);
         let off = (kinetic + strain - expected).abs() / expected;
         assert!(off < 1e-9 && kinetic >= 0.0 && strain >= 0.0, "{off:e}");
@@ -57,8 +57,8 @@ fn reset_to_rest_clears_previous_loads() {
         bank.set_step(scheme, 1e-6);
         for step in 0..5 {
             bank.loads_mut()[1] = 1e3;
-            bank.predict(true);
-            bank.ask([(3, 0, [1.0, 0.3, -0.2]), (step, 1, [-2.0, 0.0, 0.5])].into_iter());
+            bank.predict();
+            bank.ask([(3, 0, Vector3::new(1.0, 0.3, -0.2)), (step, 1, Vector3::new(-2.0, 0.0, 0.5))].into_iter());
             bank.act();
             assert!(bank.finish_loads() != 0.0);
         }
@@ -67,7 +67,7 @@ fn reset_to_rest_clears_previous_loads() {
         assert_eq!((bank.energies_now(&none), bank.collect_loss()), ((0.0, 0.0), 0.0), "{scheme:?}");
         bank.resample(scheme, 7e-7, &none);
         for _ in 0..2 {
-            bank.predict(true);
+            bank.predict();
             assert_eq!((bank.finish_loads(), bank.energies_now(&none)), (0.0, (0.0, 0.0)), "{scheme:?}");
             assert!(bank.displacement().iter().chain(bank.displacement_before()).all(|value| *value == 0.0));
         }
@@ -105,9 +105,9 @@ fn every_instruction_set_gives_the_same_bits() {
                 bank.set_step(scheme, 1e-6);
                 for step in 0..300 {
                     bank.loads_mut()[1] = 1e3;
-                    bank.predict(true);
+                    bank.predict();
                     if step % 3 > 0 {
-                        let force = [f64::from(step).cos(), 0.3, -0.2];
+                        let force = Vector3::new(f64::from(step).cos(), 0.3, -0.2);
                         let index = usize::try_from(step).unwrap();
                         let forces = [(index % sectors, index % nodes, force), (index * 5 % sectors, 0, force)];
                         bank.ask(forces.into_iter());
@@ -138,8 +138,10 @@ fn displacements_and_modes_agree_after_contact() {
     let mut bank = CyclicBank::new(&model(11, 2), false);
     bank.set_step(Scheme::ModalExact, 1e-4);
     for step in 0..200_usize {
-        bank.predict(true);
-        bank.ask([(step % 11, step % 2, [1.0, -0.4, 0.1]), (3, 0, [0.2, 0.5, -1.0])].into_iter());
+        bank.predict();
+        bank.ask(
+            [(step % 11, step % 2, Vector3::new(1.0, -0.4, 0.1)), (3, 0, Vector3::new(0.2, 0.5, -1.0))].into_iter(),
+        );
         bank.act();
         if step % 20 == 7 {
             let found = bank.displacement().to_vec();

@@ -3,10 +3,11 @@
 use super::Parameters;
 use crate::geometry::frame::PolarFrame;
 use crate::geometry::spline::SplineGap;
-use crate::geometry::{GapLaw, dot};
+use crate::geometry::{GapLaw, Vector3};
 use crate::limits::finding::{Checked, ErrorKind, Finding, Subject, WarningKind};
 use crate::limits::massless::MasslessLimit;
 use crate::limits::{self, ContactDirections, massless};
+use crate::math::vector::vector3_at;
 use crate::modes::cyclic::CyclicModel;
 use crate::modes::modal::ModalModel;
 use crate::modes::schemes::ModeCoefficients;
@@ -39,12 +40,12 @@ fn slave_at(law: &SplineGap, modes: &ModalModel, nodes: &[usize], angle: f64) ->
     for (row, &node) in nodes.iter().enumerate().filter(|(_, node)| law.nodes.contains(node)) {
         let turned = angle + law.layout.angles[node * law.layout.lanes];
         let frame = PolarFrame::new(turned);
-        let place = law.surface.locate(frame.fixed([law.layout.radii[node], 0.0, law.layout.axial[node]]));
+        let place = law.surface.locate(frame.fixed(Vector3::new(law.layout.radii[node], 0.0, law.layout.axial[node])));
         for (index, weight) in law.surface.weights(place).iter() {
             for mode in 0..modes.len() {
-                let shape = frame.local(std::array::from_fn(|i| modes.contact_modes[(3 * index + i, mode)]));
-                seen.0[(row, mode)] -= weight * dot([1.0, 0.0, 0.0], shape);
-                seen.1[(row, mode)] += weight * dot([0.0, 1.0, 0.0], shape);
+                let shape = frame.local(vector3_at(modes.contact_modes.column(mode).as_slice(), index));
+                seen.0[(row, mode)] -= weight * shape[0];
+                seen.1[(row, mode)] += weight * shape[1];
             }
         }
     }
@@ -296,7 +297,7 @@ impl<'a> Checking<'a> {
                 let length = (1.0 + slope * slope).sqrt();
                 let friction = self.friction_at(*node);
                 let share = if friction < self.friction { friction / self.friction } else { 1.0 };
-                ([-1.0 / length, 0.0, slope / length], [0.0, share * sense, 0.0])
+                (Vector3::new(-1.0 / length, 0.0, slope / length), Vector3::new(0.0, share * sense, 0.0))
             })
             .collect()
     }
@@ -311,7 +312,7 @@ impl<'a> Checking<'a> {
         self.parameters.friction[self.pair_at(node)]
     }
 
-    fn normals(&self, model: &ModalModel) -> Vec<[f64; 3]> {
+    fn normals(&self, model: &ModalModel) -> Vec<Vector3> {
         self.directions(model, 1.0).into_iter().map(|(normal, _)| normal).collect()
     }
 

@@ -10,9 +10,10 @@ use nalgebra::DMatrix;
 
 use super::{BodyLimits, Closing, Parameters};
 use crate::geometry::open::{OpenGap, tangent};
-use crate::geometry::{GapLaw, Geometry, dot};
+use crate::geometry::{GapLaw, Geometry, Vector3};
 use crate::limits::finding::{Checked, ErrorKind, Finding, Subject, WarningKind};
 use crate::limits::{self, ContactDirections};
+use crate::math::vector::length;
 use crate::modes::modal::ModalModel;
 use crate::modes::modal::fill_ratios;
 use crate::scene::method::{Scheme, Solver};
@@ -103,7 +104,7 @@ impl FlightCheck<'_> {
         let carriers: Vec<Option<(usize, ModalModel)>> = carriers.collect();
         let frictions: Vec<f64> = pairs.iter().map(|pair| self.parameters.friction[*pair]).collect();
         let mut worst = 0.0_f64;
-        for met in flight(&mut laws, self.parameters.velocities[self.body], &frictions, friction) {
+        for met in flight(&mut laws, self.parameters.velocities[self.body].into(), &frictions, friction) {
             for part in STEPS {
                 worst = worst.min(
                     self.solvability(&met, friction, &laws, &carriers, part * step).map_err(|error| error.of(of))?,
@@ -145,8 +146,8 @@ impl FlightCheck<'_> {
 
 /// Finds the contacts of the undeformed structure on its flight; slip directions are scaled by the ratio of the `frictions` of the pairs to
 /// the largest.
-fn flight(laws: &mut [OpenGap], velocity: [f64; 3], frictions: &[f64], largest: f64) -> Vec<NodesInside> {
-    let speed = dot(velocity, velocity).sqrt();
+fn flight(laws: &mut [OpenGap], velocity: Vector3, frictions: &[f64], largest: f64) -> Vec<NodesInside> {
+    let speed = length(velocity);
     let Some(extent) = laws.first().map(OpenGap::largest).filter(|_| speed != 0.0) else { return Vec::new() };
     let nodes = laws[0].positions().len();
     // `largest` is a tenth of the extent.
@@ -169,7 +170,7 @@ fn flight(laws: &mut [OpenGap], velocity: [f64; 3], frictions: &[f64], largest: 
             let normal = geometry.normal_at(*node);
             let own = laws.iter().position(|law| law.nodes().contains(node)).map_or(largest, |law| frictions[law]);
             let share = if own < largest { own / largest } else { 1.0 };
-            (normal, tangent(velocity, normal).map(|value| share * value))
+            (normal, share * tangent(velocity, normal))
         };
         let directions = inside.iter().map(direction).collect();
         met.push(NodesInside { nodes: inside, directions, geometry });

@@ -7,6 +7,7 @@ use super::response::TERMS;
 use super::rows::ContactRows;
 use super::state::SectorState;
 use crate::math::simd::{InstructionSet, Kernel};
+use crate::math::vector::Vector3;
 
 /// Scratch memory, allocated once.
 #[derive(Debug, Clone)]
@@ -96,15 +97,16 @@ impl Advance {
     /// force on a node (N), if any.
     pub fn under(
         &mut self,
-        (level, rows): (&StepTables, &ContactRows),
+        level: &StepTables,
+        rows: &ContactRows,
         state: &mut SectorState,
-        forces: impl Fn(usize) -> Option<[[f64; 3]; MOST]>,
+        forces: impl Fn(usize) -> Option<[Vector3; MOST]>,
     ) -> f64 {
         self.rows.clear();
         for node in 0..self.forces[0].len() / 3 {
             let Some(coefficients) = forces(node) else { continue };
             for component in 0..3 {
-                for (forces, values) in self.forces.iter_mut().zip(coefficients) {
+                for (forces, values) in self.forces.iter_mut().zip(&coefficients) {
                     forces[self.rows.len()] = values[component];
                 }
                 self.rows.push(3 * node + component);

@@ -4,13 +4,14 @@ use super::basis::POINTS;
 use super::compliance::Lanes;
 use super::kernels::{Combine, PADDED};
 use super::shared_body::SharedBody;
+use super::surroundings::LaneStep;
 use super::trial::ForceInterpolation;
 use crate::geometry::frame::PolarFrame;
 use crate::math::simd::InstructionSet;
+use crate::math::vector::Vector3;
 use crate::modes::bank::ModalBank;
 use crate::modes::coordinates::Coordinates;
 use crate::system::carrier::Spot;
-use crate::system::pair::at_place;
 
 /// Tables, state and scratch memory of a structure that carries surfaces.
 #[derive(Debug, Clone)]
@@ -113,26 +114,26 @@ impl CarrierIntegrator {
     }
 
     /// Velocity of a place at the start of the step (m/s), in the directions of the node.
-    pub fn velocity_at(&self, spot: Spot) -> [f64; 3] {
-        at_place(spot.surface, spot.place, spot.frame, |row| self.velocity[row])
+    pub fn velocity_at(&self, spot: Spot) -> Vector3 {
+        spot.interpolate(|row| self.velocity[row])
     }
 
     /// Returns the displacement of a place over which a force at point i of the tried step does work (m), in the directions of the node.
-    pub fn sliding_distance_at(&self, spot: Spot, i: usize) -> [f64; 3] {
+    pub fn sliding_distance_at(&self, spot: Spot, i: usize) -> Vector3 {
         let (weights, moved) = (&self.work_weights[i], &self.moved);
         let sliding_distance =
             |row: usize| weights.iter().zip(moved).map(|(weight, moved)| weight * moved[row]).sum::<f64>();
-        at_place(spot.surface, spot.place, spot.frame, sliding_distance)
+        spot.interpolate(sliding_distance)
     }
 
     /// Displacement of a place at a point of the step (m), in the directions of the node.
-    pub fn moved_at(&self, spot: Spot, point: usize) -> [f64; 3] {
-        at_place(spot.surface, spot.place, spot.frame, |row| self.moved[point][row])
+    pub fn moved_at(&self, spot: Spot, point: usize) -> Vector3 {
+        spot.interpolate(|row| self.moved[point][row])
     }
 
     /// Returns the displacement of a place over which a force at point i of the accepted step does work (m), in the directions of the node.
-    pub fn worked_at(&self, spot: Spot, i: usize) -> [f64; 3] {
-        at_place(spot.surface, spot.place, spot.frame, |row| self.worked[i][row])
+    pub fn worked_at(&self, spot: Spot, i: usize) -> Vector3 {
+        spot.interpolate(|row| self.worked[i][row])
     }
 
     /// Computes the weighted displacements for the work of forces at the points.
@@ -146,7 +147,7 @@ impl CarrierIntegrator {
     }
 
     /// Adds the reaction to a force on a node at a place, at point i.
-    pub fn react(&mut self, spot: Spot, i: usize, force: [f64; 3]) {
+    pub fn react(&mut self, spot: Spot, i: usize, force: Vector3) {
         self.find_force(spot, force);
         self.body.forces_mut(i).iter_mut().zip(&self.force).for_each(|(sum, force)| *sum -= force);
     }
@@ -157,13 +158,13 @@ impl CarrierIntegrator {
     }
 
     /// Adds an impulse on a node at a place (N·s).
-    pub fn add_impulse(&mut self, spot: Spot, impulse: [f64; 3]) {
+    pub fn add_impulse(&mut self, spot: Spot, impulse: Vector3) {
         self.find_force(spot, impulse);
         self.impulses.iter_mut().zip(&self.force).for_each(|(sum, force)| *sum += force);
     }
 
     /// Computes the modal forces of a force at a place, in the directions of the node.
-    fn find_force(&mut self, spot: Spot, force: [f64; 3]) {
+    fn find_force(&mut self, spot: Spot, force: Vector3) {
         let (around, fixed) = (Around::new(spot), spot.frame.fixed(force));
         let rows: [usize; 48] = std::array::from_fn(|i| around.rows[i / 3] + i % 3);
         let amounts: [f64; 48] = std::array::from_fn(|i| around.weights[i / 3] * fixed[i % 3]);
@@ -184,7 +185,7 @@ impl CarrierIntegrator {
     }
 
     /// Assigns a lane of the current sector to a place, with this normal.
-    pub fn set_lane(&mut self, lane: usize, spot: Spot, normal: [f64; 3]) {
+    pub fn set_lane(&mut self, lane: usize, spot: Spot, normal: Vector3) {
         let padded = self.force.len();
         (self.obstacle[lane], self.frames[lane]) = (true, spot.frame);
         let around = Around::new(spot);
@@ -198,7 +199,7 @@ impl CarrierIntegrator {
             instructions.run(Combine { table: shapes, stride: padded, columns, coefficients, sums });
         }
         let [x, y, z] = seen.each_ref().map(|seen| &seen[window.clone()]);
-        let [a, b, c] = spot.frame.fixed(normal);
+        let [a, b, c] = spot.frame.fixed(normal).into();
         for (mode, along) in along[window.clone()].iter_mut().enumerate() {
             *along = a * x[mode] + b * y[mode] + c * z[mode];
         }
@@ -208,15 +209,14 @@ impl CarrierIntegrator {
     /// `carrier_compliance`.
     pub fn add_normal_compliance(
         &mut self,
-        (level, kind): (usize, ForceInterpolation),
-        lanes: Lanes,
+        step: LaneStep,
         lane: usize,
-        direction: [f64; 3],
+        direction: Vector3,
         carrier_compliance: &mut [f64],
     ) {
-        let padded = self.force.len();
+        let (padded, lanes) = (self.force.len(), step.lanes);
         for i in 1..=lanes.points {
-            self.move_modes((level, kind), lanes, (i, lane), direction);
+            self.move_modes(step, i, lane, direction);
             for node in (0..lanes.nodes).filter(|node| self.obstacle[lanes.at(i, *node)]) {
                 let other = lanes.at(i, node);
                 carrier_compliance[other] += dot_of(&self.along[other * padded..][..padded], &self.force);
@@ -226,37 +226,25 @@ impl CarrierIntegrator {
 
     /// Adds the displacement in the directions of each lane under a `force` on one lane at the end of the step (N), if the end is
     /// the only point.
-    pub fn add_compliance(
-        &mut self,
-        at: (usize, ForceInterpolation),
-        lanes: Lanes,
-        lane: usize,
-        force: [f64; 3],
-        carrier_compliance: &mut [f64],
-    ) {
-        let padded = self.force.len();
-        self.move_modes(at, lanes, (1, lane), force);
+    pub fn add_compliance(&mut self, step: LaneStep, lane: usize, force: Vector3, carrier_compliance: &mut [f64]) {
+        let (padded, lanes) = (self.force.len(), step.lanes);
+        self.move_modes(step, 1, lane, force);
         for other in (0..lanes.nodes).filter(|node| self.obstacle[*node]) {
             let fixed = self.seen.each_ref().map(|seen| dot_of(&seen[other * padded..][..padded], &self.force));
-            lanes.set(carrier_compliance, other, self.frames[other].local(fixed));
+            lanes.set(carrier_compliance, other, self.frames[other].local(fixed.into()));
         }
     }
 
     /// Returns the motion of the modes at point i under a force on a lane, in the directions of the lane.
-    fn move_modes(
-        &mut self,
-        (level, kind): (usize, ForceInterpolation),
-        lanes: Lanes,
-        (i, lane): (usize, usize),
-        force: [f64; 3],
-    ) {
+    fn move_modes(&mut self, step: LaneStep, i: usize, lane: usize, force: Vector3) {
+        let LaneStep { level, kind, lanes } = step;
         if !self.obstacle[lane] {
             return self.force.fill(0.0);
         }
         let padded = self.force.len();
         let [x, y, z] = self.seen.each_ref().map(|seen| &seen[lane * padded..][..padded]);
         let (k, _) = lanes.place(lane);
-        let [a, b, c] = self.frames[lane].fixed(force);
+        let [a, b, c] = self.frames[lane].fixed(force).into();
         let (influence, coordinates) = (self.body.influence(level), self.body.coordinates());
         for (mode, by) in influence.iter().enumerate() {
             let inert = coordinates.inertia[mode]
@@ -276,10 +264,9 @@ struct Around {
 
 impl Around {
     fn new(spot: Spot) -> Self {
-        let (surface, carrier) = spot.surface;
         let mut found = Self { rows: [0; 16], weights: [0.0; 16], count: 0 };
-        for (index, weight) in surface.weights(spot.place).iter() {
-            (found.rows[found.count], found.weights[found.count]) = (carrier.first_row + 3 * index, weight);
+        for (index, weight) in spot.surface.weights(spot.place).iter() {
+            (found.rows[found.count], found.weights[found.count]) = (spot.carrier.first_row + 3 * index, weight);
             found.count += 1;
         }
         found

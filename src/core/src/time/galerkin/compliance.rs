@@ -1,6 +1,7 @@
 //! Displacements of the contact rows at the points of a step caused by contact forces at these points.
 
 use super::kernels::PADDED;
+use crate::math::vector::{Vector3, set_strided_vector3, strided_vector3};
 use nalgebra::DMatrix;
 
 /// Lanes of a step: points 1 … s one after the other, with all nodes at each point, padded to whole registers. Vectors have one
@@ -40,15 +41,13 @@ impl Lanes {
     }
 
     /// Returns the three components of a lane.
-    pub fn vector3(self, values: &[f64], lane: usize) -> [f64; 3] {
-        [0, 1, 2].map(|component| values[component * self.width() + lane])
+    pub fn vector3(self, values: &[f64], lane: usize) -> Vector3 {
+        strided_vector3(values, lane, self.width())
     }
 
     /// Sets the three components of a lane.
-    pub fn set(self, values: &mut [f64], lane: usize, to: [f64; 3]) {
-        for (component, value) in to.into_iter().enumerate() {
-            values[component * self.width() + lane] = value;
-        }
+    pub fn set(self, values: &mut [f64], lane: usize, to: Vector3) {
+        set_strided_vector3(values, lane, self.width(), to);
     }
 }
 

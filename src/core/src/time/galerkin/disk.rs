@@ -2,6 +2,7 @@
 
 use super::basis::POINTS;
 use super::shared_body::SharedBody;
+use crate::math::vector::{Vector3, strided_vector3};
 use crate::modes::cyclic::CyclicBank;
 
 /// A disk of coupled sectors.
@@ -48,10 +49,9 @@ impl CoupledDisk {
         self.body.keep_inertia();
         let (sectors, lanes) = (bank.sectors(), self.lanes);
         let all = (0..sectors).flat_map(|sector| (0..nodes).map(move |node| (sector, node)));
-        let force = |(sector, node): (usize, usize)| {
-            (sector, node, [0, 1, 2].map(|component| forces[(3 * node + component) * lanes + sector]))
-        };
-        let pushing = all.map(force).filter(|(.., force)| force.iter().any(|component| *component != 0.0));
+        let force = |node: usize, sector: usize| strided_vector3(forces, 3 * node * lanes + sector, lanes);
+        let all = all.map(|(sector, node)| (sector, node, force(node, sector)));
+        let pushing = all.filter(|(.., force)| *force != Vector3::zeros());
         bank.modal_forces(pushing, self.body.forces_mut(0));
     }
 
@@ -75,8 +75,8 @@ impl CoupledDisk {
     }
 
     /// Displacement of a node of a sector at a point of the step (m).
-    pub fn moved_at(&self, point: usize, node: usize, sector: usize) -> [f64; 3] {
-        [0, 1, 2].map(|component| self.moved[point][(3 * node + component) * self.lanes + sector])
+    pub fn moved_at(&self, point: usize, node: usize, sector: usize) -> Vector3 {
+        strided_vector3(&self.moved[point], 3 * node * self.lanes + sector, self.lanes)
     }
 
     /// Finds the largest displacements of the rows of any sector from rest without contact (m).

@@ -8,7 +8,7 @@ use super::disk::CoupledDisk;
 use super::shared_body::SharedBody;
 use super::span::{SpanStep, StepGoal};
 use super::state::SectorState;
-use super::surroundings::{AcceptedStep, CarriersInStep, Surroundings, Witness};
+use super::surroundings::{AcceptedStep, CarriersInStep, LaneStep, Surroundings, Witness};
 use super::tables::Tables;
 use super::trial::{ForceInterpolation, Obstacle, Trial, TrialResult};
 use crate::scene::method::Solver;
@@ -204,8 +204,8 @@ impl<W: Witness> SectorInStep<'_, W> {
         if disk.is_none() {
             trial.find_start(&tables.rows, state);
         }
-        let parts = (tables.levels[step.level].compliance_of(kind), tables.rows.residual());
-        trial.solve(parts, &mut surfaces, result)
+        let compliance = tables.levels[step.level].compliance_of(kind);
+        trial.solve(compliance, tables.rows.residual(), &mut surfaces, result)
     }
 }
 
@@ -251,7 +251,8 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
     fn sector(&mut self, index: usize, step: SpanStep, kind: ForceInterpolation) -> SectorInStep<'_, S::Surfaces<'_>> {
         let Island { sectors, carriers, tables, disks, .. } = &mut *self.island;
         let IslandSector { table, disk, trial, state, advance, .. } = &mut sectors[index];
-        let carriers = CarriersInStep { carriers, level: step.level, kind, lanes: Lanes { points: 0, nodes: 0 } };
+        let step = LaneStep { level: step.level, kind, lanes: Lanes { points: 0, nodes: 0 } };
+        let carriers = CarriersInStep { carriers, step };
         SectorInStep {
             surfaces: self.surroundings.surfaces(index, carriers),
             tables: &tables[table[0]][table[1]],
@@ -377,8 +378,8 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
             if !is_single {
                 surfaces.guess_start_places();
             }
-            trial.begin((level, kind), rows, state);
-            trial.find_start_gaps(state, |node, moved| surfaces.gap(node, 0, moved).0);
+            trial.begin(level, kind, rows, state);
+            trial.find_start_gaps(state, |node, moved| surfaces.gap(node, 0, moved).distance);
         }
         if self.island.fresh {
             // Earlier forces are applied at the places of the nodes at the start of the span.
@@ -580,7 +581,7 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
             if is_single {
                 trial.find_free_motion(level, &tables.rows, state);
             }
-            trial.judge((level, &tables.rows), &surfaces, &mut own);
+            trial.judge(level, &tables.rows, &surfaces, &mut own);
             match disk {
                 // The error of one sector makes all sectors of its disk vibrate.
                 Some(disk) => disk.error = disk.error.hypot(own.error),
@@ -592,7 +593,7 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
             if own.depth > 0.0 {
                 let depth = if is_single {
                     trial.find_start(&tables.rows, state);
-                    trial.depth_without_jumps(|node, moved| Some(surfaces.gap(node, 0, moved).0))
+                    trial.depth_without_jumps(|node, moved| Some(surfaces.gap(node, 0, moved).distance))
                 } else {
                     trial.depth_without_jumps(|node, moved| surfaces.gap_within(node, 0.0, moved))
                 };
@@ -655,7 +656,7 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
             if disk.is_none() {
                 let level = tables.of_points(step.level, kind, trial.points());
                 let forces = |node| trial.polynomial(&level.basis, kind, node);
-                surfaces.record_damping(advance.under((level, &tables.rows), state, forces));
+                surfaces.record_damping(advance.under(level, &tables.rows, state, forces));
             }
             trial.leave(state);
         }

@@ -1,6 +1,7 @@
 //! Loops over columns and lanes, compiled for every instruction set.
 
 use crate::math::simd::Kernel;
+use crate::math::vector::Vector3;
 use nalgebra::DMatrix;
 
 /// Column lengths are multiples of this number of entries, padded with zeros.
@@ -104,7 +105,7 @@ impl Kernel for Withdraw<'_> {
 /// Displacements of all lanes per λ of one lane, from those per force: column = Σ d_c Z_c and closing = n·column.
 pub struct ClosingColumn<'a> {
     pub(super) parts: [&'a [f64]; 3],
-    pub(super) direction: [f64; 3],
+    pub(super) direction: Vector3,
     pub(super) normals: &'a [f64],
     pub(super) column: &'a mut [f64],
     pub(super) closing: &'a mut [f64],
@@ -113,7 +114,8 @@ pub struct ClosingColumn<'a> {
 impl Kernel for ClosingColumn<'_> {
     #[inline(always)]
     fn run(self) {
-        let Self { parts: [x, y, z], direction: [a, b, c], normals, column, closing } = self;
+        let Self { parts: [x, y, z], direction, normals, column, closing } = self;
+        let [a, b, c] = direction.into();
         for (column, ((x, y), z)) in column.iter_mut().zip(x.iter().zip(y).zip(z)) {
             *column = a * x + b * y + c * z;
         }
@@ -184,7 +186,7 @@ mod tests {
         let run = |instructions: InstructionSet| {
             let (mut column, mut closing, mut to) = (vec![0.0; 3 * width], vec![0.0; width], vec![0.0; width]);
             let parts = [&parts[0][..], &parts[1][..], &parts[2][..]];
-            let direction = [0.3, -1.1, 0.7];
+            let direction = Vector3::new(0.3, -1.1, 0.7);
             instructions.run(ClosingColumn {
                 parts,
                 direction,

@@ -5,10 +5,11 @@ use super::carrier::CarrierIntegrator;
 use super::compliance::Lanes;
 use super::level::StepTables;
 use super::record::{SpanRecord, SurfacePlace};
-use super::surroundings::{AcceptedStep, CarriersInStep, Witness};
-use super::trial::{ForceInterpolation, Obstacle, SlidingState, Trial, node_by_node, vector3_at};
+use super::surroundings::{AcceptedStep, CarriersInStep, LaneStep, Witness};
+use super::trial::{ForceInterpolation, Obstacle, SlidingState, Trial, node_by_node};
 use crate::geometry::wrench::{At, MotionIncrement};
-use crate::geometry::{GapLaw, PrescribedMotion, dot};
+use crate::geometry::{Gap, GapLaw, PrescribedMotion, Vector3};
+use crate::math::vector::vector3_at;
 use crate::system::carrier::Spot;
 use crate::system::pair::ContactPair;
 use crate::system::work::WorkingForce;
@@ -36,14 +37,15 @@ impl ObstacleView<'_> {
     /// Reads a value from the structure that carries a surface, at the place of a node and at a point of the step.
     fn on_carrier<T>(
         &self,
-        (node, point): (usize, usize),
+        node: usize,
+        point: usize,
         when: SurfacePlace,
         read: impl Fn(&CarrierIntegrator, Spot) -> T,
     ) -> Option<T> {
         let pair = self.pair_of[node]?;
         let carrier = self.carrier_of[pair]?;
         let index = node * self.lanes + self.sector;
-        let spot = self.record.spot((node, point), (pair, &self.pairs[pair]), index, when)?;
+        let spot = self.record.spot(node, point, index, self.pairs, pair, when)?;
         Some(read(&self.carriers.carriers[carrier], spot))
     }
 
@@ -52,16 +54,16 @@ impl ObstacleView<'_> {
         let Some(pair) = self.pair_of[node] else { return };
         let Some(carrier) = self.carrier_of[pair] else { return };
         let index = node * self.lanes + self.sector;
-        if let Some(spot) = self.record.spot((node, point), (pair, &self.pairs[pair]), index, SurfacePlace::Now) {
+        if let Some(spot) = self.record.spot(node, point, index, self.pairs, pair, SurfacePlace::Now) {
             read(&mut self.carriers.carriers[carrier], spot);
         }
     }
 
     /// Returns the surface carrier of a lane, and the current step.
-    fn under(&mut self, lane: usize) -> Option<(&mut CarrierIntegrator, (usize, ForceInterpolation), Lanes)> {
-        let CarriersInStep { carriers, level, kind, lanes } = &mut self.carriers;
-        let carrier = self.pair_of[lanes.place(lane).1].and_then(|pair| self.carrier_of[pair])?;
-        Some((&mut carriers[carrier], (*level, *kind), *lanes))
+    fn under(&mut self, lane: usize) -> Option<(&mut CarrierIntegrator, LaneStep)> {
+        let CarriersInStep { carriers, step } = &mut self.carriers;
+        let carrier = self.pair_of[step.lanes.place(lane).1].and_then(|pair| self.carrier_of[pair])?;
+        Some((&mut carriers[carrier], *step))
     }
 
     fn at<'b>(&self, node: usize, drive: &'b PrescribedMotion) -> At<'b> {
@@ -91,13 +93,12 @@ impl ObstacleView<'_> {
 }
 
 impl Obstacle for ObstacleView<'_> {
-    fn gap(&mut self, node: usize, point: usize, moved: [f64; 3]) -> (f64, [f64; 3]) {
-        let Some(pair) = self.pair_of[node] else { return (f64::INFINITY, [0.0; 3]) };
+    fn gap(&mut self, node: usize, point: usize, moved: Vector3) -> Gap {
+        let Some(pair) = self.pair_of[node] else { return Gap::NOTHING };
         let at = self.at(node, &self.record.drives[pair][point].0);
-        let (gap, normal, place) =
-            self.pairs[pair].gap_mut().gap_of_node(at, moved, Some(self.record.places[point][node]));
-        self.record.places[point][node] = place;
-        (gap, normal)
+        let gap = self.pairs[pair].gap_mut().gap(at, moved, Some(self.record.places[point][node]));
+        self.record.places[point][node] = gap.foot;
+        gap
     }
 
     fn gaps(&mut self, lanes: Lanes, moved: &[f64], gaps: &mut [f64], normals: &mut [f64]) {
@@ -109,37 +110,34 @@ impl Obstacle for ObstacleView<'_> {
         node_by_node(self, lanes, moved, gaps, normals);
     }
 
-    fn gap_within(&self, node: usize, theta: f64, moved: [f64; 3]) -> Option<f64> {
+    fn gap_within(&self, node: usize, theta: f64, moved: Vector3) -> Option<f64> {
         let pair = self.pair_of[node]?;
         let [from, length] = self.record.step;
         let drive = self.record.courses[pair].at(from + length * theta).0;
         match self.pairs[pair].gap() {
-            GapLaw::Fixed(law) => Some(law.gaps[node] + dot(law.normals[node], moved)),
-            GapLaw::Revolution(law) => Some(law.gap_of_node(self.at(node, &drive), moved).0),
+            GapLaw::Fixed(law) => Some(law.gap(node, moved).distance),
+            GapLaw::Revolution(law) => Some(law.gap(self.at(node, &drive), moved).distance),
             GapLaw::Spline(_) | GapLaw::Open(_) => None,
         }
     }
 
-    fn slip_direction(&mut self, node: usize, point: usize, sliding: &SlidingState) -> [f64; 3] {
-        let Some(pair) = self.pair_of[node] else { return [0.0; 3] };
+    fn slip_direction(&mut self, node: usize, point: usize, sliding: &SlidingState) -> Vector3 {
+        let Some(pair) = self.pair_of[node] else { return Vector3::zeros() };
         let gap = self.pairs[pair].gap();
         let slip = if gap.slides_anywhere() {
             let known = self.record.slips[point][node].filter(|_| self.record.solutions > SOLUTIONS);
             let slip = known.unwrap_or_else(|| {
-                let carriers = self.on_carrier((node, point), SurfacePlace::Now, |casing, spot| {
-                    casing.sliding_distance_at(spot, point)
-                });
-                let carriers = carriers.unwrap_or_default();
-                std::array::from_fn(|c| sliding.sliding_distance[c] - carriers[c])
+                let carriers = self
+                    .on_carrier(node, point, SurfacePlace::Now, |casing, spot| casing.sliding_distance_at(spot, point));
+                sliding.sliding_distance - carriers.unwrap_or_default()
             });
             self.record.slips[point][node] = Some(slip);
             slip
         } else {
             let at = self.at(node, &self.record.drives[pair][point].0);
             let rigid = gap.sliding_velocity(node, at.index, at.drive, sliding.moved);
-            let carriers = self.on_carrier((node, point), SurfacePlace::Begun, |casing, spot| casing.velocity_at(spot));
-            let carriers = carriers.unwrap_or_default();
-            std::array::from_fn(|i| rigid[i] + sliding.velocity[i] - carriers[i])
+            let carriers = self.on_carrier(node, point, SurfacePlace::Begun, |casing, spot| casing.velocity_at(spot));
+            rigid + sliding.velocity - carriers.unwrap_or_default()
         };
         gap.slip_direction(slip, sliding.normal)
     }
@@ -148,7 +146,7 @@ impl Obstacle for ObstacleView<'_> {
         self.sector
     }
 
-    fn angle(&self, node: usize, point: usize, moved: [f64; 3]) -> f64 {
+    fn angle(&self, node: usize, point: usize, moved: Vector3) -> f64 {
         let Some(pair) = self.pair_of[node] else { return 0.0 };
         self.pairs[pair].gap().angle_on_casing(self.at(node, &self.record.drives[pair][point].0), moved)
     }
@@ -162,7 +160,7 @@ impl Obstacle for ObstacleView<'_> {
         if self.carriers.carriers.is_empty() {
             return false;
         }
-        self.carriers.lanes = lanes;
+        self.carriers.step.lanes = lanes;
         self.carriers.carriers.iter_mut().for_each(CarrierIntegrator::clear_lanes);
         for lane in (0..lanes.len()).filter(|lane| chosen[*lane]) {
             let (point, node) = lanes.place(lane);
@@ -172,17 +170,17 @@ impl Obstacle for ObstacleView<'_> {
         true
     }
 
-    fn add_normal_compliance(&mut self, lane: usize, direction: [f64; 3], carrier_compliance: &mut [f64]) {
+    fn add_normal_compliance(&mut self, lane: usize, direction: Vector3, carrier_compliance: &mut [f64]) {
         carrier_compliance.fill(0.0);
-        if let Some((casing, at, lanes)) = self.under(lane) {
-            casing.add_normal_compliance(at, lanes, lane, direction, carrier_compliance);
+        if let Some((casing, step)) = self.under(lane) {
+            casing.add_normal_compliance(step, lane, direction, carrier_compliance);
         }
     }
 
-    fn add_compliance(&mut self, lane: usize, force: [f64; 3], carrier_compliance: &mut [f64]) {
+    fn add_compliance(&mut self, lane: usize, force: Vector3, carrier_compliance: &mut [f64]) {
         carrier_compliance.fill(0.0);
-        if let Some((casing, at, lanes)) = self.under(lane) {
-            casing.add_compliance(at, lanes, lane, force, carrier_compliance);
+        if let Some((casing, step)) = self.under(lane) {
+            casing.add_compliance(step, lane, force, carrier_compliance);
         }
     }
 
@@ -190,20 +188,18 @@ impl Obstacle for ObstacleView<'_> {
         self.pair_of[node].map_or(0.0, |pair| self.pairs[pair].friction())
     }
 
-    fn drift(&self, node: usize, step_point: usize, moved: [f64; 3]) -> [f64; 3] {
-        let Some(pair) = self.pair_of[node] else { return [0.0; 3] };
+    fn drift(&self, node: usize, step_point: usize, moved: Vector3) -> Vector3 {
+        let Some(pair) = self.pair_of[node] else { return Vector3::zeros() };
         let drives = &self.record.drives[pair];
         let ((_, before), (drive, now)) = (&drives[0], &drives[step_point]);
         let (gap, motion) = (self.pairs[pair].gap(), now.less(before));
         let at = self.at(node, drive);
         let point = gap.contact_point(at, moved, self.record.places[step_point][node]);
         let (spin, shaft) = (gap.spin_motion(at, point, &motion), gap.shaft_motion(at, point, &motion));
-        let carriers = self.on_carrier((node, step_point), SurfacePlace::Now, |casing, spot| {
-            let [now, before] = [step_point, 0].map(|instant| casing.moved_at(spot, instant));
-            std::array::from_fn(|c| now[c] - before[c])
+        let carriers = self.on_carrier(node, step_point, SurfacePlace::Now, |casing, spot| {
+            casing.moved_at(spot, step_point) - casing.moved_at(spot, 0)
         });
-        let carriers: [f64; 3] = carriers.unwrap_or_default();
-        std::array::from_fn(|c| spin[c] + shaft[c] - carriers[c])
+        spin + shaft - carriers.unwrap_or_default()
     }
 }
 
@@ -249,7 +245,7 @@ impl Witness for ObstacleView<'_> {
     fn record_gaps(&mut self, level: &StepTables, trial: &Trial) {
         for (node, pair) in self.pair_of.iter().enumerate() {
             if pair.is_some() {
-                let lowest = self.lowest((trial, &level.basis), node);
+                let lowest = self.lowest(trial, &level.basis, node);
                 self.record.tallies[node].lowest = lowest;
             }
         }
@@ -267,12 +263,12 @@ impl Witness for ObstacleView<'_> {
         self.record.guess_start_places();
     }
 
-    fn react(&mut self, node: usize, point: usize, force: [f64; 3]) {
+    fn react(&mut self, node: usize, point: usize, force: Vector3) {
         self.record.act(node, point);
         self.with_carrier_mut(node, point, |carrier, spot| carrier.react(spot, point, force));
     }
 
-    fn add_impulse(&mut self, node: usize, point: usize, impulse: [f64; 3]) {
+    fn add_impulse(&mut self, node: usize, point: usize, impulse: Vector3) {
         self.with_carrier_mut(node, point, |carrier, spot| carrier.add_impulse(spot, impulse));
     }
 
@@ -282,7 +278,7 @@ impl Witness for ObstacleView<'_> {
         for (node, pair) in self.pair_of.iter().enumerate() {
             let Some(pair) = *pair else { continue };
             let points = step.trial.points();
-            self.record.tallies[node].lowest = self.lowest((step.trial, &step.level.basis), node);
+            self.record.tallies[node].lowest = self.lowest(step.trial, &step.level.basis, node);
             let comes = (1..=points).find(|i| step.trial.multiplier(*i, node) > 0.0);
             if comes.is_some_and(|i| self.was_behind(step.trial, node, pair, i)) {
                 self.record.behind_edge = Some(node);
@@ -305,11 +301,11 @@ const CLOSER: f64 = 0.25;
 
 impl ObstacleView<'_> {
     /// Smallest gap of a node (m) so far, at the points of a step, and between them if it stays open.
-    fn lowest(&self, (trial, basis): (&Trial, &TimeBasis), node: usize) -> f64 {
+    fn lowest(&self, trial: &Trial, basis: &TimeBasis, node: usize) -> f64 {
         let gaps = (1..=trial.points()).map(|point| trial.gap(point, node));
         let lowest = gaps.fold(self.record.tallies[node].lowest, f64::min);
         match trial.minimum(node).filter(|_| !self.has_jumped(trial, node)) {
-            Some(theta) => lowest.min(self.lowest_near((trial, basis), node, theta)),
+            Some(theta) => lowest.min(self.lowest_near(trial, basis, node, theta)),
             _ => lowest,
         }
     }
@@ -324,7 +320,7 @@ impl ObstacleView<'_> {
     ///
     /// A surface of revolution and the displacements are not polynomials of time, so gaps are evaluated. Gaps to other surfaces
     /// are a polynomial.
-    fn lowest_near(&self, (trial, basis): (&Trial, &TimeBasis), node: usize, theta: f64) -> f64 {
+    fn lowest_near(&self, trial: &Trial, basis: &TimeBasis, node: usize, theta: f64) -> f64 {
         let mut lowest = f64::INFINITY;
         let mut look = |theta: f64| {
             let moved = trial.displacement_within(basis, node, theta);
@@ -360,17 +356,11 @@ impl ObstacleView<'_> {
         if trial.gap(i - 1, node).is_finite() {
             return false;
         }
-        let (now, before) = (trial.displacement(i, node), trial.displacement(i - 1, node));
-        let carriers = self.on_carrier((node, i), SurfacePlace::Now, |casing, spot| {
-            let [now, before] = [i, i - 1].map(|point| casing.moved_at(spot, point));
-            std::array::from_fn(|c| now[c] - before[c])
+        let moved = trial.displacement(i, node) - trial.displacement(i - 1, node);
+        let carriers = self.on_carrier(node, i, SurfacePlace::Now, |casing, spot| {
+            casing.moved_at(spot, i) - casing.moved_at(spot, i - 1)
         });
-        let carriers: [f64; 3] = carriers.unwrap_or_default();
-        open.was_behind(
-            std::array::from_fn(|c| now[c] - before[c] - carriers[c]),
-            trial.normal(i, node),
-            trial.gap(i, node),
-        )
+        open.was_behind(moved - carriers.unwrap_or_default(), trial.normal(i, node), trial.gap(i, node))
     }
 
     /// Computes Σ_k S_ik of the prescribed motion of a pair at the points, for each point i of the step.
@@ -401,27 +391,22 @@ impl ObstacleView<'_> {
             let point = gap.contact_point(at, moved, place);
             self.record.implausible |= !gap.is_plausible(node, trial.gap(i, node), normal);
             // With the normal for which the force was found: the effect of its rotation since then is curvature work, not heat.
-            let tangential = if slides { trial.friction_force(i, node) } else { [0.0; 3] };
+            let tangential = if slides { trial.friction_force(i, node) } else { Vector3::zeros() };
             let wrench = gap.wrench(at, point, force);
-            let length = step.level.step
+            let duration = step.level.step
                 * if step.kind == ForceInterpolation::Constant {
                     f64::from(u8::from(i == 1))
                 } else {
                     basis.weights[i]
                 };
-            tally.add(length, multiplier, (force, tangential), &wrench);
             let weights = step.kind.work_weights(basis, i);
-            let (mut moved, mut open) = ([0.0; 3], 0.0);
+            let (mut moved, mut open) = (Vector3::zeros(), 0.0);
             for k in (0..=trial.points()).filter(|k| weights[*k] != 0.0) {
-                let displaced = trial.displacement(k, node);
-                moved = std::array::from_fn(|c| moved[c] + weights[k] * displaced[c]);
+                moved += weights[k] * trial.displacement(k, node);
                 open += weights[k] * trial.finite_gap(k, node);
             }
-            let carried = self.on_carrier((node, i), SurfacePlace::Acted, |carrier, spot| carrier.worked_at(spot, i));
-            let carried = carried.unwrap_or_default();
-            let (fixed, motion, approach) = (wrench.force, &motions[i], -open);
-            let moved = std::array::from_fn(|c| moved[c] - carried[c]);
-            let done = WorkingForce {
+            let carried = self.on_carrier(node, i, SurfacePlace::Acted, |carrier, spot| carrier.worked_at(spot, i));
+            let acting = WorkingForce {
                 gap,
                 at,
                 point,
@@ -430,12 +415,13 @@ impl ObstacleView<'_> {
                 multiplier,
                 force,
                 tangential,
-                fixed,
-                motion,
-                moved,
-                approach,
-            }
-            .work();
+                fixed: wrench.force,
+                motion: &motions[i],
+                moved: moved - carried.unwrap_or_default(),
+                approach: -open,
+            };
+            tally.add(duration, &acting, &wrench);
+            let done = acting.work();
             tally.heat += done.heat;
             heats += done.heat;
             work.add(&done);

@@ -3,12 +3,13 @@
 use crate::geometry::revolution::Instants;
 use crate::geometry::surface_spline::ClosestPoint;
 use crate::geometry::wrench::{MotionIncrement, Wrench};
-use crate::geometry::{PrescribedMotion, dot};
+use crate::geometry::{PrescribedMotion, Vector3};
+use crate::math::vector::{ZERO, length};
 use crate::system::carrier::Spot;
 use crate::system::contact_view::ContactMember;
 use crate::system::growth::ShapeGrowth;
 use crate::system::pair::ContactPair;
-use crate::system::work::ContactWork;
+use crate::system::work::{ContactWork, WorkingForce};
 use crate::system::{ContactEvent, StepFailure};
 use crate::time::galerkin::basis::{MOST, POINTS};
 use crate::time::galerkin::compliance::Lanes;
@@ -27,7 +28,8 @@ impl MotionCourse {
     /// Creates the course from `before` through `middle` to `end`, over a span of length `span` (s).
     pub fn new(
         before: &PrescribedMotion,
-        (middle, growth): (&PrescribedMotion, ShapeGrowth),
+        middle: &PrescribedMotion,
+        growth: ShapeGrowth,
         end: &PrescribedMotion,
         span: f64,
     ) -> Self {
@@ -40,7 +42,7 @@ impl MotionCourse {
 
     /// Returns whether only the rotor moves.
     pub fn only_turns(&self) -> bool {
-        self.parts.iter().all(|part| part.casing_rests() && part.shaft.iter().all(|along| *along == 0.0))
+        self.parts.iter().all(|part| part.casing_rests() && part.shaft == Vector3::zeros())
     }
 
     /// Motion from the start of the span to its fraction `theta`.
@@ -52,19 +54,16 @@ impl MotionCourse {
     /// Prescribed motion at the fraction `theta` of the span.
     pub fn at(&self, theta: f64) -> (PrescribedMotion, MotionIncrement) {
         let motion = self.motion(theta);
-        let rate = |part: fn(&MotionIncrement) -> f64| {
-            (part(&self.parts[0]) + 2.0 * theta * part(&self.parts[1])) / self.parts[0].step
-        };
-        let before = &self.before;
+        let ([linear, quadratic], before) = (&self.parts, &self.before);
         let drive = PrescribedMotion {
             rotor_angle: before.rotor_angle + motion.turn,
-            speed: rate(|motion| motion.turn),
+            speed: (linear.turn + 2.0 * theta * quadratic.turn) / linear.step,
             gap_offset: before.gap_offset + before.radius_change + motion.opening,
             radius_change: 0.0,
             shape_factor: before.shape_factor + motion.shape_factor,
             shape_rotation: before.shape_rotation + motion.shape_rotation,
-            shaft: std::array::from_fn(|i| before.shaft[i] + motion.shaft[i]),
-            shaft_velocity: [rate(|m| m.shaft[0]), rate(|m| m.shaft[1]), rate(|m| m.shaft[2])],
+            shaft: before.shaft + motion.shaft,
+            shaft_velocity: (linear.shaft + 2.0 * theta * quadratic.shaft) / linear.step,
         };
         (drive, motion)
     }
@@ -78,7 +77,7 @@ pub struct NodeTally {
     /// ∫|F_t| dt (N·s).
     pub tangential: f64,
     /// ∫F dt in the coordinates of the displacements (N·s).
-    pub force: [f64; 3],
+    pub force: Vector3,
     /// ∫ of force and moment in fixed directions (N·s, N·m·s), and λ-weighted ∫ of the point (m·N·s).
     pub wrench: Wrench,
     /// Largest λ (N), between the points as well.
@@ -93,23 +92,21 @@ impl NodeTally {
     pub const NOTHING: Self = Self {
         normal: 0.0,
         tangential: 0.0,
-        force: [0.0; 3],
-        wrench: Wrench { point: [0.0; 3], force: [0.0; 3], moment: [0.0; 3] },
+        force: ZERO,
+        wrench: Wrench { point: ZERO, force: ZERO, moment: ZERO },
         peak: 0.0,
         heat: 0.0,
         lowest: f64::INFINITY,
     };
 
-    /// Adds λ, a force with its tangential part, and its wrench over a `length` of time (s).
-    pub fn add(&mut self, length: f64, multiplier: f64, (force, tangential): ([f64; 3], [f64; 3]), wrench: &Wrench) {
-        self.normal += length * multiplier;
-        self.tangential += length * dot(tangential, tangential).sqrt();
-        for c in 0..3 {
-            self.force[c] += length * force[c];
-            self.wrench.force[c] += length * wrench.force[c];
-            self.wrench.moment[c] += length * wrench.moment[c];
-            self.wrench.point[c] += length * multiplier * wrench.point[c];
-        }
+    /// Adds the impulses of a force over `duration` (s).
+    pub fn add(&mut self, duration: f64, force: &WorkingForce, wrench: &Wrench) {
+        self.normal += duration * force.multiplier;
+        self.tangential += duration * length(force.tangential);
+        self.force += duration * force.force;
+        self.wrench.force += duration * wrench.force;
+        self.wrench.moment += duration * wrench.moment;
+        self.wrench.point += duration * force.multiplier * wrench.point;
     }
 
     /// Returns the event of a contact from its means over a span (s); `None` without contact.
@@ -117,13 +114,12 @@ impl NodeTally {
         if self.normal <= 0.0 {
             return None;
         }
-        let mean = |values: [f64; 3]| values.map(|value| value / span);
         let wrench = Wrench {
-            point: self.wrench.point.map(|value| value / self.normal),
-            force: mean(self.wrench.force),
-            moment: mean(self.wrench.moment),
+            point: self.wrench.point / self.normal,
+            force: self.wrench.force / span,
+            moment: self.wrench.moment / span,
         };
-        let event = ContactEvent::new(at, self.normal / span, mean(self.force), 0.0, ([0.0; 3], wrench));
+        let event = ContactEvent::new(at, self.normal / span, self.force / span, 0.0, ZERO, wrench);
         let (tangential, peak, friction_heat) = (self.tangential / span, self.peak, self.heat);
         Some(ContactEvent { tangential, peak, friction_heat, ..event })
     }
@@ -163,7 +159,7 @@ pub struct SpanRecord {
     /// Places at which forces were applied to surface carriers: those of the pass before the one in which the gaps converged.
     pub acted: [Vec<ClosestPoint>; POINTS],
     /// Sliding of nodes along open surfaces at the points (m), where it was requested in this trial; and the number of requests.
-    pub slips: [Vec<Option<[f64; 3]>>; POINTS],
+    pub slips: [Vec<Option<Vector3>>; POINTS],
     pub solutions: usize,
     pub instants: Instants,
     /// Pair to whose surface all nodes at all points are entered in `instants`.
@@ -200,18 +196,19 @@ impl SpanRecord {
     /// Returns the location of a node on the surface of a carrier, at a point of the step.
     pub fn spot<'a>(
         &self,
-        (node, point): (usize, usize),
-        (pair, of): (usize, &'a ContactPair),
+        node: usize,
+        point: usize,
         index: usize,
+        pairs: &'a [ContactPair],
+        pair: usize,
         when: SurfacePlace,
     ) -> Option<Spot<'a>> {
-        let frame = of.frame(index, self.drives[pair][point].0.rotor_angle);
         let place = match when {
             SurfacePlace::Begun => self.places[0][node],
             SurfacePlace::Now => self.places[point][node],
             SurfacePlace::Acted => self.acted[point][node],
         };
-        Some(Spot { surface: of.carried()?, place, frame })
+        pairs[pair].spot(index, place, self.drives[pair][point].0.rotor_angle)
     }
 
     /// Stores that the force on a node at a point of the step was applied at the node's current place.
@@ -220,7 +217,7 @@ impl SpanRecord {
     }
 
     /// Returns the failure that ends a span of this structure and sector, if any.
-    pub fn check(&self, (structure, sector): (usize, usize)) -> Result<(), StepFailure> {
+    pub fn check(&self, structure: usize, sector: usize) -> Result<(), StepFailure> {
         if self.implausible {
             return Err(StepFailure::Implausible { structure, sector });
         }
@@ -230,7 +227,7 @@ impl SpanRecord {
     /// Sets the prescribed motion of a span (s); the pairs are at its end.
     pub fn begin_courses(&mut self, pairs: &[ContactPair], span: f64) {
         for (course, pair) in self.courses.iter_mut().zip(pairs) {
-            *course = MotionCourse::new(pair.drive_before(), (&pair.middle.0, pair.middle.1), pair.drive_now(), span);
+            *course = MotionCourse::new(pair.drive_before(), &pair.middle.0, pair.middle.1, pair.drive_now(), span);
         }
     }
 
@@ -267,11 +264,11 @@ mod tests {
             rotor_angle: 0.3 + 1300.0 * time + 4e6 * time * time,
             speed: 1300.0 + 8e6 * time,
             gap_offset: 2e-4 - 3.0 * time,
-            shaft: [0.2 * time, 1e-5 - 0.1 * time + 500.0 * time * time, -0.3 * time],
-            shaft_velocity: [0.2, -0.1 + 1000.0 * time, -0.3],
+            shaft: Vector3::new(0.2 * time, 1e-5 - 0.1 * time + 500.0 * time * time, -0.3 * time),
+            shaft_velocity: Vector3::new(0.2, -0.1 + 1000.0 * time, -0.3),
             ..PrescribedMotion::default()
         };
-        let course = MotionCourse::new(&at(0.0), (&at(0.5 * span), ShapeGrowth::default()), &at(span), span);
+        let course = MotionCourse::new(&at(0.0), &at(0.5 * span), ShapeGrowth::default(), &at(span), span);
         for place in 0..=8 {
             let theta = 0.125 * f64::from(place);
             let (found, expected) = (course.at(theta).0, at(theta * span));

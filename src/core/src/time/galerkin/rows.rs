@@ -4,6 +4,7 @@ use super::kernels::{Combine, PADDED};
 use super::level::StepTables;
 use super::state::SectorState;
 use crate::math::simd::{InstructionSet, Kernel};
+use crate::math::vector::{Vector3, strided_vector3};
 use crate::modes::coordinates::ContactModes;
 use nalgebra::DMatrix;
 
@@ -47,8 +48,8 @@ impl<const N: usize> Sums<N> {
     }
 
     /// Returns the three components of a node in a set.
-    pub fn vector3(&self, set: usize, node: usize, nodes: usize) -> [f64; 3] {
-        [0, 1, 2].map(|component| self.rows[set][component * nodes + node])
+    pub fn vector3(&self, set: usize, node: usize, nodes: usize) -> Vector3 {
+        strided_vector3(&self.rows[set], node, nodes)
     }
 }
 
@@ -125,12 +126,13 @@ impl ContactRows {
     }
 
     /// Returns the three components of the sum over modes at a node.
-    pub fn at_node(&self, node: usize, modes: &[f64]) -> [f64; 3] {
+    pub fn at_node(&self, node: usize, modes: &[f64]) -> Vector3 {
         let padded = self.all.len().next_multiple_of(PADDED);
-        [0, 1, 2].map(|component| {
+        let sum = |component: usize| {
             let shapes = &self.by_row[(3 * node + component) * padded..][..modes.len()];
             shapes.iter().zip(modes).map(|(shape, mode)| shape * mode).sum()
-        })
+        };
+        [0, 1, 2].map(sum).into()
     }
 
     /// Finds displacements and velocities by the modes with inertia.
@@ -206,7 +208,7 @@ mod tests {
                 (0..3).for_each(|row| most[row] = most[row].max(moved[row].abs()));
                 advance.freely(&level, &mut state);
             }
-            for (most, reach) in most.into_iter().zip(reach) {
+            for (most, reach) in most.into_iter().zip(&reach) {
                 assert!(most <= reach * (1.0 + 1e-12), "case {case}: {most} beyond {reach}");
                 assert!(count > 1 || ratio > 0.0 || most > 0.999 * reach, "case {case}: {most} of {reach}");
             }

@@ -14,11 +14,11 @@ use super::surroundings::{CarriersInStep, Surroundings};
 use super::tables::{HALVINGS, Tables};
 use crate::geometry::PrescribedMotion;
 use crate::geometry::wrench::At;
+use crate::math::vector::{set_strided_vector3, set_vector3_at, vector3_at};
 use crate::modes::bank::ModalBank;
 use crate::modes::coordinates::ContactModes;
 use crate::modes::cyclic::CyclicBank;
 use crate::modes::sectors::Sectors;
-use crate::scene::method::Solver;
 use crate::system::contact_view::ContactMember;
 use crate::system::work::ContactWork;
 use crate::system::{ContactPair, StepFailure, Structure, System};
@@ -101,13 +101,8 @@ impl Surroundings for SceneSurroundings<'_> {
 
 impl SceneIsland {
     /// Creates an island for the sectors of a structure that are uncoupled and touch rigid surfaces, for spans up to `longest` (s) and errors of `tolerance` (m). `None` if the sectors are coupled.
-    pub fn single(
-        set: usize,
-        structure: usize,
-        (structures, pairs): (&[Structure], &[ContactPair]),
-        (longest, solver): (f64, Solver),
-        tolerance: f64,
-    ) -> Option<Self> {
+    pub fn single(set: usize, structure: usize, system: &System, longest: f64, tolerance: f64) -> Option<Self> {
+        let (System { structures, pairs, .. }, solver) = (system, system.settings.solver);
         let of = &structures[structure];
         let bank = of.bank()?;
         let kinds = kinds_of(of.modes());
@@ -136,13 +131,8 @@ impl SceneIsland {
 
     /// Creates the island of a set of structures that move each other, for spans up to `longest` (s)
     /// and errors of `tolerance` (m).
-    pub fn coupled(
-        set: usize,
-        members: &[usize],
-        (structures, pairs): (&[Structure], &[ContactPair]),
-        (longest, solver): (f64, Solver),
-        tolerance: f64,
-    ) -> Self {
+    pub fn coupled(set: usize, members: &[usize], system: &System, longest: f64, tolerance: f64) -> Self {
+        let (System { structures, pairs, .. }, solver) = (system, system.settings.solver);
         let touching: Vec<usize> = members.iter().copied().filter(|one| structures[*one].nodes() > 0).collect();
         let carrying: Vec<usize> = members.iter().copied().filter(|one| structures[*one].nodes() == 0).collect();
         let kinds: Vec<Vec<ContactModes>> = touching.iter().map(|one| kinds_of(structures[*one].modes())).collect();
@@ -226,7 +216,7 @@ impl SceneIsland {
         let mut surroundings = SceneSurroundings { structures, pairs, members, carrier_of };
         let outcome = island.begin(&mut surroundings, goal).integrate(&mut counted.effort);
         let load_work = self.write(structures);
-        self.members.iter().try_for_each(|one| one.record.check((one.structure, one.sector)))?;
+        self.members.iter().try_for_each(|one| one.record.check(one.structure, one.sector))?;
         outcome.map_err(|stopped| self.failure(stopped))?;
         let ledger = &mut counted.ledgers[self.set];
         if !self.island.carriers.is_empty() {
@@ -359,7 +349,7 @@ impl SceneIsland {
                     let index = structure.index(node, sector);
                     let Some(pair) = structure.pair_of[node] else { return true };
                     let at = At { node, index, drive: pairs[pair].drive_now() };
-                    let reach = std::array::from_fn(|component| reach[3 * node + component]);
+                    let reach = vector3_at(reach, node);
                     let least = pairs[pair].gap().least(at, &ends[pair], turns[pair], reach).unwrap_or(0.0);
                     structure.lowest_in_span[index] = least;
                     structure.history.multiplier[index] == 0.0 && least > 0.0
@@ -429,12 +419,10 @@ impl Structure {
             let index = self.index(node, sector);
             state.multipliers[node] = self.history.multiplier[index];
             state.gaps[node] = self.history.gap.before[index];
-            state.normals[3 * node..3 * node + 3].copy_from_slice(&self.vector3(
-                &self.step_control.normals,
-                node,
-                sector,
-            ));
-            state.forces[3 * node..3 * node + 3].copy_from_slice(&self.vector3(&self.history.force.now, node, sector));
+            let normal = self.vector3(&self.step_control.normals, node, sector);
+            let force = self.vector3(&self.history.force.now, node, sector);
+            set_vector3_at(&mut state.normals, node, normal);
+            set_vector3_at(&mut state.forces, node, force);
         }
         for (row, slope) in state.slopes.iter_mut().enumerate() {
             *slope = self.step_control.slopes[row * self.lanes() + sector];
@@ -452,11 +440,9 @@ impl Structure {
             let index = self.index(node, sector);
             self.history.multiplier[index] = state.multipliers[node];
             self.lowest_in_span[index] = lowest(node);
-            for component in 0..3 {
-                let (row, of_state) = ((3 * node + component) * lanes + sector, 3 * node + component);
-                self.history.force.now[row] = state.forces[of_state];
-                self.step_control.normals[row] = state.normals[of_state];
-            }
+            let first = 3 * node * lanes + sector;
+            set_strided_vector3(&mut self.history.force.now, first, lanes, vector3_at(&state.forces, node));
+            set_strided_vector3(&mut self.step_control.normals, first, lanes, vector3_at(&state.normals, node));
         }
     }
 }

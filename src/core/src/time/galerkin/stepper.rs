@@ -3,7 +3,7 @@
 use super::scene_island::SceneIsland;
 use crate::geometry::PrescribedMotion;
 use crate::modes::sectors::Sectors;
-use crate::system::{ContactPair, StepFailure, System};
+use crate::system::{ContactPair, SearchStart, StepFailure, System};
 use crate::time::Stepper;
 
 /// Tables and scratch memory for adaptive steps of all islands of a system.
@@ -19,11 +19,9 @@ impl Galerkin {
     /// Creates tables for spans up to `longest` (s) with errors within the fraction `tolerance` of the smallest clearance of each
     /// structure or, if structures influence each other, of their set.
     pub fn new(system: &mut System, longest: f64, tolerance: f64) -> Self {
-        let solver = system.settings.solver;
         let (mut single, mut coupled) = (Vec::new(), Vec::new());
         for set in 0..system.sets.count() {
             let members = system.sets.members(set);
-            let parts = (&system.structures[..], &system.pairs[..]);
             let own = |pair: &&ContactPair| members.contains(&pair.structure());
             let clearance = |pairs: &mut dyn Iterator<Item = &ContactPair>| {
                 tolerance * pairs.map(|pair| pair.gap().clearance()).fold(f64::INFINITY, f64::min)
@@ -31,12 +29,12 @@ impl Galerkin {
             let is_disk = |one: &usize| system.structures[*one].modes().coupled().is_some();
             if members.iter().any(is_disk) || system.pairs.iter().filter(own).any(|pair| pair.carrier().is_some()) {
                 let tolerance = clearance(&mut system.pairs.iter().filter(own));
-                coupled.push(SceneIsland::coupled(set, members, parts, (longest, solver), tolerance));
+                coupled.push(SceneIsland::coupled(set, members, system, longest, tolerance));
                 continue;
             }
             for index in members.iter().copied().filter(|index| system.structures[*index].nodes() > 0) {
                 let tolerance = clearance(&mut system.pairs.iter().filter(|pair| pair.structure() == index));
-                single.extend(SceneIsland::single(set, index, parts, (longest, solver), tolerance));
+                single.extend(SceneIsland::single(set, index, system, longest, tolerance));
             }
         }
         single.sort_by_key(SceneIsland::first_structure);
@@ -68,7 +66,7 @@ impl Stepper for Galerkin {
         self.islands.iter_mut().try_for_each(|island| island.integrate(system, span, self.most_tried))?;
         system.counted.factorisations += system.counted.effort.factorisations - factorisations;
         system.check_travel()?;
-        system.find_gaps(true);
+        system.find_gaps(SearchStart::PreviousStep);
         for structure in &mut system.structures {
             let ends = structure.lowest_in_span.iter_mut().zip(&structure.history.gap.now);
             ends.for_each(|(lowest, gap)| *lowest = lowest.min(*gap));
@@ -90,7 +88,7 @@ impl Stepper for Galerkin {
         self.islands.iter_mut().for_each(|island| island.fly(system, length));
         system.events.now.clear();
         system.events.before.clear();
-        system.find_gaps(true);
+        system.find_gaps(SearchStart::PreviousStep);
         system.counted.steps += 1;
         true
     }

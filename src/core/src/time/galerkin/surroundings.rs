@@ -4,6 +4,7 @@ use super::carrier::CarrierIntegrator;
 use super::compliance::Lanes;
 use super::level::StepTables;
 use super::trial::{ForceInterpolation, Obstacle, Trial};
+use crate::math::vector::Vector3;
 use crate::modes::cyclic::CyclicBank;
 
 /// A step that is accepted.
@@ -51,16 +52,23 @@ pub trait Witness: Obstacle {
     fn guess_start_places(&mut self) {}
 
     /// Adds the reaction to a force (N) on a node at a point of the step to the surface carrier.
-    fn react(&mut self, _node: usize, _point: usize, _force: [f64; 3]) {}
+    fn react(&mut self, _node: usize, _point: usize, _force: Vector3) {}
 
     /// Adds an impulse error (N·s) on a node at a point of the step to that of the surface carrier.
-    fn add_impulse(&mut self, _node: usize, _point: usize, _impulse: [f64; 3]) {}
+    fn add_impulse(&mut self, _node: usize, _point: usize, _impulse: Vector3) {}
 }
 
 /// Surface carriers of an island, in a step of a level.
 pub struct CarriersInStep<'a> {
     /// The carriers; empty if all surfaces are rigid.
     pub carriers: &'a mut [CarrierIntegrator],
+    /// Tried step.
+    pub step: LaneStep,
+}
+
+/// A tried step, and the lanes of its contact problem.
+#[derive(Debug, Clone, Copy)]
+pub struct LaneStep {
     /// Level of the step.
     pub level: usize,
     /// Interpolation of the contact force.

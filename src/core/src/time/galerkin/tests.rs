@@ -6,6 +6,7 @@ use super::span::StepGoal;
 use super::surroundings::{AcceptedStep, CarriersInStep, Surroundings, Witness};
 use super::tables::Tables;
 use super::trial::{ForceInterpolation, Obstacle, SlidingState};
+use crate::geometry::{Gap, Vector3};
 use crate::modes::coordinates::ContactModes;
 use crate::system::Effort;
 use nalgebra::DMatrix;
@@ -81,16 +82,16 @@ impl MovingWall {
 }
 
 impl Obstacle for &mut MovingWall {
-    fn gap(&mut self, _: usize, point: usize, moved: [f64; 3]) -> (f64, [f64; 3]) {
-        (self.place(self.times[point]) - moved[0], [-1.0, 0.0, 0.0])
+    fn gap(&mut self, _: usize, point: usize, moved: Vector3) -> Gap {
+        Gap { distance: self.place(self.times[point]) - moved[0], normal: -Vector3::x(), ..Gap::NOTHING }
     }
 
     fn friction(&self, _: usize) -> f64 {
         self.friction
     }
 
-    fn slip_direction(&mut self, _: usize, _: usize, _: &SlidingState) -> [f64; 3] {
-        [0.0, 1.0, 0.0]
+    fn slip_direction(&mut self, _: usize, _: usize, _: &SlidingState) -> Vector3 {
+        Vector3::y()
     }
 }
 

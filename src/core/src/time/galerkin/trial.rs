@@ -17,6 +17,7 @@ use super::rows::{ContactRows, Sums};
 use super::state::SectorState;
 use crate::contact::Law;
 use crate::math::simd::InstructionSet;
+use crate::math::vector::{Vector3, set_vector3_at, vector3_at};
 use crate::scene::method::Solver;
 pub use judgement::TrialResult;
 use minima::Minima;
@@ -49,11 +50,6 @@ impl ForceInterpolation {
     }
 }
 
-/// The three components of a node.
-pub fn vector3_at(values: &[f64], node: usize) -> [f64; 3] {
-    [values[3 * node], values[3 * node + 1], values[3 * node + 2]]
-}
-
 /// Scratch memory and results of a trial, for a fixed number of contact nodes.
 #[derive(Debug, Clone)]
 pub struct Trial {
@@ -78,7 +74,7 @@ pub struct Trial {
     with: Vec<f64>,
     multipliers: Vec<f64>,
     /// Rows of the contact problem of the members: unit normals.
-    rows: Vec<[f64; 3]>,
+    rows: Vec<Vector3>,
     /// Directions of the forces (force per λ), and forces.
     directions: Vec<f64>,
     forces: Vec<f64>,
@@ -170,7 +166,7 @@ impl Trial {
             without: width(),
             with: width(),
             multipliers: width(),
-            rows: vec![[0.0; 3]; lanes.len()],
+            rows: vec![Vector3::zeros(); lanes.len()],
             directions: three(),
             forces: three(),
             columns: vec![0.0; lanes.len() * 3 * lanes.width()],
@@ -237,7 +233,7 @@ impl Trial {
     ) {
         if verdict.depth > 0.0 {
             self.find_start(rows, state);
-            verdict.depth = self.depth_without_jumps(|node, moved| Some(obstacle.gap(node, 0, moved).0));
+            verdict.depth = self.depth_without_jumps(|node, moved| Some(obstacle.gap(node, 0, moved).distance));
         }
     }
 
@@ -251,8 +247,8 @@ impl Trial {
         let nodes = self.lanes.nodes;
         for node in 0..nodes {
             let [moved, velocity] = [0, 1].map(|set| self.now.vector3(set, node, nodes));
-            self.start[3 * node..3 * node + 3].copy_from_slice(&moved);
-            self.velocities[3 * node..3 * node + 3].copy_from_slice(&velocity);
+            set_vector3_at(&mut self.start, node, moved);
+            set_vector3_at(&mut self.velocities, node, velocity);
         }
         let (matrix, y) = (rows.residual(), &mut self.start);
         self.instructions.run(AddProduct { matrix, x: &state.forces, y });
@@ -264,9 +260,7 @@ impl Trial {
         let (sums, reach) = &mut self.reach;
         rows.add_largest_displacements(state, sums);
         let nodes = self.lanes.nodes;
-        for (node, reach) in reach.chunks_exact_mut(3).enumerate() {
-            reach.copy_from_slice(&sums.vector3(0, node, nodes));
-        }
+        (0..nodes).for_each(|node| set_vector3_at(reach, node, sums.vector3(0, node, nodes)));
         reach
     }
 
@@ -274,7 +268,8 @@ impl Trial {
     /// `None`), and takes the contact state at the start as initial guess.
     pub fn begin(
         &mut self,
-        (level, kind): (&StepTables, ForceInterpolation),
+        level: &StepTables,
+        kind: ForceInterpolation,
         rows: Option<&ContactRows>,
         state: &SectorState,
     ) {
@@ -291,7 +286,7 @@ impl Trial {
         self.per_step = if kind == ForceInterpolation::Polynomial { 1.0 / level.step } else { 0.0 };
         let (nodes, stride) = (lanes.nodes, 3 * lanes.width());
         if let Some(rows) = rows {
-            self.move_freely((level, kind), rows, state);
+            self.move_freely(level, kind, rows, state);
         }
         self.pushed[..stride].fill(0.0);
         for lane in 0..lanes.len() {
@@ -316,12 +311,7 @@ impl Trial {
     }
 
     /// Finds the displacements of the rows without any force.
-    fn move_freely(
-        &mut self,
-        (level, kind): (&StepTables, ForceInterpolation),
-        rows: &ContactRows,
-        state: &SectorState,
-    ) {
+    fn move_freely(&mut self, level: &StepTables, kind: ForceInterpolation, rows: &ContactRows, state: &SectorState) {
         let degree = level.basis.degree;
         let points = if kind == ForceInterpolation::Constant { degree - 1..degree } else { 0..degree };
         rows.free(level, state, points, &mut self.sums);
@@ -374,7 +364,8 @@ impl Trial {
     /// forces make penetrate.
     pub fn solve(
         &mut self,
-        (compliance, residual): (&LaneCompliance, &DMatrix<f64>),
+        compliance: &LaneCompliance,
+        residual: &DMatrix<f64>,
         obstacle: &mut impl Obstacle,
         verdict: &mut TrialResult,
     ) -> bool {
@@ -449,9 +440,8 @@ impl Trial {
         for point in 0..=self.lanes.points {
             for node in 0..self.lanes.nodes {
                 let (force, moved) = (self.force(point, node), self.displacement(point, node));
-                for c in 0..3 {
-                    (self.withdrawn[3 * node + c], self.inert[point][3 * node + c]) = (-force[c], moved[c]);
-                }
+                set_vector3_at(&mut self.withdrawn, node, -force);
+                set_vector3_at(&mut self.inert[point], node, moved);
             }
             let y = &mut self.inert[point];
             self.instructions.run(AddProduct { matrix: residual, x: &self.withdrawn, y });
@@ -459,11 +449,9 @@ impl Trial {
     }
 
     /// Returns the sliding distance over which a force on a node at a point does work (m).
-    fn sliding_distance(&self, point: usize, node: usize) -> [f64; 3] {
+    fn sliding_distance(&self, point: usize, node: usize) -> Vector3 {
         let terms = self.work_weights[point].iter().zip(&self.inert);
-        terms.fold([0.0; 3], |sliding_distance, (weight, inert)| {
-            std::array::from_fn(|c| sliding_distance[c] + weight * inert[3 * node + c])
-        })
+        terms.map(|(weight, inert)| *weight * vector3_at(inert, node)).sum()
     }
 
     /// Makes a lane an unknown, with the direction and the effect of its force.
@@ -477,11 +465,12 @@ impl Trial {
             normal: lanes.vector3(&self.normals, lane),
         };
         let friction = obstacle.friction(node);
-        let slip_direction = if friction > 0.0 { obstacle.slip_direction(node, point, &sliding) } else { [0.0; 3] };
+        let slip_direction =
+            if friction > 0.0 { obstacle.slip_direction(node, point, &sliding) } else { Vector3::zeros() };
         let Self { without, multipliers, normals, moved, .. } = &*self;
         let values = LaneValues { lanes, without, multipliers, normals, moved };
         let prediction = LanePrediction { slip_direction, ..values.prediction(lane, obstacle) };
-        let (mut row, mut column) = ([[0.0; 3]], [[0.0; 3]]);
+        let (mut row, mut column) = ([Vector3::zeros()], [Vector3::zeros()]);
         self.law.fill_directions(&prediction, &mut row, &mut column);
         let ([row], [direction]) = (row, column);
         self.rows[self.members.len()] = row;

@@ -1,6 +1,8 @@
 //! Trials of sectors that step together because they move each other or touch a common surface.
 
 use super::Trial;
+use crate::geometry::Gap;
+use crate::math::vector::{Vector3, vector3_at};
 use crate::time::galerkin::state::SectorState;
 
 impl Trial {
@@ -13,36 +15,35 @@ impl Trial {
     }
 
     /// Finds unknown gaps at the start; `gap` returns the gap of a node with a given displacement (m).
-    pub fn find_start_gaps(&mut self, state: &SectorState, mut gap: impl FnMut(usize, [f64; 3]) -> f64) {
+    pub fn find_start_gaps(&mut self, state: &SectorState, mut gap: impl FnMut(usize, Vector3) -> f64) {
         if !state.gaps_known {
             for node in 0..self.nodes() {
-                self.start_contacts.gaps[node] = gap(node, super::vector3_at(&self.start, node));
+                self.start_contacts.gaps[node] = gap(node, vector3_at(&self.start, node));
             }
         }
     }
 
     /// Sets the displacements without forces so that the total displacement (m) of a node at point 1 … s equals that of the
     /// caller, which includes the effect of other sectors.
-    pub fn carry(&mut self, of: impl Fn(usize, usize) -> [f64; 3]) {
+    pub fn carry(&mut self, of: impl Fn(usize, usize) -> Vector3) {
         for lane in 0..self.lanes.len() {
             let (point, node) = self.lanes.place(lane);
-            let (all, own) = (of(point, node), self.lanes.vector3(&self.pushed, lane));
-            self.lanes.set(&mut self.free, lane, [0, 1, 2].map(|i| all[i] - own[i]));
+            self.lanes.set(&mut self.free, lane, of(point, node) - self.lanes.vector3(&self.pushed, lane));
         }
     }
 
     /// Finds gaps (m) and normals at point 1 … s, for the current displacements of the nodes (m).
-    pub fn find_gaps_at(&mut self, point: usize, mut gap: impl FnMut(usize, [f64; 3]) -> (f64, [f64; 3])) {
+    pub fn find_gaps_at(&mut self, point: usize, mut gap: impl FnMut(usize, Vector3) -> Gap) {
         for node in 0..self.nodes() {
             let lane = self.lanes.at(point, node);
-            let (gap, normal) = gap(node, self.lanes.vector3(&self.moved, lane));
-            self.gaps[lane] = gap;
-            self.lanes.set(&mut self.normals, lane, normal);
+            let gap = gap(node, self.lanes.vector3(&self.moved, lane));
+            self.gaps[lane] = gap.distance;
+            self.lanes.set(&mut self.normals, lane, gap.normal);
         }
     }
 
     /// Impulse error on the rows of a node (N·s); valid after the step has been judged.
-    pub fn impulse(&self, node: usize) -> [f64; 3] {
-        super::vector3_at(&self.impulses, node)
+    pub fn impulse(&self, node: usize) -> Vector3 {
+        vector3_at(&self.impulses, node)
     }
 }

@@ -1,6 +1,7 @@
 //! Judges a solved step: its error, the energy of contacts that open or close, and nodes that came near between the points.
 
-use super::{ForceInterpolation, FreeMotion, Obstacle, Trial, vector3_at};
+use super::{ForceInterpolation, FreeMotion, Obstacle, Trial};
+use crate::math::vector::{Vector3, vector3_at};
 use crate::time::galerkin::basis::{POINTS, TimeBasis};
 use crate::time::galerkin::kernels::AddProduct;
 use crate::time::galerkin::level::StepTables;
@@ -57,7 +58,8 @@ impl Trial {
     /// Finds error, switches and near misses of a solved step.
     pub fn judge(
         &mut self,
-        (level, rows): (&StepTables, &ContactRows),
+        level: &StepTables,
+        rows: &ContactRows,
         obstacle: &impl Obstacle,
         verdict: &mut TrialResult,
     ) {
@@ -80,7 +82,7 @@ impl Trial {
             pushed = true;
             // A contact that passes over a free edge needs short steps.
             verdict.near |= (0..count).any(|point| self.gap(point, node) == f64::INFINITY);
-            let mut forces = [[0.0; 3]; POINTS];
+            let mut forces = [Vector3::zeros(); POINTS];
             forces[..count].iter_mut().enumerate().for_each(|(point, force)| *force = self.force(point, node));
             for component in 0..3 {
                 let force = |point: usize| forces[point][component];
@@ -137,7 +139,7 @@ impl Trial {
     ///
     /// `gap_at_start` returns the gap (m) at the start of a node displaced by a vector (m), or `None` if it is unknown; the node
     /// is then excluded.
-    pub fn depth_without_jumps(&self, mut gap_at_start: impl FnMut(usize, [f64; 3]) -> Option<f64>) -> f64 {
+    pub fn depth_without_jumps(&self, mut gap_at_start: impl FnMut(usize, Vector3) -> Option<f64>) -> f64 {
         let open = (0..self.nodes()).filter(|node| self.depths[*node] > 0.0);
         open.fold(0.0, |deepest, node| {
             let gap = gap_at_start(node, vector3_at(&self.start, node));
@@ -186,13 +188,12 @@ impl Trial {
         let (end, amplitude) = if *is_known {
             (end_velocities.vector3(0, node, self.nodes()), unresolved_amplitudes.vector3(0, node, self.nodes()))
         } else {
-            (std::array::from_fn(|c| 2.0 * (to[c] - from[c]) / step - velocity[c]), [0.0; 3])
+            (2.0 * (to - from) / step - velocity, Vector3::zeros())
         };
-        let bent = 0.125 * step * (0..3).map(|c| normal[c] * (velocity[c] - end[c])).sum::<f64>();
-        let amplitude: f64 = (0..3).map(|c| normal[c].abs() * amplitude[c]).sum();
-        let straight = std::array::from_fn(|c| 0.5 * (from[c] + to[c]));
+        let bent = 0.125 * step * normal.dot(&(velocity - end));
+        let amplitude = normal.abs().dot(&amplitude);
         let line = 0.5 * (ends[0] + ends[1]);
-        let middle = obstacle.gap_within(node, 0.5, straight).unwrap_or(line);
+        let middle = obstacle.gap_within(node, 0.5, 0.5 * (from + to)).unwrap_or(line);
         (ends[0].min(ends[1]).min(middle + bent), bent.abs() + (middle - line).abs() + amplitude)
     }
 }

@@ -7,6 +7,7 @@
 use super::judgement::NEAR;
 use super::{ForceInterpolation, Trial};
 use crate::math::cubic::{evaluate, interior_minimum};
+use crate::math::vector::Vector3;
 use crate::time::galerkin::advance::Advance;
 use crate::time::galerkin::basis::{MOST, POINTS, TimeBasis};
 use crate::time::galerkin::level::StepTables;
@@ -22,7 +23,7 @@ pub const PARTS: usize = 1 << FINER;
 const SHARE: f64 = 0.1;
 
 /// Displacement of a node at the ends of parts of a step (m), and its change per part there.
-type Path = [[[f64; 3]; 2]; PARTS + 1];
+type Path = [[Vector3; 2]; PARTS + 1];
 
 /// Smallest gaps between the points.
 #[derive(Debug, Clone)]
@@ -41,7 +42,7 @@ impl Minima {
     pub(super) fn new(modes: usize, nodes: usize) -> Self {
         Self {
             at: vec![f64::NAN; nodes],
-            paths: vec![[[[0.0; 3]; 2]; PARTS + 1]; nodes],
+            paths: vec![[[Vector3::zeros(); 2]; PARTS + 1]; nodes],
             parts: 0,
             state: SectorState::new(modes, 0),
         }
@@ -104,16 +105,13 @@ impl Trial {
                 let now = [&minima.state.position, &minima.state.velocity].map(|modes| rows.at_node(node, modes));
                 let bent = self.bent(basis, rows, node, real(part) / real(parts));
                 let [moved, velocity] = now;
-                minima.paths[node][part] = [
-                    std::array::from_fn(|c| moved[c] + bent[0][c]),
-                    std::array::from_fn(|c| table.step * velocity[c] + bent[1][c] / real(parts)),
-                ];
+                minima.paths[node][part] = [moved + bent[0], table.step * velocity + bent[1] / real(parts)];
             }
             if part < parts {
                 let forces = |node: usize| {
                     Some(within(&self.polynomial(basis, ForceInterpolation::Polynomial, node)?, part, parts))
                 };
-                advance.under((table, rows), &mut minima.state, forces);
+                advance.under(table, rows, &mut minima.state, forces);
             }
         }
         self.minima = minima;
@@ -121,8 +119,8 @@ impl Trial {
 
     /// Returns the displacement of a node within the step by the residual flexibility (m), and its derivative with respect to the
     /// fraction of the step.
-    fn bent(&self, basis: &TimeBasis, rows: &ContactRows, node: usize, theta: f64) -> [[f64; 3]; 2] {
-        let mut sums = [[0.0; 3]; 2];
+    fn bent(&self, basis: &TimeBasis, rows: &ContactRows, node: usize, theta: f64) -> [Vector3; 2] {
+        let mut sums = [Vector3::zeros(); 2];
         for other in 0..self.nodes() {
             let pushes = |point: usize| self.multiplier(point, other) > 0.0;
             if !(0..basis.count()).any(pushes) {
@@ -159,25 +157,20 @@ impl Trial {
     }
 
     /// Displacement of a node within the step (m): followed exactly, or from the polynomial through the displacements at the points.
-    pub fn displacement_within(&self, basis: &TimeBasis, node: usize, theta: f64) -> [f64; 3] {
+    pub fn displacement_within(&self, basis: &TimeBasis, node: usize, theta: f64) -> Vector3 {
         let parts = self.minima.parts;
         if parts == 0 {
             let weights = basis.weights_at(theta);
-            return (0..basis.count()).fold([0.0; 3], |sum, point| {
-                let moved = self.displacement(point, node);
-                std::array::from_fn(|c| sum[c] + weights[point] * moved[c])
-            });
+            return (0..basis.count()).map(|point| weights[point] * self.displacement(point, node)).sum();
         }
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 ≤ θ ≤ 1")]
         let part = ((theta * real(parts)) as usize).min(parts - 1);
         let t = theta * real(parts) - real(part);
         let path = &self.minima.paths[node];
         let ([from, start], [to, end]) = (path[part], path[part + 1]);
-        std::array::from_fn(|c| {
-            let rise = to[c] - from[c];
-            let [bend, twist] = [3.0 * rise - 2.0 * start[c] - end[c], start[c] + end[c] - 2.0 * rise];
-            evaluate(&[from[c], start[c], bend, twist], t)
-        })
+        let rise = to - from;
+        let (bend, twist) = (3.0 * rise - 2.0 * start - end, start + end - 2.0 * rise);
+        from + t * (start + t * (bend + t * twist))
     }
 
     /// Largest λ of a node within the step (N), from the polynomial through the values at the points.
@@ -201,12 +194,8 @@ fn real(value: usize) -> f64 {
 }
 
 /// Coefficients of a polynomial of degree 2 over one of several equal parts.
-fn within(coefficients: &[[f64; 3]; MOST], part: usize, parts: usize) -> [[f64; 3]; MOST] {
+fn within(coefficients: &[Vector3; MOST], part: usize, parts: usize) -> [Vector3; MOST] {
     let (from, length) = (real(part) / real(parts), 1.0 / real(parts));
     let [a, b, c] = *coefficients;
-    [
-        std::array::from_fn(|i| a[i] + from * (b[i] + from * c[i])),
-        std::array::from_fn(|i| length * (b[i] + 2.0 * from * c[i])),
-        std::array::from_fn(|i| length * length * c[i]),
-    ]
+    [a + from * (b + from * c), length * (b + 2.0 * from * c), length * length * c]
 }

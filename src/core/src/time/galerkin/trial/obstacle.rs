@@ -1,11 +1,12 @@
 //! Surfaces that a sector may touch.
 
+use crate::geometry::{Gap, Vector3};
 use crate::time::galerkin::compliance::Lanes;
 
 /// Surfaces that the nodes of a sector may touch, at the points of the tried step.
 pub trait Obstacle {
-    /// Returns gap (m; infinite if there is nothing to touch) and unit normal at a point of the step, for the node displaced by `moved` (m).
-    fn gap(&mut self, node: usize, point: usize, moved: [f64; 3]) -> (f64, [f64; 3]);
+    /// Returns the gap of the node displaced by `moved` (m) at a point of the step.
+    fn gap(&mut self, node: usize, point: usize, moved: Vector3) -> Gap;
 
     /// Finds gaps (m) and normals at all points but the first; arrays of [`Lanes`].
     fn gaps(&mut self, lanes: Lanes, moved: &[f64], gaps: &mut [f64], normals: &mut [f64]) {
@@ -13,7 +14,7 @@ pub trait Obstacle {
     }
 
     /// Gap (m) of a node displaced by `moved` (m) at the fraction `theta` of the step; `None` if it is known at the points only.
-    fn gap_within(&self, _node: usize, _theta: f64, _moved: [f64; 3]) -> Option<f64> {
+    fn gap_within(&self, _node: usize, _theta: f64, _moved: Vector3) -> Option<f64> {
         None
     }
 
@@ -28,8 +29,8 @@ pub trait Obstacle {
     }
 
     /// Unit direction of slip of a node relative to the surface; 0 without slip.
-    fn slip_direction(&mut self, _node: usize, _point: usize, _sliding: &SlidingState) -> [f64; 3] {
-        [0.0; 3]
+    fn slip_direction(&mut self, _node: usize, _point: usize, _sliding: &SlidingState) -> Vector3 {
+        Vector3::zeros()
     }
 
     /// Sector of the nodes, on surfaces with a coating.
@@ -38,7 +39,7 @@ pub trait Obstacle {
     }
 
     /// Angle on the surface (rad, fixed frame) of a node displaced by `moved` (m), on surfaces around an axis.
-    fn angle(&self, _node: usize, _point: usize, _moved: [f64; 3]) -> f64 {
+    fn angle(&self, _node: usize, _point: usize, _moved: Vector3) -> f64 {
         0.0
     }
 
@@ -49,15 +50,15 @@ pub trait Obstacle {
 
     /// Adds the displacement of the obstacle at all lanes (m, along their normals, away from the node) per λ of one lane, whose
     /// force per λ is `direction`. Valid only after [`Obstacle::prepare_compliance`] has returned true.
-    fn add_normal_compliance(&mut self, _lane: usize, _direction: [f64; 3], _given: &mut [f64]) {}
+    fn add_normal_compliance(&mut self, _lane: usize, _direction: Vector3, _given: &mut [f64]) {}
 
     /// Adds the displacement of the obstacle in all three directions of each lane, under a `force` on one lane (N).
-    fn add_compliance(&mut self, _lane: usize, _force: [f64; 3], _given: &mut [f64]) {}
+    fn add_compliance(&mut self, _lane: usize, _force: Vector3, _given: &mut [f64]) {}
 
     /// Returns the sliding (m) of a node up to a point of the step that prescribed motion and the motion of the surface cause;
     /// the node is displaced by `moved` (m).
-    fn drift(&self, _node: usize, _point: usize, _moved: [f64; 3]) -> [f64; 3] {
-        [0.0; 3]
+    fn drift(&self, _node: usize, _point: usize, _moved: Vector3) -> Vector3 {
+        Vector3::zeros()
     }
 }
 
@@ -65,13 +66,13 @@ pub trait Obstacle {
 #[derive(Debug, Clone, Copy)]
 pub struct SlidingState {
     /// Displacement of the node (m).
-    pub moved: [f64; 3],
+    pub moved: Vector3,
     /// Vibration velocity of the node at the start of the step (m/s).
-    pub velocity: [f64; 3],
+    pub velocity: Vector3,
     /// Sliding distance over which a force at this point does work, Σ_k S_ik ũ_k (m), by modes with inertia; 0 unless [`Obstacle::turns`].
-    pub sliding_distance: [f64; 3],
+    pub sliding_distance: Vector3,
     /// Unit normal at the point.
-    pub normal: [f64; 3],
+    pub normal: Vector3,
 }
 
 /// Evaluates [`Obstacle::gaps`] by [`Obstacle::gap`] of every lane.
@@ -84,8 +85,8 @@ pub fn node_by_node(
 ) {
     for lane in 0..lanes.len() {
         let (point, node) = lanes.place(lane);
-        let (gap, normal) = obstacle.gap(node, point, lanes.vector3(moved, lane));
-        gaps[lane] = gap;
-        lanes.set(normals, lane, normal);
+        let gap = obstacle.gap(node, point, lanes.vector3(moved, lane));
+        gaps[lane] = gap.distance;
+        lanes.set(normals, lane, gap.normal);
     }
 }

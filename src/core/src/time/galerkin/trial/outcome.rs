@@ -1,6 +1,7 @@
 //! Results of a trial: forces, gaps and displacements of the nodes at the points, and the state at the end.
 
-use super::{ForceInterpolation, Trial, vector3_at};
+use super::{ForceInterpolation, Trial};
+use crate::math::vector::{Vector3, set_vector3_at, vector3_at};
 use crate::time::galerkin::basis::{MOST, TimeBasis};
 use crate::time::galerkin::state::SectorState;
 use nalgebra::DMatrix;
@@ -22,7 +23,7 @@ impl Trial {
     }
 
     /// Force on a node at point 0 … s (N).
-    pub fn force(&self, point: usize, node: usize) -> [f64; 3] {
+    pub fn force(&self, point: usize, node: usize) -> Vector3 {
         if point == 0 { vector3_at(&self.start_contacts.forces, node) } else { self.lane(&self.forces, point, node) }
     }
 
@@ -38,12 +39,12 @@ impl Trial {
     }
 
     /// Returns the unit normal of a node.
-    pub fn normal(&self, point: usize, node: usize) -> [f64; 3] {
+    pub fn normal(&self, point: usize, node: usize) -> Vector3 {
         if point == 0 { vector3_at(&self.start_contacts.normals, node) } else { self.lane(&self.normals, point, node) }
     }
 
     /// Unit normal for which the force of a node was found: force − λ · normal is friction.
-    fn solved_normal(&self, point: usize, node: usize) -> [f64; 3] {
+    fn solved_normal(&self, point: usize, node: usize) -> Vector3 {
         if point == 0 {
             vector3_at(&self.start_contacts.normals, node)
         } else {
@@ -52,18 +53,16 @@ impl Trial {
     }
 
     /// Friction force on a node (N).
-    pub fn friction_force(&self, point: usize, node: usize) -> [f64; 3] {
-        let (force, multiplier) = (self.force(point, node), self.multiplier(point, node));
-        let normal = self.solved_normal(point, node);
-        std::array::from_fn(|c| force[c] - multiplier * normal[c])
+    pub fn friction_force(&self, point: usize, node: usize) -> Vector3 {
+        self.force(point, node) - self.multiplier(point, node) * self.solved_normal(point, node)
     }
 
     /// Returns the displacement of a node (m); at the start only if a contact is closed.
-    pub fn displacement(&self, point: usize, node: usize) -> [f64; 3] {
+    pub fn displacement(&self, point: usize, node: usize) -> Vector3 {
         if point == 0 { vector3_at(&self.start, node) } else { self.lane(&self.moved, point, node) }
     }
 
-    fn lane(&self, values: &[f64], point: usize, node: usize) -> [f64; 3] {
+    fn lane(&self, values: &[f64], point: usize, node: usize) -> Vector3 {
         self.lanes.vector3(values, self.lanes.at(point, node))
     }
 
@@ -79,8 +78,8 @@ impl Trial {
     }
 
     /// Coefficients of θᵃ of the force on a node (N), projected on degree s − 1; `None` without a force.
-    pub fn polynomial(&self, basis: &TimeBasis, kind: ForceInterpolation, node: usize) -> Option<[[f64; 3]; MOST]> {
-        let mut sums = [[0.0; 3]; MOST];
+    pub fn polynomial(&self, basis: &TimeBasis, kind: ForceInterpolation, node: usize) -> Option<[Vector3; MOST]> {
+        let mut sums = [Vector3::zeros(); MOST];
         if kind == ForceInterpolation::Constant {
             sums[0] = self.force(1, node);
             return (self.multiplier(1, node) > 0.0).then_some(sums);
@@ -90,7 +89,7 @@ impl Trial {
             pushed = true;
             let force = self.force(point, node);
             for (sum, weights) in sums.iter_mut().zip(&basis.projection) {
-                sum.iter_mut().zip(force).for_each(|(sum, force)| *sum += weights[point] * force);
+                *sum += weights[point] * force;
             }
         }
         pushed.then_some(sums)
@@ -117,17 +116,16 @@ impl Trial {
         let points = self.points();
         for node in 0..self.nodes() {
             let pushes = self.multiplier(points, node) > 0.0;
-            let normal = if pushes { self.solved_normal(points, node) } else { [0.0; 3] };
+            let normal = if pushes { self.solved_normal(points, node) } else { Vector3::zeros() };
             let force = self.force(points, node);
-            state.forces[3 * node..3 * node + 3].copy_from_slice(&force);
-            state.normals[3 * node..3 * node + 3].copy_from_slice(&normal);
-            for (component, slope) in state.slopes.iter_mut().skip(3 * node).take(3).enumerate() {
-                let change = force[component] - self.start_contacts.forces[3 * node + component];
-                *slope = if points == 1 {
-                    change * self.per_step
-                } else {
-                    (0..=points).map(|point| self.end_slopes[point] * self.force(point, node)[component]).sum()
+            set_vector3_at(&mut state.forces, node, force);
+            set_vector3_at(&mut state.normals, node, normal);
+            if !state.slopes.is_empty() {
+                let slope = match points {
+                    1 => (force - vector3_at(&self.start_contacts.forces, node)) * self.per_step,
+                    _ => (0..=points).map(|point| self.end_slopes[point] * self.force(point, node)).sum(),
                 };
+                set_vector3_at(&mut state.slopes, node, slope);
             }
             state.multipliers[node] = self.multiplier(points, node);
             state.gaps[node] = self.gap(points, node);

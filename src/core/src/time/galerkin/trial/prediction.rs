@@ -2,6 +2,7 @@
 
 use super::Obstacle;
 use crate::contact::ContactPrediction;
+use crate::math::vector::Vector3;
 use crate::time::galerkin::compliance::Lanes;
 
 /// A contact node at a point of the step, before its force is known.
@@ -10,14 +11,14 @@ pub(super) struct LanePrediction<'a, O> {
     pub gap: f64,
     /// True if the last solution of the trial, or the step before, closed the contact.
     pub closed: bool,
-    pub normal: [f64; 3],
+    pub normal: Vector3,
     /// Displacement of the node (m).
-    pub moved: [f64; 3],
+    pub moved: Vector3,
     /// Slip over the step without the force (m).
-    pub slip: [f64; 3],
-    pub slip_direction: [f64; 3],
+    pub slip: Vector3,
+    pub slip_direction: Vector3,
     /// Force of the last solution (N).
-    pub last_force: [f64; 3],
+    pub last_force: Vector3,
     pub obstacle: &'a O,
     pub point: usize,
     pub node: usize,
@@ -44,9 +45,9 @@ impl LaneValues<'_> {
             closed: self.multipliers[lane] > 0.0,
             normal: self.lanes.vector3(self.normals, lane),
             moved: self.lanes.vector3(self.moved, lane),
-            slip: [0.0; 3],
-            slip_direction: [0.0; 3],
-            last_force: [0.0; 3],
+            slip: Vector3::zeros(),
+            slip_direction: Vector3::zeros(),
+            last_force: Vector3::zeros(),
             obstacle,
             point,
             node,
@@ -61,19 +62,19 @@ impl<O: Obstacle> ContactPrediction for LanePrediction<'_, O> {
     fn was_closed(&self, _depth: f64) -> bool {
         self.closed
     }
-    fn normal(&self) -> [f64; 3] {
+    fn normal(&self) -> Vector3 {
         self.normal
     }
     fn friction(&self) -> f64 {
         self.obstacle.friction(self.node)
     }
-    fn slip(&self) -> [f64; 3] {
+    fn slip(&self) -> Vector3 {
         self.slip
     }
-    fn last_force(&self) -> [f64; 3] {
+    fn last_force(&self) -> Vector3 {
         self.last_force
     }
-    fn slip_direction(&self) -> [f64; 3] {
+    fn slip_direction(&self) -> Vector3 {
         self.slip_direction
     }
     fn sector(&self) -> usize {

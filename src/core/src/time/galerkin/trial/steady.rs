@@ -4,10 +4,9 @@
 //! on a sliding node opposes its slip. The assumption is checked afterwards: forces press and lie within the friction cone,
 //! sliding has not reversed, and open nodes stay open. Otherwise a step of degree 1 finds the change.
 
-use super::{Trial, TrialResult, vector3_at};
+use super::{Trial, TrialResult};
 use crate::contact::de_saxce::Eliminate;
-use crate::contact::tangents;
-use crate::geometry::dot;
+use crate::math::vector::{Vector3, length, tangential, tangents, vector3_at};
 use crate::time::galerkin::basis::{POINTS, TimeBasis};
 use crate::time::galerkin::compliance::LaneCompliance;
 use crate::time::galerkin::level::StepTables;
@@ -30,7 +29,7 @@ enum ContactStatus {
     Open,
     Sticks,
     /// Slides; friction opposes this direction at the start.
-    Slides([f64; 3]),
+    Slides(Vector3),
 }
 
 /// Scratch memory.
@@ -38,7 +37,7 @@ enum ContactStatus {
 pub(super) struct Steady {
     status: Vec<ContactStatus>,
     /// Direction of the slip at every lane.
-    directions: Vec<[f64; 3]>,
+    directions: Vec<Vector3>,
     matrix: Vec<f64>,
     right: Vec<f64>,
 }
@@ -48,7 +47,7 @@ impl Steady {
     pub(super) fn new(lanes: usize, nodes: usize) -> Self {
         Self {
             status: vec![ContactStatus::Open; nodes],
-            directions: vec![[0.0; 3]; lanes],
+            directions: vec![Vector3::zeros(); lanes],
             matrix: vec![0.0; 9 * lanes * lanes],
             right: vec![0.0; 3 * lanes],
         }
@@ -68,14 +67,14 @@ impl Trial {
         let mut verdict = TrialResult::default();
         let Some(mut own) = self.steady.take() else { return verdict };
         if self.find_status(&mut own, state, obstacle) {
-            self.begin((level, ForceInterpolation::Polynomial), Some(rows), state);
+            self.begin(level, ForceInterpolation::Polynomial, Some(rows), state);
             self.find_start(rows, state);
             self.end_slopes = level.basis.slopes_at(1.0).map(|slope| slope / level.step);
             verdict.solved = self.seek_steady(&mut own, level, obstacle, precision, &mut verdict);
         }
         self.steady = Some(own);
         if verdict.solved {
-            self.judge((level, rows), obstacle, &mut verdict);
+            self.judge(level, rows, obstacle, &mut verdict);
             self.check_depth(rows, state, obstacle, &mut verdict);
             // The energy supplied by friction at the start would have to come from the bank.
             verdict.solved = !verdict.switches;
@@ -87,16 +86,15 @@ impl Trial {
     fn find_status(&self, own: &mut Steady, state: &SectorState, obstacle: &impl Obstacle) -> bool {
         let mut any = false;
         for (node, status) in own.status.iter_mut().enumerate() {
-            let (multiplier, normal, force) =
-                (state.multipliers[node], vector3_at(&state.normals, node), vector3_at(&state.forces, node));
-            let along: [f64; 3] = std::array::from_fn(|c| force[c] - multiplier * normal[c]);
-            let (size, most) = (dot(along, along).sqrt(), obstacle.friction(node) * multiplier);
+            let multiplier = state.multipliers[node];
+            let along = vector3_at(&state.forces, node) - multiplier * vector3_at(&state.normals, node);
+            let (size, most) = (length(along), obstacle.friction(node) * multiplier);
             *status = if multiplier == 0.0 {
                 ContactStatus::Open
             } else if size < most * (1.0 - ON_THE_CONE) {
                 ContactStatus::Sticks
             } else {
-                ContactStatus::Slides(along.map(|component| if size > 0.0 { -component / size } else { 0.0 }))
+                ContactStatus::Slides(if size > 0.0 { -along / size } else { Vector3::zeros() })
             };
             any |= multiplier > 0.0;
         }
@@ -135,8 +133,8 @@ impl Trial {
     }
 
     /// Motion of a node relative to the surface, from the start to a point (m).
-    fn relative(&self, point: usize, node: usize, obstacle: &impl Obstacle) -> [f64; 3] {
-        if point == 0 { [0.0; 3] } else { self.slip(node, point, obstacle) }
+    fn relative(&self, point: usize, node: usize, obstacle: &impl Obstacle) -> Vector3 {
+        if point == 0 { Vector3::zeros() } else { self.slip(node, point, obstacle) }
     }
 
     /// Finds the sliding directions of the nodes at all points, and returns by how much they have turned.
@@ -144,18 +142,16 @@ impl Trial {
         let mut turned = 0.0_f64;
         for node in 0..self.lanes.nodes {
             let ContactStatus::Slides(_) = own.status[node] else { continue };
-            let mut places = [[0.0; 3]; POINTS];
+            let mut places = [Vector3::zeros(); POINTS];
             (1..basis.count()).for_each(|point| places[point] = self.relative(point, node, obstacle));
             for point in 1..basis.count() {
                 let (lane, normal) = (self.lanes.at(point, node), self.normal(point, node));
-                let slip = (0..basis.count())
-                    .fold([0.0; 3], |sum, k| std::array::from_fn(|c| sum[c] + basis.work[point][k] * places[k][c]));
-                let across = dot(slip, normal);
-                let along: [f64; 3] = std::array::from_fn(|c| slip[c] - across * normal[c]);
-                let size = dot(along, along).sqrt();
+                let slip = (0..basis.count()).map(|k| basis.work[point][k] * places[k]).sum();
+                let along = tangential(slip, normal);
+                let size = length(along);
                 if size > 0.0 {
-                    let direction = along.map(|component| component / size);
-                    let change = (0..3).map(|c| (direction[c] - own.directions[lane][c]).abs()).fold(0.0, f64::max);
+                    let direction = along / size;
+                    let change = (direction - own.directions[lane]).amax();
                     (turned, own.directions[lane]) = (turned.max(change), direction);
                 }
             }
@@ -168,10 +164,7 @@ impl Trial {
         let lanes = self.lanes;
         let slip = |lane: usize| {
             let (point, node) = lanes.place(lane);
-            let (moved, normal) = (self.relative(point, node, obstacle), self.normal(point, node));
-            let across = dot(moved, normal);
-            let along: [f64; 3] = std::array::from_fn(|c| moved[c] - across * normal[c]);
-            dot(along, along).sqrt()
+            length(tangential(self.relative(point, node, obstacle), self.normal(point, node)))
         };
         let sticking = (0..lanes.len()).filter(|lane| own.status[lanes.place(*lane).1] == ContactStatus::Sticks);
         sticking.map(slip).fold(0.0, f64::max)
@@ -199,21 +192,20 @@ impl Trial {
             for (axis, direction) in [normal, first, second].into_iter().enumerate() {
                 let row = 3 * place + axis;
                 if axis > 0 && slides {
-                    let share = friction * dot(direction, own.directions[*lane]);
-                    for c in 0..3 {
-                        own.matrix[(3 * place + c) * order + row] = scale * (direction[c] + share * normal[c]);
+                    let share = friction * direction.dot(&own.directions[*lane]);
+                    for (c, entry) in (scale * (direction + share * normal)).iter().enumerate() {
+                        own.matrix[(3 * place + c) * order + row] = *entry;
                     }
                     own.right[row] = 0.0;
                     continue;
                 }
                 for (column, other) in self.members.iter().enumerate() {
                     for (c, table) in compliance.of_lane(*other).into_iter().enumerate() {
-                        own.matrix[(3 * column + c) * order + row] = dot(direction, lanes.vector3(table, *lane));
+                        own.matrix[(3 * column + c) * order + row] = direction.dot(&lanes.vector3(table, *lane));
                     }
                 }
-                let away = if axis == 0 { self.gaps[*lane] } else { dot(direction, relative) };
-                let there: [f64; 3] = std::array::from_fn(|c| moved[c] - free[c]);
-                own.right[row] = dot(direction, there) - away;
+                let away = if axis == 0 { self.gaps[*lane] } else { direction.dot(&relative) };
+                own.right[row] = direction.dot(&(moved - free)) - away;
             }
         }
         let mut regular = false;
@@ -228,13 +220,13 @@ impl Trial {
         self.taken.clear();
         self.amounts.clear();
         for (place, lane) in self.members.iter().enumerate() {
-            let force = [0, 1, 2].map(|c| right[3 * place + c]);
+            let force = vector3_at(right, place);
             let (point, node) = lanes.place(*lane);
             lanes.set(&mut self.forces, *lane, force);
-            self.multipliers[*lane] = dot(force, self.normal(point, node));
-            for (c, force) in force.into_iter().enumerate() {
+            self.multipliers[*lane] = force.dot(&self.normal(point, node));
+            for (c, force) in force.iter().enumerate() {
                 self.taken.push(3 * (lanes.nodes + *lane) + c);
-                self.amounts.push(force);
+                self.amounts.push(*force);
             }
         }
         self.combine(compliance.columns(), compliance.stride());
@@ -249,15 +241,13 @@ impl Trial {
             let (point, node) = lanes.place(*lane);
             let (force, normal) = (lanes.vector3(&self.forces, *lane), self.normal(point, node));
             let multiplier = self.multipliers[*lane];
-            let along: [f64; 3] = std::array::from_fn(|c| force[c] - multiplier * normal[c]);
+            let along = force - multiplier * normal;
             multiplier > 0.0
                 && match own.status[node] {
                     ContactStatus::Open => true,
-                    ContactStatus::Sticks => {
-                        dot(along, along).sqrt() <= obstacle.friction(node) * multiplier + ROUNDING * largest
-                    }
+                    ContactStatus::Sticks => length(along) <= obstacle.friction(node) * multiplier + ROUNDING * largest,
                     ContactStatus::Slides(direction) => {
-                        direction.iter().all(|own| *own == 0.0) || dot(direction, own.directions[*lane]) > 0.0
+                        direction == Vector3::zeros() || direction.dot(&own.directions[*lane]) > 0.0
                     }
                 }
         })

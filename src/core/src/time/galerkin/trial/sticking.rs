@@ -4,8 +4,8 @@
 //! the slip without force, b, and the flexibility W along normal and tangents, this is the problem of [`crate::contact::de_saxce`].
 
 use super::prediction::{LanePrediction, LaneValues};
-use super::{Trial, TrialResult, vector3_at};
-use crate::geometry::dot;
+use super::{Trial, TrialResult};
+use crate::math::vector::{Vector3, length, tangential, vector3_at};
 use crate::time::galerkin::basis::POINTS;
 use crate::time::galerkin::compliance::{LaneCompliance, Lanes};
 use crate::time::galerkin::kernels::{AddProduct, Combine};
@@ -19,10 +19,10 @@ const ROUNDING: f64 = 1e-11;
 #[derive(Debug, Clone)]
 pub(super) struct Sticking {
     /// Normal and tangents of each node, and those of the members.
-    axes: Vec<[[f64; 3]; 3]>,
-    rows: Vec<[f64; 3]>,
+    axes: Vec<[Vector3; 3]>,
+    rows: Vec<Vector3>,
     /// Slip of the members under the current forces (m).
-    slips: Vec<[f64; 3]>,
+    slips: Vec<Vector3>,
     /// Motion of all nodes relative to the surface per force along each axis of each node: columns of three rows of lanes.
     columns: Vec<f64>,
     /// Motion of the surface per force, and under the current forces.
@@ -35,9 +35,9 @@ impl Sticking {
     pub(super) fn new(nodes: usize) -> Self {
         let stride = 3 * Lanes { points: 1, nodes }.width();
         Self {
-            axes: vec![[[0.0; 3]; 3]; nodes],
-            rows: vec![[0.0; 3]; 3 * nodes],
-            slips: vec![[0.0; 3]; nodes],
+            axes: vec![[Vector3::zeros(); 3]; nodes],
+            rows: vec![Vector3::zeros(); 3 * nodes],
+            slips: vec![Vector3::zeros(); nodes],
             columns: vec![0.0; 3 * nodes * stride],
             carrier_compliance: vec![0.0; stride],
             under: vec![0.0; stride],
@@ -64,9 +64,9 @@ impl Trial {
         self.amounts.clear();
         for node in 0..self.lanes.nodes {
             let force = self.lanes.vector3(&self.forces, node);
-            for (component, force) in force.into_iter().enumerate().filter(|(_, force)| *force != 0.0) {
+            for (component, force) in force.iter().enumerate().filter(|(_, force)| **force != 0.0) {
                 self.taken.push(3 * (self.lanes.nodes + node) + component);
-                self.amounts.push(force);
+                self.amounts.push(*force);
             }
         }
         self.combine(compliance.columns(), compliance.stride());
@@ -83,7 +83,7 @@ impl Trial {
         let lanes = self.lanes;
         self.members.clear();
         for lane in 0..lanes.len() {
-            let pushed = dot(lanes.vector3(&self.normals, lane), lanes.vector3(&self.pushed, lane));
+            let pushed = lanes.vector3(&self.normals, lane).dot(&lanes.vector3(&self.pushed, lane));
             self.without[lane] = self.gaps[lane] - pushed;
             self.chosen[lane] = self.gaps[lane] <= 0.0 || self.multipliers[lane] > 0.0 || self.without[lane] < 0.0;
         }
@@ -111,9 +111,10 @@ impl Trial {
         for (member, lane) in self.members.iter().enumerate() {
             let along = &self.law.multipliers()[3 * member..][..3];
             self.multipliers[*lane] = along[0];
-            let axes = &own.axes[*lane];
-            let force = std::array::from_fn(|c| (0..3).map(|axis| along[axis] * axes[axis][c]).sum());
-            lanes.set(&mut self.forces, *lane, if along[0] > 0.0 { force } else { [0.0; 3] });
+            if along[0] > 0.0 {
+                let force = along.iter().zip(&own.axes[*lane]).map(|(along, axis)| *along * axis).sum();
+                lanes.set(&mut self.forces, *lane, force);
+            }
         }
         true
     }
@@ -142,7 +143,7 @@ impl Trial {
         obstacle: &mut impl Obstacle,
     ) {
         let (lanes, stride) = (self.lanes, compliance.stride());
-        let (mut axes, mut columns) = ([[0.0; 3]; 3], [[0.0; 3]; 3]);
+        let (mut axes, mut columns) = ([Vector3::zeros(); 3], [Vector3::zeros(); 3]);
         let Self { without, multipliers, normals, moved, .. } = &*self;
         let values = LaneValues { lanes, without, multipliers, normals, moved };
         self.law.fill_directions(&values.prediction(lane, obstacle), &mut axes, &mut columns);
@@ -154,7 +155,7 @@ impl Trial {
             let target = &mut own.columns[(3 * lane + axis) * stride..][..stride];
             let (table, columns) = (compliance.columns(), &columns[..]);
             let sums = [&mut *target];
-            self.instructions.run(Combine { table, stride, columns, coefficients: [&direction[..]], sums });
+            self.instructions.run(Combine { table, stride, columns, coefficients: [direction.as_slice()], sums });
             if self.carrier_yields {
                 obstacle.add_compliance(lane, direction, &mut own.carrier_compliance[..stride]);
                 target
@@ -181,7 +182,7 @@ impl Trial {
                 for (row, other) in members.iter().enumerate() {
                     let moved = lanes.vector3(column, *other);
                     for (along, direction) in own.axes[*other].iter().enumerate() {
-                        matrix[(3 * row + along, 3 * place + axis)] = dot(*direction, moved);
+                        matrix[(3 * row + along, 3 * place + axis)] = direction.dot(&moved);
                     }
                 }
             }
@@ -191,9 +192,9 @@ impl Trial {
             let (pushed, under) = (lanes.vector3(pushed, *lane), lanes.vector3(&own.under, *lane));
             let prediction = values.prediction(*lane, obstacle);
             LanePrediction {
-                gap: prediction.gap - dot(prediction.normal, under),
-                slip: std::array::from_fn(|c| slip[c] - pushed[c] - under[c]),
-                last_force: if prediction.closed { lanes.vector3(forces, *lane) } else { [0.0; 3] },
+                gap: prediction.gap - prediction.normal.dot(&under),
+                slip: slip - pushed - under,
+                last_force: if prediction.closed { lanes.vector3(forces, *lane) } else { Vector3::zeros() },
                 ..prediction
             }
         });
@@ -216,11 +217,11 @@ impl Trial {
                 continue;
             }
             let normal = lanes.vector3(&self.normals, lane);
-            let mut after = self.without[lane] - dot(normal, lanes.vector3(&own.under, lane));
+            let mut after = self.without[lane] - normal.dot(&lanes.vector3(&own.under, lane));
             for (place, member) in self.members[..members].iter().enumerate() {
                 for axis in 0..3 {
                     let column = &own.columns[(3 * member + axis) * stride..][..stride];
-                    after += self.law.multipliers()[3 * place + axis] * dot(normal, lanes.vector3(column, lane));
+                    after += self.law.multipliers()[3 * place + axis] * normal.dot(&lanes.vector3(column, lane));
                 }
             }
             if after < -super::ROUNDING * scale {
@@ -233,10 +234,9 @@ impl Trial {
     }
 
     /// Returns the slip of a node up to a point, relative to the surface (m).
-    pub(super) fn slip(&self, node: usize, point: usize, obstacle: &impl Obstacle) -> [f64; 3] {
-        let (now, before) = (self.displacement(point, node), vector3_at(&self.start, node));
-        let under = obstacle.drift(node, point, now);
-        std::array::from_fn(|c| now[c] - before[c] + under[c])
+    pub(super) fn slip(&self, node: usize, point: usize, obstacle: &impl Obstacle) -> Vector3 {
+        let now = self.displacement(point, node);
+        now - vector3_at(&self.start, node) + obstacle.drift(node, point, now)
     }
 
     /// Energy that friction supplies at the nodes over a solved step (J), because the force at its start does not belong to the
@@ -246,17 +246,16 @@ impl Trial {
         let points = self.points();
         let touches = |node: &usize| (0..=points).any(|point| self.multiplier(point, *node) > 0.0);
         for node in (0..self.lanes.nodes).filter(touches) {
-            let mut slips = [[0.0; 3]; POINTS];
+            let mut slips = [Vector3::zeros(); POINTS];
             (1..=points).for_each(|point| slips[point] = self.slip(node, point, obstacle));
             let pushed = self.lanes.vector3(&self.pushed, self.lanes.at(points, node));
             let (mut own, mut moved) = (0.0, 0.0);
             for point in 0..=points {
                 let terms = self.work_weights[point].iter().zip(&slips);
-                let slip =
-                    terms.fold([0.0; 3], |sum, (weight, slip)| std::array::from_fn(|c| sum[c] + weight * slip[c]));
-                let tangential = self.friction_force(point, node);
-                own += dot(tangential, slip);
-                moved += dot(tangential, tangential).sqrt() * dot(pushed, pushed).sqrt();
+                let slip: Vector3 = terms.map(|(weight, slip)| *weight * slip).sum();
+                let friction = self.friction_force(point, node);
+                own += friction.dot(&slip);
+                moved += length(friction) * length(pushed);
             }
             gain += if own > ROUNDING * moved { own } else { 0.0 };
         }
@@ -278,13 +277,10 @@ impl Trial {
         let turn = |node: usize| {
             let (normal, slip) = (self.normal(1, node), self.slip(node, 1, obstacle));
             let under = obstacle.drift(node, 1, self.displacement(1, node));
-            let first = vector3_at(&self.withdrawn, node);
-            let along: [f64; 3] = std::array::from_fn(|c| first[c] + under[c] / step);
-            let across = dot(along, normal);
-            let along: [f64; 3] = std::array::from_fn(|c| along[c] - across * normal[c]);
-            let speed = dot(along, along).sqrt();
+            let along = tangential(vector3_at(&self.withdrawn, node) + under / step, normal);
+            let speed = length(along);
             // Speed at the end if it changes steadily.
-            let last = 2.0 * dot(slip, along) / (step * speed) - speed;
+            let last = 2.0 * slip.dot(&along) / (step * speed) - speed;
             if last < 0.0 { 2.0 * step * last * last / (speed - last) } else { 0.0 }
         };
         (0..self.lanes.nodes).filter(touches).map(turn).fold(0.0, f64::max)
