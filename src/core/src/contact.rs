@@ -21,14 +21,14 @@ use crate::contact::active_set::SolverOutcome;
 use crate::contact::coating::Coating;
 use crate::math::vector::{Vector3, tangents};
 use crate::scene::method::Solver;
-pub use coated::Coated;
+pub(crate) use coated::Coated;
 pub use coulomb::Coulomb;
-pub use cutting::CuttingLaw;
+pub(crate) use cutting::CuttingLaw;
 pub use film::Film;
 pub use lcp::Lcp;
 
 /// Gaps and compliances of contacts before their forces are known.
-pub trait ContactPrediction {
+pub(crate) trait ContactPrediction {
     /// Predicted gap (m).
     fn gap(&self) -> f64;
     /// Returns whether the contact was closed before, at this depth below the surface (m): the first guess.
@@ -50,7 +50,7 @@ pub trait ContactPrediction {
 }
 
 /// Interface of every contact law. Slices are along the columns of the Delassus matrix or have one entry per contact.
-pub trait ContactLaw {
+pub(crate) trait ContactLaw {
     /// Directions per contact in the Delassus matrix: 1 (normal, with sliding friction in the columns) or 3 (normal and tangents).
     const DIRECTIONS: usize;
     /// True if a contact that the solution would open or press in is checked again; the paper's rule detects once.
@@ -80,7 +80,7 @@ pub trait ContactLaw {
 
 /// A law with its unknowns.
 #[derive(Debug, Clone)]
-pub enum Law {
+pub(crate) enum Law {
     /// Forward-increment Lagrange multipliers: penetration detected once, equality there.
     Film(Film),
     /// Complementarity on all contacts.
@@ -160,7 +160,7 @@ impl Law {
     }
 
     /// Returns whether [`Law::new`] would create this law for the solver; a coating has one law.
-    pub fn matches_solver(&self, solver: Solver) -> bool {
+    pub(crate) fn matches_solver(&self, solver: Solver) -> bool {
         match self {
             Self::Film(_) => solver == Solver::Film,
             Self::Lcp(_) => solver == Solver::Lcp,
@@ -177,18 +177,18 @@ impl Law {
 
     /// Returns [`ContactLaw::LOOKS_AGAIN`].
     #[inline(always)]
-    pub fn is_iterative(&self) -> bool {
+    pub(crate) fn is_iterative(&self) -> bool {
         each_law!(self, law => is_iterative(law))
     }
 
     /// Returns [`ContactLaw::STARTS_FROM_FORCES`].
-    pub fn starts_from_forces(&self) -> bool {
+    pub(crate) fn starts_from_forces(&self) -> bool {
         each_law!(self, law => starts_from_forces(law))
     }
 
     /// Calls [`ContactLaw::fill_directions`].
     #[inline(always)]
-    pub fn fill_directions(&self, at: &impl ContactPrediction, rows: &mut [Vector3], columns: &mut [Vector3]) {
+    pub(crate) fn fill_directions(&self, at: &impl ContactPrediction, rows: &mut [Vector3], columns: &mut [Vector3]) {
         each_law!(self, law => fill_directions(law, at, rows, columns));
     }
 
@@ -206,7 +206,7 @@ impl Law {
 
     /// Calls [`ContactLaw::pose`] for all contacts; `rows` are all rows of the matrix.
     #[inline(always)]
-    pub fn pose_all<P: ContactPrediction>(&mut self, rows: &[Vector3], contacts: impl Iterator<Item = P>) {
+    pub(crate) fn pose_all<P: ContactPrediction>(&mut self, rows: &[Vector3], contacts: impl Iterator<Item = P>) {
         each_law!(self, law => pose_all(law, rows, contacts));
     }
 
@@ -230,7 +230,7 @@ impl Law {
 
     /// Calls [`ContactLaw::coating_shares`].
     #[inline(always)]
-    pub fn coating_shares(&self) -> &[f64] {
+    pub(crate) fn coating_shares(&self) -> &[f64] {
         each_law!(self, law => law.coating_shares())
     }
 
@@ -244,7 +244,7 @@ impl Law {
     }
 
     /// Returns the coating of the law for changes of its wear.
-    pub fn coating_mut(&mut self) -> Option<&mut Coating> {
+    pub(crate) fn coating_mut(&mut self) -> Option<&mut Coating> {
         match self {
             Self::Coated(law) => Some(law.coating_mut()),
             Self::Cutting(law) => Some(law.coating_mut()),

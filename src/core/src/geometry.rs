@@ -21,7 +21,7 @@ pub use crate::math::vector::Vector3;
 use crate::math::vector::{ZERO, length};
 use crate::scene::ranges::SMALL;
 use layout::Layout;
-pub use layout::sector_angle;
+pub(crate) use layout::sector_angle;
 use open::{OpenGap, tangent};
 pub use plane::FixedGap;
 pub use revolution::RevolutionGap;
@@ -81,7 +81,7 @@ impl Geometry {
 
     /// Closest point of one node of one lane, on surfaces that have closest points.
     #[inline(always)]
-    pub fn place_at(&self, index: usize) -> ClosestPoint {
+    pub(crate) fn place_at(&self, index: usize) -> ClosestPoint {
         self.places.get(index).copied().unwrap_or_default()
     }
 
@@ -222,7 +222,7 @@ impl GapLaw {
     }
 
     /// Angle over which the casing shape changes noticeably (rad).
-    pub fn angular_scale(&self) -> f64 {
+    pub(crate) fn angular_scale(&self) -> f64 {
         match self {
             Self::Fixed(_) | Self::Open(_) => f64::INFINITY,
             Self::Revolution(law) => law.surface.angular_scale(),
@@ -294,7 +294,7 @@ impl GapLaw {
     }
 
     /// Largest change of the surface by its shape at factor 1 (m).
-    pub fn shape_size(&self) -> f64 {
+    pub(crate) fn shape_size(&self) -> f64 {
         match self {
             Self::Fixed(_) | Self::Open(_) => 0.0,
             Self::Revolution(law) => law.surface.largest_change(),
@@ -304,7 +304,7 @@ impl GapLaw {
 
     /// Returns the largest change of a gap (m) when the rotor turns by `angle` (rad): under the shape at `factor`, and under a surface through points
     /// that are displaced by up to `moved` (m).
-    pub fn turned_under(&self, angle: f64, factor: f64, moved: f64) -> f64 {
+    pub(crate) fn turned_under(&self, angle: f64, factor: f64, moved: f64) -> f64 {
         // At most from one end of the range of a change to the other.
         let part = |scale: f64| 2.0 * (angle / scale).min(1.0);
         let shape = if factor == 0.0 { 0.0 } else { factor * self.shape_size() * part(self.angular_scale()) };
@@ -314,7 +314,7 @@ impl GapLaw {
 
     /// Changes of a gap below this (m) are insignificant: a fraction of the radius, or of the extent of open surfaces, since a linear gap
     /// neglects curvature; rounding for fixed gaps.
-    pub fn indifferent(&self, node: usize) -> f64 {
+    pub(crate) fn indifferent(&self, node: usize) -> f64 {
         const CURVED: f64 = 1e-5;
         match self {
             Self::Fixed(law) => 1e-9 * law.gaps[node].abs(),
@@ -325,13 +325,13 @@ impl GapLaw {
     }
 
     /// Returns the first node, `node · lanes + lane`, that has left a surface around an axis.
-    pub fn out_of_reach(&self) -> Option<usize> {
+    pub(crate) fn out_of_reach(&self) -> Option<usize> {
         if let Self::Spline(law) = self { law.out_of_reach } else { None }
     }
 
     /// Largest displacement (m) that counts as small: a tenth of the smallest radius, or of the extent of the nodes and of their open
     /// surfaces; no limit for fixed obstacles.
-    pub fn largest_displacement(&self) -> f64 {
+    pub(crate) fn largest_displacement(&self) -> f64 {
         if let Self::Open(law) = self {
             return law.largest();
         }
@@ -353,7 +353,13 @@ impl GapLaw {
     /// Prescribed velocity of the master relative to the slave (m/s), of a node displaced by `moved` (m, own directions), in the
     /// coordinates of the displacements, whose arcs are r times angles; `index` is `node · lanes + lane`.
     #[inline(always)]
-    pub fn sliding_velocity(&self, node: usize, index: usize, drive: &PrescribedMotion, moved: Vector3) -> Vector3 {
+    pub(crate) fn sliding_velocity(
+        &self,
+        node: usize,
+        index: usize,
+        drive: &PrescribedMotion,
+        moved: Vector3,
+    ) -> Vector3 {
         match self {
             Self::Fixed(law) => law.sliding[index],
             Self::Revolution(law) => law.layout.rigid_velocity(node, index, drive, moved),
@@ -364,7 +370,7 @@ impl GapLaw {
     }
 
     /// Returns whether sliding may have any direction in the tangent plane, so that it turns within a step.
-    pub fn slides_anywhere(&self) -> bool {
+    pub(crate) fn slides_anywhere(&self) -> bool {
         matches!(self, Self::Open(_))
     }
 

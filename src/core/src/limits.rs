@@ -18,9 +18,10 @@ pub mod massless;
 pub mod plausibility;
 mod secular;
 pub mod unresolved;
-pub mod wording;
+pub(crate) mod wording;
 
-pub use growing::{Fastest, GROWTH_UP_TO, GrowthRates, continuous, growth, growth_steps, stepped, without_node_mass};
+pub use growing::{Fastest, GrowthRates, continuous, growth, stepped, without_node_mass};
+pub(crate) use growing::{GROWTH_UP_TO, growth_steps};
 
 use nalgebra::DMatrix;
 
@@ -89,7 +90,7 @@ pub fn check_step_allowed(frequency: f64, scheme: Scheme, step: f64) -> Result<(
 }
 
 /// Returns the warning of modes up to the largest angular `frequency` (rad/s) that a step (s) does not resolve.
-pub fn unresolved_modes(frequency: f64, scheme: Scheme, step: f64) -> Option<WarningKind> {
+pub(crate) fn unresolved_modes(frequency: f64, scheme: Scheme, step: f64) -> Option<WarningKind> {
     (frequency * step > scheme.properties().resolved_up_to).then_some(WarningKind::UnresolvedModes {
         scheme,
         frequency,
@@ -205,7 +206,7 @@ fn has_minors(scaled: &DMatrix<f64>) -> bool {
 }
 
 /// Returns the lowest eigenvalue of the symmetric part of W with unit diagonal; `None` if a diagonal entry is not positive.
-pub fn lowest_eigenvalue(delassus: &DMatrix<f64>) -> Option<f64> {
+pub(crate) fn lowest_eigenvalue(delassus: &DMatrix<f64>) -> Option<f64> {
     Some(lowest_of_symmetric_part(&scaled(delassus)?))
 }
 

@@ -30,13 +30,12 @@ use crate::modes::sectors::{SectorModel, Sectors};
 use crate::scene::method::{Scheme, Solver};
 use crate::system::history::Two;
 pub(crate) use contact_view::Bodies;
-pub use contact_view::ContactMember;
 pub use effort::Effort;
 pub use event::ContactEvent;
 pub use failure::StepFailure;
 use group::Reach;
 pub(crate) use group::{ContactGroup, GroupSolution};
-pub use growth::ShapeGrowth;
+pub(crate) use growth::ShapeGrowth;
 pub use ledger::Ledger;
 use losses::LargestLosses;
 pub use losses::Loss;
@@ -288,12 +287,12 @@ impl System {
     }
 
     /// Sets the friction coefficient of a pair (takes effect with the next step).
-    pub fn set_friction(&mut self, pair: usize, friction: f64) {
+    pub(crate) fn set_friction(&mut self, pair: usize, friction: f64) {
         self.pairs[pair].parts.friction = friction;
     }
 
     /// Selects scheme and solver; only before [`System::start`]. Allocates if the solver changes.
-    pub fn set_methods(&mut self, scheme: Scheme, solver: Solver) {
+    pub(crate) fn set_methods(&mut self, scheme: Scheme, solver: Solver) {
         self.settings.scheme = scheme;
         self.settings.solver = solver;
         self.groups.iter_mut().for_each(|group| group.set_solver(solver, &self.structures));
@@ -323,7 +322,7 @@ impl System {
     }
 
     /// Sets the prescribed motion of a pair in the middle of the next step, and the growth of its shape, for methods that need them.
-    pub fn set_middle(&mut self, pair: usize, drive: &PrescribedMotion, growth: ShapeGrowth) {
+    pub(crate) fn set_middle(&mut self, pair: usize, drive: &PrescribedMotion, growth: ShapeGrowth) {
         self.pairs[pair].middle = (*drive, growth);
     }
 

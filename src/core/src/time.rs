@@ -71,7 +71,7 @@ impl TimeStepper {
     }
 
     /// Sets the step size `step` (s) without conversion of the state, before the first step.
-    pub fn set_first_step(&mut self, system: &mut System, step: f64) {
+    pub(crate) fn set_first_step(&mut self, system: &mut System, step: f64) {
         system.set_first_step(step);
         self.stepper().set_step(step);
     }
@@ -104,7 +104,7 @@ impl TimeStepper {
     }
 
     /// See [`Stepper::begin_loads`].
-    pub fn begin_loads(&mut self, system: &mut System) {
+    pub(crate) fn begin_loads(&mut self, system: &mut System) {
         self.stepper().begin_loads(system);
     }
 

@@ -9,7 +9,7 @@ use crate::math::vector::Vector3;
 
 /// A coating with its wear, and the contact problem of its blades. Groups are whole blades, whose nodes share cells.
 #[derive(Debug, Clone)]
-pub struct Coated {
+pub(crate) struct Coated {
     coating: Coating,
     problem: CoatedProblem,
     size: usize,
@@ -41,7 +41,7 @@ impl Coated {
     }
 
     /// Returns the coating for changes of its wear.
-    pub fn coating_mut(&mut self) -> &mut Coating {
+    pub(crate) fn coating_mut(&mut self) -> &mut Coating {
         &mut self.coating
     }
 

@@ -16,11 +16,11 @@ mod tip;
 
 use std::f64::consts::TAU;
 
-pub use cutting::BladePassage;
+pub(crate) use cutting::BladePassage;
 use cutting::CoatingCut;
 use nalgebra::DMatrix;
 pub use problem::CoatedProblem;
-pub use rod::{Branch, RodMaterial};
+pub(crate) use rod::{Branch, RodMaterial};
 pub use tip::BladeTip;
 use tiprub_cosim::persist::{Persist, StateReader, StateWriter};
 use tiprub_cosim::shown;

@@ -10,7 +10,7 @@ use crate::math::vector::Vector3;
 
 /// A coating with its cuts, and the contact problem of its blades. Groups are whole blades, whose nodes share cells.
 #[derive(Debug, Clone)]
-pub struct CuttingLaw {
+pub(crate) struct CuttingLaw {
     coating: Coating,
     problem: CoatedProblem,
     size: usize,
@@ -59,7 +59,7 @@ impl CuttingLaw {
     }
 
     /// Returns the coating for changes of its wear.
-    pub fn coating_mut(&mut self) -> &mut Coating {
+    pub(crate) fn coating_mut(&mut self) -> &mut Coating {
         &mut self.coating
     }
 

@@ -23,7 +23,7 @@ const FALL: f64 = 0.1;
 /// Factor by which ε rises if a problem is not solved.
 const RISE: f64 = 30.0;
 /// Largest number of problems.
-pub const ROUNDS: usize = 60;
+pub(crate) const ROUNDS: usize = 60;
 /// Allowed remainder as a fraction of the largest gap.
 const LEFT: f64 = 1e-10;
 /// Fraction of its flexibility by which a contact is softened once if redundant contacts require different gaps: the deepest of them then
@@ -36,7 +36,7 @@ const GOLDEN: f64 = 1.618_033_988_749_895;
 
 /// Regularisation of contacts; allocates only when created.
 #[derive(Debug, Clone)]
-pub struct Yielding {
+pub(crate) struct Yielding {
     /// Predicted gaps (m).
     predicted: Vec<f64>,
     /// D: flexibilities of the contacts (m/N).
@@ -62,7 +62,7 @@ impl Yielding {
     }
 
     /// Returns whether contacts have been softened.
-    pub fn is_softened(&self) -> bool {
+    pub(crate) fn is_softened(&self) -> bool {
         self.softened
     }
 
@@ -76,7 +76,7 @@ impl Yielding {
     }
 
     /// Returns whether forces are no solution: contacts that no motion opens simultaneously, held apart only by their softness.
-    pub fn is_pinched(&self, size: usize, scale: f64, force: impl Fn(usize) -> f64) -> bool {
+    pub(crate) fn is_pinched(&self, size: usize, scale: f64, force: impl Fn(usize) -> f64) -> bool {
         self.softened && (0..size).any(|contact| SOFTENING * self.own[contact] * force(contact) > PINCHED * scale)
     }
 
@@ -97,7 +97,7 @@ impl Yielding {
     }
 
     /// Fills in matrix and gaps of the next problem.
-    pub fn pose(&self, matrix: &mut DMatrix<f64>, gaps: &mut [f64]) {
+    pub(crate) fn pose(&self, matrix: &mut DMatrix<f64>, gaps: &mut [f64]) {
         for (contact, gap) in gaps.iter_mut().enumerate() {
             matrix[(contact, contact)] = self.own[contact] * (1.0 + self.share);
             *gap = self.predicted[contact] + self.yielded(contact, 0.0);

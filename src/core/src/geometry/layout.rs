@@ -35,7 +35,7 @@ impl Layout {
     ///
     /// # Errors
     /// Wrong number of clearances.
-    pub fn of_places(places: &[[f64; 3]], sectors: usize, clearances: &[f64], lanes: usize) -> Result<Self> {
+    pub(crate) fn of_places(places: &[[f64; 3]], sectors: usize, clearances: &[f64], lanes: usize) -> Result<Self> {
         if clearances.len() != sectors {
             return Err(Error::invalid(
                 "contact.sector_gaps",
@@ -70,7 +70,13 @@ impl Layout {
     /// Velocity by the motion of the rotor (m/s) of a node displaced by `moved` (m), in the coordinates of its displacements: r Ω around,
     /// since a displacement around is an arc of the undeformed radius r, plus the motion of the shaft centre.
     #[inline(always)]
-    pub fn rigid_velocity(&self, node: usize, index: usize, drive: &PrescribedMotion, moved: Vector3) -> Vector3 {
+    pub(crate) fn rigid_velocity(
+        &self,
+        node: usize,
+        index: usize,
+        drive: &PrescribedMotion,
+        moved: Vector3,
+    ) -> Vector3 {
         let spin = drive.speed * self.radii[node];
         if drive.shaft_velocity[0] == 0.0 && drive.shaft_velocity[1] == 0.0 {
             return Vector3::new(0.0, spin, drive.shaft_velocity[2]);
@@ -91,13 +97,13 @@ impl Layout {
     }
 
     /// Directions at a node that is displaced by an arc `around` (m), at a rotor angle (rad).
-    pub fn displaced_frame(&self, node: usize, index: usize, rotor_angle: f64, around: f64) -> PolarFrame {
+    pub(crate) fn displaced_frame(&self, node: usize, index: usize, rotor_angle: f64, around: f64) -> PolarFrame {
         PolarFrame::new(self.angles[index] + rotor_angle + around * self.per_radius[node])
     }
 }
 
 /// Angle of sector `sector` of `sectors` (rad).
-pub fn sector_angle(sector: usize, sectors: usize) -> f64 {
+pub(crate) fn sector_angle(sector: usize, sectors: usize) -> f64 {
     #[expect(clippy::cast_precision_loss, reason = "sector counts are far below 2^52")]
     let fraction = sector as f64 / sectors as f64;
     std::f64::consts::TAU * fraction

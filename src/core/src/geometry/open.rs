@@ -139,14 +139,14 @@ impl OpenGap {
 
     /// Returns whether a node with the current gap (m) was behind the surface, continued beyond its edge, before it moved by `moved`
     /// relative to it (m).
-    pub fn was_behind(&self, moved: Vector3, normal: Vector3, gap: f64) -> bool {
+    pub(crate) fn was_behind(&self, moved: Vector3, normal: Vector3, gap: f64) -> bool {
         let (approach, travel) = (moved.dot(&normal), length(moved));
         gap - approach < -(BEHIND_EDGE[0] * travel + BEHIND_EDGE[1] * self.largest)
     }
 
     /// Returns whether the contact nodes have moved relative to each other by more than small displacements: displacements minus their
     /// mean.
-    pub fn is_distorted(&self, displacement: &[f64]) -> bool {
+    pub(crate) fn is_distorted(&self, displacement: &[f64]) -> bool {
         let (moved, _) = displacement.as_chunks::<3>();
         #[expect(clippy::cast_precision_loss, reason = "node counts are far below 2^52")]
         let share = 1.0 / moved.len() as f64;

@@ -79,12 +79,12 @@ impl RevolutionGap {
     }
 
     /// Replaces the contact nodes by points at other places, with the slopes of the surface there.
-    pub fn of_points(self, layout: Layout, slopes: Vec<f64>) -> Self {
+    pub(crate) fn of_points(self, layout: Layout, slopes: Vec<f64>) -> Self {
         Self { nodes: (0..layout.nodes()).collect(), layout, slopes, ..self }
     }
 
     /// Enables whirl and axial shift of the shaft.
-    pub fn with_moving_shaft(self, shaft_moves: bool) -> Self {
+    pub(crate) fn with_moving_shaft(self, shaft_moves: bool) -> Self {
         let room = || vec![0.0; if shaft_moves { self.layout.lanes } else { 0 }];
         Self { shaft_moves, arms: [room(), room()], ..self }
     }
@@ -206,7 +206,7 @@ impl RevolutionGap {
     }
 
     /// Angle of the position of a displaced node on the casing (rad), in the fixed frame.
-    pub fn angle_on_casing(&self, at: At<'_>, moved: Vector3) -> f64 {
+    pub(crate) fn angle_on_casing(&self, at: At<'_>, moved: Vector3) -> f64 {
         let angle = self.angle(at, moved);
         let [outwards, sideways] = self.shaft_offset(angle, at.drive);
         angle + libm::atan2(sideways, self.layout.radii[at.node] + moved[0] + outwards)
@@ -267,7 +267,7 @@ impl RevolutionGap {
     }
 
     /// Computes gaps (m) and unit normals of all lanes for the displacements `moved` (m): `moved` and `normals` have three rows of lanes.
-    pub fn of_lanes(&self, instants: &mut Instants, moved: &[f64], gaps: &mut [f64], normals: &mut [f64]) {
+    pub(crate) fn of_lanes(&self, instants: &mut Instants, moved: &[f64], gaps: &mut [f64], normals: &mut [f64]) {
         self.instruction_set.run(EvaluateLanes { surface: &self.surface, instants, moved, gaps, normals });
     }
 }

@@ -10,7 +10,7 @@ use super::{Gap, Geometry, PrescribedMotion, Vector3};
 use crate::math::vector::{length, strided_vector3, vector3_at};
 
 /// Gap of a node without a surface to touch: infinite, so that it is never used as a distance.
-pub const NOTHING_TO_TOUCH: f64 = f64::INFINITY;
+pub(crate) const NOTHING_TO_TOUCH: f64 = f64::INFINITY;
 
 /// Contact nodes of equally spaced sectors facing a surface spline.
 #[derive(Debug, Clone, PartialEq)]
@@ -143,12 +143,12 @@ impl SplineGap {
     }
 
     /// Replaces the contact nodes by points at other places.
-    pub fn of_points(self, layout: Layout) -> Self {
+    pub(crate) fn of_points(self, layout: Layout) -> Self {
         Self { nodes: (0..layout.nodes()).collect(), layout, ..self }
     }
 
     /// Gap (m) of one node displaced by `moved` (m) to the current surface; infinite beyond its edges.
-    pub fn gap_of_one(&self, at: At<'_>, moved: Vector3) -> f64 {
+    pub(crate) fn gap_of_one(&self, at: At<'_>, moved: Vector3) -> f64 {
         match self.project(at, moved, None).0 {
             Projection::Found { gap, .. } => gap.distance,
             Projection::BeyondEdge { .. } => NOTHING_TO_TOUCH,
@@ -183,7 +183,13 @@ impl SplineGap {
     }
 
     /// Velocity by the motion of the rotor (m/s) of a node displaced by `moved` (m), in its own directions: Ω × (x − e) + ė.
-    pub fn rigid_velocity(&self, node: usize, index: usize, drive: &PrescribedMotion, moved: Vector3) -> Vector3 {
+    pub(crate) fn rigid_velocity(
+        &self,
+        node: usize,
+        index: usize,
+        drive: &PrescribedMotion,
+        moved: Vector3,
+    ) -> Vector3 {
         let (arm, shaft) = (self.arm(node, index % self.layout.lanes, drive, moved), drive.shaft_velocity);
         let whirls = shaft[0] != 0.0 || shaft[1] != 0.0;
         let shaft = if whirls { self.frame(index, drive.rotor_angle).local(shaft) } else { shaft };
@@ -191,7 +197,7 @@ impl SplineGap {
     }
 
     /// Position of the contact point at `place` from the shaft centre (m), in the directions of the node.
-    pub fn contact_arm(&self, index: usize, drive: &PrescribedMotion, place: ClosestPoint) -> Vector3 {
+    pub(crate) fn contact_arm(&self, index: usize, drive: &PrescribedMotion, place: ClosestPoint) -> Vector3 {
         let angle = self.layout.angles[index] + drive.rotor_angle - drive.shape_rotation;
         PolarFrame::new(angle).local(self.surface.evaluate(place).point) - self.shaft_offset(angle, drive)
     }
@@ -223,7 +229,7 @@ impl SplineGap {
     }
 
     /// Angle of the position of a displaced node on the casing (rad), in the fixed frame.
-    pub fn angle_on_casing(&self, at: At<'_>, moved: Vector3) -> f64 {
+    pub(crate) fn angle_on_casing(&self, at: At<'_>, moved: Vector3) -> f64 {
         let angle = self.layout.angles[at.index] + at.drive.rotor_angle;
         let arm = self.arm(at.node, at.index % self.layout.lanes, at.drive, moved);
         let arm = arm + PolarFrame::new(angle).local(at.drive.shaft);
@@ -237,7 +243,7 @@ impl SplineGap {
 }
 
 /// Returns whether a normal in the directions of a node is that of a casing seen from inside, on a flank below 45°.
-pub fn faces_inwards(normal: Vector3) -> bool {
+pub(crate) fn faces_inwards(normal: Vector3) -> bool {
     length(Vector3::new(0.0, normal[1], normal[2])) <= -normal[0]
 }
 

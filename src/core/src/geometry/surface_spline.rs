@@ -35,9 +35,9 @@ use crate::{Error, Result};
 use interpolation::InterpolationRow;
 
 /// Smallest number of data points around: with fewer the four control points of a patch would not be distinct.
-pub const FEWEST_AROUND: usize = 4;
+pub(crate) const FEWEST_AROUND: usize = 4;
 /// Smallest number of rings of data points along the axis, and of data points in either direction of an open surface.
-pub const FEWEST_ALONG: usize = 2;
+pub(crate) const FEWEST_ALONG: usize = 2;
 
 /// Extension of a surface around the axis beyond its first and last ring, as a fraction of its axial extent (counted in rings: exact for equal
 /// distances). It does not depend on the fineness of the grid.
@@ -265,12 +265,12 @@ impl SurfaceSpline {
     }
 
     /// Returns whether the patch of a place exists.
-    pub fn has_patch(&self, place: ClosestPoint) -> bool {
+    pub(crate) fn has_patch(&self, place: ClosestPoint) -> bool {
         place.patch[0] < self.columns() && place.patch[1] < self.along - 1
     }
 
     /// Returns whether a place is on this surface or on its extension beyond the first or last ring, up to rounding.
-    pub fn has_place(&self, place: ClosestPoint) -> bool {
+    pub(crate) fn has_place(&self, place: ClosestPoint) -> bool {
         let within = |value: f64, [low, high]: [f64; 2]| (low - BORDER..=high + BORDER).contains(&value);
         self.has_patch(place) && within(place.s, [0.0, 1.0]) && within(place.t, self.span(place.patch[1]))
     }

@@ -84,7 +84,7 @@ impl MotionIncrement {
     }
 
     /// Returns whether no input moves the casing.
-    pub fn casing_rests(&self) -> bool {
+    pub(crate) fn casing_rests(&self) -> bool {
         self.opening == 0.0 && self.shape_factor == 0.0 && self.shape_rotation == 0.0
     }
 
@@ -148,7 +148,7 @@ impl GapLaw {
     /// Displacement over a step (m) with the rotor, or along fixed obstacles with prescribed sliding, in the coordinates of the
     /// displacements of a node with this contact point.
     #[inline(always)]
-    pub fn spin_motion(&self, at: At<'_>, point: Vector3, motion: &MotionIncrement) -> Vector3 {
+    pub(crate) fn spin_motion(&self, at: At<'_>, point: Vector3, motion: &MotionIncrement) -> Vector3 {
         match self {
             Self::Fixed(law) => law.sliding[at.index] * motion.step,
             Self::Open(_) => Vector3::zeros(),
@@ -186,7 +186,7 @@ impl GapLaw {
     }
 
     /// Angle of the position of a node displaced by `moved` (m, own directions) on the casing (rad), in the fixed frame.
-    pub fn angle_on_casing(&self, at: At<'_>, moved: Vector3) -> f64 {
+    pub(crate) fn angle_on_casing(&self, at: At<'_>, moved: Vector3) -> f64 {
         match self {
             Self::Fixed(_) | Self::Open(_) => 0.0,
             Self::Revolution(law) => law.angle_on_casing(at, moved),

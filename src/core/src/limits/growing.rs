@@ -11,7 +11,7 @@ use crate::scene::method::Scheme;
 /// Growth per step below this is rounding of the eigenvalue solver.
 const GROWTH_NOISE: f64 = 1e-7;
 /// Largest number of modes for which growth rates are computed.
-pub const GROWTH_UP_TO: usize = 150;
+pub(crate) const GROWTH_UP_TO: usize = 150;
 
 /// The motion e^(st) that grows fastest.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -157,7 +157,7 @@ fn is_looked_at(model: &ModalModel, friction: f64) -> bool {
 }
 
 /// Steps at which growth is checked, from `largest` down to the step that resolves every mode well (at most 12 octaves).
-pub fn growth_steps(frequency: f64, largest: f64) -> impl Iterator<Item = f64> {
+pub(crate) fn growth_steps(frequency: f64, largest: f64) -> impl Iterator<Item = f64> {
     let resolved = 0.1 / frequency;
     std::iter::successors(Some(largest), |step| Some(step * std::f64::consts::FRAC_1_SQRT_2))
         .take_while(move |step| *step > resolved)

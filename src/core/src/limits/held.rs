@@ -8,7 +8,7 @@ use crate::scene::method::Scheme;
 
 /// (s² + a s + b) q = (1 + γs) c φ_fᵀF of each mode, while the contacts have zero gap: Σ φ_n q + R F = 0.
 #[derive(Debug, Clone)]
-pub struct HeldContacts {
+pub(crate) struct HeldContacts {
     /// φ_n and φ_f, contacts × modes.
     pub normals: DMatrix<f64>,
     pub forces: DMatrix<f64>,
@@ -88,7 +88,7 @@ impl HeldContacts {
 
     /// Returns the eigenvalues of the matrix of the first-order form; without inertialess modes on the null space of the contact normals, so that the
     /// constraint adds no zero eigenvalues.
-    pub fn dense_eigenvalues(&self) -> Option<Vec<Complex<f64>>> {
+    pub(crate) fn dense_eigenvalues(&self) -> Option<Vec<Complex<f64>>> {
         let [stiffness, damping] = match &self.residual {
             Some(residual) => self.sprung(residual)?,
             None => self.constrained()?,

@@ -15,7 +15,7 @@ pub const TOLERANCE: f64 = 1e-3;
 /// Errors above this fraction of the contact displacement are reported.
 pub const TOLD: f64 = 0.01;
 /// Errors above this fraction are rejected if the step increases the growth beyond that of the differential equations.
-pub const REFUSED: f64 = 0.05;
+pub(crate) const REFUSED: f64 = 0.05;
 /// Modes may contribute to a motion if their frequency is at least this fraction of its frequency: half an octave below.
 const BELOW: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
@@ -76,7 +76,7 @@ impl SetGrowth {
 
 /// Fraction of the static flexibility along the normals that belongs to modes of an angular frequency (rad/s) and above, including half an
 /// octave below: of the contact with the largest fraction.
-pub fn share_of(model: &ModalModel, directions: &ContactDirections, frequency: f64) -> f64 {
+pub(crate) fn share_of(model: &ModalModel, directions: &ContactDirections, frequency: f64) -> f64 {
     let frequency = BELOW * frequency;
     if frequency <= 0.0 || model.frequencies.contains(&0.0) {
         return 1.0;

@@ -28,7 +28,7 @@ const MARGIN: f64 = 1e-6;
 const USABLE: f64 = 0.8;
 /// Fraction of the limit if closed contact is much stiffer than the modes with inertia, whose damping then has too little effect on
 /// bouncing nodes: nodes a hundred times as stiff as their base settle there with a damping ratio of 0.02, but not from 0.5 on.
-pub const USABLE_STIFF: f64 = 0.25;
+pub(crate) const USABLE_STIFF: f64 = 0.25;
 /// Ratio of the squares of the highest frequency with and without closed contact above which contact counts as stiff: at 10 a damping ratio
 /// of 0.02 brings the same nodes to rest up to 0.8 of the limit.
 const STIFF: f64 = 10.0;

@@ -8,7 +8,7 @@ use crate::scene::rom::DisplacementFrame;
 use crate::{Error, Rom};
 
 /// Remedy for a rejected value that is intended.
-pub const IF_MEANT: &str =
+pub(crate) const IF_MEANT: &str =
     "If the value is correct, set `accept_implausible = true` in the scene (--accept-implausible)";
 
 /// An implausible value.
@@ -41,9 +41,9 @@ impl Slip {
 
 /// Largest plausible tip speed (m/s): fans and compressors reach 500, the last blades of steam turbines 800, and rotors of any material
 /// burst above 1500. A speed in rpm used as rad/s is 9.5 times too fast.
-pub const TIP_SPEED: f64 = 1500.0;
+pub(crate) const TIP_SPEED: f64 = 1500.0;
 /// Largest plausible velocity of a free body (m/s): ten times a bird strike, the speed of space debris.
-pub const FLIGHT: f64 = 3000.0;
+pub(crate) const FLIGHT: f64 = 3000.0;
 /// Plausible radii of contact nodes (m): from the smallest turbines on a chip to four times the largest steam turbines. A radius of 20 mm
 /// to 20 m in millimetres is 20 to 20 000.
 const RADII: [f64; 2] = [1e-3, 20.0];
@@ -58,7 +58,7 @@ const RIGID: f64 = 1e-6;
 const CROSSING_UP_TO: usize = 200;
 
 /// Checks for tips that are too fast at `speed` (rad/s), the value of the input `name`. Allocates only in this case.
-pub fn of_speed(rom: &Rom, speed: f64, name: impl FnOnce() -> String) -> Option<Slip> {
+pub(crate) fn of_speed(rom: &Rom, speed: f64, name: impl FnOnce() -> String) -> Option<Slip> {
     let fastest = speed.abs() * radii(rom)[1];
     (rom.frame == DisplacementFrame::Cylindrical && fastest > TIP_SPEED).then(|| {
         let speed_shown = shown(speed);
@@ -76,7 +76,7 @@ pub fn fastest(rom: &Rom) -> f64 {
 }
 
 /// Checks for a free body that is too fast at `velocity` (m/s).
-pub fn of_velocity(name: &str, velocity: [f64; 3]) -> Option<Slip> {
+pub(crate) fn of_velocity(name: &str, velocity: [f64; 3]) -> Option<Slip> {
     let size = velocity.iter().map(|component| component * component).sum::<f64>().sqrt();
     (size > FLIGHT).then(|| {
         let problem = format!("the free structure starts at {size:.0} m/s, above the plausible limit of {FLIGHT} m/s");

@@ -24,7 +24,7 @@ use crate::modes::modal::ModalModel;
 use crate::scene::method::Scheme;
 
 /// Steps below this ω_max h are not rejected.
-pub const HIGHEST: f64 = 10.0;
+pub(crate) const HIGHEST: f64 = 10.0;
 /// Steps are not rejected if modes beyond ωh = 2 have less than this fraction of the flexibility of contact, on average over the contact
 /// nodes.
 pub const SHARE: f64 = 0.5;

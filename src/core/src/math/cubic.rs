@@ -6,7 +6,7 @@ pub fn evaluate(coefficients: &[f64; 4], theta: f64) -> f64 {
 }
 
 /// Returns the θ in 0 < θ < 1 at which the polynomial has a minimum; up to degree 3 there is at most one.
-pub fn interior_minimum(coefficients: &[f64; 4]) -> Option<f64> {
+pub(crate) fn interior_minimum(coefficients: &[f64; 4]) -> Option<f64> {
     let [_, slope, bend, twist] = *coefficients;
     // p′ = slope + 2 bend θ + 3 twist θ²; at the minimum p″ = 2√(bend² − 3 slope twist) > 0.
     let discriminant = bend * bend - 3.0 * slope * twist;

@@ -28,25 +28,25 @@ pub fn tangents(normal: Vector3) -> [Vector3; 2] {
 
 /// Returns the vector of a node from values with three rows per node.
 #[inline(always)]
-pub fn vector3_at(values: &[f64], node: usize) -> Vector3 {
+pub(crate) fn vector3_at(values: &[f64], node: usize) -> Vector3 {
     Vector3::from_column_slice(&values[3 * node..][..3])
 }
 
 /// Sets the vector of a node in values with three rows per node.
 #[inline(always)]
-pub fn set_vector3_at(values: &mut [f64], node: usize, vector: Vector3) {
+pub(crate) fn set_vector3_at(values: &mut [f64], node: usize, vector: Vector3) {
     values[3 * node..][..3].copy_from_slice(vector.as_slice());
 }
 
 /// Returns the vector whose components begin at `first` and are `stride` apart.
 #[inline(always)]
-pub fn strided_vector3(values: &[f64], first: usize, stride: usize) -> Vector3 {
+pub(crate) fn strided_vector3(values: &[f64], first: usize, stride: usize) -> Vector3 {
     Vector3::new(values[first], values[first + stride], values[first + 2 * stride])
 }
 
 /// Sets the vector whose components begin at `first` and are `stride` apart.
 #[inline(always)]
-pub fn set_strided_vector3(values: &mut [f64], first: usize, stride: usize, vector: Vector3) {
+pub(crate) fn set_strided_vector3(values: &mut [f64], first: usize, stride: usize, vector: Vector3) {
     for (component, value) in vector.iter().enumerate() {
         values[first + component * stride] = *value;
     }

@@ -27,7 +27,7 @@ use heated::HeatLoads;
 use predict::Predict;
 
 /// Lanes of one chunk: one 512-bit register of f64.
-pub const LANES: usize = 8;
+pub(crate) const LANES: usize = 8;
 
 /// Amplitudes below this are periodically set to zero: damped modes without load would decay into denormals.
 pub(super) const FLUSH_BELOW: f64 = 1e-150;
@@ -220,7 +220,7 @@ impl ModalBank {
     }
 
     /// Stops collecting the damping loss, which takes time.
-    pub fn skip_losses(&mut self) {
+    pub(crate) fn skip_losses(&mut self) {
         self.with_loss = false;
     }
 
@@ -449,7 +449,7 @@ impl ModalBank {
 
     /// Instantaneous kinetic and strain energy of all sectors (J), ½q̇² and ½ω²q² of every mode, each sector under the persistent
     /// contact forces (`forces[row · lanes + sector]`, N) and the modal loads.
-    pub fn energies_now(&mut self, forces: &[f64]) -> (f64, f64) {
+    pub(crate) fn energies_now(&mut self, forces: &[f64]) -> (f64, f64) {
         let (mut kinetic, mut strain) = (0.0, 0.0);
         for sector in 0..self.sectors {
             self.gather_forces(sector, forces);
@@ -470,7 +470,7 @@ impl ModalBank {
     }
 
     /// Damping loss since the last call (J).
-    pub fn collect_loss(&mut self) -> f64 {
+    pub(crate) fn collect_loss(&mut self) -> f64 {
         let loss = self.state.loss[..self.sectors].iter().sum();
         self.state.loss.fill(0.0);
         loss

@@ -61,7 +61,7 @@ impl Coordinates {
     }
 
     /// Returns the modes with inertia at rows and the flexibility of the other modes there. `shapes`: rows × coordinates (1/√kg).
-    pub fn seen_at(&self, shapes: &DMatrix<f64>) -> ContactModes {
+    pub(crate) fn seen_at(&self, shapes: &DMatrix<f64>) -> ContactModes {
         let (mut dynamic, rows) = (shapes.clone(), shapes.nrows());
         let mut residual = DMatrix::zeros(rows, rows);
         for (mode, softness) in self.softness.iter().enumerate() {

@@ -27,7 +27,8 @@ use crate::math::vector::Vector3;
 use crate::modes::schemes::{ModeCoefficients, Velocity};
 use crate::scene::method::Scheme;
 use fourier::{Fourier, Synthesis};
-pub use model::{CyclicModel, DiameterModes};
+pub use model::CyclicModel;
+pub use model::DiameterModes;
 use pass::{Complexes, CyclicCoefficients, Pass, Recover};
 
 const NOTHING: Complexes = [[0.0; LANES]; 2];

@@ -70,7 +70,7 @@ impl SectorLoads {
         loads
     }
 
-    pub fn set_order(&mut self, order: u32) {
+    pub(crate) fn set_order(&mut self, order: u32) {
         let sectors = self.pattern.len();
         for (sector, pattern) in self.pattern.iter_mut().enumerate() {
             *pattern = wave(u64::from(order), sector, sectors);
@@ -115,7 +115,7 @@ impl DiskLoads {
         loads
     }
 
-    pub fn set_order(&mut self, order: u32, model: &CyclicModel) {
+    pub(crate) fn set_order(&mut self, order: u32, model: &CyclicModel) {
         let alias = order as usize % model.sectors;
         self.backward = 2 * alias > model.sectors;
         self.diameter = if self.backward { model.sectors - alias } else { alias };
@@ -150,12 +150,12 @@ impl DiskLoads {
     }
 
     /// Modal force (re, im) on a mode in the current step.
-    pub fn of_mode(&self, mode: usize) -> [f64; 2] {
+    pub(crate) fn of_mode(&self, mode: usize) -> [f64; 2] {
         times(self.load[mode], self.now)
     }
 
     /// Modal force (re, im) on a mode in the previous step.
-    pub fn of_mode_before(&self, mode: usize) -> [f64; 2] {
+    pub(crate) fn of_mode_before(&self, mode: usize) -> [f64; 2] {
         times(self.load[mode], self.before)
     }
 

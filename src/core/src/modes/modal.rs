@@ -65,7 +65,7 @@ impl ModalSpin {
     }
 
     /// Creates zero matrices for modes that are not coupled by spin.
-    pub fn without_spin(model: &ModalModel) -> Self {
+    pub(crate) fn without_spin(model: &ModalModel) -> Self {
         let none = || DMatrix::zeros(model.len(), model.len());
         let (reference_speed, reference_temperature, softening) = (0.0, 0.0, None);
         let (stiffness_speed2, stiffness_speed4, coriolis) = (none(), none(), none());
@@ -83,7 +83,7 @@ impl ModalSpin {
 }
 
 /// Sets one ratio for all modes; the first modes have their `own`. Each value is repeated `copies` times in `ratios`.
-pub fn fill_ratios(ratios: &mut [f64], ratio: f64, own: &[f64], copies: usize) {
+pub(crate) fn fill_ratios(ratios: &mut [f64], ratio: f64, own: &[f64], copies: usize) {
     ratios.fill(ratio);
     for (ratios, own) in ratios.chunks_mut(copies).zip(own) {
         ratios.fill(*own);
@@ -150,7 +150,7 @@ impl ModalModel {
     }
 
     /// Number of modes that have inertia if the highest are quasi-static.
-    pub fn inertial_modes(&self) -> usize {
+    pub(crate) fn inertial_modes(&self) -> usize {
         self.len().saturating_sub(self.quasi_static)
     }
 
@@ -171,7 +171,7 @@ impl ModalModel {
     }
 
     /// Returns the modes with the contact rows of both models, one after the other.
-    pub fn seen_at_both(self, other: Self) -> Self {
+    pub(crate) fn seen_at_both(self, other: Self) -> Self {
         let rows = (self.contact_modes.nrows(), other.contact_modes.nrows());
         let mut contact_modes = DMatrix::zeros(rows.0 + rows.1, self.contact_modes.ncols());
         contact_modes.rows_mut(0, rows.0).copy_from(&self.contact_modes);

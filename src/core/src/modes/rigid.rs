@@ -43,7 +43,7 @@ impl Translations {
 ///
 /// # Errors
 /// The errors of [`ModalModel::from_rom`], and a structure that is constrained.
-pub fn free_modes(rom: &Rom, damping_ratio: f64) -> Result<(ModalModel, Translations)> {
+pub(crate) fn free_modes(rom: &Rom, damping_ratio: f64) -> Result<(ModalModel, Translations)> {
     let mut model = ModalModel::from_rom(rom, damping_ratio)?;
     let largest = model.largest_frequency();
     let rigid = model.frequencies.iter().take_while(|frequency| **frequency <= RIGID_SHARE * largest).count();

@@ -69,7 +69,7 @@ impl Scheme {
     }
 
     /// Share of the increment by which the second position of the strain energy is earlier than the first: q (q − share · d).
-    pub fn strain_lag(self) -> f64 {
+    pub(crate) fn strain_lag(self) -> f64 {
         if self.properties().stores_velocity { 0.0 } else { 1.0 }
     }
 }
@@ -114,7 +114,7 @@ impl ModeCoefficients {
     }
 
     /// Coefficients of a mode that has inertia under the scheme (`dynamic`) or is quasi-static.
-    pub fn of_mode(scheme: Scheme, dynamic: bool, frequency: f64, damping_ratio: f64, step: f64) -> Self {
+    pub(crate) fn of_mode(scheme: Scheme, dynamic: bool, frequency: f64, damping_ratio: f64, step: f64) -> Self {
         match scheme {
             Scheme::CentralDifference | Scheme::ModalExact => Self::new(scheme, frequency, damping_ratio, step),
             Scheme::Galerkin if dynamic => galerkin::state(frequency, step),
@@ -127,7 +127,7 @@ impl ModeCoefficients {
 
     /// Coefficients of a mode whose stiffness, inertia and damping are multiplied by `share`.
     #[must_use]
-    pub fn with_stiffness(self, share: f64) -> Self {
+    pub(crate) fn with_stiffness(self, share: f64) -> Self {
         Self {
             compliance: self.compliance / share,
             delayed: self.delayed / share,
@@ -139,13 +139,13 @@ impl ModeCoefficients {
     }
 
     /// Displacement per unit of a prescribed modal force (s²).
-    pub fn load_compliance(&self) -> f64 {
+    pub(crate) fn load_compliance(&self) -> f64 {
         self.compliance + self.delayed
     }
 }
 
 /// ω_d = ω √(1 − ξ²).
-pub fn damped_frequency(frequency: f64, damping_ratio: f64) -> f64 {
+pub(crate) fn damped_frequency(frequency: f64, damping_ratio: f64) -> f64 {
     frequency * libm::sqrt(1.0 - damping_ratio * damping_ratio)
 }
 
@@ -206,7 +206,7 @@ impl Velocity {
     }
 
     /// Coefficients for states (q, hq̇).
-    pub fn of_state(step: f64) -> Self {
+    pub(crate) fn of_state(step: f64) -> Self {
         Self { increment: 1.0 / step, position: 0.0, force: 0.0 }
     }
 

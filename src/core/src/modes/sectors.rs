@@ -171,14 +171,14 @@ impl Sectors {
     }
 
     /// Moves uncoupled sectors at rest by the free expansion of a temperature (K), after [`Sectors::settle`].
-    pub fn settle_expansion(&mut self, temperature: f64) {
+    pub(crate) fn settle_expansion(&mut self, temperature: f64) {
         if let Self::Uncoupled(bank) = self {
             bank.settle_expansion(temperature);
         }
     }
 
     /// Returns the work of heat on quasi-static modes over the last step (J), in addition to the result of [`Sectors::set_speed`] before it.
-    pub fn finish_stiffening(&mut self) -> f64 {
+    pub(crate) fn finish_stiffening(&mut self) -> f64 {
         match self {
             Self::Uncoupled(bank) => bank.finish_stiffening(),
             Self::Coupled(_) => 0.0,

@@ -530,7 +530,7 @@ impl SceneSettings {
     }
 
     /// Returns whether the importer may set a tolerance instead of a step.
-    pub fn takes_a_tolerance(&self) -> bool {
+    pub(crate) fn takes_a_tolerance(&self) -> bool {
         self.time.tolerance.is_some() || self.time.scheme.properties().adaptive
     }
 }

@@ -64,7 +64,7 @@ impl CompiledShape {
     }
 
     /// Largest change of radius, up or down (m).
-    pub fn largest_change(&self) -> f64 {
+    pub(crate) fn largest_change(&self) -> f64 {
         match self {
             Self::Circular => 0.0,
             Self::Lobes { amplitude, .. } => amplitude.abs(),
@@ -85,7 +85,7 @@ impl CompiledShape {
     }
 
     /// Minimum of s between two angles (m).
-    pub fn lowest_between(&self, from: f64, to: f64) -> f64 {
+    pub(crate) fn lowest_between(&self, from: f64, to: f64) -> f64 {
         let ends = self.evaluate(from).0.min(self.evaluate(to).0);
         // Checks whether one of the angles `first` + n·`period` is in between.
         let passes = |first: f64, period: f64| ((to - first) / period).floor() > ((from - first) / period).floor();
@@ -106,7 +106,7 @@ impl CompiledShape {
     }
 
     /// Angle over which the shape changes noticeably (rad): a step of the rotor must stay below it.
-    pub fn angular_scale(&self) -> f64 {
+    pub(crate) fn angular_scale(&self) -> f64 {
         match self {
             Self::Circular => std::f64::consts::PI,
             Self::Lobes { order, .. } => 1.0 / order,
@@ -131,7 +131,7 @@ impl CompiledShape {
     }
 
     /// Lower bound of s between two angles (m): the lower of its end values, minus the difference that its curvature allows.
-    pub fn least_between(&self, from: f64, to: f64) -> f64 {
+    pub(crate) fn least_between(&self, from: f64, to: f64) -> f64 {
         let curvature = match self {
             Self::Circular => return 0.0,
             Self::Lobes { amplitude, order, .. } => amplitude.abs() * order * order,
@@ -146,7 +146,7 @@ impl CompiledShape {
 
     /// Evaluates [`CompiledShape::evaluate`] for a row of angles, in a form that the compiler can vectorise.
     #[inline(always)]
-    pub fn evaluate_row(&self, angles: &[f64], shape: &mut [f64], slope: &mut [f64]) {
+    pub(crate) fn evaluate_row(&self, angles: &[f64], shape: &mut [f64], slope: &mut [f64]) {
         let places = angles.iter().zip(shape).zip(slope);
         match self {
             Self::Circular => places.for_each(|((_, shape), slope)| (*shape, *slope) = (0.0, 0.0)),

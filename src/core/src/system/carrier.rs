@@ -11,7 +11,7 @@ use nalgebra::DMatrix;
 
 /// Location at which a contact acts on a structure.
 #[derive(Debug, Clone, Copy)]
-pub struct Spot<'a> {
+pub(crate) struct Spot<'a> {
     /// The surface.
     pub surface: &'a SurfaceSpline,
     /// The structure that carries the surface.
@@ -102,7 +102,7 @@ impl Reaction {
     }
 
     /// Adds the part of this structure to the Delassus matrix (m/N) of a group with `per` directions per contact.
-    pub fn add_delassus(&mut self, of: &Structure, matrix: &mut DMatrix<f64>, per: usize) {
+    pub(crate) fn add_delassus(&mut self, of: &Structure, matrix: &mut DMatrix<f64>, per: usize) {
         for at in 0..self.members.len() {
             for column in per * self.members[at]..per * (self.members[at] + 1) {
                 self.prepare_column(of, column);
@@ -154,7 +154,7 @@ impl Reaction {
     }
 
     /// Displacement of a place caused by the last [`Reaction::respond`], in the directions of the node (m).
-    pub fn responded(&self, spot: Spot) -> Vector3 {
+    pub(crate) fn responded(&self, spot: Spot) -> Vector3 {
         spot.interpolate(|row| self.response[row])
     }
 

@@ -9,7 +9,7 @@ use crate::geometry::wrench::At;
 
 /// A contact node of one sector of a structure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ContactMember {
+pub(crate) struct ContactMember {
     /// Structure.
     pub structure: usize,
     /// Pair that the node belongs to.
@@ -33,7 +33,7 @@ pub struct Bodies<'a> {
 }
 
 /// A contact member with its structure and pair, as its law sees it.
-pub struct ContactView<'a> {
+pub(crate) struct ContactView<'a> {
     bodies: &'a Bodies<'a>,
     structure: &'a Structure,
     pair: &'a ContactPair,
@@ -43,7 +43,7 @@ pub struct ContactView<'a> {
 impl Bodies<'_> {
     /// Returns a member with its structure and pair.
     #[inline(always)]
-    pub fn pose(&self, member: ContactMember) -> ContactView<'_> {
+    pub(crate) fn pose(&self, member: ContactMember) -> ContactView<'_> {
         ContactView {
             bodies: self,
             structure: &self.structures[member.structure],
@@ -62,7 +62,7 @@ impl ContactView<'_> {
 
     /// Displacement relative to the surface over the step including the prediction (m), without rigid motion.
     #[inline(always)]
-    pub fn slip_of_deformation(&self) -> Vector3 {
+    pub(crate) fn slip_of_deformation(&self) -> Vector3 {
         let modes = self.structure.modes();
         self.slip_between(modes.displacement(), modes.displacement_before())
     }
@@ -92,7 +92,7 @@ impl ContactView<'_> {
 
     /// Location at which the contact acts on the structure that carries its surface, if any.
     #[inline(always)]
-    pub fn spot(&self) -> Option<Spot<'_>> {
+    pub(crate) fn spot(&self) -> Option<Spot<'_>> {
         self.pair.carrier()?;
         let (index, rotor_angle) = (self.member.index, self.pair.drive(When::Now).rotor_angle);
         self.pair.spot(index, self.structure.history.geometry.now.places[index], rotor_angle)

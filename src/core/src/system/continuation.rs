@@ -56,14 +56,14 @@ impl System {
     }
 
     /// Sets the step size `step` (s) without conversion of the state, before the first step.
-    pub fn set_first_step(&mut self, step: f64) {
+    pub(crate) fn set_first_step(&mut self, step: f64) {
         let scheme = self.settings.scheme;
         self.structures.iter_mut().for_each(|structure| structure.set_step(scheme, step));
     }
 
     /// Instantaneous kinetic and strain energy of all structures (J), ½q̇ᵀMq̇ and ½qᵀKq, between steps only. `each` is called
     /// with the energies of every set.
-    pub fn energies_now(&mut self, mut each: impl FnMut(usize, (f64, f64))) -> (f64, f64) {
+    pub(crate) fn energies_now(&mut self, mut each: impl FnMut(usize, (f64, f64))) -> (f64, f64) {
         let step = self.step_size();
         self.find_lasting(step, step);
         let Self { sets, structures, .. } = self;
@@ -143,7 +143,7 @@ impl System {
     ///
     /// # Errors
     /// [`StepFailure::Gives`], [`StepFailure::Unbalanced`].
-    pub fn check_ledger(&mut self) -> Result<(), StepFailure> {
+    pub(crate) fn check_ledger(&mut self) -> Result<(), StepFailure> {
         self.check_losses()?;
         for (set, ledger) in self.counted.ledgers.iter().enumerate() {
             let (work, exchanged) = (ledger.curvature_work.value(), ledger.exchanged());
@@ -202,7 +202,7 @@ impl System {
     /// Returns the number of infinite gaps among the gaps of all structures, in the order of [`Structure::gaps`]: those of
     /// padding lanes, of nodes without a pair, and of nodes beyond a free edge. Returns `None` if any other gap is infinite, or
     /// if one is −∞.
-    pub fn infinite_gap_count(&self, gaps: &[f64]) -> Option<usize> {
+    pub(crate) fn infinite_gap_count(&self, gaps: &[f64]) -> Option<usize> {
         let (mut rest, mut sum) = (gaps, 0);
         for structure in &self.structures {
             let (own, others) = rest.split_at(structure.gaps().len());

@@ -9,7 +9,7 @@ use crate::modes::sectors::Sectors;
 use nalgebra::DMatrix;
 
 /// Contacts of a structure within a group, with their directions and the position of their block in the matrix.
-pub struct DelassusBlock<'a> {
+pub(crate) struct DelassusBlock<'a> {
     /// The contacts.
     pub members: &'a [ContactMember],
     /// Directions of the rows, `per` for each contact.

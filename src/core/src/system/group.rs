@@ -17,7 +17,7 @@ use crate::scene::method::Solver;
 const VIOLATED_FRACTION: f64 = 1e-13;
 
 /// Outputs of the solution of a group in a step.
-pub struct GroupSolution<'a> {
+pub(crate) struct GroupSolution<'a> {
     /// Active contacts; new ones are appended.
     pub events: &'a mut Vec<ContactEvent>,
     /// Number of factorised small linear systems; it is increased.
@@ -40,7 +40,7 @@ struct GroupSide {
 
 /// Coupling of the contacts of a group.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Reach {
+pub(crate) enum Reach {
     /// Each sector separately: uncoupled sectors of one structure against a rigid surface.
     Sector,
     /// All sectors of all structures of the group, coupled by a disk or by a common surface.
@@ -49,7 +49,7 @@ pub enum Reach {
 
 /// Contacts that can influence each other at any time of a run.
 #[derive(Debug, Clone)]
-pub struct ContactGroup {
+pub(crate) struct ContactGroup {
     reach: Reach,
     sides: Vec<GroupSide>,
     /// Structures that carry the surfaces of the contacts.
@@ -115,12 +115,12 @@ impl ContactGroup {
     }
 
     /// The contact law, to restore its state.
-    pub fn law_mut(&mut self) -> &mut Law {
+    pub(crate) fn law_mut(&mut self) -> &mut Law {
         &mut self.law
     }
 
     /// Selects a solver, if it is different from the current one.
-    pub fn set_solver(&mut self, solver: Solver, structures: &[Structure]) {
+    pub(crate) fn set_solver(&mut self, solver: Solver, structures: &[Structure]) {
         if !self.law.matches_solver(solver) {
             let touching: Vec<usize> = self.structures().collect();
             let carriers: Vec<usize> = self.reactions.iter().map(|reaction| reaction.structure).collect();

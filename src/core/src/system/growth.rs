@@ -2,7 +2,7 @@
 
 /// Growth of the shape of a surface over a span: a factor that is linear in time, times ½(1 − cos(πt/T)) until T.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct ShapeGrowth {
+pub(crate) struct ShapeGrowth {
     /// Factor at the start and the end.
     pub factors: [f64; 2],
     /// Time since the growth began (s), at the start and the end.

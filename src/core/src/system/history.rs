@@ -80,7 +80,7 @@ impl Persist for Three {
 /// Recent values at the contact nodes of one structure, in arrays `[node · lanes + lane]` and `[row · lanes + lane]` with three
 /// rows per node. Current and previous displacements are those of the modes.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ContactHistory {
+pub(crate) struct ContactHistory {
     /// Gaps (m); infinite in padding lanes and where there is nothing to touch.
     pub gap: Three,
     /// Normals and closest points.
@@ -101,7 +101,7 @@ pub struct ContactHistory {
 
 /// Previous values that only the current step needs.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Passing {
+pub(crate) struct Passing {
     /// Displacements of all rows of the structure (m), two steps before the end of the current step.
     pub oldest: Vec<f64>,
     /// Contact forces on all rows (N) without those of impacts.
@@ -141,7 +141,7 @@ impl ContactHistory {
     }
 
     /// Stores the forces of the last step as previous forces, for laws that start from them.
-    pub fn keep_forces(&mut self) {
+    pub(crate) fn keep_forces(&mut self) {
         self.force.before.copy_from_slice(&self.force.now);
     }
 

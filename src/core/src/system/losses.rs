@@ -36,7 +36,7 @@ const STOPPED: f64 = 0.01;
 
 /// Largest losses so far (J).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct LargestLosses {
+pub(crate) struct LargestLosses {
     friction: f64,
     impact: f64,
     /// Energy that cutting forces have supplied to tips that move backwards, which does not count as cutting (J).

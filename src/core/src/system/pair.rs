@@ -99,7 +99,7 @@ impl ContactPair {
     }
 
     /// Prescribed motion at the step before the last.
-    pub fn drive_before(&self) -> &PrescribedMotion {
+    pub(crate) fn drive_before(&self) -> &PrescribedMotion {
         self.drive(When::Before)
     }
 

@@ -6,7 +6,7 @@ use super::System;
 
 /// Impulses on the contact nodes of one structure since the start, summed over all its sectors.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Pulling {
+pub(crate) struct Pulling {
     /// Number of internal steps with contact.
     touched: u64,
     /// Impulses of pushing and of pulling forces on each node (N s).
@@ -73,7 +73,7 @@ impl System {
 
     /// Returns the node of a touching structure that was deepest inside at the end of a step, and the depth as a fraction of its clearance
     /// ([`GapLaw::clearance`](crate::geometry::GapLaw::clearance)).
-    pub fn left_inside(&self, structure: usize) -> Option<(usize, f64)> {
+    pub(crate) fn left_inside(&self, structure: usize) -> Option<(usize, f64)> {
         self.structures[structure].pulling.inside.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1))
     }
 

@@ -4,7 +4,7 @@ use super::{ContactPair, StepFailure, System};
 use crate::geometry::GapLaw;
 
 /// Clearances below this fraction of the radius belong to a press fit, in which errors of this size do not matter.
-pub const LEAST_CLEARANCE: f64 = 1e-4;
+pub(crate) const LEAST_CLEARANCE: f64 = 1e-4;
 
 /// Error of linear kinematics at a node that moves far around the axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,7 +37,7 @@ impl System {
     /// Coordinates that are not finite; displacements beyond a tenth of the radius; relative displacements of nodes on open
     /// surfaces beyond a tenth of their extent; displacements around the axis for which u_θ²/2r reaches the clearance
     /// ([`System::most_curved`]).
-    pub fn check_state(&self) -> Result<(), StepFailure> {
+    pub(crate) fn check_state(&self) -> Result<(), StepFailure> {
         if self.structures.iter().any(|structure| !structure.modes().is_finite()) {
             return Err(StepFailure::NonFinite);
         }
@@ -72,13 +72,13 @@ impl System {
     /// further from the axis, which a gap linear in the displacements neglects. On a spline the positions are exact, but a
     /// bending blade shortens by at least this amount, which its modes, being straight lines, neglect: the measure applies there
     /// too. `None` if nothing turns around an axis.
-    pub fn most_curved(&self) -> Option<Curved> {
+    pub(crate) fn most_curved(&self) -> Option<Curved> {
         let more = |most: Curved, one: Curved| if one.share() > most.share() { one } else { most };
         (0..self.structures.len()).filter_map(|structure| self.most_curved_of(structure)).reduce(more)
     }
 
     /// Returns the node of one structure with the largest error of linear kinematics.
-    pub fn most_curved_of(&self, structure: usize) -> Option<Curved> {
+    pub(crate) fn most_curved_of(&self, structure: usize) -> Option<Curved> {
         let mut most: Option<Curved> = None;
         for pair in self.pairs.iter().filter(|pair| pair.structure() == structure) {
             let Some(layout) = pair.gap().layout() else { continue };

@@ -154,7 +154,7 @@ impl Structure {
     }
 
     /// Smallest gaps within the last step (m), as far as the scheme evaluates them, `[node · lanes + lane]`.
-    pub fn lowest_gaps(&self) -> &[f64] {
+    pub(crate) fn lowest_gaps(&self) -> &[f64] {
         if self.lowest_in_span.is_empty() { &self.history.gap.now } else { &self.lowest_in_span }
     }
 

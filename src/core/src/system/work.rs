@@ -10,7 +10,7 @@ use crate::system::ledger::Ledger;
 
 /// Work of contacts over a step (J).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct ContactWork {
+pub(crate) struct ContactWork {
     /// Work of the shaft.
     pub shaft: f64,
     /// Work of whirl.
@@ -93,7 +93,7 @@ impl ContactWork {
 /// the friction heat (friction force times slip) and the loss of the approach (λ times the decrease of the gap), except for curvature work
 /// within the step.
 #[derive(Debug, Clone, Copy)]
-pub struct WorkingForce<'a> {
+pub(crate) struct WorkingForce<'a> {
     /// Gap function of the contact, and its node.
     pub gap: &'a GapLaw,
     /// Node, and prescribed motion when the force acts.

@@ -20,7 +20,7 @@ mod record;
 pub mod response;
 pub mod rows;
 mod scene_island;
-pub mod shared_body;
+pub(crate) mod shared_body;
 pub mod span;
 pub mod state;
 pub mod stepper;

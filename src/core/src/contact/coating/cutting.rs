@@ -36,7 +36,7 @@ struct Chip {
 
 /// Motion of a blade along the coating.
 #[derive(Debug, Clone, Copy)]
-pub struct BladePassage<'a> {
+pub(crate) struct BladePassage<'a> {
     /// Index of the blade.
     pub blade: usize,
     /// Angles of its contact nodes on the casing (rad).
@@ -116,17 +116,17 @@ impl CoatingCut {
 
 impl Coating {
     /// Returns whether the coating is cut instead of pressed in.
-    pub fn is_cut(&self) -> bool {
+    pub(crate) fn is_cut(&self) -> bool {
         self.cutting.is_some()
     }
 
     /// Ratio of tangential to normal force of a cut (-); 0 if the coating is pressed in.
-    pub fn tangential_ratio(&self) -> f64 {
+    pub(crate) fn tangential_ratio(&self) -> f64 {
         self.cutting.as_ref().map_or(0.0, |cutting| cutting.tangential)
     }
 
     /// Like [`Coating::locate`], for a blade that cuts: the one or two cells of each row that contain its path of the step.
-    pub fn locate_cut(&self, problem: &mut CoatedProblem, way: BladePassage) {
+    pub(crate) fn locate_cut(&self, problem: &mut CoatedProblem, way: BladePassage) {
         let Some(cutting) = &self.cutting else { return };
         let first = problem.append_nodes(self.nodes);
         for (index, row) in self.rows.iter().enumerate() {

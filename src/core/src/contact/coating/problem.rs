@@ -130,7 +130,8 @@ impl CoatedProblem {
     }
 
     /// Cells that the last solution loads, with their force (N).
-    pub fn loaded_cells(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+    #[cfg(test)]
+    pub(crate) fn loaded_cells(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
         let loaded = self.contacts.iter().filter(|contact| contact.branch != Branch::Free);
         loaded.map(|contact| (contact.cell, self.force(contact, &self.gaps).max(0.0)))
     }

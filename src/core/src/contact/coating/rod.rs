@@ -4,7 +4,7 @@ use crate::scene::settings::CoatingSettings;
 
 /// Branch of the law of a rod.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Branch {
+pub(crate) enum Branch {
     /// Blade and rod are not in contact.
     #[default]
     Free,
@@ -17,7 +17,7 @@ pub enum Branch {
 /// Material of the rods (Legrand, Batailly, Pierre, J. Comput. Nonlinear Dyn. 2012): σ = E(ε − ε_p) ≥ 0 up to
 /// σ = Y + Kε_p; beyond it ε_p grows. The hardening variable equals the plastic strain in monotonic compression.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RodMaterial {
+pub(crate) struct RodMaterial {
     pub(super) modulus: f64,
     pub(super) yield_stress: f64,
     pub(super) hardening: f64,
@@ -62,6 +62,7 @@ impl RodMaterial {
     }
 
     /// Stress (Pa) at a total strain, and the resulting plastic strain.
+    #[cfg(test)]
     pub fn stress(&self, strain: f64, plastic: f64) -> (f64, f64) {
         let branch = self.branch(strain, plastic);
         let (offset, tangent) = self.line(branch, plastic);

@@ -35,7 +35,7 @@ impl BladeTip {
 
     /// Changes the extent of the cells (m).
     #[must_use]
-    pub fn with_extent(self, extent: [f64; 2]) -> Self {
+    pub(crate) fn with_extent(self, extent: [f64; 2]) -> Self {
         Self { extent, ..self }
     }
 

@@ -55,14 +55,14 @@ impl FootPoint {
 
     /// First fundamental form [S_s·S_s, S_s·S_t, S_t·S_t].
     #[inline]
-    pub fn metric(&self) -> [f64; 3] {
+    pub(crate) fn metric(&self) -> [f64; 3] {
         let Evaluation { d_s, d_t, .. } = &self.evaluation;
         [d_s.dot(d_s), d_s.dot(d_t), d_t.dot(d_t)]
     }
 
     /// Second derivatives of f [ss, st, tt] and their determinant.
     #[inline]
-    pub fn hessian(&self, metric: [f64; 3]) -> ([f64; 3], f64) {
+    pub(crate) fn hessian(&self, metric: [f64; 3]) -> ([f64; 3], f64) {
         let Evaluation { d_ss, d_st, d_tt, .. } = &self.evaluation;
         let bend = [d_ss, d_st, d_tt].map(|second| self.residual.dot(second));
         let hessian: [f64; 3] = std::array::from_fn(|i| metric[i] - bend[i]);
@@ -77,7 +77,7 @@ impl FootPoint {
 
     /// Returns the Newton step on the coordinates that are not held; `None` if the surface is degenerate.
     #[inline]
-    pub fn newton_step(&mut self, room: &Room, metric: [f64; 3]) -> Option<[f64; 2]> {
+    pub(crate) fn newton_step(&mut self, room: &Room, metric: [f64; 3]) -> Option<[f64; 2]> {
         let gradient = self.gradient();
         let (hessian, determinant) = self.hessian(metric);
         let area = metric[0] * metric[2] - metric[1] * metric[1];

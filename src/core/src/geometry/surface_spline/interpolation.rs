@@ -50,12 +50,12 @@ impl InterpolationRow {
     }
 
     /// Creates the problem of a row with free ends at the first and the last point.
-    pub fn free_ends(count: usize) -> Self {
+    pub(crate) fn free_ends(count: usize) -> Self {
         Self { kind: RowEnds::Free { last: count - 1 }, pivots: pivots(&vec![4.0; count - 2]) }
     }
 
     /// Creates the problem of a row whose free ends meet at the first point.
-    pub fn free_ends_meeting(count: usize) -> Self {
+    pub(crate) fn free_ends_meeting(count: usize) -> Self {
         Self { kind: RowEnds::Free { last: 0 }, pivots: pivots(&vec![4.0; count - 1]) }
     }
 

@@ -106,7 +106,7 @@ impl ModalBank {
     }
 
     /// Sets the modal damping ratio of all modes; the first modes have their `own` (takes effect with the next [`ModalBank::set_step`]).
-    pub fn set_damping_ratio(&mut self, damping_ratio: f64, own: &[f64]) {
+    pub(crate) fn set_damping_ratio(&mut self, damping_ratio: f64, own: &[f64]) {
         fill_ratios(&mut self.model.damping_ratios, damping_ratio, own, 1);
     }
 

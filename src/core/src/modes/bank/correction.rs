@@ -91,7 +91,7 @@ impl ModalBank {
     }
 
     /// Finds the displacement of the contact rows of a single structure by contact forces given as modal forces (m).
-    pub fn response_to_modal(&mut self, modal_force: &[f64], displacement: &mut [f64]) {
+    pub(crate) fn response_to_modal(&mut self, modal_force: &[f64], displacement: &mut [f64]) {
         self.modal_force.copy_from_slice(modal_force);
         self.respond(0);
         displacement.fill(0.0);
@@ -100,7 +100,7 @@ impl ModalBank {
     }
 
     /// Corrects a single structure for contact forces given as modal forces, using the response of its rows to them.
-    pub fn correct_modal(&mut self, modal_force: &[f64], response: &[f64]) {
+    pub(crate) fn correct_modal(&mut self, modal_force: &[f64], response: &[f64]) {
         self.modal_force.copy_from_slice(modal_force);
         self.respond(0);
         self.move_modes(0);
@@ -122,7 +122,7 @@ impl ModalBank {
     }
 
     /// Applies contact forces of the previous step (`forces[row · lanes + sector]`, N) after the prediction (massless-boundary).
-    pub fn act_delayed(&mut self, forces: &[f64]) {
+    pub(crate) fn act_delayed(&mut self, forces: &[f64]) {
         let (lanes, mut force) = (self.lanes(), std::mem::take(&mut self.moved));
         for sector in 0..self.sectors {
             for (row, force) in force.iter_mut().enumerate() {
@@ -137,7 +137,7 @@ impl ModalBank {
     }
 
     /// Applies modal forces of the previous step to one sector after the prediction.
-    pub fn act_delayed_modal(&mut self, sector: usize, modal_force: &[f64]) {
+    pub(crate) fn act_delayed_modal(&mut self, sector: usize, modal_force: &[f64]) {
         self.modal_force.copy_from_slice(modal_force);
         self.act_delayed_modal_force(sector);
     }
@@ -154,7 +154,7 @@ impl ModalBank {
 
     /// Returns the work of the modal loads over the last step (J), after the contact correction. A quasi-static mode follows its
     /// current load, so over this step the previous load did the work.
-    pub fn finish_loads(&mut self) -> f64 {
+    pub(crate) fn finish_loads(&mut self) -> f64 {
         if !self.options.loads {
             return 0.0;
         }

@@ -71,7 +71,7 @@ impl Coupling {
     }
 
     /// Returns whether anything couples the modes at the current speed.
-    pub fn is_active(&self) -> bool {
+    pub(crate) fn is_active(&self) -> bool {
         (self.coriolis && self.speed != 0.0) || self.is_stiffened()
     }
 
@@ -86,7 +86,7 @@ impl Coupling {
     }
 
     /// Number of modes, from the lowest, that ΔK couples.
-    pub fn coupled_modes(&self) -> usize {
+    pub(crate) fn coupled_modes(&self) -> usize {
         self.coupled
     }
 
@@ -142,7 +142,7 @@ impl Coupling {
     }
 
     /// Computes T of every set from its coefficients for the current step.
-    pub fn invert_all(&mut self, coefficients: &[ModeCoefficients]) {
+    pub(crate) fn invert_all(&mut self, coefficients: &[ModeCoefficients]) {
         if self.coriolis {
             for (set, coefficients) in coefficients.chunks_exact(self.shares.len()).enumerate() {
                 self.invert(set, coefficients);

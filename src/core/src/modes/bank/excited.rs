@@ -4,7 +4,7 @@ use super::ModalBank;
 
 impl ModalBank {
     /// Sets the engine order of the excitation, if any.
-    pub fn set_excitation_order(&mut self, order: u32) {
+    pub(crate) fn set_excitation_order(&mut self, order: u32) {
         if let Some(loads) = &mut self.excitation {
             loads.set_order(order);
         }
@@ -42,7 +42,7 @@ impl ModalBank {
 
     /// Returns the work of the excitation over the last step (J), after the contact correction; for quasi-static modes see
     /// [`ModalBank::finish_loads`].
-    pub fn finish_excitation(&mut self) -> f64 {
+    pub(crate) fn finish_excitation(&mut self) -> f64 {
         let Some(mut loads) = self.excitation.take() else { return 0.0 };
         let (mut work, dynamic) = (0.0, self.model.dynamic_modes(self.scheme));
         for sector in 0..self.sectors {
@@ -58,7 +58,7 @@ impl ModalBank {
     }
 
     /// Adds a free motion to that of a mode with inertia, at the start.
-    pub fn add_modal_state(&mut self, mode: usize, sector: usize, position: f64, velocity: f64) {
+    pub(crate) fn add_modal_state(&mut self, mode: usize, sector: usize, position: f64, velocity: f64) {
         let (frequency, ratio, step) = (self.frequency(mode, sector), self.model.damping_ratios[mode], self.step);
         let index = self.index(mode, sector);
         self.state.position[index] += position;

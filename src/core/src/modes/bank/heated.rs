@@ -64,7 +64,7 @@ impl ModalBank {
     }
 
     /// Moves all sectors, which are at rest, by the free expansion of a temperature (K), which loads them from now on.
-    pub fn settle_expansion(&mut self, temperature: f64) {
+    pub(crate) fn settle_expansion(&mut self, temperature: f64) {
         let Some(heat) = self.heat.take() else { return };
         for (mode, (expansion, load)) in heat.expansion.iter().zip(&heat.load).enumerate() {
             self.state.modal_load_before[mode] += temperature * load;
@@ -139,7 +139,7 @@ impl ModalBank {
 
     /// Returns the work of heat on quasi-static modes over the last step (J), in addition to the change of energy at its
     /// beginning: these modes follow the force of the step immediately, and the change of stiffness also acts during that motion.
-    pub fn finish_stiffening(&mut self) -> f64 {
+    pub(crate) fn finish_stiffening(&mut self) -> f64 {
         let (mut work, first) = (0.0, self.modes() - self.state.stiffened.len());
         for mode in first..self.modes() {
             let gained = std::mem::take(&mut self.state.stiffened[mode - first]);

@@ -9,22 +9,22 @@ impl ModalBank {
     }
 
     /// The set of a sector.
-    pub fn set_number(&self, sector: usize) -> usize {
+    pub(crate) fn set_number(&self, sector: usize) -> usize {
         self.set_of(sector)
     }
 
     /// Angular frequency of a mode of a sector (rad/s).
-    pub fn frequency_of(&self, mode: usize, sector: usize) -> f64 {
+    pub(crate) fn frequency_of(&self, mode: usize, sector: usize) -> f64 {
         self.frequency(mode, sector)
     }
 
     /// Makes the current displacements the previous ones.
-    pub fn begin_span(&mut self) {
+    pub(crate) fn begin_span(&mut self) {
         self.state.displacement_before.copy_from_slice(&self.state.displacement);
     }
 
     /// Reads q and q̇ of the modes with inertia of a sector.
-    pub fn read_sector(&self, sector: usize, position: &mut [f64], velocity: &mut [f64]) {
+    pub(crate) fn read_sector(&self, sector: usize, position: &mut [f64], velocity: &mut [f64]) {
         for (mode, (q, v)) in position.iter_mut().zip(velocity).enumerate() {
             let (now, increment) = self.modal_state(mode, sector);
             (*q, *v) = (now, increment / self.step);
@@ -32,7 +32,14 @@ impl ModalBank {
     }
 
     /// Writes q and q̇ of a sector, its quasi-static modes under the forces `forces` on the rows (N), and the displacements of the rows (m).
-    pub fn write_sector(&mut self, sector: usize, position: &[f64], velocity: &[f64], forces: &[f64], rows: &[f64]) {
+    pub(crate) fn write_sector(
+        &mut self,
+        sector: usize,
+        position: &[f64],
+        velocity: &[f64],
+        forces: &[f64],
+        rows: &[f64],
+    ) {
         for (mode, (q, v)) in position.iter().zip(velocity).enumerate() {
             let index = self.index(mode, sector);
             (self.state.position[index], self.state.increment[index]) = (*q, v * self.step);
@@ -65,14 +72,14 @@ impl ModalBank {
     }
 
     /// Makes the current modal loads those at the start of a span.
-    pub fn begin_loads(&mut self) {
+    pub(crate) fn begin_loads(&mut self) {
         if self.options.loads {
             self.state.modal_load_before.copy_from_slice(&self.modal_load);
         }
     }
 
     /// Reads the loads at the start and at the end of the span; reads nothing if there are no loads.
-    pub fn read_loads(&self, [start, end]: &mut [Vec<f64>; 2]) {
+    pub(crate) fn read_loads(&self, [start, end]: &mut [Vec<f64>; 2]) {
         if self.options.loads {
             start.copy_from_slice(&self.state.modal_load_before);
             end.copy_from_slice(&self.modal_load);

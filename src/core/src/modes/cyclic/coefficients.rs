@@ -67,7 +67,7 @@ impl CyclicBank {
 
     /// Sets the modal damping ratio of all modes; the first modes of each nodal diameter have their `own` (takes effect with the
     /// next [`CyclicBank::set_step`]).
-    pub fn set_damping_ratio(&mut self, damping_ratio: f64, own: &[f64]) {
+    pub(crate) fn set_damping_ratio(&mut self, damping_ratio: f64, own: &[f64]) {
         self.model.set_damping_ratio(damping_ratio, own);
     }
 

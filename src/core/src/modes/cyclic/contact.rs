@@ -55,7 +55,7 @@ impl CyclicBank {
 
     /// Returns the work of the modal loads over the last step (J), after the contact correction. A quasi-static mode follows its
     /// current load, so over this step the previous load did the work.
-    pub fn finish_loads(&mut self) -> f64 {
+    pub(crate) fn finish_loads(&mut self) -> f64 {
         if !self.loads {
             return 0.0;
         }

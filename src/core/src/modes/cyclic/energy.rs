@@ -16,7 +16,7 @@ impl CyclicBank {
 
     /// Instantaneous kinetic and strain energy of the disk (J), ½q̇² and ½ω²q² of every mode, under the persistent contact forces
     /// (`forces[row · lanes + sector]`, N) and the modal loads.
-    pub fn energies_now(&mut self, forces: &[f64]) -> (f64, f64) {
+    pub(crate) fn energies_now(&mut self, forces: &[f64]) -> (f64, f64) {
         self.gather_forces(forces);
         let (mut kinetic, mut strain) = (0.0, 0.0);
         for nodal_diameter in 0..self.model.diameters.len() {
@@ -51,7 +51,7 @@ impl CyclicBank {
     }
 
     /// Damping loss since the last call (J).
-    pub fn collect_loss(&mut self) -> f64 {
+    pub(crate) fn collect_loss(&mut self) -> f64 {
         self.finish();
         let loss = self.state.loss.iter().sum();
         self.state.loss.fill(0.0);

@@ -12,7 +12,7 @@ impl CyclicBank {
     }
 
     /// Sets the engine order of the excitation, if any.
-    pub fn set_excitation_order(&mut self, order: u32) {
+    pub(crate) fn set_excitation_order(&mut self, order: u32) {
         if let Some(loads) = &mut self.excitation {
             loads.set_order(order, &self.model);
         }
@@ -50,7 +50,7 @@ impl CyclicBank {
 
     /// Returns the work of the excitation over the last step (J), after the contact correction; for quasi-static modes see
     /// [`CyclicBank::finish_loads`].
-    pub fn finish_excitation(&mut self) -> f64 {
+    pub(crate) fn finish_excitation(&mut self) -> f64 {
         let Some(loads) = &self.excitation else { return 0.0 };
         let (n, mut work) = (loads.diameter, 0.0);
         let (diameter, lane) = (&self.model.diameters[n], n % LANES);
@@ -70,7 +70,13 @@ impl CyclicBank {
     }
 
     /// Adds a free motion to that of a mode with inertia (re, im), at the start; the imaginary part of a real mode stays 0.
-    pub fn add_modal_state(&mut self, nodal_diameter: usize, mode: usize, position: [f64; 2], velocity: [f64; 2]) {
+    pub(crate) fn add_modal_state(
+        &mut self,
+        nodal_diameter: usize,
+        mode: usize,
+        position: [f64; 2],
+        velocity: [f64; 2],
+    ) {
         let diameter = &self.model.diameters[nodal_diameter];
         let (frequency, ratio) = (diameter.frequencies[mode], diameter.damping_ratios[mode]);
         let (index, lane) = self.index(nodal_diameter, mode);

@@ -73,7 +73,7 @@ impl Fourier {
 }
 
 /// Computes the values of all sectors from a spectrum of `rows` rows: u_s = Σ_n Re(U_n e^(2πins/N)), `[row · lanes + s]`.
-pub struct Synthesis<'a> {
+pub(crate) struct Synthesis<'a> {
     pub fourier: &'a Fourier,
     pub spectrum: &'a [[[f64; LANES]; 2]],
     pub rows: usize,
@@ -161,7 +161,7 @@ impl Fourier {
 }
 
 /// Sine and cosine of 2π·index/count; the symmetries of the circle hold exactly.
-pub fn sine_cosine(index: usize, count: usize) -> (f64, f64) {
+pub(crate) fn sine_cosine(index: usize, count: usize) -> (f64, f64) {
     let (quarter, rest) = (4 * (index % count) / count, 4 * (index % count) % count);
     let angle = |part: usize| {
         #[expect(clippy::cast_precision_loss, reason = "sector counts are far below 2^52")]

@@ -52,7 +52,7 @@ impl DiameterModes {
     }
 
     /// Number of modes that have inertia if the highest are quasi-static.
-    pub fn inertial_modes(&self) -> usize {
+    pub(crate) fn inertial_modes(&self) -> usize {
         self.len().saturating_sub(self.quasi_static)
     }
 
@@ -164,17 +164,17 @@ impl CyclicModel {
     }
 
     /// Largest number of modes of a nodal diameter.
-    pub fn most_modes(&self) -> usize {
+    pub(crate) fn most_modes(&self) -> usize {
         self.diameters.iter().map(DiameterModes::len).max().unwrap_or(0)
     }
 
     /// Returns whether the modes of a nodal diameter are real, so that no wave can travel.
-    pub fn is_real(&self, nodal_diameter: usize) -> bool {
+    pub(crate) fn is_real(&self, nodal_diameter: usize) -> bool {
         nodal_diameter == 0 || 2 * nodal_diameter == self.sectors
     }
 
     /// Sets one damping ratio for all modes; the first modes of each nodal diameter have their `own`.
-    pub fn set_damping_ratio(&mut self, damping_ratio: f64, own: &[f64]) {
+    pub(crate) fn set_damping_ratio(&mut self, damping_ratio: f64, own: &[f64]) {
         for diameter in &mut self.diameters {
             fill_ratios(&mut diameter.damping_ratios, damping_ratio, own, 1);
         }

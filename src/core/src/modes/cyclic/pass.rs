@@ -10,14 +10,14 @@ use crate::math::vector::Vector3;
 use crate::modes::bank::LANES;
 
 /// One complex value per lane: real and imaginary parts.
-pub type Complexes = [[f64; LANES]; 2];
+pub(crate) type Complexes = [[f64; LANES]; 2];
 
 /// Rows recovered in the fused pass: three contact nodes.
 const FUSED: usize = 9;
 
 /// Coefficients of one mode for the lanes of a block (see [`crate::modes::schemes`]); 0 where there is no such mode.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CyclicCoefficients {
+pub(crate) struct CyclicCoefficients {
     pub beta: [f64; LANES],
     pub kappa: [f64; LANES],
     pub loss: [f64; LANES],
@@ -220,7 +220,7 @@ fn add_rows<const ROWS: usize>(sums: &mut [Complexes; ROWS], shapes: &[Complexes
 
 /// Returns p = Ψᴴ F over the contact nodes with forces.
 #[inline(always)]
-pub fn modal_force(touched: &[bool], shapes: &[Complexes], force: &[Complexes]) -> Complexes {
+pub(crate) fn modal_force(touched: &[bool], shapes: &[Complexes], force: &[Complexes]) -> Complexes {
     let mut sums = [[0.0; LANES]; 2];
     let (shapes, force) = (shapes.as_chunks::<3>().0, force.as_chunks::<3>().0);
     for ((touched, shapes), force) in touched.iter().zip(shapes).zip(force) {
@@ -244,7 +244,7 @@ pub fn modal_force(touched: &[bool], shapes: &[Complexes], force: &[Complexes]) 
 
 /// Spectrum of the displacements that the forces of a spectrum cause over one step: U = Ĝ F, with Ĝ
 /// `[block][column][row]`.
-pub struct SpectralResponse<'a> {
+pub(crate) struct SpectralResponse<'a> {
     pub rows: usize,
     pub touched: &'a [bool],
     pub flexibility: &'a [Complexes],
@@ -292,7 +292,7 @@ fn answer<const ROWS: usize>(
 }
 
 /// Spectrum of the forces on some nodes.
-pub struct Gather<'a> {
+pub(crate) struct Gather<'a> {
     pub fourier: &'a Fourier,
     pub rows: usize,
     /// (sector, node, force).

@@ -27,7 +27,7 @@ impl CyclicBank {
 
     /// Returns the coordinates, whose highest modes are quasi-static, and the displacement of the contact rows of sector 0 per
     /// coordinate (rows × coordinates).
-    pub fn coordinates_of(&self) -> (Coordinates, DMatrix<f64>) {
+    pub(crate) fn coordinates_of(&self) -> (Coordinates, DMatrix<f64>) {
         let count = self.coordinates();
         let nothing = || vec![0.0; count];
         let mut found =
@@ -54,12 +54,12 @@ impl CyclicBank {
     }
 
     /// Makes the current displacements the previous ones.
-    pub fn begin_span(&mut self) {
+    pub(crate) fn begin_span(&mut self) {
         self.state.displacement_before.copy_from_slice(&self.state.displacement);
     }
 
     /// Reads q and q̇; those of modes without inertia are not 0.
-    pub fn read_all(&self, [position, velocity]: [&mut [f64]; 2]) {
+    pub(crate) fn read_all(&self, [position, velocity]: [&mut [f64]; 2]) {
         position.copy_from_slice(self.state.position.as_flattened().as_flattened());
         for (to, increment) in velocity.iter_mut().zip(self.state.increment.as_flattened().as_flattened()) {
             *to = increment / self.step;
@@ -85,7 +85,7 @@ impl CyclicBank {
     }
 
     /// Computes the forces on all coordinates that contact forces (sector, node, N) cause.
-    pub fn modal_forces(&mut self, forces: impl Iterator<Item = (usize, usize, Vector3)>, to: &mut [f64]) {
+    pub(crate) fn modal_forces(&mut self, forces: impl Iterator<Item = (usize, usize, Vector3)>, to: &mut [f64]) {
         self.asked.clear();
         self.asked.extend(forces);
         if self.asked.is_empty() {

@@ -89,12 +89,12 @@ impl TimeBasis {
     }
 
     /// L_i at θ.
-    pub fn weights_at(&self, theta: f64) -> [f64; POINTS] {
+    pub(crate) fn weights_at(&self, theta: f64) -> [f64; POINTS] {
         self.monomials.map(|row| cubic::evaluate(&row, theta))
     }
 
     /// L_i′ at θ.
-    pub fn slopes_at(&self, theta: f64) -> [f64; POINTS] {
+    pub(crate) fn slopes_at(&self, theta: f64) -> [f64; POINTS] {
         self.monomials.map(|row| row[1] + theta * (2.0 * row[2] + theta * 3.0 * row[3]))
     }
 

@@ -106,7 +106,7 @@ impl CarrierIntegrator {
     }
 
     /// Finds displacements and velocities of the rows at the start of a step.
-    pub fn find_start(&mut self) {
+    pub(crate) fn find_start(&mut self) {
         let Self { by_mode, all, moved: [start, ..], velocity, body, instructions, .. } = self;
         let (table, stride, columns) = (&by_mode[..], start.len(), &all[..]);
         let coefficients = [body.at(0), body.velocity()];
@@ -114,12 +114,12 @@ impl CarrierIntegrator {
     }
 
     /// Velocity of a place at the start of the step (m/s), in the directions of the node.
-    pub fn velocity_at(&self, spot: Spot) -> Vector3 {
+    pub(crate) fn velocity_at(&self, spot: Spot) -> Vector3 {
         spot.interpolate(|row| self.velocity[row])
     }
 
     /// Returns the displacement of a place over which a force at point i of the tried step does work (m), in the directions of the node.
-    pub fn sliding_distance_at(&self, spot: Spot, i: usize) -> Vector3 {
+    pub(crate) fn sliding_distance_at(&self, spot: Spot, i: usize) -> Vector3 {
         let (weights, moved) = (&self.work_weights[i], &self.moved);
         let sliding_distance =
             |row: usize| weights.iter().zip(moved).map(|(weight, moved)| weight * moved[row]).sum::<f64>();
@@ -127,17 +127,17 @@ impl CarrierIntegrator {
     }
 
     /// Displacement of a place at a point of the step (m), in the directions of the node.
-    pub fn moved_at(&self, spot: Spot, point: usize) -> Vector3 {
+    pub(crate) fn moved_at(&self, spot: Spot, point: usize) -> Vector3 {
         spot.interpolate(|row| self.moved[point][row])
     }
 
     /// Returns the displacement of a place over which a force at point i of the accepted step does work (m), in the directions of the node.
-    pub fn worked_at(&self, spot: Spot, i: usize) -> Vector3 {
+    pub(crate) fn worked_at(&self, spot: Spot, i: usize) -> Vector3 {
         spot.interpolate(|row| self.worked[i][row])
     }
 
     /// Computes the weighted displacements for the work of forces at the points.
-    pub fn weigh(&mut self, points: usize) {
+    pub(crate) fn weigh(&mut self, points: usize) {
         let Self { worked, moved, work_weights, .. } = self;
         for (worked, weights) in worked.iter_mut().zip(work_weights).take(points + 1) {
             for (row, worked) in worked.iter_mut().enumerate() {
@@ -147,18 +147,18 @@ impl CarrierIntegrator {
     }
 
     /// Adds the reaction to a force on a node at a place, at point i.
-    pub fn react(&mut self, spot: Spot, i: usize, force: Vector3) {
+    pub(crate) fn react(&mut self, spot: Spot, i: usize, force: Vector3) {
         self.find_force(spot, force);
         self.body.forces_mut(i).iter_mut().zip(&self.force).for_each(|(sum, force)| *sum -= force);
     }
 
     /// Sets the impulses to zero.
-    pub fn clear_impulses(&mut self) {
+    pub(crate) fn clear_impulses(&mut self) {
         self.impulses.fill(0.0);
     }
 
     /// Adds an impulse on a node at a place (N·s).
-    pub fn add_impulse(&mut self, spot: Spot, impulse: Vector3) {
+    pub(crate) fn add_impulse(&mut self, spot: Spot, impulse: Vector3) {
         self.find_force(spot, impulse);
         self.impulses.iter_mut().zip(&self.force).for_each(|(sum, force)| *sum += force);
     }
@@ -180,12 +180,12 @@ impl CarrierIntegrator {
     }
 
     /// Removes all lanes from this structure.
-    pub fn clear_lanes(&mut self) {
+    pub(crate) fn clear_lanes(&mut self) {
         self.obstacle.fill(false);
     }
 
     /// Assigns a lane of the current sector to a place, with this normal.
-    pub fn set_lane(&mut self, lane: usize, spot: Spot, normal: Vector3) {
+    pub(crate) fn set_lane(&mut self, lane: usize, spot: Spot, normal: Vector3) {
         let padded = self.force.len();
         (self.obstacle[lane], self.frames[lane]) = (true, spot.frame);
         let around = Around::new(spot);
@@ -207,7 +207,7 @@ impl CarrierIntegrator {
 
     /// Adds the displacement at all lanes (m, along their normals) per λ of one lane, whose force per λ is `direction`, to
     /// `carrier_compliance`.
-    pub fn add_normal_compliance(
+    pub(crate) fn add_normal_compliance(
         &mut self,
         step: LaneStep,
         lane: usize,
@@ -226,7 +226,13 @@ impl CarrierIntegrator {
 
     /// Adds the displacement in the directions of each lane under a `force` on one lane at the end of the step (N), if the end is
     /// the only point.
-    pub fn add_compliance(&mut self, step: LaneStep, lane: usize, force: Vector3, carrier_compliance: &mut [f64]) {
+    pub(crate) fn add_compliance(
+        &mut self,
+        step: LaneStep,
+        lane: usize,
+        force: Vector3,
+        carrier_compliance: &mut [f64],
+    ) {
         let (padded, lanes) = (self.force.len(), step.lanes);
         self.move_modes(step, 1, lane, force);
         for other in (0..lanes.nodes).filter(|node| self.obstacle[*node]) {

@@ -41,7 +41,7 @@ impl Lanes {
     }
 
     /// Returns the three components of a lane.
-    pub fn vector3(self, values: &[f64], lane: usize) -> Vector3 {
+    pub(crate) fn vector3(self, values: &[f64], lane: usize) -> Vector3 {
         strided_vector3(values, lane, self.width())
     }
 

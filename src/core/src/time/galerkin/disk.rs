@@ -56,31 +56,31 @@ impl CoupledDisk {
     }
 
     /// Finds displacements and velocities of all rows at the start of a step.
-    pub fn find_rows(&mut self, bank: &mut CyclicBank) {
+    pub(crate) fn find_rows(&mut self, bank: &mut CyclicBank) {
         bank.rows_of(self.body.at(0), &mut self.moved[0]);
         bank.rows_of(self.body.velocity(), &mut self.velocity);
     }
 
     /// Finds displacements of all rows at the points 1 … `points` of the step.
-    pub fn find_rows_at(&mut self, bank: &mut CyclicBank, points: usize) {
+    pub(crate) fn find_rows_at(&mut self, bank: &mut CyclicBank, points: usize) {
         for point in 1..=points {
             bank.rows_of(self.body.at(point), &mut self.moved[point]);
         }
     }
 
     /// Displacement (m) and velocity (m/s) of a row of a sector at the start of the step.
-    pub fn row_at_start(&self, row: usize, sector: usize) -> [f64; 2] {
+    pub(crate) fn row_at_start(&self, row: usize, sector: usize) -> [f64; 2] {
         let place = row * self.lanes + sector;
         [self.moved[0][place], self.velocity[place]]
     }
 
     /// Displacement of a node of a sector at a point of the step (m).
-    pub fn moved_at(&self, point: usize, node: usize, sector: usize) -> Vector3 {
+    pub(crate) fn moved_at(&self, point: usize, node: usize, sector: usize) -> Vector3 {
         strided_vector3(&self.moved[point], 3 * node * self.lanes + sector, self.lanes)
     }
 
     /// Finds the largest displacements of the rows of any sector from rest without contact (m).
-    pub fn find_reach(&mut self, bank: &CyclicBank) {
+    pub(crate) fn find_reach(&mut self, bank: &CyclicBank) {
         self.body.amplitudes(&mut self.amplitudes);
         bank.reach(&self.amplitudes, &self.sizes, &mut self.reach);
     }

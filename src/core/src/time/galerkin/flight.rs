@@ -44,7 +44,7 @@ impl Swing {
 
 /// Free flight of the modes of one kind of sector over one length of time.
 #[derive(Debug, Clone, PartialEq)]
-pub struct FreeFlight {
+pub(crate) struct FreeFlight {
     length: f64,
     /// ω (rad/s) and ξ.
     modes: Vec<[f64; 2]>,
@@ -60,7 +60,7 @@ impl FreeFlight {
     }
 
     /// Fills the tables for a length of time (s). Does not allocate.
-    pub fn set_length(&mut self, length: f64) {
+    pub(crate) fn set_length(&mut self, length: f64) {
         if self.length.to_bits() != length.to_bits() {
             self.length = length;
             for (swing, [frequency, ratio]) in self.swings.iter_mut().zip(&self.modes) {

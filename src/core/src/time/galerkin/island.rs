@@ -101,7 +101,7 @@ impl IslandSector {
     }
 
     /// Returns the largest displacement of each contact row from rest (m) without contact.
-    pub fn largest_displacements(&mut self, tables: &[Vec<Tables>]) -> &[f64] {
+    pub(crate) fn largest_displacements(&mut self, tables: &[Vec<Tables>]) -> &[f64] {
         let rows = &tables[self.table[0]][self.table[1]].rows;
         self.trial.largest_displacements(rows, &self.state)
     }
@@ -139,7 +139,7 @@ impl Island {
     }
 
     /// Returns whether the island is a single sector on rigid surfaces.
-    pub fn is_single(&self) -> bool {
+    pub(crate) fn is_single(&self) -> bool {
         self.sectors.len() == 1 && self.disks.is_empty() && self.carriers.is_empty()
     }
 
@@ -226,7 +226,7 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
     }
 
     /// Largest energy so far, including the start of the step (J).
-    pub fn largest_energy(&mut self) -> f64 {
+    pub(crate) fn largest_energy(&mut self) -> f64 {
         let energy = self.island.energy();
         self.island.control.largest = self.island.control.largest.max(energy);
         self.island.control.largest

@@ -5,10 +5,10 @@ use crate::math::vector::Vector3;
 use nalgebra::DMatrix;
 
 /// Column lengths are multiples of this number of entries, padded with zeros.
-pub const PADDED: usize = 8;
+pub(crate) const PADDED: usize = 8;
 
 /// `sums[a][i]` = Σ_t `coefficients[a][t]` · `table[columns[t]·stride + i]` for `N` sets of coefficients, in the order of t.
-pub struct Combine<'a, const N: usize> {
+pub(crate) struct Combine<'a, const N: usize> {
     /// Columns, one after the other.
     pub table: &'a [f64],
     /// Length of a column, a multiple of [`PADDED`].
@@ -77,7 +77,7 @@ impl Kernel for Add<'_> {
 }
 
 /// `to` = `base` − n·u for every lane.
-pub struct Withdraw<'a> {
+pub(crate) struct Withdraw<'a> {
     pub(super) base: &'a [f64],
     pub(super) normals: &'a [f64],
     pub(super) moved: &'a [f64],
@@ -103,7 +103,7 @@ impl Kernel for Withdraw<'_> {
 }
 
 /// Displacements of all lanes per λ of one lane, from those per force: column = Σ d_c Z_c and closing = n·column.
-pub struct ClosingColumn<'a> {
+pub(crate) struct ClosingColumn<'a> {
     pub(super) parts: [&'a [f64]; 3],
     pub(super) direction: Vector3,
     pub(super) normals: &'a [f64],
@@ -128,7 +128,7 @@ impl Kernel for ClosingColumn<'_> {
 }
 
 /// y += A x, using only the nonzero entries of x.
-pub struct AddProduct<'a> {
+pub(crate) struct AddProduct<'a> {
     pub(super) matrix: &'a DMatrix<f64>,
     pub(super) x: &'a [f64],
     pub(super) y: &'a mut [f64],

@@ -36,7 +36,7 @@ impl ContactModes {
     /// The form δ² = JᵀQJ of the displacement error δ (m) caused by an impulse J (N·s) on the contact rows: the root mean square
     /// over rows of the modal amplitudes, summed over modes as if they were independent. Rigid-body modes count with their
     /// displacement in the period of the lowest vibration mode.
-    pub fn error_form(&self) -> DMatrix<f64> {
+    pub(crate) fn error_form(&self) -> DMatrix<f64> {
         let lowest =
             self.frequencies.iter().copied().filter(|frequency| *frequency > 0.0).fold(f64::INFINITY, f64::min);
         let lowest = if lowest.is_finite() { lowest } else { 1.0 };
@@ -152,7 +152,7 @@ impl StepTables {
     }
 
     /// Returns the displacements of all lanes per force of a kind.
-    pub fn compliance_of(&self, kind: ForceInterpolation) -> &LaneCompliance {
+    pub(crate) fn compliance_of(&self, kind: ForceInterpolation) -> &LaneCompliance {
         match kind {
             ForceInterpolation::Polynomial => &self.compliance,
             ForceInterpolation::Constant => &self.constant,

@@ -19,7 +19,7 @@ use crate::system::work::WorkingForce;
 const SOLUTIONS: usize = 3;
 
 /// A sector of a structure and the surfaces that it can touch.
-pub struct ObstacleView<'a> {
+pub(crate) struct ObstacleView<'a> {
     /// Structures that carry the surfaces, if any.
     pub carriers: CarriersInStep<'a>,
     /// Index of the carrier of the surface of each pair.

@@ -17,7 +17,7 @@ use crate::time::galerkin::compliance::Lanes;
 /// Prescribed motion of a pair over a span: from its start, quadratic in time through the middle and the end. This is exact
 /// because inputs are linear in time and the rotor angle is quadratic; only the shape may grow differently.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct MotionCourse {
+pub(crate) struct MotionCourse {
     before: PrescribedMotion,
     /// Linear and quadratic part of the motion over the whole span.
     parts: [MotionIncrement; 2],
@@ -41,7 +41,7 @@ impl MotionCourse {
     }
 
     /// Returns whether only the rotor moves.
-    pub fn only_turns(&self) -> bool {
+    pub(crate) fn only_turns(&self) -> bool {
         self.parts.iter().all(|part| part.casing_rests() && part.shaft == Vector3::zeros())
     }
 
@@ -71,7 +71,7 @@ impl MotionCourse {
 
 /// Contact of one node over a span.
 #[derive(Debug, Clone, Copy)]
-pub struct NodeTally {
+pub(crate) struct NodeTally {
     /// ∫λ dt (N·s).
     pub normal: f64,
     /// ∫|F_t| dt (N·s).
@@ -127,7 +127,7 @@ impl NodeTally {
 
 /// Selects a place of a node on the surface of a carrier.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum SurfacePlace {
+pub(crate) enum SurfacePlace {
     /// The place at the start of the step.
     Begun,
     /// The current closest point.
@@ -138,7 +138,7 @@ pub enum SurfacePlace {
 
 /// Data that is kept from span to span, and scratch memory; allocates only on creation.
 #[derive(Debug, Clone)]
-pub struct SpanRecord {
+pub(crate) struct SpanRecord {
     /// Contact of each node over the span.
     pub tallies: Vec<NodeTally>,
     /// Work of all nodes over the span.
@@ -194,7 +194,7 @@ impl SpanRecord {
     }
 
     /// Returns the location of a node on the surface of a carrier, at a point of the step.
-    pub fn spot<'a>(
+    pub(crate) fn spot<'a>(
         &self,
         node: usize,
         point: usize,
@@ -225,14 +225,14 @@ impl SpanRecord {
     }
 
     /// Sets the prescribed motion of a span (s); the pairs are at its end.
-    pub fn begin_courses(&mut self, pairs: &[ContactPair], span: f64) {
+    pub(crate) fn begin_courses(&mut self, pairs: &[ContactPair], span: f64) {
         for (course, pair) in self.courses.iter_mut().zip(pairs) {
             *course = MotionCourse::new(pair.drive_before(), &pair.middle.0, pair.middle.1, pair.drive_now(), span);
         }
     }
 
     /// Uses the places at the start of the step as initial guess.
-    pub fn guess_start_places(&mut self) {
+    pub(crate) fn guess_start_places(&mut self) {
         let [first, rest @ ..] = &mut self.places;
         rest.iter_mut().for_each(|places| places.copy_from_slice(first));
     }

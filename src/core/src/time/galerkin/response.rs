@@ -8,7 +8,7 @@ pub const TERMS: usize = 2 + MOST;
 
 /// Solution of q̈ + 2ξωq̇ + ω²q = Σ p_a θᵃ over one step, linear in (q, q̇, p₀, p₁, p₂) at its start.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ModalResponse {
+pub(crate) struct ModalResponse {
     /// q at the end.
     pub position: [f64; TERMS],
     /// q̇ at the end.
@@ -65,7 +65,7 @@ impl ModalResponse {
 
     /// Coefficients of (q, q̇, p_a) in q at point i = 1 … s, for the polynomial of degree s that preserves both end values and
     /// the moments up to s − 2.
-    pub fn at_points(&self, basis: &TimeBasis) -> [[f64; TERMS]; MOST] {
+    pub(crate) fn at_points(&self, basis: &TimeBasis) -> [[f64; TERMS]; MOST] {
         let s = basis.degree;
         let moment = |j: usize, i: usize| -> f64 {
             basis.monomials[i].iter().enumerate().map(|(a, c)| c / real(a + j + 1)).sum()
@@ -105,7 +105,7 @@ fn exponential<const N: usize>(matrix: &SMatrix<f64, N, N>) -> SMatrix<f64, N, N
 }
 
 /// Converts coefficients of θᵃ to coefficients of the forces at the points.
-pub fn by_points(terms: &[f64; TERMS], basis: &TimeBasis) -> [f64; POINTS] {
+pub(crate) fn by_points(terms: &[f64; TERMS], basis: &TimeBasis) -> [f64; POINTS] {
     std::array::from_fn(|k| (0..basis.degree).map(|a| terms[2 + a] * basis.projection[a][k]).sum())
 }
 

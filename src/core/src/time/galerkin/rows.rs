@@ -48,7 +48,7 @@ impl<const N: usize> Sums<N> {
     }
 
     /// Returns the three components of a node in a set.
-    pub fn vector3(&self, set: usize, node: usize, nodes: usize) -> Vector3 {
+    pub(crate) fn vector3(&self, set: usize, node: usize, nodes: usize) -> Vector3 {
         strided_vector3(&self.rows[set], node, nodes)
     }
 }
@@ -106,7 +106,7 @@ impl ContactRows {
     }
 
     /// See [`ContactModes::error_form`].
-    pub fn error_form(&self) -> &DMatrix<f64> {
+    pub(crate) fn error_form(&self) -> &DMatrix<f64> {
         &self.error_form
     }
 
@@ -142,12 +142,12 @@ impl ContactRows {
     }
 
     /// Adds the largest displacement of each row from rest (m) at any time without contact: the summed amplitudes of all modes.
-    pub fn add_largest_displacements(&self, state: &SectorState, sums: &mut Sums<1>) {
+    pub(crate) fn add_largest_displacements(&self, state: &SectorState, sums: &mut Sums<1>) {
         self.unresolved_amplitudes(f64::INFINITY, state, sums);
     }
 
     /// Sums the amplitudes of the modes that turn by more than `RESOLVED` within a step of this length (s), as displacements of the rows (m).
-    pub fn unresolved_amplitudes(&self, step: f64, state: &SectorState, sums: &mut Sums<1>) {
+    pub(crate) fn unresolved_amplitudes(&self, step: f64, state: &SectorState, sums: &mut Sums<1>) {
         let [amplitudes] = &mut sums.coefficients;
         let modes = self.rates.iter().zip(state.position.iter().zip(&state.velocity));
         for (amplitude, ([rate, per_frequency], (q, v))) in amplitudes.iter_mut().zip(modes) {
@@ -159,7 +159,7 @@ impl ContactRows {
     }
 
     /// Velocities of the rows at the end of a step without forces (m/s).
-    pub fn end_velocities(&self, level: &StepTables, state: &SectorState, sums: &mut Sums<1>) {
+    pub(crate) fn end_velocities(&self, level: &StepTables, state: &SectorState, sums: &mut Sums<1>) {
         let [a, b, ..] = &level.modes.end[1];
         let ([to], [one]) = (&mut sums.coefficients, &mut sums.rows);
         self.instructions.run(Weigh { tables: [a, b], state: [&state.position, &state.velocity], to });
@@ -167,7 +167,7 @@ impl ContactRows {
     }
 
     /// Computes the forces on all modes, padded to whole registers, for sets of forces on the rows `rows` (N).
-    pub fn modal_forces<const N: usize>(&self, rows: &[usize], forces: [&[f64]; N], sums: [&mut [f64]; N]) {
+    pub(crate) fn modal_forces<const N: usize>(&self, rows: &[usize], forces: [&[f64]; N], sums: [&mut [f64]; N]) {
         let stride = self.all.len().next_multiple_of(PADDED);
         self.instructions.run(Combine { table: &self.by_row, stride, columns: rows, coefficients: forces, sums });
     }

@@ -40,7 +40,7 @@ struct Member {
 
 /// An island of a scene. The uncoupled sectors of one structure take turns in one island, because their tables are the same.
 #[derive(Debug, Clone)]
-pub struct SceneIsland {
+pub(crate) struct SceneIsland {
     /// Set of structures to whose ledger the island belongs.
     set: usize,
     island: Island,
@@ -182,12 +182,12 @@ impl SceneIsland {
     }
 
     /// Returns whether the sectors take turns on rigid surfaces.
-    pub fn is_single(&self) -> bool {
+    pub(crate) fn is_single(&self) -> bool {
         self.island.is_single()
     }
 
     /// First structure of the island.
-    pub fn first_structure(&self) -> usize {
+    pub(crate) fn first_structure(&self) -> usize {
         self.members[0].structure
     }
 

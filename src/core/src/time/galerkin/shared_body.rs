@@ -90,7 +90,7 @@ impl SharedBody {
     }
 
     /// Current q and q̇; the caller sets them for modes with inertia.
-    pub fn state_mut(&mut self) -> [&mut [f64]; 2] {
+    pub(crate) fn state_mut(&mut self) -> [&mut [f64]; 2] {
         [&mut self.state.position, &mut self.state.velocity]
     }
 
@@ -100,7 +100,7 @@ impl SharedBody {
     }
 
     /// Modal forces at point 0 … s.
-    pub fn forces_mut(&mut self, point: usize) -> &mut [f64] {
+    pub(crate) fn forces_mut(&mut self, point: usize) -> &mut [f64] {
         &mut self.forces[point]
     }
 
@@ -115,7 +115,7 @@ impl SharedBody {
     }
 
     /// Sets the state of modes without inertia to zero.
-    pub fn keep_inertia(&mut self) {
+    pub(crate) fn keep_inertia(&mut self) {
         for (mode, inertia) in self.coordinates.inertia.iter().enumerate() {
             self.state.position[mode] *= inertia;
             self.state.velocity[mode] *= inertia;
@@ -226,12 +226,12 @@ impl SharedBody {
     }
 
     /// Returns the damping loss since the last call (J).
-    pub fn collect_loss(&mut self) -> f64 {
+    pub(crate) fn collect_loss(&mut self) -> f64 {
         std::mem::take(&mut self.loss)
     }
 
     /// Returns the work of loads since the last call (J).
-    pub fn collect_load_work(&mut self) -> f64 {
+    pub(crate) fn collect_load_work(&mut self) -> f64 {
         std::mem::take(&mut self.load_work)
     }
 

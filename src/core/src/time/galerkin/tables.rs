@@ -30,7 +30,7 @@ impl Tables {
     }
 
     /// Creates tables of a degree that is known to be suitable.
-    pub fn of_degree(modes: ContactModes, degree: usize) -> Self {
+    pub(crate) fn of_degree(modes: ContactModes, degree: usize) -> Self {
         let levels = (0..=HALVINGS).map(|_| StepTables::new(&modes, degree)).collect();
         Self { rows: ContactRows::new(&modes), levels, steady: Vec::new(), modes }
     }
@@ -59,7 +59,7 @@ impl Tables {
     }
 
     /// Tables of a level with the given number of points.
-    pub fn of_points(&self, level: usize, kind: ForceInterpolation, points: usize) -> &StepTables {
+    pub(crate) fn of_points(&self, level: usize, kind: ForceInterpolation, points: usize) -> &StepTables {
         let steady = self
             .steady
             .get(level)
@@ -84,7 +84,7 @@ impl Tables {
 impl ContactModes {
     /// Largest suitable degree for spans up to `longest` (s). Shorter spans are possible, so all lengths down to a thousandth of
     /// the shortest step are checked.
-    pub fn degree_up_to(&self, longest: f64) -> usize {
+    pub(crate) fn degree_up_to(&self, longest: f64) -> usize {
         let lengths = (0..2 * HALVINGS).map(|halvings| halved(longest, halvings));
         if lengths.into_iter().all(|length| self.allows_cubics(length)) { MOST } else { MOST - 1 }
     }

@@ -22,7 +22,8 @@ use crate::scene::method::Solver;
 pub use judgement::TrialResult;
 use minima::Minima;
 use nalgebra::DMatrix;
-pub use obstacle::{Obstacle, SlidingState, node_by_node};
+pub(crate) use obstacle::node_by_node;
+pub use obstacle::{Obstacle, SlidingState};
 use prediction::{LanePrediction, LaneValues};
 use steady::Steady;
 use sticking::Sticking;
@@ -41,7 +42,7 @@ pub enum ForceInterpolation {
 
 impl ForceInterpolation {
     /// Weights of the work of forces at point i: S_ik, or those of a constant force.
-    pub fn work_weights(self, basis: &TimeBasis, i: usize) -> [f64; POINTS] {
+    pub(crate) fn work_weights(self, basis: &TimeBasis, i: usize) -> [f64; POINTS] {
         match self {
             Self::Polynomial => basis.work[i],
             Self::Constant if i == 1 => [-1.0, 1.0, 0.0, 0.0],
@@ -208,12 +209,12 @@ impl Trial {
     }
 
     /// Marks the stored start values as outdated, because the state has changed.
-    pub fn forget(&mut self) {
+    pub(crate) fn forget(&mut self) {
         self.known = false;
     }
 
     /// Finds the free motion within a step of degree 1: two points give a straight line, which cannot represent it.
-    pub fn find_free_motion(&mut self, level: &StepTables, rows: &ContactRows, state: &SectorState) {
+    pub(crate) fn find_free_motion(&mut self, level: &StepTables, rows: &ContactRows, state: &SectorState) {
         if level.basis.degree == 1 {
             self.find_start(rows, state);
             let FreeMotion { end_velocities, unresolved_amplitudes, is_known } = &mut self.free_motion;
@@ -238,7 +239,7 @@ impl Trial {
     }
 
     /// Finds the displacements and velocities of the rows at the start.
-    pub fn find_start(&mut self, rows: &ContactRows, state: &SectorState) -> &[f64] {
+    pub(crate) fn find_start(&mut self, rows: &ContactRows, state: &SectorState) -> &[f64] {
         if self.known {
             return &self.start;
         }
@@ -256,7 +257,7 @@ impl Trial {
     }
 
     /// Returns the largest displacement of each row from rest (m) without contact.
-    pub fn largest_displacements(&mut self, rows: &ContactRows, state: &SectorState) -> &[f64] {
+    pub(crate) fn largest_displacements(&mut self, rows: &ContactRows, state: &SectorState) -> &[f64] {
         let (sums, reach) = &mut self.reach;
         rows.add_largest_displacements(state, sums);
         let nodes = self.lanes.nodes;
@@ -332,7 +333,7 @@ impl Trial {
     }
 
     /// Finds displacements and gaps under the current forces. Returns the smallest gap and the largest gap of an active contact.
-    pub fn find_gaps(&mut self, obstacle: &mut impl Obstacle) -> (f64, f64) {
+    pub(crate) fn find_gaps(&mut self, obstacle: &mut impl Obstacle) -> (f64, f64) {
         self.move_rows();
         let (lanes, stride) = (self.lanes, 3 * self.lanes.width());
         let Self { moved, gaps, normals, .. } = self;
@@ -341,7 +342,7 @@ impl Trial {
     }
 
     /// Finds the displacements under the current forces.
-    pub fn move_rows(&mut self) {
+    pub(crate) fn move_rows(&mut self) {
         let stride = 3 * self.lanes.width();
         let Self { free, pushed, moved, .. } = self;
         self.instructions.run(Add { a: &free[..stride], b: &pushed[..stride], to: &mut moved[..stride] });

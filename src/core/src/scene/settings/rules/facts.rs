@@ -5,7 +5,7 @@ use crate::scene::method::{Scheme, Solver};
 use crate::scene::settings::{BodyMotion, Closure, InputInterpolation, Meridian, Shape};
 
 /// A feature of a scene at a place.
-pub struct Fact {
+pub(crate) struct Fact {
     /// Key of the scene file, whose first word determines the possible places.
     pub(super) key: &'static str,
     /// Description of the value, if the key alone does not give it.

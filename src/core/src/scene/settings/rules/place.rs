@@ -9,7 +9,7 @@ use crate::scene::settings::{
 
 /// A place of a scene: one of its structures or contacts, or the scene as a whole.
 #[derive(Clone, Copy)]
-pub struct ScenePlace<'a> {
+pub(crate) struct ScenePlace<'a> {
     pub(super) settings: &'a SceneSettings,
     pub(super) relations: &'a Relations,
     /// ROMs of the structures; empty before they are known.

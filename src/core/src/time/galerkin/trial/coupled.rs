@@ -7,7 +7,7 @@ use crate::time::galerkin::state::SectorState;
 
 impl Trial {
     /// Sets the displacements (m) and velocities (m/s) of the rows at the start from the values of the caller.
-    pub fn start_at(&mut self, of_row: impl Fn(usize) -> [f64; 2]) {
+    pub(crate) fn start_at(&mut self, of_row: impl Fn(usize) -> [f64; 2]) {
         for (row, (moved, velocity)) in self.start.iter_mut().zip(&mut self.velocities).enumerate() {
             [*moved, *velocity] = of_row(row);
         }
@@ -15,7 +15,7 @@ impl Trial {
     }
 
     /// Finds unknown gaps at the start; `gap` returns the gap of a node with a given displacement (m).
-    pub fn find_start_gaps(&mut self, state: &SectorState, mut gap: impl FnMut(usize, Vector3) -> f64) {
+    pub(crate) fn find_start_gaps(&mut self, state: &SectorState, mut gap: impl FnMut(usize, Vector3) -> f64) {
         if !state.gaps_known {
             for node in 0..self.nodes() {
                 self.start_contacts.gaps[node] = gap(node, vector3_at(&self.start, node));
@@ -33,7 +33,7 @@ impl Trial {
     }
 
     /// Finds gaps (m) and normals at point 1 … s, for the current displacements of the nodes (m).
-    pub fn find_gaps_at(&mut self, point: usize, mut gap: impl FnMut(usize, Vector3) -> Gap) {
+    pub(crate) fn find_gaps_at(&mut self, point: usize, mut gap: impl FnMut(usize, Vector3) -> Gap) {
         for node in 0..self.nodes() {
             let lane = self.lanes.at(point, node);
             let gap = gap(node, self.lanes.vector3(&self.moved, lane));

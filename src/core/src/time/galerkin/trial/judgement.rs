@@ -49,7 +49,7 @@ impl TrialResult {
 
     /// Returns whether the polynomials of the step describe the motion between its points: its force is a polynomial and its
     /// error is within the tolerance (m).
-    pub fn resolves_motion(&self, kind: ForceInterpolation, tolerance: f64) -> bool {
+    pub(crate) fn resolves_motion(&self, kind: ForceInterpolation, tolerance: f64) -> bool {
         kind == ForceInterpolation::Polynomial && !self.misses(tolerance)
     }
 }
@@ -139,7 +139,7 @@ impl Trial {
     ///
     /// `gap_at_start` returns the gap (m) at the start of a node displaced by a vector (m), or `None` if it is unknown; the node
     /// is then excluded.
-    pub fn depth_without_jumps(&self, mut gap_at_start: impl FnMut(usize, Vector3) -> Option<f64>) -> f64 {
+    pub(crate) fn depth_without_jumps(&self, mut gap_at_start: impl FnMut(usize, Vector3) -> Option<f64>) -> f64 {
         let open = (0..self.nodes()).filter(|node| self.depths[*node] > 0.0);
         open.fold(0.0, |deepest, node| {
             let gap = gap_at_start(node, vector3_at(&self.start, node));

@@ -55,7 +55,7 @@ impl Trial {
     ///
     /// Finds none if `is_resolved` is false: the polynomials of a step with a constant force, or of a step that misses the tolerance, do not
     /// describe the motion between its points.
-    pub fn find_minima(&mut self, basis: &TimeBasis, is_resolved: bool, tolerance: f64) -> bool {
+    pub(crate) fn find_minima(&mut self, basis: &TimeBasis, is_resolved: bool, tolerance: f64) -> bool {
         self.minima.at.fill(f64::NAN);
         self.minima.parts = 0;
         let mut found = false;
@@ -151,13 +151,13 @@ impl Trial {
     }
 
     /// Gap of a node within the step (m), from the polynomial through the gaps at the points.
-    pub fn gap_within(&self, basis: &TimeBasis, node: usize, theta: f64) -> f64 {
+    pub(crate) fn gap_within(&self, basis: &TimeBasis, node: usize, theta: f64) -> f64 {
         let weights = basis.weights_at(theta);
         (0..basis.count()).map(|point| weights[point] * self.gap(point, node)).sum()
     }
 
     /// Displacement of a node within the step (m): followed exactly, or from the polynomial through the displacements at the points.
-    pub fn displacement_within(&self, basis: &TimeBasis, node: usize, theta: f64) -> Vector3 {
+    pub(crate) fn displacement_within(&self, basis: &TimeBasis, node: usize, theta: f64) -> Vector3 {
         let parts = self.minima.parts;
         if parts == 0 {
             let weights = basis.weights_at(theta);

@@ -76,7 +76,7 @@ pub struct SlidingState {
 }
 
 /// Evaluates [`Obstacle::gaps`] by [`Obstacle::gap`] of every lane.
-pub fn node_by_node(
+pub(crate) fn node_by_node(
     obstacle: &mut (impl Obstacle + ?Sized),
     lanes: Lanes,
     moved: &[f64],

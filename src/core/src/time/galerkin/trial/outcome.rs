@@ -33,7 +33,7 @@ impl Trial {
     }
 
     /// Gap of a node (m), 0 where there is nothing to touch (beyond a free edge), because no force does work there.
-    pub fn finite_gap(&self, point: usize, node: usize) -> f64 {
+    pub(crate) fn finite_gap(&self, point: usize, node: usize) -> f64 {
         let gap = self.gap(point, node);
         if gap == f64::INFINITY { 0.0 } else { gap }
     }
@@ -53,7 +53,7 @@ impl Trial {
     }
 
     /// Friction force on a node (N).
-    pub fn friction_force(&self, point: usize, node: usize) -> Vector3 {
+    pub(crate) fn friction_force(&self, point: usize, node: usize) -> Vector3 {
         self.force(point, node) - self.multiplier(point, node) * self.solved_normal(point, node)
     }
 

@@ -56,7 +56,7 @@ impl Steady {
 
 impl Trial {
     /// Tries a step in which no contact changes its status; it counts as unsolved if one does.
-    pub fn run_steady(
+    pub(crate) fn run_steady(
         &mut self,
         level: &StepTables,
         rows: &ContactRows,

@@ -241,7 +241,7 @@ impl Trial {
 
     /// Energy that friction supplies at the nodes over a solved step (J), because the force at its start does not belong to the
     /// slip of the step.
-    pub fn find_gain(&self, obstacle: &impl Obstacle) -> f64 {
+    pub(crate) fn find_gain(&self, obstacle: &impl Obstacle) -> f64 {
         let mut gain = 0.0;
         let points = self.points();
         let touches = |node: &usize| (0..=points).any(|point| self.multiplier(point, *node) > 0.0);
@@ -269,7 +269,7 @@ impl Trial {
 
     /// Returns the largest distance (m) that nodes may have slid back and forth within a step. Where sliding reverses, nodes
     /// stick for a while; the result is four times the distance because of the duration of sticking.
-    pub fn find_turn(&mut self, residual: &DMatrix<f64>, step: f64, obstacle: &impl Obstacle) -> f64 {
+    pub(crate) fn find_turn(&mut self, residual: &DMatrix<f64>, step: f64, obstacle: &impl Obstacle) -> f64 {
         self.withdrawn.copy_from_slice(&self.velocities);
         let (matrix, x, y) = (residual, &self.start_contacts.slopes, &mut self.withdrawn);
         self.instructions.run(AddProduct { matrix, x, y });
