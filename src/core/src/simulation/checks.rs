@@ -108,9 +108,9 @@ impl Simulation {
     /// # Errors
     /// An output that is not a number; the error names it. The state must not be used further.
     pub fn check_outputs(&self, time: f64) -> Result<()> {
-        for variable in self.values.table().variables().iter().filter(|row| row.causality == Causality::Output) {
+        for variable in self.state.values.table().variables().iter().filter(|row| row.causality == Causality::Output) {
             let start = variable.reference as usize;
-            let values = &self.values[start..start + variable.len()];
+            let values = &self.state.values[start..start + variable.len()];
             if let Some(element) = values.iter().position(|value| !value.is_finite()) {
                 let problem = format!("{} at t = {} s", values[element], shown_time(time));
                 let remedy = "Check loads, inputs and the internal step";
