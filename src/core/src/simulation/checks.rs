@@ -135,7 +135,7 @@ impl Simulation {
                           check that its contact grid is neither folded nor collapsed to a line";
             return refuse(format!("contact node {} has no closest point on its surface", name(lost)), remedy);
         }
-        let own = self.system.pairs().iter().filter(|pair| pair.structure() == body);
+        let own = self.compiled.plan.pairs_of(body).map(|(pair, _)| &self.system.pairs()[pair]);
         if let Some(index) = own.filter_map(|pair| pair.gap().out_of_reach()).next() {
             let problem = format!(
                 "contact node {} of sector {} starts beyond the first or last ring of the casing surface by more than \

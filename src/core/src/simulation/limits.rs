@@ -8,6 +8,7 @@ mod warning_state;
 
 use tiprub_cosim::variables::Quantity;
 
+use super::compile::complementary;
 use super::table::has_one_friction;
 use super::{Compiled, Simulation};
 use crate::limits::finding::{Checked, ErrorKind, Finding, Subject, WarningKind};
@@ -193,10 +194,9 @@ impl Compiled {
             }
             Subject::Carrier(carrier) => (Some(self.carrier_name(self.bodies.len() + carrier)), None),
         };
-        let own = settings.contacts[0].solver;
-        let solver = if own == Solver::Film { Solver::Lcp } else { own };
-        let is_adaptive = self.scene.check_methods(Scheme::ADAPTIVE, solver).is_ok();
-        let adaptive = is_adaptive.then_some(AdaptiveSteps { solver: (solver != own).then_some(solver) });
+        let solver = complementary(settings);
+        let other = (solver != settings.contacts[0].solver).then_some(solver);
+        let adaptive = self.supports_adaptive.then_some(AdaptiveSteps { solver: other });
         Context { name, rom, preset: settings.preset == Preset::Paper, adaptive }
     }
 

@@ -34,7 +34,7 @@ fn rejects_slopes_that_contradict_the_positions() {
         "increase by -0.2 m per m",
     ];
     for scene in [tapered, on_ring] {
-        Simulation::new(&scene([-0.2; 3])).unwrap();
+        Simulation::new(scene([-0.2; 3])).unwrap();
         // A wrong sign, and an angle in degrees.
         for wrong in [0.2, -11.3] {
             refused(&scene([wrong; 3]), &named);
@@ -52,5 +52,5 @@ fn missing_slopes_default_to_a_cylinder() {
     refused(&scene, &["slopes 0 and 0", "increase by -0.2 m per m", "meridian = \"cylinder\""]);
     scene.settings.contacts[0].meridian = Meridian::Cylinder;
     Simulation::new(&scene).unwrap();
-    Simulation::new(&on_ring([0.0; 3])).unwrap();
+    Simulation::new(on_ring([0.0; 3])).unwrap();
 }

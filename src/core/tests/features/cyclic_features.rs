@@ -329,7 +329,7 @@ fn rejects_invalid_harmonics_by_name() {
     let refusal = |change: fn(&mut Rom)| {
         let mut rom = disk.cyclic();
         change(&mut rom);
-        let made = Simulation::new(&scene_with(rom, FEATURES[0], Scheme::ModalExact, Solver::Lcp));
+        let made = Simulation::new(scene_with(rom, FEATURES[0], Scheme::ModalExact, Solver::Lcp));
         made.err().map_or_else(|| "accepted".to_owned(), |error| error.to_string())
     };
     let cases: [Damage; 8] = [

@@ -659,7 +659,7 @@ fn span_outputs_match_many_short_steps() {
 
 #[test]
 fn without_friction_there_is_no_heat() {
-    let mut simulation = Simulation::new(&scene(Scheme::Galerkin, H, 1e-3)).unwrap();
+    let mut simulation = Simulation::new(scene(Scheme::Galerkin, H, 1e-3)).unwrap();
     set(&mut simulation, "friction_coefficient", 0.0);
     simulation.initialise(0.0).unwrap();
     (0..STEPS).for_each(|_| go(&mut simulation, H));

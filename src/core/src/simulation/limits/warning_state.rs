@@ -6,6 +6,7 @@ use crate::limits::finding::{Finding, Subject, WarningKind};
 use crate::limits::plausibility::{self, Slip};
 use crate::limits::{self, massless};
 use crate::simulation::Simulation;
+use std::collections::BTreeMap;
 use tiprub_cosim::warning::{Topic, Warning};
 
 /// A step that is longer by this factor than the reported one is reported again.
@@ -15,7 +16,7 @@ const MATERIAL: f64 = 1.5;
 #[derive(Debug, Clone)]
 pub struct WarningState {
     /// Topic, part of the scene, and magnitude: the length of a step (s), an angle (rad) or a fraction.
-    reported: Vec<(Topic, Subject, f64)>,
+    reported: BTreeMap<(Topic, Subject), f64>,
     /// Speed above which the tips of each master are implausibly fast (rad/s); infinite once it was reported.
     pub(in crate::simulation) fastest: Vec<f64>,
 }
@@ -23,13 +24,12 @@ pub struct WarningState {
 impl WarningState {
     /// Creates the state without warnings, for a number of masters.
     pub(in crate::simulation) fn new(bodies: usize) -> Self {
-        Self { reported: Vec::new(), fastest: vec![0.0; bodies] }
+        Self { reported: BTreeMap::new(), fastest: vec![0.0; bodies] }
     }
 
     /// Returns the magnitude at which a warning was last reported; 0 if it was not.
     fn magnitude(&self, topic: Topic, of: Subject) -> f64 {
-        let found = self.reported.iter().find(|(known, subject, _)| (*known, *subject) == (topic, of));
-        found.map_or(0.0, |(_, _, magnitude)| *magnitude)
+        self.reported.get(&(topic, of)).copied().unwrap_or(0.0)
     }
 
     /// Marks a warning of this magnitude as reported, if it exceeds the reported one by a factor; returns whether it does. Allocates
@@ -37,8 +37,7 @@ impl WarningState {
     pub(in crate::simulation) fn exceeds(&mut self, topic: Topic, of: Subject, magnitude: f64, factor: f64) -> bool {
         let is_new = magnitude > factor * self.magnitude(topic, of);
         if is_new {
-            self.reported.retain(|(known, subject, _)| (*known, *subject) != (topic, of));
-            self.reported.push((topic, of, magnitude));
+            self.reported.insert((topic, of), magnitude);
         }
         is_new
     }
