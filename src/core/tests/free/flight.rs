@@ -313,7 +313,7 @@ fn energy_balance_closes_when_the_step_changes() {
 
 #[test]
 fn the_initial_velocity_is_a_parameter() {
-    let mut simulation = Simulation::new(&squeezed()).unwrap();
+    let mut simulation = Simulation::new(squeezed()).unwrap();
     let reference = simulation.table().find("initial_velocity_z").unwrap().reference;
     simulation.set_real(reference, 7.0).unwrap();
     simulation.initialise(0.0).unwrap();

@@ -97,7 +97,7 @@ fn rejects_friction_that_jams_a_free_body() {
     // Near, and after a flight of two lengths of the block.
     for distance in [0.0203, 0.1] {
         // When it is pushed in, the node moves along its slip: friction against the slip pushes it in further.
-        let mut simulation = Simulation::new(&with_local_mode(distance, &[(0, [1.0, 1.0, 0.0])])).unwrap();
+        let mut simulation = Simulation::new(with_local_mode(distance, &[(0, [1.0, 1.0, 0.0])])).unwrap();
         let error = simulation.initialise(0.0).unwrap_err().to_string();
         assert!(error.contains("contact problem of left_000 alone has no unique solution"), "{error}");
         let other = started(&with_local_mode(distance, &[(0, [1.0, -1.0, 0.0])]));
@@ -114,7 +114,7 @@ fn rejects_friction_that_jams_contact_on_a_plate() {
         scene.roms[1] = with_mode(scene.roms[1].clone(), (0..nodes).map(|node| (node, [1.0, sideways, 0.0])));
         scene
     };
-    let mut jams = Simulation::new(&with_plate(1.0)).unwrap();
+    let mut jams = Simulation::new(with_plate(1.0)).unwrap();
     let error = jams.initialise(0.0).unwrap_err().to_string();
     assert!(error.contains("alone has no unique solution"), "{error}");
     let other = started(&with_plate(-1.0));

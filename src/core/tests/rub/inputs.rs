@@ -179,7 +179,7 @@ fn held_inputs_act_immediately() {
     simulation.advance().unwrap();
     assert!((simulation.shape_factor() - 0.251).abs() < 1e-15);
     // The parameter also selects it, before the start but not after.
-    let mut chosen = Simulation::new(&bumps()).unwrap();
+    let mut chosen = Simulation::new(bumps()).unwrap();
     let row = reference(&chosen, "input_interpolation");
     assert_eq!(chosen.integer(row).unwrap(), 1);
     chosen.set_integer(row, 2).unwrap();
@@ -375,7 +375,7 @@ fn interpolation_choice_exists_only_with_ramped_inputs() {
     assert!(!has(&scene));
     // The choice of the scene file can be read and selected again.
     assert!(has(&held(scene)));
-    for row in Simulation::new(&rich()).unwrap().table().variables() {
+    for row in Simulation::new(rich()).unwrap().table().variables() {
         let moves = row.causality == tiprub_cosim::variables::Causality::Input || row.name == "gap_offset";
         let says = row.description.contains("reached at the end of the communication step")
             || row.description.contains("constant over a");
