@@ -129,27 +129,32 @@ impl System {
     pub fn of(
         parts: Vec<StructureParts>,
         pairs: Vec<PairParts>,
-        mut coatings: Vec<(usize, Coating)>,
+        coatings: Vec<(usize, Coating)>,
         settings: SystemSettings,
     ) -> Self {
+        let mut own = vec![Vec::new(); parts.len()];
+        pairs.iter().enumerate().for_each(|(index, pair)| own[pair.structure].push(index));
         let mut structures: Vec<Structure> =
-            parts.into_iter().enumerate().map(|(index, part)| made(part, index, &pairs)).collect();
+            parts.into_iter().zip(&own).map(|(part, own)| made(part, own, &pairs)).collect();
         if !settings.ledger {
             structures.iter_mut().for_each(|structure| structure.modes.skip_losses());
         }
         let pairs: Vec<ContactPair> = pairs.into_iter().map(ContactPair::new).collect();
-        let group = |(reach, touching): (Reach, Vec<usize>)| {
-            let of_group = |pair: &&ContactPair| touching.contains(&pair.structure());
-            let mut carriers: Vec<usize> =
-                pairs.iter().filter(of_group).filter_map(|pair| Some(pair.carrier()?.structure)).collect();
+        let sets = StructureSets::new(&structures, &pairs);
+        let mut of_sets: Vec<Option<Coating>> = vec![None; sets.count()];
+        // Coated contacts of a set are solved with the first of their coatings.
+        for (pair, coating) in coatings {
+            of_sets[sets.of(pairs[pair].structure())].get_or_insert(coating);
+        }
+        let group = |(set, coating): (usize, Option<Coating>)| {
+            let (reach, touching) = contact_reach(&structures, &pairs, &sets, set)?;
+            let own = sets.pairs(set).iter();
+            let mut carriers: Vec<usize> = own.filter_map(|pair| Some(pairs[*pair].carrier()?.structure)).collect();
             carriers.sort_unstable();
             carriers.dedup();
-            let coated = coatings.iter().position(|(pair, _)| touching.contains(&pairs[*pair].structure()));
-            let coating = coated.map(|index| coatings.swap_remove(index).1);
-            ContactGroup::new(reach, &touching, &carriers, &structures, settings.solver, coating)
+            Some(ContactGroup::new(reach, &touching, &carriers, &structures, settings.solver, coating))
         };
-        let sets = StructureSets::new(&structures, &pairs);
-        let groups: Vec<ContactGroup> = contact_reaches(&structures, &pairs, &sets).into_iter().map(group).collect();
+        let groups: Vec<ContactGroup> = of_sets.into_iter().enumerate().filter_map(group).collect();
         let contacts = structures.iter().map(|structure| structure.gaps().len()).sum();
         let room = || Vec::with_capacity(contacts);
         let mut system = Self {
@@ -189,8 +194,7 @@ impl System {
     /// The coating of a pair.
     pub fn coating(&self, pair: usize) -> Option<&Coating> {
         let structure = self.pairs[pair].structure();
-        let group = self.groups.iter().find(|group| group.structures().any(|one| one == structure))?;
-        group.law().coating()
+        self.groups.get(self.sets.of(structure))?.law().coating()
     }
 
     /// Contacts whose forces acted over the last step and whose work was recorded for it: those of that step or, for schemes
@@ -387,34 +391,35 @@ fn sum_of(mut energies: impl Iterator<Item = (f64, f64)>) -> (f64, f64) {
     energies.fold(first, |sum, one| (sum.0 + one.0, sum.1 + one.1))
 }
 
-fn made(part: StructureParts, index: usize, pairs: &[PairParts]) -> Structure {
+fn made(part: StructureParts, own: &[usize], pairs: &[PairParts]) -> Structure {
     let (model, options) = match part {
         StructureParts::Carrying(model, loads) => return Structure::carrying(model, loads),
         StructureParts::Touching(model, options) => (model, *options),
     };
-    let own = || pairs.iter().enumerate().filter(|(_, pair)| pair.structure == index);
-    let nodes = own().map(|(_, pair)| pair.gap.nodes()).max().unwrap_or(0);
+    let gaps = || own.iter().map(|pair| (*pair, &pairs[*pair].gap));
+    let nodes = gaps().map(|(_, gap)| gap.nodes()).max().unwrap_or(0);
     let mut pair_of = vec![None; nodes];
-    for (pair, parts) in own() {
-        parts.gap.members().into_iter().for_each(|node| pair_of[node] = Some(pair));
+    for (pair, gap) in gaps() {
+        gap.members().into_iter().for_each(|node| pair_of[node] = Some(pair));
     }
-    let has_places = own().any(|(_, pair)| pair.gap.spline().is_some());
+    let has_places = gaps().any(|(_, gap)| gap.spline().is_some());
     Structure::touching(model, options, pair_of, has_places)
 }
 
-/// Finds the structures with contact nodes of each set, and how far their contacts are coupled.
-fn contact_reaches(structures: &[Structure], pairs: &[ContactPair], sets: &StructureSets) -> Vec<(Reach, Vec<usize>)> {
-    let touching = |set: usize| -> Vec<usize> {
-        let members = sets.members(set).iter().copied();
-        members.filter(|member| structures[*member].nodes() > 0).collect()
-    };
-    let reach = |members: Vec<usize>| {
-        let first = *members.first()?;
-        let carried = pairs.iter().any(|pair| members.contains(&pair.structure()) && pair.carrier().is_some());
-        // Sectors turn relative to a stationary surface; a single structure is one sector with all of its contacts.
-        let open = pairs.iter().any(|pair| pair.structure() == first && matches!(pair.gap(), GapLaw::Open(_)));
-        let coupled_sets = carried || structures[first].modes().coupled().is_some() || open;
-        Some((if coupled_sets { Reach::All } else { Reach::Sector }, members))
-    };
-    (0..sets.count()).filter_map(|set| reach(touching(set))).collect()
+/// Finds the structures with contact nodes of a set, and how far their contacts are coupled; `None` without contact nodes.
+fn contact_reach(
+    structures: &[Structure],
+    pairs: &[ContactPair],
+    sets: &StructureSets,
+    set: usize,
+) -> Option<(Reach, Vec<usize>)> {
+    let members = sets.members(set).iter().copied();
+    let touching: Vec<usize> = members.filter(|member| structures[*member].nodes() > 0).collect();
+    let first = *touching.first()?;
+    let own = || sets.pairs(set).iter().map(|pair| &pairs[*pair]);
+    let carried = own().any(|pair| pair.carrier().is_some());
+    // Sectors turn relative to a stationary surface; a single structure is one sector with all of its contacts.
+    let open = own().any(|pair| pair.structure() == first && matches!(pair.gap(), GapLaw::Open(_)));
+    let coupled = carried || structures[first].modes().coupled().is_some() || open;
+    Some((if coupled { Reach::All } else { Reach::Sector }, touching))
 }

@@ -1,23 +1,25 @@
 //! Variables together with their current values.
 
 use std::ops::{Deref, DerefMut};
+use std::sync::Arc;
 
 use crate::Result;
-use crate::variables::{DataType, StartValue, Variable, VariableTable};
+use crate::persist::{Persist, StateReader, StateWriter};
+use crate::variables::{DataType, Quantity, StartValue, Variable, VariableTable};
 
 /// Variables of a unit with their current values, which it dereferences to: one number per value reference.
 ///
 /// Integers, items and truth values are stored as numbers; texts are constants of the table.
 #[derive(Debug, Clone)]
 pub struct VariableValues {
-    table: VariableTable,
+    table: Arc<VariableTable>,
     values: Vec<f64>,
 }
 
 impl VariableValues {
     /// Creates the store with all start values.
     pub fn new(table: VariableTable) -> Self {
-        let mut store = Self { values: vec![0.0; table.references()], table };
+        let mut store = Self { values: vec![0.0; table.references()], table: Arc::new(table) };
         store.reset();
         store
     }
@@ -25,6 +27,17 @@ impl VariableValues {
     /// Returns the variables.
     pub fn table(&self) -> &VariableTable {
         &self.table
+    }
+
+    /// Returns the elements of a variable with this quantity of one structure or pair.
+    pub fn elements(&self, quantity: Quantity, of: usize) -> Option<&[f64]> {
+        let variable = self.table.with_quantity_of(quantity, of)?;
+        self.values.get(variable.reference as usize..)?.get(..variable.len())
+    }
+
+    /// Returns the first element of a variable, or 0 without this variable.
+    pub fn value_of(&self, quantity: Quantity, of: usize) -> f64 {
+        self.elements(quantity, of).map_or(0.0, |elements| elements[0])
     }
 
     /// Replaces all values and returns the previous ones.
@@ -100,5 +113,17 @@ impl Deref for VariableValues {
 impl DerefMut for VariableValues {
     fn deref_mut(&mut self) -> &mut [f64] {
         &mut self.values
+    }
+}
+
+impl Persist for VariableValues {
+    fn save(&self, writer: &mut StateWriter) {
+        self.values.save(writer);
+    }
+    fn restore(&mut self, reader: &mut StateReader) {
+        self.values.restore(reader);
+    }
+    fn check(&self, reader: &mut StateReader) {
+        self.values.check(reader);
     }
 }

@@ -27,7 +27,7 @@ impl Severity {
 macro_rules! topics {
     ($($variant:ident $id:literal $meaning:literal $remedy:literal;)*) => {
         /// Topic of a warning. Every topic has an identifier, and a row in the guide (`docs/warnings.md`).
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
         pub enum Topic {
             $(#[doc = $meaning] $variant,)*
         }

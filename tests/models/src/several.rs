@@ -43,21 +43,29 @@ pub fn two_rotors(mut scene: Scene, shift: f64, change: impl Fn(&mut StructureSe
     scene
 }
 
-/// Returns `count` copies of the rotor of the scene, each in a separate casing.
-pub fn rotors(scene: &Scene, count: usize) -> Scene {
+/// Returns `count` copies of the scene in one scene, with numbered names of structures and surfaces.
+pub fn copies(scene: &Scene, count: usize) -> Scene {
     let (mut many, settings) = (scene.clone(), &scene.settings);
     (many.settings.structures, many.settings.surfaces, many.settings.contacts) = (Vec::new(), Vec::new(), Vec::new());
+    let numbered = |name: &str, index: usize| format!("{name}_{index}");
     for index in 0..count {
-        let (mut structure, mut surface, mut contact) =
-            (settings.structures[0].clone(), settings.surfaces[0].clone(), settings.contacts[0].clone());
-        structure.name = format!("rotor_{index}");
-        surface.name = format!("casing_{index}");
-        (contact.master, contact.slave) = (structure.name.clone(), surface.name.clone());
-        many.settings.structures.push(structure);
-        many.settings.surfaces.push(surface);
-        many.settings.contacts.push(contact);
+        for structure in &settings.structures {
+            let name = numbered(&structure.name, index);
+            many.settings.structures.push(StructureSettings { name, ..structure.clone() });
+        }
+        for surface in &settings.surfaces {
+            let mut surface = surface.clone();
+            surface.name = numbered(&surface.name, index);
+            surface.structure = surface.structure.map(|name| numbered(&name, index));
+            many.settings.surfaces.push(surface);
+        }
+        for contact in &settings.contacts {
+            let mut contact = contact.clone();
+            (contact.master, contact.slave) = (numbered(&contact.master, index), numbered(&contact.slave, index));
+            many.settings.contacts.push(contact);
+        }
     }
-    many.roms = vec![scene.roms[0].clone(); count];
+    many.roms = std::iter::repeat_n(&scene.roms, count).flatten().cloned().collect();
     many
 }
 

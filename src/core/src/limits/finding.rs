@@ -6,7 +6,7 @@ use crate::scene::method::Scheme;
 use tiprub_cosim::warning::Topic;
 
 /// Part of a scene that a finding concerns.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Subject {
     /// The whole scene.
     Scene,

@@ -96,21 +96,30 @@ impl ModalModel {
     /// # Errors
     /// The ROM is invalid, or a stiffness is not positive semidefinite.
     pub fn from_rom(rom: &Rom, damping_ratio: f64) -> Result<Self> {
+        rom.validate()?;
+        Self::at_rest(rom, damping_ratio)
+    }
+
+    /// Computes the modes of a valid ROM at rest.
+    ///
+    /// # Errors
+    /// A damping ratio out of range, or a stiffness that is not positive semidefinite.
+    pub(crate) fn at_rest(rom: &Rom, damping_ratio: f64) -> Result<Self> {
         Self::at_stiffness(rom, &rom.stiffness, damping_ratio)
     }
 
-    /// Computes the modes at a steady speed Ω (rad/s): those of K + Ω²K₁ + Ω⁴K₂ if the ROM has spin matrices.
+    /// Computes the modes of a valid ROM at a steady speed Ω (rad/s): those of K + Ω²K₁ + Ω⁴K₂ if the ROM has spin matrices.
     ///
     /// # Errors
-    /// The errors of [`ModalModel::from_rom`], and a speed at which the stiffness is not positive semidefinite.
+    /// A damping ratio out of range, and a speed at which the stiffness is not positive semidefinite.
     pub fn at_speed(rom: &Rom, damping_ratio: f64, speed: f64) -> Result<Self> {
-        let Some(spin) = &rom.extras.spin else { return Self::from_rom(rom, damping_ratio) };
+        let Some(spin) = &rom.extras.spin else { return Self::at_rest(rom, damping_ratio) };
         let square = speed * speed;
         let stiffness = &rom.stiffness + &spin.stiffness_speed2 * square + &spin.stiffness_speed4 * (square * square);
         Self::at_stiffness(rom, &stiffness, damping_ratio)
     }
 
-    /// Computes the modes of a structure whose elastic stiffness is reduced by heat to the fraction `share`; `speed` is `None`
+    /// Computes the modes of a valid ROM whose elastic stiffness is reduced by heat to the fraction `share`; `speed` is `None`
     /// without stiffening.
     ///
     /// # Errors
@@ -125,7 +134,6 @@ impl ModalModel {
     }
 
     fn at_stiffness(rom: &Rom, stiffness: &DMatrix<f64>, damping_ratio: f64) -> Result<Self> {
-        rom.validate()?;
         if !(0.0..1.0).contains(&damping_ratio) {
             return Err(Error::invalid(
                 "damping_ratio",

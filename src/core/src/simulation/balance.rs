@@ -28,7 +28,7 @@ impl Simulation {
     pub(super) fn note_curvature(&mut self, time: f64) {
         let found = self.system.ledgers().iter().enumerate().find_map(|(set, ledger)| Some((set, misled(ledger)?)));
         let Some((set, (who, work))) = found else { return };
-        if !self.warning_state.is_first(Topic::CurvatureWork, Subject::Scene) {
+        if !self.diagnostics.reported.is_first(Topic::CurvatureWork, Subject::Scene) {
             return;
         }
         let curvature = self.system.ledgers()[set].curvature_work.value();
@@ -50,18 +50,18 @@ impl Simulation {
         if !settings.ledger || settings.scheme.properties().delays_contact {
             return Ok(());
         }
-        let Some(set) = (0..self.energies.len()).find(|set| !self.has_its_energy(*set)) else { return Ok(()) };
-        self.phase = SimulationPhase::Failed;
+        let Some(set) = (0..self.outputs.energies.len()).find(|set| !self.has_its_energy(*set)) else { return Ok(()) };
+        self.state.clock.phase = SimulationPhase::Failed;
         Err(Error::unstable(
             format!(
                 "at t = {} s (last good time {} s) the kinetic and strain energy{} is {:.4e} J, but it was {:.4e} J at \
                  the start and work minus friction and damping losses supplied only {:.4e} J: modes that the internal \
                  step of {:.3e} s does not resolve have gained spurious energy",
                 shown_time(time),
-                shown_time(self.time),
+                shown_time(self.state.clock.time),
                 self.of_set(set),
-                self.energies[set].now,
-                self.initial_energies[set],
+                self.outputs.energies[set].now,
+                self.state.initial_energies[set],
                 self.supplied(set),
                 self.system.step_size()
             ),
@@ -80,15 +80,15 @@ impl Simulation {
         } else {
             1.0
         };
-        let bound = factor.max(ENERGY_FACTOR) * (self.initial_energies[set] + self.supplied(set))
+        let bound = factor.max(ENERGY_FACTOR) * (self.state.initial_energies[set] + self.supplied(set))
             + ENERGY_SLACK * self.system.ledgers()[set].scale();
-        self.energies[set].now <= bound
+        self.outputs.energies[set].now <= bound
     }
 
     /// Returns the energy that forces times velocities have supplied to a set (J).
     fn supplied(&self, set: usize) -> f64 {
         let ledger = &self.system.ledgers()[set];
-        ledger.supplied().max(self.energies[set].conserved - ledger.initial).max(0.0)
+        ledger.supplied().max(self.outputs.energies[set].conserved - ledger.initial).max(0.0)
     }
 
     /// Returns problem and remedy if friction or impacts have supplied energy (J).

@@ -259,26 +259,7 @@ impl Compiled {
     }
 }
 
-impl super::RotorInputs {
-    /// Returns the inputs that a structure has.
-    pub fn of(structure: &StructureSettings) -> Self {
-        let inputs = |count: usize| vec![super::Input::default(); count];
-        Self {
-            excitation: inputs(if structure.excitation.is_some() { 2 } else { 0 }),
-            temperature: inputs(usize::from(structure.thermal)),
-            ..Self::default()
-        }
-    }
-}
-
 impl Simulation {
-    /// Returns the speed (rad/s) and temperature (K) of each master, as set.
-    pub(super) fn references(&self) -> Vec<[f64; 2]> {
-        let of =
-            |rotor: &super::RotorInputs| [rotor.speed.value, rotor.temperature.first().map_or(0.0, |one| one.value)];
-        self.inputs.rotors.iter().map(of).collect()
-    }
-
     /// Returns the damping ratios of the first modes of each master, then of the surface carriers.
     pub(super) fn mode_damping(&self) -> Vec<Vec<f64>> {
         let (bodies, carriers) = (self.compiled.bodies.len(), self.compiled.carriers.len());
@@ -288,15 +269,14 @@ impl Simulation {
 
     /// Returns all elements of a variable; empty if it does not exist.
     fn values_of(&self, quantity: Quantity, of: usize) -> Vec<f64> {
-        let variable = self.values.table().with_quantity_of(quantity, of);
-        variable.map_or(Vec::new(), |row| self.values[row.reference as usize..][..row.len()].to_vec())
+        self.state.values.elements(quantity, of).unwrap_or_default().to_vec()
     }
 
     /// Applies the engine orders of the parameters.
     pub(super) fn follow_engine_orders(&mut self) {
         for body in 0..self.compiled.bodies.len() {
             if let Some(reference) = self.compiled.references.engine_orders[body] {
-                let order = self.values[reference];
+                let order = self.state.values[reference];
                 #[expect(
                     clippy::cast_possible_truncation,
                     clippy::cast_sign_loss,
@@ -309,25 +289,25 @@ impl Simulation {
 
     /// Returns engine order times rotor angle minus phase at an offset (rad), and the amplitude (N).
     pub(super) fn excitation_at(&self, body: usize, offset: f64) -> Option<[f64; 2]> {
-        let rotor = &self.inputs.rotors[body];
+        let rotor = &self.state.inputs.rotors[body];
         let [amplitude, phase] = rotor.excitation.first_chunk::<2>()?;
-        let order = self.values[self.compiled.references.engine_orders[body]?];
+        let order = self.state.values[self.compiled.references.engine_orders[body]?];
         // The phase of the rotor omits whole turns; times the order these are whole turns, too.
-        let angle = (order * self.rotors[body].phase(&rotor.speed, offset)) % std::f64::consts::TAU;
+        let angle = (order * self.state.inputs.rotors[body].angle.phase(&rotor.speed, offset)) % std::f64::consts::TAU;
         Some([amplitude.at(offset), angle - phase.at(offset)])
     }
 
     /// Returns the angular frequency of the excitation at an offset, from the speed and from its phase (rad/s).
     pub(super) fn excitation_rate(&self, body: usize, offset: f64) -> f64 {
-        let rotor = &self.inputs.rotors[body];
-        let order = self.compiled.references.engine_orders[body].map_or(0.0, |reference| self.values[reference]);
+        let rotor = &self.state.inputs.rotors[body];
+        let order = self.compiled.references.engine_orders[body].map_or(0.0, |reference| self.state.values[reference]);
         order * rotor.speed.at(offset) - rotor.excitation.get(1).map_or(0.0, Input::rate)
     }
 
     /// Checks that the excitation does not turn too far within an internal step, by the speed and by its phase (rad/s) together.
     pub(super) fn check_excitation(&self, body: usize, step: f64, speeds: [f64; 2], phase: f64) -> Result<()> {
         let Some(reference) = self.compiled.references.engine_orders[body] else { return Ok(()) };
-        let order = self.values[reference];
+        let order = self.state.values[reference];
         let angle = speeds.into_iter().fold(0.0, |most: f64, speed| most.max(((order * speed - phase) * step).abs()));
         if angle <= crate::scene::ranges::EXCITED_ANGLE {
             return Ok(());
@@ -338,7 +318,7 @@ impl Simulation {
                 "the excitation of order {} rotates by {angle:.3e} rad in one internal step of {step:.3e} s at t = {} \
                  s, more than the limit of {} rad",
                 shown(order),
-                shown_time(self.time),
+                shown_time(self.state.clock.time),
                 shown(crate::scene::ranges::EXCITED_ANGLE)
             ),
             "Use a smaller internal_step_max (time.step), a lower order, a lower speed or a phase that changes more slowly",
@@ -347,6 +327,7 @@ impl Simulation {
 
     /// Sets the initial motion of blades on top of their static equilibrium; called again for another length of the first step.
     pub(super) fn launch_blades(&mut self) {
+        let references = self.state.inputs.references();
         for body in 0..self.compiled.bodies.len() {
             let initial = &self.compiled.body(body).0.initial;
             if initial.is_empty() {
@@ -354,7 +335,7 @@ impl Simulation {
             }
             let [displacements, velocities] =
                 [Quantity::InitialDisplacement, Quantity::InitialRate].map(|quantity| self.values_of(quantity, body));
-            let [speed, temperature] = self.references()[body];
+            let [speed, temperature] = references[body];
             let modes = self.system.structures_mut()[body].modes_mut();
             if self.compiled.loads_blades(body) {
                 self.compiled.settle(body, speed, temperature, modes);

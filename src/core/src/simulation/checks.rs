@@ -108,9 +108,9 @@ impl Simulation {
     /// # Errors
     /// An output that is not a number; the error names it. The state must not be used further.
     pub fn check_outputs(&self, time: f64) -> Result<()> {
-        for variable in self.values.table().variables().iter().filter(|row| row.causality == Causality::Output) {
+        for variable in self.state.values.table().variables().iter().filter(|row| row.causality == Causality::Output) {
             let start = variable.reference as usize;
-            let values = &self.values[start..start + variable.len()];
+            let values = &self.state.values[start..start + variable.len()];
             if let Some(element) = values.iter().position(|value| !value.is_finite()) {
                 let problem = format!("{} at t = {} s", values[element], shown_time(time));
                 let remedy = "Check loads, inputs and the internal step";
@@ -135,7 +135,7 @@ impl Simulation {
                           check that its contact grid is neither folded nor collapsed to a line";
             return refuse(format!("contact node {} has no closest point on its surface", name(lost)), remedy);
         }
-        let own = self.system.pairs().iter().filter(|pair| pair.structure() == body);
+        let own = self.compiled.plan.pairs_of(body).map(|(pair, _)| &self.system.pairs()[pair]);
         if let Some(index) = own.filter_map(|pair| pair.gap().out_of_reach()).next() {
             let problem = format!(
                 "contact node {} of sector {} starts beyond the first or last ring of the casing surface by more than \

@@ -9,9 +9,10 @@ use crate::modes::cyclic::CyclicModel;
 use crate::modes::modal::{ModalModel, ModalSpin};
 use crate::modes::rigid::{Translations, free_modes};
 use crate::modes::sectors::SectorModel;
+use crate::scene::method::{Scheme, Solver};
 use crate::scene::ranges::SMALL;
 use crate::scene::rom::{ContactNode, SupportRows};
-use crate::scene::settings::{BodyMotion, ContactSettings, Meridian, StructureSettings};
+use crate::scene::settings::{BodyMotion, ContactSettings, Meridian, SceneSettings, StructureSettings};
 use crate::scene::shape::CompiledShape;
 use crate::system::{PairParts, StructureParts, SurfaceCarrier, System, SystemSettings, joined};
 use crate::{Error, Result, Rom, Scene};
@@ -54,6 +55,12 @@ impl ValuePlaces {
             engine_orders: (0..plan.bodies.len()).map(|body| of(Quantity::ExcitationOrder, body)).collect(),
         }
     }
+}
+
+/// Returns the solver of a scene, or `lcp` instead of `film`.
+pub fn complementary(settings: &SceneSettings) -> Solver {
+    let own = settings.contacts[0].solver;
+    if own == Solver::Film { Solver::Lcp } else { own }
 }
 
 /// A master: a structure with contact nodes.
@@ -116,6 +123,8 @@ pub struct Compiled {
     pub patches: Vec<Option<HeatPatches>>,
     /// Linings between surface and mesh, per pair; empty if no support output is requested.
     pub linings: Vec<Option<Lining>>,
+    /// True if adaptive steps are supported, with `lcp` instead of `film`.
+    pub supports_adaptive: bool,
     /// Hash of settings and ROMs, stored in saved states.
     pub fingerprint: u64,
     pub references: ValuePlaces,
@@ -129,9 +138,10 @@ impl CompiledBody {
             let (model, translations) = free_modes(rom, ratio)?;
             (model, Some(translations))
         } else {
+            rom.validate()?;
             (modes(structure, rom, [0.0; 2])?, None)
         };
-        let disk = rom.is_cyclic().then(|| CyclicModel::from_rom(rom, ratio)).transpose()?;
+        let disk = rom.is_cyclic().then(|| CyclicModel::with_zero(rom, ratio, model.clone())).transpose()?;
         let (reference_speed, stiffness_range, centrifugal) = (0.0, None, Vec::new());
         let (watched, stress) = (DMatrix::zeros(0, 0), DMatrix::zeros(0, 0));
         Ok(Self {
@@ -181,6 +191,7 @@ impl Compiled {
         let carrier = |structure: &usize| {
             let (settings, rom) = (&scene.settings.structures[*structure], &scene.roms[*structure]);
             let load_order = settings.load.map_or(0, |load| load.order);
+            rom.validate()?;
             let (model, loads) = (modes(settings, rom, [0.0; 2])?, CarrierLoads::default());
             let support = rom.extras.support.as_ref().filter(|_| scene.settings.outputs.support_reaction);
             let support = support.map(|rows| SupportRows {
@@ -195,6 +206,7 @@ impl Compiled {
             fingerprint: super::fingerprint::of_scene(&scene),
             patches: plan.pairs.iter().map(|pair| HeatPatches::new(&scene, &plan, pair)).collect(),
             linings: Vec::new(),
+            supports_adaptive: scene.check_methods(Scheme::ADAPTIVE, complementary(&scene.settings)).is_ok(),
             references: ValuePlaces::new(&table, &plan),
             scene,
             plan,
@@ -227,7 +239,7 @@ impl Compiled {
 
     /// Returns the part of the contact grid of a carrier that a surface uses.
     fn share(&self, carrier: usize) -> Share {
-        if self.uses(carrier) > 1 { Share::Near } else { Share::Whole }
+        if self.plan.pairs_on(carrier).count() > 1 { Share::Near } else { Share::Whole }
     }
 
     /// Returns settings and ROM of a master.
@@ -275,11 +287,6 @@ impl Compiled {
         }
     }
 
-    /// Returns the number of pairs whose surface is on a carrier.
-    fn uses(&self, carrier: usize) -> usize {
-        self.plan.pairs.iter().filter(|pair| pair.carrier == Some(carrier)).count()
-    }
-
     /// Returns whether tips of a structure cut a coating.
     pub fn cuts(&self, body: usize) -> bool {
         self.plan
@@ -301,19 +308,22 @@ impl Compiled {
         self.check_speed(body, speed)?;
         self.check_temperature(body, temperature)?;
         let (structure, rom) = self.plan.structure(&self.scene, body);
-        if structure.softening != 0.0 {
-            self.bodies[body].model = modes(structure, rom, [speed, temperature])?;
-            self.bodies[body].reference_temperature = temperature;
+        let parts = &mut self.bodies[body];
+        let known = (!structure.spin.stiffening || parts.reference_speed.to_bits() == speed.to_bits())
+            && (structure.softening == 0.0 || parts.reference_temperature.to_bits() == temperature.to_bits());
+        if !known {
+            parts.model = modes(structure, rom, [speed, temperature])?;
         }
-        if structure.spin.stiffening {
-            let model = modes(structure, rom, [speed, temperature])?;
+        if structure.softening != 0.0 {
+            parts.reference_temperature = temperature;
+        }
+        if let Some(spin) = rom.extras.spin.as_ref().filter(|_| structure.spin.stiffening) {
             let range = |matrix: &DMatrix<f64>| {
                 let values = matrix.symmetric_eigenvalues();
                 [values.min(), values.max()]
             };
-            let spin = rom.extras.spin.as_ref().map(|spin| ModalSpin::new(spin, &model, speed));
-            let ranges = spin.map(|spin| [range(&spin.stiffness_speed2), range(&spin.stiffness_speed4)]);
-            (self.bodies[body].stiffness_range, self.bodies[body].model) = (ranges, model);
+            let spin = ModalSpin::new(spin, &parts.model, speed);
+            parts.stiffness_range = Some([range(&spin.stiffness_speed2), range(&spin.stiffness_speed4)]);
         }
         let asked = self.scene.settings.outputs.stress;
         let modes_told = self.scene.settings.outputs.modal_amplitudes.is_some();
@@ -523,8 +533,8 @@ impl Compiled {
     /// Returns the modes of each carrier at the control points of its surfaces, one surface after the other.
     fn control_modes(&self, gaps: &[GapLaw]) -> Vec<ModalModel> {
         let of = |index: usize| {
-            let own = self.plan.pairs.iter().zip(gaps).filter(|(pair, _)| pair.carrier == Some(index));
-            let seen = own.filter_map(|(_, gap)| self.control_modes_of(index, gap));
+            let own = self.plan.pairs_on(index);
+            let seen = own.filter_map(|(pair, _)| self.control_modes_of(index, &gaps[pair]));
             seen.reduce(ModalModel::seen_at_both)
         };
         (0..self.carriers.len()).filter_map(of).collect()
@@ -561,11 +571,12 @@ fn check_lengths(rom: &Rom, clearances: &[f64], surface: &CompiledShape) -> Resu
     Ok(())
 }
 
+/// Solves the eigenproblem of a valid ROM at a speed (rad/s) and a temperature (K).
 fn modes(structure: &StructureSettings, rom: &Rom, [speed, temperature]: [f64; 2]) -> Result<ModalModel> {
     let ratio = structure.damping_ratio.unwrap_or(rom.damping_ratio);
     if structure.softening != 0.0 {
         let speed = structure.spin.stiffening.then_some(speed);
         return ModalModel::softened(rom, ratio, speed, softened(structure, temperature));
     }
-    if structure.spin.stiffening { ModalModel::at_speed(rom, ratio, speed) } else { ModalModel::from_rom(rom, ratio) }
+    if structure.spin.stiffening { ModalModel::at_speed(rom, ratio, speed) } else { ModalModel::at_rest(rom, ratio) }
 }

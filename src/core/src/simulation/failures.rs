@@ -2,21 +2,22 @@
 
 use tiprub_cosim::shown_time;
 
+use super::Simulation;
 use super::checks::{OUT_OF_REACH, OUT_OF_REACH_REMEDY};
-use super::{Simulation, SimulationPhase};
+use super::clock::SimulationPhase;
 use crate::Error;
 use crate::system::{ContactPair, Curved, StepFailure};
 
 impl Simulation {
     /// Returns the error of a step that should have ended at `time`; the simulation must be restored or reset afterwards.
     pub(super) fn fail(&mut self, failure: StepFailure, time: f64) -> Error {
-        self.phase = SimulationPhase::Failed;
+        self.state.clock.phase = SimulationPhase::Failed;
         if failure == StepFailure::NonFinite {
-            return Error::non_finite(self.time, time, "Use a smaller internal step or smaller loads");
+            return Error::non_finite(self.state.clock.time, time, "Use a smaller internal step or smaller loads");
         }
         let (problem, remedy) = self.failure_texts(failure);
         Error::unstable(
-            format!("at t = {} s (last good time {} s) {problem}", shown_time(time), shown_time(self.time)),
+            format!("at t = {} s (last good time {} s) {problem}", shown_time(time), shown_time(self.state.clock.time)),
             remedy,
         )
     }
@@ -206,11 +207,11 @@ impl Simulation {
 
     /// Describes growth of sliding contact of this structure, or of another one in its set, as the likely cause of a failure.
     fn instability(&self, structure: usize) -> String {
-        let Some(limits) = &self.limits else { return String::new() };
+        let Some(limits) = &self.diagnostics.limits else { return String::new() };
         let sets = self.system.sets();
         let others = sets.members(sets.of(structure)).iter().copied();
-        let mut bodies = std::iter::once(structure).chain(others).filter(|body| *body < self.rotors.len());
-        let speed = |body: usize| self.inputs.rotors[body].speed.at(0.0);
+        let mut bodies = std::iter::once(structure).chain(others).filter(|body| *body < self.state.inputs.rotors.len());
+        let speed = |body: usize| self.state.inputs.rotors[body].speed.at(0.0);
         let found = bodies.find_map(|body| limits.grows(body, speed(body)));
         found.map_or_else(String::new, |finding| format!(". {}", self.compiled.warning(&finding)))
     }

@@ -18,7 +18,7 @@ impl Simulation {
     pub(super) fn warn_of_fast_rotation(&mut self) {
         let speeds = self.speeds().into_iter().enumerate();
         let warnings = speeds.filter_map(|(body, speed)| self.compiled.fast_rotation(body, speed));
-        self.warnings.extend(warnings);
+        self.diagnostics.warnings.extend(warnings);
     }
 }
 

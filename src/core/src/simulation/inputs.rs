@@ -3,8 +3,11 @@
 use tiprub_cosim::variables::{Causality, Quantity, Variable};
 use tiprub_cosim::{persist_fields, shown};
 
-use super::drive::Input;
-use super::{SAME_STEP, Simulation};
+use super::Simulation;
+use super::clock::SAME_STEP;
+use super::compile::Compiled;
+use super::drive::{Input, RotorAngle};
+use crate::scene::settings::StructureSettings;
 use crate::{Error, Result};
 
 /// Largest factor by which ramps may become steeper because a step is shorter.
@@ -23,6 +26,8 @@ pub struct RotorInputs {
     pub excitation: Vec<Input>,
     /// Temperature; empty if it is not an input.
     pub temperature: Vec<Input>,
+    /// Integral of the speed.
+    pub angle: RotorAngle,
 }
 
 /// Prescribed inputs of a surface.
@@ -58,12 +63,22 @@ pub struct Inputs {
     pub until: f64,
 }
 
-persist_fields!(RotorInputs { speed, spin, shaft, excitation, temperature });
+persist_fields!(RotorInputs { speed, spin, shaft, excitation, temperature, angle });
 persist_fields!(PairInputs { gap_offset, shape_factor, shape_rotation, radius_change });
 persist_fields!(CarrierInputs { load_amplitude, load_phase, temperatures });
 persist_fields!(Inputs { rotors, pairs, carriers, extrapolation, until });
 
 impl RotorInputs {
+    /// Returns the inputs that a structure has.
+    fn of(structure: &StructureSettings) -> Self {
+        let inputs = |count: usize| vec![Input::default(); count];
+        Self {
+            excitation: inputs(if structure.excitation.is_some() { 2 } else { 0 }),
+            temperature: inputs(usize::from(structure.thermal)),
+            ..Self::default()
+        }
+    }
+
     fn moving(&self) -> impl Iterator<Item = &Input> {
         self.shaft.iter().chain(&self.excitation).chain(&self.temperature)
     }
@@ -75,6 +90,11 @@ impl RotorInputs {
     /// Acting temperature at an offset (K).
     pub fn temperature_at(&self, offset: f64) -> f64 {
         self.temperature.first().map_or(0.0, |input| input.at(offset))
+    }
+
+    /// Total rotor angle at an offset (rad).
+    pub fn total_angle(&self, offset: f64) -> f64 {
+        self.angle.total(&self.speed, offset)
     }
 
     /// From `offset` on, ramps growth and stiffening to the speed at `until`.
@@ -105,6 +125,23 @@ impl CarrierInputs {
 }
 
 impl Inputs {
+    /// Returns the inputs that a scene has.
+    pub fn new(compiled: &Compiled) -> Self {
+        let heated = |count: usize| CarrierInputs { temperatures: vec![Input::default(); count], ..Default::default() };
+        Self {
+            rotors: (0..compiled.bodies.len()).map(|body| RotorInputs::of(compiled.body(body).0)).collect(),
+            pairs: vec![PairInputs::default(); compiled.plan.pairs.len()],
+            carriers: compiled.carriers.iter().map(|carrier| heated(carrier.loads.thermal.len())).collect(),
+            ..Self::default()
+        }
+    }
+
+    /// Returns speed (rad/s) and temperature (K) of each master, as set.
+    pub fn references(&self) -> Vec<[f64; 2]> {
+        let of = |rotor: &RotorInputs| [rotor.speed.value, rotor.temperature.first().map_or(0.0, |one| one.value)];
+        self.rotors.iter().map(of).collect()
+    }
+
     /// Returns the input of a variable: its quantity, the index of its structure or pair, and its element.
     pub fn get(&self, quantity: Quantity, of: usize, element: usize) -> Option<&Input> {
         match quantity {
@@ -183,6 +220,7 @@ impl Inputs {
         for rotor in &mut self.rotors {
             rotor.speed.shift(length);
             rotor.spin.shift(length);
+            rotor.angle.shift(length);
         }
         self.extrapolation = if self.until > length { self.until - 0.5 * length } else { length };
     }
@@ -197,7 +235,7 @@ impl Inputs {
     /// Resets all inputs to their start values.
     pub fn clear(&mut self) {
         self.moving_mut().for_each(|input| *input = Input::default());
-        self.rotors.iter_mut().for_each(|rotor| (rotor.speed, rotor.spin) = Default::default());
+        self.rotors.iter_mut().for_each(|rotor| (rotor.speed, rotor.spin, rotor.angle) = Default::default());
         (self.extrapolation, self.until) = (0.0, 0.0);
         for pair in &mut self.pairs {
             pair.shape_factor.value = 1.0;
@@ -209,7 +247,7 @@ impl Inputs {
 impl Simulation {
     /// Returns whether new values act immediately instead of at the end of the step.
     pub(super) fn holds(&self) -> bool {
-        self.compiled.references.input_interpolation.is_some_and(|reference| self.values[reference] > 1.5)
+        self.compiled.references.input_interpolation.is_some_and(|reference| self.state.values[reference] > 1.5)
     }
 
     /// Returns whether a new value of this input acts immediately.
@@ -219,16 +257,16 @@ impl Simulation {
 
     /// Checks that every input is in its range at the end of a step of length `step_size`. Allocates only to reject.
     pub(super) fn check_courses(&self, step_size: f64) -> Result<()> {
-        if self.inputs.rest(step_size) {
+        if self.state.inputs.rest(step_size) {
             return Ok(());
         }
-        for variable in self.values.table().variables() {
+        for variable in self.state.values.table().variables() {
             if variable.causality != Causality::Input && variable.quantity != Quantity::GapOffset {
                 continue;
             }
             let at_once = self.acts_at_once(variable.quantity);
             for element in 0..variable.len() {
-                let Some(input) = self.inputs.get(variable.quantity, variable.of, element) else { continue };
+                let Some(input) = self.state.inputs.get(variable.quantity, variable.of, element) else { continue };
                 self.check_course(variable, element, input, at_once, [0.0, step_size])?;
             }
         }
@@ -253,7 +291,7 @@ impl Simulation {
                 "with the derivative {} it reaches {} at t = {} s, outside the range {} to {}",
                 shown(input.slope),
                 shown(end),
-                shown(self.time + until),
+                shown(self.state.clock.time + until),
                 shown(low),
                 shown(high)
             );
@@ -267,7 +305,7 @@ impl Simulation {
         if at_once || (rate.is_finite() && turned <= std::f64::consts::PI) {
             return Ok(());
         }
-        let time = shown(self.time + until);
+        let time = shown(self.state.clock.time + until);
         let way = format!("the value goes from {} to {} by t = {time} s", shown(reached), shown(end));
         Err(if turned > std::f64::consts::PI {
             Error::invalid(

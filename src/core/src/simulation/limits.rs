@@ -8,6 +8,7 @@ mod warning_state;
 
 use tiprub_cosim::variables::Quantity;
 
+use super::compile::complementary;
 use super::table::has_one_friction;
 use super::{Compiled, Simulation};
 use crate::limits::finding::{Checked, ErrorKind, Finding, Subject, WarningKind};
@@ -89,7 +90,7 @@ fn senses_of(sense: f64) -> impl Iterator<Item = usize> {
 
 /// Returns the result for a step from a list of ranges: that of the smallest entry that is not below it.
 fn in_range<T>(ranges: &[(f64, Option<T>)], step: f64) -> Option<&T> {
-    let range = ranges.iter().rev().find(|(largest, _)| step <= largest * (1.0 + super::SAME_STEP));
+    let range = ranges.iter().rev().find(|(largest, _)| step <= largest * (1.0 + super::clock::SAME_STEP));
     range.and_then(|(_, found)| found.as_ref())
 }
 
@@ -103,23 +104,20 @@ impl Simulation {
     pub(super) fn parameters(&self) -> Parameters {
         let (bodies, pairs) = (self.compiled.bodies.len(), self.compiled.plan.pairs.len());
         let one = has_one_friction(&self.compiled.scene.settings);
-        let friction = |pair: usize| self.value_of(Quantity::Friction, if one { 0 } else { pair });
-        let damping = (0..bodies).map(|body| self.value_of(Quantity::DampingRatio, body));
+        let friction = |pair: usize| self.state.values.value_of(Quantity::Friction, if one { 0 } else { pair });
+        let damping = (0..bodies).map(|body| self.state.values.value_of(Quantity::DampingRatio, body));
         let carriers = 0..self.compiled.carriers.len();
-        let carried = carriers.map(|carrier| self.value_of(Quantity::CarrierDampingRatio, carrier));
-        let velocity = |body: usize| [0, 1, 2].map(|axis| self.value_of(Quantity::InitialVelocity(axis), body));
+        let carried = carriers.map(|carrier| self.state.values.value_of(Quantity::CarrierDampingRatio, carrier));
+        let velocity =
+            |body: usize| [0, 1, 2].map(|axis| self.state.values.value_of(Quantity::InitialVelocity(axis), body));
         Parameters {
             friction: (0..pairs).map(friction).collect(),
             damping_ratios: damping.chain(carried).collect(),
             mode_damping: self.mode_damping(),
-            step: self.value_of(Quantity::StepMax, 0),
-            tolerance: self
-                .values
-                .table()
-                .with_quantity_of(Quantity::Tolerance, 0)
-                .map_or(TOLERANCE, |row| self.values[row.reference as usize]),
-            scheme: chosen(&Scheme::ALL, self.value_of(Quantity::SchemeChoice, 0)),
-            solver: chosen(&Solver::ALL, self.value_of(Quantity::SolverChoice, 0)),
+            step: self.state.values.value_of(Quantity::StepMax, 0),
+            tolerance: self.state.values.elements(Quantity::Tolerance, 0).map_or(TOLERANCE, |tolerance| tolerance[0]),
+            scheme: chosen(&Scheme::ALL, self.state.values.value_of(Quantity::SchemeChoice, 0)),
+            solver: chosen(&Solver::ALL, self.state.values.value_of(Quantity::SolverChoice, 0)),
             speeds: self.speeds(),
             velocities: (0..bodies).map(velocity).collect(),
         }
@@ -129,12 +127,12 @@ impl Simulation {
     /// stay.
     pub(super) fn check_limits(&mut self, parameters: &Parameters) -> Result<Vec<Finding>> {
         let found = |limits: &Limits| limits.warnings(&parameters.speeds).map_err(|error| self.compiled.error(&error));
-        if let Some(limits) = self.limits.as_ref().filter(|limits| limits.cover(parameters)) {
+        if let Some(limits) = self.diagnostics.limits.as_ref().filter(|limits| limits.cover(parameters)) {
             return found(limits);
         }
         let limits = self.compiled.limits(parameters, &self.system);
         let warnings = found(&limits)?;
-        self.limits = Some(limits);
+        self.diagnostics.limits = Some(limits);
         Ok(warnings)
     }
 
@@ -142,9 +140,9 @@ impl Simulation {
     /// parameters, and invalid ones are not rejected yet.
     pub(super) fn renew_limits(&mut self) {
         let parameters = self.parameters();
-        let known = self.limits.as_ref().is_some_and(|limits| limits.are_of(&parameters));
-        if self.phase != super::SimulationPhase::Created && !known {
-            self.limits = Some(self.compiled.limits(&parameters, &self.system));
+        let known = self.diagnostics.limits.as_ref().is_some_and(|limits| limits.are_of(&parameters));
+        if !self.state.clock.is_created() && !known {
+            self.diagnostics.limits = Some(self.compiled.limits(&parameters, &self.system));
         }
     }
 
@@ -155,7 +153,7 @@ impl Simulation {
     }
 
     fn is_step_allowed(&self, body: usize, step: f64, speeds: [f64; 3], coldest: f64) -> Checked<()> {
-        let Some(limits) = &self.limits else { return Ok(()) };
+        let Some(limits) = &self.diagnostics.limits else { return Ok(()) };
         let (scheme, own) = (limits.parameters.scheme, &limits.bodies[body]);
         let stiffened = |speed: f64| self.compiled.stiffened(body, speed, coldest);
         let stiffened = speeds.into_iter().fold(1.0, |most: f64, speed| most.max(stiffened(speed)));
@@ -182,7 +180,7 @@ impl Compiled {
     /// Expected internal step (s): the proposed communication step divided by the number of its internal steps.
     pub(super) fn expected_step(&self, largest: f64) -> f64 {
         let length = self.scene.settings.experiment.communication_step;
-        length / (length / largest * (1.0 - super::SAME_STEP)).ceil().max(1.0)
+        length / (length / largest * (1.0 - super::clock::SAME_STEP)).ceil().max(1.0)
     }
 
     /// Returns the names and possibilities of the scene for texts about one of its parts.
@@ -196,10 +194,9 @@ impl Compiled {
             }
             Subject::Carrier(carrier) => (Some(self.carrier_name(self.bodies.len() + carrier)), None),
         };
-        let own = settings.contacts[0].solver;
-        let solver = if own == Solver::Film { Solver::Lcp } else { own };
-        let is_adaptive = self.scene.check_methods(Scheme::ADAPTIVE, solver).is_ok();
-        let adaptive = is_adaptive.then_some(AdaptiveSteps { solver: (solver != own).then_some(solver) });
+        let solver = complementary(settings);
+        let other = (solver != settings.contacts[0].solver).then_some(solver);
+        let adaptive = self.supports_adaptive.then_some(AdaptiveSteps { solver: other });
         Context { name, rom, preset: settings.preset == Preset::Paper, adaptive }
     }
 

@@ -6,10 +6,12 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 use tiprub_cosim::variables::{Causality, NO_CLEARANCE, Quantity, Span, Variable};
 
+use super::Simulation;
 use super::compile::Compiled;
 use super::units::LENGTH;
+use super::watched::WatchedGaps;
 use super::window::{StepWindow, speed_of};
-use super::{Simulation, SimulationPhase};
+use crate::Result;
 use crate::contact::coating::Coating;
 use crate::geometry::sector_angle;
 use crate::modes::sectors::Sectors;
@@ -46,6 +48,42 @@ pub fn array_reader(read: impl Fn(&OutputView, &mut [f64]) + Send + Sync + 'stat
     OutputReader(Arc::new(read))
 }
 
+/// Readers of the outputs, and values from which they read.
+#[derive(Debug, Clone)]
+pub struct Outputs {
+    /// Functions that fill the outputs, in the order of the table.
+    readers: Vec<OutputReader>,
+    /// Fraction of the friction heat that flows into the surface carrier, per pair.
+    slave_shares: Vec<f64>,
+    pub watched_gaps: WatchedGaps,
+    /// Energies of each set of structures that influence each other, if the ledger is kept.
+    pub energies: Vec<SetEnergy>,
+}
+
+/// Energies of structures that influence each other (J).
+#[derive(Debug, Clone, Copy, Default)]
+pub struct SetEnergy {
+    /// Instantaneous kinetic plus strain energy.
+    pub now: f64,
+    /// Energy that the scheme conserves.
+    pub conserved: f64,
+}
+
+impl Outputs {
+    /// Allocates the values of a scene with a number of sets of structures.
+    ///
+    /// # Errors
+    /// Errors of the gap functions of watched points.
+    pub fn new(compiled: &Compiled, readers: Vec<OutputReader>, sets: usize) -> Result<Self> {
+        Ok(Self {
+            readers,
+            slave_shares: vec![1.0; compiled.plan.pairs.len()],
+            watched_gaps: WatchedGaps::new(compiled)?,
+            energies: vec![SetEnergy::default(); sets],
+        })
+    }
+}
+
 /// Data that outputs are read from, for all outputs at one instant.
 pub struct OutputView<'a> {
     simulation: &'a Simulation,
@@ -66,38 +104,40 @@ pub struct OutputView<'a> {
 impl Simulation {
     /// Computes the outputs of the internal point reached.
     pub(super) fn compute_outputs(&mut self) {
-        let elapsed = self.communication.offset(self.communication.done);
-        let mean = if elapsed > 0.0 && self.communication.length > 0.0 { 1.0 / elapsed } else { 0.0 };
+        let [elapsed, time] = self.state.clock.step.reached();
+        let mean = if elapsed > 0.0 && self.state.clock.step.length > 0.0 { 1.0 / elapsed } else { 0.0 };
         self.system.close_ledger();
         let (mut energies, mut conserved) = ((0.0, 0.0), 0.0);
         if self.system.settings().ledger {
             let (kinetic, strain) = self.system.energies();
-            let of_sets = &mut self.energies;
+            let of_sets = &mut self.outputs.energies;
             let now = self.system.energies_now(|set, (kinetic, strain)| of_sets[set].now = kinetic + strain);
             (energies, conserved) = (now, kinetic + strain);
-            for (set, energy) in self.energies.iter_mut().enumerate() {
+            for (set, energy) in self.outputs.energies.iter_mut().enumerate() {
                 energy.conserved = self.system.mechanical_energy(set);
             }
         }
-        for pair in 0..self.slave_shares.len() {
-            let variable = self.values.table().with_quantity_of(Quantity::HeatToSlave, pair);
-            self.slave_shares[pair] = variable.map_or(1.0, |variable| self.values[variable.reference as usize]);
+        for pair in 0..self.outputs.slave_shares.len() {
+            let share = self.state.values.elements(Quantity::HeatToSlave, pair);
+            self.outputs.slave_shares[pair] = share.map_or(1.0, |share| share[0]);
         }
         self.find_watched();
-        let mut values = self.values.replace(Vec::new());
-        let (system, window) = (&self.system, &self.window);
+        let mut values = self.state.values.replace(Vec::new());
+        let (system, window) = (&self.system, &self.state.window);
         let ledger = system.ledger();
         let view = OutputView { simulation: self, system, window, mean, elapsed, energies, conserved, ledger };
-        let outputs = self.values.table().variables().iter().filter(|variable| variable.causality == Causality::Output);
-        for (variable, read) in outputs.zip(&self.readers) {
+        let outputs =
+            self.state.values.table().variables().iter().filter(|variable| variable.causality == Causality::Output);
+        for (variable, read) in outputs.zip(&self.outputs.readers) {
             let start = variable.reference as usize;
             (read.0)(&view, &mut values[start..start + variable.len()]);
         }
-        let time = self.communication.time(self.communication.done);
-        for variable in self.values.table().variables().iter().filter(|row| row.causality == Causality::Independent) {
+        for variable in
+            self.state.values.table().variables().iter().filter(|row| row.causality == Causality::Independent)
+        {
             values[variable.reference as usize] = time;
         }
-        self.values.replace(values);
+        self.state.values.replace(values);
     }
 }
 
@@ -108,12 +148,12 @@ fn smallest<'a>(values: impl Iterator<Item = &'a f64>) -> f64 {
 
 impl OutputView<'_> {
     pub fn rotor_angle(&self, body: usize) -> f64 {
-        self.simulation.rotors[body].total(&self.simulation.inputs.rotors[body].speed, self.elapsed)
+        self.simulation.state.inputs.rotors[body].total_angle(self.elapsed)
     }
 
     /// Fraction of the friction heat of a pair that flows into the surface carrier; 1 if the scene does not specify it.
     pub fn slave_share(&self, pair: usize) -> f64 {
-        self.simulation.slave_shares[pair]
+        self.simulation.outputs.slave_shares[pair]
     }
 
     pub fn ledger(&self) -> &Ledger {
@@ -122,7 +162,7 @@ impl OutputView<'_> {
 
     /// Returns the largest relative residual of any set of structures that influence each other.
     pub fn relative_residual(&self) -> f64 {
-        let ledgers = self.system.ledgers().iter().zip(&self.simulation.energies);
+        let ledgers = self.system.ledgers().iter().zip(&self.simulation.outputs.energies);
         let relative = ledgers.map(|(ledger, energy)| match ledger.scale() {
             scale if scale > 0.0 => ledger.residual(energy.conserved) / scale,
             _ => 0.0,
@@ -154,7 +194,7 @@ impl OutputView<'_> {
     /// Returns the largest number of internal steps tried within one communication step.
     #[expect(clippy::cast_precision_loss, reason = "counts are below 2^52")]
     pub fn most_tried(&self) -> f64 {
-        self.simulation.most_tried as f64
+        self.simulation.state.clock.most_tried as f64
     }
 
     /// Reads a value of the coating of a pair; empty without a coating.
@@ -272,7 +312,7 @@ impl OutputView<'_> {
             let gained = speed_of(structure, mode) - speed;
             sum += rows.stiffness[(row, mode)] * moved + rows.mass[(row, mode)] * gained;
         }
-        let temperatures = self.simulation.inputs.carriers[carrier].temperatures.iter().enumerate();
+        let temperatures = self.simulation.state.inputs.carriers[carrier].temperatures.iter().enumerate();
         let heated = temperatures.map(|(patch, input)| rows.thermal[(row, patch)] * input.at(0.5 * self.elapsed));
         let heat: f64 = heated.sum();
         let lining = row.checked_sub(3).map_or(0.0, |axis| own.lining[axis]);
@@ -289,7 +329,7 @@ impl OutputView<'_> {
     pub fn stress(&self, body: usize, sector: usize, place: usize, component: usize) -> f64 {
         let (compiled, row) = (&self.simulation.compiled, STRESSES * place + component);
         let parts = &compiled.bodies[body];
-        let rotor = &self.simulation.inputs.rotors[body];
+        let rotor = &self.simulation.state.inputs.rotors[body];
         let (temperature, speed) = (rotor.temperature_at(self.elapsed), rotor.spin.at(self.elapsed));
         let heat = parts.stress_heat.get(row).map_or(0.0, |heat| heat * temperature);
         let growth = parts.stress_growth.get(row).map_or(0.0, |growth| growth * speed * speed);
@@ -304,7 +344,7 @@ impl OutputView<'_> {
 
     /// Clearance of a watched point of a sector (m).
     pub fn watched_clearance(&self, body: usize, sector: usize, point: usize) -> f64 {
-        self.simulation.watched_gaps.clearance(body, point, sector)
+        self.simulation.outputs.watched_gaps.clearance(body, point, sector)
     }
 
     /// Computes |(2/N) Σ_b u_b e^(−i n θ_b)| (1/N for n = 0 and n = N/2) of the radial displacement of the middle node, or of the mean over
@@ -360,16 +400,16 @@ impl Simulation {
     }
 
     pub(super) fn derivative_of(&self, variable: &Variable, element: usize, reference: u32) -> f64 {
-        let (now, before) = (self.values[reference as usize], self.previous[reference as usize]);
-        let length = self.communication.length;
+        let (now, before) = (self.state.values[reference as usize], self.state.previous[reference as usize]);
+        let length = self.state.clock.step.length;
         match (variable.quantity, variable.span) {
-            _ if self.phase == SimulationPhase::Created || length == 0.0 => 0.0,
+            _ if self.state.clock.is_created() || length == 0.0 => 0.0,
             // A clearance that appears or disappears has no rate.
             _ if variable.unit == Some(&LENGTH) && now.max(before) >= NO_CLEARANCE => 0.0,
             (Quantity::Clearance(sector), _) => self.system.structures()[variable.of].gap_rate(element, sector),
-            (Quantity::RotorAngle, _) => self.inputs.rotors[variable.of].speed.at(0.0),
-            (_, Span::Mean) if self.previous_length == 0.0 => 0.0,
-            (_, Span::Mean) => (now - before) / (0.5 * (length + self.previous_length)),
+            (Quantity::RotorAngle, _) => self.state.inputs.rotors[variable.of].speed.at(0.0),
+            (_, Span::Mean) if self.state.clock.previous_length == 0.0 => 0.0,
+            (_, Span::Mean) => (now - before) / (0.5 * (length + self.state.clock.previous_length)),
             _ => (now - before) / length,
         }
     }

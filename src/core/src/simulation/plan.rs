@@ -30,6 +30,8 @@ pub struct SteppingOrder {
     pub pairs: Vec<PairPlan>,
     /// Pairs of each master.
     of_bodies: Vec<Vec<usize>>,
+    /// Pairs whose surface each carrier deforms.
+    of_carriers: Vec<Vec<usize>>,
 }
 
 /// Name prefix; empty if there is only one structure.
@@ -53,7 +55,8 @@ impl SteppingOrder {
         let relations = Relations::of(settings);
         let bodies: Vec<usize> = (0..settings.structures.len()).filter(|one| relations.touches(*one)).collect();
         let of_bodies = vec![Vec::new(); bodies.len()];
-        let mut plan = Self { bodies, carriers: Vec::new(), pairs: Vec::<PairPlan>::new(), of_bodies };
+        let (pairs, of_carriers) = (Vec::<PairPlan>::new(), Vec::new());
+        let mut plan = Self { bodies, carriers: Vec::new(), pairs, of_bodies, of_carriers };
         let mut carriers = vec![None; settings.structures.len()];
         for (index, contact) in settings.contacts.iter().enumerate() {
             let (Some(master), Some(surface)) = (relations.masters[index], relations.surfaces[index]) else {
@@ -65,6 +68,7 @@ impl SteppingOrder {
             let carrier = under.filter(|_| !settings.surfaces[surface].rigid).map(|under| {
                 *carriers[under].get_or_insert_with(|| {
                     plan.carriers.push(under);
+                    plan.of_carriers.push(Vec::new());
                     plan.carriers.len() - 1
                 })
             });
@@ -76,6 +80,7 @@ impl SteppingOrder {
                 return Err(Error::invalid(at, problem, "Assign each contact node to one pair only"));
             }
             plan.of_bodies[body].push(index);
+            carrier.into_iter().for_each(|carrier| plan.of_carriers[carrier].push(index));
             plan.pairs.push(PairPlan { surface, body, grid: under.filter(|_| open), carrier, nodes });
         }
         Ok(plan)
@@ -84,6 +89,11 @@ impl SteppingOrder {
     /// Returns the pairs of a master.
     pub fn pairs_of(&self, body: usize) -> impl Iterator<Item = (usize, &PairPlan)> {
         self.of_bodies[body].iter().map(|pair| (*pair, &self.pairs[*pair]))
+    }
+
+    /// Returns the pairs whose surface a carrier deforms.
+    pub fn pairs_on(&self, carrier: usize) -> impl Iterator<Item = (usize, &PairPlan)> {
+        self.of_carriers[carrier].iter().map(|pair| (*pair, &self.pairs[*pair]))
     }
 
     /// Returns settings and ROM of a master.

@@ -54,7 +54,7 @@ impl Simulation {
                     return Err(self.fail(StepFailure::LeftInside { structure, node, share }, time));
                 }
                 let least = if goes_on { INSIDE } else { INSIDE_TOLD };
-                if share >= least && self.warning_state.exceeds(Topic::FilmInside, of, share, DEEPER) {
+                if share >= least && self.diagnostics.reported.exceeds(Topic::FilmInside, of, share, DEEPER) {
                     let problem = self.left_inside(structure, node, share);
                     let then = if goes_on {
                         String::new()
@@ -70,7 +70,7 @@ impl Simulation {
             if share >= REFUSED && !is_paper {
                 return Err(self.fail(StepFailure::Pulls { structure, node, share }, time));
             }
-            if share >= TOLD && self.warning_state.is_first(Topic::FilmPulls, of) {
+            if share >= TOLD && self.diagnostics.reported.is_first(Topic::FilmPulls, of) {
                 let problem = self.pulls(structure, node, share);
                 let then = if is_paper {
                     String::new()

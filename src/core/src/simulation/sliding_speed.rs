@@ -19,7 +19,8 @@ impl Simulation {
     /// Warns of tips that slide more slowly than they vibrate: they stick at times, which the sliding law does not model.
     pub(super) fn warn_of_sticking(&mut self, parameters: &Parameters) {
         for body in 0..self.compiled.bodies.len() {
-            let (speed, friction) = (&self.inputs.rotors[body].speed, parameters.friction_of(&self.compiled, body));
+            let (speed, friction) =
+                (&self.state.inputs.rotors[body].speed, parameters.friction_of(&self.compiled, body));
             if self.compiled.bodies[body].translations.is_some()
                 || parameters.solver == Solver::Coulomb
                 || (friction == 0.0 && !self.compiled.cuts(body))
@@ -42,7 +43,7 @@ impl Simulation {
             );
             let remedy = "Trust the results only once the tips slide faster than they vibrate";
             let remedy = if cuts { remedy.to_owned() } else { format!("{remedy}, or use the solver coulomb") };
-            self.warnings.push(Warning::new(Topic::Sticking, problem, remedy));
+            self.diagnostics.warnings.push(Warning::new(Topic::Sticking, problem, remedy));
         }
     }
 }

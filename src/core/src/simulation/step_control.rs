@@ -4,8 +4,9 @@ use tiprub_cosim::variables::Quantity;
 use tiprub_cosim::warning::Topic;
 use tiprub_cosim::{Diagnostic, shown, shown_time};
 
+use super::Simulation;
+use super::clock::Communication;
 use super::limits::Parameters;
-use super::{Communication, Simulation};
 use crate::limits::finding::Subject;
 use crate::time::galerkin::tables::shortest;
 use crate::{Error, Result, Warning};
@@ -23,7 +24,7 @@ impl Simulation {
     /// Largest number of internal steps of a communication step, 0 for any number.
     pub(super) fn max_internal_steps(&self) -> u64 {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 ≤ value ≤ 1e9")]
-        let most = self.value_of(Quantity::MaxInternalSteps, 0) as u64;
+        let most = self.state.values.value_of(Quantity::MaxInternalSteps, 0) as u64;
         most
     }
 
@@ -36,7 +37,7 @@ impl Simulation {
 
     /// Checks the number of steps before an internal step.
     pub(super) fn allow_steps(&mut self) -> Result<()> {
-        let Communication { length, done, tried, most, .. } = self.communication;
+        let Communication { length, done, tried, most, .. } = self.state.clock.step;
         if most == 0 {
             self.stepper.allow(u64::MAX);
         } else if self.is_marched() {
@@ -58,7 +59,7 @@ impl Simulation {
             "the communication step of {} s from t = {} s needs more internal steps{of_whom} than max_internal_steps = {most}, \
              so it was discarded",
             shown(length),
-            shown_time(self.time)
+            shown_time(self.state.clock.time)
         );
         let remedy = format!(
             "Repeat it with a shorter communication step, a larger max_internal_steps (0: no limit) or {other}"
@@ -68,7 +69,7 @@ impl Simulation {
 
     /// Returns to the last state from which the run can continue, if no more steps are allowed in the middle of an internal step.
     pub(super) fn abandon_step(&mut self) -> Error {
-        let (length, most) = (self.communication.length, self.communication.most);
+        let (length, most) = (self.state.clock.step.length, self.state.clock.step.most);
         self.withdraw();
         self.exhausted(length, most)
     }
@@ -85,14 +86,14 @@ impl Simulation {
                 shown(shortest(step)),
             );
             let remedy = "Use a smaller internal_step_max (time.step) or communication step, or a larger tolerance";
-            self.warnings.push(Warning::new(Topic::ToleranceLimit, problem, remedy));
+            self.diagnostics.warnings.push(Warning::new(Topic::ToleranceLimit, problem, remedy));
         }
     }
 
     /// Warns of the first communication step in which a shortest step missed the tolerance.
     pub(super) fn note_missed(&mut self, time: f64) {
         let effort = self.system.effort();
-        if effort.missed == 0 || !self.warning_state.is_first(Topic::ToleranceMissed, Subject::Scene) {
+        if effort.missed == 0 || !self.diagnostics.reported.is_first(Topic::ToleranceMissed, Subject::Scene) {
             return;
         }
         let problem = format!(
@@ -101,12 +102,12 @@ impl Simulation {
             shown_time(time),
             effort.missed,
             effort.steps,
-            shown(self.value_of(Quantity::Tolerance, 0)),
+            shown(self.state.values.value_of(Quantity::Tolerance, 0)),
             shown(shortest(self.system.step_size())),
         );
         let remedy = format!(
             "Use an internal_step_max (time.step) below {} s or a larger tolerance; missed_steps counts all such steps",
-            shown(self.value_of(Quantity::StepMax, 0).min(self.system.step_size()))
+            shown(self.state.values.value_of(Quantity::StepMax, 0).min(self.system.step_size()))
         );
         self.note(Warning::new(Topic::ToleranceMissed, problem, remedy));
     }

@@ -1,10 +1,11 @@
 //! One communication step: begin, internal steps, end.
 
+use tiprub_cosim::shown_time;
 use tiprub_cosim::warning::Topic;
-use tiprub_cosim::{bounds, shown, shown_time};
 
+use super::Simulation;
+use super::clock::{Communication, SimulationPhase, same_step};
 use super::drive::Input;
-use super::{Communication, MOST_STEPS, Simulation, SimulationPhase, TIME_TOLERANCE, same_step};
 use crate::contact::coating::Coating;
 use crate::limits::finding::Subject;
 use crate::{Error, Result, Warning};
@@ -13,20 +14,10 @@ use crate::{Error, Result, Warning};
 const CURVED_SHARE: f64 = 0.05;
 impl Simulation {
     pub(super) fn begin(&mut self, current_time: f64, step_size: f64, partial: bool) -> Result<()> {
-        match self.phase {
-            SimulationPhase::Ready => {}
-            SimulationPhase::Failed => return Err(failed_before()),
-            SimulationPhase::Created | SimulationPhase::Stepping => {
-                return Err(Error::invalid(
-                    "doStep",
-                    "called before initialisation or within a communication step",
-                    "Initialise the instance first",
-                ));
-            }
-        }
-        self.check_step(current_time, step_size)?;
+        let limit = self.state.values[self.compiled.references.step_max];
+        self.state.clock.check_ready()?;
+        self.state.clock.check_step(current_time, step_size, limit)?;
         self.check_courses(step_size)?;
-        let limit = self.values[self.compiled.references.step_max];
         let ratio = step_size / limit;
         let same = same_step(current_time, step_size);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 ≤ value ≤ 1e9")]
@@ -41,7 +32,6 @@ impl Simulation {
         if !partial && !self.is_marched() && most > 0 && count > most {
             return Err(self.exhausted(step_size, most));
         }
-        self.partial = partial;
         if most > 0 {
             self.set_mark();
         }
@@ -54,34 +44,33 @@ impl Simulation {
                 self.launch();
             }
         }
-        self.inputs.begin(step_size, hold);
-        for body in (0..self.rotors.len()).filter(|body| hold && self.compiled.varies(*body)) {
-            let rotor = &self.inputs.rotors[body];
+        self.state.inputs.begin(step_size, hold);
+        for body in (0..self.state.inputs.rotors.len()).filter(|body| hold && self.compiled.varies(*body)) {
+            let rotor = &self.state.inputs.rotors[body];
             let speed = 0.5 * (rotor.speed.at(0.0) + rotor.speed.at(step_size));
             self.system.set_speed(body, speed, 0.5 * (rotor.temperature_at(0.0) + rotor.temperature_at(step_size)));
         }
         self.warn_of_step_and_speeds(step, step_size);
-        self.previous.copy_from_slice(&self.values);
-        self.previous_length = self.communication.length;
+        self.state.previous.copy_from_slice(&self.state.values);
         let tried = self.system.steps_tried();
-        self.communication = Communication { start: current_time, length: step_size, count, done: 0, tried, most };
-        self.window.open(self.system.structures());
-        self.phase = SimulationPhase::Stepping;
+        let step = Communication { start: current_time, length: step_size, count, done: 0, tried, most, partial };
+        self.state.clock.begin(step);
+        self.state.window.open(self.system.structures());
         Ok(())
     }
 
     /// Checks that an internal step can follow the speeds and rotations of shapes over a communication step of length `step_size`.
     fn check_motions(&self, step: f64, step_size: f64) -> Result<()> {
         for (index, pair) in self.compiled.plan.pairs.iter().enumerate() {
-            let mut rotation = self.inputs.pairs[index].shape_rotation;
+            let mut rotation = self.state.inputs.pairs[index].shape_rotation;
             if !self.holds() {
-                rotation.aim(0.0, self.inputs.extrapolation_time(step_size));
+                rotation.aim(0.0, self.state.inputs.extrapolation_time(step_size));
             }
-            let speed = &self.inputs.rotors[pair.body].speed;
+            let speed = &self.state.inputs.rotors[pair.body].speed;
             self.check_turning(index, step, step_size, speed, rotation.rate())?;
         }
-        let now = |error: Error| error.at_time(self.time);
-        for (body, rotor) in self.inputs.rotors.iter().enumerate() {
+        let now = |error: Error| error.at_time(self.state.clock.time);
+        for (body, rotor) in self.state.inputs.rotors.iter().enumerate() {
             let (first, last) = (rotor.speed.at(0.0), rotor.speed.at(step_size));
             let reached = rotor.temperature_at(0.0);
             let until = rotor.temperature.first().map_or(0.0, |input| input.requested_value(step_size));
@@ -89,14 +78,14 @@ impl Simulation {
                 self.compiled.check_temperature(body, until).map_err(now)?;
             }
             let fastest = if first.abs() > last.abs() { first } else { last };
-            if fastest.abs() > self.warning_state.fastest[body] {
+            if fastest.abs() > self.diagnostics.reported.fastest[body] {
                 self.compiled.check_tip_speed(body, fastest).map_err(now)?;
             }
             self.check_step_size(body, step, [first, last, rotor.spin.at(0.0)], reached.min(until)).map_err(now)?;
             let phase = rotor.excitation.get(1).map_or(0.0, |phase| {
                 let mut phase = *phase;
                 if !self.holds() {
-                    phase.aim(0.0, self.inputs.extrapolation_time(step_size));
+                    phase.aim(0.0, self.state.inputs.extrapolation_time(step_size));
                 }
                 phase.rate()
             });
@@ -104,58 +93,6 @@ impl Simulation {
             if self.compiled.spins(body) {
                 self.compiled.check_speed(body, fastest).map_err(now)?;
             }
-        }
-        Ok(())
-    }
-
-    fn check_step(&self, current_time: f64, step_size: f64) -> Result<()> {
-        if !(step_size.is_finite() && step_size > 0.0) {
-            return Err(Error::invalid(
-                "communicationStepSize",
-                format!("{} s at t = {} s", shown(step_size), shown_time(self.time)),
-                "Give a finite communication step > 0",
-            ));
-        }
-        if !current_time.is_finite() || (current_time - self.time).abs() > TIME_TOLERANCE * step_size {
-            return Err(Error::invalid(
-                "currentCommunicationPoint",
-                format!("{} s, but this instance is at t = {} s", shown(current_time), shown(self.time)),
-                "Continue from the end of the last step, or restore a saved state",
-            ));
-        }
-        if step_size < bounds::SHORTEST_STEP {
-            return Err(Error::invalid(
-                "communicationStepSize",
-                format!(
-                    "{} s at t = {} s is below the minimum of {} s, where rounding errors of positions would count as \
-                     motion",
-                    shown(step_size),
-                    shown_time(self.time),
-                    shown(bounds::SHORTEST_STEP)
-                ),
-                "Use a longer communication step; skip remainders that are caused by rounding in a sum of steps",
-            ));
-        }
-        // Length of the step after rounding of the time.
-        let rounded = (current_time + step_size) - current_time;
-        if (rounded - step_size).abs() > TIME_TOLERANCE * step_size {
-            return Err(Error::invalid(
-                "communicationStepSize",
-                format!(
-                    "{} s cannot be added accurately to the time {} s in double precision",
-                    shown(step_size),
-                    shown_time(current_time)
-                ),
-                "Use a longer communication step or a start time closer to 0",
-            ));
-        }
-        let ratio = step_size / self.values[self.compiled.references.step_max];
-        if ratio > MOST_STEPS {
-            return Err(Error::invalid(
-                "communicationStepSize",
-                format!("{} s would need {ratio:.3e} internal steps", shown(step_size)),
-                "Use a shorter communication step or a larger internal_step_max",
-            ));
         }
         Ok(())
     }
@@ -182,7 +119,7 @@ impl Simulation {
                 format!(
                     "the rotor turns {passed:.3e} rad in one internal step of {step:.3e} s at t = {} s, more than the \
                      width of its tips or coating cells, {stride:.3e} rad: the cells in between would not wear",
-                    shown_time(self.time)
+                    shown_time(self.state.clock.time)
                 ),
                 "Use fewer cells around the circumference, a lower speed or a smaller internal_step_max (time.step)",
             ));
@@ -203,7 +140,7 @@ impl Simulation {
             format!(
                 "the rotor turns {turned:.3e} rad relative to the casing shape in one internal step of {step:.3e} s at t = {} s, and skips features \
                  of the casing shape that are {scale:.3e} rad wide",
-                shown_time(self.time)
+                shown_time(self.state.clock.time)
             ),
             format!("{remedy} an internal_step_max (time.step) below {:.3e} s", step * scale / turned),
         ))
@@ -215,7 +152,7 @@ impl Simulation {
         let hold = self.holds();
         let (scheme, step) = (self.system.scheme(), self.system.step_size());
         for body in 0..self.compiled.bodies.len() {
-            let rotor = &self.inputs.rotors[body];
+            let rotor = &self.state.inputs.rotors[body];
             let (speed, temperature) = (rotor.spin.at(offset), rotor.temperature_at(offset));
             if !hold && self.compiled.varies(body) {
                 self.system.set_speed(body, speed, temperature);
@@ -231,7 +168,8 @@ impl Simulation {
             }
         }
         let under = self.system.structures_mut().iter_mut().skip(self.compiled.bodies.len());
-        for ((carrier, inputs), structure) in self.compiled.carriers.iter().zip(&self.inputs.carriers).zip(under) {
+        for ((carrier, inputs), structure) in self.compiled.carriers.iter().zip(&self.state.inputs.carriers).zip(under)
+        {
             if carrier.loads.are_there() {
                 carrier.loads.fill(inputs, offset, structure.modes_mut().loads_mut());
             }
@@ -249,27 +187,24 @@ impl Simulation {
         self.note_curved(time);
         self.note_curvature(time);
         self.note_missed(time);
-        self.most_tried = self.most_tried.max(self.system.steps_tried() - self.communication.tried);
-        for (angle, rotor) in self.rotors.iter_mut().zip(&self.inputs.rotors) {
-            angle.rebase(&rotor.speed, offset);
-        }
+        self.state.clock.most_tried =
+            self.state.clock.most_tried.max(self.system.steps_tried() - self.state.clock.step.tried);
+        self.state.inputs.rotors.iter_mut().for_each(|rotor| rotor.angle.rebase(&rotor.speed, offset));
         self.compute_outputs();
-        self.check_outputs(time).inspect_err(|_| self.phase = SimulationPhase::Failed)?;
+        self.check_outputs(time).inspect_err(|_| self.state.clock.phase = SimulationPhase::Failed)?;
         self.check_energy(time)?;
-        self.rotors.iter_mut().for_each(|rotor| rotor.shift(offset));
-        self.inputs.shift(offset);
-        self.time = time;
-        self.phase = SimulationPhase::Ready;
+        self.state.inputs.shift(offset);
+        self.state.clock.finish(time);
         Ok(())
     }
 
     /// Warns of the first displacement of each structure that is too large for linear kinematics.
     fn note_curved(&mut self, time: f64) {
-        for body in 0..self.rotors.len() {
+        for body in 0..self.state.inputs.rotors.len() {
             let Some(most) = self.system.most_curved_of(body).filter(|most| most.share() >= CURVED_SHARE) else {
                 continue;
             };
-            if !self.warning_state.is_first(Topic::LargeDisplacement, Subject::Body(body)) {
+            if !self.diagnostics.reported.is_first(Topic::LargeDisplacement, Subject::Body(body)) {
                 continue;
             }
             let problem = format!(
@@ -287,8 +222,4 @@ impl Simulation {
             self.note(Warning::new(Topic::LargeDisplacement, problem, remedy));
         }
     }
-}
-
-fn failed_before() -> Error {
-    Error::invalid("doStep", "an earlier step of this instance failed", "Restore a saved state or reset the instance")
 }

@@ -29,7 +29,7 @@ use parts::{AXES, BodyFacts, PairFacts, TableFacts, largest_length};
 /// # Errors
 /// Watched sector or nodal diameter that no ROM has; pairs that do not fit the ROMs.
 pub fn build(scene: &Scene, plan: &SteppingOrder) -> Result<(VariableTable, Vec<OutputReader>)> {
-    let parts = &TableFacts { scene, settings: &scene.settings, plan };
+    let parts = &TableFacts::new(scene, plan);
     let mut table = TableBuilder::default();
     table.time();
     inputs(&mut table, parts)?;
@@ -50,7 +50,7 @@ pub fn build(scene: &Scene, plan: &SteppingOrder) -> Result<(VariableTable, Vec<
 }
 
 fn inputs(table: &mut TableBuilder, parts: &TableFacts) -> Result<()> {
-    for body in parts.bodies().iter().filter(|body| body.structure.motion == BodyMotion::Rotating) {
+    for body in parts.bodies.iter().filter(|body| body.structure.motion == BodyMotion::Rotating) {
         table.belongs(body.index, parts.of_body(body));
         let text = format!(
             "Speed of {} about +z; constant over a communication step, or linear if a derivative is set",
@@ -61,7 +61,7 @@ fn inputs(table: &mut TableBuilder, parts: &TableFacts) -> Result<()> {
         speed.nominal = Some(1000.0);
         (speed.min, speed.max) = (Some(-ranges::SPEED), Some(ranges::SPEED));
     }
-    for pair in parts.pairs().iter().filter(|pair| pair.surface.moving) {
+    for pair in parts.pairs.iter().filter(|pair| pair.surface.moving) {
         table.belongs(pair.index, parts.of_pair(pair));
         let largest = largest_length(pair.body.rom);
         let change = table.moving_input(
@@ -90,7 +90,7 @@ fn inputs(table: &mut TableBuilder, parts: &TableFacts) -> Result<()> {
 }
 
 fn parameters(table: &mut TableBuilder, parts: &TableFacts) {
-    let (settings, bodies, pairs) = (parts.settings, parts.bodies(), parts.pairs());
+    let (settings, bodies, pairs) = (parts.settings, &parts.bodies, &parts.pairs);
     for body in bodies.iter().filter(|body| body.free) {
         table.belongs(body.index, parts.of_body(body));
         free::velocity(table, body);
@@ -100,7 +100,7 @@ fn parameters(table: &mut TableBuilder, parts: &TableFacts) {
         table.belongs(pair.index, parts.of_pair(pair));
         gap_offset(table, pair.body.rom);
     }
-    for body in &bodies {
+    for body in bodies {
         table.belongs(body.index, parts.of_body(body));
         let ratio = body.structure.damping_ratio.unwrap_or(body.rom.damping_ratio);
         let rigid = if body.free { "; its rigid-body modes are undamped" } else { "" };
@@ -110,7 +110,7 @@ fn parameters(table: &mut TableBuilder, parts: &TableFacts) {
         blades::mode_damping(table, Quantity::ModeDamping, "damping_ratios", body.structure, &name);
         blades::parameters(table, body);
     }
-    for carrier in parts.carriers().iter().filter(|carrier| carrier.open) {
+    for carrier in parts.carriers.iter().filter(|carrier| carrier.open) {
         features::damping(table, carrier, format!("{}.", carrier.structure.name), &carrier.structure.name);
     }
     table.belongs_to_all();
@@ -139,7 +139,7 @@ fn friction(table: &mut TableBuilder, parts: &TableFacts) {
     if !parts.has_friction() {
         return;
     }
-    let free = parts.bodies().iter().all(|body| body.free);
+    let free = parts.bodies.iter().all(|body| body.free);
     if has_one_friction(parts.settings) {
         table.belongs_to_all();
         let text = if free || parts.plan.pairs.len() > 1 {
@@ -150,8 +150,8 @@ fn friction(table: &mut TableBuilder, parts: &TableFacts) {
         table.friction(&parts.settings.contacts[0], text);
         return;
     }
-    for pair in parts.pairs() {
-        table.belongs(pair.index, parts.of_pair(&pair));
+    for pair in &parts.pairs {
+        table.belongs(pair.index, parts.of_pair(pair));
         let text =
             format!("Coulomb friction coefficient between {} and {}", pair.body.structure.name, pair.surface.name);
         table.friction(pair.contact, &text);
@@ -174,7 +174,7 @@ fn gap_offset(table: &mut TableBuilder, rom: &Rom) {
 
 /// Adds angles, clearances, forces and moments of structures and pairs, and totals over all contacts.
 fn totals(table: &mut TableBuilder, parts: &TableFacts) {
-    let (bodies, pairs) = (parts.bodies(), parts.pairs());
+    let (bodies, pairs) = (&parts.bodies, &parts.pairs);
     let rotors = || bodies.iter().filter(|body| !body.free);
     for body in rotors() {
         table.belongs(body.index, parts.of_body(body));
@@ -186,7 +186,7 @@ fn totals(table: &mut TableBuilder, parts: &TableFacts) {
         table.belongs(body.index, parts.of_body(body));
         rotor::clearances(table, parts, body);
     }
-    for body in &bodies {
+    for body in bodies {
         table.belongs(body.index, parts.of_body(body));
         forces(table, parts, body);
     }
@@ -199,7 +199,7 @@ fn totals(table: &mut TableBuilder, parts: &TableFacts) {
 }
 
 fn smallest_clearance(table: &mut TableBuilder, parts: &TableFacts) {
-    let free = parts.bodies().iter().any(|body| body.free);
+    let free = parts.bodies.iter().any(|body| body.free);
     let gap = if free { 1e-3 } else { parts.settings.contacts[0].nominal_gap() };
     let text = match (free, parts.plan.pairs.len()) {
         (true, _) => {

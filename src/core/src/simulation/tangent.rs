@@ -9,7 +9,8 @@
 use tiprub_cosim::variables::{Causality, Quantity};
 use tiprub_cosim::{CoSimulation, shown_time};
 
-use super::{Simulation, SimulationPhase};
+use super::Simulation;
+use super::clock::SimulationPhase;
 use crate::{Error, Result};
 use std::sync::Arc;
 
@@ -63,7 +64,7 @@ impl StepReplay {
 impl Simulation {
     /// Returns whether derivatives over steps can be requested: the parameter `step_derivatives`.
     pub(super) fn is_differentiated(&self) -> bool {
-        self.value_of(Quantity::StepDerivatives, 0) > 1.5
+        self.state.values.value_of(Quantity::StepDerivatives, 0) > 1.5
     }
 
     /// Allocates the state at the start of steps, if derivatives will be requested.
@@ -131,7 +132,7 @@ impl Simulation {
             grown = true;
             if !self.is_marched() {
                 let of_twin =
-                    |twin: &Self| outputs.iter().map(|output| twin.values[*output as usize]).collect::<Vec<_>>();
+                    |twin: &Self| outputs.iter().map(|output| twin.state.values[*output as usize]).collect::<Vec<_>>();
                 let (ahead, touched) = (of_twin(twin), twin.touched());
                 self.march_again(twin, inputs, seed, -moved)?;
                 let bent = bend(&twin.touched(), &self.touched(), &touched);
@@ -149,7 +150,7 @@ impl Simulation {
             }
             for (value, output) in sensitivity.iter_mut().zip(outputs) {
                 let output = *output as usize;
-                *value = (twin.values[output] - self.values[output]) / moved;
+                *value = (twin.state.values[output] - self.state.values[output]) / moved;
             }
             // The same steps mean the same piece. The last try is accepted in any case; it is on a neighbouring piece.
             if twin.system.effort() == self.system.effort() {
@@ -161,7 +162,7 @@ impl Simulation {
     }
 
     fn is_speed(&self, reference: u32) -> bool {
-        self.values.table().locate(reference).is_ok_and(|(variable, _)| variable.quantity == Quantity::Speed)
+        self.state.values.table().locate(reference).is_ok_and(|(variable, _)| variable.quantity == Quantity::Speed)
     }
 
     /// Smallest clearance of all pairs (m).
@@ -171,7 +172,7 @@ impl Simulation {
 
     /// Returns normal impulses over the communication step (N·s) and gaps at its end (m) of all structures.
     fn touched(&self) -> [Vec<f64>; 2] {
-        let impulses = self.window.bodies.iter().flat_map(|body| &body.normal_impulse).copied();
+        let impulses = self.state.window.bodies.iter().flat_map(|body| &body.normal_impulse).copied();
         let gaps = self.system.structures().iter().flat_map(|structure| structure.gaps()).copied();
         [impulses.collect(), gaps.collect()]
     }
@@ -187,7 +188,10 @@ impl Simulation {
     fn march_again(&mut self, twin: &mut Self, inputs: &[u32], seed: &[f64], moved: f64) -> Result<()> {
         let lost = |error: Error| {
             Error::unstable(
-                format!("the communication step to t = {} s cannot be repeated: {error}", shown_time(self.time)),
+                format!(
+                    "the communication step to t = {} s cannot be repeated: {error}",
+                    shown_time(self.state.clock.time)
+                ),
                 "Do not request derivatives over this step",
             )
         };
@@ -199,38 +203,39 @@ impl Simulation {
         }
         self.tangent.follows = true;
         // A step that was allowed once is allowed again.
-        let bound = twin.values.table().with_quantity_of(Quantity::MaxInternalSteps, 0);
+        let bound = twin.state.values.table().with_quantity_of(Quantity::MaxInternalSteps, 0);
         if let Some(bound) = bound.map(|bound| bound.reference as usize) {
-            twin.values[bound] = 0.0;
+            twin.state.values[bound] = 0.0;
         }
         for (input, seed) in inputs.iter().zip(seed) {
             twin.move_input(*input, moved * seed);
         }
-        twin.notes.clear();
-        twin.do_step(self.communication.start, self.communication.length).map_err(lost)
+        twin.diagnostics.notes.clear();
+        twin.do_step(self.state.clock.step.start, self.state.clock.step.length).map_err(lost)
     }
 
     /// Shifts the requested course of an input and keeps its slope.
     fn move_input(&mut self, reference: u32, by: f64) {
-        let (hold, inputs) = (self.holds(), &mut self.inputs);
-        let Ok((variable, element)) = self.values.table().locate(reference) else { return };
+        let (hold, inputs) = (self.holds(), &mut self.state.inputs);
+        let Ok((variable, element)) = self.state.values.table().locate(reference) else { return };
         let Some(input) = inputs.get_mut(variable.quantity, variable.of, element) else { return };
         input.value += by;
         if variable.quantity == Quantity::Speed || hold {
             input.take();
         }
         if variable.quantity == Quantity::Speed {
-            self.rotors[variable.of].rebase(&inputs.rotors[variable.of].speed, 0.0);
+            let rotor = &mut inputs.rotors[variable.of];
+            rotor.angle.rebase(&rotor.speed, 0.0);
         }
     }
 
     /// Returns the change of an input for a difference: a small fraction of the change that closes the clearance.
     fn nudge(&self, reference: u32) -> f64 {
-        let Ok((variable, _)) = self.values.table().locate(reference) else { return f64::INFINITY };
-        let value = self.values[reference as usize].abs();
+        let Ok((variable, _)) = self.state.values.table().locate(reference) else { return f64::INFINITY };
+        let value = self.state.values[reference as usize].abs();
         let size = match variable.quantity {
             Quantity::Speed => {
-                (TURN / self.communication.length).min(if value > 0.0 { 10.0 * value } else { f64::INFINITY })
+                (TURN / self.state.clock.step.length).min(if value > 0.0 { 10.0 * value } else { f64::INFINITY })
             }
             Quantity::ShapeRotation | Quantity::LoadPhase | Quantity::Excitation(1) => TURN,
             Quantity::ShapeFactor => 1.0,
@@ -247,7 +252,7 @@ impl Simulation {
             let remedy = "Set the parameter step_derivatives to on before initialisation";
             return Err(Error::invalid(what, "step derivatives are off", remedy));
         }
-        if self.phase != SimulationPhase::Ready || !self.tangent.stands {
+        if self.state.clock.phase != SimulationPhase::Ready || !self.tangent.stands {
             return Err(Error::invalid(
                 what,
                 "there is no communication step to repeat: none has been completed, or the last one was discarded or \

@@ -4,37 +4,38 @@ use tiprub_cosim::persist::{Persist, StateReader, to_bytes};
 use tiprub_cosim::variables::{Causality, Quantity, Value};
 use tiprub_cosim::{CoSimulation, StepProgress, VariableValues, bounds};
 
+use super::Simulation;
+use super::clock::{Clock, Communication, SimulationPhase};
 use super::drive::{Input, RotorAngle};
-use super::{Communication, Simulation, SimulationPhase};
 use crate::system::StepFailure;
 use crate::{Error, Result, Warning};
 
 impl CoSimulation for Simulation {
     fn variables(&self) -> &VariableValues {
-        &self.values
+        &self.state.values
     }
 
     fn is_initialised(&self) -> bool {
-        self.phase != SimulationPhase::Created
+        !self.state.clock.is_created()
     }
 
     fn set(&mut self, reference: u32, value: Value) -> Result<()> {
         let (variable, _) = self.check(reference, value)?;
         if variable.quantity == Quantity::Friction && self.is_initialised() {
-            let before = std::mem::replace(&mut self.values[reference as usize], value.number());
+            let before = std::mem::replace(&mut self.state.values[reference as usize], value.number());
             let parameters = self.parameters();
             let outcome = self.check_limits(&parameters);
-            self.values[reference as usize] = before;
+            self.state.values[reference as usize] = before;
             outcome?;
             self.warn_of_friction(&parameters);
             self.tangent.follow_anew();
             self.apply_friction(&parameters);
         }
         if let Value::Real(value) = value {
-            let offset = self.offset_now();
+            let offset = self.state.clock.offset_now();
             self.change_input(reference, |input| input.ask(value, offset))?;
         }
-        self.values[reference as usize] = value.number();
+        self.state.values[reference as usize] = value.number();
         if let Value::Integer(_) = value {
             // A new bound on the number of steps applies from the next communication step on.
             self.make_room();
@@ -44,7 +45,7 @@ impl CoSimulation for Simulation {
 
     fn set_input_derivative(&mut self, reference: u32, order: i32, value: f64) -> Result<()> {
         self.check_input_derivative(reference, order, value)?;
-        let offset = self.offset_now();
+        let offset = self.state.clock.offset_now();
         self.change_input(reference, |input| input.ask_slope(value, offset))
     }
 
@@ -63,99 +64,87 @@ impl CoSimulation for Simulation {
     }
 
     fn courses(&self) -> Vec<u8> {
-        to_bytes(&[&self.inputs, &self.rotors])
+        to_bytes(&[&self.state.inputs])
     }
 
     fn restore_courses(&mut self, courses: &[u8]) {
-        let reader = &mut StateReader::new(courses);
-        self.inputs.restore(reader);
-        self.rotors.restore(reader);
+        self.state.inputs.restore(&mut StateReader::new(courses));
     }
 
     fn initialise(&mut self, start_time: f64) -> Result<()> {
         bounds::at_most("start time", start_time, bounds::TIME)?;
         let parameters = self.parameters();
         // After an error the instance must be initialised again.
-        self.phase = SimulationPhase::Created;
-        self.warnings.clear();
-        self.notes.clear();
+        self.state.clock.phase = SimulationPhase::Created;
+        self.diagnostics.clear();
         self.compiled.scene.check_methods(parameters.scheme, parameters.solver)?;
         self.check_slips()?;
         self.follow_load_orders()?;
         self.check_launch(parameters.scheme)?;
-        self.follow_reference_speeds(&self.references())?;
+        self.follow_reference_speeds(&self.state.inputs.references())?;
         let findings = self.check_limits(&parameters)?;
-        self.warnings = findings.iter().map(|finding| self.compiled.warning(finding)).collect();
+        self.diagnostics.warnings = findings.iter().map(|finding| self.compiled.warning(finding)).collect();
         self.warn_of_fast_rotation();
         self.warn_of_sticking(&parameters);
         self.warn_of_tolerance(&parameters);
         self.begin_telling(&parameters, &findings);
         let settings = &self.compiled.scene.settings;
-        self.warnings.retain(|warning| !settings.is_silenced(warning.topic()));
+        self.diagnostics.warnings.retain(|warning| !settings.is_silenced(warning.topic()));
         self.rest(&parameters);
         self.apply_methods(&parameters);
         self.make_room();
         self.make_room_for_tangent();
-        self.time = start_time;
-        self.initial_time = start_time;
-        self.communication = Communication { start: start_time, count: 1, done: 1, ..Communication::default() };
-        self.previous_length = 0.0;
-        self.most_tried = 0;
-        for body in 0..self.rotors.len() {
-            self.rotors[body] = RotorAngle::new(self.value_of(Quantity::InitialAngle, body));
+        self.state.clock = Clock::at(start_time);
+        for (body, rotor) in self.state.inputs.rotors.iter_mut().enumerate() {
+            rotor.angle = RotorAngle::new(self.state.values.value_of(Quantity::InitialAngle, body));
         }
-        self.find_drives(0.0, start_time);
+        self.motions.find(&self.state, &self.compiled, [0.0, start_time]);
         self.stepper.set_first_step(&mut self.system, parameters.step);
-        self.inputs.start();
+        self.state.inputs.start();
         self.settle();
         self.launch();
-        self.system.start(&self.drives);
+        self.system.start(&self.motions.drives);
         self.check_initial_state()?;
         self.check_initial_gaps()?;
-        self.window.open(self.system.structures());
+        self.state.window.open(self.system.structures());
         self.compute_outputs();
-        for (initial, energy) in self.initial_energies.iter_mut().zip(&self.energies) {
+        for (initial, energy) in self.state.initial_energies.iter_mut().zip(&self.outputs.energies) {
             *initial = energy.now;
         }
         self.check_outputs(start_time)?;
-        self.phase = SimulationPhase::Ready;
-        self.previous.copy_from_slice(&self.values);
+        self.state.clock.phase = SimulationPhase::Ready;
+        self.state.previous.copy_from_slice(&self.state.values);
         Ok(())
     }
 
     fn reset(&mut self) {
-        self.values.reset();
-        self.previous.fill(0.0);
-        self.inputs.clear();
-        for variable in self.values.table().variables().iter().filter(|variable| variable.is_settable()) {
+        self.state.values.reset();
+        self.state.previous.fill(0.0);
+        self.state.inputs.clear();
+        for variable in self.state.values.table().variables().iter().filter(|variable| variable.is_settable()) {
             for element in 0..variable.len() {
-                if let Some(input) = self.inputs.get_mut(variable.quantity, variable.of, element) {
-                    input.ask(self.values[variable.reference as usize + element], 0.0);
+                if let Some(input) = self.state.inputs.get_mut(variable.quantity, variable.of, element) {
+                    input.ask(self.state.values[variable.reference as usize + element], 0.0);
                     input.take();
                 }
             }
         }
         self.system.structures_mut().iter_mut().for_each(|structure| structure.modes_mut().rest());
-        self.rotors.fill(RotorAngle::default());
-        self.communication = Communication::default();
-        (self.previous_length, self.most_tried) = (0.0, 0);
-        (self.time, self.initial_time) = (0.0, 0.0);
-        self.warnings.clear();
-        self.notes.clear();
+        self.state.clock = Clock::default();
+        self.diagnostics.clear();
         self.tangent.renew();
-        self.phase = SimulationPhase::Created;
     }
 
     fn time(&self) -> f64 {
-        self.time
+        self.state.clock.time
     }
 
     fn warnings(&self) -> &[Warning] {
-        &self.warnings
+        &self.diagnostics.warnings
     }
 
     fn take_notes(&mut self) -> Vec<Warning> {
-        std::mem::take(&mut self.notes)
+        std::mem::take(&mut self.diagnostics.notes)
     }
 
     fn begin_step(&mut self, current_time: f64, step_size: f64) -> Result<()> {
@@ -168,64 +157,61 @@ impl CoSimulation for Simulation {
 
     /// Does nothing unless sectors take adaptive steps, inputs rest, and no contact can close.
     fn fly_ahead(&mut self) {
-        let last = self.communication.count.saturating_sub(1);
-        if !self.is_stepping() || !self.is_marched() || self.communication.done > 0 || last < 2 {
+        let last = self.state.clock.step.count.saturating_sub(1);
+        if !self.is_stepping() || !self.is_marched() || self.state.clock.step.done > 0 || last < 2 {
             return;
         }
-        let (offset, time) = (self.communication.offset(last), self.communication.time(last));
-        for pair in 0..self.drives.len() {
-            let growth = self.growth(pair, [0.0, offset], [self.communication.start, time]);
+        let point = self.state.clock.step.point(last);
+        for pair in 0..self.motions.turns.len() {
+            let growth = self.state.growth(&self.compiled, pair, [self.state.clock.step.point(0), point]);
             if growth.elapsed[0] < growth.length {
                 return;
             }
-            let body = self.compiled.plan.pairs[pair].body;
-            let (speed, angle) = (&self.inputs.rotors[body].speed, &self.rotors[body]);
-            let shape = &self.inputs.pairs[pair].shape_rotation;
-            self.turns[pair] =
-                angle.total(speed, offset) - angle.total(speed, 0.0) - (shape.at(offset) - shape.at(0.0));
+            self.motions.turns[pair] = self.state.turn(&self.compiled, pair, point[0]);
         }
-        self.find_drives(offset, time);
-        if self.stepper.fly(&mut self.system, &self.drives, &self.turns, offset) {
-            self.window.add(&self.system, (&self.compiled.patches, &self.compiled.linings), offset);
-            self.communication.done = last;
+        self.motions.find(&self.state, &self.compiled, point);
+        let offset = point[0];
+        if self.stepper.fly(&mut self.system, &self.motions.drives, &self.motions.turns, offset) {
+            self.state.window.add(&self.system, (&self.compiled.patches, &self.compiled.linings), offset);
+            self.state.clock.step.done = last;
         }
     }
 
     fn advance(&mut self) -> Result<StepProgress> {
-        if self.phase != SimulationPhase::Stepping {
+        if !self.is_in_step() {
             let problem = "no communication step is in progress";
             return Err(Error::invalid("doStep", problem, "Begin a communication step first"));
         }
         self.allow_steps()?;
-        if self.partial && self.communication.done > 0 && self.communication.most > 0 {
+        if self.state.clock.step.partial && self.state.clock.step.done > 0 && self.state.clock.step.most > 0 {
             // The mark includes the inputs set meanwhile.
             self.set_mark();
         }
-        let next = self.communication.done + 1;
-        let (offset, time) = (self.communication.offset(next), self.communication.time(next));
-        let before = self.communication.offset(self.communication.done);
+        let next = self.state.clock.step.done + 1;
+        let (from, to) = (self.state.clock.step.reached(), self.state.clock.step.point(next));
+        let ([before, _], [offset, time]) = (from, to);
         if self.is_marched() {
-            let start = self.communication.time(self.communication.done);
-            for pair in 0..self.drives.len() {
-                let middle = self.drive(pair, 0.5 * (before + offset), 0.5 * (start + time));
-                self.system.set_middle(pair, &middle, self.growth(pair, [before, offset], [start, time]));
+            let middle = [0, 1].map(|i| 0.5 * (from[i] + to[i]));
+            for pair in 0..self.motions.drives.len() {
+                let middle = self.state.drive(&self.compiled, pair, middle);
+                self.system.set_middle(pair, &middle, self.state.growth(&self.compiled, pair, [from, to]));
             }
         }
-        self.find_drives(offset, time);
+        self.motions.find(&self.state, &self.compiled, to);
         self.load(before);
         if self.is_marched() {
             self.stepper.begin_loads(&mut self.system);
             self.load(offset);
         }
-        match self.stepper.step(&mut self.system, &self.drives) {
+        match self.stepper.step(&mut self.system, &self.motions.drives) {
             Ok(()) => {}
             Err(StepFailure::Exhausted) => return Err(self.abandon_step()),
             Err(failure) => return Err(self.fail(failure, time)),
         }
         let places = (&self.compiled.patches[..], &self.compiled.linings[..]);
-        self.window.add(&self.system, places, self.system.step_size());
-        self.communication.done = next;
-        let finished = next == self.communication.count;
+        self.state.window.add(&self.system, places, self.system.step_size());
+        self.state.clock.step.done = next;
+        let finished = next == self.state.clock.step.count;
         if finished {
             self.finish(offset, time)?;
         }
@@ -233,27 +219,27 @@ impl CoSimulation for Simulation {
     }
 
     fn is_stepping(&self) -> bool {
-        self.phase == SimulationPhase::Stepping
+        self.state.clock.is_stepping()
     }
 
     fn end_step_early(&mut self) -> Result<()> {
-        if self.phase != SimulationPhase::Stepping || self.communication.done == 0 {
+        if !self.is_in_step() || self.state.clock.step.done == 0 {
             let problem = "no internal step has been completed";
             return Err(Error::invalid("early return", problem, "Return early only after an internal step"));
         }
         self.tangent.forget();
-        let done = self.communication.done;
-        let (offset, time) = (self.communication.offset(done), self.communication.time(done));
-        self.communication = Communication { length: offset, count: done, ..self.communication };
+        let step = &mut self.state.clock.step;
+        let [offset, time] = step.reached();
+        *step = Communication { length: offset, count: step.done, ..*step };
         self.finish(offset, time)
     }
 
     fn update_outputs(&mut self) -> Result<()> {
-        if self.phase != SimulationPhase::Stepping {
+        if !self.is_in_step() {
             return Ok(());
         }
         self.compute_outputs();
-        self.check_outputs(self.communication.time(self.communication.done))
+        self.check_outputs(self.state.clock.step.time(self.state.clock.step.done))
     }
 
     fn state_size(&self) -> usize {
@@ -297,53 +283,54 @@ impl Simulation {
     /// Changes an input. Within a communication step the input turns towards its new target immediately. The target must be allowed at the
     /// end of the step, and the internal step must be able to follow; nothing is changed otherwise.
     fn change_input(&mut self, reference: u32, change: impl FnOnce(&mut Input)) -> Result<()> {
-        let (variable, element) = self.values.table().locate(reference)?;
+        let (variable, element) = self.state.values.table().locate(reference)?;
         let (quantity, of) = (variable.quantity, variable.of);
-        let (stepping, at_once) = (self.phase == SimulationPhase::Stepping, self.acts_at_once(quantity));
+        let (stepping, at_once) = (self.is_in_step(), self.acts_at_once(quantity));
         if stepping {
             self.tangent.forget();
         }
-        let Some(mut input) = self.inputs.get(quantity, of, element).copied() else { return Ok(()) };
-        let (offset, length) = (self.offset_now(), self.communication.length);
+        let Some(mut input) = self.state.inputs.get(quantity, of, element).copied() else { return Ok(()) };
+        let (offset, length) = (self.state.clock.offset_now(), self.state.clock.step.length);
         change(&mut input);
         if stepping {
             self.check_course(variable, element, &input, at_once, [offset, length])?;
         }
-        if at_once || self.phase == SimulationPhase::Created {
+        if at_once || self.state.clock.is_created() {
             input.take();
         } else if stepping {
-            input.aim(offset, self.inputs.until);
+            input.aim(offset, self.state.inputs.until);
         }
         if stepping {
             self.check_motion(quantity, of, &input)?;
         }
         if quantity == Quantity::Speed {
-            self.rotors[of].rebase(&self.inputs.rotors[of].speed, offset);
+            let rotor = &mut self.state.inputs.rotors[of];
+            rotor.angle.rebase(&rotor.speed, offset);
         }
-        if let Some(place) = self.inputs.get_mut(quantity, of, element) {
+        if let Some(place) = self.state.inputs.get_mut(quantity, of, element) {
             *place = input;
         }
         if stepping && quantity == Quantity::Speed {
-            let (until, hold) = (self.inputs.until, self.holds());
-            self.inputs.rotors[of].lead_spin(offset, until, hold);
+            let (until, hold) = (self.state.inputs.until, self.holds());
+            self.state.inputs.rotors[of].lead_spin(offset, until, hold);
         }
         Ok(())
     }
 
     /// Checks that the current internal step can follow a new course of the speed or of the rotation of the shape.
     fn check_motion(&self, quantity: Quantity, of: usize, input: &Input) -> Result<()> {
-        let (step, length) = (self.system.step_size(), self.communication.length);
+        let (step, length) = (self.system.step_size(), self.state.clock.step.length);
         match quantity {
             Quantity::Speed => {
                 for (pair, _) in self.compiled.plan.pairs_of(of) {
-                    let rotation = self.inputs.pairs[pair].shape_rotation.rate();
+                    let rotation = self.state.inputs.pairs[pair].shape_rotation.rate();
                     self.check_turning(pair, step, length, input, rotation)?;
                 }
                 [0.0, length].into_iter().try_for_each(|offset| self.compiled.check_speed(of, input.at(offset)))
             }
             Quantity::ShapeRotation => {
                 let body = self.compiled.plan.pairs[of].body;
-                self.check_turning(of, step, length, &self.inputs.rotors[body].speed, input.rate())
+                self.check_turning(of, step, length, &self.state.inputs.rotors[body].speed, input.rate())
             }
             _ => Ok(()),
         }

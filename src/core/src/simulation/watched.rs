@@ -128,12 +128,12 @@ impl WatchedPair {
 impl Simulation {
     /// Finds the clearances of watched points at the instant reached.
     pub(super) fn find_watched(&mut self) {
-        if self.watched_gaps.facing.is_empty() {
+        if self.outputs.watched_gaps.facing.is_empty() {
             return;
         }
-        let mut gaps = std::mem::take(&mut self.watched_gaps);
+        let mut gaps = std::mem::take(&mut self.outputs.watched_gaps);
         gaps.find(self);
-        self.watched_gaps = gaps;
+        self.outputs.watched_gaps = gaps;
     }
 }
 

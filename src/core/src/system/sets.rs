@@ -11,21 +11,27 @@ pub struct StructureSets {
     members: Vec<Vec<usize>>,
     /// Set of each structure.
     of: Vec<usize>,
+    /// Contact pairs of each set, ascending.
+    pairs: Vec<Vec<usize>>,
 }
 
 impl StructureSets {
     /// Finds the sets; sets with contact nodes come first.
     pub(crate) fn new(structures: &[Structure], pairs: &[ContactPair]) -> Self {
         let links = pairs.iter().filter_map(|pair| Some((pair.structure(), pair.carrier()?.structure)));
-        let number = joined(structures.len(), links);
-        let all = 0..structures.len();
-        let members = all.clone().map(|one| all.clone().filter(|index| number[*index] == one).collect());
-        let members = members.filter(|members: &Vec<usize>| !members.is_empty());
-        let touches = |members: &Vec<usize>| members.iter().any(|member| structures[*member].nodes() > 0);
-        let (mut members, others): (Vec<_>, Vec<_>) = members.partition(touches);
-        members.extend(others);
-        let place = |structure| members.iter().position(|members| members.contains(&structure));
-        Self { of: all.filter_map(place).collect(), members }
+        let numbers = joined(structures.len(), links);
+        let mut members = vec![Vec::new(); structures.len()];
+        numbers.iter().enumerate().for_each(|(structure, number)| members[*number].push(structure));
+        members.retain(|members| !members.is_empty());
+        // The order of sets with contact nodes, and that of the others, stays the same.
+        members.sort_by_key(|members| !members.iter().any(|member| structures[*member].nodes() > 0));
+        let mut of = vec![0; structures.len()];
+        for (set, members) in members.iter().enumerate() {
+            members.iter().for_each(|member| of[*member] = set);
+        }
+        let mut of_sets = vec![Vec::new(); members.len()];
+        pairs.iter().enumerate().for_each(|(index, pair)| of_sets[of[pair.structure()]].push(index));
+        Self { members, of, pairs: of_sets }
     }
 
     /// Returns the number of sets.
@@ -38,6 +44,11 @@ impl StructureSets {
         &self.members[set]
     }
 
+    /// Contact pairs of a set, ascending.
+    pub fn pairs(&self, set: usize) -> &[usize] {
+        &self.pairs[set]
+    }
+
     /// Set of a structure.
     #[inline(always)]
     pub fn of(&self, structure: usize) -> usize {
@@ -47,10 +58,20 @@ impl StructureSets {
 
 /// Returns one number per item; items connected by `links`, directly or indirectly, have the same number.
 pub fn joined(count: usize, links: impl Iterator<Item = (usize, usize)>) -> Vec<usize> {
-    let mut number: Vec<usize> = (0..count).collect();
+    // The number of an item is the end of its chain.
+    let mut next: Vec<usize> = (0..count).collect();
     for (one, other) in links {
-        let (kept, lost) = (number[one], number[other]);
-        number.iter_mut().filter(|number| **number == lost).for_each(|number| *number = kept);
+        let (kept, lost) = (end_of(&mut next, one), end_of(&mut next, other));
+        next[lost] = kept;
     }
-    number
+    (0..count).map(|item| end_of(&mut next, item)).collect()
+}
+
+/// Returns the end of the chain of an item, and shortens the chain.
+fn end_of(next: &mut [usize], mut item: usize) -> usize {
+    while next[item] != item {
+        next[item] = next[next[item]];
+        item = next[item];
+    }
+    item
 }

@@ -4,8 +4,8 @@ use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::settings::{BodyMotion, LoadSettings, PatchSettings, Shape, StructureSettings};
 use tiprub_core::{CoSimulation, Rom, Scene, Simulation, Warning};
 use tiprub_test_models::{
-    RADIUS, coating_of, disk, go, lattice, modal, node, real, rich_blade, ring, ring_of, round, rub, saved, set,
-    several, started, try_started,
+    RADIUS, coating_of, disk, flexible, go, lattice, modal, node, real, rich_blade, ring, ring_of, round, rub, saved,
+    set, several, started, try_started,
 };
 
 /// Returns the rotors `front` and `rear`, each in a separate rigid casing.
@@ -27,21 +27,30 @@ fn alone(scene: &Scene) -> Scene {
     alone
 }
 
-/// Checks that search for each name among all of them, pair by pair, would take more than a minute here.
+/// Start-up that searches all structures or pairs for each one of them would take 16 times as long for four times the structures.
 #[test]
-fn start_up_time_grows_in_proportion_to_the_number_of_rotors() {
-    let start = |rotors: usize| {
-        let scene = several::rotors(&rub(2), rotors);
+fn start_up_time_is_linear_in_the_number_of_structures() {
+    let (mut elastic, mut adaptive) = (rub(2), rub(2));
+    flexible(&mut elastic);
+    adaptive.roms[0] = rich_blade(2);
+    adaptive.settings.time.scheme = Scheme::Galerkin;
+    let blocks = lattice::with(lattice::squeezed(), 0.0, Solver::Lcp, Scheme::ModalExact);
+    let start = |scene: &Scene| {
         let clock = std::time::Instant::now();
-        let simulation = started(&scene);
-        let taken = clock.elapsed().as_secs_f64();
-        println!("{} values, {taken:.3} s", simulation.table().references());
-        taken
+        let simulation = started(scene);
+        (clock.elapsed().as_secs_f64(), simulation.table().references())
     };
-    let fastest = |rotors: usize| (0..3).map(|_| start(rotors)).fold(f64::INFINITY, f64::min);
-    // Four times the rotors: 4 in proportion, 64 with the cube of their number.
-    let ratio = fastest(400) / fastest(100);
-    assert!(ratio < 20.0, "{ratio}");
+    for (what, scene, few) in
+        [("rigid casings", rub(2), 250), ("elastic", elastic, 60), ("adaptive", adaptive, 60), ("blocks", blocks, 25)]
+    {
+        let scenes = [few, 4 * few].map(|count| several::copies(&scene, count));
+        let ratio = |attempt: usize| {
+            let [(short, _), (long, values)] = scenes.each_ref().map(start);
+            println!("{what}: {values} values, {short:.4} s and {long:.4} s, attempt {attempt}");
+            long / short
+        };
+        assert!((1..=8).any(|attempt| ratio(attempt) < 8.0), "{what}");
+    }
 }
 
 /// Each value needs a name, a column and memory: no reader supports so many.

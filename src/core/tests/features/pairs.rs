@@ -300,20 +300,18 @@ fn state_rejected_by_one_rotor_changes_nothing() {
     let mut own = vec![0; simulation.state_size()];
     simulation.save_state(&mut own).unwrap();
     let mut refused = 0;
-    for at in 0..own.len() - 24 {
-        // The reference speeds of both are adjacent, and so are the values that were set.
-        if own[at..at + 16] != [1300.0_f64.to_le_bytes(), (-1100.0_f64).to_le_bytes()].concat()[..] {
+    // Reference speed and temperature of one rotor, and reference speed of the other.
+    let references = |front: f64, rear: f64| [front, 0.0, rear].map(f64::to_le_bytes).concat();
+    for at in 0..own.len() - 32 {
+        if own[at..at + 24] != references(1300.0, -1100.0)[..] {
             continue;
         }
         let mut damaged = own.clone();
-        damaged[at..at + 16].copy_from_slice(&[1200.0_f64.to_le_bytes(), (-1e5_f64).to_le_bytes()].concat());
+        damaged[at..at + 24].copy_from_slice(&references(1200.0, -1e5));
         let end = damaged.len() - 8;
         let checksum = tiprub_cosim::persist::fingerprint(&damaged[..end], 0);
         damaged[end..].copy_from_slice(&checksum.to_le_bytes());
-        let Err(error) = simulation.restore_state(&damaged) else {
-            simulation.restore_state(&own).unwrap();
-            continue;
-        };
+        let error = simulation.restore_state(&damaged).unwrap_err();
         assert!(error.to_string().contains("were fitted"), "{error}");
         refused += 1;
         let mut now = vec![0; own.len()];

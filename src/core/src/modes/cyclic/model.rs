@@ -101,7 +101,14 @@ impl CyclicModel {
     /// # Errors
     /// The ROM is invalid, or a stiffness is not positive semidefinite; the message names the array.
     pub fn from_rom(rom: &Rom, damping_ratio: f64) -> Result<Self> {
-        let zero = ModalModel::from_rom(rom, damping_ratio)?;
+        Self::with_zero(rom, damping_ratio, ModalModel::from_rom(rom, damping_ratio)?)
+    }
+
+    /// Solves the eigenproblems of a valid ROM except that of nodal diameter 0, whose modes are `zero`.
+    ///
+    /// # Errors
+    /// A stiffness that is not positive semidefinite.
+    pub(crate) fn with_zero(rom: &Rom, damping_ratio: f64, zero: ModalModel) -> Result<Self> {
         let (sectors, complex) = (rom.sectors, |matrix: &DMatrix<f64>| matrix.map(|value| Complex::new(value, 0.0)));
         let squares: Vec<f64> = zero.frequencies.iter().map(|frequency| frequency * frequency).collect();
         let map = complex(&rom.contact_map);

@@ -13,7 +13,7 @@ use crate::modes::modal::ModalModel;
 use crate::modes::schemes::ModeCoefficients;
 use crate::scene::method::{Scheme, Solver};
 use crate::scene::settings::Meridian;
-use crate::simulation::SAME_STEP;
+use crate::simulation::clock::SAME_STEP;
 use crate::simulation::compile::Compiled;
 use crate::simulation::plan::PairPlan;
 use crate::system::System;

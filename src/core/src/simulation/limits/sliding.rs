@@ -7,7 +7,7 @@ use crate::limits::finding::{ClosedContact, ErrorKind, StepGrowth, WarningKind};
 use crate::limits::judged::{self, SetGrowth};
 use crate::limits::{self, ContactDirections, Fastest, lock_up};
 use crate::modes::modal::ModalModel;
-use crate::simulation::SAME_STEP;
+use crate::simulation::clock::SAME_STEP;
 
 /// Growth by this factor before contact opens turns an insignificant motion, a thousandth of the clearance, into one as large as the
 /// clearance.

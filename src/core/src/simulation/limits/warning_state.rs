@@ -6,6 +6,7 @@ use crate::limits::finding::{Finding, Subject, WarningKind};
 use crate::limits::plausibility::{self, Slip};
 use crate::limits::{self, massless};
 use crate::simulation::Simulation;
+use std::collections::BTreeMap;
 use tiprub_cosim::warning::{Topic, Warning};
 
 /// A step that is longer by this factor than the reported one is reported again.
@@ -15,7 +16,7 @@ const MATERIAL: f64 = 1.5;
 #[derive(Debug, Clone)]
 pub struct WarningState {
     /// Topic, part of the scene, and magnitude: the length of a step (s), an angle (rad) or a fraction.
-    reported: Vec<(Topic, Subject, f64)>,
+    reported: BTreeMap<(Topic, Subject), f64>,
     /// Speed above which the tips of each master are implausibly fast (rad/s); infinite once it was reported.
     pub(in crate::simulation) fastest: Vec<f64>,
 }
@@ -23,13 +24,12 @@ pub struct WarningState {
 impl WarningState {
     /// Creates the state without warnings, for a number of masters.
     pub(in crate::simulation) fn new(bodies: usize) -> Self {
-        Self { reported: Vec::new(), fastest: vec![0.0; bodies] }
+        Self { reported: BTreeMap::new(), fastest: vec![0.0; bodies] }
     }
 
     /// Returns the magnitude at which a warning was last reported; 0 if it was not.
     fn magnitude(&self, topic: Topic, of: Subject) -> f64 {
-        let found = self.reported.iter().find(|(known, subject, _)| (*known, *subject) == (topic, of));
-        found.map_or(0.0, |(_, _, magnitude)| *magnitude)
+        self.reported.get(&(topic, of)).copied().unwrap_or(0.0)
     }
 
     /// Marks a warning of this magnitude as reported, if it exceeds the reported one by a factor; returns whether it does. Allocates
@@ -37,8 +37,7 @@ impl WarningState {
     pub(in crate::simulation) fn exceeds(&mut self, topic: Topic, of: Subject, magnitude: f64, factor: f64) -> bool {
         let is_new = magnitude > factor * self.magnitude(topic, of);
         if is_new {
-            self.reported.retain(|(known, subject, _)| (*known, *subject) != (topic, of));
-            self.reported.push((topic, of, magnitude));
+            self.reported.insert((topic, of), magnitude);
         }
         is_new
     }
@@ -53,22 +52,22 @@ impl Simulation {
     /// Marks the warnings of the start as reported, with those for the expected step.
     pub(in crate::simulation) fn begin_telling(&mut self, parameters: &Parameters, warnings: &[Finding]) {
         let expected = self.compiled.expected_step(parameters.step);
-        self.warning_state = WarningState::new(self.rotors.len());
+        self.diagnostics.reported = WarningState::new(self.state.inputs.rotors.len());
         for finding in warnings {
-            self.warning_state.exceeds(finding.kind.topic(), finding.of, expected, 1.0);
+            self.diagnostics.reported.exceeds(finding.kind.topic(), finding.of, expected, 1.0);
         }
         let mut uncertain_warnings: Vec<Warning> = self.compiled.slips().iter().map(Slip::warning).collect();
         uncertain_warnings.extend(self.compiled.idle_patches());
         for (body, speed) in self.speeds().into_iter().enumerate() {
             for sense in senses_of(parameters.speeds[body]) {
-                self.warning_state.is_first(Topic::OtherSense, Subject::Slip { body, sense });
+                self.diagnostics.reported.is_first(Topic::OtherSense, Subject::Slip { body, sense });
             }
             let fast = self.compiled.slip_of_speed(body, speed);
             let fastest = plausibility::fastest(self.compiled.body(body).1);
-            self.warning_state.fastest[body] = if fast.is_some() { f64::INFINITY } else { fastest };
+            self.diagnostics.reported.fastest[body] = if fast.is_some() { f64::INFINITY } else { fastest };
             uncertain_warnings.extend(fast.iter().map(Slip::warning));
         }
-        self.warnings.extend(uncertain_warnings);
+        self.diagnostics.warnings.extend(uncertain_warnings);
     }
 
     /// Reports the warnings for changed friction coefficients that were not reported before.
@@ -78,9 +77,11 @@ impl Simulation {
             bodies.flat_map(|(body, speed)| body.warnings(*speed).unwrap_or_default()).collect::<Vec<_>>()
         };
         let step = self.compiled.expected_step(parameters.step);
-        for finding in self.limits.as_ref().map(found).unwrap_or_default() {
+        for finding in self.diagnostics.limits.as_ref().map(found).unwrap_or_default() {
             let (topic, of) = (finding.kind.topic(), finding.of);
-            if self.warning_state.magnitude(topic, of) == 0.0 && self.warning_state.exceeds(topic, of, step, 1.0) {
+            if self.diagnostics.reported.magnitude(topic, of) == 0.0
+                && self.diagnostics.reported.exceeds(topic, of, step, 1.0)
+            {
                 self.note(self.compiled.warning(&finding));
             }
         }
@@ -89,12 +90,12 @@ impl Simulation {
     /// Reports unreported warnings for an internal step (s) and for the speeds of a communication step of length `length` (s). Allocates
     /// only to report.
     pub(in crate::simulation) fn warn_of_step_and_speeds(&mut self, step: f64, length: f64) {
-        for body in 0..self.rotors.len() {
+        for body in 0..self.state.inputs.rotors.len() {
             for kind in self.warnings_of_step(body, step) {
                 self.report(kind, Subject::Body(body), step);
             }
             for offset in [0.0, length] {
-                self.warn_of_speed(body, self.inputs.rotors[body].speed.at(offset));
+                self.warn_of_speed(body, self.state.inputs.rotors[body].speed.at(offset));
                 self.warn_of_turn(Subject::Body(body), step * self.excitation_rate(body, offset).abs());
             }
         }
@@ -103,7 +104,7 @@ impl Simulation {
             let frequency = self.compiled.carriers[carrier].model.largest_frequency();
             self.report(limits::unresolved_modes(frequency, self.system.scheme(), step), of, step);
             if self.compiled.carriers[carrier].loads.nodal.is_some() {
-                self.warn_of_turn(of, step * self.inputs.carriers[carrier].load_phase.rate().abs());
+                self.warn_of_turn(of, step * self.state.inputs.carriers[carrier].load_phase.rate().abs());
             }
         }
     }
@@ -111,7 +112,7 @@ impl Simulation {
     /// Reports a finding, unless it was reported with nearly this magnitude.
     fn report(&mut self, kind: Option<WarningKind>, of: Subject, magnitude: f64) {
         if let Some(kind) = kind
-            && self.warning_state.exceeds(kind.topic(), of, magnitude, MATERIAL)
+            && self.diagnostics.reported.exceeds(kind.topic(), of, magnitude, MATERIAL)
         {
             self.note(self.compiled.warning(&kind.of(of)));
         }
@@ -132,14 +133,14 @@ impl Simulation {
     }
 
     fn warn_of_speed(&mut self, body: usize, speed: f64) {
-        if speed.abs() > self.warning_state.fastest[body]
+        if speed.abs() > self.diagnostics.reported.fastest[body]
             && let Some(slip) = self.compiled.slip_of_speed(body, speed)
         {
-            self.warning_state.fastest[body] = f64::INFINITY;
+            self.diagnostics.reported.fastest[body] = f64::INFINITY;
             self.note(slip.warning());
         }
         for sense in senses_of(speed).filter(|_| speed != 0.0) {
-            if self.warning_state.is_first(Topic::OtherSense, Subject::Slip { body, sense }) {
+            if self.diagnostics.reported.is_first(Topic::OtherSense, Subject::Slip { body, sense }) {
                 for finding in self.of_sense(body, sense, speed) {
                     self.note(self.compiled.warning(&finding));
                 }
@@ -149,7 +150,7 @@ impl Simulation {
 
     /// Returns the warnings about a master that depend on the step (s).
     fn warnings_of_step(&self, body: usize, step: f64) -> [Option<WarningKind>; 4] {
-        let Some(limits) = &self.limits else { return [const { None }; 4] };
+        let Some(limits) = &self.diagnostics.limits else { return [const { None }; 4] };
         let (scheme, own) = (limits.parameters.scheme, &limits.bodies[body]);
         let highest = self.compiled.bodies[body].largest_frequency() * self.compiled.stiffest(body);
         [
@@ -162,10 +163,7 @@ impl Simulation {
 
     /// Adds a warning for the next [`Simulation::take_notes`], unless it is silenced.
     pub(in crate::simulation) fn note(&mut self, warning: Warning) {
-        if !self.compiled.scene.settings.is_silenced(warning.topic()) {
-            self.warnings.push(warning.clone());
-            self.notes.push(warning);
-        }
+        self.diagnostics.note(warning, &self.compiled.scene.settings);
     }
 
     /// Returns the warnings of sliding contact in the opposite sense of rotation, which the warnings of the start omit. Empty before
@@ -184,12 +182,12 @@ impl Simulation {
     /// # Ok::<(), tiprub_core::Error>(())
     /// ```
     pub fn if_reversed(&self) -> Vec<Warning> {
-        let Some(limits) = &self.limits else { return Vec::new() };
+        let Some(limits) = &self.diagnostics.limits else { return Vec::new() };
         let mut found = Vec::new();
         for (body, own) in limits.bodies.iter().enumerate() {
             let is_other = |sense: &usize| {
                 let of = Subject::Slip { body, sense: *sense };
-                self.warning_state.magnitude(Topic::OtherSense, of) == 0.0 && own.senses[*sense].is_some()
+                self.diagnostics.reported.magnitude(Topic::OtherSense, of) == 0.0 && own.senses[*sense].is_some()
             };
             let speed = limits.parameters.speeds[body];
             found.extend([0, 1].into_iter().filter(is_other).flat_map(|sense| self.of_sense(body, sense, speed)));
@@ -199,7 +197,7 @@ impl Simulation {
 
     /// Returns the warnings for contact of a master that slides in a sense at the expected step and at a speed (rad/s).
     fn of_sense(&self, body: usize, sense: usize, speed: f64) -> Vec<Finding> {
-        let Some(own) = self.limits.as_ref().map(|limits| &limits.bodies[body]) else { return Vec::new() };
+        let Some(own) = self.diagnostics.limits.as_ref().map(|limits| &limits.bodies[body]) else { return Vec::new() };
         let kinds = match &own.senses[sense] {
             Some(sense) => sense.warnings_after_reversal(own.closing.time(speed)),
             None => vec![WarningKind::OtherSense],

@@ -195,12 +195,12 @@ const SOFTENED: &str =
     "Strain energy added since the start by stiffening and softening when speed and temperature change";
 
 fn softens(parts: &TableFacts) -> bool {
-    parts.bodies().iter().any(|body| body.structure.softening != 0.0)
+    parts.bodies.iter().any(|body| body.structure.softening != 0.0)
 }
 
 /// Returns the descriptions of kinetic energy, strain energy and impact losses.
 fn energy_descriptions(parts: &TableFacts) -> [&'static str; 3] {
-    if parts.bodies().iter().any(|body| body.free) {
+    if parts.bodies.iter().any(|body| body.free) {
         return [
             "Kinetic energy of all structures, including rigid-body motion",
             "Strain energy of all structures",
@@ -215,7 +215,7 @@ fn energy_descriptions(parts: &TableFacts) -> [&'static str; 3] {
 }
 
 fn exists(parts: &TableFacts, name: &str) -> bool {
-    let (bodies, pairs) = (parts.bodies(), parts.pairs());
+    let (bodies, pairs) = (&parts.bodies, &parts.pairs);
     let turns = |body: &BodyFacts| body.structure.motion == BodyMotion::Rotating;
     match name {
         "friction_loss" => parts.has_friction(),

@@ -18,7 +18,7 @@ pub const LARGEST_TEMPERATURE: f64 = 3000.0;
 pub fn is_loaded(parts: &TableFacts) -> bool {
     let loaded = |carrier: &CarrierFacts| carrier.structure.thermal || carrier.structure.load.is_some();
     let heated = |body: &BodyFacts| body.structure.spin.growth || body.structure.thermal;
-    parts.bodies().iter().any(heated) || parts.carriers().iter().any(loaded)
+    parts.bodies.iter().any(heated) || parts.carriers.iter().any(loaded)
 }
 
 /// Returns whether inputs move or load a structure; growth and stiffening follow the speed like such an input.
@@ -27,17 +27,17 @@ pub fn has_moving_inputs(parts: &TableFacts) -> bool {
         let StructureSettings { whirl, axial_shift, spin, excitation, .. } = body.structure;
         *whirl || *axial_shift || spin.stiffening || spin.coriolis || excitation.is_some()
     };
-    parts.pairs().iter().any(|pair| pair.surface.moving) || parts.bodies().iter().any(moves) || is_loaded(parts)
+    parts.pairs.iter().any(|pair| pair.surface.moving) || parts.bodies.iter().any(moves) || is_loaded(parts)
 }
 
 /// Adds whirl, axial shift, excitation, temperatures, nodal-diameter load.
 pub fn inputs(table: &mut TableBuilder, parts: &TableFacts) {
-    for body in &parts.bodies() {
+    for body in &parts.bodies {
         table.belongs(body.index, parts.of_body(body));
         shaft(table, body);
         blades::inputs(table, parts, body);
     }
-    for carrier in &parts.carriers() {
+    for carrier in &parts.carriers {
         table.belongs(carrier.index, parts.of_carrier(carrier));
         loads(table, carrier);
     }
@@ -97,12 +97,12 @@ pub fn damping(table: &mut TableBuilder, carrier: &CarrierFacts, prefix: String,
 
 /// Adds damping of casings and the fraction of the friction heat.
 pub fn parameters(table: &mut TableBuilder, parts: &TableFacts) {
-    let carriers = parts.carriers();
+    let carriers = &parts.carriers;
     for carrier in carriers.iter().filter(|carrier| !carrier.open) {
         let name = if carriers.len() > 1 { &carrier.structure.name } else { "the casing" };
         damping(table, carrier, parts.of_carrier(carrier), name);
     }
-    for carrier in &carriers {
+    for carrier in carriers {
         if let Some(load) = carrier.structure.load {
             table.belongs(carrier.index, parts.of_carrier(carrier));
             let text = "Number of nodal diameters of the radial line load on the casing";
@@ -111,9 +111,9 @@ pub fn parameters(table: &mut TableBuilder, parts: &TableFacts) {
             row.start = Some(StartValue::Integer(i32::try_from(load.order).unwrap_or(i32::MAX)));
         }
     }
-    for pair in parts.pairs() {
+    for pair in &parts.pairs {
         if let Some(share) = pair.contact.slave_heat_fraction.filter(|_| parts.has_friction()) {
-            table.belongs(pair.index, parts.of_pair(&pair));
+            table.belongs(pair.index, parts.of_pair(pair));
             let text = "Fraction of the friction heat that flows into the casing; the rest flows into the blades";
             let row = table.parameter(Quantity::HeatToSlave, "casing_heat_fraction", None, share, text);
             (row.min, row.max, row.variability) = (Some(0.0), Some(1.0), Variability::Tunable);
@@ -123,12 +123,12 @@ pub fn parameters(table: &mut TableBuilder, parts: &TableFacts) {
 
 /// Adds heat, wear and casing displacement.
 pub fn outputs(table: &mut TableBuilder, parts: &TableFacts) {
-    let pairs = parts.pairs();
+    let pairs = &parts.pairs;
     for pair in pairs.iter().filter(|_| parts.has_friction()) {
         table.belongs(pair.index, parts.of_pair(pair));
         heat(table, pair);
     }
-    for pair in &pairs {
+    for pair in pairs {
         table.belongs(pair.index, parts.of_pair(pair));
         if let Some(coating) = &pair.contact.coating {
             wear(table, parts, pair, coating);
@@ -138,14 +138,13 @@ pub fn outputs(table: &mut TableBuilder, parts: &TableFacts) {
         table.belongs(pair.index, parts.of_pair(pair));
         casing_forces(table, pair);
     }
-    for carrier in parts.carriers().iter().filter(|_| parts.settings.outputs.support_reaction) {
+    for carrier in parts.carriers.iter().filter(|_| parts.settings.outputs.support_reaction) {
         if carrier.rom.extras.support.is_some() && !carrier.open {
             table.belongs(carrier.index, parts.of_carrier(carrier));
             support(table, carrier);
         }
     }
-    for carrier in parts.carriers().iter().filter(|carrier| parts.settings.outputs.slave_displacement && !carrier.open)
-    {
+    for carrier in parts.carriers.iter().filter(|carrier| parts.settings.outputs.slave_displacement && !carrier.open) {
         table.belongs(carrier.index, parts.of_carrier(carrier));
         let text = "Radial displacement of the contact grid of the casing, ring by ring along z, positive outwards";
         let index = carrier.index;

@@ -27,7 +27,7 @@ pub fn velocity(table: &mut TableBuilder, body: &BodyFacts) {
 
 /// Adds rigid motion and contact nodes.
 pub fn bodies(table: &mut TableBuilder, parts: &TableFacts) {
-    for body in parts.bodies().iter().filter(|body| body.free) {
+    for body in parts.bodies.iter().filter(|body| body.free) {
         table.belongs(body.index, format!("{}.", body.structure.name));
         motion(table, body);
         if !parts.settings.outputs.watched_sectors.is_empty() {

@@ -10,9 +10,11 @@ pub const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// Properties of a scene that the variables depend on.
 pub struct TableFacts<'a> {
-    pub scene: &'a Scene,
     pub settings: &'a SceneSettings,
     pub plan: &'a SteppingOrder,
+    pub bodies: Vec<BodyFacts<'a>>,
+    pub pairs: Vec<PairFacts<'a>>,
+    pub carriers: Vec<CarrierFacts<'a>>,
 }
 
 /// A master.
@@ -46,39 +48,30 @@ pub struct CarrierFacts<'a> {
 }
 
 impl<'a> TableFacts<'a> {
-    pub fn bodies(&self) -> Vec<BodyFacts<'a>> {
+    pub fn new(scene: &'a Scene, plan: &'a SteppingOrder) -> Self {
+        let settings = &scene.settings;
         let body = |index: usize| {
-            let (structure, rom) = self.plan.structure(self.scene, index);
-            BodyFacts { index, structure, rom, free: self.plan.is_free(self.scene, index) }
+            let (structure, rom) = plan.structure(scene, index);
+            BodyFacts { index, structure, rom, free: plan.is_free(scene, index) }
         };
-        (0..self.plan.bodies.len()).map(body).collect()
-    }
-
-    pub fn pairs(&self) -> Vec<PairFacts<'a>> {
-        let bodies = self.bodies();
-        let pair = |(index, plan): (usize, &PairPlan)| PairFacts {
+        let bodies: Vec<BodyFacts> = (0..plan.bodies.len()).map(body).collect();
+        let pair = |(index, pair): (usize, &PairPlan)| PairFacts {
             index,
-            contact: &self.settings.contacts[index],
-            surface: &self.settings.surfaces[plan.surface],
-            body: bodies[plan.body],
-            carrier: plan.carrier,
-            patches: HeatPatches::new(self.scene, self.plan, plan).as_ref().map_or(0, HeatPatches::len),
+            contact: &settings.contacts[index],
+            surface: &settings.surfaces[pair.surface],
+            body: bodies[pair.body],
+            carrier: pair.carrier,
+            patches: HeatPatches::new(scene, plan, pair).as_ref().map_or(0, HeatPatches::len),
         };
-        self.plan.pairs.iter().enumerate().map(pair).collect()
-    }
-
-    pub fn carriers(&self) -> Vec<CarrierFacts<'a>> {
+        let pairs = plan.pairs.iter().enumerate().map(pair).collect();
         let carrier = |(index, structure): (usize, &usize)| CarrierFacts {
             index,
-            structure: &self.settings.structures[*structure],
-            rom: &self.scene.roms[*structure],
-            open: self
-                .plan
-                .pairs
-                .iter()
-                .any(|pair| pair.carrier == Some(index) && self.plan.is_free(self.scene, pair.body)),
+            structure: &settings.structures[*structure],
+            rom: &scene.roms[*structure],
+            open: plan.pairs_on(index).any(|(_, pair)| plan.is_free(scene, pair.body)),
         };
-        self.plan.carriers.iter().enumerate().map(carrier).collect()
+        let carriers = plan.carriers.iter().enumerate().map(carrier).collect();
+        Self { settings, plan, bodies, pairs, carriers }
     }
 
     /// Returns whether there are friction variables; a scene without a friction coefficient has none.

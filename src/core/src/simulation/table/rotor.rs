@@ -52,7 +52,7 @@ fn node_list(body: &BodyFacts) -> String {
 }
 
 pub fn watched(table: &mut TableBuilder, parts: &TableFacts) -> Result<()> {
-    let bodies = parts.bodies();
+    let bodies = &parts.bodies;
     let most = bodies.iter().map(|body| body.rom.sectors).max().unwrap_or(0);
     for sector in &parts.settings.outputs.watched_sectors {
         if *sector == 0 || *sector > most {
@@ -305,7 +305,7 @@ pub fn watched_rows(
 }
 
 pub fn fields(table: &mut TableBuilder, parts: &TableFacts) -> Result<()> {
-    for body in parts.bodies().iter().filter(|body| !body.free) {
+    for body in parts.bodies.iter().filter(|body| !body.free) {
         table.belongs(body.index, parts.of_body(body));
         if parts.settings.outputs.all_sectors {
             all_sectors(table, parts, body);

@@ -22,18 +22,18 @@ impl Galerkin {
         let (mut single, mut coupled) = (Vec::new(), Vec::new());
         for set in 0..system.sets.count() {
             let members = system.sets.members(set);
-            let own = |pair: &&ContactPair| members.contains(&pair.structure());
+            let own = || system.sets.pairs(set).iter().map(|pair| &system.pairs[*pair]);
             let clearance = |pairs: &mut dyn Iterator<Item = &ContactPair>| {
                 tolerance * pairs.map(|pair| pair.gap().clearance()).fold(f64::INFINITY, f64::min)
             };
             let is_disk = |one: &usize| system.structures[*one].modes().coupled().is_some();
-            if members.iter().any(is_disk) || system.pairs.iter().filter(own).any(|pair| pair.carrier().is_some()) {
-                let tolerance = clearance(&mut system.pairs.iter().filter(own));
+            if members.iter().any(is_disk) || own().any(|pair| pair.carrier().is_some()) {
+                let tolerance = clearance(&mut own());
                 coupled.push(SceneIsland::coupled(set, members, system, longest, tolerance));
                 continue;
             }
             for index in members.iter().copied().filter(|index| system.structures[*index].nodes() > 0) {
-                let tolerance = clearance(&mut system.pairs.iter().filter(|pair| pair.structure() == index));
+                let tolerance = clearance(&mut own().filter(|pair| pair.structure() == index));
                 single.extend(SceneIsland::single(set, index, system, longest, tolerance));
             }
         }

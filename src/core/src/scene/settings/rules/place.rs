@@ -125,7 +125,7 @@ impl<'a> ScenePlace<'a> {
 
     /// Returns the ROMs with recovered stress of the masters with a load.
     pub(super) fn stressed(self, is_loaded: fn(&StructureSettings) -> bool) -> impl Iterator<Item = &'a Rom> {
-        let masters = self.contacts().filter(move |at| at.settings.master_of(at.contact()).is_some_and(is_loaded));
+        let masters = self.contacts().filter(move |at| at.master().is_some_and(is_loaded));
         masters.filter_map(|at| at.master_rom()).filter(|rom| rom.extras.stress.is_some())
     }
 
