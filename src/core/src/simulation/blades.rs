@@ -17,7 +17,7 @@ use crate::scene::settings::{InitialSettings, StructureSettings};
 use crate::{Error, Result, Rom};
 
 /// Modal load per kelvin of coupled sectors, on nodal diameter 0; empty if the scene does not heat them.
-pub fn disk_heat(structure: &StructureSettings, rom: &Rom, model: &ModalModel) -> Vec<f64> {
+pub(crate) fn disk_heat(structure: &StructureSettings, rom: &Rom, model: &ModalModel) -> Vec<f64> {
     let Some(load) = whole_load(structure, rom).filter(|_| rom.is_cyclic()) else { return Vec::new() };
     #[expect(clippy::cast_precision_loss, reason = "sector counts are far below 2^52")]
     let all = libm::sqrt(rom.sectors as f64);
@@ -84,7 +84,7 @@ pub fn softened(structure: &StructureSettings, temperature: f64) -> f64 {
 
 impl Compiled {
     /// Fills in the modal loads of blades by growth, and of coupled sectors by heat.
-    pub fn fill_loads(&self, body: usize, speed: f64, temperature: f64, loads: &mut [f64]) {
+    pub(crate) fn fill_loads(&self, body: usize, speed: f64, temperature: f64, loads: &mut [f64]) {
         let parts = &self.bodies[body];
         if parts.centrifugal.is_empty() {
             loads.fill(0.0);
@@ -103,13 +103,13 @@ impl Compiled {
     }
 
     /// Returns whether blades are loaded by growth or heat.
-    pub fn loads_blades(&self, body: usize) -> bool {
+    pub(crate) fn loads_blades(&self, body: usize) -> bool {
         let parts = &self.bodies[body];
         [parts.centrifugal.is_empty(), parts.disk_heat.is_empty(), parts.expansion.is_empty()].contains(&false)
     }
 
     /// Factor on the elastic stiffness of a sector at a temperature (K): the square of its mistuning factor times the softening factor.
-    pub fn stiffness_factor(&self, body: usize, sector: usize, temperature: f64) -> f64 {
+    pub(crate) fn stiffness_factor(&self, body: usize, sector: usize, temperature: f64) -> f64 {
         let structure = self.body(body).0;
         let factor = structure.frequency_factors.get(sector).copied().unwrap_or(1.0);
         factor * factor * softened(structure, temperature)
@@ -164,7 +164,7 @@ impl Compiled {
     ///
     /// # Errors
     /// An invalid list; the error names the field.
-    pub fn check_blades(&self) -> Result<()> {
+    pub(crate) fn check_blades(&self) -> Result<()> {
         for (number, (structure, rom)) in self.scene.settings.structures.iter().zip(&self.scene.roms).enumerate() {
             let (listed, most) = (structure.damping_ratios.len(), rom.order());
             if listed > most {
@@ -199,7 +199,7 @@ impl Compiled {
     ///
     /// # Errors
     /// A temperature out of range; the error names the variable.
-    pub fn check_temperature(&self, body: usize, temperature: f64) -> Result<()> {
+    pub(crate) fn check_temperature(&self, body: usize, temperature: f64) -> Result<()> {
         let structure = self.body(body).0;
         let left = softened(structure, temperature);
         if (SOFTENED[0]..=SOFTENED[1]).contains(&left) {
@@ -220,7 +220,7 @@ impl Compiled {
     }
 
     /// Returns the options of the modes of a master, contact aside.
-    pub fn bank_options(&self, body: usize, excitation: Option<Excitation>) -> BankOptions {
+    pub(crate) fn bank_options(&self, body: usize, excitation: Option<Excitation>) -> BankOptions {
         let ((structure, rom), parts) = (self.body(body), &self.bodies[body]);
         let coupled = structure.spin.stiffening || structure.spin.coriolis;
         let spin = rom.extras.spin.as_ref().filter(|_| coupled);

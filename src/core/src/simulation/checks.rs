@@ -10,9 +10,9 @@ use crate::limits::plausibility::{self, Slip};
 use crate::{Error, Result};
 
 /// Extension of a surface around an axis ([`crate::geometry::surface_spline::REACH`]), and the remedy for a node beyond it.
-pub const OUT_OF_REACH: &str = "a quarter of the axial extent of the surface, the limit of its extrapolation along the \
+pub(crate) const OUT_OF_REACH: &str = "a quarter of the axial extent of the surface, the limit of its extrapolation along the \
                                 tangents";
-pub const OUT_OF_REACH_REMEDY: &str = "Use a casing whose contact grid covers the blade tips over their whole range of \
+pub(crate) const OUT_OF_REACH_REMEDY: &str = "Use a casing whose contact grid covers the blade tips over their whole range of \
                                        motion, or check axial shift, loads and speed";
 
 impl Compiled {
@@ -37,7 +37,7 @@ impl Compiled {
     }
 
     /// Returns the implausible value if tips are too fast at a speed (rad/s). Allocates only in this case.
-    pub fn slip_of_speed(&self, body: usize, speed: f64) -> Option<Slip> {
+    pub(crate) fn slip_of_speed(&self, body: usize, speed: f64) -> Option<Slip> {
         plausibility::of_speed(self.body(body).1, speed, || {
             let structure = if self.bodies.len() > 1 { format!("{}.", self.body(body).0.name) } else { String::new() };
             format!("`{structure}speed`")
@@ -45,7 +45,7 @@ impl Compiled {
     }
 
     /// Rejects tips that are implausibly fast at a speed (rad/s), unless the scene accepts them. Allocates only to reject.
-    pub fn check_tip_speed(&self, body: usize, speed: f64) -> Result<()> {
+    pub(crate) fn check_tip_speed(&self, body: usize, speed: f64) -> Result<()> {
         if self.scene.settings.accept_implausible {
             return Ok(());
         }
@@ -53,7 +53,7 @@ impl Compiled {
     }
 
     /// Warns of patches for friction power in a scene without friction.
-    pub fn idle_patches(&self) -> Option<Warning> {
+    pub(crate) fn idle_patches(&self) -> Option<Warning> {
         let settings = &self.scene.settings;
         let rubs = settings.contacts.iter().any(|contact| contact.friction > 0.0);
         let index = settings.surfaces.iter().position(|surface| surface.patches.is_some() && !rubs)?;
@@ -107,7 +107,7 @@ impl Simulation {
     ///
     /// # Errors
     /// An output that is not a number; the error names it. The state must not be used further.
-    pub fn check_outputs(&self, time: f64) -> Result<()> {
+    pub(crate) fn check_outputs(&self, time: f64) -> Result<()> {
         for variable in self.state.values.table().variables().iter().filter(|row| row.causality == Causality::Output) {
             let start = variable.reference as usize;
             let values = &self.state.values[start..start + variable.len()];

@@ -8,7 +8,7 @@ use crate::{Error, Result};
 /// Allowed difference between communication points and the simulation's own time as a fraction of H (rounding in the importer).
 const TIME_TOLERANCE: f64 = 1e-3;
 /// Step sizes within this fraction of each other are the same step (1/60 computed in several ways).
-pub const SAME_STEP: f64 = 1e-9;
+pub(crate) const SAME_STEP: f64 = 1e-9;
 /// Rounding errors of a time that may be in the difference of two times, in units of its last place.
 const TIME_ROUNDINGS: f64 = 4.0;
 /// Largest number of internal steps of one communication step.
@@ -16,13 +16,13 @@ const MOST_STEPS: f64 = 1e9;
 
 /// Tolerance for equal internal steps of a communication step of length `length` (s) at `time` (s): a length is not known better than
 /// rounding of the times.
-pub fn same_step(time: f64, length: f64) -> f64 {
+pub(crate) fn same_step(time: f64, length: f64) -> f64 {
     SAME_STEP.max(TIME_ROUNDINGS * f64::EPSILON * time.abs() / length)
 }
 
 /// Phase in the life cycle of the simulation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum SimulationPhase {
+pub(crate) enum SimulationPhase {
     /// Values can be set; nothing has been computed.
     #[default]
     Created,
@@ -122,7 +122,7 @@ impl Clock {
         Self { time: start, initial_time: start, step, ..Self::default() }
     }
 
-    pub fn is_created(&self) -> bool {
+    pub(crate) fn is_created(&self) -> bool {
         self.phase == SimulationPhase::Created
     }
 
@@ -131,7 +131,7 @@ impl Clock {
     }
 
     /// Offset of the internal point reached from the last communication point (s).
-    pub fn offset_now(&self) -> f64 {
+    pub(crate) fn offset_now(&self) -> f64 {
         if self.is_stepping() { self.step.offset(self.step.done) } else { 0.0 }
     }
 
@@ -149,7 +149,7 @@ impl Clock {
     }
 
     /// Rejects a communication step in the wrong phase.
-    pub fn check_ready(&self) -> Result<()> {
+    pub(crate) fn check_ready(&self) -> Result<()> {
         let (problem, remedy) = match self.phase {
             SimulationPhase::Ready => return Ok(()),
             SimulationPhase::Failed => {
@@ -208,7 +208,7 @@ impl Clock {
     }
 
     /// Returns whether restored times, counts and the internal step (s) are consistent; internal steps have up to `largest` (s).
-    pub fn is_consistent(&self, internal_step: f64, largest: f64) -> bool {
+    pub(crate) fn is_consistent(&self, internal_step: f64, largest: f64) -> bool {
         let Communication { start, length, count, done, .. } = self.step;
         #[expect(clippy::cast_precision_loss, reason = "checked to be at most 2^53")]
         let number = count as f64;

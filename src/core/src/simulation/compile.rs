@@ -31,11 +31,11 @@ use super::slave_surface::{CarrierModes, Lining, Share, spline_gap};
 use super::table;
 
 /// Largest number of contact nodes of all sectors that a flexible slave or the disk may couple: their Delassus matrix is dense.
-pub const MOST_COUPLED: usize = 2000;
+pub(crate) const MOST_COUPLED: usize = 2000;
 
 /// Indices of the values that the step reads.
 #[derive(Debug, Clone)]
-pub struct ValuePlaces {
+pub(crate) struct ValuePlaces {
     pub step_max: usize,
     pub input_interpolation: Option<usize>,
     /// Ramp time of each pair whose shape grows from zero.
@@ -65,7 +65,7 @@ pub fn complementary(settings: &SceneSettings) -> Solver {
 
 /// A master: a structure with contact nodes.
 #[derive(Debug, Clone)]
-pub struct CompiledBody {
+pub(crate) struct CompiledBody {
     /// Modes, at the reference speed if spin stiffens the structure; for coupled sectors those of nodal diameter 0.
     pub model: ModalModel,
     /// Modes of coupled sectors.
@@ -98,7 +98,7 @@ pub struct CompiledBody {
 
 /// A structure that carries surfaces.
 #[derive(Debug, Clone)]
-pub struct CarrierParts {
+pub(crate) struct CarrierParts {
     /// Index in the scene.
     pub structure: usize,
     /// Modes, observed at the contact grid.
@@ -259,18 +259,18 @@ impl Compiled {
     }
 
     /// Returns the name of a contact node, with the name of its structure if there are several masters.
-    pub fn node_name(&self, body: usize, node: usize) -> String {
+    pub(crate) fn node_name(&self, body: usize, node: usize) -> String {
         let prefix = self.plan.body_prefix(&self.scene, body);
         format!("{prefix}{}", self.body(body).1.contact_nodes[node].name)
     }
 
     /// Returns the name of the rotating structure for messages: "the rotor", or its name if there are several masters.
-    pub fn rotor_name(&self, body: usize) -> String {
+    pub(crate) fn rotor_name(&self, body: usize) -> String {
         if self.bodies.len() > 1 { self.body(body).0.name.clone() } else { "the rotor".to_owned() }
     }
 
     /// Returns the name of a structure of the system.
-    pub fn structure_name(&self, structure: usize) -> &str {
+    pub(crate) fn structure_name(&self, structure: usize) -> &str {
         match structure.checked_sub(self.bodies.len()) {
             Some(carrier) => &self.carrier(carrier).0.name,
             None => &self.body(structure).0.name,
@@ -279,7 +279,7 @@ impl Compiled {
 
     /// Returns the name of a surface carrier of the system for messages: "casing", or its name if there are several or if it is near a
     /// free body.
-    pub fn carrier_name(&self, structure: usize) -> &str {
+    pub(crate) fn carrier_name(&self, structure: usize) -> &str {
         let is_casing = self.carriers.len() == 1 && self.bodies.iter().all(|body| body.translations.is_none());
         match structure.checked_sub(self.bodies.len()) {
             Some(carrier) if !is_casing => &self.carrier(carrier).0.name,
@@ -304,7 +304,7 @@ impl Compiled {
     ///
     /// # Errors
     /// Speed or temperature at which the stiffness is lost, or outside the range for which the ROM was fitted.
-    pub fn set_reference_speed(&mut self, body: usize, [speed, temperature]: [f64; 2]) -> Result<()> {
+    pub(crate) fn set_reference_speed(&mut self, body: usize, [speed, temperature]: [f64; 2]) -> Result<()> {
         self.check_speed(body, speed)?;
         self.check_temperature(body, temperature)?;
         let (structure, rom) = self.plan.structure(&self.scene, body);
@@ -358,7 +358,7 @@ impl Compiled {
     ///
     /// # Errors
     /// Number that the contact grid does not resolve.
-    pub fn set_load_order(&mut self, carrier: usize, order: f64) -> Result<()> {
+    pub(crate) fn set_load_order(&mut self, carrier: usize, order: f64) -> Result<()> {
         let (structure, rom) = self.carrier(carrier);
         // Half the number of nodes would have a single phase and count twice; larger numbers are aliases of smaller ones.
         let most = u32::try_from(rom.extras.grid.map_or(0, |grid| (grid.around - 1) / 2)).unwrap_or(u32::MAX);
@@ -445,7 +445,7 @@ impl Compiled {
     }
 
     /// Adds the contact and the surface of a pair, with their numbers, to an error.
-    pub fn of_pair(&self, pair: usize, error: Error) -> Error {
+    pub(crate) fn of_pair(&self, pair: usize, error: Error) -> Error {
         let surface = self.plan.pairs[pair].surface + 1;
         error.placed("contact", &format!("contact[{}]", pair + 1)).placed("surface", &format!("surface[{surface}]"))
     }
@@ -541,7 +541,7 @@ impl Compiled {
     }
 
     /// Returns the modes of a carrier at the control points of one surface; `None` for a surface without control points.
-    pub fn control_modes_of(&self, carrier: usize, gap: &GapLaw) -> Option<ModalModel> {
+    pub(crate) fn control_modes_of(&self, carrier: usize, gap: &GapLaw) -> Option<ModalModel> {
         let first = if let GapLaw::Spline(gap) = gap { gap.first_node } else { 0 };
         let modes = CarrierModes { rom: self.carrier(carrier).1, model: &self.carriers[carrier].model };
         Some(modes.at_control_points(gap.spline()?, first))

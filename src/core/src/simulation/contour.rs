@@ -34,7 +34,7 @@ struct AxialStation {
 ///
 /// # Errors
 /// [`Error::Invalid`] with the ROM, two nodes, their slopes and the slope between their positions.
-pub fn check_contour(rom: &Rom, nodes: &[usize], uses_slopes: bool) -> Result<()> {
+pub(crate) fn check_contour(rom: &Rom, nodes: &[usize], uses_slopes: bool) -> Result<()> {
     let straight = nodes.iter().all(|node| rom.contact_nodes[*node].meridional_slope == 0.0);
     if straight && !uses_slopes {
         return Ok(());

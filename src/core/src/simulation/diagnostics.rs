@@ -7,7 +7,7 @@ use crate::scene::settings::SceneSettings;
 
 /// Warnings of a run, and the limits for its parameters. They follow from the saved state.
 #[derive(Debug, Clone)]
-pub struct Diagnostics {
+pub(crate) struct Diagnostics {
     /// Warnings since the start.
     pub warnings: Vec<Warning>,
     /// Warnings since [`tiprub_cosim::CoSimulation::take_notes`].
@@ -42,7 +42,7 @@ impl Diagnostics {
     }
 
     /// Returns whether the system was prepared for the parameters that its tables depend on.
-    pub fn is_prepared(&self, parameters: &Parameters) -> bool {
+    pub(crate) fn is_prepared(&self, parameters: &Parameters) -> bool {
         let deciding = |from: &Parameters| {
             let numbers = [from.step, from.tolerance].map(f64::to_bits);
             (numbers, from.scheme, from.solver, from.damping_ratios.clone(), from.mode_damping.clone())

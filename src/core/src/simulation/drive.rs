@@ -33,7 +33,7 @@ impl Input {
     }
 
     /// Requests a derivative from `offset` on.
-    pub fn ask_slope(&mut self, slope: f64, offset: f64) {
+    pub(crate) fn ask_slope(&mut self, slope: f64, offset: f64) {
         (self.value, self.slope, self.since) = (self.requested_value(offset), slope, offset);
     }
 
@@ -43,7 +43,7 @@ impl Input {
     }
 
     /// Requested value at `offset`.
-    pub fn requested_value(&self, offset: f64) -> f64 {
+    pub(crate) fn requested_value(&self, offset: f64) -> f64 {
         if self.slope == 0.0 { self.value } else { self.value + self.slope * (offset - self.since) }
     }
 
@@ -54,7 +54,7 @@ impl Input {
     }
 
     /// Ramps from the value reached at `offset` to the requested value at `until`.
-    pub fn aim(&mut self, offset: f64, until: f64) {
+    pub(crate) fn aim(&mut self, offset: f64, until: f64) {
         let (reached, end) = (self.at(offset), self.requested_value(until));
         (self.reached, self.from) = (reached, offset);
         (self.end, self.until) = (end, until);
@@ -130,7 +130,7 @@ impl RotorAngle {
     }
 
     /// Makes `offset` the new origin of integration (before the speed changes).
-    pub fn rebase(&mut self, speed: &Input, offset: f64) {
+    pub(crate) fn rebase(&mut self, speed: &Input, offset: f64) {
         self.angle = self.phase(speed, offset);
         self.since = offset;
         self.wrap();

@@ -15,7 +15,7 @@ const QUICKER: f64 = 2.0;
 
 /// Prescribed inputs of a rotor.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct RotorInputs {
+pub(crate) struct RotorInputs {
     /// Speed of the rotor: a new value acts immediately, so that its integral is the angle that the importer expects.
     pub speed: Input,
     /// Speed that growth and stiffening follow (rad/s): the rotor speed without its jumps.
@@ -32,7 +32,7 @@ pub struct RotorInputs {
 
 /// Prescribed inputs of a surface.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct PairInputs {
+pub(crate) struct PairInputs {
     pub gap_offset: Input,
     pub shape_factor: Input,
     pub shape_rotation: Input,
@@ -41,7 +41,7 @@ pub struct PairInputs {
 
 /// Loads of a surface carrier.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct CarrierInputs {
+pub(crate) struct CarrierInputs {
     pub load_amplitude: Input,
     pub load_phase: Input,
     /// One per patch.
@@ -88,17 +88,17 @@ impl RotorInputs {
     }
 
     /// Acting temperature at an offset (K).
-    pub fn temperature_at(&self, offset: f64) -> f64 {
+    pub(crate) fn temperature_at(&self, offset: f64) -> f64 {
         self.temperature.first().map_or(0.0, |input| input.at(offset))
     }
 
     /// Total rotor angle at an offset (rad).
-    pub fn total_angle(&self, offset: f64) -> f64 {
+    pub(crate) fn total_angle(&self, offset: f64) -> f64 {
         self.angle.total(&self.speed, offset)
     }
 
     /// From `offset` on, ramps growth and stiffening to the speed at `until`.
-    pub fn lead_spin(&mut self, offset: f64, until: f64, hold: bool) {
+    pub(crate) fn lead_spin(&mut self, offset: f64, until: f64, hold: bool) {
         self.spin.follow(&self.speed);
         if hold { self.spin.take() } else { self.spin.aim(offset, until) }
     }
@@ -194,7 +194,7 @@ impl Inputs {
     /// Returns the duration of ramps that begin with a step of length `length` (s): the length of the step. A change that accumulated over
     /// a step more than twice as long is not applied within this one, where it would act as an impact. A step of a nanosecond after one of
     /// ten microseconds continues with the current rate of change; the remaining delay shrinks by half of the time that passes.
-    pub fn extrapolation_time(&self, length: f64) -> f64 {
+    pub(crate) fn extrapolation_time(&self, length: f64) -> f64 {
         if self.extrapolation <= QUICKER * length { length } else { self.extrapolation }
     }
 

@@ -48,7 +48,7 @@ pub struct Parameters {
 
 impl Parameters {
     /// Largest friction coefficient of a structure.
-    pub fn friction_of(&self, compiled: &Compiled, body: usize) -> f64 {
+    pub(crate) fn friction_of(&self, compiled: &Compiled, body: usize) -> f64 {
         compiled.plan.pairs_of(body).map(|(pair, _)| self.friction[pair]).fold(0.0, f64::max)
     }
 }

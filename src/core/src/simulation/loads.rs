@@ -21,7 +21,7 @@ pub fn centrifugal(structure: &StructureSettings, rom: &Rom, model: &ModalModel)
 }
 
 /// Fills in the modal loads by growth at speed Ω (rad/s).
-pub fn fill_centrifugal(centrifugal: &[[f64; 2]], speed: f64, loads: &mut [f64]) {
+pub(crate) fn fill_centrifugal(centrifugal: &[[f64; 2]], speed: f64, loads: &mut [f64]) {
     let square = speed * speed;
     for (load, [second, fourth]) in loads.iter_mut().zip(centrifugal) {
         *load = square * (second + square * fourth);
@@ -30,7 +30,7 @@ pub fn fill_centrifugal(centrifugal: &[[f64; 2]], speed: f64, loads: &mut [f64])
 
 /// Modal load vectors of a surface carrier, per unit of the driving input; empty if the scene has no such load.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct CarrierLoads {
+pub(crate) struct CarrierLoads {
     /// Per kelvin of each patch.
     pub thermal: Vec<Vec<f64>>,
     /// Nodal-diameter load at phase 0 and a quarter period later, per unit amplitude.
@@ -49,7 +49,7 @@ impl CarrierLoads {
     }
 
     /// Returns whether there are any loads.
-    pub fn are_there(&self) -> bool {
+    pub(crate) fn are_there(&self) -> bool {
         !self.thermal.is_empty() || self.nodal.is_some()
     }
 

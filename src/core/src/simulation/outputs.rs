@@ -23,7 +23,7 @@ type Fill = dyn Fn(&OutputView, &mut [f64]) + Send + Sync;
 
 /// Function that fills the elements of an output.
 #[derive(Clone)]
-pub struct OutputReader(Arc<Fill>);
+pub(crate) struct OutputReader(Arc<Fill>);
 
 impl fmt::Debug for OutputReader {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -44,7 +44,7 @@ pub fn each(read: impl Fn(&OutputView, usize) -> f64 + Send + Sync + 'static) ->
 }
 
 /// Makes the reader of a whole array.
-pub fn array_reader(read: impl Fn(&OutputView, &mut [f64]) + Send + Sync + 'static) -> OutputReader {
+pub(crate) fn array_reader(read: impl Fn(&OutputView, &mut [f64]) + Send + Sync + 'static) -> OutputReader {
     OutputReader(Arc::new(read))
 }
 
@@ -62,7 +62,7 @@ pub struct Outputs {
 
 /// Energies of structures that influence each other (J).
 #[derive(Debug, Clone, Copy, Default)]
-pub struct SetEnergy {
+pub(crate) struct SetEnergy {
     /// Instantaneous kinetic plus strain energy.
     pub now: f64,
     /// Energy that the scheme conserves.
@@ -85,7 +85,7 @@ impl Outputs {
 }
 
 /// Data that outputs are read from, for all outputs at one instant.
-pub struct OutputView<'a> {
+pub(crate) struct OutputView<'a> {
     simulation: &'a Simulation,
     pub system: &'a System,
     pub window: &'a StepWindow,
@@ -152,7 +152,7 @@ impl OutputView<'_> {
     }
 
     /// Fraction of the friction heat of a pair that flows into the surface carrier; 1 if the scene does not specify it.
-    pub fn slave_share(&self, pair: usize) -> f64 {
+    pub(crate) fn slave_share(&self, pair: usize) -> f64 {
         self.simulation.outputs.slave_shares[pair]
     }
 
@@ -161,7 +161,7 @@ impl OutputView<'_> {
     }
 
     /// Returns the largest relative residual of any set of structures that influence each other.
-    pub fn relative_residual(&self) -> f64 {
+    pub(crate) fn relative_residual(&self) -> f64 {
         let ledgers = self.system.ledgers().iter().zip(&self.simulation.outputs.energies);
         let relative = ledgers.map(|(ledger, energy)| match ledger.scale() {
             scale if scale > 0.0 => ledger.residual(energy.conserved) / scale,
@@ -193,7 +193,7 @@ impl OutputView<'_> {
 
     /// Returns the largest number of internal steps tried within one communication step.
     #[expect(clippy::cast_precision_loss, reason = "counts are below 2^52")]
-    pub fn most_tried(&self) -> f64 {
+    pub(crate) fn most_tried(&self) -> f64 {
         self.simulation.state.clock.most_tried as f64
     }
 
@@ -223,18 +223,18 @@ impl OutputView<'_> {
     }
 
     /// Smallest clearance of a node over all sectors within the communication step (m).
-    pub fn lowest_of_node(&self, body: usize, node: usize) -> f64 {
+    pub(crate) fn lowest_of_node(&self, body: usize, node: usize) -> f64 {
         let modes = self.modes(body);
         smallest(self.window.bodies[body].lowest[node * modes.lanes()..][..modes.sectors()].iter())
     }
 
     /// Smallest clearance of a sector over all nodes within the communication step (m).
-    pub fn lowest_of_sector(&self, body: usize, sector: usize) -> f64 {
+    pub(crate) fn lowest_of_sector(&self, body: usize, sector: usize) -> f64 {
         smallest(self.of_sector(body, &self.window.bodies[body].lowest, sector))
     }
 
     /// Smallest clearance of one node of one sector within the communication step (m).
-    pub fn lowest_at(&self, body: usize, node: usize, sector: usize) -> f64 {
+    pub(crate) fn lowest_at(&self, body: usize, node: usize, sector: usize) -> f64 {
         self.window.bodies[body].lowest[self.index(body, node, sector)].min(NO_CLEARANCE)
     }
 
@@ -257,16 +257,16 @@ impl OutputView<'_> {
     }
 
     /// Returns the normal impulse of all nodes of all structures.
-    pub fn whole_normal_impulse(&self) -> f64 {
+    pub(crate) fn whole_normal_impulse(&self) -> f64 {
         self.window.bodies.iter().flat_map(|body| &body.normal_impulse).sum()
     }
 
-    pub fn tangential_impulse(&self, body: usize, node: usize, sector: usize) -> f64 {
+    pub(crate) fn tangential_impulse(&self, body: usize, node: usize, sector: usize) -> f64 {
         self.window.bodies[body].tangential_impulse[self.index(body, node, sector)]
     }
 
     /// Friction force of the last internal step (N).
-    pub fn tangential_now(&self, body: usize, node: usize, sector: usize) -> f64 {
+    pub(crate) fn tangential_now(&self, body: usize, node: usize, sector: usize) -> f64 {
         let sought = (body, sector, node);
         let event = self.system.events().iter().find(|event| (event.structure, event.sector, event.node) == sought);
         event.map_or(0.0, |event| event.tangential)
@@ -320,7 +320,7 @@ impl OutputView<'_> {
     }
 
     /// Displacement of a watched point of a sector along an axis of its frame (m).
-    pub fn watched_displacement(&self, body: usize, sector: usize, point: usize, axis: usize) -> f64 {
+    pub(crate) fn watched_displacement(&self, body: usize, sector: usize, point: usize, axis: usize) -> f64 {
         self.simulation.watched_row(body, 3 * point + axis, sector)
     }
 

@@ -8,7 +8,7 @@ use crate::scene::settings::PatchSettings;
 
 /// Patches for which heat is counted.
 #[derive(Debug, Clone, PartialEq)]
-pub enum HeatPatches {
+pub(crate) enum HeatPatches {
     /// Equal parts of the circumference and of an axial extent (m).
     Equal {
         /// Number of parts.

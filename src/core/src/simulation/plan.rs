@@ -6,7 +6,7 @@ use crate::{Error, Result, Rom, Scene};
 
 /// A contact pair of a scene.
 #[derive(Debug, Clone, PartialEq)]
-pub struct PairPlan {
+pub(crate) struct PairPlan {
     /// Surface.
     pub surface: usize,
     /// Master: index in [`SteppingOrder::bodies`].
@@ -21,7 +21,7 @@ pub struct PairPlan {
 
 /// Structures in the order in which they are stepped, and the pairs between them.
 #[derive(Debug, Clone, PartialEq)]
-pub struct SteppingOrder {
+pub(crate) struct SteppingOrder {
     /// Masters, in the order of the scene.
     pub bodies: Vec<usize>,
     /// Surface carriers that deform, in the order of the pairs.
@@ -87,12 +87,12 @@ impl SteppingOrder {
     }
 
     /// Returns the pairs of a master.
-    pub fn pairs_of(&self, body: usize) -> impl Iterator<Item = (usize, &PairPlan)> {
+    pub(crate) fn pairs_of(&self, body: usize) -> impl Iterator<Item = (usize, &PairPlan)> {
         self.of_bodies[body].iter().map(|pair| (*pair, &self.pairs[*pair]))
     }
 
     /// Returns the pairs whose surface a carrier deforms.
-    pub fn pairs_on(&self, carrier: usize) -> impl Iterator<Item = (usize, &PairPlan)> {
+    pub(crate) fn pairs_on(&self, carrier: usize) -> impl Iterator<Item = (usize, &PairPlan)> {
         self.of_carriers[carrier].iter().map(|pair| (*pair, &self.pairs[*pair]))
     }
 
@@ -102,12 +102,12 @@ impl SteppingOrder {
     }
 
     /// Returns the prefix of names that belong to the structure of a body.
-    pub fn body_prefix(&self, scene: &Scene, body: usize) -> String {
+    pub(crate) fn body_prefix(&self, scene: &Scene, body: usize) -> String {
         prefix(self.bodies.len(), &self.structure(scene, body).0.name)
     }
 
     /// Returns the prefix of names that belong to a pair: the name of its surface.
-    pub fn pair_prefix(&self, settings: &SceneSettings, pair: usize) -> String {
+    pub(crate) fn pair_prefix(&self, settings: &SceneSettings, pair: usize) -> String {
         prefix(self.pairs.len(), &self.surface(settings, pair).name)
     }
 

@@ -31,7 +31,7 @@ struct DataGrid {
 
 /// A surface carrier.
 #[derive(Debug, Clone, Copy)]
-pub struct CarrierModes<'a> {
+pub(crate) struct CarrierModes<'a> {
     /// ROM of the structure.
     pub rom: &'a Rom,
     /// Modes, observed at the contact grid.
@@ -43,7 +43,7 @@ pub struct CarrierModes<'a> {
 ///
 /// # Errors
 /// Structure without contact grid; contact nodes beyond the grid or far from it; too few points.
-pub fn spline_gap(
+pub(crate) fn spline_gap(
     (master, nodes): (&Rom, &[usize]),
     layout: Layout,
     contact: &ContactSettings,
@@ -77,7 +77,7 @@ pub fn spline_gap(
 impl CarrierModes<'_> {
     /// Returns the modes, observed at the control points of a surface along x, y, z; data points of the surface are nodes of the contact
     /// grid from `first` on.
-    pub fn at_control_points(&self, surface: &SurfaceSpline, first: usize) -> ModalModel {
+    pub(crate) fn at_control_points(&self, surface: &SurfaceSpline, first: usize) -> ModalModel {
         let nodes = surface.control_points().len();
         let mut model = self.model.clone();
         model.contact_modes = DMatrix::zeros(3 * nodes, model.len());
@@ -173,7 +173,7 @@ fn data(grid: &DataGrid, radius: impl Fn(f64, f64) -> f64) -> Vec<[f64; 3]> {
 /// Rings of a contact grid that carries a surface of another radius, such as the inner lining of a casing that the mesh omits. The lining
 /// transfers forces as a rigid body, so that the support feels them with the lever arm of the surface.
 #[derive(Debug, Clone)]
-pub struct Lining {
+pub(crate) struct Lining {
     /// Index among the surface carriers.
     pub carrier: usize,
     /// Axial position, and radius of the surface minus that of the mesh, ascending along z (m).

@@ -21,7 +21,7 @@ const LARGEST: f64 = 1e50;
 
 /// Everything beside the system that a run continues from.
 #[derive(Debug, Clone)]
-pub struct SimulationState {
+pub(crate) struct SimulationState {
     pub inputs: Inputs,
     pub clock: Clock,
     /// All variables with their current values.

@@ -159,7 +159,7 @@ fn friction(table: &mut TableBuilder, parts: &TableFacts) {
 }
 
 /// Returns whether all pairs of a scene have the same friction coefficient.
-pub fn has_one_friction(settings: &SceneSettings) -> bool {
+pub(crate) fn has_one_friction(settings: &SceneSettings) -> bool {
     let first = settings.contacts[0].friction.to_bits();
     settings.contacts.iter().all(|contact| contact.friction.to_bits() == first)
 }

@@ -3,14 +3,14 @@
 use tiprub_cosim::variables::{Enumeration, VariableUnit};
 
 /// rad/s.
-pub static ANGULAR_SPEED: VariableUnit = VariableUnit {
+pub(crate) static ANGULAR_SPEED: VariableUnit = VariableUnit {
     name: "rad/s",
     quantity: "AngularVelocity",
     exponents: [0, 0, -1, 1, 0],
     display: &[("rpm", 9.549_296_585_513_72)],
 };
 /// rad.
-pub static ANGLE: VariableUnit = VariableUnit {
+pub(crate) static ANGLE: VariableUnit = VariableUnit {
     name: "rad",
     quantity: "Angle",
     exponents: [0, 0, 0, 1, 0],
@@ -20,7 +20,7 @@ pub static ANGLE: VariableUnit = VariableUnit {
 pub static LENGTH: VariableUnit =
     VariableUnit { name: "m", quantity: "Length", exponents: [0, 1, 0, 0, 0], display: &[("mm", 1e3), ("um", 1e6)] };
 /// m/s.
-pub static LINEAR_SPEED: VariableUnit =
+pub(crate) static LINEAR_SPEED: VariableUnit =
     VariableUnit { name: "m/s", quantity: "Velocity", exponents: [0, 1, -1, 0, 0], display: &[] };
 /// s.
 pub static TIME: VariableUnit =
@@ -35,19 +35,19 @@ pub static STRESS: VariableUnit =
 pub static FORCE: VariableUnit =
     VariableUnit { name: "N", quantity: "Force", exponents: [1, 1, -2, 0, 0], display: &[("kN", 1e-3)] };
 /// N.m.
-pub static TORQUE: VariableUnit =
+pub(crate) static TORQUE: VariableUnit =
     VariableUnit { name: "N.m", quantity: "Torque", exponents: [1, 2, -2, 0, 0], display: &[("kN.m", 1e-3)] };
 /// N.s.
-pub static IMPULSE: VariableUnit =
+pub(crate) static IMPULSE: VariableUnit =
     VariableUnit { name: "N.s", quantity: "Impulse", exponents: [1, 1, -1, 0, 0], display: &[("mN.s", 1e3)] };
 /// W.
-pub static POWER: VariableUnit =
+pub(crate) static POWER: VariableUnit =
     VariableUnit { name: "W", quantity: "Power", exponents: [1, 2, -3, 0, 0], display: &[("kW", 1e-3)] };
 /// J.
 pub static ENERGY: VariableUnit =
     VariableUnit { name: "J", quantity: "Energy", exponents: [1, 2, -2, 0, 0], display: &[("mJ", 1e3)] };
 
-pub static INPUT_INTERPOLATIONS: Enumeration = Enumeration {
+pub(crate) static INPUT_INTERPOLATIONS: Enumeration = Enumeration {
     name: "InputInterpolation",
     description: "Interpolation of inputs between communication points",
     items: &[
@@ -57,7 +57,7 @@ pub static INPUT_INTERPOLATIONS: Enumeration = Enumeration {
 };
 
 /// Items of `step_derivatives`.
-pub static STEP_DERIVATIVES: Enumeration = Enumeration {
+pub(crate) static STEP_DERIVATIVES: Enumeration = Enumeration {
     name: "StepDerivatives",
     description: "Result of the functions for directional derivatives",
     items: &[
@@ -73,12 +73,12 @@ pub static STEP_DERIVATIVES: Enumeration = Enumeration {
 pub static TEMPERATURE: VariableUnit =
     VariableUnit { name: "K", quantity: "TemperatureDifference", exponents: [0, 0, 0, 0, 1], display: &[] };
 /// N/m.
-pub static LINE_LOAD: VariableUnit = VariableUnit {
+pub(crate) static LINE_LOAD: VariableUnit = VariableUnit {
     name: "N/m",
     quantity: "LinearForceDensity",
     exponents: [1, 0, -2, 0, 0],
     display: &[("kN/m", 1e-3)],
 };
 /// m³.
-pub static VOLUME: VariableUnit =
+pub(crate) static VOLUME: VariableUnit =
     VariableUnit { name: "m3", quantity: "Volume", exponents: [0, 3, 0, 0, 0], display: &[("mm3", 1e9)] };

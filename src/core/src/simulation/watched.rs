@@ -35,7 +35,7 @@ struct WatchedPair {
 
 /// Clearances of the watched points of all structures in the watched sectors.
 #[derive(Debug, Clone, Default)]
-pub struct WatchedGaps {
+pub(crate) struct WatchedGaps {
     facing: Vec<WatchedPair>,
     /// Watched sectors (0-based).
     sectors: Vec<usize>,

@@ -11,7 +11,7 @@ use crate::system::{Structure, System};
 
 /// Sums and extremes of a master since the communication step began, `[node · lanes + lane]`.
 #[derive(Debug, Clone, PartialEq)]
-pub struct BodyWindow {
+pub(crate) struct BodyWindow {
     /// Smallest gap of every node (m).
     pub lowest: Vec<f64>,
     /// ∫λ dt per node (N·s).
@@ -26,7 +26,7 @@ pub struct BodyWindow {
 
 /// Sums and extremes of a contact pair.
 #[derive(Debug, Clone, PartialEq)]
-pub struct PairWindow {
+pub(crate) struct PairWindow {
     /// ∫F dt on the master, along x, y, z (N·s).
     pub force_impulse: Vector3,
     /// ∫M dt (N·m·s), about the same point as for the structure.
@@ -41,7 +41,7 @@ pub struct PairWindow {
 
 /// Sums of a surface carrier, per mode.
 #[derive(Debug, Clone, PartialEq)]
-pub struct SupportWindow {
+pub(crate) struct SupportWindow {
     /// ∫q dt.
     pub moved: Vec<f64>,
     /// Velocity when the communication step began.
@@ -52,7 +52,7 @@ pub struct SupportWindow {
 
 /// Sums and extremes since the communication step began.
 #[derive(Debug, Clone, PartialEq)]
-pub struct StepWindow {
+pub(crate) struct StepWindow {
     /// Windows of the masters.
     pub bodies: Vec<BodyWindow>,
     /// Windows of the pairs.
@@ -178,13 +178,13 @@ impl StepWindow {
     }
 
     /// Smallest gaps of all structures, one after the other.
-    pub fn all_lowest(&self) -> Vec<f64> {
+    pub(crate) fn all_lowest(&self) -> Vec<f64> {
         self.bodies.iter().flat_map(|body| &body.lowest).copied().collect()
     }
 }
 
 /// Velocity of a mode of a surface carrier.
-pub fn speed_of(structure: &Structure, mode: usize) -> f64 {
+pub(crate) fn speed_of(structure: &Structure, mode: usize) -> f64 {
     let step = structure.modes().step();
     if step > 0.0 { structure.modes().modal_state(mode, 0).1 / step } else { 0.0 }
 }

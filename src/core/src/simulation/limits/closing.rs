@@ -14,7 +14,7 @@ const A_WHILE: f64 = 1.0;
 
 /// Bounds on the time that a contact of one structure stays closed.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Closing {
+pub(crate) struct Closing {
     /// Widest angle over which the undeformed structure is inside a shape at rest (rad); infinite if inputs, loads or a flexible surface
     /// may hold contact for long.
     arc: f64,
@@ -26,7 +26,7 @@ pub struct Closing {
 
 impl Closing {
     /// Returns the duration for free bodies.
-    pub fn of_run(compiled: &Compiled) -> Self {
+    pub(crate) fn of_run(compiled: &Compiled) -> Self {
         let experiment = &compiled.scene.settings.experiment;
         Self { arc: f64::INFINITY, after: 0.0, run: (experiment.stop - experiment.start).max(A_WHILE) }
     }

@@ -67,7 +67,7 @@ impl Sense {
     }
 
     /// Returns the warnings after a reversal, when the expected step may be rejected only later.
-    pub fn warnings_after_reversal(&self, closed: f64) -> Vec<WarningKind> {
+    pub(crate) fn warnings_after_reversal(&self, closed: f64) -> Vec<WarningKind> {
         match self.rejected(self.expected, closed) {
             Some(growth) => vec![WarningKind::ReversedGrowth(growth)],
             None => self.warnings(closed).unwrap_or_default(),

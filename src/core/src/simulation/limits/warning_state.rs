@@ -14,7 +14,7 @@ const MATERIAL: f64 = 1.5;
 
 /// Warnings reported since the start.
 #[derive(Debug, Clone)]
-pub struct WarningState {
+pub(crate) struct WarningState {
     /// Topic, part of the scene, and magnitude: the length of a step (s), an angle (rad) or a fraction.
     reported: BTreeMap<(Topic, Subject), f64>,
     /// Speed above which the tips of each master are implausibly fast (rad/s); infinite once it was reported.

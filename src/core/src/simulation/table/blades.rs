@@ -60,7 +60,7 @@ pub fn parameters(table: &mut TableBuilder, body: &BodyFacts) {
 }
 
 /// Adds the damping ratios of the first modes.
-pub fn mode_damping(
+pub(crate) fn mode_damping(
     table: &mut TableBuilder,
     quantity: Quantity,
     name: &str,

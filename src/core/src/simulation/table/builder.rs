@@ -15,14 +15,14 @@ use crate::simulation::outputs::OutputReader;
 use crate::simulation::units::{ANGLE, INPUT_INTERPOLATIONS, STEP_DERIVATIVES, TIME};
 
 /// Description of inputs that would cause an impact if they jumped.
-pub const RAMPED: &str = "; reached at the end of the communication step (see input_interpolation)";
+pub(crate) const RAMPED: &str = "; reached at the end of the communication step (see input_interpolation)";
 /// Description of angle inputs that would cause an impact if they jumped.
 const RAMPED_ANGLE: &str =
     "; reached at the end of the communication step (see input_interpolation), so do not wrap it to one turn";
 
 /// Collects rows and assigns references.
 #[derive(Default)]
-pub struct TableBuilder {
+pub(crate) struct TableBuilder {
     variables: Vec<Variable>,
     /// Readers of the outputs, in the order of the outputs.
     readers: Vec<OutputReader>,
@@ -39,7 +39,7 @@ impl TableBuilder {
     }
 
     /// Assigns the following rows to the whole scene.
-    pub fn belongs_to_all(&mut self) {
+    pub(crate) fn belongs_to_all(&mut self) {
         self.belongs(0, String::new());
     }
 
@@ -98,7 +98,7 @@ impl TableBuilder {
     }
 
     /// Adds an input that moves or loads a structure and therefore never jumps.
-    pub fn moving_input(
+    pub(crate) fn moving_input(
         &mut self,
         quantity: Quantity,
         name: &str,
@@ -218,7 +218,7 @@ impl TableBuilder {
     }
 
     /// Adds the name of the scene.
-    pub fn scene_name(&mut self, settings: &SceneSettings) {
+    pub(crate) fn scene_name(&mut self, settings: &SceneSettings) {
         let name = self.push(Quantity::SceneName, "scene", "Name of the scene from which this FMU was generated");
         (name.kind, name.causality, name.variability) = (DataType::String, Causality::Local, Variability::Constant);
         name.start = Some(StartValue::String(settings.name.clone()));

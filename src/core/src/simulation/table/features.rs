@@ -12,7 +12,7 @@ use crate::simulation::outputs::{array_reader, each, scalar};
 use crate::simulation::units::{ANGLE, ENERGY, FORCE, LENGTH, LINE_LOAD, POWER, TEMPERATURE, TORQUE, VOLUME};
 
 /// A linear expansion does not describe temperatures beyond this (K).
-pub const LARGEST_TEMPERATURE: f64 = 3000.0;
+pub(crate) const LARGEST_TEMPERATURE: f64 = 3000.0;
 
 /// Returns whether centrifugal, thermal or nodal-diameter loads act.
 pub fn is_loaded(parts: &TableFacts) -> bool {
@@ -22,7 +22,7 @@ pub fn is_loaded(parts: &TableFacts) -> bool {
 }
 
 /// Returns whether inputs move or load a structure; growth and stiffening follow the speed like such an input.
-pub fn has_moving_inputs(parts: &TableFacts) -> bool {
+pub(crate) fn has_moving_inputs(parts: &TableFacts) -> bool {
     let moves = |body: &BodyFacts| {
         let StructureSettings { whirl, axial_shift, spin, excitation, .. } = body.structure;
         *whirl || *axial_shift || spin.stiffening || spin.coriolis || excitation.is_some()

@@ -9,7 +9,7 @@ use crate::{Error, Result, Rom};
 pub const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// Properties of a scene that the variables depend on.
-pub struct TableFacts<'a> {
+pub(crate) struct TableFacts<'a> {
     pub settings: &'a SceneSettings,
     pub plan: &'a SteppingOrder,
     pub bodies: Vec<BodyFacts<'a>>,
@@ -19,7 +19,7 @@ pub struct TableFacts<'a> {
 
 /// A master.
 #[derive(Clone, Copy)]
-pub struct BodyFacts<'a> {
+pub(crate) struct BodyFacts<'a> {
     pub index: usize,
     pub structure: &'a StructureSettings,
     pub rom: &'a Rom,
@@ -27,7 +27,7 @@ pub struct BodyFacts<'a> {
 }
 
 /// A contact pair.
-pub struct PairFacts<'a> {
+pub(crate) struct PairFacts<'a> {
     pub index: usize,
     pub contact: &'a ContactSettings,
     pub surface: &'a SurfaceSettings,
@@ -39,7 +39,7 @@ pub struct PairFacts<'a> {
 }
 
 /// A surface carrier.
-pub struct CarrierFacts<'a> {
+pub(crate) struct CarrierFacts<'a> {
     pub index: usize,
     pub structure: &'a StructureSettings,
     pub rom: &'a Rom,
@@ -75,30 +75,30 @@ impl<'a> TableFacts<'a> {
     }
 
     /// Returns whether there are friction variables; a scene without a friction coefficient has none.
-    pub fn has_friction(&self) -> bool {
+    pub(crate) fn has_friction(&self) -> bool {
         self.settings.contacts.iter().any(|contact| contact.friction > 0.0)
     }
 
     /// Returns whether blades cut a coating.
-    pub fn is_cut(&self) -> bool {
+    pub(crate) fn is_cut(&self) -> bool {
         let mut coatings = self.settings.contacts.iter().filter_map(|contact| contact.coating);
         coatings.any(|coating| coating.cutting.is_some())
     }
 
     /// Returns whether there are tangential forces.
-    pub fn has_tangential_forces(&self) -> bool {
+    pub(crate) fn has_tangential_forces(&self) -> bool {
         self.has_friction() || self.is_cut()
     }
 
-    pub fn of_body(&self, body: &BodyFacts) -> String {
+    pub(crate) fn of_body(&self, body: &BodyFacts) -> String {
         prefix(self.plan.bodies.len(), &body.structure.name)
     }
 
-    pub fn of_pair(&self, pair: &PairFacts) -> String {
+    pub(crate) fn of_pair(&self, pair: &PairFacts) -> String {
         prefix(self.plan.pairs.len(), &pair.surface.name)
     }
 
-    pub fn of_carrier(&self, carrier: &CarrierFacts) -> String {
+    pub(crate) fn of_carrier(&self, carrier: &CarrierFacts) -> String {
         prefix(self.plan.carriers.len(), &carrier.structure.name)
     }
 
@@ -109,7 +109,7 @@ impl<'a> TableFacts<'a> {
 }
 
 /// Largest length that is small compared with the radius of the contact nodes (m).
-pub fn largest_length(rom: &Rom) -> f64 {
+pub(crate) fn largest_length(rom: &Rom) -> f64 {
     let radii = rom.contact_nodes.iter().map(|node| node.position[0]);
     ranges::SMALL * radii.fold(f64::INFINITY, f64::min)
 }

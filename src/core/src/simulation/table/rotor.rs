@@ -212,7 +212,7 @@ fn patches(table: &mut TableBuilder, body: &BodyFacts, sector: usize) {
 }
 
 /// An output over the contact nodes of a sector.
-pub struct NodeRow {
+pub(crate) struct NodeRow {
     quantity: Quantity,
     pub name: &'static str,
     span: Span,
@@ -241,7 +241,7 @@ impl NodeRow {
 }
 
 /// Adds outputs over the contact nodes of a sector of a structure (0-based); units of gaps and forces.
-pub fn watched_rows(
+pub(crate) fn watched_rows(
     body: usize,
     sector: usize,
     [gap, force]: [Option<(&'static VariableUnit, f64)>; 2],
