@@ -327,7 +327,6 @@ impl Simulation {
 
     /// Sets the initial motion of blades on top of their static equilibrium; called again for another length of the first step.
     pub(super) fn launch_blades(&mut self) {
-        let references = self.state.inputs.references();
         for body in 0..self.compiled.bodies.len() {
             let initial = &self.compiled.body(body).0.initial;
             if initial.is_empty() {
@@ -335,7 +334,7 @@ impl Simulation {
             }
             let [displacements, velocities] =
                 [Quantity::InitialDisplacement, Quantity::InitialRate].map(|quantity| self.values_of(quantity, body));
-            let [speed, temperature] = references[body];
+            let [speed, temperature] = self.state.inputs.rotors[body].reference();
             let modes = self.system.structures_mut()[body].modes_mut();
             if self.compiled.loads_blades(body) {
                 self.compiled.settle(body, speed, temperature, modes);

@@ -92,6 +92,11 @@ impl RotorInputs {
         self.temperature.first().map_or(0.0, |input| input.at(offset))
     }
 
+    /// Speed (rad/s) and temperature (K), as set.
+    pub fn reference(&self) -> [f64; 2] {
+        [self.speed.value, self.temperature.first().map_or(0.0, |input| input.value)]
+    }
+
     /// Total rotor angle at an offset (rad).
     pub(crate) fn total_angle(&self, offset: f64) -> f64 {
         self.angle.total(&self.speed, offset)
@@ -138,8 +143,7 @@ impl Inputs {
 
     /// Returns speed (rad/s) and temperature (K) of each master, as set.
     pub fn references(&self) -> Vec<[f64; 2]> {
-        let of = |rotor: &RotorInputs| [rotor.speed.value, rotor.temperature.first().map_or(0.0, |one| one.value)];
-        self.rotors.iter().map(of).collect()
+        self.rotors.iter().map(RotorInputs::reference).collect()
     }
 
     /// Returns the input of a variable: its quantity, the index of its structure or pair, and its element.
