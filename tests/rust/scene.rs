@@ -169,7 +169,7 @@ pub fn warm_scene() -> Scene {
 /// Returns the first value reference of a variable of the scene.
 #[track_caller]
 pub fn reference(name: &str) -> u32 {
-    let simulation = tiprub_core::Simulation::new(&scene()).expect("the scene of the tests is valid");
+    let simulation = tiprub_core::Simulation::new(scene()).expect("the scene of the tests is valid");
     simulation.table().find(name).unwrap_or_else(|| panic!("no variable {name}")).reference
 }
 

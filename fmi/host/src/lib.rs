@@ -311,13 +311,13 @@ mod tests {
         let (_root, path) = archive_with(&[ArchiveEntry::new("resources/zeros", vec![0; 1 << 20])]);
         announce(&path, 3 << 30);
         let failure = UnpackedFmu::open(&path).unwrap_err();
-        assert!(failure.what.contains("x.fmu") && failure.problem.contains("3221225472 bytes"), "{failure}");
+        assert!(failure.to_string().contains("x.fmu") && failure.problem.contains("3221225472 bytes"), "{failure}");
         // An entry that declares less than it holds is not unpacked further.
         for size in [0, 1, (1 << 20) - 1, (1 << 20) + 1] {
             announce(&path, size);
             let failure = UnpackedFmu::open(&path).unwrap_err();
             assert!(
-                failure.what.contains("resources/zeros") && failure.problem.contains("damaged"),
+                failure.to_string().contains("resources/zeros") && failure.problem.contains("damaged"),
                 "{size}: {failure}"
             );
         }

@@ -76,7 +76,7 @@ fn means_and_totals_start_at_zero_for_any_inputs() {
 
 #[test]
 fn describes_arrays_and_kelvin_for_each_version() {
-    let simulation = Simulation::new(&scene::complete()).unwrap();
+    let simulation = Simulation::new(scene::complete()).unwrap();
     let roms = scene::complete().roms;
     let description = |fmi3_arrays| scene::description(simulation.table(), &roms, fmi3_arrays);
     let (two, arrays, scalars) =
@@ -117,7 +117,7 @@ fn describes_arrays_and_kelvin_for_each_version() {
 
 #[test]
 fn page_describes_grid_heat_and_spin() {
-    let simulation = Simulation::new(&scene::complete()).unwrap();
+    let simulation = Simulation::new(scene::complete()).unwrap();
     let roms = scene::complete().roms;
     let page = html(&scene::description(simulation.table(), &roms, true));
     for part in [

@@ -98,7 +98,7 @@ pub(crate) fn unresolved_modes(frequency: f64, scheme: Scheme, step: f64) -> Opt
     })
 }
 
-/// Calls [`check_step_allowed`] and [`unresolved_modes`].
+/// Calls [`check_step_allowed`] and `unresolved_modes`.
 ///
 /// # Errors
 /// As [`check_step_allowed`].

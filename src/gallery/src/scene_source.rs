@@ -228,7 +228,7 @@ mod tests {
         let console = Console::new(true, false);
         let load = |argument: &str, console: &Console| load(argument, &RomCache::off(), console);
         let missing = load("/nowhere/scene.toml", &console).unwrap_err();
-        assert!(missing.what.contains("/nowhere/scene.toml"), "{missing}");
+        assert!(missing.to_string().starts_with("/nowhere/scene.toml"), "{missing}");
         let failure = load("builtin:rotor38", &console).unwrap_err();
         assert!(failure.problem.contains("rotor38") && failure.remedy.contains("builtin:abradable"), "{failure}");
         for (name, kind) in [("rub.fmu", "an FMU"), ("blade.rom.safetensors", "a ROM")] {
@@ -245,8 +245,10 @@ mod tests {
         let path = root.path().join("scene.toml");
         fs::write(&path, "name = \"a\"\n[time]\nscheme = \"modal-exact\"\n step = 1e-6\n").unwrap();
         let found = located(&path, failure("Set `time.step` below 1e-7 s"));
-        assert!(found.what.ends_with("scene.toml:4:2: time.step") && found.problem == "refused: too long", "{found}");
-        assert!(located("builtin:rotor37", failure("Set `time.step` below 1")).what.starts_with("builtin:rotor37:"));
+        let text = found.to_string();
+        assert!(text.contains("scene.toml:4:2: time.step: ") && found.problem == "refused: too long", "{found}");
+        let builtin = located("builtin:rotor37", failure("Set `time.step` below 1")).to_string();
+        assert!(builtin.starts_with("builtin:rotor37:"), "{builtin}");
         for (path, remedy) in [(path.as_path(), "Use less friction"), (Path::new("/nowhere.toml"), "Set `time.step`")] {
             assert_eq!(located(path, failure(remedy)).what, "scene `a`");
         }

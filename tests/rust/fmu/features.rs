@@ -143,7 +143,7 @@ fn disabled_features_have_no_variables_or_data() {
         assert!(simulation.table().find(name).is_none(), "{name}");
     }
     // Adding or removing a feature does not change the names of others.
-    let warm = Simulation::new(&warm_scene()).unwrap();
+    let warm = Simulation::new(warm_scene()).unwrap();
     for variable in simulation.table().variables() {
         assert!(warm.table().find(&variable.name).is_some(), "{}", variable.name);
     }

@@ -239,7 +239,7 @@ fn fmi3_array_arguments_are_validated() {
     let (api, resources) = (fmi3::load(&path), UnpackedResources::new(true));
     let slave = fmi3::Fmi3TestSlave::new(&api, &resources);
     slave.initialise();
-    let simulation = tiprub_core::Simulation::new(&tiprub_tests::scene::scene()).expect("valid");
+    let simulation = tiprub_core::Simulation::new(tiprub_tests::scene::scene()).expect("valid");
     let array = simulation.table().find("blade[1].clearance").expect("watched").reference;
     assert_eq!(slave.reals(&[array], 3).len(), 3, "one reference, three values");
     assert_eq!(slave.reals(&[0, array, 1], 5).len(), 5);
@@ -281,7 +281,7 @@ fn fmi3_array_arguments_are_validated() {
 fn string_enumeration_and_boolean_access_is_validated() {
     let path = shipped();
     let (api2, api3, resources) = (fmi2::load(&path), fmi3::load(&path), UnpackedResources::new(false));
-    let simulation = tiprub_core::Simulation::new(&tiprub_tests::scene::scene()).expect("valid");
+    let simulation = tiprub_core::Simulation::new(tiprub_tests::scene::scene()).expect("valid");
     let find = |name: &str| simulation.table().find(name).unwrap_or_else(|| panic!("no {name}")).reference;
     let (scheme, scene, touching) = (find("scheme"), find("scene"), find("in_contact"));
     let (two, three) = (fmi2::Fmi2TestSlave::new(&api2, &resources), fmi3::Fmi3TestSlave::new(&api3, &resources));

@@ -10,7 +10,7 @@ use tiprub_tests::{ERROR, OK, fmi2, fmi3, shipped};
 const H: f64 = 1.0137e-4;
 
 fn references() -> Vec<u32> {
-    let mut simulation = Simulation::new(&scene()).expect("the scene is valid");
+    let mut simulation = Simulation::new(scene()).expect("the scene is valid");
     simulation.initialise(0.0).expect("the scene can be initialised");
     let count = u32::try_from(simulation.table().references()).expect("few variables");
     (0..count).filter(|reference| simulation.real(*reference).is_ok()).collect()
@@ -30,7 +30,7 @@ fn march(slave: &fmi2::Fmi2TestSlave<'_>, references: &[u32], first: u32, last: 
 }
 
 fn contact(slave: &fmi2::Fmi2TestSlave<'_>) -> bool {
-    let simulation = Simulation::new(&scene()).expect("the scene is valid");
+    let simulation = Simulation::new(scene()).expect("the scene is valid");
     let count = simulation.table().find("contact_count").expect("there is a count").reference;
     let mut value = 0;
     // SAFETY: arrays of one element.

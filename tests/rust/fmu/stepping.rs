@@ -15,7 +15,7 @@ const H: f64 = 1.0137e-4;
 const STEPS: u32 = 450;
 
 fn simulation() -> Simulation {
-    let mut simulation = Simulation::new(&scene()).expect("the scene is valid");
+    let mut simulation = Simulation::new(scene()).expect("the scene is valid");
     simulation.initialise(0.0).expect("the scene can be initialised");
     simulation
 }
@@ -403,7 +403,7 @@ unsafe extern "C" fn overreach(
     let context = unsafe { &mut *environment.cast::<fmi3::CallbackContext>() };
     // SAFETY: the functions outlive the instance.
     let api: &Fmi3Api = unsafe { &*context.api };
-    let core = Simulation::new(&whirling()).expect("the scene is valid");
+    let core = Simulation::new(whirling()).expect("the scene is valid");
     let (references, values) = ([reference_of(&core, "whirl_x"), reference_of(&core, "speed")], [1e-5, 1e9]);
     // SAFETY: arrays of two elements, on the instance that is calling.
     let status = unsafe { (api.fmi3SetFloat64)(context.handle, references.as_ptr(), 2, values.as_ptr(), 2) };
@@ -421,7 +421,7 @@ fn whirling() -> tiprub_core::Scene {
 fn rejected_values_within_a_step_do_not_change_ramps() {
     let path = shipped();
     let (api, resources) = (fmi3::load(&path), UnpackedResources::of(&whirling(), true));
-    let core = Simulation::new(&whirling()).expect("the scene is valid");
+    let core = Simulation::new(whirling()).expect("the scene is valid");
     let whirl = [reference_of(&core, "whirl_x"), reference_of(&core, "whirl_y")];
     let clearance = reference_of(&core, "clearance_minimum");
     let plain = fmi3::Fmi3TestSlave::new(&api, &resources);

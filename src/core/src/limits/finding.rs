@@ -1,4 +1,4 @@
-//! Findings as data: exceeded limits, and doubtful results. [`super::wording`] gives them words when they are reported.
+//! Findings as data: exceeded limits, and doubtful results. `wording.rs` gives them words when they are reported.
 
 use super::massless::MasslessLimit;
 use super::{Fastest, GrowthRates};

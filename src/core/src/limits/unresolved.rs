@@ -17,7 +17,7 @@
 //! | 23 | 82 % | −1.8 % | −25 % (casing: −21 %) |
 //! | 46 | 90 % | −22 % | −59 % (casing: +100 %) |
 //!
-//! Steps are rejected if both ω_max h ≥ [`HIGHEST`] and the fraction exceeds [`SHARE`].
+//! Steps are rejected if both ω_max h ≥ `HIGHEST` and the fraction exceeds [`SHARE`].
 
 use super::finding::{ErrorKind, WarningKind};
 use crate::modes::modal::ModalModel;

@@ -1,6 +1,6 @@
 //! State of all modes of all sectors, and the fused pass of one step.
 //!
-//! Layout: sectors are SIMD lanes in chunks of [`LANES`]; within a chunk the modes follow each other,
+//! Layout: sectors are SIMD lanes in chunks of `LANES`; within a chunk the modes follow each other,
 //! `state[(chunk · modes + mode) · width + lane]`. The pass predicts (eq. 9 of the paper without contact), recovers the
 //! displacements of the contact rows and sums the damping loss while a chunk is in registers; there is no horizontal sum. Contact
 //! forces are then applied to the few sectors in contact.

@@ -1,6 +1,6 @@
 //! A disk of coupled sectors in modal coordinates, stepped together.
 //!
-//! Nodal diameters are SIMD lanes in blocks of [`LANES`], complex amplitudes are pairs of real and imaginary parts:
+//! Nodal diameters are SIMD lanes in blocks of `LANES`, complex amplitudes are pairs of real and imaginary parts:
 //! `state[block · modes + mode][re, im][lane]`. If a nodal diameter has fewer modes than others, or is padding of the last block,
 //! the coefficients of the additional modes are 0. The transforms of `fourier` convert contact displacements to sectors and
 //! forces on sectors to nodal diameters. The effect of a force on any sector within a step is the block-circulant flexibility G(s

@@ -92,19 +92,6 @@ impl Simulation {
 
     /// Checks that no output is NaN; outputs belong to `time` (s).
     ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::{CoSimulation, Simulation};
-    /// # let scene = tiprub_test_models::rub(2);
-    /// # let mut simulation = Simulation::new(&scene)?;
-    /// # simulation.initialise(0.0)?;
-    /// simulation.begin_step(0.0, 1e-4)?;
-    /// simulation.advance()?;
-    /// simulation.update_outputs();
-    /// simulation.check_outputs(1e-4)?;
-    /// # Ok::<(), tiprub_core::Error>(())
-    /// ```
-    ///
     /// # Errors
     /// An output that is not a number; the error names it. The state must not be used further.
     pub(crate) fn check_outputs(&self, time: f64) -> Result<()> {

@@ -49,7 +49,7 @@ impl Product {
     /// A scene or a state that is rejected.
     pub(super) fn run(&self, scene: &Scene, flight: &CubeFlight, end: f64, record: f64) -> Result<ProductRun> {
         let started = processor_time();
-        let mut simulation = Simulation::new(&self.scene(scene, flight))?;
+        let mut simulation = Simulation::new(self.scene(scene, flight))?;
         simulation.initialise(0.0)?;
         let columns = Columns::new(&simulation, scene.roms[0].contact_nodes.len() / 2);
         let mut run = ProductRun {

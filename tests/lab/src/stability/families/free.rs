@@ -42,7 +42,7 @@ pub(crate) fn throw(body: LumpChain, velocity: [f64; 3], plates: Vec<Plate>) -> 
 /// # Errors
 /// A rejected scene.
 pub(crate) fn started(throw: &Throw) -> Result<Simulation> {
-    let mut simulation = Simulation::new(&throw.scene())?;
+    let mut simulation = Simulation::new(throw.scene())?;
     simulation.initialise(0.0)?;
     Ok(simulation)
 }

@@ -103,7 +103,7 @@ fn at_product(method: StabilityMethod, product: f64, friction: f64) -> Result<Ve
     scene.roms[0].stiffness.fill_diagonal(fastest);
     scene.settings.contacts[0].friction = friction;
     let step = product / fastest.sqrt();
-    let mut simulation = Simulation::new(&method.stepping(scene.clone(), step))?;
+    let mut simulation = Simulation::new(method.stepping(scene.clone(), step))?;
     simulation.initialise(0.0)?;
     let mut watch = StabilityWatch::new(&scene);
     let mut negative = 0.0_f64;
@@ -136,7 +136,7 @@ fn curved() -> Vec<StabilityCase> {
 fn dragged(method: StabilityMethod, share: f64) -> Result<Vec<Check>> {
     let mut scene = method.on(round(Tower::default().rom()));
     scene.settings.contacts[0].friction = 0.3;
-    let mut simulation = Simulation::new(&method.stepping(scene.clone(), 2e-6))?;
+    let mut simulation = Simulation::new(method.stepping(scene.clone(), 2e-6))?;
     simulation.initialise(0.0)?;
     let wanted = (2.0 * RADIUS * share * GAP).sqrt();
     let moved = |simulation: &Simulation| {

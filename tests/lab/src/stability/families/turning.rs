@@ -109,7 +109,7 @@ impl Travelling {
         scene.settings.structures[1].load = Some(LoadSettings { order: self.order, amplitude: load, phase: 0.0 });
         scene.settings.outputs.slave_displacement = true;
         scene.settings.contacts[0].gap = 0.02;
-        let mut simulation = Simulation::new(&with_step(scene, step))?;
+        let mut simulation = Simulation::new(with_step(scene, step))?;
         set(&mut simulation, "casing_load_phase", self.early * omega * step)?;
         simulation.initialise(0.0)?;
         let row = simulation.table().find("casing_load_phase").map_or(0, |row| row.reference);

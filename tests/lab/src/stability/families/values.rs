@@ -70,7 +70,7 @@ pub(crate) fn cases() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     for name in SCENES {
         // The variable table of a scene is cheap, and the only list of settable variables.
-        let Ok(simulation) = Simulation::new(&scene(name)) else { continue };
+        let Ok(simulation) = Simulation::new(scene(name)) else { continue };
         for variable in
             simulation.table().variables().iter().filter(|row| row.is_settable() && row.kind == DataType::Real)
         {
@@ -312,7 +312,7 @@ fn by_import(context: &CaseContext, scene: &str, version: u8, variable: &str, va
         let mut checks = vec![Check::so("all outputs finite", values.iter().all(|value| value.is_finite()))];
         // The same run without FMI, bit by bit.
         let mut native =
-            Simulation::new(&self::scene(scene)).map_err(|error| tiprub_shell::Failure::from_core("scene", error))?;
+            Simulation::new(self::scene(scene)).map_err(|error| tiprub_shell::Failure::from_core("scene", error))?;
         let run = native.table().find(variable).map_or(0, |row| row.reference);
         let ran = native.set_real(run, value).and_then(|()| native.initialise(0.0)).and_then(|()| go_on(&mut native));
         checks.push(Check::so("also runs without FMI", ran.is_ok()));
