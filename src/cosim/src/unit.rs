@@ -273,6 +273,29 @@ pub trait CoSimulation: Send {
         Ok((variable, element))
     }
 
+    /// Checks the seed of an input for derivatives over a step; returns the variable and the index of the element.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::{CoSimulation, Simulation};
+    /// # let simulation = Simulation::new(&tiprub_test_models::rub(2))?;
+    /// let speed = simulation.table().find("speed").expect("an input").reference;
+    /// assert!(simulation.check_seed(speed, 1.0).is_ok());
+    /// assert!(simulation.check_seed(speed, f64::NAN).is_err());
+    /// # Ok::<(), tiprub_cosim::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Unknown reference, a variable that is not a continuous real input, or a seed that is not finite.
+    fn check_seed(&self, reference: u32, seed: f64) -> Result<(&Variable, usize)> {
+        let (variable, element) = self.check_input_derivative(reference, 1, 0.0)?;
+        if !seed.is_finite() {
+            let what = format!("seed of `{}`", variable.element_name(element));
+            return Err(crate::Error::invalid(what, format!("{seed} is not finite"), "Give finite seeds"));
+        }
+        Ok((variable, element))
+    }
+
     /// Returns the first time derivative of a continuous real output at the last communication point.
     ///
     /// # Examples

@@ -194,13 +194,6 @@ impl Warning {
         Self { text: text.into(), ..self }
     }
 
-    /// Replaces the remedy, also at the end of the whole text if that ends with the old remedy.
-    pub fn with_remedy(self, remedy: impl Into<String>) -> Self {
-        let ([problem, before], remedy) = (self.lines, remedy.into());
-        let text = self.text.strip_suffix(&before).map(|explanation| format!("{explanation}{remedy}"));
-        Self { lines: [problem, remedy], text: text.unwrap_or(self.text), ..self }
-    }
-
     /// Sets the severity.
     pub fn at_level(self, level: Severity) -> Self {
         Self { level, ..self }

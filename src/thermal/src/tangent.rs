@@ -61,7 +61,7 @@ impl ThermalSimulation {
         let mut heat = vec![0.0; self.model.patches.len()];
         let mut films = [0.0; 2];
         for (&input, &seed) in inputs.iter().zip(seed) {
-            let (variable, element) = self.check_input_derivative(input, 1, seed)?;
+            let (variable, element) = self.check_seed(input, seed)?;
             match self.item(variable) {
                 Item::Heat => heat[element] += seed,
                 Item::Film(index) => films[index] += seed,

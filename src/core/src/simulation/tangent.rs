@@ -264,14 +264,7 @@ impl Simulation {
             let (variable, element) = self.table().locate(*output)?;
             variable.check_derivative(element, Causality::Output, 1)?;
         }
-        for (input, seed) in inputs.iter().zip(seed) {
-            let (variable, element) = self.check_input_derivative(*input, 1, 0.0)?;
-            if !seed.is_finite() {
-                let what = format!("seed of `{}`", variable.element_name(element));
-                return Err(Error::invalid(what, format!("{seed} is not finite"), "Give finite seeds"));
-            }
-        }
-        Ok(())
+        inputs.iter().zip(seed).try_for_each(|(input, seed)| self.check_seed(*input, *seed).map(drop))
     }
 }
 

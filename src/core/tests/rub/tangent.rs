@@ -300,7 +300,7 @@ fn rejects_variables_without_derivatives() {
     assert!(ask(on, speed, speed, 1.0).contains("not a continuous real output"));
     assert!(ask(on, steps, speed, 1.0).contains("`internal_steps`"));
     assert!(ask(on, torque, friction, 1.0).contains("not a continuous real input"));
-    assert!(ask(on, torque, speed, f64::NAN).contains("not finite"));
+    assert!(ask(on, torque, speed, f64::NAN).contains("seed"));
     assert!(ask(on, u32::MAX, speed, 1.0).contains("does not exist"));
     // A step that is not complete.
     on.begin_partial_step(on.time(), H).unwrap();

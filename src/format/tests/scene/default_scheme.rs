@@ -55,7 +55,7 @@ fn rigid_casing_defaults_to_adaptive_steps() {
 
 /// Advises adaptive steps for a missing step only where they are the default.
 #[test]
-fn missing_step_suggests_adaptive_steps_only_if_they_are_allowed() {
+fn missing_step_suggests_adaptive_steps_where_allowed() {
     let refusal = |text: String| {
         parse_scene(&format!("{text}[time]\nscheme = \"modal-exact\"\n"), "demo.toml").unwrap_err().to_string()
     };

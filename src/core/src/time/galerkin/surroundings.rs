@@ -1,4 +1,4 @@
-//! What an island touches: the surfaces of each of its sectors, and a record of its steps.
+//! Surfaces that the sectors of an island may touch, and a record of its steps.
 
 use super::carrier::CarrierIntegrator;
 use super::compliance::Lanes;
