@@ -1,6 +1,5 @@
 //! Describes the features of a scene beyond sliding contact of a rotor in a rigid casing, and the limits of the model.
 
-use tiprub_core::scene::method::Solver;
 use tiprub_core::scene::settings::{
     BodyMotion, CoatingSettings, ContactSettings, CuttingSettings, InputInterpolation, Preset, SceneSettings,
     StructureSettings, SurfaceSettings, TOLERANCE,
@@ -126,9 +125,7 @@ fn of_surface(surface: &SurfaceSettings, scene: &Scene, found: &mut Vec<String>)
 }
 
 fn of_contact(contact: &ContactSettings, found: &mut Vec<String>) {
-    if contact.solver == Solver::Coulomb {
-        found.push("friction sticks and slides (coulomb)".into());
-    }
+    found.extend(contact.solver.properties().feature.map(String::from));
     if let Some(CoatingSettings { thickness, cells_around, cells_along, contact_width, cutting, .. }) = contact.coating
     {
         let cut = cutting.map_or(String::new(), |cut| {
@@ -164,7 +161,7 @@ pub fn limits(scene: &Scene) -> Vec<String> {
     let mut limits = vec![
         "Displacements within each structure are small; the rotation between rotor and casing may be large.",
         choose(
-            any(|contact| contact.solver == Solver::Coulomb),
+            any(|contact| contact.solver.properties().sticks),
             "Friction is Coulomb friction that sticks and slides, with one coefficient for both.",
             "Friction is Coulomb friction in steady sliding along the circumference; sticking is not modelled.",
         ),
@@ -199,7 +196,7 @@ pub fn limits(scene: &Scene) -> Vec<String> {
 
 /// Returns the limits of a scene whose master is a free body.
 fn limits_of_flight(settings: &SceneSettings) -> [&'static str; 5] {
-    let sticks = settings.contacts.iter().any(|contact| contact.solver == Solver::Coulomb);
+    let sticks = settings.contacts.iter().any(|contact| contact.solver.properties().sticks);
     [
         "Displacements within each structure are small; the free structure may travel any distance, but its rotations \
          must stay small.",
@@ -233,6 +230,7 @@ fn blades(coupled: bool, stiffens: bool) -> &'static str {
 #[cfg(test)]
 mod tests {
     use nalgebra::DMatrix;
+    use tiprub_core::scene::method::Solver;
     use tiprub_core::scene::rom::{DisplacementFrame, Harmonic, RomChecks, RomExtras};
 
     use super::*;

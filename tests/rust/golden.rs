@@ -11,6 +11,7 @@ mod scenes;
 use std::fmt::Write as _;
 use std::fs;
 
+use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::{CoSimulation, Scene, Simulation};
 use tiprub_cosim::variables::{Causality, DataType, Variable};
 use tiprub_tests::scene::UnpackedResources;
@@ -204,6 +205,17 @@ fn fmi2_and_fmi3_match_the_core_bit_for_bit() {
         let mut three = fmi3::Fmi3TestSlave::new(&api3, &resources);
         three.initialise();
         assert_eq!(run(&scene, &mut three, false).0, native(&scene, false).0, "FMI 3.0, {}", scene.settings.name);
+    }
+}
+
+#[test]
+fn golden_scenes_use_every_scheme_and_solver() {
+    let scenes = scenes::all();
+    for scheme in Scheme::ALL {
+        assert!(scenes.iter().any(|scene| scene.settings.time.scheme == scheme), "{scheme:?}");
+    }
+    for solver in Solver::ALL {
+        assert!(scenes.iter().any(|scene| scene.settings.contacts[0].solver == solver), "{solver:?}");
     }
 }
 

@@ -106,9 +106,9 @@ impl Effect {
 pub static EFFECTS: &[Effect] = &[
     physics("friction", "`contact.friction`", always, |scene| contact(scene, |one| one.friction > 0.0)),
     physics("sticking friction", "`contact.solver = \"coulomb\"`", always, |scene| {
-        contact(scene, |one| one.solver == Solver::Coulomb)
+        contact(scene, |one| one.solver.properties().sticks)
     })
-    .by(|scene| scene.settings.contacts.iter_mut().for_each(|one| one.solver = Solver::Coulomb)),
+    .by(|scene| scene.settings.contacts.iter_mut().for_each(|one| one.solver = Solver::STICKING)),
     physics(
         "separate contact of both sides of the tip",
         "a ROM with two rows of patches (`--contact-rows 2`)",

@@ -18,11 +18,11 @@ pub mod wrench;
 use tiprub_cosim::persist_fields;
 
 pub use crate::math::vector::Vector3;
-use crate::math::vector::{ZERO, length};
+use crate::math::vector::{ZERO, length, tangential};
 use crate::scene::ranges::SMALL;
 use layout::Layout;
 pub(crate) use layout::sector_angle;
-use open::{OpenGap, tangent};
+use open::OpenGap;
 pub use plane::FixedGap;
 pub use revolution::RevolutionGap;
 use spline::{NOTHING_TO_TOUCH, SplineGap, faces_inwards};
@@ -111,6 +111,32 @@ impl Gap {
     /// Gap of a node without a surface.
     pub const NOTHING: Self =
         Self { distance: NOTHING_TO_TOUCH, normal: ZERO, foot: ClosestPoint { patch: [0; 2], s: 0.0, t: 0.0 } };
+}
+
+/// Sliding of a node along a surface: its velocity in the tangent plane.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Sliding {
+    /// Unit direction (own directions of the node); 0 without slip.
+    pub direction: Vector3,
+    /// Speed (m/s).
+    pub speed: f64,
+}
+
+impl Sliding {
+    /// Returns the part of a relative velocity (m/s) in the tangent plane.
+    #[inline(always)]
+    pub fn new(velocity: Vector3, normal: Vector3) -> Self {
+        let along = tangential(velocity, normal);
+        let speed = length(along);
+        Self { direction: if speed > 0.0 { along / speed } else { Vector3::zeros() }, speed }
+    }
+}
+
+/// Velocities of a node and of the surface below it (m/s), without prescribed motion.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Vibration {
+    pub node: Vector3,
+    pub surface: Vector3,
 }
 
 /// Gap function of a contact pair, compiled for stepping, for some contact nodes of a structure in all sectors. Arrays have the size of the
@@ -353,13 +379,7 @@ impl GapLaw {
     /// Prescribed velocity of the master relative to the slave (m/s), of a node displaced by `moved` (m, own directions), in the
     /// coordinates of the displacements, whose arcs are r times angles; `index` is `node · lanes + lane`.
     #[inline(always)]
-    pub(crate) fn sliding_velocity(
-        &self,
-        node: usize,
-        index: usize,
-        drive: &PrescribedMotion,
-        moved: Vector3,
-    ) -> Vector3 {
+    pub(crate) fn rigid_velocity(&self, At { node, index, drive }: At<'_>, moved: Vector3) -> Vector3 {
         match self {
             Self::Fixed(law) => law.sliding[index],
             Self::Revolution(law) => law.layout.rigid_velocity(node, index, drive, moved),
@@ -374,13 +394,13 @@ impl GapLaw {
         matches!(self, Self::Open(_))
     }
 
-    /// Unit slip direction of the master in the tangent plane, from the predicted relative velocity (m/s); zero without slip. On surfaces
-    /// of revolution axial slip is neglected, as in section 4.3 of the paper.
-    pub fn slip_direction(&self, velocity: Vector3, normal: Vector3) -> Vector3 {
-        let candidate = match self {
-            Self::Fixed(_) | Self::Open(_) => velocity,
-            Self::Revolution(_) | Self::Spline(_) => Vector3::new(0.0, velocity[1], 0.0),
-        };
-        tangent(candidate, normal)
+    /// Returns the sliding of the master along the surface, of a node displaced by `moved` (m, own directions). On surfaces around an axis
+    /// axial slip is neglected, as in section 4.3 of the paper.
+    pub(crate) fn sliding(&self, at: At<'_>, moved: Vector3, vibration: Vibration, normal: Vector3) -> Sliding {
+        let velocity = self.rigid_velocity(at, moved) + vibration.node - vibration.surface;
+        match self {
+            Self::Fixed(_) | Self::Open(_) => Sliding::new(velocity, normal),
+            Self::Revolution(_) | Self::Spline(_) => Sliding::new(Vector3::new(0.0, velocity[1], 0.0), normal),
+        }
     }
 }

@@ -107,25 +107,8 @@ pub struct System {
 }
 
 impl System {
-    /// Creates a system of one structure, with all sectors at rest, and a rigid surface with friction coefficient µ. Call
-    /// [`System::set_step`] and [`System::start`] before the first step.
-    pub fn new(model: &ModalModel, sectors: usize, gap: GapLaw, friction: f64, settings: SystemSettings) -> Self {
-        Self::alone(SectorModel::Uncoupled(model, sectors), BankOptions::default(), gap, friction, settings)
-    }
-
-    /// Creates a system of one structure with coupled sectors, or with options of its modes.
-    pub fn alone(
-        model: SectorModel,
-        options: BankOptions,
-        gap: GapLaw,
-        friction: f64,
-        settings: SystemSettings,
-    ) -> Self {
-        let pair = PairParts { structure: 0, gap, carrier: None, friction, cutting: 0.0 };
-        Self::of(vec![StructureParts::Touching(model, Box::new(options))], vec![pair], Vec::new(), settings)
-    }
-
-    /// Creates a system of any number of structures and pairs; `coatings` are those of the pairs.
+    /// Creates a system of any number of structures at rest and pairs; `coatings` are those of the pairs. Call [`System::set_step`] and
+    /// [`System::start`] before the first step.
     pub fn of(
         parts: Vec<StructureParts>,
         pairs: Vec<PairParts>,
@@ -292,14 +275,16 @@ impl System {
 
     /// Sets the friction coefficient of a pair (takes effect with the next step).
     pub(crate) fn set_friction(&mut self, pair: usize, friction: f64) {
-        self.pairs[pair].parts.friction = friction;
+        self.pairs[pair].parts.parameters.friction = friction;
     }
 
     /// Selects scheme and solver; only before [`System::start`]. Allocates if the solver changes.
     pub(crate) fn set_methods(&mut self, scheme: Scheme, solver: Solver) {
         self.settings.scheme = scheme;
-        self.settings.solver = solver;
-        self.groups.iter_mut().for_each(|group| group.set_solver(solver, &self.structures));
+        if solver != self.settings.solver {
+            self.settings.solver = solver;
+            self.groups.iter_mut().for_each(|group| group.set_solver(solver, &self.structures));
+        }
     }
 
     /// Finds the gap of every node and the smallest gap of each lane. If `warm`, the search for closest points starts from those

@@ -6,13 +6,14 @@ mod guide;
 mod rods;
 
 use guide::print_row;
-use rods::{NEARLY_NONE, SCHEMES, SOLVERS, StraightRod, ascending, quiet_step};
+use rods::{NEARLY_NONE, SCHEMES, StraightRod, ascending, quiet_step};
 use tiprub_core::geometry::{FixedGap, GapLaw, PrescribedMotion, Vector3};
 use tiprub_core::modes::modal::{ModalModel, NodePair};
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::system::{System, SystemSettings};
 use tiprub_core::time::{Recurrence, Stepper};
 use tiprub_reference::carpenter::{self, AREA, DENSITY, GAP, LENGTH, SPEED, YOUNG};
+use tiprub_test_models::single_sector;
 
 const COURANT: f64 = 0.9;
 
@@ -49,7 +50,7 @@ fn collide(elements: usize, scheme: Scheme, solver: Solver) -> BarRun {
     let model = ascending(&ModalModel::combined(&models, &[pair]).unwrap(), 2);
     let law =
         GapLaw::Fixed(FixedGap { normals: vec![-Vector3::x()], gaps: vec![GAP], sliding: vec![Vector3::zeros()] });
-    let mut system = System::new(&model, 1, law, 0.0, SystemSettings { scheme, solver, ledger: true });
+    let mut system = single_sector(&model, law, 0.0, SystemSettings { scheme, solver, ledger: true });
     let courant = COURANT * bars[0].wave_time();
     let step = if scheme == Scheme::MasslessBoundary { quiet_step(&model, courant) } else { courant };
     system.set_step(step);
@@ -108,7 +109,7 @@ fn impact_of_two_bars_matches_plane_wave_solution() {
     print_row!("|---|---|---|---|---|---|---|---|---|---|");
     for scheme in SCHEMES {
         // With one contact node all solvers solve the same problem, so the other solvers run only on the coarsest mesh.
-        for (solver, meshes) in SOLVERS.map(|solver| (solver, if solver == Solver::Lcp { 4 } else { 1 })) {
+        for (solver, meshes) in Solver::ALL.map(|solver| (solver, if solver == Solver::Lcp { 4 } else { 1 })) {
             for elements in [20, 40, 80, 200].into_iter().take(meshes) {
                 let found = collide(elements, scheme, solver);
                 let BarRun { force, touch, release, impulse, energy_loss, residual, momentum } = found;

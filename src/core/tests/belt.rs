@@ -12,11 +12,11 @@ use nalgebra::DMatrix;
 use tiprub_core::geometry::{FixedGap, GapLaw, PrescribedMotion, Vector3};
 use tiprub_core::modes::bank::BankOptions;
 use tiprub_core::modes::modal::ModalModel;
-use tiprub_core::modes::sectors::SectorModel;
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::system::{System, SystemSettings};
 use tiprub_core::time::{Recurrence, Stepper, TimeStepper};
 use tiprub_reference::closed::belt::{StickSlipBelt, ThrownBlock};
+use tiprub_test_models::{single_sector, single_sector_with};
 
 const MASS: f64 = 2.0;
 const OMEGA: f64 = 50.0;
@@ -40,7 +40,7 @@ fn block(scheme: Scheme, step: f64) -> System {
     });
     let settings = SystemSettings { scheme, solver: Solver::Coulomb, ledger: true };
     let bank = BankOptions { loads: true, ..BankOptions::default() };
-    let mut system = System::alone(SectorModel::Uncoupled(&model, 1), bank, law, FRICTION, settings);
+    let mut system = single_sector_with(&model, bank, law, FRICTION, settings);
     system.set_step(step);
     system.bank_mut().set_modal_state(1, 0, 0.0, BELT * MASS.sqrt());
     system.start(&[PrescribedMotion::default()]);
@@ -155,7 +155,7 @@ fn by_tolerance(tolerance: f64, longest: f64) -> (System, TimeStepper) {
         sliding: vec![Vector3::zeros(); 2],
     });
     let settings = SystemSettings { scheme: Scheme::Galerkin, solver: Solver::Coulomb, ledger: true };
-    let mut system = System::alone(SectorModel::Uncoupled(&model, 1), BankOptions::default(), law, FRICTION, settings);
+    let mut system = single_sector(&model, law, FRICTION, settings);
     let mut stepper = TimeStepper::new(&mut system, longest, tolerance);
     stepper.set_step(&mut system, longest);
     system.bank_mut().set_modal_state(0, 0, 0.0, THROWN * MASS.sqrt());

@@ -15,7 +15,7 @@ use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::system::{System, SystemSettings};
 use tiprub_core::time::{Recurrence, Stepper};
 use tiprub_reference::carpenter;
-use tiprub_test_models::{node, structure};
+use tiprub_test_models::{node, single_sector, structure};
 
 /// The bars of N. J. Carpenter, R. L. Taylor, M. G. Katona, Int. J. Numer. Methods Eng. 32 (1991): half of the
 /// symmetric problem, a bar that hits a rigid wall.
@@ -35,7 +35,7 @@ fn system(model: &ModalModel, scheme: Scheme, step: f64) -> System {
     let law =
         GapLaw::Fixed(FixedGap { normals: vec![-Vector3::x()], gaps: vec![GAP], sliding: vec![Vector3::zeros()] });
     let settings = SystemSettings { scheme, solver: Solver::Lcp, ledger: true };
-    let mut system = System::new(model, 1, law, 0.0, settings);
+    let mut system = single_sector(model, law, 0.0, settings);
     system.set_step(step);
     system
 }
@@ -95,7 +95,7 @@ fn pressed(damping_ratio: f64, share: f64) -> (f64, f64) {
     print_row!("ξ = {damping_ratio}: limit {limit:.3e} s, {:.2} of 2/ω_max", limit * model.largest_frequency() / 2.0);
     let law = FixedGap { normals: vec![-Vector3::x()], gaps: vec![-1e-4], sliding: vec![Vector3::zeros()] };
     let settings = SystemSettings { scheme: Scheme::MasslessBoundary, solver: Solver::Lcp, ledger: true };
-    let mut pressed = System::new(&model, 1, GapLaw::Fixed(law), 0.0, settings);
+    let mut pressed = single_sector(&model, GapLaw::Fixed(law), 0.0, settings);
     pressed.set_step(share * limit);
     pressed.start(&[PrescribedMotion::default()]);
     let (mut most, mut last) = (0.0_f64, [f64::INFINITY, f64::NEG_INFINITY]);
@@ -222,7 +222,7 @@ fn dragged(step: f64, solver: Solver) -> (System, f64) {
     let sliding = vec![Vector3::y()];
     let law = FixedGap { normals: vec![-Vector3::x()], gaps: vec![-1e-4], sliding };
     let settings = SystemSettings { scheme: Scheme::MasslessBoundary, solver, ledger: true };
-    let mut system = System::new(&model, 1, GapLaw::Fixed(law), 0.3, settings);
+    let mut system = single_sector(&model, GapLaw::Fixed(law), 0.3, settings);
     system.set_step(step);
     system.start(&[PrescribedMotion::default()]);
     (system, step)

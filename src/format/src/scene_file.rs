@@ -190,7 +190,7 @@ fn apply_preset(settings: &mut SceneSettings, document: &Document) {
     }
     for (index, contact) in settings.contacts.iter_mut().enumerate() {
         if !document.holds(&format!("contact[{}].solver", index + 1)) {
-            contact.solver = Solver::Film;
+            contact.solver = Solver::PAPER;
         }
     }
 }

@@ -10,6 +10,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use nalgebra::{Complex, DMatrix};
+use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::rom::{ContactNode, DisplacementFrame};
 use tiprub_core::scene::settings::{CuttingSettings, Preset, SceneSettings, Shape, TimeSettings, rules};
 use tiprub_format::{ARRAYS, FIELDS, METADATA, SceneField, parse_scene, read_rom, write_scene};
@@ -83,6 +84,15 @@ fn documented_keys_match_the_settings() {
     }
     let listed: BTreeSet<String> = FIELDS.iter().map(|field| field.path.to_owned()).collect();
     assert_eq!(listed, found);
+}
+
+#[test]
+fn documented_choices_contain_every_scheme_and_solver() {
+    let schemes = Scheme::ALL.map(|scheme| ("time.scheme", scheme.name()));
+    for (path, name) in schemes.into_iter().chain(Solver::ALL.map(|solver| ("contact.solver", solver.name()))) {
+        let field = FIELDS.iter().find(|field| field.path == path).unwrap();
+        assert!(field.range.contains(&format!("`{name}`")), "{path} = {name}: {}", field.range);
+    }
 }
 
 /// The guide contains every identifier of a warning.

@@ -13,8 +13,6 @@ use tiprub_figure::plots::{Plot, Series};
 use tiprub_shell::{Failure, Result, sweep};
 use tiprub_study::{Picture, Sheet, Statement, Study, StudyFigure};
 
-use crate::stability::models::SOLVERS;
-
 /// Schemes of the table with their names.
 const SCHEMES: [(Scheme, &str); Scheme::RECURRENCES.len()] =
     [(Scheme::CentralDifference, "central"), (Scheme::ModalExact, "exact"), (Scheme::MasslessBoundary, "massless")];
@@ -30,7 +28,7 @@ pub(crate) const TABLE: &str = "table.md";
 struct ConjugacyCase {
     feature: SurfaceFeature,
     scheme: (Scheme, &'static str),
-    solver: (Solver, &'static str),
+    solver: Solver,
     friction: f64,
 }
 
@@ -47,26 +45,26 @@ struct ConjugacyRow {
 impl ConjugacyCase {
     fn exists(&self, quick: bool) -> bool {
         let shown = match self.scheme.0 {
-            Scheme::CentralDifference => self.solver.0 == Solver::Film,
-            Scheme::ModalExact => self.solver.0 == Solver::Lcp || self.solver.0 == Solver::Coulomb,
-            Scheme::MasslessBoundary | Scheme::Galerkin => self.solver.0 == Solver::Lcp,
+            Scheme::CentralDifference => self.solver == Solver::Film,
+            Scheme::ModalExact => self.solver.properties().complementary,
+            Scheme::MasslessBoundary | Scheme::Galerkin => self.solver == Solver::Lcp,
         };
         let asked =
-            if quick { shown && self.friction > 0.0 } else { self.friction > 0.0 || self.solver.0 != Solver::Coulomb };
-        asked && self.scene(self.friction, false).check_methods(self.scheme.0, self.solver.0).is_ok()
+            if quick { shown && self.friction > 0.0 } else { self.friction > 0.0 || !self.solver.properties().sticks };
+        asked && self.scene(self.friction, false).check_methods(self.scheme.0, self.solver).is_ok()
     }
 
     fn scene(&self, friction: f64, round: bool) -> Scene {
         let mut scene = self.feature.scene(friction, true, round);
         scene.settings.time.scheme = self.scheme.0;
-        scene.settings.contacts.iter_mut().for_each(|contact| contact.solver = self.solver.0);
+        scene.settings.contacts.iter_mut().for_each(|contact| contact.solver = self.solver);
         scene
     }
 
     fn row(&self) -> Result<ConjugacyRow> {
         let named = |error: tiprub_core::Error| {
             Failure::new(
-                format!("{}, {}, {}, µ = {}", self.feature.name(), self.scheme.1, self.solver.1, self.friction),
+                format!("{}, {}, {}, µ = {}", self.feature.name(), self.scheme.1, self.solver.name(), self.friction),
                 error.to_string(),
                 "Report this to the developers",
             )
@@ -77,7 +75,7 @@ impl ConjugacyCase {
             self.feature,
             SurfaceFeature::Revolution | SurfaceFeature::Spline | SurfaceFeature::Disk | SurfaceFeature::Coating
         );
-        let free_of_friction = self.solver.0 != Solver::Coulomb && stays_round;
+        let free_of_friction = !self.solver.properties().sticks && stays_round;
         let round = free_of_friction.then(|| run(&self.scene(0.0, true), STEP).map_err(named)).transpose()?;
         Ok(ConjugacyRow { case: *self, seen, round: round.map(|seen| seen.axis_moment) })
     }
@@ -87,7 +85,7 @@ fn cases(quick: bool) -> Vec<ConjugacyCase> {
     let mut cases = Vec::new();
     for feature in SurfaceFeature::ALL {
         for scheme in SCHEMES {
-            for solver in SOLVERS {
+            for solver in Solver::ALL {
                 for friction in [0.0, 0.15] {
                     cases.push(ConjugacyCase { feature, scheme, solver, friction });
                 }
@@ -194,7 +192,7 @@ impl ConjugacyRow {
         let ConjugacyCase { feature, scheme, solver, friction } = self.case;
         let [first, second] = self.seen;
         json!({
-            "feature": feature.name(), "scheme": scheme.1, "solver": solver.1, "friction": friction,
+            "feature": feature.name(), "scheme": scheme.1, "solver": solver.name(), "friction": friction,
             "contacts": first.contacts, "axis_moment_round": self.round, "shaft": first.shaft, "ledger": first.balance,
             "force": first.force, "moment": first.moment, "modal": first.modal,
             "curvature": first.curvature, "curvature_half_step": second.curvature,
@@ -221,7 +219,7 @@ fn table(rows: &[ConjugacyRow]) -> String {
             "| {} | {} | {} | {friction} | {} | {round} | {shaft} | {:.0e} | {force} | {moment} | {:.1e} | {:.1e} |",
             feature.name(),
             scheme.1,
-            solver.1,
+            solver.name(),
             first.contacts,
             first.balance,
             first.curvature,

@@ -8,6 +8,7 @@ pub mod lattice;
 mod random;
 mod scenes;
 pub mod several;
+mod single;
 mod wall;
 
 use std::f64::consts::{FRAC_PI_2, TAU};
@@ -22,6 +23,7 @@ pub use drive::{
 };
 pub use random::SeededRandom;
 pub use scenes::{bumps, coating, coating_of, flexible, on_ring, round, rub};
+pub use single::{single_sector, single_sector_with};
 pub use wall::wall;
 
 /// Radius of the contact nodes (m).

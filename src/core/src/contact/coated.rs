@@ -34,29 +34,15 @@ impl Coated {
             multipliers: vec![0.0; contacts],
         }
     }
-
-    /// Returns the coating.
-    pub fn coating(&self) -> &Coating {
-        &self.coating
-    }
-
-    /// Returns the coating for changes of its wear.
-    pub(crate) fn coating_mut(&mut self) -> &mut Coating {
-        &mut self.coating
-    }
-
-    /// Applies the wear of the last solution; returns the energy it consumes (J).
-    pub fn commit(&mut self) -> f64 {
-        self.coating.commit(&self.problem)
-    }
 }
 
 impl ContactLaw for Coated {
-    const DIRECTIONS: usize = 1;
-    const LOOKS_AGAIN: bool = true;
+    fn directions(&self) -> usize {
+        1
+    }
 
-    fn fill_directions(at: &impl ContactPrediction, rows: &mut [Vector3], columns: &mut [Vector3]) {
-        fill_sliding(at, rows, columns);
+    fn fill_directions(&self, at: &impl ContactPrediction, rows: &mut [Vector3], columns: &mut [Vector3]) {
+        fill_sliding(at, |parameters, _| parameters.friction, rows, columns);
     }
 
     fn begin(&mut self, size: usize) {
@@ -72,7 +58,7 @@ impl ContactLaw for Coated {
     fn pose(&mut self, contact: usize, _: &[Vector3], at: &impl ContactPrediction) {
         self.angles[contact] = at.angle();
         self.gaps[contact] = at.gap();
-        self.problem.monotone &= at.friction() == 0.0;
+        self.problem.monotone &= at.parameters().friction == 0.0;
         self.closed[contact] = at.was_closed(self.coating.thickness());
     }
 
@@ -101,5 +87,17 @@ impl ContactLaw for Coated {
 
     fn coating_shares(&self) -> &[f64] {
         &self.problem.coating[..self.size]
+    }
+
+    fn coating(&self) -> Option<&Coating> {
+        Some(&self.coating)
+    }
+
+    fn coating_mut(&mut self) -> Option<&mut Coating> {
+        Some(&mut self.coating)
+    }
+
+    fn commit(&mut self) -> f64 {
+        self.coating.commit(&self.problem)
     }
 }

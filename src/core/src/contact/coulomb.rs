@@ -9,7 +9,7 @@ use crate::math::vector::Vector3;
 
 /// Coulomb friction, started from the forces of the last step.
 #[derive(Debug, Clone)]
-pub struct Coulomb {
+pub(crate) struct Coulomb {
     solver: CoulombSolver,
     size: usize,
     /// Corrected gaps (m).
@@ -24,11 +24,15 @@ impl Coulomb {
 }
 
 impl ContactLaw for Coulomb {
-    const DIRECTIONS: usize = 3;
-    const LOOKS_AGAIN: bool = true;
-    const STARTS_FROM_FORCES: bool = true;
+    fn directions(&self) -> usize {
+        3
+    }
 
-    fn fill_directions(at: &impl ContactPrediction, rows: &mut [Vector3], columns: &mut [Vector3]) {
+    fn starts_from_forces(&self) -> bool {
+        true
+    }
+
+    fn fill_directions(&self, at: &impl ContactPrediction, rows: &mut [Vector3], columns: &mut [Vector3]) {
         fill_tangents(at, rows, columns);
     }
 
@@ -42,7 +46,7 @@ impl ContactLaw for Coulomb {
 
     fn pose(&mut self, contact: usize, directions: &[Vector3], at: &impl ContactPrediction) {
         let (slip, last) = (at.slip(), at.last_force());
-        self.solver.friction[contact] = at.friction();
+        self.solver.friction[contact] = at.parameters().friction;
         for (along, direction) in directions.iter().enumerate() {
             self.solver.free[3 * contact + along] = direction.dot(&slip);
             self.solver.reactions[3 * contact + along] = direction.dot(&last);

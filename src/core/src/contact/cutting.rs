@@ -53,21 +53,6 @@ impl CuttingLaw {
         }
     }
 
-    /// Returns the coating.
-    pub fn coating(&self) -> &Coating {
-        &self.coating
-    }
-
-    /// Returns the coating for changes of its wear.
-    pub(crate) fn coating_mut(&mut self) -> &mut Coating {
-        &mut self.coating
-    }
-
-    /// Records the cut of the last solution; the material is removed once the sliding distance is known ([`Coating::cut`]).
-    pub fn commit(&mut self) {
-        self.coating.take_chips(&self.problem, &self.slid);
-    }
-
     /// Fills in gaps per normal force with its tangential force: on the hard casing, and on the coating.
     fn fill(&mut self) {
         let tangential = self.coating.tangential_ratio();
@@ -83,10 +68,11 @@ impl CuttingLaw {
 }
 
 impl ContactLaw for CuttingLaw {
-    const DIRECTIONS: usize = 3;
-    const LOOKS_AGAIN: bool = true;
+    fn directions(&self) -> usize {
+        3
+    }
 
-    fn fill_directions(at: &impl ContactPrediction, rows: &mut [Vector3], columns: &mut [Vector3]) {
+    fn fill_directions(&self, at: &impl ContactPrediction, rows: &mut [Vector3], columns: &mut [Vector3]) {
         fill_tangents(at, rows, columns);
     }
 
@@ -101,7 +87,7 @@ impl ContactLaw for CuttingLaw {
     }
 
     fn pose(&mut self, contact: usize, directions: &[Vector3], at: &impl ContactPrediction) {
-        let (along, friction) = (at.slip_direction(), at.friction());
+        let (along, friction) = (at.sliding().direction, at.parameters().friction);
         let (gap, closed) = (at.gap(), at.was_closed(self.coating.thickness()));
         let sense = along.dot(&directions[1]);
         self.contacts[contact] = CuttingContact { gap, closed, friction, sense, sector: at.sector() };
@@ -141,5 +127,19 @@ impl ContactLaw for CuttingLaw {
 
     fn coating_shares(&self) -> &[f64] {
         &self.problem.coating[..self.size]
+    }
+
+    fn coating(&self) -> Option<&Coating> {
+        Some(&self.coating)
+    }
+
+    fn coating_mut(&mut self) -> Option<&mut Coating> {
+        Some(&mut self.coating)
+    }
+
+    /// Records the cut of the last solution; the material is removed once the sliding distance is known ([`Coating::cut`]).
+    fn commit(&mut self) -> f64 {
+        self.coating.take_chips(&self.problem, &self.slid);
+        0.0
     }
 }

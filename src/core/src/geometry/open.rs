@@ -5,7 +5,7 @@
 
 use super::surface_spline::{ClosestPoint, Projection, SurfaceSpline};
 use super::{Gap, Geometry, Vector3};
-use crate::math::vector::{length, tangential, vector3_at};
+use crate::math::vector::{length, vector3_at};
 use crate::scene::ranges::SMALL;
 
 /// [`OpenGap::clearance`] as a fraction of the largest displacement that counts as small.
@@ -164,12 +164,4 @@ fn extent(points: &[Vector3]) -> f64 {
         values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
     };
     (0..3).map(side).fold(0.0, f64::max)
-}
-
-/// Unit tangent along a velocity (m/s); zero without slip.
-#[inline(always)]
-pub fn tangent(velocity: Vector3, normal: Vector3) -> Vector3 {
-    let along = tangential(velocity, normal);
-    let speed = length(along);
-    if speed > 0.0 { along / speed } else { Vector3::zeros() }
 }

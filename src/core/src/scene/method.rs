@@ -147,30 +147,81 @@ pub enum Solver {
 }
 
 impl Solver {
-    /// Returns whether contacts may stick, so that tangential forces have any direction within the friction cone.
-    pub fn sticks(self) -> bool {
-        match self {
-            Self::Film | Self::Lcp => false,
-            Self::Coulomb => true,
-        }
-    }
-
     /// All solvers, in the order of the FMU's enumeration.
     pub const ALL: [Self; 3] = [Self::Film, Self::Lcp, Self::Coulomb];
 
+    /// The paper's solver, which the preset `paper` fixes.
+    pub const PAPER: Self = Self::Film;
+
+    /// The solver with sticking friction that remedies propose.
+    pub const STICKING: Self = Self::Coulomb;
+
+    /// Returns the facts about the solver on which limits, checks, remedies and texts depend.
+    pub const fn properties(self) -> &'static SolverProperties {
+        match self {
+            Self::Film => &SolverProperties {
+                name: "film",
+                description: "Forward-increment Lagrange multipliers: zero gap at the nodes that are predicted to penetrate",
+                complementary: false,
+                ..SolverProperties::SLIDING
+            },
+            Self::Lcp => &SolverProperties {
+                name: "lcp",
+                description: "Complementarity over all contact nodes",
+                solves_coatings: true,
+                ..SolverProperties::SLIDING
+            },
+            Self::Coulomb => &SolverProperties {
+                name: "coulomb",
+                description: "Coulomb friction with sticking",
+                feature: Some("friction sticks and slides (coulomb)"),
+                sticks: true,
+                ..SolverProperties::SLIDING
+            },
+        }
+    }
+
     /// Name in scene files and in the FMU's enumeration.
     pub fn name(self) -> &'static str {
-        SOLVERS.items[self as usize].0
+        self.properties().name
     }
+}
+
+/// Facts about a contact solver and its law.
+#[derive(Debug)]
+pub struct SolverProperties {
+    /// Name in scene files.
+    pub name: &'static str,
+    /// Description for importers.
+    pub description: &'static str,
+    /// Phrase that describes a scene with this solver; `None` for plain sliding friction.
+    pub feature: Option<&'static str>,
+    /// True if contacts may stick, so that tangential forces have any direction within the friction cone.
+    pub sticks: bool,
+    /// True if gap and force are complementary; otherwise nodes may be pulled, or left inside a surface for a step.
+    pub complementary: bool,
+    /// True if contacts may have a coating, which yields within the contact problem.
+    pub solves_coatings: bool,
+}
+
+impl SolverProperties {
+    /// Complementarity with friction that always slides.
+    const SLIDING: Self =
+        Self { name: "", description: "", feature: None, sticks: false, complementary: true, solves_coatings: false };
 }
 
 /// Enumeration of the solvers for importers.
 pub(crate) static SOLVERS: Enumeration = Enumeration {
     name: "Solver",
     description: "Contact solver",
-    items: &[
-        ("film", "Forward-increment Lagrange multipliers: zero gap at the nodes that are predicted to penetrate"),
-        ("lcp", "Complementarity over all contact nodes"),
-        ("coulomb", "Coulomb friction with sticking"),
-    ],
+    items: &{
+        let mut items = [("", ""); Solver::ALL.len()];
+        let mut index = 0;
+        while index < items.len() {
+            let row = Solver::ALL[index].properties();
+            items[index] = (row.name, row.description);
+            index += 1;
+        }
+        items
+    },
 };

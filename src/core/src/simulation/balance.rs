@@ -117,8 +117,9 @@ impl Simulation {
                     "impacts{of} have added {given:.3e} J to the vibration, out of {exchanged:.3e} J of contact work, \
                      although they can only dissipate"
                 ),
-                if settings.solver == Solver::Film {
-                    "Use solver = \"lcp\", because film leaves nodes inside the surface for one step".to_owned()
+                if !settings.solver.properties().complementary {
+                    let [own, other] = [settings.solver, Solver::default()].map(Solver::name);
+                    format!("Use solver = \"{other}\", because {own} leaves nodes inside the surface for one step")
                 } else if settings.scheme.properties().adaptive {
                     "Use a smaller `tolerance`".to_owned()
                 } else if settings.scheme.properties().delays_contact {
@@ -134,14 +135,15 @@ impl Simulation {
     /// Returns the remedy for tips that do not only slide: the law with sticking, if the scene supports it.
     fn against_sliding(&self, scheme: Scheme) -> String {
         let scene = &self.compiled.scene;
-        let coulomb = match scene.check_methods(scheme, Solver::Coulomb) {
-            Ok(()) => "Use the solver coulomb, ",
+        let name = Solver::STICKING.name();
+        let sticking = match scene.check_methods(scheme, Solver::STICKING) {
+            Ok(()) => format!("Use the solver {name}, "),
             Err(_) if scene.settings.contacts.iter().all(|contact| contact.coating.is_none()) => {
-                "Set contact.solver = \"coulomb\" in the scene, or use "
+                format!("Set contact.solver = \"{name}\" in the scene, or use ")
             }
-            Err(_) => "Use ",
+            Err(_) => "Use ".to_owned(),
         };
-        format!("{coulomb}less friction, or a motion in which the tips keep sliding")
+        format!("{sticking}less friction, or a motion in which the tips keep sliding")
     }
 }
 

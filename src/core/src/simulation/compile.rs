@@ -1,5 +1,6 @@
 //! Compilation of settings into kernels: everything that is determined before the first step.
 
+use crate::contact::ContactParameters;
 use crate::contact::coating::{BladeTip, Coating};
 use crate::geometry::layout::Layout;
 use crate::geometry::open::{OpenGap, OpenSurface};
@@ -57,10 +58,10 @@ impl ValuePlaces {
     }
 }
 
-/// Returns the solver of a scene, or `lcp` instead of `film`.
+/// Returns the solver of a scene, or the default if forces would not be complementary to gaps.
 pub fn complementary(settings: &SceneSettings) -> Solver {
     let own = settings.contacts[0].solver;
-    if own == Solver::Film { Solver::Lcp } else { own }
+    if own.properties().complementary { own } else { Solver::default() }
 }
 
 /// A master: a structure with contact nodes.
@@ -428,9 +429,8 @@ impl Compiled {
                 rows[carrier] += 3 * gap.spline().map_or(0, |surface| surface.control_points().len());
                 SurfaceCarrier { structure: self.bodies.len() + carrier, first_row }
             });
-            let contact = self.contact(index);
-            let cutting = contact.coating.and_then(|coating| coating.cutting).map_or(0.0, |cut| 1.0 / cut.normal_ratio);
-            pairs.push(PairParts { structure: plan.body, gap, carrier, friction: contact.friction, cutting });
+            let parameters = ContactParameters::new(self.contact(index));
+            pairs.push(PairParts { structure: plan.body, gap, carrier, parameters });
         }
         let coating = |pair| self.coating(pair).map_err(|error| self.of_pair(pair, error));
         let coatings = (0..pairs.len()).filter_map(|pair| Some((pair, coating(pair).transpose()?)));

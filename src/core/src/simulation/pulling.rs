@@ -21,7 +21,6 @@ use tiprub_cosim::warning::Topic;
 
 use super::Simulation;
 use crate::limits::finding::Subject;
-use crate::scene::method::Solver;
 use crate::scene::settings::Preset;
 use crate::system::StepFailure;
 use crate::{Result, Warning};
@@ -42,7 +41,7 @@ const LASTED: u64 = 100;
 impl Simulation {
     /// Warns of a node that is pulled or left deep inside a surface, or ends the run.
     pub(super) fn check_pulling(&mut self, time: f64) -> Result<()> {
-        if self.system.settings().solver != Solver::Film {
+        if self.system.settings().solver.properties().complementary {
             return Ok(());
         }
         let is_paper = self.compiled.scene.settings.preset == Preset::Paper;

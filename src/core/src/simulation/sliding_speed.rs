@@ -9,7 +9,6 @@ use super::compile::Compiled;
 use super::limits::Parameters;
 use crate::Warning;
 use crate::modes::modal::ModalModel;
-use crate::scene::method::Solver;
 use crate::scene::shape::CompiledShape;
 
 /// Angles at which a shape is sampled.
@@ -22,7 +21,7 @@ impl Simulation {
             let (speed, friction) =
                 (&self.state.inputs.rotors[body].speed, parameters.friction_of(&self.compiled, body));
             if self.compiled.bodies[body].translations.is_some()
-                || parameters.solver == Solver::Coulomb
+                || parameters.solver.properties().sticks
                 || (friction == 0.0 && !self.compiled.cuts(body))
                 || speed.slope != 0.0
             {

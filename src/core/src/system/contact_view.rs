@@ -3,9 +3,9 @@
 use super::carrier::Spot;
 use super::pair::When;
 use super::{ContactPair, StepFailure, Structure};
-use crate::contact::ContactPrediction;
-use crate::geometry::Vector3;
+use crate::contact::{ContactParameters, ContactPrediction};
 use crate::geometry::wrench::At;
+use crate::geometry::{Sliding, Vector3, Vibration};
 
 /// A contact node of one sector of a structure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -98,11 +98,9 @@ impl ContactView<'_> {
         self.pair.spot(index, self.structure.history.geometry.now.places[index], rotor_angle)
     }
 
-    /// Prescribed velocity relative to the surface (m/s).
     #[inline(always)]
-    fn sliding(&self) -> Vector3 {
-        let ContactMember { node, index, .. } = self.member;
-        self.pair.gap().sliding_velocity(node, index, self.pair.drive(When::Now), self.displacement())
+    fn at(&self) -> At<'_> {
+        At { node: self.member.node, index: self.member.index, drive: self.pair.drive(When::Now) }
     }
 
     /// Checks that small displacements can describe the contact.
@@ -133,27 +131,26 @@ impl ContactPrediction for ContactView<'_> {
     fn normal(&self) -> Vector3 {
         self.structure.history.geometry.now.normal_at(self.member.index)
     }
-    fn friction(&self) -> f64 {
-        self.pair.friction()
+    fn parameters(&self) -> &ContactParameters {
+        self.pair.parameters()
     }
     fn slip(&self) -> Vector3 {
-        self.sliding() * self.structure.modes().step() + self.slip_of_deformation()
+        let rigid = self.pair.gap().rigid_velocity(self.at(), self.displacement());
+        rigid * self.structure.modes().step() + self.slip_of_deformation()
     }
     fn last_force(&self) -> Vector3 {
         self.structure.vector3(&self.structure.history.force.before, self.member.node, self.member.sector)
     }
-    /// From the predicted relative velocity.
     #[inline(always)]
-    fn slip_direction(&self) -> Vector3 {
+    fn sliding(&self) -> Sliding {
         let moved = if self.bodies.delays_contact { self.slip_of_inertia() } else { self.slip_of_deformation() };
-        let velocity = self.sliding() + moved / self.structure.modes().step();
-        self.pair.gap().slip_direction(velocity, self.normal())
+        let vibration = Vibration { node: moved / self.structure.modes().step(), ..Vibration::default() };
+        self.pair.gap().sliding(self.at(), self.displacement(), vibration, self.normal())
     }
     fn sector(&self) -> usize {
         self.member.sector
     }
     fn angle(&self) -> f64 {
-        let ContactMember { node, index, .. } = self.member;
-        self.pair.gap().angle_on_casing(At { node, index, drive: self.pair.drive(When::Now) }, self.displacement())
+        self.pair.gap().angle_on_casing(self.at(), self.displacement())
     }
 }

@@ -119,9 +119,9 @@ impl ContactGroup {
         &mut self.law
     }
 
-    /// Selects a solver, if it is different from the current one.
+    /// Selects another solver; a coating has one law for all solvers.
     pub(crate) fn set_solver(&mut self, solver: Solver, structures: &[Structure]) {
-        if !self.law.matches_solver(solver) {
+        if self.law.coating().is_none() {
             let touching: Vec<usize> = self.structures().collect();
             let carriers: Vec<usize> = self.reactions.iter().map(|reaction| reaction.structure).collect();
             *self = Self::new(self.reach, &touching, &carriers, structures, solver, None);

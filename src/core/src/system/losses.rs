@@ -9,7 +9,6 @@
 use tiprub_cosim::persist_fields;
 
 use super::{ContactPair, StepFailure, System};
-use crate::scene::method::Solver;
 use crate::system::ledger::Ledger;
 
 /// A contact loss that may only dissipate energy.
@@ -66,7 +65,7 @@ impl System {
         // Before the first step, the gap of the previous step is unknown too.
         let another_step = self.counted.witnessed > 0;
         let returns = self.settings.scheme.properties().returns_impact_energy
-            || self.settings.solver == Solver::Film
+            || !self.settings.solver.properties().complementary
             || another_step;
         let pays = self.settings.scheme.properties().adaptive;
         for (set, (ledger, taken)) in self.counted.ledgers.iter().zip(&mut self.counted.taken).enumerate() {

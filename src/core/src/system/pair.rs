@@ -5,6 +5,7 @@ use tiprub_cosim::persist_fields;
 use super::Structure;
 use super::carrier::Spot;
 use super::growth::ShapeGrowth;
+use crate::contact::ContactParameters;
 use crate::geometry::frame::PolarFrame;
 use crate::geometry::surface_spline::ClosestPoint;
 use crate::geometry::wrench::MotionIncrement;
@@ -29,10 +30,8 @@ pub struct PairParts {
     pub gap: GapLaw,
     /// Structure that deforms the surface; `None` for a rigid surface.
     pub carrier: Option<SurfaceCarrier>,
-    /// Friction coefficient µ.
-    pub friction: f64,
-    /// Tangential per normal force when a coating is cut (-); 0 without a coating.
-    pub cutting: f64,
+    /// Parameters of the contact law.
+    pub parameters: ContactParameters,
 }
 
 /// Prescribed motion over the last steps.
@@ -83,14 +82,9 @@ impl ContactPair {
         self.parts.carrier
     }
 
-    /// Friction coefficient µ.
-    pub fn friction(&self) -> f64 {
-        self.parts.friction
-    }
-
-    /// Tangential per normal force when a coating is cut (-); 0 without a coating.
-    pub fn cutting(&self) -> f64 {
-        self.parts.cutting
+    /// Parameters of the contact law.
+    pub fn parameters(&self) -> &ContactParameters {
+        &self.parts.parameters
     }
 
     /// The gap function, for evaluation.

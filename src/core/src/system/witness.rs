@@ -60,10 +60,12 @@ impl System {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contact::ContactParameters;
     use crate::geometry::{FixedGap, GapLaw, PrescribedMotion};
     use crate::modes::modal::ModalModel;
+    use crate::modes::sectors::SectorModel;
     use crate::scene::method::{Scheme, Solver};
-    use crate::system::SystemSettings;
+    use crate::system::{PairParts, StructureParts, SystemSettings};
     use crate::time::{Recurrence, Stepper};
     use nalgebra::DMatrix;
 
@@ -79,7 +81,10 @@ mod tests {
         let law = FixedGap { normals: vec![-Vector3::x()], gaps: vec![1e-4], sliding: vec![Vector3::zeros()] };
         let (scheme, solver) = (Scheme::ModalExact, Solver::Lcp);
         let settings = SystemSettings { scheme, solver, ledger: true };
-        let mut system = System::new(&model, 1, GapLaw::Fixed(law), 0.0, settings);
+        let parameters = ContactParameters::FRICTIONLESS;
+        let pair = PairParts { structure: 0, gap: GapLaw::Fixed(law), carrier: None, parameters };
+        let structure = StructureParts::Touching(SectorModel::Uncoupled(&model, 1), Box::default());
+        let mut system = System::of(vec![structure], vec![pair], Vec::new(), settings);
         system.set_step(1e-6);
         system.bank_mut().set_modal_state(0, 0, 0.0, 1.0);
         system.start(&[PrescribedMotion::default()]);

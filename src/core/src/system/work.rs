@@ -5,7 +5,6 @@ use super::{ContactEvent, StepFailure, System};
 use crate::geometry::surface_spline::ClosestPoint;
 use crate::geometry::wrench::{At, MotionIncrement};
 use crate::geometry::{GapLaw, Geometry, Vector3};
-use crate::scene::method::Solver;
 use crate::system::ledger::Ledger;
 
 /// Work of contacts over a step (J).
@@ -282,9 +281,10 @@ impl System {
         };
         let work = force.work();
         let opposed = work.heat;
-        let cut = if pair.cutting() > 0.0 { opposed * share_cut(event, pair.cutting()) } else { 0.0 };
+        let cutting = pair.parameters().cutting;
+        let cut = if cutting > 0.0 { opposed * share_cut(event, cutting) } else { 0.0 };
         let heat = opposed - cut;
-        let turned = if self.settings.solver == Solver::Coulomb { heat.min(0.0) } else { 0.0 };
+        let turned = if self.settings.solver.properties().sticks { heat.min(0.0) } else { 0.0 };
         let uncut = cut.min(0.0);
         ContactWork {
             heat: heat - turned,

@@ -3,7 +3,7 @@
 //! D. Doyen, A. Ern, S. Piperno, SIAM J. Sci. Comput. 33 (2011): period 16/3 s, contacts on [1, 5/3] and [11/3, 13/3].
 
 use crate::guide::print_row;
-use crate::rods::{NEARLY_NONE, SCHEMES, SOLVERS, StraightRod, against_plane, orders, quiet_step, set_samples};
+use crate::rods::{NEARLY_NONE, SCHEMES, StraightRod, against_plane, orders, quiet_step, set_samples};
 use tiprub_core::geometry::PrescribedMotion;
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::time::{Recurrence, Stepper};
@@ -147,7 +147,7 @@ fn bouncing_bar_matches_series_solution() {
             check(scheme, elements, &found);
             errors.push(found.bottom[1]);
             // With one contact node all solvers solve the same problem.
-            for solver in SOLVERS.into_iter().filter(|solver| *solver != Solver::Lcp && elements == 25) {
+            for solver in Solver::ALL.into_iter().filter(|solver| *solver != Solver::Lcp && elements == 25) {
                 let other = bounce(elements, scheme, solver, 0.9);
                 print(scheme, solver, elements, &other);
                 assert!((other.bottom[1] / found.bottom[1] - 1.0).abs() < 1e-6, "{solver:?}");

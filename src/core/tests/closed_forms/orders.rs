@@ -2,7 +2,7 @@
 //! contact, impacts.
 
 use crate::guide::print_row;
-use crate::rods::{SCHEMES, SOLVERS, against_plane, orders, set_samples, single};
+use crate::rods::{SCHEMES, against_plane, orders, set_samples, single};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use tiprub_core::geometry::PrescribedMotion;
 use tiprub_core::modes::modal::ModalModel;
@@ -27,7 +27,7 @@ fn row(phase: &str, scheme: Scheme, solver: Solver, quantity: &str, errors: &[f6
 /// Returns the solvers to test. With one contact node all of them solve the same problem, so the others are tested with
 /// one scheme.
 fn solvers(scheme: Scheme) -> Vec<Solver> {
-    if scheme == Scheme::ModalExact { SOLVERS.to_vec() } else { vec![Solver::Lcp] }
+    if scheme == Scheme::ModalExact { Solver::ALL.to_vec() } else { vec![Solver::Lcp] }
 }
 
 fn head() {

@@ -4,6 +4,7 @@
 use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
+use tiprub_core::contact::ContactParameters;
 use tiprub_core::geometry::open::{OpenGap, OpenSurface};
 use tiprub_core::geometry::surface_spline::SurfaceSpline;
 use tiprub_core::geometry::{FixedGap, GapLaw, PrescribedMotion, Vector3};
@@ -15,7 +16,7 @@ use tiprub_core::scene::settings::{Interpolation, LoadSettings, Shape, SplineSet
 use tiprub_core::system::{PairParts, StructureParts, SurfaceCarrier, System, SystemSettings};
 use tiprub_core::time::{Recurrence, Stepper};
 use tiprub_core::{CoSimulation, Scene, Simulation};
-use tiprub_test_models::{self as models, element, go, lattice, move_on, real, reference, set, started};
+use tiprub_test_models::{self as models, element, go, lattice, move_on, real, reference, set, single_sector, started};
 
 const SECTORS: usize = 5;
 const SLOPE: f64 = -0.2;
@@ -329,7 +330,7 @@ fn swinging_blade(scheme: Scheme, friction: f64, settings: SystemSettings) -> Sy
     let delayed = scheme == Scheme::MasslessBoundary;
     let model = if delayed { masses(&modes, 3, 2) } else { masses(&modes[..2], 3, 0) };
     let law = FixedGap { normals: vec![Vector3::z()], gaps: vec![-DEPTH], sliding: vec![Vector3::zeros()] };
-    System::new(&model, 1, GapLaw::Fixed(law), friction, settings)
+    single_sector(&model, GapLaw::Fixed(law), friction, settings)
 }
 
 /// Returns a mass on a vibrating plane. A second node without contact gives the free structure an extent.
@@ -345,7 +346,8 @@ fn swinging_plane(scheme: Scheme, friction: f64, settings: SystemSettings) -> Sy
     let gap = GapLaw::Open(Box::new(OpenGap::new(positions, vec![0], OpenSurface::new(surface))));
     let touching = StructureParts::Touching(SectorModel::Uncoupled(&model, 1), Box::default());
     let carrier = Some(SurfaceCarrier { structure: 1, first_row: 0 });
-    let pair = PairParts { structure: 0, gap, carrier, friction, cutting: 0.0 };
+    let parameters = ContactParameters { friction, ..ContactParameters::FRICTIONLESS };
+    let pair = PairParts { structure: 0, gap, carrier, parameters };
     System::of(vec![touching, StructureParts::Carrying(&plane, false)], vec![pair], Vec::new(), settings)
 }
 

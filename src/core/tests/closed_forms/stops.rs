@@ -1,7 +1,7 @@
 //! The core against closed forms for oscillators and balls at stops: exact times, losses, grazing, long sequences.
 
 use crate::guide::print_row;
-use crate::rods::{SOLVERS, against_plane, set_samples, single};
+use crate::rods::{against_plane, set_samples, single};
 use tiprub_core::geometry::PrescribedMotion;
 use tiprub_core::modes::modal::ModalModel;
 use tiprub_core::scene::method::{Scheme, Solver};
@@ -53,7 +53,7 @@ fn mass_stays_at_rigid_stop_until_the_spring_returns_it() {
     print_row!("| scheme | solver | d/A | h (µs) | position | touch (steps) | loss | exact | ledger |");
     print_row!("|---|---|---|---|---|---|---|---|---|");
     for scheme in RIGID {
-        for solver in SOLVERS {
+        for solver in Solver::ALL {
             for share in [0.2, 0.9] {
                 let case = DeadStop { omega: OMEGA, amplitude: 1e-3, distance: share * 1e-3 };
                 let mut last = f64::INFINITY;
@@ -99,7 +99,7 @@ fn after_one_impact_an_oscillator_only_grazes() {
 #[test]
 fn a_preloaded_mass_stays_on_its_stop() {
     for scheme in RIGID {
-        for solver in SOLVERS {
+        for solver in Solver::ALL {
             let model = single(&[(OMEGA, 1.0)], 0);
             let mut system = against_plane(&model, (scheme, solver), 1.0, -2e-4, false);
             system.set_step(1e-4);
@@ -121,7 +121,7 @@ fn a_preloaded_mass_stays_on_its_stop() {
 #[test]
 fn impact_after_step_change_is_recorded_as_impact_loss() {
     let (step, speed) = (1e-5, 2.0);
-    for methods in RIGID.into_iter().flat_map(|scheme| SOLVERS.map(|solver| (scheme, solver))) {
+    for methods in RIGID.into_iter().flat_map(|scheme| Solver::ALL.map(|solver| (scheme, solver))) {
         for ratio in [0.1, 0.9, 1.7, 12.0] {
             let model = single(&[(0.0, 1.0)], 0);
             // Five steps of flight, the stop in the middle of the sixth.
@@ -162,7 +162,7 @@ fn ball_on_a_spring_bounces_without_loss() {
     print_row!("| solver | h (µs) | height, 20 bounces | time of touch 20 (s) | largest force | energy | ledger |");
     print_row!("|---|---|---|---|---|---|---|");
     let ball = Ball { omega: 200.0, gravity: 9.81, height: 0.05 };
-    for solver in SOLVERS {
+    for solver in Solver::ALL {
         let mut errors = Vec::new();
         for step in [8e-5, 4e-5, 2e-5] {
             let model = on_a_spring(0.0, 1.0 / (ball.omega * ball.omega));
@@ -238,7 +238,7 @@ fn bilinear(case: Bilinear, solver: Solver, step: f64, turns: u32) -> [f64; 3] {
 fn impact_oscillator_period_matches_the_closed_form() {
     print_row!("| solver | A/d | period (s) | period, h = 200, 100, 50 µs | order | force at 50 µs | energy |");
     print_row!("|---|---|---|---|---|---|---|");
-    for solver in SOLVERS {
+    for solver in Solver::ALL {
         for share in [1.000_1, 1.01, 1.5, 10.0] {
             let case = Bilinear { omega: OMEGA, ratio: 25.0, distance: 1e-3, amplitude: share * 1e-3 };
             let found = [2e-4, 1e-4, 5e-5].map(|step| bilinear(case, solver, step, 40));

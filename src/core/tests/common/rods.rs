@@ -8,14 +8,12 @@ use tiprub_core::limits::massless::{MasslessCheck, QUIET};
 use tiprub_core::modes::bank::BankOptions;
 use tiprub_core::modes::modal::ModalModel;
 use tiprub_core::modes::schemes::free_increment;
-use tiprub_core::modes::sectors::SectorModel;
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::rom::Rom;
 use tiprub_core::system::{System, SystemSettings};
-use tiprub_test_models::{node, structure};
+use tiprub_test_models::{node, single_sector_with, structure};
 
 pub const SCHEMES: [Scheme; 3] = Scheme::RECURRENCES;
-pub const SOLVERS: [Solver; 3] = Solver::ALL;
 
 /// Fraction of its mass that a nominally massless contact node of a rod keeps; the matrix must stay invertible.
 pub const NEARLY_NONE: f64 = 1e-4;
@@ -106,7 +104,7 @@ pub fn against_plane(model: &ModalModel, methods: (Scheme, Solver), normal: f64,
     let law = FixedGap { normals: vec![normal * Vector3::x()], gaps: vec![gap], sliding: vec![Vector3::zeros()] };
     let settings = SystemSettings { scheme: methods.0, solver: methods.1, ledger: true };
     let bank = BankOptions { loads, ..BankOptions::default() };
-    System::alone(SectorModel::Uncoupled(model, 1), bank, GapLaw::Fixed(law), 0.0, settings)
+    single_sector_with(model, bank, GapLaw::Fixed(law), 0.0, settings)
 }
 
 /// Sets amplitude and increment q(0) − q(−h) of a mode.

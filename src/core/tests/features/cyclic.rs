@@ -10,7 +10,6 @@ use tiprub_test_models::{
 };
 
 const SCHEMES: [Scheme; 3] = Scheme::RECURRENCES;
-const SOLVERS: [Solver; 3] = Solver::ALL;
 
 /// Returns both forms of one disk with the same settings.
 fn pair(disk: &TestDisk, scheme: Scheme, solver: Solver, friction: f64) -> [Simulation; 2] {
@@ -104,7 +103,7 @@ fn every_pair(mut check: impl FnMut(&TestDisk, [Simulation; 2], String)) {
     for (sectors, nodes, order) in [(5, 1, 5), (6, 1, 5), (8, 1, 5), (6, 2, 8), (3, 1, 5), (2, 2, 8)] {
         for scheme in SCHEMES {
             let excluded = |solver: &Solver| scheme == Scheme::MasslessBoundary && *solver == Solver::Film;
-            for solver in SOLVERS.into_iter().filter(|solver| !excluded(solver)) {
+            for solver in Solver::ALL.into_iter().filter(|solver| !excluded(solver)) {
                 for friction in [0.0, 0.15] {
                     let disk = TestDisk::random(sectors, nodes, order, 0.2, 3 + sectors as u64);
                     let both = pair(&disk, scheme, solver, friction);

@@ -7,7 +7,6 @@ use tiprub_cosim::variables::{Causality, DataType};
 use tiprub_test_models::{lattice, real, rich_blade, rub, several, spin};
 
 const SCHEMES: [Scheme; 3] = Scheme::RECURRENCES;
-const SOLVERS: [Solver; 3] = Solver::ALL;
 
 /// Sets every input and parameter whose name ends with `name`.
 fn set_all(simulation: &mut Simulation, name: &str, value: f64) {
@@ -57,7 +56,7 @@ fn run_closing(scene: &Scene, steps: u32, length: f64, mut each: impl FnMut(&Sim
 #[test]
 fn splitting_a_contact_pair_keeps_bit_identical_results() {
     for scheme in SCHEMES {
-        for solver in SOLVERS {
+        for solver in Solver::ALL {
             let mut whole = rub(6);
             (whole.settings.time.scheme, whole.settings.contacts[0].solver) = (scheme, solver);
             // massless-boundary would make nine of the eight modes quasi-static here.

@@ -8,7 +8,7 @@ use tiprub_core::scene::rom::Rom;
 use tiprub_core::system::{System, SystemSettings};
 use tiprub_core::time::{Recurrence, Stepper};
 use tiprub_reference::paper::DenseFilm;
-use tiprub_test_models::{SeededRandom, node, structure};
+use tiprub_test_models::{SeededRandom, node, single_sector, structure};
 
 const CONTACTS: usize = 3;
 const ORDER: usize = 14;
@@ -41,7 +41,7 @@ fn a_thousand_contact_steps_agree_to_rounding() {
     let gaps = [-1e-4, 0.1e-4, -0.5e-4];
     let law = GapLaw::Fixed(FixedGap { normals: normals.clone(), gaps: gaps.to_vec(), sliding });
     let settings = SystemSettings { scheme: Scheme::CentralDifference, solver: Solver::Film, ledger: true };
-    let mut system = System::new(&model, 1, law, FRICTION, settings);
+    let mut system = single_sector(&model, law, FRICTION, settings);
     system.set_step(step);
     let start = DVector::from_fn(ORDER, |_, _| 2e-4 * numbers.signed());
     let modal = model.shapes.transpose() * &rom.mass * &start;

@@ -13,7 +13,7 @@ const fn field(
 }
 
 /// Every key, in file order.
-pub const FIELDS: [SceneField; 102] = [
+pub static FIELDS: &[SceneField] = &[
     field("name", "text", None, "letters, digits, underscore; starts with a letter", "Name of the model."),
     field("description", "text", Some("empty"), "any", "Short description for the importer's catalogue."),
     field(

@@ -231,10 +231,10 @@ fn checks_ranges_of_coating_values() {
 
 #[test]
 fn rejects_mutually_exclusive_features() {
-    let parts = ["contact[1].solver: `film` cannot be combined with a coating", "Use solver = \"lcp\""];
-    refused(|scene| scene.contacts[0].solver = Solver::Film, &parts);
-    let parts = ["contact[1].solver: `coulomb` cannot be combined with a coating", "Use solver = \"lcp\""];
-    refused(|scene| scene.contacts[0].solver = Solver::Coulomb, &parts);
+    let parts = ["contact[1].solver: a solver other than `lcp` cannot be combined with a coating", "solver = \"lcp\""];
+    for solver in Solver::ALL.into_iter().filter(|solver| *solver != Solver::Lcp) {
+        refused(|scene| scene.contacts[0].solver = solver, &parts);
+    }
     let parts =
         ["time.scheme: `massless-boundary` cannot be combined with `structure.spin.coriolis`", "\"modal-exact\""];
     refused(|scene| scene.time.scheme = Scheme::MasslessBoundary, &parts);

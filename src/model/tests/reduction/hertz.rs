@@ -7,7 +7,7 @@ use tiprub_core::Rom;
 use tiprub_core::geometry::{FixedGap, GapLaw, PrescribedMotion, Vector3};
 use tiprub_core::modes::modal::{ModalModel, NodePair};
 use tiprub_core::scene::method::{Scheme, Solver};
-use tiprub_core::system::{System, SystemSettings};
+use tiprub_core::system::SystemSettings;
 use tiprub_core::time::{Recurrence, Stepper};
 use tiprub_model::assembly::assemble_with;
 use tiprub_model::craig_bampton::craig_bampton;
@@ -17,7 +17,7 @@ use tiprub_model::progress::silent;
 use tiprub_model::sparse::principal_pair;
 use tiprub_model::{Material, Mesh};
 use tiprub_reference::closed::impact::Hertz;
-use tiprub_test_models::{node, structure};
+use tiprub_test_models::{node, single_sector, structure};
 
 /// Contact radius in the computation (m); below, the radius of the sphere.
 const CONTACT: f64 = 1e-3;
@@ -144,7 +144,7 @@ struct AtRest {
 /// Computes the equilibrium under strong damping with the sphere held at `approach` (m).
 fn at_rest(block: &HertzBlock, model: &ModalModel, solver: Solver, approach: f64) -> AtRest {
     let settings = SystemSettings { scheme: Scheme::ModalExact, solver, ledger: true };
-    let mut system = System::new(model, 1, law(block, approach), 0.0, settings);
+    let mut system = single_sector(model, law(block, approach), 0.0, settings);
     system.set_step(0.5 / model.frequencies[0]);
     system.start(&[PrescribedMotion::default()]);
     for _ in 0..200 {
@@ -265,7 +265,7 @@ fn sphere_impact_on_block_matches_hertz() {
     for scheme in [Scheme::ModalExact] {
         let step = duration / 4000.0;
         let settings = SystemSettings { scheme, solver: Solver::Lcp, ledger: true };
-        let mut system = System::new(&model, 1, law(&block, 0.0), 0.0, settings);
+        let mut system = single_sector(&model, law(&block, 0.0), 0.0, settings);
         system.set_step(step);
         // The sphere moves down with its lowest point on the surface at time 0.
         system.bank_mut().set_modal_state(last, 0, 0.0, -speed * (0.25 * mass).sqrt());

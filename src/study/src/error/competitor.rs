@@ -42,7 +42,7 @@ pub const TOLERANCES: [u32; 4] = [100, 1000, 10_000, 100_000];
 /// Inverse of the tolerance of the finest run.
 pub const FINEST: u32 = 10_000_000;
 /// The method of the paper.
-pub const PAPER: Competitor = Competitor::Core(Scheme::CentralDifference, Solver::Film);
+pub const PAPER: Competitor = Competitor::Core(Scheme::PAPER, Solver::PAPER);
 /// First reference and default of tiprub.
 pub const DEFAULT: Competitor = Competitor::Core(Scheme::ModalExact, Solver::Lcp);
 /// Equations that a competitor solves: all runs of one family converge to the same limit for h → 0.
@@ -67,7 +67,7 @@ impl EquationFamily {
     /// Returns the competitor whose fine run represents the limit.
     pub fn reference(self) -> Competitor {
         let scheme = if self.massless { Scheme::MasslessBoundary } else { Scheme::ModalExact };
-        Competitor::Core(scheme, if self.sticking { Solver::Coulomb } else { Solver::Lcp })
+        Competitor::Core(scheme, if self.sticking { Solver::STICKING } else { Solver::default() })
     }
 }
 
@@ -102,7 +102,7 @@ impl Competitor {
     /// Returns the equations that the method solves.
     pub fn family(self) -> EquationFamily {
         let Self::Core(scheme, solver) = self else { return EquationFamily::PLAIN };
-        EquationFamily { massless: scheme.properties().quasi_static, sticking: solver == Solver::Coulomb }
+        EquationFamily { massless: scheme.properties().quasi_static, sticking: solver.properties().sticks }
     }
 
     /// Returns whether the method uses a tolerance instead of a step; a division then applies to the smallest clearance instead of the sample

@@ -259,7 +259,8 @@ fn true_run(case: &UserScene, scene: &Scene) -> std::result::Result<(u32, RunSum
 /// Returns the competitors: the schemes with the solver of the scene's law, and the paper's method.
 fn competitors(case: &UserScene) -> Vec<Competitor> {
     let Competitor::Core(_, solver) = case.method() else { return Vec::new() };
-    let solvers = if solver == Solver::Coulomb { &[Solver::Coulomb][..] } else { &[Solver::Lcp, Solver::Film] };
+    let alike = [Solver::Lcp, Solver::Film];
+    let solvers = if alike.contains(&solver) { alike.to_vec() } else { vec![solver] };
     let all = Scheme::RECURRENCES.into_iter().flat_map(|scheme| solvers.iter().map(move |solver| (scheme, *solver)));
     all.map(|(scheme, solver)| Competitor::Core(scheme, solver)).chain([TOLERANT]).collect()
 }

@@ -188,7 +188,7 @@ impl UserScene {
     /// Returns an empty work plan. Its rate is the slowest of three runs per unit of work: the scene's own method, and fixed steps with `lcp` and
     /// `coulomb`, of which most of the work consists.
     pub fn ledger(&self) -> WorkPlan {
-        let sticking = Competitor::Core(Scheme::default(), Solver::Coulomb);
+        let sticking = Competitor::Core(Scheme::default(), Solver::STICKING);
         let runs = [(self.method(), self.own_division()), (DEFAULT, self.base), (sticking, self.base)];
         WorkPlan::new(runs.into_iter().filter_map(|(method, division)| self.rate(method, division)).fold(0.0, f64::max))
     }

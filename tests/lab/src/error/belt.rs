@@ -3,11 +3,12 @@
 use nalgebra::DMatrix;
 use tiprub_core::geometry::{FixedGap, GapLaw, PrescribedMotion, Vector3};
 use tiprub_core::limits::{self, massless};
-use tiprub_core::modes::{bank::BankOptions, modal::ModalModel, sectors::SectorModel};
+use tiprub_core::modes::modal::ModalModel;
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::system::{System, SystemSettings};
 use tiprub_core::time::TimeStepper;
 use tiprub_reference::closed::belt::ThrownBlock;
+use tiprub_test_models::single_sector;
 
 use super::{
     case::ErrorCase,
@@ -75,8 +76,7 @@ impl BeltCase {
             sliding: vec![Vector3::zeros(); NODES],
         });
         let settings = SystemSettings { scheme, solver, ledger: true };
-        let sector = SectorModel::Uncoupled(&self.model, 1);
-        let mut system = System::alone(sector, BankOptions::default(), law, FRICTION, settings);
+        let mut system = single_sector(&self.model, law, FRICTION, settings);
         let by_tolerance = scheme == Scheme::Galerkin;
         let step = if by_tolerance { INTERVAL } else { INTERVAL / f64::from(division) };
         if !by_tolerance {

@@ -4,7 +4,8 @@
 //! has no loads.
 
 use nalgebra::{DMatrix, DVector};
-use tiprub_core::geometry::{Gap, Vector3};
+use tiprub_core::contact::ContactParameters;
+use tiprub_core::geometry::{Gap, Sliding, Vector3};
 use tiprub_core::modes::coordinates::ContactModes;
 use tiprub_core::modes::modal::ModalModel;
 use tiprub_core::scene::method::Scheme;
@@ -16,7 +17,7 @@ use tiprub_core::time::galerkin::{
     state::SectorState,
     surroundings::{AcceptedStep, CarriersInStep, Surroundings, Witness},
     tables::Tables,
-    trial::{ForceInterpolation, Obstacle},
+    trial::{ForceInterpolation, Obstacle, SlidingState},
 };
 
 use super::{
@@ -49,6 +50,22 @@ impl RigidObstacle {
 impl Obstacle for &mut RigidObstacle {
     fn gap(&mut self, _: usize, point: usize, moved: Vector3) -> Gap {
         Gap { distance: self.gap_at(self.times[point], moved[0]), normal: NORMAL, ..Gap::NOTHING }
+    }
+
+    fn parameters(&self, _: usize) -> &ContactParameters {
+        &ContactParameters::FRICTIONLESS
+    }
+
+    fn sliding(&mut self, _: usize, _: usize, _: &SlidingState) -> Sliding {
+        Sliding::default()
+    }
+
+    fn sector(&self) -> usize {
+        0
+    }
+
+    fn angle(&self, _: usize, _: usize, _: Vector3) -> f64 {
+        0.0
     }
 }
 

@@ -3,12 +3,12 @@
 use nalgebra::{DMatrix, DVector};
 use tiprub_core::geometry::{FixedGap, GapLaw, PrescribedMotion, Vector3};
 use tiprub_core::limits::{self, massless};
-use tiprub_core::modes::{bank::BankOptions, modal::ModalModel, sectors::SectorModel};
+use tiprub_core::modes::{bank::BankOptions, modal::ModalModel};
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::system::{System, SystemSettings};
 use tiprub_core::time::{Recurrence, Stepper};
 use tiprub_reference::reduced::bars::RodModel;
-use tiprub_test_models::{node, structure};
+use tiprub_test_models::{node, single_sector_with, structure};
 
 use super::run::{StepExtremes, TimedRun};
 
@@ -76,7 +76,7 @@ impl CoreRod {
         let law = GapLaw::Fixed(FixedGap { normals: vec![NORMAL], gaps: vec![gap], sliding: vec![Vector3::zeros()] });
         let settings = SystemSettings { scheme, solver, ledger: true };
         let bank = BankOptions { loads: true, ..BankOptions::default() };
-        let mut system = System::alone(SectorModel::Uncoupled(&self.model, 1), bank, law, 0.0, settings);
+        let mut system = single_sector_with(&self.model, bank, law, 0.0, settings);
         system.set_step(step);
         for mode in 0..self.model.len() {
             let dynamic = mode < self.model.dynamic_modes(scheme);

@@ -1,7 +1,8 @@
 //! Random sectors against a wall, without a scene: energy over very many switches, contact problems without a solution.
 
 use nalgebra::DMatrix;
-use tiprub_core::geometry::{Gap, Vector3};
+use tiprub_core::contact::ContactParameters;
+use tiprub_core::geometry::{Gap, Sliding, Vector3};
 use tiprub_core::modes::coordinates::ContactModes;
 use tiprub_core::system::Effort;
 use tiprub_core::time::galerkin::{
@@ -36,11 +37,18 @@ fn modes(count: usize, nodes: usize, stiff: f64, random: &mut SeededRandom) -> C
 /// A plane normal to x that slides along y.
 struct ScatterWall {
     place: f64,
-    friction: f64,
+    parameters: ContactParameters,
     /// Number of steps in which a node opens or closes.
     switches: u64,
     /// Energy dropped by constant forces (J).
     dropped: f64,
+}
+
+impl ScatterWall {
+    fn new(place: f64, friction: f64) -> Self {
+        let parameters = ContactParameters { friction, ..ContactParameters::FRICTIONLESS };
+        Self { place, parameters, switches: 0, dropped: 0.0 }
+    }
 }
 
 impl Obstacle for &mut ScatterWall {
@@ -48,12 +56,20 @@ impl Obstacle for &mut ScatterWall {
         Gap { distance: self.place - moved[0], normal: -Vector3::x(), ..Gap::NOTHING }
     }
 
-    fn friction(&self, _: usize) -> f64 {
-        self.friction
+    fn parameters(&self, _: usize) -> &ContactParameters {
+        &self.parameters
     }
 
-    fn slip_direction(&mut self, _: usize, _: usize, _: &SlidingState) -> Vector3 {
-        Vector3::y()
+    fn sliding(&mut self, _: usize, _: usize, _: &SlidingState) -> Sliding {
+        Sliding { direction: Vector3::y(), speed: 1.0 }
+    }
+
+    fn sector(&self) -> usize {
+        0
+    }
+
+    fn angle(&self, _: usize, _: usize, _: Vector3) -> f64 {
+        0.0
     }
 }
 
@@ -108,7 +124,7 @@ pub(super) fn energy(tolerance: f64, switches: u64) -> Option<SectorEnergy> {
     for (mode, v) in state.velocity.iter_mut().enumerate() {
         *v = 0.5 / (mode + 1) as f64;
     }
-    let mut wall = ScatterWall { place: 1e-4, friction: 0.0, switches: 0, dropped: 0.0 };
+    let mut wall = ScatterWall::new(1e-4, 0.0);
     state.gaps.fill(wall.place);
     let energy = |state: &SectorState| {
         let (kinetic, strain) = state.energies(&modes.frequencies, &modes.residual);
@@ -164,7 +180,7 @@ pub(super) fn problems(degree: usize, friction: f64, trials: u64) -> Problems {
             let state = &mut island.sectors[0].state;
             *state = SectorState::new(count, nodes);
             state.velocity.iter_mut().for_each(|v| *v = random.signed());
-            let mut wall = ScatterWall { place: 2e-5 * random.unit(), friction, switches: 0, dropped: 0.0 };
+            let mut wall = ScatterWall::new(2e-5 * random.unit(), friction);
             state.gaps.fill(wall.place);
             let (mut effort, goal) =
                 (Effort::default(), StepGoal { tolerance: 1e-7, precision: 1e-13, most: u64::MAX });

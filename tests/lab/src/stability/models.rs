@@ -11,9 +11,6 @@ use tiprub_test_models::{node, ring, structure};
 
 /// Longest step of adaptive integration (s), the default of scenes.
 pub(crate) const LONGEST: f64 = tiprub_core::scene::settings::ADAPTIVE_STEP;
-/// All contact solvers with their names.
-pub(crate) const SOLVERS: [(Solver, &str); Solver::ALL.len()] =
-    [(Solver::Film, "film"), (Solver::Lcp, "lcp"), (Solver::Coulomb, "coulomb")];
 
 /// Choice of the step length.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,7 +49,7 @@ impl StabilityMethod {
 
     /// Returns every method.
     pub(crate) fn all() -> impl Iterator<Item = Self> {
-        let with = |(scheme, steps, _)| SOLVERS.into_iter().map(move |(solver, _)| Self { scheme, solver, steps });
+        let with = |(scheme, steps, _)| Solver::ALL.into_iter().map(move |solver| Self { scheme, solver, steps });
         INTEGRATIONS.into_iter().flat_map(with)
     }
 
@@ -78,7 +75,7 @@ impl StabilityMethod {
 
     /// Returns the name of the solver.
     pub(crate) fn solver_name(self) -> &'static str {
-        SOLVERS.iter().find(|(solver, _)| *solver == self.solver).map_or("", |(_, name)| name)
+        self.solver.name()
     }
 
     /// Returns both as parts of the name of a case.
@@ -90,7 +87,7 @@ impl StabilityMethod {
     pub(crate) fn in_name(name: &str) -> (Option<&'static str>, Option<&'static str>) {
         let part = |known: &'static str| name.split('/').any(|part| part == known).then_some(known);
         let scheme = INTEGRATIONS.iter().find_map(|(.., known)| part(known));
-        (scheme, SOLVERS.iter().find_map(|(_, known)| part(known)))
+        (scheme, Solver::ALL.iter().find_map(|known| part(known.name())))
     }
 
     /// Returns the names of schemes with their choice of the step.

@@ -210,7 +210,7 @@ static VARIABLES: &[FeatureRule] = &[
 /// Rules of schemes and solvers, for those of the scene and for those chosen by parameters.
 static METHODS: &[FeatureRule] = &[
     needs(
-        &[COULOMB],
+        &[STICKING],
         ("a scene packaged with it, or one with friction, rigid surfaces and rotors with uncoupled sectors", |at| {
             at.may_stick()
         }),
@@ -218,7 +218,7 @@ static METHODS: &[FeatureRule] = &[
         "Package the scene with contact.solver = \"coulomb\"",
     ),
     excludes(
-        &[FILM, COULOMB],
+        &[UNCOATED],
         ("a coating", |at| at.contacts().any(|at| at.is_coated())),
         "a coating yields within the linear complementarity problem, which only `lcp` solves",
         "Use solver = \"lcp\", or remove the coating",
@@ -271,13 +271,13 @@ static METHODS: &[FeatureRule] = &[
     ),
     excludes(
         &[GALERKIN],
-        ("`contact.solver = \"film\"`", |at| at.solver == Solver::Film),
+        ("`contact.solver = \"film\"`", |at| !at.solver.properties().complementary),
         "it needs a solver that enforces complementarity of gap and force",
         "Use solver = \"lcp\", or \"coulomb\"",
     ),
     excludes(
         &[MASSLESS],
-        ("`contact.solver = \"film\"`", |at| at.solver == Solver::Film),
+        ("`contact.solver = \"film\"`", |at| !at.solver.properties().complementary),
         "`film` checks for penetration only once per step, and a massless node that it leaves inside the surface \
          stays there",
         "Use solver = \"lcp\", or another scheme",

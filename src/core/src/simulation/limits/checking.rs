@@ -11,7 +11,7 @@ use crate::math::vector::vector3_at;
 use crate::modes::cyclic::CyclicModel;
 use crate::modes::modal::ModalModel;
 use crate::modes::schemes::ModeCoefficients;
-use crate::scene::method::{Scheme, Solver};
+use crate::scene::method::Scheme;
 use crate::scene::settings::Meridian;
 use crate::simulation::clock::SAME_STEP;
 use crate::simulation::compile::Compiled;
@@ -200,7 +200,7 @@ impl<'a> Checking<'a> {
     /// step and at all others.
     pub(super) fn casing(&self, expected: f64) -> Vec<(f64, Option<WarningKind>)> {
         let carried = self.carried();
-        if self.friction == 0.0 || carried.is_empty() || self.parameters.solver == Solver::Coulomb {
+        if self.friction == 0.0 || carried.is_empty() || self.parameters.solver.properties().sticks {
             return Vec::new();
         }
         let places = |(gap, _, modes): &(&SplineGap, usize, ModalModel)| {

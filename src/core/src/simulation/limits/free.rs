@@ -9,14 +9,15 @@
 use nalgebra::DMatrix;
 
 use super::{BodyLimits, Closing, Parameters};
-use crate::geometry::open::{OpenGap, tangent};
+use crate::geometry::Sliding;
+use crate::geometry::open::OpenGap;
 use crate::geometry::{GapLaw, Geometry, Vector3};
 use crate::limits::finding::{Checked, ErrorKind, Finding, Subject, WarningKind};
 use crate::limits::{self, ContactDirections};
 use crate::math::vector::length;
 use crate::modes::modal::ModalModel;
 use crate::modes::modal::fill_ratios;
-use crate::scene::method::{Scheme, Solver};
+use crate::scene::method::Scheme;
 use crate::simulation::compile::Compiled;
 use crate::system::System;
 
@@ -87,7 +88,7 @@ impl FlightCheck<'_> {
         let mut warnings: Vec<Finding> = unresolved.into_iter().map(|kind| kind.of(of)).collect();
         warnings.extend(compiled.unresolved_carriers(self.body, scheme, step)?);
         let friction = self.parameters.friction_of(compiled, self.body);
-        if friction == 0.0 || self.parameters.solver == Solver::Coulomb {
+        if friction == 0.0 || self.parameters.solver.properties().sticks {
             return Ok(warnings);
         }
         let pairs: Vec<usize> = compiled.plan.pairs_of(self.body).map(|(pair, _)| pair).collect();
@@ -170,7 +171,7 @@ fn flight(laws: &mut [OpenGap], velocity: Vector3, frictions: &[f64], largest: f
             let normal = geometry.normal_at(*node);
             let own = laws.iter().position(|law| law.nodes().contains(node)).map_or(largest, |law| frictions[law]);
             let share = if own < largest { own / largest } else { 1.0 };
-            (normal, share * tangent(velocity, normal))
+            (normal, share * Sliding::new(velocity, normal).direction)
         };
         let directions = inside.iter().map(direction).collect();
         met.push(NodesInside { nodes: inside, directions, geometry });

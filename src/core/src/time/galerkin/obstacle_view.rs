@@ -7,8 +7,9 @@ use super::level::StepTables;
 use super::record::{SpanRecord, SurfacePlace};
 use super::surroundings::{AcceptedStep, CarriersInStep, LaneStep, Witness};
 use super::trial::{ForceInterpolation, Obstacle, SlidingState, Trial, node_by_node};
+use crate::contact::ContactParameters;
 use crate::geometry::wrench::{At, MotionIncrement};
-use crate::geometry::{Gap, GapLaw, PrescribedMotion, Vector3};
+use crate::geometry::{Gap, GapLaw, PrescribedMotion, Sliding, Vector3, Vibration};
 use crate::math::vector::vector3_at;
 use crate::system::carrier::Spot;
 use crate::system::pair::ContactPair;
@@ -121,25 +122,26 @@ impl Obstacle for ObstacleView<'_> {
         }
     }
 
-    fn slip_direction(&mut self, node: usize, point: usize, sliding: &SlidingState) -> Vector3 {
-        let Some(pair) = self.pair_of[node] else { return Vector3::zeros() };
+    fn sliding(&mut self, node: usize, point: usize, sliding: &SlidingState) -> Sliding {
+        let Some(pair) = self.pair_of[node] else { return Sliding::default() };
         let gap = self.pairs[pair].gap();
-        let slip = if gap.slides_anywhere() {
+        let at = self.at(node, &self.record.drives[pair][point].0);
+        if gap.slides_anywhere() {
             let known = self.record.slips[point][node].filter(|_| self.record.solutions > SOLUTIONS);
             let slip = known.unwrap_or_else(|| {
                 let carriers = self
                     .on_carrier(node, point, SurfacePlace::Now, |casing, spot| casing.sliding_distance_at(spot, point));
                 sliding.sliding_distance - carriers.unwrap_or_default()
             });
+            let vibration = Vibration { node: slip, ..Vibration::default() };
+            let over_step = gap.sliding(at, sliding.moved, vibration, sliding.normal);
             self.record.slips[point][node] = Some(slip);
-            slip
+            Sliding { speed: over_step.speed / sliding.duration, ..over_step }
         } else {
-            let at = self.at(node, &self.record.drives[pair][point].0);
-            let rigid = gap.sliding_velocity(node, at.index, at.drive, sliding.moved);
             let carriers = self.on_carrier(node, point, SurfacePlace::Begun, |casing, spot| casing.velocity_at(spot));
-            rigid + sliding.velocity - carriers.unwrap_or_default()
-        };
-        gap.slip_direction(slip, sliding.normal)
+            let vibration = Vibration { node: sliding.velocity, surface: carriers.unwrap_or_default() };
+            gap.sliding(at, sliding.moved, vibration, sliding.normal)
+        }
     }
 
     fn sector(&self) -> usize {
@@ -152,7 +154,7 @@ impl Obstacle for ObstacleView<'_> {
     }
 
     fn turns(&self) -> bool {
-        self.pairs.iter().any(|pair| pair.gap().slides_anywhere() && pair.friction() != 0.0)
+        self.pairs.iter().any(|pair| pair.gap().slides_anywhere() && pair.parameters().friction != 0.0)
     }
 
     fn prepare_compliance(&mut self, lanes: Lanes, chosen: &[bool], normals: &[f64]) -> bool {
@@ -184,8 +186,8 @@ impl Obstacle for ObstacleView<'_> {
         }
     }
 
-    fn friction(&self, node: usize) -> f64 {
-        self.pair_of[node].map_or(0.0, |pair| self.pairs[pair].friction())
+    fn parameters(&self, node: usize) -> &ContactParameters {
+        self.pair_of[node].map_or(&ContactParameters::FRICTIONLESS, |pair| self.pairs[pair].parameters())
     }
 
     fn drift(&self, node: usize, step_point: usize, moved: Vector3) -> Vector3 {
@@ -380,7 +382,7 @@ impl ObstacleView<'_> {
         let (trial, basis) = (step.trial, &step.level.basis);
         let (mut tally, mut work) = (self.record.tallies[node], self.record.work);
         let (drives, motions) = (&self.record.drives[pair], &self.record.motions[pair]);
-        let (gap, slides) = (self.pairs[pair].gap(), self.pairs[pair].friction() != 0.0);
+        let (gap, slides) = (self.pairs[pair].gap(), self.pairs[pair].parameters().friction != 0.0);
         tally.peak = tally.peak.max(trial.peak(basis, step.kind, node));
         let mut heats = 0.0;
         for i in (0..=trial.points()).filter(|i| trial.multiplier(*i, node) != 0.0) {
@@ -393,12 +395,7 @@ impl ObstacleView<'_> {
             // With the normal for which the force was found: the effect of its rotation since then is curvature work, not heat.
             let tangential = if slides { trial.friction_force(i, node) } else { Vector3::zeros() };
             let wrench = gap.wrench(at, point, force);
-            let duration = step.level.step
-                * if step.kind == ForceInterpolation::Constant {
-                    f64::from(u8::from(i == 1))
-                } else {
-                    basis.weights[i]
-                };
+            let duration = step.level.step * step.kind.weight(basis, i);
             let weights = step.kind.work_weights(basis, i);
             let (mut moved, mut open) = (Vector3::zeros(), 0.0);
             for k in (0..=trial.points()).filter(|k| weights[*k] != 0.0) {

@@ -6,7 +6,8 @@ use super::span::StepGoal;
 use super::surroundings::{AcceptedStep, CarriersInStep, Surroundings, Witness};
 use super::tables::Tables;
 use super::trial::{ForceInterpolation, Obstacle, SlidingState};
-use crate::geometry::{Gap, Vector3};
+use crate::contact::ContactParameters;
+use crate::geometry::{Gap, Sliding, Vector3};
 use crate::modes::coordinates::ContactModes;
 use crate::system::Effort;
 use nalgebra::DMatrix;
@@ -44,7 +45,7 @@ struct MovingWall {
     clearance: f64,
     amplitude: f64,
     frequency: f64,
-    friction: f64,
+    parameters: ContactParameters,
     /// Start and length of the span (s), and times of the points of the step.
     start: f64,
     span: f64,
@@ -63,7 +64,7 @@ impl MovingWall {
             clearance,
             amplitude,
             frequency: 1700.0,
-            friction,
+            parameters: ContactParameters { friction, ..ContactParameters::FRICTIONLESS },
             start: 0.0,
             span: 0.0,
             times: [0.0; 4],
@@ -86,12 +87,20 @@ impl Obstacle for &mut MovingWall {
         Gap { distance: self.place(self.times[point]) - moved[0], normal: -Vector3::x(), ..Gap::NOTHING }
     }
 
-    fn friction(&self, _: usize) -> f64 {
-        self.friction
+    fn parameters(&self, _: usize) -> &ContactParameters {
+        &self.parameters
     }
 
-    fn slip_direction(&mut self, _: usize, _: usize, _: &SlidingState) -> Vector3 {
-        Vector3::y()
+    fn sliding(&mut self, _: usize, _: usize, _: &SlidingState) -> Sliding {
+        Sliding { direction: Vector3::y(), speed: 1.0 }
+    }
+
+    fn sector(&self) -> usize {
+        0
+    }
+
+    fn angle(&self, _: usize, _: usize, _: Vector3) -> f64 {
+        0.0
     }
 }
 

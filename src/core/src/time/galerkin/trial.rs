@@ -16,6 +16,7 @@ use super::level::StepTables;
 use super::rows::{ContactRows, Sums};
 use super::state::SectorState;
 use crate::contact::Law;
+use crate::geometry::Sliding;
 use crate::math::simd::InstructionSet;
 use crate::math::vector::{Vector3, set_vector3_at, vector3_at};
 use crate::scene::method::Solver;
@@ -47,6 +48,14 @@ impl ForceInterpolation {
             Self::Polynomial => basis.work[i],
             Self::Constant if i == 1 => [-1.0, 1.0, 0.0, 0.0],
             Self::Constant => [0.0; POINTS],
+        }
+    }
+
+    /// Fraction of the step for which a force at point i acts: b_i, or 1 for a constant force.
+    pub(crate) fn weight(self, basis: &TimeBasis, i: usize) -> f64 {
+        match self {
+            Self::Polynomial => basis.weights[i],
+            Self::Constant => f64::from(u8::from(i == 1)),
         }
     }
 }
@@ -98,6 +107,8 @@ pub struct Trial {
     free_motion: FreeMotion,
     /// Weights of the work of forces at each point.
     work_weights: [[f64; POINTS]; POINTS],
+    /// Time for which the force at each point acts (s).
+    durations: [f64; POINTS],
     /// Displacements at each point without the residual flexibility (m), if they are needed.
     inert: [Vec<f64>; POINTS],
     /// Negative forces at one point (N).
@@ -142,7 +153,7 @@ impl Trial {
     /// Creates a trial for a sector with `modes` modes and `nodes` contact nodes. If contacts may stick, polynomials are of degree 1.
     pub fn new(modes: usize, nodes: usize, solver: Solver) -> Self {
         let lanes = Lanes { points: MOST, nodes };
-        let contacts = if solver.sticks() { nodes } else { lanes.len() };
+        let contacts = if solver.properties().sticks { nodes } else { lanes.len() };
         let (width, three) = (|| vec![0.0; lanes.width()], || vec![0.0; 3 * lanes.width()]);
         let rows = || vec![0.0; 3 * nodes];
         Self {
@@ -156,7 +167,7 @@ impl Trial {
                 multipliers: vec![0.0; nodes],
                 gaps: vec![0.0; nodes],
                 normals: rows(),
-                slopes: if solver.sticks() { rows() } else { Vec::new() },
+                slopes: if solver.properties().sticks { rows() } else { Vec::new() },
             },
             free: three(),
             pushed: three(),
@@ -188,13 +199,14 @@ impl Trial {
                 is_known: false,
             },
             work_weights: [[0.0; POINTS]; POINTS],
+            durations: [0.0; POINTS],
             inert: std::array::from_fn(|_| rows()),
             withdrawn: rows(),
             impulses: rows(),
             left: rows(),
             depths: vec![0.0; nodes],
             minima: Minima::new(modes, nodes),
-            sticking: solver.sticks().then(|| Box::new(Sticking::new(nodes))),
+            sticking: solver.properties().sticks.then(|| Box::new(Sticking::new(nodes))),
             per_step: 0.0,
             steady: None,
             end_slopes: [0.0; POINTS],
@@ -277,6 +289,7 @@ impl Trial {
         let compliance = level.compliance_of(kind);
         self.free_motion.is_known = false;
         self.work_weights = std::array::from_fn(|i| kind.work_weights(&level.basis, i));
+        self.durations = std::array::from_fn(|i| level.step * kind.weight(&level.basis, i));
         self.lanes = compliance.lanes();
         let (start_contacts, lanes) = (&mut self.start_contacts, self.lanes);
         start_contacts.forces.copy_from_slice(&state.forces);
@@ -463,14 +476,14 @@ impl Trial {
             moved: lanes.vector3(&self.moved, lane),
             velocity: vector3_at(&self.velocities, node),
             sliding_distance: self.sliding_distance(point, node),
+            duration: self.durations[point],
             normal: lanes.vector3(&self.normals, lane),
         };
-        let friction = obstacle.friction(node);
-        let slip_direction =
-            if friction > 0.0 { obstacle.slip_direction(node, point, &sliding) } else { Vector3::zeros() };
+        let has_friction = obstacle.parameters(node).friction > 0.0;
+        let sliding = if has_friction { obstacle.sliding(node, point, &sliding) } else { Sliding::default() };
         let Self { without, multipliers, normals, moved, .. } = &*self;
         let values = LaneValues { lanes, without, multipliers, normals, moved };
-        let prediction = LanePrediction { slip_direction, ..values.prediction(lane, obstacle) };
+        let prediction = LanePrediction { sliding, ..values.prediction(lane, obstacle) };
         let (mut row, mut column) = ([Vector3::zeros()], [Vector3::zeros()]);
         self.law.fill_directions(&prediction, &mut row, &mut column);
         let ([row], [direction]) = (row, column);

@@ -7,7 +7,7 @@ use super::{
     super::{
         Cases, Check, Expected, StabilityCase,
         bodies::{HALF, LumpChain, PLATE, Plate, Throw, vector},
-        models::{SOLVERS, StabilityMethod},
+        models::StabilityMethod,
         observe::{outputs, real, worse},
     },
     free::{STEP, apart, methods, size, started, throw, unless_few_modes},
@@ -154,7 +154,7 @@ fn edges() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     // From beyond the edge y = 0.09 m inwards, with the face this far in front of the plate.
     let beyond = PLATE + HALF + 1e-4;
-    for (solver, name) in SOLVERS {
+    for (solver, name) in Solver::ALL.map(|solver| (solver, solver.name())) {
         for (what, front, velocity) in [
             ("behind-0.2mm", -2e-4, [0.0, -40.0, 0.0]),
             ("behind-0.2µm", -2e-7, [0.0, -40.0, 0.0]),

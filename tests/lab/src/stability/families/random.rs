@@ -7,7 +7,7 @@ use tiprub_core::{CoSimulation, Result, Scene};
 
 use super::super::{
     CaseEnd, Check, Expected, StabilityCase,
-    models::{GAP, SOLVERS, SeededRandom, StabilityMethod, Tower, blade, on_ring, round, with_methods, with_step},
+    models::{GAP, SeededRandom, StabilityMethod, Tower, blade, on_ring, round, with_methods, with_step},
     observe::{MASSLESS_RETURN, StabilityWatch, apart, begin, displacements, set},
 };
 
@@ -66,7 +66,7 @@ fn scene(index: u64) -> (Scene, f64, f64) {
         }
         .rom(),
     };
-    let (scheme, solver) = (random.of(&Scheme::RECURRENCES), random.of(&SOLVERS).0);
+    let (scheme, solver) = (random.of(&Scheme::RECURRENCES), random.of(&Solver::ALL));
     let mut scene = with_methods(round(rom), scheme, solver);
     scene.settings.contacts[0].gap = random.scale(1e-5, 1e-3);
     scene.settings.contacts[0].friction = random.of(&[0.0, 0.05, 0.15, 0.3, 0.6]);

@@ -80,11 +80,12 @@ pub(super) const YIELD: Fact =
 pub(super) const HARDENING: Fact = fact("contact.coating.hardening", "", |at| at.plastic(|coating| coating.hardening));
 pub(super) const HEAT: Fact = fact("contact.slave_heat_fraction", "", |at| at.contact().slave_heat_fraction.is_some());
 pub(super) const SOLVER: Fact = fact("contact.solver", "", |_| true);
-pub(super) const FILM: Fact = fact("contact.solver", "`film`", |at| at.solver == Solver::Film);
-pub(super) const COULOMB: Fact = fact("contact.solver", "`coulomb`", |at| at.solver == Solver::Coulomb);
+pub(super) const STICKING: Fact = fact("contact.solver", "`coulomb`", |at| at.solver.properties().sticks);
+pub(super) const UNCOATED: Fact =
+    fact("contact.solver", "a solver other than `lcp`", |at| !at.solver.properties().solves_coatings);
 
 pub(super) const OTHER_SOLVER: Fact =
-    fact("contact.solver", "a solver other than `film`", |at| at.contact().solver != Solver::Film);
+    fact("contact.solver", "a solver other than `film`", |at| at.contact().solver != Solver::PAPER);
 pub(super) const OTHER_SCHEME: Fact =
     fact("time.scheme", "a scheme other than `central-difference`", |at| at.settings.time.scheme != Scheme::PAPER);
 pub(super) const MASSLESS: Fact =

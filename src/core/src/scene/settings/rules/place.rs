@@ -139,13 +139,13 @@ impl<'a> ScenePlace<'a> {
         own.filter_map(|contact| Self { index: *contact, ..*self }.master()).any(|master| moves(master.motion))
     }
 
-    /// Returns whether `coulomb` is possible: a coupled problem of all sectors supports it only if the scene selects it.
+    /// Returns whether a solver with sticking is possible: a coupled problem of all sectors supports it only if the scene selects it.
     pub(super) fn may_stick(&self) -> bool {
         let settings = self.settings;
         let small = self.contacts().all(|at| !at.is_free() && at.carrier().is_none());
         let uncoupled = self.roms.iter().all(|rom| !rom.is_cyclic());
         let rubs = settings.contacts.iter().any(|contact| contact.friction > 0.0);
-        settings.contacts[0].solver == Solver::Coulomb
+        settings.contacts[0].solver.properties().sticks
             || (small && uncoupled && rubs && self.contacts().all(|at| !at.is_coated()))
     }
 

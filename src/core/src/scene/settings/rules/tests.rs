@@ -234,7 +234,7 @@ const OF_ROTORS: &[(&str, Change)] = &[
         scene.settings.surfaces[0].structure = None;
         scene.settings.outputs.slave_displacement = true;
     }),
-    ("contact[1].solver: `film` cannot be combined with a coating", |scene| {
+    ("contact[1].solver: a solver other than `lcp` cannot be combined with a coating", |scene| {
         (scene.settings.contacts[0].coating, scene.settings.contacts[0].solver) = (coating(), Solver::Film);
     }),
     ("time.scheme: `massless-boundary` cannot be combined with `structure.spin.coriolis`", |scene| {

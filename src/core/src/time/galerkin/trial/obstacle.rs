@@ -1,6 +1,7 @@
 //! Surfaces that a sector may touch.
 
-use crate::geometry::{Gap, Vector3};
+use crate::contact::ContactParameters;
+use crate::geometry::{Gap, Sliding, Vector3};
 use crate::time::galerkin::compliance::Lanes;
 
 /// Surfaces that the nodes of a sector may touch, at the points of the tried step.
@@ -23,25 +24,17 @@ pub trait Obstacle {
         false
     }
 
-    /// Friction coefficient µ of a node.
-    fn friction(&self, _node: usize) -> f64 {
-        0.0
-    }
+    /// Parameters of the contact law of a node.
+    fn parameters(&self, node: usize) -> &ContactParameters;
 
-    /// Unit direction of slip of a node relative to the surface; 0 without slip.
-    fn slip_direction(&mut self, _node: usize, _point: usize, _sliding: &SlidingState) -> Vector3 {
-        Vector3::zeros()
-    }
+    /// Returns the sliding of a node relative to the surface; called only with friction.
+    fn sliding(&mut self, node: usize, point: usize, state: &SlidingState) -> Sliding;
 
-    /// Sector of the nodes, on surfaces with a coating.
-    fn sector(&self) -> usize {
-        0
-    }
+    /// Sector of the nodes.
+    fn sector(&self) -> usize;
 
-    /// Angle on the surface (rad, fixed frame) of a node displaced by `moved` (m), on surfaces around an axis.
-    fn angle(&self, _node: usize, _point: usize, _moved: Vector3) -> f64 {
-        0.0
-    }
+    /// Angle on the surface (rad, fixed frame) of a node displaced by `moved` (m); 0 on surfaces without an axis.
+    fn angle(&self, node: usize, point: usize, moved: Vector3) -> f64;
 
     /// Prepares the compliance of the obstacle at the chosen lanes with these normals. Returns false if the obstacle is rigid.
     fn prepare_compliance(&mut self, _lanes: Lanes, _chosen: &[bool], _normals: &[f64]) -> bool {
@@ -71,6 +64,8 @@ pub struct SlidingState {
     pub velocity: Vector3,
     /// Sliding distance over which a force at this point does work, Σ_k S_ik ũ_k (m), by modes with inertia; 0 unless [`Obstacle::turns`].
     pub sliding_distance: Vector3,
+    /// Time for which a force at this point acts (s).
+    pub duration: f64,
     /// Unit normal at the point.
     pub normal: Vector3,
 }

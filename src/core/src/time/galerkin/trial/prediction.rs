@@ -1,7 +1,8 @@
 //! A lane of a trial as its contact law sees it.
 
 use super::Obstacle;
-use crate::contact::ContactPrediction;
+use crate::contact::{ContactParameters, ContactPrediction};
+use crate::geometry::Sliding;
 use crate::math::vector::Vector3;
 use crate::time::galerkin::compliance::Lanes;
 
@@ -16,7 +17,7 @@ pub(super) struct LanePrediction<'a, O> {
     pub moved: Vector3,
     /// Slip over the step without the force (m).
     pub slip: Vector3,
-    pub slip_direction: Vector3,
+    pub sliding: Sliding,
     /// Force of the last solution (N).
     pub last_force: Vector3,
     pub obstacle: &'a O,
@@ -37,7 +38,7 @@ pub(super) struct LaneValues<'a> {
 }
 
 impl LaneValues<'_> {
-    /// Returns the prediction for a lane; slip and its direction are those of a contact that does not slide.
+    /// Returns the prediction for a lane; slip and sliding are those of a contact that does not slide.
     pub fn prediction<'a, O: Obstacle>(&self, lane: usize, obstacle: &'a O) -> LanePrediction<'a, O> {
         let (point, node) = self.lanes.place(lane);
         LanePrediction {
@@ -46,7 +47,7 @@ impl LaneValues<'_> {
             normal: self.lanes.vector3(self.normals, lane),
             moved: self.lanes.vector3(self.moved, lane),
             slip: Vector3::zeros(),
-            slip_direction: Vector3::zeros(),
+            sliding: Sliding::default(),
             last_force: Vector3::zeros(),
             obstacle,
             point,
@@ -65,8 +66,8 @@ impl<O: Obstacle> ContactPrediction for LanePrediction<'_, O> {
     fn normal(&self) -> Vector3 {
         self.normal
     }
-    fn friction(&self) -> f64 {
-        self.obstacle.friction(self.node)
+    fn parameters(&self) -> &ContactParameters {
+        self.obstacle.parameters(self.node)
     }
     fn slip(&self) -> Vector3 {
         self.slip
@@ -74,8 +75,8 @@ impl<O: Obstacle> ContactPrediction for LanePrediction<'_, O> {
     fn last_force(&self) -> Vector3 {
         self.last_force
     }
-    fn slip_direction(&self) -> Vector3 {
-        self.slip_direction
+    fn sliding(&self) -> Sliding {
+        self.sliding
     }
     fn sector(&self) -> usize {
         self.obstacle.sector()

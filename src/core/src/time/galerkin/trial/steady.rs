@@ -88,7 +88,7 @@ impl Trial {
         for (node, status) in own.status.iter_mut().enumerate() {
             let multiplier = state.multipliers[node];
             let along = vector3_at(&state.forces, node) - multiplier * vector3_at(&state.normals, node);
-            let (size, most) = (length(along), obstacle.friction(node) * multiplier);
+            let (size, most) = (length(along), obstacle.parameters(node).friction * multiplier);
             *status = if multiplier == 0.0 {
                 ContactStatus::Open
             } else if size < most * (1.0 - ON_THE_CONE) {
@@ -181,7 +181,7 @@ impl Trial {
         own.matrix[..order * order].fill(0.0);
         for (place, lane) in self.members.iter().enumerate() {
             let (point, node) = lanes.place(*lane);
-            let (normal, friction) = (self.normal(point, node), obstacle.friction(node));
+            let (normal, friction) = (self.normal(point, node), obstacle.parameters(node).friction);
             let [first, second] = tangents(normal);
             let (moved, free) = (lanes.vector3(&self.moved, *lane), lanes.vector3(&self.free, *lane));
             let relative = self.relative(point, node, obstacle);
@@ -245,7 +245,9 @@ impl Trial {
             multiplier > 0.0
                 && match own.status[node] {
                     ContactStatus::Open => true,
-                    ContactStatus::Sticks => length(along) <= obstacle.friction(node) * multiplier + ROUNDING * largest,
+                    ContactStatus::Sticks => {
+                        length(along) <= obstacle.parameters(node).friction * multiplier + ROUNDING * largest
+                    }
                     ContactStatus::Slides(direction) => {
                         direction == Vector3::zeros() || direction.dot(&own.directions[*lane]) > 0.0
                     }
