@@ -161,7 +161,7 @@ pub fn limits(scene: &Scene) -> Vec<String> {
     let mut limits = vec![
         "Displacements within each structure are small; the rotation between rotor and casing may be large.",
         choose(
-            any(|contact| contact.solver.properties().sticks),
+            any(|contact| contact.solver.sticks()),
             "Friction is Coulomb friction that sticks and slides, with one coefficient for both.",
             "Friction is Coulomb friction in steady sliding along the circumference; sticking is not modelled.",
         ),
@@ -196,7 +196,7 @@ pub fn limits(scene: &Scene) -> Vec<String> {
 
 /// Returns the limits of a scene whose master is a free body.
 fn limits_of_flight(settings: &SceneSettings) -> [&'static str; 5] {
-    let sticks = settings.contacts.iter().any(|contact| contact.solver.properties().sticks);
+    let sticks = settings.contacts.iter().any(|contact| contact.solver.sticks());
     [
         "Displacements within each structure are small; the free structure may travel any distance, but its rotations \
          must stay small.",

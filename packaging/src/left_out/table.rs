@@ -106,7 +106,7 @@ impl Effect {
 pub static EFFECTS: &[Effect] = &[
     physics("friction", "`contact.friction`", always, |scene| contact(scene, |one| one.friction > 0.0)),
     physics("sticking friction", "`contact.solver = \"coulomb\"`", always, |scene| {
-        contact(scene, |one| one.solver.properties().sticks)
+        contact(scene, |one| one.solver.sticks())
     })
     .by(|scene| scene.settings.contacts.iter_mut().for_each(|one| one.solver = Solver::STICKING)),
     physics(

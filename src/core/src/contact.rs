@@ -78,7 +78,9 @@ pub(crate) trait ContactPrediction {
 /// Interface of every contact law. Slices are along the columns of the Delassus matrix or have one entry per contact.
 pub(crate) trait ContactLaw {
     /// Directions per contact in the Delassus matrix: 1 (normal, with sliding friction in the columns) or 3 (normal and tangents).
-    fn directions(&self) -> usize;
+    fn directions(&self) -> usize {
+        1
+    }
     /// Returns whether a contact that the solution would open or press in is checked again; the paper's rule detects once.
     fn is_iterative(&self) -> bool {
         true

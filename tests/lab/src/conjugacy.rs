@@ -49,8 +49,7 @@ impl ConjugacyCase {
             Scheme::ModalExact => self.solver.properties().complementary,
             Scheme::MasslessBoundary | Scheme::Galerkin => self.solver == Solver::Lcp,
         };
-        let asked =
-            if quick { shown && self.friction > 0.0 } else { self.friction > 0.0 || !self.solver.properties().sticks };
+        let asked = if quick { shown && self.friction > 0.0 } else { self.friction > 0.0 || !self.solver.sticks() };
         asked && self.scene(self.friction, false).check_methods(self.scheme.0, self.solver).is_ok()
     }
 
@@ -75,7 +74,7 @@ impl ConjugacyCase {
             self.feature,
             SurfaceFeature::Revolution | SurfaceFeature::Spline | SurfaceFeature::Disk | SurfaceFeature::Coating
         );
-        let free_of_friction = !self.solver.properties().sticks && stays_round;
+        let free_of_friction = !self.solver.sticks() && stays_round;
         let round = free_of_friction.then(|| run(&self.scene(0.0, true), STEP).map_err(named)).transpose()?;
         Ok(ConjugacyRow { case: *self, seen, round: round.map(|seen| seen.axis_moment) })
     }

@@ -13,10 +13,8 @@ pub(crate) struct Coated {
     coating: Coating,
     problem: CoatedProblem,
     size: usize,
-    /// Angles of the contacts on the casing (rad), predicted gaps (m), and the contacts that are initially on the hard casing.
+    /// Angles of the contacts on the casing (rad).
     angles: Vec<f64>,
-    gaps: Vec<f64>,
-    closed: Vec<bool>,
     /// Force of coating and hard casing together (N).
     multipliers: Vec<f64>,
 }
@@ -29,18 +27,12 @@ impl Coated {
             coating,
             size: 0,
             angles: vec![0.0; contacts],
-            gaps: vec![0.0; contacts],
-            closed: vec![false; contacts],
             multipliers: vec![0.0; contacts],
         }
     }
 }
 
 impl ContactLaw for Coated {
-    fn directions(&self) -> usize {
-        1
-    }
-
     fn fill_directions(&self, at: &impl ContactPrediction, rows: &mut [Vector3], columns: &mut [Vector3]) {
         fill_sliding(at, |parameters, _| parameters.friction, rows, columns);
     }
@@ -57,9 +49,9 @@ impl ContactLaw for Coated {
 
     fn pose(&mut self, contact: usize, _: &[Vector3], at: &impl ContactPrediction) {
         self.angles[contact] = at.angle();
-        self.gaps[contact] = at.gap();
+        self.problem.gaps[contact] = at.gap();
         self.problem.monotone &= at.parameters().friction == 0.0;
-        self.closed[contact] = at.was_closed(self.coating.thickness());
+        self.problem.closed[contact] = at.was_closed(self.coating.thickness());
     }
 
     #[inline(never)]
@@ -68,8 +60,6 @@ impl ContactLaw for Coated {
         for blade in self.angles[..size].chunks_exact(self.coating.nodes()) {
             self.coating.locate(&mut self.problem, blade);
         }
-        self.problem.gaps[..size].copy_from_slice(&self.gaps[..size]);
-        self.problem.closed[..size].copy_from_slice(&self.closed[..size]);
         let outcome = self.problem.solve();
         for contact in 0..size {
             self.multipliers[contact] = self.problem.coating[contact] + self.problem.hard[contact];

@@ -27,8 +27,6 @@ pub(crate) struct CuttingLaw {
 /// Data of one contact.
 #[derive(Debug, Clone, Copy, Default)]
 struct CuttingContact {
-    gap: f64,
-    closed: bool,
     /// Coulomb coefficient of the hard casing.
     friction: f64,
     /// Component of the slip direction along the first tangent.
@@ -88,9 +86,10 @@ impl ContactLaw for CuttingLaw {
 
     fn pose(&mut self, contact: usize, directions: &[Vector3], at: &impl ContactPrediction) {
         let (along, friction) = (at.sliding().direction, at.parameters().friction);
-        let (gap, closed) = (at.gap(), at.was_closed(self.coating.thickness()));
         let sense = along.dot(&directions[1]);
-        self.contacts[contact] = CuttingContact { gap, closed, friction, sense, sector: at.sector() };
+        self.problem.gaps[contact] = at.gap();
+        self.problem.closed[contact] = at.was_closed(self.coating.thickness());
+        self.contacts[contact] = CuttingContact { friction, sense, sector: at.sector() };
         self.angles[contact] = at.angle();
         self.slid[contact] = sense * along.dot(&at.slip());
     }
@@ -103,9 +102,6 @@ impl ContactLaw for CuttingLaw {
             let (angles, slid) = (&self.angles[first..first + nodes], &self.slid[first..first + nodes]);
             let way = BladePassage { blade: self.contacts[first].sector, angles, slid };
             self.coating.locate_cut(&mut self.problem, way);
-        }
-        for (contact, posed) in self.contacts[..size].iter().enumerate() {
-            (self.problem.gaps[contact], self.problem.closed[contact]) = (posed.gap, posed.closed);
         }
         let outcome = self.problem.solve();
         let tangential = self.coating.tangential_ratio();

@@ -36,10 +36,6 @@ impl<R: SlidingRule> SlidingLaw<R> {
 }
 
 impl<R: SlidingRule> ContactLaw for SlidingLaw<R> {
-    fn directions(&self) -> usize {
-        1
-    }
-
     fn is_iterative(&self) -> bool {
         R::IS_ITERATIVE
     }

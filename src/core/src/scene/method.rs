@@ -157,23 +157,11 @@ impl Solver {
     pub const STICKING: Self = Self::Coulomb;
 
     /// Returns the facts about the solver on which limits, checks, remedies and texts depend.
-    pub const fn properties(self) -> &'static SolverProperties {
+    pub fn properties(self) -> &'static SolverProperties {
         match self {
-            Self::Film => &SolverProperties {
-                name: "film",
-                description: "Forward-increment Lagrange multipliers: zero gap at the nodes that are predicted to penetrate",
-                complementary: false,
-                ..SolverProperties::SLIDING
-            },
-            Self::Lcp => &SolverProperties {
-                name: "lcp",
-                description: "Complementarity over all contact nodes",
-                solves_coatings: true,
-                ..SolverProperties::SLIDING
-            },
+            Self::Film => &SolverProperties { complementary: false, ..SolverProperties::SLIDING },
+            Self::Lcp => &SolverProperties { solves_coatings: true, ..SolverProperties::SLIDING },
             Self::Coulomb => &SolverProperties {
-                name: "coulomb",
-                description: "Coulomb friction with sticking",
                 feature: Some("friction sticks and slides (coulomb)"),
                 sticks: true,
                 ..SolverProperties::SLIDING
@@ -183,17 +171,18 @@ impl Solver {
 
     /// Name in scene files and in the FMU's enumeration.
     pub fn name(self) -> &'static str {
-        self.properties().name
+        SOLVERS.items[self as usize].0
+    }
+
+    /// Returns [`SolverProperties::sticks`].
+    pub fn sticks(self) -> bool {
+        self.properties().sticks
     }
 }
 
 /// Facts about a contact solver and its law.
 #[derive(Debug)]
 pub struct SolverProperties {
-    /// Name in scene files.
-    pub name: &'static str,
-    /// Description for importers.
-    pub description: &'static str,
     /// Phrase that describes a scene with this solver; `None` for plain sliding friction.
     pub feature: Option<&'static str>,
     /// True if contacts may stick, so that tangential forces have any direction within the friction cone.
@@ -206,22 +195,16 @@ pub struct SolverProperties {
 
 impl SolverProperties {
     /// Complementarity with friction that always slides.
-    const SLIDING: Self =
-        Self { name: "", description: "", feature: None, sticks: false, complementary: true, solves_coatings: false };
+    const SLIDING: Self = Self { feature: None, sticks: false, complementary: true, solves_coatings: false };
 }
 
 /// Enumeration of the solvers for importers.
 pub(crate) static SOLVERS: Enumeration = Enumeration {
     name: "Solver",
     description: "Contact solver",
-    items: &{
-        let mut items = [("", ""); Solver::ALL.len()];
-        let mut index = 0;
-        while index < items.len() {
-            let row = Solver::ALL[index].properties();
-            items[index] = (row.name, row.description);
-            index += 1;
-        }
-        items
-    },
+    items: &[
+        ("film", "Forward-increment Lagrange multipliers: zero gap at the nodes that are predicted to penetrate"),
+        ("lcp", "Complementarity over all contact nodes"),
+        ("coulomb", "Coulomb friction with sticking"),
+    ],
 };

@@ -21,7 +21,7 @@ impl Simulation {
             let (speed, friction) =
                 (&self.state.inputs.rotors[body].speed, parameters.friction_of(&self.compiled, body));
             if self.compiled.bodies[body].translations.is_some()
-                || parameters.solver.properties().sticks
+                || parameters.solver.sticks()
                 || (friction == 0.0 && !self.compiled.cuts(body))
                 || speed.slope != 0.0
             {

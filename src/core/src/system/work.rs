@@ -284,7 +284,7 @@ impl System {
         let cutting = pair.parameters().cutting;
         let cut = if cutting > 0.0 { opposed * share_cut(event, cutting) } else { 0.0 };
         let heat = opposed - cut;
-        let turned = if self.settings.solver.properties().sticks { heat.min(0.0) } else { 0.0 };
+        let turned = if self.settings.solver.sticks() { heat.min(0.0) } else { 0.0 };
         let uncut = cut.min(0.0);
         ContactWork {
             heat: heat - turned,

@@ -253,6 +253,6 @@ fn rejects_features_incompatible_with_cutting() {
     refused(&scheme(Scheme::Galerkin), &["`galerkin` cannot be combined with `contact.coating`"]);
     refused(
         &|scene| scene.settings.contacts[0].solver = Solver::Coulomb,
-        &["`coulomb` cannot be combined with a coating"],
+        &["a solver other than `lcp` cannot be combined with a coating"],
     );
 }

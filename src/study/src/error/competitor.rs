@@ -102,7 +102,7 @@ impl Competitor {
     /// Returns the equations that the method solves.
     pub fn family(self) -> EquationFamily {
         let Self::Core(scheme, solver) = self else { return EquationFamily::PLAIN };
-        EquationFamily { massless: scheme.properties().quasi_static, sticking: solver.properties().sticks }
+        EquationFamily { massless: scheme.properties().quasi_static, sticking: solver.sticks() }
     }
 
     /// Returns whether the method uses a tolerance instead of a step; a division then applies to the smallest clearance instead of the sample

@@ -103,6 +103,7 @@ impl CoatedProblem {
     pub fn clear(&mut self) {
         self.size = 0;
         self.contacts.clear();
+        self.closed.fill(false);
     }
 
     /// Number of nodes of the group.
@@ -114,7 +115,6 @@ impl CoatedProblem {
     pub(super) fn append_nodes(&mut self, nodes: usize) -> usize {
         let first = self.size;
         self.size += nodes;
-        self.closed[first..self.size].fill(false);
         first
     }
 

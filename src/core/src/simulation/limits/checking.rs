@@ -200,7 +200,7 @@ impl<'a> Checking<'a> {
     /// step and at all others.
     pub(super) fn casing(&self, expected: f64) -> Vec<(f64, Option<WarningKind>)> {
         let carried = self.carried();
-        if self.friction == 0.0 || carried.is_empty() || self.parameters.solver.properties().sticks {
+        if self.friction == 0.0 || carried.is_empty() || self.parameters.solver.sticks() {
             return Vec::new();
         }
         let places = |(gap, _, modes): &(&SplineGap, usize, ModalModel)| {

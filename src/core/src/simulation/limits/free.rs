@@ -88,7 +88,7 @@ impl FlightCheck<'_> {
         let mut warnings: Vec<Finding> = unresolved.into_iter().map(|kind| kind.of(of)).collect();
         warnings.extend(compiled.unresolved_carriers(self.body, scheme, step)?);
         let friction = self.parameters.friction_of(compiled, self.body);
-        if friction == 0.0 || self.parameters.solver.properties().sticks {
+        if friction == 0.0 || self.parameters.solver.sticks() {
             return Ok(warnings);
         }
         let pairs: Vec<usize> = compiled.plan.pairs_of(self.body).map(|(pair, _)| pair).collect();

@@ -74,7 +74,7 @@ impl IslandSector {
         Self {
             table,
             disk,
-            state: if solver.properties().sticks { state.sticking() } else { state },
+            state: if solver.sticks() { state.sticking() } else { state },
             trial: Trial::new(modes, nodes, solver),
             advance: Advance::new(modes, nodes),
             far: false,

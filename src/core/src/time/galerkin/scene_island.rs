@@ -109,11 +109,7 @@ impl SceneIsland {
         let flights = kinds.iter().map(FreeFlight::new).collect();
         let tables = |kind: ContactModes| {
             let degree = kind.degree_up_to(longest);
-            if solver.properties().sticks {
-                Tables::of_degree(kind, 1).steady(degree)
-            } else {
-                Tables::of_degree(kind, degree)
-            }
+            if solver.sticks() { Tables::of_degree(kind, 1).steady(degree) } else { Tables::of_degree(kind, degree) }
         };
         let size = [bank.model().inertial_modes(), of.nodes()];
         let sector = IslandSector::new([0; 2], None, size, solver);
@@ -123,7 +119,7 @@ impl SceneIsland {
             set,
             island: Island::new(
                 vec![kinds.into_iter().map(tables).collect()],
-                vec![if solver.properties().sticks { sector.steady() } else { sector }],
+                vec![if solver.sticks() { sector.steady() } else { sector }],
             ),
             members: vec![Member { structure, sector: 0, record: SpanRecord::new(of.nodes(), pairs.len(), tolerance) }],
             turns: of.modes().sectors(),
@@ -141,7 +137,7 @@ impl SceneIsland {
         let carrying: Vec<usize> = members.iter().copied().filter(|one| structures[*one].nodes() == 0).collect();
         let kinds: Vec<Vec<ContactModes>> = touching.iter().map(|one| kinds_of(structures[*one].modes())).collect();
         let banks: Vec<&ModalBank> = carrying.iter().filter_map(|one| structures[*one].bank()).collect();
-        let degree = |modes: &ContactModes| if solver.properties().sticks { 1 } else { modes.degree_up_to(longest) };
+        let degree = |modes: &ContactModes| if solver.sticks() { 1 } else { modes.degree_up_to(longest) };
         let carried = banks.iter().map(|bank| degree(&coordinates(bank).seen_at(&bank.model().contact_modes)));
         let degree = kinds.iter().flatten().map(degree).chain(carried).min().unwrap_or(MOST);
         let own = pairs.iter().filter(|pair| touching.contains(&pair.structure()));

@@ -153,7 +153,7 @@ impl Trial {
     /// Creates a trial for a sector with `modes` modes and `nodes` contact nodes. If contacts may stick, polynomials are of degree 1.
     pub fn new(modes: usize, nodes: usize, solver: Solver) -> Self {
         let lanes = Lanes { points: MOST, nodes };
-        let contacts = if solver.properties().sticks { nodes } else { lanes.len() };
+        let contacts = if solver.sticks() { nodes } else { lanes.len() };
         let (width, three) = (|| vec![0.0; lanes.width()], || vec![0.0; 3 * lanes.width()]);
         let rows = || vec![0.0; 3 * nodes];
         Self {
@@ -167,7 +167,7 @@ impl Trial {
                 multipliers: vec![0.0; nodes],
                 gaps: vec![0.0; nodes],
                 normals: rows(),
-                slopes: if solver.properties().sticks { rows() } else { Vec::new() },
+                slopes: if solver.sticks() { rows() } else { Vec::new() },
             },
             free: three(),
             pushed: three(),
@@ -206,7 +206,7 @@ impl Trial {
             left: rows(),
             depths: vec![0.0; nodes],
             minima: Minima::new(modes, nodes),
-            sticking: solver.properties().sticks.then(|| Box::new(Sticking::new(nodes))),
+            sticking: solver.sticks().then(|| Box::new(Sticking::new(nodes))),
             per_step: 0.0,
             steady: None,
             end_slopes: [0.0; POINTS],

@@ -80,7 +80,7 @@ pub(super) const YIELD: Fact =
 pub(super) const HARDENING: Fact = fact("contact.coating.hardening", "", |at| at.plastic(|coating| coating.hardening));
 pub(super) const HEAT: Fact = fact("contact.slave_heat_fraction", "", |at| at.contact().slave_heat_fraction.is_some());
 pub(super) const SOLVER: Fact = fact("contact.solver", "", |_| true);
-pub(super) const STICKING: Fact = fact("contact.solver", "`coulomb`", |at| at.solver.properties().sticks);
+pub(super) const STICKING: Fact = fact("contact.solver", "`coulomb`", |at| at.solver.sticks());
 pub(super) const UNCOATED: Fact =
     fact("contact.solver", "a solver other than `lcp`", |at| !at.solver.properties().solves_coatings);
 

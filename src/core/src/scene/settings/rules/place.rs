@@ -145,7 +145,7 @@ impl<'a> ScenePlace<'a> {
         let small = self.contacts().all(|at| !at.is_free() && at.carrier().is_none());
         let uncoupled = self.roms.iter().all(|rom| !rom.is_cyclic());
         let rubs = settings.contacts.iter().any(|contact| contact.friction > 0.0);
-        settings.contacts[0].solver.properties().sticks
+        settings.contacts[0].solver.sticks()
             || (small && uncoupled && rubs && self.contacts().all(|at| !at.is_coated()))
     }
 
