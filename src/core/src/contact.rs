@@ -34,7 +34,7 @@ use lcp::Lcp;
 use sliding::SlidingLaw;
 
 /// Parameters of the law of a contact pair.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContactParameters {
     /// Friction coefficient µ (-).
     pub friction: f64,
