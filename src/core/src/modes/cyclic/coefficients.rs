@@ -16,7 +16,7 @@ impl CyclicBank {
         self.lane_coefficients.fill(CyclicCoefficients::NONE);
         for (n, diameter) in self.model.diameters.iter().enumerate() {
             for mode in 0..diameter.len() {
-                let k = diameter.coefficient(mode, scheme, step);
+                let k = diameter.coefficient(mode, 1.0, scheme, step);
                 self.coefficients[n * self.modes + mode] = k;
                 let (frequency, ratio) = (diameter.frequencies[mode], diameter.damping_ratios[mode]);
                 let dynamic = mode < diameter.dynamic_modes(scheme);

@@ -1,18 +1,15 @@
 //! Modes of a disk of coupled sectors, nodal diameter by nodal diameter.
 //!
-//! Every nodal diameter n has its Hermitian pencil K_n φ = ω² M_n φ (see [`Harmonic`]). With the mass-normalised modes,
+//! Every nodal diameter n has its Hermitian pencil K_n φ = ω² M_n φ (see [`Harmonic`](crate::scene::rom::Harmonic)). With the mass-normalised modes,
 //! z_n = Φ_n q_n, the equations are q̈ + 2ξω q̇ + ω² q = p for each complex amplitude q, and the displacement of sector s is
 //! u_s = Σ_n Re(Ψ_n q_n e^(2πi n s/N)) with the weighted contact modes Ψ_n = w_n C_n Φ_n. Virtual work gives the modal
 //! force p_n = Ψ_nᴴ Σ_s f_s e^(−2πi n s/N) of forces f_s on the sectors; its imaginary part is omitted for n = 0 and 2n = N,
 //! whose modes are real.
 
-use nalgebra::{Complex, DMatrix, SymmetricEigen};
+use nalgebra::{Complex, DMatrix};
 use tiprub_cosim::shown;
 
-use crate::modes::modal::{ModalModel, RIGID_FRACTION, check_semidefinite, fill_ratios, real_modes};
-use crate::modes::schemes::ModeCoefficients;
-use crate::scene::method::Scheme;
-use crate::scene::rom::{Harmonic, cholesky};
+use crate::modes::modal::{ModalModel, ModeNumber, eigenmodes, fill_ratios};
 use crate::{Error, Result, Rom};
 
 /// Entries of a mode shape this close to the largest count as equally large when the phase is chosen.
@@ -23,68 +20,9 @@ const SAME_FREQUENCY: f64 = 1e-3;
 /// Frequencies of rigid-body modes agree to this fraction of the highest frequency.
 const RIGID_FREQUENCY: f64 = 1e-5;
 
-/// Modes of one nodal diameter, mass-normalised, in the order of their frequencies.
-#[derive(Debug, Clone, PartialEq)]
-pub struct DiameterModes {
-    /// Nodal diameter n.
-    pub nodal_diameter: usize,
-    /// Undamped angular frequencies ω (rad/s), ascending; exactly 0 for rigid-body modes.
-    pub frequencies: Vec<f64>,
-    /// Damping ratios ξ (-), one per mode.
-    pub damping_ratios: Vec<f64>,
-    /// Ψ_n = w_n C_n Φ_n, rows × modes: displacement of the contact rows of sector 0 per unit amplitude.
-    pub contact_modes: DMatrix<Complex<f64>>,
-    /// Φ_n, reduced coordinates × modes. The largest entry of every column (the first of equals) is real and positive.
-    pub shapes: DMatrix<Complex<f64>>,
-    /// Number of the highest modes that massless-boundary treats as quasi-static.
-    pub quasi_static: usize,
-}
-
-impl DiameterModes {
-    /// Number of modes.
-    pub fn len(&self) -> usize {
-        self.frequencies.len()
-    }
-
-    /// Returns whether there are no modes.
-    pub fn is_empty(&self) -> bool {
-        self.frequencies.is_empty()
-    }
-
-    /// Number of modes that have inertia if the highest are quasi-static.
-    pub(crate) fn inertial_modes(&self) -> usize {
-        self.len().saturating_sub(self.quasi_static)
-    }
-
-    /// Number of modes with inertia under a scheme; the others are the highest.
-    pub fn dynamic_modes(&self, scheme: Scheme) -> usize {
-        if scheme.properties().quasi_static { self.inertial_modes() } else { self.len() }
-    }
-
-    /// Coefficients of one mode at the step size `step` (s).
-    pub fn coefficient(&self, mode: usize, scheme: Scheme, step: f64) -> ModeCoefficients {
-        let dynamic = mode < self.dynamic_modes(scheme);
-        ModeCoefficients::of_mode(scheme, dynamic, self.frequencies[mode], self.damping_ratios[mode], step)
-    }
-
-    fn new(
-        nodal_diameter: usize,
-        damping_ratio: f64,
-        weight: f64,
-        contact_map: &DMatrix<Complex<f64>>,
-        eigenvalues: &[f64],
-        shapes: DMatrix<Complex<f64>>,
-    ) -> Self {
-        Self {
-            nodal_diameter,
-            damping_ratios: vec![damping_ratio; eigenvalues.len()],
-            frequencies: eigenvalues.iter().map(|value| value.sqrt()).collect(),
-            contact_modes: contact_map * &shapes * Complex::new(weight, 0.0),
-            quasi_static: contact_map.nrows(),
-            shapes,
-        }
-    }
-}
+/// Modes of one nodal diameter. `contact_modes` are Ψ_n = w_n C_n Φ_n, the displacements of the contact rows of sector 0 per unit
+/// amplitude; `shapes` are Φ_n, with a real and positive largest entry (the first of equals) in every column.
+pub type DiameterModes = ModalModel<Complex<f64>>;
 
 /// Modes of all nodal diameters 0 ..= ⌊N/2⌋ of N coupled sectors.
 #[derive(Debug, Clone, PartialEq)]
@@ -110,24 +48,24 @@ impl CyclicModel {
     /// A stiffness that is not positive semidefinite.
     pub(crate) fn with_zero(rom: &Rom, damping_ratio: f64, zero: ModalModel) -> Result<Self> {
         let (sectors, complex) = (rom.sectors, |matrix: &DMatrix<f64>| matrix.map(|value| Complex::new(value, 0.0)));
-        let squares: Vec<f64> = zero.frequencies.iter().map(|frequency| frequency * frequency).collect();
-        let map = complex(&rom.contact_map);
-        let mut first = DiameterModes::new(0, damping_ratio, weight(0, sectors), &map, &squares, complex(&zero.shapes));
+        let modes_of = |n: usize, map: &DMatrix<Complex<f64>>, squares: &[f64], shapes: DMatrix<Complex<f64>>| {
+            let contact_modes = map * &shapes * Complex::new(weight(n, sectors), 0.0);
+            DiameterModes::new(squares, damping_ratio, contact_modes, shapes)
+        };
+        let mut first = modes_of(0, &complex(&rom.contact_map), &zero.frequencies, complex(&zero.shapes));
         // The frequencies are not computed from their squares, which would add a rounding error.
         first.frequencies = zero.frequencies;
         let mut diameters = vec![first];
         for (index, harmonic) in rom.extras.harmonics.iter().enumerate() {
-            let nodal_diameter = index + 1;
-            let suffix = format!("_{nodal_diameter}");
-            let (modes, map) = if 2 * nodal_diameter == sectors {
+            let (n, suffix) = (index + 1, format!("_{}", index + 1));
+            diameters.push(if 2 * n == sectors {
                 let real = |matrix: &DMatrix<Complex<f64>>| matrix.map(|value| value.re);
-                let (squares, shapes) = real_modes(&real(&harmonic.mass), &real(&harmonic.stiffness), &suffix)?;
-                ((squares, complex(&shapes)), complex(&real(&harmonic.contact_map)))
+                let (squares, shapes) = eigenmodes(&real(&harmonic.mass), &real(&harmonic.stiffness), &suffix)?;
+                modes_of(n, &complex(&real(&harmonic.contact_map)), &squares, complex(&shapes))
             } else {
-                (hermitian_modes(harmonic, &suffix)?, harmonic.contact_map.clone())
-            };
-            let weight = weight(nodal_diameter, sectors);
-            diameters.push(DiameterModes::new(nodal_diameter, damping_ratio, weight, &map, &modes.0, modes.1));
+                let (squares, shapes) = eigenmodes(&harmonic.mass, &harmonic.stiffness, &suffix)?;
+                modes_of(n, &harmonic.contact_map, &squares, shapes)
+            });
         }
         let model = Self { sectors, diameters };
         model.check_frequencies(rom)?;
@@ -141,9 +79,9 @@ impl CyclicModel {
         if checks.nodal_diameters.len() != checks.reduced_frequencies.len() {
             return Ok(());
         }
-        for diameter in &self.diameters {
+        for (n, diameter) in self.diameters.iter().enumerate() {
             let stored = checks.nodal_diameters.iter().zip(&checks.reduced_frequencies);
-            let stored = stored.filter(|(number, _)| usize::try_from(**number) == Ok(diameter.nodal_diameter));
+            let stored = stored.filter(|(number, _)| usize::try_from(**number) == Ok(n));
             let largest = diameter.frequencies.last().map_or(0.0, |most| most / std::f64::consts::TAU);
             for ((_, stored), found) in stored.zip(&diameter.frequencies) {
                 let found = found / std::f64::consts::TAU;
@@ -151,8 +89,7 @@ impl CyclicModel {
                     return Err(Error::invalid(
                         "ROM harmonics",
                         format!(
-                            "nodal diameter {} has a mode at {} Hz, but the checks stored in the ROM give {} Hz",
-                            diameter.nodal_diameter,
+                            "nodal diameter {n} has a mode at {} Hz, but the checks stored in the ROM give {} Hz",
                             shown(found),
                             shown(*stored)
                         ),
@@ -189,8 +126,7 @@ impl CyclicModel {
 
     /// Largest undamped angular frequency (rad/s).
     pub fn largest_frequency(&self) -> f64 {
-        let all = self.diameters.iter().flat_map(|diameter| &diameter.frequencies);
-        all.fold(0.0, |largest, value| f64::max(largest, *value))
+        self.diameters.iter().map(DiameterModes::largest_frequency).fold(0.0, f64::max)
     }
 
     /// w_n: displacement of a sector per unit amplitude of a nodal diameter that moves every reduced coordinate by one.
@@ -232,86 +168,28 @@ fn weight(nodal_diameter: usize, sectors: usize) -> f64 {
     libm::sqrt(share / count)
 }
 
-/// Eigenvalues ω² (ascending, exactly 0 for rigid-body modes) and mass-normalised modes of a Hermitian pencil.
-fn hermitian_modes(harmonic: &Harmonic, suffix: &str) -> Result<(Vec<f64>, DMatrix<Complex<f64>>)> {
-    let Harmonic { mass, stiffness, .. } = harmonic;
-    if let Some(modes) = modal_already(mass, stiffness) {
-        return Ok(modes);
-    }
-    let Some(lower) = cholesky(mass) else {
-        let what = format!("ROM array `mass{suffix}`");
-        return Err(Error::invalid(what, "not positive definite", "Regenerate the ROM"));
-    };
-    let half = lower.solve_lower_triangular(stiffness).unwrap_or_else(|| stiffness.clone());
-    let full = lower.solve_lower_triangular(&half.adjoint()).unwrap_or(half);
-    let eigen = SymmetricEigen::new((&full + full.adjoint()) * Complex::new(0.5, 0.0));
-    let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
-    order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
-    let largest = eigen.eigenvalues.amax();
-    check_semidefinite(eigen.eigenvalues[order[0]], largest, suffix)?;
-    let vectors = eigen.eigenvectors.select_columns(&order);
-    let mut shapes = lower.adjoint().solve_upper_triangular(&vectors).unwrap_or(vectors);
-    fix_phases(&mut shapes);
-    let values = order.iter().enumerate().map(|(mode, index)| {
-        let value = eigen.eigenvalues[*index];
-        if value < RIGID_FRACTION * largest { unresolved_eigenvalue(stiffness, &shapes, mode) } else { value }
-    });
-    let values = values.collect();
-    Ok((values, shapes))
-}
+impl ModeNumber for Complex<f64> {
+    const ROUNDING: f64 = 32.0;
 
-/// Returns modes without solving the eigenproblem if the matrices are in modal coordinates (M = I, K diagonal and ascending).
-fn modal_already(
-    mass: &DMatrix<Complex<f64>>,
-    stiffness: &DMatrix<Complex<f64>>,
-) -> Option<(Vec<f64>, DMatrix<Complex<f64>>)> {
-    let order = mass.nrows();
-    let diagonal: Vec<f64> = (0..order).map(|mode| stiffness[(mode, mode)].re).collect();
-    let ascending = diagonal.windows(2).all(|pair| pair[0] <= pair[1]) && diagonal.iter().all(|value| *value >= 0.0);
-    let nothing = Complex::new(0.0, 0.0);
-    let diagonal_only = |matrix: &DMatrix<Complex<f64>>| {
-        let mut entries = matrix.iter().enumerate();
-        entries.all(
-            |(index, value)| {
-                if index % order == index / order { value.im.to_bits() == 0 } else { *value == nothing }
-            },
-        )
-    };
-    let unit = (0..order).all(|mode| mass[(mode, mode)].re.to_bits() == 1.0_f64.to_bits());
-    (ascending && unit && diagonal_only(mass) && diagonal_only(stiffness))
-        .then(|| (diagonal, DMatrix::identity(order, order)))
-}
-
-/// Returns φᴴKφ, exactly 0 for a rigid-body mode, as for real modes.
-fn unresolved_eigenvalue(stiffness: &DMatrix<Complex<f64>>, shapes: &DMatrix<Complex<f64>>, mode: usize) -> f64 {
-    let (mut quotient, mut magnitude) = (0.0, 0.0);
-    for column in 0..stiffness.ncols() {
-        for row in 0..stiffness.nrows() {
-            let term = shapes[(row, mode)].conj() * stiffness[(row, column)] * shapes[(column, mode)];
-            quotient += term.re;
-            magnitude += libm::hypot(term.re, term.im);
+    /// Makes the largest entry of each eigenvector real and positive.
+    fn fix_phases(shapes: &mut DMatrix<Self>) {
+        let size = |value: &Self| libm::hypot(value.re, value.im);
+        for mut column in shapes.column_iter_mut() {
+            let largest = column.iter().fold(0.0, |most: f64, value| most.max(size(value)));
+            let Some(chosen) = column.iter().position(|value| size(value) >= (1.0 - SAME_SIZE) * largest) else {
+                continue;
+            };
+            let turn = column[chosen].conj() / size(&column[chosen]);
+            column.iter_mut().for_each(|value| *value *= turn);
+            column[chosen].im = 0.0;
         }
-    }
-    #[expect(clippy::cast_precision_loss, reason = "orders are far below 2^52")]
-    let rounding = 32.0 * f64::EPSILON * stiffness.nrows() as f64 * magnitude;
-    if quotient > rounding { quotient } else { 0.0 }
-}
-
-/// Makes the largest entry of each eigenvector real and positive, because its phase is arbitrary and numbers should be comparable.
-fn fix_phases(shapes: &mut DMatrix<Complex<f64>>) {
-    let size = |value: &Complex<f64>| libm::hypot(value.re, value.im);
-    for mut column in shapes.column_iter_mut() {
-        let largest = column.iter().fold(0.0, |most: f64, value| most.max(size(value)));
-        let Some(chosen) = column.iter().position(|value| size(value) >= (1.0 - SAME_SIZE) * largest) else { continue };
-        let turn = column[chosen].conj() / size(&column[chosen]);
-        column.iter_mut().for_each(|value| *value *= turn);
-        column[chosen].im = 0.0;
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::rom::Harmonic;
 
     fn number(seed: &mut u64) -> f64 {
         *seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -335,7 +213,7 @@ mod tests {
     fn modes_are_orthonormal_and_diagonalise_the_pencil_to_rounding() {
         for (order, seed) in [(1, 1), (3, 2), (14, 3), (34, 4), (60, 5)] {
             let harmonic = pencil(order, seed);
-            let (squares, shapes) = hermitian_modes(&harmonic, "_1").unwrap();
+            let (squares, shapes) = eigenmodes(&harmonic.mass, &harmonic.stiffness, "_1").unwrap();
             let size =
                 |matrix: DMatrix<Complex<f64>>| matrix.iter().fold(0.0, |most: f64, z| most.max(z.re.hypot(z.im)));
             let error = size(shapes.adjoint() * &harmonic.mass * &shapes - DMatrix::identity(order, order));
@@ -356,8 +234,8 @@ mod tests {
         for (column, angle) in [0.3, 1.9, -2.5, 3.1, 0.0_f64].into_iter().enumerate() {
             turned.column_mut(column).iter_mut().for_each(|value| *value *= Complex::new(angle.cos(), angle.sin()));
         }
-        fix_phases(&mut shapes);
-        fix_phases(&mut turned);
+        ModeNumber::fix_phases(&mut shapes);
+        ModeNumber::fix_phases(&mut turned);
         let off = shapes.iter().zip(turned.iter()).fold(0.0_f64, |most, (a, b)| most.max((a - b).norm_sqr().sqrt()));
         assert!(off < 1e-15, "{off:e}");
     }
@@ -368,8 +246,10 @@ mod tests {
         let (sectors, modes) = (5, 4);
         let of = |nodal_diameter: usize| {
             let Harmonic { contact_map, .. } = pencil(modes, 8);
-            let shapes = hermitian_modes(&pencil(modes, 9), "_1").unwrap();
-            DiameterModes::new(nodal_diameter, 0.01, weight(nodal_diameter, sectors), &contact_map, &shapes.0, shapes.1)
+            let Harmonic { mass, stiffness, .. } = pencil(modes, 9);
+            let (squares, shapes) = eigenmodes(&mass, &stiffness, "_1").unwrap();
+            let weight = Complex::new(weight(nodal_diameter, sectors), 0.0);
+            DiameterModes::new(&squares, 0.01, contact_map * &shapes * weight, shapes)
         };
         let disk = CyclicModel { sectors, diameters: vec![of(0), of(1)] };
         let (paired, own) = (disk.paired(1), &disk.diameters[1]);
@@ -404,7 +284,7 @@ mod tests {
         let mass =
             DMatrix::from_diagonal(&nalgebra::DVector::from_row_slice(&[2.0, 0.7])).map(|m| Complex::new(m, 0.0));
         let harmonic = Harmonic { mass, stiffness, contact_map: DMatrix::zeros(3, 2) };
-        let (squares, _) = hermitian_modes(&harmonic, "_1").unwrap();
+        let (squares, _) = eigenmodes(&harmonic.mass, &harmonic.stiffness, "_1").unwrap();
         assert!(squares[0] == 0.0, "{squares:?}");
         assert!((squares[1] / (3e7 * (1.0 / 2.0 + 1.0 / 0.7)) - 1.0).abs() < 1e-13, "{squares:?}");
     }

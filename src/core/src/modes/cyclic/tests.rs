@@ -13,7 +13,6 @@ pub(super) fn model(sectors: usize, nodes: usize) -> CyclicModel {
             Complex::new(x.sin(), if real { 0.0 } else { (1.3 * x).cos() })
         };
         DiameterModes {
-            nodal_diameter: n,
             frequencies: (1..=modes).map(|mode| 700.0 * (mode * mode) as f64 + 50.0 * n as f64).collect(),
             damping_ratios: vec![0.005; modes],
             contact_modes: DMatrix::from_fn(3 * nodes, modes, shape),
