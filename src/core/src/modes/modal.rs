@@ -5,7 +5,7 @@
 use nalgebra::{ComplexField, DMatrix, Scalar, SymmetricEigen};
 use tiprub_cosim::shown;
 
-use crate::modes::schemes::ModeCoefficients;
+use crate::modes::schemes::{ModeCoefficients, Velocity};
 use crate::scene::method::Scheme;
 use crate::scene::rom::cholesky;
 use crate::{Error, Result, Rom};
@@ -26,6 +26,38 @@ pub struct ModalModel<T: Scalar = f64> {
     pub shapes: DMatrix<T>,
     /// Number of the highest modes that massless-boundary treats as quasi-static.
     pub quasi_static: usize,
+}
+
+/// One mode.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Oscillator {
+    /// Angular frequency ω (rad/s).
+    pub frequency: f64,
+    /// Damping ratio ξ.
+    pub damping_ratio: f64,
+    /// True if it has inertia even where the highest modes are quasi-static.
+    is_inertial: bool,
+}
+
+impl Oscillator {
+    /// Returns whether the mode has inertia under a scheme.
+    pub fn is_dynamic(&self, scheme: Scheme) -> bool {
+        self.is_inertial || !scheme.properties().quasi_static
+    }
+
+    /// Coefficients at the step size `step` (s).
+    pub fn coefficients(&self, scheme: Scheme, step: f64) -> ModeCoefficients {
+        ModeCoefficients::of_mode(scheme, self.is_dynamic(scheme), self.frequency, self.damping_ratio, step)
+    }
+
+    /// Velocity coefficients at the step size `step` (s); a quasi-static mode has none.
+    pub fn velocity(&self, scheme: Scheme, step: f64) -> Velocity {
+        if self.is_dynamic(scheme) {
+            scheme.velocity(self.frequency, self.damping_ratio, step)
+        } else {
+            Velocity::default()
+        }
+    }
 }
 
 /// Effects of spin in modal coordinates (see [`crate::scene::rom::Spin`]).
@@ -123,10 +155,16 @@ impl<T: Scalar> ModalModel<T> {
         if scheme.properties().quasi_static { self.inertial_modes() } else { self.len() }
     }
 
+    /// Returns a mode if there is one, with its frequency multiplied by `factor` (mistuning; 1 if tuned).
+    pub(super) fn oscillator(&self, mode: usize, factor: f64) -> Option<Oscillator> {
+        let is_inertial = mode < self.inertial_modes();
+        let (frequency, damping_ratio) = (self.frequencies.get(mode)? * factor, *self.damping_ratios.get(mode)?);
+        Some(Oscillator { frequency, damping_ratio, is_inertial })
+    }
+
     /// Coefficients of one mode at the step size `step` (s), with its frequency multiplied by `factor` (mistuning; 1 if tuned).
     pub fn coefficient(&self, mode: usize, factor: f64, scheme: Scheme, step: f64) -> ModeCoefficients {
-        let (frequency, ratio) = (self.frequencies[mode] * factor, self.damping_ratios[mode]);
-        ModeCoefficients::of_mode(scheme, mode < self.dynamic_modes(scheme), frequency, ratio, step)
+        self.oscillator(mode, factor).map_or_else(ModeCoefficients::default, |of| of.coefficients(scheme, step))
     }
 
     /// Largest undamped angular frequency (rad/s).
