@@ -119,6 +119,7 @@ impl ModalBank {
 
     /// Collects the persistent contact forces on a disk (`forces[row · lanes + sector]`, N), before [`ModalBank::gather_forces`].
     pub(super) fn gather_disk(&mut self, forces: &[f64]) {
+        self.finish();
         let lanes = self.lanes;
         if let Some(disk) = &mut self.disk {
             disk.gather_rows(forces, lanes);
@@ -146,7 +147,10 @@ impl ModalBank {
             if self.heat.is_some() {
                 force[0] += self.heat_before(mode, group);
             }
-            self.modal_force[mode * self.parts..][..self.parts].copy_from_slice(&force[..self.parts]);
+            self.modal_force[mode * self.parts] = force[0];
+            if self.parts == 2 {
+                self.modal_force[mode * self.parts + 1] = force[1];
+            }
         }
         self.add_coupling_force(group);
         if let Some(coupling) = self.coupling.as_ref().filter(|coupling| coupling.softens()) {
@@ -163,7 +167,6 @@ impl ModalBank {
             self.state.increment.iter_mut().for_each(|increment| *increment *= ratio);
             return self.set_step(scheme, new_step);
         }
-        self.finish();
         self.gather_disk(forces);
         for group in 0..self.groups {
             self.gather_forces(group, forces);

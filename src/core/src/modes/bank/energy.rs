@@ -22,11 +22,14 @@ impl ModalBank {
         let (mut kinetic, mut strain) = sums;
         // The strain energy belongs to one time, or to two.
         let lag = self.scheme.strain_lag();
-        for (mode, k) in self.coefficients(group).iter().enumerate() {
-            let [position, increment] = self.amplitudes(mode, group);
-            for (position, increment) in position.into_iter().zip(increment).take(self.parts) {
+        for (k, [position, increment]) in self.coefficients(group).iter().zip(self.amplitudes_of(group)) {
+            let mut add = |position: f64, increment: f64| {
                 kinetic += k.inertia * (increment * increment);
                 strain += k.spring * (position * (position - lag * increment));
+            };
+            add(position[0], increment[0]);
+            if self.parts == 2 {
+                add(position[1], increment[1]);
             }
         }
         if let Some(coupling) = &self.coupling {
@@ -41,18 +44,20 @@ impl ModalBank {
     /// (`forces[row · lanes + sector]`, N) and the modal loads.
     pub(crate) fn energies_now(&mut self, forces: &[f64]) -> (f64, f64) {
         let (mut kinetic, mut strain) = (0.0, 0.0);
-        self.finish();
         self.gather_disk(forces);
         for group in 0..self.groups {
             self.gather_forces(group, forces);
             let velocities = &self.velocities[self.set_of(group) * self.modes..];
-            let modes = self.coefficients(group).iter().zip(velocities).zip(self.modal_force.chunks_exact(self.parts));
-            for (mode, ((k, velocity), forces)) in modes.enumerate() {
-                let [position, increment] = self.amplitudes(mode, group);
-                for ((position, increment), force) in position.into_iter().zip(increment).zip(forces) {
-                    let velocity = velocity.of(position, increment, *force);
+            let modes = self.coefficients(group).iter().zip(velocities).zip(self.amplitudes_of(group));
+            for (mode, ((k, velocity), [position, increment])) in modes.enumerate() {
+                let mut add = |position: f64, increment: f64, force: f64| {
+                    let velocity = velocity.of(position, increment, force);
                     kinetic += 0.5 * velocity * velocity;
                     strain += k.spring * (position * position);
+                };
+                add(position[0], increment[0], self.modal_force[mode * self.parts]);
+                if self.parts == 2 {
+                    add(position[1], increment[1], self.modal_force[mode * self.parts + 1]);
                 }
             }
             if let Some(coupling) = &self.coupling {

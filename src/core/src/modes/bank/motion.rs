@@ -1,6 +1,6 @@
 //! Motion of the modes: states that are set, states of rest, and displacements recovered from them.
 
-use super::{FLUSH_BELOW, ModalBank};
+use super::{FLUSH_BELOW, LANES, ModalBank};
 
 impl ModalBank {
     /// Modal position and increment of one mode of a sector, or of the real part of a nodal diameter.
@@ -11,18 +11,25 @@ impl ModalBank {
 
     /// Modal position and increment (re, im) of one mode of a group, including contact forces that have not been applied yet.
     pub fn amplitudes(&self, mode: usize, group: usize) -> [[f64; 2]; 2] {
-        let (index, mut found) = (self.index(mode, group), [[0.0; 2]; 2]);
-        for part in 0..self.parts {
-            let at = index + part * self.width;
-            (found[0][part], found[1][part]) = (self.state.position[at], self.state.increment[at]);
-        }
-        if let Some(disk) = self.disk.as_ref().filter(|disk| disk.state.unapplied) {
+        self.amplitudes_at(self.index(mode, group), mode, group)
+    }
+
+    /// Modal positions and increments (re, im) of the modes of a group, in their order.
+    pub(super) fn amplitudes_of(&self, group: usize) -> impl Iterator<Item = [[f64; 2]; 2]> {
+        let (first, stride) = (self.index(0, group), self.parts * self.width);
+        (0..self.modes).map(move |mode| self.amplitudes_at(first + mode * stride, mode, group))
+    }
+
+    #[inline(always)]
+    fn amplitudes_at(&self, index: usize, mode: usize, group: usize) -> [[f64; 2]; 2] {
+        let (position, increment) = (&self.state.position, &self.state.increment);
+        let Some(disk) = &self.disk else { return [[position[index], 0.0], [increment[index], 0.0]] };
+        let mut found = [position, increment].map(|values| [values[index], values[index + LANES]]);
+        if disk.state.unapplied {
             let compliance = self.coefficients(group)[mode].compliance;
-            for (part, force) in
-                disk.modal_force(mode, group, &disk.state.touched, &disk.state.force).iter().enumerate()
-            {
-                found[0][part] += compliance * force;
-                found[1][part] += compliance * force;
+            let force = disk.modal_force(mode, group, &disk.state.touched, &disk.state.force);
+            for values in &mut found {
+                values.iter_mut().zip(force).for_each(|(value, force)| *value += compliance * force);
             }
         }
         found

@@ -1,8 +1,8 @@
 //! The fused pass over all modes: forces of the previous step, damping loss, prediction and recovery.
 //!
 //! Contact forces of a step are applied to the modes in the next pass, which loads the contact modes anyway; until then they are
-//! stored as a spectrum (see `ModalBank::finish`). Accumulators stay in registers and sums run mode
-//! by mode for every lane, so that wider registers do not change the result.
+//! stored as a spectrum (see `ModalBank::finish`). Accumulators stay in registers and sums run mode by mode for every lane, so that
+//! wider registers do not change the result.
 
 use super::fourier::Fourier;
 use crate::math::simd::Kernel;
