@@ -66,7 +66,7 @@ impl ModalBank {
                 let Some(of) = self.oscillator(mode, group) else { continue };
                 let forces = if of.is_dynamic(self.scheme) { &excitation.now } else { &self.state.excited_before };
                 let force = excitation.on_mode(mode, group, forces);
-                if force == [0.0; 2] {
+                if force.iter().all(|part| *part == 0.0) {
                     continue;
                 }
                 let ([_, increment], index) = (self.amplitudes(mode, group), self.index(mode, group));
