@@ -7,4 +7,3 @@ pub mod excitation;
 pub mod modal;
 pub mod rigid;
 pub mod schemes;
-pub mod sectors;

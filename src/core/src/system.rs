@@ -24,9 +24,8 @@ use tiprub_cosim::persist_fields;
 
 use crate::contact::coating::Coating;
 use crate::geometry::{GapLaw, PrescribedMotion};
-use crate::modes::bank::BankOptions;
+use crate::modes::bank::{BankOptions, ModalBank, SectorModel};
 use crate::modes::modal::ModalModel;
-use crate::modes::sectors::{SectorModel, Sectors};
 use crate::scene::method::{Scheme, Solver};
 use crate::system::history::Two;
 pub(crate) use contact_view::Bodies;
@@ -192,12 +191,12 @@ impl System {
     }
 
     /// Modes of the first structure.
-    pub fn bank(&self) -> &Sectors {
+    pub fn bank(&self) -> &ModalBank {
         self.structures[0].modes()
     }
 
     /// Modes of the first structure, to set initial conditions before [`System::start`].
-    pub fn bank_mut(&mut self) -> &mut Sectors {
+    pub fn bank_mut(&mut self) -> &mut ModalBank {
         self.structures[0].modes_mut()
     }
 
@@ -405,6 +404,6 @@ fn contact_reach(
     let carried = own().any(|pair| pair.carrier().is_some());
     // Sectors turn relative to a stationary surface; a single structure is one sector with all of its contacts.
     let open = own().any(|pair| pair.structure() == first && matches!(pair.gap(), GapLaw::Open(_)));
-    let coupled = carried || structures[first].modes().coupled().is_some() || open;
+    let coupled = carried || structures[first].modes().disk().is_some() || open;
     Some((if coupled { Reach::All } else { Reach::Sector }, touching))
 }

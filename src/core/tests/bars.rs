@@ -8,7 +8,7 @@ mod rods;
 use guide::print_row;
 use rods::{NEARLY_NONE, SCHEMES, StraightRod, ascending, quiet_step};
 use tiprub_core::geometry::{FixedGap, GapLaw, PrescribedMotion, Vector3};
-use tiprub_core::modes::modal::{ModalModel, NodePair};
+use tiprub_core::modes::modal::ModalModel;
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::system::{System, SystemSettings};
 use tiprub_core::time::{Recurrence, Stepper};
@@ -46,8 +46,7 @@ fn collide(elements: usize, scheme: Scheme, solver: Solver) -> BarRun {
     let bars = bars(elements, scheme);
     let roms = bars.map(|bar| bar.rom());
     let models = [&roms[0], &roms[1]].map(|rom| ModalModel::from_rom(rom, 0.0).unwrap());
-    let pair = NodePair { master: (0, 0), slave: Some((1, 0)) };
-    let model = ascending(&ModalModel::combined(&models, &[pair]).unwrap(), 2);
+    let model = ascending(&tiprub_test_models::relative(&models[0], &models[1], &[[0, 0]]), 2);
     let law =
         GapLaw::Fixed(FixedGap { normals: vec![-Vector3::x()], gaps: vec![GAP], sliding: vec![Vector3::zeros()] });
     let mut system = single_sector(&model, law, 0.0, SystemSettings { scheme, solver, ledger: true });

@@ -6,6 +6,7 @@ pub mod disk;
 mod drive;
 pub mod lattice;
 mod random;
+mod relative;
 mod scenes;
 pub mod several;
 mod single;
@@ -22,6 +23,7 @@ pub use drive::{
     bits, element, go, move_on, real, reference, saved, set, set_element, slope, started, started_at, try_started,
 };
 pub use random::SeededRandom;
+pub use relative::relative;
 pub use scenes::{bumps, coating, coating_of, flexible, on_ring, round, rub};
 pub use single::{single_sector, single_sector_with};
 pub use wall::wall;

@@ -1,421 +1,291 @@
-//! A disk of coupled sectors in modal coordinates, stepped together.
+//! Modes of a disk of coupled sectors, nodal diameter by nodal diameter.
 //!
-//! Nodal diameters are SIMD lanes in blocks of `LANES`, complex amplitudes are pairs of real and imaginary parts:
-//! `state[block · modes + mode][re, im][lane]`. If a nodal diameter has fewer modes than others, or is padding of the last block,
-//! the coefficients of the additional modes are 0. The transforms of `fourier` convert contact displacements to sectors and
-//! forces on sectors to nodal diameters. The effect of a force on any sector within a step is the block-circulant flexibility G(s
-//! − s') = Σ_n Re(Ĝ_n e^(2πin(s − s')/N)), Ĝ_n = Ψ_n diag(c) Ψ_nᴴ.
+//! Every nodal diameter n has its Hermitian pencil K_n φ = ω² M_n φ (see [`Harmonic`](crate::scene::rom::Harmonic)). With the mass-normalised modes,
+//! z_n = Φ_n q_n, the equations are q̈ + 2ξω q̇ + ω² q = p for each complex amplitude q, and the displacement of sector s is
+//! u_s = Σ_n Re(Ψ_n q_n e^(2πi n s/N)) with the weighted contact modes Ψ_n = w_n C_n Φ_n. Virtual work gives the modal
+//! force p_n = Ψ_nᴴ Σ_s f_s e^(−2πi n s/N) of forces f_s on the sectors; its imaginary part is omitted for n = 0 and 2n = N,
+//! whose modes are real.
 
-mod coefficients;
-mod contact;
-mod energy;
-mod excited;
-mod fourier;
-mod model;
-mod pass;
-mod span;
-#[cfg(test)]
-mod tests;
+use nalgebra::{Complex, DMatrix};
+use tiprub_cosim::shown;
 
-use tiprub_cosim::persist::{Persist, StateReader, StateWriter};
-use tiprub_cosim::persist_fields;
+use crate::modes::modal::{ModalModel, ModeNumber, eigenmodes, fill_ratios};
+use crate::{Error, Result, Rom};
 
-use super::bank::{FLUSH_BELOW, LANES, lanes};
-use super::excitation::DiskLoads;
-use crate::math::simd::InstructionSet;
-use crate::math::vector::Vector3;
-use crate::modes::schemes::{ModeCoefficients, Velocity};
-use crate::scene::method::Scheme;
-use fourier::{Fourier, Synthesis};
-pub use model::CyclicModel;
-pub use model::DiameterModes;
-use pass::{Complexes, CyclicCoefficients, Pass, Recover};
+/// Entries of a mode shape this close to the largest count as equally large when the phase is chosen.
+const SAME_SIZE: f64 = 1e-6;
 
-const NOTHING: Complexes = [[0.0; LANES]; 2];
+/// Frequencies of one mode, computed by the reduction and from the matrices of the ROM, agree to this fraction.
+const SAME_FREQUENCY: f64 = 1e-3;
+/// Frequencies of rigid-body modes agree to this fraction of the highest frequency.
+const RIGID_FREQUENCY: f64 = 1e-5;
 
-/// All state variables.
+/// Modes of one nodal diameter. `contact_modes` are Ψ_n = w_n C_n Φ_n, the displacements of the contact rows of sector 0 per unit
+/// amplitude; `shapes` are Φ_n, with a real and positive largest entry (the first of equals) in every column.
+pub type DiameterModes = ModalModel<Complex<f64>>;
+
+/// Modes of all nodal diameters 0 ..= ⌊N/2⌋ of N coupled sectors.
 #[derive(Debug, Clone, PartialEq)]
-struct CyclicState {
-    /// q at the current step, without contact forces that have not been applied yet.
-    position: Vec<Complexes>,
-    /// d = q − q⁻, without contact forces that have not been applied yet.
-    increment: Vec<Complexes>,
-    /// d of the previous step, for the damping loss.
-    older: Vec<Complexes>,
-    /// Displacements of the contact rows at the current step, `[row][lane of sector]`, including contact.
-    displacement: Vec<f64>,
-    /// Displacements of the contact rows one step earlier, `[row][lane of sector]`.
-    displacement_before: Vec<f64>,
-    /// Damping loss per nodal diameter since the last collection (J).
-    loss: Vec<f64>,
-    /// Modal loads of the previous step; empty without loads.
-    modal_load_before: Vec<f64>,
-    /// Spectrum of the contact forces of the last step (N).
-    force: Vec<Complexes>,
-    /// True for contact nodes with a force on any sector.
-    touched: Vec<bool>,
-    /// True if the contact forces have not been applied to the modes of their step.
-    unapplied: bool,
-    /// True if there are such forces.
-    acting: bool,
-    /// True if the damping loss of the last step has not been added.
-    loss_due: bool,
+pub struct CyclicModel {
+    /// Number of sectors N.
+    pub sectors: usize,
+    /// Nodal diameters in ascending order, from 0.
+    pub diameters: Vec<DiameterModes>,
 }
 
-persist_fields!(CyclicState {
-    position,
-    increment,
-    older,
-    displacement,
-    displacement_before,
-    loss,
-    modal_load_before,
-    force,
-    touched,
-    unapplied,
-    acting,
-    loss_due
-});
+impl CyclicModel {
+    /// Solves the eigenproblem of every nodal diameter and assigns one damping ratio to all modes.
+    ///
+    /// # Errors
+    /// The ROM is invalid, or a stiffness is not positive semidefinite; the message names the array.
+    pub fn from_rom(rom: &Rom, damping_ratio: f64) -> Result<Self> {
+        Self::with_zero(rom, damping_ratio, ModalModel::from_rom(rom, damping_ratio)?)
+    }
 
-/// Coupled sectors, stepped together.
-#[derive(Debug, Clone)]
-pub struct CyclicBank {
-    instruction_set: InstructionSet,
-    model: CyclicModel,
-    fourier: Fourier,
-    lanes: usize,
-    rows: usize,
-    /// Largest number of modes of a nodal diameter.
-    modes: usize,
-    /// Ψ, `[block][mode][row]`.
-    shapes: Vec<Complexes>,
-    /// `[block][mode]`.
-    lane_coefficients: Vec<CyclicCoefficients>,
-    /// `[n · modes + mode]`; the default if there is no such mode.
-    coefficients: Vec<ModeCoefficients>,
-    /// Velocity coefficients, `[n · modes + mode]`; quasi-static modes have none.
-    velocities: Vec<Velocity>,
-    /// Ĝ, `[block][column][row]`.
-    spectral_flexibility: Vec<Complexes>,
-    /// G(s − s'), `[difference][column node][row node][component of the force][component of the displacement]`, the last
-    /// padded to four.
-    flexibility: Vec<[[f64; 4]; 3]>,
-    scheme: Scheme,
-    step: f64,
-    loads: bool,
-    excitation: Option<DiskLoads>,
-    state: CyclicState,
-    /// Modal loads of nodal diameter 0 for the current step.
-    modal_load: Vec<f64>,
-    /// Displacements caused by `modal_load`, per mode.
-    load_response: Vec<f64>,
-    /// Scratch: spectrum of displacements.
-    spectrum: Vec<Complexes>,
-    /// Requested forces: (sector, node, force).
-    asked: Vec<(usize, usize, Vector3)>,
-    /// Spectrum and contact nodes of the requested forces.
-    asked_force: Vec<Complexes>,
-    asked_nodes: Vec<bool>,
-    /// Displacements caused by the requested forces (m), `[row][lane of sector]`.
-    moved: Vec<f64>,
-    /// True if the damping loss is collected.
-    with_loss: bool,
-}
+    /// Solves the eigenproblems of a valid ROM except that of nodal diameter 0, whose modes are `zero`.
+    ///
+    /// # Errors
+    /// A stiffness that is not positive semidefinite.
+    pub(crate) fn with_zero(rom: &Rom, damping_ratio: f64, zero: ModalModel) -> Result<Self> {
+        let (sectors, complex) = (rom.sectors, |matrix: &DMatrix<f64>| matrix.map(|value| Complex::new(value, 0.0)));
+        let modes_of = |n: usize, map: &DMatrix<Complex<f64>>, squares: &[f64], shapes: DMatrix<Complex<f64>>| {
+            let contact_modes = map * &shapes * Complex::new(weight(n, sectors), 0.0);
+            DiameterModes::new(squares, damping_ratio, contact_modes, shapes)
+        };
+        let mut first = modes_of(0, &complex(&rom.contact_map), &zero.frequencies, complex(&zero.shapes));
+        // The frequencies are not computed from their squares, which would add a rounding error.
+        first.frequencies = zero.frequencies;
+        let mut diameters = vec![first];
+        for (index, harmonic) in rom.extras.harmonics.iter().enumerate() {
+            let (n, suffix) = (index + 1, format!("_{}", index + 1));
+            diameters.push(if 2 * n == sectors {
+                let real = |matrix: &DMatrix<Complex<f64>>| matrix.map(|value| value.re);
+                let (squares, shapes) = eigenmodes(&real(&harmonic.mass), &real(&harmonic.stiffness), &suffix)?;
+                modes_of(n, &complex(&real(&harmonic.contact_map)), &squares, complex(&shapes))
+            } else {
+                let (squares, shapes) = eigenmodes(&harmonic.mass, &harmonic.stiffness, &suffix)?;
+                modes_of(n, &harmonic.contact_map, &squares, shapes)
+            });
+        }
+        let model = Self { sectors, diameters };
+        model.check_frequencies(rom)?;
+        Ok(model)
+    }
 
-impl CyclicBank {
-    /// Creates a disk with all sectors at rest; call [`CyclicBank::set_step`] before stepping. If `loads`, there are modal loads
-    /// of nodal diameter 0 in addition to contact forces.
-    pub fn new(model: &CyclicModel, loads: bool) -> Self {
-        let (sectors, rows, modes) = (model.sectors, model.rows(), model.most_modes());
-        let (fourier, lanes) = (Fourier::new(sectors), lanes(sectors));
-        let blocks = fourier.blocks();
-        let mut shapes = vec![NOTHING; blocks * modes * rows];
-        for (n, diameter) in model.diameters.iter().enumerate() {
-            for mode in 0..diameter.len() {
-                for row in 0..rows {
-                    let value = diameter.contact_modes[(row, mode)];
-                    let entry = &mut shapes[(n / LANES * modes + mode) * rows + row];
-                    (entry[0][n % LANES], entry[1][n % LANES]) = (value.re, value.im);
+    /// Checks that the harmonics have the frequencies that the ROM states, which detects exchanged harmonics. (The complex
+    /// conjugate of a harmonic has the same frequencies; its waves travel in the other direction.)
+    fn check_frequencies(&self, rom: &Rom) -> Result<()> {
+        let checks = &rom.checks;
+        if checks.nodal_diameters.len() != checks.reduced_frequencies.len() {
+            return Ok(());
+        }
+        for (n, diameter) in self.diameters.iter().enumerate() {
+            let stored = checks.nodal_diameters.iter().zip(&checks.reduced_frequencies);
+            let stored = stored.filter(|(number, _)| usize::try_from(**number) == Ok(n));
+            let largest = diameter.frequencies.last().map_or(0.0, |most| most / std::f64::consts::TAU);
+            for ((_, stored), found) in stored.zip(&diameter.frequencies) {
+                let found = found / std::f64::consts::TAU;
+                if (found - stored).abs() > SAME_FREQUENCY * stored + RIGID_FREQUENCY * largest {
+                    return Err(Error::invalid(
+                        "ROM harmonics",
+                        format!(
+                            "nodal diameter {n} has a mode at {} Hz, but the checks stored in the ROM give {} Hz",
+                            shown(found),
+                            shown(*stored)
+                        ),
+                        "Store the harmonics in the order of their nodal diameters, or regenerate the ROM with `tiprub \
+                         reduce`",
+                    ));
                 }
             }
         }
-        let load_count = if loads { model.diameters[0].len() } else { 0 };
-        Self {
-            instruction_set: InstructionSet::detect(),
-            lane_coefficients: vec![CyclicCoefficients::NONE; blocks * modes],
-            coefficients: vec![ModeCoefficients::default(); model.diameters.len() * modes],
-            velocities: vec![Velocity::default(); model.diameters.len() * modes],
-            spectral_flexibility: vec![NOTHING; blocks * rows * rows],
-            flexibility: vec![[[0.0; 4]; 3]; sectors * rows / 3 * rows / 3],
-            scheme: Scheme::default(),
-            step: 0.0,
-            state: CyclicState {
-                position: vec![NOTHING; blocks * modes],
-                increment: vec![NOTHING; blocks * modes],
-                older: vec![NOTHING; blocks * modes],
-                displacement: vec![0.0; rows * lanes],
-                displacement_before: vec![0.0; rows * lanes],
-                loss: vec![0.0; blocks * LANES],
-                modal_load_before: vec![0.0; load_count],
-                force: vec![NOTHING; blocks * rows],
-                touched: vec![false; rows / 3],
-                unapplied: false,
-                acting: false,
-                loss_due: false,
-            },
-            modal_load: vec![0.0; load_count],
-            load_response: vec![0.0; load_count],
-            spectrum: vec![NOTHING; blocks * rows],
-            asked: Vec::with_capacity(sectors * rows / 3),
-            asked_force: vec![NOTHING; blocks * rows],
-            asked_nodes: vec![false; rows / 3],
-            moved: vec![0.0; rows * lanes],
-            model: model.clone(),
-            fourier,
-            lanes,
-            rows,
-            modes,
-            shapes,
-            loads,
-            excitation: None,
-            with_loss: true,
-        }
+        Ok(())
     }
 
-    /// Stops collecting the damping loss, which takes time.
-    pub fn skip_losses(&mut self) {
-        self.with_loss = false;
-    }
-
-    /// Number of sectors.
-    pub fn sectors(&self) -> usize {
-        self.model.sectors
-    }
-
-    /// Number of lanes of a displacement row: sectors rounded up to whole registers.
-    pub fn lanes(&self) -> usize {
-        self.lanes
-    }
-
-    /// Number of contact rows of a sector (3 per contact node).
+    /// Contact rows per sector (3 per contact node).
     pub fn rows(&self) -> usize {
-        self.rows
+        self.diameters[0].contact_modes.nrows()
     }
 
-    /// Instruction set of the hot loops.
-    pub fn instruction_set(&self) -> InstructionSet {
-        self.instruction_set
+    /// Largest number of modes of a nodal diameter.
+    pub(crate) fn most_modes(&self) -> usize {
+        self.diameters.iter().map(DiameterModes::len).max().unwrap_or(0)
     }
 
-    /// Modes of the disk.
-    pub fn model(&self) -> &CyclicModel {
-        &self.model
+    /// Returns whether the modes of a nodal diameter are real, so that no wave can travel.
+    pub(crate) fn is_real(&self, nodal_diameter: usize) -> bool {
+        nodal_diameter == 0 || 2 * nodal_diameter == self.sectors
     }
 
-    /// Step size of the current coefficients (s).
-    pub fn step(&self) -> f64 {
-        self.step
+    /// Sets one damping ratio for all modes; the first modes of each nodal diameter have their `own`.
+    pub(crate) fn set_damping_ratio(&mut self, damping_ratio: f64, own: &[f64]) {
+        for diameter in &mut self.diameters {
+            fill_ratios(&mut diameter.damping_ratios, damping_ratio, own, 1);
+        }
     }
 
-    /// Displacements of the contact rows at the current step (m), `[row][lane of sector]`.
-    pub fn displacement(&self) -> &[f64] {
-        &self.state.displacement
+    /// Largest undamped angular frequency (rad/s).
+    pub fn largest_frequency(&self) -> f64 {
+        self.diameters.iter().map(DiameterModes::largest_frequency).fold(0.0, f64::max)
     }
 
-    /// Displacements of the contact rows one step earlier (m), `[row][lane of sector]`.
-    pub fn displacement_before(&self) -> &[f64] {
-        &self.state.displacement_before
+    /// w_n: displacement of a sector per unit amplitude of a nodal diameter that moves every reduced coordinate by one.
+    pub fn weight(&self, nodal_diameter: usize) -> f64 {
+        weight(nodal_diameter, self.sectors)
     }
 
-    fn index(&self, nodal_diameter: usize, mode: usize) -> (usize, usize) {
-        (nodal_diameter / LANES * self.modes + mode, nodal_diameter % LANES)
-    }
-
-    /// Modal amplitude q (re, im) and increment d (re, im) of a mode of a nodal diameter.
-    pub fn modal_state(&self, nodal_diameter: usize, mode: usize) -> ([f64; 2], [f64; 2]) {
-        let (index, lane) = self.index(nodal_diameter, mode);
-        let part = |values: &Complexes| values.map(|part| part[lane]);
-        let (mut position, mut increment) = (part(&self.state.position[index]), part(&self.state.increment[index]));
-        if self.state.unapplied {
-            let compliance = self.lane_coefficients[index].compliance[lane];
-            for (part, force) in self.modal_force(nodal_diameter, mode).into_iter().enumerate() {
-                position[part] += compliance * force;
-                increment[part] += compliance * force;
+    /// Returns one nodal diameter as a real structure: real and imaginary parts of the amplitudes are modes, those of the
+    /// displacement pattern are contact nodes (first all real, then all imaginary parts). Contact that is closed on all sectors
+    /// decouples into these structures. A nodal diameter with real modes has only real parts.
+    pub fn paired(&self, nodal_diameter: usize) -> ModalModel {
+        let diameter = &self.diameters[nodal_diameter];
+        let (rows, modes) = diameter.contact_modes.shape();
+        let copies = if self.is_real(nodal_diameter) { 1 } else { 2 };
+        let double = |values: &[f64]| values.iter().flat_map(|value| vec![*value; copies]).collect();
+        let contact_modes = DMatrix::from_fn(copies * rows, copies * modes, |row, mode| {
+            let value = diameter.contact_modes[(row % rows, mode / copies)];
+            match (row / rows, mode % copies) {
+                (0, 0) | (1, 1) => value.re,
+                (0, _) => -value.im,
+                _ => value.im,
             }
-        }
-        (position, increment)
-    }
-
-    /// Sets amplitude and velocity (re, im) of a mode of a nodal diameter; the increment is that of free motion without force. A
-    /// quasi-static mode has neither and stays 0, and so does the imaginary part of a real mode.
-    pub fn set_modal_state(&mut self, nodal_diameter: usize, mode: usize, position: [f64; 2], velocity: [f64; 2]) {
-        let diameter = &self.model.diameters[nodal_diameter];
-        if mode >= diameter.dynamic_modes(self.scheme) {
-            return;
-        }
-        let (frequency, ratio) = (diameter.frequencies[mode], diameter.damping_ratios[mode]);
-        let (index, lane) = self.index(nodal_diameter, mode);
-        self.state.unapplied = false;
-        for part in 0..if self.model.is_real(nodal_diameter) { 1 } else { 2 } {
-            let increment = self.scheme.increment(frequency, ratio, position[part], velocity[part], self.step);
-            self.state.position[index][part][lane] = position[part];
-            self.state.increment[index][part][lane] = increment;
-        }
-    }
-
-    /// Sets the static equilibrium under the modal loads `modal_load` of nodal diameter 0: q = L/ω², rigid-body modes at 0.
-    pub fn settle(&mut self, modal_load: &[f64]) {
-        self.rest();
-        self.state.modal_load_before.copy_from_slice(modal_load);
-        for (mode, load) in modal_load.iter().enumerate() {
-            let frequency = self.model.diameters[0].frequencies[mode];
-            let rest = if frequency > 0.0 { load / (frequency * frequency) } else { 0.0 };
-            self.state.position[mode][0][0] = rest;
-        }
-        self.recover();
-    }
-
-    /// Sets the state to rest, undeformed.
-    pub fn rest(&mut self) {
-        let state = &mut self.state;
-        for values in [&mut state.position, &mut state.increment, &mut state.older, &mut state.force] {
-            values.fill(NOTHING);
-        }
-        for values in [
-            &mut state.displacement,
-            &mut state.displacement_before,
-            &mut state.loss,
-            &mut state.modal_load_before,
-            &mut self.modal_load,
-        ] {
-            values.fill(0.0);
-        }
-        state.touched.fill(false);
-        (state.unapplied, state.acting, state.loss_due) = (false, false, false);
-        if let Some(loads) = &mut self.excitation {
-            loads.rest();
-        }
-    }
-
-    /// Modal loads of nodal diameter 0 for the next step, to be set before [`CyclicBank::predict`].
-    pub fn loads_mut(&mut self) -> &mut [f64] {
-        &mut self.modal_load
-    }
-
-    /// Predicts one step without contact (eq. 9 of the paper) and recovers the contact displacements of all sectors. Contact
-    /// forces of the previous step that have not been applied yet are applied first.
-    pub fn predict(&mut self) {
-        for (mode, (load_response, modal_load)) in self.load_response.iter_mut().zip(&self.modal_load).enumerate() {
-            *load_response = self.coefficients[mode].load_compliance() * modal_load;
-        }
-        let delayed = self.state.acting && self.scheme.properties().delays_contact;
-        match (self.state.unapplied, delayed, self.state.loss_due) {
-            (false, false, false) => self.pass::<false, false, false, true>(),
-            (false, false, true) => self.pass::<false, false, true, true>(),
-            (true, false, false) => self.pass::<true, false, false, true>(),
-            (true, false, true) => self.pass::<true, false, true, true>(),
-            (false, true, false) => self.pass::<false, true, false, true>(),
-            (false, true, true) => self.pass::<false, true, true, true>(),
-            (true, true, false) => self.pass::<true, true, false, true>(),
-            (true, true, true) => self.pass::<true, true, true, true>(),
-        }
-        self.act_excited();
-        std::mem::swap(&mut self.state.increment, &mut self.state.older);
-        std::mem::swap(&mut self.state.displacement, &mut self.state.displacement_before);
-        (self.state.unapplied, self.state.acting, self.state.loss_due) = (false, false, self.with_loss);
-        let values = &mut self.state.displacement;
-        let (fourier, spectrum, rows, lanes) = (&self.fourier, &self.spectrum, self.rows, self.lanes);
-        self.instruction_set.run(Synthesis { fourier, spectrum, rows, lanes, values });
-    }
-
-    /// Applies the contact forces of the last step to its modes and adds its damping loss. The result is the same as that of the
-    /// next [`CyclicBank::predict`].
-    pub fn finish(&mut self) {
-        match (self.state.unapplied, self.state.loss_due) {
-            (false, false) => {}
-            (false, true) => self.pass::<false, false, true, false>(),
-            (true, false) => self.pass::<true, false, false, false>(),
-            (true, true) => self.pass::<true, false, true, false>(),
-        }
-        (self.state.unapplied, self.state.loss_due) = (false, false);
-    }
-
-    fn pass<const APPLY: bool, const DELAYED: bool, const LOSS: bool, const ADVANCE: bool>(&mut self) {
-        let state = &mut self.state;
-        self.instruction_set.run(Pass::<APPLY, DELAYED, LOSS, ADVANCE> {
-            modes: self.modes,
-            rows: self.rows,
-            touched: &state.touched,
-            coefficients: &self.lane_coefficients,
-            shapes: &self.shapes,
-            force: &state.force,
-            modal_load: &self.load_response,
-            position: &mut state.position,
-            increment: &mut state.increment,
-            older: &mut state.older,
-            loss: &mut state.loss,
-            spectrum: &mut self.spectrum,
         });
-    }
-
-    /// Recomputes the contact displacements from the modal state (after setting it). Losses that have not been added yet are dropped.
-    pub fn recover(&mut self) {
-        self.finish();
-        let state = &mut self.state;
-        for ((before, position), increment) in state.older.iter_mut().zip(&state.position).zip(&state.increment) {
-            for part in 0..2 {
-                for lane in 0..LANES {
-                    before[part][lane] = position[part][lane] - increment[part][lane];
-                }
-            }
-        }
-        for (position, displacement) in
-            [(&state.position, &mut state.displacement), (&state.older, &mut state.displacement_before)]
-        {
-            let (modes, rows, shapes) = (self.modes, self.rows, &self.shapes[..]);
-            self.instruction_set.run(Recover { modes, rows, shapes, position, spectrum: &mut self.spectrum });
-            let (fourier, spectrum, lanes) = (&self.fourier, &self.spectrum, self.lanes);
-            self.instruction_set.run(Synthesis { fourier, spectrum, rows, lanes, values: displacement });
+        ModalModel {
+            frequencies: double(&diameter.frequencies),
+            damping_ratios: double(&diameter.damping_ratios),
+            contact_modes,
+            shapes: DMatrix::identity(copies * modes, copies * modes),
+            quasi_static: copies * diameter.quasi_static,
         }
     }
+}
 
-    /// Sets amplitudes that have decayed almost to zero to exactly zero, so that no denormals arise.
-    pub fn flush(&mut self) {
-        for values in [&mut self.state.position, &mut self.state.increment, &mut self.state.older] {
-            for value in values.iter_mut().flatten().flatten().filter(|value| value.abs() < FLUSH_BELOW) {
-                *value = 0.0;
-            }
+/// w_n: 1/√N for real amplitudes, √(2/N) for complex ones.
+fn weight(nodal_diameter: usize, sectors: usize) -> f64 {
+    let share = if nodal_diameter == 0 || 2 * nodal_diameter == sectors { 1.0 } else { 2.0 };
+    #[expect(clippy::cast_precision_loss, reason = "sector counts are far below 2^52")]
+    let count = sectors as f64;
+    libm::sqrt(share / count)
+}
+
+impl ModeNumber for Complex<f64> {
+    const ROUNDING: f64 = 32.0;
+
+    /// Makes the largest entry of each eigenvector real and positive.
+    fn fix_phases(shapes: &mut DMatrix<Self>) {
+        let size = |value: &Self| libm::hypot(value.re, value.im);
+        for mut column in shapes.column_iter_mut() {
+            let largest = column.iter().fold(0.0, |most: f64, value| most.max(size(value)));
+            let Some(chosen) = column.iter().position(|value| size(value) >= (1.0 - SAME_SIZE) * largest) else {
+                continue;
+            };
+            let turn = column[chosen].conj() / size(&column[chosen]);
+            column.iter_mut().for_each(|value| *value *= turn);
+            column[chosen].im = 0.0;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::rom::Harmonic;
+
+    fn number(seed: &mut u64) -> f64 {
+        *seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        f64::from(u32::try_from(*seed >> 33).unwrap()) / f64::from(1_u32 << 30) - 1.0
+    }
+
+    fn pencil(order: usize, seed: u64) -> Harmonic {
+        let mut seed = seed;
+        let mut random =
+            |rows, columns| DMatrix::from_fn(rows, columns, |_, _| Complex::new(number(&mut seed), number(&mut seed)));
+        let (a, b, contact_map) = (random(order, order), random(order, order), random(3, order));
+        let hermitian = |matrix: DMatrix<Complex<f64>>| (&matrix + matrix.adjoint()) * Complex::new(0.5, 0.0);
+        Harmonic {
+            mass: hermitian(&a * a.adjoint() * Complex::new(0.1, 0.0) + DMatrix::identity(order, order)),
+            stiffness: hermitian(&b * b.adjoint() * Complex::new(1e6, 0.0)),
+            contact_map,
         }
     }
 
-    /// Returns whether every modal coordinate is finite.
-    pub fn is_finite(&self) -> bool {
-        let state = &self.state;
-        let all = state.position.iter().chain(&state.increment).chain(&state.force);
-        all.flatten().flatten().all(|value| value.is_finite())
-    }
-
-    /// Saves the state (not the step size).
-    pub fn save(&self, writer: &mut StateWriter) {
-        self.state.save(writer);
-        if let Some(loads) = &self.excitation {
-            loads.before.save(writer);
+    #[test]
+    fn modes_are_orthonormal_and_diagonalise_the_pencil_to_rounding() {
+        for (order, seed) in [(1, 1), (3, 2), (14, 3), (34, 4), (60, 5)] {
+            let harmonic = pencil(order, seed);
+            let (squares, shapes) = eigenmodes(&harmonic.mass, &harmonic.stiffness, "_1").unwrap();
+            let size =
+                |matrix: DMatrix<Complex<f64>>| matrix.iter().fold(0.0, |most: f64, z| most.max(z.re.hypot(z.im)));
+            let error = size(shapes.adjoint() * &harmonic.mass * &shapes - DMatrix::identity(order, order));
+            let diagonal =
+                DMatrix::from_fn(order, order, |i, j| Complex::new(if i == j { squares[i] } else { 0.0 }, 0.0));
+            let off = size(shapes.adjoint() * &harmonic.stiffness * &shapes - diagonal) / squares[order - 1];
+            println!("n = {order}: orthonormality {error:.1e}, diagonality {off:.1e}");
+            assert!(error < 1e-13 && off < 1e-13, "n = {order}: {error:e}, {off:e}");
+            assert!(squares.windows(2).all(|pair| pair[0] <= pair[1]));
         }
     }
 
-    /// Reads over a saved state and rejects invalid values.
-    pub fn check(&self, reader: &mut StateReader) {
-        self.state.check(reader);
-        if let Some(loads) = &self.excitation {
-            loads.before.check(reader);
+    #[test]
+    fn phases_are_independent_of_eigenvector_choice() {
+        let mut seed = 9;
+        let mut shapes = DMatrix::from_fn(7, 5, |_, _| Complex::new(number(&mut seed), number(&mut seed)));
+        let mut turned = shapes.clone();
+        for (column, angle) in [0.3, 1.9, -2.5, 3.1, 0.0_f64].into_iter().enumerate() {
+            turned.column_mut(column).iter_mut().for_each(|value| *value *= Complex::new(angle.cos(), angle.sin()));
         }
+        ModeNumber::fix_phases(&mut shapes);
+        ModeNumber::fix_phases(&mut turned);
+        let off = shapes.iter().zip(turned.iter()).fold(0.0_f64, |most, (a, b)| most.max((a - b).norm_sqr().sqrt()));
+        assert!(off < 1e-15, "{off:e}");
     }
 
-    /// Restores a saved state, after [`CyclicBank::set_step`].
-    pub fn restore(&mut self, reader: &mut StateReader) {
-        self.state.restore(reader);
-        if let Some(loads) = &mut self.excitation {
-            loads.before.restore(reader);
+    /// u = Ψq and p = Ψᴴf for arbitrary amplitudes and forces.
+    #[test]
+    fn paired_nodal_diameter_equals_the_complex_one() {
+        let (sectors, modes) = (5, 4);
+        let of = |nodal_diameter: usize| {
+            let Harmonic { contact_map, .. } = pencil(modes, 8);
+            let Harmonic { mass, stiffness, .. } = pencil(modes, 9);
+            let (squares, shapes) = eigenmodes(&mass, &stiffness, "_1").unwrap();
+            let weight = Complex::new(weight(nodal_diameter, sectors), 0.0);
+            DiameterModes::new(&squares, 0.01, contact_map * &shapes * weight, shapes)
+        };
+        let disk = CyclicModel { sectors, diameters: vec![of(0), of(1)] };
+        let (paired, own) = (disk.paired(1), &disk.diameters[1]);
+        let mut seed = 10;
+        let mut random =
+            |count: usize| DMatrix::from_fn(count, 1, |_, _| Complex::new(number(&mut seed), number(&mut seed)));
+        // Amplitudes as pairs; patterns with all real parts first.
+        let in_pairs = |z: &DMatrix<Complex<f64>>| z.iter().flat_map(|z| [z.re, z.im]).collect::<Vec<_>>();
+        let in_parts =
+            |z: &DMatrix<Complex<f64>>| z.iter().map(|z| z.re).chain(z.iter().map(|z| z.im)).collect::<Vec<_>>();
+        let near = |found: &DMatrix<f64>, expected: &[f64]| {
+            let off = found.iter().zip(expected).fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
+            assert!(found.len() == expected.len() && off < 1e-14, "{off:e}");
+        };
+        let (amplitudes, forces) = (random(modes), random(3));
+        let moved = &paired.contact_modes * DMatrix::from_vec(2 * modes, 1, in_pairs(&amplitudes));
+        near(&moved, &in_parts(&(&own.contact_modes * &amplitudes)));
+        let pushed = paired.contact_modes.transpose() * DMatrix::from_vec(6, 1, in_parts(&forces));
+        near(&pushed, &in_pairs(&(own.contact_modes.adjoint() * &forces)));
+        for (mode, frequency) in own.frequencies.iter().enumerate() {
+            let alike = [0, 1].map(|part| paired.frequencies[2 * mode + part].to_bits());
+            assert_eq!(alike, [frequency.to_bits(); 2]);
         }
+        assert_eq!((paired.quasi_static, disk.paired(0).contact_modes.shape()), (2 * own.quasi_static, (3, modes)));
+    }
+
+    #[test]
+    fn a_rigid_rotation_of_a_free_pair_is_exactly_rigid() {
+        // Two masses connected by a spring of complex direction: the stiffness has rank one, so one mode is rigid.
+        let direction = [Complex::new(1.0, 0.0), Complex::new(-0.6, 0.8)];
+        let stiffness = DMatrix::from_fn(2, 2, |i, j| direction[i] * direction[j].conj() * Complex::new(3e7, 0.0));
+        let mass =
+            DMatrix::from_diagonal(&nalgebra::DVector::from_row_slice(&[2.0, 0.7])).map(|m| Complex::new(m, 0.0));
+        let harmonic = Harmonic { mass, stiffness, contact_map: DMatrix::zeros(3, 2) };
+        let (squares, _) = eigenmodes(&harmonic.mass, &harmonic.stiffness, "_1").unwrap();
+        assert!(squares[0] == 0.0, "{squares:?}");
+        assert!((squares[1] / (3e7 * (1.0 / 2.0 + 1.0 / 0.7)) - 1.0).abs() < 1e-13, "{squares:?}");
     }
 }

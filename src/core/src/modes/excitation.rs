@@ -5,6 +5,10 @@
 //! k that travels in the other direction: Re(z e^(2πins/N)) with z = F e^(iψ) or F e^(−iψ). Its modal load is Ψ* z N/2, and Ψ*
 //! Re(z) N if the modes are real.
 
+use std::ops::Range;
+
+use nalgebra::DMatrix;
+
 use super::cyclic::CyclicModel;
 use super::modal::ModalModel;
 
@@ -42,129 +46,97 @@ fn wave(order: u64, sector: usize, sectors: usize) -> [f64; 2] {
     [cosine, sine]
 }
 
-/// Excitation of uncoupled sectors.
+/// Loads of an excitation on the modes of uncoupled sectors, or of one nodal diameter of a disk.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct SectorLoads {
-    /// Modal load per unit force, of each mode (1/√kg).
+pub(super) struct ModalExcitation {
+    excitation: Excitation,
+    /// Loaded sectors, or the loaded nodal diameter.
+    pub groups: Range<usize>,
+    /// 1 for sectors, 2 for a nodal diameter: real and imaginary parts of the loads and forces.
+    parts: usize,
+    /// Modal load per unit force, `[mode][part]` (1/√kg); 0 for entries without a mode.
     pub load: Vec<f64>,
+    /// Force on a sector per amplitude, or z times N or N/2 per z.
+    share: f64,
+    /// Factors of (cos ψ, −sin ψ) in the forces, `[group][part]`.
     pattern: Vec<[f64; 2]>,
-    /// Forces on the sectors in the current step (N).
+    /// Forces in the current step (N), `[group][part]`: on sectors, or z times N or N/2.
     pub now: Vec<f64>,
-    /// Forces on the sectors in the previous step (N).
-    pub before: Vec<f64>,
 }
 
-impl SectorLoads {
-    pub fn new(excitation: Excitation, model: &ModalModel, sectors: usize) -> Self {
-        let own = excitation.mode.unwrap_or(0);
-        let sizes = || model.contact_modes.column(own).iter().map(|value| value.abs()).collect::<Vec<_>>().into_iter();
-        let row = excitation.row.unwrap_or_else(|| most_moved(sizes()));
-        let of_mode = |mode| if excitation.acts_on(mode) { model.contact_modes[(row, mode)] } else { 0.0 };
-        let mut loads = Self {
-            load: (0..model.len()).map(of_mode).collect(),
-            pattern: vec![[0.0; 2]; sectors],
-            now: vec![0.0; sectors],
-            before: vec![0.0; sectors],
-        };
-        loads.set_order(excitation.order);
+impl ModalExcitation {
+    pub fn new(excitation: Excitation, model: &ModalModel, disk: Option<&CyclicModel>, sectors: usize) -> Self {
+        let (groups, parts) = (if disk.is_some() { 0..1 } else { 0..sectors }, if disk.is_some() { 2 } else { 1 });
+        let (count, modes) = (groups.len() * parts, disk.map_or(model.len(), CyclicModel::most_modes));
+        let (load, pattern, now) = (vec![0.0; parts * modes], vec![[0.0; 2]; count], vec![0.0; count]);
+        let mut loads = Self { excitation, groups, parts, load, share: 1.0, pattern, now };
+        if disk.is_none() {
+            loads.fill(&model.contact_modes, |shape| [*shape, 0.0]);
+        }
+        loads.set_order(excitation.order, disk);
         loads
     }
 
-    pub(crate) fn set_order(&mut self, order: u32) {
-        let sectors = self.pattern.len();
-        for (sector, pattern) in self.pattern.iter_mut().enumerate() {
-            *pattern = wave(u64::from(order), sector, sectors);
+    /// Sets the modal loads from the shapes of the modes, whose real and imaginary parts are `parts_of`.
+    fn fill<T>(&mut self, shapes: &DMatrix<T>, parts_of: impl Fn(&T) -> [f64; 2]) {
+        let size = |value: &T| {
+            let [real, imaginary] = parts_of(value);
+            libm::hypot(real, imaginary)
+        };
+        let own = self.excitation.mode.unwrap_or(0);
+        let most = || most_moved(shapes.column(own).iter().map(size));
+        let row = self.excitation.row.unwrap_or_else(most);
+        self.load.fill(0.0);
+        for (mode, load) in self.load.chunks_exact_mut(self.parts).take(shapes.ncols()).enumerate() {
+            if self.excitation.acts_on(mode) {
+                load.copy_from_slice(&parts_of(&shapes[(row, mode)])[..self.parts]);
+            }
         }
+    }
+
+    /// Sets the engine order, on uncoupled sectors or on a `disk`.
+    pub fn set_order(&mut self, order: u32, disk: Option<&CyclicModel>) {
+        let Some(disk) = disk else {
+            let sectors = self.groups.len();
+            for (sector, pattern) in self.pattern.iter_mut().enumerate() {
+                *pattern = wave(u64::from(order), sector, sectors);
+            }
+            return;
+        };
+        let alias = order as usize % disk.sectors;
+        let n = alias.min(disk.sectors - alias);
+        self.groups = n..n + 1;
+        #[expect(clippy::cast_precision_loss, reason = "sector counts are far below 2^52")]
+        let count = disk.sectors as f64;
+        // A real mode has no imaginary part.
+        let [share, turning] = match (disk.is_real(n), 2 * alias > disk.sectors) {
+            (true, _) => [1.0, 0.0],
+            (false, true) => [0.5, 1.0],
+            (false, false) => [0.5, -1.0],
+        };
+        self.share = share * count;
+        self.pattern.copy_from_slice(&[[1.0, 0.0], [0.0, turning]]);
+        self.fill(&disk.diameters[n].contact_modes, |shape| [shape.re, -turning.abs() * shape.im]);
     }
 
     /// Sets the forces of the next step from amplitude (N) and phase ψ (rad).
     pub fn set(&mut self, amplitude: f64, phase: f64) {
         let (sine, cosine) = libm::sincos(phase);
         for (force, [across, along]) in self.now.iter_mut().zip(&self.pattern) {
-            *force = amplitude * (cosine * across - sine * along);
+            *force = self.share * amplitude * (cosine * across - sine * along);
         }
     }
 
-    pub fn rest(&mut self) {
-        self.now.fill(0.0);
-        self.before.fill(0.0);
-    }
-}
-
-/// Excitation of a disk of coupled sectors.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct DiskLoads {
-    excitation: Excitation,
-    /// Loaded nodal diameter.
-    pub diameter: usize,
-    backward: bool,
-    /// N, or N/2 if the modes are complex.
-    share: f64,
-    /// Modal load per unit z (re, im), of each mode (1/√kg); 0 for entries without a mode.
-    load: Vec<[f64; 2]>,
-    now: [f64; 2],
-    pub before: [f64; 2],
-}
-
-impl DiskLoads {
-    pub fn new(excitation: Excitation, model: &CyclicModel) -> Self {
-        let load = vec![[0.0; 2]; model.most_modes()];
-        let mut loads =
-            Self { excitation, diameter: 0, backward: false, share: 0.0, load, now: [0.0; 2], before: [0.0; 2] };
-        loads.set_order(excitation.order, model);
-        loads
-    }
-
-    pub(crate) fn set_order(&mut self, order: u32, model: &CyclicModel) {
-        let alias = order as usize % model.sectors;
-        self.backward = 2 * alias > model.sectors;
-        self.diameter = if self.backward { model.sectors - alias } else { alias };
-        let (shapes, own) = (&model.diameters[self.diameter].contact_modes, self.excitation.mode.unwrap_or(0));
-        #[expect(clippy::cast_precision_loss, reason = "sector counts are far below 2^52")]
-        let count = model.sectors as f64;
-        self.share = if model.is_real(self.diameter) { count } else { 0.5 * count };
-        let row = self.excitation.row.unwrap_or_else(|| {
-            let sizes = (0..shapes.nrows()).map(|row| libm::hypot(shapes[(row, own)].re, shapes[(row, own)].im));
-            most_moved(sizes)
-        });
-        self.load.fill([0.0; 2]);
-        for mode in (0..shapes.ncols()).filter(|mode| self.excitation.acts_on(*mode)) {
-            self.load[mode] = [shapes[(row, mode)].re, -shapes[(row, mode)].im];
+    /// Returns the modal force (re, im) on a mode of a group that `forces` cause, `[group][part]`.
+    pub fn on_mode(&self, mode: usize, group: usize, forces: &[f64]) -> [f64; 2] {
+        if !self.groups.contains(&group) {
+            return [0.0; 2];
         }
-        if model.is_real(self.diameter) {
-            self.load.iter_mut().for_each(|load| load[1] = 0.0);
-        }
-    }
-
-    /// Sets the forces of the next step from amplitude (N) and phase ψ (rad).
-    pub fn set(&mut self, amplitude: f64, phase: f64, is_real: bool) {
-        let (sine, cosine) = libm::sincos(phase);
-        let along = if is_real {
-            0.0
-        } else if self.backward {
-            -sine
-        } else {
-            sine
+        let parts = |values: &[f64], index: usize| {
+            let of = &values[index * self.parts..][..self.parts];
+            [of[0], of.get(1).copied().unwrap_or(0.0)]
         };
-        self.now = [cosine, along].map(|part| self.share * amplitude * part);
-    }
-
-    /// Modal force (re, im) on a mode in the current step.
-    pub(crate) fn of_mode(&self, mode: usize) -> [f64; 2] {
-        times(self.load[mode], self.now)
-    }
-
-    /// Modal force (re, im) on a mode in the previous step.
-    pub(crate) fn of_mode_before(&self, mode: usize) -> [f64; 2] {
-        times(self.load[mode], self.before)
-    }
-
-    pub fn keep(&mut self) {
-        self.before = self.now;
-    }
-
-    pub fn rest(&mut self) {
-        (self.now, self.before) = ([0.0; 2], [0.0; 2]);
+        times(parts(&self.load, mode), parts(forces, group - self.groups.start))
     }
 }
 

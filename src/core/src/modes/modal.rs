@@ -2,29 +2,62 @@
 //!
 //! For modal damping the two forms are algebraically identical; prediction then costs O(number of modes).
 
-use nalgebra::{DMatrix, SymmetricEigen};
+use nalgebra::{ComplexField, DMatrix, Scalar, SymmetricEigen};
 use tiprub_cosim::shown;
 
-use crate::modes::schemes::ModeCoefficients;
+use crate::modes::schemes::{ModeCoefficients, Velocity};
 use crate::scene::method::Scheme;
+use crate::scene::rom::cholesky;
 use crate::{Error, Result, Rom};
 
 /// Eigenvalues below this fraction of the largest are not resolved by the eigenproblem; their Rayleigh quotient is used.
-pub(super) const RIGID_FRACTION: f64 = 1e-13;
+const RIGID_FRACTION: f64 = 1e-13;
 
-/// Modes of the reduced pencil (K, M), mass-normalised.
+/// Modes of the reduced pencil (K, M), mass-normalised; complex (`T`) for nodal diameters of coupled sectors.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ModalModel {
+pub struct ModalModel<T: Scalar = f64> {
     /// Undamped angular frequencies ω (rad/s), ascending; exactly 0 for rigid-body modes.
     pub frequencies: Vec<f64>,
     /// Damping ratios ξ (-), one per mode.
     pub damping_ratios: Vec<f64>,
     /// Displacement of the contact rows per unit modal coordinate, rows × modes.
-    pub contact_modes: DMatrix<f64>,
+    pub contact_modes: DMatrix<T>,
     /// Mass-normalised mode shapes in reduced coordinates, n × modes: reduced = shapes · modal.
-    pub shapes: DMatrix<f64>,
+    pub shapes: DMatrix<T>,
     /// Number of the highest modes that massless-boundary treats as quasi-static.
     pub quasi_static: usize,
+}
+
+/// One mode.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Oscillator {
+    /// Angular frequency ω (rad/s).
+    pub frequency: f64,
+    /// Damping ratio ξ.
+    pub damping_ratio: f64,
+    /// True if it has inertia even where the highest modes are quasi-static.
+    is_inertial: bool,
+}
+
+impl Oscillator {
+    /// Returns whether the mode has inertia under a scheme.
+    pub fn is_dynamic(&self, scheme: Scheme) -> bool {
+        self.is_inertial || !scheme.properties().quasi_static
+    }
+
+    /// Coefficients at the step size `step` (s).
+    pub fn coefficients(&self, scheme: Scheme, step: f64) -> ModeCoefficients {
+        ModeCoefficients::of_mode(scheme, self.is_dynamic(scheme), self.frequency, self.damping_ratio, step)
+    }
+
+    /// Velocity coefficients at the step size `step` (s); a quasi-static mode has none.
+    pub fn velocity(&self, scheme: Scheme, step: f64) -> Velocity {
+        if self.is_dynamic(scheme) {
+            scheme.velocity(self.frequency, self.damping_ratio, step)
+        } else {
+            Velocity::default()
+        }
+    }
 }
 
 /// Effects of spin in modal coordinates (see [`crate::scene::rom::Spin`]).
@@ -90,6 +123,56 @@ pub(crate) fn fill_ratios(ratios: &mut [f64], ratio: f64, own: &[f64], copies: u
     }
 }
 
+impl<T: Scalar> ModalModel<T> {
+    /// Creates modes with one damping ratio; the highest, one per contact row, are those that can be quasi-static.
+    pub(super) fn new(eigenvalues: &[f64], damping_ratio: f64, contact_modes: DMatrix<T>, shapes: DMatrix<T>) -> Self {
+        Self {
+            damping_ratios: vec![damping_ratio; eigenvalues.len()],
+            frequencies: eigenvalues.iter().map(|value| value.sqrt()).collect(),
+            quasi_static: contact_modes.nrows(),
+            contact_modes,
+            shapes,
+        }
+    }
+
+    /// Number of modes.
+    pub fn len(&self) -> usize {
+        self.frequencies.len()
+    }
+
+    /// Returns whether there are no modes.
+    pub fn is_empty(&self) -> bool {
+        self.frequencies.is_empty()
+    }
+
+    /// Number of modes that have inertia if the highest are quasi-static.
+    pub(crate) fn inertial_modes(&self) -> usize {
+        self.len().saturating_sub(self.quasi_static)
+    }
+
+    /// Number of modes with inertia under a scheme; the others are the highest.
+    pub fn dynamic_modes(&self, scheme: Scheme) -> usize {
+        if scheme.properties().quasi_static { self.inertial_modes() } else { self.len() }
+    }
+
+    /// Returns a mode if there is one, with its frequency multiplied by `factor` (mistuning; 1 if tuned).
+    pub(super) fn oscillator(&self, mode: usize, factor: f64) -> Option<Oscillator> {
+        let is_inertial = mode < self.inertial_modes();
+        let (frequency, damping_ratio) = (self.frequencies.get(mode)? * factor, *self.damping_ratios.get(mode)?);
+        Some(Oscillator { frequency, damping_ratio, is_inertial })
+    }
+
+    /// Coefficients of one mode at the step size `step` (s), with its frequency multiplied by `factor` (mistuning; 1 if tuned).
+    pub fn coefficient(&self, mode: usize, factor: f64, scheme: Scheme, step: f64) -> ModeCoefficients {
+        self.oscillator(mode, factor).map_or_else(ModeCoefficients::default, |of| of.coefficients(scheme, step))
+    }
+
+    /// Largest undamped angular frequency (rad/s).
+    pub fn largest_frequency(&self) -> f64 {
+        self.frequencies.iter().fold(0.0, |largest, value| f64::max(largest, *value))
+    }
+}
+
 impl ModalModel {
     /// Solves the symmetric eigenproblem of the ROM's matrices and assigns one damping ratio to all modes.
     ///
@@ -141,36 +224,13 @@ impl ModalModel {
                 "Give the modal damping ratio as a fraction of critical damping, for example 0.005",
             ));
         }
-        let (eigenvalues, shapes) = real_modes(&rom.mass, stiffness, "")?;
-        let contact_modes = &rom.contact_map * &shapes;
-        Ok(Self {
-            damping_ratios: vec![damping_ratio; eigenvalues.len()],
-            frequencies: eigenvalues.iter().map(|value| value.sqrt()).collect(),
-            quasi_static: contact_modes.nrows(),
-            contact_modes,
-            shapes,
-        })
+        let (eigenvalues, shapes) = eigenmodes(&rom.mass, stiffness, "")?;
+        Ok(Self::new(&eigenvalues, damping_ratio, &rom.contact_map * &shapes, shapes))
     }
 
     /// Returns φᵀf of a load on the reduced coordinates.
     pub fn modal_load(&self, load: &[f64]) -> Vec<f64> {
         self.shapes.column_iter().map(|shape| shape.iter().zip(load).map(|(a, b)| a * b).sum()).collect()
-    }
-
-    /// Number of modes that have inertia if the highest are quasi-static.
-    pub(crate) fn inertial_modes(&self) -> usize {
-        self.len().saturating_sub(self.quasi_static)
-    }
-
-    /// Number of modes with inertia under a scheme; the others are the highest.
-    pub fn dynamic_modes(&self, scheme: Scheme) -> usize {
-        if scheme.properties().quasi_static { self.inertial_modes() } else { self.len() }
-    }
-
-    /// Coefficients of one mode at the step size `step` (s), with its frequency multiplied by `factor` (mistuning; 1 if tuned).
-    pub fn coefficient(&self, mode: usize, factor: f64, scheme: Scheme, step: f64) -> ModeCoefficients {
-        let (frequency, ratio) = (self.frequencies[mode] * factor, self.damping_ratios[mode]);
-        ModeCoefficients::of_mode(scheme, mode < self.dynamic_modes(scheme), frequency, ratio, step)
     }
 
     /// Coefficients of all modes at the step size `step` (s).
@@ -187,132 +247,60 @@ impl ModalModel {
         Self { contact_modes, ..self }
     }
 
-    /// Combines several structures into one: modes concatenated, contact rows relative (master − slave).
-    ///
-    /// `pairs` lists (master structure, master node, slave) with an optional slave (structure, node); the rows of
-    /// the result are the relative displacements of the pairs, three components each.
-    ///
-    /// # Errors
-    /// A structure or node index does not exist.
-    pub fn combined(structures: &[Self], pairs: &[NodePair]) -> Result<Self> {
-        let modes = structures.iter().map(|structure| structure.frequencies.len()).sum();
-        let mut contact_modes = DMatrix::zeros(3 * pairs.len(), modes);
-        let offsets: Vec<usize> = structures
-            .iter()
-            .scan(0, |offset, structure| {
-                let start = *offset;
-                *offset += structure.frequencies.len();
-                Some(start)
-            })
-            .collect();
-        for (row, pair) in pairs.iter().enumerate() {
-            for (reference, sign) in [(Some(pair.master), 1.0), (pair.slave, -1.0)] {
-                let Some((structure, node)) = reference else { continue };
-                let source = structures.get(structure).filter(|s| 3 * node + 2 < s.contact_modes.nrows());
-                let Some(source) = source else {
-                    return Err(Error::invalid(
-                        format!("contact pair {}", row + 1),
-                        format!("structure {structure} has no contact node {node}"),
-                        "Use 0-based indices of existing structures and contact nodes",
-                    ));
-                };
-                for component in 0..3 {
-                    for mode in 0..source.frequencies.len() {
-                        contact_modes[(3 * row + component, offsets[structure] + mode)] +=
-                            sign * source.contact_modes[(3 * node + component, mode)];
-                    }
-                }
-            }
-        }
-        let mut shapes = DMatrix::zeros(structures.iter().map(|s| s.shapes.nrows()).sum(), modes);
-        let mut row = 0;
-        for (structure, offset) in structures.iter().zip(&offsets) {
-            shapes.view_mut((row, *offset), structure.shapes.shape()).copy_from(&structure.shapes);
-            row += structure.shapes.nrows();
-        }
-        Ok(Self {
-            frequencies: structures.iter().flat_map(|s| s.frequencies.iter().copied()).collect(),
-            damping_ratios: structures.iter().flat_map(|s| s.damping_ratios.iter().copied()).collect(),
-            contact_modes,
-            shapes,
-            quasi_static: 0,
-        })
-    }
-
     /// Returns the modes with some of the contact nodes only.
     pub fn with_nodes(&self, nodes: &[usize]) -> Self {
         let rows: Vec<usize> = nodes.iter().flat_map(|node| 3 * node..3 * node + 3).collect();
         Self { contact_modes: self.contact_modes.select_rows(&rows), ..self.clone() }
     }
-
-    /// Number of modes.
-    pub fn len(&self) -> usize {
-        self.frequencies.len()
-    }
-
-    /// Returns whether there are no modes.
-    pub fn is_empty(&self) -> bool {
-        self.frequencies.is_empty()
-    }
-
-    /// Largest undamped angular frequency (rad/s).
-    pub fn largest_frequency(&self) -> f64 {
-        self.frequencies.iter().fold(0.0, |largest, value| f64::max(largest, *value))
-    }
 }
 
-/// A node of one structure and the node of another, or a rigid surface, that it can touch.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct NodePair {
-    /// (structure, contact node) of the master.
-    pub master: (usize, usize),
-    /// (structure, contact node) of the slave; `None` for a rigid surface.
-    pub slave: Option<(usize, usize)>,
+/// Number type of a pencil: real, or complex and Hermitian.
+pub(super) trait ModeNumber: ComplexField<RealField = f64> {
+    /// Bound on the rounding error of a Rayleigh quotient as a multiple of ε, the order and the sum of the absolute terms.
+    const ROUNDING: f64;
+
+    /// Chooses the arbitrary signs or phases of eigenvectors, so that saved numbers are comparable.
+    fn fix_phases(shapes: &mut DMatrix<Self>);
+}
+
+impl ModeNumber for f64 {
+    const ROUNDING: f64 = 16.0;
+
+    /// Makes the largest entry of each eigenvector positive.
+    fn fix_phases(shapes: &mut DMatrix<Self>) {
+        for mut column in shapes.column_iter_mut() {
+            let largest = column.iter().copied().fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
+            if largest < 0.0 {
+                column.neg_mut();
+            }
+        }
+    }
 }
 
 /// Eigenvalues ω² (ascending, exactly 0 for rigid-body modes) and mass-normalised modes of K φ = ω² M φ; errors name the arrays
 /// `mass` and `stiffness` with `suffix`.
-pub(super) fn real_modes(
-    mass: &DMatrix<f64>,
-    stiffness: &DMatrix<f64>,
+pub(super) fn eigenmodes<T: ModeNumber>(
+    mass: &DMatrix<T>,
+    stiffness: &DMatrix<T>,
     suffix: &str,
-) -> Result<(Vec<f64>, DMatrix<f64>)> {
-    modal_already(mass, stiffness).map_or_else(|| generalised_modes(mass, stiffness, suffix), Ok)
-}
-
-/// Returns modes without solving the eigenproblem if the ROM is in modal coordinates (M = I, K diagonal and ascending).
-fn modal_already(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f64>)> {
-    let order = mass.nrows();
-    let diagonal: Vec<f64> = (0..order).map(|mode| stiffness[(mode, mode)]).collect();
-    let ascending =
-        diagonal.windows(2).all(|pair| pair[0] <= pair[1]) && diagonal.first().is_some_and(|low| *low >= 0.0);
-    let on_diagonal = |index: usize| index % order == index / order;
-    let is_modal = ascending
-        && stiffness.iter().enumerate().all(|(index, value)| on_diagonal(index) || *value == 0.0)
-        && mass.iter().enumerate().all(|(index, value)| {
-            let expected: f64 = if on_diagonal(index) { 1.0 } else { 0.0 };
-            value.to_bits() == expected.to_bits()
-        });
-    is_modal.then(|| (diagonal, DMatrix::identity(order, order)))
-}
-
-fn generalised_modes(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>, suffix: &str) -> Result<(Vec<f64>, DMatrix<f64>)> {
-    let Some(cholesky) = mass.clone().cholesky() else {
+) -> Result<(Vec<f64>, DMatrix<T>)> {
+    if let Some(modes) = modal_already(mass, stiffness) {
+        return Ok(modes);
+    }
+    let Some(lower) = cholesky(mass) else {
         let what = format!("ROM array `mass{suffix}`");
         return Err(Error::invalid(what, "not positive definite", "Regenerate the ROM"));
     };
-    let lower = cholesky.l();
     let half = lower.solve_lower_triangular(stiffness).unwrap_or_else(|| stiffness.clone());
-    let full = lower.solve_lower_triangular(&half.transpose()).unwrap_or(half);
-    let eigen = SymmetricEigen::new((&full + full.transpose()) * 0.5);
+    let full = lower.solve_lower_triangular(&half.adjoint()).unwrap_or(half);
+    let eigen = SymmetricEigen::new((&full + full.adjoint()) * T::from_real(0.5));
     let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
     order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
     let largest = eigen.eigenvalues.amax();
     check_semidefinite(eigen.eigenvalues[order[0]], largest, suffix)?;
-    let vectors =
-        DMatrix::from_columns(&order.iter().map(|index| eigen.eigenvectors.column(*index)).collect::<Vec<_>>());
-    let mut shapes = lower.transpose().solve_upper_triangular(&vectors).unwrap_or(vectors);
-    fix_signs(&mut shapes);
+    let vectors = eigen.eigenvectors.select_columns(&order);
+    let mut shapes = lower.adjoint().solve_upper_triangular(&vectors).unwrap_or(vectors);
+    T::fix_phases(&mut shapes);
     let values = order.iter().enumerate().map(|(mode, index)| {
         let value = eigen.eigenvalues[*index];
         if value < RIGID_FRACTION * largest { unresolved_eigenvalue(stiffness, &shapes, mode) } else { value }
@@ -321,8 +309,23 @@ fn generalised_modes(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>, suffix: &str
     Ok((values, shapes))
 }
 
+/// Returns modes without solving the eigenproblem if the matrices are in modal coordinates (M = I, K diagonal and ascending).
+fn modal_already<T: ModeNumber>(mass: &DMatrix<T>, stiffness: &DMatrix<T>) -> Option<(Vec<f64>, DMatrix<T>)> {
+    let order = mass.nrows();
+    let diagonal: Vec<f64> = (0..order).map(|mode| stiffness[(mode, mode)].clone().real()).collect();
+    let ascending = diagonal.windows(2).all(|pair| pair[0] <= pair[1]) && diagonal.iter().all(|value| *value >= 0.0);
+    let is_diagonal = |matrix: &DMatrix<T>| {
+        matrix.iter().enumerate().all(|(index, value)| {
+            if index % order == index / order { value.clone().imaginary().to_bits() == 0 } else { *value == T::zero() }
+        })
+    };
+    let is_unit = (0..order).all(|mode| mass[(mode, mode)].clone().real().to_bits() == 1.0_f64.to_bits());
+    (ascending && is_unit && is_diagonal(mass) && is_diagonal(stiffness))
+        .then(|| (diagonal, DMatrix::identity(order, order)))
+}
+
 /// Rejects a lowest eigenvalue of K φ = ω² M φ that is below zero by more than rounding.
-pub(super) fn check_semidefinite(smallest: f64, largest: f64, suffix: &str) -> Result<()> {
+fn check_semidefinite(smallest: f64, largest: f64, suffix: &str) -> Result<()> {
     if smallest >= -1e-9 * largest {
         return Ok(());
     }
@@ -344,30 +347,23 @@ pub(super) fn check_semidefinite(smallest: f64, largest: f64, suffix: &str) -> R
     ))
 }
 
-/// Returns φᵀKφ of a mode far below the largest. Its error is of second order in the error of the mode shape, so that it
+/// Returns φᴴKφ of a mode far below the largest. Its error is of second order in the error of the mode shape, so that it
 /// distinguishes a soft mode from a rigid-body mode (exactly 0) wherever the stiffness matrix itself does.
-fn unresolved_eigenvalue(stiffness: &DMatrix<f64>, shapes: &DMatrix<f64>, mode: usize) -> f64 {
+fn unresolved_eigenvalue<T: ModeNumber>(stiffness: &DMatrix<T>, shapes: &DMatrix<T>, mode: usize) -> f64 {
     let (mut quotient, mut magnitude) = (0.0, 0.0);
     for column in 0..stiffness.ncols() {
         for row in 0..stiffness.nrows() {
-            let term = shapes[(row, mode)] * stiffness[(row, column)] * shapes[(column, mode)];
-            quotient += term;
-            magnitude += term.abs();
+            let entry = |matrix: &DMatrix<T>, at: (usize, usize)| matrix[at].clone();
+            let term = entry(shapes, (row, mode)).conjugate()
+                * entry(stiffness, (row, column))
+                * entry(shapes, (column, mode));
+            quotient += term.clone().real();
+            magnitude += libm::hypot(term.clone().real(), term.imaginary());
         }
     }
     #[expect(clippy::cast_precision_loss, reason = "orders are far below 2^52")]
-    let rounding = 16.0 * f64::EPSILON * stiffness.nrows() as f64 * magnitude;
+    let rounding = T::ROUNDING * f64::EPSILON * stiffness.nrows() as f64 * magnitude;
     if quotient > rounding { quotient } else { 0.0 }
-}
-
-/// Makes the largest entry of each eigenvector positive, because its sign is arbitrary and saved numbers should be comparable.
-fn fix_signs(shapes: &mut DMatrix<f64>) {
-    for mut column in shapes.column_iter_mut() {
-        let largest = column.iter().copied().fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
-        if largest < 0.0 {
-            column.neg_mut();
-        }
-    }
 }
 
 #[cfg(test)]

@@ -6,10 +6,9 @@ use tiprub_cosim::{shown, shown_time};
 use super::compile::{Compiled, CompiledBody};
 use super::drive::Input;
 use super::{Quantity, Simulation};
-use crate::modes::bank::BankOptions;
+use crate::modes::bank::{BankOptions, ModalBank};
 use crate::modes::excitation::{Excitation, most_moved};
 use crate::modes::modal::{ModalModel, ModalSpin};
-use crate::modes::sectors::Sectors;
 use crate::scene::method::Scheme;
 use crate::scene::ranges::SOFTENED;
 use crate::scene::rom::WatchedPoints;
@@ -95,7 +94,7 @@ impl Compiled {
     }
 
     /// Puts blades into equilibrium with growth and heat.
-    pub fn settle(&self, body: usize, speed: f64, temperature: f64, modes: &mut Sectors) {
+    pub fn settle(&self, body: usize, speed: f64, temperature: f64, modes: &mut ModalBank) {
         let mut load = vec![0.0; self.bodies[body].model.len()];
         self.fill_loads(body, speed, temperature, &mut load);
         modes.settle(&load);
@@ -365,11 +364,11 @@ impl Simulation {
 }
 
 /// Adds an initial motion to the motion of the modes.
-fn launch(modes: &mut Sectors, one: &InitialSettings, displacement: f64, velocity: f64) {
+fn launch(bank: &mut ModalBank, one: &InitialSettings, displacement: f64, velocity: f64) {
     let mode = one.mode - 1;
     let n = one.nodal_diameter.unwrap_or(0);
-    match modes {
-        Sectors::Uncoupled(bank) => {
+    match bank.disk() {
+        None => {
             let shape = |row: usize| bank.model().contact_modes[(row, mode)];
             let most = shape(most_moved((0..bank.rows()).map(|row| shape(row).abs())));
             let sectors = bank.sectors();
@@ -377,11 +376,11 @@ fn launch(modes: &mut Sectors, one: &InitialSettings, displacement: f64, velocit
                 #[expect(clippy::cast_precision_loss, reason = "sector counts are far below 2^52")]
                 let angle = std::f64::consts::TAU * ((n * sector % sectors) as f64 / sectors as f64);
                 let share = if one.sector.is_some() { 1.0 } else { libm::cos(angle - one.phase) } / most;
-                bank.add_modal_state(mode, sector, share * displacement, share * velocity);
+                bank.add_amplitude(mode, sector, [share * displacement, 0.0], [share * velocity, 0.0]);
             }
         }
-        Sectors::Coupled(bank) => {
-            let shapes = &bank.model().diameters[n].contact_modes;
+        Some(disk) => {
+            let shapes = &disk.model().diameters[n].contact_modes;
             let size = |row: usize| libm::hypot(shapes[(row, mode)].re, shapes[(row, mode)].im);
             let most = shapes[(most_moved((0..shapes.nrows()).map(size)), mode)];
             let square = most.re * most.re + most.im * most.im;
@@ -389,7 +388,7 @@ fn launch(modes: &mut Sectors, one: &InitialSettings, displacement: f64, velocit
             // e^(−i phase)/Ψ.
             let share = [(cosine * most.re - sine * most.im) / square, -(sine * most.re + cosine * most.im) / square];
             let times = |value: f64| share.map(|part| part * value);
-            bank.add_modal_state(n, mode, times(displacement), times(velocity));
+            bank.add_amplitude(mode, n, times(displacement), times(velocity));
         }
     }
 }

@@ -14,7 +14,7 @@ use super::window::{StepWindow, speed_of};
 use crate::Result;
 use crate::contact::coating::Coating;
 use crate::geometry::sector_angle;
-use crate::modes::sectors::Sectors;
+use crate::modes::bank::ModalBank;
 use crate::scene::rom::{STRESSES, von_mises};
 use crate::system::System;
 use crate::system::ledger::Ledger;
@@ -209,7 +209,7 @@ impl OutputView<'_> {
         }
     }
 
-    pub fn modes(&self, body: usize) -> &Sectors {
+    pub fn modes(&self, body: usize) -> &ModalBank {
         self.system.structures()[body].modes()
     }
 

@@ -91,7 +91,7 @@ impl StepWindow {
             casing_moment: vec![0.0; if outputs.casing_forces { 3 } else { 0 }],
         };
         let support = |structure: &Structure| {
-            let modes = structure.modes().uncoupled().map_or(0, ModalBank::modes);
+            let modes = structure.bank().map_or(0, ModalBank::modes);
             SupportWindow { moved: vec![0.0; modes], speeds: vec![0.0; modes], lining: Vector3::zeros() }
         };
         let carriers = structures.iter().filter(|structure| outputs.support_reaction && structure.nodes() == 0);

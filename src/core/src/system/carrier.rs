@@ -6,7 +6,6 @@ use crate::geometry::Vector3;
 use crate::geometry::frame::PolarFrame;
 use crate::geometry::surface_spline::{ClosestPoint, SurfaceSpline};
 use crate::modes::bank::ModalBank;
-use crate::modes::sectors::Sectors;
 use nalgebra::DMatrix;
 
 /// Location at which a contact acts on a structure.
@@ -148,8 +147,8 @@ impl Reaction {
         self.gather(multipliers, per);
         if self.members.is_empty() {
             self.response.fill(0.0);
-        } else if let Sectors::Uncoupled(bank) = of.modes_mut() {
-            bank.response_to_modal(&self.force, &mut self.response);
+        } else {
+            of.modes_mut().response_to_modal(&self.force, &mut self.response);
         }
     }
 
@@ -161,8 +160,8 @@ impl Reaction {
     /// Applies the forces of the solution passed to the last [`Reaction::respond`].
     pub fn apply(&self, of: &mut Structure) {
         of.delayed.copy_from_slice(&self.force);
-        if let (false, Sectors::Uncoupled(bank)) = (self.members.is_empty(), of.modes_mut()) {
-            bank.correct_modal(&self.force, &self.response);
+        if !self.members.is_empty() {
+            of.modes_mut().correct_modal(&self.force, &self.response);
         }
     }
 }

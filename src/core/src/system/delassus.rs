@@ -3,9 +3,7 @@
 use super::contact_view::ContactMember;
 use crate::math::simd::Kernel;
 use crate::math::vector::Vector3;
-use crate::modes::bank::ModalBank;
-use crate::modes::cyclic::CyclicBank;
-use crate::modes::sectors::Sectors;
+use crate::modes::bank::{Disk, ModalBank};
 use nalgebra::DMatrix;
 
 /// Contacts of a structure within a group, with their directions and the position of their block in the matrix.
@@ -23,27 +21,27 @@ pub(crate) struct DelassusBlock<'a> {
 }
 
 /// Fills the block of contacts of a structure (m/N).
-pub fn fill(matrix: &mut DMatrix<f64>, modes: &Sectors, nodes: usize, block: &DelassusBlock) {
-    match modes {
+pub fn fill(matrix: &mut DMatrix<f64>, bank: &ModalBank, nodes: usize, block: &DelassusBlock) {
+    match bank.disk() {
         // One sector with all of its nodes.
-        Sectors::Uncoupled(bank) if is_whole_sector(block, nodes) => {
+        None if is_whole_sector(block, nodes) => {
             let flexibility = bank.flexibility(block.members[0].sector).as_slice();
             match block.per {
                 1 => fill_sector::<1>(matrix, flexibility, block.rows, block.columns),
                 _ => fill_sector::<3>(matrix, flexibility, block.rows, block.columns),
             }
         }
-        Sectors::Uncoupled(bank) => fill_sectors(matrix, bank, block),
-        Sectors::Coupled(disk) => fill_disk(matrix, disk, block),
+        None => fill_sectors(matrix, bank, block),
+        Some(disk) => fill_disk(matrix, bank, disk, block),
     }
 }
 
 /// Fills W of nodes of a disk of coupled sectors.
 #[inline(never)]
-fn fill_disk(matrix: &mut DMatrix<f64>, disk: &CyclicBank, block: &DelassusBlock) {
+fn fill_disk(matrix: &mut DMatrix<f64>, bank: &ModalBank, disk: &Disk, block: &DelassusBlock) {
     match block.per {
-        1 => disk.instruction_set().run(FillDisk::<1> { matrix, disk, block }),
-        _ => disk.instruction_set().run(FillDisk::<3> { matrix, disk, block }),
+        1 => bank.instruction_set().run(FillDisk::<1> { matrix, disk, block }),
+        _ => bank.instruction_set().run(FillDisk::<3> { matrix, disk, block }),
     }
 }
 
@@ -78,7 +76,7 @@ fn fill_sectors(matrix: &mut DMatrix<f64>, bank: &ModalBank, block: &DelassusBlo
 /// W of nodes of a disk of coupled sectors, as a kernel.
 struct FillDisk<'a, const PER: usize> {
     matrix: &'a mut DMatrix<f64>,
-    disk: &'a CyclicBank,
+    disk: &'a Disk,
     block: &'a DelassusBlock<'a>,
 }
 
@@ -86,7 +84,7 @@ impl<const PER: usize> Kernel for FillDisk<'_, PER> {
     #[inline(always)]
     fn run(self) {
         let Self { matrix, disk, block } = self;
-        let (sectors, leading) = (disk.sectors(), matrix.nrows());
+        let (sectors, leading) = (disk.model().sectors, matrix.nrows());
         let (members, start) = (block.members, PER * block.first);
         let targets = matrix.as_mut_slice().chunks_exact_mut(PER * leading).skip(block.first);
         let columns = block.columns.as_chunks::<PER>().0;

@@ -10,7 +10,6 @@ use crate::contact::coating::Coating;
 use crate::geometry::Vector3;
 use crate::geometry::wrench::At;
 use crate::math::vector::{set_strided_vector3, set_vector3_at};
-use crate::modes::sectors::Sectors;
 use crate::scene::method::Solver;
 
 /// Nodes outside a group count as penetrating beyond this fraction of the largest gap of the group.
@@ -378,12 +377,14 @@ impl ContactGroup {
     /// Applies the solution to a structure with contact nodes.
     #[inline(always)]
     fn act(&mut self, structure: &mut Structure, span: std::ops::Range<usize>) {
-        let bank = match structure.modes_mut() {
-            Sectors::Uncoupled(bank) => bank,
+        let bank = structure.modes_mut();
+        if bank.disk().is_some() {
             // The disk already has the forces of the request.
-            Sectors::Coupled(_) if span.is_empty() => return,
-            Sectors::Coupled(disk) => return disk.act(),
-        };
+            if !span.is_empty() {
+                bank.act();
+            }
+            return;
+        }
         let (members, forces) = (&self.members[span.clone()], &self.forces[span]);
         let force = &mut self.sector_force[..bank.rows()];
         let mut next = 0;
@@ -433,13 +434,13 @@ impl GroupSide {
     #[inline(never)]
     fn respond(&mut self, structure: &mut Structure, members: &[ContactMember], forces: &[Vector3]) {
         let nodes = structure.nodes();
-        if let Sectors::Coupled(disk) = structure.modes_mut() {
+        if let Some(disk) = structure.modes_mut().disk_mut() {
             disk.ask(members.iter().zip(forces).map(|(member, force)| (member.sector, member.node, *force)));
         }
         let normals = &structure.history.geometry.now;
-        match structure.modes() {
-            Sectors::Uncoupled(bank) => {
-                let lanes = bank.lanes();
+        let (bank, lanes) = (structure.modes(), structure.lanes());
+        match bank.disk() {
+            None => {
                 for (&ContactMember { node: column, sector, .. }, force) in members.iter().zip(forces) {
                     let flexibility = bank.flexibility(sector);
                     for node in 0..nodes {
@@ -450,8 +451,8 @@ impl GroupSide {
                 }
             }
             // Every force moves every sector.
-            Sectors::Coupled(disk) => {
-                let (sectors, lanes, [across, around, along]) = (disk.sectors(), disk.lanes(), &normals.normal);
+            Some(disk) => {
+                let (sectors, [across, around, along]) = (bank.sectors(), &normals.normal);
                 let nodes = disk.moved().chunks_exact(3 * lanes).zip(self.response.chunks_exact_mut(lanes));
                 let normals = across.chunks_exact(lanes).zip(around.chunks_exact(lanes)).zip(along.chunks_exact(lanes));
                 for ((moved, response), ((across, around), along)) in nodes.zip(normals) {

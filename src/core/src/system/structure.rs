@@ -5,9 +5,8 @@ use tiprub_cosim::persist_fields;
 
 use crate::geometry::{GapLaw, Geometry, PrescribedMotion, Vector3};
 use crate::math::vector::{set_strided_vector3, strided_vector3, vector3_at};
-use crate::modes::bank::{BankOptions, LANES, ModalBank};
+use crate::modes::bank::{BankOptions, LANES, ModalBank, SectorModel};
 use crate::modes::modal::ModalModel;
-use crate::modes::sectors::{SectorModel, Sectors};
 use crate::scene::method::Scheme;
 use crate::system::history::ContactHistory;
 use crate::system::pair::SearchStart;
@@ -20,7 +19,7 @@ const LEAST_PENETRATION: f64 = 1e-150;
 /// A structure of a scene. Rows of its modes are three per contact node, or three per control point of the surfaces it carries.
 #[derive(Debug, Clone)]
 pub struct Structure {
-    pub(crate) modes: Sectors,
+    pub(crate) modes: ModalBank,
     /// Lanes of a row of the sectors.
     lanes: usize,
     /// Pair of each contact node.
@@ -76,7 +75,7 @@ impl Structure {
         pair_of: Vec<Option<usize>>,
         has_places: bool,
     ) -> Self {
-        let modes = Sectors::new(model, options);
+        let modes = ModalBank::new(model, options);
         let contacts = pair_of.len() * modes.lanes();
         let rows = modes.rows() * modes.lanes();
         Self {
@@ -96,7 +95,7 @@ impl Structure {
     /// to contact forces.
     pub(crate) fn carrying(model: &ModalModel, loads: bool) -> Self {
         let options = BankOptions { loads, flexibility: false, ..BankOptions::default() };
-        let modes = Sectors::Uncoupled(ModalBank::with_options(model, 1, options));
+        let modes = ModalBank::new(SectorModel::Uncoupled(model, 1), options);
         let rows = modes.rows() * modes.lanes();
         Self {
             history: ContactHistory::new(Geometry::new(0, false), 0, rows),
@@ -112,12 +111,12 @@ impl Structure {
     }
 
     /// Modes of the structure.
-    pub fn modes(&self) -> &Sectors {
+    pub fn modes(&self) -> &ModalBank {
         &self.modes
     }
 
     /// Modes of the structure, to set loads and initial conditions.
-    pub fn modes_mut(&mut self) -> &mut Sectors {
+    pub fn modes_mut(&mut self) -> &mut ModalBank {
         &mut self.modes
     }
 
@@ -133,7 +132,7 @@ impl Structure {
 
     /// Returns the bank of modes, if sectors are not coupled.
     pub(crate) fn bank(&self) -> Option<&ModalBank> {
-        self.modes.uncoupled()
+        self.modes.disk().is_none().then_some(&self.modes)
     }
 
     /// Lanes of a row of the sectors.
@@ -236,12 +235,14 @@ impl Structure {
     /// Applies the contact forces of the last step to the modes with inertia.
     fn act_later(&mut self) {
         // A disk of coupled sectors keeps its forces until it predicts.
-        let Sectors::Uncoupled(bank) = &mut self.modes else { return };
+        if self.modes.disk().is_some() {
+            return;
+        }
         if self.delayed.iter().any(|force| *force != 0.0) {
-            bank.act_delayed_modal(0, &self.delayed);
+            self.modes.act_delayed_modal(0, &self.delayed);
         }
         if !self.pair_of.is_empty() {
-            bank.act_delayed(&self.history.force.now);
+            self.modes.act_delayed(&self.history.force.now);
         }
     }
 

@@ -8,8 +8,8 @@ use tiprub_core::contact::ContactParameters;
 use tiprub_core::geometry::open::{OpenGap, OpenSurface};
 use tiprub_core::geometry::surface_spline::SurfaceSpline;
 use tiprub_core::geometry::{FixedGap, GapLaw, PrescribedMotion, Vector3};
+use tiprub_core::modes::bank::SectorModel;
 use tiprub_core::modes::modal::ModalModel;
-use tiprub_core::modes::sectors::SectorModel;
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::rom::WatchedPoints;
 use tiprub_core::scene::settings::{Interpolation, LoadSettings, Shape, SplineSettings};
@@ -483,7 +483,7 @@ fn damping_parameters_belong_to_their_own_structures() {
         simulation.initialise(0.0).unwrap();
         go(&mut simulation, 7.7e-7);
         let system = simulation.system();
-        let banks = system.structures().iter().map(|structure| structure.modes().uncoupled().unwrap());
+        let banks = system.structures().iter().map(|structure| structure.modes());
         let banks: Vec<_> = banks.collect();
         assert_eq!(banks.len(), ratios.len());
         for (bank, (name, ratio)) in banks.iter().zip(ratios) {

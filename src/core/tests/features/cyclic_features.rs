@@ -252,11 +252,11 @@ fn a_change_of_step_keeps_the_order_of_the_scheme() {
         scene.settings.time.step = 2e-5;
         let mut system = started(&scene).system().clone();
         system.set_step(2e-6);
-        let bank = system.bank_mut().coupled_mut().unwrap();
+        let bank = system.bank_mut();
         for n in 0..4 {
             for mode in 0..5 {
                 let amplitude = 1e-5 / (1.0 + mode as f64 + n as f64);
-                bank.set_modal_state(n, mode, [amplitude, -0.5 * amplitude], [0.1 * amplitude, 0.0]);
+                bank.set_amplitude(mode, n, [amplitude, -0.5 * amplitude], [0.1 * amplitude, 0.0]);
             }
         }
         let drive = tiprub_core::geometry::PrescribedMotion { speed: 1300.0, ..Default::default() };
@@ -376,7 +376,7 @@ proptest! {
             }
         }
         prop_assert!(real(&simulation, "energy_residual_relative").abs() < 1e-11);
-        let bank = simulation.system().bank().coupled().unwrap();
+        let bank = simulation.system().bank().disk().unwrap();
         for difference in 0..sectors {
             for (a, b) in (0..nodes).flat_map(|a| (0..nodes).map(move |b| (a, b))) {
                 let there = bank.flexibility(difference, a, b);

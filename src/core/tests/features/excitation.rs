@@ -202,9 +202,9 @@ fn engine_order_excitation_matches_full_disk() {
             // Only the nodal diameter of the order moves.
             let alias = order as usize % sectors;
             let excited = alias.min(sectors - alias);
-            let disk = run.system().bank().coupled().unwrap();
+            let disk = run.system().bank();
             let of = |n: usize| {
-                let (kinetic, strain) = disk.diameter_energies(n);
+                let (kinetic, strain) = disk.group_energies(n, (0.0, 0.0));
                 kinetic + strain
             };
             let others = (0..=sectors / 2).filter(|n| *n != excited).map(of).fold(0.0, f64::max);

@@ -107,8 +107,8 @@ fn initial_nodal_diameter_decays_without_exciting_others() {
                 }
             }
             let others = (0..=3).filter(|other| *other != n);
-            let disk = run.system().bank().coupled().unwrap();
-            assert!(others.map(|n| disk.diameter_energies(n)).all(|energies| energies == (0.0, 0.0)));
+            let disk = run.system().bank();
+            assert!(others.map(|n| disk.group_energies(n, (0.0, 0.0))).all(|energies| energies == (0.0, 0.0)));
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Spin in modal coordinates against closed forms, and in scenes whose speed changes.
 
 use nalgebra::DMatrix;
-use tiprub_core::modes::bank::{BankOptions, ModalBank};
+use tiprub_core::modes::bank::{BankOptions, ModalBank, SectorModel};
 use tiprub_core::modes::modal::{ModalModel, ModalSpin};
 use tiprub_core::modes::schemes::free_increment;
 use tiprub_core::scene::method::Scheme;
@@ -36,7 +36,8 @@ fn bank(scheme: Scheme, stiffening: bool, coriolis: bool) -> ModalBank {
         coriolis: DMatrix::from_row_slice(2, 2, &[0.0, -SKEW, SKEW, 0.0]),
     };
     let coupling = Some((spin, stiffening, coriolis));
-    let mut bank = ModalBank::with_options(&model, 1, BankOptions { coupling, ..BankOptions::default() });
+    let mut bank =
+        ModalBank::new(SectorModel::Uncoupled(&model, 1), BankOptions { coupling, ..BankOptions::default() });
     bank.set_step(scheme, 1e-6);
     bank.set_speed(SPEED, 0.0);
     bank

@@ -5,7 +5,7 @@ use crate::guide::print_row;
 use nalgebra::DMatrix;
 use tiprub_core::Rom;
 use tiprub_core::geometry::{FixedGap, GapLaw, PrescribedMotion, Vector3};
-use tiprub_core::modes::modal::{ModalModel, NodePair};
+use tiprub_core::modes::modal::ModalModel;
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::system::SystemSettings;
 use tiprub_core::time::{Recurrence, Stepper};
@@ -259,8 +259,8 @@ fn sphere_impact_on_block_matches_hertz() {
     let sphere = rom("sphere", DMatrix::from_element(1, 1, 0.25 * mass), DMatrix::zeros(1, 1), 1);
     let parts = [&block.rom, &sphere].map(|rom| ModalModel::from_rom(rom, 0.0).unwrap());
     let nodes = block.distance.len();
-    let pairs: Vec<NodePair> = (0..nodes).map(|node| NodePair { master: (0, node), slave: Some((1, 0)) }).collect();
-    let model = ModalModel::combined(&parts, &pairs).unwrap();
+    let pairs: Vec<_> = (0..nodes).map(|node| [node, 0]).collect();
+    let model = tiprub_test_models::relative(&parts[0], &parts[1], &pairs);
     let last = model.len() - 1;
     for scheme in [Scheme::ModalExact] {
         let step = duration / 4000.0;

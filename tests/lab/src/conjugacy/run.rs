@@ -2,7 +2,6 @@
 
 use tiprub_core::CoSimulation;
 use tiprub_core::geometry::{Vector3, frame::PolarFrame, surface_spline::SurfaceSpline, wrench::Wrench};
-use tiprub_core::modes::sectors::Sectors;
 use tiprub_core::scene::method::Solver;
 use tiprub_core::scene::settings::{Shape, SplineSettings};
 use tiprub_core::scene::shape::CompiledShape;
@@ -255,12 +254,11 @@ fn reaction(scene: &Scene, simulation: &Simulation) -> (Vector3, Vector3, f64) {
             force += acts;
             moment += point.cross(&acts);
             let Some(carrier) = carrier else { continue };
-            if let Sectors::Uncoupled(bank) = system.structures()[carrier.structure].modes() {
-                for (component, value) in acts.iter().enumerate() {
-                    let shapes = bank.contact_row(carrier.first_row + 3 * index + component);
-                    let modal = &mut expected[carrier.structure];
-                    modal.iter_mut().zip(shapes).for_each(|(sum, shape)| *sum += value * shape);
-                }
+            let bank = system.structures()[carrier.structure].modes();
+            for (component, value) in acts.iter().enumerate() {
+                let shapes = bank.contact_row(carrier.first_row + 3 * index + component);
+                let modal = &mut expected[carrier.structure];
+                modal.iter_mut().zip(shapes).for_each(|(sum, shape)| *sum += value * shape);
             }
         }
     }

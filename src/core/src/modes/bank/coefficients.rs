@@ -2,31 +2,34 @@
 
 use super::{BankCoefficients, ModalBank};
 use crate::modes::modal::fill_ratios;
-use crate::modes::schemes::{Velocity, resample};
+use crate::modes::schemes::resample;
 use crate::scene::method::Scheme;
 
 impl ModalBank {
     /// Sets a new step size: coefficients and flexibility. The state is unchanged (see [`ModalBank::resample`]).
     pub fn set_step(&mut self, scheme: Scheme, step: f64) {
+        // The contact forces of the last step act on a disk with the coefficients they were found with.
+        self.finish();
         (self.scheme, self.step) = (scheme, step);
-        let modes = self.modes();
-        for (index, coefficients) in self.coefficients.iter_mut().enumerate() {
-            let factor = self.options.frequency_factors.get(index / modes).copied().unwrap_or(1.0);
-            *coefficients = self.model.coefficient(index % modes, factor, scheme, step);
-            let (frequency, ratio) = (self.model.frequencies[index % modes], self.model.damping_ratios[index % modes]);
-            let dynamic = index % modes < self.model.dynamic_modes(scheme);
-            self.velocities[index] =
-                if dynamic { scheme.velocity(factor * frequency, ratio, step) } else { Velocity::default() };
+        for set in 0..self.sets {
+            for mode in 0..self.modes {
+                let (Some(of), index) = (self.oscillator(mode, set), set * self.modes + mode) else { continue };
+                self.coefficients[index] = of.coefficients(scheme, step);
+                self.velocities[index] = of.velocity(scheme, step);
+            }
         }
         if !self.lane_coefficients.is_empty() {
             self.spread_coefficients();
+        }
+        if let Some(disk) = &mut self.disk {
+            disk.fill(&self.coefficients);
         }
         self.refresh_coupling();
     }
 
     pub(super) fn spread_coefficients(&mut self) {
         for sector in 0..self.sectors {
-            for mode in 0..self.modes() {
+            for mode in 0..self.modes {
                 let k = self.coefficients(sector)[mode];
                 let lane = BankCoefficients { beta: k.beta, kappa: k.kappa, load: k.load_compliance(), loss: k.loss };
                 let index = self.index(mode, sector);
@@ -52,7 +55,7 @@ impl ModalBank {
     }
 
     fn fill_flexibility(&mut self, set: usize) {
-        let (modes, rows) = (self.modes(), self.rows);
+        let (modes, rows) = (self.modes, self.rows);
         for column in 0..rows {
             for mode in 0..modes {
                 let compliance = self.coefficients[set * modes + mode].compliance;
@@ -72,13 +75,13 @@ impl ModalBank {
     /// Adds the modal forces of spin on one sector, at its current velocity, to `modal_force`.
     fn add_coupling_force(&mut self, sector: usize) {
         let Some(coupling) = self.coupling.take() else { return };
-        for mode in 0..self.modes() {
+        for mode in 0..self.modes {
             (self.gathered[0][mode], self.gathered[1][mode]) = self.modal_state(mode, sector);
         }
         let set = self.set_of(sector);
         coupling.force(set, &self.gathered[0], &self.gathered[1], &mut self.correction);
         // q̇ = d/h + ½hq̈: the velocity in the middle of the step would cause an error that accumulates.
-        for mode in 0..self.modes() {
+        for mode in 0..self.modes {
             let square = self.frequency(mode, sector) * self.frequency(mode, sector);
             let force = self.modal_force[mode] + self.correction[mode] - square * self.gathered[0][mode];
             self.gathered[1][mode] += (0.5 * self.step * self.step).min(2.0 / square) * force;
@@ -105,58 +108,77 @@ impl ModalBank {
         (now.1 - before.1) + (now.0 - before.0)
     }
 
-    /// Sets the modal damping ratio of all modes; the first modes have their `own` (takes effect with the next [`ModalBank::set_step`]).
+    /// Sets the modal damping ratio of all modes; the first modes of a sector or nodal diameter have their `own` (takes effect with
+    /// the next [`ModalBank::set_step`]).
     pub(crate) fn set_damping_ratio(&mut self, damping_ratio: f64, own: &[f64]) {
         fill_ratios(&mut self.model.damping_ratios, damping_ratio, own, 1);
+        if let Some(disk) = &mut self.disk {
+            disk.set_damping_ratio(damping_ratio, own);
+        }
     }
 
-    /// Collects the modal forces on one sector that persist over the step: contact forces (`forces[row · lanes + sector]`, N;
+    /// Collects the persistent contact forces on a disk (`forces[row · lanes + sector]`, N), before [`ModalBank::gather_forces`].
+    pub(super) fn gather_disk(&mut self, forces: &[f64]) {
+        self.finish();
+        let lanes = self.lanes;
+        if let Some(disk) = &mut self.disk {
+            disk.gather_rows(forces, lanes);
+        }
+    }
+
+    /// Collects the modal forces on one group that persist over the step: contact forces (`forces[row · lanes + sector]`, N;
     /// none for an empty slice), modal loads and spin.
-    pub(super) fn gather_forces(&mut self, sector: usize, forces: &[f64]) {
-        let lanes = self.lanes();
-        let of_row = |row: usize| forces.get(row * lanes + sector).copied().unwrap_or(0.0);
-        let touched = (0..self.rows).any(|row| of_row(row) != 0.0);
-        for mode in 0..self.modes() {
-            let shapes = &self.contact_modes[mode * self.rows..][..self.rows];
-            let contact: f64 =
-                if touched { shapes.iter().enumerate().map(|(row, shape)| shape * of_row(row)).sum() } else { 0.0 };
-            self.modal_force[mode] = contact + self.state.modal_load_before.get(mode).copied().unwrap_or(0.0);
-            if let Some(loads) = &self.excitation {
-                self.modal_force[mode] += loads.load[mode] * loads.before[sector];
+    pub(super) fn gather_forces(&mut self, group: usize, forces: &[f64]) {
+        let of_row = |row: usize| forces.get(row * self.lanes + group).copied().unwrap_or(0.0);
+        let touched = self.disk.is_none() && (0..self.rows).any(|row| of_row(row) != 0.0);
+        let load = if group < self.loaded_groups() { &self.state.modal_load_before[..] } else { &[] };
+        for mode in 0..self.modes {
+            let shapes = || self.contact_modes[mode * self.rows..][..self.rows].iter().enumerate();
+            let mut force = match &self.disk {
+                Some(disk) => disk.gathered_force(mode, group),
+                None if touched => [shapes().map(|(row, shape)| shape * of_row(row)).sum(), 0.0],
+                None => [0.0; 2],
+            };
+            force[0] += load.get(mode).copied().unwrap_or(0.0);
+            if let Some(excitation) = &self.excitation {
+                let excited = excitation.on_mode(mode, group, &self.state.excited_before);
+                force.iter_mut().zip(excited).for_each(|(force, excited)| *force += excited);
             }
             if self.heat.is_some() {
-                self.modal_force[mode] += self.heat_before(mode, sector);
+                force[0] += self.heat_before(mode, group);
+            }
+            self.modal_force[mode * self.parts] = force[0];
+            if self.parts == 2 {
+                self.modal_force[mode * self.parts + 1] = force[1];
             }
         }
-        self.add_coupling_force(sector);
+        self.add_coupling_force(group);
         if let Some(coupling) = self.coupling.as_ref().filter(|coupling| coupling.softens()) {
             // Converted to forces on the cold mode, which cause the same motion.
             self.modal_force.iter_mut().enumerate().for_each(|(mode, force)| *force /= coupling.share(mode));
         }
     }
 
-    /// Converts the state from the current step size to `new_step`, each sector under its last contact force
-    /// (`forces[row · lanes + sector]`, N; none for an empty slice) and the modal loads, then uses the new coefficients.
+    /// Converts the state from the current step size to `new_step` under the last contact forces (`forces[row · lanes + sector]`, N;
+    /// none for an empty slice) and the modal loads, then uses the new coefficients.
     pub fn resample(&mut self, scheme: Scheme, new_step: f64, forces: &[f64]) {
-        let dynamic = self.model.dynamic_modes(self.scheme);
         if scheme.properties().stores_velocity {
             let ratio = new_step / self.step;
             self.state.increment.iter_mut().for_each(|increment| *increment *= ratio);
             return self.set_step(scheme, new_step);
         }
-        for sector in 0..self.sectors {
-            self.gather_forces(sector, forces);
-            for mode in 0..dynamic {
-                let (force, index) = (self.modal_force[mode], self.index(mode, sector));
-                self.state.increment[index] = resample(
-                    self.frequency(mode, sector),
-                    self.model.damping_ratios[mode],
-                    self.state.position[index],
-                    self.state.increment[index],
-                    force,
-                    self.step,
-                    new_step,
-                );
+        self.gather_disk(forces);
+        for group in 0..self.groups {
+            self.gather_forces(group, forces);
+            for mode in 0..self.modes {
+                let Some(of) = self.oscillator(mode, group).filter(|of| of.is_dynamic(self.scheme)) else { continue };
+                for part in 0..self.parts {
+                    let index = self.index(mode, group) + part * self.width;
+                    let (now, increment) = (self.state.position[index], self.state.increment[index]);
+                    let force = self.modal_force[mode * self.parts + part];
+                    self.state.increment[index] =
+                        resample(of.frequency, of.damping_ratio, now, increment, force, self.step, new_step);
+                }
             }
         }
         self.set_step(scheme, new_step);

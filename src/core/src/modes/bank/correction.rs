@@ -26,7 +26,7 @@ impl ModalBank {
         values: impl Iterator<Item = &'a f64>,
         correction: impl Fn(&ModeCoefficients, &f64) -> f64,
     ) {
-        let (modes, width, set) = (self.modes(), self.width, self.set_of(sector));
+        let (modes, width, set) = (self.modes, self.width, self.set_of(sector));
         let coefficients = &self.coefficients[set * modes..][..modes];
         let (block, lane) = (sector / width * modes * width, sector % width);
         let position = self.state.position[block..][..modes * width].chunks_exact_mut(width);
@@ -49,7 +49,7 @@ impl ModalBank {
 
     /// Adds the displacement of the contact rows by `correction`.
     pub(super) fn move_rows(&mut self, sector: usize) {
-        let lanes = self.lanes();
+        let lanes = self.lanes;
         if lanes == 1 {
             let (sums, matrix) = (&mut self.state.displacement, &self.contact_modes);
             self.instruction_set.run(Accumulate { sums, matrix, values: &self.correction });
@@ -77,7 +77,7 @@ impl ModalBank {
         } else {
             self.respond_and_move(sector);
         }
-        let lanes = self.lanes();
+        let lanes = self.lanes;
         let flexibility = self.flexibility[self.set_of(sector)].as_slice();
         self.moved.fill(0.0);
         for (column, value) in flexibility.chunks_exact(self.rows).zip(force) {
@@ -111,7 +111,7 @@ impl ModalBank {
 
     /// `correction` ← T c φᵀf.
     fn respond(&mut self, sector: usize) {
-        let (modes, set) = (self.modes(), self.set_of(sector));
+        let (modes, set) = (self.modes, self.set_of(sector));
         let coefficients = &self.coefficients[set * modes..][..modes];
         for ((correction, force), k) in self.correction.iter_mut().zip(&self.modal_force).zip(coefficients) {
             *correction = k.compliance * force;
@@ -123,7 +123,7 @@ impl ModalBank {
 
     /// Applies contact forces of the previous step (`forces[row · lanes + sector]`, N) after the prediction (massless-boundary).
     pub(crate) fn act_delayed(&mut self, forces: &[f64]) {
-        let (lanes, mut force) = (self.lanes(), std::mem::take(&mut self.moved));
+        let (lanes, mut force) = (self.lanes, std::mem::take(&mut self.moved));
         for sector in 0..self.sectors {
             for (row, force) in force.iter_mut().enumerate() {
                 *force = forces[row * lanes + sector];
@@ -143,34 +143,12 @@ impl ModalBank {
     }
 
     fn act_delayed_modal_force(&mut self, sector: usize) {
-        let (modes, set) = (self.modes(), self.set_of(sector));
+        let (modes, set) = (self.modes, self.set_of(sector));
         let coefficients = &self.coefficients[set * modes..][..modes];
         for ((correction, force), k) in self.correction.iter_mut().zip(&self.modal_force).zip(coefficients) {
             *correction = k.delayed * force;
         }
         self.move_modes(sector);
         self.move_rows(sector);
-    }
-
-    /// Returns the work of the modal loads over the last step (J), after the contact correction. A quasi-static mode follows its
-    /// current load, so over this step the previous load did the work.
-    pub(crate) fn finish_loads(&mut self) -> f64 {
-        if !self.options.loads {
-            return 0.0;
-        }
-        let mut work = 0.0;
-        for mode in 0..self.modes() {
-            let dynamic = mode < self.model.dynamic_modes(self.scheme);
-            let load = if dynamic { self.modal_load[mode] } else { self.state.modal_load_before[mode] };
-            if load != 0.0 {
-                let twice: f64 = (0..self.sectors)
-                    .map(|sector| self.index(mode, sector))
-                    .map(|index| self.state.increment[index] + self.increment_before[index])
-                    .sum();
-                work += 0.5 * load * twice;
-            }
-        }
-        self.state.modal_load_before.copy_from_slice(&self.modal_load);
-        work + self.finish_heat()
     }
 }

@@ -1,34 +1,34 @@
-//! Effects of an excitation and of an initial motion on the modes of each sector.
+//! Effects of an excitation on the modes of sectors or of a nodal diameter.
 
-use super::ModalBank;
+use super::{Disk, ModalBank};
 
 impl ModalBank {
     /// Sets the engine order of the excitation, if any.
     pub(crate) fn set_excitation_order(&mut self, order: u32) {
-        if let Some(loads) = &mut self.excitation {
-            loads.set_order(order);
+        if let Some(excitation) = &mut self.excitation {
+            excitation.set_order(order, self.disk.as_ref().map(Disk::model));
         }
     }
 
     /// Sets the excitation of the next step, before [`ModalBank::predict`]: amplitude (N) and phase ψ (rad).
     pub fn excite(&mut self, amplitude: f64, phase: f64) {
-        if let Some(loads) = &mut self.excitation {
-            loads.set(amplitude, phase);
+        if let Some(excitation) = &mut self.excitation {
+            excitation.set(amplitude, phase);
         }
     }
 
-    /// Adds the effect of the excitation to the predicted step.
+    /// Adds the effect of the excitation to the predicted step of uncoupled sectors.
     pub(super) fn act_excited(&mut self) {
-        let Some(loads) = self.excitation.take() else { return };
-        for (sector, force) in loads.now.iter().enumerate().filter(|(_, force)| **force != 0.0) {
-            self.act_on_modes(sector, &loads.load, *force);
+        let Some(excitation) = self.excitation.take() else { return };
+        for (sector, force) in excitation.now.iter().enumerate().filter(|(_, force)| **force != 0.0) {
+            self.act_on_modes(sector, &excitation.load, *force);
         }
-        self.excitation = Some(loads);
+        self.excitation = Some(excitation);
     }
 
-    /// Adds the effect of `factor` times prescribed modal loads to the predicted step of one sector.
+    /// Adds the effect of `factor` times prescribed modal loads to the predicted step of one uncoupled sector.
     pub(super) fn act_on_modes(&mut self, sector: usize, loads: &[f64], factor: f64) {
-        let (modes, set) = (self.modes(), self.set_of(sector));
+        let (modes, set) = (self.modes, self.set_of(sector));
         let coefficients = &self.coefficients[set * modes..][..modes];
         for ((correction, load), k) in self.correction.iter_mut().zip(loads).zip(coefficients) {
             *correction = k.load_compliance() * load * factor;
@@ -40,28 +40,42 @@ impl ModalBank {
         self.move_rows(sector);
     }
 
+    /// Adds the effect of the excitation to the predicted step of a nodal diameter and to the spectrum of its displacements.
+    pub(super) fn act_excited_disk(&mut self) {
+        let (Some(excitation), Some(disk)) = (&self.excitation, &mut self.disk) else { return };
+        let group = excitation.groups.start;
+        for mode in 0..disk.model().diameters[group].len() {
+            let compliance = self.coefficients[group * self.modes + mode].load_compliance();
+            let moved = excitation.on_mode(mode, group, &excitation.now).map(|force| compliance * force);
+            disk.add_to_spectrum(mode, group, moved);
+            for (part, moved) in moved.into_iter().enumerate() {
+                let index = disk.coordinate(group, mode, part);
+                self.state.position[index] += moved;
+                self.state.increment[index] += moved;
+            }
+        }
+    }
+
     /// Returns the work of the excitation over the last step (J), after the contact correction; for quasi-static modes see
     /// [`ModalBank::finish_loads`].
     pub(crate) fn finish_excitation(&mut self) -> f64 {
-        let Some(mut loads) = self.excitation.take() else { return 0.0 };
-        let (mut work, dynamic) = (0.0, self.model.dynamic_modes(self.scheme));
-        for sector in 0..self.sectors {
-            for (mode, load) in loads.load.iter().enumerate().filter(|(_, load)| **load != 0.0) {
-                let force = if mode < dynamic { loads.now[sector] } else { loads.before[sector] };
-                let index = self.index(mode, sector);
-                work += 0.5 * load * force * (self.state.increment[index] + self.increment_before[index]);
+        let Some(excitation) = &self.excitation else { return 0.0 };
+        let mut work = 0.0;
+        for group in excitation.groups.clone() {
+            for mode in 0..self.modes {
+                let Some(of) = self.oscillator(mode, group) else { continue };
+                let forces = if of.is_dynamic(self.scheme) { &excitation.now } else { &self.state.excited_before };
+                let force = excitation.on_mode(mode, group, forces);
+                if force.iter().all(|part| *part == 0.0) {
+                    continue;
+                }
+                let ([_, increment], index) = (self.amplitudes(mode, group), self.index(mode, group));
+                for part in 0..self.parts {
+                    work += 0.5 * force[part] * (increment[part] + self.increment_before[index + part * self.width]);
+                }
             }
         }
-        loads.before.copy_from_slice(&loads.now);
-        self.excitation = Some(loads);
+        self.state.excited_before.copy_from_slice(&excitation.now);
         work
-    }
-
-    /// Adds a free motion to that of a mode with inertia, at the start.
-    pub(crate) fn add_modal_state(&mut self, mode: usize, sector: usize, position: f64, velocity: f64) {
-        let (frequency, ratio, step) = (self.frequency(mode, sector), self.model.damping_ratios[mode], self.step);
-        let index = self.index(mode, sector);
-        self.state.position[index] += position;
-        self.state.increment[index] += self.scheme.increment(frequency, ratio, position, velocity, step);
     }
 }

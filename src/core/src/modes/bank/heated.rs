@@ -140,8 +140,8 @@ impl ModalBank {
     /// Returns the work of heat on quasi-static modes over the last step (J), in addition to the change of energy at its
     /// beginning: these modes follow the force of the step immediately, and the change of stiffness also acts during that motion.
     pub(crate) fn finish_stiffening(&mut self) -> f64 {
-        let (mut work, first) = (0.0, self.modes() - self.state.stiffened.len());
-        for mode in first..self.modes() {
+        let (mut work, first) = (0.0, self.modes - self.state.stiffened.len());
+        for mode in first..self.modes {
             let gained = std::mem::take(&mut self.state.stiffened[mode - first]);
             if gained != 0.0 {
                 for sector in 0..self.sectors {

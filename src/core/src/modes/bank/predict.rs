@@ -1,7 +1,59 @@
-//! Loops over all modes and sectors.
+//! Prediction of one step, and loops over all modes of uncoupled sectors.
 
-use super::{BankCoefficients, ModalBank, ModeCoefficients};
+use super::coupling::Coupling;
+use super::{BankCoefficients, LANES, ModalBank, ModeCoefficients};
 use crate::math::simd::Kernel;
+
+impl ModalBank {
+    /// Predicts one step without contact (eq. 9 of the paper) and recovers the contact displacements of all sectors.
+    pub fn predict(&mut self) {
+        std::mem::swap(&mut self.state.increment, &mut self.increment_before);
+        std::mem::swap(&mut self.state.displacement, &mut self.state.displacement_before);
+        if self.disk.is_some() {
+            return self.predict_disk();
+        }
+        let instruction_set = self.instruction_set;
+        match (self.width, self.with_loss, self.lane_coefficients.is_empty()) {
+            (1, true, true) => instruction_set.run(Predict::<1, true, false>(self)),
+            (1, false, true) => instruction_set.run(Predict::<1, false, false>(self)),
+            (_, true, true) => instruction_set.run(Predict::<LANES, true, false>(self)),
+            (_, false, true) => instruction_set.run(Predict::<LANES, false, false>(self)),
+            (1, true, false) => instruction_set.run(Predict::<1, true, true>(self)),
+            (1, false, false) => instruction_set.run(Predict::<1, false, true>(self)),
+            (_, true, false) => instruction_set.run(Predict::<LANES, true, true>(self)),
+            (_, false, false) => instruction_set.run(Predict::<LANES, false, true>(self)),
+        }
+        if self.coupling.as_ref().is_some_and(Coupling::is_active) {
+            self.couple();
+        }
+        if self.excitation.is_some() {
+            self.act_excited();
+        }
+        if self.heat.is_some() {
+            self.act_expanded();
+        }
+    }
+
+    fn couple(&mut self) {
+        let Some(mut coupling) = self.coupling.take() else { return };
+        for sector in 0..self.sectors {
+            for mode in 0..self.modes {
+                let index = self.index(mode, sector);
+                let predicted = self.state.increment[index];
+                self.gathered[0][mode] = self.state.position[index] - predicted;
+                self.gathered[1][mode] = self.increment_before[index];
+                self.correction[mode] = predicted;
+            }
+            let mut correction = std::mem::take(&mut self.correction);
+            let [position, increment] = &self.gathered;
+            coupling.couple(self.set_of(sector), self.coefficients(sector), position, increment, &mut correction);
+            self.correction = correction;
+            self.move_modes(sector);
+            self.move_rows(sector);
+        }
+        self.coupling = Some(coupling);
+    }
+}
 
 /// φᵀf of all modes for the forces on the contact rows of one sector.
 pub(super) struct ModalForce<'a> {

@@ -1,29 +1,14 @@
-//! State of single sectors, for a scheme that integrates them one by one over a span.
+//! State of the modes as plain arrays, for a scheme that integrates sectors or whole structures over a span.
 
 use super::ModalBank;
 
 impl ModalBank {
-    /// Number of sets of coefficients: one, or one per sector with mistuning.
-    pub fn sets(&self) -> usize {
-        if self.options.frequency_factors.is_empty() { 1 } else { self.sectors }
-    }
-
-    /// The set of a sector.
-    pub(crate) fn set_number(&self, sector: usize) -> usize {
-        self.set_of(sector)
-    }
-
-    /// Angular frequency of a mode of a sector (rad/s).
-    pub(crate) fn frequency_of(&self, mode: usize, sector: usize) -> f64 {
-        self.frequency(mode, sector)
-    }
-
     /// Makes the current displacements the previous ones.
     pub(crate) fn begin_span(&mut self) {
         self.state.displacement_before.copy_from_slice(&self.state.displacement);
     }
 
-    /// Reads q and q̇ of the modes with inertia of a sector.
+    /// Reads q and q̇ of the modes with inertia of an uncoupled sector.
     pub(crate) fn read_sector(&self, sector: usize, position: &mut [f64], velocity: &mut [f64]) {
         for (mode, (q, v)) in position.iter_mut().zip(velocity).enumerate() {
             let (now, increment) = self.modal_state(mode, sector);
@@ -31,7 +16,8 @@ impl ModalBank {
         }
     }
 
-    /// Writes q and q̇ of a sector, its quasi-static modes under the forces `forces` on the rows (N), and the displacements of the rows (m).
+    /// Writes q and q̇ of an uncoupled sector, its quasi-static modes under the forces `forces` on the rows (N), and the displacements
+    /// of the rows (m).
     pub(crate) fn write_sector(
         &mut self,
         sector: usize,
@@ -44,30 +30,39 @@ impl ModalBank {
             let index = self.index(mode, sector);
             (self.state.position[index], self.state.increment[index]) = (*q, v * self.step);
         }
-        for mode in position.len()..self.modes() {
+        for mode in position.len()..self.modes {
             let shapes = &self.contact_modes[mode * self.rows..][..self.rows];
             let force: f64 = shapes.iter().zip(forces).map(|(shape, force)| shape * force).sum();
             let (index, frequency) = (self.index(mode, sector), self.frequency(mode, sector));
             self.state.position[index] = force / (frequency * frequency);
         }
-        let lanes = self.lanes();
         for (row, moved) in rows.iter().enumerate() {
-            self.state.displacement[row * lanes + sector] = *moved;
+            self.state.displacement[row * self.lanes + sector] = *moved;
         }
     }
 
-    /// Writes q and q̇ of all modes of a single structure, including those without inertia, and the displacements of the rows (m).
-    pub fn write_all(&mut self, position: &[f64], velocity: &[f64], rows: &[f64]) {
-        for (mode, (q, v)) in position.iter().zip(velocity).enumerate() {
-            let index = self.index(mode, 0);
-            (self.state.position[index], self.state.increment[index]) = (*q, v * self.step);
+    /// Reads q and q̇ of all modes in the order of the state; velocities of modes without inertia are not 0.
+    pub(crate) fn read_all(&self, [position, velocity]: [&mut [f64]; 2]) {
+        position.copy_from_slice(&self.state.position);
+        for (to, increment) in velocity.iter_mut().zip(&self.state.increment) {
+            *to = increment / self.step;
         }
-        let lanes = self.lanes();
-        rows.iter().enumerate().for_each(|(row, moved)| self.state.displacement[row * lanes] = *moved);
+    }
+
+    /// Writes q and q̇ of all modes of a disk or of a single structure, in the order of the state. The displacements of a disk follow;
+    /// those of a single structure are `rows` (m).
+    pub fn write_all(&mut self, position: &[f64], velocity: &[f64], rows: &[f64]) {
+        self.state.position.copy_from_slice(position);
+        let increments = self.state.increment.iter_mut().zip(velocity);
+        increments.for_each(|(increment, v)| *increment = v * self.step);
+        match &mut self.disk {
+            Some(disk) => disk.rows_of(position, &mut self.state.displacement),
+            None => self.state.displacement.copy_from_slice(rows),
+        }
     }
 
     /// Returns whether there are modal loads in addition to contact forces.
-    pub fn is_loaded(&self) -> bool {
+    pub(crate) fn is_loaded(&self) -> bool {
         self.options.loads
     }
 
@@ -84,10 +79,5 @@ impl ModalBank {
             start.copy_from_slice(&self.state.modal_load_before);
             end.copy_from_slice(&self.modal_load);
         }
-    }
-
-    /// Adds to the damping loss of a sector (J).
-    pub fn lose(&mut self, sector: usize, loss: f64) {
-        self.state.loss[sector] += loss;
     }
 }

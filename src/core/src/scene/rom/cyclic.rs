@@ -10,7 +10,7 @@
 //! strain energy of the whole disk are the sums of ½ żᴴM_nż and ½ zᴴK_nz (D. L. Thomas, Int. J. Num. Meth. Eng. 14, 1979). Sector s + 1 is
 //! sector s turned by +2π/N about z; n > 0 is a wave e^(i n 2π s/N).
 
-use nalgebra::{Complex, DMatrix};
+use nalgebra::{Complex, ComplexField, DMatrix};
 use tiprub_cosim::{bounds, shown};
 
 use super::Rom;
@@ -119,11 +119,12 @@ impl Rom {
 
 /// Cholesky factor L of a Hermitian matrix L Lᴴ; `None` unless it is positive definite. (Every complex number has a square root, so that
 /// the factorisation of a complex matrix alone does not detect this.)
-pub(crate) fn cholesky(matrix: &DMatrix<Complex<f64>>) -> Option<DMatrix<Complex<f64>>> {
+pub(crate) fn cholesky<T: ComplexField<RealField = f64>>(matrix: &DMatrix<T>) -> Option<DMatrix<T>> {
     let lower = matrix.clone().cholesky()?.l();
     let real = |index: usize| {
-        let pivot: Complex<f64> = lower[(index, index)];
-        pivot.re > 0.0 && pivot.im.abs() <= 1e-8 * pivot.re
+        let pivot: &T = &lower[(index, index)];
+        let (real, imaginary) = (pivot.clone().real(), pivot.clone().imaginary());
+        real > 0.0 && imaginary.abs() <= 1e-8 * real
     };
     (0..lower.nrows()).all(real).then_some(lower)
 }

@@ -3,7 +3,7 @@
 use super::basis::POINTS;
 use super::shared_body::SharedBody;
 use crate::math::vector::{Vector3, strided_vector3};
-use crate::modes::cyclic::CyclicBank;
+use crate::modes::bank::{Disk, ModalBank};
 
 /// A disk of coupled sectors.
 #[derive(Debug, Clone)]
@@ -27,14 +27,14 @@ pub struct CoupledDisk {
 
 impl CoupledDisk {
     /// Creates the tables of a structure, with polynomials of degree `degree`.
-    pub fn new(structure: usize, bank: &CyclicBank, degree: usize) -> Self {
-        let (coordinates, shapes) = bank.coordinates_of();
+    pub fn new(structure: usize, bank: &ModalBank, disk: &Disk, degree: usize) -> Self {
+        let (coordinates, shapes) = disk.coordinates_of();
         let rows = bank.rows() * bank.lanes();
         Self {
             structure,
             moved: std::array::from_fn(|_| vec![0.0; rows]),
             velocity: vec![0.0; rows],
-            sizes: bank.sizes(&shapes),
+            sizes: disk.sizes(&shapes),
             amplitudes: vec![0.0; coordinates.inertia.len()],
             reach: vec![0.0; bank.rows()],
             error: 0.0,
@@ -44,7 +44,7 @@ impl CoupledDisk {
     }
 
     /// Reads the state of the structure before a span; `forces` are the contact forces on all rows (N).
-    pub fn read(&mut self, bank: &mut CyclicBank, forces: &[f64], nodes: usize) {
+    pub fn read(&mut self, bank: &mut ModalBank, forces: &[f64], nodes: usize) {
         bank.read_all(self.body.state_mut());
         self.body.keep_inertia();
         let (sectors, lanes) = (bank.sectors(), self.lanes);
@@ -52,19 +52,21 @@ impl CoupledDisk {
         let force = |node: usize, sector: usize| strided_vector3(forces, 3 * node * lanes + sector, lanes);
         let all = all.map(|(sector, node)| (sector, node, force(node, sector)));
         let pushing = all.filter(|(.., force)| *force != Vector3::zeros());
-        bank.modal_forces(pushing, self.body.forces_mut(0));
+        if let Some(disk) = bank.disk_mut() {
+            disk.modal_forces(pushing, self.body.forces_mut(0));
+        }
     }
 
     /// Finds displacements and velocities of all rows at the start of a step.
-    pub(crate) fn find_rows(&mut self, bank: &mut CyclicBank) {
-        bank.rows_of(self.body.at(0), &mut self.moved[0]);
-        bank.rows_of(self.body.velocity(), &mut self.velocity);
+    pub(crate) fn find_rows(&mut self, disk: &mut Disk) {
+        disk.rows_of(self.body.at(0), &mut self.moved[0]);
+        disk.rows_of(self.body.velocity(), &mut self.velocity);
     }
 
     /// Finds displacements of all rows at the points 1 … `points` of the step.
-    pub(crate) fn find_rows_at(&mut self, bank: &mut CyclicBank, points: usize) {
+    pub(crate) fn find_rows_at(&mut self, disk: &mut Disk, points: usize) {
         for point in 1..=points {
-            bank.rows_of(self.body.at(point), &mut self.moved[point]);
+            disk.rows_of(self.body.at(point), &mut self.moved[point]);
         }
     }
 
@@ -80,8 +82,8 @@ impl CoupledDisk {
     }
 
     /// Finds the largest displacements of the rows of any sector from rest without contact (m).
-    pub(crate) fn find_reach(&mut self, bank: &CyclicBank) {
+    pub(crate) fn find_reach(&mut self, disk: &Disk) {
         self.body.amplitudes(&mut self.amplitudes);
-        bank.reach(&self.amplitudes, &self.sizes, &mut self.reach);
+        disk.reach(&self.amplitudes, &self.sizes, &mut self.reach);
     }
 }

@@ -15,10 +15,8 @@ use super::tables::{HALVINGS, Tables};
 use crate::geometry::PrescribedMotion;
 use crate::geometry::wrench::At;
 use crate::math::vector::{set_strided_vector3, set_vector3_at, vector3_at};
-use crate::modes::bank::ModalBank;
+use crate::modes::bank::{Disk, ModalBank};
 use crate::modes::coordinates::ContactModes;
-use crate::modes::cyclic::CyclicBank;
-use crate::modes::sectors::Sectors;
 use crate::system::contact_view::ContactMember;
 use crate::system::work::ContactWork;
 use crate::system::{ContactPair, StepFailure, Structure, System};
@@ -91,11 +89,8 @@ impl Surroundings for SceneSurroundings<'_> {
         }
     }
 
-    fn disk(&mut self, structure: usize) -> Option<&mut CyclicBank> {
-        match &mut self.structures[structure].modes {
-            Sectors::Coupled(bank) => Some(bank),
-            Sectors::Uncoupled(_) => None,
-        }
+    fn disk(&mut self, structure: usize) -> Option<&mut Disk> {
+        self.structures[structure].modes.disk_mut()
     }
 }
 
@@ -147,14 +142,17 @@ impl SceneIsland {
         let carriers: Vec<CarrierIntegrator> =
             carrying.iter().zip(banks).map(|(one, bank)| CarrierIntegrator::new(*one, bank, degree, lanes)).collect();
         let place = |structure: usize| carriers.iter().position(|carrier| carrier.structure == structure);
-        let disk = |one: &usize| structures[*one].modes().coupled().map(|bank| CoupledDisk::new(*one, bank, degree));
+        let disk = |one: &usize| {
+            let bank = structures[*one].modes();
+            bank.disk().map(|disk| CoupledDisk::new(*one, bank, disk, degree))
+        };
         let disks: Vec<CoupledDisk> = touching.iter().filter_map(disk).collect();
         let (mut sectors, mut members) = (Vec::new(), Vec::new());
         for (number, structure) in touching.iter().copied().enumerate() {
             let of = &structures[structure];
             let disk = disks.iter().position(|disk| disk.structure == structure);
             for sector in 0..of.modes().sectors() {
-                let kind = of.bank().map_or(0, |bank| bank.set_number(sector));
+                let kind = of.bank().map_or(0, |bank| bank.set_of(sector));
                 let one = IslandSector::new(
                     [number, kind],
                     disk.map(|disk| (disk, sector)),
@@ -242,7 +240,7 @@ impl SceneIsland {
         if self.is_single() {
             self.members[0].sector = turn;
             let bank = structures[self.members[0].structure].bank();
-            self.island.sectors[0].table[1] = bank.map_or(0, |bank| bank.set_number(turn));
+            self.island.sectors[0].table[1] = bank.map_or(0, |bank| bank.set_of(turn));
         }
     }
 
@@ -261,9 +259,7 @@ impl SceneIsland {
         for disk in &mut self.island.disks {
             let structure = &mut structures[disk.structure];
             let nodes = structure.nodes();
-            if let Sectors::Coupled(bank) = &mut structure.modes {
-                disk.read(bank, &structure.history.force.now, nodes);
-            }
+            disk.read(&mut structure.modes, &structure.history.force.now, nodes);
         }
         for carrier in &mut self.island.carriers {
             let Some(bank) = structures[carrier.structure].bank() else { continue };
@@ -291,27 +287,25 @@ impl SceneIsland {
             let of = &mut structure.step_control;
             (of.bank[*sector], of.largest[*sector]) = (control.bank, control.largest);
             of.level[*sector] = control.level as u64;
-            if let (None, Sectors::Uncoupled(bank)) = (one.disk, &mut structure.modes) {
-                let (moved, state) = one.displacements(tables);
+            if one.disk.is_none() {
+                let (bank, (moved, state)) = (&mut structure.modes, one.displacements(tables));
                 bank.write_sector(*sector, &state.position, &state.velocity, &state.forces, moved);
                 bank.lose(*sector, record.damping);
             }
         }
         for disk in disks {
-            if let Sectors::Coupled(bank) = &mut structures[disk.structure].modes {
-                bank.write_all(disk.body.at(0), disk.body.velocity());
-                bank.lose(disk.body.collect_loss());
-            }
+            let bank = &mut structures[disk.structure].modes;
+            bank.write_all(disk.body.at(0), disk.body.velocity(), &[]);
+            bank.lose(0, disk.body.collect_loss());
         }
         for carrier in carriers {
             let structure = &mut structures[carrier.structure];
             structure.delayed.copy_from_slice(carrier.body.forces_mut(0));
-            if let Sectors::Uncoupled(bank) = &mut structure.modes {
-                let rows = &carrier.moved(0)[..bank.rows()];
-                bank.write_all(carrier.body.at(0), carrier.body.velocity(), rows);
-                bank.lose(0, carrier.body.collect_loss());
-                bank.begin_loads();
-            }
+            let bank = &mut structure.modes;
+            let rows = &carrier.moved(0)[..bank.rows()];
+            bank.write_all(carrier.body.at(0), carrier.body.velocity(), rows);
+            bank.lose(0, carrier.body.collect_loss());
+            bank.begin_loads();
             load_work += carrier.body.collect_load_work();
         }
         load_work
@@ -365,7 +359,7 @@ impl SceneIsland {
         self.flights.iter_mut().for_each(|flight| flight.set_length(length));
         for sector in 0..self.turns {
             self.aim(sector, structures);
-            let Sectors::Uncoupled(bank) = structures[index].modes_mut() else { continue };
+            let bank = structures[index].modes_mut();
             let one = &mut self.island.sectors[0];
             one.state.forces.fill(0.0);
             bank.read_sector(sector, &mut one.state.position, &mut one.state.velocity);
@@ -382,17 +376,13 @@ impl SceneIsland {
 }
 
 /// Modes of the sectors, one entry per kind of sector.
-fn kinds_of(modes: &Sectors) -> Vec<ContactModes> {
-    match modes {
-        Sectors::Uncoupled(bank) => {
-            let count = bank.model().inertial_modes();
-            (0..bank.sets()).map(|set| modes_of(bank, set, count)).collect()
-        }
-        Sectors::Coupled(bank) => {
-            let (coordinates, shapes) = bank.coordinates_of();
-            vec![coordinates.seen_at(&shapes)]
-        }
+fn kinds_of(bank: &ModalBank) -> Vec<ContactModes> {
+    if let Some(disk) = bank.disk() {
+        let (coordinates, shapes) = disk.coordinates_of();
+        return vec![coordinates.seen_at(&shapes)];
     }
+    let count = bank.model().inertial_modes();
+    (0..bank.sets()).map(|set| modes_of(bank, set, count)).collect()
 }
 
 /// Modes with inertia of a sector, and the flexibility of the others.
@@ -402,10 +392,10 @@ fn modes_of(bank: &ModalBank, sector: usize, count: usize) -> ContactModes {
     let mut residual = DMatrix::zeros(rows, rows);
     for mode in count..model.len() {
         let shape = model.contact_modes.column(mode);
-        residual.ger(bank.frequency_of(mode, sector).powi(-2), &shape, &shape, 1.0);
+        residual.ger(bank.frequency(mode, sector).powi(-2), &shape, &shape, 1.0);
     }
     ContactModes {
-        frequencies: (0..count).map(|mode| bank.frequency_of(mode, sector)).collect(),
+        frequencies: (0..count).map(|mode| bank.frequency(mode, sector)).collect(),
         damping_ratios: model.damping_ratios[..count].to_vec(),
         shapes: model.contact_modes.columns(0, count).into_owned(),
         residual,

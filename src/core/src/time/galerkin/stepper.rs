@@ -2,7 +2,6 @@
 
 use super::scene_island::SceneIsland;
 use crate::geometry::PrescribedMotion;
-use crate::modes::sectors::Sectors;
 use crate::system::{ContactPair, SearchStart, StepFailure, System};
 use crate::time::Stepper;
 
@@ -26,7 +25,7 @@ impl Galerkin {
             let clearance = |pairs: &mut dyn Iterator<Item = &ContactPair>| {
                 tolerance * pairs.map(|pair| pair.gap().clearance()).fold(f64::INFINITY, f64::min)
             };
-            let is_disk = |one: &usize| system.structures[*one].modes().coupled().is_some();
+            let is_disk = |one: &usize| system.structures[*one].modes().disk().is_some();
             if members.iter().any(is_disk) || own().any(|pair| pair.carrier().is_some()) {
                 let tolerance = clearance(&mut own());
                 coupled.push(SceneIsland::coupled(set, members, system, longest, tolerance));
@@ -95,8 +94,8 @@ impl Stepper for Galerkin {
 
     fn begin_loads(&mut self, system: &mut System) {
         for structure in &mut system.structures {
-            if let Sectors::Uncoupled(bank) = structure.modes_mut() {
-                bank.begin_loads();
+            if structure.bank().is_some() {
+                structure.modes_mut().begin_loads();
             }
         }
     }

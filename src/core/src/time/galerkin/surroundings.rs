@@ -5,7 +5,7 @@ use super::compliance::Lanes;
 use super::level::StepTables;
 use super::trial::{ForceInterpolation, Obstacle, Trial};
 use crate::math::vector::Vector3;
-use crate::modes::cyclic::CyclicBank;
+use crate::modes::bank::Disk;
 
 /// A step that is accepted.
 #[derive(Debug)]
@@ -91,7 +91,7 @@ pub trait Surroundings {
     fn bend(&mut self, _carriers: &[CarrierIntegrator], _point: usize) {}
 
     /// Returns the modes of the structure of a disk.
-    fn disk(&mut self, _structure: usize) -> Option<&mut CyclicBank> {
+    fn disk(&mut self, _structure: usize) -> Option<&mut Disk> {
         None
     }
 }

@@ -1,7 +1,14 @@
 //! Energies, states of rest, instruction sets, and displacements compared with modes.
 
 use super::*;
+use crate::modes::bank::{BankOptions, SectorModel};
+use crate::modes::cyclic::DiameterModes;
+use crate::scene::method::Scheme;
 use nalgebra::{Complex, DMatrix};
+
+fn bank(model: &CyclicModel, loads: bool) -> ModalBank {
+    ModalBank::new(SectorModel::Coupled(model), BankOptions { loads, ..BankOptions::default() })
+}
 
 pub(super) fn model(sectors: usize, nodes: usize) -> CyclicModel {
     let diameter = |n: usize| {
@@ -13,7 +20,6 @@ pub(super) fn model(sectors: usize, nodes: usize) -> CyclicModel {
             Complex::new(x.sin(), if real { 0.0 } else { (1.3 * x).cos() })
         };
         DiameterModes {
-            nodal_diameter: n,
             frequencies: (1..=modes).map(|mode| 700.0 * (mode * mode) as f64 + 50.0 * n as f64).collect(),
             damping_ratios: vec![0.005; modes],
             contact_modes: DMatrix::from_fn(3 * nodes, modes, shape),
@@ -29,13 +35,13 @@ pub(super) fn model(sectors: usize, nodes: usize) -> CyclicModel {
 fn instantaneous_energy_matches_the_motion() {
     let mut undamped = model(11, 2);
     undamped.set_damping_ratio(0.0, &[]);
-    let mut bank = CyclicBank::new(&undamped, false);
+    let mut bank = bank(&undamped, false);
     bank.set_step(Scheme::ModalExact, 2e-5);
     let mut expected = 0.0;
     for (n, diameter) in undamped.diameters.iter().enumerate() {
         for (mode, frequency) in diameter.frequencies.iter().enumerate() {
             let (q, v) = (1e-4 / (1.0 + mode as f64), 0.3 - 0.1 * n as f64);
-            bank.set_modal_state(n, mode, [q, -0.5 * q], [v, 0.2 * v]);
+            bank.set_amplitude(mode, n, [q, -0.5 * q], [v, 0.2 * v]);
             let parts = if undamped.is_real(n) { [1.0, 0.0] } else { [1.0, 1.0] };
             let square = |a: f64, b: f64| parts[0] * a * a + parts[1] * b * b;
             expected += 0.5 * square(v, 0.2 * v) + 0.5 * frequency * frequency * square(q, 0.5 * q);
@@ -53,12 +59,14 @@ fn instantaneous_energy_matches_the_motion() {
 #[test]
 fn reset_to_rest_clears_previous_loads() {
     for scheme in [Scheme::ModalExact, Scheme::CentralDifference, Scheme::MasslessBoundary] {
-        let mut bank = CyclicBank::new(&model(11, 2), true);
+        let mut bank = bank(&model(11, 2), true);
         bank.set_step(scheme, 1e-6);
         for step in 0..5 {
             bank.loads_mut()[1] = 1e3;
             bank.predict();
-            bank.ask([(3, 0, Vector3::new(1.0, 0.3, -0.2)), (step, 1, Vector3::new(-2.0, 0.0, 0.5))].into_iter());
+            bank.disk_mut()
+                .unwrap()
+                .ask([(3, 0, Vector3::new(1.0, 0.3, -0.2)), (step, 1, Vector3::new(-2.0, 0.0, 0.5))].into_iter());
             bank.act();
             assert!(bank.finish_loads() != 0.0);
         }
@@ -79,12 +87,12 @@ fn reset_to_rest_clears_previous_loads() {
 fn quasi_static_modes_start_without_motion() {
     let mut undamped = model(8, 1);
     undamped.set_damping_ratio(0.0, &[]);
-    let mut bank = CyclicBank::new(&undamped, false);
+    let mut bank = bank(&undamped, false);
     bank.set_step(Scheme::MasslessBoundary, 1e-6);
     let mut expected = 0.0;
     for (n, diameter) in undamped.diameters.iter().enumerate() {
         for (mode, frequency) in diameter.frequencies.iter().enumerate() {
-            bank.set_modal_state(n, mode, [1e-4, 0.0], [0.3, 0.0]);
+            bank.set_amplitude(mode, n, [1e-4, 0.0], [0.3, 0.0]);
             let dynamic = mode + diameter.quasi_static < diameter.len();
             expected += if dynamic { 0.5 * (0.09 + (1e-4 * frequency).powi(2)) } else { 0.0 };
         }
@@ -100,8 +108,9 @@ fn every_instruction_set_gives_the_same_bits() {
     for (sectors, nodes) in [(13, 1), (20, 2), (36, 5)] {
         for scheme in [Scheme::ModalExact, Scheme::MasslessBoundary] {
             let run = |instruction_set| {
-                let mut bank = CyclicBank::new(&model(sectors, nodes), true);
+                let mut bank = bank(&model(sectors, nodes), true);
                 bank.instruction_set = instruction_set;
+                bank.disk_mut().unwrap().instruction_set = instruction_set;
                 bank.set_step(scheme, 1e-6);
                 for step in 0..300 {
                     bank.loads_mut()[1] = 1e3;
@@ -110,7 +119,7 @@ fn every_instruction_set_gives_the_same_bits() {
                         let force = Vector3::new(f64::from(step).cos(), 0.3, -0.2);
                         let index = usize::try_from(step).unwrap();
                         let forces = [(index % sectors, index % nodes, force), (index * 5 % sectors, 0, force)];
-                        bank.ask(forces.into_iter());
+                        bank.disk_mut().unwrap().ask(forces.into_iter());
                         bank.act();
                     }
                     if step % 50 == 0 {
@@ -119,7 +128,7 @@ fn every_instruction_set_gives_the_same_bits() {
                 }
                 let loss = bank.collect_loss().to_bits();
                 let state = &bank.state;
-                let modes = state.position.iter().chain(&state.increment).flatten().flatten();
+                let modes = state.position.iter().chain(&state.increment);
                 let bits = modes.chain(&state.displacement).map(|value| value.to_bits());
                 (bits.collect::<Vec<_>>(), loss)
             };
@@ -135,11 +144,11 @@ fn every_instruction_set_gives_the_same_bits() {
 /// Contact displacements that were corrected immediately agree with those of the modes, which are corrected later.
 #[test]
 fn displacements_and_modes_agree_after_contact() {
-    let mut bank = CyclicBank::new(&model(11, 2), false);
+    let mut bank = bank(&model(11, 2), false);
     bank.set_step(Scheme::ModalExact, 1e-4);
     for step in 0..200_usize {
         bank.predict();
-        bank.ask(
+        bank.disk_mut().unwrap().ask(
             [(step % 11, step % 2, Vector3::new(1.0, -0.4, 0.1)), (3, 0, Vector3::new(0.2, 0.5, -1.0))].into_iter(),
         );
         bank.act();

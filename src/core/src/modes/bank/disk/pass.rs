@@ -1,23 +1,24 @@
 //! The fused pass over all modes: forces of the previous step, damping loss, prediction and recovery.
 //!
 //! Contact forces of a step are applied to the modes in the next pass, which loads the contact modes anyway; until then they are
-//! stored as a spectrum (see [`CyclicBank::finish`](super::CyclicBank::finish)). Accumulators stay in registers and sums run mode
-//! by mode for every lane, so that wider registers do not change the result.
+//! stored as a spectrum (see `ModalBank::finish`). Accumulators stay in registers and sums run mode by mode for every lane, so that
+//! wider registers do not change the result.
 
 use super::fourier::Fourier;
 use crate::math::simd::Kernel;
 use crate::math::vector::Vector3;
 use crate::modes::bank::LANES;
+use crate::modes::schemes::ModeCoefficients;
 
 /// One complex value per lane: real and imaginary parts.
-pub(crate) type Complexes = [[f64; LANES]; 2];
+pub(in crate::modes::bank) type Complexes = [[f64; LANES]; 2];
 
 /// Rows recovered in the fused pass: three contact nodes.
 const FUSED: usize = 9;
 
 /// Coefficients of one mode for the lanes of a block (see [`crate::modes::schemes`]); 0 where there is no such mode.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct CyclicCoefficients {
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct LaneCoefficients {
     pub beta: [f64; LANES],
     pub kappa: [f64; LANES],
     pub loss: [f64; LANES],
@@ -25,26 +26,24 @@ pub(crate) struct CyclicCoefficients {
     pub delayed: [f64; LANES],
 }
 
-impl CyclicCoefficients {
-    pub const NONE: Self = Self {
-        beta: [0.0; LANES],
-        kappa: [0.0; LANES],
-        loss: [0.0; LANES],
-        compliance: [0.0; LANES],
-        delayed: [0.0; LANES],
-    };
+impl LaneCoefficients {
+    /// Sets the coefficients of one lane.
+    pub fn set(&mut self, lane: usize, k: &ModeCoefficients) {
+        (self.beta[lane], self.kappa[lane], self.loss[lane]) = (k.beta, k.kappa, k.loss);
+        (self.compliance[lane], self.delayed[lane]) = (k.compliance, k.delayed);
+    }
 }
 
 /// Data of one pass. Arrays of modes are `[block][mode]`, spectra `[block][row]`.
 ///
 /// `APPLY`: the contact forces of the previous step act with their compliance first. `DELAYED`: they also act on the predicted
 /// step (massless-boundary). `LOSS`: add the damping loss of the previous step. `ADVANCE`: predict and recover.
-pub struct Pass<'a, const APPLY: bool, const DELAYED: bool, const LOSS: bool, const ADVANCE: bool> {
+pub(super) struct Pass<'a, const APPLY: bool, const DELAYED: bool, const LOSS: bool, const ADVANCE: bool> {
     pub modes: usize,
     pub rows: usize,
     /// Contact nodes on which the forces act.
     pub touched: &'a [bool],
-    pub coefficients: &'a [CyclicCoefficients],
+    pub coefficients: &'a [LaneCoefficients],
     /// Ψ, `[block][mode][row]`.
     pub shapes: &'a [Complexes],
     /// Contact forces of the previous step.
@@ -146,64 +145,71 @@ impl<const APPLY: bool, const DELAYED: bool, const LOSS: bool, const ADVANCE: bo
         }
         if ADVANCE {
             self.spectrum[block * rows..][..ROWS].copy_from_slice(&sums);
-            self.recover(block, ROWS);
-        }
-    }
-
-    /// Recovers the rows from `row` on, for which the fused pass has no registers.
-    #[inline(always)]
-    fn recover(&mut self, block: usize, mut row: usize) {
-        let (modes, rows) = (self.modes, self.rows);
-        let shapes = &self.shapes[block * modes * rows..][..modes * rows];
-        let position = &self.position[block * modes..][..modes];
-        while row < rows {
-            let spectrum = &mut self.spectrum[block * rows + row..];
-            row += match rows - row {
-                9.. => recover::<9>(shapes, row, rows, position, spectrum),
-                6.. => recover::<6>(shapes, row, rows, position, spectrum),
-                _ => recover::<3>(shapes, row, rows, position, spectrum),
-            };
+            let (shapes, position) = (&self.shapes[block * modes * rows..], &self.position[block * modes..][..modes]);
+            combine(shapes, position, None, ROWS, &mut self.spectrum[block * rows..][..rows]);
         }
     }
 }
 
-/// Recovers U = Σ Ψ q of `ROWS` rows from `first` on, for one block. Returns `ROWS`.
-#[inline(always)]
-fn recover<const ROWS: usize>(
-    shapes: &[Complexes],
-    first: usize,
-    rows: usize,
-    position: &[Complexes],
-    spectrum: &mut [Complexes],
-) -> usize {
-    let mut sums = [[[0.0; LANES]; 2]; ROWS];
-    for (q, shapes) in position.iter().zip(shapes.chunks_exact(rows)) {
-        add_rows(&mut sums, &shapes[first..], q);
-    }
-    spectrum[..ROWS].copy_from_slice(&sums);
-    ROWS
-}
-
-/// Recovers Σ Ψ q for all rows, without prediction.
-pub struct Recover<'a> {
-    pub modes: usize,
+/// Spectra of rows as combinations of columns: displacements from amplitudes, U = Σ Ψ q, or over one step from forces, U = Ĝ F.
+pub(super) struct Combination<'a> {
+    pub columns: usize,
     pub rows: usize,
-    pub shapes: &'a [Complexes],
-    pub position: &'a [Complexes],
+    /// `[block][column][row]`.
+    pub matrix: &'a [Complexes],
+    /// `[block][column]`.
+    pub values: &'a [Complexes],
+    /// Contact nodes whose columns count; `None` if all columns count.
+    pub touched: Option<&'a [bool]>,
     pub spectrum: &'a mut [Complexes],
 }
 
-impl Kernel for Recover<'_> {
+impl Kernel for Combination<'_> {
     #[inline(always)]
     fn run(self) {
-        let Self { modes, rows, shapes, position, spectrum } = self;
-        for (block, spectrum) in spectrum.chunks_exact_mut(rows).enumerate() {
-            let shapes = &shapes[block * modes * rows..][..modes * rows];
-            for row in (0..rows).step_by(3) {
-                recover::<3>(shapes, row, rows, &position[block * modes..][..modes], &mut spectrum[row..]);
-            }
+        let Self { columns, rows, matrix, values, touched, spectrum } = self;
+        let blocks = matrix.chunks_exact(columns * rows).zip(values.chunks_exact(columns));
+        for ((matrix, values), spectrum) in blocks.zip(spectrum.chunks_exact_mut(rows)) {
+            combine(matrix, values, touched, 0, spectrum);
         }
     }
+}
+
+/// Combines the columns of the rows from `row` on, for one block, in groups of rows that fit the registers.
+#[inline(always)]
+fn combine(
+    matrix: &[Complexes],
+    values: &[Complexes],
+    touched: Option<&[bool]>,
+    mut row: usize,
+    spectrum: &mut [Complexes],
+) {
+    while row < spectrum.len() {
+        row += match spectrum.len() - row {
+            9.. => combine_rows::<9>(matrix, values, touched, row, spectrum),
+            6.. => combine_rows::<6>(matrix, values, touched, row, spectrum),
+            _ => combine_rows::<3>(matrix, values, touched, row, spectrum),
+        };
+    }
+}
+
+/// Combines the columns of `ROWS` rows from `first` on. Returns `ROWS`.
+#[inline(always)]
+fn combine_rows<const ROWS: usize>(
+    matrix: &[Complexes],
+    values: &[Complexes],
+    touched: Option<&[bool]>,
+    first: usize,
+    spectrum: &mut [Complexes],
+) -> usize {
+    let mut sums = [[[0.0; LANES]; 2]; ROWS];
+    for (column, (entries, value)) in matrix.chunks_exact(spectrum.len()).zip(values).enumerate() {
+        if touched.is_none_or(|touched| touched[column / 3]) {
+            add_rows(&mut sums, &entries[first..], value);
+        }
+    }
+    spectrum[first..][..ROWS].copy_from_slice(&sums);
+    ROWS
 }
 
 #[inline(always)]
@@ -220,7 +226,7 @@ fn add_rows<const ROWS: usize>(sums: &mut [Complexes; ROWS], shapes: &[Complexes
 
 /// Returns p = Ψᴴ F over the contact nodes with forces.
 #[inline(always)]
-pub(crate) fn modal_force(touched: &[bool], shapes: &[Complexes], force: &[Complexes]) -> Complexes {
+pub(super) fn modal_force(touched: &[bool], shapes: &[Complexes], force: &[Complexes]) -> Complexes {
     let mut sums = [[0.0; LANES]; 2];
     let (shapes, force) = (shapes.as_chunks::<3>().0, force.as_chunks::<3>().0);
     for ((touched, shapes), force) in touched.iter().zip(shapes).zip(force) {
@@ -242,57 +248,8 @@ pub(crate) fn modal_force(touched: &[bool], shapes: &[Complexes], force: &[Compl
     sums
 }
 
-/// Spectrum of the displacements that the forces of a spectrum cause over one step: U = Ĝ F, with Ĝ
-/// `[block][column][row]`.
-pub(crate) struct SpectralResponse<'a> {
-    pub rows: usize,
-    pub touched: &'a [bool],
-    pub flexibility: &'a [Complexes],
-    pub force: &'a [Complexes],
-    pub spectrum: &'a mut [Complexes],
-}
-
-impl Kernel for SpectralResponse<'_> {
-    #[inline(always)]
-    fn run(self) {
-        let rows = self.rows;
-        for (block, spectrum) in self.spectrum.chunks_exact_mut(rows).enumerate() {
-            let force = &self.force[block * rows..][..rows];
-            let flexibility = &self.flexibility[block * rows * rows..][..rows * rows];
-            let mut row = 0;
-            while row < rows {
-                let target = &mut spectrum[row..];
-                row += match rows - row {
-                    9.. => answer::<9>(self.touched, flexibility, row, rows, force, target),
-                    6.. => answer::<6>(self.touched, flexibility, row, rows, force, target),
-                    _ => answer::<3>(self.touched, flexibility, row, rows, force, target),
-                };
-            }
-        }
-    }
-}
-
-#[inline(always)]
-fn answer<const ROWS: usize>(
-    touched: &[bool],
-    flexibility: &[Complexes],
-    first: usize,
-    rows: usize,
-    force: &[Complexes],
-    spectrum: &mut [Complexes],
-) -> usize {
-    let mut sums = [[[0.0; LANES]; 2]; ROWS];
-    for (column, (entries, force)) in flexibility.chunks_exact(rows).zip(force).enumerate() {
-        if touched[column / 3] {
-            add_rows(&mut sums, &entries[first..], force);
-        }
-    }
-    spectrum[..ROWS].copy_from_slice(&sums);
-    ROWS
-}
-
 /// Spectrum of the forces on some nodes.
-pub(crate) struct Gather<'a> {
+pub(super) struct Gather<'a> {
     pub fourier: &'a Fourier,
     pub rows: usize,
     /// (sector, node, force).
