@@ -28,6 +28,7 @@ mod fmi3;
 mod load;
 #[forbid(unsafe_code)]
 mod location;
+mod shared;
 #[forbid(unsafe_code)]
 mod slave;
 

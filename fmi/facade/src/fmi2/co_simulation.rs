@@ -25,8 +25,7 @@ pub(super) extern "C" fn fmi2SetRealInputDerivatives(
         let references = vr.array(nvr, limit, "vr")?;
         let (orders, values) = (order.array(nvr, limit, "order")?, value.array(nvr, limit, "value")?);
         slave.elements(&AccessRequest { type_name: "Real", references, values: nvr })?;
-        slave.set_input_derivatives(references, orders, values)?;
-        Ok(FmiStatus::Ok)
+        slave.set_input_derivatives(references, orders, values)
     })
 }
 
@@ -44,8 +43,7 @@ pub(super) extern "C" fn fmi2GetRealOutputDerivatives(
         let orders = order.array(nvr, limit, "order")?;
         let window = value.window(nvr, "value")?;
         let elements = slave.elements(&AccessRequest { type_name: "Real", references, values: nvr })?;
-        window.fill(&slave.output_derivatives(&elements, orders)?);
-        Ok(FmiStatus::Ok)
+        slave.output_derivatives(&elements, orders).map(|values| window.fill(&values))
     })
 }
 
@@ -56,15 +54,12 @@ pub(super) extern "C" fn fmi2DoStep(
     communicationStepSize: f64,
     _noSetFMUStatePriorToCurrentPoint: Boolean,
 ) -> FmiStatus {
-    guard(c, &order::DO_STEP, |slave| {
-        slave.step(currentCommunicationPoint, communicationStepSize)?;
-        Ok(FmiStatus::Ok)
-    })
+    guard(c, &order::DO_STEP, |slave| slave.step(currentCommunicationPoint, communicationStepSize))
 }
 
 /// Answers a status request. No step is ever pending, so most status kinds have no information and return `fmi2Discard`
 /// (FMI 2.0.4, section 4.2.3).
-fn status<T: Copy>(kind: i32, value: &Out<T>, answer: Option<T>) -> Result<FmiStatus> {
+fn status<T: Copy>(kind: i32, value: &Out<T>, answer: Option<T>) -> Result<()> {
     let window = value.single("value")?;
     let nothing = || {
         Refusal::discard(format!(
@@ -72,8 +67,7 @@ fn status<T: Copy>(kind: i32, value: &Out<T>, answer: Option<T>) -> Result<FmiSt
              fmi2LastSuccessfulTime (2), or fmi2GetBooleanStatus with fmi2Terminated (3)"
         ))
     };
-    window.fill(&[answer.ok_or_else(nothing)?]);
-    Ok(FmiStatus::Ok)
+    answer.ok_or_else(nothing).map(|answer| window.fill(&[answer]))
 }
 
 #[unsafe(no_mangle)]
