@@ -133,6 +133,20 @@ pub struct VariableUnit {
     pub display: &'static [(&'static str, f64)],
 }
 
+/// Defines units: name of the constant, name of the unit, quantity, exponents of kg, m, s, rad, K, and display units.
+#[macro_export]
+macro_rules! units {
+    ($($constant:ident $name:literal $quantity:literal [$($exponents:literal),*] [$($display:expr),*];)*) => {$(
+        #[doc = $name]
+        pub(crate) static $constant: $crate::variables::VariableUnit = $crate::variables::VariableUnit {
+            name: $name,
+            quantity: $quantity,
+            exponents: [$($exponents),*],
+            display: &[$($display),*],
+        };
+    )*};
+}
+
 /// Relation of a value to the last communication step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Span {

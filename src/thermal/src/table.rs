@@ -2,10 +2,10 @@
 
 use std::ops::RangeInclusive;
 
-use tiprub_cosim::Result;
 use tiprub_cosim::variables::{
     Causality, DataType, Enumeration, Quantity, Span, StartValue, Variability, Variable, VariableTable, VariableUnit,
 };
+use tiprub_cosim::{Result, units};
 
 use crate::model::ConductionModel;
 
@@ -16,18 +16,14 @@ pub(crate) const HEAT: RangeInclusive<f64> = -1e9..=1e9;
 /// Range of the factors on film coefficients.
 pub(crate) const FACTORS: RangeInclusive<f64> = 0.0..=1e3;
 
-static KELVIN: VariableUnit =
-    VariableUnit { name: "K", quantity: "TemperatureDifference", exponents: [0, 0, 0, 0, 1], display: &[] };
-static WATT: VariableUnit =
-    VariableUnit { name: "W", quantity: "Power", exponents: [1, 2, -3, 0, 0], display: &[("kW", 1e-3)] };
-static JOULE: VariableUnit =
-    VariableUnit { name: "J", quantity: "Energy", exponents: [1, 2, -2, 0, 0], display: &[("kJ", 1e-3)] };
-static CAPACITY: VariableUnit =
-    VariableUnit { name: "J/K", quantity: "HeatCapacity", exponents: [1, 2, -2, 0, -1], display: &[] };
-static CONDUCTANCE: VariableUnit =
-    VariableUnit { name: "W/K", quantity: "ThermalConductance", exponents: [1, 2, -3, 0, -1], display: &[] };
-static SECOND: VariableUnit =
-    VariableUnit { name: "s", quantity: "Time", exponents: [0, 0, 1, 0, 0], display: &[("min", 1.0 / 60.0)] };
+units! {
+    KELVIN "K" "TemperatureDifference" [0, 0, 0, 0, 1] [];
+    WATT "W" "Power" [1, 2, -3, 0, 0] [("kW", 1e-3)];
+    JOULE "J" "Energy" [1, 2, -2, 0, 0] [("kJ", 1e-3)];
+    CAPACITY "J/K" "HeatCapacity" [1, 2, -2, 0, -1] [];
+    CONDUCTANCE "W/K" "ThermalConductance" [1, 2, -3, 0, -1] [];
+    SECOND "s" "Time" [0, 0, 1, 0, 0] [("min", 1.0 / 60.0)];
+}
 
 static INITIAL_STATES: Enumeration = Enumeration {
     name: "InitialState",
