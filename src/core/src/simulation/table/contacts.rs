@@ -4,7 +4,7 @@ use tiprub_cosim::variables::{DataType, Quantity, Span, Variability, VariableUni
 
 use super::builder::TableBuilder;
 use super::features;
-use super::parts::{BodyFacts, TableFacts};
+use super::parts::TableFacts;
 use crate::scene::settings::{BodyMotion, SceneSettings};
 use crate::simulation::outputs::{OutputView, scalar};
 use crate::simulation::units::{ENERGY, FORCE, IMPULSE, POWER, TIME};
@@ -60,13 +60,20 @@ pub fn totals(table: &mut TableBuilder, friction: bool) {
     (touching.kind, touching.variability) = (DataType::Boolean, Variability::Discrete);
 }
 
-/// Name, span, quantity if other code looks it up, text, and the term of the ledger or the instantaneous energy.
-type Energy = (&'static str, Span, Quantity, &'static str, fn(&OutputView) -> f64);
+/// Name, span, quantity, text, the term of the ledger or the instantaneous energy, and whether a scene has the row.
+type Energy = (&'static str, Span, Quantity, &'static str, fn(&OutputView) -> f64, fn(&TableFacts) -> bool);
 
-/// All rows of the ledger; rows without text have different texts for rotors and for free bodies.
-const ENERGIES: [Energy; 19] = [
-    ("kinetic_energy", Span::Point, Quantity::KineticEnergy, "", |view| view.energies.0),
-    ("strain_energy", Span::Point, Quantity::StrainEnergy, "", |view| view.energies.1),
+/// Defines rows of terms of the ledger: quantity, name, term, text, and whether a scene has the row.
+macro_rules! terms {
+    ($($quantity:ident $name:literal $($term:ident).+ $text:expr, $exists:expr;)*) => {
+        [$(($name, Span::Total, Quantity::$quantity, $text, |view| view.ledger().$($term).+(), $exists)),*]
+    };
+}
+
+/// Instantaneous energies; rows without text have different texts for rotors and for free bodies.
+const STATES: [Energy; 3] = [
+    ("kinetic_energy", Span::Point, Quantity::KineticEnergy, "", |view| view.energies.0, |_| true),
+    ("strain_energy", Span::Point, Quantity::StrainEnergy, "", |view| view.energies.1, |_| true),
     (
         "scheme_energy",
         Span::Point,
@@ -74,112 +81,68 @@ const ENERGIES: [Energy; 19] = [
         "Energy conserved by the time scheme and used in the energy balance: kinetic plus strain energy, up to a \
          difference of second order in the step",
         |view| view.conserved,
+        |_| true,
     ),
-    (
-        "damping_loss",
-        Span::Total,
-        Quantity::DampingLoss,
-        "Energy dissipated by modal damping since the start",
-        |view| view.ledger().damping_loss.value(),
-    ),
-    ("friction_loss", Span::Total, Quantity::FrictionLoss, "Energy dissipated by friction since the start", |view| {
-        view.ledger().friction_loss.value()
-    }),
-    ("impact_loss", Span::Total, Quantity::ImpactLoss, "", |view| view.ledger().impact_loss.value()),
-    (
-        "wear_work",
-        Span::Total,
-        Quantity::Output,
+];
+
+/// Terms of the ledger.
+const TERMS: [Energy; 15] = terms! {
+    DampingLoss "damping_loss" damping_loss.value "Energy dissipated by modal damping since the start", |_| true;
+    FrictionLoss "friction_loss" friction_loss.value
+        "Energy dissipated by friction since the start",
+        |parts| parts.has_friction();
+    ImpactLoss "impact_loss" impact_loss.value "", |_| true;
+    Output "wear_work" wear_work.value
         "Work of the normal force of the coating against the approaching blades since the start",
-        |view| view.ledger().wear_work.value(),
-    ),
-    (
-        "cutting_work",
-        Span::Total,
-        Quantity::Output,
+        |parts| parts.pairs.iter().any(|pair| pair.contact.coating.is_some());
+    Output "cutting_work" cutting_work.value
         "Work spent on cutting the coating since the start: specific cutting energy times removed volume",
-        |view| view.ledger().cutting_work.value(),
-    ),
-    (
-        "load_work",
-        Span::Total,
-        Quantity::Output,
+        |parts| parts.is_cut();
+    Output "load_work" load_work.value
         "Work of centrifugal, thermal and nodal-diameter loads since the start",
-        |view| view.ledger().load_work.value(),
-    ),
-    (
-        "excitation_work",
-        Span::Total,
-        Quantity::Output,
+        features::is_loaded;
+    Output "excitation_work" excitation_work.value
         "Work of the excitation of the blades since the start",
-        |view| view.ledger().excitation_work.value(),
-    ),
-    (
-        "external_work",
-        Span::Total,
-        Quantity::ExternalWork,
+        |parts| parts.bodies.iter().any(|body| body.structure.excitation.is_some());
+    ExternalWork "external_work" external_work
         "Work of all inputs except loads since the start: shaft, whirl, axial shift, casing motion",
-        |view| view.ledger().external_work(),
-    ),
-    (
-        "shaft_work",
-        Span::Total,
-        Quantity::Output,
+        // Free bodies have no inputs that could do work.
+        |parts| parts.bodies.iter().any(|body| !body.free);
+    Output "shaft_work" shaft_work.value
         "Work of the shaft through the contacts since the start: minus the integral of torque times speed",
-        |view| view.ledger().shaft_work.value(),
-    ),
-    (
-        "stiffening_work",
-        Span::Total,
-        Quantity::Output,
+        |parts| parts.bodies.iter().any(|body| body.structure.motion == BodyMotion::Rotating);
+    Output "stiffening_work" stiffening_work.value
         "Strain energy added since the start by centrifugal stiffening when the speed changes",
-        |view| view.ledger().stiffening_work.value(),
-    ),
-    (
-        "whirl_work",
-        Span::Total,
-        Quantity::Output,
+        |parts| parts.bodies.iter().any(|body| body.structure.spin.stiffening) || softens(parts);
+    Output "whirl_work" whirl_work.value
         "Work of the whirling shaft since the start: minus the integral of force times velocity of its centre",
-        |view| view.ledger().whirl_work.value(),
-    ),
-    ("shift_work", Span::Total, Quantity::Output, "Work of the axial shift of the rotor since the start", |view| {
-        view.ledger().shift_work.value()
-    }),
-    (
-        "casing_motion_work",
-        Span::Total,
-        Quantity::Output,
+        |parts| parts.bodies.iter().any(|body| body.structure.whirl);
+    Output "shift_work" shift_work.value
+        "Work of the axial shift of the rotor since the start",
+        |parts| parts.bodies.iter().any(|body| body.structure.axial_shift);
+    Output "casing_motion_work" casing_work.value
         "Work of the prescribed motion of the casing (radius, gap offset, shape) since the start",
-        |view| view.ledger().casing_work.value(),
-    ),
-    (
-        "curvature_work",
-        Span::Total,
-        Quantity::CurvatureWork,
+        |parts| parts.pairs.iter().any(|pair| pair.surface.moving);
+    CurvatureWork "curvature_work" curvature_work.value
         "Spurious energy added by contact forces since the start because of rotating normals and surface curvature within an \
          internal step (vanishes with the step)",
-        |view| view.ledger().curvature_work.value(),
-    ),
-    (
-        "step_change_energy",
-        Span::Total,
-        Quantity::Output,
+        |_| true;
+    Output "step_change_energy" step_change.value
         "Energy added by changes of the internal step since the start",
-        |view| view.ledger().step_change.value(),
-    ),
-    ("energy_residual", Span::Point, Quantity::Output, "Residual of the energy balance", |view| {
-        view.ledger().residual(view.conserved)
-    }),
-];
+        |_| true;
+};
 
 /// Adds the rows of the ledger that the scene needs.
 pub fn energies(table: &mut TableBuilder, parts: &TableFacts) {
     let mut words = energy_descriptions(parts).into_iter();
-    for (name, span, quantity, text, read) in ENERGIES.into_iter().filter(|row| exists(parts, row.0)) {
+    for (name, span, quantity, text, read, _) in STATES.into_iter().chain(TERMS).filter(|row| row.5(parts)) {
         let text = if text.is_empty() { words.next().unwrap_or_default() } else { text };
         let text = if name == "stiffening_work" && softens(parts) { SOFTENED } else { text };
         table.output(name, span, Some((&ENERGY, 1.0)), text, scalar(read)).quantity = quantity;
     }
+    let read = scalar(|view| view.ledger().residual(view.conserved));
+    let text = "Residual of the energy balance";
+    table.output("energy_residual", Span::Point, Some((&ENERGY, 1.0)), text, read);
     let relative = table.output(
         "energy_residual_relative",
         Span::Point,
@@ -212,26 +175,6 @@ fn energy_descriptions(parts: &TableFacts) -> [&'static str; 3] {
         "Instantaneous strain energy",
         "Energy lost since the start when contact nodes hit the casing",
     ]
-}
-
-fn exists(parts: &TableFacts, name: &str) -> bool {
-    let (bodies, pairs) = (&parts.bodies, &parts.pairs);
-    let turns = |body: &BodyFacts| body.structure.motion == BodyMotion::Rotating;
-    match name {
-        "friction_loss" => parts.has_friction(),
-        "wear_work" => pairs.iter().any(|pair| pair.contact.coating.is_some()),
-        "cutting_work" => parts.is_cut(),
-        "load_work" => features::is_loaded(parts),
-        "excitation_work" => bodies.iter().any(|body| body.structure.excitation.is_some()),
-        // Free bodies have no inputs that could do work.
-        "external_work" => bodies.iter().any(|body| !body.free),
-        "shaft_work" => bodies.iter().any(turns),
-        "stiffening_work" => bodies.iter().any(|body| body.structure.spin.stiffening) || softens(parts),
-        "whirl_work" => bodies.iter().any(|body| body.structure.whirl),
-        "shift_work" => bodies.iter().any(|body| body.structure.axial_shift),
-        "casing_motion_work" => pairs.iter().any(|pair| pair.surface.moving),
-        _ => true,
-    }
 }
 
 /// Name, text, and the count.
