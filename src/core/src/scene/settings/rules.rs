@@ -49,7 +49,8 @@ const COUPLED: RelatedFeature = ("a ROM whose sectors are coupled by harmonics",
 
 /// Rules of structures, surfaces and contacts.
 static PARTS: &[FeatureRule] = rules! {
-    [SPEED, FACTORS, STIFFENING, GROWTH, CORIOLIS, WHIRL, AXIAL_SHIFT, SOFTENING, EXCITATION, INITIAL] needs ("`motion = \"rotating\"`", |at| at.structure().motion == BodyMotion::Rotating),
+    [SPEED, FACTORS, STIFFENING, GROWTH, CORIOLIS, WHIRL, AXIAL_SHIFT, SOFTENING, EXCITATION, INITIAL] needs
+        ("`motion = \"rotating\"`", |at| at.structure().motion == BodyMotion::Rotating),
         "only a rotating structure has a speed, blades and a shaft",
         "Remove the line, or set motion = \"rotating\"";
     [LOAD] needs ("`motion = \"still\"`", |at| at.structure().motion == BodyMotion::Still),
@@ -64,7 +65,8 @@ static PARTS: &[FeatureRule] = rules! {
     [VELOCITY] needs ("`motion = \"free\"`", |at| at.structure().motion == BodyMotion::Free),
         "only a free structure has an initial velocity",
         "Remove the line, or set motion = \"free\"";
-    [CARRIED] needs ("a structure with `motion = \"still\"`", |at| at.carrier().is_some_and(|own| own.motion == BodyMotion::Still)),
+    [CARRIED] needs
+        ("a structure with `motion = \"still\"`", |at| at.carrier().is_some_and(|own| own.motion == BodyMotion::Still)),
         "only a stationary structure can carry a surface",
         "Name a stationary structure, or remove the line for a rigid surface";
     [CARRIED] excludes ("a structure that is the master of a contact", |at| at.carrier_touches()),
@@ -150,7 +152,8 @@ static METHODS: &[FeatureRule] = rules! {
     [MASSLESS] excludes ("`structure.spin.coriolis`", |at| at.settings.structures.iter().any(|own| own.spin.coriolis)),
         "its quasi-static modes have no velocity, on which the Coriolis force depends",
         "Use \"modal-exact\", or leave out the Coriolis force";
-    [GALERKIN] excludes ("`structure.spin`", |at| at.settings.structures.iter().any(|own| own.spin != SpinSettings::default())),
+    [GALERKIN] excludes
+        ("`structure.spin`", |at| at.settings.structures.iter().any(|own| own.spin != SpinSettings::default())),
         "its step tables assume that modes keep their stiffness and are loaded by contact alone",
         "Use \"modal-exact\", or leave out the effects of spin";
     [GALERKIN] excludes ("`structure.thermal` of a rotor or `structure.excitation`", |at| {
@@ -184,7 +187,8 @@ static METHODS: &[FeatureRule] = rules! {
     [QUASI_STATIC] needs ("more than three modes per contact node", |at| at.has_modes_left()),
         "it makes the highest modes quasi-static, three per contact node, and at least one other mode must remain",
         "Use more modes or fewer contact nodes, or \"modal-exact\"";
-    [MASSLESS] excludes ("several surfaces on one flexible structure", |at| at.contacts().any(|at| at.shares_carrier())),
+    [MASSLESS] excludes
+        ("several surfaces on one flexible structure", |at| at.contacts().any(|at| at.shares_carrier())),
         "the largest stable step is unknown in this case",
         "Use \"modal-exact\" or \"central-difference\", or rigid surfaces";
 };
@@ -260,10 +264,12 @@ static ROMS: &[FeatureRule] = rules! {
     [LOAD] needs ("a contact grid in the ROM", |at| at.rom().extras.grid.is_some()),
         "the load acts on the rings of the grid",
         "Use a ROM with a contact grid, or remove the load";
-    [CARRIED] excludes ("a structure whose sectors are coupled by harmonics", |at| at.carrier_rom().is_some_and(Rom::is_cyclic)),
+    [CARRIED] excludes
+        ("a structure whose sectors are coupled by harmonics", |at| at.carrier_rom().is_some_and(Rom::is_cyclic)),
         "the surface interpolates the contact grid of a structure that was reduced as a whole",
         "Use a separate structure with sectors = 1 to carry the surface";
-    [CARRIED_AROUND] needs ("a contact grid in its ROM", |at| at.carrier_rom().is_some_and(|rom| rom.extras.grid.is_some())),
+    [CARRIED_AROUND] needs
+        ("a contact grid in its ROM", |at| at.carrier_rom().is_some_and(|rom| rom.extras.grid.is_some())),
         "the surface interpolates this grid",
         "Reduce the casing with `tiprub reduce casing`, or add the metadata `contact_grid`";
     [CARRIED_OPEN] needs ("an open contact grid in its ROM", |at| {
