@@ -1,62 +1,40 @@
 //! Outputs that every scene has.
 
-use tiprub_cosim::variables::{DataType, Quantity, Span, Variability, VariableUnit};
+use tiprub_cosim::variables::{DataType, Quantity, Span, Variability};
 
-use super::builder::TableBuilder;
+use super::builder::{NominalUnit, TableBuilder};
 use super::features;
 use super::parts::TableFacts;
 use crate::scene::settings::{BodyMotion, SceneSettings};
 use crate::simulation::outputs::{OutputView, scalar};
 use crate::simulation::units::{ENERGY, FORCE, IMPULSE, POWER, TIME};
 
-pub fn smallest_clearance(table: &mut TableBuilder, unit: Option<(&'static VariableUnit, f64)>, text: &str) {
-    let read = scalar(|view| view.lowest());
-    table.output("clearance_minimum", Span::Window, unit, text, read).display = Some(1);
+pub fn smallest_clearance(table: &mut TableBuilder, unit: NominalUnit, text: &str) {
+    table.output("clearance_minimum", Span::Window, unit, text, scalar(|view| view.lowest())).display(1);
 }
 
 /// Adds total forces and contact counts.
 pub fn totals(table: &mut TableBuilder, friction: bool) {
-    let peak = table.output(
-        "normal_force_peak",
-        Span::Window,
-        Some((&FORCE, 100.0)),
-        "Largest normal force of any contact node in any internal step of the communication step (grows as 1/h for impacts)",
-        scalar(|view| view.window.normal_peak),
-    );
-    peak.quantity = Quantity::NormalForcePeak;
-    table.output(
-        "normal_impulse",
-        Span::Window,
-        Some((&IMPULSE, 1e-3)),
-        "Sum of the normal impulses of all contact nodes within the communication step",
-        scalar(|view| view.whole_normal_impulse()),
-    );
+    let text = "Largest normal force of any contact node in any internal step of the communication step (grows as 1/h for \
+                impacts)";
+    let read = scalar(|view| view.window.normal_peak);
+    let peak = table.output("normal_force_peak", Span::Window, Some((&FORCE, 100.0)), text, read);
+    peak.quantity(Quantity::NormalForcePeak);
+    let text = "Sum of the normal impulses of all contact nodes within the communication step";
+    let read = scalar(|view| view.whole_normal_impulse());
+    table.output("normal_impulse", Span::Window, Some((&IMPULSE, 1e-3)), text, read);
     if friction {
-        table.output(
-            "friction_power",
-            Span::Mean,
-            Some((&POWER, 100.0)),
-            "Friction power, mean over the communication step",
-            scalar(|view| view.mean * view.window.friction_heat),
-        );
+        let text = "Friction power, mean over the communication step";
+        let read = scalar(|view| view.mean * view.window.friction_heat);
+        table.output("friction_power", Span::Mean, Some((&POWER, 100.0)), text, read);
     }
-    let count = table.output(
-        "contact_count",
-        Span::Point,
-        None,
-        "Number of contact nodes in contact at the communication point",
-        scalar(|view| view.contacts()),
-    );
-    (count.kind, count.variability, count.quantity) =
-        (DataType::Integer, Variability::Discrete, Quantity::ContactCount);
-    count.min = Some(0.0);
-    let touching = table.output(
-        "in_contact",
-        Span::Point,
-        None,
-        "Whether any contact node is in contact at the communication point",
-        scalar(|view| f64::from(u8::from(!view.system.events().is_empty()))),
-    );
+    let text = "Number of contact nodes in contact at the communication point";
+    let count = table.output("contact_count", Span::Point, None, text, scalar(|view| view.contacts()));
+    (count.kind, count.variability, count.min) = (DataType::Integer, Variability::Discrete, Some(0.0));
+    count.quantity(Quantity::ContactCount);
+    let text = "Whether any contact node is in contact at the communication point";
+    let read = scalar(|view| f64::from(u8::from(!view.system.events().is_empty())));
+    let touching = table.output("in_contact", Span::Point, None, text, read);
     (touching.kind, touching.variability) = (DataType::Boolean, Variability::Discrete);
 }
 
@@ -138,19 +116,15 @@ pub fn energies(table: &mut TableBuilder, parts: &TableFacts) {
     for (name, span, quantity, text, read, _) in STATES.into_iter().chain(TERMS).filter(|row| row.5(parts)) {
         let text = if text.is_empty() { words.next().unwrap_or_default() } else { text };
         let text = if name == "stiffening_work" && softens(parts) { SOFTENED } else { text };
-        table.output(name, span, Some((&ENERGY, 1.0)), text, scalar(read)).quantity = quantity;
+        table.output(name, span, Some((&ENERGY, 1.0)), text, scalar(read)).quantity(quantity);
     }
     let read = scalar(|view| view.ledger().residual(view.conserved));
     let text = "Residual of the energy balance";
     table.output("energy_residual", Span::Point, Some((&ENERGY, 1.0)), text, read);
-    let relative = table.output(
-        "energy_residual_relative",
-        Span::Point,
-        None,
-        "Residual of the energy balance relative to the initial energy plus all work exchanged",
-        scalar(|view| view.relative_residual()),
-    );
-    relative.quantity = Quantity::EnergyResidualRelative;
+    let text = "Residual of the energy balance relative to the initial energy plus all work exchanged";
+    let read = scalar(|view| view.relative_residual());
+    let relative = table.output("energy_residual_relative", Span::Point, None, text, read);
+    relative.quantity(Quantity::EnergyResidualRelative);
 }
 
 /// Description of stiffening if heat also softens.
@@ -202,30 +176,19 @@ const EFFORTS: [Count; 3] = [
 /// Adds the current internal step and the number of steps; with a tolerance, also the effort.
 pub fn internal_steps(table: &mut TableBuilder, settings: &SceneSettings) {
     let with_tolerance = settings.takes_a_tolerance();
-    let internal = table.output(
-        "internal_step",
-        Span::Point,
-        Some((&TIME, settings.time.step)),
-        if with_tolerance {
-            "Internal time step in use; with galerkin the maximum step"
-        } else {
-            "Internal time step in use"
-        },
-        scalar(|view| view.system.step_size()),
-    );
-    (internal.variability, internal.quantity) = (Variability::Discrete, Quantity::InternalStep);
-    let steps = table.output(
-        "internal_steps",
-        Span::Total,
-        None,
-        if with_tolerance {
-            "Number of internal steps since the start; with galerkin, the total of all blades"
-        } else {
-            "Number of internal steps since the start"
-        },
-        scalar(|view| view.internal_steps()),
-    );
-    steps.variability = Variability::Discrete;
+    let [step_text, count_text] = if with_tolerance {
+        [
+            "Internal time step in use; with galerkin the maximum step",
+            "Number of internal steps since the start; with galerkin, the total of all blades",
+        ]
+    } else {
+        ["Internal time step in use", "Number of internal steps since the start"]
+    };
+    let (unit, read) = (Some((&TIME, settings.time.step)), scalar(|view| view.system.step_size()));
+    let internal = table.output("internal_step", Span::Point, unit, step_text, read);
+    internal.quantity(Quantity::InternalStep).variability = Variability::Discrete;
+    let read = scalar(|view| view.internal_steps());
+    table.output("internal_steps", Span::Total, None, count_text, read).variability = Variability::Discrete;
     for (name, text, read) in EFFORTS.into_iter().filter(|_| with_tolerance) {
         table.output(name, Span::Total, None, text, scalar(read)).variability = Variability::Discrete;
     }
