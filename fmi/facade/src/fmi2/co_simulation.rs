@@ -70,36 +70,27 @@ fn status<T: Copy>(kind: i32, value: &Out<T>, answer: Option<T>) -> Result<()> {
     answer.ok_or_else(nothing).map(|answer| window.fill(&[answer]))
 }
 
-#[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2GetStatus(c: InstanceHandle, s: i32, value: Out<i32>) -> FmiStatus {
-    guard(c, &order::GET_STATUS, |_| status(s, &value, None))
-}
-
-#[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2GetRealStatus(c: InstanceHandle, s: i32, value: Out<f64>) -> FmiStatus {
-    guard(c, &order::GET_REAL_STATUS, |slave| status(s, &value, (s == LAST_SUCCESSFUL_TIME).then(|| slave.time())))
-}
-
-#[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2GetIntegerStatus(c: InstanceHandle, s: i32, value: Out<i32>) -> FmiStatus {
-    guard(c, &order::GET_INTEGER_STATUS, |_| status(s, &value, None))
-}
-
 /// Returns whether the slave requests the end of the simulation, which it does only after its state became non-finite.
 fn wants_to_terminate(slave: &Slave) -> Boolean {
     Boolean::from(matches!(slave.phase(), InstancePhase::Failed { .. }))
 }
 
-#[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2GetBooleanStatus(c: InstanceHandle, s: i32, value: Out<Boolean>) -> FmiStatus {
-    guard(c, &order::GET_BOOLEAN_STATUS, |slave| {
-        status(s, &value, (s == TERMINATED).then(|| wants_to_terminate(slave)))
-    })
+/// Defines status requests: name, rule, C type of the answer, and the answer to a kind of status.
+macro_rules! status_requests {
+    ($($function:ident $rule:ident $type:ty, |$slave:ident, $kind:ident| $answer:expr;)*) => {$(
+        #[unsafe(no_mangle)]
+        pub(crate) extern "C" fn $function(c: InstanceHandle, $kind: i32, value: Out<$type>) -> FmiStatus {
+            guard(c, &order::$rule, |$slave| status($kind, &value, $answer))
+        }
+    )*};
 }
 
-#[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2GetStringStatus(c: InstanceHandle, s: i32, value: Out<*const c_char>) -> FmiStatus {
-    guard(c, &order::GET_STRING_STATUS, |_| status(s, &value, None))
+status_requests! {
+    fmi2GetStatus GET_STATUS i32, |_slave, kind| None;
+    fmi2GetRealStatus GET_REAL_STATUS f64, |slave, kind| (kind == LAST_SUCCESSFUL_TIME).then(|| slave.time());
+    fmi2GetIntegerStatus GET_INTEGER_STATUS i32, |_slave, kind| None;
+    fmi2GetBooleanStatus GET_BOOLEAN_STATUS Boolean, |slave, kind| (kind == TERMINATED).then(|| wants_to_terminate(slave));
+    fmi2GetStringStatus GET_STRING_STATUS *const c_char, |_slave, kind| None;
 }
 
 /// Derivatives with respect to inputs over the last communication step, which require the parameter `step_derivatives`.

@@ -6,7 +6,7 @@ use super::builder::{NominalUnit, TableBuilder};
 use super::features;
 use super::parts::TableFacts;
 use crate::scene::settings::{BodyMotion, SceneSettings};
-use crate::simulation::outputs::{OutputView, scalar};
+use crate::simulation::outputs::{OutputView, count, scalar};
 use crate::simulation::units::{ENERGY, FORCE, IMPULSE, POWER, TIME};
 
 pub fn smallest_clearance(table: &mut TableBuilder, unit: NominalUnit, text: &str) {
@@ -29,9 +29,10 @@ pub fn totals(table: &mut TableBuilder, friction: bool) {
         table.output("friction_power", Span::Mean, Some((&POWER, 100.0)), text, read);
     }
     let text = "Number of contact nodes in contact at the communication point";
-    let count = table.output("contact_count", Span::Point, None, text, scalar(|view| view.contacts()));
-    (count.kind, count.variability, count.min) = (DataType::Integer, Variability::Discrete, Some(0.0));
-    count.quantity(Quantity::ContactCount);
+    let contacts =
+        table.output("contact_count", Span::Point, None, text, count(|view| view.system.events().len() as u64));
+    (contacts.kind, contacts.variability, contacts.min) = (DataType::Integer, Variability::Discrete, Some(0.0));
+    contacts.quantity(Quantity::ContactCount);
     let text = "Whether any contact node is in contact at the communication point";
     let read = scalar(|view| f64::from(u8::from(!view.system.events().is_empty())));
     let touching = table.output("in_contact", Span::Point, None, text, read);
@@ -152,14 +153,14 @@ fn energy_descriptions(parts: &TableFacts) -> [&'static str; 3] {
 }
 
 /// Name, text, and the count.
-type Count = (&'static str, &'static str, fn(&OutputView) -> f64);
+type Count = (&'static str, &'static str, fn(&OutputView) -> u64);
 
 /// Counts of the effort for a tolerance since the start.
 const EFFORTS: [Count; 3] = [
     (
         "internal_trials",
         "Number of trial internal steps of all blades together since the start, including accepted steps",
-        |view| view.trials(),
+        |view| view.system.steps_tried(),
     ),
     (
         "internal_steps_max",
@@ -169,7 +170,7 @@ const EFFORTS: [Count; 3] = [
     (
         "missed_steps",
         "Number of galerkin steps of minimum length since the start that were accepted although they missed the tolerance",
-        |view| view.missed(),
+        |view| view.system.effort().missed,
     ),
 ];
 
@@ -187,9 +188,9 @@ pub fn internal_steps(table: &mut TableBuilder, settings: &SceneSettings) {
     let (unit, read) = (Some((&TIME, settings.time.step)), scalar(|view| view.system.step_size()));
     let internal = table.output("internal_step", Span::Point, unit, step_text, read);
     internal.quantity(Quantity::InternalStep).variability = Variability::Discrete;
-    let read = scalar(|view| view.internal_steps());
+    let read = count(|view| view.system.steps_taken());
     table.output("internal_steps", Span::Total, None, count_text, read).variability = Variability::Discrete;
     for (name, text, read) in EFFORTS.into_iter().filter(|_| with_tolerance) {
-        table.output(name, Span::Total, None, text, scalar(read)).variability = Variability::Discrete;
+        table.output(name, Span::Total, None, text, count(read)).variability = Variability::Discrete;
     }
 }
