@@ -215,8 +215,9 @@ fn public_entry_points_have_examples() {
     for name in model {
         texts.push(("model", file(&format!("src/model/src/{name}.rs"))));
     }
-    let functions =
-        texts.iter().flat_map(|(unit, text)| without_example(text).into_iter().map(move |name| format!("{unit}: {name}")));
+    let functions = texts
+        .iter()
+        .flat_map(|(unit, text)| without_example(text).into_iter().map(move |name| format!("{unit}: {name}")));
     let missing: Vec<String> = functions.chain(without_call(&trait_text)).collect();
     let found: usize = texts.iter().map(|(_, text)| text.matches("pub fn ").count()).sum();
     let found = found + trait_text.matches("\n    fn ").count();
