@@ -2,7 +2,7 @@
 //! [`CoSimulation`](tiprub_cosim::CoSimulation).
 //!
 //! ```text
-//! fmi2/  fmi3/     one expression per exported function, no unsafe block
+//! fmi2/  fmi3/     one expression per exported function, no unsafe block; those of both versions in shared.rs
 //!      \  /
 //!    boundary/     the only unsafe code: pointers to slices and back, callbacks, the guard around every call
 //!       |
@@ -28,6 +28,7 @@ mod fmi3;
 mod load;
 #[forbid(unsafe_code)]
 mod location;
+mod shared;
 #[forbid(unsafe_code)]
 mod slave;
 

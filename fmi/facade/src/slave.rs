@@ -35,6 +35,12 @@ pub enum FmiStatus {
     Error = 3,
 }
 
+impl From<()> for FmiStatus {
+    fn from((): ()) -> Self {
+        Self::Ok
+    }
+}
+
 /// Version of the standard by which an instance was created: names of types and arguments differ.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Dialect {

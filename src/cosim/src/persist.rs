@@ -86,47 +86,34 @@ pub trait Persist {
 /// Largest valid step counter; no run comes near it.
 const MOST_COUNTED: u64 = 1 << 53;
 
-impl Persist for f64 {
-    fn save(&self, writer: &mut StateWriter) {
-        writer.put(&self.to_bits().to_le_bytes());
-    }
-    fn restore(&mut self, reader: &mut StateReader) {
-        *self = Self::from_bits(u64::from_le_bytes(reader.take()));
-    }
-    fn check(&self, reader: &mut StateReader) {
-        let value = Self::from_bits(u64::from_le_bytes(reader.take()));
+/// Implements [`Persist`] for numbers, with the check of a number that was read.
+macro_rules! persist_numbers {
+    ($($number:ty, |$value:ident, $reader:ident| $check:expr;)*) => {$(
+        impl Persist for $number {
+            fn save(&self, writer: &mut StateWriter) {
+                writer.put(&self.to_le_bytes());
+            }
+            fn restore(&mut self, reader: &mut StateReader) {
+                *self = Self::from_le_bytes(reader.take());
+            }
+            fn check(&self, $reader: &mut StateReader) {
+                let $value = Self::from_le_bytes($reader.take());
+                $check
+            }
+        }
+    )*};
+}
+
+persist_numbers! {
+    f64, |value, reader| {
         if value.is_infinite() {
             reader.infinite += 1;
         } else if !(value.abs() <= reader.largest || reader.largest.is_infinite()) {
             reader.refuse("a number is out of range");
         }
-    }
-}
-
-impl Persist for u64 {
-    fn save(&self, writer: &mut StateWriter) {
-        writer.put(&self.to_le_bytes());
-    }
-    fn restore(&mut self, reader: &mut StateReader) {
-        *self = Self::from_le_bytes(reader.take());
-    }
-    fn check(&self, reader: &mut StateReader) {
-        if Self::from_le_bytes(reader.take()) > MOST_COUNTED {
-            reader.refuse("a counter is out of range");
-        }
-    }
-}
-
-impl Persist for i32 {
-    fn save(&self, writer: &mut StateWriter) {
-        writer.put(&self.to_le_bytes());
-    }
-    fn restore(&mut self, reader: &mut StateReader) {
-        *self = Self::from_le_bytes(reader.take());
-    }
-    fn check(&self, reader: &mut StateReader) {
-        let _ = reader.take::<4>();
-    }
+    };
+    u64, |value, reader| if value > MOST_COUNTED { reader.refuse("a counter is out of range") };
+    i32, |_value, reader| {};
 }
 
 impl Persist for bool {
@@ -163,28 +150,26 @@ impl<T: Persist> Persist for [T] {
     }
 }
 
-impl<T: Persist> Persist for Vec<T> {
-    fn save(&self, writer: &mut StateWriter) {
-        self.as_slice().save(writer);
-    }
-    fn restore(&mut self, reader: &mut StateReader) {
-        self.as_mut_slice().restore(reader);
-    }
-    fn check(&self, reader: &mut StateReader) {
-        self.as_slice().check(reader);
-    }
+/// Implements [`Persist`] for containers as for slices.
+macro_rules! persist_as_slice {
+    ($([$($generics:tt)*] $container:ty;)*) => {$(
+        impl<$($generics)*> Persist for $container {
+            fn save(&self, writer: &mut StateWriter) {
+                self.as_slice().save(writer);
+            }
+            fn restore(&mut self, reader: &mut StateReader) {
+                self.as_mut_slice().restore(reader);
+            }
+            fn check(&self, reader: &mut StateReader) {
+                self.as_slice().check(reader);
+            }
+        }
+    )*};
 }
 
-impl<T: Persist, const N: usize> Persist for [T; N] {
-    fn save(&self, writer: &mut StateWriter) {
-        self.as_slice().save(writer);
-    }
-    fn restore(&mut self, reader: &mut StateReader) {
-        self.as_mut_slice().restore(reader);
-    }
-    fn check(&self, reader: &mut StateReader) {
-        self.as_slice().check(reader);
-    }
+persist_as_slice! {
+    [T: Persist] Vec<T>;
+    [T: Persist, const N: usize] [T; N];
 }
 
 /// Implements [`Persist`] for a struct from the list of its fields; a missing field is a compile error. `field.part` saves this part of a

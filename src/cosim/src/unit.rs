@@ -20,44 +20,102 @@ pub struct StepProgress {
 /// A call that returns an error has changed nothing, unless its description says otherwise.
 ///
 /// `Debug` is not required: its texts for a whole simulation, which are never read, would make up a tenth of a library.
+///
+/// # Examples
+/// A run with parameters, an input and outputs:
+/// ```
+/// # use tiprub_core::{CoSimulation, Simulation};
+/// # use tiprub_cosim::Value;
+/// let mut unit = Simulation::new(&tiprub_test_models::rub(2))?;
+/// let find = |name: &str| unit.table().find(name).expect("a variable").reference;
+/// let [speed, damping, choice] = ["speed", "damping_ratio", "step_derivatives"].map(find);
+/// let [scene, angle, contacts, touching] = ["scene", "rotor_angle", "contact_count", "in_contact"].map(find);
+/// // One number per value reference.
+/// assert_eq!(unit.variables().len(), unit.table().references());
+/// println!("{} starts with a speed of {} rad/s", unit.string(scene)?, unit.real(speed)?);
+/// assert!(unit.check(speed, Value::Real(f64::NAN)).is_err());
+/// unit.set_real(damping, 0.01)?;
+/// assert!(unit.set_integer(choice, 3).is_err(), "an enumeration of two items");
+/// assert!(unit.set_boolean(touching, true).is_err(), "an output");
+/// assert!(!unit.is_initialised());
+/// unit.initialise(0.0)?;
+/// unit.warnings().iter().for_each(|warning| println!("{warning}"));
+/// for step in 0..10 {
+///     unit.set(speed, Value::Real(1300.0 + f64::from(step)))?;
+///     unit.do_step(f64::from(step) * 1e-4, 1e-4)?;
+///     unit.take_notes().iter().for_each(|note| println!("{note}"));
+/// }
+/// println!("{} s: {} contacts, {}", unit.time(), unit.integer(contacts)?, unit.boolean(touching)?);
+/// assert!((unit.output_derivative(angle, 1)? - 1309.0).abs() < 1e-6);
+/// unit.reset();
+/// # Ok::<(), tiprub_cosim::Error>(())
+/// ```
+///
+/// Internal steps, of which only ten are allowed here, and a step that is withdrawn:
+/// ```
+/// # use tiprub_core::{CoSimulation, Simulation};
+/// # use tiprub_cosim::Error;
+/// let mut scene = tiprub_test_models::rub(2);
+/// scene.settings.time.max_internal_steps = Some(10);
+/// let mut unit = Simulation::new(&scene)?;
+/// unit.initialise(0.0)?;
+/// let mut state = vec![0; unit.state_size()];
+/// unit.save_state(&mut state)?;
+/// // A step of ten internal steps, without the values in between.
+/// unit.begin_step(0.0, 1e-5)?;
+/// unit.fly_ahead();
+/// while !unit.advance()?.finished {}
+/// unit.restore_state(&state)?;
+/// // A step that ends where the allowed internal steps are used up.
+/// unit.begin_partial_step(0.0, 1e-4)?;
+/// let reached = loop {
+///     match unit.advance() {
+///         Ok(progress) if progress.finished => break progress.time,
+///         Ok(_) => unit.update_outputs()?,
+///         Err(Error::Exhausted(_)) => {
+///             assert!(unit.is_stepping());
+///             unit.end_step_early()?;
+///             break unit.time();
+///         }
+///         Err(error) => return Err(error),
+///     }
+/// };
+/// assert!((reached - 1e-5).abs() < 1e-12);
+/// # Ok::<(), Error>(())
+/// ```
+///
+/// Derivatives of inputs, and of an output with respect to an input over a step:
+/// ```
+/// # use tiprub_core::{CoSimulation, Simulation};
+/// let mut unit = Simulation::new(&tiprub_test_models::rub(2))?;
+/// let find = |name: &str| unit.table().find(name).expect("a variable").reference;
+/// let [speed, angle, choice] = ["speed", "rotor_angle", "step_derivatives"].map(find);
+/// unit.set_integer(choice, 2)?;
+/// assert!(unit.no_derivatives().is_none());
+/// unit.initialise(0.0)?;
+/// // The speed grows by 5000 rad/s per second over the step; what was set can be withdrawn.
+/// assert!(unit.check_input_derivative(speed, 2, 5000.0).is_err());
+/// let before = unit.courses();
+/// unit.set_input_derivative(speed, 1, 5000.0)?;
+/// unit.restore_courses(&before);
+/// unit.do_step(0.0, 1e-4)?;
+/// assert!(unit.check_seed(speed, f64::NAN).is_err());
+/// let mut sensitivity = [0.0];
+/// unit.step_derivative(&[angle], &[speed], &[1.0], &mut sensitivity)?;
+/// // The speed acts over the whole step of 0.1 ms.
+/// assert!((sensitivity[0] - 1e-4).abs() < 1e-9);
+/// # Ok::<(), tiprub_cosim::Error>(())
+/// ```
 pub trait CoSimulation: Send {
     /// Returns the variables with their current values.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::{CoSimulation, Simulation};
-    /// # let simulation = Simulation::new(&tiprub_test_models::rub(2))?;
-    /// // One number per value reference.
-    /// assert_eq!(simulation.variables().len(), simulation.table().references());
-    /// # Ok::<(), tiprub_cosim::Error>(())
-    /// ```
     fn variables(&self) -> &VariableValues;
 
     /// Returns all variables.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::{CoSimulation, Simulation};
-    /// # let simulation = Simulation::new(&tiprub_test_models::rub(2))?;
-    /// let speed = simulation.table().find("speed").expect("a rotor has a speed");
-    /// assert_eq!(simulation.real(speed.reference)?, 1300.0);
-    /// # Ok::<(), tiprub_cosim::Error>(())
-    /// ```
     fn table(&self) -> &VariableTable {
         self.variables().table()
     }
 
     /// Returns one element of a real variable; inputs and parameters return the value that was set.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::{CoSimulation, Simulation};
-    /// # let mut simulation = Simulation::new(&tiprub_test_models::rub(2))?;
-    /// # simulation.initialise(0.0)?;
-    /// let torque = simulation.table().find("torque").expect("an output").reference;
-    /// assert_eq!(simulation.real(torque)?, 0.0);
-    /// # Ok::<(), tiprub_cosim::Error>(())
-    /// ```
     ///
     /// # Errors
     /// Unknown reference, or a variable of another type.
@@ -67,16 +125,6 @@ pub trait CoSimulation: Send {
 
     /// Returns an integer or an item of an enumeration.
     ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::{CoSimulation, Simulation};
-    /// # let mut simulation = Simulation::new(&tiprub_test_models::rub(2))?;
-    /// # simulation.initialise(0.0)?;
-    /// let contacts = simulation.table().find("contact_count").expect("an output").reference;
-    /// assert_eq!(simulation.integer(contacts)?, 0);
-    /// # Ok::<(), tiprub_cosim::Error>(())
-    /// ```
-    ///
     /// # Errors
     /// Same as [`CoSimulation::real`].
     fn integer(&self, reference: u32) -> Result<i32> {
@@ -84,16 +132,6 @@ pub trait CoSimulation: Send {
     }
 
     /// Returns a truth value.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::{CoSimulation, Simulation};
-    /// # let mut simulation = Simulation::new(&tiprub_test_models::rub(2))?;
-    /// # simulation.initialise(0.0)?;
-    /// let touching = simulation.table().find("in_contact").expect("an output").reference;
-    /// assert!(!simulation.boolean(touching)?);
-    /// # Ok::<(), tiprub_cosim::Error>(())
-    /// ```
     ///
     /// # Errors
     /// Same as [`CoSimulation::real`].
@@ -103,17 +141,6 @@ pub trait CoSimulation: Send {
 
     /// Returns a text.
     ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::{CoSimulation, Simulation};
-    /// # use tiprub_cosim::variables::DataType;
-    /// # let simulation = Simulation::new(&tiprub_test_models::rub(2))?;
-    /// for variable in simulation.table().variables().iter().filter(|variable| variable.kind == DataType::String) {
-    ///     println!("{} = {}", variable.name, simulation.string(variable.reference)?);
-    /// }
-    /// # Ok::<(), tiprub_cosim::Error>(())
-    /// ```
-    ///
     /// # Errors
     /// Same as [`CoSimulation::real`].
     fn string(&self, reference: u32) -> Result<&str> {
@@ -121,31 +148,10 @@ pub trait CoSimulation: Send {
     }
 
     /// Returns whether the unit has been initialised, after which fixed parameters cannot be set.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::{CoSimulation, Simulation};
-    /// # let mut simulation = Simulation::new(&tiprub_test_models::rub(2))?;
-    /// assert!(!simulation.is_initialised());
-    /// simulation.initialise(0.0)?;
-    /// assert!(simulation.is_initialised());
-    /// # Ok::<(), tiprub_cosim::Error>(())
-    /// ```
     fn is_initialised(&self) -> bool;
 
     /// Checks that a variable has the type of a value, can be set now, and that the value is in its range; returns the variable and the
     /// index of the element. A unit may have further limits, which only [`CoSimulation::set`] checks.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::{CoSimulation, Simulation};
-    /// # use tiprub_cosim::Value;
-    /// # let simulation = Simulation::new(&tiprub_test_models::rub(2))?;
-    /// let speed = simulation.table().find("speed").expect("an input").reference;
-    /// assert!(simulation.check(speed, Value::Real(1310.0)).is_ok());
-    /// assert!(simulation.check(speed, Value::Real(f64::NAN)).is_err());
-    /// # Ok::<(), tiprub_cosim::Error>(())
-    /// ```
     ///
     /// # Errors
     /// Same as [`CoSimulation::real`]; a variable that cannot be set, or a value outside its range.
@@ -159,33 +165,11 @@ pub trait CoSimulation: Send {
     /// value to the new one until the end of the current or next communication step, unless the parameter `input_interpolation` is `hold`
     /// or the description of the variable says that it acts immediately.
     ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::{CoSimulation, Simulation};
-    /// # use tiprub_cosim::Value;
-    /// # let mut simulation = Simulation::new(&tiprub_test_models::rub(2))?;
-    /// # simulation.initialise(0.0)?;
-    /// let speed = simulation.table().find("speed").expect("an input").reference;
-    /// simulation.set(speed, Value::Real(1310.0))?;
-    /// # Ok::<(), tiprub_cosim::Error>(())
-    /// ```
-    ///
     /// # Errors
     /// Same as [`CoSimulation::check`]; limits of stability, and of motions within a step.
     fn set(&mut self, reference: u32, value: Value) -> Result<()>;
 
     /// Sets one element of a real input or parameter.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::{CoSimulation, Simulation};
-    /// # let mut simulation = Simulation::new(&tiprub_test_models::rub(2))?;
-    /// # simulation.initialise(0.0)?;
-    /// let speed = simulation.table().find("speed").expect("an input").reference;
-    /// simulation.set_real(speed, 1310.0)?;
-    /// simulation.do_step(0.0, 1e-4)?;
-    /// # Ok::<(), tiprub_cosim::Error>(())
-    /// ```
     ///
     /// # Errors
     /// Same as [`CoSimulation::set`].
@@ -195,16 +179,6 @@ pub trait CoSimulation: Send {
 
     /// Sets an integer or an item of an enumeration.
     ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::{CoSimulation, Simulation};
-    /// # let mut simulation = Simulation::new(&tiprub_test_models::rub(2))?;
-    /// let derivatives = simulation.table().find("step_derivatives").expect("a parameter").reference;
-    /// simulation.set_integer(derivatives, 2)?;
-    /// assert!(simulation.set_integer(derivatives, 3).is_err());
-    /// # Ok::<(), tiprub_cosim::Error>(())
-    /// ```
-    ///
     /// # Errors
     /// Same as [`CoSimulation::set`].
     fn set_integer(&mut self, reference: u32, value: i32) -> Result<()> {
@@ -212,16 +186,6 @@ pub trait CoSimulation: Send {
     }
 
     /// Sets a truth value.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::{CoSimulation, Simulation};
-    /// # let mut simulation = Simulation::new(&tiprub_test_models::rub(2))?;
-    /// // Truth values of this unit are outputs; none can be set.
-    /// let touching = simulation.table().find("in_contact").expect("an output").reference;
-    /// assert!(simulation.set_boolean(touching, true).is_err());
-    /// # Ok::<(), tiprub_cosim::Error>(())
-    /// ```
     ///
     /// # Errors
     /// Same as [`CoSimulation::set`].
@@ -232,34 +196,11 @@ pub trait CoSimulation: Send {
     /// Sets the first time derivative of a continuous real input, which is valid until the input is set again: value and derivative
     /// together define the end of a ramp over the communication step.
     ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::{CoSimulation, Simulation};
-    /// # let mut simulation = Simulation::new(&tiprub_test_models::rub(2))?;
-    /// # simulation.initialise(0.0)?;
-    /// // The speed grows by 5000 rad/s per second over the step.
-    /// let speed = simulation.table().find("speed").expect("an input").reference;
-    /// simulation.set_real(speed, 1300.0)?;
-    /// simulation.set_input_derivative(speed, 1, 5000.0)?;
-    /// simulation.do_step(0.0, 1e-4)?;
-    /// # Ok::<(), tiprub_cosim::Error>(())
-    /// ```
-    ///
     /// # Errors
     /// Same as [`CoSimulation::check_input_derivative`].
     fn set_input_derivative(&mut self, reference: u32, order: i32, value: f64) -> Result<()>;
 
     /// Checks that a derivative of an input may be set; returns the variable and the index of the element.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::{CoSimulation, Simulation};
-    /// # let simulation = Simulation::new(&tiprub_test_models::rub(2))?;
-    /// let speed = simulation.table().find("speed").expect("an input").reference;
-    /// assert!(simulation.check_input_derivative(speed, 1, 5000.0).is_ok());
-    /// assert!(simulation.check_input_derivative(speed, 2, 5000.0).is_err());
-    /// # Ok::<(), tiprub_cosim::Error>(())
-    /// ```
     ///
     /// # Errors
     /// Unknown reference, a variable that is not a continuous real input, an order other than 1, or a value that is not finite.
@@ -275,16 +216,6 @@ pub trait CoSimulation: Send {
 
     /// Checks the seed of an input for derivatives over a step; returns the variable and the index of the element.
     ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::{CoSimulation, Simulation};
-    /// # let simulation = Simulation::new(&tiprub_test_models::rub(2))?;
-    /// let speed = simulation.table().find("speed").expect("an input").reference;
-    /// assert!(simulation.check_seed(speed, 1.0).is_ok());
-    /// assert!(simulation.check_seed(speed, f64::NAN).is_err());
-    /// # Ok::<(), tiprub_cosim::Error>(())
-    /// ```
-    ///
     /// # Errors
     /// Unknown reference, a variable that is not a continuous real input, or a seed that is not finite.
     fn check_seed(&self, reference: u32, seed: f64) -> Result<(&Variable, usize)> {
@@ -298,142 +229,38 @@ pub trait CoSimulation: Send {
 
     /// Returns the first time derivative of a continuous real output at the last communication point.
     ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::{CoSimulation, Simulation};
-    /// # let mut simulation = Simulation::new(&tiprub_test_models::rub(2))?;
-    /// # simulation.initialise(0.0)?;
-    /// let angle = simulation.table().find("rotor_angle").expect("an output").reference;
-    /// simulation.do_step(0.0, 1e-4)?;
-    /// assert!((simulation.output_derivative(angle, 1)? - 1300.0).abs() < 1e-6);
-    /// # Ok::<(), tiprub_cosim::Error>(())
-    /// ```
-    ///
     /// # Errors
     /// Unknown reference, a variable that is not a continuous real output, or an order other than 1.
     fn output_derivative(&self, reference: u32, order: i32) -> Result<f64>;
 
     /// Returns the inputs over time as bytes, derivatives included, so that they can be restored if a set of values is rejected as a
     /// whole.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::{CoSimulation, Simulation};
-    /// # let mut simulation = Simulation::new(&tiprub_test_models::rub(2))?;
-    /// # simulation.initialise(0.0)?;
-    /// let speed = simulation.table().find("speed").expect("an input").reference;
-    /// let before = simulation.courses();
-    /// simulation.set_input_derivative(speed, 1, 5000.0)?;
-    /// simulation.restore_courses(&before);
-    /// # Ok::<(), tiprub_cosim::Error>(())
-    /// ```
     fn courses(&self) -> Vec<u8>;
 
     /// Restores what [`CoSimulation::courses`] returned at the same time; the values that were read are set before.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::{CoSimulation, Simulation};
-    /// # let mut simulation = Simulation::new(&tiprub_test_models::rub(2))?;
-    /// # simulation.initialise(0.0)?;
-    /// let speed = simulation.table().find("speed").expect("an input").reference;
-    /// let before = simulation.courses();
-    /// simulation.set_real(speed, 1310.0)?;
-    /// simulation.set_real(speed, 1300.0)?;
-    /// simulation.restore_courses(&before);
-    /// # Ok::<(), tiprub_cosim::Error>(())
-    /// ```
     fn restore_courses(&mut self, courses: &[u8]);
 
     /// Checks parameters, sets the initial state and computes outputs.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::{CoSimulation, Simulation};
-    /// # let mut simulation = Simulation::new(&tiprub_test_models::rub(2))?;
-    /// let damping = simulation.table().find("damping_ratio").expect("a parameter").reference;
-    /// simulation.set_real(damping, 0.01)?;
-    /// simulation.initialise(0.0)?;
-    /// assert_eq!(simulation.time(), 0.0);
-    /// # Ok::<(), tiprub_cosim::Error>(())
-    /// ```
     ///
     /// # Errors
     /// Rejected parameters, with numbers and a remedy. The unit can be initialised again with other parameters.
     fn initialise(&mut self, start_time: f64) -> Result<()>;
 
     /// Restores the state after creation, with all start values.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::{CoSimulation, Simulation};
-    /// # let mut simulation = Simulation::new(&tiprub_test_models::rub(2))?;
-    /// # simulation.initialise(0.0)?;
-    /// simulation.do_step(0.0, 1e-4)?;
-    /// simulation.reset();
-    /// simulation.initialise(0.0)?;
-    /// assert_eq!(simulation.time(), 0.0);
-    /// # Ok::<(), tiprub_cosim::Error>(())
-    /// ```
     fn reset(&mut self);
 
     /// Returns the current time (s): the end of the last finished step, also of one that ended early.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::{CoSimulation, Simulation};
-    /// # let mut simulation = Simulation::new(&tiprub_test_models::rub(2))?;
-    /// # simulation.initialise(0.0)?;
-    /// simulation.do_step(0.0, 2.5e-4)?;
-    /// assert_eq!(simulation.time(), 2.5e-4);
-    /// # Ok::<(), tiprub_cosim::Error>(())
-    /// ```
     fn time(&self) -> f64;
 
     /// Returns the warnings about the parameters after [`CoSimulation::initialise`].
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::{CoSimulation, Simulation};
-    /// # let mut simulation = Simulation::new(&tiprub_test_models::rub(2))?;
-    /// # simulation.initialise(0.0)?;
-    /// for warning in simulation.warnings() {
-    ///     println!("{warning}");
-    /// }
-    /// # Ok::<(), tiprub_cosim::Error>(())
-    /// ```
     fn warnings(&self) -> &[Warning] {
         &[]
     }
 
     /// Returns the warnings since initialisation or the last call. Each is reported once.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::{CoSimulation, Simulation};
-    /// # let mut simulation = Simulation::new(&tiprub_test_models::rub(2))?;
-    /// # simulation.initialise(0.0)?;
-    /// simulation.do_step(0.0, 1e-4)?;
-    /// for note in simulation.take_notes() {
-    ///     println!("{note}");
-    /// }
-    /// assert!(simulation.take_notes().is_empty());
-    /// # Ok::<(), tiprub_cosim::Error>(())
-    /// ```
     fn take_notes(&mut self) -> Vec<Warning>;
 
     /// Begins a communication step of length `step_size` (s), which ends exactly at `current_time + step_size`.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::{CoSimulation, Simulation};
-    /// # let mut simulation = Simulation::new(&tiprub_test_models::rub(2))?;
-    /// # simulation.initialise(0.0)?;
-    /// simulation.begin_step(0.0, 1e-4)?;
-    /// while !simulation.advance()?.finished {}
-    /// assert_eq!(simulation.time(), 1e-4);
-    /// # Ok::<(), tiprub_cosim::Error>(())
-    /// ```
     ///
     /// # Errors
     /// A step size out of range, a `current_time` further than 1e-3 step sizes from [`CoSimulation::time`], or inputs that leave their
@@ -441,29 +268,6 @@ pub trait CoSimulation: Send {
     fn begin_step(&mut self, current_time: f64, step_size: f64) -> Result<()>;
 
     /// Begins a communication step that may end when the allowed internal steps are used up ([`CoSimulation::end_step_early`]).
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::{CoSimulation, Simulation};
-    /// # let mut scene = tiprub_test_models::rub(2);
-    /// scene.settings.time.max_internal_steps = Some(10);
-    /// let mut simulation = Simulation::new(&scene)?;
-    /// simulation.initialise(0.0)?;
-    /// simulation.begin_partial_step(0.0, 1e-4)?;
-    /// let ended_early = loop {
-    ///     match simulation.advance() {
-    ///         Ok(progress) if progress.finished => break false,
-    ///         Ok(_) => {}
-    ///         Err(tiprub_cosim::Error::Exhausted(_)) => break true,
-    ///         Err(error) => return Err(error),
-    ///     }
-    /// };
-    /// if ended_early {
-    ///     simulation.end_step_early()?;
-    /// }
-    /// assert!(simulation.time() < 1e-4);
-    /// # Ok::<(), tiprub_cosim::Error>(())
-    /// ```
     ///
     /// # Errors
     /// Same as [`CoSimulation::begin_step`].
@@ -473,34 +277,9 @@ pub trait CoSimulation: Send {
 
     /// Skips internal steps that are not needed, for callers that do not read values within the communication step. The last step is
     /// taken normally, so that rates at its end are those of an internal step.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::{CoSimulation, Simulation};
-    /// # let mut simulation = Simulation::new(&tiprub_test_models::rub(2))?;
-    /// # simulation.initialise(0.0)?;
-    /// simulation.begin_step(0.0, 1e-4)?;
-    /// simulation.fly_ahead();
-    /// while !simulation.advance()?.finished {}
-    /// # Ok::<(), tiprub_cosim::Error>(())
-    /// ```
     fn fly_ahead(&mut self) {}
 
     /// Advances the current communication step by one internal step. Inputs may be set between calls.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::{CoSimulation, Simulation};
-    /// # let mut simulation = Simulation::new(&tiprub_test_models::rub(2))?;
-    /// # simulation.initialise(0.0)?;
-    /// simulation.begin_step(0.0, 1e-4)?;
-    /// let mut steps = 1;
-    /// while !simulation.advance()?.finished {
-    ///     steps += 1;
-    /// }
-    /// assert_eq!(steps, 100);
-    /// # Ok::<(), tiprub_cosim::Error>(())
-    /// ```
     ///
     /// # Errors
     /// The state is lost, and the unit must be reset or restored. [`crate::Error::Exhausted`] if the allowed internal steps are used up:
@@ -509,33 +288,9 @@ pub trait CoSimulation: Send {
     fn advance(&mut self) -> Result<StepProgress>;
 
     /// Returns whether a communication step has begun and not ended.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::{CoSimulation, Simulation};
-    /// # let mut simulation = Simulation::new(&tiprub_test_models::rub(2))?;
-    /// # simulation.initialise(0.0)?;
-    /// simulation.begin_step(0.0, 1e-4)?;
-    /// assert!(simulation.is_stepping());
-    /// while !simulation.advance()?.finished {}
-    /// assert!(!simulation.is_stepping());
-    /// # Ok::<(), tiprub_cosim::Error>(())
-    /// ```
     fn is_stepping(&self) -> bool;
 
     /// Ends the communication step at the internal step reached; outputs cover the finished part.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::{CoSimulation, Simulation};
-    /// # let mut simulation = Simulation::new(&tiprub_test_models::rub(2))?;
-    /// # simulation.initialise(0.0)?;
-    /// simulation.begin_step(0.0, 1e-4)?;
-    /// let progress = simulation.advance()?;
-    /// simulation.end_step_early()?;
-    /// assert_eq!(simulation.time(), progress.time);
-    /// # Ok::<(), tiprub_cosim::Error>(())
-    /// ```
     ///
     /// # Errors
     /// No finished internal step in a current communication step; a state that is lost.
@@ -546,19 +301,6 @@ pub trait CoSimulation: Send {
     /// Updates the outputs to the internal time reached, for callers that read within a communication step: means cover the finished part
     /// of it. At communication points outputs are up to date, and this does nothing.
     ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::{CoSimulation, Simulation};
-    /// # let mut simulation = Simulation::new(&tiprub_test_models::rub(2))?;
-    /// # simulation.initialise(0.0)?;
-    /// let angle = simulation.table().find("rotor_angle").expect("an output").reference;
-    /// simulation.begin_step(0.0, 1e-4)?;
-    /// simulation.advance()?;
-    /// simulation.update_outputs()?;
-    /// assert!(simulation.real(angle)? > 0.0);
-    /// # Ok::<(), tiprub_cosim::Error>(())
-    /// ```
-    ///
     /// # Errors
     /// An output that is not finite.
     fn update_outputs(&mut self) -> Result<()> {
@@ -566,19 +308,6 @@ pub trait CoSimulation: Send {
     }
 
     /// Computes a whole communication step.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::{CoSimulation, Simulation};
-    /// # let mut simulation = Simulation::new(&tiprub_test_models::rub(2))?;
-    /// # simulation.initialise(0.0)?;
-    /// let clearance = simulation.table().find("clearance_minimum").expect("an output").reference;
-    /// for step in 0..10 {
-    ///     simulation.do_step(f64::from(step) * 1e-4, 1e-4)?;
-    ///     println!("{:.3e} m", simulation.real(clearance)?);
-    /// }
-    /// # Ok::<(), tiprub_cosim::Error>(())
-    /// ```
     ///
     /// # Errors
     /// Same as [`CoSimulation::begin_step`] and [`CoSimulation::advance`].
@@ -590,27 +319,9 @@ pub trait CoSimulation: Send {
     }
 
     /// Returns the length of every saved state (bytes).
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::{CoSimulation, Simulation};
-    /// # let simulation = Simulation::new(&tiprub_test_models::rub(2))?;
-    /// let buffer = vec![0; simulation.state_size()];
-    /// assert!(!buffer.is_empty());
-    /// # Ok::<(), tiprub_cosim::Error>(())
-    /// ```
     fn state_size(&self) -> usize;
 
     /// Saves everything that determines the future into exactly [`CoSimulation::state_size`] bytes.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::{CoSimulation, Simulation};
-    /// # let simulation = Simulation::new(&tiprub_test_models::rub(2))?;
-    /// let mut state = vec![0; simulation.state_size()];
-    /// simulation.save_state(&mut state)?;
-    /// # Ok::<(), tiprub_cosim::Error>(())
-    /// ```
     ///
     /// # Errors
     /// A buffer of another length.
@@ -618,57 +329,17 @@ pub trait CoSimulation: Send {
 
     /// Restores a saved state.
     ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::{CoSimulation, Simulation};
-    /// # let mut simulation = Simulation::new(&tiprub_test_models::rub(2))?;
-    /// # simulation.initialise(0.0)?;
-    /// let mut state = vec![0; simulation.state_size()];
-    /// simulation.save_state(&mut state)?;
-    /// simulation.do_step(0.0, 1e-4)?;
-    /// simulation.restore_state(&state)?;
-    /// assert_eq!(simulation.time(), 0.0);
-    /// # Ok::<(), tiprub_cosim::Error>(())
-    /// ```
-    ///
     /// # Errors
     /// Bytes of another length or of another unit, or damaged ones.
     fn restore_state(&mut self, buffer: &[u8]) -> Result<()>;
 
     /// Returns the reason why there are no derivatives over the last communication step, `None` if there are.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::{CoSimulation, Simulation};
-    /// # let mut simulation = Simulation::new(&tiprub_test_models::rub(2))?;
-    /// let derivatives = simulation.table().find("step_derivatives").expect("a parameter").reference;
-    /// assert!(simulation.no_derivatives().is_some());
-    /// simulation.set_integer(derivatives, 2)?;
-    /// assert!(simulation.no_derivatives().is_none());
-    /// # Ok::<(), tiprub_cosim::Error>(())
-    /// ```
     fn no_derivatives(&self) -> Option<&'static str> {
         None
     }
 
     /// Computes the derivatives of `outputs` at the end of the last communication step with respect to `inputs` over it, in the direction
     /// `seed`: Σ_j ∂y_i(t+H)/∂u_j s_j, written to `sensitivity`.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_core::{CoSimulation, Simulation};
-    /// # let mut simulation = Simulation::new(&tiprub_test_models::rub(2))?;
-    /// let derivatives = simulation.table().find("step_derivatives").expect("a parameter").reference;
-    /// simulation.set_integer(derivatives, 2)?;
-    /// simulation.initialise(0.0)?;
-    /// simulation.do_step(0.0, 1e-4)?;
-    /// let [speed, angle] = ["speed", "rotor_angle"].map(|name| simulation.table().find(name).expect("a variable").reference);
-    /// let mut sensitivity = [0.0];
-    /// simulation.step_derivative(&[angle], &[speed], &[1.0], &mut sensitivity)?;
-    /// // The speed acts over the whole step of 0.1 ms.
-    /// assert!((sensitivity[0] - 1e-4).abs() < 1e-9);
-    /// # Ok::<(), tiprub_cosim::Error>(())
-    /// ```
     ///
     /// # Errors
     /// No such step, variables without derivatives, or a seed that is not finite.

@@ -4,9 +4,12 @@
 //! `variable.reference + i`. FMI 2.0 sees every element as a scalar named `name[i+1]`; FMI 3.0 sees the array under its first reference (or
 //! the scalars, if packaged in this way).
 
-use std::collections::{BTreeMap, HashSet};
+mod quantity;
+mod table;
 
-use crate::{Diagnostic, Error, Result, bounds, shown};
+use crate::{Diagnostic, Result, shown};
+pub use quantity::Quantity;
+pub use table::VariableTable;
 
 /// Value of a clearance output if there is no surface to touch (m): finite, as FMI requires, and larger than any distance in an engine. Its
 /// time derivative is then 0.
@@ -133,6 +136,20 @@ pub struct VariableUnit {
     pub display: &'static [(&'static str, f64)],
 }
 
+/// Defines units: name of the constant, name of the unit, quantity, exponents of kg, m, s, rad, K, and display units.
+#[macro_export]
+macro_rules! units {
+    ($($constant:ident $name:literal $quantity:literal [$($exponents:literal),*] [$($display:expr),*];)*) => {$(
+        #[doc = $name]
+        pub(crate) static $constant: $crate::variables::VariableUnit = $crate::variables::VariableUnit {
+            name: $name,
+            quantity: $quantity,
+            exponents: [$($exponents),*],
+            display: &[$($display),*],
+        };
+    )*};
+}
+
 /// Relation of a value to the last communication step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Span {
@@ -197,123 +214,61 @@ pub struct Variable {
     pub of: usize,
 }
 
-/// Quantity of a variable, for code other than the reader of an output.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Quantity {
-    /// Simulated time.
-    Time,
-    /// Rotor speed Ω, input.
-    Speed,
-    /// Factor on the casing shape, input.
-    ShapeFactor,
-    /// Rotation of the casing shape, input.
-    ShapeRotation,
-    /// Uniform change of the casing radius, input.
-    RadiusChange,
-    /// Displacement of the shaft centre along x, y (whirl), z (axial shift) by component 0, 1, 2; input.
-    ShaftDisplacement(usize),
-    /// Temperature of each casing patch above the reference, input.
-    CasingTemperature,
-    /// Amplitude of the nodal-diameter load, input.
-    LoadAmplitude,
-    /// Phase of the nodal-diameter load, input.
-    LoadPhase,
-    /// Number of nodal diameters of that load, parameter.
-    LoadOrder,
-    /// Amplitude and phase (component 0, 1) of the excitation of blades, input.
-    Excitation(usize),
-    /// Engine order, parameter.
-    ExcitationOrder,
-    /// Temperature of a rotor above the reference, input.
-    RotorTemperature,
-    /// Friction coefficient µ, parameter.
-    Friction,
-    /// Offset added to every clearance, parameter.
-    GapOffset,
-    /// Damping ratio ξ of a master, parameter.
-    DampingRatio,
-    /// Damping ratio ξ of a surface carrier, parameter.
-    CarrierDampingRatio,
-    /// Damping ratios ξ of the first modes of a master, parameter.
-    ModeDamping,
-    /// Damping ratios ξ of the first modes of a surface carrier, parameter.
-    CarrierModeDamping,
-    /// Initial displacement of blades, parameter.
-    InitialDisplacement,
-    /// Initial velocity of blades, parameter.
-    InitialRate,
-    /// Initial velocity of a free master along x, y, z (component 0, 1, 2), parameter.
-    InitialVelocity(usize),
-    /// Fraction of the friction heat that flows into the slave, parameter.
-    HeatToSlave,
-    /// Largest internal step, parameter.
-    StepMax,
-    /// Scheme, parameter.
-    SchemeChoice,
-    /// Error that a step may make, parameter.
-    Tolerance,
-    /// Largest number of internal steps of a communication step, parameter.
-    MaxInternalSteps,
-    /// Solver, parameter.
-    SolverChoice,
-    /// Interpolation of inputs between communication points, parameter.
-    InputInterpolation,
-    /// Choice of derivatives over the last step, parameter.
-    StepDerivatives,
-    /// Initial rotor angle θ_r, parameter.
-    InitialAngle,
-    /// Ramp time of the casing shape, parameter.
-    RampTime,
-    /// Name of the scene, constant.
-    SceneName,
-    /// Rotor angle θ_r.
-    RotorAngle,
-    /// Gaps of a watched sector (0-based) at the communication point.
-    Clearance(usize),
-    /// Smallest gaps of a watched sector within the step.
-    WatchedClearanceMinimum(usize),
-    /// Mean normal forces of a watched sector.
-    NormalForce(usize),
-    /// Mean friction forces of a watched sector.
-    TangentialForce(usize),
-    /// Velocity of the centre of mass of a free master along x, y, z.
-    CentreVelocity(usize),
-    /// Displacements of all contact nodes of a free master along x, y, z.
-    NodeDisplacement(usize),
-    /// Mean moment of the contact forces about fixed x, y, z: on the rotor about the shaft centre (z: the torque), on a free master about
-    /// the origin.
-    Moment(usize),
-    /// Largest λ of any node within the step.
-    NormalForcePeak,
-    /// Radial displacement of the contact grid of the flexible slave.
-    SlaveDisplacement,
-    /// Nodes in contact at the communication point.
-    ContactCount,
-    /// Amplitude of the radial tip displacement per nodal diameter.
-    NodalDiameterAmplitude,
-    /// Kinetic energy.
-    KineticEnergy,
-    /// Strain energy.
-    StrainEnergy,
-    /// Damping loss.
-    DampingLoss,
-    /// Friction loss.
-    FrictionLoss,
-    /// Impact loss.
-    ImpactLoss,
-    /// Work of all inputs except loads.
-    ExternalWork,
-    /// Energy added by turning normals and curving surfaces within steps.
-    CurvatureWork,
-    /// Residual of the energy balance relative to initial energy and all work exchanged.
-    EnergyResidualRelative,
-    /// Current internal step.
-    InternalStep,
-    /// Output that only its reader uses.
-    Output,
+/// Defines methods that set fields of a row and return it.
+macro_rules! setters {
+    ($($(#[$doc:meta])* $name:ident($($argument:ident: $type:ty),*) { $($field:ident = $value:expr),+ })*) => {
+        impl Variable {$(
+            $(#[$doc])*
+            pub fn $name(&mut self, $($argument: $type),*) -> &mut Self {
+                $(self.$field = $value;)+
+                self
+            }
+        )*}
+    };
+}
+
+setters! {
+    /// Sets the typical magnitude.
+    nominal(value: f64) { nominal = Some(value) }
+    /// Sets the index of the display unit.
+    display(index: usize) { display = Some(index) }
+    /// Sets the smallest and the largest value.
+    range(low: f64, high: f64) { min = Some(low), max = Some(high) }
+    /// Makes it an array.
+    elements(count: usize) { dimension = Some(count) }
+    /// Makes it an array with start values.
+    starts(values: Vec<f64>) { dimension = Some(values.len()), start = Some(StartValue::Real(values)) }
+    /// Sets type and start value.
+    kind(kind: DataType, start: StartValue) { kind = kind, start = Some(start) }
+    /// Sets role and variability.
+    role(causality: Causality, variability: Variability) { causality = causality, variability = variability }
+    /// Sets the quantity.
+    quantity(quantity: Quantity) { quantity = quantity }
 }
 
 impl Variable {
+    /// Creates the row of a continuous real output.
+    pub fn output(name: String, reference: u32, description: String) -> Self {
+        Self {
+            name,
+            reference,
+            dimension: None,
+            kind: DataType::Real,
+            causality: Causality::Output,
+            variability: Variability::Continuous,
+            span: Span::Point,
+            unit: None,
+            display: None,
+            min: None,
+            max: None,
+            nominal: None,
+            start: None,
+            description,
+            quantity: Quantity::Output,
+            of: 0,
+        }
+    }
+
     /// Number of elements (1 for a scalar).
     pub fn len(&self) -> usize {
         self.dimension.unwrap_or(1)
@@ -443,101 +398,5 @@ impl Variable {
             }
             DataType::String => true,
         }
-    }
-}
-
-/// The table: variables in order of their references, which start at 0 (time) without gaps.
-#[derive(Debug, Clone, PartialEq)]
-pub struct VariableTable {
-    variables: Vec<Variable>,
-    /// Row of each value reference.
-    rows: Vec<u32>,
-    /// First row of each quantity of a structure or pair.
-    places: BTreeMap<(Quantity, usize), usize>,
-}
-
-/// Rejects more values than any reader supports.
-fn check_count(variables: &[Variable]) -> Result<()> {
-    let count = variables.iter().fold(0, |sum: usize, variable| sum.saturating_add(variable.len()));
-    let Some(largest) = variables.iter().max_by_key(|variable| variable.len()).filter(|_| count > bounds::VALUES)
-    else {
-        return Ok(());
-    };
-    Err(Error::invalid(
-        "scene",
-        format!(
-            "the variables have {count} values, which exceeds the limit of {}; `{}` alone has {}",
-            bounds::VALUES,
-            largest.name,
-            largest.len()
-        ),
-        "Request fewer outputs, or use fewer coating cells, structures or sectors",
-    ))
-}
-
-impl VariableTable {
-    /// Creates a table from rows whose references are consecutive, starting at 0.
-    ///
-    /// # Errors
-    /// [`Error::Invalid`] if references are not consecutive, a name occurs twice, or there are more than [`bounds::VALUES`] values.
-    pub fn new(variables: Vec<Variable>) -> Result<Self> {
-        check_count(&variables)?;
-        let (mut rows, mut names) = (Vec::new(), HashSet::with_capacity(variables.len()));
-        for (row, variable) in variables.iter().enumerate() {
-            let expected = u32::try_from(rows.len()).unwrap_or(u32::MAX);
-            let repeated = !names.insert(variable.name.as_str());
-            if variable.reference != expected || repeated {
-                return Err(Error::invalid(
-                    format!("variable `{}`", variable.name),
-                    format!("reference {} instead of {expected}, or duplicate name", variable.reference),
-                    "Give consecutive references and unique names",
-                ));
-            }
-            rows.extend(std::iter::repeat_n(u32::try_from(row).unwrap_or(u32::MAX), variable.len()));
-        }
-        let mut places = BTreeMap::new();
-        for (row, variable) in variables.iter().enumerate() {
-            places.entry((variable.quantity, variable.of)).or_insert(row);
-        }
-        Ok(Self { variables, rows, places })
-    }
-
-    /// Number of value references (elements of all variables).
-    pub fn references(&self) -> usize {
-        self.rows.len()
-    }
-
-    /// First variable with this quantity.
-    pub fn with_quantity(&self, quantity: Quantity) -> Option<&Variable> {
-        self.variables.iter().find(|variable| variable.quantity == quantity)
-    }
-
-    /// Variable with this quantity of one structure or pair.
-    pub fn with_quantity_of(&self, quantity: Quantity, of: usize) -> Option<&Variable> {
-        self.places.get(&(quantity, of)).map(|row| &self.variables[*row])
-    }
-
-    /// All rows.
-    pub fn variables(&self) -> &[Variable] {
-        &self.variables
-    }
-
-    /// Row and element index of a value reference.
-    ///
-    /// # Errors
-    /// [`Error::Invalid`] for an unknown reference.
-    pub fn locate(&self, reference: u32) -> Result<(&Variable, usize)> {
-        let row = usize::try_from(reference).ok().and_then(|index| self.rows.get(index));
-        let row = *row.ok_or_else(|| {
-            let remedy = "Use a value reference of its modelDescription.xml";
-            Error::invalid("", format!("value reference {reference} does not exist in this FMU"), remedy)
-        })? as usize;
-        let variable = &self.variables[row];
-        Ok((variable, (reference - variable.reference) as usize))
-    }
-
-    /// Finds a variable by its name (scalar or array name, not an element name).
-    pub fn find(&self, name: &str) -> Option<&Variable> {
-        self.variables.iter().find(|variable| variable.name == name)
     }
 }

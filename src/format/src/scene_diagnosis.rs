@@ -247,7 +247,8 @@ fn description(value: &DeValue) -> String {
 /// Returns type, range and meaning of a field, for a remedy; empty for unknown paths.
 pub(crate) fn requirement(fields: &str) -> String {
     let Some(field) = FIELDS.iter().find(|field| field.path == fields) else { return String::new() };
-    let range = if field.range.is_empty() { String::new() } else { format!(" ({})", field.range) };
+    let range = field.range();
+    let range = if range.is_empty() { range } else { format!(" ({range})") };
     format!("{}{range}. {}", field.value, field.description.trim_end_matches('.'))
 }
 

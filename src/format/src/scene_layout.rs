@@ -2,6 +2,8 @@
 
 mod fields;
 
+use tiprub_cosim::shown;
+
 pub use fields::FIELDS;
 
 /// One key of the scene file.
@@ -13,13 +15,27 @@ pub struct SceneField {
     pub value: &'static str,
     /// Default, `None` if the key is required.
     pub default: Option<&'static str>,
-    /// Accepted range.
-    pub range: &'static str,
+    /// Accepted range; `{}` stands for the bounds of a number ([`SceneField::range`]).
+    range: &'static str,
     /// One or two sentences.
     pub description: &'static str,
 }
 
 impl SceneField {
+    /// Returns the accepted range with the bounds that are checked.
+    pub fn range(&self) -> String {
+        let Some((_, [low, high])) = fields::BOUNDS.iter().find(|(path, _)| *path == self.path) else {
+            return self.range.to_owned();
+        };
+        // The smallest positive number stands for any positive value.
+        let bounds = if low.to_bits() == 1 {
+            format!("above 0, up to {}", shown(*high))
+        } else {
+            format!("{} to {}", shown(*low), shown(*high))
+        };
+        self.range.replace("{}", &bounds)
+    }
+
     /// Returns the key without its table.
     pub fn key(&self) -> &'static str {
         self.path.rsplit('.').next().unwrap_or(self.path)

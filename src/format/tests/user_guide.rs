@@ -149,7 +149,10 @@ fn the_chapter_on_scenes_lists_every_key() {
         let _ = writeln!(
             text,
             "| `{}` | {} | {default} | {} | {} |",
-            field.path, field.value, field.range, field.description
+            field.path,
+            field.value,
+            field.range(),
+            field.description
         );
     }
     compare("scene-file.md", "keys", &text);

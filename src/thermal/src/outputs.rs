@@ -5,7 +5,6 @@ use nalgebra::DMatrix;
 use crate::model::ConductionModel;
 use crate::operator::DiagonalOperator;
 use crate::simulation::ThermalSimulation;
-use crate::state::ThermalState;
 use crate::table::Item;
 
 /// Returns the rows of temperatures by coordinates x: of patches, of their heated surfaces, of the whole model, of
@@ -68,20 +67,27 @@ impl ThermalSimulation {
 
     /// Returns one output; `None` if the item is not an output.
     fn output(&self, item: Item, element: usize) -> Option<f64> {
-        let (state, operator) = (&self.state, &self.operator);
-        let ThermalState { coordinates, totals, powers, .. } = state;
+        let state = &self.state;
         Some(match item {
             Item::Time => state.time,
-            Item::Rows(first) => row_times(operator, first + element, coordinates),
-            Item::Hottest => row_times(operator, self.hottest(), coordinates),
-            Item::Power(film) => powers[film],
-            Item::Stored => stored(operator, coordinates),
-            Item::Total(index) => totals[index].value(),
+            Item::Power(film) => state.powers[film],
             Item::Residual => self.residual(),
             Item::RelativeResidual => {
                 let size = state.exchanged + state.initial_heat.abs();
                 if size > 0.0 { self.residual() / size } else { 0.0 }
             }
+            _ => return self.linear(item, element, &state.coordinates, state.totals.map(|total| total.value())),
+        })
+    }
+
+    /// Returns a temperature or a heat that is linear in the coordinates and the supplied heats: of the state, of its rates or of its
+    /// changes; `None` for other items.
+    pub(crate) fn linear(&self, item: Item, element: usize, coordinates: &[f64], heats: [f64; 3]) -> Option<f64> {
+        Some(match item {
+            Item::Rows(first) => row_times(&self.operator, first + element, coordinates),
+            Item::Hottest => row_times(&self.operator, self.hottest(), coordinates),
+            Item::Stored => stored(&self.operator, coordinates),
+            Item::Total(index) => heats[index],
             _ => return None,
         })
     }

@@ -1,7 +1,7 @@
 //! Model with its state, which an FMU instance or the tests drive.
 
 use tiprub_cosim::warning::Topic;
-use tiprub_cosim::{CoSimulation, Error, Result, Sum, VariableValues, Warning, shown};
+use tiprub_cosim::{CoSimulation, Error, Result, VariableValues, Warning, shown};
 
 use crate::course::InputCourse;
 use crate::exponential::Phi;
@@ -224,21 +224,13 @@ impl ThermalState {
     pub(crate) fn new(patches: usize, order: usize) -> Self {
         Self {
             phase: CREATED,
-            time: 0.0,
-            initial_temperature: 0.0,
             initial_state: 1,
             interpolation: 1,
             heat: vec![InputCourse::default(); patches],
-            films: [InputCourse::default(); 2],
             factors: [1.0; 2],
             factors_used: [1.0; 2],
             coordinates: vec![0.0; order],
-            last_length: 0.0,
-            last_ramped: false,
-            powers: [0.0; 2],
-            totals: [Sum::default(); 3],
-            exchanged: 0.0,
-            initial_heat: 0.0,
+            ..Self::default()
         }
     }
 }

@@ -19,7 +19,7 @@ pub(crate) const READY: u64 = 1;
 pub(crate) const FAILED: u64 = 2;
 
 /// State of a simulation.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct ThermalState {
     pub(crate) phase: u64,
     /// Time (s).

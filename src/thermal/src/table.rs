@@ -2,10 +2,10 @@
 
 use std::ops::RangeInclusive;
 
-use tiprub_cosim::Result;
 use tiprub_cosim::variables::{
     Causality, DataType, Enumeration, Quantity, Span, StartValue, Variability, Variable, VariableTable, VariableUnit,
 };
+use tiprub_cosim::{Result, units};
 
 use crate::model::ConductionModel;
 
@@ -16,18 +16,14 @@ pub(crate) const HEAT: RangeInclusive<f64> = -1e9..=1e9;
 /// Range of the factors on film coefficients.
 pub(crate) const FACTORS: RangeInclusive<f64> = 0.0..=1e3;
 
-static KELVIN: VariableUnit =
-    VariableUnit { name: "K", quantity: "TemperatureDifference", exponents: [0, 0, 0, 0, 1], display: &[] };
-static WATT: VariableUnit =
-    VariableUnit { name: "W", quantity: "Power", exponents: [1, 2, -3, 0, 0], display: &[("kW", 1e-3)] };
-static JOULE: VariableUnit =
-    VariableUnit { name: "J", quantity: "Energy", exponents: [1, 2, -2, 0, 0], display: &[("kJ", 1e-3)] };
-static CAPACITY: VariableUnit =
-    VariableUnit { name: "J/K", quantity: "HeatCapacity", exponents: [1, 2, -2, 0, -1], display: &[] };
-static CONDUCTANCE: VariableUnit =
-    VariableUnit { name: "W/K", quantity: "ThermalConductance", exponents: [1, 2, -3, 0, -1], display: &[] };
-static SECOND: VariableUnit =
-    VariableUnit { name: "s", quantity: "Time", exponents: [0, 0, 1, 0, 0], display: &[("min", 1.0 / 60.0)] };
+units! {
+    KELVIN "K" "TemperatureDifference" [0, 0, 0, 0, 1] [];
+    WATT "W" "Power" [1, 2, -3, 0, 0] [("kW", 1e-3)];
+    JOULE "J" "Energy" [1, 2, -2, 0, 0] [("kJ", 1e-3)];
+    CAPACITY "J/K" "HeatCapacity" [1, 2, -2, 0, -1] [];
+    CONDUCTANCE "W/K" "ThermalConductance" [1, 2, -3, 0, -1] [];
+    SECOND "s" "Time" [0, 0, 1, 0, 0] [("min", 1.0 / 60.0)];
+}
 
 static INITIAL_STATES: Enumeration = Enumeration {
     name: "InitialState",
@@ -82,24 +78,8 @@ impl ThermalTableBuilder {
     fn push(&mut self, item: Item, name: &str, unit: Option<&'static VariableUnit>, text: &str) -> &mut Variable {
         self.close();
         self.items.push(item);
-        self.variables.push(Variable {
-            name: name.into(),
-            reference: self.next,
-            dimension: None,
-            kind: DataType::Real,
-            causality: Causality::Output,
-            variability: Variability::Continuous,
-            span: Span::Point,
-            unit,
-            display: None,
-            min: None,
-            max: None,
-            nominal: None,
-            start: None,
-            description: text.into(),
-            quantity: Quantity::Output,
-            of: 0,
-        });
+        let row = Variable::output(name.into(), self.next, text.into());
+        self.variables.push(Variable { unit, ..row });
         self.variables.last_mut().expect("just pushed")
     }
 
@@ -126,14 +106,13 @@ impl ThermalTableBuilder {
 
     fn choice(&mut self, item: Item, name: &str, kind: &'static Enumeration, text: &str) {
         let variable = self.push(item, name, None, text);
-        (variable.kind, variable.start) = (DataType::Enumeration(kind), Some(StartValue::Integer(1)));
-        (variable.causality, variable.variability) = (Causality::Parameter, Variability::Fixed);
+        variable.kind(DataType::Enumeration(kind), StartValue::Integer(1));
+        variable.role(Causality::Parameter, Variability::Fixed);
     }
 
     fn constant(&mut self, name: &str, unit: &'static VariableUnit, value: f64, text: &str) {
         let variable = self.push(Item::Constant, name, Some(unit), text);
-        variable.start = Some(StartValue::Real(vec![value]));
-        (variable.causality, variable.variability) = (Causality::Local, Variability::Constant);
+        variable.kind(DataType::Real, StartValue::Real(vec![value])).role(Causality::Local, Variability::Constant);
     }
 
     fn output(&mut self, item: Item, name: &str, unit: &'static VariableUnit, span: Span, text: &str) -> &mut Variable {
@@ -141,10 +120,6 @@ impl ThermalTableBuilder {
         variable.span = span;
         variable
     }
-}
-
-fn limit(variable: &mut Variable, range: &RangeInclusive<f64>) {
-    (variable.min, variable.max) = (Some(*range.start()), Some(*range.end()));
 }
 
 /// Builds the table of a model, with the items of its rows.
@@ -163,36 +138,31 @@ fn inputs(table: &mut ThermalTableBuilder, patches: usize) {
     let text = "Heat flow into each patch, spread over its heated surface; constant over the step, or linear if a \
                 derivative is set";
     let heat = table.input(Item::Heat, "casing_heat", Some(&WATT), 0.0, text);
-    (heat.dimension, heat.start, heat.nominal) =
-        (Some(patches), Some(StartValue::Real(vec![0.0; patches])), Some(100.0));
-    limit(heat, &HEAT);
+    heat.starts(vec![0.0; patches]).nominal(100.0).range(*HEAT.start(), *HEAT.end());
     for (index, (name, what)) in [("gas", "gas inside"), ("ambient", "air outside")].into_iter().enumerate() {
         let text = format!(
             "Temperature of the {what} above the reference; reached at the end of the step (input_interpolation)"
         );
         let film = table.input(Item::Film(index), &format!("{name}_temperature"), Some(&KELVIN), 0.0, &text);
-        film.nominal = Some(100.0);
-        limit(film, &TEMPERATURES);
+        film.nominal(100.0).range(*TEMPERATURES.start(), *TEMPERATURES.end());
     }
     for (index, (name, what)) in [("gas", "gas inside"), ("ambient", "air outside")].into_iter().enumerate() {
         let text =
             format!("Factor on the film coefficient of the {what}; constant over the step, 0 means no convection");
         let factor = table.input(Item::Factor(index), &format!("{name}_convection_factor"), None, 1.0, &text);
-        limit(factor, &FACTORS);
+        factor.range(*FACTORS.start(), *FACTORS.end());
     }
 }
 
 fn parameters(table: &mut ThermalTableBuilder, model: &ConductionModel) {
     let text = "Initial temperature above the reference for a uniform start";
     let initial = table.input(Item::InitialTemperature, "initial_temperature", Some(&KELVIN), 0.0, text);
-    (initial.causality, initial.variability) = (Causality::Parameter, Variability::Fixed);
-    limit(initial, &TEMPERATURES);
+    initial.role(Causality::Parameter, Variability::Fixed).range(*TEMPERATURES.start(), *TEMPERATURES.end());
     table.choice(Item::InitialState, "initial_state", &INITIAL_STATES, "Initial temperatures");
     let text = "Temperatures of gas and air between communication points";
     table.choice(Item::Interpolation, "input_interpolation", &INTERPOLATIONS, text);
     let name = table.push(Item::Constant, "model_name", None, "Name of the model");
-    (name.kind, name.start) = (DataType::String, Some(StartValue::String(model.name.clone())));
-    (name.causality, name.variability) = (Causality::Local, Variability::Constant);
+    name.kind(DataType::String, StartValue::String(model.name.clone())).role(Causality::Local, Variability::Constant);
     table.constant("heat_capacity", &CAPACITY, model.heat_capacity, "Total heat capacity");
     let text = "Film coefficient times area of the gas inside, at a factor of 1";
     table.constant("gas_conductance", &CONDUCTANCE, model.gas_conductance(), text);

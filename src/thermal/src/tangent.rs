@@ -6,7 +6,6 @@ use tiprub_cosim::{CoSimulation, Error, Result};
 
 use crate::exponential::Phi;
 use crate::operator::DiagonalOperator;
-use crate::outputs::{row_times, stored};
 use crate::simulation::ThermalSimulation;
 use crate::table::Item;
 
@@ -32,15 +31,10 @@ impl ThermalSimulation {
             operator.conductances[film] * films[film] - back
         };
         match item {
-            Item::Rows(first) => row_times(operator, first + element, &rates),
-            Item::Hottest => row_times(operator, self.hottest(), &rates),
-            Item::Stored => stored(operator, &rates),
-            Item::Total(0) => heat.iter().sum(),
-            Item::Total(index) => flow(index - 1),
             Item::Power(film) if state.last_length > 0.0 => {
                 (flow(film) - state.powers[film]) / (0.5 * state.last_length)
             }
-            _ => 0.0,
+            _ => self.linear(item, element, &rates, [heat.iter().sum(), flow(0), flow(1)]).unwrap_or(0.0),
         }
     }
 
@@ -73,14 +67,13 @@ impl ThermalSimulation {
         let change = self.change(length, &heat, films);
         for (&output, sensitivity) in outputs.iter().zip(sensitivity) {
             let (variable, element) = self.values.table().locate(output)?;
-            *sensitivity = match self.item(variable) {
-                Item::Rows(first) => row_times(&self.operator, first + element, &change.coordinates),
-                Item::Hottest => row_times(&self.operator, self.hottest(), &change.coordinates),
-                Item::Stored => stored(&self.operator, &change.coordinates),
-                Item::Total(index) => change.heats[index],
+            let item = self.item(variable);
+            *sensitivity = match item {
                 Item::Power(film) => change.heats[1 + film] / length,
                 Item::Residual | Item::RelativeResidual => 0.0,
-                _ => return Err(refused(variable, "it is not an output")),
+                _ => self
+                    .linear(item, element, &change.coordinates, change.heats)
+                    .ok_or_else(|| refused(variable, "it is not an output"))?,
             };
         }
         Ok(())

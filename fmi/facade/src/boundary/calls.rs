@@ -28,7 +28,7 @@ pub(crate) fn get<T: FmiValue, C: Copy>(
         let window = values.window(n_values, value_argument)?;
         let read = slave.read::<T>(&AccessRequest { type_name, references, values: n_values })?;
         window.fill(&read.into_iter().map(convert).collect::<Vec<_>>());
-        Ok(FmiStatus::Ok)
+        Ok(())
     })
 }
 
@@ -44,8 +44,7 @@ pub(crate) fn set<T: FmiValue, C>(
         let references = references.array(count, slave.reference_limit(), reference_argument)?;
         let elements = slave.elements(&AccessRequest { type_name, references, values: n_values })?;
         let values = values.array(elements.len(), usize::MAX, value_argument)?;
-        slave.write(&elements, &values.iter().map(convert).collect::<Result<Vec<T>>>()?)?;
-        Ok(FmiStatus::Ok)
+        slave.write(&elements, &values.iter().map(convert).collect::<Result<Vec<T>>>()?)
     })
 }
 
@@ -62,7 +61,7 @@ pub(crate) fn strings(
         let read = slave.read::<String>(&AccessRequest { type_name: "String", references, values: n_values })?;
         let texts = read.into_iter().map(|text| CString::new(text.replace('\0', " ")).unwrap_or_default()).collect();
         window.fill(&slave.keep(texts).iter().map(|text| text.as_ptr()).collect::<Vec<_>>());
-        Ok(FmiStatus::Ok)
+        Ok(())
     })
 }
 
@@ -101,32 +100,27 @@ pub(crate) mod state {
         guard(handle, rule, |slave| {
             let window = state.single("FMUstate")?;
             let existing = window.current().filter(|existing| !existing.is_null());
-            let saved = slave.save(existing)?;
-            window.fill(&[saved]);
-            Ok(FmiStatus::Ok)
+            slave.save(existing).map(|saved| window.fill(&[saved]))
         })
     }
 
     /// Restores a state.
     pub(crate) fn restore(handle: InstanceHandle, rule: &CallRule, state: StateHandle) -> FmiStatus {
-        guard(handle, rule, |slave| {
-            slave.restore(required(state)?)?;
-            Ok(FmiStatus::Ok)
-        })
+        guard(handle, rule, |slave| slave.restore(required(state)?))
     }
 
     /// Frees a state; NULL, or a pointer to NULL, is legal.
     pub(crate) fn free(handle: InstanceHandle, rule: &CallRule, state: Out<StateHandle>) -> FmiStatus {
         guard(handle, rule, |slave| {
             if state.is_null() {
-                return Ok(FmiStatus::Ok);
+                return Ok(());
             }
             let window = state.single("FMUstate")?;
             if let Some(existing) = window.current().filter(|existing| !existing.is_null()) {
                 slave.free_snapshot(existing)?;
                 window.fill(&[std::ptr::null()]);
             }
-            Ok(FmiStatus::Ok)
+            Ok(())
         })
     }
 
@@ -134,9 +128,7 @@ pub(crate) mod state {
     pub(crate) fn size(handle: InstanceHandle, rule: &CallRule, state: StateHandle, size: Out<usize>) -> FmiStatus {
         guard(handle, rule, |slave| {
             let window = size.single("size")?;
-            let length = slave.serialised(required(state)?)?.len();
-            window.fill(&[length]);
-            Ok(FmiStatus::Ok)
+            slave.serialised(required(state)?).map(|saved| window.fill(&[saved.len()]))
         })
     }
 
@@ -160,8 +152,7 @@ pub(crate) mod state {
         guard(handle, rule, |slave: &mut Slave| {
             let saved = slave.serialised(required(state)?)?;
             check_size(size, saved.len())?;
-            bytes.window(size, "serializedState")?.fill(saved);
-            Ok(FmiStatus::Ok)
+            bytes.window(size, "serializedState").map(|window| window.fill(saved))
         })
     }
 
@@ -178,9 +169,7 @@ pub(crate) mod state {
             check_size(size, slave.serialised_size())?;
             let bytes = bytes.array(size, size, "serializedState")?;
             let existing = window.current().filter(|existing| !existing.is_null());
-            let saved = slave.deserialise(bytes, existing)?;
-            window.fill(&[saved]);
-            Ok(FmiStatus::Ok)
+            slave.deserialise(bytes, existing).map(|saved| window.fill(&[saved]))
         })
     }
 }

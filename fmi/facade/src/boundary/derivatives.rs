@@ -34,7 +34,6 @@ pub(crate) fn derivatives(
         let (outputs, inputs) = (elements(slave, unknowns)?, elements(slave, knowns)?);
         let seed = seed.array(seeds, usize::MAX, seed_name)?;
         let window = sensitivity.window(sensitivities, sensitivity_name)?;
-        window.fill(&answer(slave, &outputs, &inputs, seed)?);
-        Ok(FmiStatus::Ok)
+        answer(slave, &outputs, &inputs, seed).map(|values| window.fill(&values))
     })
 }

@@ -205,19 +205,19 @@ pub(crate) fn enter<T>(
     }
 }
 
-/// Runs a call whose only result is its status behind the guard.
-pub(crate) fn guard(
+/// Runs a call whose only result is its status, by default `Ok`, behind the guard.
+pub(crate) fn guard<S: Into<FmiStatus>>(
     handle: InstanceHandle,
     rule: &CallRule,
-    action: impl FnOnce(&mut Slave) -> Result<FmiStatus>,
+    action: impl FnOnce(&mut Slave) -> Result<S>,
 ) -> FmiStatus {
-    enter(handle, rule, |slave, _| Ok((action(slave)?, ()))).0
+    enter(handle, rule, |slave, _| Ok((action(slave)?.into(), ()))).0
 }
 
 /// Returns the status of a function whose capability this FMU does not have.
 pub(crate) fn unsupported(handle: InstanceHandle, name: &'static str, capability: &str) -> FmiStatus {
     guard(handle, &order::unsupported(name), |_| {
-        Err(Refusal::error(format!(
+        Err::<(), _>(Refusal::error(format!(
             "this FMU has no {capability} (see its modelDescription.xml). Do not call this function"
         )))
     })

@@ -25,8 +25,7 @@ pub(super) extern "C" fn fmi2SetRealInputDerivatives(
         let references = vr.array(nvr, limit, "vr")?;
         let (orders, values) = (order.array(nvr, limit, "order")?, value.array(nvr, limit, "value")?);
         slave.elements(&AccessRequest { type_name: "Real", references, values: nvr })?;
-        slave.set_input_derivatives(references, orders, values)?;
-        Ok(FmiStatus::Ok)
+        slave.set_input_derivatives(references, orders, values)
     })
 }
 
@@ -44,8 +43,7 @@ pub(super) extern "C" fn fmi2GetRealOutputDerivatives(
         let orders = order.array(nvr, limit, "order")?;
         let window = value.window(nvr, "value")?;
         let elements = slave.elements(&AccessRequest { type_name: "Real", references, values: nvr })?;
-        window.fill(&slave.output_derivatives(&elements, orders)?);
-        Ok(FmiStatus::Ok)
+        slave.output_derivatives(&elements, orders).map(|values| window.fill(&values))
     })
 }
 
@@ -56,15 +54,12 @@ pub(super) extern "C" fn fmi2DoStep(
     communicationStepSize: f64,
     _noSetFMUStatePriorToCurrentPoint: Boolean,
 ) -> FmiStatus {
-    guard(c, &order::DO_STEP, |slave| {
-        slave.step(currentCommunicationPoint, communicationStepSize)?;
-        Ok(FmiStatus::Ok)
-    })
+    guard(c, &order::DO_STEP, |slave| slave.step(currentCommunicationPoint, communicationStepSize))
 }
 
 /// Answers a status request. No step is ever pending, so most status kinds have no information and return `fmi2Discard`
 /// (FMI 2.0.4, section 4.2.3).
-fn status<T: Copy>(kind: i32, value: &Out<T>, answer: Option<T>) -> Result<FmiStatus> {
+fn status<T: Copy>(kind: i32, value: &Out<T>, answer: Option<T>) -> Result<()> {
     let window = value.single("value")?;
     let nothing = || {
         Refusal::discard(format!(
@@ -72,23 +67,7 @@ fn status<T: Copy>(kind: i32, value: &Out<T>, answer: Option<T>) -> Result<FmiSt
              fmi2LastSuccessfulTime (2), or fmi2GetBooleanStatus with fmi2Terminated (3)"
         ))
     };
-    window.fill(&[answer.ok_or_else(nothing)?]);
-    Ok(FmiStatus::Ok)
-}
-
-#[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2GetStatus(c: InstanceHandle, s: i32, value: Out<i32>) -> FmiStatus {
-    guard(c, &order::GET_STATUS, |_| status(s, &value, None))
-}
-
-#[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2GetRealStatus(c: InstanceHandle, s: i32, value: Out<f64>) -> FmiStatus {
-    guard(c, &order::GET_REAL_STATUS, |slave| status(s, &value, (s == LAST_SUCCESSFUL_TIME).then(|| slave.time())))
-}
-
-#[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2GetIntegerStatus(c: InstanceHandle, s: i32, value: Out<i32>) -> FmiStatus {
-    guard(c, &order::GET_INTEGER_STATUS, |_| status(s, &value, None))
+    answer.ok_or_else(nothing).map(|answer| window.fill(&[answer]))
 }
 
 /// Returns whether the slave requests the end of the simulation, which it does only after its state became non-finite.
@@ -96,16 +75,22 @@ fn wants_to_terminate(slave: &Slave) -> Boolean {
     Boolean::from(matches!(slave.phase(), InstancePhase::Failed { .. }))
 }
 
-#[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2GetBooleanStatus(c: InstanceHandle, s: i32, value: Out<Boolean>) -> FmiStatus {
-    guard(c, &order::GET_BOOLEAN_STATUS, |slave| {
-        status(s, &value, (s == TERMINATED).then(|| wants_to_terminate(slave)))
-    })
+/// Defines status requests: name, rule, C type of the answer, and the answer to a kind of status.
+macro_rules! status_requests {
+    ($($function:ident $rule:ident $type:ty, |$slave:ident, $kind:ident| $answer:expr;)*) => {$(
+        #[unsafe(no_mangle)]
+        pub(crate) extern "C" fn $function(c: InstanceHandle, $kind: i32, value: Out<$type>) -> FmiStatus {
+            guard(c, &order::$rule, |$slave| status($kind, &value, $answer))
+        }
+    )*};
 }
 
-#[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2GetStringStatus(c: InstanceHandle, s: i32, value: Out<*const c_char>) -> FmiStatus {
-    guard(c, &order::GET_STRING_STATUS, |_| status(s, &value, None))
+status_requests! {
+    fmi2GetStatus GET_STATUS i32, |_slave, kind| None;
+    fmi2GetRealStatus GET_REAL_STATUS f64, |slave, kind| (kind == LAST_SUCCESSFUL_TIME).then(|| slave.time());
+    fmi2GetIntegerStatus GET_INTEGER_STATUS i32, |_slave, kind| None;
+    fmi2GetBooleanStatus GET_BOOLEAN_STATUS Boolean, |slave, kind| (kind == TERMINATED).then(|| wants_to_terminate(slave));
+    fmi2GetStringStatus GET_STRING_STATUS *const c_char, |_slave, kind| None;
 }
 
 /// Derivatives with respect to inputs over the last communication step, which require the parameter `step_derivatives`.

@@ -9,8 +9,9 @@ use crate::boundary::{
 };
 use crate::load::Load;
 use crate::location;
+use crate::shared::{accessors, shared_functions};
 use crate::slave::order::fmi2 as order;
-use crate::slave::{Dialect, ExperimentTimes, FmiStatus, Refusal};
+use crate::slave::{Dialect, ExperimentTimes, FmiStatus, Refusal, Slave};
 
 /// `fmi2CallbackFunctions`. Memory functions and `stepFinished` are never called.
 #[derive(Clone, Copy)]
@@ -34,16 +35,6 @@ pub(super) extern "C" fn fmi2GetTypesPlatform() -> *const c_char {
 #[unsafe(no_mangle)]
 pub(super) extern "C" fn fmi2GetVersion() -> *const c_char {
     c"2.0".as_ptr()
-}
-
-#[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2SetDebugLogging(
-    c: InstanceHandle,
-    loggingOn: Boolean,
-    nCategories: usize,
-    categories: In<TextArgument>,
-) -> FmiStatus {
-    boundary::set_debug_logging(c, &order::SET_DEBUG_LOGGING, loggingOn != 0, (categories, nCategories))
 }
 
 /// Implements `fmi2Instantiate` of a library with a unit created by `load`. The library exports it, see
@@ -86,11 +77,6 @@ pub fn instantiate_unit(
 }
 
 #[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2FreeInstance(c: InstanceHandle) {
-    release(c, &order::FREE_INSTANCE);
-}
-
-#[unsafe(no_mangle)]
 pub(super) extern "C" fn fmi2SetupExperiment(
     c: InstanceHandle,
     _toleranceDefined: Boolean,
@@ -100,8 +86,9 @@ pub(super) extern "C" fn fmi2SetupExperiment(
     stopTime: f64,
 ) -> FmiStatus {
     guard(c, &order::SETUP_EXPERIMENT, |slave| {
-        slave.set_experiment(ExperimentTimes::new(startTime, (stopTimeDefined != 0).then_some(stopTime))?);
-        Ok(FmiStatus::Ok)
+        let experiment = ExperimentTimes::new(startTime, (stopTimeDefined != 0).then_some(stopTime))?;
+        slave.set_experiment(experiment);
+        Ok(())
     })
 }
 
@@ -109,131 +96,27 @@ pub(super) extern "C" fn fmi2SetupExperiment(
 pub(super) extern "C" fn fmi2EnterInitializationMode(c: InstanceHandle) -> FmiStatus {
     guard(c, &order::ENTER_INITIALIZATION_MODE, |slave| {
         slave.enter_initialisation(None);
-        Ok(FmiStatus::Ok)
+        Ok(())
     })
 }
 
-#[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2ExitInitializationMode(c: InstanceHandle) -> FmiStatus {
-    guard(c, &order::EXIT_INITIALIZATION_MODE, |slave| slave.exit_initialisation())
+shared_functions! {
+    Boolean; fmi2SetDebugLogging fmi2FreeInstance fmi2ExitInitializationMode fmi2Terminate fmi2Reset
+    fmi2GetFMUstate fmi2SetFMUstate fmi2FreeFMUstate
+    fmi2SerializedFMUstateSize fmi2SerializeFMUstate fmi2DeSerializeFMUstate
 }
 
-#[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2Terminate(c: InstanceHandle) -> FmiStatus {
-    guard(c, &order::TERMINATE, |slave| {
-        slave.terminate();
-        Ok(FmiStatus::Ok)
-    })
-}
-
-#[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2Reset(c: InstanceHandle) -> FmiStatus {
-    guard(c, &order::RESET, |slave| {
-        slave.reset();
-        Ok(FmiStatus::Ok)
-    })
-}
-
-#[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2GetReal(c: InstanceHandle, vr: In<u32>, nvr: usize, value: Out<f64>) -> FmiStatus {
-    boundary::get((c, &order::GET_REAL, "Real"), (vr, nvr), (value, nvr), |value: f64| value)
-}
-
-#[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2GetInteger(c: InstanceHandle, vr: In<u32>, nvr: usize, value: Out<i32>) -> FmiStatus {
-    boundary::get((c, &order::GET_INTEGER, "Integer"), (vr, nvr), (value, nvr), |value: i32| value)
-}
-
-#[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2GetBoolean(c: InstanceHandle, vr: In<u32>, nvr: usize, value: Out<Boolean>) -> FmiStatus {
-    boundary::get((c, &order::GET_BOOLEAN, "Boolean"), (vr, nvr), (value, nvr), |value: bool| Boolean::from(value))
-}
-
-#[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2GetString(
-    c: InstanceHandle,
-    vr: In<u32>,
-    nvr: usize,
-    value: Out<*const c_char>,
-) -> FmiStatus {
-    boundary::strings((c, &order::GET_STRING), (vr, nvr), (value, nvr))
-}
-
-#[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2SetReal(c: InstanceHandle, vr: In<u32>, nvr: usize, value: In<f64>) -> FmiStatus {
-    boundary::set((c, &order::SET_REAL, "Real"), (vr, nvr), (value, nvr), |value: &f64| Ok(*value))
-}
-
-#[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2SetInteger(c: InstanceHandle, vr: In<u32>, nvr: usize, value: In<i32>) -> FmiStatus {
-    boundary::set((c, &order::SET_INTEGER, "Integer"), (vr, nvr), (value, nvr), |value: &i32| Ok(*value))
-}
-
-#[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2SetBoolean(c: InstanceHandle, vr: In<u32>, nvr: usize, value: In<Boolean>) -> FmiStatus {
-    boundary::set((c, &order::SET_BOOLEAN, "Boolean"), (vr, nvr), (value, nvr), |value: &Boolean| Ok(*value != 0))
-}
-
-#[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2SetString(
-    c: InstanceHandle,
-    vr: In<u32>,
-    nvr: usize,
-    value: In<TextArgument>,
-) -> FmiStatus {
-    boundary::set((c, &order::SET_STRING, "String"), (vr, nvr), (value, nvr), |value: &TextArgument| {
-        value.required("value").map(str::to_owned)
-    })
-}
-
-#[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2GetFMUstate(c: InstanceHandle, FMUstate: Out<StateHandle>) -> FmiStatus {
-    state::save(c, &order::GET_FMU_STATE, FMUstate)
-}
-
-#[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2SetFMUstate(c: InstanceHandle, FMUstate: StateHandle) -> FmiStatus {
-    state::restore(c, &order::SET_FMU_STATE, FMUstate)
-}
-
-#[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2FreeFMUstate(c: InstanceHandle, FMUstate: Out<StateHandle>) -> FmiStatus {
-    state::free(c, &order::FREE_FMU_STATE, FMUstate)
-}
-
-#[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2SerializedFMUstateSize(
-    c: InstanceHandle,
-    FMUstate: StateHandle,
-    size: Out<usize>,
-) -> FmiStatus {
-    state::size(c, &order::SERIALIZED_FMU_STATE_SIZE, FMUstate, size)
-}
-
-#[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2SerializeFMUstate(
-    c: InstanceHandle,
-    FMUstate: StateHandle,
-    serializedState: Out<u8>,
-    size: usize,
-) -> FmiStatus {
-    state::serialise(c, &order::SERIALIZE_FMU_STATE, FMUstate, serializedState, size)
-}
-
-#[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2DeSerializeFMUstate(
-    c: InstanceHandle,
-    serializedState: In<u8>,
-    size: usize,
-    FMUstate: Out<StateHandle>,
-) -> FmiStatus {
-    state::deserialise(c, &order::DESERIALIZE_FMU_STATE, serializedState, size, FMUstate)
+accessors! {
+    [] fmi2GetString fmi2SetString "value";
+    fmi2GetReal GET_REAL fmi2SetReal SET_REAL "Real" f64, f64, |value| value, |value| *value;
+    fmi2GetInteger GET_INTEGER fmi2SetInteger SET_INTEGER "Integer" i32, i32, |value| value, |value| *value;
+    fmi2GetBoolean GET_BOOLEAN fmi2SetBoolean SET_BOOLEAN "Boolean" Boolean, bool, Boolean::from, |value| *value != 0;
 }
 
 /// Implements `fmi2CancelStep`: there is never an asynchronous step.
 #[unsafe(no_mangle)]
 pub(super) extern "C" fn fmi2CancelStep(c: InstanceHandle) -> FmiStatus {
     guard(c, &order::CANCEL_STEP, |_| {
-        Err(Refusal::error("no step is pending: steps of this FMU are never asynchronous"))
+        Err::<(), _>(Refusal::error("no step is pending: steps of this FMU are never asynchronous"))
     })
 }

@@ -9,22 +9,13 @@ use crate::boundary::{
 };
 use crate::load::Load;
 use crate::location;
+use crate::shared::shared_functions;
 use crate::slave::order::fmi3 as order;
-use crate::slave::{Dialect, ExperimentTimes, FmiStatus, Refusal};
+use crate::slave::{Dialect, ExperimentTimes, FmiStatus, Refusal, Slave};
 
 #[unsafe(no_mangle)]
 pub(super) extern "C" fn fmi3GetVersion() -> *const c_char {
     c"3.0".as_ptr()
-}
-
-#[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi3SetDebugLogging(
-    instance: InstanceHandle,
-    loggingOn: Boolean,
-    nCategories: usize,
-    categories: In<TextArgument>,
-) -> FmiStatus {
-    boundary::set_debug_logging(instance, &order::SET_DEBUG_LOGGING, loggingOn != 0, (categories, nCategories))
 }
 
 #[unsafe(no_mangle)]
@@ -112,11 +103,6 @@ pub(super) extern "C" fn fmi3InstantiateScheduledExecution(
 }
 
 #[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi3FreeInstance(instance: InstanceHandle) {
-    release(instance, &order::FREE_INSTANCE);
-}
-
-#[unsafe(no_mangle)]
 pub(super) extern "C" fn fmi3EnterInitializationMode(
     instance: InstanceHandle,
     _toleranceDefined: Boolean,
@@ -128,71 +114,12 @@ pub(super) extern "C" fn fmi3EnterInitializationMode(
     guard(instance, &order::ENTER_INITIALIZATION_MODE, |slave| {
         let experiment = ExperimentTimes::new(startTime, (stopTimeDefined != 0).then_some(stopTime))?;
         slave.enter_initialisation(Some(experiment));
-        Ok(FmiStatus::Ok)
+        Ok(())
     })
 }
 
-#[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi3ExitInitializationMode(instance: InstanceHandle) -> FmiStatus {
-    guard(instance, &order::EXIT_INITIALIZATION_MODE, |slave| slave.exit_initialisation())
-}
-
-#[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi3Terminate(instance: InstanceHandle) -> FmiStatus {
-    guard(instance, &order::TERMINATE, |slave| {
-        slave.terminate();
-        Ok(FmiStatus::Ok)
-    })
-}
-
-#[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi3Reset(instance: InstanceHandle) -> FmiStatus {
-    guard(instance, &order::RESET, |slave| {
-        slave.reset();
-        Ok(FmiStatus::Ok)
-    })
-}
-
-#[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi3GetFMUState(instance: InstanceHandle, FMUState: Out<StateHandle>) -> FmiStatus {
-    state::save(instance, &order::GET_FMU_STATE, FMUState)
-}
-
-#[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi3SetFMUState(instance: InstanceHandle, FMUState: StateHandle) -> FmiStatus {
-    state::restore(instance, &order::SET_FMU_STATE, FMUState)
-}
-
-#[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi3FreeFMUState(instance: InstanceHandle, FMUState: Out<StateHandle>) -> FmiStatus {
-    state::free(instance, &order::FREE_FMU_STATE, FMUState)
-}
-
-#[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi3SerializedFMUStateSize(
-    instance: InstanceHandle,
-    FMUState: StateHandle,
-    size: Out<usize>,
-) -> FmiStatus {
-    state::size(instance, &order::SERIALIZED_FMU_STATE_SIZE, FMUState, size)
-}
-
-#[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi3SerializeFMUState(
-    instance: InstanceHandle,
-    FMUState: StateHandle,
-    serializedState: Out<u8>,
-    size: usize,
-) -> FmiStatus {
-    state::serialise(instance, &order::SERIALIZE_FMU_STATE, FMUState, serializedState, size)
-}
-
-#[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi3DeserializeFMUState(
-    instance: InstanceHandle,
-    serializedState: In<u8>,
-    size: usize,
-    FMUState: Out<StateHandle>,
-) -> FmiStatus {
-    state::deserialise(instance, &order::DESERIALIZE_FMU_STATE, serializedState, size, FMUState)
+shared_functions! {
+    Boolean; fmi3SetDebugLogging fmi3FreeInstance fmi3ExitInitializationMode fmi3Terminate fmi3Reset
+    fmi3GetFMUState fmi3SetFMUState fmi3FreeFMUState
+    fmi3SerializedFMUStateSize fmi3SerializeFMUState fmi3DeserializeFMUState
 }

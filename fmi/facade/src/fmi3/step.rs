@@ -140,7 +140,6 @@ pub(super) extern "C" fn fmi3GetOutputDerivatives(
         let window = values.window(nValues, "values")?;
         let elements = slave.elements(&AccessRequest { type_name: "Float64", references, values: nValues })?;
         let orders = slave.orders_of_elements(references, orders);
-        window.fill(&slave.output_derivatives(&elements, &orders)?);
-        Ok(FmiStatus::Ok)
+        slave.output_derivatives(&elements, &orders).map(|values| window.fill(&values))
     })
 }

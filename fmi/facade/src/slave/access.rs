@@ -19,9 +19,7 @@ pub(crate) struct AccessRequest<'a> {
 /// A value of one of the types that the C functions transfer.
 pub(crate) trait FmiValue: Sized {
     /// Returns the value of the independent variable, if this is its type.
-    fn of_time(_time: f64) -> Option<Self> {
-        None
-    }
+    fn of_time(time: f64) -> Option<Self>;
 
     /// Reads one element.
     fn get(unit: &dyn CoSimulation, reference: u32) -> tiprub_cosim::Result<Self>;
@@ -30,59 +28,34 @@ pub(crate) trait FmiValue: Sized {
     fn value(&self) -> Value<'_>;
 }
 
-impl FmiValue for f64 {
-    fn of_time(time: f64) -> Option<Self> {
-        Some(time)
-    }
+/// Implements [`FmiValue`]: the type, the getter of a unit and what makes the type of its value, the value for setting, and the value of the
+/// independent variable.
+macro_rules! fmi_values {
+    ($($rust:ty: $get:ident $from:expr, |$own:ident| $value:expr, |$time:ident| $of_time:expr;)*) => {$(
+        impl FmiValue for $rust {
+            fn of_time($time: f64) -> Option<Self> {
+                $of_time
+            }
 
-    fn get(unit: &dyn CoSimulation, reference: u32) -> tiprub_cosim::Result<Self> {
-        unit.real(reference)
-    }
+            fn get(unit: &dyn CoSimulation, reference: u32) -> tiprub_cosim::Result<Self> {
+                unit.$get(reference).map($from)
+            }
 
-    fn value(&self) -> Value<'_> {
-        Value::Real(*self)
-    }
+            fn value(&self) -> Value<'_> {
+                let $own = self;
+                $value
+            }
+        }
+    )*};
 }
 
-impl FmiValue for i32 {
-    fn get(unit: &dyn CoSimulation, reference: u32) -> tiprub_cosim::Result<Self> {
-        unit.integer(reference)
-    }
-
-    fn value(&self) -> Value<'_> {
-        Value::Integer((*self).into())
-    }
-}
-
-/// FMI 3.0 transfers integers and enumerations as 64-bit integers.
-impl FmiValue for i64 {
-    fn get(unit: &dyn CoSimulation, reference: u32) -> tiprub_cosim::Result<Self> {
-        unit.integer(reference).map(Self::from)
-    }
-
-    fn value(&self) -> Value<'_> {
-        Value::Integer(*self)
-    }
-}
-
-impl FmiValue for bool {
-    fn get(unit: &dyn CoSimulation, reference: u32) -> tiprub_cosim::Result<Self> {
-        unit.boolean(reference)
-    }
-
-    fn value(&self) -> Value<'_> {
-        Value::Boolean(*self)
-    }
-}
-
-impl FmiValue for String {
-    fn get(unit: &dyn CoSimulation, reference: u32) -> tiprub_cosim::Result<Self> {
-        unit.string(reference).map(Self::from)
-    }
-
-    fn value(&self) -> Value<'_> {
-        Value::String(self)
-    }
+// FMI 3.0 transfers integers and enumerations as 64-bit integers.
+fmi_values! {
+    f64: real Self::from, |own| Value::Real(*own), |time| Some(time);
+    i32: integer Self::from, |own| Value::Integer((*own).into()), |_time| None;
+    i64: integer Self::from, |own| Value::Integer(*own), |_time| None;
+    bool: boolean Self::from, |own| Value::Boolean(*own), |_time| None;
+    String: string Self::from, |own| Value::String(own), |_time| None;
 }
 
 /// Returns the name of a variable's type in the function names of the standard.

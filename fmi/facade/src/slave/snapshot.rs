@@ -4,6 +4,8 @@
 //! stop time u8, two zero bytes, time f64, stop time f64, length of the core's state u64, the core's state, FNV-1a 64
 //! of everything before. The length is the same for all states of an FMU.
 
+use tiprub_cosim::persist::fingerprint;
+
 use super::{ExperimentTimes, InstancePhase, Refusal, Result, Slave};
 
 const MAGIC: &[u8; 8] = b"tiprubST";
@@ -20,11 +22,6 @@ fn damaged(problem: impl std::fmt::Display) -> Refusal {
     Refusal::error(format!(
         "the saved state cannot be used: {problem}. Use an unmodified state that was saved by this FMU"
     ))
-}
-
-/// Computes FNV-1a, 64 bit.
-fn checksum(bytes: &[u8]) -> u64 {
-    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3))
 }
 
 /// Reads fields from the front of a byte string.
@@ -175,7 +172,7 @@ impl Slave {
             InstancePhase::Initialising { before: Some(before), .. } => out[start..].copy_from_slice(before),
             _ => self.unit.save_state(&mut out[start..])?,
         }
-        out.extend(checksum(&out).to_le_bytes());
+        out.extend(fingerprint(&out, 0).to_le_bytes());
         Ok(out)
     }
 
@@ -200,7 +197,7 @@ impl Slave {
             return Err(damaged(format!("it has {} bytes instead of {}", bytes.len(), self.serialised_size())));
         }
         let (content, tail) = bytes.split_at(bytes.len() - CHECKSUM);
-        if checksum(content).to_le_bytes() != tail {
+        if fingerprint(content, 0).to_le_bytes() != tail {
             return Err(damaged("its checksum does not match its content"));
         }
         let phase = decode_phase(&mut reader)?;

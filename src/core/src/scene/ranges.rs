@@ -2,7 +2,7 @@
 //! numbers lose the digits of the others. Implausible values within the range are checked by [`crate::limits::plausibility`].
 
 /// Largest coordinate of a contact node, and largest radius (m): eight times a wind turbine.
-pub(crate) const POSITION: f64 = 1e3;
+pub const POSITION: f64 = 1e3;
 /// Smallest radius of a contact node (m): that of a hair.
 pub(crate) const SMALLEST_RADIUS: f64 = 1e-5;
 /// The model does not describe gaps, casing shapes and displacements beyond this fraction of the radius, or of the extent of open surfaces.
@@ -20,17 +20,19 @@ pub const SPEED: f64 = 1e6;
 /// Largest velocity of a free body (m/s): ten times the escape velocity from the solar system.
 pub const VELOCITY: f64 = 1e5;
 /// Largest angle (rad) of a phase: a larger angle loses too many digits of its remainder.
-pub(crate) const ANGLE: f64 = 1e6;
+pub const ANGLE: f64 = 1e6;
 /// Largest angle (rad) of an input that may turn for hours: an angle of that size is rounded to 1e-4 rad.
 pub const TURNED: f64 = 1e12;
 /// Largest line load (N/m): a thousand times the strength of any casing.
-pub(crate) const LINE_LOAD: f64 = 1e12;
+pub const LINE_LOAD: f64 = 1e12;
 /// Smallest and largest depth factor of bumps (-), whose heights are checked against the radius.
 pub const DEPTH: f64 = 1e12;
+/// Smallest and largest width parameter of bumps (-).
+pub const LOBE_WIDTH: [f64; 2] = [1e-3, 0.25];
 /// Largest number of lobes around the circumference.
 pub const LOBES: f64 = 1e6;
 /// Longest internal step (s): far above the period of any mode of a blade.
-pub(crate) const LONGEST_STEP: f64 = 1.0;
+pub const LONGEST_STEP: f64 = 1.0;
 /// Largest number of internal steps of one communication step.
 pub const STEPS: f64 = 1e9;
 /// Smallest and largest error of a step, as a fraction of the clearance: below, it is mostly rounding.
@@ -40,9 +42,9 @@ pub const FRICTION: f64 = 2.0;
 /// Largest damping ratio of a scene.
 pub const DAMPING: f64 = 0.99;
 /// Largest amplitude of the excitation of a blade (N): a thousand times the force that tears it off.
-pub(crate) const EXCITATION: f64 = 1e9;
+pub const EXCITATION: f64 = 1e9;
 /// Largest engine order.
-pub(crate) const ENGINE_ORDER: f64 = 1e6;
+pub const ENGINE_ORDER: f64 = 1e6;
 /// Largest angle of an excitation per internal step (rad): a step of the recurrences assumes it to be constant.
 pub(crate) const EXCITED_ANGLE: f64 = 1.0;
 /// Largest fraction of stiffness lost per kelvin (1/K): twenty times that of a metal.
@@ -50,7 +52,7 @@ pub const SOFTENING: f64 = 1e-2;
 /// Smallest and largest remaining fraction of the stiffness at a temperature (-).
 pub(crate) const SOFTENED: [f64; 2] = [0.1, 2.0];
 /// Smallest and largest mistuning factor: beyond them it is a different blade.
-pub(crate) const FREQUENCY_FACTORS: [f64; 2] = [0.5, 2.0];
+pub const FREQUENCY_FACTORS: [f64; 2] = [0.5, 2.0];
 /// Smallest number of data points for a closed cubic spline, and an upper bound above that of any mesh.
 pub(crate) const SPLINE_AROUND: [usize; 2] = [4, 2000];
 /// Smallest and largest number of rings of data points.
@@ -63,10 +65,10 @@ pub const MODULUS: [f64; 2] = [5e-324, 1e13];
 /// Largest yield stress and hardening of a coating (Pa), above that of any solid.
 pub const STRESS: f64 = 1e13;
 /// Specific cutting energy of a coating (J/m³): from softer than any foam to harder to cut than any alloy.
-pub(crate) const CUTTING_ENERGY: [f64; 2] = [1e3, 1e12];
+pub const CUTTING_ENERGY: [f64; 2] = [1e3, 1e12];
 /// Normal force per tangential force of a cut: from tools that are drawn in to tips that hardly cut.
-pub(crate) const NORMAL_RATIO: [f64; 2] = [0.05, 20.0];
+pub const NORMAL_RATIO: [f64; 2] = [0.05, 20.0];
 /// Width around the circumference over which a tip presses a coating (m): from a foil to a metre.
-pub(crate) const CONTACT_WIDTH: [f64; 2] = [1e-6, 1.0];
+pub const CONTACT_WIDTH: [f64; 2] = [1e-6, 1.0];
 /// Largest number of cells of a coating: 80 megabytes of state.
 pub(crate) const CELLS: usize = 10_000_000;

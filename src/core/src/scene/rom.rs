@@ -208,14 +208,6 @@ pub struct Rom {
     pub extras: RomExtras,
 }
 
-/// Problem of an array with a wrong shape, or else with a value that is not finite.
-fn shape_or_value(found: (usize, usize), expected: (usize, usize)) -> String {
-    if found == expected && expected.1 > 0 {
-        return "a value is not finite".into();
-    }
-    format!("shape {found:?} found, {expected:?} expected")
-}
-
 impl Rom {
     /// Number of reduced coordinates of one sector.
     pub fn order(&self) -> usize {
@@ -232,14 +224,9 @@ impl Rom {
     /// # Errors
     /// [`Error::Invalid`] with the array and the remedy.
     pub fn validate(&self) -> Result<()> {
-        let remedy = "Regenerate the ROM with `tiprub reduce`, or see the ROM file chapter of the user guide";
-        self.validate_shapes(remedy)?;
-        for (name, matrix) in [("mass", &self.mass), ("stiffness", &self.stiffness), ("contact_map", &self.contact_map)]
-        {
-            entries(name, matrix, if name == "contact_map" { ranges::MAP } else { bounds::MATRIX }, remedy)?;
-        }
+        self.validate_basics()?;
         for (index, node) in self.contact_nodes.iter().enumerate() {
-            self.validate_place(&format!("ROM array `contact_positions`, node {}", index + 1), node, remedy)?;
+            self.validate_place(&format!("ROM array `contact_positions`, node {}", index + 1), node)?;
             let what = format!("ROM array `contact_meridional_slopes`, node {}", index + 1);
             bounds::at_most(&what, node.meridional_slope, ranges::SLOPE)?;
             for (name, value, most) in [
@@ -249,73 +236,53 @@ impl Rom {
                 bounds::within(&format!("ROM array `{name}`, node {}", index + 1), value, 0.0, most)?;
             }
         }
-        self.validate_definiteness(remedy)?;
-        self.validate_spin(remedy)?;
-        self.validate_thermal(remedy)?;
+        symmetric("mass", &self.mass, 1.0)?;
+        symmetric("stiffness", &self.stiffness, 1.0)?;
+        if self.mass.clone().cholesky().is_none() {
+            return refuse("ROM array `mass`", "not positive definite");
+        }
+        self.validate_spin()?;
+        self.validate_thermal()?;
         self.validate_grid()?;
-        self.validate_rows(remedy)?;
-        self.validate_watched(remedy)?;
-        self.validate_support(remedy)?;
-        self.validate_harmonics(remedy)
+        self.validate_rows()?;
+        self.validate_watched()?;
+        self.validate_support()?;
+        self.validate_harmonics()
     }
 
-    fn validate_shapes(&self, remedy: &str) -> Result<()> {
-        let order = self.mass.nrows();
-        if order == 0 || self.mass.ncols() != order {
-            return Err(Error::invalid(
-                "ROM array `mass`",
-                format!("shape {:?} is empty or not square", self.mass.shape()),
-                remedy,
-            ));
+    /// Checks the data that every ROM has.
+    fn validate_basics(&self) -> Result<()> {
+        let (order, nodes) = (self.order(), self.contact_nodes.len());
+        if order == 0 {
+            return refuse("ROM array `mass`", format!("shape {:?} is empty", self.mass.shape()));
         }
-        if self.stiffness.shape() != (order, order) {
-            return Err(Error::invalid(
-                "ROM array `stiffness`",
-                format!("shape {:?} does not match `mass` ({order} x {order})", self.stiffness.shape()),
-                remedy,
-            ));
+        if nodes == 0 {
+            return refuse("ROM array `contact_positions`", "no contact nodes");
         }
-        if self.contact_nodes.is_empty() {
-            return Err(Error::invalid("ROM array `contact_positions`", "no contact nodes", remedy));
-        }
-        if self.contact_map.shape() != (3 * self.contact_nodes.len(), order) {
-            return Err(Error::invalid(
-                "ROM array `contact_map`",
-                format!(
-                    "shape {:?} found, 3 x {} nodes by {order} coordinates expected",
-                    self.contact_map.shape(),
-                    self.contact_nodes.len()
-                ),
-                remedy,
-            ));
-        }
+        array("mass", &self.mass, (order, order), bounds::MATRIX)?;
+        array("stiffness", &self.stiffness, (order, order), bounds::MATRIX)?;
+        array("contact_map", &self.contact_map, (3 * nodes, order), ranges::MAP)?;
         if self.sectors == 0 {
-            return Err(Error::invalid("ROM metadata `sectors`", "zero sectors", remedy));
+            return refuse("ROM metadata `sectors`", "zero sectors");
         }
         if self.sectors > MAX_SECTORS {
-            return Err(Error::invalid(
-                "ROM metadata `sectors`",
-                format!("{} sectors exceed the limit of {MAX_SECTORS}", self.sectors),
-                remedy,
-            ));
+            let problem = format!("{} sectors exceed the limit of {MAX_SECTORS}", self.sectors);
+            return refuse("ROM metadata `sectors`", problem);
         }
         if !(0.0..1.0).contains(&self.damping_ratio) {
-            return Err(Error::invalid(
-                "ROM metadata `damping_ratio`",
-                format!("{} is outside 0 ≤ ξ < 1", shown(self.damping_ratio)),
-                remedy,
-            ));
+            let problem = format!("{} is outside 0 ≤ ξ < 1", shown(self.damping_ratio));
+            return refuse("ROM metadata `damping_ratio`", problem);
         }
         Ok(())
     }
 
     /// Checks that lengths are plausible for a machine in metres.
-    fn validate_place(&self, what: &str, node: &ContactNode, remedy: &str) -> Result<()> {
+    fn validate_place(&self, what: &str, node: &ContactNode) -> Result<()> {
         let finite = node.position.iter().all(|value| value.is_finite());
         let radius_positive = self.frame == DisplacementFrame::Cartesian || node.position[0] > 0.0;
         if !finite || !radius_positive {
             let problem = format!("{:?} is not finite, or its radius is not positive", node.position);
-            return Err(Error::invalid(what, problem, remedy));
+            return refuse(what, problem);
         }
         let mut lengths = &node.position[..];
         if self.frame == DisplacementFrame::Cylindrical {
@@ -326,101 +293,86 @@ impl Rom {
         lengths.iter().try_for_each(|length| bounds::at_most(what, *length, ranges::POSITION))
     }
 
-    fn validate_spin(&self, remedy: &str) -> Result<()> {
+    fn validate_spin(&self) -> Result<()> {
         let Some(spin) = &self.extras.spin else { return Ok(()) };
         let order = self.order();
-        let matrices = [
+        for (name, matrix, sign) in [
             ("stiffness_speed2", &spin.stiffness_speed2, 1.0),
             ("stiffness_speed4", &spin.stiffness_speed4, 1.0),
             ("coriolis", &spin.coriolis, -1.0),
-        ];
-        for (name, matrix, sign) in matrices {
-            let what = format!("ROM array `{name}`");
-            if matrix.shape() != (order, order) || matrix.iter().any(|value| !value.is_finite()) {
-                let problem = shape_or_value(matrix.shape(), (order, order));
-                return Err(Error::invalid(what, problem, remedy));
-            }
-            entries(name, matrix, bounds::MATRIX, remedy)?;
-            let asymmetry = (matrix - matrix.transpose() * sign).amax();
-            if asymmetry > 1e-8 * matrix.amax() {
-                let kind = if sign > 0.0 { "symmetric" } else { "skew-symmetric" };
-                let problem = format!("not {kind}: deviation {asymmetry:.3e}, largest entry {:.3e}", matrix.amax());
-                return Err(Error::invalid(what, problem, remedy));
-            }
+        ] {
+            array(name, matrix, (order, order), bounds::MATRIX)?;
+            symmetric(name, matrix, sign)?;
         }
         let loads =
             [("centrifugal_load", &spin.centrifugal_load), ("centrifugal_load_speed4", &spin.centrifugal_load_speed4)];
         for (name, load) in loads {
-            if load.len() != order || load.iter().any(|value| !value.is_finite()) {
-                let problem = shape_or_value((load.len(), 1), (order, 1));
-                return Err(Error::invalid(format!("ROM array `{name}`"), problem, remedy));
-            }
-            load.iter()
-                .try_for_each(|value| bounds::at_most(&format!("ROM array `{name}`"), *value, bounds::MATRIX))?;
+            array(name, &DMatrix::from_column_slice(load.len(), 1, load), (order, 1), bounds::MATRIX)?;
         }
         if !(spin.largest_speed.is_finite() && spin.largest_speed > 0.0) {
             let problem = format!("{} rad/s is not a finite positive speed", shown(spin.largest_speed));
-            return Err(Error::invalid("ROM metadata `largest_speed`", problem, remedy));
+            return refuse("ROM metadata `largest_speed`", problem);
         }
         bounds::at_most("ROM metadata `largest_speed`", spin.largest_speed, ranges::SPEED)
     }
 
-    fn validate_thermal(&self, remedy: &str) -> Result<()> {
+    fn validate_thermal(&self) -> Result<()> {
         let Some(thermal) = &self.extras.thermal else { return Ok(()) };
-        let expected = (self.order(), thermal.patches.len());
-        if thermal.loads.shape() != expected || expected.1 == 0 || thermal.loads.iter().any(|v| !v.is_finite()) {
-            let problem = shape_or_value(thermal.loads.shape(), expected);
-            return Err(Error::invalid("ROM array `thermal_loads`", problem, remedy));
+        if thermal.patches.is_empty() {
+            return refuse("ROM array `thermal_loads`", "no patches");
         }
-        entries("thermal_loads", &thermal.loads, ranges::THERMAL_LOAD, remedy)?;
+        array("thermal_loads", &thermal.loads, (self.order(), thermal.patches.len()), ranges::THERMAL_LOAD)?;
         for (index, patch) in thermal.patches.iter().enumerate() {
+            let what = format!("ROM array `thermal_patches`, patch {}", index + 1);
             let finite = patch.angle.iter().chain(&patch.axial).all(|value| value.is_finite());
             let turn = patch.angle[1] - patch.angle[0];
             let ordered =
                 turn > 0.0 && turn <= std::f64::consts::TAU * (1.0 + 1e-12) && patch.axial[0] < patch.axial[1];
             if !(finite && ordered) {
-                return Err(Error::invalid(
-                    format!("ROM array `thermal_patches`, patch {}", index + 1),
-                    format!(
-                        "angles {:?} rad and axial positions {:?} m do not define a patch",
-                        patch.angle, patch.axial
-                    ),
-                    remedy,
-                ));
+                let problem = format!(
+                    "angles {:?} rad and axial positions {:?} m do not define a patch",
+                    patch.angle, patch.axial
+                );
+                return refuse(what, problem);
             }
-            let what = format!("ROM array `thermal_patches`, patch {}", index + 1);
             patch.angle.iter().try_for_each(|value| bounds::at_most(&what, *value, ranges::ANGLE))?;
             patch.axial.iter().try_for_each(|value| bounds::at_most(&what, *value, ranges::POSITION))?;
         }
         Ok(())
     }
-
-    fn validate_definiteness(&self, remedy: &str) -> Result<()> {
-        for (name, matrix) in [("mass", &self.mass), ("stiffness", &self.stiffness)] {
-            let asymmetry = (matrix - matrix.transpose()).amax();
-            if asymmetry > 1e-8 * matrix.amax() {
-                return Err(Error::invalid(
-                    format!("ROM array `{name}`"),
-                    format!("not symmetric: deviation {asymmetry:.3e}, largest entry {:.3e}", matrix.amax()),
-                    remedy,
-                ));
-            }
-        }
-        if self.mass.clone().cholesky().is_none() {
-            return Err(Error::invalid("ROM array `mass`", "not positive definite", remedy));
-        }
-        Ok(())
-    }
 }
 
-/// Checks that entries are finite, and small enough that squares do not overflow.
-fn entries(name: &str, matrix: &DMatrix<f64>, most: f64, remedy: &str) -> Result<()> {
+/// Rejects data of a ROM.
+fn refuse(what: impl ToString, problem: impl ToString) -> Result<()> {
+    let remedy = "Regenerate the ROM with `tiprub reduce`, or see the ROM file chapter of the user guide";
+    Err(Error::invalid(what, problem, remedy))
+}
+
+/// Checks the shape of an array, and that its entries are finite, and small enough that squares do not overflow.
+fn array(name: &str, matrix: &DMatrix<f64>, expected: (usize, usize), most: f64) -> Result<()> {
+    let what = format!("ROM array `{name}`");
+    if matrix.shape() != expected {
+        return refuse(what, format!("shape {:?} found, {expected:?} expected", matrix.shape()));
+    }
     let Some(index) = matrix.iter().position(|value| value.is_nan() || value.abs() > most) else { return Ok(()) };
     let (row, column, value) = (index % matrix.nrows(), index / matrix.nrows(), matrix[index]);
-    let problem = if value.is_finite() {
-        format!("entry {} at ({row}, {column}) is outside ±{}", shown(value), shown(most))
-    } else {
-        format!("non-finite entry at ({row}, {column})")
-    };
-    Err(Error::invalid(format!("ROM array `{name}`"), problem, remedy))
+    refuse(
+        what,
+        if value.is_finite() {
+            format!("entry {} at ({row}, {column}) is outside ±{}", shown(value), shown(most))
+        } else {
+            format!("non-finite entry at ({row}, {column})")
+        },
+    )
+}
+
+/// Checks that a matrix is symmetric (`sign` 1) or skew-symmetric (−1).
+fn symmetric(name: &str, matrix: &DMatrix<f64>, sign: f64) -> Result<()> {
+    let asymmetry = (matrix - matrix.transpose() * sign).amax();
+    if asymmetry <= 1e-8 * matrix.amax() {
+        return Ok(());
+    }
+    let kind = if sign > 0.0 { "symmetric" } else { "skew-symmetric" };
+    let problem = format!("not {kind}: deviation {asymmetry:.3e}, largest entry {:.3e}", matrix.amax());
+    refuse(format!("ROM array `{name}`"), problem)
 }

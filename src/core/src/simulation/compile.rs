@@ -1,21 +1,17 @@
 //! Compilation of settings into kernels: everything that is determined before the first step.
 
+mod surfaces;
+
 use crate::contact::ContactParameters;
 use crate::contact::coating::{BladeTip, Coating};
-use crate::geometry::layout::Layout;
-use crate::geometry::open::{OpenGap, OpenSurface};
-use crate::geometry::surface_spline::SurfaceSpline;
-use crate::geometry::{GapLaw, RevolutionGap};
 use crate::modes::bank::SectorModel;
 use crate::modes::cyclic::CyclicModel;
 use crate::modes::modal::{ModalModel, ModalSpin};
 use crate::modes::rigid::{Translations, free_modes};
 use crate::scene::method::{Scheme, Solver};
-use crate::scene::ranges::SMALL;
 use crate::scene::rom::{ContactNode, SupportRows};
-use crate::scene::settings::{BodyMotion, ContactSettings, Meridian, SceneSettings, StructureSettings};
-use crate::scene::shape::CompiledShape;
-use crate::system::{PairParts, StructureParts, SurfaceCarrier, System, SystemSettings, joined};
+use crate::scene::settings::{BodyMotion, ContactSettings, SceneSettings, StructureSettings};
+use crate::system::{PairParts, StructureParts, SurfaceCarrier, System, SystemSettings};
 use crate::{Error, Result, Rom, Scene};
 use nalgebra::DMatrix;
 use std::sync::Arc;
@@ -23,12 +19,11 @@ use tiprub_cosim::shown;
 use tiprub_cosim::variables::{Quantity, VariableTable};
 
 use super::blades::{disk_heat, expansion, softened, static_stress};
-use super::contour::check_contour;
 use super::loads::{CarrierLoads, centrifugal};
 use super::outputs::OutputReader;
 use super::patches::HeatPatches;
-use super::plan::{PairPlan, SteppingOrder, prefix};
-use super::slave_surface::{CarrierModes, Lining, Share, spline_gap};
+use super::plan::{SteppingOrder, prefix};
+use super::slave_surface::Lining;
 use super::table;
 
 /// Largest number of contact nodes of all sectors that a flexible slave or the disk may couple: their Delassus matrix is dense.
@@ -143,20 +138,18 @@ impl CompiledBody {
             (modes(structure, rom, [0.0; 2])?, None)
         };
         let disk = rom.is_cyclic().then(|| CyclicModel::with_zero(rom, ratio, model.clone())).transpose()?;
-        let (reference_speed, stiffness_range, centrifugal) = (0.0, None, Vec::new());
-        let (watched, stress) = (DMatrix::zeros(0, 0), DMatrix::zeros(0, 0));
         Ok(Self {
             model,
             disk,
             translations,
-            reference_speed,
+            reference_speed: 0.0,
             reference_temperature: 0.0,
-            stiffness_range,
-            centrifugal,
+            stiffness_range: None,
+            centrifugal: Vec::new(),
             disk_heat: Vec::new(),
             expansion: Vec::new(),
-            watched,
-            stress,
+            watched: DMatrix::zeros(0, 0),
+            stress: DMatrix::zeros(0, 0),
             stress_heat: Vec::new(),
             stress_growth: Vec::new(),
             senses: Vec::new(),
@@ -227,20 +220,6 @@ impl Compiled {
                 (0..compiled.plan.pairs.len()).map(|pair| compiled.lining(pair)).collect::<Result<_>>()?;
         }
         Ok((compiled, table, readers))
-    }
-
-    /// Returns the lining between the surface of a pair and the mesh of its carrier, if the support is requested.
-    fn lining(&self, pair: usize) -> Result<Option<Lining>> {
-        let plan = &self.plan.pairs[pair];
-        let supported = |carrier: &usize| self.carriers[*carrier].support.is_some();
-        let Some(carrier) = plan.carrier.filter(supported).filter(|_| plan.grid.is_none()) else { return Ok(None) };
-        let master = (self.body(plan.body).1, &plan.nodes[..]);
-        Lining::new(carrier, (self.carrier(carrier).1, self.share(carrier)), master, self.contact(pair)).map(Some)
-    }
-
-    /// Returns the part of the contact grid of a carrier that a surface uses.
-    fn share(&self, carrier: usize) -> Share {
-        if self.plan.pairs_on(carrier).count() > 1 { Share::Near } else { Share::Whole }
     }
 
     /// Returns settings and ROM of a master.
@@ -450,103 +429,6 @@ impl Compiled {
         error.placed("contact", &format!("contact[{}]", pair + 1)).placed("surface", &format!("surface[{surface}]"))
     }
 
-    /// Checks that the contacts that are solved together are not too many: those of a structure, or of several that share a surface
-    /// carrier.
-    fn check_size(&self) -> Result<()> {
-        let (count, pairs) = (self.bodies.len(), self.plan.pairs.iter());
-        let links = pairs.filter_map(|pair| Some((pair.body, count + pair.carrier?)));
-        let set = joined(count + self.carriers.len(), links);
-        let mut coupled = vec![0; set.len()];
-        for (body, parts) in self.bodies.iter().enumerate() {
-            let rom = self.body(body).1;
-            let own: usize = self.plan.pairs_of(body).map(|(_, pair)| pair.nodes.len()).sum();
-            let carried = self.plan.pairs_of(body).any(|(_, pair)| pair.carrier.is_some());
-            if parts.disk.is_some() || parts.translations.is_some() || carried {
-                coupled[set[body]] += own * rom.sectors;
-            }
-            let (together, name) = (coupled[set[body]], &self.body(body).0.name);
-            if together <= MOST_COUPLED {
-                continue;
-            }
-            let first = self.plan.pairs_of(body).next().map_or(0, |(pair, _)| pair);
-            let (what, problem, remedy) = if parts.translations.is_some() {
-                let problem = format!("{together} contact nodes in all pairs");
-                ("contact.nodes", problem, "Choose fewer nodes, or a coarser mesh")
-            } else {
-                let what = if parts.disk.is_some() { "ROM metadata `sectors`" } else { "surface.structure" };
-                let problem = format!("{together} coupled contact nodes in all sectors");
-                (what, problem, "Use fewer contact nodes or sectors, or uncoupled sectors on a rigid surface")
-            };
-            let problem = format!("{problem} of `{name}` and the structures coupled to it, more than {MOST_COUPLED}");
-            return Err(self.of_pair(first, Error::invalid(what, problem, remedy)));
-        }
-        Ok(())
-    }
-
-    /// Creates the gap function of a pair.
-    pub(super) fn gap(&self, pair: usize) -> Result<GapLaw> {
-        let plan = &self.plan.pairs[pair];
-        if self.bodies[plan.body].translations.is_some() {
-            return self.open_gap(plan);
-        }
-        let (contact, settings) = (self.contact(pair), self.plan.surface(&self.scene.settings, pair));
-        let (structure, rom) = self.body(plan.body);
-        let clearances =
-            if contact.sector_gaps.is_empty() { vec![contact.gap; rom.sectors] } else { contact.sector_gaps.clone() };
-        let surface = CompiledShape::new(&settings.shape, contact.nominal_gap())?;
-        check_lengths(rom, &clearances, &surface)?;
-        let lanes = crate::modes::bank::lanes(rom.sectors);
-        let spline = settings.spline.is_some() || plan.carrier.is_some();
-        if contact.meridian == Meridian::Contour {
-            check_contour(rom, &plan.nodes, !spline)?;
-        }
-        if !spline {
-            let gap = RevolutionGap::new(rom, surface, &clearances, contact.meridian, lanes)?;
-            let gap = gap.of_nodes(plan.nodes.clone()).with_moving_shaft(structure.whirl || structure.axial_shift);
-            return Ok(GapLaw::Revolution(gap));
-        }
-        let layout = Layout::new(rom, &clearances, lanes)?;
-        let carrier = plan.carrier.map(|carrier| (self.carrier(carrier).1, self.share(carrier)));
-        let gap = spline_gap((rom, &plan.nodes), layout, contact, settings, carrier)?;
-        Ok(GapLaw::Spline(Box::new(gap)))
-    }
-
-    fn open_gap(&self, plan: &PairPlan) -> Result<GapLaw> {
-        let rom = self.body(plan.body).1;
-        let positions = rom.contact_nodes.iter().map(|node| node.position.into()).collect();
-        let mut gap = OpenGap::new(positions, plan.nodes.clone(), self.open_surface(plan)?);
-        for (_, other) in self.plan.pairs_of(plan.body) {
-            gap = gap.beside(self.open_surface(other)?.extent());
-        }
-        Ok(GapLaw::Open(Box::new(gap)))
-    }
-
-    /// Creates the undeformed surface through an open contact grid.
-    fn open_surface(&self, plan: &PairPlan) -> Result<OpenSurface> {
-        let Some(rom) = plan.grid.map(|grid| &self.scene.roms[grid]) else { unreachable!("validated") };
-        let Some(grid) = rom.extras.grid else { unreachable!("checked") };
-        let data: Vec<[f64; 3]> = rom.contact_nodes.iter().map(|node| node.position).collect();
-        let spline = self.scene.settings.surfaces[plan.surface].spline.unwrap_or_default();
-        Ok(OpenSurface::new(SurfaceSpline::open(&data, grid.around, grid.along, spline.interpolation)?))
-    }
-
-    /// Returns the modes of each carrier at the control points of its surfaces, one surface after the other.
-    fn control_modes(&self, gaps: &[GapLaw]) -> Vec<ModalModel> {
-        let of = |index: usize| {
-            let own = self.plan.pairs_on(index);
-            let seen = own.filter_map(|(pair, _)| self.control_modes_of(index, &gaps[pair]));
-            seen.reduce(ModalModel::seen_at_both)
-        };
-        (0..self.carriers.len()).filter_map(of).collect()
-    }
-
-    /// Returns the modes of a carrier at the control points of one surface; `None` for a surface without control points.
-    pub(crate) fn control_modes_of(&self, carrier: usize, gap: &GapLaw) -> Option<ModalModel> {
-        let first = if let GapLaw::Spline(gap) = gap { gap.first_node } else { 0 };
-        let modes = CarrierModes { rom: self.carrier(carrier).1, model: &self.carriers[carrier].model };
-        Some(modes.at_control_points(gap.spline()?, first))
-    }
-
     fn coating(&self, pair: usize) -> Result<Option<Coating>> {
         let Some(settings) = &self.contact(pair).coating else { return Ok(None) };
         let plan = &self.plan.pairs[pair];
@@ -554,21 +436,6 @@ impl Compiled {
         let nodes: Vec<&ContactNode> = plan.nodes.iter().map(|node| &rom.contact_nodes[*node]).collect();
         Ok(Some(Coating::new(settings, &BladeTip::of(&nodes, settings), rom.sectors)?))
     }
-}
-
-fn check_lengths(rom: &Rom, clearances: &[f64], surface: &CompiledShape) -> Result<()> {
-    let smallest = rom.contact_nodes.iter().fold(f64::INFINITY, |low, node| low.min(node.position[0]));
-    let largest_gap = clearances.iter().fold(0.0, |largest: f64, gap| largest.max(*gap));
-    for (what, value) in [("contact.gap", largest_gap), ("surface.shape", surface.largest_change())] {
-        if value > SMALL * smallest {
-            return Err(Error::invalid(
-                what,
-                format!("{value:.3e} m is not small compared with the radius of the contact nodes, {smallest:.3e} m"),
-                "Give lengths in metres, well below a tenth of the radius",
-            ));
-        }
-    }
-    Ok(())
 }
 
 /// Solves the eigenproblem of a valid ROM at a speed (rad/s) and a temperature (K).

@@ -79,14 +79,6 @@ impl RotorInputs {
         }
     }
 
-    fn moving(&self) -> impl Iterator<Item = &Input> {
-        self.shaft.iter().chain(&self.excitation).chain(&self.temperature)
-    }
-
-    fn moving_mut(&mut self) -> impl Iterator<Item = &mut Input> {
-        self.shaft.iter_mut().chain(&mut self.excitation).chain(&mut self.temperature)
-    }
-
     /// Acting temperature at an offset (K).
     pub(crate) fn temperature_at(&self, offset: f64) -> f64 {
         self.temperature.first().map_or(0.0, |input| input.at(offset))
@@ -109,26 +101,6 @@ impl RotorInputs {
     }
 }
 
-impl PairInputs {
-    fn moving(&self) -> impl Iterator<Item = &Input> {
-        [&self.gap_offset, &self.shape_factor, &self.shape_rotation, &self.radius_change].into_iter()
-    }
-
-    fn moving_mut(&mut self) -> impl Iterator<Item = &mut Input> {
-        [&mut self.gap_offset, &mut self.shape_factor, &mut self.shape_rotation, &mut self.radius_change].into_iter()
-    }
-}
-
-impl CarrierInputs {
-    fn moving(&self) -> impl Iterator<Item = &Input> {
-        [&self.load_amplitude, &self.load_phase].into_iter().chain(&self.temperatures)
-    }
-
-    fn moving_mut(&mut self) -> impl Iterator<Item = &mut Input> {
-        [&mut self.load_amplitude, &mut self.load_phase].into_iter().chain(&mut self.temperatures)
-    }
-}
-
 impl Inputs {
     /// Returns the inputs that a scene has.
     pub fn new(compiled: &Compiled) -> Self {
@@ -144,55 +116,6 @@ impl Inputs {
     /// Returns speed (rad/s) and temperature (K) of each master, as set.
     pub fn references(&self) -> Vec<[f64; 2]> {
         self.rotors.iter().map(RotorInputs::reference).collect()
-    }
-
-    /// Returns the input of a variable: its quantity, the index of its structure or pair, and its element.
-    pub fn get(&self, quantity: Quantity, of: usize, element: usize) -> Option<&Input> {
-        match quantity {
-            Quantity::Speed => Some(&self.rotors[of].speed),
-            Quantity::ShaftDisplacement(component) => self.rotors[of].shaft.get(component),
-            Quantity::Excitation(component) => self.rotors[of].excitation.get(component),
-            Quantity::RotorTemperature => self.rotors[of].temperature.first(),
-            Quantity::GapOffset => Some(&self.pairs[of].gap_offset),
-            Quantity::ShapeFactor => Some(&self.pairs[of].shape_factor),
-            Quantity::ShapeRotation => Some(&self.pairs[of].shape_rotation),
-            Quantity::RadiusChange => Some(&self.pairs[of].radius_change),
-            Quantity::LoadAmplitude => Some(&self.carriers[of].load_amplitude),
-            Quantity::LoadPhase => Some(&self.carriers[of].load_phase),
-            Quantity::CasingTemperature => self.carriers[of].temperatures.get(element),
-            _ => None,
-        }
-    }
-
-    /// Returns the input of a variable for a change.
-    pub fn get_mut(&mut self, quantity: Quantity, of: usize, element: usize) -> Option<&mut Input> {
-        match quantity {
-            Quantity::Speed => Some(&mut self.rotors[of].speed),
-            Quantity::ShaftDisplacement(component) => self.rotors[of].shaft.get_mut(component),
-            Quantity::Excitation(component) => self.rotors[of].excitation.get_mut(component),
-            Quantity::RotorTemperature => self.rotors[of].temperature.first_mut(),
-            Quantity::GapOffset => Some(&mut self.pairs[of].gap_offset),
-            Quantity::ShapeFactor => Some(&mut self.pairs[of].shape_factor),
-            Quantity::ShapeRotation => Some(&mut self.pairs[of].shape_rotation),
-            Quantity::RadiusChange => Some(&mut self.pairs[of].radius_change),
-            Quantity::LoadAmplitude => Some(&mut self.carriers[of].load_amplitude),
-            Quantity::LoadPhase => Some(&mut self.carriers[of].load_phase),
-            Quantity::CasingTemperature => self.carriers[of].temperatures.get_mut(element),
-            _ => None,
-        }
-    }
-
-    /// Returns all inputs that move or load a structure, which would shake it if they jumped.
-    fn moving(&self) -> impl Iterator<Item = &Input> {
-        let shafts = self.rotors.iter().flat_map(RotorInputs::moving);
-        let pairs = self.pairs.iter().flat_map(PairInputs::moving);
-        shafts.chain(pairs).chain(self.carriers.iter().flat_map(CarrierInputs::moving))
-    }
-
-    fn moving_mut(&mut self) -> impl Iterator<Item = &mut Input> {
-        let shafts = self.rotors.iter_mut().flat_map(RotorInputs::moving_mut);
-        let pairs = self.pairs.iter_mut().flat_map(PairInputs::moving_mut);
-        shafts.chain(pairs).chain(self.carriers.iter_mut().flat_map(CarrierInputs::moving_mut))
     }
 
     /// Returns the duration of ramps that begin with a step of length `length` (s): the length of the step. A change that accumulated over
@@ -246,6 +169,53 @@ impl Inputs {
             pair.shape_factor.take();
         }
     }
+}
+
+/// Defines the ways to single inputs, for reading and for changes: names of the functions and the methods of collections.
+macro_rules! ways_to_inputs {
+    ($($of_variable:ident $moving:ident $get:ident $iter:ident $($mutable:ident)?;)*) => {$(
+        impl Inputs {
+            /// Returns the input of a variable: its quantity, the index of its structure or pair, and its element.
+            pub fn $of_variable(&$($mutable)? self, quantity: Quantity, of: usize, element: usize) -> Option<&$($mutable)? Input> {
+                match quantity {
+                    Quantity::Speed => Some(&$($mutable)? self.rotors[of].speed),
+                    Quantity::ShaftDisplacement(component) => self.rotors[of].shaft.$get(component),
+                    Quantity::Excitation(component) => self.rotors[of].excitation.$get(component),
+                    Quantity::RotorTemperature => self.rotors[of].temperature.$get(0),
+                    Quantity::GapOffset => Some(&$($mutable)? self.pairs[of].gap_offset),
+                    Quantity::ShapeFactor => Some(&$($mutable)? self.pairs[of].shape_factor),
+                    Quantity::ShapeRotation => Some(&$($mutable)? self.pairs[of].shape_rotation),
+                    Quantity::RadiusChange => Some(&$($mutable)? self.pairs[of].radius_change),
+                    Quantity::LoadAmplitude => Some(&$($mutable)? self.carriers[of].load_amplitude),
+                    Quantity::LoadPhase => Some(&$($mutable)? self.carriers[of].load_phase),
+                    Quantity::CasingTemperature => self.carriers[of].temperatures.$get(element),
+                    _ => None,
+                }
+            }
+
+            /// Returns all inputs that move or load a structure, which would shake it if they jumped.
+            fn $moving(&$($mutable)? self) -> impl Iterator<Item = &$($mutable)? Input> {
+                let rotors = self.rotors.$iter().flat_map(|rotor| {
+                    let RotorInputs { shaft, excitation, temperature, .. } = rotor;
+                    shaft.$iter().chain(excitation.$iter()).chain(temperature.$iter())
+                });
+                let pairs = self.pairs.$iter().flat_map(|pair| {
+                    let PairInputs { gap_offset, shape_factor, shape_rotation, radius_change } = pair;
+                    [gap_offset, shape_factor, shape_rotation, radius_change]
+                });
+                let carriers = self.carriers.$iter().flat_map(|carrier| {
+                    let CarrierInputs { load_amplitude, load_phase, temperatures } = carrier;
+                    [load_amplitude, load_phase].into_iter().chain(temperatures.$iter())
+                });
+                rotors.chain(pairs).chain(carriers)
+            }
+        }
+    )*};
+}
+
+ways_to_inputs! {
+    get moving get iter;
+    get_mut moving_mut get_mut iter_mut mut;
 }
 
 impl Simulation {

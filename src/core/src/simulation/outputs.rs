@@ -36,6 +36,12 @@ pub fn scalar(read: impl Fn(&OutputView) -> f64 + Send + Sync + 'static) -> Outp
     OutputReader(Arc::new(move |view, out| out[0] = read(view)))
 }
 
+/// Makes the reader of a count.
+pub fn count(read: impl Fn(&OutputView) -> u64 + Send + Sync + 'static) -> OutputReader {
+    #[expect(clippy::cast_precision_loss, reason = "counts are below 2^52")]
+    scalar(move |view| read(view) as f64)
+}
+
 /// Makes the reader of an array, element by element.
 pub fn each(read: impl Fn(&OutputView, usize) -> f64 + Send + Sync + 'static) -> OutputReader {
     OutputReader(Arc::new(move |view, out| {
@@ -171,30 +177,9 @@ impl OutputView<'_> {
         relative.reduce(larger).unwrap_or_default()
     }
 
-    #[expect(clippy::cast_precision_loss, reason = "counts are below 2^52")]
-    pub fn contacts(&self) -> f64 {
-        self.system.events().len() as f64
-    }
-
-    #[expect(clippy::cast_precision_loss, reason = "counts are below 2^52")]
-    pub fn internal_steps(&self) -> f64 {
-        self.system.steps_taken() as f64
-    }
-
-    #[expect(clippy::cast_precision_loss, reason = "counts are below 2^52")]
-    pub fn trials(&self) -> f64 {
-        self.system.steps_tried() as f64
-    }
-
-    #[expect(clippy::cast_precision_loss, reason = "counts are below 2^52")]
-    pub fn missed(&self) -> f64 {
-        self.system.effort().missed as f64
-    }
-
     /// Returns the largest number of internal steps tried within one communication step.
-    #[expect(clippy::cast_precision_loss, reason = "counts are below 2^52")]
-    pub(crate) fn most_tried(&self) -> f64 {
-        self.simulation.state.clock.most_tried as f64
+    pub(crate) fn most_tried(&self) -> u64 {
+        self.simulation.state.clock.most_tried
     }
 
     /// Reads a value of the coating of a pair; empty without a coating.

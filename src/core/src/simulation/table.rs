@@ -57,22 +57,14 @@ fn inputs(table: &mut TableBuilder, parts: &TableFacts) -> Result<()> {
             parts.rotor(body)
         );
         let speed = table.input(Quantity::Speed, "speed", Some(&ANGULAR_SPEED), body.structure.speed, &text);
-        speed.display = Some(0);
-        speed.nominal = Some(1000.0);
-        (speed.min, speed.max) = (Some(-ranges::SPEED), Some(ranges::SPEED));
+        speed.display(0).nominal(1000.0).range(-ranges::SPEED, ranges::SPEED);
     }
     for pair in parts.pairs.iter().filter(|pair| pair.surface.moving) {
         table.belongs(pair.index, parts.of_pair(pair));
         let largest = largest_length(pair.body.rom);
-        let change = table.moving_input(
-            Quantity::RadiusChange,
-            "casing_radius_change",
-            Some(&LENGTH),
-            0.0,
-            "Uniform change of the casing radius; positive values increase every clearance",
-        );
-        (change.nominal, change.display) = (Some(1e-4), Some(1));
-        (change.min, change.max) = (Some(-largest), Some(largest));
+        let text = "Uniform change of the casing radius; positive values increase every clearance";
+        let change = table.moving_input(Quantity::RadiusChange, "casing_radius_change", Some(&LENGTH), 0.0, text);
+        change.nominal(1e-4).display(1).range(-largest, largest);
         if pair.surface.shape == (Shape::Circular {}) {
             continue;
         }
@@ -80,7 +72,7 @@ fn inputs(table: &mut TableBuilder, parts: &TableFacts) -> Result<()> {
         let factor = table.moving_input(Quantity::ShapeFactor, "casing_shape_factor", None, 1.0, text);
         let change = CompiledShape::new(&pair.surface.shape, pair.contact.nominal_gap())?.largest_change();
         let largest = if change > 0.0 { largest / change } else { 1.0 };
-        (factor.min, factor.max) = (Some(-largest), Some(largest));
+        factor.range(-largest, largest);
         if pair.carrier.is_none() {
             let text = "Rotation of the casing shape about +z";
             table.moving_input(Quantity::ShapeRotation, "casing_shape_rotation", Some(&ANGLE), 0.0, text);
@@ -122,13 +114,13 @@ fn parameters(table: &mut TableBuilder, parts: &TableFacts) {
     for body in bodies.iter().filter(|body| !body.free) {
         table.belongs(body.index, parts.of_body(body));
         let text = format!("Initial angle of {} about +z", parts.rotor(body));
-        table.parameter(Quantity::InitialAngle, "initial_rotor_angle", Some(&ANGLE), 0.0, &text).display = Some(0);
+        table.parameter(Quantity::InitialAngle, "initial_rotor_angle", Some(&ANGLE), 0.0, &text).display(0);
     }
     for pair in pairs.iter().filter(|pair| !pair.body.free && pair.surface.shape != (Shape::Circular {})) {
         table.belongs(pair.index, parts.of_pair(pair));
         let text = "Time after the start over which the casing shape grows smoothly from round to its full amplitude";
         let ramp = table.parameter(Quantity::RampTime, "casing_ramp_time", Some(&TIME), pair.surface.ramp_time, text);
-        (ramp.min, ramp.max) = (Some(0.0), Some(bounds::TIME));
+        ramp.range(0.0, bounds::TIME);
     }
     table.belongs_to_all();
     table.scene_name(settings);
@@ -168,8 +160,7 @@ fn gap_offset(table: &mut TableBuilder, rom: &Rom) {
     let text = "Offset added to the radial clearance of every sector";
     let offset = table.parameter(Quantity::GapOffset, "gap_offset", Some(&LENGTH), 0.0, text);
     offset.description += RAMPED;
-    (offset.display, offset.nominal, offset.variability) = (Some(1), Some(1e-4), Variability::Tunable);
-    (offset.min, offset.max) = (Some(-largest_length(rom)), Some(largest_length(rom)));
+    offset.display(1).nominal(1e-4).range(-largest_length(rom), largest_length(rom)).variability = Variability::Tunable;
 }
 
 /// Adds angles, clearances, forces and moments of structures and pairs, and totals over all contacts.
@@ -215,15 +206,14 @@ fn smallest_clearance(table: &mut TableBuilder, parts: &TableFacts) {
 /// Adds force and moment on a structure: for a rotor about the centre of the shaft.
 fn forces(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts) {
     let (index, name) = (body.index, parts.rotor(body));
-    for (axis, letter) in AXES.into_iter().enumerate() {
-        let text = if body.free {
-            format!("Contact force on {name} along {letter}, all pairs, mean over the communication step")
-        } else {
-            format!("Contact force on {name} along the fixed {letter} axis, mean over the communication step")
-        };
-        let read = scalar(move |view| view.mean * view.window.bodies[index].force_impulse[axis]);
-        table.output(format!("force_{letter}"), Span::Mean, Some((&FORCE, 100.0)), text, read);
-    }
+    let text = if body.free {
+        format!("Contact force on {name} along {{axis}}, all pairs, mean over the communication step")
+    } else {
+        format!("Contact force on {name} along the fixed {{axis}} axis, mean over the communication step")
+    };
+    table.vector("force", Span::Mean, Some((&FORCE, 100.0)), &text, move |view, axis| {
+        view.mean * view.window.bodies[index].force_impulse[axis]
+    });
     for axis in 0..3 {
         // The other two components of a rotor are for a model of the shaft, which provides the whirl.
         if !body.free && axis < 2 && !body.structure.whirl {
@@ -231,54 +221,45 @@ fn forces(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts) {
         }
         let (row, text) = moment(parts, body, axis);
         let read = scalar(move |view| view.mean * view.window.bodies[index].moment_impulse[axis]);
-        table.output(row, Span::Mean, Some((&TORQUE, 10.0)), text, read).quantity = Quantity::Moment(axis);
+        table.output(row, Span::Mean, Some((&TORQUE, 10.0)), text, read).quantity(Quantity::Moment(axis));
     }
 }
 
 /// Returns name and text of a moment.
 fn moment(parts: &TableFacts, body: &BodyFacts, axis: usize) -> (String, String) {
     let (name, letter) = (parts.rotor(body), AXES[axis]);
-    let row = format!("moment_{letter}");
-    match (body.free, axis) {
-        (true, _) => (
-            row,
-            format!(
-                "Moment of the contact forces on {name} about the {letter} axis through the origin, all pairs, mean \
-                 over the communication step"
-            ),
-        ),
-        (false, 2) => (
-            "torque".to_owned(),
-            format!(
-                "Torque of the contact forces on {name} about the +z axis through the shaft's centre, conjugate to the \
-                 rotor angle, mean over the communication step"
-            ),
-        ),
-        (false, _) => (
-            row,
-            format!(
-                "Moment of the contact forces on {name} about the fixed {letter} axis through the shaft's centre at z \
-                 = 0 of the rotor (which moves with whirl and axial shift), mean over the communication step"
-            ),
-        ),
-    }
+    let (row, what, about) = match (body.free, axis) {
+        (true, _) => {
+            (format!("moment_{letter}"), "Moment", format!("about the {letter} axis through the origin, all pairs"))
+        }
+        (false, 2) => {
+            let about = "about the +z axis through the shaft's centre, conjugate to the rotor angle";
+            ("torque".to_owned(), "Torque", about.to_owned())
+        }
+        (false, _) => {
+            let about = format!(
+                "about the fixed {letter} axis through the shaft's centre at z = 0 of the rotor (which moves with whirl \
+                 and axial shift)"
+            );
+            (format!("moment_{letter}"), "Moment", about)
+        }
+    };
+    (row, format!("{what} of the contact forces on {name} {about}, mean over the communication step"))
 }
 
 /// Adds force and moment of one surface on the master.
 fn pair_forces(table: &mut TableBuilder, pair: &PairFacts) {
     let (index, surface, master) = (pair.index, &pair.surface.name, &pair.body.structure.name);
     let point = if pair.body.free { "the origin" } else { "the shaft's centre" };
-    for (axis, letter) in AXES.into_iter().enumerate() {
-        let text = format!(
-            "Moment of the contact force on {master} from {surface} about the {letter} axis through {point}, mean over \
-             the communication step"
-        );
-        let read = scalar(move |view| view.mean * view.window.pairs[index].moment_impulse[axis]);
-        table.output(format!("{surface}.moment_{letter}"), Span::Mean, Some((&TORQUE, 10.0)), text, read);
-    }
-    for (axis, letter) in AXES.into_iter().enumerate() {
-        let text = format!("Contact force on {master} from {surface} along {letter}, mean over the communication step");
-        let read = scalar(move |view| view.mean * view.window.pairs[index].force_impulse[axis]);
-        table.output(format!("{surface}.force_{letter}"), Span::Mean, Some((&FORCE, 100.0)), text, read);
-    }
+    let text = format!(
+        "Moment of the contact force on {master} from {surface} about the {{axis}} axis through {point}, mean over the \
+         communication step"
+    );
+    table.vector(&format!("{surface}.moment"), Span::Mean, Some((&TORQUE, 10.0)), &text, move |view, axis| {
+        view.mean * view.window.pairs[index].moment_impulse[axis]
+    });
+    let text = format!("Contact force on {master} from {surface} along {{axis}}, mean over the communication step");
+    table.vector(&format!("{surface}.force"), Span::Mean, Some((&FORCE, 100.0)), &text, move |view, axis| {
+        view.mean * view.window.pairs[index].force_impulse[axis]
+    });
 }

@@ -65,7 +65,7 @@ fn rejects_inconsistent_thermal_loads() {
     assert_eq!(heated(|_| {}), Ok(()));
     type Change = (fn(&mut nalgebra::DMatrix<f64>), &'static str);
     let changes: [Change; 3] = [
-        (|loads| loads[(1, 0)] = f64::NAN, "a value is not finite"),
+        (|loads| loads[(1, 0)] = f64::NAN, "non-finite entry at (1, 0)"),
         (|loads| *loads = loads.clone().insert_row(0, 1.0), "expected"),
         (|loads| *loads = loads.clone().insert_column(0, 1.0), "expected"),
     ];

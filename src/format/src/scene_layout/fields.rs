@@ -1,5 +1,8 @@
 //! The list of all keys.
 
+use tiprub_core::scene::ranges;
+use tiprub_cosim::bounds;
+
 use super::SceneField;
 
 const fn field(
@@ -59,28 +62,28 @@ pub static FIELDS: &[SceneField] = &[
         "structure.speed",
         "number, rad/s",
         Some("0"),
-        "-1e6 to 1e6; 0 for `still` and `free`",
+        "{}; 0 for `still` and `free`",
         "Start value of the speed input, about +z.",
     ),
     field(
         "structure.velocity",
         "list of 3 numbers, m/s",
         Some("[0, 0, 0]"),
-        "-1e5 to 1e5 each; `free` structures only",
+        "{} each; `free` structures only",
         "Initial velocity of the whole body along x, y, z.",
     ),
     field(
         "structure.damping_ratio",
         "number",
         Some("from the ROM"),
-        "0 to 0.99",
+        "{}",
         "Modal damping ratio of all modes that are not in `damping_ratios`.",
     ),
     field(
         "structure.damping_ratios",
         "list of numbers",
         Some("empty"),
-        "0 to 0.99 each",
+        "{} each",
         "Modal damping ratios of the lowest modes, in ascending order; with coupled sectors, of the lowest modes of \
          each nodal diameter.",
     ),
@@ -124,7 +127,7 @@ pub static FIELDS: &[SceneField] = &[
         "structure.frequency_factors",
         "list of numbers",
         Some("empty"),
-        "0.5 to 2, one value per sector",
+        "{}, one value per sector",
         "Mistuning: factor on the natural frequencies of each sector; if empty, all sectors are equal.",
     ),
     field(
@@ -139,7 +142,7 @@ pub static FIELDS: &[SceneField] = &[
         "structure.softening",
         "number, 1/K",
         Some("0"),
-        "0 to 0.01; rotating structures with `thermal` only",
+        "{}; rotating structures with `thermal` only",
         "Fraction of its elastic stiffness that a rotor loses per kelvin above the reference.",
     ),
     field(
@@ -160,10 +163,10 @@ pub static FIELDS: &[SceneField] = &[
         "structure.load.amplitude",
         "number, N/m",
         Some("0"),
-        "-1e12 to 1e12",
+        "{}",
         "Start value of the amplitude input, per metre of circumference, positive outward.",
     ),
-    field("structure.load.phase", "number, rad", Some("0"), "-1e6 to 1e6", "Start value of the phase input."),
+    field("structure.load.phase", "number, rad", Some("0"), "{}", "Start value of the phase input."),
     field(
         "structure.excitation",
         "table",
@@ -176,7 +179,7 @@ pub static FIELDS: &[SceneField] = &[
         "structure.excitation.order",
         "whole number",
         None,
-        "0 to 1000000, at most 1 rad per internal step",
+        "{}, at most 1 rad per internal step",
         "Start value of the engine order.",
     ),
     field(
@@ -205,10 +208,10 @@ pub static FIELDS: &[SceneField] = &[
         "structure.excitation.amplitude",
         "number, N",
         Some("0"),
-        "-1e9 to 1e9",
+        "{}",
         "Start value of the amplitude input, per blade.",
     ),
-    field("structure.excitation.phase", "number, rad", Some("0"), "-1e6 to 1e6", "Start value of the phase input."),
+    field("structure.excitation.phase", "number, rad", Some("0"), "{}", "Start value of the phase input."),
     field(
         "structure.initial",
         "list of tables",
@@ -238,19 +241,19 @@ pub static FIELDS: &[SceneField] = &[
         "up to half the number of sectors; not with `sector`",
         "Number of nodal diameters n of the motion: blade j of N moves with cos(2πn(j − 1)/N − phase).",
     ),
-    field("structure.initial.phase", "number, rad", Some("0"), "-1e6 to 1e6", "Phase of the motion over the blades."),
+    field("structure.initial.phase", "number, rad", Some("0"), "{}", "Phase of the motion over the blades."),
     field(
         "structure.initial.displacement",
         "number, m",
         Some("0"),
-        "-1000 to 1000; must not penetrate the casing",
+        "{}; must not penetrate the casing",
         "Start value of the parameter `initial_displacement[k]`.",
     ),
     field(
         "structure.initial.velocity",
         "number, m/s",
         Some("0"),
-        "-1e5 to 1e5",
+        "{}",
         "Start value of the parameter `initial_velocity[k]`.",
     ),
     field("surface.name", "text", None, "as for the scene `name`", "Name of the surface, used by contacts."),
@@ -269,18 +272,12 @@ pub static FIELDS: &[SceneField] = &[
         "magnitude up to a tenth of the radius",
         "`lobes`: the casing radius changes by −amplitude·cos(order·θ − phase).",
     ),
-    field(
-        "surface.shape.order",
-        "whole number",
-        None,
-        "1 to 1000000",
-        "`lobes`: number of lobes around the circumference.",
-    ),
+    field("surface.shape.order", "whole number", None, "{}", "`lobes`: number of lobes around the circumference."),
     field(
         "surface.shape.phase",
         "number, rad",
         Some("0"),
-        "-1e6 to 1e6",
+        "{}",
         "`lobes`: phase of the lobes; `two-lobe`: angle by which the shape is rotated.",
     ),
     field(
@@ -294,7 +291,7 @@ pub static FIELDS: &[SceneField] = &[
         "surface.shape.width",
         "number",
         Some("0.15"),
-        "0.001 to 0.25",
+        "{}",
         "`two-lobe`: width of a bump as a fraction of half a turn.",
     ),
     field(
@@ -309,7 +306,7 @@ pub static FIELDS: &[SceneField] = &[
         "surface.ramp_time",
         "number, s",
         Some("0"),
-        "0 to 1e9",
+        "{}",
         "Time over which the shape grows smoothly from circular to its full size; 0 applies it immediately.",
     ),
     field(
@@ -424,7 +421,7 @@ pub static FIELDS: &[SceneField] = &[
         "Clearance of each sector if they differ; replaces `gap`. If `gap` is omitted, the depth of a `two-lobe` shape \
          refers to their mean.",
     ),
-    field("contact.friction", "number", Some("0"), "0 to 2", "Coulomb friction coefficient µ; 0 means no friction."),
+    field("contact.friction", "number", Some("0"), "{}", "Coulomb friction coefficient µ; 0 means no friction."),
     field(
         "contact.solver",
         "text",
@@ -452,28 +449,22 @@ pub static FIELDS: &[SceneField] = &[
         "contact.coating.thickness",
         "number, m",
         None,
-        "1e-9 to 0.1",
+        "{}",
         "Thickness of the unworn coating in front of the hard surface.",
     ),
-    field(
-        "contact.coating.modulus",
-        "number, Pa",
-        None,
-        "above 0, up to 1e13; not with `cutting`",
-        "Modulus of elasticity.",
-    ),
+    field("contact.coating.modulus", "number, Pa", None, "{}; not with `cutting`", "Modulus of elasticity."),
     field(
         "contact.coating.yield_stress",
         "number, Pa",
         None,
-        "0 to 1e13; not with `cutting`",
+        "{}; not with `cutting`",
         "Stress at which the unworn coating yields.",
     ),
     field(
         "contact.coating.hardening",
         "number, Pa",
         None,
-        "0 to 1e13; not with `cutting`",
+        "{}; not with `cutting`",
         "Increase in yield stress per unit plastic strain; 0 is perfectly plastic.",
     ),
     field(
@@ -494,7 +485,7 @@ pub static FIELDS: &[SceneField] = &[
         "contact.coating.contact_width",
         "number, m",
         Some("from the patches of the ROM"),
-        "1e-6 to 1; not with `cutting`",
+        "{}; not with `cutting`",
         "Circumferential width over which a tip presses on the coating: tip thickness divided by the cosine of the \
          stagger angle.",
     ),
@@ -510,21 +501,15 @@ pub static FIELDS: &[SceneField] = &[
         "contact.coating.cutting.specific_energy",
         "number, J/m³",
         None,
-        "1e3 to 1e12",
+        "{}",
         "Cutting energy u per unit volume removed.",
     ),
-    field(
-        "contact.coating.cutting.normal_ratio",
-        "number",
-        None,
-        "0.05 to 20",
-        "Ratio of normal to tangential cutting force.",
-    ),
+    field("contact.coating.cutting.normal_ratio", "number", None, "{}", "Ratio of normal to tangential cutting force."),
     field(
         "contact.slave_heat_fraction",
         "number",
         Some("not given"),
-        "0 to 1; with friction only",
+        "{}; with friction only",
         "Fraction of the friction heat that flows into the slave; the patch outputs include only this fraction.",
     ),
     field(
@@ -547,7 +532,7 @@ pub static FIELDS: &[SceneField] = &[
         "time.step",
         "number, s",
         Some("8e-5 for `galerkin`; *needed* for other schemes"),
-        "1e-12 to 1",
+        "{}",
         "Largest internal step; the step used divides the communication step evenly. With `galerkin`, the longest \
          adaptive step.",
     ),
@@ -555,7 +540,7 @@ pub static FIELDS: &[SceneField] = &[
         "time.tolerance",
         "number",
         Some("1e-3"),
-        "1e-9 to 0.1",
+        "{}",
         "Displacement error that `galerkin` accepts per step, as a fraction of the smallest clearance; with free \
          masters, as a fraction of one thousandth of the smallest dimension of the body.",
     ),
@@ -563,7 +548,7 @@ pub static FIELDS: &[SceneField] = &[
         "time.max_internal_steps",
         "whole number",
         Some("0 (no limit)"),
-        "0 to 1000000000",
+        "{}",
         "Maximum number of internal steps in one communication step. A communication step that needs more is discarded \
          and can be repeated. With `galerkin`, the steps of all blades are counted together, including rejected ones.",
     ),
@@ -655,13 +640,43 @@ pub static FIELDS: &[SceneField] = &[
         "",
         "Radial displacement of every contact-grid node of the flexible slave.",
     ),
-    field("experiment.start", "number, s", Some("0"), "-1e9 to 1e9", "Start time proposed to the importer."),
+    field("experiment.start", "number, s", Some("0"), "{}", "Start time proposed to the importer."),
     field("experiment.stop", "number, s", None, "> start, up to 1e9", "Stop time proposed to the importer."),
-    field(
-        "experiment.communication_step",
-        "number, s",
-        None,
-        "1e-12 to 1e9",
-        "Communication step proposed to the importer.",
-    ),
+    field("experiment.communication_step", "number, s", None, "{}", "Communication step proposed to the importer."),
+];
+
+/// Bounds of numbers, which replace `{}` in the ranges above.
+pub(super) const BOUNDS: [(&str, [f64; 2]); 32] = [
+    ("structure.speed", [-ranges::SPEED, ranges::SPEED]),
+    ("structure.velocity", [-ranges::VELOCITY, ranges::VELOCITY]),
+    ("structure.damping_ratio", [0.0, ranges::DAMPING]),
+    ("structure.damping_ratios", [0.0, ranges::DAMPING]),
+    ("structure.frequency_factors", ranges::FREQUENCY_FACTORS),
+    ("structure.softening", [0.0, ranges::SOFTENING]),
+    ("structure.load.amplitude", [-ranges::LINE_LOAD, ranges::LINE_LOAD]),
+    ("structure.load.phase", [-ranges::ANGLE, ranges::ANGLE]),
+    ("structure.excitation.order", [0.0, ranges::ENGINE_ORDER]),
+    ("structure.excitation.amplitude", [-ranges::EXCITATION, ranges::EXCITATION]),
+    ("structure.excitation.phase", [-ranges::ANGLE, ranges::ANGLE]),
+    ("structure.initial.phase", [-ranges::ANGLE, ranges::ANGLE]),
+    ("structure.initial.displacement", [-ranges::POSITION, ranges::POSITION]),
+    ("structure.initial.velocity", [-ranges::VELOCITY, ranges::VELOCITY]),
+    ("surface.shape.order", [1.0, ranges::LOBES]),
+    ("surface.shape.phase", [-ranges::ANGLE, ranges::ANGLE]),
+    ("surface.shape.width", ranges::LOBE_WIDTH),
+    ("surface.ramp_time", [0.0, bounds::TIME]),
+    ("contact.friction", [0.0, ranges::FRICTION]),
+    ("contact.coating.thickness", ranges::THICKNESS),
+    ("contact.coating.modulus", ranges::MODULUS),
+    ("contact.coating.yield_stress", [0.0, ranges::STRESS]),
+    ("contact.coating.hardening", [0.0, ranges::STRESS]),
+    ("contact.coating.contact_width", ranges::CONTACT_WIDTH),
+    ("contact.coating.cutting.specific_energy", ranges::CUTTING_ENERGY),
+    ("contact.coating.cutting.normal_ratio", ranges::NORMAL_RATIO),
+    ("contact.slave_heat_fraction", [0.0, 1.0]),
+    ("time.step", [bounds::SHORTEST_STEP, ranges::LONGEST_STEP]),
+    ("time.tolerance", ranges::TOLERANCE),
+    ("time.max_internal_steps", [0.0, ranges::STEPS]),
+    ("experiment.start", [-bounds::TIME, bounds::TIME]),
+    ("experiment.communication_step", [bounds::SHORTEST_STEP, bounds::TIME]),
 ];

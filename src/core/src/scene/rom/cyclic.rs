@@ -13,9 +13,9 @@
 use nalgebra::{Complex, ComplexField, DMatrix};
 use tiprub_cosim::{bounds, shown};
 
-use super::Rom;
+use super::{Rom, refuse};
+use crate::Result;
 use crate::scene::ranges;
-use crate::{Error, Result};
 
 /// Reduced matrices of one nodal diameter above 0 (those of diameter 0 are the ROM's own).
 #[derive(Debug, Clone, PartialEq)]
@@ -51,7 +51,7 @@ impl Rom {
         self.order() + harmonics.map(real).sum::<usize>()
     }
 
-    pub(super) fn validate_harmonics(&self, remedy: &str) -> Result<()> {
+    pub(super) fn validate_harmonics(&self) -> Result<()> {
         let harmonics = &self.extras.harmonics;
         if harmonics.is_empty() {
             return Ok(());
@@ -63,18 +63,16 @@ impl Rom {
                 self.largest_nodal_diameter(),
                 self.sectors
             );
-            return Err(Error::invalid("ROM harmonics", problem, remedy));
+            return refuse("ROM harmonics", problem);
         }
         for (index, harmonic) in harmonics.iter().enumerate() {
-            self.validate_harmonic(index + 1, harmonic, remedy)?;
+            self.validate_harmonic(index + 1, harmonic)?;
         }
         Ok(())
     }
 
-    fn validate_harmonic(&self, nodal_diameter: usize, harmonic: &Harmonic, remedy: &str) -> Result<()> {
-        let refuse = |array: &str, problem: String| {
-            Err(Error::invalid(format!("ROM array `{array}_{nodal_diameter}`"), problem, remedy))
-        };
+    fn validate_harmonic(&self, nodal_diameter: usize, harmonic: &Harmonic) -> Result<()> {
+        let refuse = |array: &str, problem: String| refuse(format!("ROM array `{array}_{nodal_diameter}`"), problem);
         let order = harmonic.mass.nrows();
         let arrays = [
             ("mass", &harmonic.mass, (order, order)),

@@ -1,7 +1,7 @@
 //! Contact grids, through which surfaces are laid, and rows of contact patches.
 
 use super::{ContactGrid, ContactNode, DisplacementFrame, Rom};
-use crate::{Error, Result};
+use crate::Result;
 
 /// Nodes closer than this fraction of the longest edge of an open grid are the same node.
 const SAME_NODE: f64 = 1e-9;
@@ -12,7 +12,7 @@ impl Rom {
         self.extras.rows.unwrap_or(1)
     }
 
-    pub(super) fn validate_rows(&self, remedy: &str) -> Result<()> {
+    pub(super) fn validate_rows(&self) -> Result<()> {
         let Some(rows) = self.extras.rows else { return Ok(()) };
         let nodes = self.contact_nodes.len();
         let patches = self.contact_nodes.iter().all(|node| node.area > 0.0);
@@ -22,7 +22,7 @@ impl Rom {
         let what = if patches { "patches" } else { "contact nodes without areas" };
         let problem =
             format!("{nodes} {what} in {rows} rows; at least two rows with the same number of patches are required");
-        Err(Error::invalid("ROM metadata `contact_rows`", problem, remedy))
+        super::refuse("ROM metadata `contact_rows`", problem)
     }
 
     /// Checks that the contact nodes form the grid that the ROM describes.
@@ -55,8 +55,7 @@ impl Rom {
 }
 
 fn refuse(problem: String) -> Result<()> {
-    let remedy = "Regenerate the ROM with `tiprub reduce`, or see the ROM file chapter of the user guide";
-    Err(Error::invalid("ROM metadata `contact_grid`", problem, remedy))
+    super::refuse("ROM metadata `contact_grid`", problem)
 }
 
 /// Checks for rings in order of increasing z, with nodes equally spaced about z.

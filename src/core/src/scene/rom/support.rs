@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 use tiprub_cosim::bounds;
 
-use super::{Rom, entries};
+use super::{Rom, array};
 use crate::scene::ranges;
 use crate::{Error, Result};
 
@@ -26,20 +26,13 @@ pub struct SupportRows {
 }
 
 impl Rom {
-    pub(super) fn validate_support(&self, remedy: &str) -> Result<()> {
+    pub(super) fn validate_support(&self) -> Result<()> {
         let Some(support) = &self.extras.support else { return Ok(()) };
         let patches = self.extras.thermal.as_ref().map_or(0, |thermal| thermal.patches.len());
-        for (name, matrix, columns, most) in [
-            ("support_stiffness", &support.stiffness, self.order(), bounds::MATRIX),
-            ("support_mass", &support.mass, self.order(), bounds::MATRIX),
-            ("support_thermal", &support.thermal, patches, ranges::THERMAL_LOAD),
-        ] {
-            if matrix.shape() != (SUPPORT_ROWS, columns) {
-                let problem = format!("shape {:?} found, {SUPPORT_ROWS} x {columns} expected", matrix.shape());
-                return Err(Error::invalid(format!("ROM array `{name}`"), problem, remedy));
-            }
-            entries(name, matrix, most, remedy)?;
-        }
+        let order = self.order();
+        array("support_stiffness", &support.stiffness, (SUPPORT_ROWS, order), bounds::MATRIX)?;
+        array("support_mass", &support.mass, (SUPPORT_ROWS, order), bounds::MATRIX)?;
+        array("support_thermal", &support.thermal, (SUPPORT_ROWS, patches), ranges::THERMAL_LOAD)?;
         if self.sectors != 1 {
             let problem = format!("not supported for a ROM with {} sectors", self.sectors);
             let remedy = "Remove it, or use a ROM with one sector";

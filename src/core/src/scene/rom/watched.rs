@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::{ContactNode, Rom, entries};
+use super::{ContactNode, Rom, array, refuse};
 use crate::scene::ranges;
 use crate::{Error, Result};
 
@@ -26,31 +26,26 @@ pub fn von_mises([xx, yy, zz, xy, yz, zx]: [f64; STRESSES]) -> f64 {
 }
 
 impl Rom {
-    pub(super) fn validate_watched(&self, remedy: &str) -> Result<()> {
-        self.validate_points("watched", self.extras.watched.as_ref(), (3, ranges::MAP), remedy)?;
-        self.validate_points("stress", self.extras.stress.as_ref(), (STRESSES, ranges::STRESS_MAP), remedy)?;
-        self.validate_static_stress(remedy)
+    pub(super) fn validate_watched(&self) -> Result<()> {
+        self.validate_points("watched", self.extras.watched.as_ref(), (3, ranges::MAP))?;
+        self.validate_points("stress", self.extras.stress.as_ref(), (STRESSES, ranges::STRESS_MAP))?;
+        self.validate_static_stress()
     }
 
-    fn validate_static_stress(&self, remedy: &str) -> Result<()> {
+    fn validate_static_stress(&self) -> Result<()> {
         let extras = &self.extras;
         let patches = extras.thermal.as_ref().map(|thermal| thermal.patches.len());
-        for (name, array, load, columns) in [
+        for (name, values, load, columns) in [
             ("stress_thermal", &extras.stress_thermal, "thermal_loads", patches),
             ("stress_centrifugal", &extras.stress_centrifugal, "centrifugal_load", extras.spin.as_ref().map(|_| 1)),
         ] {
-            let Some(array) = array else { continue };
+            let Some(values) = values else { continue };
             let (Some(stress), Some(columns)) = (&extras.stress, columns) else {
                 let problem = format!("requires `stress_map` and `{load}`");
                 let remedy = "Add these arrays, or remove this one";
                 return Err(Error::invalid(format!("ROM array `{name}`"), problem, remedy));
             };
-            let expected = (STRESSES * stress.points.len(), columns);
-            if array.shape() != expected {
-                let problem = format!("shape {:?} found, {expected:?} expected", array.shape());
-                return Err(Error::invalid(format!("ROM array `{name}`"), problem, remedy));
-            }
-            entries(name, array, ranges::STRESS_MAP, remedy)?;
+            array(name, values, (STRESSES * stress.points.len(), columns), ranges::STRESS_MAP)?;
         }
         Ok(())
     }
@@ -61,23 +56,19 @@ impl Rom {
         of: &str,
         watched: Option<&WatchedPoints>,
         (components, largest): (usize, f64),
-        remedy: &str,
     ) -> Result<()> {
         let Some(watched) = watched else { return Ok(()) };
         let name = format!("{of}_map");
-        let expected = (components * watched.points.len(), self.order());
-        if watched.points.is_empty() || watched.map.shape() != expected {
-            let found = watched.map.shape();
-            let problem = format!("shape {found:?} found, {expected:?} with at least one point expected");
-            return Err(Error::invalid(format!("ROM array `{name}`"), problem, remedy));
+        if watched.points.is_empty() {
+            return refuse(format!("ROM array `{name}`"), "no points");
         }
+        array(&name, &watched.map, (components * watched.points.len(), self.order()), largest)?;
         if self.is_cyclic() {
             let problem = "not supported for coupled sectors, because it has no data for nodal diameters above 0";
             return Err(Error::invalid(format!("ROM array `{name}`"), problem, "Remove these points"));
         }
-        entries(&name, &watched.map, largest, remedy)?;
         let what = |index: usize| format!("ROM array `{of}_positions`, point {}", index + 1);
         let mut places = watched.points.iter().enumerate();
-        places.try_for_each(|(index, point)| self.validate_place(&what(index), point, remedy))
+        places.try_for_each(|(index, point)| self.validate_place(&what(index), point))
     }
 }

@@ -58,47 +58,36 @@ struct CoatingInFile {
 
 impl From<CoatingSettings> for CoatingInFile {
     fn from(settings: CoatingSettings) -> Self {
-        let CoatingSettings {
-            thickness,
-            modulus,
-            yield_stress,
-            hardening,
-            cells_around,
-            cells_along,
-            contact_width,
-            cutting,
-        } = settings;
-        let [modulus, yield_stress, hardening] =
-            [modulus, yield_stress, hardening].map(|value| (cutting.is_none() || value != 0.0).then_some(value));
-        Self { thickness, modulus, yield_stress, hardening, cells_around, cells_along, contact_width, cutting }
+        let of_plastic = |value: f64| (settings.cutting.is_none() || value != 0.0).then_some(value);
+        Self {
+            thickness: settings.thickness,
+            modulus: of_plastic(settings.modulus),
+            yield_stress: of_plastic(settings.yield_stress),
+            hardening: of_plastic(settings.hardening),
+            cells_around: settings.cells_around,
+            cells_along: settings.cells_along,
+            contact_width: settings.contact_width,
+            cutting: settings.cutting,
+        }
     }
 }
 
 impl<'de> Deserialize<'de> for CoatingSettings {
     fn deserialize<D: Deserializer<'de>>(source: D) -> Result<Self, D::Error> {
-        let CoatingInFile {
-            thickness,
-            modulus,
-            yield_stress,
-            hardening,
-            cells_around,
-            cells_along,
-            contact_width,
-            cutting,
-        } = CoatingInFile::deserialize(source)?;
-        let given = |value: Option<f64>, key: &'static str| match (value, cutting) {
+        let file = CoatingInFile::deserialize(source)?;
+        let given = |value: Option<f64>, key: &'static str| match (value, file.cutting) {
             (None, None) => Err(D::Error::missing_field(key)),
             (value, _) => Ok(value.unwrap_or(0.0)),
         };
         Ok(Self {
-            thickness,
-            modulus: given(modulus, "modulus")?,
-            yield_stress: given(yield_stress, "yield_stress")?,
-            hardening: given(hardening, "hardening")?,
-            cells_around,
-            cells_along,
-            contact_width,
-            cutting,
+            thickness: file.thickness,
+            modulus: given(file.modulus, "modulus")?,
+            yield_stress: given(file.yield_stress, "yield_stress")?,
+            hardening: given(file.hardening, "hardening")?,
+            cells_around: file.cells_around,
+            cells_along: file.cells_along,
+            contact_width: file.contact_width,
+            cutting: file.cutting,
         })
     }
 }

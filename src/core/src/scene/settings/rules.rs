@@ -28,22 +28,19 @@ pub struct FeatureRule {
     remedy: &'static str,
 }
 
-const fn needs(
-    features: &'static [Fact],
-    other: RelatedFeature,
-    because: &'static str,
-    remedy: &'static str,
-) -> FeatureRule {
-    FeatureRule { features, needed: true, other, because, remedy }
-}
-
-const fn excludes(
-    features: &'static [Fact],
-    other: RelatedFeature,
-    because: &'static str,
-    remedy: &'static str,
-) -> FeatureRule {
-    FeatureRule { features, needed: false, other, because, remedy }
+/// Defines rules: features, the feature that they need or exclude at the same place, the reason and the remedy.
+macro_rules! rules {
+    ($([$($feature:ident),*] $relation:ident $other:expr, $because:literal, $remedy:literal;)*) => {
+        &[$(FeatureRule {
+            features: &[$($feature),*],
+            needed: rules!($relation),
+            other: $other,
+            because: $because,
+            remedy: $remedy,
+        }),*]
+    };
+    (needs) => { true };
+    (excludes) => { false };
 }
 
 const FREE: RelatedFeature = ("a free master", |at| at.is_free());
@@ -51,397 +48,236 @@ const ALL_FREE: RelatedFeature = ("a scene with free masters only", |at| at.cont
 const COUPLED: RelatedFeature = ("a ROM whose sectors are coupled by harmonics", |at| at.rom().is_cyclic());
 
 /// Rules of structures, surfaces and contacts.
-static PARTS: &[FeatureRule] = &[
-    needs(
-        &[SPEED, FACTORS, STIFFENING, GROWTH, CORIOLIS, WHIRL, AXIAL_SHIFT, SOFTENING, EXCITATION, INITIAL],
+static PARTS: &[FeatureRule] = rules! {
+    [SPEED, FACTORS, STIFFENING, GROWTH, CORIOLIS, WHIRL, AXIAL_SHIFT, SOFTENING, EXCITATION, INITIAL] needs
         ("`motion = \"rotating\"`", |at| at.structure().motion == BodyMotion::Rotating),
         "only a rotating structure has a speed, blades and a shaft",
-        "Remove the line, or set motion = \"rotating\"",
-    ),
-    needs(
-        &[LOAD],
-        ("`motion = \"still\"`", |at| at.structure().motion == BodyMotion::Still),
+        "Remove the line, or set motion = \"rotating\"";
+    [LOAD] needs ("`motion = \"still\"`", |at| at.structure().motion == BodyMotion::Still),
         "only a stationary structure can have a load on its contact grid",
-        "Remove the line, or set motion = \"still\"",
-    ),
-    excludes(
-        &[THERMAL],
-        ("`motion = \"free\"`", |at| at.structure().motion == BodyMotion::Free),
+        "Remove the line, or set motion = \"still\"";
+    [THERMAL] excludes ("`motion = \"free\"`", |at| at.structure().motion == BodyMotion::Free),
         "a free structure has no inputs",
-        "Remove the line",
-    ),
-    needs(
-        &[SOFTENING],
-        ("`structure.thermal`", |at| at.structure().thermal),
+        "Remove the line";
+    [SOFTENING] needs ("`structure.thermal`", |at| at.structure().thermal),
         "softening depends on the temperature of the structure",
-        "Set thermal = true, or remove the line",
-    ),
-    needs(
-        &[VELOCITY],
-        ("`motion = \"free\"`", |at| at.structure().motion == BodyMotion::Free),
+        "Set thermal = true, or remove the line";
+    [VELOCITY] needs ("`motion = \"free\"`", |at| at.structure().motion == BodyMotion::Free),
         "only a free structure has an initial velocity",
-        "Remove the line, or set motion = \"free\"",
-    ),
-    needs(
-        &[CARRIED],
+        "Remove the line, or set motion = \"free\"";
+    [CARRIED] needs
         ("a structure with `motion = \"still\"`", |at| at.carrier().is_some_and(|own| own.motion == BodyMotion::Still)),
         "only a stationary structure can carry a surface",
-        "Name a stationary structure, or remove the line for a rigid surface",
-    ),
-    excludes(
-        &[CARRIED],
-        ("a structure that is the master of a contact", |at| at.carrier_touches()),
+        "Name a stationary structure, or remove the line for a rigid surface";
+    [CARRIED] excludes ("a structure that is the master of a contact", |at| at.carrier_touches()),
         "a structure cannot be the master of one contact and carry the surface of another",
-        "Make it the master of both contacts, and put the surfaces on the structures that it can touch",
-    ),
-    needs(
-        &[RIGID],
-        FREE,
+        "Make it the master of both contacts, and put the surfaces on the structures that it can touch";
+    [RIGID] needs FREE,
         "a surface around a rotor is rigid if it has no `structure`",
-        "Remove the line; for a rigid surface, also remove `structure`",
-    ),
-    excludes(
-        &[SHAPE, MOVING, RAMP_TIME, PATCHES, CLOSURE],
-        FREE,
+        "Remove the line; for a rigid surface, also remove `structure`";
+    [SHAPE, MOVING, RAMP_TIME, PATCHES, CLOSURE] excludes FREE,
         "only a surface around an axis can have it, and the surface of a free master is an open contact grid",
-        "Remove the line",
-    ),
-    excludes(
-        &[GAP, SECTOR_GAPS, MERIDIAN, COATING, HEAT],
-        FREE,
+        "Remove the line";
+    [GAP, SECTOR_GAPS, MERIDIAN, COATING, HEAT] excludes FREE,
         "the gaps and normals of a free master follow from the positions in both ROMs",
-        "Remove the line",
-    ),
-    needs(
-        &[FREE_MASTER],
-        ("`surface.structure`", |at| at.surface().structure.is_some()),
+        "Remove the line";
+    [FREE_MASTER] needs ("`surface.structure`", |at| at.surface().structure.is_some()),
         "the position of its surface comes from the ROM of a structure",
-        "Give the surface a stationary `structure`; set `rigid = true` to ignore its deformation",
-    ),
-    needs(
-        &[ONE_OF_SEVERAL],
-        ("`contact.nodes`", |at| at.contact().nodes.is_some()),
+        "Give the surface a stationary `structure`; set `rigid = true` to ignore its deformation";
+    [ONE_OF_SEVERAL] needs ("`contact.nodes`", |at| at.contact().nodes.is_some()),
         "otherwise each contact would use all contact nodes of the structure",
-        "Set `nodes` in every contact to the prefix of the names of its contact nodes",
-    ),
-    excludes(
-        &[MERIDIAN],
-        ("a surface spline", |at| at.surface().spline.is_some() || at.carrier().is_some()),
+        "Set `nodes` in every contact to the prefix of the names of its contact nodes";
+    [MERIDIAN] excludes ("a surface spline", |at| at.surface().spline.is_some() || at.carrier().is_some()),
         "a surface spline uses the normal at the closest point",
-        "Remove the line",
-    ),
-    needs(
-        &[HEAT],
-        ("`contact.friction` above 0", |at| at.contact().friction > 0.0),
+        "Remove the line";
+    [HEAT] needs ("`contact.friction` above 0", |at| at.contact().friction > 0.0),
         "without friction there is no heat to distribute",
-        "Give the contact a friction coefficient (friction > 0), or remove the line",
-    ),
-    excludes(
-        &[COATING],
-        ("a contact that is solved together with another one", |at| at.is_coupled()),
+        "Give the contact a friction coefficient (friction > 0), or remove the line";
+    [COATING] excludes ("a contact that is solved together with another one", |at| at.is_coupled()),
         "contacts of one structure, or of surfaces on one flexible structure, act on each other",
-        "Remove the coating, or use a separate structure and a separate surface for this contact",
-    ),
-    excludes(
-        &[MODULUS, YIELD, HARDENING],
-        ("`contact.coating.cutting`", |at| at.is_cut()),
+        "Remove the coating, or use a separate structure and a separate surface for this contact";
+    [MODULUS, YIELD, HARDENING] excludes ("`contact.coating.cutting`", |at| at.is_cut()),
         "this key belongs to the plastic law, but this coating is cut",
-        "Remove the line, or remove `cutting` to use the plastic law",
-    ),
-    excludes(
-        &[CONTACT_WIDTH],
-        ("`contact.coating.cutting`", |at| at.is_cut()),
+        "Remove the line, or remove `cutting` to use the plastic law";
+    [CONTACT_WIDTH] excludes ("`contact.coating.cutting`", |at| at.is_cut()),
         "the cutting force does not depend on the width of the tip",
-        "Remove the line, or remove `cutting` to use the plastic law",
-    ),
-    needs(
-        &[SOLVER],
-        ("the solver of contact[1]", |at| at.contact().solver == at.settings.contacts[0].solver),
+        "Remove the line, or remove `cutting` to use the plastic law";
+    [SOLVER] needs ("the solver of contact[1]", |at| at.contact().solver == at.settings.contacts[0].solver),
         "all contacts of a scene use the same solver",
-        "Give all contacts the same solver",
-    ),
-];
+        "Give all contacts the same solver";
+};
 
 /// Rules of outputs and inputs.
-static VARIABLES: &[FeatureRule] = &[
-    needs(
-        &[WEAR, WEAR_PROFILE],
-        ("`contact.coating`", |at| at.contacts().any(|at| at.is_coated())),
+static VARIABLES: &[FeatureRule] = rules! {
+    [WEAR, WEAR_PROFILE] needs ("`contact.coating`", |at| at.contacts().any(|at| at.is_coated())),
         "only coatings wear",
-        "Add a `coating` to the contact, or remove the line",
-    ),
-    needs(
-        &[STRESS, MODES, TIPS],
-        ("`outputs.watched_sectors`", |at| !at.outputs().watched_sectors.is_empty()),
+        "Add a `coating` to the contact, or remove the line";
+    [STRESS, MODES, TIPS] needs ("`outputs.watched_sectors`", |at| !at.outputs().watched_sectors.is_empty()),
         "it is reported for watched sectors only",
-        "Add a sector to `watched_sectors`, or remove the line",
-    ),
-    needs(
-        &[DISPLACEMENT],
-        ("`surface.structure` of a surface around an axis", |at| {
+        "Add a sector to `watched_sectors`, or remove the line";
+    [DISPLACEMENT] needs ("`surface.structure` of a surface around an axis", |at| {
             at.contacts().any(|at| at.carrier().is_some() && !at.is_free())
         }),
         "the output is a radial displacement: a rigid surface does not deform, and an open surface has no axis",
-        "Give the surface around a rotor a `structure`, or remove the line",
-    ),
-    needs(
-        &[SUPPORT],
-        ("`surface.structure` of a surface around an axis", |at| {
+        "Give the surface around a rotor a `structure`, or remove the line";
+    [SUPPORT] needs ("`surface.structure` of a surface around an axis", |at| {
             at.contacts().any(|at| at.carrier().is_some() && !at.is_free())
         }),
         "a rigid surface has no separate support: its reaction is the contact force",
-        "Give the surface around a rotor a `structure`, or remove the line",
-    ),
-    excludes(
-        &[MODES, TIPS, CASING_FORCES],
-        ALL_FREE,
+        "Give the surface around a rotor a `structure`, or remove the line";
+    [MODES, TIPS, CASING_FORCES] excludes ALL_FREE,
         "it is reported for rotors and their casings only",
-        "Remove the line",
-    ),
-    excludes(
-        &[OTHER_SECTORS, ALL_SECTORS, DIAMETERS],
-        ALL_FREE,
+        "Remove the line";
+    [OTHER_SECTORS, ALL_SECTORS, DIAMETERS] excludes ALL_FREE,
         "a free structure has one sector",
-        "Remove the line; `watched_sectors` may be [1] or []",
-    ),
-    excludes(&[INTERPOLATION], ALL_FREE, "such a scene has no inputs", "Remove the line"),
-];
+        "Remove the line; `watched_sectors` may be [1] or []";
+    [INTERPOLATION] excludes ALL_FREE,
+        "such a scene has no inputs",
+        "Remove the line";
+};
 
 /// Rules of schemes and solvers, for those of the scene and for those chosen by parameters.
-static METHODS: &[FeatureRule] = &[
-    needs(
-        &[STICKING],
-        ("a scene packaged with it, or one with friction, rigid surfaces and rotors with uncoupled sectors", |at| {
+static METHODS: &[FeatureRule] = rules! {
+    [STICKING] needs ("a scene packaged with it, or one with friction, rigid surfaces and rotors with uncoupled sectors", |at| {
             at.may_stick()
         }),
         "the solver is set up for larger problems only if the scene selects it",
-        "Package the scene with contact.solver = \"coulomb\"",
-    ),
-    excludes(
-        &[UNCOATED],
-        ("a coating", |at| at.contacts().any(|at| at.is_coated())),
+        "Package the scene with contact.solver = \"coulomb\"";
+    [UNCOATED] excludes ("a coating", |at| at.contacts().any(|at| at.is_coated())),
         "a coating yields within the linear complementarity problem, which only `lcp` solves",
-        "Use solver = \"lcp\", or remove the coating",
-    ),
-    excludes(
-        &[MASSLESS],
-        ("a free master", |at| at.contacts().any(|at| at.is_free())),
+        "Use solver = \"lcp\", or remove the coating";
+    [MASSLESS] excludes ("a free master", |at| at.contacts().any(|at| at.is_free())),
         "this scheme does not support free structures",
-        "Use \"modal-exact\" or \"central-difference\"",
-    ),
-    excludes(
-        &[MASSLESS],
-        ("`structure.spin.coriolis`", |at| at.settings.structures.iter().any(|own| own.spin.coriolis)),
+        "Use \"modal-exact\" or \"central-difference\"";
+    [MASSLESS] excludes ("`structure.spin.coriolis`", |at| at.settings.structures.iter().any(|own| own.spin.coriolis)),
         "its quasi-static modes have no velocity, on which the Coriolis force depends",
-        "Use \"modal-exact\", or leave out the Coriolis force",
-    ),
-    excludes(
-        &[GALERKIN],
+        "Use \"modal-exact\", or leave out the Coriolis force";
+    [GALERKIN] excludes
         ("`structure.spin`", |at| at.settings.structures.iter().any(|own| own.spin != SpinSettings::default())),
         "its step tables assume that modes keep their stiffness and are loaded by contact alone",
-        "Use \"modal-exact\", or leave out the effects of spin",
-    ),
-    excludes(
-        &[GALERKIN],
-        ("`structure.thermal` of a rotor or `structure.excitation`", |at| {
+        "Use \"modal-exact\", or leave out the effects of spin";
+    [GALERKIN] excludes ("`structure.thermal` of a rotor or `structure.excitation`", |at| {
             let loaded = |own: &StructureSettings| own.thermal && own.motion == BodyMotion::Rotating;
             at.settings.structures.iter().any(|own| loaded(own) || own.excitation.is_some())
         }),
         "its step tables assume that blades are loaded by contact alone",
-        "Use \"modal-exact\", or leave out the loads on the blades",
-    ),
-    excludes(
-        &[GALERKIN],
-        ("`contact.coating`", |at| at.contacts().any(|at| at.is_coated())),
+        "Use \"modal-exact\", or leave out the loads on the blades";
+    [GALERKIN] excludes ("`contact.coating`", |at| at.contacts().any(|at| at.is_coated())),
         "it computes the forces that keep gaps from closing further, but a coating is compressed under force",
-        "Use \"modal-exact\", or remove the coating",
-    ),
-    excludes(
-        &[MASSLESS],
-        ("`contact.coating.cutting`", |at| at.contacts().any(|at| at.is_cut())),
+        "Use \"modal-exact\", or remove the coating";
+    [MASSLESS] excludes ("`contact.coating.cutting`", |at| at.contacts().any(|at| at.is_cut())),
         "the cutting force depends on the sliding distance of the same step, but forces of this scheme act one step \
          later",
-        "Use \"modal-exact\" or \"central-difference\", or remove `cutting` to use the plastic law",
-    ),
-    excludes(
-        &[GALERKIN],
-        ("`outputs.support_reaction`", |at| at.outputs().support_reaction),
+        "Use \"modal-exact\" or \"central-difference\", or remove `cutting` to use the plastic law";
+    [GALERKIN] excludes ("`outputs.support_reaction`", |at| at.outputs().support_reaction),
         "it does not average the motion of the casing over a step",
-        "Use \"modal-exact\", or remove the output",
-    ),
-    excludes(
-        &[GALERKIN],
-        ("`contact.solver = \"film\"`", |at| !at.solver.properties().complementary),
+        "Use \"modal-exact\", or remove the output";
+    [GALERKIN] excludes ("`contact.solver = \"film\"`", |at| !at.solver.properties().complementary),
         "it needs a solver that enforces complementarity of gap and force",
-        "Use solver = \"lcp\", or \"coulomb\"",
-    ),
-    excludes(
-        &[MASSLESS],
-        ("`contact.solver = \"film\"`", |at| !at.solver.properties().complementary),
+        "Use solver = \"lcp\", or \"coulomb\"";
+    [MASSLESS] excludes ("`contact.solver = \"film\"`", |at| !at.solver.properties().complementary),
         "`film` checks for penetration only once per step, and a massless node that it leaves inside the surface \
          stays there",
-        "Use solver = \"lcp\", or another scheme",
-    ),
-    needs(
-        &[GALERKIN],
-        ("a clearance above 0 in every contact of a rotor", |at| {
+        "Use solver = \"lcp\", or another scheme";
+    [GALERKIN] needs ("a clearance above 0 in every contact of a rotor", |at| {
             at.contacts().all(|at| at.is_free() || at.contact().nominal_gap() > 0.0)
         }),
         "its tolerance is a fraction of the clearance",
-        "Give the contact a `gap`, or use \"modal-exact\"",
-    ),
-    needs(
-        &[QUASI_STATIC],
-        ("more than three modes per contact node", |at| at.has_modes_left()),
+        "Give the contact a `gap`, or use \"modal-exact\"";
+    [QUASI_STATIC] needs ("more than three modes per contact node", |at| at.has_modes_left()),
         "it makes the highest modes quasi-static, three per contact node, and at least one other mode must remain",
-        "Use more modes or fewer contact nodes, or \"modal-exact\"",
-    ),
-    excludes(
-        &[MASSLESS],
+        "Use more modes or fewer contact nodes, or \"modal-exact\"";
+    [MASSLESS] excludes
         ("several surfaces on one flexible structure", |at| at.contacts().any(|at| at.shares_carrier())),
         "the largest stable step is unknown in this case",
-        "Use \"modal-exact\" or \"central-difference\", or rigid surfaces",
-    ),
-];
+        "Use \"modal-exact\" or \"central-difference\", or rigid surfaces";
+};
 
 /// Rules of presets: settings that the scene file may have in addition. Parameters may have any value.
-static PRESETS: &[FeatureRule] = &[excludes(
-    &[OTHER_SCHEME, OTHER_SOLVER],
-    ("`preset = \"paper\"`", |at| at.settings.preset == Preset::Paper),
-    "the preset prescribes the scheme and the solver of the paper",
-    "Remove the line or the preset",
-)];
+static PRESETS: &[FeatureRule] = rules! {
+    [OTHER_SCHEME, OTHER_SOLVER] excludes ("`preset = \"paper\"`", |at| at.settings.preset == Preset::Paper),
+        "the preset prescribes the scheme and the solver of the paper",
+        "Remove the line or the preset";
+};
 
 /// Rules of ROMs.
-static ROMS: &[FeatureRule] = &[
-    needs(
-        &[ROM_AROUND],
-        ("`frame = cylindrical`", |at| at.rom().frame == DisplacementFrame::Cylindrical),
+static ROMS: &[FeatureRule] = rules! {
+    [ROM_AROUND] needs ("`frame = cylindrical`", |at| at.rom().frame == DisplacementFrame::Cylindrical),
         "contact around an axis is computed from displacements along (r, θ, z)",
-        "Write the ROM with frame = cylindrical",
-    ),
-    needs(
-        &[ROM_FREE],
-        ("`frame = cartesian`", |at| at.rom().frame == DisplacementFrame::Cartesian),
+        "Write the ROM with frame = cylindrical";
+    [ROM_FREE] needs ("`frame = cartesian`", |at| at.rom().frame == DisplacementFrame::Cartesian),
         "contact of a free master is computed from displacements along x, y, z",
-        "Write the ROM with frame = cartesian",
-    ),
-    needs(
-        &[ROM_FREE],
-        ("`sectors = 1`", |at| at.rom().sectors == 1 && !at.rom().is_cyclic()),
+        "Write the ROM with frame = cartesian";
+    [ROM_FREE] needs ("`sectors = 1`", |at| at.rom().sectors == 1 && !at.rom().is_cyclic()),
         "a free master and the structures that it can touch must have a single sector",
-        "Use a ROM with sectors = 1",
-    ),
-    needs(
-        &[STIFFENING, GROWTH, CORIOLIS],
-        ("spin matrices in the ROM", |at| at.rom().extras.spin.is_some()),
+        "Use a ROM with sectors = 1";
+    [STIFFENING, GROWTH, CORIOLIS] needs ("spin matrices in the ROM", |at| at.rom().extras.spin.is_some()),
         "they describe the effect of the speed on the structure",
-        "Reduce it with `tiprub reduce --spin`, or remove the line",
-    ),
-    excludes(
-        &[FACTORS, STIFFENING, CORIOLIS, SOFTENING],
-        COUPLED,
+        "Reduce it with `tiprub reduce --spin`, or remove the line";
+    [FACTORS, STIFFENING, CORIOLIS, SOFTENING] excludes COUPLED,
         "nodal-diameter modes assume identical sectors and do not depend on speed or temperature",
-        "Remove the line, or use a ROM of uncoupled sectors (without harmonics)",
-    ),
-    excludes(
-        &[INITIAL_SECTOR],
-        COUPLED,
+        "Remove the line, or use a ROM of uncoupled sectors (without harmonics)";
+    [INITIAL_SECTOR] excludes COUPLED,
         "the blades of such a disk have no individual modes",
-        "Give a `nodal_diameter` instead",
-    ),
-    needs(
-        &[THERMAL],
-        ("thermal loads in the ROM", |at| at.rom().extras.thermal.is_some()),
+        "Give a `nodal_diameter` instead";
+    [THERMAL] needs ("thermal loads in the ROM", |at| at.rom().extras.thermal.is_some()),
         "they describe the thermal expansion caused by each patch",
-        "Reduce the structure from a mesh with a single material (for a casing, with thermal patches), or remove the line",
-    ),
-    excludes(
-        &[COATING],
-        ("a ROM with several rows of contact patches across the thickness", |at| {
+        "Reduce the structure from a mesh with a single material (for a casing, with thermal patches), or remove the line";
+    [COATING] excludes ("a ROM with several rows of contact patches across the thickness", |at| {
             at.master_rom().is_some_and(|rom| rom.rows() > 1)
         }),
         "the penetration of a row of cells is interpolated between two patches along the axis, and patches of \
          different rows would be interleaved",
-        "Reduce the blade with --contact-rows 1, or remove the coating",
-    ),
-    needs(
-        &[PLASTIC_COATING],
-        ("`contact.coating.contact_width`, or contact patches with areas and lengths in the ROM of the master", |at| {
+        "Reduce the blade with --contact-rows 1, or remove the coating";
+    [PLASTIC_COATING] needs ("`contact.coating.contact_width`, or contact patches with areas and lengths in the ROM of the master", |at| {
             at.contact().coating.is_some_and(|coating| coating.contact_width.is_some())
                 || at.master_rom().is_some_and(Rom::has_patches)
         }),
         "the force on a tip increases with the width of the contact, and contact nodes have no width",
         "Set `contact_width` to the tip thickness divided by the cosine of the stagger angle (m), or reduce the blade with \
-         --contact-patches",
-    ),
-    needs(
-        &[STRESS],
-        ("stress points in the ROM of a rotor", |at| {
+         --contact-patches";
+    [STRESS] needs ("stress points in the ROM of a rotor", |at| {
             at.contacts().any(|at| !at.is_free() && at.master_rom().is_some_and(|rom| rom.extras.stress.is_some()))
         }),
         "stress is computed from the finite-element model that the ROM was reduced from",
-        "Reduce the blade with --stress-modes or --stress-set, or remove the line",
-    ),
-    needs(
-        &[HEATED_STRESS],
-        ("static thermal stress in the ROM of the rotor (array `stress_thermal`)", |at| {
+        "Reduce the blade with --stress-modes or --stress-set, or remove the line";
+    [HEATED_STRESS] needs ("static thermal stress in the ROM of the rotor (array `stress_thermal`)", |at| {
             at.stressed(|own| own.thermal).all(|rom| rom.extras.stress_thermal.is_some())
         }),
         "the reduced coordinates alone would give stress even for free thermal expansion, which is free of stress",
-        "Reduce the blade again, add the array, or remove `thermal` or this line",
-    ),
-    needs(
-        &[GROWN_STRESS],
-        ("static centrifugal stress in the ROM of the rotor (array `stress_centrifugal`)", |at| {
+        "Reduce the blade again, add the array, or remove `thermal` or this line";
+    [GROWN_STRESS] needs ("static centrifugal stress in the ROM of the rotor (array `stress_centrifugal`)", |at| {
             at.stressed(|own| own.spin.growth).all(|rom| rom.extras.stress_centrifugal.is_some())
         }),
         "a few modes do not resolve the stress of a load that acts on the whole blade",
-        "Reduce the blade again, add the array, or remove `spin.growth` or this line",
-    ),
-    excludes(
-        &[MODES],
-        ("a rotor whose sectors are coupled by harmonics", |at| {
+        "Reduce the blade again, add the array, or remove `spin.growth` or this line";
+    [MODES] excludes ("a rotor whose sectors are coupled by harmonics", |at| {
             at.contacts().any(|at| at.master_rom().is_some_and(Rom::is_cyclic))
         }),
         "its modes belong to nodal diameters, not to single sectors",
-        "Use `nodal_diameters`, or remove the line",
-    ),
-    needs(
-        &[SUPPORT],
-        ("support rows in the ROM of a casing", |at| {
+        "Use `nodal_diameters`, or remove the line";
+    [SUPPORT] needs ("support rows in the ROM of a casing", |at| {
             at.contacts().any(|at| !at.is_free() && at.carrier_rom().is_some_and(|rom| rom.extras.support.is_some()))
         }),
         "they give the reaction at the clamped nodes of the finite-element model that the ROM was reduced from",
-        "Reduce the casing again with clamped nodes, or remove the line",
-    ),
-    needs(
-        &[LOAD],
-        ("a contact grid in the ROM", |at| at.rom().extras.grid.is_some()),
+        "Reduce the casing again with clamped nodes, or remove the line";
+    [LOAD] needs ("a contact grid in the ROM", |at| at.rom().extras.grid.is_some()),
         "the load acts on the rings of the grid",
-        "Use a ROM with a contact grid, or remove the load",
-    ),
-    excludes(
-        &[CARRIED],
+        "Use a ROM with a contact grid, or remove the load";
+    [CARRIED] excludes
         ("a structure whose sectors are coupled by harmonics", |at| at.carrier_rom().is_some_and(Rom::is_cyclic)),
         "the surface interpolates the contact grid of a structure that was reduced as a whole",
-        "Use a separate structure with sectors = 1 to carry the surface",
-    ),
-    needs(
-        &[CARRIED_AROUND],
+        "Use a separate structure with sectors = 1 to carry the surface";
+    [CARRIED_AROUND] needs
         ("a contact grid in its ROM", |at| at.carrier_rom().is_some_and(|rom| rom.extras.grid.is_some())),
         "the surface interpolates this grid",
-        "Reduce the casing with `tiprub reduce casing`, or add the metadata `contact_grid`",
-    ),
-    needs(
-        &[CARRIED_OPEN],
-        ("an open contact grid in its ROM", |at| {
+        "Reduce the casing with `tiprub reduce casing`, or add the metadata `contact_grid`";
+    [CARRIED_OPEN] needs ("an open contact grid in its ROM", |at| {
             at.carrier_rom().and_then(|rom| rom.extras.grid).is_some_and(|grid| !grid.closed)
         }),
         "the surface interpolates this grid",
-        "Add the metadata `contact_grid` for an open grid, with the contact nodes listed row by row",
-    ),
-];
+        "Add the metadata `contact_grid` for an open grid, with the contact nodes listed row by row";
+};
 
 /// All rows, in the order of the guide.
 pub fn all() -> impl Iterator<Item = &'static FeatureRule> {

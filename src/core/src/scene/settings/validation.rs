@@ -252,7 +252,7 @@ impl SurfaceSettings {
             Shape::TwoLobe { depth, width, phase } => {
                 at_most(&format!("{at}.shape.depth"), *depth, ranges::DEPTH)?;
                 at_most(&format!("{at}.shape.phase"), *phase, ranges::ANGLE)?;
-                within(&format!("{at}.shape.width"), *width, 1e-3, 0.25)
+                within(&format!("{at}.shape.width"), *width, ranges::LOBE_WIDTH[0], ranges::LOBE_WIDTH[1])
             }
             Shape::Table { radius_change } => {
                 crate::scene::shape::CompiledShape::new(&Shape::Table { radius_change: radius_change.clone() }, 0.0)

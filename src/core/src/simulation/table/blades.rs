@@ -1,6 +1,6 @@
 //! Rows of effects on blades other than contact: excitation, heat, initial motion; and of damping by modes.
 
-use tiprub_cosim::variables::{DataType, Quantity, StartValue};
+use tiprub_cosim::variables::Quantity;
 
 use super::builder::TableBuilder;
 use super::features::LARGEST_TEMPERATURE;
@@ -15,12 +15,11 @@ pub fn inputs(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts) {
         let text = "Amplitude of the engine-order excitation of each blade";
         let (name, quantity) = ("excitation_amplitude", Quantity::Excitation(0));
         let row = table.moving_input(quantity, name, Some(&FORCE), excitation.amplitude, text);
-        row.nominal = Some(1.0);
-        (row.min, row.max) = (Some(-ranges::EXCITATION), Some(ranges::EXCITATION));
+        row.nominal(1.0).range(-ranges::EXCITATION, ranges::EXCITATION);
         let text = "Phase of the excitation: the load on blade j of N is amplitude cos(order (rotor angle + 2 pi (j - 1)/N) - \
              phase)";
         let (name, quantity) = ("excitation_phase", Quantity::Excitation(1));
-        table.moving_input(quantity, name, Some(&ANGLE), excitation.phase, text).display = Some(0);
+        table.moving_input(quantity, name, Some(&ANGLE), excitation.phase, text).display(0);
     }
     if body.structure.thermal {
         let text = format!(
@@ -28,8 +27,7 @@ pub fn inputs(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts) {
             parts.rotor(body)
         );
         let row = table.moving_input(Quantity::RotorTemperature, "rotor_temperature", Some(&TEMPERATURE), 0.0, &text);
-        row.nominal = Some(100.0);
-        (row.min, row.max) = (Some(-LARGEST_TEMPERATURE), Some(LARGEST_TEMPERATURE));
+        row.nominal(100.0).range(-LARGEST_TEMPERATURE, LARGEST_TEMPERATURE);
     }
 }
 
@@ -37,9 +35,8 @@ pub fn inputs(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts) {
 pub fn parameters(table: &mut TableBuilder, body: &BodyFacts) {
     if let Some(excitation) = &body.structure.excitation {
         let text = "Engine order of the excitation of the blades";
-        let row = table.parameter(Quantity::ExcitationOrder, "excitation_order", None, 0.0, text);
-        (row.kind, row.min, row.max) = (DataType::Integer, Some(0.0), Some(ranges::ENGINE_ORDER));
-        row.start = Some(StartValue::Integer(i32::try_from(excitation.order).unwrap_or(i32::MAX)));
+        let row = table.whole(Quantity::ExcitationOrder, "excitation_order", excitation.order, text);
+        row.range(0.0, ranges::ENGINE_ORDER);
     }
     let initial = &body.structure.initial;
     if initial.is_empty() {
@@ -50,13 +47,10 @@ pub fn parameters(table: &mut TableBuilder, body: &BodyFacts) {
     let text = "Initial displacement of the blades, one value per [[structure.initial]]";
     let (name, quantity) = ("initial_displacement", Quantity::InitialDisplacement);
     let row = table.parameter(quantity, name, Some(&LENGTH), 0.0, text);
-    (row.dimension, row.start, row.nominal, row.display) =
-        (Some(initial.len()), Some(StartValue::Real(displacements)), Some(1e-4), Some(1));
-    (row.min, row.max) = (Some(-ranges::POSITION), Some(ranges::POSITION));
+    row.starts(displacements).nominal(1e-4).display(1).range(-ranges::POSITION, ranges::POSITION);
     let text = "Initial velocity of the blades, one value per [[structure.initial]]";
     let row = table.parameter(Quantity::InitialRate, "initial_velocity", Some(&LINEAR_SPEED), 0.0, text);
-    (row.dimension, row.start, row.nominal) = (Some(initial.len()), Some(StartValue::Real(velocities)), Some(1.0));
-    (row.min, row.max) = (Some(-ranges::VELOCITY), Some(ranges::VELOCITY));
+    row.starts(velocities).nominal(1.0).range(-ranges::VELOCITY, ranges::VELOCITY);
 }
 
 /// Adds the damping ratios of the first modes.
@@ -69,7 +63,7 @@ pub(crate) fn mode_damping(
 ) {
     let ratios = &structure.damping_ratios;
     if !ratios.is_empty() {
-        let row = table.damping(quantity, name, 0.0, &format!("Modal damping ratios of the first modes of {owner}"));
-        (row.dimension, row.start) = (Some(ratios.len()), Some(StartValue::Real(ratios.clone())));
+        let text = format!("Modal damping ratios of the first modes of {owner}");
+        table.damping(quantity, name, 0.0, &text).starts(ratios.clone());
     }
 }

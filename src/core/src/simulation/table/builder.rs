@@ -5,13 +5,14 @@ use tiprub_cosim::variables::{
     Causality, DataType, Enumeration, Quantity, Span, StartValue, Variability, Variable, VariableTable, VariableUnit,
 };
 
+use super::parts::AXES;
 use crate::Result;
 use crate::scene::method::SCHEMES;
 use crate::scene::method::SOLVERS;
 use crate::scene::ranges;
 use crate::scene::ranges::{DAMPING, FRICTION, LONGEST_STEP, TURNED};
 use crate::scene::settings::{ContactSettings, SceneSettings, TOLERANCE};
-use crate::simulation::outputs::OutputReader;
+use crate::simulation::outputs::{OutputReader, OutputView, scalar};
 use crate::simulation::units::{ANGLE, INPUT_INTERPOLATIONS, STEP_DERIVATIVES, TIME};
 
 /// Description of inputs that would cause an impact if they jumped.
@@ -19,6 +20,9 @@ pub(crate) const RAMPED: &str = "; reached at the end of the communication step 
 /// Description of angle inputs that would cause an impact if they jumped.
 const RAMPED_ANGLE: &str =
     "; reached at the end of the communication step (see input_interpolation), so do not wrap it to one turn";
+
+/// Unit with a typical magnitude; `None` for numbers without unit.
+pub(crate) type NominalUnit = Option<(&'static VariableUnit, f64)>;
 
 /// Collects rows and assigns references.
 #[derive(Default)]
@@ -50,25 +54,10 @@ impl TableBuilder {
         description: impl Into<String>,
     ) -> &mut Variable {
         self.close();
-        self.variables.push(Variable {
-            name: format!("{}{}", self.prefix, name.into()),
-            reference: self.next,
-            dimension: None,
-            kind: DataType::Real,
-            causality: Causality::Output,
-            variability: Variability::Continuous,
-            span: Span::Point,
-            unit: None,
-            display: None,
-            min: None,
-            max: None,
-            nominal: None,
-            start: None,
-            description: description.into(),
-            quantity,
-            of: self.of,
-        });
-        self.variables.last_mut().unwrap_or_else(|| unreachable!("just pushed"))
+        let name = format!("{}{}", self.prefix, name.into());
+        self.variables.push(Variable { of: self.of, ..Variable::output(name, self.next, description.into()) });
+        let variable = self.variables.last_mut().unwrap_or_else(|| unreachable!("just pushed"));
+        variable.quantity(quantity)
     }
 
     /// Counts the references of the last row, whose dimension is now known.
@@ -88,13 +77,9 @@ impl TableBuilder {
         text: &str,
     ) -> &mut Variable {
         let variable = self.push(quantity, name, text);
-        variable.causality = Causality::Input;
-        variable.unit = unit;
+        (variable.causality, variable.unit) = (Causality::Input, unit);
         variable.start = Some(StartValue::Real(vec![start]));
-        if unit == Some(&ANGLE) {
-            (variable.min, variable.max) = (Some(-TURNED), Some(TURNED));
-        }
-        variable
+        if unit == Some(&ANGLE) { variable.range(-TURNED, TURNED) } else { variable }
     }
 
     /// Adds an input that moves or loads a structure and therefore never jumps.
@@ -119,16 +104,18 @@ impl TableBuilder {
         start: f64,
         text: &str,
     ) -> &mut Variable {
-        let variable = self.input(quantity, name, unit, start, text);
-        variable.causality = Causality::Parameter;
-        variable.variability = Variability::Fixed;
-        variable
+        self.input(quantity, name, unit, start, text).role(Causality::Parameter, Variability::Fixed)
     }
 
     pub fn choice(&mut self, quantity: Quantity, name: &str, choices: &'static Enumeration, start: i32, text: &str) {
-        let variable = self.parameter(quantity, name, None, 0.0, text);
-        variable.kind = DataType::Enumeration(choices);
-        variable.start = Some(StartValue::Integer(start));
+        let kind = DataType::Enumeration(choices);
+        self.parameter(quantity, name, None, 0.0, text).kind(kind, StartValue::Integer(start));
+    }
+
+    /// Adds a parameter that is a whole number.
+    pub fn whole(&mut self, quantity: Quantity, name: &str, start: u32, text: &str) -> &mut Variable {
+        let start = StartValue::Integer(i32::try_from(start).unwrap_or(i32::MAX));
+        self.parameter(quantity, name, None, 0.0, text).kind(DataType::Integer, start)
     }
 
     /// Adds an output with its reader.
@@ -136,51 +123,54 @@ impl TableBuilder {
         &mut self,
         name: impl Into<String>,
         span: Span,
-        unit: Option<(&'static VariableUnit, f64)>,
+        unit: NominalUnit,
         text: impl Into<String>,
         read: OutputReader,
     ) -> &mut Variable {
         self.readers.push(read);
         let variable = self.push(Quantity::Output, name, text);
         variable.span = span;
-        if let Some((unit, nominal)) = unit {
-            variable.unit = Some(unit);
-            variable.nominal = Some(nominal);
-        }
+        (variable.unit, variable.nominal) = unit.unzip();
         variable
+    }
+
+    /// Adds the components of a vector along x, y, z: `{axis}` in the text is the axis, and the reader gets its index.
+    pub fn vector(
+        &mut self,
+        name: &str,
+        span: Span,
+        unit: NominalUnit,
+        text: &str,
+        read: impl Fn(&OutputView, usize) -> f64 + Copy + Send + Sync + 'static,
+    ) {
+        for (axis, letter) in AXES.into_iter().enumerate() {
+            let text = text.replace("{axis}", letter);
+            self.output(format!("{name}_{letter}"), span, unit, text, scalar(move |view| read(view, axis)));
+        }
     }
 
     /// Adds a friction coefficient, which may change between communication steps.
     pub fn friction(&mut self, contact: &ContactSettings, text: &str) {
         let row = self.parameter(Quantity::Friction, "friction_coefficient", None, contact.friction, text);
-        (row.min, row.max, row.variability) = (Some(0.0), Some(FRICTION), Variability::Tunable);
+        row.range(0.0, FRICTION).variability = Variability::Tunable;
     }
 
     /// Adds a modal damping ratio.
     pub fn damping(&mut self, quantity: Quantity, name: &str, start: f64, text: &str) -> &mut Variable {
-        let row = self.parameter(quantity, name, None, start, text);
-        (row.min, row.max) = (Some(0.0), Some(DAMPING));
-        row
+        self.parameter(quantity, name, None, start, text).range(0.0, DAMPING)
     }
 
     /// Adds internal step, largest number of steps, scheme and solver.
     pub fn methods(&mut self, settings: &SceneSettings) {
-        let step = self.parameter(
-            Quantity::StepMax,
-            "internal_step_max",
-            Some(&TIME),
-            settings.time.step,
-            "Maximum internal time step; the step in use divides the communication step evenly",
-        );
-        (step.min, step.max) = (Some(SHORTEST_STEP), Some(LONGEST_STEP));
-        (step.nominal, step.display) = (Some(settings.time.step), Some(1));
+        let text = "Maximum internal time step; the step in use divides the communication step evenly";
+        let step = self.parameter(Quantity::StepMax, "internal_step_max", Some(&TIME), settings.time.step, text);
+        step.range(SHORTEST_STEP, LONGEST_STEP).nominal(settings.time.step).display(1);
         let (scheme, solver) = (settings.time.scheme as i32 + 1, settings.contacts[0].solver as i32 + 1);
         if settings.takes_a_tolerance() {
             let text = "Permitted displacement error of a galerkin step, as a fraction of the smallest clearance";
             let start = settings.time.tolerance.unwrap_or(TOLERANCE);
             let tolerance = self.parameter(Quantity::Tolerance, "tolerance", None, start, text);
-            (tolerance.min, tolerance.max) = (Some(ranges::TOLERANCE[0]), Some(ranges::TOLERANCE[1]));
-            tolerance.nominal = Some(start);
+            tolerance.range(ranges::TOLERANCE[0], ranges::TOLERANCE[1]).nominal(start);
         }
         if settings.bounds_steps() {
             self.max_internal_steps(settings);
@@ -195,11 +185,9 @@ impl TableBuilder {
     fn max_internal_steps(&mut self, settings: &SceneSettings) {
         let text = "Maximum number of internal steps in one communication step, including rejected trials (0: no \
                     limit); a communication step that needs more is discarded";
-        let most = self.parameter(Quantity::MaxInternalSteps, "max_internal_steps", None, 0.0, text);
-        (most.kind, most.variability) = (DataType::Integer, Variability::Tunable);
-        (most.min, most.max) = (Some(0.0), Some(ranges::STEPS));
-        most.start =
-            Some(StartValue::Integer(i32::try_from(settings.time.max_internal_steps.unwrap_or(0)).unwrap_or(i32::MAX)));
+        let most = settings.time.max_internal_steps.unwrap_or(0);
+        let row = self.whole(Quantity::MaxInternalSteps, "max_internal_steps", most, text);
+        row.range(0.0, ranges::STEPS).variability = Variability::Tunable;
     }
 
     /// Adds the interpolation of inputs between communication points.
@@ -220,15 +208,14 @@ impl TableBuilder {
     /// Adds the name of the scene.
     pub(crate) fn scene_name(&mut self, settings: &SceneSettings) {
         let name = self.push(Quantity::SceneName, "scene", "Name of the scene from which this FMU was generated");
-        (name.kind, name.causality, name.variability) = (DataType::String, Causality::Local, Variability::Constant);
-        name.start = Some(StartValue::String(settings.name.clone()));
+        name.kind(DataType::String, StartValue::String(settings.name.clone()))
+            .role(Causality::Local, Variability::Constant);
     }
 
     /// Adds the time, the independent variable.
     pub fn time(&mut self) {
         let time = self.push(Quantity::Time, "time", "Simulated time");
-        time.causality = Causality::Independent;
-        time.unit = Some(&TIME);
+        (time.causality, time.unit) = (Causality::Independent, Some(&TIME));
     }
 
     /// Returns the table of all rows, and the readers of its outputs, in their order.

@@ -1,14 +1,14 @@
 //! Rows that only some scenes have.
 
-use tiprub_cosim::variables::{DataType, Quantity, Span, StartValue, Variability};
+use tiprub_cosim::variables::{Quantity, Span, Variability};
 
 use super::blades;
 use super::builder::TableBuilder;
-use super::parts::{AXES, BodyFacts, CarrierFacts, PairFacts, TableFacts, largest_length};
+use super::parts::{BodyFacts, CarrierFacts, PairFacts, TableFacts, largest_length};
 use crate::contact::coating::Coating;
 use crate::scene::ranges;
 use crate::scene::settings::{CoatingSettings, StructureSettings};
-use crate::simulation::outputs::{array_reader, each, scalar};
+use crate::simulation::outputs::{OutputView, array_reader, each, scalar};
 use crate::simulation::units::{ANGLE, ENERGY, FORCE, LENGTH, LINE_LOAD, POWER, TEMPERATURE, TORQUE, VOLUME};
 
 /// A linear expansion does not describe temperatures beyond this (K).
@@ -54,35 +54,26 @@ fn shaft(table: &mut TableBuilder, body: &BodyFacts) {
         if exists {
             let quantity = Quantity::ShaftDisplacement(component);
             let row = table.moving_input(quantity, name, Some(&LENGTH), 0.0, text);
-            (row.nominal, row.display) = (Some(1e-4), Some(1));
-            (row.min, row.max) = (Some(-largest), Some(largest));
+            row.nominal(1e-4).display(1).range(-largest, largest);
         }
     }
 }
 
 fn loads(table: &mut TableBuilder, CarrierFacts { structure, rom, .. }: &CarrierFacts) {
     if let Some(thermal) = rom.extras.thermal.as_ref().filter(|_| structure.thermal) {
-        let row = table.moving_input(
-            Quantity::CasingTemperature,
-            "casing_temperature",
-            Some(&TEMPERATURE),
-            0.0,
-            "Temperature of each casing patch relative to the reference temperature, at which the casing is undeformed",
-        );
-        let patches = thermal.patches.len();
-        row.dimension = Some(patches);
-        row.start = Some(StartValue::Real(vec![0.0; patches]));
-        row.nominal = Some(100.0);
-        (row.min, row.max) = (Some(-LARGEST_TEMPERATURE), Some(LARGEST_TEMPERATURE));
+        let text = "Temperature of each casing patch relative to the reference temperature, at which the casing is \
+                    undeformed";
+        let (quantity, name) = (Quantity::CasingTemperature, "casing_temperature");
+        let row = table.moving_input(quantity, name, Some(&TEMPERATURE), 0.0, text);
+        row.starts(vec![0.0; thermal.patches.len()]).nominal(100.0).range(-LARGEST_TEMPERATURE, LARGEST_TEMPERATURE);
     }
     if let Some(load) = structure.load {
         let text = "Amplitude of the radial nodal-diameter line load on the casing, positive outwards";
         let (name, quantity) = ("casing_load_amplitude", Quantity::LoadAmplitude);
         let row = table.moving_input(quantity, name, Some(&LINE_LOAD), load.amplitude, text);
-        row.nominal = Some(1e4);
-        (row.min, row.max) = (Some(-ranges::LINE_LOAD), Some(ranges::LINE_LOAD));
+        row.nominal(1e4).range(-ranges::LINE_LOAD, ranges::LINE_LOAD);
         let text = "Phase of the nodal-diameter load: the load is amplitude cos(n theta - phase)";
-        table.moving_input(Quantity::LoadPhase, "casing_load_phase", Some(&ANGLE), load.phase, text).display = Some(0);
+        table.moving_input(Quantity::LoadPhase, "casing_load_phase", Some(&ANGLE), load.phase, text).display(0);
     }
 }
 
@@ -106,9 +97,7 @@ pub fn parameters(table: &mut TableBuilder, parts: &TableFacts) {
         if let Some(load) = carrier.structure.load {
             table.belongs(carrier.index, parts.of_carrier(carrier));
             let text = "Number of nodal diameters of the radial line load on the casing";
-            let row = table.parameter(Quantity::LoadOrder, "casing_load_order", None, 0.0, text);
-            (row.kind, row.min) = (DataType::Integer, Some(0.0));
-            row.start = Some(StartValue::Integer(i32::try_from(load.order).unwrap_or(i32::MAX)));
+            table.whole(Quantity::LoadOrder, "casing_load_order", load.order, text).min = Some(0.0);
         }
     }
     for pair in &parts.pairs {
@@ -116,7 +105,7 @@ pub fn parameters(table: &mut TableBuilder, parts: &TableFacts) {
             table.belongs(pair.index, parts.of_pair(pair));
             let text = "Fraction of the friction heat that flows into the casing; the rest flows into the blades";
             let row = table.parameter(Quantity::HeatToSlave, "casing_heat_fraction", None, share, text);
-            (row.min, row.max, row.variability) = (Some(0.0), Some(1.0), Variability::Tunable);
+            row.range(0.0, 1.0).variability = Variability::Tunable;
         }
     }
 }
@@ -150,49 +139,33 @@ pub fn outputs(table: &mut TableBuilder, parts: &TableFacts) {
         let index = carrier.index;
         let read = array_reader(move |view, out| view.slave_displacement(index, out));
         let row = table.output("casing_displacement", Span::Point, Some((&LENGTH, 1e-4)), text, read);
-        (row.dimension, row.display) = (Some(carrier.rom.contact_nodes.len()), Some(1));
-        row.quantity = Quantity::SlaveDisplacement;
+        row.elements(carrier.rom.contact_nodes.len()).display(1).quantity(Quantity::SlaveDisplacement);
     }
 }
 
 /// Adds force and moment on a surface: opposite to those on the rotor, at the same points.
 fn casing_forces(table: &mut TableBuilder, pair: &PairFacts) {
     let index = pair.index;
-    for (axis, letter) in AXES.into_iter().enumerate() {
-        let text =
-            format!("Contact force on the casing along the fixed {letter} axis, mean over the communication step");
-        let read = scalar(move |view| -view.mean * view.window.pairs[index].force_impulse[axis]);
-        table.output(format!("casing_force_{letter}"), Span::Mean, Some((&FORCE, 100.0)), text, read);
-    }
-    for (axis, letter) in AXES.into_iter().enumerate() {
-        let text = format!(
-            "Moment of the contact forces on the casing about the fixed {letter} axis through the origin on the casing \
-             axis, mean over the communication step"
-        );
-        let read = scalar(move |view| -view.mean * view.window.pairs[index].casing_moment[axis]);
-        table.output(format!("casing_moment_{letter}"), Span::Mean, Some((&TORQUE, 10.0)), text, read);
-    }
+    let text = "Contact force on the casing along the fixed {axis} axis, mean over the communication step";
+    table.vector("casing_force", Span::Mean, Some((&FORCE, 100.0)), text, move |view, axis| {
+        -view.mean * view.window.pairs[index].force_impulse[axis]
+    });
+    let text = "Moment of the contact forces on the casing about the fixed {axis} axis through the origin on the casing axis, \
+                mean over the communication step";
+    table.vector("casing_moment", Span::Mean, Some((&TORQUE, 10.0)), text, move |view, axis| {
+        -view.mean * view.window.pairs[index].casing_moment[axis]
+    });
 }
 
 /// Adds force and moment of the support on a casing.
 fn support(table: &mut TableBuilder, carrier: &CarrierFacts) {
     let index = carrier.index;
-    for (row, (axis, letter)) in (0..2).flat_map(|_| AXES.into_iter().enumerate()).enumerate() {
-        let (name, text, unit) = if row < 3 {
-            let text = format!(
-                "Force of the support on the casing along the fixed {letter} axis, mean over the communication step"
-            );
-            ("force", text, (&FORCE, 100.0))
-        } else {
-            let text = format!(
-                "Moment of the support on the casing about the fixed {letter} axis through the origin on the casing \
-                 axis, mean over the communication step"
-            );
-            ("moment", text, (&TORQUE, 10.0))
-        };
-        let read = scalar(move |view| view.support(index, row / 3 * 3 + axis));
-        table.output(format!("support_{name}_{letter}"), Span::Mean, Some(unit), text, read);
-    }
+    let text = "Force of the support on the casing along the fixed {axis} axis, mean over the communication step";
+    table.vector("support_force", Span::Mean, Some((&FORCE, 100.0)), text, move |view, axis| view.support(index, axis));
+    let text = "Moment of the support on the casing about the fixed {axis} axis through the origin on the casing axis, mean \
+                over the communication step";
+    let read = move |view: &OutputView, axis: usize| view.support(index, 3 + axis);
+    table.vector("support_moment", Span::Mean, Some((&TORQUE, 10.0)), text, read);
 }
 
 fn heat(table: &mut TableBuilder, pair: &PairFacts) {
@@ -201,7 +174,7 @@ fn heat(table: &mut TableBuilder, pair: &PairFacts) {
         let text = "Friction power into each casing patch, mean over the communication step";
         let read =
             each(move |view, patch| view.mean * view.slave_share(index) * view.window.pairs[index].patch_heat[patch]);
-        table.output("casing_friction_power", Span::Mean, power, text, read).dimension = Some(pair.patches);
+        table.output("casing_friction_power", Span::Mean, power, text, read).elements(pair.patches);
     }
     if pair.contact.slave_heat_fraction.is_some() {
         let text = "Friction power into the blades, mean over the communication step";
@@ -215,7 +188,7 @@ fn wear(table: &mut TableBuilder, parts: &TableFacts, pair: &PairFacts, coating:
     let (index, depth) = (pair.index, Some((&LENGTH, coating.thickness)));
     let read = scalar(move |view| view.coating(index, Coating::largest_wear_depth));
     let text = "Largest wear depth of the coating";
-    table.output("wear_depth_maximum", Span::Total, depth, text, read).display = Some(1);
+    table.output("wear_depth_maximum", Span::Total, depth, text, read).display(1);
     let read = scalar(move |view| view.coating(index, Coating::worn_volume));
     table.output("worn_volume", Span::Total, Some((&VOLUME, 1e-9)), "Worn volume of the coating", read);
     // Total over all coatings.
@@ -237,9 +210,8 @@ fn wear(table: &mut TableBuilder, parts: &TableFacts, pair: &PairFacts, coating:
             ("wear_profile_along", false, "Wear depth of each row along z, mean over the circumference"),
         ] {
             let read = array_reader(move |view, out| view.wear_profile(index, around, out));
-            let row = table.output(name, Span::Total, depth, text, read);
             let count = if around { coating.cells_around } else { coating.cells_along };
-            (row.dimension, row.display) = (Some(count), Some(1));
+            table.output(name, Span::Total, depth, text, read).elements(count).display(1);
         }
     }
     if parts.settings.outputs.wear {
@@ -248,7 +220,7 @@ fn wear(table: &mut TableBuilder, parts: &TableFacts, pair: &PairFacts, coating:
             coating.cells_around, coating.cells_along
         );
         let read = each(move |view, cell| view.coating(index, |coating| coating.wear_depth(cell)));
-        let row = table.output("wear_depth", Span::Total, depth, text, read);
-        (row.dimension, row.display) = (Some(coating.cells_around * coating.cells_along), Some(1));
+        let cells = coating.cells_around * coating.cells_along;
+        table.output("wear_depth", Span::Total, depth, text, read).elements(cells).display(1);
     }
 }

@@ -1,6 +1,6 @@
 //! Rows of free bodies.
 
-use tiprub_cosim::variables::{Quantity, Span, VariableUnit};
+use tiprub_cosim::variables::{Quantity, Span};
 
 use super::builder::TableBuilder;
 use super::parts::{AXES, BodyFacts, TableFacts};
@@ -20,8 +20,7 @@ pub fn velocity(table: &mut TableBuilder, body: &BodyFacts) {
             body.structure.velocity[axis],
             &format!("Initial rigid-body velocity of {} along {name}", body.structure.name),
         );
-        velocity.nominal = Some(100.0);
-        (velocity.min, velocity.max) = (Some(-ranges::VELOCITY), Some(ranges::VELOCITY));
+        velocity.nominal(100.0).range(-ranges::VELOCITY, ranges::VELOCITY);
     }
 }
 
@@ -42,39 +41,36 @@ fn motion(table: &mut TableBuilder, body: &BodyFacts) {
         let text = format!("Velocity of the centre of mass of {name} along {letter}, mean over the last internal step");
         let read = scalar(move |view| view.centre(index, axis, |(_, increment)| increment / view.system.step_size()));
         let row = table.output(format!("velocity_{letter}"), Span::Point, Some((&LINEAR_SPEED, 100.0)), text, read);
-        row.quantity = Quantity::CentreVelocity(axis);
+        row.quantity(Quantity::CentreVelocity(axis));
     }
     for (axis, letter) in AXES.into_iter().enumerate() {
         let text = format!("Displacement of the centre of mass of {name} along {letter} since the start");
         let read = scalar(move |view| view.centre(index, axis, |(position, _)| position));
-        let row = table.output(format!("displacement_{letter}"), Span::Point, Some((&LENGTH, 1e-2)), text, read);
-        row.display = Some(1);
+        table.output(format!("displacement_{letter}"), Span::Point, Some((&LENGTH, 1e-2)), text, read).display(1);
     }
 }
 
 /// Adds arrays over the contact nodes.
 fn nodes(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts) {
     let (list, count, index) = (node_list(body.rom), body.rom.contact_nodes.len(), body.index);
-    let units: [Option<(&'static VariableUnit, f64)>; 2] = [Some((&LENGTH, 1e-3)), Some((&FORCE, 100.0))];
-    for row in watched_rows(index, 0, units) {
-        if row.exists(parts.settings.outputs.instantaneous_forces, parts.has_friction()) {
-            let text = match row.name {
-                "clearance" => {
-                    "Clearance normal to the surface at the communication point; 1e9 m where a node faces no surface, \
-                     beyond an edge, and for nodes in no contact pair"
-                }
-                "tangential_force" => "Magnitude of the friction force, mean over the communication step",
-                _ => row.text,
-            };
-            row.add(table, row.name.to_owned(), format!("{text} ({list})"), count);
-        }
+    for row in watched_rows(parts, body, 0, [Some((&LENGTH, 1e-3)), Some((&FORCE, 100.0))]) {
+        let text = match row.name {
+            "clearance" => {
+                "Clearance normal to the surface at the communication point; 1e9 m where a node faces no surface, \
+                 beyond an edge, and for nodes in no contact pair"
+            }
+            "tangential_force" => "Magnitude of the friction force, mean over the communication step",
+            _ => row.text,
+        };
+        let name = row.name.to_owned();
+        row.add(table, name, format!("{text} ({list})"), count);
     }
     for (axis, letter) in AXES.into_iter().enumerate() {
         let text = format!("Displacement along {letter} since the start, including rigid-body motion ({list})");
         let read = each(move |view, node| view.modes(index).displacement()[3 * node + axis]);
         let name = format!("node_displacement_{letter}");
         let row = table.output(name, Span::Point, Some((&LENGTH, 1e-3)), text, read);
-        (row.dimension, row.display, row.quantity) = (Some(count), Some(1), Quantity::NodeDisplacement(axis));
+        row.elements(count).display(1).quantity(Quantity::NodeDisplacement(axis));
     }
 }
 

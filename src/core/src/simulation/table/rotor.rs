@@ -2,7 +2,7 @@
 
 use tiprub_cosim::variables::{Quantity, Span, VariableUnit};
 
-use super::builder::TableBuilder;
+use super::builder::{NominalUnit, TableBuilder};
 use super::parts::{BodyFacts, TableFacts, refuse};
 use crate::Result;
 use crate::scene::rom::{ContactNode, DisplacementFrame, STRESSES};
@@ -14,11 +14,11 @@ pub fn angle(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts) {
     let text = format!("Angle of {} about +z", parts.rotor(body));
     let read = scalar(move |view| view.rotor_angle(index));
     let angle = table.output("rotor_angle", Span::Point, Some((&ANGLE, 1.0)), text, read);
-    (angle.display, angle.quantity) = (Some(0), Quantity::RotorAngle);
+    angle.display(0).quantity(Quantity::RotorAngle);
 }
 
 /// Clearance for nominal values of a rotor's outputs (m): that of its first pair.
-fn nominal(parts: &TableFacts, body: &BodyFacts) -> Option<(&'static VariableUnit, f64)> {
+fn nominal(parts: &TableFacts, body: &BodyFacts) -> NominalUnit {
     let mut pairs = parts.plan.pairs_of(body.index);
     let gap = pairs.next().map_or(0.0, |(pair, _)| parts.settings.contacts[pair].nominal_gap());
     Some((&LENGTH, gap))
@@ -26,18 +26,14 @@ fn nominal(parts: &TableFacts, body: &BodyFacts) -> Option<(&'static VariableUni
 
 pub fn clearances(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts) {
     let index = body.index;
-    let each_node = table.output(
-        "node_clearance_minimum",
-        Span::Window,
-        nominal(parts, body),
-        format!(
-            "Smallest clearance over all sectors within the communication step, per contact node ({}){}",
-            node_list(body),
-            untouched(parts, body)
-        ),
-        each(move |view, node| view.lowest_of_node(index, node)),
+    let text = format!(
+        "Smallest clearance over all sectors within the communication step, per contact node ({}){}",
+        node_list(body),
+        untouched(parts, body)
     );
-    (each_node.dimension, each_node.display) = (Some(body.rom.contact_nodes.len()), Some(1));
+    let read = each(move |view, node| view.lowest_of_node(index, node));
+    let row = table.output("node_clearance_minimum", Span::Window, nominal(parts, body), text, read);
+    row.elements(body.rom.contact_nodes.len()).display(1);
 }
 
 /// Describes clearances if there is no surface to touch.
@@ -88,12 +84,11 @@ fn watch(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts, sector:
     }
     patches(table, body, sector);
     let list = node_list(body);
-    for row in watched_rows(body.index, sector - 1, [nominal(parts, body), Some((&FORCE, 100.0))]) {
-        if row.exists(parts.settings.outputs.instantaneous_forces, parts.has_tangential_forces()) {
-            let untouched = if row.is_length() { untouched(parts, body) } else { "" };
-            let text = format!("{} ({list}){untouched}", row.text);
-            row.add(table, format!("blade[{sector}].{}", row.name), text, body.rom.contact_nodes.len());
-        }
+    for row in watched_rows(parts, body, sector - 1, [nominal(parts, body), Some((&FORCE, 100.0))]) {
+        let untouched = if row.is_length() { untouched(parts, body) } else { "" };
+        let text = format!("{} ({list}){untouched}", row.text);
+        let name = format!("blade[{sector}].{}", row.name);
+        row.add(table, name, text, body.rom.contact_nodes.len());
     }
 }
 
@@ -111,7 +106,7 @@ fn watched_points(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts
         let read = each(move |view, point| view.watched_displacement(index, sector - 1, point, axis));
         let row =
             table.output(format!("blade[{sector}].{name}_displacement"), Span::Point, nominal(parts, body), text, read);
-        (row.dimension, row.display) = (Some(names.len()), Some(1));
+        row.elements(names.len()).display(1);
     }
     if body.rom.frame == DisplacementFrame::Cartesian {
         return;
@@ -125,7 +120,7 @@ fn watched_points(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts
     let read = each(move |view, point| view.watched_clearance(index, sector - 1, point));
     let name = format!("blade[{sector}].watched_clearance");
     let row = table.output(name, Span::Point, nominal(parts, body), text, read);
-    (row.dimension, row.display) = (Some(names.len()), Some(1));
+    row.elements(names.len()).display(1);
 }
 
 /// Adds amplitudes of the lowest modes.
@@ -138,8 +133,7 @@ fn modes(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts, sector:
          direction"
     );
     let read = each(move |view, mode| view.modal_amplitude(index, sector - 1, mode));
-    let row = table.output(format!("blade[{sector}].modal_amplitude"), Span::Point, None, text, read);
-    row.dimension = Some(count);
+    table.output(format!("blade[{sector}].modal_amplitude"), Span::Point, None, text, read).elements(count);
 }
 
 /// Adds displacements of the contact nodes.
@@ -151,7 +145,7 @@ fn tips(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts, sector: 
         let read = each(move |view, node| view.displacement(index, sector - 1, node, axis));
         let name = format!("blade[{sector}].tip_{name}_displacement");
         let row = table.output(name, Span::Point, nominal(parts, body), text, read);
-        (row.dimension, row.display) = (Some(body.rom.contact_nodes.len()), Some(1));
+        row.elements(body.rom.contact_nodes.len()).display(1);
     }
 }
 
@@ -169,7 +163,7 @@ fn stresses(table: &mut TableBuilder, body: &BodyFacts, sector: usize) {
     let list = names.join(", ");
     let mut add = |name: String, text: String, read: OutputReader| {
         let row = table.output(format!("blade[{sector}].{name}"), Span::Point, Some((&STRESS, 1e8)), text, read);
-        (row.dimension, row.display) = (Some(places), Some(0));
+        row.elements(places).display(0);
     };
     let read = each(move |view, place| view.von_mises(index, sector - 1, place));
     add("von_mises_stress".to_owned(), format!("Von Mises equivalent stress ({list})"), read);
@@ -206,8 +200,7 @@ fn patches(table: &mut TableBuilder, body: &BodyFacts, sector: usize) {
         let text =
             format!("Normal contact {quantity} at the centre of each patch ({list}), mean over the communication step");
         let read = each(move |view, node| view.mean * view.normal_impulse(index, node, sector - 1) / extents[node]);
-        let row = table.output(format!("blade[{sector}].{name}"), Span::Mean, Some((unit, nominal)), text, read);
-        row.dimension = Some(count);
+        table.output(format!("blade[{sector}].{name}"), Span::Mean, Some((unit, nominal)), text, read).elements(count);
     }
 }
 
@@ -216,92 +209,61 @@ pub(crate) struct NodeRow {
     quantity: Quantity,
     pub name: &'static str,
     span: Span,
-    unit: Option<(&'static VariableUnit, f64)>,
+    unit: NominalUnit,
     pub text: &'static str,
-    /// True if the row needs friction, and if it needs the request of instantaneous forces.
-    needs: [bool; 2],
     read: OutputReader,
 }
 
 impl NodeRow {
-    pub fn exists(&self, instantaneous: bool, friction: bool) -> bool {
-        let [needs_friction, needs_instantaneous] = self.needs;
-        (friction || !needs_friction) && (instantaneous || !needs_instantaneous)
-    }
-
     fn is_length(&self) -> bool {
         self.unit.is_some_and(|(unit, _)| *unit == LENGTH)
     }
 
-    pub fn add(&self, table: &mut TableBuilder, name: String, text: String, nodes: usize) {
-        let row = table.output(name, self.span, self.unit, text, self.read.clone());
-        (row.dimension, row.quantity) = (Some(nodes), self.quantity);
-        row.display = self.is_length().then_some(1);
+    pub fn add(self, table: &mut TableBuilder, name: String, text: String, nodes: usize) {
+        let display = self.is_length().then_some(1);
+        let row = table.output(name, self.span, self.unit, text, self.read);
+        row.elements(nodes).quantity(self.quantity).display = display;
     }
 }
 
-/// Adds outputs over the contact nodes of a sector of a structure (0-based); units of gaps and forces.
+/// Returns the outputs over the contact nodes of a sector of a structure (0-based), with the units of gaps and forces; those of friction
+/// and of single internal steps only if the scene has them.
 pub(crate) fn watched_rows(
-    body: usize,
+    parts: &TableFacts,
+    body: &BodyFacts,
     sector: usize,
-    [gap, force]: [Option<(&'static VariableUnit, f64)>; 2],
-) -> [NodeRow; 6] {
-    [
-        NodeRow {
-            quantity: Quantity::Clearance(sector),
-            name: "clearance",
-            span: Span::Point,
-            unit: gap,
-            text: "Clearance normal to the casing at the communication point",
-            needs: [false, false],
-            read: each(move |view, node| view.clearance(body, node, sector)),
-        },
-        NodeRow {
-            quantity: Quantity::WatchedClearanceMinimum(sector),
-            name: "clearance_minimum",
-            span: Span::Window,
-            unit: gap,
-            text: "Smallest clearance within the communication step",
-            needs: [false, false],
-            read: each(move |view, node| view.lowest_at(body, node, sector)),
-        },
-        NodeRow {
-            quantity: Quantity::NormalForce(sector),
-            name: "normal_force",
-            span: Span::Mean,
-            unit: force,
-            text: "Normal contact force, mean over the communication step",
-            needs: [false, false],
-            read: each(move |view, node| view.mean * view.normal_impulse(body, node, sector)),
-        },
-        NodeRow {
-            quantity: Quantity::TangentialForce(sector),
-            name: "tangential_force",
-            span: Span::Mean,
-            unit: force,
-            text: "Magnitude of the friction force (axial part included), mean over the communication step",
-            needs: [true, false],
-            read: each(move |view, node| view.mean * view.tangential_impulse(body, node, sector)),
-        },
-        NodeRow {
-            quantity: Quantity::Output,
-            name: "normal_force_instantaneous",
-            span: Span::Point,
-            unit: force,
-            text: "Normal contact force in the last internal step",
-            needs: [false, true],
-            read: each(move |view, node| view.system.structures()[body].multiplier(node, sector)),
-        },
-        NodeRow {
-            quantity: Quantity::Output,
-            name: "tangential_force_instantaneous",
-            span: Span::Point,
-            unit: force,
-            text: "Friction force in the last internal step",
-            needs: [true, true],
-            read: each(move |view, node| view.tangential_now(body, node, sector)),
-        },
-    ]
+    [gap, force]: [NominalUnit; 2],
+) -> Vec<NodeRow> {
+    let friction = if body.free { parts.has_friction() } else { parts.has_tangential_forces() };
+    let (instantaneous, body) = (parts.settings.outputs.instantaneous_forces, body.index);
+    let mut rows = Vec::new();
+    let mut add =
+        |quantity, name, span, unit, text, read| rows.push(NodeRow { quantity, name, span, unit, text, read });
+    let text = "Clearance normal to the casing at the communication point";
+    let read = each(move |view, node| view.clearance(body, node, sector));
+    add(Quantity::Clearance(sector), "clearance", Span::Point, gap, text, read);
+    let text = "Smallest clearance within the communication step";
+    let read = each(move |view, node| view.lowest_at(body, node, sector));
+    add(Quantity::WatchedClearanceMinimum(sector), "clearance_minimum", Span::Window, gap, text, read);
+    let text = "Normal contact force, mean over the communication step";
+    let read = each(move |view, node| view.mean * view.normal_impulse(body, node, sector));
+    add(Quantity::NormalForce(sector), "normal_force", Span::Mean, force, text, read);
+    if friction {
+        let text = "Magnitude of the friction force (axial part included), mean over the communication step";
+        let read = each(move |view, node| view.mean * view.tangential_impulse(body, node, sector));
+        add(Quantity::TangentialForce(sector), "tangential_force", Span::Mean, force, text, read);
+    }
+    if instantaneous {
+        let text = "Normal contact force in the last internal step";
+        let read = each(move |view, node| view.system.structures()[body].multiplier(node, sector));
+        add(Quantity::Output, "normal_force_instantaneous", Span::Point, force, text, read);
+    }
+    if friction && instantaneous {
+        let text = "Friction force in the last internal step";
+        let read = each(move |view, node| view.tangential_now(body, node, sector));
+        add(Quantity::Output, "tangential_force_instantaneous", Span::Point, force, text, read);
+    }
+    rows
 }
 
 pub fn fields(table: &mut TableBuilder, parts: &TableFacts) -> Result<()> {
@@ -319,25 +281,16 @@ pub fn fields(table: &mut TableBuilder, parts: &TableFacts) -> Result<()> {
 
 fn all_sectors(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts) {
     let (index, sectors) = (body.index, body.rom.sectors);
-    let clearance = table.output(
-        "sector_clearance_minimum",
-        Span::Window,
-        nominal(parts, body),
-        "Smallest clearance of each sector within the communication step",
-        each(move |view, sector| view.lowest_of_sector(index, sector)),
-    );
-    (clearance.dimension, clearance.display) = (Some(sectors), Some(1));
-    let force = table.output(
-        "sector_normal_force",
-        Span::Mean,
-        Some((&FORCE, 100.0)),
-        "Normal contact force of each sector, mean over the communication step",
-        each(move |view, sector| {
-            let impulses = &view.window.bodies[index].normal_impulse;
-            view.mean * view.of_sector(index, impulses, sector).sum::<f64>()
-        }),
-    );
-    force.dimension = Some(sectors);
+    let text = "Smallest clearance of each sector within the communication step";
+    let read = each(move |view, sector| view.lowest_of_sector(index, sector));
+    let clearance = table.output("sector_clearance_minimum", Span::Window, nominal(parts, body), text, read);
+    clearance.elements(sectors).display(1);
+    let text = "Normal contact force of each sector, mean over the communication step";
+    let read = each(move |view, sector| {
+        let impulses = &view.window.bodies[index].normal_impulse;
+        view.mean * view.of_sector(index, impulses, sector).sum::<f64>()
+    });
+    table.output("sector_normal_force", Span::Mean, Some((&FORCE, 100.0)), text, read).elements(sectors);
 }
 
 fn nodal_diameters(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts, largest: usize) -> Result<()> {
@@ -346,15 +299,10 @@ fn nodal_diameters(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFact
         let remedy = format!("Use at most {}", sectors / 2);
         return refuse("nodal_diameters", format!("{largest} is too large for {sectors} sectors"), remedy);
     }
-    let amplitude = table.output(
-        "nodal_diameter_amplitude",
-        Span::Point,
-        nominal(parts, body),
-        "Amplitude of the radial displacement of the middle contact node (mean over the rows of patches) per nodal \
-         diameter 0, 1, 2, …",
-        array_reader(move |view, out| view.nodal_diameters(index, rows, out)),
-    );
-    (amplitude.dimension, amplitude.display) = (Some(largest + 1), Some(1));
-    amplitude.quantity = Quantity::NodalDiameterAmplitude;
+    let text = "Amplitude of the radial displacement of the middle contact node (mean over the rows of patches) per nodal \
+                diameter 0, 1, 2, …";
+    let read = array_reader(move |view, out| view.nodal_diameters(index, rows, out));
+    let amplitude = table.output("nodal_diameter_amplitude", Span::Point, nominal(parts, body), text, read);
+    amplitude.elements(largest + 1).display(1).quantity(Quantity::NodalDiameterAmplitude);
     Ok(())
 }

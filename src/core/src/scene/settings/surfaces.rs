@@ -1,0 +1,170 @@
+//! Settings of surfaces: shape, spline, patches.
+
+use serde::{Deserialize, Serialize};
+
+use super::is_default;
+
+/// Shape of a rigid surface of revolution: radial clearance change around the circumference.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Shape {
+    /// Perfectly round: the clearance is the gap everywhere.
+    Circular {},
+    /// Harmonic lobes: the casing radius changes by −amplitude·cos(order·θ − phase).
+    Lobes {
+        /// Amplitude (m).
+        amplitude: f64,
+        /// Number of lobes around the circumference.
+        order: u32,
+        /// Phase (rad).
+        #[serde(default)]
+        phase: f64,
+    },
+    /// Two smooth bumps half a turn apart: clearance c(1 − 2·depth·exp(−((mod(θ − phase, π)/π − ½)/width)²)), c the gap.
+    TwoLobe {
+        /// Depth factor (-): at 1 the bump overlaps the undeformed tip by as much as the gap.
+        #[serde(default = "one")]
+        depth: f64,
+        /// Width parameter of the bump (-), fraction of half a turn.
+        #[serde(default = "two_lobe_width")]
+        width: f64,
+        /// Phase (rad).
+        #[serde(default)]
+        phase: f64,
+    },
+    /// Table of the change of casing radius (m) at equally spaced angles starting at θ = 0, periodic cubic between.
+    Table {
+        /// Change of casing radius (m), at least 4 values; positive opens the clearance.
+        radius_change: Vec<f64>,
+    },
+}
+
+impl Default for Shape {
+    fn default() -> Self {
+        Self::Circular {}
+    }
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+fn two_lobe_width() -> f64 {
+    0.15
+}
+
+/// Continuation of a surface spline around the circumference.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Closure {
+    /// Continuous first and second derivatives (fig. 8b of the paper; default).
+    #[default]
+    Smooth,
+    /// Free ends that only meet in position at the seam θ = 0 (fig. 8a of the paper).
+    FreeEnds,
+}
+
+/// Interpolation between the data points of a surface.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Interpolation {
+    /// Bicubic uniform B-spline (default).
+    #[default]
+    Spline,
+    /// Bilinear facets, whose normals jump from one to the next: only for comparison.
+    Facets,
+}
+
+/// A surface through data points, with the closest point as the contact point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SplineSettings {
+    /// Number of data points around the circumference; that of the structure's contact grid if the surface has a structure.
+    #[serde(default = "default_around", skip_serializing_if = "is_default_around")]
+    pub around: usize,
+    /// Number of rings of data points along the axis; that of the structure's contact grid if the surface has a structure.
+    #[serde(default = "default_along", skip_serializing_if = "is_default_along")]
+    pub along: usize,
+    /// Closure around the circumference.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub closure: Closure,
+    /// Interpolation between the data points.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub interpolation: Interpolation,
+}
+
+impl Default for SplineSettings {
+    fn default() -> Self {
+        Self {
+            around: default_around(),
+            along: default_along(),
+            closure: Closure::default(),
+            interpolation: Interpolation::default(),
+        }
+    }
+}
+
+fn default_around() -> usize {
+    72
+}
+
+fn default_along() -> usize {
+    5
+}
+
+fn is_default_around(around: &usize) -> bool {
+    *around == default_around()
+}
+
+fn is_default_along(along: &usize) -> bool {
+    *along == default_along()
+}
+
+/// Equal parts of the circumference and of the axial extent of the contact, for friction power.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PatchSettings {
+    /// Number of parts around the circumference, the first from θ = 0.
+    pub around: usize,
+    /// Number of parts along the axis.
+    #[serde(default = "one_part", skip_serializing_if = "is_one_part")]
+    pub along: usize,
+}
+
+fn one_part() -> usize {
+    1
+}
+
+fn is_one_part(parts: &usize) -> bool {
+    *parts == one_part()
+}
+
+/// One surface: around the z axis and parallel to the tip contour of its rotor, or through the open contact grid of a structure if its
+/// master is a free body.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SurfaceSettings {
+    /// Name by which contacts refer to it.
+    pub name: String,
+    /// Shape around the circumference.
+    #[serde(default)]
+    pub shape: Shape,
+    /// Time over which the shape grows smoothly from circular to full (s), 0 = immediately.
+    #[serde(default)]
+    pub ramp_time: f64,
+    /// Makes the amplitude factor of the shape, its rotation and the uniform radius change inputs.
+    #[serde(default)]
+    pub moving: bool,
+    /// Structure that carries the surface and deforms it; its ROM needs a contact grid. The surface is rigid if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub structure: Option<String>,
+    /// True if the structure only defines the position of the surface and does not deform it. For free bodies only.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub rigid: bool,
+    /// Surface spline through data points; the analytical surface of revolution if absent (always a spline on a structure).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spline: Option<SplineSettings>,
+    /// Patches whose friction power is an output; the heated patches of the ROM if absent and the structure is thermal.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub patches: Option<PatchSettings>,
+}

@@ -1,0 +1,102 @@
+//! All variables of a unit, by reference and by quantity.
+
+use std::collections::{BTreeMap, HashSet};
+
+use super::{Quantity, Variable};
+use crate::{Error, Result, bounds};
+
+/// The table: variables in order of their references, which start at 0 (time) without gaps.
+#[derive(Debug, Clone, PartialEq)]
+pub struct VariableTable {
+    variables: Vec<Variable>,
+    /// Row of each value reference.
+    rows: Vec<u32>,
+    /// First row of each quantity of a structure or pair.
+    places: BTreeMap<(Quantity, usize), usize>,
+}
+
+/// Rejects more values than any reader supports.
+fn check_count(variables: &[Variable]) -> Result<()> {
+    let count = variables.iter().fold(0, |sum: usize, variable| sum.saturating_add(variable.len()));
+    let Some(largest) = variables.iter().max_by_key(|variable| variable.len()).filter(|_| count > bounds::VALUES)
+    else {
+        return Ok(());
+    };
+    Err(Error::invalid(
+        "scene",
+        format!(
+            "the variables have {count} values, which exceeds the limit of {}; `{}` alone has {}",
+            bounds::VALUES,
+            largest.name,
+            largest.len()
+        ),
+        "Request fewer outputs, or use fewer coating cells, structures or sectors",
+    ))
+}
+
+impl VariableTable {
+    /// Creates a table from rows whose references are consecutive, starting at 0.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if references are not consecutive, a name occurs twice, or there are more than [`bounds::VALUES`] values.
+    pub fn new(variables: Vec<Variable>) -> Result<Self> {
+        check_count(&variables)?;
+        let (mut rows, mut names) = (Vec::new(), HashSet::with_capacity(variables.len()));
+        for (row, variable) in variables.iter().enumerate() {
+            let expected = u32::try_from(rows.len()).unwrap_or(u32::MAX);
+            let repeated = !names.insert(variable.name.as_str());
+            if variable.reference != expected || repeated {
+                return Err(Error::invalid(
+                    format!("variable `{}`", variable.name),
+                    format!("reference {} instead of {expected}, or duplicate name", variable.reference),
+                    "Give consecutive references and unique names",
+                ));
+            }
+            rows.extend(std::iter::repeat_n(u32::try_from(row).unwrap_or(u32::MAX), variable.len()));
+        }
+        let mut places = BTreeMap::new();
+        for (row, variable) in variables.iter().enumerate() {
+            places.entry((variable.quantity, variable.of)).or_insert(row);
+        }
+        Ok(Self { variables, rows, places })
+    }
+
+    /// Number of value references (elements of all variables).
+    pub fn references(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// First variable with this quantity.
+    pub fn with_quantity(&self, quantity: Quantity) -> Option<&Variable> {
+        self.variables.iter().find(|variable| variable.quantity == quantity)
+    }
+
+    /// Variable with this quantity of one structure or pair.
+    pub fn with_quantity_of(&self, quantity: Quantity, of: usize) -> Option<&Variable> {
+        self.places.get(&(quantity, of)).map(|row| &self.variables[*row])
+    }
+
+    /// All rows.
+    pub fn variables(&self) -> &[Variable] {
+        &self.variables
+    }
+
+    /// Row and element index of a value reference.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for an unknown reference.
+    pub fn locate(&self, reference: u32) -> Result<(&Variable, usize)> {
+        let row = usize::try_from(reference).ok().and_then(|index| self.rows.get(index));
+        let row = *row.ok_or_else(|| {
+            let remedy = "Use a value reference of its modelDescription.xml";
+            Error::invalid("", format!("value reference {reference} does not exist in this FMU"), remedy)
+        })? as usize;
+        let variable = &self.variables[row];
+        Ok((variable, (reference - variable.reference) as usize))
+    }
+
+    /// Finds a variable by its name (scalar or array name, not an element name).
+    pub fn find(&self, name: &str) -> Option<&Variable> {
+        self.variables.iter().find(|variable| variable.name == name)
+    }
+}
