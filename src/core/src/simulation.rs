@@ -35,7 +35,7 @@ use tiprub_cosim::variables::Quantity;
 use tiprub_cosim::{CoSimulation, VariableValues};
 
 use crate::system::System;
-use crate::time::TimeStepper;
+use crate::time::{Recurrence, TimeStepper};
 use crate::{Result, Scene};
 use clock::{Clock, SimulationPhase};
 use compile::Compiled;
@@ -56,6 +56,7 @@ use window::StepWindow;
 pub struct Simulation {
     compiled: Compiled,
     system: System,
+    /// Created by [`Simulation::initialise`] for its parameters, or for those of a restored state.
     stepper: TimeStepper,
     /// Everything beside the system that a run continues from.
     state: SimulationState,
@@ -88,8 +89,7 @@ impl Simulation {
     /// Invalid settings or ROM; combinations that are not supported.
     pub fn new(scene: impl Into<Arc<Scene>>) -> Result<Self> {
         let (compiled, table, readers) = Compiled::new(scene.into())?;
-        let mut system = compiled.system()?;
-        let stepper = TimeStepper::new(&mut system, 0.0, 0.0);
+        let system = compiled.system()?;
         let sets = system.sets().count();
         let state = SimulationState {
             inputs: Inputs::new(&compiled),
@@ -106,7 +106,7 @@ impl Simulation {
             diagnostics: Diagnostics::new(compiled.bodies.len()),
             compiled,
             system,
-            stepper,
+            stepper: TimeStepper::Recurrence(Recurrence),
             state,
             state_size: 0,
             mark: Vec::new(),

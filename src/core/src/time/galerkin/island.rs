@@ -109,11 +109,16 @@ impl IslandSector {
 
 impl Island {
     /// Creates an island; call [`Island::set_span`] before the first span.
-    pub fn new(tables: Vec<Vec<Tables>>, sectors: Vec<IslandSector>) -> Self {
+    pub fn new(
+        tables: Vec<Vec<Tables>>,
+        sectors: Vec<IslandSector>,
+        disks: Vec<CoupledDisk>,
+        carriers: Vec<CarrierIntegrator>,
+    ) -> Self {
         Self {
             sectors,
-            disks: Vec::new(),
-            carriers: Vec::new(),
+            disks,
+            carriers,
             tables,
             control: StepControl::default(),
             span: 0.0,
@@ -125,7 +130,8 @@ impl Island {
     /// Creates an island of one sector.
     pub fn of_one(tables: Tables) -> Self {
         let (modes, nodes) = (tables.modes(), tables.nodes());
-        Self::new(vec![vec![tables]], vec![IslandSector::new([0; 2], None, [modes, nodes], Solver::Lcp)])
+        let sector = IslandSector::new([0; 2], None, [modes, nodes], Solver::Lcp);
+        Self::new(vec![vec![tables]], vec![sector], Vec::new(), Vec::new())
     }
 
     /// Fills the tables for spans of length `span` (s).

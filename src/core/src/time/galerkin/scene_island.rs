@@ -7,7 +7,7 @@ use super::disk::CoupledDisk;
 use super::flight::FreeFlight;
 use super::island::{Island, IslandSector, StepControl};
 use super::obstacle_view::ObstacleView;
-use super::record::SpanRecord;
+use super::record::{PairRecord, SpanRecord};
 use super::span::{StepGoal, Stopped};
 use super::state::SectorState;
 use super::surroundings::{CarriersInStep, Surroundings};
@@ -30,14 +30,6 @@ const PRECISION: f64 = 1e-4;
 /// a single sector is exact except for curvature.
 const CLOSE: f64 = 1e-2;
 
-/// A sector of a structure in an island.
-#[derive(Debug, Clone)]
-struct Member {
-    structure: usize,
-    sector: usize,
-    record: SpanRecord,
-}
-
 /// An island of a scene. The uncoupled sectors of one structure take turns in one island, because their tables are the same.
 #[derive(Debug, Clone)]
 pub(crate) struct SceneIsland {
@@ -45,11 +37,9 @@ pub(crate) struct SceneIsland {
     set: usize,
     island: Island,
     /// One for each sector of the island.
-    members: Vec<Member>,
+    records: Vec<SpanRecord>,
     /// Number of sectors that take turns.
     turns: usize,
-    /// Index of the carrier of the surface of each pair.
-    carrier_of: Vec<Option<usize>>,
     goal: StepGoal,
     /// Free flight of each kind of a single sector.
     flights: Vec<FreeFlight>,
@@ -59,8 +49,7 @@ pub(crate) struct SceneIsland {
 struct SceneSurroundings<'a> {
     structures: &'a mut [Structure],
     pairs: &'a mut [ContactPair],
-    members: &'a mut [Member],
-    carrier_of: &'a [Option<usize>],
+    records: &'a mut [SpanRecord],
 }
 
 impl Surroundings for SceneSurroundings<'_> {
@@ -70,24 +59,16 @@ impl Surroundings for SceneSurroundings<'_> {
         Self: 'a;
 
     fn surfaces<'a>(&'a mut self, sector: usize, carriers: CarriersInStep<'a>) -> ObstacleView<'a> {
-        let Member { structure, sector, record } = &mut self.members[sector];
-        let structure = &self.structures[*structure];
-        ObstacleView {
-            carriers,
-            carrier_of: self.carrier_of,
-            pairs: self.pairs,
-            pair_of: &structure.pair_of,
-            lanes: structure.lanes(),
-            sector: *sector,
-            record,
-        }
+        ObstacleView { carriers, pairs: self.pairs, record: &mut self.records[sector] }
     }
 
     fn bend(&mut self, carriers: &[CarrierIntegrator], point: usize) {
-        for (number, pair) in self.pairs.iter_mut().enumerate() {
-            let Some(carrier) = self.carrier_of[number].map(|carrier| &carriers[carrier]) else { continue };
-            let Some(one) = self.members.iter().find(|one| one.structure == pair.structure()) else { continue };
-            pair.bend(one.record.drives[number][point].0.shape_factor, carrier.moved(point));
+        // The sectors of a structure share its pairs.
+        let own = self.records.iter().filter(|record| record.sector == 0).flat_map(|record| &record.pairs);
+        for PairRecord { pair, carrier, drives, .. } in own {
+            if let Some(carrier) = *carrier {
+                self.pairs[*pair].bend(drives[point].0.shape_factor, carriers[carrier].moved(point));
+            }
         }
     }
 
@@ -100,84 +81,59 @@ impl Surroundings for SceneSurroundings<'_> {
 }
 
 impl SceneIsland {
-    /// Creates an island for the sectors of a structure that are uncoupled and touch rigid surfaces, for spans up to `longest` (s) and errors of `tolerance` (m). `None` if the sectors are coupled.
-    pub fn single(set: usize, structure: usize, system: &System, longest: f64, tolerance: f64) -> Option<Self> {
-        let (System { structures, pairs, .. }, solver) = (system, system.settings.solver);
-        let of = &structures[structure];
-        let bank = of.bank()?;
-        let kinds = kinds_of(of.modes());
-        let flights = kinds.iter().map(FreeFlight::new).collect();
-        let tables = |kind: ContactModes| {
-            let degree = kind.degree_up_to(longest);
-            if solver.sticks() { Tables::of_degree(kind, 1).steady(degree) } else { Tables::of_degree(kind, degree) }
-        };
-        let size = [bank.model().inertial_modes(), of.nodes()];
-        let sector = IslandSector::new([0; 2], None, size, solver);
-        let own = pairs.iter().filter(|pair| pair.structure() == structure);
-        let rounding = own.map(|pair| pair.gap().rounding()).fold(0.0, f64::max);
-        Some(Self {
-            set,
-            island: Island::new(
-                vec![kinds.into_iter().map(tables).collect()],
-                vec![if solver.sticks() { sector.steady() } else { sector }],
-            ),
-            members: vec![Member { structure, sector: 0, record: SpanRecord::new(of.nodes(), pairs.len(), tolerance) }],
-            turns: of.modes().sectors(),
-            carrier_of: vec![None; pairs.len()],
-            goal: StepGoal { tolerance, precision: (PRECISION * tolerance).max(rounding), most: u64::MAX },
-            flights,
-        })
-    }
-
-    /// Creates the island of a set of structures that move each other, for spans up to `longest` (s)
-    /// and errors of `tolerance` (m).
-    pub fn coupled(set: usize, members: &[usize], system: &System, longest: f64, tolerance: f64) -> Self {
-        let (System { structures, pairs, .. }, solver) = (system, system.settings.solver);
-        let touching: Vec<usize> = members.iter().copied().filter(|one| structures[*one].nodes() > 0).collect();
-        let carrying: Vec<usize> = members.iter().copied().filter(|one| structures[*one].nodes() == 0).collect();
+    /// Creates the island of a set of structures, for spans up to `longest` (s) and errors within the fraction `tolerance` of the smallest
+    /// clearance of the set. The sectors of a structure that are uncoupled and touch rigid surfaces take turns.
+    pub fn new(set: usize, system: &System, longest: f64, tolerance: f64) -> Self {
+        let (System { structures, pairs, sets, .. }, solver) = (system, system.settings.solver);
+        let own = || sets.pairs(set).iter().map(|pair| (*pair, &pairs[*pair]));
+        let tolerance = tolerance * own().map(|(_, pair)| pair.gap().clearance()).fold(f64::INFINITY, f64::min);
+        let rounding = own().map(|(_, pair)| pair.gap().rounding()).fold(0.0, f64::max);
+        let (touching, carrying): (Vec<usize>, Vec<usize>) =
+            sets.members(set).iter().partition(|member| structures[**member].nodes() > 0);
+        let takes_turns = carrying.is_empty() && structures[touching[0]].bank().is_some();
         let kinds: Vec<Vec<ContactModes>> = touching.iter().map(|one| kinds_of(structures[*one].modes())).collect();
         let banks: Vec<&ModalBank> = carrying.iter().filter_map(|one| structures[*one].bank()).collect();
         let degree = |modes: &ContactModes| if solver.sticks() { 1 } else { modes.degree_up_to(longest) };
         let carried = banks.iter().map(|bank| degree(&coordinates(bank).seen_at(&bank.model().contact_modes)));
-        let degree = kinds.iter().flatten().map(degree).chain(carried).min().unwrap_or(MOST);
-        let own = pairs.iter().filter(|pair| touching.contains(&pair.structure()));
-        let rounding = own.map(|pair| pair.gap().rounding()).fold(0.0, f64::max);
+        let common = kinds.iter().flatten().map(degree).chain(carried).min().unwrap_or(MOST);
         let nodes = touching.iter().map(|one| structures[*one].nodes()).max().unwrap_or(0);
         let lanes = Lanes { points: MOST, nodes };
         let carriers: Vec<CarrierIntegrator> =
-            carrying.iter().zip(banks).map(|(one, bank)| CarrierIntegrator::new(*one, bank, degree, lanes)).collect();
-        let place = |structure: usize| carriers.iter().position(|carrier| carrier.structure == structure);
-        let disk = |one: &usize| structures[*one].modes().coupled().map(|bank| CoupledDisk::new(*one, bank, degree));
+            carrying.iter().zip(banks).map(|(one, bank)| CarrierIntegrator::new(*one, bank, common, lanes)).collect();
+        let disk = |one: &usize| structures[*one].modes().coupled().map(|bank| CoupledDisk::new(*one, bank, common));
         let disks: Vec<CoupledDisk> = touching.iter().filter_map(disk).collect();
-        let (mut sectors, mut members) = (Vec::new(), Vec::new());
+        let (mut sectors, mut records) = (Vec::new(), Vec::new());
         for (number, structure) in touching.iter().copied().enumerate() {
             let of = &structures[structure];
             let disk = disks.iter().position(|disk| disk.structure == structure);
-            for sector in 0..of.modes().sectors() {
+            let carrier = |pair: &ContactPair| pair.carrier().map(|carrier| carrier.structure);
+            let place = |pair| carriers.iter().position(|one| Some(one.structure) == carrier(pair));
+            let pairs = own().filter(|(_, pair)| pair.structure() == structure);
+            let pairs = pairs.map(|(index, pair)| PairRecord::new(index, place(pair))).collect();
+            let record = SpanRecord::new(structure, of, pairs, tolerance);
+            for sector in 0..if takes_turns { 1 } else { of.modes().sectors() } {
                 let kind = of.bank().map_or(0, |bank| bank.set_number(sector));
-                let one = IslandSector::new(
-                    [number, kind],
-                    disk.map(|disk| (disk, sector)),
-                    [kinds[number][kind].len(), of.nodes()],
-                    solver,
-                );
-                sectors.push(one);
-                let record = SpanRecord::new(of.nodes(), pairs.len(), tolerance);
-                members.push(Member { structure, sector, record });
+                let size = [kinds[number][kind].len(), of.nodes()];
+                let one = IslandSector::new([number, kind], disk.map(|disk| (disk, sector)), size, solver);
+                sectors.push(if takes_turns && solver.sticks() { one.steady() } else { one });
+                records.push(SpanRecord { sector, ..record.clone() });
             }
         }
-        let made = |kinds: Vec<ContactModes>| kinds.into_iter().map(|kind| Tables::of_degree(kind, degree)).collect();
-        let carrier_of = pairs.iter().map(|pair| place(pair.carrier()?.structure)).collect();
-        let mut island = Island::new(kinds.into_iter().map(made).collect(), sectors);
-        (island.disks, island.carriers) = (disks, carriers);
+        let flights = if takes_turns { kinds[0].iter().map(FreeFlight::new).collect() } else { Vec::new() };
+        let tables = |kind: ContactModes| match (takes_turns, solver.sticks()) {
+            (false, _) => Tables::of_degree(kind, common),
+            (true, false) => Tables::new(kind, longest),
+            (true, true) => Tables::with_steady(kind, longest),
+        };
+        let tables = kinds.into_iter().map(|kinds| kinds.into_iter().map(tables).collect()).collect();
+        let precision = if takes_turns { PRECISION } else { CLOSE * PRECISION };
         Self {
             set,
-            island,
-            members,
-            turns: 1,
-            carrier_of,
-            goal: StepGoal { tolerance, precision: (CLOSE * PRECISION * tolerance).max(rounding), most: u64::MAX },
-            flights: Vec::new(),
+            island: Island::new(tables, sectors, disks, carriers),
+            records,
+            turns: if takes_turns { structures[touching[0]].modes().sectors() } else { 1 },
+            goal: StepGoal { tolerance, precision: (precision * tolerance).max(rounding), most: u64::MAX },
+            flights,
         }
     }
 
@@ -188,7 +144,7 @@ impl SceneIsland {
 
     /// First structure of the island.
     pub(crate) fn first_structure(&self) -> usize {
-        self.members[0].structure
+        self.records[0].structure
     }
 
     /// Fills the tables for spans of length `span` (s).
@@ -202,7 +158,7 @@ impl SceneIsland {
     /// [`StepFailure`]; the state is then undefined.
     pub fn integrate(&mut self, system: &mut System, span: f64, most_tried: u64) -> Result<(), StepFailure> {
         system.sets.members(self.set).iter().for_each(|one| system.structures[*one].begin_span());
-        self.members.iter_mut().for_each(|one| one.record.begin_courses(&system.pairs, span));
+        self.records.iter_mut().for_each(|record| record.begin_courses(&system.pairs, span));
         (0..self.turns).try_for_each(|turn| self.take_turn(turn, system, span, most_tried))
     }
 
@@ -212,22 +168,22 @@ impl SceneIsland {
         let System { structures, pairs, events, counted, .. } = system;
         self.read(structures);
         let goal = StepGoal { most: most_tried, ..self.goal };
-        let Self { island, members, carrier_of, .. } = &mut *self;
-        let mut surroundings = SceneSurroundings { structures, pairs, members, carrier_of };
+        let Self { island, records, .. } = &mut *self;
+        let mut surroundings = SceneSurroundings { structures, pairs, records };
         let outcome = island.begin(&mut surroundings, goal).integrate(&mut counted.effort);
         let load_work = self.write(structures);
-        self.members.iter().try_for_each(|one| one.record.check(one.structure, one.sector))?;
+        self.records.iter().try_for_each(SpanRecord::check)?;
         outcome.map_err(|stopped| self.failure(stopped))?;
         let ledger = &mut counted.ledgers[self.set];
         if !self.island.carriers.is_empty() {
             ledger.load_work.add(load_work);
             ledger.turnover.add(load_work.abs());
         }
-        for Member { structure, sector, record } in &self.members {
+        for record in &self.records {
             let ContactWork { shaft, whirl, shift, casing, .. } = record.work;
             let turnover = shaft.abs() + whirl.abs() + shift.abs() + casing.abs();
             ContactWork { turnover, ..record.work }.enter(ledger);
-            let (structure, sector, of) = (*structure, *sector, &structures[*structure]);
+            let (structure, sector, of) = (record.structure, record.sector, &structures[record.structure]);
             let contacts = of.pair_of.iter().zip(&record.tallies).enumerate();
             events.now.extend(contacts.filter_map(|(node, (pair, tally))| {
                 let at = ContactMember { structure, pair: (*pair)?, node, sector, index: of.index(node, sector) };
@@ -240,23 +196,22 @@ impl SceneIsland {
     /// Selects the sector whose turn it is.
     fn aim(&mut self, turn: usize, structures: &[Structure]) {
         if self.is_single() {
-            self.members[0].sector = turn;
-            let bank = structures[self.members[0].structure].bank();
+            self.records[0].sector = turn;
+            let bank = structures[self.records[0].structure].bank();
             self.island.sectors[0].table[1] = bank.map_or(0, |bank| bank.set_number(turn));
         }
     }
 
     /// Reads the state of the structures before a span.
     fn read(&mut self, structures: &mut [Structure]) {
-        for (one, Member { structure, sector, record }) in self.island.sectors.iter_mut().zip(&mut self.members) {
-            let structure = &structures[*structure];
-            structure.read_contacts(*sector, &mut one.state);
+        for (one, record) in self.island.sectors.iter_mut().zip(&mut self.records) {
+            let (structure, sector) = (&structures[record.structure], record.sector);
+            structure.read_contacts(sector, &mut one.state);
             if let Some(bank) = structure.bank() {
-                bank.read_sector(*sector, &mut one.state.position, &mut one.state.velocity);
+                bank.read_sector(sector, &mut one.state.position, &mut one.state.velocity);
             }
-            let (places, lanes) = (&structure.history.geometry.before, structure.lanes());
-            let gaps = &structure.history.gap.before;
-            record.begin(|node| places.place_at(node * lanes + *sector), |node| gaps[node * lanes + *sector]);
+            let (places, gaps) = (&structure.history.geometry.before, &structure.history.gap.before);
+            record.begin(|index| places.place_at(index), |index| gaps[index]);
         }
         for disk in &mut self.island.disks {
             let structure = &mut structures[disk.structure];
@@ -272,7 +227,7 @@ impl SceneIsland {
             bank.read_sector(0, &mut position[..dynamic], &mut velocity[..dynamic]);
             bank.read_loads(carrier.body.loads_mut());
         }
-        let Member { structure, sector, .. } = self.members[0];
+        let SpanRecord { structure, sector, .. } = self.records[0];
         let control = &structures[structure].step_control;
         self.island.control = StepControl {
             bank: control.bank[sector],
@@ -285,16 +240,16 @@ impl SceneIsland {
     fn write(&mut self, structures: &mut [Structure]) -> f64 {
         let mut load_work = 0.0;
         let Island { sectors, tables, control, disks, carriers, .. } = &mut self.island;
-        for (one, Member { structure, sector, record }) in sectors.iter_mut().zip(&self.members) {
-            let structure = &mut structures[*structure];
-            structure.write_contacts(*sector, &one.state, |node| record.tallies[node].lowest);
+        for (one, record) in sectors.iter_mut().zip(&self.records) {
+            let (structure, sector) = (&mut structures[record.structure], record.sector);
+            structure.write_contacts(sector, &one.state, |node| record.tallies[node].lowest);
             let of = &mut structure.step_control;
-            (of.bank[*sector], of.largest[*sector]) = (control.bank, control.largest);
-            of.level[*sector] = control.level as u64;
+            (of.bank[sector], of.largest[sector]) = (control.bank, control.largest);
+            of.level[sector] = control.level as u64;
             if let (None, Sectors::Uncoupled(bank)) = (one.disk, &mut structure.modes) {
                 let (moved, state) = one.displacements(tables);
-                bank.write_sector(*sector, &state.position, &state.velocity, &state.forces, moved);
-                bank.lose(*sector, record.damping);
+                bank.write_sector(sector, &state.position, &state.velocity, &state.forces, moved);
+                bank.lose(sector, record.damping);
             }
         }
         for disk in disks {
@@ -322,7 +277,7 @@ impl SceneIsland {
         let Some((index, is_lost)) = self.island.failed.filter(|_| stopped == Stopped::Unsolved) else {
             return if stopped == Stopped::Exhausted { StepFailure::Exhausted } else { StepFailure::NonFinite };
         };
-        let Member { structure, sector, .. } = self.members[index];
+        let SpanRecord { structure, sector, .. } = self.records[index];
         match self.island.sectors[index].entered() {
             // The node is far from the surface.
             _ if is_lost => StepFailure::Implausible { structure, sector },
