@@ -170,11 +170,11 @@ impl ContactPair {
         Some(Spot { surface: self.parts.gap.spline()?, carrier, place, frame: self.frame(index, rotor_angle) })
     }
 
-    /// Deforms the surface with this factor of its shape and these displacements of the rows of its carrier (m).
+    /// Deforms the surface with this factor of its shape and these displacements of the rows of its carrier, if there is one (m).
     pub(crate) fn bend(&mut self, factor: f64, rows: &[f64]) {
-        let Some(carrier) = self.parts.carrier else { return };
         let points = self.parts.gap.spline().map_or(0, |surface| surface.control_points().len());
-        self.parts.gap.bend(factor, &rows[carrier.first_row..][..3 * points]);
+        let moved = self.parts.carrier.map_or(&[][..], |carrier| &rows[carrier.first_row..][..3 * points]);
+        self.parts.gap.bend(factor, moved);
     }
 
     /// Finds the gaps of the nodes at the current displacements. The search for closest points begins at `start`.

@@ -346,21 +346,45 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         self.prepare(step, kind);
         self.move_bodies(step, kind, points);
         self.find_gaps(step, kind, points, false);
+        self.find_minima(step, kind, true);
         for index in self.indices() {
-            self.find_minima(index, step, kind, true);
             let SectorInStep { mut surfaces, tables, trial, .. } = self.sector(index, step, kind);
             surfaces.record_gaps(&tables.levels[step.level], trial);
         }
     }
 
-    /// Finds where nodes of a sector may come closer between the points of a step; the motion of a single sector is followed exactly.
-    fn find_minima(&mut self, index: usize, step: SpanStep, kind: ForceInterpolation, is_resolved: bool) {
-        let (tolerance, is_single) = (self.goal.tolerance, self.island.is_single());
-        let SectorInStep { tables, trial, state, advance, .. } = self.sector(index, step, kind);
-        let level = tables.of_points(step.level, kind, trial.points());
-        if trial.find_minima(&level.basis, is_resolved, tolerance) && is_single {
+    /// Finds where nodes may come closer between the points of a step; the motion of a single sector is followed exactly.
+    fn find_minima(&mut self, step: SpanStep, kind: ForceInterpolation, is_resolved: bool) {
+        let (tolerance, is_single, mut found) = (self.goal.tolerance, self.island.is_single(), false);
+        for index in self.indices() {
+            let SectorInStep { tables, trial, .. } = self.sector(index, step, kind);
+            let level = tables.of_points(step.level, kind, trial.points());
+            found |= trial.find_minima(&level.basis, is_resolved, tolerance);
+        }
+        if !found {
+            return;
+        }
+        self.at_start(step, |trial, surfaces| trial.drop_jumps(surfaces, tolerance));
+        if is_single {
+            let SectorInStep { tables, trial, state, advance, .. } = self.sector(0, step, kind);
+            let level = tables.of_points(step.level, kind, trial.points());
             trial.follow(tables, level, step.level, state, advance);
         }
+    }
+
+    /// Visits all sectors of a step with polynomial forces, while surfaces are bent as at its start and displacements there are known.
+    fn at_start(&mut self, step: SpanStep, mut visit: impl FnMut(&mut Trial, &mut S::Surfaces<'_>)) {
+        self.surroundings.bend(&self.island.carriers, 0);
+        for index in self.indices() {
+            let SectorInStep { mut surfaces, tables, disk, trial, state, .. } =
+                self.sector(index, step, ForceInterpolation::Polynomial);
+            if disk.is_none() {
+                trial.find_start(&tables.rows, state);
+            }
+            visit(trial, &mut surfaces);
+        }
+        let points = self.island.points(step, ForceInterpolation::Polynomial);
+        self.surroundings.bend(&self.island.carriers, points);
     }
 
     /// Starts a trial: prescribed motion at the points, motion without forces, and an initial guess of the forces.
@@ -596,21 +620,15 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
             result.switches |= own.switches;
             result.switched += own.switched;
             result.near |= own.near;
-            if own.depth > 0.0 {
-                let depth = if is_single {
-                    trial.find_start(&tables.rows, state);
-                    trial.depth_without_jumps(|node, moved| Some(surfaces.gap(node, 0, moved).distance))
-                } else {
-                    trial.depth_without_jumps(|node, moved| surfaces.gap_within(node, 0.0, moved))
-                };
-                result.depth = result.depth.max(depth);
-            }
             for node in 0..trial.nodes() {
                 let impulse = trial.impulse(node);
                 if impulse.iter().any(|component| *component != 0.0) {
                     surfaces.add_impulse(node, points, impulse);
                 }
             }
+        }
+        if self.island.sectors.iter().any(|one| one.trial.has_depth()) {
+            self.at_start(step, |trial, surfaces| result.depth = result.depth.max(trial.depth(surfaces)));
         }
         let errors = self.island.carriers.iter().map(CarrierIntegrator::error);
         let errors = errors.chain(self.island.disks.iter().map(|disk| disk.error));
@@ -628,9 +646,9 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         }
         let mut of_bodies = dropped;
         let is_resolved = result.resolves_motion(kind, self.goal.tolerance);
+        self.find_minima(step, kind, is_resolved);
         for index in self.indices() {
             self.island.sectors[index].far = false;
-            self.find_minima(index, step, kind, is_resolved);
             let SectorInStep { mut surfaces, tables, disk, trial, state, .. } = self.sector(index, step, kind);
             let own = if constant && disk.is_none() { trial.dropped(tables.rows.residual(), state) } else { 0.0 };
             closed += if constant { trial.closed() } else { 0.0 };

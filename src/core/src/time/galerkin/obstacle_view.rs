@@ -105,6 +105,13 @@ impl Obstacle for ObstacleView<'_> {
         gap
     }
 
+    fn gap_at_start(&mut self, node: usize, moved: Vector3) -> f64 {
+        let place = self.record.places[0][node];
+        let gap = self.gap(node, 0, moved).distance;
+        self.record.places[0][node] = place;
+        gap
+    }
+
     fn gaps(&mut self, lanes: Lanes, moved: &[f64], gaps: &mut [f64], normals: &mut [f64]) {
         if let Some(pair) = self.record.lanes_of
             && let GapLaw::Revolution(law) = self.pairs[pair].gap()
@@ -295,16 +302,10 @@ impl ObstacleView<'_> {
     fn lowest(&self, trial: &Trial, basis: &TimeBasis, node: usize) -> f64 {
         let gaps = (1..=trial.points()).map(|point| trial.gap(point, node));
         let lowest = gaps.fold(self.record.tallies[node].lowest, f64::min);
-        match trial.minimum(node).filter(|_| !self.has_jumped(trial, node)) {
+        match trial.minimum(node) {
             Some(theta) => lowest.min(self.lowest_near(trial, basis, node, theta)),
             _ => lowest,
         }
-    }
-
-    /// Returns whether a held input has jumped at the start of the step and changed the gap of a node by more than the tolerance.
-    fn has_jumped(&self, trial: &Trial, node: usize) -> bool {
-        let start = self.gap_within(node, 0.0, trial.displacement(0, node));
-        start.is_some_and(|gap| (gap - trial.gap(0, node)).abs() > self.record.tolerance)
     }
 
     /// Smallest gap of a node (m) within a step, near `theta` if its motion is not known in parts.

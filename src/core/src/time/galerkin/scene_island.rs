@@ -66,9 +66,8 @@ impl Surroundings for SceneSurroundings<'_> {
         // The sectors of a structure share its pairs.
         let own = self.records.iter().filter(|record| record.sector == 0).flat_map(|record| &record.pairs);
         for PairRecord { pair, carrier, drives, .. } in own {
-            if let Some(carrier) = *carrier {
-                self.pairs[*pair].bend(drives[point].0.shape_factor, carriers[carrier].moved(point));
-            }
+            let rows = carrier.map_or(&[][..], |carrier| carriers[carrier].moved(point));
+            self.pairs[*pair].bend(drives[point].0.shape_factor, rows);
         }
     }
 

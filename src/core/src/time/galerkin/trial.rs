@@ -224,20 +224,6 @@ impl Trial {
         }
     }
 
-    /// Corrects the depth of a step for jumps of the surfaces at its start.
-    fn check_depth(
-        &mut self,
-        rows: &ContactRows,
-        state: &SectorState,
-        obstacle: &mut impl Obstacle,
-        verdict: &mut TrialResult,
-    ) {
-        if verdict.depth > 0.0 {
-            self.find_start(rows, state);
-            verdict.depth = self.depth_without_jumps(|node, moved| Some(obstacle.gap(node, 0, moved).distance));
-        }
-    }
-
     /// Finds the displacements and velocities of the rows at the start.
     pub(crate) fn find_start(&mut self, rows: &ContactRows, state: &SectorState) -> &[f64] {
         if self.known {

@@ -65,8 +65,7 @@ impl Trial {
     ) {
         let (basis, count) = (&level.basis, level.basis.count());
         self.impulses.fill(0.0);
-        (verdict.switches, verdict.switched, verdict.near, verdict.error, verdict.depth) =
-            (false, 0.0, false, 0.0, 0.0);
+        (verdict.switches, verdict.switched, verdict.near, verdict.error) = (false, 0.0, false, 0.0);
         self.depths.fill(0.0);
         let mut pushed = false;
         for node in 0..self.nodes() {
@@ -75,7 +74,6 @@ impl Trial {
             if !any {
                 let (near, depth) = self.comes_near(level, node, obstacle);
                 verdict.near |= near;
-                verdict.depth = verdict.depth.max(depth);
                 self.depths[node] = depth;
                 continue;
             }
@@ -134,19 +132,24 @@ impl Trial {
         if self.multiplier(1, node) == 0.0 && slope.abs() > before.abs() { slope } else { before }
     }
 
+    /// Returns whether open nodes are within a surface between the points, as far as their gaps at the points show.
+    pub(crate) fn has_depth(&self) -> bool {
+        self.depths.iter().any(|depth| *depth > 0.0)
+    }
+
     /// Returns the largest depth of open nodes between the points (m). It excludes nodes whose surface has jumped at the start of
-    /// the step, because the polynomial through their gaps overshoots. Displacements at the start must be known.
-    ///
-    /// `gap_at_start` returns the gap (m) at the start of a node displaced by a vector (m), or `None` if it is unknown; the node
-    /// is then excluded.
-    pub(crate) fn depth_without_jumps(&self, mut gap_at_start: impl FnMut(usize, Vector3) -> Option<f64>) -> f64 {
+    /// the step, because the polynomial through their gaps overshoots. Displacements at the start must be known, and surfaces must be
+    /// bent as at the start.
+    pub(crate) fn depth(&self, obstacle: &mut impl Obstacle) -> f64 {
         let open = (0..self.nodes()).filter(|node| self.depths[*node] > 0.0);
-        open.fold(0.0, |deepest, node| {
-            let gap = gap_at_start(node, vector3_at(&self.start, node));
-            // The overshoot below the gaps at the points is less than 0.15 times the jump.
-            let is_steady = gap.is_some_and(|gap| (gap - self.start_contacts.gaps[node]).abs() < self.depths[node]);
-            if is_steady { deepest.max(self.depths[node]) } else { deepest }
-        })
+        // The overshoot below the gaps at the points is less than 0.15 times the jump.
+        let steady = open.filter(|node| self.jump(*node, obstacle) < self.depths[*node]);
+        steady.map(|node| self.depths[node]).fold(0.0, f64::max)
+    }
+
+    /// Returns the change of the gap of a node at the start of the step (m), because a held input has jumped there.
+    pub(super) fn jump(&self, node: usize, obstacle: &mut impl Obstacle) -> f64 {
+        (obstacle.gap_at_start(node, vector3_at(&self.start, node)) - self.start_contacts.gaps[node]).abs()
     }
 
     /// Returns whether the gap of an open node comes near zero between the points, and its depth below zero there (m).
@@ -161,7 +164,7 @@ impl Trial {
         if basis.degree == 1 {
             let (lowest, bend) = self.bend_of_gap(level.step, node, [gaps[0], gaps[1]], obstacle);
             // A parabola with this deviation falls below its ends and its middle by at most a quarter of it.
-            return (lowest < 0.25 * NEAR * bend, 0.0);
+            return (lowest < 0.25 * NEAR * bend, (-lowest).max(0.0));
         }
         // Between its points, a cubic exceeds their range by less than half of it, and its interpolation error is less than the range.
         let extremes = |(low, high): (f64, f64), gap: &f64| (gap.min(low), gap.max(high));

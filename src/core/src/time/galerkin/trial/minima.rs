@@ -5,7 +5,7 @@
 //! contact is closed at a point, only the gaps at the points are used.
 
 use super::judgement::NEAR;
-use super::{ForceInterpolation, Trial};
+use super::{ForceInterpolation, Obstacle, Trial};
 use crate::math::cubic::{evaluate, interior_minimum};
 use crate::math::vector::Vector3;
 use crate::time::galerkin::advance::Advance;
@@ -81,6 +81,16 @@ impl Trial {
             }
         }
         found
+    }
+
+    /// Drops the selected nodes whose surface has jumped by more than `tolerance` (m) at the start of the step. Displacements at the start
+    /// must be known, and surfaces must be bent as at the start.
+    pub(crate) fn drop_jumps(&mut self, obstacle: &mut impl Obstacle, tolerance: f64) {
+        for node in 0..self.nodes() {
+            if self.minimum(node).is_some() && self.jump(node, obstacle) > tolerance {
+                self.minima.at[node] = f64::NAN;
+            }
+        }
     }
 
     /// Follows the selected nodes over a step of a level, before its state is advanced.
