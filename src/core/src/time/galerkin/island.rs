@@ -59,7 +59,7 @@ pub struct IslandSector {
     pub disk: Option<(usize, usize)>,
     /// State between steps.
     pub state: SectorState,
-    trial: Trial,
+    pub(super) trial: Trial,
     advance: Advance,
     /// True if no force acts on the sector and its gaps are wider than the depth of other sectors' penetration, because other
     /// sectors move it by less in a step.
@@ -67,30 +67,19 @@ pub struct IslandSector {
 }
 
 impl IslandSector {
-    /// Creates a sector with the modes of its tables and `nodes` contact nodes; the modes of a disk belong to the disk.
-    pub fn new(table: [usize; 2], disk: Option<(usize, usize)>, [modes, nodes]: [usize; 2], solver: Solver) -> Self {
-        let modes = if disk.is_some() { 0 } else { modes };
-        let state = SectorState::new(modes, nodes);
+    /// Creates a sector with the modes and contact nodes of its tables; the modes of a disk belong to the disk.
+    pub(crate) fn new(table: [usize; 2], disk: Option<(usize, usize)>, tables: &[Vec<Tables>], solver: Solver) -> Self {
+        let own = &tables[table[0]][table[1]];
+        let (modes, nodes) = (if disk.is_some() { 0 } else { own.modes() }, own.nodes());
+        let trial = Trial::new(modes, nodes, solver);
         Self {
             table,
             disk,
-            state: if solver.sticks() { state.sticking() } else { state },
-            trial: Trial::new(modes, nodes, solver),
+            state: SectorState::new(modes, nodes),
+            trial: if own.steady.is_empty() { trial } else { trial.steady() },
             advance: Advance::new(modes, nodes),
             far: false,
         }
-    }
-
-    /// Enables steps of a higher degree while no contact changes its status.
-    #[must_use]
-    pub fn steady(mut self) -> Self {
-        self.trial = self.trial.steady();
-        self
-    }
-
-    /// Returns a node that had nothing to touch at the start of the tried step and penetrates in it.
-    pub fn entered(&self) -> Option<usize> {
-        self.trial.entered()
     }
 
     /// Returns the displacements of the contact rows (m) and the state.
@@ -129,9 +118,9 @@ impl Island {
 
     /// Creates an island of one sector.
     pub fn of_one(tables: Tables) -> Self {
-        let (modes, nodes) = (tables.modes(), tables.nodes());
-        let sector = IslandSector::new([0; 2], None, [modes, nodes], Solver::Lcp);
-        Self::new(vec![vec![tables]], vec![sector], Vec::new(), Vec::new())
+        let tables = vec![vec![tables]];
+        let sector = IslandSector::new([0; 2], None, &tables, Solver::Lcp);
+        Self::new(tables, vec![sector], Vec::new(), Vec::new())
     }
 
     /// Fills the tables for spans of length `span` (s).
@@ -176,10 +165,7 @@ impl Island {
 
     /// Number of points of a step.
     fn points(&self, step: SpanStep, kind: ForceInterpolation) -> usize {
-        match kind {
-            ForceInterpolation::Constant => 1,
-            ForceInterpolation::Polynomial => self.tables[0][0].levels[step.level].basis.degree,
-        }
+        kind.points(&self.tables[0][0].levels[step.level].basis)
     }
 }
 
@@ -198,21 +184,6 @@ struct SectorInStep<'a, W> {
     trial: &'a mut Trial,
     state: &'a mut SectorState,
     advance: &'a mut Advance,
-}
-
-impl<W: Witness> SectorInStep<'_, W> {
-    /// Finds forces that remove penetration, if there are forces or penetration. Returns false if the contact problem has no solution.
-    fn solve(self, step: SpanStep, kind: ForceInterpolation, result: &mut TrialResult) -> bool {
-        let Self { mut surfaces, tables, disk, trial, state, .. } = self;
-        if trial.extremes().0 >= 0.0 && trial.rests() {
-            return true;
-        }
-        if disk.is_none() {
-            trial.find_start(&tables.rows, state);
-        }
-        let compliance = tables.levels[step.level].compliance_of(kind);
-        trial.solve(compliance, tables.rows.residual(), &mut surfaces, result)
-    }
 }
 
 /// Gaps of an island at the points of a step.
@@ -355,36 +326,21 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
 
     /// Finds where nodes may come closer between the points of a step; the motion of a single sector is followed exactly.
     fn find_minima(&mut self, step: SpanStep, kind: ForceInterpolation, is_resolved: bool) {
-        let (tolerance, is_single, mut found) = (self.goal.tolerance, self.island.is_single(), false);
+        let (tolerance, is_single) = (self.goal.tolerance, self.island.is_single());
         for index in self.indices() {
-            let SectorInStep { tables, trial, .. } = self.sector(index, step, kind);
+            let SectorInStep { surfaces, tables, disk, trial, state, advance } = self.sector(index, step, kind);
             let level = tables.of_points(step.level, kind, trial.points());
-            found |= trial.find_minima(&level.basis, is_resolved, tolerance);
-        }
-        if !found {
-            return;
-        }
-        self.at_start(step, |trial, surfaces| trial.drop_jumps(surfaces, tolerance));
-        if is_single {
-            let SectorInStep { tables, trial, state, advance, .. } = self.sector(0, step, kind);
-            let level = tables.of_points(step.level, kind, trial.points());
-            trial.follow(tables, level, step.level, state, advance);
-        }
-    }
-
-    /// Visits all sectors of a step with polynomial forces, while surfaces are bent as at its start and displacements there are known.
-    fn at_start(&mut self, step: SpanStep, mut visit: impl FnMut(&mut Trial, &mut S::Surfaces<'_>)) {
-        self.surroundings.bend(&self.island.carriers, 0);
-        for index in self.indices() {
-            let SectorInStep { mut surfaces, tables, disk, trial, state, .. } =
-                self.sector(index, step, ForceInterpolation::Polynomial);
+            if !trial.find_minima(&level.basis, is_resolved, tolerance) {
+                continue;
+            }
             if disk.is_none() {
                 trial.find_start(&tables.rows, state);
             }
-            visit(trial, &mut surfaces);
+            trial.drop_jumps(&surfaces, tolerance);
+            if is_single {
+                trial.follow(tables, level, step.level, state, advance);
+            }
         }
-        let points = self.island.points(step, ForceInterpolation::Polynomial);
-        self.surroundings.bend(&self.island.carriers, points);
     }
 
     /// Starts a trial: prescribed motion at the points, motion without forces, and an initial guess of the forces.
@@ -533,10 +489,18 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
     /// Finds forces that remove penetration, sector by sector. Returns false if a contact problem has no solution.
     fn solve(&mut self, step: SpanStep, kind: ForceInterpolation, result: &mut TrialResult) -> bool {
         for index in self.indices() {
-            if self.island.sectors[index].far {
+            let IslandSector { far, trial, .. } = &self.island.sectors[index];
+            if *far || (trial.extremes().0 >= 0.0 && trial.rests()) {
                 continue;
             }
-            if !self.sector(index, step, kind).solve(step, kind, result) {
+            let SectorInStep { mut surfaces, tables, disk, trial, state, .. } = self.sector(index, step, kind);
+            if disk.is_none() {
+                trial.find_start(&tables.rows, state);
+            }
+            let compliance = tables.levels[step.level].compliance_of(kind);
+            let solved = trial.solve(compliance, tables.rows.residual(), &mut surfaces, result);
+            drop(surfaces);
+            if !solved {
                 self.island.failed = Some((index, false));
                 return false;
             }
@@ -628,11 +592,30 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
             }
         }
         if self.island.sectors.iter().any(|one| one.trial.has_depth()) {
-            self.at_start(step, |trial, surfaces| result.depth = result.depth.max(trial.depth(surfaces)));
+            result.depth = self.depth(step, points);
         }
         let errors = self.island.carriers.iter().map(CarrierIntegrator::error);
         let errors = errors.chain(self.island.disks.iter().map(|disk| disk.error));
         result.error = errors.fold(result.error, f64::max);
+    }
+
+    /// Returns the largest depth of open nodes between the points of a step (m).
+    fn depth(&mut self, step: SpanStep, points: usize) -> f64 {
+        let (mut deepest, is_single) = (0.0_f64, self.island.is_single());
+        self.surroundings.bend(&self.island.carriers, 0);
+        for index in self.indices() {
+            let SectorInStep { mut surfaces, tables, disk, trial, state, .. } =
+                self.sector(index, step, ForceInterpolation::Polynomial);
+            if disk.is_none() {
+                trial.find_start(&tables.rows, state);
+            }
+            deepest = deepest.max(trial.depth(&mut surfaces));
+        }
+        // Contacts of a single sector are recorded on the surface as it was last evaluated.
+        if !is_single {
+            self.surroundings.bend(&self.island.carriers, points);
+        }
+        deepest
     }
 
     /// Accepts the step of the last trial and returns the energy that its contacts add to the bank (J).

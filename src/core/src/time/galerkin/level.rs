@@ -112,6 +112,22 @@ pub struct Influence {
     pub constant: f64,
 }
 
+impl Influence {
+    /// Displacement at point i under forces at the points 0 … `points`.
+    pub(crate) fn displacement(
+        &self,
+        kind: ForceInterpolation,
+        i: usize,
+        points: usize,
+        force: impl Fn(usize) -> f64,
+    ) -> f64 {
+        match kind {
+            ForceInterpolation::Constant => self.constant * force(1),
+            ForceInterpolation::Polynomial => (0..=points).map(|k| self.points[i - 1][k] * force(k)).sum(),
+        }
+    }
+}
+
 /// Tables for one step length.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StepTables {

@@ -101,6 +101,13 @@ impl SceneIsland {
             carrying.iter().zip(banks).map(|(one, bank)| CarrierIntegrator::new(*one, bank, common, lanes)).collect();
         let disk = |one: &usize| structures[*one].modes().coupled().map(|bank| CoupledDisk::new(*one, bank, common));
         let disks: Vec<CoupledDisk> = touching.iter().filter_map(disk).collect();
+        let flights = if takes_turns { kinds[0].iter().map(FreeFlight::new).collect() } else { Vec::new() };
+        let of_kind = |kind: ContactModes| match (takes_turns, solver.sticks()) {
+            (false, _) => Tables::of_degree(kind, common),
+            (true, false) => Tables::new(kind, longest),
+            (true, true) => Tables::with_steady(kind, longest),
+        };
+        let tables: Vec<Vec<Tables>> = kinds.into_iter().map(|kinds| kinds.into_iter().map(of_kind).collect()).collect();
         let (mut sectors, mut records) = (Vec::new(), Vec::new());
         for (number, structure) in touching.iter().copied().enumerate() {
             let of = &structures[structure];
@@ -112,19 +119,11 @@ impl SceneIsland {
             let record = SpanRecord::new(structure, of, pairs, tolerance);
             for sector in 0..if takes_turns { 1 } else { of.modes().sectors() } {
                 let kind = of.bank().map_or(0, |bank| bank.set_number(sector));
-                let size = [kinds[number][kind].len(), of.nodes()];
-                let one = IslandSector::new([number, kind], disk.map(|disk| (disk, sector)), size, solver);
-                sectors.push(if takes_turns && solver.sticks() { one.steady() } else { one });
+                let disk = disk.map(|disk| (disk, sector));
+                sectors.push(IslandSector::new([number, kind], disk, &tables, solver));
                 records.push(SpanRecord { sector, ..record.clone() });
             }
         }
-        let flights = if takes_turns { kinds[0].iter().map(FreeFlight::new).collect() } else { Vec::new() };
-        let tables = |kind: ContactModes| match (takes_turns, solver.sticks()) {
-            (false, _) => Tables::of_degree(kind, common),
-            (true, false) => Tables::new(kind, longest),
-            (true, true) => Tables::with_steady(kind, longest),
-        };
-        let tables = kinds.into_iter().map(|kinds| kinds.into_iter().map(tables).collect()).collect();
         let precision = if takes_turns { PRECISION } else { CLOSE * PRECISION };
         Self {
             set,
@@ -277,7 +276,7 @@ impl SceneIsland {
             return if stopped == Stopped::Exhausted { StepFailure::Exhausted } else { StepFailure::NonFinite };
         };
         let SpanRecord { structure, sector, .. } = self.records[index];
-        match self.island.sectors[index].entered() {
+        match self.island.sectors[index].trial.entered() {
             // The node is far from the surface.
             _ if is_lost => StepFailure::Implausible { structure, sector },
             // A node that had nothing to touch before is now inside an open surface.

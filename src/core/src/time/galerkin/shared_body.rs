@@ -58,7 +58,7 @@ impl SharedBody {
     /// Enables modal loads in addition to contact forces.
     #[must_use]
     pub fn loaded(mut self) -> Self {
-        let count = self.len();
+        let count = self.coordinates.inertia.len();
         let [start, end] = &mut self.loads;
         [start, end].into_iter().chain(&mut self.loads_at).for_each(|loads| loads.resize(count, 0.0));
         self
@@ -72,16 +72,6 @@ impl SharedBody {
     /// Fills the tables for spans of length `span` (s).
     pub fn set_span(&mut self, span: f64) {
         self.tables.set_span(span);
-    }
-
-    /// Number of coordinates.
-    pub fn len(&self) -> usize {
-        self.coordinates.inertia.len()
-    }
-
-    /// Returns whether there are no coordinates.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 
     /// Returns the coordinates of the body.
@@ -134,19 +124,13 @@ impl SharedBody {
         self.find_loads(step, kind);
         let Self { coordinates, tables, state, free, loads_at, .. } = self;
         let table = &tables.levels[step.level];
-        let degree = table.basis.degree;
-        let points = if kind == ForceInterpolation::Constant { degree - 1..degree } else { 0..degree };
+        let points = kind.last_points(&table.basis);
         for (point, (free, [a, b])) in free.iter_mut().zip(&table.modes.points[points]).enumerate() {
             let modes = a.iter().zip(b).zip(state.position.iter().zip(&state.velocity));
             free.iter_mut().zip(modes).for_each(|(free, ((a, b), (q, v)))| *free = a * q + b * v);
-            for (mode, load) in loads_at[0].iter().enumerate() {
-                let influence = &table.influence[mode];
-                let pushed = match kind {
-                    ForceInterpolation::Constant => influence.constant * load,
-                    ForceInterpolation::Polynomial => {
-                        (0..=degree).map(|k| influence.points[point][k] * loads_at[k][mode]).sum()
-                    }
-                };
+            for mode in 0..loads_at[0].len() {
+                let load = |k: usize| loads_at[k][mode];
+                let pushed = table.influence[mode].displacement(kind, point + 1, table.basis.degree, load);
                 free[mode] += coordinates.inertia[mode] * pushed;
             }
         }
@@ -181,16 +165,11 @@ impl SharedBody {
     pub fn push(&mut self, level: usize, kind: ForceInterpolation) {
         let Self { coordinates, tables, forces, free, at, .. } = self;
         let table = &tables.levels[level];
-        let points = if kind == ForceInterpolation::Constant { 1 } else { table.basis.degree };
+        let points = kind.points(&table.basis);
         for i in 1..=points {
             let (target, free) = (&mut at[i], &free[i - 1]);
             for (mode, target) in target.iter_mut().enumerate() {
-                let influence = &table.influence[mode];
-                let pushed = if kind == ForceInterpolation::Constant {
-                    influence.constant * forces[1][mode]
-                } else {
-                    (0..=points).map(|k| influence.points[i - 1][k] * forces[k][mode]).sum()
-                };
+                let pushed = table.influence[mode].displacement(kind, i, points, |k| forces[k][mode]);
                 *target =
                     free[mode] + coordinates.inertia[mode] * pushed + coordinates.softness[mode] * forces[i][mode];
             }
@@ -203,7 +182,7 @@ impl SharedBody {
         let Self { coordinates, tables, state, forces, polynomial, advance, loads_at, .. } = self;
         let table = &tables.levels[level];
         let basis = &table.basis;
-        let points = if kind == ForceInterpolation::Constant { 1 } else { basis.degree };
+        let points = kind.points(basis);
         for (a, polynomial) in polynomial.iter_mut().enumerate() {
             for (mode, value) in polynomial.iter_mut().enumerate() {
                 let all = |k: usize| forces[k][mode] + loads_at[k].get(mode).copied().unwrap_or(0.0);
@@ -248,7 +227,7 @@ impl SharedBody {
             let w = self.coordinates.frequencies[mode];
             self.coordinates.inertia[mode] * (v * v + (w * q) * (w * q)) + self.coordinates.softness[mode] * p * p
         };
-        0.5 * (0..self.len()).map(mode).sum::<f64>()
+        0.5 * (0..self.state.position.len()).map(mode).sum::<f64>()
     }
 
     /// Largest amplitude of each coordinate in the future motion without forces.

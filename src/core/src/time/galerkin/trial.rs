@@ -11,7 +11,7 @@ mod sticking;
 
 use super::basis::{MOST, POINTS, TimeBasis};
 use super::compliance::{LaneCompliance, Lanes};
-use super::kernels::{Add, AddProduct, ClosingColumn, Combine, Withdraw};
+use super::kernels::{AddProduct, ClosingColumn, Combine, Withdraw};
 use super::level::StepTables;
 use super::rows::{ContactRows, Sums};
 use super::state::SectorState;
@@ -41,6 +41,19 @@ pub enum ForceInterpolation {
 }
 
 impl ForceInterpolation {
+    /// Number of points of a step at which forces are unknown.
+    pub(crate) fn points(self, basis: &TimeBasis) -> usize {
+        match self {
+            Self::Polynomial => basis.degree,
+            Self::Constant => 1,
+        }
+    }
+
+    /// Indices of these points among all after the start.
+    pub(crate) fn last_points(self, basis: &TimeBasis) -> std::ops::Range<usize> {
+        basis.degree - self.points(basis)..basis.degree
+    }
+
     /// Weights of the work of forces at point i: S_ik, or those of a constant force.
     pub(crate) fn work_weights(self, basis: &TimeBasis, i: usize) -> [f64; POINTS] {
         match self {
@@ -61,7 +74,7 @@ pub struct Trial {
     known: bool,
     now: Sums<2>,
     /// Contacts at the start.
-    start_contacts: Contacts,
+    start_contacts: SectorState,
     /// Displacements of the lanes without forces after the start (m), those caused by the forces, and their sum.
     free: Vec<f64>,
     pushed: Vec<f64>,
@@ -127,17 +140,6 @@ struct FreeMotion {
     is_known: bool,
 }
 
-/// Forces, λ, gaps and normals of the nodes at the start; the normals are those for which the forces were found.
-#[derive(Debug, Clone, PartialEq)]
-struct Contacts {
-    forces: Vec<f64>,
-    multipliers: Vec<f64>,
-    gaps: Vec<f64>,
-    normals: Vec<f64>,
-    /// Slopes of the forces over the last step (N/s), if contacts may stick.
-    slopes: Vec<f64>,
-}
-
 impl Trial {
     /// Creates a trial for a sector with `modes` modes and `nodes` contact nodes. If contacts may stick, polynomials are of degree 1.
     pub fn new(modes: usize, nodes: usize, solver: Solver) -> Self {
@@ -151,13 +153,7 @@ impl Trial {
             velocities: rows(),
             known: false,
             now: Sums::new(modes, nodes),
-            start_contacts: Contacts {
-                forces: rows(),
-                multipliers: vec![0.0; nodes],
-                gaps: vec![0.0; nodes],
-                normals: rows(),
-                slopes: if solver.sticks() { rows() } else { Vec::new() },
-            },
+            start_contacts: SectorState::new(0, nodes),
             free: three(),
             pushed: three(),
             moved: three(),
@@ -245,7 +241,7 @@ impl Trial {
     /// Returns the largest displacement of each row from rest (m) without contact.
     pub(crate) fn largest_displacements(&mut self, rows: &ContactRows, state: &SectorState) -> &[f64] {
         let (sums, reach) = &mut self.reach;
-        rows.add_largest_displacements(state, sums);
+        rows.unresolved_amplitudes(f64::INFINITY, state, sums);
         let nodes = self.lanes.nodes;
         (0..nodes).for_each(|node| set_vector3_at(reach, node, sums.vector3(0, node, nodes)));
         reach
@@ -264,12 +260,8 @@ impl Trial {
         self.free_motion.is_known = false;
         self.work_weights = std::array::from_fn(|i| kind.work_weights(&level.basis, i));
         self.lanes = compliance.lanes();
-        let (start_contacts, lanes) = (&mut self.start_contacts, self.lanes);
-        start_contacts.forces.copy_from_slice(&state.forces);
-        start_contacts.multipliers.copy_from_slice(&state.multipliers);
-        start_contacts.gaps.copy_from_slice(&state.gaps);
-        start_contacts.normals.copy_from_slice(&state.normals);
-        start_contacts.slopes.iter_mut().zip(&state.slopes).for_each(|(slope, before)| *slope = *before);
+        let lanes = self.lanes;
+        self.start_contacts.copy_contacts(state);
         self.per_step = if kind == ForceInterpolation::Polynomial { 1.0 / level.step } else { 0.0 };
         let (nodes, stride) = (lanes.nodes, 3 * lanes.width());
         if let Some(rows) = rows {
@@ -299,9 +291,7 @@ impl Trial {
 
     /// Finds the displacements of the rows without any force.
     fn move_freely(&mut self, level: &StepTables, kind: ForceInterpolation, rows: &ContactRows, state: &SectorState) {
-        let degree = level.basis.degree;
-        let points = if kind == ForceInterpolation::Constant { degree - 1..degree } else { 0..degree };
-        rows.free(level, state, points, &mut self.sums);
+        rows.free(level, state, kind.last_points(&level.basis), &mut self.sums);
         let (nodes, width) = (self.lanes.nodes, self.lanes.width());
         for (point, sums) in self.sums.rows[..self.lanes.points].iter().enumerate() {
             for component in 0..3 {
@@ -331,7 +321,9 @@ impl Trial {
     pub(crate) fn move_rows(&mut self) {
         let stride = 3 * self.lanes.width();
         let Self { free, pushed, moved, .. } = self;
-        self.instructions.run(Add { a: &free[..stride], b: &pushed[..stride], to: &mut moved[..stride] });
+        for ((moved, free), pushed) in moved[..stride].iter_mut().zip(free).zip(pushed) {
+            *moved = *free + *pushed;
+        }
     }
 
     /// Returns the smallest gap and the largest gap of an active contact.

@@ -143,13 +143,13 @@ impl Trial {
     pub(crate) fn depth(&self, obstacle: &mut impl Obstacle) -> f64 {
         let open = (0..self.nodes()).filter(|node| self.depths[*node] > 0.0);
         // The overshoot below the gaps at the points is less than 0.15 times the jump.
-        let steady = open.filter(|node| self.jump(*node, obstacle) < self.depths[*node]);
-        steady.map(|node| self.depths[node]).fold(0.0, f64::max)
+        let mut jump = |node| self.jump(node, obstacle.gap_at_start(node, vector3_at(&self.start, node)));
+        open.filter(|node| jump(*node) < self.depths[*node]).map(|node| self.depths[node]).fold(0.0, f64::max)
     }
 
-    /// Returns the change of the gap of a node at the start of the step (m), because a held input has jumped there.
-    pub(super) fn jump(&self, node: usize, obstacle: &mut impl Obstacle) -> f64 {
-        (obstacle.gap_at_start(node, vector3_at(&self.start, node)) - self.start_contacts.gaps[node]).abs()
+    /// Returns the jump of the surface of a node at the start of the step (m), because of a held input: `gap` is the gap there (m).
+    pub(super) fn jump(&self, node: usize, gap: f64) -> f64 {
+        (gap - self.start_contacts.gaps[node]).abs()
     }
 
     /// Returns whether the gap of an open node comes near zero between the points, and its depth below zero there (m).

@@ -83,11 +83,15 @@ impl Trial {
         found
     }
 
-    /// Drops the selected nodes whose surface has jumped by more than `tolerance` (m) at the start of the step. Displacements at the start
-    /// must be known, and surfaces must be bent as at the start.
-    pub(crate) fn drop_jumps(&mut self, obstacle: &mut impl Obstacle, tolerance: f64) {
+    /// Drops the selected nodes whose surface has jumped by more than `tolerance` (m) at the start of the step, as far as gaps there are
+    /// known. Displacements at the start must be known.
+    pub(crate) fn drop_jumps(&mut self, obstacle: &impl Obstacle, tolerance: f64) {
         for node in 0..self.nodes() {
-            if self.minimum(node).is_some() && self.jump(node, obstacle) > tolerance {
+            if self.minimum(node).is_none() {
+                continue;
+            }
+            let gap = obstacle.gap_within(node, 0.0, self.displacement(0, node));
+            if gap.is_some_and(|gap| self.jump(node, gap) > tolerance) {
                 self.minima.at[node] = f64::NAN;
             }
         }

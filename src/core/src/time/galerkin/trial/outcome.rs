@@ -120,7 +120,7 @@ impl Trial {
             let force = self.force(points, node);
             set_vector3_at(&mut state.forces, node, force);
             set_vector3_at(&mut state.normals, node, normal);
-            if !state.slopes.is_empty() {
+            if self.sticks() {
                 let slope = match points {
                     1 => (force - vector3_at(&self.start_contacts.forces, node)) * self.per_step,
                     _ => (0..=points).map(|point| self.end_slopes[point] * self.force(point, node)).sum(),
