@@ -19,8 +19,8 @@ mod outputs;
 mod patches;
 mod plan;
 mod pulling;
-mod slave_surface;
 mod sliding_speed;
+mod spline_surface;
 mod state;
 mod step_control;
 mod stepping;
@@ -212,8 +212,9 @@ impl Simulation {
             let (speed, temperature) = (rotor.speed.at(0.0), rotor.temperature_at(0.0));
             self.compiled.settle(body, speed, temperature, structures[body].modes_mut());
         }
-        let under = structures.iter_mut().skip(self.compiled.bodies.len());
-        for ((carrier, inputs), structure) in self.compiled.carriers.iter().zip(&self.state.inputs.carriers).zip(under)
+        let carriers = structures.iter_mut().skip(self.compiled.bodies.len());
+        for ((carrier, inputs), structure) in
+            self.compiled.carriers.iter().zip(&self.state.inputs.carriers).zip(carriers)
         {
             if carrier.loads.are_there() {
                 let mut load = vec![0.0; carrier.model.len()];

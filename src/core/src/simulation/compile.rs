@@ -27,7 +27,7 @@ use super::loads::{CarrierLoads, centrifugal};
 use super::outputs::OutputReader;
 use super::patches::HeatPatches;
 use super::plan::{PairPlan, SteppingOrder, prefix};
-use super::slave_surface::{CarrierModes, Lining, Share, spline_gap};
+use super::spline_surface::{CarrierModes, Lining, Share, spline_gap};
 use super::table;
 
 /// Largest number of contact nodes of all sectors that a flexible slave or the disk may couple: their Delassus matrix is dense.

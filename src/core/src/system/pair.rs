@@ -181,12 +181,14 @@ impl ContactPair {
     pub(crate) fn find_gaps(&mut self, structures: &mut [Structure], start: SearchStart) {
         let Self { parts: PairParts { structure, gap, carrier, .. }, prescribed, .. } = self;
         let drive = &prescribed.drive.now;
-        let Some(carrier) = carrier else { return structures[*structure].find_gaps(gap, drive, &[], start) };
+        let Some(SurfaceCarrier { structure: carrier, first_row }) = carrier else {
+            return structures[*structure].find_gaps(gap, drive, &[], start);
+        };
         let points = gap.spline().map_or(0, |surface| surface.control_points().len());
-        let Ok([structure, under]) = structures.get_disjoint_mut([*structure, carrier.structure]) else {
+        let Ok([structure, carrier]) = structures.get_disjoint_mut([*structure, *carrier]) else {
             unreachable!("a structure does not carry the surface that it touches")
         };
-        let moved = &under.modes().displacement()[carrier.first_row..][..3 * points];
+        let moved = &carrier.modes().displacement()[*first_row..][..3 * points];
         structure.find_gaps(gap, drive, moved, start);
     }
 }
