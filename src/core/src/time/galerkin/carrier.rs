@@ -165,11 +165,11 @@ impl CarrierIntegrator {
 
     /// Computes the modal forces of a force at a place, in the directions of the node.
     fn find_force(&mut self, spot: Spot, force: Vector3) {
-        let (around, fixed) = (Around::new(spot), spot.frame.fixed(force));
-        let rows: [usize; 48] = std::array::from_fn(|i| around.rows[i / 3] + i % 3);
-        let amounts: [f64; 48] = std::array::from_fn(|i| around.weights[i / 3] * fixed[i % 3]);
-        let (stride, columns, coefficients) =
-            (self.force.len(), &rows[..3 * around.count], [&amounts[..3 * around.count]]);
+        let ((weights, first), fixed) = (spot.rows(), spot.frame.fixed(force));
+        let rows: [usize; 48] = std::array::from_fn(|i| first[i / 3] + i % 3);
+        let amounts: [f64; 48] = std::array::from_fn(|i| weights.values[i / 3] * fixed[i % 3]);
+        let (stride, count) = (self.force.len(), 3 * weights.len);
+        let (columns, coefficients) = (&rows[..count], [&amounts[..count]]);
         let sums = [&mut self.force[..]];
         self.instructions.run(Combine { table: &self.shapes, stride, columns, coefficients, sums });
     }
@@ -188,21 +188,17 @@ impl CarrierIntegrator {
     pub(crate) fn set_lane(&mut self, lane: usize, spot: Spot, normal: Vector3) {
         let padded = self.force.len();
         (self.obstacle[lane], self.frames[lane]) = (true, spot.frame);
-        let around = Around::new(spot);
+        let (weights, first) = spot.rows();
         let window = lane * padded..(lane + 1) * padded;
         let Self { seen, shapes, along, instructions, .. } = self;
-        let count = around.count;
         for (component, seen) in seen.iter_mut().enumerate() {
-            let rows: [usize; 16] = std::array::from_fn(|i| around.rows[i] + component);
-            let (columns, coefficients) = (&rows[..count], [&around.weights[..count]]);
+            let rows = first.map(|row| row + component);
+            let (columns, coefficients) = (&rows[..weights.len], [&weights.values[..weights.len]]);
             let sums = [&mut seen[window.clone()]];
             instructions.run(Combine { table: shapes, stride: padded, columns, coefficients, sums });
         }
-        let [x, y, z] = seen.each_ref().map(|seen| &seen[window.clone()]);
-        let [a, b, c] = spot.frame.fixed(normal).into();
-        for (mode, along) in along[window.clone()].iter_mut().enumerate() {
-            *along = a * x[mode] + b * y[mode] + c * z[mode];
-        }
+        let seen = seen.each_ref().map(|seen| &seen[window.clone()]);
+        spot.components(normal, seen, &mut along[window.clone()]);
     }
 
     /// Adds the displacement at all lanes (m, along their normals) per λ of one lane, whose force per λ is `direction`, to
@@ -258,24 +254,6 @@ impl CarrierIntegrator {
             let soft = if i == k { coordinates.softness[mode] } else { 0.0 };
             self.force[mode] = (inert + soft) * (a * x[mode] + b * y[mode] + c * z[mode]);
         }
-    }
-}
-
-/// Rows of the control points that define a place, and their weights.
-struct Around {
-    rows: [usize; 16],
-    weights: [f64; 16],
-    count: usize,
-}
-
-impl Around {
-    fn new(spot: Spot) -> Self {
-        let mut found = Self { rows: [0; 16], weights: [0.0; 16], count: 0 };
-        for (index, weight) in spot.surface.weights(spot.place).iter() {
-            (found.rows[found.count], found.weights[found.count]) = (spot.carrier.first_row + 3 * index, weight);
-            found.count += 1;
-        }
-        found
     }
 }
 

@@ -104,16 +104,7 @@ impl Island {
         disks: Vec<CoupledDisk>,
         carriers: Vec<CarrierIntegrator>,
     ) -> Self {
-        Self {
-            sectors,
-            disks,
-            carriers,
-            tables,
-            control: StepControl::default(),
-            span: 0.0,
-            fresh: true,
-            failed: None,
-        }
+        Self { sectors, disks, carriers, tables, control: StepControl::default(), span: 0.0, fresh: true, failed: None }
     }
 
     /// Creates an island of one sector.

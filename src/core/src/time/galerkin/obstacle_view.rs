@@ -139,8 +139,9 @@ impl Obstacle for ObstacleView<'_> {
         let slip = if gap.slides_anywhere() {
             let known = self.record.slips[point][node].filter(|_| self.record.solutions > SOLUTIONS);
             let slip = known.unwrap_or_else(|| {
-                let carriers = self
-                    .on_carrier(node, point, SurfacePlace::Now, |carrier, spot| carrier.sliding_distance_at(spot, point));
+                let carriers = self.on_carrier(node, point, SurfacePlace::Now, |carrier, spot| {
+                    carrier.sliding_distance_at(spot, point)
+                });
                 sliding.sliding_distance - carriers.unwrap_or_default()
             });
             self.record.slips[point][node] = Some(slip);

@@ -107,7 +107,8 @@ impl SceneIsland {
             (true, false) => Tables::new(kind, longest),
             (true, true) => Tables::with_steady(kind, longest),
         };
-        let tables: Vec<Vec<Tables>> = kinds.into_iter().map(|kinds| kinds.into_iter().map(of_kind).collect()).collect();
+        let tables: Vec<Vec<Tables>> =
+            kinds.into_iter().map(|kinds| kinds.into_iter().map(of_kind).collect()).collect();
         let (mut sectors, mut records) = (Vec::new(), Vec::new());
         for (number, structure) in touching.iter().copied().enumerate() {
             let of = &structures[structure];
