@@ -97,7 +97,7 @@ impl CarrierIntegrator {
     pub fn recover(&mut self, points: usize) {
         let Self { by_mode, all, moved: [_, one, two, three], body, instructions, .. } = self;
         let (table, stride, columns) = (&by_mode[..], one.len(), &all[..]);
-        let [a, b, c] = [1, 2, 3].map(|point| body.at(point));
+        let [_, a, b, c] = body.at.each_ref().map(|at| &at[..]);
         match points {
             1 => instructions.run(Combine { table, stride, columns, coefficients: [a], sums: [one] }),
             2 => instructions.run(Combine { table, stride, columns, coefficients: [a, b], sums: [one, two] }),
@@ -109,7 +109,7 @@ impl CarrierIntegrator {
     pub(crate) fn find_start(&mut self) {
         let Self { by_mode, all, moved: [start, ..], velocity, body, instructions, .. } = self;
         let (table, stride, columns) = (&by_mode[..], start.len(), &all[..]);
-        let coefficients = [body.at(0), body.velocity()];
+        let coefficients = [&body.at[0][..], &body.state.velocity];
         instructions.run(Combine { table, stride, columns, coefficients, sums: [start, velocity] });
     }
 
@@ -149,7 +149,7 @@ impl CarrierIntegrator {
     /// Adds the reaction to a force on a node at a place, at point i.
     pub(crate) fn react(&mut self, spot: Spot, i: usize, force: Vector3) {
         self.find_force(spot, force);
-        self.body.forces_mut(i).iter_mut().zip(&self.force).for_each(|(sum, force)| *sum -= force);
+        self.body.forces[i].iter_mut().zip(&self.force).for_each(|(sum, force)| *sum -= force);
     }
 
     /// Sets the impulses to zero.
@@ -247,7 +247,7 @@ impl CarrierIntegrator {
         let [x, y, z] = self.seen.each_ref().map(|seen| &seen[lane * padded..][..padded]);
         let (k, _) = lanes.place(lane);
         let [a, b, c] = self.frames[lane].fixed(force).into();
-        let (influence, coordinates) = (self.body.influence(level), self.body.coordinates());
+        let (influence, coordinates) = (&self.body.tables.levels[level].influence, &self.body.coordinates);
         for (mode, by) in influence.iter().enumerate() {
             let inert = coordinates.inertia[mode]
                 * if kind == ForceInterpolation::Constant { by.constant } else { by.points[i - 1][k] };

@@ -2,6 +2,7 @@
 
 use super::basis::POINTS;
 use super::shared_body::SharedBody;
+use super::state::SectorState;
 use crate::math::vector::{Vector3, strided_vector3};
 use crate::modes::cyclic::CyclicBank;
 
@@ -45,26 +46,27 @@ impl CoupledDisk {
 
     /// Reads the state of the structure before a span; `forces` are the contact forces on all rows (N).
     pub fn read(&mut self, bank: &mut CyclicBank, forces: &[f64], nodes: usize) {
-        bank.read_all(self.body.state_mut());
+        let SectorState { position, velocity, .. } = &mut self.body.state;
+        bank.read_all([position, velocity]);
         self.body.keep_inertia();
         let (sectors, lanes) = (bank.sectors(), self.lanes);
         let all = (0..sectors).flat_map(|sector| (0..nodes).map(move |node| (sector, node)));
         let force = |node: usize, sector: usize| strided_vector3(forces, 3 * node * lanes + sector, lanes);
         let all = all.map(|(sector, node)| (sector, node, force(node, sector)));
         let pushing = all.filter(|(.., force)| *force != Vector3::zeros());
-        bank.modal_forces(pushing, self.body.forces_mut(0));
+        bank.modal_forces(pushing, &mut self.body.forces[0]);
     }
 
     /// Finds displacements and velocities of all rows at the start of a step.
     pub(crate) fn find_rows(&mut self, bank: &mut CyclicBank) {
-        bank.rows_of(self.body.at(0), &mut self.moved[0]);
-        bank.rows_of(self.body.velocity(), &mut self.velocity);
+        bank.rows_of(&self.body.at[0], &mut self.moved[0]);
+        bank.rows_of(&self.body.state.velocity, &mut self.velocity);
     }
 
     /// Finds displacements of all rows at the points 1 … `points` of the step.
     pub(crate) fn find_rows_at(&mut self, bank: &mut CyclicBank, points: usize) {
         for point in 1..=points {
-            bank.rows_of(self.body.at(point), &mut self.moved[point]);
+            bank.rows_of(&self.body.at[point], &mut self.moved[point]);
         }
     }
 

@@ -370,7 +370,7 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
             return;
         }
         for carrier in &mut self.island.carriers {
-            points.clone().for_each(|point| carrier.body.forces_mut(point).fill(0.0));
+            points.clone().for_each(|point| carrier.body.forces[point].fill(0.0));
         }
         for index in self.indices() {
             if self.island.sectors[index].far {
@@ -397,7 +397,7 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
                     let nodes = (0..one.trial.nodes()).filter(|node| one.trial.multiplier(point, *node) != 0.0);
                     nodes.map(move |node| (lane, node, one.trial.force(point, node)))
                 });
-                bank.modal_forces(pushing, disk.body.forces_mut(point));
+                bank.modal_forces(pushing, &mut disk.body.forces[point]);
             }
             disk.body.push(step.level, kind);
             disk.find_rows_at(bank, points);

@@ -23,6 +23,7 @@ use crate::system::contact_view::ContactMember;
 use crate::system::work::ContactWork;
 use crate::system::{ContactPair, StepFailure, Structure, System};
 use nalgebra::DMatrix;
+use std::mem::take;
 
 /// Contacts count as closed within this fraction of the tolerance.
 const PRECISION: f64 = 1e-4;
@@ -221,10 +222,10 @@ impl SceneIsland {
         }
         for carrier in &mut self.island.carriers {
             let Some(bank) = structures[carrier.structure].bank() else { continue };
-            let dynamic = carrier.body.coordinates().inertia.iter().filter(|inertia| **inertia > 0.0).count();
-            let [position, velocity] = carrier.body.state_mut();
+            let dynamic = carrier.body.coordinates.inertia.iter().filter(|inertia| **inertia > 0.0).count();
+            let SectorState { position, velocity, .. } = &mut carrier.body.state;
             bank.read_sector(0, &mut position[..dynamic], &mut velocity[..dynamic]);
-            bank.read_loads(carrier.body.loads_mut());
+            bank.read_loads(&mut carrier.body.loads);
         }
         let SpanRecord { structure, sector, .. } = self.records[0];
         let control = &structures[structure].step_control;
@@ -253,20 +254,20 @@ impl SceneIsland {
         }
         for disk in disks {
             if let Sectors::Coupled(bank) = &mut structures[disk.structure].modes {
-                bank.write_all(disk.body.at(0), disk.body.velocity());
-                bank.lose(disk.body.collect_loss());
+                bank.write_all(&disk.body.at[0], &disk.body.state.velocity);
+                bank.lose(take(&mut disk.body.loss));
             }
         }
         for carrier in carriers {
             let structure = &mut structures[carrier.structure];
-            structure.delayed.copy_from_slice(carrier.body.forces_mut(0));
+            structure.delayed.copy_from_slice(&carrier.body.forces[0]);
             if let Sectors::Uncoupled(bank) = &mut structure.modes {
                 let rows = &carrier.moved(0)[..bank.rows()];
-                bank.write_all(carrier.body.at(0), carrier.body.velocity(), rows);
-                bank.lose(0, carrier.body.collect_loss());
+                bank.write_all(&carrier.body.at[0], &carrier.body.state.velocity, rows);
+                bank.lose(0, take(&mut carrier.body.loss));
                 bank.begin_loads();
             }
-            load_work += carrier.body.collect_load_work();
+            load_work += take(&mut carrier.body.load_work);
         }
         load_work
     }
@@ -373,13 +374,10 @@ impl Structure {
             let index = self.index(node, sector);
             state.multipliers[node] = self.history.multiplier[index];
             state.gaps[node] = self.history.gap.before[index];
-            let normal = self.vector3(&self.step_control.normals, node, sector);
-            let force = self.vector3(&self.history.force.now, node, sector);
-            set_vector3_at(&mut state.normals, node, normal);
-            set_vector3_at(&mut state.forces, node, force);
-        }
-        for (row, slope) in state.slopes.iter_mut().enumerate() {
-            *slope = self.step_control.slopes[row * self.lanes() + sector];
+            let (normals, slopes) = (&self.step_control.normals, &self.step_control.slopes);
+            set_vector3_at(&mut state.normals, node, self.vector3(normals, node, sector));
+            set_vector3_at(&mut state.slopes, node, self.vector3(slopes, node, sector));
+            set_vector3_at(&mut state.forces, node, self.vector3(&self.history.force.now, node, sector));
         }
         state.gaps_known = true;
     }
@@ -387,9 +385,6 @@ impl Structure {
     /// Writes the contacts of a sector after a span, and the smallest gap of each node during the span (m).
     pub(crate) fn write_contacts(&mut self, sector: usize, state: &SectorState, lowest: impl Fn(usize) -> f64) {
         let lanes = self.lanes();
-        for (row, slope) in state.slopes.iter().enumerate() {
-            self.step_control.slopes[row * lanes + sector] = *slope;
-        }
         for node in 0..self.nodes() {
             let index = self.index(node, sector);
             self.history.multiplier[index] = state.multipliers[node];
@@ -397,6 +392,7 @@ impl Structure {
             let first = 3 * node * lanes + sector;
             set_strided_vector3(&mut self.history.force.now, first, lanes, vector3_at(&state.forces, node));
             set_strided_vector3(&mut self.step_control.normals, first, lanes, vector3_at(&state.normals, node));
+            set_strided_vector3(&mut self.step_control.slopes, first, lanes, vector3_at(&state.slopes, node));
         }
     }
 }
