@@ -9,7 +9,8 @@ mod prediction;
 mod steady;
 mod sticking;
 
-use super::basis::{MOST, POINTS, TimeBasis};
+pub use super::basis::ForceInterpolation;
+use super::basis::{MOST, POINTS};
 use super::compliance::{LaneCompliance, Lanes};
 use super::kernels::{AddProduct, ClosingColumn, Combine, Withdraw};
 use super::level::StepTables;
@@ -19,6 +20,7 @@ use crate::contact::Law;
 use crate::math::simd::InstructionSet;
 use crate::math::vector::{Vector3, set_vector3_at, vector3_at};
 use crate::scene::method::Solver;
+use judgement::FreeMotion;
 pub use judgement::TrialResult;
 use minima::Minima;
 use nalgebra::DMatrix;
@@ -30,39 +32,6 @@ use sticking::Sticking;
 
 /// Negative gaps within this fraction of the largest gap count as rounding.
 const ROUNDING: f64 = 1e-13;
-
-/// Forces over a step: a polynomial through all points, or a constant force and the end alone.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ForceInterpolation {
-    /// The force is a polynomial of degree s.
-    Polynomial,
-    /// The force has its value at the end of the step throughout, which is dissipative whatever opens or closes.
-    Constant,
-}
-
-impl ForceInterpolation {
-    /// Number of points of a step at which forces are unknown.
-    pub(crate) fn points(self, basis: &TimeBasis) -> usize {
-        match self {
-            Self::Polynomial => basis.degree,
-            Self::Constant => 1,
-        }
-    }
-
-    /// Indices of these points among all after the start.
-    pub(crate) fn last_points(self, basis: &TimeBasis) -> std::ops::Range<usize> {
-        basis.degree - self.points(basis)..basis.degree
-    }
-
-    /// Weights of the work of forces at point i: S_ik, or those of a constant force.
-    pub(crate) fn work_weights(self, basis: &TimeBasis, i: usize) -> [f64; POINTS] {
-        match self {
-            Self::Polynomial => basis.work[i],
-            Self::Constant if i == 1 => [-1.0, 1.0, 0.0, 0.0],
-            Self::Constant => [0.0; POINTS],
-        }
-    }
-}
 
 /// Scratch memory and results of a trial, for a fixed number of contact nodes.
 #[derive(Debug, Clone)]
@@ -129,17 +98,6 @@ pub struct Trial {
     end_slopes: [f64; POINTS],
 }
 
-/// Free motion of the contact rows over a step of degree 1.
-#[derive(Debug, Clone)]
-struct FreeMotion {
-    /// Velocities at the end (m/s).
-    end_velocities: Sums<1>,
-    /// Summed amplitudes of the modes that the step does not resolve (m).
-    unresolved_amplitudes: Sums<1>,
-    /// True if the two belong to the tried step.
-    is_known: bool,
-}
-
 impl Trial {
     /// Creates a trial for a sector with `modes` modes and `nodes` contact nodes. If contacts may stick, polynomials are of degree 1.
     pub fn new(modes: usize, nodes: usize, solver: Solver) -> Self {
@@ -178,11 +136,7 @@ impl Trial {
             amounts: Vec::with_capacity(3 * lanes.len()),
             sums: Sums::new(modes, nodes),
             reach: (Sums::new(modes, nodes), rows()),
-            free_motion: FreeMotion {
-                end_velocities: Sums::new(modes, nodes),
-                unresolved_amplitudes: Sums::new(modes, nodes),
-                is_known: false,
-            },
+            free_motion: FreeMotion::new(modes, nodes),
             work_weights: [[0.0; POINTS]; POINTS],
             inert: std::array::from_fn(|_| rows()),
             withdrawn: rows(),
@@ -207,17 +161,6 @@ impl Trial {
     /// Marks the stored start values as outdated, because the state has changed.
     pub(crate) fn forget(&mut self) {
         self.known = false;
-    }
-
-    /// Finds the free motion within a step of degree 1: two points give a straight line, which cannot represent it.
-    pub(crate) fn find_free_motion(&mut self, level: &StepTables, rows: &ContactRows, state: &SectorState) {
-        if level.basis.degree == 1 {
-            self.find_start(rows, state);
-            let FreeMotion { end_velocities, unresolved_amplitudes, is_known } = &mut self.free_motion;
-            rows.end_velocities(level, state, end_velocities);
-            rows.unresolved_amplitudes(level.step, state, unresolved_amplitudes);
-            *is_known = true;
-        }
     }
 
     /// Finds the displacements and velocities of the rows at the start.
@@ -324,19 +267,6 @@ impl Trial {
         for ((moved, free), pushed) in moved[..stride].iter_mut().zip(free).zip(pushed) {
             *moved = *free + *pushed;
         }
-    }
-
-    /// Returns the smallest gap and the largest gap of an active contact.
-    pub fn extremes(&self) -> (f64, f64) {
-        let lanes = self.lanes;
-        let (mut lowest, mut largest) = (f64::INFINITY, 0.0_f64);
-        for (gap, multiplier) in self.gaps[..lanes.len()].iter().zip(&self.multipliers) {
-            lowest = if gap.is_nan() || lowest.is_nan() { f64::NAN } else { lowest.min(*gap) };
-            if *multiplier > 0.0 {
-                largest = largest.max(gap.abs());
-            }
-        }
-        (lowest, largest)
     }
 
     /// Solves 0 ≤ λ ⟂ g ≥ 0 at all points and nodes: first for contacts that penetrate or push, then also for those that these

@@ -1,11 +1,12 @@
 //! Judges a solved step: its error, the energy of contacts that open or close, and nodes that came near between the points.
 
-use super::{ForceInterpolation, FreeMotion, Obstacle, Trial};
+use super::{ForceInterpolation, Obstacle, Trial};
 use crate::math::vector::{Vector3, vector3_at};
 use crate::time::galerkin::basis::{POINTS, TimeBasis};
 use crate::time::galerkin::kernels::AddProduct;
 use crate::time::galerkin::level::StepTables;
-use crate::time::galerkin::rows::ContactRows;
+use crate::time::galerkin::rows::{ContactRows, Sums};
+use crate::time::galerkin::state::SectorState;
 
 /// Weight of the largest change of slope of a force in the error of a step, because the highest divided difference misses a
 /// contact that opens or closes. Measured on 148 random rubs at tolerances from 1e-2 to 1e-5 (`lab scatter`): with 0.05, 0.1 and
@@ -22,6 +23,25 @@ const BEND: f64 = 0.5;
 const OPENING: f64 = 30.0;
 /// A step is shortened if the gap of a node between the points may be below this multiple of the interpolation error.
 pub(super) const NEAR: f64 = 4.0;
+/// Free motion of the contact rows over a step of degree 1.
+#[derive(Debug, Clone)]
+pub(super) struct FreeMotion {
+    /// Velocities at the end (m/s).
+    end_velocities: Sums<1>,
+    /// Summed amplitudes of the modes that the step does not resolve (m).
+    unresolved_amplitudes: Sums<1>,
+    /// True if the two belong to the tried step.
+    pub(super) is_known: bool,
+}
+
+impl FreeMotion {
+    /// Allocates data for `modes` modes and `nodes` contact nodes.
+    pub(super) fn new(modes: usize, nodes: usize) -> Self {
+        let sums = || Sums::new(modes, nodes);
+        Self { end_velocities: sums(), unresolved_amplitudes: sums(), is_known: false }
+    }
+}
+
 /// Result of a trial.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct TrialResult {
@@ -55,6 +75,17 @@ impl TrialResult {
 }
 
 impl Trial {
+    /// Finds the free motion within a step of degree 1: two points give a straight line, which cannot represent it.
+    pub(crate) fn find_free_motion(&mut self, level: &StepTables, rows: &ContactRows, state: &SectorState) {
+        if level.basis.degree == 1 {
+            self.find_start(rows, state);
+            let FreeMotion { end_velocities, unresolved_amplitudes, is_known } = &mut self.free_motion;
+            rows.end_velocities(level, state, end_velocities);
+            rows.unresolved_amplitudes(level.step, state, unresolved_amplitudes);
+            *is_known = true;
+        }
+    }
+
     /// Finds error, switches and near misses of a solved step.
     pub fn judge(
         &mut self,

@@ -72,6 +72,19 @@ impl Trial {
         (0..self.nodes()).find(|node| self.start_contacts.gaps[*node] == f64::INFINITY && inside(node))
     }
 
+    /// Returns the smallest gap and the largest gap of an active contact.
+    pub fn extremes(&self) -> (f64, f64) {
+        let lanes = self.lanes;
+        let (mut lowest, mut largest) = (f64::INFINITY, 0.0_f64);
+        for (gap, multiplier) in self.gaps[..lanes.len()].iter().zip(&self.multipliers) {
+            lowest = if gap.is_nan() || lowest.is_nan() { f64::NAN } else { lowest.min(*gap) };
+            if *multiplier > 0.0 {
+                largest = largest.max(gap.abs());
+            }
+        }
+        (lowest, largest)
+    }
+
     /// Returns whether no contact is active.
     pub fn rests(&self) -> bool {
         self.multipliers[..self.lanes.len()].iter().all(|value| *value == 0.0)
