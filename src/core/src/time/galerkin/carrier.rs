@@ -1,6 +1,6 @@
 //! A structure that carries surfaces, during the steps of the sectors that touch them.
 
-use super::basis::POINTS;
+use super::basis::{POINTS, real};
 use super::compliance::Lanes;
 use super::kernels::{Combine, PADDED};
 use super::shared_body::SharedBody;
@@ -36,11 +36,13 @@ pub struct CarrierIntegrator {
     pub work_weights: [[f64; POINTS]; POINTS],
     /// δ² per squared impulse on each mode: ½ mean φ²/ω².
     error_form: Vec<f64>,
-    impulses: Vec<f64>,
-    /// Modal components of each lane in fixed directions and along its normal; lanes on this structure, and their directions.
+    /// Errors of impulses on the modes in the tried step.
+    pub impulses: Vec<f64>,
+    /// Modal components of each lane in fixed directions and along its normal, and its directions.
     seen: [Vec<f64>; 3],
     along: Vec<f64>,
-    obstacle: Vec<bool>,
+    /// True for lanes on this structure.
+    pub touches: Vec<bool>,
     frames: Vec<PolarFrame>,
     /// Modal forces per unit of λ of one lane.
     force: Vec<f64>,
@@ -58,13 +60,14 @@ impl CarrierIntegrator {
             (shapes[row * stride + mode], by_mode[mode * padded + row]) = (shape, shape);
         }
         let lowest = coordinates.frequencies.iter().copied().filter(|w| *w > 0.0).fold(f64::INFINITY, f64::min);
-        #[expect(clippy::cast_precision_loss, reason = "some hundreds of rows")]
         let of_mode = |mode: usize| {
             let square: f64 = (0..rows).map(|row| shapes[row * stride + mode].powi(2)).sum();
-            0.5 * coordinates.inertia[mode] * square / rows as f64 / coordinates.frequencies[mode].max(lowest).powi(2)
+            0.5 * coordinates.inertia[mode] * square / real(rows) / coordinates.frequencies[mode].max(lowest).powi(2)
         };
+        let error_form = (0..modes).map(of_mode).collect();
+        let body = SharedBody::new(coordinates, degree);
         Self {
-            error_form: (0..modes).map(of_mode).collect(),
+            error_form,
             structure,
             shapes,
             by_mode,
@@ -77,14 +80,10 @@ impl CarrierIntegrator {
             impulses: vec![0.0; modes],
             seen: std::array::from_fn(|_| vec![0.0; lanes.len() * stride]),
             along: vec![0.0; lanes.len() * stride],
-            obstacle: vec![false; lanes.len()],
+            touches: vec![false; lanes.len()],
             frames: vec![PolarFrame::FIXED; lanes.len()],
             force: vec![0.0; stride],
-            body: if bank.is_loaded() {
-                SharedBody::new(coordinates, degree).loaded()
-            } else {
-                SharedBody::new(coordinates, degree)
-            },
+            body: if bank.is_loaded() { body.loaded() } else { body },
         }
     }
 
@@ -107,6 +106,7 @@ impl CarrierIntegrator {
 
     /// Finds displacements and velocities of the rows at the start of a step.
     pub(crate) fn find_start(&mut self) {
+        self.body.settle();
         let Self { by_mode, all, moved: [start, ..], velocity, body, instructions, .. } = self;
         let (table, stride, columns) = (&by_mode[..], start.len(), &all[..]);
         let coefficients = [&body.at[0][..], &body.state.velocity];
@@ -152,11 +152,6 @@ impl CarrierIntegrator {
         self.body.forces[i].iter_mut().zip(&self.force).for_each(|(sum, force)| *sum -= force);
     }
 
-    /// Sets the impulses to zero.
-    pub(crate) fn clear_impulses(&mut self) {
-        self.impulses.fill(0.0);
-    }
-
     /// Adds an impulse on a node at a place (N·s).
     pub(crate) fn add_impulse(&mut self, spot: Spot, impulse: Vector3) {
         self.find_force(spot, impulse);
@@ -179,15 +174,10 @@ impl CarrierIntegrator {
         self.impulses.iter().zip(&self.error_form).map(|(impulse, form)| impulse * impulse * form).sum::<f64>().sqrt()
     }
 
-    /// Removes all lanes from this structure.
-    pub(crate) fn clear_lanes(&mut self) {
-        self.obstacle.fill(false);
-    }
-
     /// Assigns a lane of the current sector to a place, with this normal.
     pub(crate) fn set_lane(&mut self, lane: usize, spot: Spot, normal: Vector3) {
         let padded = self.force.len();
-        (self.obstacle[lane], self.frames[lane]) = (true, spot.frame);
+        (self.touches[lane], self.frames[lane]) = (true, spot.frame);
         let (weights, first) = spot.rows();
         let window = lane * padded..(lane + 1) * padded;
         let Self { seen, shapes, along, instructions, .. } = self;
@@ -213,7 +203,7 @@ impl CarrierIntegrator {
         let (padded, lanes) = (self.force.len(), step.lanes);
         for i in 1..=lanes.points {
             self.move_modes(step, i, lane, direction);
-            for node in (0..lanes.nodes).filter(|node| self.obstacle[lanes.at(i, *node)]) {
+            for node in (0..lanes.nodes).filter(|node| self.touches[lanes.at(i, *node)]) {
                 let other = lanes.at(i, node);
                 carrier_compliance[other] += dot_of(&self.along[other * padded..][..padded], &self.force);
             }
@@ -231,7 +221,7 @@ impl CarrierIntegrator {
     ) {
         let (padded, lanes) = (self.force.len(), step.lanes);
         self.move_modes(step, 1, lane, force);
-        for other in (0..lanes.nodes).filter(|node| self.obstacle[*node]) {
+        for other in (0..lanes.nodes).filter(|node| self.touches[*node]) {
             let fixed = self.seen.each_ref().map(|seen| dot_of(&seen[other * padded..][..padded], &self.force));
             lanes.set(carrier_compliance, other, self.frames[other].local(fixed.into()));
         }
@@ -240,7 +230,7 @@ impl CarrierIntegrator {
     /// Returns the motion of the modes at point i under a force on a lane, in the directions of the lane.
     fn move_modes(&mut self, step: LaneStep, i: usize, lane: usize, force: Vector3) {
         let LaneStep { level, kind, lanes } = step;
-        if !self.obstacle[lane] {
+        if !self.touches[lane] {
             return self.force.fill(0.0);
         }
         let padded = self.force.len();

@@ -227,10 +227,7 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
                 disk.find_rows(bank);
             }
         }
-        for carrier in carriers {
-            carrier.body.settle();
-            carrier.find_start();
-        }
+        carriers.iter_mut().for_each(CarrierIntegrator::find_start);
         for one in sectors {
             if let Some((disk, lane)) = one.disk {
                 one.trial.start_at(|row| disks[disk].row_at_start(row, lane));

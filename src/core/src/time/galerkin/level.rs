@@ -1,6 +1,6 @@
 //! Tables of the modes of one sector for one step length.
 
-use super::basis::{MOST, POINTS, TimeBasis};
+use super::basis::{MOST, POINTS, TimeBasis, real};
 use super::compliance::{LaneCompliance, Lanes};
 use super::kernels::PADDED;
 use super::response::{ModalResponse, TERMS, by_points};
@@ -40,8 +40,7 @@ impl ContactModes {
         let lowest =
             self.frequencies.iter().copied().filter(|frequency| *frequency > 0.0).fold(f64::INFINITY, f64::min);
         let lowest = if lowest.is_finite() { lowest } else { 1.0 };
-        #[expect(clippy::cast_precision_loss, reason = "few rows")]
-        let rows = self.rows() as f64;
+        let rows = real(self.rows());
         let scale = |mode: usize| {
             let shape = self.shapes.column(mode);
             0.5 * shape.norm_squared() / rows / self.frequencies[mode].max(lowest).powi(2)

@@ -1,6 +1,6 @@
 //! One sector and its surfaces over a span: gaps at any time, and a record of the contacts.
 
-use super::basis::TimeBasis;
+use super::basis::{TimeBasis, real};
 use super::carrier::CarrierIntegrator;
 use super::compliance::Lanes;
 use super::level::StepTables;
@@ -177,7 +177,7 @@ impl Obstacle for ObstacleView<'_> {
             return false;
         }
         self.carriers.step.lanes = lanes;
-        self.carriers.carriers.iter_mut().for_each(CarrierIntegrator::clear_lanes);
+        self.carriers.carriers.iter_mut().for_each(|carrier| carrier.touches.fill(false));
         for lane in (0..lanes.len()).filter(|lane| chosen[*lane]) {
             let (point, node) = lanes.place(lane);
             let normal = lanes.vector3(normals, lane);
@@ -321,10 +321,8 @@ impl ObstacleView<'_> {
             lowest = lowest.min(gap);
             gap
         };
-        #[expect(clippy::cast_precision_loss, reason = "few parts")]
-        let (parts, count) = (trial.parts() as f64, trial.parts());
-        #[expect(clippy::cast_precision_loss, reason = "few parts")]
-        let ends = (1..count).map(|part| part as f64 / parts);
+        let parts = real(trial.parts());
+        let ends = (1..trial.parts()).map(|part| real(part) / parts);
         let (mut theta, _) = ends.fold((theta, f64::INFINITY), |(best, least), theta| {
             let gap = look(theta);
             if gap < least { (theta, gap) } else { (best, least) }

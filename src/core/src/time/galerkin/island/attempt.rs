@@ -249,7 +249,7 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
 
     /// Finds error, switches and near misses of all sectors.
     fn judge(&mut self, step: SpanStep, points: usize, result: &mut TrialResult) {
-        self.island.carriers.iter_mut().for_each(CarrierIntegrator::clear_impulses);
+        self.island.carriers.iter_mut().for_each(|carrier| carrier.impulses.fill(0.0));
         self.island.disks.iter_mut().for_each(|disk| disk.error = 0.0);
         let is_single = self.island.is_single();
         for index in self.indices() {

@@ -9,7 +9,7 @@ use super::{ForceInterpolation, Obstacle, Trial};
 use crate::math::cubic::{evaluate, interior_minimum};
 use crate::math::vector::Vector3;
 use crate::time::galerkin::advance::Advance;
-use crate::time::galerkin::basis::{MOST, POINTS, TimeBasis};
+use crate::time::galerkin::basis::{MOST, POINTS, TimeBasis, real};
 use crate::time::galerkin::level::StepTables;
 use crate::time::galerkin::rows::ContactRows;
 use crate::time::galerkin::state::SectorState;
@@ -199,12 +199,6 @@ impl Trial {
         let falling = basis.coefficients(&falling);
         interior_minimum(&falling).map_or(at_points, |theta| at_points.max(-evaluate(&falling, theta)))
     }
-}
-
-/// Converts a small integer to a real number.
-#[expect(clippy::cast_precision_loss, reason = "below 100")]
-fn real(value: usize) -> f64 {
-    value as f64
 }
 
 /// Coefficients of a polynomial of degree 2 over one of several equal parts.
