@@ -40,8 +40,8 @@ impl Spot<'_> {
     }
 
     /// Writes the modal components along a direction of the contact node, from those along x, y, z.
-    pub fn components(&self, direction: Vector3, [x, y, z]: [&[f64]; 3], to: &mut [f64]) {
-        let [a, b, c] = self.frame.fixed(direction).into();
+    pub fn components(&self, direction: Vector3, seen: [&[f64]; 3], to: &mut [f64]) {
+        let ([x, y, z], [a, b, c]) = (seen, self.frame.fixed(direction).into());
         for (((to, x), y), z) in to.iter_mut().zip(x).zip(y).zip(z) {
             *to = a * x + b * y + c * z;
         }
