@@ -43,7 +43,7 @@ fn massless_contact_nodes_agree_and_allow_longer_steps() {
         let length = (1.0 + node.meridional_slope * node.meridional_slope).sqrt();
         Vector3::new(-1.0 / length, 0.0, node.meridional_slope / length)
     });
-    let check = MasslessCheck { model: &model, normals: normals.collect(), slaves: Vec::new() };
+    let check = MasslessCheck { model: &model, normals: normals.collect(), carriers: Vec::new() };
     let (limit, central) = (check.limit(1e-3).unwrap().closed, central_difference_limit(&model));
     print_row!("| limit of massless-boundary in closed contact | {:.2} |", 1e6 * limit);
     print_row!("| of which 0.8 is accepted | {:.2} |", 0.8e6 * limit);

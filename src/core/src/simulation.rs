@@ -19,8 +19,8 @@ mod outputs;
 mod patches;
 mod plan;
 mod pulling;
-mod slave_surface;
 mod sliding_speed;
+mod spline_surface;
 mod state;
 mod step_control;
 mod stepping;
@@ -35,7 +35,7 @@ use tiprub_cosim::variables::Quantity;
 use tiprub_cosim::{CoSimulation, VariableValues};
 
 use crate::system::System;
-use crate::time::TimeStepper;
+use crate::time::{Recurrence, TimeStepper};
 use crate::{Result, Scene};
 use clock::{Clock, SimulationPhase};
 use compile::Compiled;
@@ -56,6 +56,7 @@ use window::StepWindow;
 pub struct Simulation {
     compiled: Compiled,
     system: System,
+    /// Created by [`Simulation::initialise`] for its parameters, or for those of a restored state.
     stepper: TimeStepper,
     /// Everything beside the system that a run continues from.
     state: SimulationState,
@@ -88,8 +89,7 @@ impl Simulation {
     /// Invalid settings or ROM; combinations that are not supported.
     pub fn new(scene: impl Into<Arc<Scene>>) -> Result<Self> {
         let (compiled, table, readers) = Compiled::new(scene.into())?;
-        let mut system = compiled.system()?;
-        let stepper = TimeStepper::new(&mut system, 0.0, 0.0);
+        let system = compiled.system()?;
         let sets = system.sets().count();
         let state = SimulationState {
             inputs: Inputs::new(&compiled),
@@ -106,7 +106,7 @@ impl Simulation {
             diagnostics: Diagnostics::new(compiled.bodies.len()),
             compiled,
             system,
-            stepper,
+            stepper: TimeStepper::Recurrence(Recurrence),
             state,
             state_size: 0,
             mark: Vec::new(),
@@ -212,8 +212,9 @@ impl Simulation {
             let (speed, temperature) = (rotor.speed.at(0.0), rotor.temperature_at(0.0));
             self.compiled.settle(body, speed, temperature, structures[body].modes_mut());
         }
-        let under = structures.iter_mut().skip(self.compiled.bodies.len());
-        for ((carrier, inputs), structure) in self.compiled.carriers.iter().zip(&self.state.inputs.carriers).zip(under)
+        let carriers = structures.iter_mut().skip(self.compiled.bodies.len());
+        for ((carrier, inputs), structure) in
+            self.compiled.carriers.iter().zip(&self.state.inputs.carriers).zip(carriers)
         {
             if carrier.loads.are_there() {
                 let mut load = vec![0.0; carrier.model.len()];

@@ -90,7 +90,7 @@ fn a_bar_bounces_off_without_impact_loss() {
 fn pressed(damping_ratio: f64, share: f64) -> (f64, f64) {
     let mut model = bar(12, NEARLY_NONE).clamped_model();
     model.damping_ratios.fill(damping_ratio);
-    let check = MasslessCheck { model: &model, normals: vec![-Vector3::x()], slaves: Vec::new() };
+    let check = MasslessCheck { model: &model, normals: vec![-Vector3::x()], carriers: Vec::new() };
     let limit = check.limit(1.0).unwrap().closed;
     print_row!("ξ = {damping_ratio}: limit {limit:.3e} s, {:.2} of 2/ω_max", limit * model.largest_frequency() / 2.0);
     let law = FixedGap { normals: vec![-Vector3::x()], gaps: vec![-1e-4], sliding: vec![Vector3::zeros()] };
@@ -137,7 +137,7 @@ fn step_limit_accounts_for_damping() {
             shapes: DMatrix::identity(4, 4),
             quasi_static: 3,
         };
-        let check = MasslessCheck { model: &model, normals: vec![-Vector3::x()], slaves: Vec::new() };
+        let check = MasslessCheck { model: &model, normals: vec![-Vector3::x()], carriers: Vec::new() };
         let limit = check.limit(1.0).unwrap().closed;
         let radius = |step: f64| {
             let mode = model.coefficient(0, 1.0, Scheme::MasslessBoundary, step);
@@ -186,7 +186,7 @@ fn step_limit_accounts_for_slave_flexibility() {
             // Residual flexibility along the normal: (1000/1000)² = 1.
             let master = model(vec![own, 1e3, 1e3, 1e3], [1.0, 0.0, 0.0, 0.0], 3);
             let other = model(vec![slave], [seen, 0.0, 0.0, 0.0], 0);
-            let check = |slaves| MasslessCheck { model: &master, normals: vec![-Vector3::x()], slaves };
+            let check = |carriers| MasslessCheck { model: &master, normals: vec![-Vector3::x()], carriers };
             let flexible = check(vec![(DMatrix::from_element(1, 1, seen), &other)]);
             let (limit, alone) =
                 (flexible.limit(100.0).unwrap().closed, check(Vec::new()).limit(100.0).unwrap().closed);

@@ -4,9 +4,9 @@
 //! Their step q⁺ − (1 + β)q + βq⁻ = −C(Λ + K_c)q, C = diag(c), is that of the masses ½(1 + β) with dashpots, and is stable while the
 //! largest eigenvalue µ of D + X½ K_c X½ is below 4, with X = 2(1 + β)⁻¹C and D = XΛ.
 //!
-//! A flexible slave has its own D_s < 4 and X_s; several slaves under one blade have those of all their modes. With the modes of both, and
+//! A flexible carrier has its own D_s < 4 and X_s; several carriers under one blade have those of all their modes. With the modes of both, and
 //! U = L⁻¹[Φ_n X½, Ψ_n X_s½], G_nn = L Lᵀ, all eigenvalues are below 4 while those of the sum over modes U(4 − D)⁻¹Uᵀ are below 1. The part
-//! of the master has no eigenvalue above µ/4, so that the slave adds the largest eigenvalue of G_nn⁻¹ Ψ_n X_s(1 − D_s/4)⁻¹ Ψ_nᵀ to µ, per
+//! of the master has no eigenvalue above µ/4, so that the carrier adds the largest eigenvalue of G_nn⁻¹ Ψ_n X_s(1 − D_s/4)⁻¹ Ψ_nᵀ to µ, per
 //! blade in contact.
 //!
 //! Steps may have any length up to the limit, and a mode comes closest to D = 4 at ω_d h = π: each mode counts with its worst case at steps
@@ -59,11 +59,11 @@ pub struct MasslessCheck<'a> {
     /// Unit normal of every contact node.
     pub normals: Vec<Vector3>,
     /// Modes of every structure under the nodes along those normals, nodes × modes, and the structure.
-    pub slaves: Vec<(DMatrix<f64>, &'a ModalModel)>,
+    pub carriers: Vec<(DMatrix<f64>, &'a ModalModel)>,
 }
 
 impl MasslessCheck<'_> {
-    /// Bound on the eigenvalues of the step of closed contact at all h up to `step` (s): (master, slave per blade); stable while the sum is
+    /// Bound on the eigenvalues of the step of closed contact at all h up to `step` (s): (master, carrier per blade); stable while the sum is
     /// below 4. `None` if the residual flexibility is singular.
     pub fn eigenvalues(&self, step: f64) -> Option<(f64, f64)> {
         let coefficients = self.model.coefficients(Scheme::MasslessBoundary, step);
@@ -90,14 +90,14 @@ impl MasslessCheck<'_> {
         }
         let master = if dynamic == 0 { 0.0 } else { matrix.symmetric_eigenvalues().max() };
         let mut added = DMatrix::zeros(nodes, nodes);
-        for (seen, model) in &self.slaves {
+        for (seen, model) in &self.carriers {
             let own: Vec<[f64; 2]> = (0..model.len()).map(|mode| worst(model, mode, step)).collect();
             let raised = |[kept, moved]: [f64; 2]| (moved / (1.0 - 0.25 * kept)).sqrt();
             let half = scaled(model.len(), &|node, mode| seen[(node, mode)] * raised(own[mode]))?;
             added += &half * half.transpose();
         }
-        let slave = if self.slaves.is_empty() { 0.0 } else { added.symmetric_eigenvalues().max() };
-        Some((master, slave))
+        let carrier = if self.carriers.is_empty() { 0.0 } else { added.symmetric_eigenvalues().max() };
+        Some((master, carrier))
     }
 
     /// Returns the steps (s) at which closed contact becomes unstable and up to which the scheme is used, searched up to `largest`;
@@ -123,12 +123,12 @@ impl MasslessCheck<'_> {
         let coefficients = self.model.coefficients(Scheme::MasslessBoundary, step);
         let dynamic = self.model.dynamic_modes(Scheme::MasslessBoundary);
         let open = coefficients[..dynamic].iter().fold(0.0, |most: f64, mode| most.max(per_mass(mode, mode.kappa)));
-        self.eigenvalues(step).map_or(1.0, |(master, slave)| (master + slave) / open)
+        self.eigenvalues(step).map_or(1.0, |(master, carrier)| (master + carrier) / open)
     }
 
     fn closed(&self, largest: f64) -> Result<f64, ErrorKind> {
         let unstable = |step: f64| {
-            let found = self.eigenvalues(step).map(|(master, slave)| master + slave >= 4.0 * (1.0 - MARGIN));
+            let found = self.eigenvalues(step).map(|(master, carrier)| master + carrier >= 4.0 * (1.0 - MARGIN));
             found.ok_or(ErrorKind::RigidNormal)
         };
         let first = 1e-3 / self.model.largest_frequency();

@@ -23,7 +23,7 @@ use super::loads::{CarrierLoads, centrifugal};
 use super::outputs::OutputReader;
 use super::patches::HeatPatches;
 use super::plan::{SteppingOrder, prefix};
-use super::slave_surface::Lining;
+use super::spline_surface::Lining;
 use super::table;
 
 /// Largest number of contact nodes of all sectors that a flexible slave or the disk may couple: their Delassus matrix is dense.

@@ -75,8 +75,8 @@ struct BodyLimits {
     closing: Closing,
     /// Step limits of closed contact whose forces act a step late; infinite for other schemes.
     massless: MasslessLimit,
-    /// Largest step of each range of step sizes, descending, and the warning if the casing spoils solvability there.
-    casing: Vec<(f64, Option<WarningKind>)>,
+    /// Largest step of each range of step sizes, descending, and the warning if surface carriers spoil solvability there.
+    carriers: Vec<(f64, Option<WarningKind>)>,
     /// Smallest step that does not resolve modes which contact excites; infinite for schemes that need no such limit.
     unresolved: f64,
     /// Warning of growth while blades cut.
@@ -300,7 +300,7 @@ impl Compiled {
                 ..BodyLimits::new(of, Closing::new(self, body))
             };
         }
-        let casing = at.casing(expected);
+        let carriers = at.carriers(expected);
         // Radially: along an inclined normal the bending of the blade would hide the compliance of the tip itself.
         let radial = |model: &ModalModel| vec![[-1.0, 0.0, 0.0]; model.contact_modes.nrows() / 3];
         let masters = at.models.iter().map(|model| limits::unresolved::limit(model, &radial(model)));
@@ -309,7 +309,7 @@ impl Compiled {
         let (outcome, massless) = match resolved.and_then(|()| at.massless(expected)) {
             Ok((mut more, limit)) => {
                 more.extend(limits::unresolved::warning(parameters.scheme, expected, unresolved));
-                (at.warnings(expected, in_range(&casing, expected).cloned(), more), limit)
+                (at.warnings(expected, in_range(&carriers, expected).cloned(), more), limit)
             }
             Err(error) => (Err(error.of(of)), MasslessLimit::NONE),
         };
@@ -322,7 +322,7 @@ impl Compiled {
             }
         }
         let (closing, cutting) = (Closing::new(self, body), at.cutting());
-        BodyLimits { of, outcome, senses, closing, massless, casing, unresolved, cutting }
+        BodyLimits { of, outcome, senses, closing, massless, carriers, unresolved, cutting }
     }
 
     /// Smallest step (s) that does not resolve modes which contact excites, of the master and of carriers.
@@ -377,7 +377,7 @@ impl BodyLimits {
             senses: [Some(Sense::default()), Some(Sense::default())],
             closing,
             massless: MasslessLimit::NONE,
-            casing: Vec::new(),
+            carriers: Vec::new(),
             unresolved: f64::INFINITY,
             cutting: None,
         }

@@ -62,12 +62,12 @@ impl SteppingOrder {
             let (Some(master), Some(surface)) = (relations.masters[index], relations.surfaces[index]) else {
                 unreachable!("validated")
             };
-            let under = relations.carriers[index];
+            let carrying = relations.carriers[index];
             let open = settings.structures[master].motion == BodyMotion::Free;
             let body = plan.bodies.binary_search(&master).unwrap_or(0);
-            let carrier = under.filter(|_| !settings.surfaces[surface].rigid).map(|under| {
-                *carriers[under].get_or_insert_with(|| {
-                    plan.carriers.push(under);
+            let carrier = carrying.filter(|_| !settings.surfaces[surface].rigid).map(|structure| {
+                *carriers[structure].get_or_insert_with(|| {
+                    plan.carriers.push(structure);
                     plan.of_carriers.push(Vec::new());
                     plan.carriers.len() - 1
                 })
@@ -81,7 +81,7 @@ impl SteppingOrder {
             }
             plan.of_bodies[body].push(index);
             carrier.into_iter().for_each(|carrier| plan.of_carriers[carrier].push(index));
-            plan.pairs.push(PairPlan { surface, body, grid: under.filter(|_| open), carrier, nodes });
+            plan.pairs.push(PairPlan { surface, body, grid: carrying.filter(|_| open), carrier, nodes });
         }
         Ok(plan)
     }

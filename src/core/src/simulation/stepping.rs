@@ -167,8 +167,9 @@ impl Simulation {
                 self.system.structures_mut()[body].modes_mut().excite(factor * amplitude, phase);
             }
         }
-        let under = self.system.structures_mut().iter_mut().skip(self.compiled.bodies.len());
-        for ((carrier, inputs), structure) in self.compiled.carriers.iter().zip(&self.state.inputs.carriers).zip(under)
+        let carriers = self.system.structures_mut().iter_mut().skip(self.compiled.bodies.len());
+        for ((carrier, inputs), structure) in
+            self.compiled.carriers.iter().zip(&self.state.inputs.carriers).zip(carriers)
         {
             if carrier.loads.are_there() {
                 carrier.loads.fill(inputs, offset, structure.modes_mut().loads_mut());

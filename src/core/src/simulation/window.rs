@@ -3,7 +3,7 @@
 use tiprub_cosim::persist_fields;
 
 use super::patches::HeatPatches;
-use super::slave_surface::Lining;
+use super::spline_surface::Lining;
 use crate::geometry::Vector3;
 use crate::modes::bank::ModalBank;
 use crate::scene::settings::OutputSettings;

@@ -4,7 +4,7 @@ use super::Structure;
 use super::pair::SurfaceCarrier;
 use crate::geometry::Vector3;
 use crate::geometry::frame::PolarFrame;
-use crate::geometry::surface_spline::{ClosestPoint, SurfaceSpline};
+use crate::geometry::surface_spline::{ClosestPoint, SurfaceSpline, Weights};
 use crate::modes::bank::ModalBank;
 use nalgebra::DMatrix;
 
@@ -22,6 +22,12 @@ pub(crate) struct Spot<'a> {
 }
 
 impl Spot<'_> {
+    /// Returns the weights of the control points around the place, and the first row of each.
+    pub fn rows(&self) -> (Weights, [usize; 16]) {
+        let weights = self.surface.weights(self.place);
+        (weights, weights.indices.map(|point| self.carrier.first_row + 3 * point as usize))
+    }
+
     /// Interpolates values per row of the carrier, in the directions of the contact node.
     pub fn interpolate(&self, value: impl Fn(usize) -> f64) -> Vector3 {
         let mut sum = Vector3::zeros();
@@ -30,6 +36,14 @@ impl Spot<'_> {
             sum += weight * Vector3::new(value(row), value(row + 1), value(row + 2));
         }
         self.frame.local(sum)
+    }
+
+    /// Writes the modal components along a direction of the contact node, from those along x, y, z.
+    pub fn components(&self, direction: Vector3, seen: [&[f64]; 3], to: &mut [f64]) {
+        let ([x, y, z], [a, b, c]) = (seen, self.frame.fixed(direction).into());
+        for (((to, x), y), z) in to.iter_mut().zip(x).zip(y).zip(z) {
+            *to = a * x + b * y + c * z;
+        }
     }
 }
 
@@ -76,56 +90,41 @@ impl Reaction {
         self.members.clear();
     }
 
-    /// Projects the modes on the directions of contact `member` of the group, which acts on this structure.
-    pub fn see(&mut self, of: &Structure, member: usize, spot: Spot, rows: &[Vector3], columns: &[Vector3]) {
+    /// Projects the modes on the directions of contact `member` of the group, which acts on this structure: those of gaps and of forces.
+    pub fn see(&mut self, of: &Structure, member: usize, spot: Spot, normals: &[Vector3], forces: &[Vector3]) {
         self.members.push(member);
         let bank = bank(of);
-        let modes = bank.modes();
+        let (modes, (weights, rows)) = (bank.modes(), spot.rows());
         for (component, seen) in self.seen.iter_mut().enumerate() {
             seen.fill(0.0);
-            for (index, weight) in spot.surface.weights(spot.place).iter() {
-                let shapes = bank.contact_row(spot.carrier.first_row + 3 * index + component);
+            for (first, weight) in rows[..weights.len].iter().zip(weights.values) {
+                let shapes = bank.contact_row(first + component);
                 seen.iter_mut().zip(shapes).for_each(|(sum, shape)| *sum += weight * shape);
             }
         }
-        let [x, y, z] = &self.seen;
-        for (directions, target) in [(rows, &mut self.rows), (columns, &mut self.columns)] {
+        let seen = self.seen.each_ref().map(|seen| &seen[..]);
+        for (directions, target) in [(normals, &mut self.rows), (forces, &mut self.columns)] {
             for (index, direction) in directions.iter().enumerate() {
-                let [a, b, c] = spot.frame.fixed(*direction).into();
                 let target = &mut target[(member * directions.len() + index) * modes..][..modes];
-                for (((value, x), y), z) in target.iter_mut().zip(x).zip(y).zip(z) {
-                    *value = a * x + b * y + c * z;
-                }
+                spot.components(*direction, seen, target);
             }
         }
     }
 
     /// Adds the part of this structure to the Delassus matrix (m/N) of a group with `per` directions per contact.
     pub(crate) fn add_delassus(&mut self, of: &Structure, matrix: &mut DMatrix<f64>, per: usize) {
+        let modes = self.force.len();
         for at in 0..self.members.len() {
             for column in per * self.members[at]..per * (self.members[at] + 1) {
-                self.prepare_column(of, column);
-                for member in &self.members {
-                    for row in per * member..per * (member + 1) {
-                        matrix[(row, column)] += self.delassus(row);
-                    }
+                let shapes = &self.columns[column * modes..][..modes];
+                for ((moved, shape), k) in self.force.iter_mut().zip(shapes).zip(bank(of).coefficients(0)) {
+                    *moved = k.compliance * shape;
+                }
+                for row in self.members.iter().flat_map(|member| per * member..per * (member + 1)) {
+                    let shapes = self.rows[row * modes..][..modes].iter();
+                    matrix[(row, column)] += shapes.zip(&self.force).map(|(shape, moved)| shape * moved).sum::<f64>();
                 }
             }
-        }
-    }
-
-    /// Entry of the Delassus matrix (m/N) in this row and the prepared column.
-    fn delassus(&self, row: usize) -> f64 {
-        let modes = self.force.len();
-        self.rows[row * modes..][..modes].iter().zip(&self.force).map(|(shape, moved)| shape * moved).sum()
-    }
-
-    /// Computes the modal displacement per unit force along a column of the Delassus matrix.
-    fn prepare_column(&mut self, of: &Structure, column: usize) {
-        let modes = self.force.len();
-        let shapes = &self.columns[column * modes..][..modes];
-        for ((value, shape), k) in self.force.iter_mut().zip(shapes).zip(bank(of).coefficients(0)) {
-            *value = k.compliance * shape;
         }
     }
 

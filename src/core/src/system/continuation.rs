@@ -4,7 +4,7 @@ use tiprub_cosim::persist::{Persist, StateReader, StateWriter};
 
 use super::contact_view::ContactMember;
 use super::pair::When;
-use super::{Bodies, ContactEvent, ContactPair, StepFailure, Structure, System, sum_of};
+use super::{Bodies, ContactEvent, ContactPair, StepFailure, Structure, SurfaceCarrier, System, sum_of};
 use crate::geometry::surface_spline::ClosestPoint;
 use crate::geometry::wrench::At;
 use crate::geometry::{GapLaw, Vector3};
@@ -265,8 +265,11 @@ impl System {
 impl ContactPair {
     /// Also applies persistent contact forces to the structure that carries the surface.
     fn spread_lasting(&self, structures: &mut [Structure]) {
-        let (Some(surface), Some(carrier)) = (self.gap().spline(), self.carrier()) else { return };
-        let Ok([touching, under]) = structures.get_disjoint_mut([self.structure(), carrier.structure]) else { return };
+        let (Some(surface), Some(SurfaceCarrier { structure, first_row })) = (self.gap().spline(), self.carrier())
+        else {
+            return;
+        };
+        let Ok([touching, carrier]) = structures.get_disjoint_mut([self.structure(), structure]) else { return };
         let rotor_angle = self.drive(When::Now).rotor_angle;
         for &node in self.nodes() {
             for sector in 0..touching.modes().sectors() {
@@ -278,7 +281,7 @@ impl ContactPair {
                 let force = self.frame(index, rotor_angle).fixed(force);
                 for (point, weight) in surface.weights(touching.geometry().places[index]).iter() {
                     for (component, value) in force.iter().enumerate() {
-                        under.history.passing.lasting[carrier.first_row + 3 * point + component] -= weight * value;
+                        carrier.history.passing.lasting[first_row + 3 * point + component] -= weight * value;
                     }
                 }
             }

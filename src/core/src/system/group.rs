@@ -344,8 +344,8 @@ impl ContactGroup {
                     let at = ContactMember { structure: side.structure, pair, node, sector, index };
                     let posed = bodies.pose(at);
                     let Some(spot) = posed.spot() else { continue };
-                    let under = self.reactions.iter().find(|one| one.structure == spot.carrier.structure);
-                    let moved = under.map_or(Vector3::zeros(), |reaction| reaction.responded(spot));
+                    let carrier = self.reactions.iter().find(|one| one.structure == spot.carrier.structure);
+                    let moved = carrier.map_or(Vector3::zeros(), |reaction| reaction.responded(spot));
                     side.response[index] -= structure.history.geometry.now.normal_at(index).dot(&moved);
                 }
             }

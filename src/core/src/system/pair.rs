@@ -164,23 +164,25 @@ impl ContactPair {
         Some(Spot { surface: self.parts.gap.spline()?, carrier, place, frame: self.frame(index, rotor_angle) })
     }
 
-    /// Deforms the surface with this factor of its shape and these displacements of the rows of its carrier (m).
+    /// Deforms the surface with this factor of its shape and these displacements of the rows of its carrier, if there is one (m).
     pub(crate) fn bend(&mut self, factor: f64, rows: &[f64]) {
-        let Some(carrier) = self.parts.carrier else { return };
         let points = self.parts.gap.spline().map_or(0, |surface| surface.control_points().len());
-        self.parts.gap.bend(factor, &rows[carrier.first_row..][..3 * points]);
+        let moved = self.parts.carrier.map_or(&[][..], |carrier| &rows[carrier.first_row..][..3 * points]);
+        self.parts.gap.bend(factor, moved);
     }
 
     /// Finds the gaps of the nodes at the current displacements. The search for closest points begins at `start`.
     pub(crate) fn find_gaps(&mut self, structures: &mut [Structure], start: SearchStart) {
         let Self { parts: PairParts { structure, gap, carrier, .. }, prescribed, .. } = self;
         let drive = &prescribed.drive.now;
-        let Some(carrier) = carrier else { return structures[*structure].find_gaps(gap, drive, &[], start) };
+        let Some(SurfaceCarrier { structure: carrier, first_row }) = carrier else {
+            return structures[*structure].find_gaps(gap, drive, &[], start);
+        };
         let points = gap.spline().map_or(0, |surface| surface.control_points().len());
-        let Ok([structure, under]) = structures.get_disjoint_mut([*structure, carrier.structure]) else {
+        let Ok([structure, carrier]) = structures.get_disjoint_mut([*structure, *carrier]) else {
             unreachable!("a structure does not carry the surface that it touches")
         };
-        let moved = &under.modes().displacement()[carrier.first_row..][..3 * points];
+        let moved = &carrier.modes().displacement()[*first_row..][..3 * points];
         structure.find_gaps(gap, drive, moved, start);
     }
 }

@@ -322,8 +322,8 @@ impl System {
         let (pair, index) = (&self.pairs[event.pair], self.structures[event.structure].index(event.node, event.sector));
         let place = self.geometry_of(event, when).places[index];
         let Some(spot) = pair.spot(index, place, pair.drive(when).rotor_angle) else { return moved };
-        let under = &self.structures[spot.carrier.structure];
-        let (now, oldest) = (under.modes().displacement(), &under.history.passing.oldest);
+        let carrier = &self.structures[spot.carrier.structure];
+        let (now, oldest) = (carrier.modes().displacement(), &carrier.history.passing.oldest);
         moved - spot.interpolate(|row| 0.5 * (now[row] - oldest[row]))
     }
 }

@@ -117,7 +117,7 @@ pub fn set_samples(system: &mut System, model: &ModalModel, mode: usize, now: f6
 
 /// Returns the step of massless-boundary, at most `largest` (s), at which opening and closing contact gains no energy.
 pub fn quiet_step(model: &ModalModel, largest: f64) -> f64 {
-    let check = MasslessCheck { model, normals: vec![Vector3::x()], slaves: Vec::new() };
+    let check = MasslessCheck { model, normals: vec![Vector3::x()], carriers: Vec::new() };
     let limit = check.limit(1e3 * largest).unwrap();
     (0.95 * (QUIET * limit.closed).min(limit.usable)).min(largest)
 }

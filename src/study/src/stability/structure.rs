@@ -315,7 +315,7 @@ impl<'a> SingleStructure<'a> {
             }
             let copies = model.contact_modes.nrows() / (3 * self.rom.contact_nodes.len());
             let normals = self.closed[0].repeat(copies).into_iter().map(|(normal, _)| normal).collect();
-            let check = MasslessCheck { model, normals, slaves: Vec::new() };
+            let check = MasslessCheck { model, normals, carriers: Vec::new() };
             usable = usable.min(check.limit(largest).map_err(|error| error.to_string())?.usable);
         }
         Ok(usable)

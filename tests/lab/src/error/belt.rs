@@ -59,7 +59,7 @@ impl BeltCase {
             shapes: DMatrix::identity(rows + 1, rows + 1),
             quasi_static: rows,
         };
-        let check = massless::MasslessCheck { model: &model, normals: vec![NORMAL; NODES], slaves: Vec::new() };
+        let check = massless::MasslessCheck { model: &model, normals: vec![NORMAL; NODES], carriers: Vec::new() };
         let massless_limit = check.limit(1.0).unwrap_or(massless::MasslessLimit::NONE);
         Self { model, massless_limit, quick }
     }

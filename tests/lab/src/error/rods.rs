@@ -44,7 +44,7 @@ impl CoreRod {
         let model = ModalModel::from_rom(&rom, 0.0).map_err(|error| error.to_string())?;
         let model = ModalModel { quasi_static: ends, ..model };
         let amplitudes = |values: &DVector<f64>| model.modal_load((&rod.mass * values).as_slice());
-        let check = massless::MasslessCheck { model: &model, normals: vec![NORMAL], slaves: Vec::new() };
+        let check = massless::MasslessCheck { model: &model, normals: vec![NORMAL], carriers: Vec::new() };
         Ok(Self {
             load: model.modal_load(rod.load.as_slice()),
             start: [amplitudes(&rod.displacement), amplitudes(&rod.velocity)],

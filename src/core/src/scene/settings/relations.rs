@@ -33,10 +33,10 @@ impl Relations {
         let contacts = &settings.contacts;
         let masters: Vec<_> = contacts.iter().map(|contact| structures.get(contact.master.as_str()).copied()).collect();
         let surfaces: Vec<_> = contacts.iter().map(|contact| named.get(contact.slave.as_str()).copied()).collect();
-        let under = |surface: &Option<usize>| {
+        let carrier = |surface: &Option<usize>| {
             structures.get(settings.surfaces[(*surface)?].structure.as_ref()?.as_str()).copied()
         };
-        let carriers: Vec<_> = surfaces.iter().map(under).collect();
+        let carriers: Vec<_> = surfaces.iter().map(carrier).collect();
         let mut of_structures = vec![Vec::new(); settings.structures.len()];
         for (contact, (master, carrier)) in masters.iter().zip(&carriers).enumerate() {
             for structure in master.iter().chain(carrier.iter().filter(|carrier| Some(**carrier) != *master)) {

@@ -11,7 +11,7 @@ use crate::scene::settings::Meridian;
 use crate::scene::shape::CompiledShape;
 use crate::simulation::contour::check_contour;
 use crate::simulation::plan::PairPlan;
-use crate::simulation::slave_surface::{CarrierModes, Lining, Share, spline_gap};
+use crate::simulation::spline_surface::{CarrierModes, Lining, Share, spline_gap};
 use crate::system::joined;
 use crate::{Error, Result, Rom};
 

@@ -25,16 +25,16 @@ const ALL_COMBINATIONS_UP_TO: usize = 3;
 /// Growth per step below this is rounding of the eigenvalue solver.
 const GROWTH_NOISE: f64 = 1e-7;
 
-/// Angles at which the flexible slave is checked.
-const SLAVE_ANGLES: u32 = 48;
+/// Angles at which the flexible carrier is checked.
+const CARRIER_ANGLES: u32 = 48;
 
-fn slave_angle(place: u32) -> f64 {
-    std::f64::consts::TAU * f64::from(place) / f64::from(SLAVE_ANGLES)
+fn carrier_angle(place: u32) -> f64 {
+    std::f64::consts::TAU * f64::from(place) / f64::from(CARRIER_ANGLES)
 }
 
 /// The slave's modes along normals and tangents of `nodes` of a blade at `angle` (rad), nodes × modes; 0 for nodes that do not face the
-/// slave.
-fn slave_at(law: &SplineGap, modes: &ModalModel, nodes: &[usize], angle: f64) -> (DMatrix<f64>, DMatrix<f64>) {
+/// carrier.
+fn carrier_at(law: &SplineGap, modes: &ModalModel, nodes: &[usize], angle: f64) -> (DMatrix<f64>, DMatrix<f64>) {
     let zeros = || DMatrix::zeros(nodes.len(), modes.len());
     let mut seen = (zeros(), zeros());
     for (row, &node) in nodes.iter().enumerate().filter(|(_, node)| law.nodes.contains(node)) {
@@ -76,8 +76,8 @@ fn yielding_most<'a>(
     step: f64,
 ) -> massless::MasslessCheck<'a> {
     let (mut most, mut chosen) = (f64::NEG_INFINITY, check.clone());
-    for slaves in places {
-        let tried = massless::MasslessCheck { slaves, ..check.clone() };
+    for carriers in places {
+        let tried = massless::MasslessCheck { carriers, ..check.clone() };
         if let Some((_, found)) = tried.eigenvalues(step).filter(|(_, found)| *found > most) {
             (most, chosen) = (found, tried);
         }
@@ -146,11 +146,11 @@ impl<'a> Checking<'a> {
         Subject::Body(self.body)
     }
 
-    /// Returns all warnings at the expected step (s), for any sense of slip; `casing` and `more` come last.
+    /// Returns all warnings at the expected step (s), for any sense of slip; `carriers` and `more` come last.
     pub(super) fn warnings(
         &self,
         step: f64,
-        casing: Option<WarningKind>,
+        carriers: Option<WarningKind>,
         more: Vec<WarningKind>,
     ) -> Checked<Vec<Finding>> {
         let Parameters { scheme, step: largest, .. } = *self.parameters;
@@ -166,7 +166,7 @@ impl<'a> Checking<'a> {
         .map_err(own)?;
         let of_carriers = self.compiled.unresolved_carriers(self.body, scheme, step)?;
         let first = unresolved.into_iter().chain(self.not_looked_at()).map(|kind| kind.of(self.subject()));
-        let last = casing.into_iter().chain(more).map(|kind| kind.of(self.subject()));
+        let last = carriers.into_iter().chain(more).map(|kind| kind.of(self.subject()));
         Ok(first.chain(of_carriers).chain(last).collect())
     }
 
@@ -198,13 +198,13 @@ impl<'a> Checking<'a> {
 
     /// Checks whether the compliance of the structures under the surfaces spoils the solvability of the contact problem, at the expected
     /// step and at all others.
-    pub(super) fn casing(&self, expected: f64) -> Vec<(f64, Option<WarningKind>)> {
+    pub(super) fn carriers(&self, expected: f64) -> Vec<(f64, Option<WarningKind>)> {
         let carried = self.carried();
         if self.friction == 0.0 || carried.is_empty() || self.parameters.solver.sticks() {
             return Vec::new();
         }
         let places = |(gap, _, modes): &(&SplineGap, usize, ModalModel)| {
-            (0..SLAVE_ANGLES).map(|place| slave_at(gap, modes, &gap.nodes, slave_angle(place))).collect()
+            (0..CARRIER_ANGLES).map(|place| carrier_at(gap, modes, &gap.nodes, carrier_angle(place))).collect()
         };
         let places: Vec<Vec<_>> = carried.iter().map(places).collect();
         let worst_at = |step: f64| {
@@ -214,7 +214,7 @@ impl<'a> Checking<'a> {
                     for sense in [1.0, -1.0] {
                         let ratio = lowest_ratio(seen, modes, self.parameters.scheme, step, sense * self.friction);
                         if ratio < worst {
-                            (worst, at) = (ratio, slave_angle(place));
+                            (worst, at) = (ratio, carrier_angle(place));
                         }
                     }
                 }
@@ -245,16 +245,16 @@ impl<'a> Checking<'a> {
         let (mut limit, mut worst) = (MasslessLimit::NONE, (0.0, 0.0));
         for (diameter, model) in self.models.iter().enumerate() {
             let normals = self.normals(model);
-            let mut check = massless::MasslessCheck { model, normals, slaves: Vec::new() };
+            let mut check = massless::MasslessCheck { model, normals, carriers: Vec::new() };
             if !carried.is_empty() {
-                let under = |angle: f64, gap: &SplineGap, modes: &ModalModel| {
-                    self.seen_by(diameter, slave_at(gap, modes, &self.nodes, angle).0)
+                let seen_at = |angle: f64, gap: &SplineGap, modes: &ModalModel| {
+                    self.seen_by(diameter, carrier_at(gap, modes, &self.nodes, angle).0)
                 };
                 let at = |place| {
                     let all = carried.iter();
-                    all.map(|(gap, _, modes)| (under(slave_angle(place), gap, modes), modes)).collect()
+                    all.map(|(gap, _, modes)| (seen_at(carrier_angle(place), gap, modes), modes)).collect()
                 };
-                check = yielding_most(check, (0..SLAVE_ANGLES).map(at), step);
+                check = yielding_most(check, (0..CARRIER_ANGLES).map(at), step);
             }
             // Only the tightest of several limits counts.
             let own = check.limit(largest.min(limit.closed))?;
@@ -265,15 +265,15 @@ impl<'a> Checking<'a> {
         massless::check(step, limit)?;
         let sectors = self.compiled.body(self.body).1.sectors;
         let all = f64::from(u32::try_from(sectors).unwrap_or(u32::MAX));
-        let (master, slave) = worst;
-        let some = (master + all * slave >= 4.0)
-            .then(|| WarningKind::MasslessBlades { stable: ((4.0 - master) / slave).floor(), sectors });
+        let (master, carrier) = worst;
+        let some = (master + all * carrier >= 4.0)
+            .then(|| WarningKind::MasslessBlades { stable: ((4.0 - master) / carrier).floor(), sectors });
         let warnings = massless::warning(step, limit).into_iter().chain(some).collect();
         Ok((warnings, limit))
     }
 
     /// The slave's modes as the real part of a nodal diameter sees them. One blade in contact has an equal share of all nodal diameters, so
-    /// that the softest of them bounds the contribution of the slave.
+    /// that the softest of them bounds the contribution of the carrier.
     fn seen_by(&self, diameter: usize, seen: DMatrix<f64>) -> DMatrix<f64> {
         let Some(disk) = self.disk() else { return seen };
         let rows = self.models[diameter].contact_modes.nrows() / 3;

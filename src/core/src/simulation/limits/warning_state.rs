@@ -157,7 +157,7 @@ impl Simulation {
             limits::unresolved_modes(highest, scheme, step),
             massless::warning(step, own.massless),
             limits::unresolved::warning(scheme, step, own.unresolved),
-            in_range(&own.casing, step).cloned(),
+            in_range(&own.carriers, step).cloned(),
         ]
     }
 

@@ -104,6 +104,47 @@ impl TimeBasis {
     }
 }
 
+/// Forces over a step: a polynomial through all points, or a constant force and the end alone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ForceInterpolation {
+    /// The force is a polynomial of degree s.
+    Polynomial,
+    /// The force has its value at the end of the step throughout, which is dissipative whatever opens or closes.
+    Constant,
+}
+
+impl ForceInterpolation {
+    /// Number of points of a step at which forces are unknown.
+    pub(crate) fn points(self, basis: &TimeBasis) -> usize {
+        match self {
+            Self::Polynomial => basis.degree,
+            Self::Constant => 1,
+        }
+    }
+
+    /// Indices of these points among all after the start.
+    pub(crate) fn last_points(self, basis: &TimeBasis) -> std::ops::Range<usize> {
+        basis.degree - self.points(basis)..basis.degree
+    }
+
+    /// Weights of the work of forces at point i: S_ik, or those of a constant force.
+    pub(crate) fn work_weights(self, basis: &TimeBasis, i: usize) -> [f64; POINTS] {
+        match self {
+            Self::Polynomial => basis.work[i],
+            Self::Constant if i == 1 => [-1.0, 1.0, 0.0, 0.0],
+            Self::Constant => [0.0; POINTS],
+        }
+    }
+
+    /// Fraction of the step for which a force at point i acts: b_i, or 1 for a constant force.
+    pub(crate) fn weight(self, basis: &TimeBasis, i: usize) -> f64 {
+        match self {
+            Self::Polynomial => basis.weights[i],
+            Self::Constant => f64::from(u8::from(i == 1)),
+        }
+    }
+}
+
 /// L_k′ at point i, in barycentric form.
 fn slopes_at(i: usize, points: &[f64]) -> [f64; POINTS] {
     let weight = |k: usize| -> f64 {
@@ -119,7 +160,7 @@ fn slopes_at(i: usize, points: &[f64]) -> [f64; POINTS] {
 }
 
 /// Converts a small integer to a real number.
-#[expect(clippy::cast_precision_loss, reason = "below 100")]
+#[expect(clippy::cast_precision_loss, reason = "far below 2^52")]
 pub(super) fn real(value: usize) -> f64 {
     value as f64
 }

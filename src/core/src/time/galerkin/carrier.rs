@@ -1,6 +1,6 @@
 //! A structure that carries surfaces, during the steps of the sectors that touch them.
 
-use super::basis::POINTS;
+use super::basis::{POINTS, real};
 use super::compliance::Lanes;
 use super::kernels::{Combine, PADDED};
 use super::shared_body::SharedBody;
@@ -36,11 +36,13 @@ pub struct CarrierIntegrator {
     pub work_weights: [[f64; POINTS]; POINTS],
     /// δ² per squared impulse on each mode: ½ mean φ²/ω².
     error_form: Vec<f64>,
-    impulses: Vec<f64>,
-    /// Modal components of each lane in fixed directions and along its normal; lanes on this structure, and their directions.
+    /// Errors of impulses on the modes in the tried step.
+    pub impulses: Vec<f64>,
+    /// Modal components of each lane in fixed directions and along its normal, and its directions.
     seen: [Vec<f64>; 3],
     along: Vec<f64>,
-    obstacle: Vec<bool>,
+    /// True for lanes on this structure.
+    pub touches: Vec<bool>,
     frames: Vec<PolarFrame>,
     /// Modal forces per unit of λ of one lane.
     force: Vec<f64>,
@@ -58,13 +60,14 @@ impl CarrierIntegrator {
             (shapes[row * stride + mode], by_mode[mode * padded + row]) = (shape, shape);
         }
         let lowest = coordinates.frequencies.iter().copied().filter(|w| *w > 0.0).fold(f64::INFINITY, f64::min);
-        #[expect(clippy::cast_precision_loss, reason = "some hundreds of rows")]
         let of_mode = |mode: usize| {
             let square: f64 = (0..rows).map(|row| shapes[row * stride + mode].powi(2)).sum();
-            0.5 * coordinates.inertia[mode] * square / rows as f64 / coordinates.frequencies[mode].max(lowest).powi(2)
+            0.5 * coordinates.inertia[mode] * square / real(rows) / coordinates.frequencies[mode].max(lowest).powi(2)
         };
+        let error_form = (0..modes).map(of_mode).collect();
+        let body = SharedBody::new(coordinates, degree);
         Self {
-            error_form: (0..modes).map(of_mode).collect(),
+            error_form,
             structure,
             shapes,
             by_mode,
@@ -77,14 +80,10 @@ impl CarrierIntegrator {
             impulses: vec![0.0; modes],
             seen: std::array::from_fn(|_| vec![0.0; lanes.len() * stride]),
             along: vec![0.0; lanes.len() * stride],
-            obstacle: vec![false; lanes.len()],
+            touches: vec![false; lanes.len()],
             frames: vec![PolarFrame::FIXED; lanes.len()],
             force: vec![0.0; stride],
-            body: if bank.is_loaded() {
-                SharedBody::new(coordinates, degree).loaded()
-            } else {
-                SharedBody::new(coordinates, degree)
-            },
+            body: if bank.is_loaded() { body.loaded() } else { body },
         }
     }
 
@@ -97,7 +96,7 @@ impl CarrierIntegrator {
     pub fn recover(&mut self, points: usize) {
         let Self { by_mode, all, moved: [_, one, two, three], body, instructions, .. } = self;
         let (table, stride, columns) = (&by_mode[..], one.len(), &all[..]);
-        let [a, b, c] = [1, 2, 3].map(|point| body.at(point));
+        let [_, a, b, c] = body.at.each_ref().map(|at| &at[..]);
         match points {
             1 => instructions.run(Combine { table, stride, columns, coefficients: [a], sums: [one] }),
             2 => instructions.run(Combine { table, stride, columns, coefficients: [a, b], sums: [one, two] }),
@@ -107,9 +106,10 @@ impl CarrierIntegrator {
 
     /// Finds displacements and velocities of the rows at the start of a step.
     pub(crate) fn find_start(&mut self) {
+        self.body.settle();
         let Self { by_mode, all, moved: [start, ..], velocity, body, instructions, .. } = self;
         let (table, stride, columns) = (&by_mode[..], start.len(), &all[..]);
-        let coefficients = [body.at(0), body.velocity()];
+        let coefficients = [&body.at[0][..], &body.state.velocity];
         instructions.run(Combine { table, stride, columns, coefficients, sums: [start, velocity] });
     }
 
@@ -149,12 +149,7 @@ impl CarrierIntegrator {
     /// Adds the reaction to a force on a node at a place, at point i.
     pub(crate) fn react(&mut self, spot: Spot, i: usize, force: Vector3) {
         self.find_force(spot, force);
-        self.body.forces_mut(i).iter_mut().zip(&self.force).for_each(|(sum, force)| *sum -= force);
-    }
-
-    /// Sets the impulses to zero.
-    pub(crate) fn clear_impulses(&mut self) {
-        self.impulses.fill(0.0);
+        self.body.forces[i].iter_mut().zip(&self.force).for_each(|(sum, force)| *sum -= force);
     }
 
     /// Adds an impulse on a node at a place (N·s).
@@ -165,11 +160,11 @@ impl CarrierIntegrator {
 
     /// Computes the modal forces of a force at a place, in the directions of the node.
     fn find_force(&mut self, spot: Spot, force: Vector3) {
-        let (around, fixed) = (Around::new(spot), spot.frame.fixed(force));
-        let rows: [usize; 48] = std::array::from_fn(|i| around.rows[i / 3] + i % 3);
-        let amounts: [f64; 48] = std::array::from_fn(|i| around.weights[i / 3] * fixed[i % 3]);
-        let (stride, columns, coefficients) =
-            (self.force.len(), &rows[..3 * around.count], [&amounts[..3 * around.count]]);
+        let ((weights, first), fixed) = (spot.rows(), spot.frame.fixed(force));
+        let rows: [usize; 48] = std::array::from_fn(|i| first[i / 3] + i % 3);
+        let amounts: [f64; 48] = std::array::from_fn(|i| weights.values[i / 3] * fixed[i % 3]);
+        let (stride, count) = (self.force.len(), 3 * weights.len);
+        let (columns, coefficients) = (&rows[..count], [&amounts[..count]]);
         let sums = [&mut self.force[..]];
         self.instructions.run(Combine { table: &self.shapes, stride, columns, coefficients, sums });
     }
@@ -179,30 +174,21 @@ impl CarrierIntegrator {
         self.impulses.iter().zip(&self.error_form).map(|(impulse, form)| impulse * impulse * form).sum::<f64>().sqrt()
     }
 
-    /// Removes all lanes from this structure.
-    pub(crate) fn clear_lanes(&mut self) {
-        self.obstacle.fill(false);
-    }
-
     /// Assigns a lane of the current sector to a place, with this normal.
     pub(crate) fn set_lane(&mut self, lane: usize, spot: Spot, normal: Vector3) {
         let padded = self.force.len();
-        (self.obstacle[lane], self.frames[lane]) = (true, spot.frame);
-        let around = Around::new(spot);
+        (self.touches[lane], self.frames[lane]) = (true, spot.frame);
+        let (weights, first) = spot.rows();
         let window = lane * padded..(lane + 1) * padded;
         let Self { seen, shapes, along, instructions, .. } = self;
-        let count = around.count;
         for (component, seen) in seen.iter_mut().enumerate() {
-            let rows: [usize; 16] = std::array::from_fn(|i| around.rows[i] + component);
-            let (columns, coefficients) = (&rows[..count], [&around.weights[..count]]);
+            let rows = first.map(|row| row + component);
+            let (columns, coefficients) = (&rows[..weights.len], [&weights.values[..weights.len]]);
             let sums = [&mut seen[window.clone()]];
             instructions.run(Combine { table: shapes, stride: padded, columns, coefficients, sums });
         }
-        let [x, y, z] = seen.each_ref().map(|seen| &seen[window.clone()]);
-        let [a, b, c] = spot.frame.fixed(normal).into();
-        for (mode, along) in along[window.clone()].iter_mut().enumerate() {
-            *along = a * x[mode] + b * y[mode] + c * z[mode];
-        }
+        let seen = seen.each_ref().map(|seen| &seen[window.clone()]);
+        spot.components(normal, seen, &mut along[window.clone()]);
     }
 
     /// Adds the displacement at all lanes (m, along their normals) per λ of one lane, whose force per λ is `direction`, to
@@ -217,7 +203,7 @@ impl CarrierIntegrator {
         let (padded, lanes) = (self.force.len(), step.lanes);
         for i in 1..=lanes.points {
             self.move_modes(step, i, lane, direction);
-            for node in (0..lanes.nodes).filter(|node| self.obstacle[lanes.at(i, *node)]) {
+            for node in (0..lanes.nodes).filter(|node| self.touches[lanes.at(i, *node)]) {
                 let other = lanes.at(i, node);
                 carrier_compliance[other] += dot_of(&self.along[other * padded..][..padded], &self.force);
             }
@@ -235,7 +221,7 @@ impl CarrierIntegrator {
     ) {
         let (padded, lanes) = (self.force.len(), step.lanes);
         self.move_modes(step, 1, lane, force);
-        for other in (0..lanes.nodes).filter(|node| self.obstacle[*node]) {
+        for other in (0..lanes.nodes).filter(|node| self.touches[*node]) {
             let fixed = self.seen.each_ref().map(|seen| dot_of(&seen[other * padded..][..padded], &self.force));
             lanes.set(carrier_compliance, other, self.frames[other].local(fixed.into()));
         }
@@ -244,38 +230,20 @@ impl CarrierIntegrator {
     /// Returns the motion of the modes at point i under a force on a lane, in the directions of the lane.
     fn move_modes(&mut self, step: LaneStep, i: usize, lane: usize, force: Vector3) {
         let LaneStep { level, kind, lanes } = step;
-        if !self.obstacle[lane] {
+        if !self.touches[lane] {
             return self.force.fill(0.0);
         }
         let padded = self.force.len();
         let [x, y, z] = self.seen.each_ref().map(|seen| &seen[lane * padded..][..padded]);
         let (k, _) = lanes.place(lane);
         let [a, b, c] = self.frames[lane].fixed(force).into();
-        let (influence, coordinates) = (self.body.influence(level), self.body.coordinates());
+        let (influence, coordinates) = (&self.body.tables.levels[level].influence, &self.body.coordinates);
         for (mode, by) in influence.iter().enumerate() {
             let inert = coordinates.inertia[mode]
                 * if kind == ForceInterpolation::Constant { by.constant } else { by.points[i - 1][k] };
             let soft = if i == k { coordinates.softness[mode] } else { 0.0 };
             self.force[mode] = (inert + soft) * (a * x[mode] + b * y[mode] + c * z[mode]);
         }
-    }
-}
-
-/// Rows of the control points that define a place, and their weights.
-struct Around {
-    rows: [usize; 16],
-    weights: [f64; 16],
-    count: usize,
-}
-
-impl Around {
-    fn new(spot: Spot) -> Self {
-        let mut found = Self { rows: [0; 16], weights: [0.0; 16], count: 0 };
-        for (index, weight) in spot.surface.weights(spot.place).iter() {
-            (found.rows[found.count], found.weights[found.count]) = (spot.carrier.first_row + 3 * index, weight);
-            found.count += 1;
-        }
-        found
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::basis::POINTS;
 use super::shared_body::SharedBody;
+use super::state::SectorState;
 use crate::math::vector::{Vector3, strided_vector3};
 use crate::modes::bank::{Disk, ModalBank};
 
@@ -45,7 +46,8 @@ impl CoupledDisk {
 
     /// Reads the state of the structure before a span; `forces` are the contact forces on all rows (N).
     pub fn read(&mut self, bank: &mut ModalBank, forces: &[f64], nodes: usize) {
-        bank.read_all(self.body.state_mut());
+        let SectorState { position, velocity, .. } = &mut self.body.state;
+        bank.read_all([position, velocity]);
         self.body.keep_inertia();
         let (sectors, lanes) = (bank.sectors(), self.lanes);
         let all = (0..sectors).flat_map(|sector| (0..nodes).map(move |node| (sector, node)));
@@ -53,20 +55,20 @@ impl CoupledDisk {
         let all = all.map(|(sector, node)| (sector, node, force(node, sector)));
         let pushing = all.filter(|(.., force)| *force != Vector3::zeros());
         if let Some(disk) = bank.disk_mut() {
-            disk.modal_forces(pushing, self.body.forces_mut(0));
+            disk.modal_forces(pushing, &mut self.body.forces[0]);
         }
     }
 
     /// Finds displacements and velocities of all rows at the start of a step.
     pub(crate) fn find_rows(&mut self, disk: &mut Disk) {
-        disk.rows_of(self.body.at(0), &mut self.moved[0]);
-        disk.rows_of(self.body.velocity(), &mut self.velocity);
+        disk.rows_of(&self.body.at[0], &mut self.moved[0]);
+        disk.rows_of(&self.body.state.velocity, &mut self.velocity);
     }
 
     /// Finds displacements of all rows at the points 1 … `points` of the step.
     pub(crate) fn find_rows_at(&mut self, disk: &mut Disk, points: usize) {
         for point in 1..=points {
-            disk.rows_of(self.body.at(point), &mut self.moved[point]);
+            disk.rows_of(&self.body.at[point], &mut self.moved[point]);
         }
     }
 

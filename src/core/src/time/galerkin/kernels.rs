@@ -60,22 +60,6 @@ impl<const N: usize> Kernel for Combine<'_, N> {
     }
 }
 
-/// `to` = a + b.
-pub struct Add<'a> {
-    pub(super) a: &'a [f64],
-    pub(super) b: &'a [f64],
-    pub(super) to: &'a mut [f64],
-}
-
-impl Kernel for Add<'_> {
-    #[inline(always)]
-    fn run(self) {
-        for (to, (a, b)) in self.to.iter_mut().zip(self.a.iter().zip(self.b)) {
-            *to = a + b;
-        }
-    }
-}
-
 /// `to` = `base` − n·u for every lane.
 pub(crate) struct Withdraw<'a> {
     pub(super) base: &'a [f64],

@@ -1,6 +1,6 @@
 //! Tables of the modes of one sector for one step length.
 
-use super::basis::{MOST, POINTS, TimeBasis};
+use super::basis::{MOST, POINTS, TimeBasis, real};
 use super::compliance::{LaneCompliance, Lanes};
 use super::kernels::PADDED;
 use super::response::{ModalResponse, TERMS, by_points};
@@ -40,8 +40,7 @@ impl ContactModes {
         let lowest =
             self.frequencies.iter().copied().filter(|frequency| *frequency > 0.0).fold(f64::INFINITY, f64::min);
         let lowest = if lowest.is_finite() { lowest } else { 1.0 };
-        #[expect(clippy::cast_precision_loss, reason = "few rows")]
-        let rows = self.rows() as f64;
+        let rows = real(self.rows());
         let scale = |mode: usize| {
             let shape = self.shapes.column(mode);
             0.5 * shape.norm_squared() / rows / self.frequencies[mode].max(lowest).powi(2)
@@ -110,6 +109,22 @@ pub struct Influence {
     pub points: [[f64; POINTS]; MOST],
     /// Displacement at the end per constant modal force.
     pub constant: f64,
+}
+
+impl Influence {
+    /// Displacement at point i under forces at the points 0 … `points`.
+    pub(crate) fn displacement(
+        &self,
+        kind: ForceInterpolation,
+        i: usize,
+        points: usize,
+        force: impl Fn(usize) -> f64,
+    ) -> f64 {
+        match kind {
+            ForceInterpolation::Constant => self.constant * force(1),
+            ForceInterpolation::Polynomial => (0..=points).map(|k| self.points[i - 1][k] * force(k)).sum(),
+        }
+    }
 }
 
 /// Tables for one step length.

@@ -1,10 +1,10 @@
 //! One sector and its surfaces over a span: gaps at any time, and a record of the contacts.
 
-use super::basis::TimeBasis;
+use super::basis::{TimeBasis, real};
 use super::carrier::CarrierIntegrator;
 use super::compliance::Lanes;
 use super::level::StepTables;
-use super::record::{SpanRecord, SurfacePlace};
+use super::record::{PairRecord, SpanRecord, SurfacePlace};
 use super::surroundings::{AcceptedStep, CarriersInStep, LaneStep, Witness};
 use super::trial::{ForceInterpolation, Obstacle, SlidingState, Trial, node_by_node};
 use crate::contact::ContactParameters;
@@ -23,19 +23,18 @@ const SOLUTIONS: usize = 3;
 pub(crate) struct ObstacleView<'a> {
     /// Structures that carry the surfaces, if any.
     pub carriers: CarriersInStep<'a>,
-    /// Index of the carrier of the surface of each pair.
-    pub carrier_of: &'a [Option<usize>],
     pub pairs: &'a mut [ContactPair],
-    /// Pair of each node.
-    pub pair_of: &'a [Option<usize>],
-    /// Number of lanes of a row, and lane of the sector.
-    pub lanes: usize,
-    pub sector: usize,
     pub record: &'a mut SpanRecord,
 }
 
 impl ObstacleView<'_> {
-    /// Reads a value from the structure that carries a surface, at the place of a node and at a point of the step.
+    /// Returns the pair of a node, and its record.
+    fn pair(&self, node: usize) -> Option<(&ContactPair, &PairRecord)> {
+        let own = &self.record.pairs[self.record.pair_of[node]?];
+        Some((&self.pairs[own.pair], own))
+    }
+
+    /// Reads a value from the carrier of a surface, at the place of a node and at a point of the step.
     fn on_carrier<T>(
         &self,
         node: usize,
@@ -43,62 +42,74 @@ impl ObstacleView<'_> {
         when: SurfacePlace,
         read: impl Fn(&CarrierIntegrator, Spot) -> T,
     ) -> Option<T> {
-        let pair = self.pair_of[node]?;
-        let carrier = self.carrier_of[pair]?;
-        let index = node * self.lanes + self.sector;
-        let spot = self.record.spot(node, point, index, self.pairs, pair, when)?;
+        let (carrier, spot) = self.record.spot(node, point, when, self.pairs)?;
         Some(read(&self.carriers.carriers[carrier], spot))
     }
 
-    /// Calls `read` with the structure that carries the surface of a node, at a point of the step.
+    /// Calls `read` with the carrier of the surface of a node, at a point of the step.
     fn with_carrier_mut(&mut self, node: usize, point: usize, read: impl FnOnce(&mut CarrierIntegrator, Spot)) {
-        let Some(pair) = self.pair_of[node] else { return };
-        let Some(carrier) = self.carrier_of[pair] else { return };
-        let index = node * self.lanes + self.sector;
-        if let Some(spot) = self.record.spot(node, point, index, self.pairs, pair, SurfacePlace::Now) {
+        if let Some((carrier, spot)) = self.record.spot(node, point, SurfacePlace::Now, self.pairs) {
             read(&mut self.carriers.carriers[carrier], spot);
         }
     }
 
     /// Returns the surface carrier of a lane, and the current step.
-    fn under(&mut self, lane: usize) -> Option<(&mut CarrierIntegrator, LaneStep)> {
+    fn carrier(&mut self, lane: usize) -> Option<(&mut CarrierIntegrator, LaneStep)> {
         let CarriersInStep { carriers, step } = &mut self.carriers;
-        let carrier = self.pair_of[step.lanes.place(lane).1].and_then(|pair| self.carrier_of[pair])?;
-        Some((&mut carriers[carrier], *step))
+        let pair = self.record.pair_of[step.lanes.place(lane).1]?;
+        Some((&mut carriers[self.record.pairs[pair].carrier?], *step))
     }
 
     fn at<'b>(&self, node: usize, drive: &'b PrescribedMotion) -> At<'b> {
-        At { node, index: node * self.lanes + self.sector, drive }
+        At { node, index: self.record.index(node), drive }
+    }
+
+    /// Returns whether `holds` for the gap of any node over a step of `length` from `from` (fractions of the span), with the motion at its
+    /// start and the rotor angle (rad) at its end.
+    fn any_node(&self, from: f64, length: f64, holds: impl Fn(At, &GapLaw, f64) -> bool) -> bool {
+        self.record.pairs.iter().any(|own| {
+            let [start, end] = [from, from + length].map(|theta| own.course.at(theta).0);
+            let pair = &self.pairs[own.pair];
+            pair.nodes().iter().any(|node| holds(self.at(*node, &start), pair.gap(), end.rotor_angle))
+        })
     }
 }
 
 impl ObstacleView<'_> {
     /// Enters all nodes at all points as lanes, if they face one surface of revolution and the shaft does not move.
     fn enter_lanes(&mut self, lanes: Lanes) -> Option<usize> {
-        let pair = (*self.pair_of.first()?)?;
-        let GapLaw::Revolution(law) = self.pairs[pair].gap() else { return None };
-        for (node, other) in self.pair_of.iter().enumerate() {
-            if *other != Some(pair) {
+        let first = (*self.record.pair_of.first()?)?;
+        let PairRecord { pair, drives, .. } = &self.record.pairs[first];
+        let GapLaw::Revolution(law) = self.pairs[*pair].gap() else { return None };
+        for (node, other) in self.record.pair_of.iter().enumerate() {
+            if *other != Some(first) {
                 return None;
             }
             for point in 1..=lanes.points {
-                let drive = &self.record.drives[pair][point].0;
-                let at = At { node, index: node * self.lanes + self.sector, drive };
+                let at = self.at(node, &drives[point].0);
                 if !law.enter(at, lanes.at(point, node), &mut self.record.instants) {
                     return None;
                 }
             }
         }
-        Some(pair)
+        Some(*pair)
     }
 }
 
 impl Obstacle for ObstacleView<'_> {
     fn gap(&mut self, node: usize, point: usize, moved: Vector3) -> Gap {
-        let Some(pair) = self.pair_of[node] else { return Gap::NOTHING };
-        let at = self.at(node, &self.record.drives[pair][point].0);
-        let gap = self.pairs[pair].gap_mut().gap(at, moved, Some(self.record.places[point][node]));
+        let Some(number) = self.record.pair_of[node] else { return Gap::NOTHING };
+        let PairRecord { pair, drives, .. } = &self.record.pairs[number];
+        let at = At { node, index: self.record.index(node), drive: &drives[point].0 };
+        let gap = self.pairs[*pair].gap_mut().gap(at, moved, Some(self.record.places[point][node]));
         self.record.places[point][node] = gap.foot;
+        gap
+    }
+
+    fn gap_at_start(&mut self, node: usize, moved: Vector3) -> f64 {
+        let place = self.record.places[0][node];
+        let gap = self.gap(node, 0, moved).distance;
+        self.record.places[0][node] = place;
         gap
     }
 
@@ -112,10 +123,10 @@ impl Obstacle for ObstacleView<'_> {
     }
 
     fn gap_within(&self, node: usize, theta: f64, moved: Vector3) -> Option<f64> {
-        let pair = self.pair_of[node]?;
+        let (pair, own) = self.pair(node)?;
         let [from, length] = self.record.step;
-        let drive = self.record.courses[pair].at(from + length * theta).0;
-        match self.pairs[pair].gap() {
+        let drive = own.course.at(from + length * theta).0;
+        match pair.gap() {
             GapLaw::Fixed(law) => Some(law.gap(node, moved).distance),
             GapLaw::Revolution(law) => Some(law.gap(self.at(node, &drive), moved).distance),
             GapLaw::Spline(_) | GapLaw::Open(_) => None,
@@ -123,14 +134,16 @@ impl Obstacle for ObstacleView<'_> {
     }
 
     fn sliding(&mut self, node: usize, point: usize, sliding: &SlidingState) -> Sliding {
-        let Some(pair) = self.pair_of[node] else { return Sliding::default() };
-        let gap = self.pairs[pair].gap();
-        let at = self.at(node, &self.record.drives[pair][point].0);
+        let Some(number) = self.record.pair_of[node] else { return Sliding::default() };
+        let PairRecord { pair, drives, .. } = &self.record.pairs[number];
+        let gap = self.pairs[*pair].gap();
+        let at = self.at(node, &drives[point].0);
         if gap.slides_anywhere() {
             let known = self.record.slips[point][node].filter(|_| self.record.solutions > SOLUTIONS);
             let slip = known.unwrap_or_else(|| {
-                let carriers = self
-                    .on_carrier(node, point, SurfacePlace::Now, |casing, spot| casing.sliding_distance_at(spot, point));
+                let carriers = self.on_carrier(node, point, SurfacePlace::Now, |carrier, spot| {
+                    carrier.sliding_distance_at(spot, point)
+                });
                 sliding.sliding_distance - carriers.unwrap_or_default()
             });
             let vibration = Vibration { node: slip, ..Vibration::default() };
@@ -138,23 +151,26 @@ impl Obstacle for ObstacleView<'_> {
             self.record.slips[point][node] = Some(slip);
             Sliding { speed: over_step.speed / sliding.duration, ..over_step }
         } else {
-            let carriers = self.on_carrier(node, point, SurfacePlace::Begun, |casing, spot| casing.velocity_at(spot));
+            let carriers = self.on_carrier(node, point, SurfacePlace::Begun, |carrier, spot| carrier.velocity_at(spot));
             let vibration = Vibration { node: sliding.velocity, surface: carriers.unwrap_or_default() };
             gap.sliding(at, sliding.moved, vibration, sliding.normal)
         }
     }
 
     fn sector(&self) -> usize {
-        self.sector
+        self.record.sector
     }
 
     fn angle(&self, node: usize, point: usize, moved: Vector3) -> f64 {
-        let Some(pair) = self.pair_of[node] else { return 0.0 };
-        self.pairs[pair].gap().angle_on_casing(self.at(node, &self.record.drives[pair][point].0), moved)
+        let of = |(pair, own): (&ContactPair, &PairRecord)| {
+            pair.gap().angle_on_casing(self.at(node, &own.drives[point].0), moved)
+        };
+        self.pair(node).map_or(0.0, of)
     }
 
     fn turns(&self) -> bool {
-        self.pairs.iter().any(|pair| pair.gap().slides_anywhere() && pair.parameters().friction != 0.0)
+        let mut pairs = self.record.pairs.iter().map(|own| &self.pairs[own.pair]);
+        pairs.any(|pair| pair.gap().slides_anywhere() && pair.parameters().friction != 0.0)
     }
 
     fn prepare_compliance(&mut self, lanes: Lanes, chosen: &[bool], normals: &[f64]) -> bool {
@@ -163,43 +179,42 @@ impl Obstacle for ObstacleView<'_> {
             return false;
         }
         self.carriers.step.lanes = lanes;
-        self.carriers.carriers.iter_mut().for_each(CarrierIntegrator::clear_lanes);
+        self.carriers.carriers.iter_mut().for_each(|carrier| carrier.touches.fill(false));
         for lane in (0..lanes.len()).filter(|lane| chosen[*lane]) {
             let (point, node) = lanes.place(lane);
             let normal = lanes.vector3(normals, lane);
-            self.with_carrier_mut(node, point, |casing, spot| casing.set_lane(lane, spot, normal));
+            self.with_carrier_mut(node, point, |carrier, spot| carrier.set_lane(lane, spot, normal));
         }
         true
     }
 
     fn add_normal_compliance(&mut self, lane: usize, direction: Vector3, carrier_compliance: &mut [f64]) {
         carrier_compliance.fill(0.0);
-        if let Some((casing, step)) = self.under(lane) {
-            casing.add_normal_compliance(step, lane, direction, carrier_compliance);
+        if let Some((carrier, step)) = self.carrier(lane) {
+            carrier.add_normal_compliance(step, lane, direction, carrier_compliance);
         }
     }
 
     fn add_compliance(&mut self, lane: usize, force: Vector3, carrier_compliance: &mut [f64]) {
         carrier_compliance.fill(0.0);
-        if let Some((casing, step)) = self.under(lane) {
-            casing.add_compliance(step, lane, force, carrier_compliance);
+        if let Some((carrier, step)) = self.carrier(lane) {
+            carrier.add_compliance(step, lane, force, carrier_compliance);
         }
     }
 
     fn parameters(&self, node: usize) -> &ContactParameters {
-        self.pair_of[node].map_or(&ContactParameters::FRICTIONLESS, |pair| self.pairs[pair].parameters())
+        self.pair(node).map_or(&ContactParameters::FRICTIONLESS, |(pair, _)| pair.parameters())
     }
 
     fn drift(&self, node: usize, step_point: usize, moved: Vector3) -> Vector3 {
-        let Some(pair) = self.pair_of[node] else { return Vector3::zeros() };
-        let drives = &self.record.drives[pair];
+        let Some((pair, PairRecord { drives, .. })) = self.pair(node) else { return Vector3::zeros() };
         let ((_, before), (drive, now)) = (&drives[0], &drives[step_point]);
-        let (gap, motion) = (self.pairs[pair].gap(), now.less(before));
+        let (gap, motion) = (pair.gap(), now.less(before));
         let at = self.at(node, drive);
         let point = gap.contact_point(at, moved, self.record.places[step_point][node]);
         let (spin, shaft) = (gap.spin_motion(at, point, &motion), gap.shaft_motion(at, point, &motion));
-        let carriers = self.on_carrier(node, step_point, SurfacePlace::Now, |casing, spot| {
-            casing.moved_at(spot, step_point) - casing.moved_at(spot, 0)
+        let carriers = self.on_carrier(node, step_point, SurfacePlace::Now, |carrier, spot| {
+            carrier.moved_at(spot, step_point) - carrier.moved_at(spot, 0)
         });
         spin + shaft - carriers.unwrap_or_default()
     }
@@ -207,48 +222,32 @@ impl Obstacle for ObstacleView<'_> {
 
 impl Witness for ObstacleView<'_> {
     fn begin_step(&mut self, from: f64, length: f64, level: &StepTables, kind: ForceInterpolation) {
-        let count = if kind == ForceInterpolation::Constant { 2 } else { level.basis.count() };
-        for (drives, course) in self.record.drives.iter_mut().zip(&self.record.courses) {
-            for (point, drive) in drives[..count].iter_mut().enumerate() {
-                let theta =
-                    if kind == ForceInterpolation::Constant { [0.0, 1.0][point] } else { level.basis.points[point] };
-                *drive = course.at(from + length * theta);
-            }
+        let points: &[f64] = match kind {
+            ForceInterpolation::Constant => &[0.0, 1.0],
+            ForceInterpolation::Polynomial => &level.basis.points[..level.basis.count()],
+        };
+        for PairRecord { course, drives, .. } in &mut self.record.pairs {
+            drives.iter_mut().zip(points).for_each(|(drive, theta)| *drive = course.at(from + length * theta));
         }
         (self.record.solutions, self.record.step) = (0, [from, length]);
         self.record.slips.iter_mut().for_each(|slips| slips.fill(None));
-        self.record.lanes_of = self.enter_lanes(Lanes { points: count - 1, nodes: self.pair_of.len() });
+        self.record.lanes_of = self.enter_lanes(Lanes { points: points.len() - 1, nodes: self.record.pair_of.len() });
     }
 
     fn is_clear(&self, from: f64, length: f64, reach: &[f64]) -> bool {
-        let ends = |pair: usize| [from, from + length].map(|theta| self.record.courses[pair].at(theta).0);
-        let pairs = self.pairs.iter().enumerate().filter(|(pair, _)| self.pair_of.contains(&Some(*pair)));
-        pairs.into_iter().all(|(pair, of)| {
-            self.record.courses[pair].only_turns() && {
-                let [start, end] = ends(pair);
-                of.nodes()
-                    .iter()
-                    .all(|node| of.gap().is_clear(self.at(*node, &start), end.rotor_angle, vector3_at(reach, *node)))
-            }
-        })
+        self.record.pairs.iter().all(|own| own.course.only_turns())
+            && !self.any_node(from, length, |at, gap, end| !gap.is_clear(at, end, vector3_at(reach, at.node)))
     }
 
     fn may_come_closer(&self, from: f64, length: f64, reach: &[f64]) -> bool {
-        let pairs = self.pairs.iter().enumerate().filter(|(pair, _)| self.pair_of.contains(&Some(*pair)));
-        pairs.into_iter().any(|(pair, of)| {
-            let [start, end] = [from, from + length].map(|theta| self.record.courses[pair].at(theta).0);
-            of.nodes().iter().any(|node| {
-                let (at, reach) = (self.at(*node, &start), vector3_at(reach, *node));
-                of.gap().approach(at, end.rotor_angle, reach) > self.record.tolerance
-            })
-        })
+        let tolerance = self.record.tolerance;
+        self.any_node(from, length, |at, gap, end| gap.approach(at, end, vector3_at(reach, at.node)) > tolerance)
     }
 
     fn record_gaps(&mut self, level: &StepTables, trial: &Trial) {
-        for (node, pair) in self.pair_of.iter().enumerate() {
-            if pair.is_some() {
-                let lowest = self.lowest(trial, &level.basis, node);
-                self.record.tallies[node].lowest = lowest;
+        for node in 0..trial.nodes() {
+            if self.record.pair_of[node].is_some() {
+                self.record.tallies[node].lowest = self.lowest(trial, &level.basis, node);
             }
         }
     }
@@ -277,9 +276,9 @@ impl Witness for ObstacleView<'_> {
     fn record_step(&mut self, step: &AcceptedStep) {
         self.record.work.dropped += step.dropped;
         self.weigh_motions(step);
-        for (node, pair) in self.pair_of.iter().enumerate() {
-            let Some(pair) = *pair else { continue };
-            let points = step.trial.points();
+        let points = step.trial.points();
+        for node in 0..step.trial.nodes() {
+            let Some(pair) = self.record.pair_of[node] else { continue };
             self.record.tallies[node].lowest = self.lowest(step.trial, &step.level.basis, node);
             let comes = (1..=points).find(|i| step.trial.multiplier(*i, node) > 0.0);
             if comes.is_some_and(|i| self.was_behind(step.trial, node, pair, i)) {
@@ -291,7 +290,7 @@ impl Witness for ObstacleView<'_> {
         }
         for places in [&mut self.record.places, &mut self.record.acted] {
             let [first, rest @ ..] = places;
-            first.copy_from_slice(&rest[step.trial.points() - 1]);
+            first.copy_from_slice(&rest[points - 1]);
         }
     }
 }
@@ -306,16 +305,10 @@ impl ObstacleView<'_> {
     fn lowest(&self, trial: &Trial, basis: &TimeBasis, node: usize) -> f64 {
         let gaps = (1..=trial.points()).map(|point| trial.gap(point, node));
         let lowest = gaps.fold(self.record.tallies[node].lowest, f64::min);
-        match trial.minimum(node).filter(|_| !self.has_jumped(trial, node)) {
+        match trial.minimum(node) {
             Some(theta) => lowest.min(self.lowest_near(trial, basis, node, theta)),
             _ => lowest,
         }
-    }
-
-    /// Returns whether a held input has jumped at the start of the step and changed the gap of a node by more than the tolerance.
-    fn has_jumped(&self, trial: &Trial, node: usize) -> bool {
-        let start = self.gap_within(node, 0.0, trial.displacement(0, node));
-        start.is_some_and(|gap| (gap - trial.gap(0, node)).abs() > self.record.tolerance)
     }
 
     /// Smallest gap of a node (m) within a step, near `theta` if its motion is not known in parts.
@@ -330,10 +323,8 @@ impl ObstacleView<'_> {
             lowest = lowest.min(gap);
             gap
         };
-        #[expect(clippy::cast_precision_loss, reason = "few parts")]
-        let (parts, count) = (trial.parts() as f64, trial.parts());
-        #[expect(clippy::cast_precision_loss, reason = "few parts")]
-        let ends = (1..count).map(|part| part as f64 / parts);
+        let parts = real(trial.parts());
+        let ends = (1..trial.parts()).map(|part| real(part) / parts);
         let (mut theta, _) = ends.fold((theta, f64::INFINITY), |(best, least), theta| {
             let gap = look(theta);
             if gap < least { (theta, gap) } else { (best, least) }
@@ -354,13 +345,13 @@ impl ObstacleView<'_> {
 
     /// Returns whether a node that touches at point `i` had nothing to touch before and was behind the surface, extrapolated beyond its edge.
     fn was_behind(&self, trial: &Trial, node: usize, pair: usize, i: usize) -> bool {
-        let GapLaw::Open(open) = self.pairs[pair].gap() else { return false };
+        let GapLaw::Open(open) = self.pairs[self.record.pairs[pair].pair].gap() else { return false };
         if trial.gap(i - 1, node).is_finite() {
             return false;
         }
         let moved = trial.displacement(i, node) - trial.displacement(i - 1, node);
-        let carriers = self.on_carrier(node, i, SurfacePlace::Now, |casing, spot| {
-            casing.moved_at(spot, i) - casing.moved_at(spot, i - 1)
+        let carriers = self.on_carrier(node, i, SurfacePlace::Now, |carrier, spot| {
+            carrier.moved_at(spot, i) - carrier.moved_at(spot, i - 1)
         });
         open.was_behind(moved - carriers.unwrap_or_default(), trial.normal(i, node), trial.gap(i, node))
     }
@@ -368,7 +359,7 @@ impl ObstacleView<'_> {
     /// Computes Σ_k S_ik of the prescribed motion of a pair at the points, for each point i of the step.
     fn weigh_motions(&mut self, step: &AcceptedStep) {
         let points = 0..=step.trial.points();
-        for (motions, drives) in self.record.motions.iter_mut().zip(&self.record.drives) {
+        for PairRecord { drives, motions, .. } in &mut self.record.pairs {
             for i in points.clone() {
                 let weights = step.kind.work_weights(&step.level.basis, i);
                 let terms = points.clone().map(|k| drives[k].1.less(&drives[0].1).over(weights[k]));
@@ -381,8 +372,8 @@ impl ObstacleView<'_> {
     fn enter(&mut self, step: &AcceptedStep, node: usize, pair: usize) {
         let (trial, basis) = (step.trial, &step.level.basis);
         let (mut tally, mut work) = (self.record.tallies[node], self.record.work);
-        let (drives, motions) = (&self.record.drives[pair], &self.record.motions[pair]);
-        let (gap, slides) = (self.pairs[pair].gap(), self.pairs[pair].parameters().friction != 0.0);
+        let PairRecord { pair, drives, motions, .. } = &self.record.pairs[pair];
+        let (gap, slides) = (self.pairs[*pair].gap(), self.pairs[*pair].parameters().friction != 0.0);
         tally.peak = tally.peak.max(trial.peak(basis, step.kind, node));
         let mut heats = 0.0;
         for i in (0..=trial.points()).filter(|i| trial.multiplier(*i, node) != 0.0) {

@@ -10,7 +10,7 @@ use crate::system::contact_view::ContactMember;
 use crate::system::growth::ShapeGrowth;
 use crate::system::pair::ContactPair;
 use crate::system::work::{ContactWork, WorkingForce};
-use crate::system::{ContactEvent, StepFailure};
+use crate::system::{ContactEvent, StepFailure, Structure};
 use crate::time::galerkin::basis::{MOST, POINTS};
 use crate::time::galerkin::compliance::Lanes;
 
@@ -136,25 +136,49 @@ pub(crate) enum SurfacePlace {
     Acted,
 }
 
+/// A contact pair of the structure over a span.
+#[derive(Debug, Clone)]
+pub(crate) struct PairRecord {
+    /// Index of the pair in the system.
+    pub pair: usize,
+    /// Index of the carrier of its surface in the island.
+    pub carrier: Option<usize>,
+    /// Prescribed motion over the span.
+    pub course: MotionCourse,
+    /// Prescribed motion at the points of the tried step.
+    pub drives: [(PrescribedMotion, MotionIncrement); POINTS],
+    /// Weighted motion over which forces at each point of the accepted step do work.
+    pub motions: [MotionIncrement; POINTS],
+}
+
+impl PairRecord {
+    /// Creates the record of a pair.
+    pub fn new(pair: usize, carrier: Option<usize>) -> Self {
+        let (course, drives, motions) = Default::default();
+        Self { pair, carrier, course, drives, motions }
+    }
+}
+
 /// Data that is kept from span to span, and scratch memory; allocates only on creation.
 #[derive(Debug, Clone)]
 pub(crate) struct SpanRecord {
+    pub structure: usize,
+    pub sector: usize,
+    /// Lanes of a row of the structure.
+    pub lanes: usize,
+    /// Pairs of the structure, and the number among them of the pair of each node.
+    pub pairs: Vec<PairRecord>,
+    pub pair_of: Vec<Option<usize>>,
     /// Contact of each node over the span.
     pub tallies: Vec<NodeTally>,
     /// Work of all nodes over the span.
     pub work: ContactWork,
     /// Damping loss over the span (J).
     pub damping: f64,
-    /// Motion of each pair over the span.
-    pub courses: Vec<MotionCourse>,
     /// Start and length of the tried step, as fractions of the span.
     pub step: [f64; 2],
     /// Gaps within free flight are searched if they may be smaller than at its ends by more than this (m).
     pub tolerance: f64,
-    /// Prescribed motion at the points of the tried step, for each pair.
-    pub drives: Vec<[(PrescribedMotion, MotionIncrement); POINTS]>,
-    /// Weighted motion over which forces at each point of the accepted step do work, for each pair.
-    pub motions: Vec<[MotionIncrement; POINTS]>,
     pub places: [Vec<ClosestPoint>; POINTS],
     /// Places at which forces were applied to surface carriers: those of the pass before the one in which the gaps converged.
     pub acted: [Vec<ClosestPoint>; POINTS],
@@ -171,17 +195,21 @@ pub(crate) struct SpanRecord {
 }
 
 impl SpanRecord {
-    /// Allocates data for `nodes` nodes and `pairs` pairs, with errors of `tolerance` (m).
-    pub fn new(nodes: usize, pairs: usize, tolerance: f64) -> Self {
+    /// Allocates data for the first sector of a structure with these pairs, with errors of `tolerance` (m).
+    pub fn new(structure: usize, of: &Structure, pairs: Vec<PairRecord>, tolerance: f64) -> Self {
+        let nodes = of.nodes();
+        let number = |pair: &Option<usize>| pairs.iter().position(|own| Some(own.pair) == *pair);
         Self {
+            structure,
+            sector: 0,
+            lanes: of.lanes(),
+            pair_of: of.pair_of.iter().map(number).collect(),
+            pairs,
             step: [0.0; 2],
             tolerance,
             tallies: vec![NodeTally::NOTHING; nodes],
             work: ContactWork::default(),
             damping: 0.0,
-            courses: vec![MotionCourse::default(); pairs],
-            drives: vec![[<(PrescribedMotion, MotionIncrement)>::default(); POINTS]; pairs],
-            motions: vec![[MotionIncrement::default(); POINTS]; pairs],
             places: std::array::from_fn(|_| vec![ClosestPoint::default(); nodes]),
             acted: std::array::from_fn(|_| vec![ClosestPoint::default(); nodes]),
             slips: std::array::from_fn(|_| vec![None; nodes]),
@@ -193,22 +221,26 @@ impl SpanRecord {
         }
     }
 
-    /// Returns the location of a node on the surface of a carrier, at a point of the step.
+    /// Index of a node of the sector among all lanes of the structure.
+    pub(crate) fn index(&self, node: usize) -> usize {
+        node * self.lanes + self.sector
+    }
+
+    /// Returns the carrier of the surface of a node, and the location of the node on it at a point of the step.
     pub(crate) fn spot<'a>(
         &self,
         node: usize,
         point: usize,
-        index: usize,
-        pairs: &'a [ContactPair],
-        pair: usize,
         when: SurfacePlace,
-    ) -> Option<Spot<'a>> {
+        pairs: &'a [ContactPair],
+    ) -> Option<(usize, Spot<'a>)> {
+        let own = &self.pairs[self.pair_of[node]?];
         let place = match when {
             SurfacePlace::Begun => self.places[0][node],
             SurfacePlace::Now => self.places[point][node],
             SurfacePlace::Acted => self.acted[point][node],
         };
-        pairs[pair].spot(index, place, self.drives[pair][point].0.rotor_angle)
+        Some((own.carrier?, pairs[own.pair].spot(self.index(node), place, own.drives[point].0.rotor_angle)?))
     }
 
     /// Stores that the force on a node at a point of the step was applied at the node's current place.
@@ -216,8 +248,9 @@ impl SpanRecord {
         self.acted[point][node] = self.places[point][node];
     }
 
-    /// Returns the failure that ends a span of this structure and sector, if any.
-    pub fn check(&self, structure: usize, sector: usize) -> Result<(), StepFailure> {
+    /// Returns the failure that ends a span, if any.
+    pub fn check(&self) -> Result<(), StepFailure> {
+        let Self { structure, sector, .. } = *self;
         if self.implausible {
             return Err(StepFailure::Implausible { structure, sector });
         }
@@ -226,8 +259,9 @@ impl SpanRecord {
 
     /// Sets the prescribed motion of a span (s); the pairs are at its end.
     pub(crate) fn begin_courses(&mut self, pairs: &[ContactPair], span: f64) {
-        for (course, pair) in self.courses.iter_mut().zip(pairs) {
-            *course = MotionCourse::new(pair.drive_before(), &pair.middle.0, pair.middle.1, pair.drive_now(), span);
+        for own in &mut self.pairs {
+            let pair = &pairs[own.pair];
+            own.course = MotionCourse::new(pair.drive_before(), &pair.middle.0, pair.middle.1, pair.drive_now(), span);
         }
     }
 
@@ -237,16 +271,15 @@ impl SpanRecord {
         rest.iter_mut().for_each(|places| places.copy_from_slice(first));
     }
 
-    /// Starts the span of a sector with these places and gaps (m) of its nodes. The search for the closest points of the first
+    /// Starts the span of a sector with the places and gaps (m) of its nodes at their indices. The search for the closest points of the first
     /// step also starts there, because the places of earlier trials are not part of a saved state.
     pub fn begin(&mut self, place_of: impl Fn(usize) -> ClosestPoint, gap_of: impl Fn(usize) -> f64) {
-        for (node, place) in self.places[0].iter_mut().enumerate() {
-            *place = place_of(node);
+        for node in 0..self.tallies.len() {
+            let index = self.index(node);
+            self.places[0][node] = place_of(index);
+            self.tallies[node] = NodeTally { lowest: gap_of(index), ..NodeTally::NOTHING };
         }
         self.guess_start_places();
-        for (node, tally) in self.tallies.iter_mut().enumerate() {
-            *tally = NodeTally { lowest: gap_of(node), ..NodeTally::NOTHING };
-        }
         (self.work, self.damping) = (ContactWork::default(), 0.0);
         (self.implausible, self.behind_edge) = (false, None);
     }

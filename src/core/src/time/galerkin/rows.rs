@@ -141,12 +141,8 @@ impl ContactRows {
         self.add_up(&self.by_mode, [&state.position, &state.velocity], [one, two]);
     }
 
-    /// Adds the largest displacement of each row from rest (m) at any time without contact: the summed amplitudes of all modes.
-    pub(crate) fn add_largest_displacements(&self, state: &SectorState, sums: &mut Sums<1>) {
-        self.unresolved_amplitudes(f64::INFINITY, state, sums);
-    }
-
-    /// Sums the amplitudes of the modes that turn by more than `RESOLVED` within a step of this length (s), as displacements of the rows (m).
+    /// Sums the amplitudes of the modes that turn by more than `RESOLVED` within a step of this length (s), as displacements of the rows (m):
+    /// for an infinite length, the largest displacements from rest at any time without contact.
     pub(crate) fn unresolved_amplitudes(&self, step: f64, state: &SectorState, sums: &mut Sums<1>) {
         let [amplitudes] = &mut sums.coefficients;
         let modes = self.rates.iter().zip(state.position.iter().zip(&state.velocity));
@@ -199,7 +195,7 @@ mod tests {
             state.position.iter_mut().for_each(|q| *q = random.signed());
             state.velocity.iter_mut().for_each(|v| *v = 3e3 * random.signed());
             let (mut reach, mut now) = (Sums::new(count, 1), Sums::new(count, 1));
-            rows.add_largest_displacements(&state, &mut reach);
+            rows.unresolved_amplitudes(f64::INFINITY, &state, &mut reach);
             let (reach, mut advance) = (reach.vector3(0, 0, 1), Advance::new(count, 1));
             let mut most = [0.0_f64; 3];
             for _ in 0..1500 {

@@ -7,7 +7,7 @@ use super::disk::CoupledDisk;
 use super::flight::FreeFlight;
 use super::island::{Island, IslandSector, StepControl};
 use super::obstacle_view::ObstacleView;
-use super::record::SpanRecord;
+use super::record::{PairRecord, SpanRecord};
 use super::span::{StepGoal, Stopped};
 use super::state::SectorState;
 use super::surroundings::{CarriersInStep, Surroundings};
@@ -21,20 +21,13 @@ use crate::system::contact_view::ContactMember;
 use crate::system::work::ContactWork;
 use crate::system::{ContactPair, StepFailure, Structure, System};
 use nalgebra::DMatrix;
+use std::mem::take;
 
 /// Contacts count as closed within this fraction of the tolerance.
 const PRECISION: f64 = 1e-4;
 /// Trials of several sectors end at this fraction of the closed-gap precision, because other sectors have moved since; the last pass of
 /// a single sector is exact except for curvature.
 const CLOSE: f64 = 1e-2;
-
-/// A sector of a structure in an island.
-#[derive(Debug, Clone)]
-struct Member {
-    structure: usize,
-    sector: usize,
-    record: SpanRecord,
-}
 
 /// An island of a scene. The uncoupled sectors of one structure take turns in one island, because their tables are the same.
 #[derive(Debug, Clone)]
@@ -43,11 +36,9 @@ pub(crate) struct SceneIsland {
     set: usize,
     island: Island,
     /// One for each sector of the island.
-    members: Vec<Member>,
+    records: Vec<SpanRecord>,
     /// Number of sectors that take turns.
     turns: usize,
-    /// Index of the carrier of the surface of each pair.
-    carrier_of: Vec<Option<usize>>,
     goal: StepGoal,
     /// Free flight of each kind of a single sector.
     flights: Vec<FreeFlight>,
@@ -57,8 +48,7 @@ pub(crate) struct SceneIsland {
 struct SceneSurroundings<'a> {
     structures: &'a mut [Structure],
     pairs: &'a mut [ContactPair],
-    members: &'a mut [Member],
-    carrier_of: &'a [Option<usize>],
+    records: &'a mut [SpanRecord],
 }
 
 impl Surroundings for SceneSurroundings<'_> {
@@ -68,24 +58,15 @@ impl Surroundings for SceneSurroundings<'_> {
         Self: 'a;
 
     fn surfaces<'a>(&'a mut self, sector: usize, carriers: CarriersInStep<'a>) -> ObstacleView<'a> {
-        let Member { structure, sector, record } = &mut self.members[sector];
-        let structure = &self.structures[*structure];
-        ObstacleView {
-            carriers,
-            carrier_of: self.carrier_of,
-            pairs: self.pairs,
-            pair_of: &structure.pair_of,
-            lanes: structure.lanes(),
-            sector: *sector,
-            record,
-        }
+        ObstacleView { carriers, pairs: self.pairs, record: &mut self.records[sector] }
     }
 
     fn bend(&mut self, carriers: &[CarrierIntegrator], point: usize) {
-        for (number, pair) in self.pairs.iter_mut().enumerate() {
-            let Some(carrier) = self.carrier_of[number].map(|carrier| &carriers[carrier]) else { continue };
-            let Some(one) = self.members.iter().find(|one| one.structure == pair.structure()) else { continue };
-            pair.bend(one.record.drives[number][point].0.shape_factor, carrier.moved(point));
+        // The sectors of a structure share its pairs.
+        let own = self.records.iter().filter(|record| record.sector == 0).flat_map(|record| &record.pairs);
+        for PairRecord { pair, carrier, drives, .. } in own {
+            let rows = carrier.map_or(&[][..], |carrier| carriers[carrier].moved(point));
+            self.pairs[*pair].bend(drives[point].0.shape_factor, rows);
         }
     }
 
@@ -95,87 +76,62 @@ impl Surroundings for SceneSurroundings<'_> {
 }
 
 impl SceneIsland {
-    /// Creates an island for the sectors of a structure that are uncoupled and touch rigid surfaces, for spans up to `longest` (s) and errors of `tolerance` (m). `None` if the sectors are coupled.
-    pub fn single(set: usize, structure: usize, system: &System, longest: f64, tolerance: f64) -> Option<Self> {
-        let (System { structures, pairs, .. }, solver) = (system, system.settings.solver);
-        let of = &structures[structure];
-        let bank = of.bank()?;
-        let kinds = kinds_of(of.modes());
-        let flights = kinds.iter().map(FreeFlight::new).collect();
-        let tables = |kind: ContactModes| {
-            let degree = kind.degree_up_to(longest);
-            if solver.sticks() { Tables::of_degree(kind, 1).steady(degree) } else { Tables::of_degree(kind, degree) }
-        };
-        let size = [bank.model().inertial_modes(), of.nodes()];
-        let sector = IslandSector::new([0; 2], None, size, solver);
-        let own = pairs.iter().filter(|pair| pair.structure() == structure);
-        let rounding = own.map(|pair| pair.gap().rounding()).fold(0.0, f64::max);
-        Some(Self {
-            set,
-            island: Island::new(
-                vec![kinds.into_iter().map(tables).collect()],
-                vec![if solver.sticks() { sector.steady() } else { sector }],
-            ),
-            members: vec![Member { structure, sector: 0, record: SpanRecord::new(of.nodes(), pairs.len(), tolerance) }],
-            turns: of.modes().sectors(),
-            carrier_of: vec![None; pairs.len()],
-            goal: StepGoal { tolerance, precision: (PRECISION * tolerance).max(rounding), most: u64::MAX },
-            flights,
-        })
-    }
-
-    /// Creates the island of a set of structures that move each other, for spans up to `longest` (s)
-    /// and errors of `tolerance` (m).
-    pub fn coupled(set: usize, members: &[usize], system: &System, longest: f64, tolerance: f64) -> Self {
-        let (System { structures, pairs, .. }, solver) = (system, system.settings.solver);
-        let touching: Vec<usize> = members.iter().copied().filter(|one| structures[*one].nodes() > 0).collect();
-        let carrying: Vec<usize> = members.iter().copied().filter(|one| structures[*one].nodes() == 0).collect();
+    /// Creates the island of a set of structures, for spans up to `longest` (s) and errors within the fraction `tolerance` of the smallest
+    /// clearance of the set. The sectors of a structure that are uncoupled and touch rigid surfaces take turns.
+    pub fn new(set: usize, system: &System, longest: f64, tolerance: f64) -> Self {
+        let (System { structures, pairs, sets, .. }, solver) = (system, system.settings.solver);
+        let own = || sets.pairs(set).iter().map(|pair| (*pair, &pairs[*pair]));
+        let tolerance = tolerance * own().map(|(_, pair)| pair.gap().clearance()).fold(f64::INFINITY, f64::min);
+        let rounding = own().map(|(_, pair)| pair.gap().rounding()).fold(0.0, f64::max);
+        let (touching, carrying): (Vec<usize>, Vec<usize>) =
+            sets.members(set).iter().partition(|member| structures[**member].nodes() > 0);
+        let takes_turns = carrying.is_empty() && structures[touching[0]].bank().is_some();
         let kinds: Vec<Vec<ContactModes>> = touching.iter().map(|one| kinds_of(structures[*one].modes())).collect();
         let banks: Vec<&ModalBank> = carrying.iter().filter_map(|one| structures[*one].bank()).collect();
         let degree = |modes: &ContactModes| if solver.sticks() { 1 } else { modes.degree_up_to(longest) };
         let carried = banks.iter().map(|bank| degree(&coordinates(bank).seen_at(&bank.model().contact_modes)));
-        let degree = kinds.iter().flatten().map(degree).chain(carried).min().unwrap_or(MOST);
-        let own = pairs.iter().filter(|pair| touching.contains(&pair.structure()));
-        let rounding = own.map(|pair| pair.gap().rounding()).fold(0.0, f64::max);
+        let common = kinds.iter().flatten().map(degree).chain(carried).min().unwrap_or(MOST);
         let nodes = touching.iter().map(|one| structures[*one].nodes()).max().unwrap_or(0);
         let lanes = Lanes { points: MOST, nodes };
         let carriers: Vec<CarrierIntegrator> =
-            carrying.iter().zip(banks).map(|(one, bank)| CarrierIntegrator::new(*one, bank, degree, lanes)).collect();
-        let place = |structure: usize| carriers.iter().position(|carrier| carrier.structure == structure);
+            carrying.iter().zip(banks).map(|(one, bank)| CarrierIntegrator::new(*one, bank, common, lanes)).collect();
         let disk = |one: &usize| {
             let bank = structures[*one].modes();
-            bank.disk().map(|disk| CoupledDisk::new(*one, bank, disk, degree))
+            bank.disk().map(|disk| CoupledDisk::new(*one, bank, disk, common))
         };
         let disks: Vec<CoupledDisk> = touching.iter().filter_map(disk).collect();
-        let (mut sectors, mut members) = (Vec::new(), Vec::new());
+        let flights = if takes_turns { kinds[0].iter().map(FreeFlight::new).collect() } else { Vec::new() };
+        let of_kind = |kind: ContactModes| match (takes_turns, solver.sticks()) {
+            (false, _) => Tables::of_degree(kind, common),
+            (true, false) => Tables::new(kind, longest),
+            (true, true) => Tables::with_steady(kind, longest),
+        };
+        let tables: Vec<Vec<Tables>> =
+            kinds.into_iter().map(|kinds| kinds.into_iter().map(of_kind).collect()).collect();
+        let (mut sectors, mut records) = (Vec::new(), Vec::new());
         for (number, structure) in touching.iter().copied().enumerate() {
             let of = &structures[structure];
             let disk = disks.iter().position(|disk| disk.structure == structure);
-            for sector in 0..of.modes().sectors() {
+            let carrier = |pair: &ContactPair| pair.carrier().map(|carrier| carrier.structure);
+            let place = |pair| carriers.iter().position(|one| Some(one.structure) == carrier(pair));
+            let pairs = own().filter(|(_, pair)| pair.structure() == structure);
+            let pairs = pairs.map(|(index, pair)| PairRecord::new(index, place(pair))).collect();
+            let record = SpanRecord::new(structure, of, pairs, tolerance);
+            for sector in 0..if takes_turns { 1 } else { of.modes().sectors() } {
                 let kind = of.bank().map_or(0, |bank| bank.set_of(sector));
-                let one = IslandSector::new(
-                    [number, kind],
-                    disk.map(|disk| (disk, sector)),
-                    [kinds[number][kind].len(), of.nodes()],
-                    solver,
-                );
-                sectors.push(one);
-                let record = SpanRecord::new(of.nodes(), pairs.len(), tolerance);
-                members.push(Member { structure, sector, record });
+                let disk = disk.map(|disk| (disk, sector));
+                sectors.push(IslandSector::new([number, kind], disk, &tables, solver));
+                records.push(SpanRecord { sector, ..record.clone() });
             }
         }
-        let made = |kinds: Vec<ContactModes>| kinds.into_iter().map(|kind| Tables::of_degree(kind, degree)).collect();
-        let carrier_of = pairs.iter().map(|pair| place(pair.carrier()?.structure)).collect();
-        let mut island = Island::new(kinds.into_iter().map(made).collect(), sectors);
-        (island.disks, island.carriers) = (disks, carriers);
+        let precision = if takes_turns { PRECISION } else { CLOSE * PRECISION };
         Self {
             set,
-            island,
-            members,
-            turns: 1,
-            carrier_of,
-            goal: StepGoal { tolerance, precision: (CLOSE * PRECISION * tolerance).max(rounding), most: u64::MAX },
-            flights: Vec::new(),
+            island: Island::new(tables, sectors, disks, carriers),
+            records,
+            turns: if takes_turns { structures[touching[0]].modes().sectors() } else { 1 },
+            goal: StepGoal { tolerance, precision: (precision * tolerance).max(rounding), most: u64::MAX },
+            flights,
         }
     }
 
@@ -186,7 +142,7 @@ impl SceneIsland {
 
     /// First structure of the island.
     pub(crate) fn first_structure(&self) -> usize {
-        self.members[0].structure
+        self.records[0].structure
     }
 
     /// Fills the tables for spans of length `span` (s).
@@ -200,7 +156,7 @@ impl SceneIsland {
     /// [`StepFailure`]; the state is then undefined.
     pub fn integrate(&mut self, system: &mut System, span: f64, most_tried: u64) -> Result<(), StepFailure> {
         system.sets.members(self.set).iter().for_each(|one| system.structures[*one].begin_span());
-        self.members.iter_mut().for_each(|one| one.record.begin_courses(&system.pairs, span));
+        self.records.iter_mut().for_each(|record| record.begin_courses(&system.pairs, span));
         (0..self.turns).try_for_each(|turn| self.take_turn(turn, system, span, most_tried))
     }
 
@@ -210,22 +166,22 @@ impl SceneIsland {
         let System { structures, pairs, events, counted, .. } = system;
         self.read(structures);
         let goal = StepGoal { most: most_tried, ..self.goal };
-        let Self { island, members, carrier_of, .. } = &mut *self;
-        let mut surroundings = SceneSurroundings { structures, pairs, members, carrier_of };
+        let Self { island, records, .. } = &mut *self;
+        let mut surroundings = SceneSurroundings { structures, pairs, records };
         let outcome = island.begin(&mut surroundings, goal).integrate(&mut counted.effort);
         let load_work = self.write(structures);
-        self.members.iter().try_for_each(|one| one.record.check(one.structure, one.sector))?;
+        self.records.iter().try_for_each(SpanRecord::check)?;
         outcome.map_err(|stopped| self.failure(stopped))?;
         let ledger = &mut counted.ledgers[self.set];
         if !self.island.carriers.is_empty() {
             ledger.load_work.add(load_work);
             ledger.turnover.add(load_work.abs());
         }
-        for Member { structure, sector, record } in &self.members {
+        for record in &self.records {
             let ContactWork { shaft, whirl, shift, casing, .. } = record.work;
             let turnover = shaft.abs() + whirl.abs() + shift.abs() + casing.abs();
             ContactWork { turnover, ..record.work }.enter(ledger);
-            let (structure, sector, of) = (*structure, *sector, &structures[*structure]);
+            let (structure, sector, of) = (record.structure, record.sector, &structures[record.structure]);
             let contacts = of.pair_of.iter().zip(&record.tallies).enumerate();
             events.now.extend(contacts.filter_map(|(node, (pair, tally))| {
                 let at = ContactMember { structure, pair: (*pair)?, node, sector, index: of.index(node, sector) };
@@ -238,23 +194,22 @@ impl SceneIsland {
     /// Selects the sector whose turn it is.
     fn aim(&mut self, turn: usize, structures: &[Structure]) {
         if self.is_single() {
-            self.members[0].sector = turn;
-            let bank = structures[self.members[0].structure].bank();
+            self.records[0].sector = turn;
+            let bank = structures[self.records[0].structure].bank();
             self.island.sectors[0].table[1] = bank.map_or(0, |bank| bank.set_of(turn));
         }
     }
 
     /// Reads the state of the structures before a span.
     fn read(&mut self, structures: &mut [Structure]) {
-        for (one, Member { structure, sector, record }) in self.island.sectors.iter_mut().zip(&mut self.members) {
-            let structure = &structures[*structure];
-            structure.read_contacts(*sector, &mut one.state);
+        for (one, record) in self.island.sectors.iter_mut().zip(&mut self.records) {
+            let (structure, sector) = (&structures[record.structure], record.sector);
+            structure.read_contacts(sector, &mut one.state);
             if let Some(bank) = structure.bank() {
-                bank.read_sector(*sector, &mut one.state.position, &mut one.state.velocity);
+                bank.read_sector(sector, &mut one.state.position, &mut one.state.velocity);
             }
-            let (places, lanes) = (&structure.history.geometry.before, structure.lanes());
-            let gaps = &structure.history.gap.before;
-            record.begin(|node| places.place_at(node * lanes + *sector), |node| gaps[node * lanes + *sector]);
+            let (places, gaps) = (&structure.history.geometry.before, &structure.history.gap.before);
+            record.begin(|index| places.place_at(index), |index| gaps[index]);
         }
         for disk in &mut self.island.disks {
             let structure = &mut structures[disk.structure];
@@ -263,12 +218,12 @@ impl SceneIsland {
         }
         for carrier in &mut self.island.carriers {
             let Some(bank) = structures[carrier.structure].bank() else { continue };
-            let dynamic = carrier.body.coordinates().inertia.iter().filter(|inertia| **inertia > 0.0).count();
-            let [position, velocity] = carrier.body.state_mut();
+            let dynamic = carrier.body.coordinates.inertia.iter().filter(|inertia| **inertia > 0.0).count();
+            let SectorState { position, velocity, .. } = &mut carrier.body.state;
             bank.read_sector(0, &mut position[..dynamic], &mut velocity[..dynamic]);
-            bank.read_loads(carrier.body.loads_mut());
+            bank.read_loads(&mut carrier.body.loads);
         }
-        let Member { structure, sector, .. } = self.members[0];
+        let SpanRecord { structure, sector, .. } = self.records[0];
         let control = &structures[structure].step_control;
         self.island.control = StepControl {
             bank: control.bank[sector],
@@ -281,32 +236,32 @@ impl SceneIsland {
     fn write(&mut self, structures: &mut [Structure]) -> f64 {
         let mut load_work = 0.0;
         let Island { sectors, tables, control, disks, carriers, .. } = &mut self.island;
-        for (one, Member { structure, sector, record }) in sectors.iter_mut().zip(&self.members) {
-            let structure = &mut structures[*structure];
-            structure.write_contacts(*sector, &one.state, |node| record.tallies[node].lowest);
+        for (one, record) in sectors.iter_mut().zip(&self.records) {
+            let (structure, sector) = (&mut structures[record.structure], record.sector);
+            structure.write_contacts(sector, &one.state, |node| record.tallies[node].lowest);
             let of = &mut structure.step_control;
-            (of.bank[*sector], of.largest[*sector]) = (control.bank, control.largest);
-            of.level[*sector] = control.level as u64;
+            (of.bank[sector], of.largest[sector]) = (control.bank, control.largest);
+            of.level[sector] = control.level as u64;
             if one.disk.is_none() {
                 let (bank, (moved, state)) = (&mut structure.modes, one.displacements(tables));
-                bank.write_sector(*sector, &state.position, &state.velocity, &state.forces, moved);
-                bank.lose(*sector, record.damping);
+                bank.write_sector(sector, &state.position, &state.velocity, &state.forces, moved);
+                bank.lose(sector, record.damping);
             }
         }
         for disk in disks {
             let bank = &mut structures[disk.structure].modes;
-            bank.write_all(disk.body.at(0), disk.body.velocity(), &[]);
-            bank.lose(0, disk.body.collect_loss());
+            bank.write_all(&disk.body.at[0], &disk.body.state.velocity, &[]);
+            bank.lose(0, take(&mut disk.body.loss));
         }
         for carrier in carriers {
             let structure = &mut structures[carrier.structure];
-            structure.delayed.copy_from_slice(carrier.body.forces_mut(0));
+            structure.delayed.copy_from_slice(&carrier.body.forces[0]);
             let bank = &mut structure.modes;
             let rows = &carrier.moved(0)[..bank.rows()];
-            bank.write_all(carrier.body.at(0), carrier.body.velocity(), rows);
-            bank.lose(0, carrier.body.collect_loss());
+            bank.write_all(&carrier.body.at[0], &carrier.body.state.velocity, rows);
+            bank.lose(0, take(&mut carrier.body.loss));
             bank.begin_loads();
-            load_work += carrier.body.collect_load_work();
+            load_work += take(&mut carrier.body.load_work);
         }
         load_work
     }
@@ -316,8 +271,8 @@ impl SceneIsland {
         let Some((index, is_lost)) = self.island.failed.filter(|_| stopped == Stopped::Unsolved) else {
             return if stopped == Stopped::Exhausted { StepFailure::Exhausted } else { StepFailure::NonFinite };
         };
-        let Member { structure, sector, .. } = self.members[index];
-        match self.island.sectors[index].entered() {
+        let SpanRecord { structure, sector, .. } = self.records[index];
+        match self.island.sectors[index].trial.entered() {
             // The node is far from the surface.
             _ if is_lost => StepFailure::Implausible { structure, sector },
             // A node that had nothing to touch before is now inside an open surface.
@@ -409,13 +364,10 @@ impl Structure {
             let index = self.index(node, sector);
             state.multipliers[node] = self.history.multiplier[index];
             state.gaps[node] = self.history.gap.before[index];
-            let normal = self.vector3(&self.step_control.normals, node, sector);
-            let force = self.vector3(&self.history.force.now, node, sector);
-            set_vector3_at(&mut state.normals, node, normal);
-            set_vector3_at(&mut state.forces, node, force);
-        }
-        for (row, slope) in state.slopes.iter_mut().enumerate() {
-            *slope = self.step_control.slopes[row * self.lanes() + sector];
+            let (normals, slopes) = (&self.step_control.normals, &self.step_control.slopes);
+            set_vector3_at(&mut state.normals, node, self.vector3(normals, node, sector));
+            set_vector3_at(&mut state.slopes, node, self.vector3(slopes, node, sector));
+            set_vector3_at(&mut state.forces, node, self.vector3(&self.history.force.now, node, sector));
         }
         state.gaps_known = true;
     }
@@ -423,9 +375,6 @@ impl Structure {
     /// Writes the contacts of a sector after a span, and the smallest gap of each node during the span (m).
     pub(crate) fn write_contacts(&mut self, sector: usize, state: &SectorState, lowest: impl Fn(usize) -> f64) {
         let lanes = self.lanes();
-        for (row, slope) in state.slopes.iter().enumerate() {
-            self.step_control.slopes[row * lanes + sector] = *slope;
-        }
         for node in 0..self.nodes() {
             let index = self.index(node, sector);
             self.history.multiplier[index] = state.multipliers[node];
@@ -433,6 +382,7 @@ impl Structure {
             let first = 3 * node * lanes + sector;
             set_strided_vector3(&mut self.history.force.now, first, lanes, vector3_at(&state.forces, node));
             set_strided_vector3(&mut self.step_control.normals, first, lanes, vector3_at(&state.normals, node));
+            set_strided_vector3(&mut self.step_control.slopes, first, lanes, vector3_at(&state.slopes, node));
         }
     }
 }

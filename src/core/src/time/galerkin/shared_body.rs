@@ -2,7 +2,6 @@
 
 use super::advance::Advance;
 use super::basis::{MOST, POINTS, TimeBasis};
-use super::level::Influence;
 use super::span::SpanStep;
 use super::state::SectorState;
 use super::tables::Tables;
@@ -13,24 +12,29 @@ use nalgebra::DMatrix;
 /// State, tables and scratch memory of a body; allocates only on creation.
 #[derive(Debug, Clone)]
 pub struct SharedBody {
-    coordinates: Coordinates,
-    tables: Tables,
-    state: SectorState,
+    /// Modes of the body.
+    pub coordinates: Coordinates,
+    /// Tables of the modes with inertia.
+    pub tables: Tables,
+    /// Current q and q̇; the caller sets them for modes with inertia.
+    pub state: SectorState,
     advance: Advance,
     /// Modal forces at points 0 … s.
-    forces: [Vec<f64>; POINTS],
+    pub forces: [Vec<f64>; POINTS],
     /// Coefficients of θᵃ of the forces on modes with inertia.
     polynomial: [Vec<f64>; MOST],
-    /// Coordinates at points 1 … s without forces, and at points 0 … s with forces.
+    /// Coordinates at points 1 … s of the tried step without forces.
     free: [Vec<f64>; MOST],
-    at: [Vec<f64>; POINTS],
+    /// Coordinates at points 0 … s with the forces there.
+    pub at: [Vec<f64>; POINTS],
     /// Modal loads of modes with inertia, without contact forces: at the start and the end of the span, with linear
     /// interpolation, and at the points of the step. Empty without loads.
-    loads: [Vec<f64>; 2],
+    pub loads: [Vec<f64>; 2],
     loads_at: [Vec<f64>; POINTS],
-    /// Damping loss and work of loads since the last collection (J).
-    loss: f64,
-    load_work: f64,
+    /// Damping loss since the owner has collected it (J).
+    pub loss: f64,
+    /// Work of loads since the owner has collected it (J).
+    pub load_work: f64,
 }
 
 impl SharedBody {
@@ -58,60 +62,15 @@ impl SharedBody {
     /// Enables modal loads in addition to contact forces.
     #[must_use]
     pub fn loaded(mut self) -> Self {
-        let count = self.len();
+        let count = self.coordinates.inertia.len();
         let [start, end] = &mut self.loads;
         [start, end].into_iter().chain(&mut self.loads_at).for_each(|loads| loads.resize(count, 0.0));
         self
     }
 
-    /// Modal loads at the start and the end of the span.
-    pub fn loads_mut(&mut self) -> &mut [Vec<f64>; 2] {
-        &mut self.loads
-    }
-
     /// Fills the tables for spans of length `span` (s).
     pub fn set_span(&mut self, span: f64) {
         self.tables.set_span(span);
-    }
-
-    /// Number of coordinates.
-    pub fn len(&self) -> usize {
-        self.coordinates.inertia.len()
-    }
-
-    /// Returns whether there are no coordinates.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// Returns the coordinates of the body.
-    pub fn coordinates(&self) -> &Coordinates {
-        &self.coordinates
-    }
-
-    /// Current q and q̇; the caller sets them for modes with inertia.
-    pub(crate) fn state_mut(&mut self) -> [&mut [f64]; 2] {
-        [&mut self.state.position, &mut self.state.velocity]
-    }
-
-    /// Current q̇.
-    pub fn velocity(&self) -> &[f64] {
-        &self.state.velocity
-    }
-
-    /// Modal forces at point 0 … s.
-    pub(crate) fn forces_mut(&mut self, point: usize) -> &mut [f64] {
-        &mut self.forces[point]
-    }
-
-    /// Coordinates at point 0 … s of the tried step, under the forces there.
-    pub fn at(&self, point: usize) -> &[f64] {
-        &self.at[point]
-    }
-
-    /// Displacement of the coordinates at the points per force at the points.
-    pub fn influence(&self, level: usize) -> &[Influence] {
-        &self.tables.levels[level].influence
     }
 
     /// Sets the state of modes without inertia to zero.
@@ -134,19 +93,13 @@ impl SharedBody {
         self.find_loads(step, kind);
         let Self { coordinates, tables, state, free, loads_at, .. } = self;
         let table = &tables.levels[step.level];
-        let degree = table.basis.degree;
-        let points = if kind == ForceInterpolation::Constant { degree - 1..degree } else { 0..degree };
+        let points = kind.last_points(&table.basis);
         for (point, (free, [a, b])) in free.iter_mut().zip(&table.modes.points[points]).enumerate() {
             let modes = a.iter().zip(b).zip(state.position.iter().zip(&state.velocity));
             free.iter_mut().zip(modes).for_each(|(free, ((a, b), (q, v)))| *free = a * q + b * v);
-            for (mode, load) in loads_at[0].iter().enumerate() {
-                let influence = &table.influence[mode];
-                let pushed = match kind {
-                    ForceInterpolation::Constant => influence.constant * load,
-                    ForceInterpolation::Polynomial => {
-                        (0..=degree).map(|k| influence.points[point][k] * loads_at[k][mode]).sum()
-                    }
-                };
+            for mode in 0..loads_at[0].len() {
+                let load = |k: usize| loads_at[k][mode];
+                let pushed = table.influence[mode].displacement(kind, point + 1, table.basis.degree, load);
                 free[mode] += coordinates.inertia[mode] * pushed;
             }
         }
@@ -181,16 +134,11 @@ impl SharedBody {
     pub fn push(&mut self, level: usize, kind: ForceInterpolation) {
         let Self { coordinates, tables, forces, free, at, .. } = self;
         let table = &tables.levels[level];
-        let points = if kind == ForceInterpolation::Constant { 1 } else { table.basis.degree };
+        let points = kind.points(&table.basis);
         for i in 1..=points {
             let (target, free) = (&mut at[i], &free[i - 1]);
             for (mode, target) in target.iter_mut().enumerate() {
-                let influence = &table.influence[mode];
-                let pushed = if kind == ForceInterpolation::Constant {
-                    influence.constant * forces[1][mode]
-                } else {
-                    (0..=points).map(|k| influence.points[i - 1][k] * forces[k][mode]).sum()
-                };
+                let pushed = table.influence[mode].displacement(kind, i, points, |k| forces[k][mode]);
                 *target =
                     free[mode] + coordinates.inertia[mode] * pushed + coordinates.softness[mode] * forces[i][mode];
             }
@@ -203,7 +151,7 @@ impl SharedBody {
         let Self { coordinates, tables, state, forces, polynomial, advance, loads_at, .. } = self;
         let table = &tables.levels[level];
         let basis = &table.basis;
-        let points = if kind == ForceInterpolation::Constant { 1 } else { basis.degree };
+        let points = kind.points(basis);
         for (a, polynomial) in polynomial.iter_mut().enumerate() {
             for (mode, value) in polynomial.iter_mut().enumerate() {
                 let all = |k: usize| forces[k][mode] + loads_at[k].get(mode).copied().unwrap_or(0.0);
@@ -225,16 +173,6 @@ impl SharedBody {
         self.loss += self.advance.freely(&self.tables.levels[level], &mut self.state);
     }
 
-    /// Returns the damping loss since the last call (J).
-    pub(crate) fn collect_loss(&mut self) -> f64 {
-        std::mem::take(&mut self.loss)
-    }
-
-    /// Returns the work of loads since the last call (J).
-    pub(crate) fn collect_load_work(&mut self) -> f64 {
-        std::mem::take(&mut self.load_work)
-    }
-
     /// ½ΔpᵀGΔp of the quasi-static coordinates, the energy lost by the change to a constant force (J).
     pub fn dropped(&self) -> f64 {
         let change = self.forces[1].iter().zip(&self.forces[0]).map(|(new, old)| new - old);
@@ -248,7 +186,7 @@ impl SharedBody {
             let w = self.coordinates.frequencies[mode];
             self.coordinates.inertia[mode] * (v * v + (w * q) * (w * q)) + self.coordinates.softness[mode] * p * p
         };
-        0.5 * (0..self.len()).map(mode).sum::<f64>()
+        0.5 * (0..self.state.position.len()).map(mode).sum::<f64>()
     }
 
     /// Largest amplitude of each coordinate in the future motion without forces.
@@ -279,8 +217,8 @@ mod tests {
             let ratios: Vec<f64> = (0..7).map(|_| random.of(&[0.0, 0.01, 0.2])).collect();
             let mut whole = SharedBody::new(Coordinates::new(&frequencies, &ratios, 5), degree).loaded();
             whole.set_span(4e-5);
-            whole.state_mut()[0][..5].iter_mut().for_each(|q| *q = 1e-5 * random.signed());
-            whole.state_mut()[1][..5].iter_mut().for_each(|v| *v = random.signed());
+            whole.state.position[..5].iter_mut().for_each(|q| *q = 1e-5 * random.signed());
+            whole.state.velocity[..5].iter_mut().for_each(|v| *v = random.signed());
             let energy = |whole: &SharedBody| -> f64 {
                 let (q, v) = (&whole.state.position, &whole.state.velocity);
                 let of = |m: usize| v[m] * v[m] + (frequencies[m] * q[m]).powi(2);
@@ -294,11 +232,11 @@ mod tests {
                 let before = energy(&whole);
                 whole.settle();
                 let [from, length] = [0.25, 0.5_f64.powi(i32::try_from(level).unwrap())];
-                whole.loads_mut().iter_mut().flatten().for_each(|load| *load = 1e4 * random.signed());
+                whole.loads.iter_mut().flatten().for_each(|load| *load = 1e4 * random.signed());
                 whole.begin(SpanStep { level, from, length }, kind);
                 let points = if kind == ForceInterpolation::Constant { 1 } else { degree };
                 for point in 1..=points {
-                    whole.forces_mut(point).iter_mut().for_each(|p| *p = 1e4 * random.signed());
+                    whole.forces[point].iter_mut().for_each(|p| *p = 1e4 * random.signed());
                 }
                 whole.push(level, kind);
                 let basis = whole.tables.levels[level].basis.clone();
@@ -311,17 +249,17 @@ mod tests {
                                 ForceInterpolation::Constant if i == 1 => [-1.0, 1.0][k],
                                 ForceInterpolation::Constant => 0.0,
                             };
-                            work += whole.forces[i][m] * weight * whole.at(k)[m];
+                            work += whole.forces[i][m] * weight * whole.at[k][m];
                         }
                     }
                 }
                 if kind == ForceInterpolation::Constant {
                     work -= whole.dropped();
                 }
-                let end = whole.at(points).to_vec();
+                let end = whole.at[points].clone();
                 whole.take(level, kind);
-                let loss = whole.collect_loss();
-                work += whole.collect_load_work();
+                let loss = std::mem::take(&mut whole.loss);
+                work += std::mem::take(&mut whole.load_work);
                 let after = energy(&whole);
                 let scale = before + after + work.abs();
                 assert!(

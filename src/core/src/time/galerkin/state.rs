@@ -17,7 +17,7 @@ pub struct SectorState {
     pub gaps: Vec<f64>,
     /// Normals of the nodes in contact for which their forces were found.
     pub normals: Vec<f64>,
-    /// Slopes of the forces over the last step (N/s) if contacts may stick, otherwise empty.
+    /// Slopes of the forces over the last step (N/s) if contacts may stick, otherwise 0.
     pub slopes: Vec<f64>,
     /// True if gaps and normals are current; they are not evaluated at the end of a free flight.
     pub gaps_known: bool,
@@ -33,16 +33,18 @@ impl SectorState {
             multipliers: vec![0.0; nodes],
             gaps: vec![f64::INFINITY; nodes],
             normals: vec![0.0; 3 * nodes],
-            slopes: Vec::new(),
+            slopes: vec![0.0; 3 * nodes],
             gaps_known: true,
         }
     }
 
-    /// Enables contacts that may stick.
-    #[must_use]
-    pub fn sticking(mut self) -> Self {
-        self.slopes = vec![0.0; self.forces.len()];
-        self
+    /// Copies everything about the contacts, but not the modes.
+    pub(crate) fn copy_contacts(&mut self, from: &Self) {
+        self.forces.copy_from_slice(&from.forces);
+        self.multipliers.copy_from_slice(&from.multipliers);
+        self.gaps.copy_from_slice(&from.gaps);
+        self.normals.copy_from_slice(&from.normals);
+        self.slopes.copy_from_slice(&from.slopes);
     }
 
     /// Kinetic energy and strain energy (J), the latter including the residual flexibility.

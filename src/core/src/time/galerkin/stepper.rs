@@ -2,7 +2,7 @@
 
 use super::scene_island::SceneIsland;
 use crate::geometry::PrescribedMotion;
-use crate::system::{ContactPair, SearchStart, StepFailure, System};
+use crate::system::{SearchStart, StepFailure, System};
 use crate::time::Stepper;
 
 /// Tables and scratch memory for adaptive steps of all islands of a system.
@@ -15,33 +15,16 @@ pub struct Galerkin {
 }
 
 impl Galerkin {
-    /// Creates tables for spans up to `longest` (s) with errors within the fraction `tolerance` of the smallest clearance of each
-    /// structure or, if structures influence each other, of their set.
+    /// Creates tables for spans up to `longest` (s) with errors within the fraction `tolerance` of the smallest clearance of each set.
     pub fn new(system: &mut System, longest: f64, tolerance: f64) -> Self {
-        let (mut single, mut coupled) = (Vec::new(), Vec::new());
-        for set in 0..system.sets.count() {
-            let members = system.sets.members(set);
-            let own = || system.sets.pairs(set).iter().map(|pair| &system.pairs[*pair]);
-            let clearance = |pairs: &mut dyn Iterator<Item = &ContactPair>| {
-                tolerance * pairs.map(|pair| pair.gap().clearance()).fold(f64::INFINITY, f64::min)
-            };
-            let is_disk = |one: &usize| system.structures[*one].modes().disk().is_some();
-            if members.iter().any(is_disk) || own().any(|pair| pair.carrier().is_some()) {
-                let tolerance = clearance(&mut own());
-                coupled.push(SceneIsland::coupled(set, members, system, longest, tolerance));
-                continue;
-            }
-            for index in members.iter().copied().filter(|index| system.structures[*index].nodes() > 0) {
-                let tolerance = clearance(&mut own().filter(|pair| pair.structure() == index));
-                single.extend(SceneIsland::single(set, index, system, longest, tolerance));
-            }
-        }
-        single.sort_by_key(SceneIsland::first_structure);
+        let touches = |set: &usize| !system.sets.pairs(*set).is_empty();
+        let sets = (0..system.sets.count()).filter(touches);
+        let mut islands: Vec<_> = sets.map(|set| SceneIsland::new(set, system, longest, tolerance)).collect();
+        islands.sort_by_key(|island| !island.is_single());
         for structure in system.structures.iter_mut().filter(|structure| structure.nodes() > 0) {
             structure.lowest_in_span = vec![f64::INFINITY; structure.gaps().len()];
         }
-        single.extend(coupled);
-        Self { islands: single, most_tried: u64::MAX }
+        Self { islands, most_tried: u64::MAX }
     }
 }
 

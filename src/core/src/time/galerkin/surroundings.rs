@@ -87,7 +87,7 @@ pub trait Surroundings {
     /// Returns the surfaces of a sector of the island in a step.
     fn surfaces<'a>(&'a mut self, sector: usize, carriers: CarriersInStep<'a>) -> Self::Surfaces<'a>;
 
-    /// Deforms the surfaces on carriers as at a point of the step.
+    /// Deforms the surfaces as at a point of the step.
     fn bend(&mut self, _carriers: &[CarrierIntegrator], _point: usize) {}
 
     /// Returns the modes of the structure of a disk.

@@ -29,6 +29,13 @@ impl Tables {
         Self::of_degree(modes, degree)
     }
 
+    /// Creates tables of degree 1, and of a higher degree for steps in which no sticking contact changes its status.
+    pub(crate) fn with_steady(modes: ContactModes, longest: f64) -> Self {
+        let degree = modes.degree_up_to(longest);
+        let steady = (0..=HALVINGS).map(|_| StepTables::new(&modes, degree)).collect();
+        Self { steady, ..Self::of_degree(modes, 1) }
+    }
+
     /// Creates tables of a degree that is known to be suitable.
     pub(crate) fn of_degree(modes: ContactModes, degree: usize) -> Self {
         let levels = (0..=HALVINGS).map(|_| StepTables::new(&modes, degree)).collect();
@@ -49,13 +56,6 @@ impl Tables {
     pub fn energy(&self, state: &SectorState) -> f64 {
         let (kinetic, strain) = state.energies(&self.modes.frequencies, self.rows.residual());
         kinetic + strain
-    }
-
-    /// Adds tables of degree `degree` for steps in which no contact changes its status.
-    #[must_use]
-    pub fn steady(mut self, degree: usize) -> Self {
-        self.steady = (0..=HALVINGS).map(|_| StepTables::new(&self.modes, degree)).collect();
-        self
     }
 
     /// Tables of a level with the given number of points.

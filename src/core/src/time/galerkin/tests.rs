@@ -246,6 +246,29 @@ fn errors_meet_the_requested_tolerance() {
     }
 }
 
+/// A node that swings through the wall and back within a step that is too short to be halved for near misses: straight lines
+/// through the gaps at its ends do not show the contact.
+#[test]
+fn contact_between_the_ends_of_a_short_linear_step_is_found() {
+    let (span, clearance, amplitude) = (1e-6, 5e-7, 1e-6);
+    let frequency = std::f64::consts::PI / span;
+    let modes = ContactModes {
+        frequencies: vec![frequency],
+        damping_ratios: vec![0.0],
+        shapes: DMatrix::from_column_slice(3, 1, &[1.0, 0.0, 0.0]),
+        residual: DMatrix::identity(3, 3) * 1e-9,
+    };
+    let mut island = Island::of_one(Tables::of_degree(modes, 1));
+    island.set_span(span);
+    let (mut wall, mut effort) = (MovingWall::new(clearance, 0.0, 0.0), Effort::default());
+    let state = &mut island.sectors[0].state;
+    (state.velocity[0], wall.span) = (amplitude * frequency, span);
+    state.gaps.fill(clearance);
+    let goal = StepGoal { tolerance: 1e-8, precision: 1e-15, most: u64::MAX };
+    island.begin(&mut wall, goal).integrate(&mut effort).unwrap();
+    assert!(effort.steps > 1 && wall.impulse > 0.0, "{effort:?}, {} N·s", wall.impulse);
+}
+
 /// The energy never exceeds the initial energy, whatever the tolerance. Later steps spend the energy that lossy switches add to
 /// the bank, so that little is lost even with a coarse tolerance.
 #[test]

@@ -9,9 +9,10 @@ mod prediction;
 mod steady;
 mod sticking;
 
-use super::basis::{MOST, POINTS, TimeBasis};
+pub use super::basis::ForceInterpolation;
+use super::basis::{MOST, POINTS};
 use super::compliance::{LaneCompliance, Lanes};
-use super::kernels::{Add, AddProduct, ClosingColumn, Combine, Withdraw};
+use super::kernels::{AddProduct, ClosingColumn, Combine, Withdraw};
 use super::level::StepTables;
 use super::rows::{ContactRows, Sums};
 use super::state::SectorState;
@@ -20,6 +21,7 @@ use crate::geometry::Sliding;
 use crate::math::simd::InstructionSet;
 use crate::math::vector::{Vector3, set_vector3_at, vector3_at};
 use crate::scene::method::Solver;
+use judgement::FreeMotion;
 pub use judgement::TrialResult;
 use minima::Minima;
 use nalgebra::DMatrix;
@@ -32,34 +34,6 @@ use sticking::Sticking;
 /// Negative gaps within this fraction of the largest gap count as rounding.
 const ROUNDING: f64 = 1e-13;
 
-/// Forces over a step: a polynomial through all points, or a constant force and the end alone.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ForceInterpolation {
-    /// The force is a polynomial of degree s.
-    Polynomial,
-    /// The force has its value at the end of the step throughout, which is dissipative whatever opens or closes.
-    Constant,
-}
-
-impl ForceInterpolation {
-    /// Weights of the work of forces at point i: S_ik, or those of a constant force.
-    pub(crate) fn work_weights(self, basis: &TimeBasis, i: usize) -> [f64; POINTS] {
-        match self {
-            Self::Polynomial => basis.work[i],
-            Self::Constant if i == 1 => [-1.0, 1.0, 0.0, 0.0],
-            Self::Constant => [0.0; POINTS],
-        }
-    }
-
-    /// Fraction of the step for which a force at point i acts: b_i, or 1 for a constant force.
-    pub(crate) fn weight(self, basis: &TimeBasis, i: usize) -> f64 {
-        match self {
-            Self::Polynomial => basis.weights[i],
-            Self::Constant => f64::from(u8::from(i == 1)),
-        }
-    }
-}
-
 /// Scratch memory and results of a trial, for a fixed number of contact nodes.
 #[derive(Debug, Clone)]
 pub struct Trial {
@@ -70,7 +44,7 @@ pub struct Trial {
     known: bool,
     now: Sums<2>,
     /// Contacts at the start.
-    start_contacts: Contacts,
+    start_contacts: SectorState,
     /// Displacements of the lanes without forces after the start (m), those caused by the forces, and their sum.
     free: Vec<f64>,
     pushed: Vec<f64>,
@@ -127,28 +101,6 @@ pub struct Trial {
     end_slopes: [f64; POINTS],
 }
 
-/// Free motion of the contact rows over a step of degree 1.
-#[derive(Debug, Clone)]
-struct FreeMotion {
-    /// Velocities at the end (m/s).
-    end_velocities: Sums<1>,
-    /// Summed amplitudes of the modes that the step does not resolve (m).
-    unresolved_amplitudes: Sums<1>,
-    /// True if the two belong to the tried step.
-    is_known: bool,
-}
-
-/// Forces, λ, gaps and normals of the nodes at the start; the normals are those for which the forces were found.
-#[derive(Debug, Clone, PartialEq)]
-struct Contacts {
-    forces: Vec<f64>,
-    multipliers: Vec<f64>,
-    gaps: Vec<f64>,
-    normals: Vec<f64>,
-    /// Slopes of the forces over the last step (N/s), if contacts may stick.
-    slopes: Vec<f64>,
-}
-
 impl Trial {
     /// Creates a trial for a sector with `modes` modes and `nodes` contact nodes. If contacts may stick, polynomials are of degree 1.
     pub fn new(modes: usize, nodes: usize, solver: Solver) -> Self {
@@ -162,13 +114,7 @@ impl Trial {
             velocities: rows(),
             known: false,
             now: Sums::new(modes, nodes),
-            start_contacts: Contacts {
-                forces: rows(),
-                multipliers: vec![0.0; nodes],
-                gaps: vec![0.0; nodes],
-                normals: rows(),
-                slopes: if solver.sticks() { rows() } else { Vec::new() },
-            },
+            start_contacts: SectorState::new(0, nodes),
             free: three(),
             pushed: three(),
             moved: three(),
@@ -193,11 +139,7 @@ impl Trial {
             amounts: Vec::with_capacity(3 * lanes.len()),
             sums: Sums::new(modes, nodes),
             reach: (Sums::new(modes, nodes), rows()),
-            free_motion: FreeMotion {
-                end_velocities: Sums::new(modes, nodes),
-                unresolved_amplitudes: Sums::new(modes, nodes),
-                is_known: false,
-            },
+            free_motion: FreeMotion::new(modes, nodes),
             work_weights: [[0.0; POINTS]; POINTS],
             durations: [0.0; POINTS],
             inert: std::array::from_fn(|_| rows()),
@@ -225,31 +167,6 @@ impl Trial {
         self.known = false;
     }
 
-    /// Finds the free motion within a step of degree 1: two points give a straight line, which cannot represent it.
-    pub(crate) fn find_free_motion(&mut self, level: &StepTables, rows: &ContactRows, state: &SectorState) {
-        if level.basis.degree == 1 {
-            self.find_start(rows, state);
-            let FreeMotion { end_velocities, unresolved_amplitudes, is_known } = &mut self.free_motion;
-            rows.end_velocities(level, state, end_velocities);
-            rows.unresolved_amplitudes(level.step, state, unresolved_amplitudes);
-            *is_known = true;
-        }
-    }
-
-    /// Corrects the depth of a step for jumps of the surfaces at its start.
-    fn check_depth(
-        &mut self,
-        rows: &ContactRows,
-        state: &SectorState,
-        obstacle: &mut impl Obstacle,
-        verdict: &mut TrialResult,
-    ) {
-        if verdict.depth > 0.0 {
-            self.find_start(rows, state);
-            verdict.depth = self.depth_without_jumps(|node, moved| Some(obstacle.gap(node, 0, moved).distance));
-        }
-    }
-
     /// Finds the displacements and velocities of the rows at the start.
     pub(crate) fn find_start(&mut self, rows: &ContactRows, state: &SectorState) -> &[f64] {
         if self.known {
@@ -271,7 +188,7 @@ impl Trial {
     /// Returns the largest displacement of each row from rest (m) without contact.
     pub(crate) fn largest_displacements(&mut self, rows: &ContactRows, state: &SectorState) -> &[f64] {
         let (sums, reach) = &mut self.reach;
-        rows.add_largest_displacements(state, sums);
+        rows.unresolved_amplitudes(f64::INFINITY, state, sums);
         let nodes = self.lanes.nodes;
         (0..nodes).for_each(|node| set_vector3_at(reach, node, sums.vector3(0, node, nodes)));
         reach
@@ -291,12 +208,8 @@ impl Trial {
         self.work_weights = std::array::from_fn(|i| kind.work_weights(&level.basis, i));
         self.durations = std::array::from_fn(|i| level.step * kind.weight(&level.basis, i));
         self.lanes = compliance.lanes();
-        let (start_contacts, lanes) = (&mut self.start_contacts, self.lanes);
-        start_contacts.forces.copy_from_slice(&state.forces);
-        start_contacts.multipliers.copy_from_slice(&state.multipliers);
-        start_contacts.gaps.copy_from_slice(&state.gaps);
-        start_contacts.normals.copy_from_slice(&state.normals);
-        start_contacts.slopes.iter_mut().zip(&state.slopes).for_each(|(slope, before)| *slope = *before);
+        let lanes = self.lanes;
+        self.start_contacts.copy_contacts(state);
         self.per_step = if kind == ForceInterpolation::Polynomial { 1.0 / level.step } else { 0.0 };
         let (nodes, stride) = (lanes.nodes, 3 * lanes.width());
         if let Some(rows) = rows {
@@ -326,9 +239,7 @@ impl Trial {
 
     /// Finds the displacements of the rows without any force.
     fn move_freely(&mut self, level: &StepTables, kind: ForceInterpolation, rows: &ContactRows, state: &SectorState) {
-        let degree = level.basis.degree;
-        let points = if kind == ForceInterpolation::Constant { degree - 1..degree } else { 0..degree };
-        rows.free(level, state, points, &mut self.sums);
+        rows.free(level, state, kind.last_points(&level.basis), &mut self.sums);
         let (nodes, width) = (self.lanes.nodes, self.lanes.width());
         for (point, sums) in self.sums.rows[..self.lanes.points].iter().enumerate() {
             for component in 0..3 {
@@ -358,20 +269,9 @@ impl Trial {
     pub(crate) fn move_rows(&mut self) {
         let stride = 3 * self.lanes.width();
         let Self { free, pushed, moved, .. } = self;
-        self.instructions.run(Add { a: &free[..stride], b: &pushed[..stride], to: &mut moved[..stride] });
-    }
-
-    /// Returns the smallest gap and the largest gap of an active contact.
-    pub fn extremes(&self) -> (f64, f64) {
-        let lanes = self.lanes;
-        let (mut lowest, mut largest) = (f64::INFINITY, 0.0_f64);
-        for (gap, multiplier) in self.gaps[..lanes.len()].iter().zip(&self.multipliers) {
-            lowest = if gap.is_nan() || lowest.is_nan() { f64::NAN } else { lowest.min(*gap) };
-            if *multiplier > 0.0 {
-                largest = largest.max(gap.abs());
-            }
+        for ((moved, free), pushed) in moved[..stride].iter_mut().zip(free).zip(pushed) {
+            *moved = *free + *pushed;
         }
-        (lowest, largest)
     }
 
     /// Solves 0 ≤ λ ⟂ g ≥ 0 at all points and nodes: first for contacts that penetrate or push, then also for those that these

@@ -1,11 +1,12 @@
 //! Judges a solved step: its error, the energy of contacts that open or close, and nodes that came near between the points.
 
-use super::{ForceInterpolation, FreeMotion, Obstacle, Trial};
+use super::{ForceInterpolation, Obstacle, Trial};
 use crate::math::vector::{Vector3, vector3_at};
 use crate::time::galerkin::basis::{POINTS, TimeBasis};
 use crate::time::galerkin::kernels::AddProduct;
 use crate::time::galerkin::level::StepTables;
-use crate::time::galerkin::rows::ContactRows;
+use crate::time::galerkin::rows::{ContactRows, Sums};
+use crate::time::galerkin::state::SectorState;
 
 /// Weight of the largest change of slope of a force in the error of a step, because the highest divided difference misses a
 /// contact that opens or closes. Measured on 148 random rubs at tolerances from 1e-2 to 1e-5 (`lab scatter`): with 0.05, 0.1 and
@@ -22,6 +23,25 @@ const BEND: f64 = 0.5;
 const OPENING: f64 = 30.0;
 /// A step is shortened if the gap of a node between the points may be below this multiple of the interpolation error.
 pub(super) const NEAR: f64 = 4.0;
+/// Free motion of the contact rows over a step of degree 1.
+#[derive(Debug, Clone)]
+pub(super) struct FreeMotion {
+    /// Velocities at the end (m/s).
+    end_velocities: Sums<1>,
+    /// Summed amplitudes of the modes that the step does not resolve (m).
+    unresolved_amplitudes: Sums<1>,
+    /// True if the two belong to the tried step.
+    pub(super) is_known: bool,
+}
+
+impl FreeMotion {
+    /// Allocates data for `modes` modes and `nodes` contact nodes.
+    pub(super) fn new(modes: usize, nodes: usize) -> Self {
+        let sums = || Sums::new(modes, nodes);
+        Self { end_velocities: sums(), unresolved_amplitudes: sums(), is_known: false }
+    }
+}
+
 /// Result of a trial.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct TrialResult {
@@ -55,6 +75,17 @@ impl TrialResult {
 }
 
 impl Trial {
+    /// Finds the free motion within a step of degree 1: two points give a straight line, which cannot represent it.
+    pub(crate) fn find_free_motion(&mut self, level: &StepTables, rows: &ContactRows, state: &SectorState) {
+        if level.basis.degree == 1 {
+            self.find_start(rows, state);
+            let FreeMotion { end_velocities, unresolved_amplitudes, is_known } = &mut self.free_motion;
+            rows.end_velocities(level, state, end_velocities);
+            rows.unresolved_amplitudes(level.step, state, unresolved_amplitudes);
+            *is_known = true;
+        }
+    }
+
     /// Finds error, switches and near misses of a solved step.
     pub fn judge(
         &mut self,
@@ -65,8 +96,7 @@ impl Trial {
     ) {
         let (basis, count) = (&level.basis, level.basis.count());
         self.impulses.fill(0.0);
-        (verdict.switches, verdict.switched, verdict.near, verdict.error, verdict.depth) =
-            (false, 0.0, false, 0.0, 0.0);
+        (verdict.switches, verdict.switched, verdict.near, verdict.error) = (false, 0.0, false, 0.0);
         self.depths.fill(0.0);
         let mut pushed = false;
         for node in 0..self.nodes() {
@@ -75,7 +105,6 @@ impl Trial {
             if !any {
                 let (near, depth) = self.comes_near(level, node, obstacle);
                 verdict.near |= near;
-                verdict.depth = verdict.depth.max(depth);
                 self.depths[node] = depth;
                 continue;
             }
@@ -134,19 +163,24 @@ impl Trial {
         if self.multiplier(1, node) == 0.0 && slope.abs() > before.abs() { slope } else { before }
     }
 
+    /// Returns whether open nodes are within a surface between the points, as far as their gaps at the points show.
+    pub(crate) fn has_depth(&self) -> bool {
+        self.depths.iter().any(|depth| *depth > 0.0)
+    }
+
     /// Returns the largest depth of open nodes between the points (m). It excludes nodes whose surface has jumped at the start of
-    /// the step, because the polynomial through their gaps overshoots. Displacements at the start must be known.
-    ///
-    /// `gap_at_start` returns the gap (m) at the start of a node displaced by a vector (m), or `None` if it is unknown; the node
-    /// is then excluded.
-    pub(crate) fn depth_without_jumps(&self, mut gap_at_start: impl FnMut(usize, Vector3) -> Option<f64>) -> f64 {
+    /// the step, because the polynomial through their gaps overshoots. Displacements at the start must be known, and surfaces must be
+    /// bent as at the start.
+    pub(crate) fn depth(&self, obstacle: &mut impl Obstacle) -> f64 {
         let open = (0..self.nodes()).filter(|node| self.depths[*node] > 0.0);
-        open.fold(0.0, |deepest, node| {
-            let gap = gap_at_start(node, vector3_at(&self.start, node));
-            // The overshoot below the gaps at the points is less than 0.15 times the jump.
-            let is_steady = gap.is_some_and(|gap| (gap - self.start_contacts.gaps[node]).abs() < self.depths[node]);
-            if is_steady { deepest.max(self.depths[node]) } else { deepest }
-        })
+        // The overshoot below the gaps at the points is less than 0.15 times the jump.
+        let mut jump = |node| self.jump(node, obstacle.gap_at_start(node, vector3_at(&self.start, node)));
+        open.filter(|node| jump(*node) < self.depths[*node]).map(|node| self.depths[node]).fold(0.0, f64::max)
+    }
+
+    /// Returns the jump of the surface of a node at the start of the step (m), because of a held input: `gap` is the gap there (m).
+    pub(super) fn jump(&self, node: usize, gap: f64) -> f64 {
+        (gap - self.start_contacts.gaps[node]).abs()
     }
 
     /// Returns whether the gap of an open node comes near zero between the points, and its depth below zero there (m).
@@ -161,7 +195,7 @@ impl Trial {
         if basis.degree == 1 {
             let (lowest, bend) = self.bend_of_gap(level.step, node, [gaps[0], gaps[1]], obstacle);
             // A parabola with this deviation falls below its ends and its middle by at most a quarter of it.
-            return (lowest < 0.25 * NEAR * bend, 0.0);
+            return (lowest < 0.25 * NEAR * bend, (-lowest).max(0.0));
         }
         // Between its points, a cubic exceeds their range by less than half of it, and its interpolation error is less than the range.
         let extremes = |(low, high): (f64, f64), gap: &f64| (gap.min(low), gap.max(high));

@@ -5,11 +5,11 @@
 //! contact is closed at a point, only the gaps at the points are used.
 
 use super::judgement::NEAR;
-use super::{ForceInterpolation, Trial};
+use super::{ForceInterpolation, Obstacle, Trial};
 use crate::math::cubic::{evaluate, interior_minimum};
 use crate::math::vector::Vector3;
 use crate::time::galerkin::advance::Advance;
-use crate::time::galerkin::basis::{MOST, POINTS, TimeBasis};
+use crate::time::galerkin::basis::{MOST, POINTS, TimeBasis, real};
 use crate::time::galerkin::level::StepTables;
 use crate::time::galerkin::rows::ContactRows;
 use crate::time::galerkin::state::SectorState;
@@ -81,6 +81,20 @@ impl Trial {
             }
         }
         found
+    }
+
+    /// Drops the selected nodes whose surface has jumped by more than `tolerance` (m) at the start of the step, as far as gaps there are
+    /// known. Displacements at the start must be known.
+    pub(crate) fn drop_jumps(&mut self, obstacle: &impl Obstacle, tolerance: f64) {
+        for node in 0..self.nodes() {
+            if self.minimum(node).is_none() {
+                continue;
+            }
+            let gap = obstacle.gap_within(node, 0.0, self.displacement(0, node));
+            if gap.is_some_and(|gap| self.jump(node, gap) > tolerance) {
+                self.minima.at[node] = f64::NAN;
+            }
+        }
     }
 
     /// Follows the selected nodes over a step of a level, before its state is advanced.
@@ -185,12 +199,6 @@ impl Trial {
         let falling = basis.coefficients(&falling);
         interior_minimum(&falling).map_or(at_points, |theta| at_points.max(-evaluate(&falling, theta)))
     }
-}
-
-/// Converts a small integer to a real number.
-#[expect(clippy::cast_precision_loss, reason = "below 100")]
-fn real(value: usize) -> f64 {
-    value as f64
 }
 
 /// Coefficients of a polynomial of degree 2 over one of several equal parts.

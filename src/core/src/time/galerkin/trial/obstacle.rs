@@ -9,6 +9,11 @@ pub trait Obstacle {
     /// Returns the gap of the node displaced by `moved` (m) at a point of the step.
     fn gap(&mut self, node: usize, point: usize, moved: Vector3) -> Gap;
 
+    /// Returns the gap (m) of the node displaced by `moved` (m) at the start of the step, on surfaces that are bent as there.
+    fn gap_at_start(&mut self, node: usize, moved: Vector3) -> f64 {
+        self.gap(node, 0, moved).distance
+    }
+
     /// Finds gaps (m) and normals at all points but the first; arrays of [`Lanes`].
     fn gaps(&mut self, lanes: Lanes, moved: &[f64], gaps: &mut [f64], normals: &mut [f64]) {
         node_by_node(self, lanes, moved, gaps, normals);

@@ -72,6 +72,19 @@ impl Trial {
         (0..self.nodes()).find(|node| self.start_contacts.gaps[*node] == f64::INFINITY && inside(node))
     }
 
+    /// Returns the smallest gap and the largest gap of an active contact.
+    pub fn extremes(&self) -> (f64, f64) {
+        let lanes = self.lanes;
+        let (mut lowest, mut largest) = (f64::INFINITY, 0.0_f64);
+        for (gap, multiplier) in self.gaps[..lanes.len()].iter().zip(&self.multipliers) {
+            lowest = if gap.is_nan() || lowest.is_nan() { f64::NAN } else { lowest.min(*gap) };
+            if *multiplier > 0.0 {
+                largest = largest.max(gap.abs());
+            }
+        }
+        (lowest, largest)
+    }
+
     /// Returns whether no contact is active.
     pub fn rests(&self) -> bool {
         self.multipliers[..self.lanes.len()].iter().all(|value| *value == 0.0)
@@ -120,7 +133,7 @@ impl Trial {
             let force = self.force(points, node);
             set_vector3_at(&mut state.forces, node, force);
             set_vector3_at(&mut state.normals, node, normal);
-            if !state.slopes.is_empty() {
+            if self.sticks() {
                 let slope = match points {
                     1 => (force - vector3_at(&self.start_contacts.forces, node)) * self.per_step,
                     _ => (0..=points).map(|point| self.end_slopes[point] * self.force(point, node)).sum(),

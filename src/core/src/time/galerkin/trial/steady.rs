@@ -75,7 +75,7 @@ impl Trial {
         self.steady = Some(own);
         if verdict.solved {
             self.judge(level, rows, obstacle, &mut verdict);
-            self.check_depth(rows, state, obstacle, &mut verdict);
+            verdict.depth = self.depth(obstacle);
             // The energy supplied by friction at the start would have to come from the bank.
             verdict.solved = !verdict.switches;
         }
@@ -132,18 +132,13 @@ impl Trial {
         false
     }
 
-    /// Motion of a node relative to the surface, from the start to a point (m).
-    fn relative(&self, point: usize, node: usize, obstacle: &impl Obstacle) -> Vector3 {
-        if point == 0 { Vector3::zeros() } else { self.slip(node, point, obstacle) }
-    }
-
     /// Finds the sliding directions of the nodes at all points, and returns by how much they have turned.
     fn find_directions(&self, own: &mut Steady, basis: &TimeBasis, obstacle: &impl Obstacle) -> f64 {
         let mut turned = 0.0_f64;
         for node in 0..self.lanes.nodes {
             let ContactStatus::Slides(_) = own.status[node] else { continue };
             let mut places = [Vector3::zeros(); POINTS];
-            (1..basis.count()).for_each(|point| places[point] = self.relative(point, node, obstacle));
+            (1..basis.count()).for_each(|point| places[point] = self.slip(node, point, obstacle));
             for point in 1..basis.count() {
                 let (lane, normal) = (self.lanes.at(point, node), self.normal(point, node));
                 let slip = (0..basis.count()).map(|k| basis.work[point][k] * places[k]).sum();
@@ -164,7 +159,7 @@ impl Trial {
         let lanes = self.lanes;
         let slip = |lane: usize| {
             let (point, node) = lanes.place(lane);
-            length(tangential(self.relative(point, node, obstacle), self.normal(point, node)))
+            length(tangential(self.slip(node, point, obstacle), self.normal(point, node)))
         };
         let sticking = (0..lanes.len()).filter(|lane| own.status[lanes.place(*lane).1] == ContactStatus::Sticks);
         sticking.map(slip).fold(0.0, f64::max)
@@ -184,7 +179,7 @@ impl Trial {
             let (normal, friction) = (self.normal(point, node), obstacle.parameters(node).friction);
             let [first, second] = tangents(normal);
             let (moved, free) = (lanes.vector3(&self.moved, *lane), lanes.vector3(&self.free, *lane));
-            let relative = self.relative(point, node, obstacle);
+            let relative = self.slip(node, point, obstacle);
             let slides = own.status[node] != ContactStatus::Sticks;
             // Scales forces to displacements.
             let own_columns = compliance.of_lane(*lane);

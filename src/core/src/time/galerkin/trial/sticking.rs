@@ -27,7 +27,7 @@ pub(super) struct Sticking {
     columns: Vec<f64>,
     /// Motion of the surface per force, and under the current forces.
     carrier_compliance: Vec<f64>,
-    under: Vec<f64>,
+    carrier_moved: Vec<f64>,
 }
 
 impl Sticking {
@@ -40,7 +40,7 @@ impl Sticking {
             slips: vec![Vector3::zeros(); nodes],
             columns: vec![0.0; 3 * nodes * stride],
             carrier_compliance: vec![0.0; stride],
-            under: vec![0.0; stride],
+            carrier_moved: vec![0.0; stride],
         }
     }
 }
@@ -88,7 +88,7 @@ impl Trial {
             self.chosen[lane] = self.gaps[lane] <= 0.0 || self.multipliers[lane] > 0.0 || self.without[lane] < 0.0;
         }
         self.carrier_yields = obstacle.prepare_compliance(lanes, &self.chosen, &self.normals[..3 * lanes.width()]);
-        self.find_under(own, obstacle);
+        self.find_carrier_motion(own, obstacle);
         for lane in 0..lanes.len() {
             if self.chosen[lane] {
                 self.choose_axes(own, lane, compliance, obstacle);
@@ -120,14 +120,14 @@ impl Trial {
     }
 
     /// Finds the displacements of the obstacle under the current forces.
-    fn find_under(&mut self, own: &mut Sticking, obstacle: &mut impl Obstacle) {
-        own.under.fill(0.0);
+    fn find_carrier_motion(&mut self, own: &mut Sticking, obstacle: &mut impl Obstacle) {
+        own.carrier_moved.fill(0.0);
         if !self.carrier_yields {
             return;
         }
         for lane in (0..self.lanes.len()).filter(|lane| self.multipliers[*lane] > 0.0) {
             obstacle.add_compliance(lane, self.lanes.vector3(&self.forces, lane), &mut own.carrier_compliance);
-            own.under
+            own.carrier_moved
                 .iter_mut()
                 .zip(&own.carrier_compliance)
                 .for_each(|(sum, carrier_compliance)| *sum += carrier_compliance);
@@ -189,11 +189,11 @@ impl Trial {
         }
         let values = LaneValues { lanes, without, multipliers, normals, moved };
         let predictions = members.iter().zip(&own.slips).map(|(lane, slip)| {
-            let (pushed, under) = (lanes.vector3(pushed, *lane), lanes.vector3(&own.under, *lane));
+            let (pushed, carrier) = (lanes.vector3(pushed, *lane), lanes.vector3(&own.carrier_moved, *lane));
             let prediction = values.prediction(*lane, obstacle);
             LanePrediction {
-                gap: prediction.gap - prediction.normal.dot(&under),
-                slip: slip - pushed - under,
+                gap: prediction.gap - prediction.normal.dot(&carrier),
+                slip: slip - pushed - carrier,
                 last_force: if prediction.closed { lanes.vector3(forces, *lane) } else { Vector3::zeros() },
                 ..prediction
             }
@@ -217,7 +217,7 @@ impl Trial {
                 continue;
             }
             let normal = lanes.vector3(&self.normals, lane);
-            let mut after = self.without[lane] - normal.dot(&lanes.vector3(&own.under, lane));
+            let mut after = self.without[lane] - normal.dot(&lanes.vector3(&own.carrier_moved, lane));
             for (place, member) in self.members[..members].iter().enumerate() {
                 for axis in 0..3 {
                     let column = &own.columns[(3 * member + axis) * stride..][..stride];
@@ -276,8 +276,8 @@ impl Trial {
         let touches = |node: &usize| (0..2).all(|point| self.multiplier(point, *node) > 0.0);
         let turn = |node: usize| {
             let (normal, slip) = (self.normal(1, node), self.slip(node, 1, obstacle));
-            let under = obstacle.drift(node, 1, self.displacement(1, node));
-            let along = tangential(vector3_at(&self.withdrawn, node) + under / step, normal);
+            let drift = obstacle.drift(node, 1, self.displacement(1, node));
+            let along = tangential(vector3_at(&self.withdrawn, node) + drift / step, normal);
             let speed = length(along);
             // Speed at the end if it changes steadily.
             let last = 2.0 * slip.dot(&along) / (step * speed) - speed;

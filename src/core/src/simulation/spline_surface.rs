@@ -1,4 +1,4 @@
-//! Slave surface of a scene through data points, and the modes of its carrier.
+//! Surface of a scene through data points, and the modes of its carrier.
 
 use crate::geometry::Vector3;
 use crate::geometry::frame::PolarFrame;

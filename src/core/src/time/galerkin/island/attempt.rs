@@ -1,0 +1,305 @@
+//! Tries a step of an island: motion, gaps and forces in turn until they agree, and the judgement of the step.
+
+use super::{Island, IslandInSpan, IslandSector, SectorInStep};
+use crate::time::galerkin::carrier::CarrierIntegrator;
+use crate::time::galerkin::span::SpanStep;
+use crate::time::galerkin::surroundings::{Surroundings, Witness};
+use crate::time::galerkin::trial::{ForceInterpolation, Obstacle, TrialResult};
+
+/// Largest number of gap evaluations in one trial of a single sector. The last one is exact except for curvature.
+const PASSES_OF_ONE: usize = 6;
+/// Largest number of gap evaluations in one trial of several sectors, which move each other.
+const PASSES: usize = 16;
+
+/// Gaps of an island at the points of a step.
+pub(super) struct IslandGaps {
+    /// Smallest gap (m).
+    lowest: f64,
+    /// Largest gap of an active contact (m).
+    largest: f64,
+    /// True if no contact is active.
+    rests: bool,
+}
+
+impl<S: Surroundings> IslandInSpan<'_, S> {
+    /// Starts a trial: prescribed motion at the points, motion without forces, and an initial guess of the forces.
+    pub(super) fn prepare(&mut self, step: SpanStep, kind: ForceInterpolation) {
+        self.island.disks.iter_mut().for_each(|disk| disk.body.begin(step, kind));
+        let basis = &self.island.tables[0][0].levels[step.level].basis;
+        for carrier in &mut self.island.carriers {
+            carrier.body.begin(step, kind);
+            carrier.work_weights = std::array::from_fn(|i| kind.work_weights(basis, i));
+        }
+        let is_single = self.island.is_single();
+        for index in self.indices() {
+            self.island.sectors[index].far = false;
+            let SectorInStep { mut surfaces, tables, disk, trial, state, .. } = self.sector(index, step, kind);
+            let level = &tables.levels[step.level];
+            surfaces.begin_step(step.from, step.length, level, kind);
+            let rows = disk.is_none().then_some(&tables.rows);
+            if let Some(rows) = rows.filter(|_| !is_single || !state.gaps_known) {
+                trial.find_start(rows, state);
+            }
+            if !is_single {
+                surfaces.guess_start_places();
+            }
+            trial.begin(level, kind, rows, state);
+            trial.find_start_gaps(state, |node, moved| surfaces.gap(node, 0, moved).distance);
+        }
+        if self.island.fresh {
+            // Earlier forces are applied at the places of the nodes at the start of the span.
+            self.react(0..=0, step, kind);
+        }
+    }
+
+    /// Applies the forces at some points of the step to the surface carriers.
+    fn react(&mut self, points: std::ops::RangeInclusive<usize>, step: SpanStep, kind: ForceInterpolation) {
+        if self.island.carriers.is_empty() {
+            return;
+        }
+        for carrier in &mut self.island.carriers {
+            points.clone().for_each(|point| carrier.body.forces[point].fill(0.0));
+        }
+        for index in self.indices() {
+            if self.island.sectors[index].far {
+                continue;
+            }
+            let SectorInStep { mut surfaces, trial, .. } = self.sector(index, step, kind);
+            for (point, node) in points.clone().flat_map(|point| (0..trial.nodes()).map(move |node| (point, node))) {
+                if trial.multiplier(point, node) != 0.0 {
+                    surfaces.react(node, point, trial.force(point, node));
+                }
+            }
+        }
+    }
+
+    /// Computes the motion of all shared bodies under the current forces.
+    pub(super) fn move_bodies(&mut self, step: SpanStep, kind: ForceInterpolation, points: usize) {
+        let Island { disks, sectors, .. } = &mut *self.island;
+        for (number, disk) in disks.iter_mut().enumerate() {
+            let Some(bank) = self.surroundings.disk(disk.structure) else { continue };
+            let of_disk = |one: &IslandSector| one.disk.filter(|(disk, _)| *disk == number).map(|(_, lane)| lane);
+            for point in 1..=points {
+                let own = sectors.iter().filter_map(|one| Some((one, of_disk(one)?)));
+                let pushing = own.flat_map(|(one, lane)| {
+                    let nodes = (0..one.trial.nodes()).filter(|node| one.trial.multiplier(point, *node) != 0.0);
+                    nodes.map(move |node| (lane, node, one.trial.force(point, node)))
+                });
+                bank.modal_forces(pushing, &mut disk.body.forces[point]);
+            }
+            disk.body.push(step.level, kind);
+            disk.find_rows_at(bank, points);
+            for one in sectors.iter_mut() {
+                if let Some(lane) = of_disk(one) {
+                    one.trial.carry(|point, node| disk.moved_at(point, node, lane));
+                }
+            }
+        }
+        if self.island.carriers.is_empty() {
+            return;
+        }
+        self.react(1..=points, step, kind);
+        for carrier in &mut self.island.carriers {
+            carrier.body.push(step.level, kind);
+            carrier.recover(points);
+        }
+    }
+
+    /// Finds the gaps at all points, of sectors that are far or of those that are not.
+    pub(super) fn find_gaps(
+        &mut self,
+        step: SpanStep,
+        kind: ForceInterpolation,
+        points: usize,
+        far: bool,
+    ) -> IslandGaps {
+        let all = self.indices();
+        if self.island.carriers.is_empty() {
+            for index in all {
+                if self.island.sectors[index].far == far {
+                    let SectorInStep { mut surfaces, trial, .. } = self.sector(index, step, kind);
+                    trial.find_gaps(&mut surfaces);
+                }
+            }
+        } else {
+            let chosen = self.island.sectors.iter_mut().filter(|one| one.far == far);
+            chosen.for_each(|one| one.trial.move_rows());
+            for point in 1..=points {
+                self.surroundings.bend(&self.island.carriers, point);
+                for index in all.clone() {
+                    if self.island.sectors[index].far == far {
+                        let SectorInStep { mut surfaces, trial, .. } = self.sector(index, step, kind);
+                        trial.find_gaps_at(point, |node, moved| surfaces.gap(node, point, moved));
+                    }
+                }
+            }
+        }
+        let mut found = IslandGaps { lowest: f64::INFINITY, largest: 0.0, rests: true };
+        for one in self.island.sectors.iter().filter(|one| one.far == far) {
+            let (lowest, largest) = one.trial.extremes();
+            let is_lost = lowest.is_nan() || found.lowest.is_nan();
+            found.lowest = if is_lost { f64::NAN } else { found.lowest.min(lowest) };
+            found.largest = found.largest.max(largest);
+            found.rests &= one.trial.rests();
+        }
+        found
+    }
+
+    /// Marks the sectors that are far; `lowest` is the lowest gap (m).
+    fn separate_far_sectors(&mut self, lowest: f64) {
+        for one in &mut self.island.sectors {
+            one.far = one.trial.rests() && one.trial.extremes().0 > -lowest;
+        }
+    }
+
+    /// Rechecks sectors that are far. Returns whether one of them touches; it is then no longer far.
+    fn recheck_far_sectors(&mut self, step: SpanStep, kind: ForceInterpolation, points: usize) -> bool {
+        if !self.island.sectors.iter().any(|one| one.far) {
+            return false;
+        }
+        let IslandGaps { lowest, .. } = self.find_gaps(step, kind, points, true);
+        for one in self.island.sectors.iter_mut().filter(|one| one.far) {
+            let lowest = one.trial.extremes().0;
+            one.far = lowest >= 0.0;
+        }
+        // The next evaluation of the near sectors reports NaN gaps.
+        lowest.is_nan() || lowest < 0.0
+    }
+
+    /// Stores the first sector for which `holds` is true as the cause of the failure.
+    fn blame(&mut self, holds: impl Fn(&IslandSector) -> bool, is_lost: bool) {
+        self.island.failed = self.island.sectors.iter().position(holds).map(|index| (index, is_lost));
+    }
+
+    /// Finds forces that remove penetration, sector by sector. Returns false if a contact problem has no solution.
+    fn solve(&mut self, step: SpanStep, kind: ForceInterpolation, result: &mut TrialResult) -> bool {
+        for index in self.indices() {
+            let IslandSector { far, trial, .. } = &self.island.sectors[index];
+            if *far || (trial.extremes().0 >= 0.0 && trial.rests()) {
+                continue;
+            }
+            let SectorInStep { mut surfaces, tables, disk, trial, state, .. } = self.sector(index, step, kind);
+            if disk.is_none() {
+                trial.find_start(&tables.rows, state);
+            }
+            let compliance = tables.levels[step.level].compliance_of(kind);
+            let solved = trial.solve(compliance, tables.rows.residual(), &mut surfaces, result);
+            drop(surfaces);
+            if !solved {
+                self.island.failed = Some((index, false));
+                return false;
+            }
+        }
+        true
+    }
+
+    /// Tries a step.
+    pub fn attempt(&mut self, step: SpanStep, kind: ForceInterpolation) -> TrialResult {
+        if let Some(result) = self.attempt_steady(step, kind) {
+            return result;
+        }
+        self.prepare(step, kind);
+        let (points, precision) = (self.island.points(step, kind), self.goal.precision);
+        let passes = if self.island.is_single() { PASSES_OF_ONE } else { PASSES };
+        let mut result = TrialResult::default();
+        for pass in 0..passes {
+            self.move_bodies(step, kind, points);
+            let IslandGaps { lowest, largest, rests } = self.find_gaps(step, kind, points, false);
+            if lowest.is_nan() {
+                self.blame(|one| one.trial.extremes().0.is_nan(), true);
+                return result;
+            }
+            // No contact is active or needed, or the solution also holds for the curved gaps.
+            if ((rests && lowest >= 0.0) || (pass > 0 && lowest >= -precision && largest <= precision))
+                && !self.recheck_far_sectors(step, kind, points)
+            {
+                result.solved = true;
+                break;
+            }
+            if pass == 0 && !self.island.is_single() {
+                self.separate_far_sectors(lowest.min(-precision));
+            }
+            if pass + 1 == passes {
+                self.blame(|one| one.trial.extremes().0 <= lowest || one.trial.extremes().1 >= largest, false);
+                return result;
+            }
+            if !self.solve(step, kind, &mut result) {
+                return result;
+            }
+        }
+        if kind == ForceInterpolation::Polynomial {
+            self.judge(step, points, &mut result);
+        }
+        result
+    }
+
+    /// Tries a step of a higher degree in which no sticking contact changes its status, if there are tables for it; returns the result if
+    /// none does.
+    fn attempt_steady(&mut self, step: SpanStep, kind: ForceInterpolation) -> Option<TrialResult> {
+        if kind == ForceInterpolation::Constant || !self.island.is_single() {
+            return None;
+        }
+        let precision = self.goal.precision;
+        let SectorInStep { mut surfaces, tables, trial, state, .. } = self.sector(0, step, kind);
+        let level = tables.steady.get(step.level)?;
+        surfaces.begin_step(step.from, step.length, level, kind);
+        let result = trial.run_steady(level, &tables.rows, state, &mut surfaces, precision);
+        result.solved.then_some(result)
+    }
+
+    /// Finds error, switches and near misses of all sectors.
+    fn judge(&mut self, step: SpanStep, points: usize, result: &mut TrialResult) {
+        self.island.carriers.iter_mut().for_each(|carrier| carrier.impulses.fill(0.0));
+        self.island.disks.iter_mut().for_each(|disk| disk.error = 0.0);
+        let is_single = self.island.is_single();
+        for index in self.indices() {
+            self.island.sectors[index].far = false;
+            let SectorInStep { mut surfaces, tables, disk, trial, state, .. } =
+                self.sector(index, step, ForceInterpolation::Polynomial);
+            let (level, mut own) = (&tables.levels[step.level], TrialResult::default());
+            if is_single {
+                trial.find_free_motion(level, &tables.rows, state);
+            }
+            trial.judge(level, &tables.rows, &surfaces, &mut own);
+            match disk {
+                // The error of one sector makes all sectors of its disk vibrate.
+                Some(disk) => disk.error = disk.error.hypot(own.error),
+                None => result.error = result.error.max(own.error),
+            }
+            result.switches |= own.switches;
+            result.switched += own.switched;
+            result.near |= own.near;
+            for node in 0..trial.nodes() {
+                let impulse = trial.impulse(node);
+                if impulse.iter().any(|component| *component != 0.0) {
+                    surfaces.add_impulse(node, points, impulse);
+                }
+            }
+        }
+        if self.island.sectors.iter().any(|one| one.trial.has_depth()) {
+            result.depth = self.depth(step, points);
+        }
+        let errors = self.island.carriers.iter().map(CarrierIntegrator::error);
+        let errors = errors.chain(self.island.disks.iter().map(|disk| disk.error));
+        result.error = errors.fold(result.error, f64::max);
+    }
+
+    /// Returns the largest depth of open nodes between the points of a step (m).
+    fn depth(&mut self, step: SpanStep, points: usize) -> f64 {
+        let (mut deepest, is_single) = (0.0_f64, self.island.is_single());
+        self.surroundings.bend(&self.island.carriers, 0);
+        for index in self.indices() {
+            let SectorInStep { mut surfaces, tables, disk, trial, state, .. } =
+                self.sector(index, step, ForceInterpolation::Polynomial);
+            if disk.is_none() {
+                trial.find_start(&tables.rows, state);
+            }
+            deepest = deepest.max(trial.depth(&mut surfaces));
+        }
+        // Contacts of a single sector are recorded on the surface as it was last evaluated.
+        if !is_single {
+            self.surroundings.bend(&self.island.carriers, points);
+        }
+        deepest
+    }
+}
