@@ -13,11 +13,8 @@ use tiprub_figure::plots::{Plot, Series};
 use tiprub_shell::{Failure, Result, sweep};
 use tiprub_study::{Picture, Sheet, Statement, Study, StudyFigure};
 
-use crate::stability::models::SOLVERS;
+use crate::stability::models::{SOLVERS, short_name};
 
-/// Schemes of the table with their names.
-const SCHEMES: [(Scheme, &str); Scheme::RECURRENCES.len()] =
-    [(Scheme::CentralDifference, "central"), (Scheme::ModalExact, "exact"), (Scheme::MasslessBoundary, "massless")];
 /// Largest internal step of the table (s).
 const STEP: f64 = 1e-6;
 /// Number of halvings in the figure.
@@ -29,7 +26,7 @@ pub(crate) const TABLE: &str = "table.md";
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct ConjugacyCase {
     feature: SurfaceFeature,
-    scheme: (Scheme, &'static str),
+    scheme: Scheme,
     solver: (Solver, &'static str),
     friction: f64,
 }
@@ -46,19 +43,19 @@ struct ConjugacyRow {
 
 impl ConjugacyCase {
     fn exists(&self, quick: bool) -> bool {
-        let shown = match self.scheme.0 {
-            Scheme::CentralDifference => self.solver.0 == Solver::Film,
-            Scheme::ModalExact => self.solver.0 == Solver::Lcp || self.solver.0 == Solver::Coulomb,
-            Scheme::MasslessBoundary | Scheme::Galerkin => self.solver.0 == Solver::Lcp,
+        let shown = match self.solver.0 {
+            Solver::Film => self.scheme == Scheme::PAPER,
+            Solver::Lcp => self.scheme != Scheme::PAPER,
+            Solver::Coulomb => self.scheme == Scheme::default(),
         };
         let asked =
             if quick { shown && self.friction > 0.0 } else { self.friction > 0.0 || self.solver.0 != Solver::Coulomb };
-        asked && self.scene(self.friction, false).check_methods(self.scheme.0, self.solver.0).is_ok()
+        asked && self.scene(self.friction, false).check_methods(self.scheme, self.solver.0).is_ok()
     }
 
     fn scene(&self, friction: f64, round: bool) -> Scene {
         let mut scene = self.feature.scene(friction, true, round);
-        scene.settings.time.scheme = self.scheme.0;
+        scene.settings.time.scheme = self.scheme;
         scene.settings.contacts.iter_mut().for_each(|contact| contact.solver = self.solver.0);
         scene
     }
@@ -66,7 +63,13 @@ impl ConjugacyCase {
     fn row(&self) -> Result<ConjugacyRow> {
         let named = |error: tiprub_core::Error| {
             Failure::new(
-                format!("{}, {}, {}, µ = {}", self.feature.name(), self.scheme.1, self.solver.1, self.friction),
+                format!(
+                    "{}, {}, {}, µ = {}",
+                    self.feature.name(),
+                    short_name(self.scheme),
+                    self.solver.1,
+                    self.friction
+                ),
                 error.to_string(),
                 "Report this to the developers",
             )
@@ -86,7 +89,7 @@ impl ConjugacyCase {
 fn cases(quick: bool) -> Vec<ConjugacyCase> {
     let mut cases = Vec::new();
     for feature in SurfaceFeature::ALL {
-        for scheme in SCHEMES {
+        for scheme in Scheme::RECURRENCES {
             for solver in SOLVERS {
                 for friction in [0.0, 0.15] {
                     cases.push(ConjugacyCase { feature, scheme, solver, friction });

@@ -2,9 +2,9 @@
 
 mod blades;
 mod coating;
-mod default_scheme;
 pub(crate) mod relations;
 pub mod rules;
+mod time;
 mod validation;
 
 use serde::{Deserialize, Serialize};
@@ -12,9 +12,10 @@ use std::sync::Arc;
 use tiprub_cosim::warning::Topic;
 
 use crate::Rom;
-use crate::scene::method::{Scheme, Solver};
+use crate::scene::method::Solver;
 pub use blades::{ExcitationSettings, ForceDirection, InitialSettings};
 pub use coating::{CoatingSettings, CuttingSettings};
+pub use time::{ADAPTIVE_STEP, InputInterpolation, TOLERANCE, TimeSettings};
 
 /// Shape of a rigid surface of revolution: radial clearance change around the circumference.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -79,12 +80,6 @@ fn one() -> f64 {
 fn two_lobe_width() -> f64 {
     0.15
 }
-
-/// Default error that a step of `galerkin` may make, as a fraction of the smallest clearance.
-pub const TOLERANCE: f64 = 1e-3;
-
-/// Longest step (s) of `galerkin` if the scene file gives none. The communication step also bounds steps.
-pub const ADAPTIVE_STEP: f64 = 8e-5;
 
 /// Rigid motion of a structure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -361,42 +356,6 @@ impl ContactSettings {
     }
 }
 
-/// Interpolation between communication points of inputs that move or load a structure.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum InputInterpolation {
-    /// Ramp from the current value to the new one, which is reached at the end of the step (default).
-    #[default]
-    Ramp,
-    /// The new value acts immediately: a jump within one internal step.
-    Hold,
-}
-
-/// Internal time stepping.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct TimeSettings {
-    /// Scheme. A file without this key has the [default](SceneSettings::default_scheme), which is chosen when the file is read.
-    #[serde(default)]
-    pub scheme: Scheme,
-    /// Reason for the scheme if the file does not give one; for messages, without effect.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub scheme_reason: Option<String>,
-    /// Largest internal step h (s); the actual step divides the communication step evenly. With adaptive steps the longest one,
-    /// [`ADAPTIVE_STEP`] if the file gives none.
-    #[serde(default)]
-    pub step: f64,
-    /// Error that a step of `galerkin` may make in displacements, as a fraction of the smallest clearance; 1e-3 if absent.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub tolerance: Option<f64>,
-    /// Largest number of internal steps of one communication step, including rejected trials; 0, or absent: any number.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub max_internal_steps: Option<u32>,
-    /// Interpolation of inputs between communication points.
-    #[serde(default, skip_serializing_if = "is_default")]
-    pub input_interpolation: InputInterpolation,
-}
-
 /// Outputs of the FMU in addition to the totals.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -519,19 +478,9 @@ pub struct SceneSettings {
 }
 
 impl SceneSettings {
-    /// Returns whether the importer may bound the number of internal steps: if the scene does, or if the steps are adaptive.
-    pub fn bounds_steps(&self) -> bool {
-        self.time.max_internal_steps.is_some() || self.takes_a_tolerance()
-    }
-
     /// Returns whether warnings about a topic are silenced.
     pub fn is_silenced(&self, topic: Topic) -> bool {
         self.silence.iter().any(|id| id == topic.id())
-    }
-
-    /// Returns whether the importer may set a tolerance instead of a step.
-    pub(crate) fn takes_a_tolerance(&self) -> bool {
-        self.time.tolerance.is_some() || self.time.scheme.properties().adaptive
     }
 }
 

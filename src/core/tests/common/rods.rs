@@ -14,7 +14,7 @@ use tiprub_core::scene::rom::Rom;
 use tiprub_core::system::{System, SystemSettings};
 use tiprub_test_models::{node, structure};
 
-pub const SCHEMES: [Scheme; 3] = Scheme::RECURRENCES;
+pub const SCHEMES: [Scheme; Scheme::RECURRENCES.len()] = Scheme::RECURRENCES;
 pub const SOLVERS: [Solver; 3] = Solver::ALL;
 
 /// Fraction of its mass that a nominally massless contact node of a rod keeps; the matrix must stay invertible.

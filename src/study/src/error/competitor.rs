@@ -135,14 +135,15 @@ impl Competitor {
     /// Returns the index of the colour: one per scheme or independent method.
     pub fn color(self) -> usize {
         match self {
-            Self::Core(Scheme::CentralDifference, _) => 0,
-            Self::Core(Scheme::ModalExact, _) => 1,
-            Self::Core(Scheme::MasslessBoundary, _) => 2,
+            // The colours of independent methods follow those of the first three schemes.
+            Self::Core(scheme, _) => match scheme.number() as usize {
+                number @ ..=3 => number - 1,
+                number => number + 3,
+            },
             Self::Moreau => 3,
             Self::Augmented => 4,
             Self::Penalty(_) => 5,
             Self::Full(_) => 6,
-            Self::Core(Scheme::Galerkin, _) => 7,
         }
     }
 

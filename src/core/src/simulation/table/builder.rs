@@ -174,7 +174,7 @@ impl TableBuilder {
         );
         (step.min, step.max) = (Some(SHORTEST_STEP), Some(LONGEST_STEP));
         (step.nominal, step.display) = (Some(settings.time.step), Some(1));
-        let (scheme, solver) = (settings.time.scheme as i32 + 1, settings.contacts[0].solver as i32 + 1);
+        let (scheme, solver) = (settings.time.scheme.number(), settings.contacts[0].solver as i32 + 1);
         if settings.takes_a_tolerance() {
             let text = "Permitted displacement error of a galerkin step, as a fraction of the smallest clearance";
             let start = settings.time.tolerance.unwrap_or(TOLERANCE);

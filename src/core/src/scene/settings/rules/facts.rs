@@ -13,7 +13,7 @@ pub(crate) struct Fact {
     pub(super) holds: fn(&ScenePlace) -> bool,
 }
 
-const fn fact(key: &'static str, words: &'static str, holds: fn(&ScenePlace) -> bool) -> Fact {
+pub(super) const fn fact(key: &'static str, words: &'static str, holds: fn(&ScenePlace) -> bool) -> Fact {
     Fact { key, words, holds }
 }
 
