@@ -142,7 +142,7 @@ fn statements(rows: &[ConjugacyRow]) -> Vec<Statement> {
     let touching = rows.iter().map(|row| row.seen[0].contacts).min().unwrap_or(0);
     let of =
         |side: WrenchSide| worst(rows, |row| if row.case.feature.side() == side { row.seen[0].moment } else { 0.0 });
-    let massless = |row: &ConjugacyRow| row.case.scheme.0 == Scheme::MasslessBoundary;
+    let massless = |row: &ConjugacyRow| row.case.scheme == Scheme::MasslessBoundary;
     let curved = |step: usize| worst(rows, |row| if massless(row) { 0.0 } else { row.seen[step].curvature.abs() });
     vec![
         Statement::tested("every run has contacts", touching > 0, format!("at least {touching} per run")),
@@ -197,7 +197,7 @@ impl ConjugacyRow {
         let ConjugacyCase { feature, scheme, solver, friction } = self.case;
         let [first, second] = self.seen;
         json!({
-            "feature": feature.name(), "scheme": scheme.1, "solver": solver.1, "friction": friction,
+            "feature": feature.name(), "scheme": short_name(scheme), "solver": solver.1, "friction": friction,
             "contacts": first.contacts, "axis_moment_round": self.round, "shaft": first.shaft, "ledger": first.balance,
             "force": first.force, "moment": first.moment, "modal": first.modal,
             "curvature": first.curvature, "curvature_half_step": second.curvature,
@@ -223,7 +223,7 @@ fn table(rows: &[ConjugacyRow]) -> String {
             text,
             "| {} | {} | {} | {friction} | {} | {round} | {shaft} | {:.0e} | {force} | {moment} | {:.1e} | {:.1e} |",
             feature.name(),
-            scheme.1,
+            short_name(*scheme),
             solver.1,
             first.contacts,
             first.balance,
