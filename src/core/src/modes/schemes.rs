@@ -106,10 +106,10 @@ impl ModeCoefficients {
             beta,
             kappa,
             compliance,
-            delayed: 0.0,
             loss: (1.0 - beta) / (4.0 * compliance),
             inertia: (1.0 + beta) / (4.0 * compliance),
             spring: 0.5 * frequency * frequency,
+            ..Self::default()
         }
     }
 

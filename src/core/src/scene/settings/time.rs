@@ -57,7 +57,7 @@ impl TimeSettings {
         if let Some(tolerance) = self.tolerance {
             within("time.tolerance", tolerance, ranges::TOLERANCE[0], ranges::TOLERANCE[1])?;
         }
-        Ok(within("time.step", self.step, bounds::SHORTEST_STEP, ranges::LONGEST_STEP)?)
+        within("time.step", self.step, bounds::SHORTEST_STEP, ranges::LONGEST_STEP)
     }
 }
 
