@@ -136,9 +136,9 @@ impl Competitor {
     pub fn color(self) -> usize {
         match self {
             // The colours of independent methods follow those of the first three schemes.
-            Self::Core(scheme, _) => match scheme.number() as usize {
-                number @ ..=3 => number - 1,
-                number => number + 3,
+            Self::Core(scheme, _) => match Scheme::ALL.iter().position(|one| *one == scheme) {
+                Some(index @ ..3) => index,
+                other => other.unwrap_or(3) + 4,
             },
             Self::Moreau => 3,
             Self::Augmented => 4,
