@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 use tiprub_core::Rom;
 use tiprub_core::limits;
 use tiprub_core::limits::plausibility::{self, Slip};
+use tiprub_core::scene::method::Scheme;
 use tiprub_core::scene::rom::{ContactNode, DisplacementFrame};
 use tiprub_cosim::warning::{Topic, Warning};
 use tiprub_shell::{Failure, Result};
@@ -351,8 +352,15 @@ impl RomFacts {
         }
     }
 
-    fn step_limit(&self, scheme: &str) -> Option<f64> {
-        self.step_limits.iter().find(|limit| limit.scheme == scheme).and_then(StepLimit::below)
+    /// Returns the largest stable step of every scheme with fixed steps, and the contact for which it holds, as JSON.
+    fn step_limits_json(&self) -> Value {
+        let of = |scheme: Scheme| self.step_limits.iter().find(|limit| limit.scheme == scheme.name());
+        let limits = Scheme::RECURRENCES.map(|scheme| (scheme.name(), json!(of(scheme).and_then(StepLimit::below))));
+        let others = [
+            ("friction", json!(self.sliding.map(|sliding| sliding.friction))),
+            ("modal-exact_resolves_all_modes_up_to", json!(self.central_difference_limit)),
+        ];
+        limits.into_iter().chain(others).collect()
     }
 
     /// Returns the facts as JSON.
@@ -384,13 +392,7 @@ impl RomFacts {
             }),
             "frequencies_hz": self.frequencies,
             "largest_angular_frequency": self.largest_angular_frequency,
-            "largest_stable_step": {
-                "central-difference": self.step_limit("central-difference"),
-                "modal-exact": self.step_limit("modal-exact"),
-                "massless-boundary": self.step_limit("massless-boundary"),
-                "friction": self.sliding.map(|sliding| sliding.friction),
-                "modal-exact_resolves_all_modes_up_to": self.central_difference_limit,
-            },
+            "largest_stable_step": self.step_limits_json(),
             "solvable_up_to_friction": self.solvable_friction,
             "locks_up_above": self.least_lock_up().map(lock_up_json),
             "locks_up_by_sense": self.lock_up.iter().flatten().map(lock_up_json).collect::<Vec<_>>(),

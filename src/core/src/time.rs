@@ -5,6 +5,8 @@
 pub mod galerkin;
 mod recurrence;
 
+use std::ops::{Deref, DerefMut};
+
 use tiprub_cosim::persist::StateReader;
 
 use crate::geometry::PrescribedMotion;
@@ -67,48 +69,37 @@ impl TimeStepper {
     /// Sets the step size `step` (s) from now on; a running state is converted ([`System::set_step`]).
     pub fn set_step(&mut self, system: &mut System, step: f64) {
         system.set_step(step);
-        self.stepper().set_step(step);
+        self.deref_mut().set_step(step);
     }
 
     /// Sets the step size `step` (s) without conversion of the state, before the first step.
     pub(crate) fn set_first_step(&mut self, system: &mut System, step: f64) {
         system.set_first_step(step);
-        self.stepper().set_step(step);
+        self.deref_mut().set_step(step);
     }
 
     /// Restores a saved state of the system.
     pub fn restore(&mut self, system: &mut System, reader: &mut StateReader) {
         system.restore(reader);
         if system.step_size() > 0.0 {
-            self.stepper().set_step(system.step_size());
+            self.deref_mut().set_step(system.step_size());
         }
     }
+}
 
-    /// See [`Stepper::allow`].
-    pub fn allow(&mut self, most_tried: u64) {
-        self.stepper().allow(most_tried);
+impl Deref for TimeStepper {
+    type Target = dyn Stepper;
+
+    fn deref(&self) -> &Self::Target {
+        match self {
+            Self::Recurrence(stepper) => stepper,
+            Self::Galerkin(stepper) => &**stepper,
+        }
     }
+}
 
-    /// See [`Stepper::step`].
-    ///
-    /// # Errors
-    /// A [`StepFailure`]; the state is undefined afterwards.
-    #[inline]
-    pub fn step(&mut self, system: &mut System, drives: &[PrescribedMotion]) -> Result<(), StepFailure> {
-        self.stepper().step(system, drives)
-    }
-
-    /// See [`Stepper::fly`].
-    pub fn fly(&mut self, system: &mut System, drives: &[PrescribedMotion], turns: &[f64], length: f64) -> bool {
-        self.stepper().fly(system, drives, turns, length)
-    }
-
-    /// See [`Stepper::begin_loads`].
-    pub(crate) fn begin_loads(&mut self, system: &mut System) {
-        self.stepper().begin_loads(system);
-    }
-
-    fn stepper(&mut self) -> &mut dyn Stepper {
+impl DerefMut for TimeStepper {
+    fn deref_mut(&mut self) -> &mut Self::Target {
         match self {
             Self::Recurrence(stepper) => stepper,
             Self::Galerkin(stepper) => &mut **stepper,

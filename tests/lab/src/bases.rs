@@ -158,7 +158,7 @@ struct BasisModel {
 
 /// Runs a model with all schemes and steps.
 fn timed(scene: &Scene, modes: usize, truth: &RunSummary, size: &BasisSize) -> Vec<Timed> {
-    let schemes = [Scheme::CentralDifference, Scheme::ModalExact, Scheme::MasslessBoundary];
+    let schemes = Scheme::RECURRENCES;
     let samples = size.samples;
     let configurations = schemes.iter().flat_map(|scheme| size.divisions.iter().map(|division| (*scheme, *division)));
     let of = |(scheme, division): (Scheme, u32)| {

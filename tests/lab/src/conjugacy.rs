@@ -13,9 +13,8 @@ use tiprub_figure::plots::{Plot, Series};
 use tiprub_shell::{Failure, Result, sweep};
 use tiprub_study::{Picture, Sheet, Statement, Study, StudyFigure};
 
-/// Schemes of the table with their names.
-const SCHEMES: [(Scheme, &str); Scheme::RECURRENCES.len()] =
-    [(Scheme::CentralDifference, "central"), (Scheme::ModalExact, "exact"), (Scheme::MasslessBoundary, "massless")];
+use crate::stability::models::short_name;
+
 /// Largest internal step of the table (s).
 const STEP: f64 = 1e-6;
 /// Number of halvings in the figure.
@@ -27,7 +26,7 @@ pub(crate) const TABLE: &str = "table.md";
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct ConjugacyCase {
     feature: SurfaceFeature,
-    scheme: (Scheme, &'static str),
+    scheme: Scheme,
     solver: Solver,
     friction: f64,
 }
@@ -44,18 +43,18 @@ struct ConjugacyRow {
 
 impl ConjugacyCase {
     fn exists(&self, quick: bool) -> bool {
-        let shown = match self.scheme.0 {
-            Scheme::CentralDifference => self.solver == Solver::Film,
-            Scheme::ModalExact => self.solver.properties().complementary,
-            Scheme::MasslessBoundary | Scheme::Galerkin => self.solver == Solver::Lcp,
+        let shown = match (self.solver.properties().complementary, self.solver.sticks()) {
+            (false, _) => self.scheme == Scheme::PAPER,
+            (true, false) => self.scheme != Scheme::PAPER,
+            (true, true) => self.scheme == Scheme::default(),
         };
         let asked = if quick { shown && self.friction > 0.0 } else { self.friction > 0.0 || !self.solver.sticks() };
-        asked && self.scene(self.friction, false).check_methods(self.scheme.0, self.solver).is_ok()
+        asked && self.scene(self.friction, false).check_methods(self.scheme, self.solver).is_ok()
     }
 
     fn scene(&self, friction: f64, round: bool) -> Scene {
         let mut scene = self.feature.scene(friction, true, round);
-        scene.settings.time.scheme = self.scheme.0;
+        scene.settings.time.scheme = self.scheme;
         scene.settings.contacts.iter_mut().for_each(|contact| contact.solver = self.solver);
         scene
     }
@@ -63,7 +62,13 @@ impl ConjugacyCase {
     fn row(&self) -> Result<ConjugacyRow> {
         let named = |error: tiprub_core::Error| {
             Failure::new(
-                format!("{}, {}, {}, µ = {}", self.feature.name(), self.scheme.1, self.solver.name(), self.friction),
+                format!(
+                    "{}, {}, {}, µ = {}",
+                    self.feature.name(),
+                    short_name(self.scheme),
+                    self.solver.name(),
+                    self.friction
+                ),
                 error.to_string(),
                 "Report this to the developers",
             )
@@ -83,7 +88,7 @@ impl ConjugacyCase {
 fn cases(quick: bool) -> Vec<ConjugacyCase> {
     let mut cases = Vec::new();
     for feature in SurfaceFeature::ALL {
-        for scheme in SCHEMES {
+        for scheme in Scheme::RECURRENCES {
             for solver in Solver::ALL {
                 for friction in [0.0, 0.15] {
                     cases.push(ConjugacyCase { feature, scheme, solver, friction });
@@ -136,7 +141,7 @@ fn statements(rows: &[ConjugacyRow]) -> Vec<Statement> {
     let touching = rows.iter().map(|row| row.seen[0].contacts).min().unwrap_or(0);
     let of =
         |side: WrenchSide| worst(rows, |row| if row.case.feature.side() == side { row.seen[0].moment } else { 0.0 });
-    let massless = |row: &ConjugacyRow| row.case.scheme.0 == Scheme::MasslessBoundary;
+    let massless = |row: &ConjugacyRow| row.case.scheme == Scheme::MasslessBoundary;
     let curved = |step: usize| worst(rows, |row| if massless(row) { 0.0 } else { row.seen[step].curvature.abs() });
     vec![
         Statement::tested("every run has contacts", touching > 0, format!("at least {touching} per run")),
@@ -191,7 +196,7 @@ impl ConjugacyRow {
         let ConjugacyCase { feature, scheme, solver, friction } = self.case;
         let [first, second] = self.seen;
         json!({
-            "feature": feature.name(), "scheme": scheme.1, "solver": solver.name(), "friction": friction,
+            "feature": feature.name(), "scheme": short_name(scheme), "solver": solver.name(), "friction": friction,
             "contacts": first.contacts, "axis_moment_round": self.round, "shaft": first.shaft, "ledger": first.balance,
             "force": first.force, "moment": first.moment, "modal": first.modal,
             "curvature": first.curvature, "curvature_half_step": second.curvature,
@@ -217,7 +222,7 @@ fn table(rows: &[ConjugacyRow]) -> String {
             text,
             "| {} | {} | {} | {friction} | {} | {round} | {shaft} | {:.0e} | {force} | {moment} | {:.1e} | {:.1e} |",
             feature.name(),
-            scheme.1,
+            short_name(*scheme),
             solver.name(),
             first.contacts,
             first.balance,

@@ -106,23 +106,20 @@ impl ModeCoefficients {
             beta,
             kappa,
             compliance,
-            delayed: 0.0,
             loss: (1.0 - beta) / (4.0 * compliance),
             inertia: (1.0 + beta) / (4.0 * compliance),
             spring: 0.5 * frequency * frequency,
+            ..Self::default()
         }
     }
 
     /// Coefficients of a mode that has inertia under the scheme (`dynamic`) or is quasi-static.
     pub(crate) fn of_mode(scheme: Scheme, dynamic: bool, frequency: f64, damping_ratio: f64, step: f64) -> Self {
-        match scheme {
-            Scheme::CentralDifference | Scheme::ModalExact => Self::new(scheme, frequency, damping_ratio, step),
-            Scheme::Galerkin if dynamic => galerkin::state(frequency, step),
-            Scheme::MasslessBoundary if dynamic => {
-                massless_boundary::delay(Self::new(scheme, frequency, damping_ratio, step))
-            }
-            Scheme::MasslessBoundary | Scheme::Galerkin => massless_boundary::quasi_static(frequency),
+        if !dynamic {
+            return massless_boundary::quasi_static(frequency);
         }
+        let mode = Self::new(scheme, frequency, damping_ratio, step);
+        if scheme.properties().delays_contact { massless_boundary::delay(mode) } else { mode }
     }
 
     /// Coefficients of a mode whose stiffness, inertia and damping are multiplied by `share`.

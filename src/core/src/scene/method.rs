@@ -70,6 +70,11 @@ impl Scheme {
     pub fn name(self) -> &'static str {
         SCHEMES.items[self as usize].0
     }
+
+    /// Number in the FMU's enumeration, which counts from 1.
+    pub fn number(self) -> i32 {
+        self as i32 + 1
+    }
 }
 
 /// Facts about a time-stepping scheme.

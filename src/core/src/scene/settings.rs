@@ -2,10 +2,10 @@
 
 mod blades;
 mod coating;
-mod default_scheme;
 pub(crate) mod relations;
 pub mod rules;
 mod surfaces;
+mod time;
 mod validation;
 
 use serde::{Deserialize, Serialize};
@@ -13,10 +13,11 @@ use std::sync::Arc;
 use tiprub_cosim::warning::Topic;
 
 use crate::Rom;
-use crate::scene::method::{Scheme, Solver};
+use crate::scene::method::Solver;
 pub use blades::{ExcitationSettings, ForceDirection, InitialSettings};
 pub use coating::{CoatingSettings, CuttingSettings};
 pub use surfaces::{Closure, Interpolation, PatchSettings, Shape, SplineSettings, SurfaceSettings};
+pub use time::{ADAPTIVE_STEP, InputInterpolation, TOLERANCE, TimeSettings};
 
 /// Returns whether a value is its default. Newer keys at their default are not written, so that older scenes are unchanged.
 fn is_default<T: Default + PartialEq>(value: &T) -> bool {
@@ -38,12 +39,6 @@ fn three<'de, D: serde::Deserializer<'de>>(source: D) -> std::result::Result<[f6
 fn is_at_rest(velocity: &[f64; 3]) -> bool {
     velocity.iter().all(is_positive_zero)
 }
-
-/// Default error that a step of `galerkin` may make, as a fraction of the smallest clearance.
-pub const TOLERANCE: f64 = 1e-3;
-
-/// Longest step (s) of `galerkin` if the scene file gives none. The communication step also bounds steps.
-pub const ADAPTIVE_STEP: f64 = 8e-5;
 
 /// Rigid motion of a structure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -198,42 +193,6 @@ impl ContactSettings {
     }
 }
 
-/// Interpolation between communication points of inputs that move or load a structure.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum InputInterpolation {
-    /// Ramp from the current value to the new one, which is reached at the end of the step (default).
-    #[default]
-    Ramp,
-    /// The new value acts immediately: a jump within one internal step.
-    Hold,
-}
-
-/// Internal time stepping.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct TimeSettings {
-    /// Scheme. A file without this key has the [default](SceneSettings::default_scheme), which is chosen when the file is read.
-    #[serde(default)]
-    pub scheme: Scheme,
-    /// Reason for the scheme if the file does not give one; for messages, without effect.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub scheme_reason: Option<String>,
-    /// Largest internal step h (s); the actual step divides the communication step evenly. With adaptive steps the longest one,
-    /// [`ADAPTIVE_STEP`] if the file gives none.
-    #[serde(default)]
-    pub step: f64,
-    /// Error that a step of `galerkin` may make in displacements, as a fraction of the smallest clearance; 1e-3 if absent.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub tolerance: Option<f64>,
-    /// Largest number of internal steps of one communication step, including rejected trials; 0, or absent: any number.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub max_internal_steps: Option<u32>,
-    /// Interpolation of inputs between communication points.
-    #[serde(default, skip_serializing_if = "is_default")]
-    pub input_interpolation: InputInterpolation,
-}
-
 /// Outputs of the FMU in addition to the totals.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -356,19 +315,9 @@ pub struct SceneSettings {
 }
 
 impl SceneSettings {
-    /// Returns whether the importer may bound the number of internal steps: if the scene does, or if the steps are adaptive.
-    pub fn bounds_steps(&self) -> bool {
-        self.time.max_internal_steps.is_some() || self.takes_a_tolerance()
-    }
-
     /// Returns whether warnings about a topic are silenced.
     pub fn is_silenced(&self, topic: Topic) -> bool {
         self.silence.iter().any(|id| id == topic.id())
-    }
-
-    /// Returns whether the importer may set a tolerance instead of a step.
-    pub(crate) fn takes_a_tolerance(&self) -> bool {
-        self.time.tolerance.is_some() || self.time.scheme.properties().adaptive
     }
 }
 

@@ -13,7 +13,7 @@ use tiprub_core::scene::rom::Rom;
 use tiprub_core::system::{System, SystemSettings};
 use tiprub_test_models::{node, single_sector_with, structure};
 
-pub const SCHEMES: [Scheme; 3] = Scheme::RECURRENCES;
+pub const SCHEMES: [Scheme; Scheme::RECURRENCES.len()] = Scheme::RECURRENCES;
 
 /// Fraction of its mass that a nominally massless contact node of a rod keeps; the matrix must stay invertible.
 pub const NEARLY_NONE: f64 = 1e-4;

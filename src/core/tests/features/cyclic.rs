@@ -9,7 +9,7 @@ use tiprub_test_models::{
     real, started,
 };
 
-const SCHEMES: [Scheme; 3] = Scheme::RECURRENCES;
+const SCHEMES: [Scheme; Scheme::RECURRENCES.len()] = Scheme::RECURRENCES;
 
 /// Returns both forms of one disk with the same settings.
 fn pair(disk: &TestDisk, scheme: Scheme, solver: Solver, friction: f64) -> [Simulation; 2] {

@@ -15,7 +15,7 @@ use tiprub_test_models::{
     flexible, go, real, started, try_started,
 };
 
-const SCHEMES: [Scheme; 3] = Scheme::RECURRENCES;
+const SCHEMES: [Scheme; Scheme::RECURRENCES.len()] = Scheme::RECURRENCES;
 
 type Feature = (&'static str, fn(&mut Scene));
 

@@ -6,7 +6,7 @@ use tiprub_core::{CoSimulation, Scene, Simulation};
 use tiprub_cosim::variables::{Causality, DataType};
 use tiprub_test_models::{lattice, real, rich_blade, rub, several, spin};
 
-const SCHEMES: [Scheme; 3] = Scheme::RECURRENCES;
+const SCHEMES: [Scheme; Scheme::RECURRENCES.len()] = Scheme::RECURRENCES;
 
 /// Sets every input and parameter whose name ends with `name`.
 fn set_all(simulation: &mut Simulation, name: &str, value: f64) {

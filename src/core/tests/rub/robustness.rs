@@ -309,7 +309,7 @@ proptest! {
             }
         }
         // After a reset the instance behaves like a new one: with rejected parameters, and with those of the scene.
-        for scheme in [3, 1, scene.settings.time.scheme as i32 + 1] {
+        for scheme in [3, 1, scene.settings.time.scheme.number()] {
             simulation.reset();
             let mut fresh = Simulation::new(scene).unwrap();
             let mut outcomes = Vec::new();

@@ -135,14 +135,15 @@ impl Competitor {
     /// Returns the index of the colour: one per scheme or independent method.
     pub fn color(self) -> usize {
         match self {
-            Self::Core(Scheme::CentralDifference, _) => 0,
-            Self::Core(Scheme::ModalExact, _) => 1,
-            Self::Core(Scheme::MasslessBoundary, _) => 2,
+            // The colours of independent methods follow those of the first three schemes.
+            Self::Core(scheme, _) => match Scheme::ALL.iter().position(|one| *one == scheme) {
+                Some(index @ ..3) => index,
+                other => other.unwrap_or(3) + 4,
+            },
             Self::Moreau => 3,
             Self::Augmented => 4,
             Self::Penalty(_) => 5,
             Self::Full(_) => 6,
-            Self::Core(Scheme::Galerkin, _) => 7,
         }
     }
 

@@ -179,7 +179,7 @@ impl MapSetup {
         let (Some(scheme), Some(step)) = (reference(Quantity::SchemeChoice), reference(Quantity::StepMax)) else {
             return Ok(());
         };
-        let marched = simulation.integer(scheme)? == Scheme::ADAPTIVE as i32 + 1;
+        let marched = simulation.integer(scheme)? == Scheme::ADAPTIVE.number();
         if marched && simulation.real(step)? > longest {
             simulation.set_real(step, longest)?;
         }

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use tiprub_core::geometry::{FixedGap, GapLaw, PrescribedMotion, Vector3};
 use tiprub_core::limits::{self, massless};
-use tiprub_core::modes::{bank::{BankOptions}, modal::ModalModel};
+use tiprub_core::modes::{bank::BankOptions, modal::ModalModel};
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::system::{System, SystemSettings};
 use tiprub_core::time::{Recurrence, Stepper};

@@ -336,10 +336,13 @@ fn announced(name: &str, scene: &Scene) -> Fall {
 fn factor(scene: &Scene) -> f64 {
     let fastest = scene.roms.iter().map(largest_frequency).fold(0.0, f64::max);
     let half = 0.5 * fastest * scene.settings.time.step;
-    match scene.settings.time.scheme {
-        Scheme::CentralDifference => FACTOR.max(1.0 / (1.0 - half * half).max(0.05)),
-        Scheme::ModalExact | Scheme::MasslessBoundary => FACTOR,
-        Scheme::Galerkin => 1.0,
+    let properties = scene.settings.time.scheme.properties();
+    if properties.adaptive {
+        1.0
+    } else if properties.stable_below.is_finite() {
+        FACTOR.max(1.0 / (1.0 - half * half).max(0.05))
+    } else {
+        FACTOR
     }
 }
 

@@ -32,14 +32,21 @@ pub(crate) struct StabilityMethod {
     pub steps: StepChoice,
 }
 
-/// Schemes with their choice of the step and their name in the table.
-const INTEGRATIONS: [(Scheme, StepChoice, &str); Scheme::ALL.len() + 1] = [
-    (Scheme::CentralDifference, StepChoice::Fixed, "central"),
-    (Scheme::ModalExact, StepChoice::Fixed, "exact"),
-    (Scheme::MasslessBoundary, StepChoice::Fixed, "massless"),
-    (Scheme::Galerkin, StepChoice::Adaptive(1e-4), "galerkin"),
-    (Scheme::Galerkin, StepChoice::Fixed, "galerkin-fixed"),
-];
+/// Returns the first word of the name of a scheme that distinguishes it from the others.
+pub(crate) fn short_name(scheme: Scheme) -> &'static str {
+    let name = scheme.name();
+    name.strip_prefix("modal-").unwrap_or(name).split('-').next().unwrap_or(name)
+}
+
+/// Returns all schemes with their choice of the step and their name in the table.
+fn integrations() -> impl Iterator<Item = (Scheme, StepChoice, &'static str)> {
+    Scheme::ALL.into_iter().flat_map(|scheme| {
+        let adaptive = scheme.properties().adaptive;
+        let by_tolerance = adaptive.then_some((scheme, StepChoice::Adaptive(1e-4), short_name(scheme)));
+        let fixed = (scheme, StepChoice::Fixed, if adaptive { "galerkin-fixed" } else { short_name(scheme) });
+        by_tolerance.into_iter().chain([fixed])
+    })
+}
 
 impl StabilityMethod {
     /// Returns modal-exact with this solver.
@@ -50,7 +57,7 @@ impl StabilityMethod {
     /// Returns every method.
     pub(crate) fn all() -> impl Iterator<Item = Self> {
         let with = |(scheme, steps, _)| Solver::ALL.into_iter().map(move |solver| Self { scheme, solver, steps });
-        INTEGRATIONS.into_iter().flat_map(with)
+        integrations().flat_map(with)
     }
 
     /// Returns every scheme and choice of the step, with one solver.
@@ -67,10 +74,9 @@ impl StabilityMethod {
     /// Returns the name of scheme and choice of the step.
     pub(crate) fn integration(self) -> &'static str {
         let adaptive = |steps| matches!(steps, StepChoice::Adaptive(_));
-        let own = |&(scheme, steps, _): &(Scheme, StepChoice, &str)| {
-            scheme == self.scheme && adaptive(steps) == adaptive(self.steps)
-        };
-        INTEGRATIONS.iter().find(|row| own(row)).map_or("", |(.., name)| name)
+        let mut all = integrations();
+        let own = all.find(|(scheme, steps, _)| *scheme == self.scheme && adaptive(*steps) == adaptive(self.steps));
+        own.map_or("", |(.., name)| name)
     }
 
     /// Returns the name of the solver.
@@ -86,13 +92,13 @@ impl StabilityMethod {
     /// Returns the method in the name of a case: scheme with choice of the step, and solver.
     pub(crate) fn in_name(name: &str) -> (Option<&'static str>, Option<&'static str>) {
         let part = |known: &'static str| name.split('/').any(|part| part == known).then_some(known);
-        let scheme = INTEGRATIONS.iter().find_map(|(.., known)| part(known));
+        let scheme = integrations().find_map(|(.., known)| part(known));
         (scheme, Solver::ALL.iter().find_map(|known| part(known.name())))
     }
 
     /// Returns the names of schemes with their choice of the step.
     pub(crate) fn integrations() -> impl Iterator<Item = &'static str> {
-        INTEGRATIONS.iter().map(|(.., name)| *name)
+        integrations().map(|(.., name)| name)
     }
 
     /// Returns whether the scheme is galerkin, with a tolerance or at longest steps.

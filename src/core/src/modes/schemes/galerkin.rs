@@ -6,11 +6,8 @@ use super::ModeCoefficients;
 pub(super) fn state(frequency: f64, step: f64) -> ModeCoefficients {
     ModeCoefficients {
         beta: 1.0,
-        kappa: 0.0,
-        compliance: 0.0,
-        delayed: 0.0,
-        loss: 0.0,
         inertia: 0.5 / (step * step),
         spring: 0.5 * frequency * frequency,
+        ..ModeCoefficients::default()
     }
 }

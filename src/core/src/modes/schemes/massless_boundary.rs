@@ -7,15 +7,7 @@ use super::ModeCoefficients;
 /// A mode without inertia, q = f/ω².
 pub(super) fn quasi_static(frequency: f64) -> ModeCoefficients {
     let square = frequency * frequency;
-    ModeCoefficients {
-        beta: 0.0,
-        kappa: 1.0,
-        compliance: 1.0 / square,
-        delayed: 0.0,
-        loss: 0.0,
-        inertia: 0.0,
-        spring: 0.5 * square,
-    }
+    ModeCoefficients { kappa: 1.0, compliance: 1.0 / square, spring: 0.5 * square, ..ModeCoefficients::default() }
 }
 
 /// Delays the contact forces by one step.

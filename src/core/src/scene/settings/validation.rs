@@ -63,16 +63,12 @@ impl SceneSettings {
             let flies = master.is_some_and(|master| master.motion == BodyMotion::Free);
             contact.validate(flies, &format!("contact[{}]", index + 1))?;
         }
-        within("time.max_internal_steps", f64::from(self.time.max_internal_steps.unwrap_or(0)), 0.0, ranges::STEPS)?;
-        if let Some(tolerance) = self.time.tolerance {
-            within("time.tolerance", tolerance, ranges::TOLERANCE[0], ranges::TOLERANCE[1])?;
-        }
+        self.time.validate()?;
         let experiment = &self.experiment;
         at_most("experiment.start", experiment.start, bounds::TIME)?;
         at_most("experiment.stop", experiment.stop, bounds::TIME)?;
         let length = experiment.communication_step;
         within("experiment.communication_step", length, bounds::SHORTEST_STEP, bounds::TIME)?;
-        within("time.step", self.time.step, bounds::SHORTEST_STEP, ranges::LONGEST_STEP)?;
         if !(self.experiment.stop.is_finite() && self.experiment.stop > self.experiment.start) {
             return Err(Error::invalid(
                 "experiment.stop",

@@ -165,7 +165,7 @@ impl TableBuilder {
         let text = "Maximum internal time step; the step in use divides the communication step evenly";
         let step = self.parameter(Quantity::StepMax, "internal_step_max", Some(&TIME), settings.time.step, text);
         step.range(SHORTEST_STEP, LONGEST_STEP).nominal(settings.time.step).display(1);
-        let (scheme, solver) = (settings.time.scheme as i32 + 1, settings.contacts[0].solver as i32 + 1);
+        let (scheme, solver) = (settings.time.scheme.number(), settings.contacts[0].solver as i32 + 1);
         if settings.takes_a_tolerance() {
             let text = "Permitted displacement error of a galerkin step, as a fraction of the smallest clearance";
             let start = settings.time.tolerance.unwrap_or(TOLERANCE);

@@ -125,8 +125,9 @@ fn ratio(kind: &str, ratio: f64, method: StabilityMethod) -> CaseEnd {
     let mut scene = method.on(round(tower.rom()));
     scene.settings.contacts[0].friction = 0.15;
     let step = match method.scheme {
-        Scheme::CentralDifference => 0.9 * 2.0 / tower.largest_frequency(),
-        Scheme::ModalExact | Scheme::Galerkin => method.step(5e-6),
+        scheme if scheme.properties().stable_below.is_finite() => {
+            0.9 * scheme.properties().stable_below / tower.largest_frequency()
+        }
         Scheme::MasslessBoundary => {
             scene.settings.structures[0].damping_ratio = Some(0.3);
             match massless_step(&scene) {
@@ -135,6 +136,7 @@ fn ratio(kind: &str, ratio: f64, method: StabilityMethod) -> CaseEnd {
                 None => 5e-6,
             }
         }
+        _ => method.step(5e-6),
     };
     CaseEnd::of(Press::new(with_step(scene, step)).run())
 }

@@ -197,9 +197,11 @@ fn kicked(method: StabilityMethod, step: f64) -> Result<(Simulation, f64)> {
     scene.settings.structures[0].damping_ratio = Some(0.0);
     scene.settings.outputs.all_sectors = false;
     let step = match method.scheme {
-        Scheme::CentralDifference => 0.9 * 2.0 / tower.largest_frequency(),
-        Scheme::ModalExact | Scheme::Galerkin => step,
+        scheme if scheme.properties().stable_below.is_finite() => {
+            0.9 * scheme.properties().stable_below / tower.largest_frequency()
+        }
         Scheme::MasslessBoundary => 0.5 * massless_step(&scene).unwrap_or(step),
+        _ => step,
     };
     let scene = with_step(scene, method.step(step));
     let mut simulation = Simulation::new(&scene)?;

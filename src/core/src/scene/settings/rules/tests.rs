@@ -2,6 +2,7 @@ use nalgebra::{Complex, DMatrix};
 use tiprub_cosim::ThermalPatch;
 
 use super::all;
+use crate::scene::method::{Scheme, Solver};
 use crate::scene::rom::{
     ContactGrid, ContactNode, DisplacementFrame, Harmonic, RomChecks, RomExtras, Spin, Thermal, WatchedPoints,
 };
