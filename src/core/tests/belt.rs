@@ -10,7 +10,7 @@ mod guide;
 use guide::print_row;
 use nalgebra::DMatrix;
 use tiprub_core::geometry::{FixedGap, GapLaw, PrescribedMotion, Vector3};
-use tiprub_core::modes::bank::{BankOptions, SectorModel};
+use tiprub_core::modes::bank::BankOptions;
 use tiprub_core::modes::modal::ModalModel;
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::system::{System, SystemSettings};

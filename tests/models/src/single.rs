@@ -3,8 +3,8 @@
 use tiprub_core::contact::ContactParameters;
 use tiprub_core::geometry::GapLaw;
 use tiprub_core::modes::bank::BankOptions;
+use tiprub_core::modes::bank::SectorModel;
 use tiprub_core::modes::modal::ModalModel;
-use tiprub_core::modes::sectors::SectorModel;
 use tiprub_core::system::{PairParts, StructureParts, System, SystemSettings};
 
 /// Returns a system at rest, with friction coefficient µ. Call `set_step` and `start` before the first step.

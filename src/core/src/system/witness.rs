@@ -62,8 +62,8 @@ mod tests {
     use super::*;
     use crate::contact::ContactParameters;
     use crate::geometry::{FixedGap, GapLaw, PrescribedMotion};
+    use crate::modes::bank::SectorModel;
     use crate::modes::modal::ModalModel;
-    use crate::modes::sectors::SectorModel;
     use crate::scene::method::{Scheme, Solver};
     use crate::system::{PairParts, StructureParts, SystemSettings};
     use crate::time::{Recurrence, Stepper};

@@ -5,7 +5,7 @@
 use nalgebra::DMatrix;
 use tiprub_core::geometry::{FixedGap, GapLaw, Vector3};
 use tiprub_core::limits::massless::{MasslessCheck, QUIET};
-use tiprub_core::modes::bank::{BankOptions, SectorModel};
+use tiprub_core::modes::bank::BankOptions;
 use tiprub_core::modes::modal::ModalModel;
 use tiprub_core::modes::schemes::free_increment;
 use tiprub_core::scene::method::{Scheme, Solver};
