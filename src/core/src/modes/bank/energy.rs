@@ -1,6 +1,7 @@
 //! Energies of the modes, damping losses, and the work of loads.
 
 use super::ModalBank;
+use crate::modes::schemes::{ModeCoefficients, Velocity};
 
 impl ModalBank {
     /// Kinetic and strain energy of all sectors (J), in the form that the scheme conserves (see [`crate::modes::schemes`]).
@@ -22,14 +23,19 @@ impl ModalBank {
         let (mut kinetic, mut strain) = sums;
         // The strain energy belongs to one time, or to two.
         let lag = self.scheme.strain_lag();
-        for (k, [position, increment]) in self.coefficients(group).iter().zip(self.amplitudes_of(group)) {
-            let mut add = |position: f64, increment: f64| {
-                kinetic += k.inertia * (increment * increment);
-                strain += k.spring * (position * (position - lag * increment));
-            };
-            add(position[0], increment[0]);
-            if self.parts == 2 {
-                add(position[1], increment[1]);
+        let mut add = |k: &ModeCoefficients, position: f64, increment: f64| {
+            kinetic += k.inertia * (increment * increment);
+            strain += k.spring * (position * (position - lag * increment));
+        };
+        let coefficients = self.coefficients(group);
+        if self.disk.is_none() {
+            coefficients
+                .iter()
+                .zip(self.stored(group))
+                .for_each(|(k, (position, increment))| add(k, position, increment));
+        } else {
+            for (k, [position, increment]) in coefficients.iter().zip(self.amplitudes_of(group)) {
+                (0..2).for_each(|part| add(k, position[part], increment[part]));
             }
         }
         if let Some(coupling) = &self.coupling {
@@ -48,16 +54,19 @@ impl ModalBank {
         for group in 0..self.groups {
             self.gather_forces(group, forces);
             let velocities = &self.velocities[self.set_of(group) * self.modes..];
-            let modes = self.coefficients(group).iter().zip(velocities).zip(self.amplitudes_of(group));
-            for (mode, ((k, velocity), [position, increment])) in modes.enumerate() {
-                let mut add = |position: f64, increment: f64, force: f64| {
-                    let velocity = velocity.of(position, increment, force);
-                    kinetic += 0.5 * velocity * velocity;
-                    strain += k.spring * (position * position);
-                };
-                add(position[0], increment[0], self.modal_force[mode * self.parts]);
-                if self.parts == 2 {
-                    add(position[1], increment[1], self.modal_force[mode * self.parts + 1]);
+            let modes = self.coefficients(group).iter().zip(velocities);
+            let mut add = |(k, velocity): (&ModeCoefficients, &Velocity), position: f64, increment: f64, force: f64| {
+                let velocity = velocity.of(position, increment, force);
+                kinetic += 0.5 * velocity * velocity;
+                strain += k.spring * (position * position);
+            };
+            if self.disk.is_none() {
+                let all = modes.zip(self.stored(group)).zip(&self.modal_force);
+                all.for_each(|((mode, (position, increment)), force)| add(mode, position, increment, *force));
+            } else {
+                let all = modes.zip(self.amplitudes_of(group)).zip(self.modal_force.as_chunks::<2>().0);
+                for ((mode, [position, increment]), force) in all {
+                    (0..2).for_each(|part| add(mode, position[part], increment[part], force[part]));
                 }
             }
             if let Some(coupling) = &self.coupling {

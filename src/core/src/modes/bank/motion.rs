@@ -20,6 +20,14 @@ impl ModalBank {
         (0..self.modes).map(move |mode| self.amplitudes_at(first + mode * stride, mode, group))
     }
 
+    /// Positions and increments of the modes of a sector whose modes are not those of a disk, in their order.
+    #[inline(always)]
+    pub(super) fn stored(&self, group: usize) -> impl Iterator<Item = (f64, f64)> {
+        let first = self.index(0, group);
+        let (position, increment) = (&self.state.position[first..], &self.state.increment[first..]);
+        position.iter().step_by(self.width).copied().zip(increment.iter().step_by(self.width).copied())
+    }
+
     #[inline(always)]
     fn amplitudes_at(&self, index: usize, mode: usize, group: usize) -> [[f64; 2]; 2] {
         let (position, increment) = (&self.state.position, &self.state.increment);
