@@ -89,7 +89,9 @@ impl Simulation {
     /// Invalid settings or ROM; combinations that are not supported.
     pub fn new(scene: impl Into<Arc<Scene>>) -> Result<Self> {
         let (compiled, table, readers) = Compiled::new(scene.into())?;
-        let system = compiled.system()?;
+        let mut system = compiled.system()?;
+        let outputs = &compiled.scene.settings.outputs;
+        system.structures.iter_mut().for_each(|one| one.need_minima(&outputs.watched_sectors, outputs.all_sectors));
         let sets = system.sets().count();
         let state = SimulationState {
             inputs: Inputs::new(&compiled),

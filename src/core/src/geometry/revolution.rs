@@ -73,6 +73,16 @@ impl RevolutionGap {
         &self.nodes
     }
 
+    /// Shape of the surface, and positions of the nodes.
+    pub(crate) fn faced(&self) -> (&CompiledShape, &Layout) {
+        (&self.surface, &self.layout)
+    }
+
+    /// Returns whether the shaft centre moves.
+    pub(crate) fn is_shifted(&self) -> bool {
+        self.shaft_moves
+    }
+
     /// Meridional slope of the surface per contact node of the structure.
     pub fn slopes(&self) -> &[f64] {
         &self.slopes

@@ -3,6 +3,10 @@
 //! The loop bodies have the same source for every instruction set and use neither fused multiply-add nor horizontal sums, so
 //! wider registers change the speed but not a single bit of the result.
 
+#[cfg(target_arch = "x86_64")]
+use super::octet::wide::{Avx2, Avx512};
+use super::octet::{OctetKernel, Portable};
+
 /// Instruction set for which the hot loops are compiled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum InstructionSet {
@@ -29,6 +33,20 @@ impl InstructionSet {
             }
         }
         Self::Baseline
+    }
+
+    /// Runs `kernel` with the registers of this instruction set.
+    #[inline]
+    pub(crate) fn run_octets<K: OctetKernel>(self, kernel: K) -> K::Output {
+        match self {
+            Self::Baseline => kernel.run::<Portable>(),
+            // SAFETY: the variants are only created by `detect`, after the processor reported the feature.
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 => unsafe { octets_with_avx2(kernel) },
+            // SAFETY: as above.
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512 => unsafe { octets_with_avx512(kernel) },
+        }
     }
 
     /// Runs `kernel` compiled for this instruction set.
@@ -62,4 +80,16 @@ fn with_avx2(kernel: impl Kernel) {
 #[target_feature(enable = "avx512f")]
 fn with_avx512(kernel: impl Kernel) {
     kernel.run();
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn octets_with_avx2<K: OctetKernel>(kernel: K) -> K::Output {
+    kernel.run::<Avx2>()
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f")]
+fn octets_with_avx512<K: OctetKernel>(kernel: K) -> K::Output {
+    kernel.run::<Avx512>()
 }

@@ -194,13 +194,16 @@ pub struct SolverProperties {
     pub sticks: bool,
     /// True if gap and force are complementary; otherwise nodes may be pulled, or left inside a surface for a step.
     pub complementary: bool,
+    /// True if friction is µ times the normal force at any sliding speed.
+    pub constant_friction: bool,
     /// True if contacts may have a coating, which yields within the contact problem.
     pub solves_coatings: bool,
 }
 
 impl SolverProperties {
     /// Complementarity with friction that always slides.
-    const SLIDING: Self = Self { feature: None, sticks: false, complementary: true, solves_coatings: false };
+    const SLIDING: Self =
+        Self { feature: None, sticks: false, complementary: true, constant_friction: true, solves_coatings: false };
 }
 
 /// Enumeration of the solvers for importers.

@@ -130,16 +130,40 @@ impl CompiledShape {
         }
     }
 
+    /// Change of radius s (m), slope ds/dθ (m/rad) and curvature d²s/dθ² (m/rad²) at an angle (rad).
+    pub(crate) fn evaluate_twice(&self, angle: f64) -> [f64; 3] {
+        let (value, slope) = self.evaluate(angle);
+        let curvature = match self {
+            Self::Circular => 0.0,
+            Self::Lobes { order, .. } => -order * order * value,
+            Self::TwoLobe { height, width, phase } => {
+                let (bump, slope) = two_lobe(*height, *width, *phase, angle);
+                let distance = if bump == 0.0 { 0.0 } else { -0.5 * slope * width / bump };
+                (4.0 * distance * distance - 2.0) / (width * width) * bump
+            }
+            Self::Table { knots, .. } => {
+                let (cubic, t, spacing) = spline_part(knots, angle);
+                (2.0 * cubic[2] + 6.0 * t * cubic[3]) / (spacing * spacing)
+            }
+        };
+        [value, slope, curvature]
+    }
+
+    /// Largest curvature by which s may be below its chord (m/rad²); `None` if s is never negative.
+    pub(crate) fn bumpiness(&self) -> Option<f64> {
+        match self {
+            Self::Circular => None,
+            Self::Lobes { amplitude, order, .. } => Some(amplitude.abs() * order * order),
+            // Dents lower nothing. Between two bumps there is a ridge, which is above any chord.
+            Self::TwoLobe { height, .. } if *height < 0.0 => None,
+            Self::TwoLobe { height, width, .. } => Some(2.0 * height.abs() / (width * width)),
+            Self::Table { curvature, .. } => Some(*curvature),
+        }
+    }
+
     /// Lower bound of s between two angles (m): the lower of its end values, minus the difference that its curvature allows.
     pub(crate) fn least_between(&self, from: f64, to: f64) -> f64 {
-        let curvature = match self {
-            Self::Circular => return 0.0,
-            Self::Lobes { amplitude, order, .. } => amplitude.abs() * order * order,
-            // Dents lower nothing. Between two bumps there is a ridge, which is above any chord.
-            Self::TwoLobe { height, .. } if *height < 0.0 => return 0.0,
-            Self::TwoLobe { height, width, .. } => 2.0 * height.abs() / (width * width),
-            Self::Table { curvature, .. } => *curvature,
-        };
+        let Some(curvature) = self.bumpiness() else { return 0.0 };
         let width = to - from;
         self.evaluate(from).0.min(self.evaluate(to).0) - 0.125 * curvature * width * width
     }
@@ -255,18 +279,22 @@ fn largest_curvature(knots: &[[f64; 2]]) -> f64 {
     both.fold(0.0, f64::max)
 }
 
-/// Value and slope of a periodic cubic (Hermite form) at `angle`.
-fn evaluate_spline(knots: &[[f64; 2]], angle: f64) -> (f64, f64) {
+/// Coefficients of the part of a periodic cubic (Hermite form) at `angle`, the fraction of the part there, and its length (rad).
+fn spline_part(knots: &[[f64; 2]], angle: f64) -> ([f64; 4], f64, f64) {
     #[expect(clippy::cast_precision_loss, reason = "tables are far shorter than 2^52")]
     let count = knots.len() as f64;
     let spacing = std::f64::consts::TAU / count;
     let place = angle / spacing;
     let floor = place.floor();
-    let t = place - floor;
     // rem_euclid keeps the index in range for any angle, so that the cast cannot truncate.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 ≤ value < len")]
     let index = (floor.rem_euclid(count) as usize).min(knots.len() - 1);
-    let [a, p, quadratic, cubic] = hermite(knots, index, spacing);
+    (hermite(knots, index, spacing), place - floor, spacing)
+}
+
+/// Value and slope of a periodic cubic (Hermite form) at `angle`.
+fn evaluate_spline(knots: &[[f64; 2]], angle: f64) -> (f64, f64) {
+    let ([a, p, quadratic, cubic], t, spacing) = spline_part(knots, angle);
     let value = a + t * (p + t * (quadratic + t * cubic));
     let slope = (p + t * (2.0 * quadratic + 3.0 * t * cubic)) / spacing;
     (value, slope)

@@ -36,6 +36,24 @@ pub struct Structure {
     pub(crate) step_control: StepControl,
     /// Smallest gaps within the last span (m), `[node · lanes + lane]`, if the scheme evaluates them; otherwise empty.
     pub(crate) lowest_in_span: Vec<f64>,
+    /// Which of these gaps are needed.
+    pub(crate) needed_minima: NeededMinima,
+}
+
+/// Smallest gaps within spans that are needed; others may be larger than they are.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct NeededMinima {
+    /// For each sector, whether those of all of its nodes are needed; empty if all are. Those of each node over all sectors are needed anyway.
+    pub of_sectors: Vec<bool>,
+    /// True if that of each sector over all nodes is needed.
+    pub by_sector: bool,
+}
+
+impl NeededMinima {
+    /// Returns whether those of all nodes of a sector are needed.
+    pub fn all_of(&self, sector: usize) -> bool {
+        self.of_sectors.get(sector).copied().unwrap_or(true)
+    }
 }
 
 /// State of adaptive steps for all sectors.
@@ -85,6 +103,7 @@ impl Structure {
             delayed: Vec::new(),
             step_control: StepControl::new(modes.sectors(), contacts),
             lowest_in_span: Vec::new(),
+            needed_minima: NeededMinima::default(),
             pair_of,
             lanes: modes.lanes(),
             modes,
@@ -105,6 +124,7 @@ impl Structure {
             delayed: vec![0.0; model.len()],
             step_control: StepControl::default(),
             lowest_in_span: Vec::new(),
+            needed_minima: NeededMinima::default(),
             lanes: modes.lanes(),
             modes,
         }
@@ -150,6 +170,12 @@ impl Structure {
     /// Gaps at the current step (m), `[node · lanes + lane]`; padding lanes are infinite.
     pub fn gaps(&self) -> &[f64] {
         &self.history.gap.now
+    }
+
+    /// Sets which smallest gaps are needed: those of all nodes of the sectors `watched` (1-based), and that of each sector if `by_sector`.
+    pub(crate) fn need_minima(&mut self, watched: &[usize], by_sector: bool) {
+        let of_sectors = (1..=self.modes.sectors()).map(|sector| watched.contains(&sector)).collect();
+        self.needed_minima = NeededMinima { of_sectors, by_sector };
     }
 
     /// Smallest gaps within the last step (m), as far as the scheme evaluates them, `[node · lanes + lane]`.

@@ -8,6 +8,7 @@
 
 pub mod advance;
 pub mod basis;
+mod blade;
 pub mod carrier;
 pub mod compliance;
 mod disk;

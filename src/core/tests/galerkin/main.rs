@@ -8,6 +8,7 @@ mod extremes;
 #[path = "../../../../tests/guide.rs"]
 mod guide;
 mod sticking;
+mod two_numbers;
 
 use counting::allocations_of;
 use guide::print_row;

@@ -8,12 +8,13 @@ use super::carrier::CarrierIntegrator;
 use super::compliance::Lanes;
 use super::disk::CoupledDisk;
 use super::shared_body::SharedBody;
-use super::span::{SpanStep, StepGoal};
+use super::span::{SpanStep, SpanSteps, StepGoal, Stopped, integrate};
 use super::state::SectorState;
 use super::surroundings::{AcceptedStep, CarriersInStep, LaneStep, Surroundings, Witness};
 use super::tables::Tables;
 use super::trial::{ForceInterpolation, Trial, TrialResult};
 use crate::scene::method::Solver;
+use crate::system::Effort;
 
 /// State of step control that persists from span to span.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -111,14 +112,15 @@ impl Island {
         Self::new(tables, vec![sector], Vec::new(), Vec::new())
     }
 
-    /// Fills the tables for spans of length `span` (s).
-    pub fn set_span(&mut self, span: f64) {
+    /// Fills the tables for spans of length `span` (s). Returns false if they were for this length already.
+    pub fn set_span(&mut self, span: f64) -> bool {
         if span.to_bits() == self.span.to_bits() {
-            return;
+            return false;
         }
         self.span = span;
         self.tables.iter_mut().flatten().for_each(|tables| tables.set_span(span));
         self.shared_bodies_mut().for_each(|body| body.set_span(span));
+        true
     }
 
     /// Returns whether the island is a single sector on rigid surfaces.
@@ -175,26 +177,12 @@ struct SectorInStep<'a, W> {
 }
 
 impl<S: Surroundings> IslandInSpan<'_, S> {
-    /// Step control.
-    pub fn control(&mut self) -> &mut StepControl {
-        &mut self.island.control
-    }
-
-    /// Largest energy so far, including the start of the step (J).
-    pub(crate) fn largest_energy(&mut self) -> f64 {
-        let energy = self.island.energy();
-        self.island.control.largest = self.island.control.largest.max(energy);
-        self.island.control.largest
-    }
-
-    /// Length of the steps of a level (s).
-    pub fn length(&self, level: usize) -> f64 {
-        self.island.tables[0][0].levels[level].step
-    }
-
-    /// Returns the number of sectors.
-    pub fn count(&self) -> u64 {
-        self.island.sectors.len() as u64
+    /// Integrates over the span.
+    ///
+    /// # Errors
+    /// [`Stopped`]; the state is then that after the last accepted step.
+    pub fn integrate(&mut self, effort: &mut Effort) -> Result<(), Stopped> {
+        integrate(self, effort)
     }
 
     /// Indices of the sectors.
@@ -233,38 +221,6 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
                 one.trial.start_at(|row| disks[disk].row_at_start(row, lane));
             }
         }
-    }
-
-    /// Takes the step without a trial if no contact is possible during the step, and returns whether it did.
-    pub fn fly(&mut self, step: SpanStep) -> bool {
-        let pushed = |one: &IslandSector| one.state.multipliers.iter().any(|value| *value != 0.0);
-        if !self.island.carriers.is_empty() || self.island.sectors.iter().any(pushed) {
-            return false;
-        }
-        for disk in &mut self.island.disks {
-            if let Some(bank) = self.surroundings.disk(disk.structure) {
-                disk.find_reach(bank);
-            }
-        }
-        for index in self.indices() {
-            let (surfaces, reach) = self.reach(index, step);
-            if !surfaces.is_clear(step.from, step.length, reach) {
-                return false;
-            }
-        }
-        self.follow_flight(step);
-        for index in self.indices() {
-            let SectorInStep { mut surfaces, tables, disk, trial, state, advance } =
-                self.sector(index, step, ForceInterpolation::Polynomial);
-            if disk.is_none() {
-                surfaces.record_damping(advance.freely(&tables.levels[step.level], state));
-            }
-            trial.forget();
-            state.gaps_known = false;
-        }
-        self.island.disks.iter_mut().for_each(|disk| disk.body.fly(step.level));
-        self.find_start();
-        true
     }
 
     /// Returns the surfaces of a sector, and the largest displacements of its rows from rest (m) without contact.
@@ -318,8 +274,82 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         }
     }
 
-    /// Accepts the step of the last trial and returns the energy that its contacts add to the bank (J).
-    pub fn accept(&mut self, step: SpanStep, kind: ForceInterpolation, result: &TrialResult) -> f64 {
+    /// Advances all states to the end of the step.
+    fn accept_states(&mut self, step: SpanStep, kind: ForceInterpolation) {
+        self.island.fresh = false;
+        for index in self.indices() {
+            let SectorInStep { mut surfaces, tables, disk, trial, state, advance } = self.sector(index, step, kind);
+            if disk.is_none() {
+                let level = tables.of_points(step.level, kind, trial.points());
+                let forces = |node| trial.polynomial(&level.basis, kind, node);
+                surfaces.record_damping(advance.under(level, &tables.rows, state, forces));
+            }
+            trial.leave(state);
+        }
+        self.island.shared_bodies_mut().for_each(|body| body.take(step.level, kind));
+        self.find_start();
+    }
+}
+
+impl<S: Surroundings> SpanSteps for IslandInSpan<'_, S> {
+    fn goal(&self) -> StepGoal {
+        self.goal
+    }
+
+    fn control(&mut self) -> &mut StepControl {
+        &mut self.island.control
+    }
+
+    fn largest_energy(&mut self) -> f64 {
+        let energy = self.island.energy();
+        self.island.control.largest = self.island.control.largest.max(energy);
+        self.island.control.largest
+    }
+
+    fn length(&self, level: usize) -> f64 {
+        self.island.tables[0][0].levels[level].step
+    }
+
+    fn count(&self) -> u64 {
+        self.island.sectors.len() as u64
+    }
+
+    fn fly(&mut self, step: SpanStep) -> bool {
+        let pushed = |one: &IslandSector| one.state.multipliers.iter().any(|value| *value != 0.0);
+        if !self.island.carriers.is_empty() || self.island.sectors.iter().any(pushed) {
+            return false;
+        }
+        for disk in &mut self.island.disks {
+            if let Some(bank) = self.surroundings.disk(disk.structure) {
+                disk.find_reach(bank);
+            }
+        }
+        for index in self.indices() {
+            let (surfaces, reach) = self.reach(index, step);
+            if !surfaces.is_clear(step.from, step.length, reach) {
+                return false;
+            }
+        }
+        self.follow_flight(step);
+        for index in self.indices() {
+            let SectorInStep { mut surfaces, tables, disk, trial, state, advance } =
+                self.sector(index, step, ForceInterpolation::Polynomial);
+            if disk.is_none() {
+                surfaces.record_damping(advance.freely(&tables.levels[step.level], state));
+            }
+            trial.forget();
+            state.gaps_known = false;
+        }
+        self.island.disks.iter_mut().for_each(|disk| disk.body.fly(step.level));
+        self.find_start();
+        true
+    }
+
+    fn attempt(&mut self, step: SpanStep, kind: ForceInterpolation) -> TrialResult {
+        self.attempt_step(step, kind)
+    }
+
+    fn accept(&mut self, step: SpanStep, kind: ForceInterpolation, result: &TrialResult) -> f64 {
         let constant = kind == ForceInterpolation::Constant;
         let points = self.island.points(step, kind);
         self.island.carriers.iter_mut().for_each(|carrier| carrier.weigh(points));
@@ -353,21 +383,5 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
             ForceInterpolation::Polynomial if result.switches => -result.switched,
             ForceInterpolation::Polynomial => 0.0,
         }
-    }
-
-    /// Advances all states to the end of the step.
-    fn accept_states(&mut self, step: SpanStep, kind: ForceInterpolation) {
-        self.island.fresh = false;
-        for index in self.indices() {
-            let SectorInStep { mut surfaces, tables, disk, trial, state, advance } = self.sector(index, step, kind);
-            if disk.is_none() {
-                let level = tables.of_points(step.level, kind, trial.points());
-                let forces = |node| trial.polynomial(&level.basis, kind, node);
-                surfaces.record_damping(advance.under(level, &tables.rows, state, forces));
-            }
-            trial.leave(state);
-        }
-        self.island.shared_bodies_mut().for_each(|body| body.take(step.level, kind));
-        self.find_start();
     }
 }

@@ -1,6 +1,7 @@
 //! An island of a scene: the sectors and carriers that it consists of, their state, and the record of their contacts.
 
 use super::basis::MOST;
+use super::blade::{Blade, BladeInSpan, BladePlace};
 use super::carrier::{CarrierIntegrator, coordinates};
 use super::compliance::Lanes;
 use super::disk::CoupledDisk;
@@ -8,12 +9,12 @@ use super::flight::FreeFlight;
 use super::island::{Island, IslandSector, StepControl};
 use super::obstacle_view::ObstacleView;
 use super::record::{PairRecord, SpanRecord};
-use super::span::{StepGoal, Stopped};
+use super::span::{StepGoal, Stopped, integrate};
 use super::state::SectorState;
 use super::surroundings::{CarriersInStep, Surroundings};
 use super::tables::{HALVINGS, Tables};
-use crate::geometry::PrescribedMotion;
 use crate::geometry::wrench::At;
+use crate::geometry::{GapLaw, PrescribedMotion};
 use crate::math::vector::{set_strided_vector3, set_vector3_at, vector3_at};
 use crate::modes::bank::{Disk, ModalBank};
 use crate::modes::coordinates::ContactModes;
@@ -40,6 +41,8 @@ pub(crate) struct SceneIsland {
     /// Number of sectors that take turns.
     turns: usize,
     goal: StepGoal,
+    /// Steps of sectors that face one surface of revolution.
+    blade: Option<Box<Blade>>,
     /// Free flight of each kind of a single sector.
     flights: Vec<FreeFlight>,
 }
@@ -124,11 +127,16 @@ impl SceneIsland {
                 records.push(SpanRecord { sector, ..record.clone() });
             }
         }
+        let blade = match own().next() {
+            Some((_, pair)) if takes_turns && own().nth(1).is_none() => Blade::new(&tables[0], pair.gap(), solver),
+            _ => None,
+        };
         let precision = if takes_turns { PRECISION } else { CLOSE * PRECISION };
         Self {
             set,
             island: Island::new(tables, sectors, disks, carriers),
             records,
+            blade: blade.map(Box::new),
             turns: if takes_turns { structures[touching[0]].modes().sectors() } else { 1 },
             goal: StepGoal { tolerance, precision: (precision * tolerance).max(rounding), most: u64::MAX },
             flights,
@@ -147,7 +155,11 @@ impl SceneIsland {
 
     /// Fills the tables for spans of length `span` (s).
     pub fn set_span(&mut self, span: f64) {
-        self.island.set_span(span);
+        if self.island.set_span(span)
+            && let Some(blade) = &mut self.blade
+        {
+            blade.fill(&self.island.tables[0]);
+        }
     }
 
     /// Integrates all sectors over a span (s), at whose end the pairs are.
@@ -157,6 +169,11 @@ impl SceneIsland {
     pub fn integrate(&mut self, system: &mut System, span: f64, most_tried: u64) -> Result<(), StepFailure> {
         system.sets.members(self.set).iter().for_each(|one| system.structures[*one].begin_span());
         self.records.iter_mut().for_each(|record| record.begin_courses(&system.pairs, span));
+        if let Some(blade) = &mut self.blade {
+            let structure = &system.structures[self.records[0].structure];
+            blade.begin_span(&structure.history.gap.before, structure.lanes(), self.turns);
+            return (0..self.turns).try_for_each(|turn| self.step_blade(turn, system, span, most_tried));
+        }
         (0..self.turns).try_for_each(|turn| self.take_turn(turn, system, span, most_tried))
     }
 
@@ -189,6 +206,44 @@ impl SceneIsland {
             }));
         }
         Ok(())
+    }
+
+    /// Integrates one sector that faces a surface of revolution over a span.
+    fn step_blade(&mut self, turn: usize, system: &mut System, span: f64, most_tried: u64) -> Result<(), StepFailure> {
+        self.aim(turn, &system.structures);
+        let System { structures, pairs, events, counted, .. } = system;
+        self.read(structures);
+        let goal = StepGoal { most: most_tried, ..self.goal };
+        let Self { island: Island { sectors, control, .. }, records, blade: Some(blade), set, .. } = &mut *self else {
+            return Ok(());
+        };
+        let (IslandSector { table: [_, kind], state, .. }, record) = (&mut sectors[0], &mut records[0]);
+        let PairRecord { pair, course, .. } = &record.pairs[0];
+        let (structure, sector, pair) = (record.structure, record.sector, *pair);
+        let GapLaw::Revolution(gap) = pairs[pair].gap() else { return Ok(()) };
+        blade.choose_minima(&structures[structure].needed_minima, sector, |node| record.tallies[node].lowest);
+        let place = BladePlace { kind: *kind, sector, gap, parameters: *pairs[pair].parameters(), course };
+        let mut steps = BladeInSpan::begin(blade, place, *control, goal, state);
+        let outcome = integrate(&mut steps, &mut counted.effort);
+        steps.write(state);
+        *control = steps.control;
+        let is_lost = steps.is_lost();
+        record.damping = blade.tally.damping;
+        (0..record.tallies.len()).for_each(|node| record.tallies[node].lowest = blade.tally.lowest(node));
+        let of = &structures[structure];
+        events.now.extend((0..of.nodes()).filter_map(|node| {
+            let at = ContactMember { structure, pair, node, sector, index: of.index(node, sector) };
+            blade.tally.event(blade.rows(*kind), at, span)
+        }));
+        blade.tally.work.enter(&mut counted.ledgers[*set]);
+        if blade.tally.implausible || is_lost {
+            return Err(StepFailure::Implausible { structure, sector });
+        }
+        self.write(structures);
+        outcome.map_err(|stopped| match stopped {
+            Stopped::Exhausted => StepFailure::Exhausted,
+            Stopped::Unsolved => StepFailure::Unsolved { structure, sector },
+        })
     }
 
     /// Selects the sector whose turn it is.

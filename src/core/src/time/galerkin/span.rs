@@ -1,7 +1,6 @@
 //! Integrates an island over a span with steps that the tolerance and the energy balance allow.
 
-use super::island::IslandInSpan;
-use super::surroundings::Surroundings;
+use super::island::StepControl;
 use super::tables::HALVINGS;
 use super::trial::{ForceInterpolation, TrialResult};
 use crate::system::Effort;
@@ -46,16 +45,52 @@ pub enum Stopped {
     Exhausted,
 }
 
-impl<S: Surroundings> IslandInSpan<'_, S> {
-    /// Integrates over a span.
-    ///
-    /// # Errors
-    /// [`Stopped`]; the state is then that after the last accepted step.
-    pub fn integrate(&mut self, effort: &mut Effort) -> Result<(), Stopped> {
+/// Steps within a span, of an island or of a blade.
+pub trait SpanSteps {
+    /// Tolerance and limits.
+    fn goal(&self) -> StepGoal;
+
+    /// Step control.
+    fn control(&mut self) -> &mut StepControl;
+
+    /// Largest energy so far, including the start of the step (J).
+    fn largest_energy(&mut self) -> f64;
+
+    /// Length of the steps of a level (s).
+    fn length(&self, level: usize) -> f64;
+
+    /// Returns the number of sectors.
+    fn count(&self) -> u64;
+
+    /// Takes the step without a trial if no contact is possible during the step, and returns whether it did.
+    fn fly(&mut self, step: SpanStep) -> bool;
+
+    /// Tries a step.
+    fn attempt(&mut self, step: SpanStep, kind: ForceInterpolation) -> TrialResult;
+
+    /// Accepts the step of the last trial and returns the energy that its contacts add to the bank (J).
+    fn accept(&mut self, step: SpanStep, kind: ForceInterpolation, result: &TrialResult) -> f64;
+}
+
+/// Integrates over a span.
+///
+/// # Errors
+/// [`Stopped`]; the state is then that after the last accepted step.
+pub(crate) fn integrate(steps: &mut impl SpanSteps, effort: &mut Effort) -> Result<(), Stopped> {
+    Integration { steps }.integrate(effort)
+}
+
+/// Choice of the steps of a span.
+struct Integration<'a, S> {
+    steps: &'a mut S,
+}
+
+impl<S: SpanSteps> Integration<'_, S> {
+    fn integrate(&mut self, effort: &mut Effort) -> Result<(), Stopped> {
         const WHOLE: u64 = 1 << HALVINGS;
-        let (goal, count, mut done) = (self.goal, self.count(), 0_u64);
+        let (goal, count, mut done) = (self.steps.goal(), self.steps.count(), 0_u64);
         while done < WHOLE {
-            let level = self.control().level;
+            let level = self.steps.control().level;
             // A shortest step may need two trials.
             let next = count * if level == HALVINGS { 2 } else { 1 };
             if effort.tried().saturating_add(next) > goal.most {
@@ -63,26 +98,26 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
             }
             let units = WHOLE >> level;
             let step = SpanStep { level, from: share(done, WHOLE), length: share(units, WHOLE) };
-            if self.fly(step) {
+            if self.steps.fly(step) {
                 (effort.steps, effort.flights, done) = (effort.steps + count, effort.flights + count, done + units);
-                self.control().level -= usize::from(level > 0 && done.is_multiple_of(2 * units));
+                self.steps.control().level -= usize::from(level > 0 && done.is_multiple_of(2 * units));
                 continue;
             }
             let (result, kind) = self.try_step(step, effort);
             if self.is_too_long(step, kind, &result, goal.tolerance) && level < HALVINGS {
-                self.control().level += 1;
+                self.steps.control().level += 1;
                 continue;
             }
             if !result.solved {
                 return Err(Stopped::Unsolved);
             }
             effort.missed += count * u64::from(result.misses(goal.tolerance));
-            let left = self.accept(step, kind, &result);
-            self.control().bank += left;
+            let left = self.steps.accept(step, kind, &result);
+            self.steps.control().bank += left;
             (effort.steps, done) = (effort.steps + count, done + units);
             let even = done.is_multiple_of(2 * units);
             if level > 0 && even && kind == ForceInterpolation::Polynomial && result.error < LENGTHEN * goal.tolerance {
-                self.control().level -= 1;
+                self.steps.control().level -= 1;
             }
         }
         Ok(())
@@ -94,34 +129,34 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         if !result.solved || kind == ForceInterpolation::Constant {
             return !result.solved;
         }
-        let bank = self.control().bank;
+        let bank = self.steps.control().bank;
         result.misses(tolerance)
-            || (result.near && self.length(step.level) > SHORTEST_LOOK)
+            || (result.near && self.steps.length(step.level) > SHORTEST_LOOK)
             || (result.switches && result.switched > bank)
             || (result.switched < 0.0 && (step.level < SAVED && bank > 0.0 || self.overflows_bank(-result.switched)))
     }
 
     /// Returns whether the bank would exceed its limit if `paid` (J) were added. Without any energy so far there is no limit.
     fn overflows_bank(&mut self, paid: f64) -> bool {
-        let largest = self.largest_energy();
-        largest > 0.0 && self.control().bank + paid > FULL * largest
+        let largest = self.steps.largest_energy();
+        largest > 0.0 && self.steps.control().bank + paid > FULL * largest
     }
 
     /// Tries one step; a shortest step is tried with a constant force if the polynomial is rejected.
     fn try_step(&mut self, step: SpanStep, effort: &mut Effort) -> (TrialResult, ForceInterpolation) {
         let result = self.run_trial(step, ForceInterpolation::Polynomial, effort);
-        let affordable = result.solved && !(result.switches && result.switched > self.control().bank);
+        let affordable = result.solved && !(result.switches && result.switched > self.steps.control().bank);
         if step.level < HALVINGS || affordable {
             return (result, ForceInterpolation::Polynomial);
         }
         let result = self.run_trial(step, ForceInterpolation::Constant, effort);
-        effort.constant += self.count();
+        effort.constant += self.steps.count();
         (result, ForceInterpolation::Constant)
     }
 
     fn run_trial(&mut self, step: SpanStep, kind: ForceInterpolation, effort: &mut Effort) -> TrialResult {
-        let result = self.attempt(step, kind);
-        effort.trials += self.count();
+        let result = self.steps.attempt(step, kind);
+        effort.trials += self.steps.count();
         effort.factorisations += result.factorisations as u64;
         effort.unsolved += u64::from(!result.solved);
         result

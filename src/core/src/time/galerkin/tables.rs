@@ -42,6 +42,11 @@ impl Tables {
         Self { rows: ContactRows::new(&modes), levels, steady: Vec::new(), modes }
     }
 
+    /// Modes with inertia, and the flexibility of the others.
+    pub(crate) fn shapes(&self) -> &ContactModes {
+        &self.modes
+    }
+
     /// Number of modes with inertia.
     pub fn modes(&self) -> usize {
         self.modes.len()

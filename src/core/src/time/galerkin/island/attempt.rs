@@ -194,7 +194,7 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
     }
 
     /// Tries a step.
-    pub fn attempt(&mut self, step: SpanStep, kind: ForceInterpolation) -> TrialResult {
+    pub(super) fn attempt_step(&mut self, step: SpanStep, kind: ForceInterpolation) -> TrialResult {
         if let Some(result) = self.attempt_steady(step, kind) {
             return result;
         }

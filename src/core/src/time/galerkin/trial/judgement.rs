@@ -11,7 +11,7 @@ use crate::time::galerkin::state::SectorState;
 /// Weight of the largest change of slope of a force in the error of a step, because the highest divided difference misses a
 /// contact that opens or closes. Measured on 148 random rubs at tolerances from 1e-2 to 1e-5 (`lab scatter`): with 0.05, 0.1 and
 /// 0.2, 5 % of the errors exceed 1.9, 1.9 and 1.8 times the tolerance, with 1, 2 and 6 % more trials than without this term.
-const KINK: f64 = 0.2;
+pub(crate) const KINK: f64 = 0.2;
 /// Weight of the change of slope of forces that are linear in time, if contacts may stick. Measured on a block that swings under
 /// friction (`core/tests/belt.rs`): 14 stops cause an error of up to 2.5 times the tolerance. On a rub in which all contacts
 /// slide (`core/tests/galerkin/sticking.rs`): 0.2 to 0.8 times.
@@ -22,7 +22,7 @@ const BEND: f64 = 0.5;
 /// trials.
 const OPENING: f64 = 30.0;
 /// A step is shortened if the gap of a node between the points may be below this multiple of the interpolation error.
-pub(super) const NEAR: f64 = 4.0;
+pub(crate) const NEAR: f64 = 4.0;
 /// Free motion of the contact rows over a step of degree 1.
 #[derive(Debug, Clone)]
 pub(super) struct FreeMotion {

@@ -1,0 +1,465 @@
+//! Eight numbers at a time, in the registers of an instruction set.
+//!
+//! Every operation rounds each number separately, and sums over the eight have a fixed order, so that all implementations give the same
+//! bits. The wide implementations exist only because compilers keep arrays of eight numbers in memory where masks select among them.
+
+use std::ops::{Add, Div, Mul, Sub};
+
+/// Eight numbers in memory, aligned to the widest register.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[repr(align(64))]
+pub(crate) struct Eight(pub [f64; 8]);
+
+impl Eight {
+    /// Eight zeros.
+    pub const ZERO: Self = Self([0.0; 8]);
+
+    /// Number of blocks of eight that hold `count` numbers.
+    pub fn blocks(count: usize) -> usize {
+        count.div_ceil(8)
+    }
+
+    /// Copies numbers into blocks; the last block is filled with `fill`.
+    pub fn spread(values: impl Iterator<Item = f64>, fill: f64, blocks: &mut [Self]) {
+        let flat = blocks.iter_mut().flat_map(|block| &mut block.0);
+        flat.zip(values.chain(std::iter::repeat(fill))).for_each(|(to, value)| *to = value);
+    }
+}
+
+/// Values for 0 and 1. Unlike `map` of an array it is always inlined, so that registers of an instruction set stay registers.
+#[inline(always)]
+pub(crate) fn both<T>(of: impl Fn(usize) -> T) -> [T; 2] {
+    [of(0), of(1)]
+}
+
+/// Adding and subtracting this rounds to the nearest integer (1.5·2⁵²).
+const ROUNDER: f64 = 6_755_399_441_055_744.0;
+
+/// Eight numbers in registers. A mask has bit `i` set where number `i` is selected.
+pub(crate) trait Octet:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
+{
+    /// Reads eight numbers.
+    fn load(from: &Eight) -> Self;
+    /// Writes eight numbers.
+    fn store(self, to: &mut Eight);
+    /// Eight equal numbers.
+    fn splat(value: f64) -> Self;
+    /// Magnitudes.
+    fn abs(self) -> Self;
+    /// Square roots.
+    fn sqrt(self) -> Self;
+    /// The larger numbers; the second where one is NaN.
+    fn max(self, other: Self) -> Self;
+    /// The smaller numbers; the second where one is NaN.
+    fn min(self, other: Self) -> Self;
+    /// Mask of the numbers that are smaller than those of `other`.
+    fn less(self, other: Self) -> u8;
+    /// Numbers of `chosen` where the mask is set, otherwise those of `other`.
+    fn select(mask: u8, chosen: Self, other: Self) -> Self;
+    /// 2^k for numbers `1.5·2⁵² + k`.
+    fn power_of_two(shifted: Self) -> Self;
+
+    /// Eight zeros.
+    #[inline(always)]
+    fn zero() -> Self {
+        Self::splat(0.0)
+    }
+    /// The eight numbers.
+    #[inline(always)]
+    fn array(self) -> [f64; 8] {
+        let mut out = Eight::ZERO;
+        self.store(&mut out);
+        out.0
+    }
+    /// Sum of the eight numbers, in halves.
+    #[inline(always)]
+    fn total(self) -> f64 {
+        let [a, b, c, d, e, f, g, h] = self.array();
+        ((a + e) + (c + g)) + ((b + f) + (d + h))
+    }
+    /// The nearest integers, for magnitudes below 2⁵¹.
+    #[inline(always)]
+    fn rounded(self) -> Self {
+        (self + Self::splat(ROUNDER)) - Self::splat(ROUNDER)
+    }
+    /// e^x for x ≤ 0, within two units in the last place; e^(−700) below −700.
+    ///
+    /// Cody-Waite reduction x = k ln 2 + r with |r| ≤ ½ ln 2, Taylor polynomial of degree 13 in two parts, scaling by exponent bits.
+    #[inline(always)]
+    fn exp_of_negative(self) -> Self {
+        const LN2_HIGH: f64 = 0.693_147_180_369_123_8;
+        const LN2_LOW: f64 = 1.908_214_929_270_587_7e-10;
+        let x = self.max(Self::splat(-700.0));
+        let shifted = x * Self::splat(std::f64::consts::LOG2_E) + Self::splat(ROUNDER);
+        let k = shifted - Self::splat(ROUNDER);
+        let r = (x - k * Self::splat(LN2_HIGH)) - k * Self::splat(LN2_LOW);
+        let square = r * r;
+        let (mut odd, mut even) = (Self::splat(INVERSE_FACTORIALS[13]), Self::splat(INVERSE_FACTORIALS[12]));
+        for pair in 1..7 {
+            odd = odd * square + Self::splat(INVERSE_FACTORIALS[13 - 2 * pair]);
+            even = even * square + Self::splat(INVERSE_FACTORIALS[12 - 2 * pair]);
+        }
+        (odd * r + even) * Self::power_of_two(shifted)
+    }
+}
+
+/// 1/n!.
+const INVERSE_FACTORIALS: [f64; 14] = [
+    1.0,
+    1.0,
+    0.5,
+    1.0 / 6.0,
+    1.0 / 24.0,
+    1.0 / 120.0,
+    1.0 / 720.0,
+    1.0 / 5_040.0,
+    1.0 / 40_320.0,
+    1.0 / 362_880.0,
+    1.0 / 3_628_800.0,
+    1.0 / 39_916_800.0,
+    1.0 / 479_001_600.0,
+    1.0 / 6_227_020_800.0,
+];
+
+/// A loop nest over blocks of eight that is compiled once per instruction set. `run` must be `#[inline(always)]`.
+pub(crate) trait OctetKernel {
+    /// Result of the loops.
+    type Output;
+    /// Runs the loops.
+    fn run<L: Octet>(self) -> Self::Output;
+}
+
+/// Eight numbers as an array.
+#[derive(Clone, Copy)]
+pub(crate) struct Portable([f64; 8]);
+
+macro_rules! portable_operator {
+    ($name:ident, $call:ident, $operator:tt) => {
+        impl $name for Portable {
+            type Output = Self;
+            #[inline(always)]
+            fn $call(mut self, other: Self) -> Self {
+                for (one, other) in self.0.iter_mut().zip(&other.0) {
+                    *one = *one $operator *other;
+                }
+                self
+            }
+        }
+    };
+}
+portable_operator!(Add, add, +);
+portable_operator!(Sub, sub, -);
+portable_operator!(Mul, mul, *);
+portable_operator!(Div, div, /);
+
+impl Portable {
+    #[inline(always)]
+    fn with(self, other: Self, of: impl Fn(f64, f64) -> f64) -> Self {
+        let mut out = [0.0; 8];
+        for i in 0..8 {
+            out[i] = of(self.0[i], other.0[i]);
+        }
+        Self(out)
+    }
+}
+
+impl Octet for Portable {
+    #[inline(always)]
+    fn load(from: &Eight) -> Self {
+        Self(from.0)
+    }
+    #[inline(always)]
+    fn store(self, to: &mut Eight) {
+        to.0 = self.0;
+    }
+    #[inline(always)]
+    fn splat(value: f64) -> Self {
+        Self([value; 8])
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(self.0.map(f64::abs))
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(self.0.map(f64::sqrt))
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        self.with(other, |a, b| if a > b { a } else { b })
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        self.with(other, |a, b| if a < b { a } else { b })
+    }
+    #[inline(always)]
+    fn less(self, other: Self) -> u8 {
+        let bits = self.0.iter().zip(&other.0).enumerate();
+        bits.fold(0, |mask, (i, (a, b))| mask | u8::from(a < b) << i)
+    }
+    #[inline(always)]
+    fn select(mask: u8, chosen: Self, other: Self) -> Self {
+        Self(std::array::from_fn(|i| if mask >> i & 1 == 1 { chosen.0[i] } else { other.0[i] }))
+    }
+    #[inline(always)]
+    fn power_of_two(shifted: Self) -> Self {
+        Self(shifted.0.map(|value| f64::from_bits((value.to_bits() << 52).wrapping_add(1023 << 52))))
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+pub(crate) mod wide {
+    //! Eight numbers in the registers of AVX2 and AVX-512. Values of these types are made only inside functions that
+    //! [`InstructionSet::run_octets`](crate::math::simd::InstructionSet::run_octets) calls after the processor reported the feature.
+
+    use super::{Eight, Octet, both};
+    use std::arch::x86_64::{
+        __m256d, __m256i, __m512d, _CMP_LT_OQ, _mm256_add_epi64, _mm256_add_pd, _mm256_and_pd, _mm256_and_si256,
+        _mm256_blendv_pd, _mm256_castpd_si256, _mm256_castsi256_pd, _mm256_cmp_pd, _mm256_cmpeq_epi64, _mm256_div_pd,
+        _mm256_load_pd, _mm256_max_pd, _mm256_min_pd, _mm256_movemask_pd, _mm256_mul_pd, _mm256_set1_epi64x,
+        _mm256_set1_pd, _mm256_setr_epi64x, _mm256_slli_epi64, _mm256_sqrt_pd, _mm256_store_pd, _mm256_sub_pd,
+        _mm512_abs_pd, _mm512_add_epi64, _mm512_add_pd, _mm512_castpd_si512, _mm512_castsi512_pd, _mm512_cmp_pd_mask,
+        _mm512_div_pd, _mm512_load_pd, _mm512_mask_blend_pd, _mm512_max_pd, _mm512_min_pd, _mm512_mul_pd,
+        _mm512_set1_epi64, _mm512_set1_pd, _mm512_slli_epi64, _mm512_sqrt_pd, _mm512_store_pd, _mm512_sub_pd,
+    };
+    use std::ops::{Add, Div, Mul, Sub};
+
+    /// Eight numbers in one register of AVX-512.
+    #[derive(Clone, Copy)]
+    pub(crate) struct Avx512(__m512d);
+
+    /// Eight numbers in two registers of AVX2.
+    #[derive(Clone, Copy)]
+    pub(crate) struct Avx2([__m256d; 2]);
+
+    macro_rules! operator {
+        ($name:ident, $call:ident, $long:ident, $short:ident) => {
+            impl $name for Avx512 {
+                type Output = Self;
+                #[inline(always)]
+                fn $call(self, other: Self) -> Self {
+                    // SAFETY: see the module.
+                    Self(unsafe { $long(self.0, other.0) })
+                }
+            }
+            impl $name for Avx2 {
+                type Output = Self;
+                #[inline(always)]
+                fn $call(self, other: Self) -> Self {
+                    // SAFETY: see the module.
+                    Self(both(|half| unsafe { $short(self.0[half], other.0[half]) }))
+                }
+            }
+        };
+    }
+    operator!(Add, add, _mm512_add_pd, _mm256_add_pd);
+    operator!(Sub, sub, _mm512_sub_pd, _mm256_sub_pd);
+    operator!(Mul, mul, _mm512_mul_pd, _mm256_mul_pd);
+    operator!(Div, div, _mm512_div_pd, _mm256_div_pd);
+
+    impl Octet for Avx512 {
+        #[inline(always)]
+        fn load(from: &Eight) -> Self {
+            // SAFETY: see the module; `Eight` is aligned to 64 bytes.
+            Self(unsafe { _mm512_load_pd(from.0.as_ptr()) })
+        }
+        #[inline(always)]
+        fn store(self, to: &mut Eight) {
+            // SAFETY: see the module; `Eight` is aligned to 64 bytes.
+            unsafe { _mm512_store_pd(to.0.as_mut_ptr(), self.0) }
+        }
+        #[inline(always)]
+        fn splat(value: f64) -> Self {
+            // SAFETY: see the module.
+            Self(unsafe { _mm512_set1_pd(value) })
+        }
+        #[inline(always)]
+        fn abs(self) -> Self {
+            // SAFETY: see the module.
+            Self(unsafe { _mm512_abs_pd(self.0) })
+        }
+        #[inline(always)]
+        fn sqrt(self) -> Self {
+            // SAFETY: see the module.
+            Self(unsafe { _mm512_sqrt_pd(self.0) })
+        }
+        #[inline(always)]
+        fn max(self, other: Self) -> Self {
+            // SAFETY: see the module.
+            Self(unsafe { _mm512_max_pd(self.0, other.0) })
+        }
+        #[inline(always)]
+        fn min(self, other: Self) -> Self {
+            // SAFETY: see the module.
+            Self(unsafe { _mm512_min_pd(self.0, other.0) })
+        }
+        #[inline(always)]
+        fn less(self, other: Self) -> u8 {
+            // SAFETY: see the module.
+            unsafe { _mm512_cmp_pd_mask::<_CMP_LT_OQ>(self.0, other.0) }
+        }
+        #[inline(always)]
+        fn select(mask: u8, chosen: Self, other: Self) -> Self {
+            // SAFETY: see the module.
+            Self(unsafe { _mm512_mask_blend_pd(mask, other.0, chosen.0) })
+        }
+        #[inline(always)]
+        fn power_of_two(shifted: Self) -> Self {
+            // SAFETY: see the module.
+            Self(unsafe {
+                let exponent = _mm512_slli_epi64::<52>(_mm512_castpd_si512(shifted.0));
+                _mm512_castsi512_pd(_mm512_add_epi64(exponent, _mm512_set1_epi64(1023 << 52)))
+            })
+        }
+    }
+
+    /// A mask as numbers with all bits set or none.
+    #[inline(always)]
+    fn spread(mask: u8) -> [__m256d; 2] {
+        // SAFETY: see the module.
+        unsafe {
+            let (all, low, high) = (
+                _mm256_set1_epi64x(i64::from(mask)),
+                _mm256_setr_epi64x(1, 2, 4, 8),
+                _mm256_setr_epi64x(16, 32, 64, 128),
+            );
+            let of = |bits: __m256i| _mm256_castsi256_pd(_mm256_cmpeq_epi64(_mm256_and_si256(all, bits), bits));
+            [of(low), of(high)]
+        }
+    }
+
+    impl Octet for Avx2 {
+        #[inline(always)]
+        fn load(from: &Eight) -> Self {
+            let (halves, _) = from.0.as_chunks::<4>();
+            // SAFETY: see the module; both halves of `Eight` are aligned to 32 bytes.
+            Self(both(|half| unsafe { _mm256_load_pd(halves[half].as_ptr()) }))
+        }
+        #[inline(always)]
+        fn store(self, to: &mut Eight) {
+            let (halves, _) = to.0.as_chunks_mut::<4>();
+            // SAFETY: see the module; both halves of `Eight` are aligned to 32 bytes.
+            for half in [0, 1] {
+                unsafe { _mm256_store_pd(halves[half].as_mut_ptr(), self.0[half]) }
+            }
+        }
+        #[inline(always)]
+        fn splat(value: f64) -> Self {
+            // SAFETY: see the module.
+            Self([unsafe { _mm256_set1_pd(value) }; 2])
+        }
+        #[inline(always)]
+        fn abs(self) -> Self {
+            // SAFETY: see the module.
+            Self(both(|half| unsafe {
+                _mm256_and_pd(self.0[half], _mm256_castsi256_pd(_mm256_set1_epi64x(0x7fff_ffff_ffff_ffff)))
+            }))
+        }
+        #[inline(always)]
+        fn sqrt(self) -> Self {
+            // SAFETY: see the module.
+            Self(both(|half| unsafe { _mm256_sqrt_pd(self.0[half]) }))
+        }
+        #[inline(always)]
+        fn max(self, other: Self) -> Self {
+            // SAFETY: see the module.
+            Self(both(|half| unsafe { _mm256_max_pd(self.0[half], other.0[half]) }))
+        }
+        #[inline(always)]
+        fn min(self, other: Self) -> Self {
+            // SAFETY: see the module.
+            Self(both(|half| unsafe { _mm256_min_pd(self.0[half], other.0[half]) }))
+        }
+        #[inline(always)]
+        fn less(self, other: Self) -> u8 {
+            // SAFETY: see the module.
+            let [low, high] =
+                both(|half| unsafe { _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(self.0[half], other.0[half])) });
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "eight bits")]
+            let mask = (low | high << 4) as u8;
+            mask
+        }
+        #[inline(always)]
+        fn select(mask: u8, chosen: Self, other: Self) -> Self {
+            let mask = spread(mask);
+            // SAFETY: see the module.
+            Self(both(|half| unsafe { _mm256_blendv_pd(other.0[half], chosen.0[half], mask[half]) }))
+        }
+        #[inline(always)]
+        fn power_of_two(shifted: Self) -> Self {
+            // SAFETY: see the module.
+            Self(both(|half| unsafe {
+                let exponent = _mm256_slli_epi64::<52>(_mm256_castpd_si256(shifted.0[half]));
+                _mm256_castsi256_pd(_mm256_add_epi64(exponent, _mm256_set1_epi64x(1023 << 52)))
+            }))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::simd::InstructionSet;
+
+    /// All operations on some numbers, in one row.
+    struct Operations {
+        one: Eight,
+        other: Eight,
+    }
+
+    impl OctetKernel for Operations {
+        type Output = Vec<u64>;
+        #[inline(always)]
+        fn run<L: Octet>(self) -> Vec<u64> {
+            let (a, b) = (L::load(&self.one), L::load(&self.other));
+            let mask = a.less(b);
+            let all = [
+                a + b,
+                a - b,
+                a * b,
+                a / b,
+                a.abs().sqrt(),
+                a.max(b),
+                a.min(b),
+                L::select(mask, a, b),
+                a.rounded(),
+                (L::zero() - a.abs()).exp_of_negative(),
+                L::splat(a.total()),
+                L::splat(f64::from(mask)),
+            ];
+            all.into_iter().flat_map(|one| one.array().map(f64::to_bits)).collect()
+        }
+    }
+
+    #[test]
+    fn every_instruction_set_gives_the_same_bits() {
+        let special = [0.0, -0.0, 1.0, -1.0, f64::NAN, f64::INFINITY, f64::MIN_POSITIVE, -3.5];
+        for turn in 0..1000_u32 {
+            let number = |i: usize| (f64::from(turn) + 0.37 * i as f64).sin() * f64::from(turn % 41) * 20.0;
+            let mut one = Eight(std::array::from_fn(number));
+            let other = Eight(std::array::from_fn(|i| number(i + 3) + 0.1));
+            if turn % 7 == 0 {
+                one.0[turn as usize % 8] = special[turn as usize / 7 % 8];
+            }
+            let sets = [InstructionSet::Baseline, InstructionSet::detect()];
+            let [first, second] = sets.map(|set| set.run_octets(Operations { one, other }));
+            let is_same = |(a, b): (&u64, &u64)| a == b || f64::from_bits(*a).is_nan() && f64::from_bits(*b).is_nan();
+            assert!(first.iter().zip(&second).all(is_same), "{one:?} {other:?}");
+            #[cfg(target_arch = "x86_64")]
+            if InstructionSet::detect() != InstructionSet::Baseline {
+                let third = InstructionSet::Avx2.run_octets(Operations { one, other });
+                assert!(first.iter().zip(&third).all(is_same), "{one:?} {other:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_exponential_is_within_two_ulp_of_the_library() {
+        for i in 0..100_000 {
+            let x = -f64::from(i) * 6.98e-3;
+            let (found, expected) = (Portable::splat(x).exp_of_negative().array()[0], libm::exp(x));
+            assert!((found - expected).abs() <= 2.0 * f64::EPSILON * expected, "e^{x}: {found:e} vs {expected:e}");
+        }
+    }
+}

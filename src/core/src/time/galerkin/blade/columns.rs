@@ -1,0 +1,161 @@
+//! Sums of columns, and elimination, in blocks of eight.
+
+use crate::math::octet::{Eight, Octet};
+
+/// `sums[p]` = Σ over modes of shape times `modes[p]`, for `B` blocks of nodes from `block`.
+#[inline(always)]
+pub(super) fn add_modes<L: Octet, const P: usize, const B: usize>(
+    shapes: &[Eight],
+    blocks: usize,
+    block: usize,
+    modes: [&[Eight]; P],
+) -> [[L; B]; P] {
+    let mut sums = [[L::zero(); B]; P];
+    let count = shapes.len() / blocks;
+    for (mode, shape) in shapes.chunks_exact(blocks).enumerate().take(count) {
+        for p in 0..P {
+            let amount = L::splat(modes[p][mode / 8].0[mode % 8]);
+            for b in 0..B {
+                sums[p][b] = sums[p][b] + L::load(&shape[block + b]) * amount;
+            }
+        }
+    }
+    sums
+}
+
+/// Writes Σ over modes of shape times `modes[p]` to point p of the lanes.
+#[inline(always)]
+pub(super) fn displace<L: Octet, const P: usize>(
+    shapes: &[Eight],
+    blocks: usize,
+    modes: [&[Eight]; P],
+    lanes: &mut [Eight],
+) {
+    let mut block = 0;
+    while block + 3 <= blocks {
+        put::<L, P, 3>(add_modes(shapes, blocks, block, modes), blocks, block, lanes);
+        block += 3;
+    }
+    while block < blocks {
+        put::<L, P, 1>(add_modes(shapes, blocks, block, modes), blocks, block, lanes);
+        block += 1;
+    }
+}
+
+#[inline(always)]
+pub(super) fn put<L: Octet, const P: usize, const B: usize>(
+    sums: [[L; B]; P],
+    blocks: usize,
+    block: usize,
+    lanes: &mut [Eight],
+) {
+    for (p, sums) in sums.into_iter().enumerate() {
+        for (b, sum) in sums.into_iter().enumerate() {
+            sum.store(&mut lanes[p * blocks + block + b]);
+        }
+    }
+}
+
+/// `to[i]` = `base[i]` + Σ `amounts[t]` · `columns[members[t]][i]`.
+#[inline(always)]
+pub(super) fn combine<L: Octet>(
+    base: Option<&[Eight]>,
+    columns: &[Eight],
+    members: &[usize],
+    amounts: impl Fn(usize) -> f64 + Copy,
+    to: &mut [Eight],
+) {
+    let width = to.len();
+    let mut from = 0;
+    while from + 4 <= width {
+        combine_blocks::<L, 4>(base, columns, members, amounts, from, to);
+        from += 4;
+    }
+    while from + 2 <= width {
+        combine_blocks::<L, 2>(base, columns, members, amounts, from, to);
+        from += 2;
+    }
+    if from < width {
+        combine_blocks::<L, 1>(base, columns, members, amounts, from, to);
+    }
+}
+
+#[inline(always)]
+pub(super) fn combine_blocks<L: Octet, const B: usize>(
+    base: Option<&[Eight]>,
+    columns: &[Eight],
+    members: &[usize],
+    amounts: impl Fn(usize) -> f64,
+    from: usize,
+    to: &mut [Eight],
+) {
+    let width = to.len();
+    let mut sums = [L::zero(); B];
+    if let Some(base) = base {
+        for b in 0..B {
+            sums[b] = L::load(&base[from + b]);
+        }
+    }
+    for (place, member) in members.iter().enumerate() {
+        let amount = L::splat(amounts(place));
+        let column = &columns[member * width + from..][..B];
+        for b in 0..B {
+            sums[b] = sums[b] + L::load(&column[b]) * amount;
+        }
+    }
+    for b in 0..B {
+        sums[b].store(&mut to[from + b]);
+    }
+}
+
+/// Eliminates `count` columns of `K` blocks each; the column after them becomes the solution.
+#[inline(always)]
+pub(super) fn eliminate<L: Octet, const K: usize>(matrix: &mut [Eight], count: usize) {
+    for pivot in 0..count {
+        let (block, at) = (pivot / 8, pivot % 8);
+        let (done, rest) = matrix.split_at_mut((pivot + 1) * K);
+        let column = &done[pivot * K..];
+        let inverse = 1.0 / column[block].0[at];
+        let mut scaled = [L::zero(); K];
+        for k in 0..K {
+            scaled[k] = L::load(&column[k]) * L::splat(inverse);
+        }
+        for other in rest.chunks_exact_mut(K).take(count - pivot) {
+            let value = other[block].0[at];
+            let amount = L::splat(value);
+            for k in 0..K {
+                (L::load(&other[k]) - scaled[k] * amount).store(&mut other[k]);
+            }
+            other[block].0[at] = value * inverse;
+        }
+    }
+}
+
+/// [`eliminate`] for any number of blocks.
+#[inline(always)]
+pub(super) fn eliminate_any<L: Octet>(matrix: &mut [Eight], count: usize, blocks: usize) {
+    for pivot in 0..count {
+        let (block, at) = (pivot / 8, pivot % 8);
+        let (done, rest) = matrix.split_at_mut((pivot + 1) * blocks);
+        let column = &done[pivot * blocks..];
+        let inverse = 1.0 / column[block].0[at];
+        for other in rest.chunks_exact_mut(blocks).take(count - pivot) {
+            let value = other[block].0[at];
+            let amount = L::splat(value * inverse);
+            for (other, own) in other.iter_mut().zip(column) {
+                (L::load(other) - L::load(own) * amount).store(other);
+            }
+            other[block].0[at] = value * inverse;
+        }
+    }
+}
+
+/// Σ values times weights.
+#[inline(always)]
+pub(super) fn sum<L: Octet>(values: &[L], weights: &[f64]) -> L {
+    let mut sum = L::zero();
+    for (value, weight) in values.iter().zip(weights) {
+        sum = sum + *value * L::splat(*weight);
+    }
+    sum
+}

@@ -1,0 +1,130 @@
+//! Judges a solved step of a blade: its error, the energy of contacts that open or close, and nodes that came near between the points.
+
+use super::columns::sum;
+use super::solve::Attempt;
+use crate::math::octet::{Eight, Octet};
+use crate::time::galerkin::basis::{POINTS, TimeBasis};
+use crate::time::galerkin::trial::{KINK, NEAR, TrialResult};
+
+impl Attempt<'_> {
+    /// Finds error, switches and near misses.
+    #[inline(always)]
+    pub(super) fn judge<L: Octet>(&mut self, result: &mut TrialResult) {
+        let (basis, blocks) = (&self.level.basis, self.rows.blocks);
+        let count = basis.count();
+        let mut switched = L::zero();
+        self.trial.impulses.fill(Eight::ZERO);
+        for block in 0..blocks {
+            let valid = self.rows.valid(block);
+            let trial = &mut *self.trial;
+            let of = |start: &[Eight], lanes: &[Eight]| -> [L; POINTS] {
+                let mut values = [L::zero(); POINTS];
+                values[0] = L::load(&start[block]);
+                for point in 1..count {
+                    values[point] = L::load(&lanes[(point - 1) * blocks + block]);
+                }
+                values
+            };
+            let multipliers = of(&trial.start.multipliers, &trial.multipliers);
+            let gaps = of(&trial.start.gaps, &trial.gaps);
+            let (mut any, mut all) = (0, valid);
+            if trial.pushes {
+                for multiplier in &multipliers[..count] {
+                    let pushes = L::zero().less(*multiplier) & valid;
+                    (any, all) = (any | pushes, all & pushes);
+                }
+            }
+            if any != valid {
+                let (near, depth) = comes_near(basis, &gaps, valid & !any);
+                result.near |= near;
+                result.depth = result.depth.max(depth);
+            }
+            if any == 0 {
+                continue;
+            }
+            let mixed = any & !all;
+            for along in [0, 1] {
+                let forces = of(&trial.start.forces[along], &trial.forces[along]);
+                let left = sum(&forces[..count], &basis.left_out) * L::splat(self.level.step);
+                let mut impulse = left;
+                if mixed != 0 {
+                    let kink = kink(basis, &forces) * L::splat(KINK * self.level.step);
+                    let most = left.abs().max(kink);
+                    // Radial, tangential and axial errors of a contact that switches do not cancel.
+                    let signed = if along == 0 { L::zero() - most } else { most };
+                    impulse = L::select(mixed, signed, left);
+                }
+                L::select(any, impulse, L::zero()).store(&mut trial.impulses[along * blocks + block]);
+            }
+            if mixed != 0 {
+                result.switches = true;
+                let mut energy = L::zero();
+                for (multiplier, weights) in multipliers[..count].iter().zip(&basis.work) {
+                    energy = energy + *multiplier * sum(&gaps[..count], weights);
+                }
+                switched = switched + L::select(mixed, energy, L::zero());
+            }
+        }
+        result.switched = if result.switches { switched.total() } else { 0.0 };
+        if self.trial.pushes {
+            result.error = self.error::<L>();
+        }
+    }
+
+    /// Displacement error of the impulse errors (m).
+    #[inline(always)]
+    fn error<L: Octet>(&mut self) -> f64 {
+        let (rows, impulses) = (self.rows, &self.trial.impulses);
+        let width = 2 * rows.blocks;
+        let mut square = 0.0;
+        for (along, node) in (0..2).flat_map(|along| (0..rows.nodes).map(move |node| (along, node))) {
+            let impulse = impulses[along * rows.blocks + node / 8].0[node % 8];
+            if impulse != 0.0 {
+                let form = &rows.error_form[(along * rows.nodes + node) * width..][..width];
+                let mut terms = L::zero();
+                for (a, b) in form.iter().zip(impulses) {
+                    terms = terms + L::load(a) * L::load(b);
+                }
+                square += impulse * terms.total();
+            }
+        }
+        square.max(0.0).sqrt()
+    }
+}
+
+/// Returns whether gaps of the selected nodes come near zero between the points, and their largest depth below zero there (m).
+#[inline(always)]
+fn comes_near<L: Octet>(basis: &TimeBasis, gaps: &[L; POINTS], nodes: u8) -> (bool, f64) {
+    let gaps = &gaps[..basis.count()];
+    let (mut low, mut high) = (gaps[0], gaps[0]);
+    for gap in &gaps[1..] {
+        (low, high) = (low.min(*gap), high.max(*gap));
+    }
+    let candidates = low.less(L::splat(0.5 + NEAR) * (high - low)) & nodes;
+    if candidates == 0 {
+        return (false, 0.0);
+    }
+    let left = sum(gaps, &basis.left_out).abs() * L::splat(NEAR);
+    let mut lowest = L::splat(f64::INFINITY);
+    for place in &basis.between {
+        lowest = lowest.min(sum(gaps, place));
+    }
+    let depth = L::select(candidates, L::zero() - lowest, L::zero()).max(L::zero());
+    (lowest.less(left) & candidates != 0, depth.array().into_iter().fold(0.0, f64::max))
+}
+
+/// Largest change of slope of values at the points, which rest before and after the step where they are zero at its ends.
+#[inline(always)]
+fn kink<L: Octet>(basis: &TimeBasis, values: &[L; POINTS]) -> L {
+    let last = basis.degree;
+    let slope = |i: usize| (values[i + 1] - values[i]) * L::splat(1.0 / (basis.points[i + 1] - basis.points[i]));
+    let is_zero = |value: L| !(L::zero().less(value) | value.less(L::zero()));
+    let mut before = L::select(is_zero(values[0]), L::zero(), slope(0));
+    let mut most = L::zero();
+    for i in 0..=last {
+        let after = if i < last { slope(i) } else { L::select(is_zero(values[last]), L::zero(), slope(last - 1)) };
+        most = most.max((after - before).abs());
+        before = after;
+    }
+    most
+}

@@ -1,0 +1,138 @@
+//! Tables of a blade for one step length.
+
+use super::rows::BladeRows;
+use crate::math::octet::Eight;
+use crate::math::vector::Vector3;
+use crate::time::galerkin::basis::{MOST, POINTS, TimeBasis};
+use crate::time::galerkin::level::StepTables;
+use crate::time::galerkin::response::TERMS;
+use crate::time::galerkin::trial::ForceInterpolation;
+
+/// Tables for one step length. Lanes are blocks of nodes, point by point.
+#[derive(Debug, Clone)]
+pub(crate) struct BladeLevel {
+    /// h (s), and its fraction of the span.
+    pub step: f64,
+    pub basis: TimeBasis,
+    /// Number of blocks of lanes.
+    pub blocks: usize,
+    /// Coefficients of q and q̇ in the displacement at each point.
+    pub free: [[Vec<Eight>; 2]; MOST],
+    /// Weights of the work of forces at the points, and durations of their impulses (s).
+    pub work: [[f64; POINTS]; POINTS],
+    pub durations: [f64; POINTS],
+    /// Coefficients of (q, q̇, p_a) in q and q̇ at the end, and in the damping loss.
+    pub end: [[Vec<Eight>; TERMS]; 2],
+    pub loss: Vec<Eight>,
+    /// True if any mode is damped.
+    pub damped: bool,
+    /// Interpolation of the forces.
+    pub kind: ForceInterpolation,
+    /// Displacements of all lanes per force: for each lane (point · nodes + node) and each of the two directions of the force, the closing
+    /// displacements, then those around.
+    pub columns: Vec<Eight>,
+    /// The same for forces at the start.
+    pub start_columns: Vec<Eight>,
+}
+
+impl BladeLevel {
+    /// Allocates tables for steps of a degree.
+    pub fn new(rows: &BladeRows, degree: usize, kind: ForceInterpolation) -> Self {
+        let basis = TimeBasis::new(degree);
+        let points = if kind == ForceInterpolation::Constant { 1 } else { degree };
+        let blocks = points * rows.blocks;
+        let column = 4 * blocks;
+        let of_modes = || vec![Eight::ZERO; rows.mode_blocks];
+        Self {
+            step: 0.0,
+            blocks,
+            free: std::array::from_fn(|_| [of_modes(), of_modes()]),
+            work: std::array::from_fn(|i| kind.work_weights(&basis, i)),
+            durations: [0.0; POINTS],
+            end: [0, 1].map(|_| std::array::from_fn(|_| of_modes())),
+            loss: vec![Eight::ZERO; TERMS * (TERMS + 1) / 2 * rows.mode_blocks],
+            damped: false,
+            kind,
+            basis,
+            columns: vec![Eight::ZERO; points * rows.nodes * column],
+            start_columns: vec![Eight::ZERO; rows.nodes * column],
+        }
+    }
+
+    /// Fills the tables from those of all rows. Does not allocate.
+    pub fn fill(&mut self, rows: &BladeRows, tables: &StepTables) {
+        (self.step, self.damped) = (tables.step, tables.damped);
+        let (points, degree) = (self.points(), self.basis.degree);
+        self.durations = match self.kind {
+            ForceInterpolation::Polynomial => self.basis.weights.map(|weight| weight * tables.step),
+            ForceInterpolation::Constant => [0.0, tables.step, 0.0, 0.0],
+        };
+        for (free, point) in self.free.iter_mut().zip(&tables.modes.points[degree - points..degree]) {
+            for (to, from) in free.iter_mut().zip(point) {
+                Eight::spread(from.iter().copied(), 0.0, to);
+            }
+        }
+        for (to, from) in self.end.as_flattened_mut().iter_mut().zip(tables.modes.end.as_flattened()) {
+            Eight::spread(from.iter().copied(), 0.0, to);
+        }
+        let blocks = self.end[0][0].len();
+        let pairs = (0..TERMS).flat_map(|row| (row..TERMS).map(move |term| (row, term)));
+        for (to, (row, term)) in self.loss.chunks_exact_mut(blocks.max(1)).zip(pairs) {
+            let twice = if row == term { 1.0 } else { 2.0 };
+            Eight::spread(tables.modes.loss[row][term].iter().map(|value| twice * value), 0.0, to);
+        }
+        let compliance = tables.compliance_of(self.kind);
+        let (lanes, stride) = (compliance.lanes(), compliance.stride());
+        for from in 0..=points {
+            for node in 0..rows.nodes {
+                let columns =
+                    [0, 1, 2].map(|c| &compliance.columns()[(3 * (from * rows.nodes + node) + c) * stride..][..stride]);
+                for (along, at, other) in (0..2).flat_map(|along| {
+                    (1..=points).flat_map(move |at| (0..rows.nodes).map(move |other| (along, at, other)))
+                }) {
+                    let direction = rows.along(along, node);
+                    let moved: Vector3 =
+                        (0..3).map(|c| direction[c] * lanes.vector3(columns[c], lanes.at(at, other))).sum();
+                    for seen in [0, 1] {
+                        let column = ((node * 2 + along) * 2 + seen) * self.blocks;
+                        let target = match from {
+                            0 => &mut self.start_columns[column..][..self.blocks],
+                            _ => {
+                                let lane = (from - 1) * rows.nodes * 4 * self.blocks;
+                                &mut self.columns[lane + column..][..self.blocks]
+                            }
+                        };
+                        target[(at - 1) * rows.blocks + other / 8].0[other % 8] = rows.along(seen, other).dot(&moved);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Number of points at which forces are unknown.
+    #[inline(always)]
+    pub fn points(&self) -> usize {
+        if self.kind == ForceInterpolation::Constant { 1 } else { self.basis.degree }
+    }
+
+    /// Displacements of all lanes per force on a lane: per force along the closing displacement and around, closing and around.
+    #[inline(always)]
+    pub fn column(&self, lane: usize) -> [&[Eight]; 4] {
+        let columns = &self.columns[4 * lane * self.blocks..][..4 * self.blocks];
+        quarters(columns, self.blocks)
+    }
+
+    /// The same for a force at the start.
+    #[inline(always)]
+    pub fn start_column(&self, node: usize) -> [&[Eight]; 4] {
+        let columns = &self.start_columns[4 * node * self.blocks..][..4 * self.blocks];
+        quarters(columns, self.blocks)
+    }
+}
+
+#[inline(always)]
+fn quarters(columns: &[Eight], blocks: usize) -> [&[Eight]; 4] {
+    let (first, second) = columns.split_at(2 * blocks);
+    let ((a, b), (c, d)) = (first.split_at(blocks), second.split_at(blocks));
+    [a, b, c, d]
+}

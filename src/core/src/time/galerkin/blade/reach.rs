@@ -1,0 +1,114 @@
+//! How far the nodes of a blade can move without contact, and its energy.
+
+use super::columns::displace;
+use super::rows::BladeRows;
+use super::surface::FacedSurface;
+use super::trial::BladeTrial;
+use crate::math::octet::{Eight, Octet, OctetKernel};
+
+/// See [`BladeTrial::find_reach`].
+pub(super) struct FindReach<'a> {
+    pub trial: &'a mut BladeTrial,
+    pub rows: &'a BladeRows,
+}
+
+impl OctetKernel for FindReach<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<L: Octet>(self) {
+        let Self { trial, rows } = self;
+        let BladeTrial { start, modal, reach, .. } = trial;
+        let ([q, v], [rates, per_frequency, _]) = (&start.modes, &rows.rates);
+        let amplitudes = &mut modal[0];
+        for (k, amplitude) in amplitudes.iter_mut().enumerate() {
+            let (q, v) = (L::load(&q[k]), L::load(&v[k]));
+            let turned = (v + L::load(&rates[k]) * q) * L::load(&per_frequency[k]);
+            (q * q + turned * turned).sqrt().store(amplitude);
+        }
+        for (magnitudes, reach) in rows.magnitudes.iter().zip(reach) {
+            displace::<L, 1>(magnitudes, rows.blocks, [amplitudes], reach);
+        }
+    }
+}
+
+/// What is known of the gaps of all nodes over a step without contact.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Clearance {
+    /// A node may touch.
+    Unknown,
+    /// No node can touch, but a gap may be smaller than what is known of it.
+    Needed,
+    /// No node can touch, and no gap is needed.
+    Wide,
+}
+
+/// See [`BladeTrial::find_clearance`].
+pub(super) struct FindClearance<'a> {
+    pub trial: &'a BladeTrial,
+    pub rows: &'a BladeRows,
+    pub given: &'a FacedSurface<'a>,
+    pub floors: &'a [Eight],
+    pub lowest: &'a [Eight],
+}
+
+impl OctetKernel for FindClearance<'_> {
+    type Output = Clearance;
+    #[inline(always)]
+    fn run<L: Octet>(self) -> Clearance {
+        let Self { trial, rows, given, floors, lowest } = self;
+        let [start, end, ..] = &given.drives;
+        if start.factor < 0.0 {
+            return Clearance::Unknown;
+        }
+        let bumpiness = given.surface.bumpiness();
+        let mut needed = 0;
+        for block in 0..rows.blocks {
+            let around = L::load(&trial.reach[1][block]) * L::load(&rows.per_radius[block]);
+            let angles = L::load(&trial.angles[block]);
+            let from = angles + L::splat(start.turned.min(end.turned)) - around;
+            let to = angles + L::splat(start.turned.max(end.turned)) + around;
+            let ([low, ..], [high, ..]) = (given.surface.of_octet::<L>(from), given.surface.of_octet::<L>(to));
+            let width = to - from;
+            let shape = match bumpiness {
+                Some(curvature) => low.min(high) - width * width * L::splat(0.125 * curvature),
+                None => L::zero(),
+            };
+            let left = L::splat(start.clearance) + shape * L::splat(start.factor) - L::load(&trial.reach[0][block]);
+            let valid = rows.valid(block);
+            if L::zero().less(left) & valid != valid {
+                return Clearance::Unknown;
+            }
+            // The gap is F/N with N ≥ M; on a flank below 45° N ≤ √2 M.
+            let least = left / (L::load(&rows.steepness[block]) * L::splat(std::f64::consts::SQRT_2));
+            needed |= least.less(L::load(&floors[block]).min(L::load(&lowest[block]))) & valid;
+        }
+        if needed == 0 { Clearance::Wide } else { Clearance::Needed }
+    }
+}
+
+/// See [`BladeTrial::energy`].
+pub(super) struct Energy<'a> {
+    pub trial: &'a BladeTrial,
+    pub rows: &'a BladeRows,
+}
+
+impl OctetKernel for Energy<'_> {
+    type Output = f64;
+    #[inline(always)]
+    fn run<L: Octet>(self) -> f64 {
+        let Self { trial, rows } = self;
+        let start = &trial.start;
+        let [q, v] = &start.modes;
+        let mut sum = L::zero();
+        for (k, (q, v)) in q.iter().zip(v).enumerate() {
+            let (q, v) = (L::load(q), L::load(v));
+            sum = sum + v * v + q * q * L::load(&rows.rates[2][k]);
+        }
+        for along in [0, 1] {
+            for (force, held) in start.forces[along].iter().zip(&start.held[along]) {
+                sum = sum + L::load(force) * L::load(held);
+            }
+        }
+        0.5 * sum.total()
+    }
+}

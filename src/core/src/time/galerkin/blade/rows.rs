@@ -1,0 +1,155 @@
+//! Mode shapes of a blade along the closing displacement and around, in blocks of eight nodes.
+
+use crate::geometry::layout::Layout;
+use crate::math::octet::Eight;
+use crate::math::vector::{Vector3, vector3_at};
+use crate::modes::coordinates::ContactModes;
+use nalgebra::{DMatrix, Vector2};
+
+/// What all step lengths share.
+#[derive(Debug, Clone)]
+pub(crate) struct BladeRows {
+    /// ξω, 1/ω_d and ω² of each mode.
+    pub rates: [Vec<Eight>; 3],
+    /// Magnitudes of `shapes`.
+    pub magnitudes: [Vec<Eight>; 2],
+    /// Number of contact nodes, and of their blocks.
+    pub nodes: usize,
+    pub blocks: usize,
+    /// Number of blocks of modes.
+    pub mode_blocks: usize,
+    /// Shapes mode by mode, along the closing displacement and around.
+    pub shapes: [Vec<Eight>; 2],
+    /// Displacements of all nodes per force on a node (m/N) by the flexibility of modes without inertia: per force along the closing
+    /// displacement, closing and around; then per force around.
+    pub flexibility: [[Vec<Eight>; 2]; 2],
+    /// Rows of the error form of forces: those of all nodes along the closing displacement, then around; each row likewise.
+    pub error_form: Vec<Eight>,
+    /// M = √(1 + m²) and its inverse for each node.
+    pub steepness: Vec<Eight>,
+    pub per_steepness: Vec<Eight>,
+    /// Meridional slope m and axial position of each node (m).
+    pub slopes: Vec<Eight>,
+    pub axial: Vec<Eight>,
+    /// Shapes row by row: those along the closing displacement of all nodes, then those around.
+    pub by_row: Vec<Eight>,
+    /// 1/r of each node (1/m).
+    pub per_radius: Vec<Eight>,
+    /// Largest norm of the shapes around of a node.
+    pub largest_around: f64,
+    /// Smallest radius (m).
+    pub smallest_radius: f64,
+    /// Directions of the closing displacement.
+    directions: Vec<Vector3>,
+}
+
+impl BladeRows {
+    /// Arranges the rows of modes for nodes with these meridional slopes and radii (m).
+    pub fn new(modes: &ContactModes, error_form: &DMatrix<f64>, slopes: &[f64], layout: &Layout) -> Self {
+        let per_radius = &layout.per_radius;
+        let (nodes, count) = (slopes.len(), modes.len());
+        let blocks = Eight::blocks(nodes);
+        let directions: Vec<Vector3> = slopes.iter().map(|slope| Vector3::new(-1.0, 0.0, *slope)).collect();
+        let of_nodes = |of: &dyn Fn(usize) -> f64| {
+            let mut target = vec![Eight::ZERO; blocks];
+            Eight::spread((0..nodes).map(of), 1.0, &mut target);
+            target
+        };
+        let of_modes = |of: &dyn Fn(f64, f64) -> f64| {
+            let mut target = vec![Eight::ZERO; Eight::blocks(count)];
+            let values = modes.frequencies.iter().zip(&modes.damping_ratios).map(|(w, ratio)| of(*w, *ratio));
+            Eight::spread(values, 0.0, &mut target);
+            target
+        };
+        let mut rows = Self {
+            rates: [
+                of_modes(&|w, ratio| ratio * w),
+                of_modes(&|w, ratio| 1.0 / (w * (1.0 - ratio * ratio).sqrt())),
+                of_modes(&|w, _| w * w),
+            ],
+            magnitudes: [Vec::new(), Vec::new()],
+            nodes,
+            blocks,
+            mode_blocks: Eight::blocks(count),
+            shapes: [0, 1].map(|_| vec![Eight::ZERO; blocks * count]),
+            flexibility: [0, 1].map(|_| [0, 1].map(|_| vec![Eight::ZERO; blocks * nodes])),
+            error_form: vec![Eight::ZERO; 2 * nodes * 2 * blocks],
+            steepness: of_nodes(&|node| (1.0 + slopes[node] * slopes[node]).sqrt()),
+            per_steepness: of_nodes(&|node| 1.0 / (1.0 + slopes[node] * slopes[node]).sqrt()),
+            slopes: of_nodes(&|node| slopes[node]),
+            axial: of_nodes(&|node| layout.axial[node]),
+            by_row: vec![Eight::ZERO; 2 * nodes * Eight::blocks(count)],
+            per_radius: of_nodes(&|node| per_radius[node]),
+            largest_around: 0.0,
+            smallest_radius: per_radius.iter().fold(f64::INFINITY, |least, value| least.min(1.0 / value)),
+            directions,
+        };
+        for (mode, shape) in modes.shapes.column_iter().enumerate() {
+            for along in [0, 1] {
+                let values = (0..nodes).map(|node| rows.along(along, node).dot(&vector3_at(shape.as_slice(), node)));
+                let values: Vec<f64> = values.collect();
+                Eight::spread(values.into_iter(), 0.0, &mut rows.shapes[along][mode * blocks..][..blocks]);
+            }
+        }
+        rows.magnitudes =
+            rows.shapes.each_ref().map(|shapes| shapes.iter().map(|block| Eight(block.0.map(f64::abs))).collect());
+        for node in 0..nodes {
+            for along in [0, 1] {
+                let direction = rows.along(along, node);
+                let shapes: Vec<f64> = modes
+                    .shapes
+                    .column_iter()
+                    .map(|shape| direction.dot(&vector3_at(shape.as_slice(), node)))
+                    .collect();
+                let first = (along * nodes + node) * rows.mode_blocks;
+                Eight::spread(shapes.into_iter(), 0.0, &mut rows.by_row[first..][..rows.mode_blocks]);
+                for seen in [0, 1] {
+                    let moved: Vec<f64> =
+                        (0..nodes).map(|other| rows.contract(&modes.residual, [other, node])[(seen, along)]).collect();
+                    let target = &mut rows.flexibility[along][seen][node * blocks..][..blocks];
+                    Eight::spread(moved.into_iter(), 0.0, target);
+                }
+                let form: Vec<[f64; 2]> = (0..nodes)
+                    .map(|other| rows.contract(error_form, [node, other]))
+                    .map(|block| [block[(along, 0)], block[(along, 1)]])
+                    .collect();
+                for other in [0, 1] {
+                    let first = (along * nodes + node) * 2 * blocks + other * blocks;
+                    let values = form.iter().map(|pair| pair[other]);
+                    Eight::spread(values, 0.0, &mut rows.error_form[first..][..blocks]);
+                }
+            }
+            let square = modes.shapes.row(3 * node + 1).norm_squared();
+            rows.largest_around = rows.largest_around.max(square.sqrt());
+        }
+        rows
+    }
+
+    /// Bits of the nodes of a block, or of a block of lanes.
+    #[inline(always)]
+    pub fn valid(&self, block: usize) -> u8 {
+        let left = self.nodes - 8 * (block % self.blocks);
+        if left >= 8 { 0xff } else { (1 << left) - 1 }
+    }
+
+    /// Direction along the closing displacement (0) or around (1) at a node.
+    pub fn along(&self, along: usize, node: usize) -> Vector3 {
+        if along == 0 { self.directions[node] } else { Vector3::y() }
+    }
+
+    /// Components of a force on a node, given in three directions, along the two of the plane: those with the same force if it lies in it.
+    pub fn in_plane(&self, force: Vector3) -> Vector2<f64> {
+        Vector2::new(-force[0], force[1])
+    }
+
+    /// Force on a node in three directions.
+    pub fn in_space(&self, node: usize, force: Vector2<f64>) -> Vector3 {
+        force[0] * self.directions[node] + force[1] * Vector3::y()
+    }
+
+    /// Block of two nodes of a matrix of rows, along the two directions of each.
+    pub fn contract(&self, matrix: &DMatrix<f64>, [node, other]: [usize; 2]) -> nalgebra::Matrix2<f64> {
+        let block = matrix.fixed_view::<3, 3>(3 * node, 3 * other);
+        nalgebra::Matrix2::from_fn(|a, e| self.along(a, node).dot(&(block * self.along(e, other))))
+    }
+}

@@ -1,0 +1,360 @@
+//! The contact problem of a step of a blade: forces that keep all nodes from penetrating at all points.
+
+use super::columns::{combine, displace, eliminate, eliminate_any};
+use super::level::BladeLevel;
+use super::rows::BladeRows;
+use super::surface::FacedSurface;
+use super::trial::BladeTrial;
+use crate::math::octet::{Eight, Octet, OctetKernel, both};
+use crate::time::galerkin::trial::{ForceInterpolation, TrialResult};
+
+/// Number of solutions in which all lanes with the wrong sign change; after that only the first of them does.
+const JOINT_CHANGES: usize = 8;
+/// Number of evaluations of the curvature of the surface.
+const PASSES: usize = 6;
+/// Forces and gaps of the wrong sign within this fraction of the largest count as rounding.
+const ROUNDING: f64 = 1e-13;
+
+/// Tries a step.
+pub(super) struct Attempt<'a> {
+    pub trial: &'a mut BladeTrial,
+    pub rows: &'a BladeRows,
+    pub level: &'a BladeLevel,
+    pub given: &'a FacedSurface<'a>,
+    /// Largest gap of a contact that counts as closed (m).
+    pub precision: f64,
+}
+
+impl OctetKernel for Attempt<'_> {
+    type Output = TrialResult;
+    #[inline(always)]
+    fn run<L: Octet>(mut self) -> TrialResult {
+        let mut result = TrialResult { solved: true, ..TrialResult::default() };
+        match self.level.points() {
+            1 => self.move_freely::<L, 1>(),
+            2 => self.move_freely::<L, 2>(),
+            _ => self.move_freely::<L, 3>(),
+        }
+        let penetrates = self.find_open_gaps::<L>();
+        if penetrates {
+            self.choose_first::<L>();
+            result.solved = self.solve::<L>(&mut result.factorisations);
+        } else {
+            self.rest::<L>();
+        }
+        if result.solved && self.level.kind == ForceInterpolation::Polynomial {
+            self.judge::<L>(&mut result);
+        }
+        result
+    }
+}
+
+impl Attempt<'_> {
+    /// Displacements at the points without forces after the start.
+    #[inline(always)]
+    fn move_freely<L: Octet, const P: usize>(&mut self) {
+        let Self { trial: BladeTrial { start, modal, moved, held, .. }, rows, level, .. } = self;
+        let [q, v] = &start.modes;
+        for (modal, [a, b]) in modal.iter_mut().zip(&level.free).take(P) {
+            for (block, modal) in modal.iter_mut().enumerate() {
+                let terms = L::load(&a[block]) * L::load(&q[block]) + L::load(&b[block]) * L::load(&v[block]);
+                terms.store(modal);
+            }
+        }
+        let modes: [&[Eight]; P] = std::array::from_fn(|p| &modal[p][..]);
+        for along in [0, 1] {
+            displace::<L, P>(&rows.shapes[along], rows.blocks, modes, &mut moved[along][..level.blocks]);
+        }
+        held.copy_from_slice(&start.held[1]);
+        if level.kind == ForceInterpolation::Constant {
+            // The force at the start does not act on.
+            held.fill(Eight::ZERO);
+        }
+        if !start.pushed || level.kind == ForceInterpolation::Constant {
+            return;
+        }
+        let [closing, around] = moved;
+        for node in 0..rows.nodes {
+            if start.multipliers[node / 8].0[node % 8] > 0.0 {
+                let [a, b] = both(|along| L::splat(start.forces[along][node / 8].0[node % 8]));
+                let columns = level.start_column(node);
+                for block in 0..level.blocks {
+                    let ([aa, ab], [ba, bb]) =
+                        (both(|i| L::load(&columns[i][block])), both(|i| L::load(&columns[2 + i][block])));
+                    (L::load(&closing[block]) + (a * aa + b * ba)).store(&mut closing[block]);
+                    (L::load(&around[block]) + (a * ab + b * bb)).store(&mut around[block]);
+                }
+            }
+        }
+    }
+
+    /// F of all lanes without forces, linear about where their nodes go; and the directions of the forces. Returns whether any penetrates.
+    #[inline(always)]
+    fn find_open_gaps<L: Octet>(&mut self) -> bool {
+        let mut penetrates = false;
+        for lane in 0..self.level.blocks {
+            let (point, block) = (lane / self.rows.blocks, lane % self.rows.blocks);
+            let valid = self.rows.valid(lane);
+            let Self { trial, rows, given, .. } = &mut *self;
+            let drive = &given.drives[point + 1];
+            let (per_radius, held) = (L::load(&rows.per_radius[block]), L::load(&trial.held[block]));
+            let (closing, around) = (L::load(&trial.moved[0][lane]), L::load(&trial.moved[1][lane]));
+            let at = L::load(&trial.angles[block]) + L::splat(drive.turned) + (around + held) * per_radius;
+            let [shape, slope, curvature] = given.surface.of_octet::<L>(at);
+            let factor = L::splat(drive.factor);
+            let sigma = slope * factor * per_radius;
+            let clear = L::splat(drive.clearance) + shape * factor;
+            let open = clear + closing - sigma * held;
+            sigma.store(&mut trial.sigma[lane]);
+            clear.store(&mut trial.clear[lane]);
+            (curvature * factor * per_radius * per_radius * L::splat(0.5)).store(&mut trial.bend[lane]);
+            open.store(&mut trial.open[lane]);
+            let friction = L::load(&trial.start.friction[block]);
+            (L::splat(1.0) + friction * sigma * L::load(&rows.per_steepness[block]))
+                .store(&mut trial.directions[0][lane]);
+            (sigma - friction * L::load(&rows.steepness[block])).store(&mut trial.directions[1][lane]);
+            trial.active[lane] = open.less(L::zero()) & valid;
+            penetrates |= trial.active[lane] != 0;
+        }
+        penetrates
+    }
+
+    /// Nothing touches: F with its curvature, and no forces.
+    #[inline(always)]
+    fn rest<L: Octet>(&mut self) {
+        let Self { trial, rows, level, .. } = self;
+        for lane in 0..level.blocks {
+            let held = L::load(&trial.held[lane % rows.blocks]);
+            (L::load(&trial.open[lane]) + L::load(&trial.bend[lane]) * held * held).store(&mut trial.gaps[lane]);
+        }
+        trial.multipliers.fill(Eight::ZERO);
+        trial.forces.iter_mut().for_each(|forces| forces.fill(Eight::ZERO));
+        trial.pushes = trial.start.pushed;
+    }
+
+    /// Chooses the first members: lanes of closed nodes that still push if λ' goes on as before, or all lanes that penetrate.
+    #[inline(always)]
+    fn choose_first<L: Octet>(&mut self) {
+        let Self { trial, rows, level, .. } = &mut *self;
+        trial.prepared.fill(0);
+        trial.later.fill(0);
+        trial.pushes = true;
+        if !trial.start.pushed || level.kind == ForceInterpolation::Constant {
+            return;
+        }
+        for lane in 0..level.blocks {
+            let (point, block) = (lane / rows.blocks, lane % rows.blocks);
+            let (now, slope) = (L::load(&trial.start.multipliers[block]), L::load(&trial.start.slopes[block]));
+            let closed = L::zero().less(now);
+            let expected = (now + slope * L::splat(level.basis.points[point + 1] * level.step)).max(L::zero());
+            trial.later[lane] = trial.active[lane] & !closed;
+            trial.active[lane] = closed & L::zero().less(expected);
+            expected.store(&mut trial.multipliers[lane]);
+        }
+    }
+
+    /// Lists the members, and prepares the columns of new ones.
+    #[inline(always)]
+    fn list_members<L: Octet>(&mut self) {
+        let Self { trial, rows, level, .. } = &mut *self;
+        trial.members.clear();
+        for lane in 0..level.blocks {
+            let (point, block) = (lane / rows.blocks, lane % rows.blocks);
+            let mut mask = trial.active[lane];
+            while mask != 0 {
+                let at = mask.trailing_zeros() as usize;
+                mask &= mask - 1;
+                let member = 8 * lane + at;
+                trial.members.push(member);
+                if trial.prepared[lane] >> at & 1 == 1 {
+                    continue;
+                }
+                trial.prepared[lane] |= 1 << at;
+                let [a, b] = both(|along| L::splat(trial.directions[along][lane].0[at]));
+                let columns = level.column(point * rows.nodes + 8 * block + at);
+                let (closing, around) = (&mut trial.closing, &mut trial.around);
+                let closing = &mut closing[member * level.blocks..][..level.blocks];
+                let around = &mut around[member * level.blocks..][..level.blocks];
+                for i in 0..level.blocks {
+                    let ([aa, ab], [ba, bb]) =
+                        (both(|c| L::load(&columns[c][i])), both(|c| L::load(&columns[2 + c][i])));
+                    let turned = a * ab + b * bb;
+                    ((a * aa + b * ba) + L::load(&trial.sigma[i]) * turned).store(&mut closing[i]);
+                    turned.store(&mut around[i]);
+                }
+            }
+        }
+    }
+
+    /// Adds open lanes that penetrate where closed ones push as before. Returns whether there are any.
+    #[inline(always)]
+    fn add_open<L: Octet>(&mut self) -> bool {
+        let width = self.level.blocks;
+        let BladeTrial { open, closing, members, multipliers, gaps, later, active, .. } = &mut *self.trial;
+        if later.iter().all(|mask| *mask == 0) {
+            return false;
+        }
+        let amount = |place: usize| multipliers[members[place] / 8].0[members[place] % 8];
+        combine::<L>(Some(&open[..width]), closing, members, amount, &mut gaps[..width]);
+        let mut found = false;
+        for lane in 0..width {
+            let more = L::load(&gaps[lane]).less(L::zero()) & later[lane];
+            active[lane] |= more;
+            found |= more != 0;
+        }
+        later.fill(0);
+        found
+    }
+
+    /// Solves for the members, and finds F of all lanes.
+    #[inline(always)]
+    fn solve_members<L: Octet>(&mut self) {
+        let width = self.level.blocks;
+        let BladeTrial { open, closing, members, multipliers, gaps, matrix, .. } = &mut *self.trial;
+        let count = members.len();
+        let blocks = Eight::blocks(count);
+        let matrix = &mut matrix[..(count + 1) * blocks];
+        for (column, member) in matrix.chunks_exact_mut(blocks.max(1)).zip(&*members) {
+            let entries = &closing[member * width..][..width];
+            for (place, row) in members.iter().enumerate() {
+                column[place / 8].0[place % 8] = entries[row / 8].0[row % 8];
+            }
+        }
+        for (place, row) in members.iter().enumerate() {
+            matrix[count * blocks + place / 8].0[place % 8] = -open[row / 8].0[row % 8];
+        }
+        match blocks {
+            0 => {}
+            1 => eliminate::<L, 1>(matrix, count),
+            2 => eliminate::<L, 2>(matrix, count),
+            3 => eliminate::<L, 3>(matrix, count),
+            4 => eliminate::<L, 4>(matrix, count),
+            5 => eliminate::<L, 5>(matrix, count),
+            6 => eliminate::<L, 6>(matrix, count),
+            _ => eliminate_any::<L>(matrix, count, blocks),
+        }
+        multipliers.fill(Eight::ZERO);
+        let solution = &matrix[count * blocks..];
+        for (place, member) in members.iter().enumerate() {
+            multipliers[member / 8].0[member % 8] = solution[place / 8].0[place % 8];
+        }
+        let amount = |place: usize| solution[place / 8].0[place % 8];
+        combine::<L>(Some(&open[..width]), closing, members, amount, &mut gaps[..width]);
+    }
+
+    /// Solves 0 ≤ λ' ⟂ F ≥ 0 by changing all lanes of the wrong sign, and then for the curved surface. Returns false without a solution.
+    #[inline(always)]
+    fn solve<L: Octet>(&mut self, factorisations: &mut usize) -> bool {
+        let width = self.level.blocks;
+        let most = 40 + 4 * 8 * width;
+        self.trial.curved.fill(Eight::ZERO);
+        let (mut pass, mut solutions) = (0, 0);
+        while solutions < most {
+            self.list_members::<L>();
+            if self.add_open::<L>() {
+                continue;
+            }
+            self.solve_members::<L>();
+            *factorisations += 1;
+            solutions += 1;
+            if self.change_members::<L>(solutions) {
+                continue;
+            }
+            let is_curved = self.find_curvature::<L>();
+            pass += 1;
+            if !is_curved {
+                self.finish::<L>();
+                let gaps = &self.trial.gaps[..width];
+                return gaps.iter().all(|block| block.0.iter().all(|gap| gap.is_finite()));
+            }
+            if pass == PASSES {
+                return false;
+            }
+        }
+        false
+    }
+
+    /// Removes members that pull and adds lanes that penetrate. Returns whether any changed.
+    #[inline(always)]
+    fn change_members<L: Octet>(&mut self, solutions: usize) -> bool {
+        let mut largest = [L::zero(); 2];
+        for lane in 0..self.level.blocks {
+            largest[0] = largest[0].max(L::load(&self.trial.multipliers[lane]).abs());
+            let (open, active) = (L::load(&self.trial.open[lane]), self.trial.active[lane]);
+            largest[1] = largest[1].max(L::select(active, open.abs(), L::zero()));
+        }
+        let [force, gap] = largest.map(|one| one.array().into_iter().fold(0.0_f64, f64::max) * ROUNDING);
+        let mut changed = false;
+        for lane in 0..self.level.blocks {
+            let valid = self.rows.valid(lane);
+            let BladeTrial { multipliers, gaps, active, .. } = &mut *self.trial;
+            let pulls = active[lane] & L::load(&multipliers[lane]).less(L::splat(-force));
+            let penetrates = !active[lane] & valid & L::load(&gaps[lane]).less(L::splat(-gap));
+            let wrong = pulls | penetrates;
+            if wrong == 0 {
+                continue;
+            }
+            changed = true;
+            if solutions > JOINT_CHANGES {
+                active[lane] ^= wrong & wrong.wrapping_neg();
+                break;
+            }
+            active[lane] ^= wrong;
+        }
+        changed
+    }
+
+    /// Finds F by the curvature of the surface under the solution. Returns whether it is more than the precision away from what the solution
+    /// assumed, which it then replaces.
+    #[inline(always)]
+    fn find_curvature<L: Octet>(&mut self) -> bool {
+        let (width, precision) = (self.level.blocks, L::splat(self.precision));
+        let BladeTrial { around, members, multipliers, gaps, held, bend, curved, open, active, turned, .. } =
+            &mut *self.trial;
+        let amount = |place: usize| multipliers[members[place] / 8].0[members[place] % 8];
+        combine::<L>(None, around, members, amount, &mut turned[..width]);
+        let mut over = 0;
+        for lane in 0..width {
+            let by = L::load(&turned[lane]) - L::load(&held[lane % self.rows.blocks]);
+            let change = L::load(&bend[lane]) * by * by - L::load(&curved[lane]);
+            let valid = self.rows.valid(lane);
+            over |= active[lane] & precision.less(change.abs());
+            over |= !active[lane] & valid & (L::load(&gaps[lane]) + change).less(L::zero() - precision);
+        }
+        if over == 0 {
+            return false;
+        }
+        for lane in 0..width {
+            let by = L::load(&turned[lane]) - L::load(&held[lane % self.rows.blocks]);
+            let now = L::load(&bend[lane]) * by * by;
+            let change = now - L::load(&curved[lane]);
+            (L::load(&open[lane]) + change).store(&mut open[lane]);
+            now.store(&mut curved[lane]);
+        }
+        true
+    }
+
+    /// Writes displacements, F and forces of the solution.
+    #[inline(always)]
+    fn finish<L: Octet>(&mut self) {
+        let width = self.level.blocks;
+        let BladeTrial {
+            clear, sigma, bend, curved, gaps, moved, multipliers, directions, forces, held, turned, ..
+        } = &mut *self.trial;
+        let [closing, around] = moved;
+        for lane in 0..width {
+            let turned = L::load(&turned[lane]);
+            let by = turned - L::load(&held[lane % self.rows.blocks]);
+            let straight = L::load(&gaps[lane]) - L::load(&curved[lane]);
+            (straight - L::load(&clear[lane]) - L::load(&sigma[lane]) * by).store(&mut closing[lane]);
+            (L::load(&around[lane]) + turned).store(&mut around[lane]);
+            (straight + L::load(&bend[lane]) * by * by).store(&mut gaps[lane]);
+            // A force within rounding of zero pulls.
+            let multiplier = L::load(&multipliers[lane]).max(L::zero());
+            multiplier.store(&mut multipliers[lane]);
+            for along in [0, 1] {
+                (multiplier * L::load(&directions[along][lane])).store(&mut forces[along][lane]);
+            }
+        }
+    }
+}

@@ -1,0 +1,85 @@
+//! The start of a step: displacements, gaps and sliding.
+
+use super::columns::displace;
+use super::rows::BladeRows;
+use super::surface::FacedSurface;
+use super::trial::BladeTrial;
+use crate::math::octet::{Eight, Octet, OctetKernel, both};
+
+/// Finds displacements, F and σ at the start of a step, and the direction of sliding.
+pub(super) struct FindStart<'a> {
+    /// True if displacements, F and σ are known.
+    pub known: bool,
+    pub trial: &'a mut BladeTrial,
+    pub rows: &'a BladeRows,
+    pub given: &'a FacedSurface<'a>,
+}
+
+impl OctetKernel for FindStart<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<L: Octet>(self) {
+        let Self { known, trial, rows, given } = self;
+        let BladeTrial { start, angles, .. } = trial;
+        let [q, v] = &start.modes;
+        start.held.iter_mut().for_each(|held| held.fill(Eight::ZERO));
+        start.pushed = false;
+        for node in 0..rows.nodes {
+            if start.multipliers[node / 8].0[node % 8] > 0.0 {
+                start.pushed = true;
+                let force = both(|along| L::splat(start.forces[along][node / 8].0[node % 8]));
+                for block in 0..rows.blocks {
+                    let moved = |seen: usize| {
+                        let [a, b] = both(|along| {
+                            L::load(&rows.flexibility[along][seen][node * rows.blocks + block]) * force[along]
+                        });
+                        a + b
+                    };
+                    for (seen, held) in start.held.iter_mut().enumerate() {
+                        (L::load(&held[block]) + moved(seen)).store(&mut held[block]);
+                    }
+                }
+            }
+        }
+        let drive = &given.drives[0];
+        // Nodes that vibrate more slowly than the rotor turns cannot reverse.
+        let mut square = L::zero();
+        for v in v {
+            square = square + L::load(v) * L::load(v);
+        }
+        let square = square.total();
+        let spin = drive.speed;
+        let reverses = rows.largest_around * square.sqrt() >= spin.abs() * rows.smallest_radius;
+        if reverses {
+            displace::<L, 1>(&rows.shapes[1], rows.blocks, [v], &mut start.friction);
+        }
+        if !known {
+            for along in [0, 1] {
+                displace::<L, 1>(&rows.shapes[along], rows.blocks, [q], &mut start.moved[along]);
+            }
+        }
+        for block in 0..rows.blocks {
+            let per_radius = L::load(&rows.per_radius[block]);
+            let speed =
+                L::splat(spin) / per_radius + if reverses { L::load(&start.friction[block]) } else { L::zero() };
+            let (forwards, backwards) = (L::zero().less(speed), speed.less(L::zero()));
+            let friction = L::select(forwards, L::splat(given.friction), L::zero());
+            L::select(backwards, L::splat(-given.friction), friction).store(&mut start.friction[block]);
+            if known {
+                continue;
+            }
+            let [closing, around] =
+                both(|along| L::load(&start.moved[along][block]) + L::load(&start.held[along][block]));
+            closing.store(&mut start.moved[0][block]);
+            around.store(&mut start.moved[1][block]);
+            let at = L::load(&angles[block]) + L::splat(drive.turned) + around * per_radius;
+            let [shape, slope, _] = given.surface.of_octet::<L>(at);
+            let factor = L::splat(drive.factor);
+            (L::splat(drive.clearance) + shape * factor + closing).store(&mut start.gaps[block]);
+            // σ of a node that pushes is the one for which its force was found.
+            let pushes = L::zero().less(L::load(&start.multipliers[block]));
+            let sigma = slope * factor * per_radius;
+            L::select(pushes, L::load(&start.sigma[block]), sigma).store(&mut start.sigma[block]);
+        }
+    }
+}

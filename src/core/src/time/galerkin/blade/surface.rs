@@ -1,0 +1,56 @@
+//! Shape of the surface at the angles of eight nodes.
+
+use crate::math::octet::{Eight, Octet};
+use crate::scene::shape::CompiledShape;
+use crate::time::galerkin::basis::POINTS;
+
+/// Prescribed motion at a point of a step, and what it leaves of the gap.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct PointDrive {
+    /// Angle of the rotor relative to the shape (rad).
+    pub turned: f64,
+    /// Factor on the shape.
+    pub factor: f64,
+    /// Clearance without the shape (m).
+    pub clearance: f64,
+    /// Speed of the rotor (rad/s), and sine and cosine of its angle.
+    pub speed: f64,
+    pub rotor: (f64, f64),
+}
+
+/// Surface of revolution that all nodes of a blade face, past which only the rotor turns.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct FacedSurface<'a> {
+    /// Shape of the surface.
+    pub surface: &'a CompiledShape,
+    /// Prescribed motion at the points of the step.
+    pub drives: [PointDrive; POINTS],
+    /// Friction coefficient.
+    pub friction: f64,
+}
+
+impl CompiledShape {
+    /// Shape (m), slope (m/rad) and curvature (m/rad²) at eight angles (rad), without the factor.
+    #[inline(always)]
+    pub(crate) fn of_octet<L: Octet>(&self, angles: L) -> [L; 3] {
+        match self {
+            Self::Circular => [L::zero(); 3],
+            Self::TwoLobe { height, width, phase } => {
+                let turned = (angles - L::splat(*phase)) * L::splat(std::f64::consts::FRAC_1_PI) - L::splat(0.5);
+                let distance = (turned - turned.rounded()) * L::splat(std::f64::consts::PI / width);
+                let square = distance * distance;
+                let bump = (L::zero() - square).exp_of_negative() * L::splat(-height);
+                let per_width = L::splat(1.0 / width);
+                let slope = distance * per_width * bump * L::splat(-2.0);
+                [bump, slope, (square * L::splat(4.0) - L::splat(2.0)) * per_width * per_width * bump]
+            }
+            Self::Lobes { .. } | Self::Table { .. } => {
+                let mut out = [Eight::ZERO; 3];
+                for (i, angle) in angles.array().into_iter().enumerate() {
+                    [out[0].0[i], out[1].0[i], out[2].0[i]] = self.evaluate_twice(angle);
+                }
+                [0, 1, 2].map(|of| L::load(&out[of]))
+            }
+        }
+    }
+}

@@ -1,0 +1,291 @@
+//! Contacts of a blade over a span, added up in blocks of nodes.
+
+use super::level::BladeLevel;
+use super::rows::BladeRows;
+use super::surface::FacedSurface;
+use super::trial::BladeTrial;
+use crate::geometry::Vector3;
+use crate::geometry::wrench::{MotionIncrement, Wrench};
+use crate::math::octet::{Eight, Octet, OctetKernel, both};
+use crate::math::vector::ZERO;
+use crate::system::ContactEvent;
+use crate::system::contact_view::ContactMember;
+use crate::system::work::ContactWork;
+use crate::time::galerkin::basis::POINTS;
+use crate::time::galerkin::trial::ForceInterpolation;
+
+/// Sums over a span for each node.
+#[derive(Debug, Clone)]
+pub(crate) struct BladeTally {
+    /// ∫λ dt and ∫|F_t| dt (N·s).
+    normal: Vec<Eight>,
+    tangential: Vec<Eight>,
+    /// ∫ of the force along the closing displacement and around (N·s).
+    force: [Vec<Eight>; 2],
+    /// ∫ of the force and of its moment in fixed directions (N·s, N·m·s), and λ-weighted ∫ of its point (m·N·s).
+    fixed_force: [Vec<Eight>; 3],
+    moment: [Vec<Eight>; 3],
+    point: [Vec<Eight>; 3],
+    /// Largest λ (N), friction heat (J), and smallest gap (m).
+    peak: Vec<Eight>,
+    heat: Vec<Eight>,
+    pub(super) lowest: Vec<Eight>,
+    /// Work of all nodes (J).
+    pub work: ContactWork,
+    /// Damping loss (J).
+    pub damping: f64,
+    /// True if a contact exceeds the limits of small displacements.
+    pub implausible: bool,
+}
+
+/// Largest depth of a plausible contact, as a fraction of the radius.
+const SMALL: f64 = 0.1;
+
+impl BladeTally {
+    /// Allocates sums for the nodes of a blade.
+    pub fn new(rows: &BladeRows) -> Self {
+        let zeros = || vec![Eight::ZERO; rows.blocks];
+        Self {
+            normal: zeros(),
+            tangential: zeros(),
+            force: [zeros(), zeros()],
+            fixed_force: [zeros(), zeros(), zeros()],
+            moment: [zeros(), zeros(), zeros()],
+            point: [zeros(), zeros(), zeros()],
+            peak: zeros(),
+            heat: zeros(),
+            lowest: zeros(),
+            work: ContactWork::default(),
+            damping: 0.0,
+            implausible: false,
+        }
+    }
+
+    /// Starts a span with these gaps (m).
+    pub(super) fn begin(&mut self, lowest: &[Eight]) {
+        let Self { normal, tangential, force, fixed_force, moment, point, peak, heat, .. } = self;
+        let sums = [normal, tangential, peak, heat].into_iter();
+        let sums = sums.chain(force).chain(fixed_force).chain(moment).chain(point);
+        sums.for_each(|sums| sums.fill(Eight::ZERO));
+        self.lowest.copy_from_slice(lowest);
+        (self.work, self.damping, self.implausible) = (ContactWork::default(), 0.0, false);
+    }
+
+    /// Smallest gap of a node (m).
+    pub fn lowest(&self, node: usize) -> f64 {
+        self.lowest[node / 8].0[node % 8]
+    }
+
+    /// Mean contact of a node over a span (s); `None` without contact.
+    pub fn event(&self, rows: &BladeRows, at: ContactMember, span: f64) -> Option<ContactEvent> {
+        let (block, i) = (at.node / 8, at.node % 8);
+        let of = |values: &[Eight]| values[block].0[i];
+        let normal = of(&self.normal);
+        if normal <= 0.0 {
+            return None;
+        }
+        let three = |values: &[Vec<Eight>; 3]| Vector3::from([0, 1, 2].map(|c| of(&values[c])));
+        let wrench = Wrench {
+            point: three(&self.point) / normal,
+            force: three(&self.fixed_force) / span,
+            moment: three(&self.moment) / span,
+        };
+        let force = rows.in_space(at.node, [0, 1].map(|along| of(&self.force[along])).into()) / span;
+        let event = ContactEvent::new(at, normal / span, force, 0.0, ZERO, wrench);
+        let (tangential, peak, friction_heat) = (of(&self.tangential) / span, of(&self.peak), of(&self.heat));
+        Some(ContactEvent { tangential, peak, friction_heat, ..event })
+    }
+}
+
+/// Adds an accepted step to the sums of a span.
+pub(super) struct AddStep<'a> {
+    pub tally: &'a mut BladeTally,
+    pub trial: &'a BladeTrial,
+    pub rows: &'a BladeRows,
+    pub level: &'a BladeLevel,
+    pub given: &'a FacedSurface<'a>,
+    /// Motion over which forces at the points do work.
+    pub motions: &'a [MotionIncrement; POINTS],
+}
+
+/// Sine and cosine in blocks of eight: rotation of the angles of the nodes by that of the rotor, and a series for the displacement around.
+struct Directions<L> {
+    sine: L,
+    cosine: L,
+}
+
+impl<L: Octet> Directions<L> {
+    /// Directions at angles (sine, cosine), turned by a rotor angle (sine, cosine) and a small angle.
+    #[inline(always)]
+    fn new([sine, cosine]: [L; 2], rotor: (f64, f64), small: L) -> Self {
+        let (s, c) = (L::splat(rotor.0), L::splat(rotor.1));
+        let (sine, cosine) = (sine * c + cosine * s, cosine * c - sine * s);
+        let square = small * small;
+        let small_sine = small * (L::splat(1.0) - square * (L::splat(1.0 / 6.0) - square * L::splat(1.0 / 120.0)));
+        let small_cosine = L::splat(1.0) - square * (L::splat(0.5) - square * L::splat(1.0 / 24.0));
+        Self { sine: sine * small_cosine + cosine * small_sine, cosine: cosine * small_cosine - sine * small_sine }
+    }
+
+    /// Fixed components of (radial, tangential).
+    #[inline(always)]
+    fn fixed(&self, radial: L, tangential: L) -> [L; 2] {
+        [radial * self.cosine - tangential * self.sine, radial * self.sine + tangential * self.cosine]
+    }
+}
+
+impl OctetKernel for AddStep<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<L: Octet>(mut self) {
+        for block in 0..self.rows.blocks {
+            self.add_block::<L>(block);
+        }
+    }
+}
+
+impl AddStep<'_> {
+    #[inline(always)]
+    fn add_block<L: Octet>(&mut self, block: usize) {
+        let Self { tally, trial, rows, level, given, motions } = self;
+        let count = level.points() + 1;
+        let of = |start: &[Eight], lanes: &[Eight]| -> [L; POINTS] {
+            let mut values = [L::zero(); POINTS];
+            values[0] = L::load(&start[block]);
+            for point in 1..count {
+                values[point] = L::load(&lanes[(point - 1) * rows.blocks + block]);
+            }
+            values
+        };
+        let start = &trial.start;
+        let gaps = of(&start.gaps, &trial.gaps);
+        let sigmas = of(&start.sigma, &trial.sigma);
+        let multipliers = of(&start.multipliers, &trial.multipliers);
+        let steepness = L::load(&rows.steepness[block]);
+        let length = |sigma: L| (steepness * steepness + sigma * sigma).sqrt();
+        let mut lowest = L::load(&tally.lowest[block]);
+        let mut any = 0;
+        for point in 0..count {
+            any |= L::zero().less(multipliers[point]);
+            if point > 0 {
+                lowest = lowest.min(gaps[point] / length(sigmas[point]));
+            }
+        }
+        lowest.store(&mut tally.lowest[block]);
+        if any == 0 {
+            return;
+        }
+        let forces = both(|along| of(&start.forces[along], &trial.forces[along]));
+        let moved = both(|along| of(&start.moved[along], &trial.moved[along]));
+        let radius = L::splat(1.0) / L::load(&rows.per_radius[block]);
+        let per_radius = L::load(&rows.per_radius[block]);
+        let slope = L::load(&rows.slopes[block]);
+        let angles = both(|of| L::load(&trial.directions_of_nodes[of][block]));
+        let mut work = [L::zero(); 4];
+        let mut heat_of_nodes = L::zero();
+        let mut normals = [L::zero(); POINTS];
+        let weights_of = |i: usize, values: &[L; POINTS]| {
+            let mut sum = L::zero();
+            for k in 0..count {
+                sum = sum + values[k] * L::splat(level.work[i][k]);
+            }
+            sum
+        };
+        for i in 0..count {
+            if L::zero().less(multipliers[i]) == 0 {
+                continue;
+            }
+            let (multiplier, sigma) = (multipliers[i], sigmas[i]);
+            let (size, duration) = (length(sigma), L::splat(level.durations[i]));
+            let normal = multiplier * size;
+            normals[i] = normal;
+            let [closing, around] = [forces[0][i], forces[1][i]];
+            // Friction is what a force has beyond λ' (1, σ).
+            let friction = match given.friction == 0.0 {
+                true => [L::zero(); 2],
+                false => [closing - multiplier, around - multiplier * sigma],
+            };
+            let tangential = (friction[0] * friction[0] * steepness * steepness + friction[1] * friction[1]).sqrt();
+            let motion = &motions[i];
+            let spin = radius * L::splat(motion.turn);
+            let over = [weights_of(i, &moved[0]), weights_of(i, &moved[1])];
+            let heat = L::zero() - (friction[0] * over[0] + friction[1] * (over[1] + spin));
+            heat_of_nodes = heat_of_nodes + heat;
+            work[0] = work[0] - around * spin;
+            work[1] = work[1] + closing * over[0] + around * over[1];
+            work[2] = work[2] - multiplier * weights_of(i, &gaps);
+            if !motion.casing_rests() {
+                let at = L::load(&trial.angles[block]) + L::splat(given.drives[i].turned) + moved[1][i] * per_radius;
+                let [shape, slope, _] = given.surface.of_octet::<L>(at);
+                let turned = slope * L::splat(given.drives[i].factor * motion.shape_rotation);
+                let opened = L::splat(motion.opening) + shape * L::splat(motion.shape_factor) - turned;
+                work[3] = work[3] - multiplier * opened;
+            }
+            let add = |sum: &mut Eight, value: L| (L::load(sum) + value).store(sum);
+            add(&mut tally.normal[block], duration * normal);
+            add(&mut tally.tangential[block], duration * tangential);
+            add(&mut tally.force[0][block], duration * closing);
+            add(&mut tally.force[1][block], duration * around);
+            let radial_move = L::zero() - moved[0][i] / (steepness * steepness);
+            let axial_move = slope * moved[0][i] / (steepness * steepness);
+            let frame = Directions::new(angles, given.drives[i].rotor, moved[1][i] * per_radius);
+            let (arm, height) = (radius + radial_move, L::load(&rows.axial[block]) + axial_move);
+            let (radial, tangent, axial) =
+                (L::zero() - closing, around / (L::splat(1.0) + radial_move * per_radius), slope * closing);
+            let in_plane = frame.fixed(radial, tangent);
+            let place = frame.fixed(arm, L::zero());
+            // (arm, 0, height) × (radial, tangent, axial) in the directions of the node.
+            let moment = frame.fixed(L::zero() - height * tangent, height * radial - arm * axial);
+            for c in [0, 1] {
+                add(&mut tally.fixed_force[c][block], duration * in_plane[c]);
+                add(&mut tally.moment[c][block], duration * moment[c]);
+                add(&mut tally.point[c][block], duration * normal * place[c]);
+            }
+            add(&mut tally.fixed_force[2][block], duration * axial);
+            add(&mut tally.moment[2][block], duration * radius * around);
+            add(&mut tally.point[2][block], duration * normal * height);
+            let deep = (gaps[i] / size).less(radius * L::splat(-SMALL)) | L::splat(1.0).less(sigma.abs());
+            tally.implausible |= deep & L::zero().less(multiplier) != 0;
+        }
+        (L::load(&tally.heat[block]) + heat_of_nodes).store(&mut tally.heat[block]);
+        let peak = peak_of(level, &normals);
+        peak.max(L::load(&tally.peak[block])).store(&mut tally.peak[block]);
+        let [shaft, exact, closing, casing] = [work[0].total(), work[1].total(), work[2].total(), work[3].total()];
+        let work = ContactWork {
+            shaft,
+            exact,
+            closing,
+            casing,
+            heat: heat_of_nodes.total(),
+            turnover: shaft.abs() + casing.abs(),
+            moved: exact.abs(),
+            ..ContactWork::default()
+        };
+        tally.work.add(&work);
+    }
+}
+
+/// Largest value of the polynomial through values at the points of a step, at the points and between them.
+#[inline(always)]
+fn peak_of<L: Octet>(level: &BladeLevel, values: &[L; POINTS]) -> L {
+    let count = level.points() + 1;
+    let mut peak = L::zero();
+    for value in &values[..count] {
+        peak = peak.max(*value);
+    }
+    if level.kind == ForceInterpolation::Constant {
+        return peak;
+    }
+    let mut terms = [L::zero(); POINTS];
+    for (value, row) in values[..count].iter().zip(&level.basis.monomials) {
+        for (term, coefficient) in terms.iter_mut().zip(row) {
+            *term = *term + *value * L::splat(*coefficient);
+        }
+    }
+    // The derivative b + 2cθ + 3dθ² falls through zero at θ = b/(√(c² − 3bd) − c).
+    let [a, b, c, d] = terms;
+    let square = c * c - L::splat(3.0) * b * d;
+    let theta = b / (square.max(L::zero()).sqrt() - c);
+    let value = a + theta * (b + theta * (c + theta * d));
+    let is_inside = L::zero().less(square) & L::zero().less(theta) & theta.less(L::splat(1.0));
+    L::select(is_inside, peak.max(value), peak)
+}

@@ -1,0 +1,318 @@
+//! Scratch memory and results of trials of a blade.
+
+use super::level::BladeLevel;
+use super::minima::{FindMinima, Follow, PARTS};
+use super::reach::{Clearance, Energy, FindClearance, FindReach};
+use super::rows::BladeRows;
+use super::solve::Attempt;
+use super::start::FindStart;
+use super::surface::{FacedSurface, PointDrive};
+use super::take::{Advance, FindModalForces, Leave};
+use super::tally::{AddStep, BladeTally};
+use crate::geometry::wrench::MotionIncrement;
+use crate::math::octet::Eight;
+use crate::math::simd::InstructionSet;
+use crate::math::vector::{Vector3, set_vector3_at, vector3_at};
+use crate::time::galerkin::basis::{MOST, POINTS};
+use crate::time::galerkin::state::SectorState;
+use crate::time::galerkin::trial::TrialResult;
+use nalgebra::Vector2;
+
+/// Contacts at the start of a step, in blocks of nodes.
+#[derive(Debug, Clone)]
+pub(super) struct StartContacts {
+    /// q and q̇.
+    pub modes: [Vec<Eight>; 2],
+    /// Forces along the closing displacement and around (N), and λ'.
+    pub forces: [Vec<Eight>; 2],
+    pub multipliers: Vec<Eight>,
+    /// Change of λ' per second over the last step.
+    pub slopes: Vec<Eight>,
+    /// Displacements by the flexibility of modes without inertia (m).
+    pub held: [Vec<Eight>; 2],
+    /// Closing displacement, displacement around, F and σ.
+    pub moved: [Vec<Eight>; 2],
+    pub gaps: Vec<Eight>,
+    pub sigma: Vec<Eight>,
+    /// µ, negative where the node slides towards negative displacements around.
+    pub friction: Vec<Eight>,
+    /// True if a force acts.
+    pub pushed: bool,
+}
+
+/// Scratch memory and results of trials, in blocks of lanes; allocates only on creation.
+#[derive(Debug, Clone)]
+pub(crate) struct BladeTrial {
+    pub(super) start: StartContacts,
+    /// Angles of the nodes from the origin of the rotor (rad).
+    pub(super) angles: Vec<Eight>,
+    /// Sines and cosines of these angles.
+    pub(super) directions_of_nodes: [Vec<Eight>; 2],
+    /// Coefficients of θᵃ of the modal forces.
+    pub(super) modal_forces: [Vec<Eight>; MOST],
+    /// Modal displacements at the points.
+    pub(super) modal: [Vec<Eight>; MOST],
+    /// Closing displacements and displacements around.
+    pub(super) moved: [Vec<Eight>; 2],
+    /// Displacements around about which the shape of the surface is expanded, beyond those without forces.
+    pub(super) held: Vec<Eight>,
+    /// Clearance and shape, σ, and half the curvature per square of the displacement around.
+    pub(super) clear: Vec<Eight>,
+    pub(super) sigma: Vec<Eight>,
+    pub(super) bend: Vec<Eight>,
+    /// F without forces, and the part of it that comes from curvature.
+    pub(super) open: Vec<Eight>,
+    pub(super) curved: Vec<Eight>,
+    /// Displacements around by the forces.
+    pub(super) turned: Vec<Eight>,
+    /// Force per λ'.
+    pub(super) directions: [Vec<Eight>; 2],
+    /// F and displacements around of all lanes per λ' of each lane.
+    pub(super) closing: Vec<Eight>,
+    pub(super) around: Vec<Eight>,
+    /// Columns of the contact problem of the members.
+    pub(super) matrix: Vec<Eight>,
+    pub(super) members: Vec<usize>,
+    /// Masks of the members, of lanes with columns, and of open lanes that penetrate without forces.
+    pub(super) active: Vec<u8>,
+    pub(super) prepared: Vec<u8>,
+    pub(super) later: Vec<u8>,
+    /// F, λ' and forces.
+    pub(super) gaps: Vec<Eight>,
+    pub(super) multipliers: Vec<Eight>,
+    pub(super) forces: [Vec<Eight>; 2],
+    /// Nodes that may come closer between the points; modes, displacements and gaps within the step.
+    pub(super) followed: Vec<u8>,
+    pub(super) path_modes: [Vec<Eight>; 2],
+    pub(super) path_moved: [Vec<Eight>; 2],
+    pub(super) path_gaps: Vec<Eight>,
+    /// Impulse errors, along the closing displacement and then around.
+    pub(super) impulses: Vec<Eight>,
+    /// True if a force acts in the step.
+    pub(super) pushes: bool,
+    /// Largest closing displacements and displacements around without contact.
+    pub(super) reach: [Vec<Eight>; 2],
+    instructions: InstructionSet,
+}
+
+impl BladeTrial {
+    /// Allocates memory for a blade with these rows, and steps of up to `degree` points.
+    pub fn new(rows: &BladeRows, degree: usize) -> Self {
+        let (nodes, lanes) = (rows.blocks, degree * rows.blocks);
+        let (of_nodes, of_lanes) = (|| vec![Eight::ZERO; nodes], || vec![Eight::ZERO; lanes]);
+        let of_modes = || vec![Eight::ZERO; rows.mode_blocks];
+        let count = degree * rows.nodes;
+        Self {
+            start: StartContacts {
+                modes: [of_modes(), of_modes()],
+                forces: [of_nodes(), of_nodes()],
+                multipliers: of_nodes(),
+                slopes: of_nodes(),
+                held: [of_nodes(), of_nodes()],
+                moved: [of_nodes(), of_nodes()],
+                gaps: of_nodes(),
+                sigma: of_nodes(),
+                friction: of_nodes(),
+                pushed: false,
+            },
+            angles: of_nodes(),
+            directions_of_nodes: [of_nodes(), of_nodes()],
+            modal_forces: std::array::from_fn(|_| of_modes()),
+            modal: std::array::from_fn(|_| of_modes()),
+            moved: [of_lanes(), of_lanes()],
+            held: of_nodes(),
+            clear: of_lanes(),
+            sigma: of_lanes(),
+            bend: of_lanes(),
+            open: of_lanes(),
+            curved: of_lanes(),
+            turned: of_lanes(),
+            directions: [of_lanes(), of_lanes()],
+            closing: vec![Eight::ZERO; lanes * 8 * lanes],
+            around: vec![Eight::ZERO; lanes * 8 * lanes],
+            matrix: vec![Eight::ZERO; (count + 1) * Eight::blocks(count)],
+            members: Vec::with_capacity(count),
+            active: vec![0; lanes],
+            prepared: vec![0; lanes],
+            later: vec![0; lanes],
+            gaps: of_lanes(),
+            multipliers: of_lanes(),
+            forces: [of_lanes(), of_lanes()],
+            followed: vec![0; nodes],
+            path_modes: [of_modes(), of_modes()],
+            path_moved: [of_nodes(), of_nodes()],
+            path_gaps: vec![Eight::ZERO; (PARTS + 1) * nodes],
+            impulses: vec![Eight::ZERO; 2 * nodes],
+            pushes: false,
+            reach: [of_nodes(), of_nodes()],
+            instructions: InstructionSet::detect(),
+        }
+    }
+
+    /// Reads the state of a sector at the start of a span; its nodes have these angles in the rotating frame (rad).
+    pub fn read(&mut self, rows: &BladeRows, state: &SectorState, angle: impl Fn(usize) -> f64) {
+        Eight::spread((0..rows.nodes).map(&angle), 0.0, &mut self.angles);
+        for (node, (sine, cosine)) in (0..rows.nodes).map(|node| libm::sincos(angle(node))).enumerate() {
+            let [sines, cosines] = &mut self.directions_of_nodes;
+            (sines[node / 8].0[node % 8], cosines[node / 8].0[node % 8]) = (sine, cosine);
+        }
+        let start = &mut self.start;
+        Eight::spread(state.position.iter().copied(), 0.0, &mut start.modes[0]);
+        Eight::spread(state.velocity.iter().copied(), 0.0, &mut start.modes[1]);
+        start.slopes.fill(Eight::ZERO);
+        start.pushed = false;
+        for node in 0..rows.nodes {
+            let force = rows.in_plane(vector3_at(&state.forces, node));
+            let (block, at) = (node / 8, node % 8);
+            (0..2).for_each(|along| start.forces[along][block].0[at] = force[along]);
+            // A force λ' ∇F has λ' along the closing displacement, and friction adds to it.
+            let normal = vector3_at(&state.normals, node);
+            start.multipliers[block].0[at] = state.multipliers[node] * -normal[0];
+            start.sigma[block].0[at] = if normal[0] < 0.0 { normal[1] / -normal[0] } else { 0.0 };
+            start.pushed |= state.multipliers[node] > 0.0;
+        }
+    }
+
+    /// Writes the state at the end of a span, and the gaps (m), which must be known.
+    pub fn write(&self, rows: &BladeRows, state: &mut SectorState) {
+        let flat = |blocks: &[Eight], to: &mut [f64]| {
+            to.iter_mut().zip(blocks.iter().flat_map(|block| block.0)).for_each(|(to, value)| *to = value);
+        };
+        flat(&self.start.modes[0], &mut state.position);
+        flat(&self.start.modes[1], &mut state.velocity);
+        for node in 0..rows.nodes {
+            let (block, i) = (node / 8, node % 8);
+            let start = &self.start;
+            let [multiplier, sigma, gap, closing, around] =
+                [&start.multipliers, &start.sigma, &start.gaps, &start.forces[0], &start.forces[1]]
+                    .map(|values| values[block].0[i]);
+            let steepness = rows.steepness[block].0[i];
+            let length = (steepness * steepness + sigma * sigma).sqrt();
+            set_vector3_at(&mut state.forces, node, rows.in_space(node, Vector2::new(closing, around)));
+            let normal = rows.in_space(node, Vector2::new(1.0, sigma)) / length;
+            set_vector3_at(&mut state.normals, node, if multiplier > 0.0 { normal } else { Vector3::zeros() });
+            state.multipliers[node] = multiplier * length;
+            state.gaps[node] = gap / length;
+        }
+        state.gaps_known = true;
+    }
+
+    /// Finds what a step needs of its start; displacements and gaps as well, unless they are known.
+    pub fn begin(&mut self, rows: &BladeRows, known: bool, given: &FacedSurface) {
+        self.instructions.run_octets(FindStart { known, trial: self, rows, given });
+    }
+
+    /// Tries a step.
+    pub fn attempt(
+        &mut self,
+        rows: &BladeRows,
+        level: &BladeLevel,
+        given: &FacedSurface,
+        precision: f64,
+    ) -> TrialResult {
+        self.instructions.run_octets(Attempt { trial: self, rows, level, given, precision })
+    }
+
+    /// Adds the tried step to the sums of a span.
+    pub fn add(
+        &self,
+        rows: &BladeRows,
+        level: &BladeLevel,
+        (given, motions): (&FacedSurface, &[MotionIncrement; POINTS]),
+        tally: &mut BladeTally,
+    ) {
+        self.instructions.run_octets(AddStep { tally, trial: self, rows, level, given, motions });
+    }
+
+    /// Finds the modal forces of the tried step.
+    pub fn find_modal_forces(&mut self, rows: &BladeRows, level: &BladeLevel) {
+        self.instructions.run_octets(FindModalForces { trial: self, rows, level });
+    }
+
+    /// Finds the nodes that may come closer between the points of the tried step than at them, by more than a fraction of `tolerance` (m)
+    /// and to below one of these gaps (m). Returns whether there are any.
+    pub fn find_minima(
+        &mut self,
+        (rows, level): (&BladeRows, &BladeLevel),
+        tally: &BladeTally,
+        floors: &[Eight],
+        tolerance: f64,
+    ) -> bool {
+        self.instructions.run_octets(FindMinima { trial: self, rows, level, tally, floors, tolerance })
+    }
+
+    /// Records the smallest gaps of these nodes within the tried step, with the prescribed motion at the ends of equal parts.
+    pub fn follow(
+        &mut self,
+        (rows, level, part): (&BladeRows, &BladeLevel, &BladeLevel),
+        (given, drives): (&FacedSurface, &[PointDrive]),
+        tally: &mut BladeTally,
+    ) {
+        let pushes = self.pushes;
+        self.instructions.run_octets(Follow { trial: self, rows, level, part, given, drives, tally, pushes });
+    }
+
+    /// Advances the modes over the tried step, or over a step without forces, and returns the damping loss (J).
+    pub fn advance(&mut self, level: &BladeLevel, pushes: bool) -> f64 {
+        self.instructions.run_octets(Advance { trial: self, level, pushes })
+    }
+
+    /// Makes the contacts at the end of the tried step those at the start of the next.
+    pub fn leave(&mut self, rows: &BladeRows, level: &BladeLevel) {
+        self.instructions.run_octets(Leave { trial: self, rows, level });
+    }
+
+    /// Finds the largest closing displacement and the largest displacement around of each node (m) at any time without contact.
+    pub fn find_reach(&mut self, rows: &BladeRows) {
+        self.instructions.run_octets(FindReach { trial: self, rows });
+    }
+
+    /// Finds what is known of the gaps while the rotor turns from the first to the second given angle past the resting surface. Smallest gaps
+    /// are needed below `floors` and below those known so far, `lowest` (m).
+    pub fn find_clearance(
+        &self,
+        rows: &BladeRows,
+        given: &FacedSurface,
+        floors: &[Eight],
+        lowest: &[Eight],
+    ) -> Clearance {
+        self.instructions.run_octets(FindClearance { trial: self, rows, given, floors, lowest })
+    }
+
+    /// Kinetic and strain energy at the start of the step (J).
+    pub fn energy(&self, rows: &BladeRows) -> f64 {
+        self.instructions.run_octets(Energy { trial: self, rows })
+    }
+
+    /// ½ΔfᵀGΔf, the energy lost by the change from the forces at the start to a constant force (J).
+    pub fn dropped(&self, rows: &BladeRows) -> f64 {
+        let change = |along: usize, node: usize| {
+            let at = |forces: &[Eight]| forces[node / 8].0[node % 8];
+            at(&self.forces[along]) - at(&self.start.forces[along])
+        };
+        let mut sum = 0.0;
+        for (along, node) in (0..2).flat_map(|along| (0..rows.nodes).map(move |node| (along, node))) {
+            let own = change(along, node);
+            for (seen, other) in (0..2).flat_map(|seen| (0..rows.nodes).map(move |other| (seen, other))) {
+                let flexibility = rows.flexibility[along][seen][node * rows.blocks + other / 8].0[other % 8];
+                sum += own * flexibility * change(seen, other);
+            }
+        }
+        0.5 * sum
+    }
+
+    /// Returns whether a gap of the tried step is not a number.
+    pub fn is_lost(&self) -> bool {
+        self.gaps.iter().any(|block| block.0.iter().any(|gap| gap.is_nan()))
+    }
+
+    /// True if a force acts in the tried step.
+    pub fn pushes(&self) -> bool {
+        self.pushes
+    }
+
+    /// True if a force acts at the start of the step.
+    pub fn is_pushed(&self) -> bool {
+        self.start.pushed
+    }
+}

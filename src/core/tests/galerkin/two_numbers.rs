@@ -1,0 +1,95 @@
+//! Steps of blades with two numbers per node against steps with three. A shaft that may whirl but stays in the middle selects the latter
+//! for the same motion.
+
+use super::{H, SECTORS, apart, scene};
+use tiprub_core::scene::method::Scheme;
+use tiprub_core::scene::settings::{Meridian, Shape};
+use tiprub_core::{Scene, Simulation};
+use tiprub_test_models::{element, go, real, set, started};
+
+const STEPS: u32 = 80;
+
+/// A change of the scene, and the inputs that the importer sets before a communication step.
+type Case = (&'static str, fn(&mut Scene), fn(&mut Simulation, u32));
+
+const CASES: [Case; 7] = [
+    ("two lobes", |_| (), |_, _| ()),
+    ("without friction", |scene| scene.settings.contacts[0].friction = 0.0, |_, _| ()),
+    ("meridian", |scene| scene.settings.contacts[0].meridian = Meridian::Contour, |_, _| ()),
+    (
+        "lobes, and a casing that moves",
+        |scene| scene.settings.surfaces[0].shape = Shape::Lobes { amplitude: 4.2e-4, order: 3, phase: 0.4 },
+        |simulation, n| set(simulation, "casing_radius_change", 2e-5 * (f64::from(n) * 0.3).sin()),
+    ),
+    (
+        "table",
+        |scene| {
+            let radius_change = (0..24).map(|i| -4.6e-4 * (f64::from(i) * 0.9).sin().max(0.0)).collect();
+            scene.settings.surfaces[0].shape = Shape::Table { radius_change };
+        },
+        |_, _| (),
+    ),
+    (
+        "round, closing",
+        |scene| scene.settings.surfaces[0].shape = Shape::Circular {},
+        |simulation, n| {
+            set(simulation, "casing_radius_change", -3.9e-4 * (f64::from(n) * 0.05).min(1.0));
+        },
+    ),
+    (
+        "tips that vibrate faster than they slide",
+        |scene| scene.settings.contacts[0].friction = 0.02,
+        |simulation, n| set(simulation, "speed", if n % 2 == 0 { 30.0 } else { -30.0 }),
+    ),
+];
+
+/// Values of a run.
+struct Values {
+    displacements: Vec<f64>,
+    /// Forces, moments and heat.
+    forces: Vec<f64>,
+    trials: u64,
+}
+
+fn values(scene: &Scene, drive: fn(&mut Simulation, u32)) -> Values {
+    let mut simulation = started(scene);
+    let (mut displacements, mut forces) = (Vec::new(), Vec::new());
+    for n in 0..STEPS {
+        drive(&mut simulation, n);
+        go(&mut simulation, H);
+        let bank = simulation.system().bank();
+        for row in 0..bank.rows() {
+            displacements.extend_from_slice(&bank.displacement()[row * bank.lanes()..][..SECTORS]);
+        }
+        for name in ["force_x", "force_y", "force_z", "torque"] {
+            forces.push(real(&simulation, name));
+        }
+        for sector in 1..=SECTORS {
+            forces.extend((0..3).map(|node| element(&simulation, &format!("blade[{sector}].normal_force"), node)));
+        }
+        forces.push(1e3 * simulation.system().ledger().friction_loss.value());
+    }
+    let ledger = simulation.system().ledger();
+    let (kinetic, strain) = simulation.system().energies();
+    let residual = ledger.residual(kinetic + strain).abs() / ledger.scale();
+    assert!(residual < 1e-12, "{residual:e}");
+    Values { displacements, forces, trials: simulation.system().effort().trials }
+}
+
+#[test]
+fn two_numbers_per_node_give_the_same_steps_as_three() {
+    for (name, change, drive) in CASES {
+        for tolerance in [1e-2, 1e-4] {
+            let mut plane = scene(Scheme::Galerkin, H, tolerance);
+            change(&mut plane);
+            let mut space = plane.clone();
+            space.settings.structures[0].whirl = true;
+            let [two, three] = [plane, space].map(|scene| values(&scene, drive));
+            let moved = apart(&two.displacements, &three.displacements);
+            let force = apart(&two.forces, &three.forces);
+            println!("{name}, {tolerance:e}: {moved:.1e} {force:.1e}, trials {} {}", two.trials, three.trials);
+            assert!(three.forces.iter().any(|force| *force != 0.0), "{name}: no contact");
+            assert!(moved < 0.2 * tolerance && force < 2.0 * tolerance, "{name}, {tolerance:e}: {moved:e} {force:e}");
+        }
+    }
+}
