@@ -139,11 +139,8 @@ macro_rules! portable_operator {
         impl $name for Portable {
             type Output = Self;
             #[inline(always)]
-            fn $call(mut self, other: Self) -> Self {
-                for (one, other) in self.0.iter_mut().zip(&other.0) {
-                    *one = *one $operator *other;
-                }
-                self
+            fn $call(self, other: Self) -> Self {
+                self.with(other, |a, b| a $operator b)
             }
         }
     };
@@ -339,8 +336,8 @@ pub(crate) mod wide {
         #[inline(always)]
         fn store(self, to: &mut Eight) {
             let (halves, _) = to.0.as_chunks_mut::<4>();
-            // SAFETY: see the module; both halves of `Eight` are aligned to 32 bytes.
             for half in [0, 1] {
+                // SAFETY: see the module; both halves of `Eight` are aligned to 32 bytes.
                 unsafe { _mm256_store_pd(halves[half].as_mut_ptr(), self.0[half]) }
             }
         }
