@@ -382,7 +382,7 @@ fn quick_random_rub_study_meets_tolerance_and_energy_bounds() {
     );
     let [flown, spans, rub] =
         [0, 1, 2].map(|index: usize| results["milliseconds_of_long_steps"][index].as_f64().unwrap());
-    assert!(flown < 0.1 * spans && spans < rub, "{results:#}");
+    assert!(flown < 0.1 * spans.min(rub), "{results:#}");
     let mission = &results["mission"];
     assert!(mission["steps"] == 360 && mission["of_them_rubbing"] == 1, "{mission:#}");
     assert!(
