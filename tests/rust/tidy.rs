@@ -179,7 +179,7 @@ fn without_example(text: &str) -> Vec<String> {
     missing
 }
 
-/// Returns the methods of a trait that no example in its file calls.
+/// Returns the methods of a trait that are not called in any example of its file.
 fn without_call(text: &str) -> Vec<String> {
     let examples: Vec<&str> = text.lines().map(str::trim_start).filter(|line| line.starts_with("///")).collect();
     let methods = text.lines().filter_map(|line| line.strip_prefix("    fn "));

@@ -2,7 +2,7 @@
 //! [`CoSimulation`](tiprub_cosim::CoSimulation).
 //!
 //! ```text
-//! fmi2/  fmi3/     one expression per exported function, no unsafe block; those of both versions in shared.rs
+//! fmi2/  fmi3/     one expression per exported function, no unsafe block; shared.rs defines functions of both versions
 //!      \  /
 //!    boundary/     the only unsafe code: pointers to slices and back, callbacks, the guard around every call
 //!       |

@@ -1,4 +1,4 @@
-//! Functions that both versions of the standard have: they differ in their names and in C types only.
+//! Functions that exist in both versions of the standard and differ only in their names and C types.
 
 /// Defines the functions for logging, for the end of the life cycle and for saved states; `$boolean` is the C type of truth values.
 macro_rules! shared_functions {
@@ -84,8 +84,8 @@ macro_rules! shared_functions {
     };
 }
 
-/// Defines a getter or setter: the C type of its array of values, and how it is carried out. `[]` contains the number of values where it is
-/// an argument.
+/// Defines a getter or setter from the C type of its array of values and the call that it makes. `[]` contains the
+/// number of values if it is an argument of the function.
 macro_rules! accessor {
     ([$($n_values:ident)?] $function:ident $array:ty, $action:expr) => {
         #[unsafe(no_mangle)]
@@ -102,8 +102,9 @@ macro_rules! accessor {
     };
 }
 
-/// Defines getters and setters of all types that have variables: their names and rules, name of the type, C type, type of the values,
-/// conversions. The first row has the functions for strings, and the name of their array of values for messages.
+/// Defines the getters and setters of all types of variables. A row lists the names and rules of the functions, the
+/// name of the type, the C type, the type of the values and the conversions. The first row lists the functions for
+/// strings, and the name of their array of values for messages.
 macro_rules! accessors {
     (
         $n_values:tt $get_string:ident $set_string:ident $argument:literal;

@@ -38,7 +38,7 @@ use sliding::SlidingLaw;
 pub struct ContactParameters {
     /// Friction coefficient µ (-).
     pub friction: f64,
-    /// Tangential per normal force when a coating is cut (-); 0 without a coating.
+    /// Ratio of the tangential to the normal force when a coating is cut (-); 0 without a coating.
     pub cutting: f64,
 }
 
@@ -81,7 +81,8 @@ pub(crate) trait ContactLaw {
     fn directions(&self) -> usize {
         1
     }
-    /// Returns whether a contact that the solution would open or press in is checked again; the paper's rule detects once.
+    /// Returns whether contacts are detected again after a solution that opens them or lets them penetrate. The rule of
+    /// the paper detects contacts only once per step.
     fn is_iterative(&self) -> bool {
         true
     }
@@ -89,8 +90,8 @@ pub(crate) trait ContactLaw {
     fn starts_from_forces(&self) -> bool {
         false
     }
-    /// Fills the rows of the Delassus matrix along which the law needs the motion of a contact, and the columns along which its multipliers
-    /// push.
+    /// Fills the directions of a contact in the Delassus matrix: the rows, along which the law needs its motion, and
+    /// the columns, along which its multipliers act.
     fn fill_directions(&self, at: &impl ContactPrediction, rows: &mut [Vector3], columns: &mut [Vector3])
     where
         Self: Sized;
@@ -98,7 +99,7 @@ pub(crate) trait ContactLaw {
     fn begin(&mut self, size: usize);
     /// Delassus matrix (m/N), to be filled.
     fn matrix(&mut self) -> &mut DMatrix<f64>;
-    /// Poses contact `contact` of the group, in order; `directions` are its rows of the matrix.
+    /// Adds contact `contact` of the group to the problem, in order; `directions` are its rows of the matrix.
     fn pose(&mut self, contact: usize, directions: &[Vector3], at: &impl ContactPrediction)
     where
         Self: Sized;
@@ -120,13 +121,14 @@ pub(crate) trait ContactLaw {
     fn coating_mut(&mut self) -> Option<&mut Coating> {
         None
     }
-    /// Applies the wear of the last solution; returns the energy it consumes (J); for a coating that is cut this follows later.
+    /// Applies the wear of the last solution and returns the energy that the wear consumes (J). For a coating that is
+    /// cut, the energy is known only later.
     fn commit(&mut self) -> f64 {
         0.0
     }
 }
 
-/// A law with its unknowns; it dereferences to the interface of all laws.
+/// A law with its unknowns. It dereferences to [`ContactLaw`], the interface of all laws.
 #[derive(Debug, Clone)]
 pub(crate) enum Law {
     /// Forward-increment Lagrange multipliers: penetration detected once, equality there.
@@ -195,7 +197,8 @@ impl Law {
     }
 }
 
-/// Poses all contacts of one law. Each law has its own instance: all of them inlined in their caller would exceed the instruction cache.
+/// Adds all contacts of one law to its contact problem. This function is not inlined, because the code of all laws in
+/// one caller would exceed the instruction cache.
 #[inline(never)]
 fn pose_all<L: ContactLaw, P: ContactPrediction>(law: &mut L, rows: &[Vector3], contacts: impl Iterator<Item = P>) {
     let directions = law.directions();

@@ -84,7 +84,7 @@ pub trait Persist {
 }
 
 /// Largest valid step counter; no run comes near it.
-const MOST_COUNTED: u64 = 1 << 53;
+const MAX_COUNT: u64 = 1 << 53;
 
 /// Implements [`Persist`] for numbers, with the check of a number that was read.
 macro_rules! persist_numbers {
@@ -112,7 +112,7 @@ persist_numbers! {
             reader.refuse("a number is out of range");
         }
     };
-    u64, |value, reader| if value > MOST_COUNTED { reader.refuse("a counter is out of range") };
+    u64, |value, reader| if value > MAX_COUNT { reader.refuse("a counter is out of range") };
     i32, |_value, reader| {};
 }
 

@@ -51,7 +51,7 @@ pub struct StepProgress {
 /// # Ok::<(), tiprub_cosim::Error>(())
 /// ```
 ///
-/// Internal steps, of which only ten are allowed here, and a step that is withdrawn:
+/// At most ten internal steps, and a step that is discarded and repeated:
 /// ```
 /// # use tiprub_core::{CoSimulation, Simulation};
 /// # use tiprub_cosim::Error;
@@ -61,12 +61,12 @@ pub struct StepProgress {
 /// unit.initialise(0.0)?;
 /// let mut state = vec![0; unit.state_size()];
 /// unit.save_state(&mut state)?;
-/// // A step of ten internal steps, without the values in between.
+/// // A step of ten internal steps, without intermediate output values.
 /// unit.begin_step(0.0, 1e-5)?;
 /// unit.fly_ahead();
 /// while !unit.advance()?.finished {}
 /// unit.restore_state(&state)?;
-/// // A step that ends where the allowed internal steps are used up.
+/// // A step that ends early when the limit of internal steps is reached.
 /// unit.begin_partial_step(0.0, 1e-4)?;
 /// let reached = loop {
 ///     match unit.advance() {
@@ -93,7 +93,7 @@ pub struct StepProgress {
 /// unit.set_integer(choice, 2)?;
 /// assert!(unit.no_derivatives().is_none());
 /// unit.initialise(0.0)?;
-/// // The speed grows by 5000 rad/s per second over the step; what was set can be withdrawn.
+/// // The speed grows by 5000 rad/s per second over the step. The derivative can be removed again.
 /// assert!(unit.check_input_derivative(speed, 2, 5000.0).is_err());
 /// let before = unit.courses();
 /// unit.set_input_derivative(speed, 1, 5000.0)?;

@@ -1,4 +1,4 @@
-//! Two structures as one, whose contact rows are the relative displacements of pairs of their nodes.
+//! Two structures combined into one, whose contact rows are relative displacements between nodes of the two.
 
 use nalgebra::DMatrix;
 use tiprub_core::modes::modal::ModalModel;

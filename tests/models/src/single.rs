@@ -12,7 +12,7 @@ pub fn single_sector(model: &ModalModel, gap: GapLaw, friction: f64, settings: S
     single_sector_with(model, BankOptions::default(), gap, friction, settings)
 }
 
-/// Returns such a system with options of its modes.
+/// Returns a system as [`single_sector`] does, with options for its modes.
 pub fn single_sector_with(
     model: &ModalModel,
     options: BankOptions,

@@ -28,8 +28,8 @@ pub(crate) trait FmiValue: Sized {
     fn value(&self) -> Value<'_>;
 }
 
-/// Implements [`FmiValue`]: the type, the getter of a unit and what makes the type of its value, the value for setting, and the value of the
-/// independent variable.
+/// Implements [`FmiValue`] for a type. The arguments are the type, the getter of a unit with the conversion of its
+/// result, the value for setting, and the value of the independent variable.
 macro_rules! fmi_values {
     ($($rust:ty: $get:ident $from:expr, |$own:ident| $value:expr, |$time:ident| $of_time:expr;)*) => {$(
         impl FmiValue for $rust {

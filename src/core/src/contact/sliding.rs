@@ -8,7 +8,7 @@ use super::{ContactLaw, ContactParameters, ContactPrediction, fill_sliding};
 use crate::contact::active_set::{ContactSolver, SolverOutcome};
 use crate::math::vector::Vector3;
 
-/// The differences between laws of sliding contacts.
+/// Properties in which laws of sliding contacts differ.
 pub(crate) trait SlidingRule {
     /// See [`ContactLaw::is_iterative`].
     const IS_ITERATIVE: bool = true;
@@ -18,7 +18,7 @@ pub(crate) trait SlidingRule {
         parameters.friction
     }
 
-    /// Solves a posed problem.
+    /// Solves a contact problem that is completely filled in.
     fn solve(solver: &mut ContactSolver) -> SolverOutcome {
         solver.lcp()
     }
@@ -55,7 +55,7 @@ impl<R: SlidingRule> ContactLaw for SlidingLaw<R> {
 
     fn pose(&mut self, contact: usize, _: &[Vector3], at: &impl ContactPrediction) {
         self.0.gaps[contact] = at.gap();
-        // Contacts that were closed in the last step are the best guess for this one.
+        // The contacts that were closed in the last step are the best initial guess for this step.
         self.0.active[contact] = at.was_closed(0.0);
         self.0.monotone &= at.parameters().friction == 0.0;
     }

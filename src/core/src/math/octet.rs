@@ -1,7 +1,8 @@
-//! Eight numbers at a time, in the registers of an instruction set.
+//! SIMD arithmetic on eight numbers at a time.
 //!
 //! Every operation rounds each number separately, and sums over the eight have a fixed order, so that all implementations give the same
-//! bits. The wide implementations exist only because compilers keep arrays of eight numbers in memory where masks select among them.
+//! bits. The implementations with intrinsics exist because compilers keep arrays of eight numbers in memory, not in
+//! registers, if masks select among the numbers.
 
 use std::ops::{Add, Div, Mul, Sub};
 
@@ -14,19 +15,20 @@ impl Eight {
     /// Eight zeros.
     pub const ZERO: Self = Self([0.0; 8]);
 
-    /// Number of blocks of eight that hold `count` numbers.
+    /// Returns the number of blocks of eight that hold `count` numbers.
     pub fn blocks(count: usize) -> usize {
         count.div_ceil(8)
     }
 
-    /// Copies numbers into blocks; the last block is filled with `fill`.
+    /// Copies numbers into blocks, and pads the last block with `fill`.
     pub fn spread(values: impl Iterator<Item = f64>, fill: f64, blocks: &mut [Self]) {
         let flat = blocks.iter_mut().flat_map(|block| &mut block.0);
         flat.zip(values.chain(std::iter::repeat(fill))).for_each(|(to, value)| *to = value);
     }
 }
 
-/// Values for 0 and 1. Unlike `map` of an array it is always inlined, so that registers of an instruction set stay registers.
+/// Returns the values of a function at 0 and 1. Unlike `map` on an array it is always inlined, so SIMD values stay in
+/// registers.
 #[inline(always)]
 pub(crate) fn both<T>(of: impl Fn(usize) -> T) -> [T; 2] {
     [of(0), of(1)]
@@ -65,14 +67,14 @@ pub(crate) trait Octet:
     fn zero() -> Self {
         Self::splat(0.0)
     }
-    /// The eight numbers.
+    /// Returns the eight numbers as an array.
     #[inline(always)]
     fn array(self) -> [f64; 8] {
         let mut out = Eight::ZERO;
         self.store(&mut out);
         out.0
     }
-    /// Sum of the eight numbers, in halves.
+    /// Sum of the eight numbers: adds the upper half to the lower half until one number remains.
     #[inline(always)]
     fn total(self) -> f64 {
         let [a, b, c, d, e, f, g, h] = self.array();
@@ -122,7 +124,7 @@ const INVERSE_FACTORIALS: [f64; 14] = [
     1.0 / 6_227_020_800.0,
 ];
 
-/// A loop nest over blocks of eight that is compiled once per instruction set. `run` must be `#[inline(always)]`.
+/// Loops over blocks of eight numbers that are compiled once per instruction set. `run` must be `#[inline(always)]`.
 pub(crate) trait OctetKernel {
     /// Result of the loops.
     type Output;
@@ -130,7 +132,7 @@ pub(crate) trait OctetKernel {
     fn run<L: Octet>(self) -> Self::Output;
 }
 
-/// Eight numbers as an array.
+/// Eight numbers in an array, for processors without a supported instruction set.
 #[derive(Clone, Copy)]
 pub(crate) struct Portable([f64; 8]);
 
@@ -311,7 +313,7 @@ pub(crate) mod wide {
         }
     }
 
-    /// A mask as numbers with all bits set or none.
+    /// Expands a mask to numbers in which either all bits or no bits are set.
     #[inline(always)]
     fn spread(mask: u8) -> [__m256d; 2] {
         // SAFETY: see the module.
@@ -399,7 +401,7 @@ mod tests {
     use super::*;
     use crate::math::simd::InstructionSet;
 
-    /// All operations on some numbers, in one row.
+    /// Applies every operation to some numbers and collects the bits of the results.
     struct Operations {
         one: Eight,
         other: Eight,

@@ -1,4 +1,4 @@
-//! State of all modes of all sectors, and the steps that they take together.
+//! State of all modes of all sectors, and the steps of all sectors together.
 //!
 //! Modes belong to groups that interact in contact only: uncoupled sectors, or the nodal diameters of a disk of coupled sectors,
 //! whose amplitudes have a real and an imaginary part. Groups are SIMD lanes in chunks of `width` lanes; within a chunk the modes
@@ -143,13 +143,13 @@ pub struct ModalBank {
     sectors: usize,
     /// Number of groups: sectors or nodal diameters.
     groups: usize,
-    /// Number of modes of a group; the largest, if they differ.
+    /// Number of modes of a group; the largest number if the groups differ.
     modes: usize,
-    /// Real and imaginary parts of an amplitude, or 1.
+    /// Number of parts of an amplitude: 2 if it has a real and an imaginary part, otherwise 1.
     parts: usize,
     width: usize,
     chunks: usize,
-    /// Lanes of a displacement row.
+    /// Number of lanes of a displacement row.
     lanes: usize,
     rows: usize,
     /// `[mode][row]`.
@@ -158,7 +158,7 @@ pub struct ModalBank {
     contact_rows: Vec<f64>,
     /// Number of sets of coefficients: one for all sectors, or one per sector with mistuning or per nodal diameter.
     sets: usize,
-    /// `[set][mode]`; the default if there is no such mode.
+    /// Coefficients, `[set][mode]`; the default for modes that a group does not have.
     coefficients: Vec<ModeCoefficients>,
     /// Velocity coefficients, `[set][mode]`; quasi-static modes have none.
     velocities: Vec<Velocity>,
@@ -308,13 +308,13 @@ impl ModalBank {
         self.instruction_set
     }
 
-    /// Returns what couples the sectors, if anything.
+    /// Returns the coupling of the sectors; `None` if they are uncoupled.
     #[inline(always)]
     pub fn disk(&self) -> Option<&Disk> {
         self.disk.as_ref()
     }
 
-    /// Returns what couples the sectors, if anything, to find the effects of forces.
+    /// Returns the coupling of the sectors, for computing the effects of forces; `None` if they are uncoupled.
     #[inline(always)]
     pub(crate) fn disk_mut(&mut self) -> Option<&mut Disk> {
         self.disk.as_mut()
@@ -330,7 +330,7 @@ impl ModalBank {
         self.sets
     }
 
-    /// The set of coefficients of a group.
+    /// Index of the set of coefficients of a group.
     pub(crate) fn set_of(&self, group: usize) -> usize {
         if self.sets == 1 { 0 } else { group }
     }
@@ -397,12 +397,13 @@ impl ModalBank {
         self.model.frequencies[mode] * self.factor(sector)
     }
 
-    /// Modal loads of the next step, of every sector or of nodal diameter 0; to be set before [`ModalBank::predict`].
+    /// Modal loads of the next step, on every sector or on nodal diameter 0. Set them before [`ModalBank::predict`].
     pub fn loads_mut(&mut self) -> &mut [f64] {
         &mut self.modal_load
     }
 
-    /// Number of groups, from the first, on which the modal loads act: loads rotate with the disk, so that they load nodal diameter 0.
+    /// Number of groups, starting with the first, on which the modal loads act. Loads rotate with a disk, so they act
+    /// only on its nodal diameter 0.
     fn loaded_groups(&self) -> usize {
         if self.disk.is_some() { 1 } else { self.sectors }
     }

@@ -50,9 +50,9 @@ fn wave(order: u64, sector: usize, sectors: usize) -> [f64; 2] {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct ModalExcitation {
     excitation: Excitation,
-    /// Loaded sectors, or the loaded nodal diameter.
+    /// Groups on which the loads act: sectors, or one nodal diameter.
     pub groups: Range<usize>,
-    /// 1 for sectors, 2 for a nodal diameter: real and imaginary parts of the loads and forces.
+    /// Number of parts of loads and forces: 1 for sectors, 2 for a nodal diameter (real and imaginary).
     parts: usize,
     /// Modal load per unit force, `[mode][part]` (1/√kg); 0 for entries without a mode.
     pub load: Vec<f64>,

@@ -71,7 +71,7 @@ impl Scheme {
         SCHEMES.items[self as usize].0
     }
 
-    /// Number in the FMU's enumeration, which counts from 1.
+    /// Number in the enumeration of the FMU, which starts at 1.
     pub fn number(self) -> i32 {
         self as i32 + 1
     }
@@ -155,13 +155,13 @@ impl Solver {
     /// All solvers, in the order of the FMU's enumeration.
     pub const ALL: [Self; 3] = [Self::Film, Self::Lcp, Self::Coulomb];
 
-    /// The paper's solver, which the preset `paper` fixes.
+    /// Solver of the paper, which the preset `paper` prescribes.
     pub const PAPER: Self = Self::Film;
 
     /// The solver with sticking friction that remedies propose.
     pub const STICKING: Self = Self::Coulomb;
 
-    /// Returns the facts about the solver on which limits, checks, remedies and texts depend.
+    /// Returns the properties of the solver on which limits, checks, remedies and texts depend.
     pub fn properties(self) -> &'static SolverProperties {
         match self {
             Self::Film => &SolverProperties { complementary: false, ..SolverProperties::SLIDING },
@@ -185,14 +185,15 @@ impl Solver {
     }
 }
 
-/// Facts about a contact solver and its law.
+/// Properties of a contact solver and its law.
 #[derive(Debug)]
 pub struct SolverProperties {
     /// Phrase that describes a scene with this solver; `None` for plain sliding friction.
     pub feature: Option<&'static str>,
     /// True if contacts may stick, so that tangential forces have any direction within the friction cone.
     pub sticks: bool,
-    /// True if gap and force are complementary; otherwise nodes may be pulled, or left inside a surface for a step.
+    /// True if gap and force are complementary. Otherwise a contact may pull a node, or leave it inside a surface for a
+    /// step.
     pub complementary: bool,
     /// True if friction is µ times the normal force at any sliding speed.
     pub constant_friction: bool,

@@ -149,19 +149,21 @@ impl CompiledShape {
         [value, slope, curvature]
     }
 
-    /// Largest curvature by which s may be below its chord (m/rad²); `None` if s is never negative.
+    /// Largest curvature with which s may bend below its chord (m/rad²); `None` if s is never negative.
     pub(crate) fn bumpiness(&self) -> Option<f64> {
         match self {
             Self::Circular => None,
             Self::Lobes { amplitude, order, .. } => Some(amplitude.abs() * order * order),
-            // Dents lower nothing. Between two bumps there is a ridge, which is above any chord.
+            // A bump of negative height only opens the clearance. Between two bumps, s is concave and lies above its
+            // chords.
             Self::TwoLobe { height, .. } if *height < 0.0 => None,
             Self::TwoLobe { height, width, .. } => Some(2.0 * height.abs() / (width * width)),
             Self::Table { curvature, .. } => Some(*curvature),
         }
     }
 
-    /// Lower bound of s between two angles (m): the lower of its end values, minus the difference that its curvature allows.
+    /// Lower bound of s between two angles (m): the lower end value, minus the largest deviation that the curvature
+    /// allows.
     pub(crate) fn least_between(&self, from: f64, to: f64) -> f64 {
         let Some(curvature) = self.bumpiness() else { return 0.0 };
         let width = to - from;
@@ -279,7 +281,8 @@ fn largest_curvature(knots: &[[f64; 2]]) -> f64 {
     both.fold(0.0, f64::max)
 }
 
-/// Coefficients of the part of a periodic cubic (Hermite form) at `angle`, the fraction of the part there, and its length (rad).
+/// Returns the segment of a periodic cubic (Hermite form) at `angle`: its coefficients, the position of the angle as a
+/// fraction of the segment, and the length of the segment (rad).
 fn spline_part(knots: &[[f64; 2]], angle: f64) -> ([f64; 4], f64, f64) {
     #[expect(clippy::cast_precision_loss, reason = "tables are far shorter than 2^52")]
     let count = knots.len() as f64;

@@ -27,7 +27,7 @@ use super::spline_surface::Lining;
 use super::table;
 
 /// Largest number of contact nodes of all sectors that a flexible slave or the disk may couple: their Delassus matrix is dense.
-pub(crate) const MOST_COUPLED: usize = 2000;
+pub(crate) const MAX_COUPLED: usize = 2000;
 
 /// Indices of the values that the step reads.
 #[derive(Debug, Clone)]
@@ -53,7 +53,8 @@ impl ValuePlaces {
     }
 }
 
-/// Returns the solver of a scene, or the default if forces would not be complementary to gaps.
+/// Returns the solver of a scene, or the default solver if the solver of the scene does not make forces and gaps
+/// complementary.
 pub fn complementary(settings: &SceneSettings) -> Solver {
     let own = settings.contacts[0].solver;
     if own.properties().complementary { own } else { Solver::default() }

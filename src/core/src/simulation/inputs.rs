@@ -171,7 +171,8 @@ impl Inputs {
     }
 }
 
-/// Defines the ways to single inputs, for reading and for changes: names of the functions and the methods of collections.
+/// Defines the functions that look up single inputs, for reading and for changes: their names, and the collection
+/// methods that they call.
 macro_rules! ways_to_inputs {
     ($($of_variable:ident $moving:ident $get:ident $iter:ident $($mutable:ident)?;)*) => {$(
         impl Inputs {
@@ -193,7 +194,7 @@ macro_rules! ways_to_inputs {
                 }
             }
 
-            /// Returns all inputs that move or load a structure, which would shake it if they jumped.
+            /// Returns all inputs that move or load a structure. A jump of such an input would excite vibration.
             fn $moving(&$($mutable)? self) -> impl Iterator<Item = &$($mutable)? Input> {
                 let rotors = self.rotors.$iter().flat_map(|rotor| {
                     let RotorInputs { shaft, excitation, temperature, .. } = rotor;

@@ -75,7 +75,8 @@ struct BodyLimits {
     closing: Closing,
     /// Step limits of closed contact whose forces act a step late; infinite for other schemes.
     massless: MasslessLimit,
-    /// Largest step of each range of step sizes, descending, and the warning if surface carriers spoil solvability there.
+    /// Largest step of each range of step sizes, descending, and a warning if surface carriers make contact problems
+    /// unsolvable in this range.
     carriers: Vec<(f64, Option<WarningKind>)>,
     /// Smallest step that does not resolve modes which contact excites; infinite for schemes that need no such limit.
     unresolved: f64,

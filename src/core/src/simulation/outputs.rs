@@ -36,7 +36,7 @@ pub fn scalar(read: impl Fn(&OutputView) -> f64 + Send + Sync + 'static) -> Outp
     OutputReader(Arc::new(move |view, out| out[0] = read(view)))
 }
 
-/// Makes the reader of a count.
+/// Creates the reader of an output that is a count.
 pub fn count(read: impl Fn(&OutputView) -> u64 + Send + Sync + 'static) -> OutputReader {
     #[expect(clippy::cast_precision_loss, reason = "counts are below 2^52")]
     scalar(move |view| read(view) as f64)

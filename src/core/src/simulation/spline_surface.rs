@@ -1,4 +1,4 @@
-//! Surface of a scene through data points, and the modes of its carrier.
+//! Surfaces through data points, and the modes of their surface carriers.
 
 use crate::geometry::Vector3;
 use crate::geometry::frame::PolarFrame;

@@ -90,7 +90,8 @@ impl Reaction {
         self.members.clear();
     }
 
-    /// Projects the modes on the directions of contact `member` of the group, which acts on this structure: those of gaps and of forces.
+    /// Projects the modes on the gap and force directions of contact `member` of the group. The contact acts on this
+    /// structure.
     pub fn see(&mut self, of: &Structure, member: usize, spot: Spot, normals: &[Vector3], forces: &[Vector3]) {
         self.members.push(member);
         let bank = bank(of);

@@ -118,7 +118,7 @@ impl ContactGroup {
         &mut self.law
     }
 
-    /// Selects another solver; a coating has one law for all solvers.
+    /// Selects another solver. A coating has the same law for all solvers.
     pub(crate) fn set_solver(&mut self, solver: Solver, structures: &[Structure]) {
         if self.law.coating().is_none() {
             let touching: Vec<usize> = self.structures().collect();

@@ -164,7 +164,8 @@ impl ContactPair {
         Some(Spot { surface: self.parts.gap.spline()?, carrier, place, frame: self.frame(index, rotor_angle) })
     }
 
-    /// Deforms the surface with this factor of its shape and these displacements of the rows of its carrier, if there is one (m).
+    /// Deforms the surface by this factor on its shape and, if it has a surface carrier, by these displacements of the
+    /// rows of the carrier (m).
     pub(crate) fn bend(&mut self, factor: f64, rows: &[f64]) {
         let points = self.parts.gap.spline().map_or(0, |surface| surface.control_points().len());
         let moved = self.parts.carrier.map_or(&[][..], |carrier| &rows[carrier.first_row..][..3 * points]);

@@ -36,21 +36,23 @@ pub struct Structure {
     pub(crate) step_control: StepControl,
     /// Smallest gaps within the last span (m), `[node · lanes + lane]`, if the scheme evaluates them; otherwise empty.
     pub(crate) lowest_in_span: Vec<f64>,
-    /// Which of these gaps are needed.
+    /// Selection of the smallest gaps that outputs need.
     pub(crate) needed_minima: NeededMinima,
 }
 
-/// Smallest gaps within spans that are needed; others may be larger than they are.
+/// Smallest gaps within spans that outputs need. The stored values of other smallest gaps may be too large.
+///
+/// The smallest gap of each node over all sectors is always needed.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct NeededMinima {
-    /// For each sector, whether those of all of its nodes are needed; empty if all are. Those of each node over all sectors are needed anyway.
+    /// For each sector, true if the smallest gaps of all of its nodes are needed; empty if this holds for every sector.
     pub of_sectors: Vec<bool>,
-    /// True if that of each sector over all nodes is needed.
+    /// True if the smallest gap of each sector over all of its nodes is needed.
     pub by_sector: bool,
 }
 
 impl NeededMinima {
-    /// Returns whether those of all nodes of a sector are needed.
+    /// Returns whether the smallest gaps of all nodes of a sector are needed.
     pub fn all_of(&self, sector: usize) -> bool {
         self.of_sectors.get(sector).copied().unwrap_or(true)
     }
@@ -172,7 +174,8 @@ impl Structure {
         &self.history.gap.now
     }
 
-    /// Sets which smallest gaps are needed: those of all nodes of the sectors `watched` (1-based), and that of each sector if `by_sector`.
+    /// Selects the smallest gaps that are needed: the gap of every node of the sectors `watched` (1-based) and, if
+    /// `by_sector`, the smallest gap of each sector.
     pub(crate) fn need_minima(&mut self, watched: &[usize], by_sector: bool) {
         let of_sectors = (1..=self.modes.sectors()).map(|sector| watched.contains(&sector)).collect();
         self.needed_minima = NeededMinima { of_sectors, by_sector };

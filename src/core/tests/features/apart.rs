@@ -27,7 +27,8 @@ fn alone(scene: &Scene) -> Scene {
     alone
 }
 
-/// A start or a step that searches all structures or pairs for each one of them would take 16 times as long for four times the structures.
+/// For four times as many structures, a start or a step that searches all structures or pairs for each of them would
+/// take 16 times as long.
 #[test]
 fn start_up_time_is_linear_in_the_number_of_structures() {
     let (mut elastic, mut adaptive) = (rub(2), rub(2));

@@ -1,5 +1,5 @@
-//! Steps of blades with two numbers per node against steps with three. A shaft that may whirl but stays in the middle selects the latter
-//! for the same motion.
+//! Compares steps of blades with two numbers per node with the general steps, which use three. Inputs for a whirl that
+//! stays zero select the general steps for the same motion.
 
 use super::{H, SECTORS, apart, scene};
 use tiprub_core::scene::method::Scheme;

@@ -1,4 +1,4 @@
-//! Quantities by which code other than the reader of an output finds variables.
+//! Quantities by which code finds variables without their names.
 
 /// Quantity of a variable, for code other than the reader of an output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -21,7 +21,7 @@ pub enum Quantity {
     LoadAmplitude,
     /// Phase of the nodal-diameter load, input.
     LoadPhase,
-    /// Number of nodal diameters of that load, parameter.
+    /// Number of nodal diameters of the nodal-diameter load, parameter.
     LoadOrder,
     /// Amplitude and phase (component 0, 1) of the excitation of blades, input.
     Excitation(usize),
@@ -47,13 +47,13 @@ pub enum Quantity {
     InitialRate,
     /// Initial velocity of a free master along x, y, z (component 0, 1, 2), parameter.
     InitialVelocity(usize),
-    /// Fraction of the friction heat that flows into the slave, parameter.
+    /// Fraction of the friction heat that flows into the surface carrier, parameter.
     HeatToSlave,
     /// Largest internal step, parameter.
     StepMax,
     /// Scheme, parameter.
     SchemeChoice,
-    /// Error that a step may make, parameter.
+    /// Error tolerance of a step, parameter.
     Tolerance,
     /// Largest number of internal steps of a communication step, parameter.
     MaxInternalSteps,
@@ -88,7 +88,7 @@ pub enum Quantity {
     Moment(usize),
     /// Largest λ of any node within the step.
     NormalForcePeak,
-    /// Radial displacement of the contact grid of the flexible slave.
+    /// Radial displacement of the contact grid of the flexible surface carrier.
     SlaveDisplacement,
     /// Nodes in contact at the communication point.
     ContactCount,

@@ -15,7 +15,7 @@ pub struct VariableTable {
     places: BTreeMap<(Quantity, usize), usize>,
 }
 
-/// Rejects more values than any reader supports.
+/// Rejects tables with more than [`bounds::VALUES`] values.
 fn check_count(variables: &[Variable]) -> Result<()> {
     let count = variables.iter().fold(0, |sum: usize, variable| sum.saturating_add(variable.len()));
     let Some(largest) = variables.iter().max_by_key(|variable| variable.len()).filter(|_| count > bounds::VALUES)

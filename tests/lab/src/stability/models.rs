@@ -38,7 +38,7 @@ pub(crate) fn short_name(scheme: Scheme) -> &'static str {
     name.strip_prefix("modal-").unwrap_or(name).split('-').next().unwrap_or(name)
 }
 
-/// Returns all schemes with their choice of the step and their name in the table.
+/// Returns all schemes with their choice of the step size and their name in the table.
 fn integrations() -> impl Iterator<Item = (Scheme, StepChoice, &'static str)> {
     Scheme::ALL.into_iter().flat_map(|scheme| {
         let adaptive = scheme.properties().adaptive;

@@ -8,7 +8,7 @@ use crate::scene::method::Scheme;
 impl ModalBank {
     /// Sets a new step size: coefficients and flexibility. The state is unchanged (see [`ModalBank::resample`]).
     pub fn set_step(&mut self, scheme: Scheme, step: f64) {
-        // The contact forces of the last step act on a disk with the coefficients they were found with.
+        // The contact forces of the last step act on a disk with the coefficients for which they were computed.
         self.finish();
         (self.scheme, self.step) = (scheme, step);
         for set in 0..self.sets {
@@ -108,7 +108,8 @@ impl ModalBank {
         (now.1 - before.1) + (now.0 - before.0)
     }
 
-    /// Sets the modal damping ratio of all modes; the first modes of a sector or nodal diameter have their `own` (takes effect with
+    /// Sets the modal damping ratio of all modes; the first modes of a sector or nodal diameter get the ratios `own`
+    /// (takes effect with
     /// the next [`ModalBank::set_step`]).
     pub(crate) fn set_damping_ratio(&mut self, damping_ratio: f64, own: &[f64]) {
         fill_ratios(&mut self.model.damping_ratios, damping_ratio, own, 1);

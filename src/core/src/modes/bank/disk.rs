@@ -1,4 +1,4 @@
-//! What couples the sectors of a disk: modes of nodal diameters, and effects of contact forces on any of the sectors.
+//! Coupling of the sectors of a disk: modes of nodal diameters, and the effects of contact forces on all sectors.
 //!
 //! The transforms of `fourier` convert contact displacements to sectors and forces on sectors to nodal diameters. The effect of a
 //! force on any sector within a step is the block-circulant flexibility G(s − s') = Σ_n Re(Ĝ_n e^(2πin(s − s')/N)), Ĝ_n = Ψ_n diag(c)
@@ -122,7 +122,7 @@ impl Disk {
         }
     }
 
-    /// Modes of the disk.
+    /// Returns the modes of the disk.
     pub fn model(&self) -> &CyclicModel {
         &self.model
     }

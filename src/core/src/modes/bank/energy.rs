@@ -85,13 +85,13 @@ impl ModalBank {
         loss
     }
 
-    /// Adds to the damping loss of a group (J).
+    /// Adds `loss` to the damping loss of a group (J).
     pub(crate) fn lose(&mut self, group: usize, loss: f64) {
         self.state.loss[group] += loss;
     }
 
-    /// Returns the work of the modal loads over the last step (J), after the contact correction. A quasi-static mode follows its
-    /// current load, so over this step the previous load did the work.
+    /// Returns the work of the modal loads over the last step (J), after the contact correction. On a quasi-static
+    /// mode, which follows its current load instantaneously, the load of the previous step does the work.
     pub(crate) fn finish_loads(&mut self) -> f64 {
         if !self.options.loads {
             return 0.0;

@@ -1,4 +1,4 @@
-//! Motion of the modes: states that are set, states of rest, and displacements recovered from them.
+//! Motion of the modes: setting and reading states, states of rest, and recovery of displacements.
 
 use super::{FLUSH_BELOW, LANES, ModalBank};
 
@@ -20,7 +20,7 @@ impl ModalBank {
         (0..self.modes).map(move |mode| self.amplitudes_at(first + mode * stride, mode, group))
     }
 
-    /// Positions and increments of the modes of a sector whose modes are not those of a disk, in their order.
+    /// Positions and increments of the modes of an uncoupled sector, in their order.
     #[inline(always)]
     pub(super) fn stored(&self, group: usize) -> impl Iterator<Item = (f64, f64)> {
         let first = self.index(0, group);
@@ -49,8 +49,8 @@ impl ModalBank {
         self.set_amplitude(mode, group, [position, 0.0], [velocity, 0.0]);
     }
 
-    /// Sets position and velocity (re, im) of a mode of a group; the increment is that of free motion without force. A quasi-static
-    /// mode has neither and stays 0, and so does the imaginary part of a real mode.
+    /// Sets position and velocity (re, im) of a mode of a group. The increment is computed from free motion without
+    /// force. A quasi-static mode and the imaginary part of a real mode stay 0.
     pub fn set_amplitude(&mut self, mode: usize, group: usize, position: [f64; 2], velocity: [f64; 2]) {
         if !self.oscillator(mode, group).is_some_and(|of| of.is_dynamic(self.scheme)) {
             return;
@@ -65,7 +65,7 @@ impl ModalBank {
         self.add_amplitude(mode, group, position, velocity);
     }
 
-    /// Adds a free motion (re, im) to that of a mode with inertia; the imaginary part of a real mode stays 0.
+    /// Adds a free motion (re, im) to the motion of a mode with inertia. The imaginary part of a real mode stays 0.
     pub(crate) fn add_amplitude(&mut self, mode: usize, group: usize, position: [f64; 2], velocity: [f64; 2]) {
         let Some(of) = self.oscillator(mode, group) else { return };
         for part in 0..self.moving_parts(group) {
@@ -116,7 +116,7 @@ impl ModalBank {
         }
     }
 
-    /// Sets the state to rest, undeformed.
+    /// Sets the undeformed state of rest.
     pub fn rest(&mut self) {
         let state = &mut self.state;
         for values in [

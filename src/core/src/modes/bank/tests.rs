@@ -2,8 +2,8 @@
 
 use super::*;
 
-/// Free motion conserves ½q̇² + ½ω²q² exactly, even where the energy of the scheme is half of it. A state at rest under load
-/// has no kinetic energy, for a load as well as for a persistent contact force.
+/// Free motion conserves ½q̇² + ½ω²q² exactly, even if the energy that the scheme conserves is only half as large. A
+/// state at rest has no kinetic energy, under a load as well as under a persistent contact force.
 #[test]
 fn instantaneous_energy_matches_the_motion() {
     let frequencies = vec![0.0, 1e3, 4e4, 1.2e5];

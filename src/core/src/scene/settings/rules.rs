@@ -28,7 +28,8 @@ pub struct FeatureRule {
     remedy: &'static str,
 }
 
-/// Defines rules: features, the feature that they need or exclude at the same place, the reason and the remedy.
+/// Defines rules. Each lists features, the feature that they need or exclude at the same place, the reason and the
+/// remedy.
 macro_rules! rules {
     ($([$($feature:ident),*] $relation:ident $other:expr, $because:literal, $remedy:literal;)*) => {
         &[$(FeatureRule {

@@ -60,7 +60,7 @@ pub enum Closure {
     /// Continuous first and second derivatives (fig. 8b of the paper; default).
     #[default]
     Smooth,
-    /// Free ends that only meet in position at the seam θ = 0 (fig. 8a of the paper).
+    /// Free ends: at the seam θ = 0 only the position is continuous (fig. 8a of the paper).
     FreeEnds,
 }
 
@@ -71,7 +71,7 @@ pub enum Interpolation {
     /// Bicubic uniform B-spline (default).
     #[default]
     Spline,
-    /// Bilinear facets, whose normals jump from one to the next: only for comparison.
+    /// Bilinear facets, whose normals jump from facet to facet; for comparison only.
     Facets,
 }
 
@@ -120,7 +120,7 @@ fn is_default_along(along: &usize) -> bool {
     *along == default_along()
 }
 
-/// Equal parts of the circumference and of the axial extent of the contact, for friction power.
+/// Patches for friction power: equal parts of the circumference and of the axial extent of the contact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PatchSettings {

@@ -1,4 +1,4 @@
-//! Internal time stepping: settings with their ranges, and the scheme of a scene whose file does not give one.
+//! Internal time stepping: settings with their ranges, and the default scheme.
 
 use serde::{Deserialize, Serialize};
 use tiprub_cosim::bounds::{self, within};
@@ -8,10 +8,10 @@ use crate::scene::method::Scheme;
 use crate::scene::ranges;
 use crate::{Result, Rom};
 
-/// Default error that a step of `galerkin` may make, as a fraction of the smallest clearance.
+/// Default error tolerance of a step of `galerkin`, as a fraction of the smallest clearance.
 pub const TOLERANCE: f64 = 1e-3;
 
-/// Longest step (s) of `galerkin` if the scene file gives none. The communication step also bounds steps.
+/// Default longest step of `galerkin` (s). The communication step also limits the step.
 pub const ADAPTIVE_STEP: f64 = 8e-5;
 
 /// Interpolation between communication points of inputs that move or load a structure.
@@ -32,17 +32,18 @@ pub struct TimeSettings {
     /// Scheme. A file without this key has the [default](SceneSettings::default_scheme), which is chosen when the file is read.
     #[serde(default)]
     pub scheme: Scheme,
-    /// Reason for the scheme if the file does not give one; for messages, without effect.
+    /// Reason why this scheme was chosen, if the file does not specify a scheme; used in messages only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scheme_reason: Option<String>,
-    /// Largest internal step h (s); the actual step divides the communication step evenly. With adaptive steps the longest one,
-    /// [`ADAPTIVE_STEP`] if the file gives none.
+    /// Largest internal step h (s); the actual step divides the communication step evenly. With adaptive steps, the
+    /// longest step; [`ADAPTIVE_STEP`] if the file does not specify it.
     #[serde(default)]
     pub step: f64,
-    /// Error that a step of `galerkin` may make in displacements, as a fraction of the smallest clearance; 1e-3 if absent.
+    /// Tolerance on the displacement error of a step of `galerkin`, as a fraction of the smallest clearance; 1e-3 if
+    /// absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tolerance: Option<f64>,
-    /// Largest number of internal steps of one communication step, including rejected trials; 0, or absent: any number.
+    /// Largest number of internal steps of one communication step, including rejected trials; no limit if 0 or absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_internal_steps: Option<u32>,
     /// Interpolation of inputs between communication points.
@@ -62,7 +63,8 @@ impl TimeSettings {
 }
 
 impl SceneSettings {
-    /// Returns whether the importer may bound the number of internal steps: if the scene does, or if the steps are adaptive.
+    /// Returns whether the importer may limit the number of internal steps. This requires adaptive steps or a limit in
+    /// the scene.
     pub fn bounds_steps(&self) -> bool {
         self.time.max_internal_steps.is_some() || self.takes_a_tolerance()
     }

@@ -1,6 +1,6 @@
-//! Gap functions of contact pairs, and the modes of the carriers of their surfaces.
+//! Gap functions of contact pairs, and the modes of surface carriers.
 
-use super::{Compiled, MOST_COUPLED};
+use super::{Compiled, MAX_COUPLED};
 use crate::geometry::layout::Layout;
 use crate::geometry::open::{OpenGap, OpenSurface};
 use crate::geometry::surface_spline::SurfaceSpline;
@@ -30,8 +30,8 @@ impl Compiled {
         if self.plan.pairs_on(carrier).count() > 1 { Share::Near } else { Share::Whole }
     }
 
-    /// Checks that the contacts that are solved together are not too many: those of a structure, or of several that share a surface
-    /// carrier.
+    /// Checks that the number of contacts that are solved together is within the limit. These are the contacts of one
+    /// structure, or of several structures that share a surface carrier.
     pub(super) fn check_size(&self) -> Result<()> {
         let (count, pairs) = (self.bodies.len(), self.plan.pairs.iter());
         let links = pairs.filter_map(|pair| Some((pair.body, count + pair.carrier?)));
@@ -45,7 +45,7 @@ impl Compiled {
                 coupled[set[body]] += own * rom.sectors;
             }
             let (together, name) = (coupled[set[body]], &self.body(body).0.name);
-            if together <= MOST_COUPLED {
+            if together <= MAX_COUPLED {
                 continue;
             }
             let first = self.plan.pairs_of(body).next().map_or(0, |(pair, _)| pair);
@@ -57,7 +57,7 @@ impl Compiled {
                 let problem = format!("{together} coupled contact nodes in all sectors");
                 (what, problem, "Use fewer contact nodes or sectors, or uncoupled sectors on a rigid surface")
             };
-            let problem = format!("{problem} of `{name}` and the structures coupled to it, more than {MOST_COUPLED}");
+            let problem = format!("{problem} of `{name}` and the structures coupled to it, more than {MAX_COUPLED}");
             return Err(self.of_pair(first, Error::invalid(what, problem, remedy)));
         }
         Ok(())

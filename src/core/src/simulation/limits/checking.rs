@@ -19,20 +19,22 @@ use crate::simulation::plan::PairPlan;
 use crate::system::System;
 use nalgebra::DMatrix;
 
-/// Up to this number, contact nodes are checked in every combination; beyond it alone, in neighbouring pairs, and all together.
+/// Up to this number of contact nodes, every combination is checked; for more nodes, single nodes, neighbouring pairs,
+/// and all nodes together.
 const ALL_COMBINATIONS_UP_TO: usize = 3;
 
 /// Growth per step below this is rounding of the eigenvalue solver.
 const GROWTH_NOISE: f64 = 1e-7;
 
-/// Angles at which the flexible carrier is checked.
+/// Number of angles at which a flexible surface carrier is checked.
 const CARRIER_ANGLES: u32 = 48;
 
 fn carrier_angle(place: u32) -> f64 {
     std::f64::consts::TAU * f64::from(place) / f64::from(CARRIER_ANGLES)
 }
 
-/// The slave's modes along normals and tangents of `nodes` of a blade at `angle` (rad), nodes × modes; 0 for nodes that do not face the
+/// Modes of the surface carrier along normals and tangents of `nodes` of a blade at `angle` (rad), nodes × modes; 0 for
+/// nodes that do not face the
 /// carrier.
 fn carrier_at(law: &SplineGap, modes: &ModalModel, nodes: &[usize], angle: f64) -> (DMatrix<f64>, DMatrix<f64>) {
     let zeros = || DMatrix::zeros(nodes.len(), modes.len());
@@ -52,7 +54,8 @@ fn carrier_at(law: &SplineGap, modes: &ModalModel, nodes: &[usize], angle: f64) 
     seen
 }
 
-/// Lowest eigenvalue of the symmetric part of the slave's Delassus matrix relative to the largest in size.
+/// Lowest eigenvalue of the symmetric part of the surface carrier's Delassus matrix, relative to the eigenvalue of
+/// largest magnitude.
 fn lowest_ratio(
     (normals, tangents): &(DMatrix<f64>, DMatrix<f64>),
     modes: &ModalModel,
@@ -146,7 +149,8 @@ impl<'a> Checking<'a> {
         Subject::Body(self.body)
     }
 
-    /// Returns all warnings at the expected step (s), for any sense of slip; `carriers` and `more` come last.
+    /// Returns all warnings at the expected step (s), for both senses of slip. The findings `carriers` and `more` come
+    /// last.
     pub(super) fn warnings(
         &self,
         step: f64,
@@ -196,8 +200,8 @@ impl<'a> Checking<'a> {
         both.max_by(|a, b| a.rate.total_cmp(&b.rate)).map(WarningKind::CuttingGrowth)
     }
 
-    /// Checks whether the compliance of the structures under the surfaces spoils the solvability of the contact problem, at the expected
-    /// step and at all others.
+    /// Checks whether the compliance of the surface carriers makes the contact problem unsolvable, at the expected step
+    /// and at all other steps.
     pub(super) fn carriers(&self, expected: f64) -> Vec<(f64, Option<WarningKind>)> {
         let carried = self.carried();
         if self.friction == 0.0 || carried.is_empty() || self.parameters.solver.sticks() {
@@ -234,7 +238,8 @@ impl<'a> Checking<'a> {
         steps.into_iter().map(|step| (step, worst_at(step))).collect()
     }
 
-    /// Returns the largest step of contact whose forces act a step late, and a warning if many blades in contact simultaneously may lower it.
+    /// Returns the largest stable step if contact forces act one step late, and a warning if many blades in
+    /// simultaneous contact may reduce this step.
     pub(super) fn massless(&self, step: f64) -> Result<(Vec<WarningKind>, MasslessLimit), ErrorKind> {
         if !self.parameters.scheme.properties().delays_contact {
             return Ok((Vec::new(), MasslessLimit::NONE));
@@ -272,8 +277,8 @@ impl<'a> Checking<'a> {
         Ok((warnings, limit))
     }
 
-    /// The slave's modes as the real part of a nodal diameter sees them. One blade in contact has an equal share of all nodal diameters, so
-    /// that the softest of them bounds the contribution of the carrier.
+    /// Projects the modes of the surface carrier on the real part of a nodal diameter. A contact of one blade acts
+    /// equally on all nodal diameters, so the most compliant one bounds the contribution of the carrier.
     fn seen_by(&self, diameter: usize, seen: DMatrix<f64>) -> DMatrix<f64> {
         let Some(disk) = self.disk() else { return seen };
         let rows = self.models[diameter].contact_modes.nrows() / 3;

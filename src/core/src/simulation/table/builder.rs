@@ -21,7 +21,7 @@ pub(crate) const RAMPED: &str = "; reached at the end of the communication step 
 const RAMPED_ANGLE: &str =
     "; reached at the end of the communication step (see input_interpolation), so do not wrap it to one turn";
 
-/// Unit with a typical magnitude; `None` for numbers without unit.
+/// Unit with a typical magnitude; `None` for dimensionless numbers.
 pub(crate) type NominalUnit = Option<(&'static VariableUnit, f64)>;
 
 /// Collects rows and assigns references.
@@ -134,7 +134,8 @@ impl TableBuilder {
         variable
     }
 
-    /// Adds the components of a vector along x, y, z: `{axis}` in the text is the axis, and the reader gets its index.
+    /// Adds the components of a vector along x, y, z. The name of the axis replaces `{axis}` in the text; the reader
+    /// receives the index of the axis.
     pub fn vector(
         &mut self,
         name: &str,

@@ -42,14 +42,15 @@ pub fn totals(table: &mut TableBuilder, friction: bool) {
 /// Name, span, quantity, text, the term of the ledger or the instantaneous energy, and whether a scene has the row.
 type Energy = (&'static str, Span, Quantity, &'static str, fn(&OutputView) -> f64, fn(&TableFacts) -> bool);
 
-/// Defines rows of terms of the ledger: quantity, name, term, text, and whether a scene has the row.
+/// Defines rows of the energy ledger: quantity, name, term, text, and whether a scene has the row.
 macro_rules! terms {
     ($($quantity:ident $name:literal $($term:ident).+ $text:expr, $exists:expr;)*) => {
         [$(($name, Span::Total, Quantity::$quantity, $text, |view| view.ledger().$($term).+(), $exists)),*]
     };
 }
 
-/// Instantaneous energies; rows without text have different texts for rotors and for free bodies.
+/// Instantaneous energies. A row without a text gets its text elsewhere, because rotors and free bodies need different
+/// texts.
 const STATES: [Energy; 3] = [
     ("kinetic_energy", Span::Point, Quantity::KineticEnergy, "", |view| view.energies.0, |_| true),
     ("strain_energy", Span::Point, Quantity::StrainEnergy, "", |view| view.energies.1, |_| true),
@@ -64,7 +65,7 @@ const STATES: [Energy; 3] = [
     ),
 ];
 
-/// Terms of the ledger.
+/// Terms of the energy ledger.
 const TERMS: [Energy; 15] = terms! {
     DampingLoss "damping_loss" damping_loss.value "Energy dissipated by modal damping since the start", |_| true;
     FrictionLoss "friction_loss" friction_loss.value

@@ -226,8 +226,8 @@ impl NodeRow {
     }
 }
 
-/// Returns the outputs over the contact nodes of a sector of a structure (0-based), with the units of gaps and forces; those of friction
-/// and of single internal steps only if the scene has them.
+/// Returns the outputs over the contact nodes of a sector of a structure (0-based), with the units of gaps and forces.
+/// Outputs of friction and of single internal steps are included only if the scene has them.
 pub(crate) fn watched_rows(
     parts: &TableFacts,
     body: &BodyFacts,

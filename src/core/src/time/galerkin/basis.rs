@@ -109,7 +109,8 @@ impl TimeBasis {
 pub enum ForceInterpolation {
     /// The force is a polynomial of degree s.
     Polynomial,
-    /// The force has its value at the end of the step throughout, which is dissipative whatever opens or closes.
+    /// The force is constant over the step, with its value at the end. Contacts that open or close then always
+    /// dissipate energy.
     Constant,
 }
 

@@ -1,10 +1,16 @@
-//! Steps of one blade on a surface of revolution that its shaft does not move, with two numbers per node and force.
+//! Steps of one blade on a surface of revolution whose shaft stays in the middle. Every displacement and every force of
+//! a node has two components instead of three.
 //!
-//! With F = r_c − r − u_r + m u_z ([`revolution`](crate::geometry::revolution)), the gap is F/N and the force λ' ∇F with λ' = λ/N, N = |∇F|:
-//! the same complementarity and the same work without a root or a division. Forces and the displacements that matter lie in a plane: the
-//! closing displacement a = −u_r + m u_z and the displacement around b = u_θ. A force λ' with friction is λ' (1 + µσ/M, σ − µM) along the
-//! two, with σ = s'/r, M = √(1 + m²) and µ negative where the node slides towards negative b.
+//! With F = r_c − r − u_r + m u_z ([`revolution`](crate::geometry::revolution)) and N = |∇F|, the gap is F/N and the
+//! normal force is λ' ∇F with the scaled multiplier λ' = λ/N. The complementarity condition and the work keep their
+//! form, but need neither a square root nor a division.
+//!
+//! Only two displacements affect F: the closing displacement a = −u_r + m u_z and the circumferential displacement
+//! b = u_θ. Contact forces lie in the plane of the two. With friction, the components of a force along a and b are
+//! λ' (1 + µσ/M) and λ' (σ − µM), with σ = s'/r and M = √(1 + m²). The coefficient µ is negative if the node slides
+//! towards negative b.
 
+mod accept;
 mod columns;
 mod judge;
 mod level;
@@ -15,7 +21,6 @@ mod solve;
 mod span;
 mod start;
 mod surface;
-mod take;
 mod tally;
 mod trial;
 

@@ -112,7 +112,7 @@ impl Island {
         Self::new(tables, vec![sector], Vec::new(), Vec::new())
     }
 
-    /// Fills the tables for spans of length `span` (s). Returns false if they were for this length already.
+    /// Fills the tables for spans of length `span` (s). Returns false if the tables are already valid for this length.
     pub fn set_span(&mut self, span: f64) -> bool {
         if span.to_bits() == self.span.to_bits() {
             return false;
@@ -180,7 +180,7 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
     /// Integrates over the span.
     ///
     /// # Errors
-    /// [`Stopped`]; the state is then that after the last accepted step.
+    /// [`Stopped`] if the span is not integrated to its end; the state is then the state after the last accepted step.
     pub fn integrate(&mut self, effort: &mut Effort) -> Result<(), Stopped> {
         integrate(self, effort)
     }

@@ -34,7 +34,7 @@ impl ObstacleView<'_> {
         Some((&self.pairs[own.pair], own))
     }
 
-    /// Reads a value from the carrier of a surface, at the place of a node and at a point of the step.
+    /// Reads a value of the surface carrier that a node faces, at the place of the node and at a point of the step.
     fn on_carrier<T>(
         &self,
         node: usize,
@@ -46,7 +46,7 @@ impl ObstacleView<'_> {
         Some(read(&self.carriers.carriers[carrier], spot))
     }
 
-    /// Calls `read` with the carrier of the surface of a node, at a point of the step.
+    /// Calls `read` with the surface carrier that a node faces, at a point of the step.
     fn with_carrier_mut(&mut self, node: usize, point: usize, read: impl FnOnce(&mut CarrierIntegrator, Spot)) {
         if let Some((carrier, spot)) = self.record.spot(node, point, SurfacePlace::Now, self.pairs) {
             read(&mut self.carriers.carriers[carrier], spot);
@@ -76,7 +76,7 @@ impl ObstacleView<'_> {
 }
 
 impl ObstacleView<'_> {
-    /// Enters all nodes at all points as lanes, if they face one surface of revolution and the shaft does not move.
+    /// Adds all nodes at all points as lanes, if they face one surface of revolution and the shaft stays in the middle.
     fn enter_lanes(&mut self, lanes: Lanes) -> Option<usize> {
         let first = (*self.record.pair_of.first()?)?;
         let PairRecord { pair, drives, .. } = &self.record.pairs[first];
@@ -343,7 +343,8 @@ impl ObstacleView<'_> {
         lowest
     }
 
-    /// Returns whether a node that touches at point `i` had nothing to touch before and was behind the surface, extrapolated beyond its edge.
+    /// Returns whether a node that touches at point `i` faced no surface before and was behind the surface extrapolated
+    /// beyond its edge.
     fn was_behind(&self, trial: &Trial, node: usize, pair: usize, i: usize) -> bool {
         let GapLaw::Open(open) = self.pairs[self.record.pairs[pair].pair].gap() else { return false };
         if trial.gap(i - 1, node).is_finite() {

@@ -166,7 +166,7 @@ pub(crate) struct SpanRecord {
     pub sector: usize,
     /// Lanes of a row of the structure.
     pub lanes: usize,
-    /// Pairs of the structure, and the number among them of the pair of each node.
+    /// Pairs of the structure, and for each node the index of its pair in this list.
     pub pairs: Vec<PairRecord>,
     pub pair_of: Vec<Option<usize>>,
     /// Contact of each node over the span.
@@ -190,7 +190,7 @@ pub(crate) struct SpanRecord {
     pub lanes_of: Option<usize>,
     /// True if a contact exceeds the limits of small displacements.
     pub implausible: bool,
-    /// A node that has passed a free edge and was already behind the surface.
+    /// Node that has passed a free edge and was already behind the surface, if any.
     pub behind_edge: Option<usize>,
 }
 
@@ -271,8 +271,9 @@ impl SpanRecord {
         rest.iter_mut().for_each(|places| places.copy_from_slice(first));
     }
 
-    /// Starts the span of a sector with the places and gaps (m) of its nodes at their indices. The search for the closest points of the first
-    /// step also starts there, because the places of earlier trials are not part of a saved state.
+    /// Starts the span of a sector, with the places and gaps (m) of its nodes at their indices. The search for closest
+    /// points in the first step also starts at these places, because the places of earlier trials are not part of a
+    /// saved state.
     pub fn begin(&mut self, place_of: impl Fn(usize) -> ClosestPoint, gap_of: impl Fn(usize) -> f64) {
         for node in 0..self.tallies.len() {
             let index = self.index(node);

@@ -141,8 +141,9 @@ impl ContactRows {
         self.add_up(&self.by_mode, [&state.position, &state.velocity], [one, two]);
     }
 
-    /// Sums the amplitudes of the modes that turn by more than `RESOLVED` within a step of this length (s), as displacements of the rows (m):
-    /// for an infinite length, the largest displacements from rest at any time without contact.
+    /// Sums the amplitudes of the modes whose phase advances by more than `RESOLVED` within a step of this length (s),
+    /// as displacements of the rows (m). For an infinite length, these are the largest displacements from rest at any
+    /// time without contact.
     pub(crate) fn unresolved_amplitudes(&self, step: f64, state: &SectorState, sums: &mut Sums<1>) {
         let [amplitudes] = &mut sums.coefficients;
         let modes = self.rates.iter().zip(state.position.iter().zip(&state.velocity));

@@ -31,9 +31,9 @@ pub struct SharedBody {
     /// interpolation, and at the points of the step. Empty without loads.
     pub loads: [Vec<f64>; 2],
     loads_at: [Vec<f64>; POINTS],
-    /// Damping loss since the owner has collected it (J).
+    /// Damping loss since it was last collected (J).
     pub loss: f64,
-    /// Work of loads since the owner has collected it (J).
+    /// Work of loads since it was last collected (J).
     pub load_work: f64,
 }
 

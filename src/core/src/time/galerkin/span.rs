@@ -75,7 +75,7 @@ pub trait SpanSteps {
 /// Integrates over a span.
 ///
 /// # Errors
-/// [`Stopped`]; the state is then that after the last accepted step.
+/// [`Stopped`] if the span is not integrated to its end; the state is then the state after the last accepted step.
 pub(crate) fn integrate(steps: &mut impl SpanSteps, effort: &mut Effort) -> Result<(), Stopped> {
     Integration { steps }.integrate(effort)
 }

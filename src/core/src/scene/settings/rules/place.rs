@@ -139,7 +139,8 @@ impl<'a> ScenePlace<'a> {
         own.filter_map(|contact| Self { index: *contact, ..*self }.master()).any(|master| moves(master.motion))
     }
 
-    /// Returns whether a solver with sticking is possible: a coupled problem of all sectors supports it only if the scene selects it.
+    /// Returns whether a solver with sticking is possible. For a coupled problem of all sectors, this requires that the
+    /// scene selects it.
     pub(super) fn may_stick(&self) -> bool {
         let settings = self.settings;
         let small = self.contacts().all(|at| !at.is_free() && at.carrier().is_none());

@@ -1,4 +1,4 @@
-//! Sums of columns, and elimination, in blocks of eight.
+//! Linear combinations of columns and Gaussian elimination, in blocks of eight numbers.
 
 use crate::math::octet::{Eight, Octet};
 
@@ -23,7 +23,7 @@ pub(super) fn add_modes<L: Octet, const P: usize, const B: usize>(
     sums
 }
 
-/// Writes Σ over modes of shape times `modes[p]` to point p of the lanes.
+/// Writes the displacements of all nodes, Σ over modes of shape times `modes[p]`, to the lanes of each point p.
 #[inline(always)]
 pub(super) fn displace<L: Octet, const P: usize>(
     shapes: &[Eight],
@@ -108,7 +108,8 @@ pub(super) fn combine_blocks<L: Octet, const B: usize>(
     }
 }
 
-/// Eliminates `count` columns of `K` blocks each; the column after them becomes the solution.
+/// Solves a linear system by elimination of `count` columns of `K` blocks each. The column after them is the
+/// right-hand side, which the solution replaces.
 #[inline(always)]
 pub(super) fn eliminate<L: Octet, const K: usize>(matrix: &mut [Eight], count: usize) {
     for pivot in 0..count {
@@ -131,7 +132,7 @@ pub(super) fn eliminate<L: Octet, const K: usize>(matrix: &mut [Eight], count: u
     }
 }
 
-/// [`eliminate`] for any number of blocks.
+/// Calls [`eliminate`] for any number of blocks.
 #[inline(always)]
 pub(super) fn eliminate_any<L: Octet>(matrix: &mut [Eight], count: usize, blocks: usize) {
     for pivot in 0..count {
@@ -150,7 +151,7 @@ pub(super) fn eliminate_any<L: Octet>(matrix: &mut [Eight], count: usize, blocks
     }
 }
 
-/// Σ values times weights.
+/// Returns the sum of values times weights.
 #[inline(always)]
 pub(super) fn sum<L: Octet>(values: &[L], weights: &[f64]) -> L {
     let mut sum = L::zero();

@@ -1,4 +1,5 @@
-//! Judges a solved step of a blade: its error, the energy of contacts that open or close, and nodes that came near between the points.
+//! Assesses a solved step of a blade: its error, the energy of contacts that open or close, and nodes that nearly touch
+//! between the points of the step (near misses).
 
 use super::columns::sum;
 use super::solve::Attempt;
@@ -7,7 +8,7 @@ use crate::time::galerkin::basis::{POINTS, TimeBasis};
 use crate::time::galerkin::trial::{KINK, NEAR, TrialResult};
 
 impl Attempt<'_> {
-    /// Finds error, switches and near misses.
+    /// Computes the error, and finds contacts that open or close (switches) and near misses.
     #[inline(always)]
     pub(super) fn judge<L: Octet>(&mut self, result: &mut TrialResult) {
         let (basis, blocks) = (&self.level.basis, self.rows.blocks);
@@ -71,7 +72,7 @@ impl Attempt<'_> {
         }
     }
 
-    /// Displacement error of the impulse errors (m).
+    /// Displacement error that the impulse errors cause (m).
     #[inline(always)]
     fn error<L: Octet>(&mut self) -> f64 {
         let (rows, impulses) = (self.rows, &self.trial.impulses);
@@ -92,7 +93,8 @@ impl Attempt<'_> {
     }
 }
 
-/// Returns whether gaps of the selected nodes come near zero between the points, and their largest depth below zero there (m).
+/// Returns whether a gap of the selected nodes comes near zero between the points, and the largest penetration there
+/// (m).
 #[inline(always)]
 fn comes_near<L: Octet>(basis: &TimeBasis, gaps: &[L; POINTS], nodes: u8) -> (bool, f64) {
     let gaps = &gaps[..basis.count()];
@@ -113,7 +115,7 @@ fn comes_near<L: Octet>(basis: &TimeBasis, gaps: &[L; POINTS], nodes: u8) -> (bo
     (lowest.less(left) & candidates != 0, depth.array().into_iter().fold(0.0, f64::max))
 }
 
-/// Largest change of slope of values at the points, which rest before and after the step where they are zero at its ends.
+/// Largest change of the slope of values at the points. Values that are zero at an end of the step stay zero beyond it.
 #[inline(always)]
 fn kink<L: Octet>(basis: &TimeBasis, values: &[L; POINTS]) -> L {
     let last = basis.degree;

@@ -8,7 +8,8 @@ use crate::time::galerkin::level::StepTables;
 use crate::time::galerkin::response::TERMS;
 use crate::time::galerkin::trial::ForceInterpolation;
 
-/// Tables for one step length. Lanes are blocks of nodes, point by point.
+/// Tables for one step length. A lane is one node at one point of the step. Lanes are stored point by point, in blocks
+/// of eight nodes.
 #[derive(Debug, Clone)]
 pub(crate) struct BladeLevel {
     /// h (s), and its fraction of the span.
@@ -24,19 +25,19 @@ pub(crate) struct BladeLevel {
     /// Coefficients of (q, q̇, p_a) in q and q̇ at the end, and in the damping loss.
     pub end: [[Vec<Eight>; TERMS]; 2],
     pub loss: Vec<Eight>,
-    /// True if any mode is damped.
+    /// True if at least one mode is damped.
     pub damped: bool,
     /// Interpolation of the forces.
     pub kind: ForceInterpolation,
-    /// Displacements of all lanes per force: for each lane (point · nodes + node) and each of the two directions of the force, the closing
-    /// displacements, then those around.
+    /// Displacements of all lanes per unit force on each lane (point · nodes + node). For each of the two directions of
+    /// the force, the closing displacements come first, then the circumferential ones.
     pub columns: Vec<Eight>,
-    /// The same for forces at the start.
+    /// Displacements of all lanes per unit force on each node at the start of the step, in the same order.
     pub start_columns: Vec<Eight>,
 }
 
 impl BladeLevel {
-    /// Allocates tables for steps of a degree.
+    /// Allocates tables for steps of the given degree.
     pub fn new(rows: &BladeRows, degree: usize, kind: ForceInterpolation) -> Self {
         let basis = TimeBasis::new(degree);
         let points = if kind == ForceInterpolation::Constant { 1 } else { degree };
@@ -59,7 +60,7 @@ impl BladeLevel {
         }
     }
 
-    /// Fills the tables from those of all rows. Does not allocate.
+    /// Fills the tables from the step tables of all contact rows, without allocating.
     pub fn fill(&mut self, rows: &BladeRows, tables: &StepTables) {
         (self.step, self.damped) = (tables.step, tables.damped);
         let (points, degree) = (self.points(), self.basis.degree);
@@ -115,14 +116,15 @@ impl BladeLevel {
         if self.kind == ForceInterpolation::Constant { 1 } else { self.basis.degree }
     }
 
-    /// Displacements of all lanes per force on a lane: per force along the closing displacement and around, closing and around.
+    /// Displacements of all lanes per unit force on one lane: closing and circumferential displacements for a force
+    /// along the closing displacement, then both for a circumferential force.
     #[inline(always)]
     pub fn column(&self, lane: usize) -> [&[Eight]; 4] {
         let columns = &self.columns[4 * lane * self.blocks..][..4 * self.blocks];
         quarters(columns, self.blocks)
     }
 
-    /// The same for a force at the start.
+    /// Displacements of all lanes per unit force on a node at the start of the step, in the order of [`Self::column`].
     #[inline(always)]
     pub fn start_column(&self, node: usize) -> [&[Eight]; 4] {
         let columns = &self.start_columns[4 * node * self.blocks..][..4 * self.blocks];

@@ -1,7 +1,8 @@
 //! Smallest gaps between the points of a step, for nodes that stay open.
 //!
-//! The polynomial through F at the points shows where a node may come closer between them. There, all modes are followed exactly at the
-//! ends of equal parts of the step, and a parabola through three of them gives the smallest gap.
+//! The polynomial through F at the points shows which nodes may come closer between the points. For these nodes, all
+//! modes are evaluated exactly at the ends of equal parts of the step. A parabola through three of these gaps gives the
+//! smallest gap.
 
 use super::columns::{displace, sum};
 use super::level::BladeLevel;
@@ -14,20 +15,21 @@ use crate::time::galerkin::basis::POINTS;
 use crate::time::galerkin::response::TERMS;
 use crate::time::galerkin::trial::NEAR;
 
-/// Number of halvings of a step at whose ends the motion is followed.
+/// Number of halvings of a step into the parts at whose ends the motion is evaluated.
 pub(super) const FINER: usize = 4;
-/// Number of these parts.
+/// Number of parts of a step.
 pub(super) const PARTS: usize = 1 << FINER;
-/// Nodes are followed if they may come closer by more than this fraction of the tolerance.
-const SHARE: f64 = 0.1;
+/// Nodes are followed if they may come closer between the points by more than this fraction of the tolerance.
+const FOLLOW_FRACTION: f64 = 0.1;
 
-/// Finds the nodes that may come closer between the points than at them, to below what matters. Returns whether there are any.
+/// Finds the nodes that may come closer between the points than at the points, with a smallest gap that an output
+/// needs. Returns whether there are such nodes.
 pub(super) struct FindMinima<'a> {
     pub trial: &'a mut BladeTrial,
     pub rows: &'a BladeRows,
     pub level: &'a BladeLevel,
     pub tally: &'a BladeTally,
-    /// Gaps below which smallest gaps matter (m).
+    /// Gaps below which the smallest gaps are needed (m).
     pub floors: &'a [Eight],
     /// Largest displacement error of a step (m).
     pub tolerance: f64,
@@ -63,7 +65,7 @@ impl OctetKernel for FindMinima<'_> {
             let slope = L::select(at_end, sum(&gaps[..count], &slopes[1]), sum(&gaps[..count], &slopes[0])).abs();
             #[expect(clippy::cast_precision_loss, reason = "few parts")]
             let falls = !L::zero().less(deeper) & (left * L::splat(PARTS as f64)).less(slope);
-            let comes = L::splat(SHARE * tolerance).less(deeper.max(L::zero()) + left);
+            let comes = L::splat(FOLLOW_FRACTION * tolerance).less(deeper.max(L::zero()) + left);
             let size = L::load(&rows.steepness[block]);
             let bar = L::load(&floors[block]).min(L::load(&tally.lowest[block]));
             let matters = ((low.min(within) - left) / size).less(bar);
@@ -75,15 +77,15 @@ impl OctetKernel for FindMinima<'_> {
     }
 }
 
-/// Follows the nodes found by [`FindMinima`], before the modes are advanced; modal forces are known.
+/// Follows the nodes found by [`FindMinima`]. The modal forces must be known and the modes not yet advanced.
 pub(super) struct Follow<'a> {
     pub trial: &'a mut BladeTrial,
     pub rows: &'a BladeRows,
     pub level: &'a BladeLevel,
     /// Tables for the length of a part.
     pub part: &'a BladeLevel,
-    pub given: &'a FacedSurface<'a>,
-    /// Prescribed motion at the ends of all parts.
+    pub faced: &'a FacedSurface<'a>,
+    /// Prescribed motion at the end of each part.
     pub drives: &'a [PointDrive],
     pub tally: &'a mut BladeTally,
     /// True if forces act in the step.
@@ -108,17 +110,18 @@ impl OctetKernel for Follow<'_> {
     }
 }
 
-/// A fraction of small integers.
+/// Returns the quotient of two small integers.
 #[expect(clippy::cast_precision_loss, reason = "few parts")]
 fn fraction(part: usize, parts: usize) -> f64 {
     part as f64 / parts as f64
 }
 
 impl Follow<'_> {
-    /// Gaps of the followed nodes at the end of some parts, without those that other nodes' forces cause at once.
+    /// Finds the gaps of the followed nodes after `end` of the `parts` parts, without the instantaneous displacements
+    /// that forces on other nodes cause.
     #[inline(always)]
     fn find_gaps<L: Octet>(&mut self, end: usize, parts: usize) {
-        let Self { trial, rows, level, given, drives, pushes, .. } = self;
+        let Self { trial, rows, level, faced, drives, pushes, .. } = self;
         let BladeTrial { start, path_modes, path_moved, path_gaps, forces, multipliers, angles, .. } = &mut **trial;
         for along in [0, 1] {
             displace::<L, 1>(&rows.shapes[along], rows.blocks, [&path_modes[0]], &mut path_moved[along]);
@@ -148,8 +151,9 @@ impl Follow<'_> {
         for block in 0..rows.blocks {
             let per_radius = L::load(&rows.per_radius[block]);
             let [closing, around] = both(|along| L::load(&path_moved[along][block]));
-            let [shape, slope, _] =
-                given.surface.of_octet::<L>(L::load(&angles[block]) + L::splat(drive.turned) + around * per_radius);
+            let [shape, slope, _] = faced
+                .surface
+                .evaluate_octet::<L>(L::load(&angles[block]) + L::splat(drive.turned) + around * per_radius);
             let factor = L::splat(drive.factor);
             let (sigma, steepness) = (slope * factor * per_radius, L::load(&rows.steepness[block]));
             let open = L::splat(drive.clearance) + shape * factor + closing;
@@ -187,7 +191,7 @@ impl Follow<'_> {
         }
     }
 
-    /// Records the smallest gaps, at the ends of parts or at the vertex of a parabola through three of them.
+    /// Records the smallest gaps, each at the end of a part or at the vertex of a parabola through three such gaps.
     #[inline(always)]
     fn record<L: Octet>(&mut self, parts: usize) {
         let Self { trial, rows, tally, .. } = self;

@@ -1,4 +1,4 @@
-//! How far the nodes of a blade can move without contact, and its energy.
+//! Largest displacements of the nodes of a blade without contact, and the energy of the blade.
 
 use super::columns::displace;
 use super::rows::BladeRows;
@@ -31,14 +31,14 @@ impl OctetKernel for FindReach<'_> {
     }
 }
 
-/// What is known of the gaps of all nodes over a step without contact.
+/// Bound on the gaps of all nodes over a step without contact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Clearance {
     /// A node may touch.
     Unknown,
-    /// No node can touch, but a gap may be smaller than what is known of it.
+    /// No node can touch, but a gap may become smaller than the smallest gap recorded so far, which an output needs.
     Needed,
-    /// No node can touch, and no gap is needed.
+    /// No node can touch, and no output needs a gap of this step.
     Wide,
 }
 
@@ -46,7 +46,7 @@ pub(super) enum Clearance {
 pub(super) struct FindClearance<'a> {
     pub trial: &'a BladeTrial,
     pub rows: &'a BladeRows,
-    pub given: &'a FacedSurface<'a>,
+    pub faced: &'a FacedSurface<'a>,
     pub floors: &'a [Eight],
     pub lowest: &'a [Eight],
 }
@@ -55,19 +55,20 @@ impl OctetKernel for FindClearance<'_> {
     type Output = Clearance;
     #[inline(always)]
     fn run<L: Octet>(self) -> Clearance {
-        let Self { trial, rows, given, floors, lowest } = self;
-        let [start, end, ..] = &given.drives;
+        let Self { trial, rows, faced, floors, lowest } = self;
+        let [start, end, ..] = &faced.drives;
         if start.factor < 0.0 {
             return Clearance::Unknown;
         }
-        let bumpiness = given.surface.bumpiness();
+        let bumpiness = faced.surface.bumpiness();
         let mut needed = 0;
         for block in 0..rows.blocks {
             let around = L::load(&trial.reach[1][block]) * L::load(&rows.per_radius[block]);
             let angles = L::load(&trial.angles[block]);
             let from = angles + L::splat(start.turned.min(end.turned)) - around;
             let to = angles + L::splat(start.turned.max(end.turned)) + around;
-            let ([low, ..], [high, ..]) = (given.surface.of_octet::<L>(from), given.surface.of_octet::<L>(to));
+            let ([low, ..], [high, ..]) =
+                (faced.surface.evaluate_octet::<L>(from), faced.surface.evaluate_octet::<L>(to));
             let width = to - from;
             let shape = match bumpiness {
                 Some(curvature) => low.min(high) - width * width * L::splat(0.125 * curvature),
@@ -79,8 +80,8 @@ impl OctetKernel for FindClearance<'_> {
                 return Clearance::Unknown;
             }
             // The gap is F/N with N ≥ M; on a flank below 45° N ≤ √2 M.
-            let least = left / (L::load(&rows.steepness[block]) * L::splat(std::f64::consts::SQRT_2));
-            needed |= least.less(L::load(&floors[block]).min(L::load(&lowest[block]))) & valid;
+            let smallest = left / (L::load(&rows.steepness[block]) * L::splat(std::f64::consts::SQRT_2));
+            needed |= smallest.less(L::load(&floors[block]).min(L::load(&lowest[block]))) & valid;
         }
         if needed == 0 { Clearance::Wide } else { Clearance::Needed }
     }

@@ -1,4 +1,4 @@
-//! Mode shapes of a blade along the closing displacement and around, in blocks of eight nodes.
+//! Mode shapes of a blade along the closing and the circumferential displacement, in blocks of eight nodes.
 
 use crate::geometry::layout::Layout;
 use crate::math::octet::Eight;
@@ -6,24 +6,25 @@ use crate::math::vector::{Vector3, vector3_at};
 use crate::modes::coordinates::ContactModes;
 use nalgebra::{DMatrix, Vector2};
 
-/// What all step lengths share.
+/// Data of a blade that do not depend on the step length.
 #[derive(Debug, Clone)]
 pub(crate) struct BladeRows {
     /// ξω, 1/ω_d and ω² of each mode.
     pub rates: [Vec<Eight>; 3],
     /// Magnitudes of `shapes`.
     pub magnitudes: [Vec<Eight>; 2],
-    /// Number of contact nodes, and of their blocks.
+    /// Number of contact nodes, and number of blocks of eight that hold them.
     pub nodes: usize,
     pub blocks: usize,
     /// Number of blocks of modes.
     pub mode_blocks: usize,
-    /// Shapes mode by mode, along the closing displacement and around.
+    /// Shapes mode by mode, along the closing and the circumferential displacement.
     pub shapes: [Vec<Eight>; 2],
-    /// Displacements of all nodes per force on a node (m/N) by the flexibility of modes without inertia: per force along the closing
-    /// displacement, closing and around; then per force around.
+    /// Flexibility of the modes without inertia (m/N), `[direction of the force][direction of the displacement]`, where
+    /// direction 0 is closing and 1 is circumferential. For each loaded node, the displacements of all nodes.
     pub flexibility: [[Vec<Eight>; 2]; 2],
-    /// Rows of the error form of forces: those of all nodes along the closing displacement, then around; each row likewise.
+    /// Quadratic form that gives the error of impulses. Rows and columns are the closing direction of all nodes, then
+    /// their circumferential direction.
     pub error_form: Vec<Eight>,
     /// M = √(1 + m²) and its inverse for each node.
     pub steepness: Vec<Eight>,
@@ -31,20 +32,20 @@ pub(crate) struct BladeRows {
     /// Meridional slope m and axial position of each node (m).
     pub slopes: Vec<Eight>,
     pub axial: Vec<Eight>,
-    /// Shapes row by row: those along the closing displacement of all nodes, then those around.
+    /// Shapes row by row: the closing displacement of all nodes, then the circumferential one.
     pub by_row: Vec<Eight>,
     /// 1/r of each node (1/m).
     pub per_radius: Vec<Eight>,
-    /// Largest norm of the shapes around of a node.
+    /// Largest norm over the nodes of the circumferential shapes.
     pub largest_around: f64,
     /// Smallest radius (m).
     pub smallest_radius: f64,
-    /// Directions of the closing displacement.
+    /// Direction of the closing displacement of each node.
     directions: Vec<Vector3>,
 }
 
 impl BladeRows {
-    /// Arranges the rows of modes for nodes with these meridional slopes and radii (m).
+    /// Arranges the rows of modes by direction, for nodes with these meridional slopes and radii (m).
     pub fn new(modes: &ContactModes, error_form: &DMatrix<f64>, slopes: &[f64], layout: &Layout) -> Self {
         let per_radius = &layout.per_radius;
         let (nodes, count) = (slopes.len(), modes.len());
@@ -125,29 +126,30 @@ impl BladeRows {
         rows
     }
 
-    /// Bits of the nodes of a block, or of a block of lanes.
+    /// Mask of the entries of a block of nodes or lanes that belong to a node.
     #[inline(always)]
     pub fn valid(&self, block: usize) -> u8 {
         let left = self.nodes - 8 * (block % self.blocks);
         if left >= 8 { 0xff } else { (1 << left) - 1 }
     }
 
-    /// Direction along the closing displacement (0) or around (1) at a node.
+    /// Unit direction of the closing (`along` 0) or circumferential (1) displacement of a node.
     pub fn along(&self, along: usize, node: usize) -> Vector3 {
         if along == 0 { self.directions[node] } else { Vector3::y() }
     }
 
-    /// Components of a force on a node, given in three directions, along the two of the plane: those with the same force if it lies in it.
+    /// Components of a force on a node along the two directions, from its three components. They represent the whole
+    /// force if it lies in the plane of the two directions.
     pub fn in_plane(&self, force: Vector3) -> Vector2<f64> {
         Vector2::new(-force[0], force[1])
     }
 
-    /// Force on a node in three directions.
+    /// Three components of a force on a node, from its components along the two directions.
     pub fn in_space(&self, node: usize, force: Vector2<f64>) -> Vector3 {
         force[0] * self.directions[node] + force[1] * Vector3::y()
     }
 
-    /// Block of two nodes of a matrix of rows, along the two directions of each.
+    /// Block of a matrix of rows that belongs to two nodes, along the two directions of each node.
     pub fn contract(&self, matrix: &DMatrix<f64>, [node, other]: [usize; 2]) -> nalgebra::Matrix2<f64> {
         let block = matrix.fixed_view::<3, 3>(3 * node, 3 * other);
         nalgebra::Matrix2::from_fn(|a, e| self.along(a, node).dot(&(block * self.along(e, other))))

@@ -8,9 +8,10 @@ use super::trial::BladeTrial;
 use crate::math::octet::{Eight, Octet, OctetKernel, both};
 use crate::time::galerkin::trial::{ForceInterpolation, TrialResult};
 
-/// Number of solutions in which all lanes with the wrong sign change; after that only the first of them does.
+/// Number of solutions after which all lanes of the wrong sign change their status together. Later solutions change
+/// only the first lane of the wrong sign.
 const JOINT_CHANGES: usize = 8;
-/// Number of evaluations of the curvature of the surface.
+/// Largest number of evaluations of the curvature of the surface.
 const PASSES: usize = 6;
 /// Forces and gaps of the wrong sign within this fraction of the largest count as rounding.
 const ROUNDING: f64 = 1e-13;
@@ -20,7 +21,7 @@ pub(super) struct Attempt<'a> {
     pub trial: &'a mut BladeTrial,
     pub rows: &'a BladeRows,
     pub level: &'a BladeLevel,
-    pub given: &'a FacedSurface<'a>,
+    pub faced: &'a FacedSurface<'a>,
     /// Largest gap of a contact that counts as closed (m).
     pub precision: f64,
 }
@@ -50,7 +51,7 @@ impl OctetKernel for Attempt<'_> {
 }
 
 impl Attempt<'_> {
-    /// Displacements at the points without forces after the start.
+    /// Computes the displacements at the points without forces after the start of the step.
     #[inline(always)]
     fn move_freely<L: Octet, const P: usize>(&mut self) {
         let Self { trial: BladeTrial { start, modal, moved, held, .. }, rows, level, .. } = self;
@@ -67,7 +68,7 @@ impl Attempt<'_> {
         }
         held.copy_from_slice(&start.held[1]);
         if level.kind == ForceInterpolation::Constant {
-            // The force at the start does not act on.
+            // The force at the start does not persist into the step.
             held.fill(Eight::ZERO);
         }
         if !start.pushed || level.kind == ForceInterpolation::Constant {
@@ -88,19 +89,20 @@ impl Attempt<'_> {
         }
     }
 
-    /// F of all lanes without forces, linear about where their nodes go; and the directions of the forces. Returns whether any penetrates.
+    /// Computes F of all lanes without forces, linearised about the place of their nodes, and the directions of the
+    /// forces. Returns whether a lane penetrates.
     #[inline(always)]
     fn find_open_gaps<L: Octet>(&mut self) -> bool {
         let mut penetrates = false;
         for lane in 0..self.level.blocks {
             let (point, block) = (lane / self.rows.blocks, lane % self.rows.blocks);
             let valid = self.rows.valid(lane);
-            let Self { trial, rows, given, .. } = &mut *self;
-            let drive = &given.drives[point + 1];
+            let Self { trial, rows, faced, .. } = &mut *self;
+            let drive = &faced.drives[point + 1];
             let (per_radius, held) = (L::load(&rows.per_radius[block]), L::load(&trial.held[block]));
             let (closing, around) = (L::load(&trial.moved[0][lane]), L::load(&trial.moved[1][lane]));
             let at = L::load(&trial.angles[block]) + L::splat(drive.turned) + (around + held) * per_radius;
-            let [shape, slope, curvature] = given.surface.of_octet::<L>(at);
+            let [shape, slope, curvature] = faced.surface.evaluate_octet::<L>(at);
             let factor = L::splat(drive.factor);
             let sigma = slope * factor * per_radius;
             let clear = L::splat(drive.clearance) + shape * factor;
@@ -119,7 +121,7 @@ impl Attempt<'_> {
         penetrates
     }
 
-    /// Nothing touches: F with its curvature, and no forces.
+    /// Writes the result of a step without contact: F with the curvature of the surface, and zero forces.
     #[inline(always)]
     fn rest<L: Octet>(&mut self) {
         let Self { trial, rows, level, .. } = self;
@@ -132,7 +134,9 @@ impl Attempt<'_> {
         trial.pushes = trial.start.pushed;
     }
 
-    /// Chooses the first members: lanes of closed nodes that still push if λ' goes on as before, or all lanes that penetrate.
+    /// Chooses the first members of the contact problem. If a force acts at the start and the forces are polynomials,
+    /// these are the lanes of closed nodes whose λ', extrapolated from the last step, stays positive. Otherwise, they are
+    /// all lanes that penetrate.
     #[inline(always)]
     fn choose_first<L: Octet>(&mut self) {
         let Self { trial, rows, level, .. } = &mut *self;
@@ -153,7 +157,7 @@ impl Attempt<'_> {
         }
     }
 
-    /// Lists the members, and prepares the columns of new ones.
+    /// Lists the members, and computes the columns of new members.
     #[inline(always)]
     fn list_members<L: Octet>(&mut self) {
         let Self { trial, rows, level, .. } = &mut *self;
@@ -186,7 +190,8 @@ impl Attempt<'_> {
         }
     }
 
-    /// Adds open lanes that penetrate where closed ones push as before. Returns whether there are any.
+    /// Adds the open lanes that penetrate under the extrapolated forces of the closed lanes. Returns whether there are
+    /// any.
     #[inline(always)]
     fn add_open<L: Octet>(&mut self) -> bool {
         let width = self.level.blocks;
@@ -206,7 +211,7 @@ impl Attempt<'_> {
         found
     }
 
-    /// Solves for the members, and finds F of all lanes.
+    /// Solves the contact problem of the members, and computes F of all lanes.
     #[inline(always)]
     fn solve_members<L: Octet>(&mut self) {
         let width = self.level.blocks;
@@ -242,7 +247,8 @@ impl Attempt<'_> {
         combine::<L>(Some(&open[..width]), closing, members, amount, &mut gaps[..width]);
     }
 
-    /// Solves 0 ≤ λ' ⟂ F ≥ 0 by changing all lanes of the wrong sign, and then for the curved surface. Returns false without a solution.
+    /// Solves 0 ≤ λ' ⟂ F ≥ 0 by changing the status of all lanes of the wrong sign, first on the linearised and then on
+    /// the curved surface. Returns false if no solution is found.
     #[inline(always)]
     fn solve<L: Octet>(&mut self, factorisations: &mut usize) -> bool {
         let width = self.level.blocks;
@@ -304,8 +310,8 @@ impl Attempt<'_> {
         changed
     }
 
-    /// Finds F by the curvature of the surface under the solution. Returns whether it is more than the precision away from what the solution
-    /// assumed, which it then replaces.
+    /// Computes the contribution of the curvature of the surface to F for the current solution. If it differs by more
+    /// than the precision from the assumed contribution, replaces that and returns true.
     #[inline(always)]
     fn find_curvature<L: Octet>(&mut self) -> bool {
         let (width, precision) = (self.level.blocks, L::splat(self.precision));
@@ -334,7 +340,7 @@ impl Attempt<'_> {
         true
     }
 
-    /// Writes displacements, F and forces of the solution.
+    /// Writes the displacements, F and the forces of the solution.
     #[inline(always)]
     fn finish<L: Octet>(&mut self) {
         let width = self.level.blocks;
@@ -349,7 +355,7 @@ impl Attempt<'_> {
             (straight - L::load(&clear[lane]) - L::load(&sigma[lane]) * by).store(&mut closing[lane]);
             (L::load(&around[lane]) + turned).store(&mut around[lane]);
             (straight + L::load(&bend[lane]) * by * by).store(&mut gaps[lane]);
-            // A force within rounding of zero pulls.
+            // Rounding may make a force slightly negative.
             let multiplier = L::load(&multipliers[lane]).max(L::zero());
             multiplier.store(&mut multipliers[lane]);
             for along in [0, 1] {

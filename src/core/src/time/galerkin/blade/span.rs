@@ -1,4 +1,4 @@
-//! A blade during a span.
+//! Integration of a blade over a span.
 
 use super::level::BladeLevel;
 use super::minima::{FINER, PARTS};
@@ -37,8 +37,8 @@ pub(crate) struct Blade {
     kinds: Vec<BladeTables>,
     trial: BladeTrial,
     pub tally: BladeTally,
-    /// Smallest gaps of the nodes over all sectors so far (m), those at the start of the span of the current sector, and gaps below which its
-    /// smallest gaps are needed.
+    /// Smallest gaps of the nodes over all sectors so far (m); gaps of the current sector at the start of the span (m);
+    /// and gaps below which the smallest gaps of the current sector are needed (m).
     lowest: Vec<Eight>,
     begun: Vec<Eight>,
     floors: Vec<Eight>,
@@ -60,7 +60,8 @@ pub(crate) struct BladePlace<'a> {
 }
 
 impl Blade {
-    /// Allocates tables for the kinds of a structure, all of whose nodes face a surface of revolution. `None` if that is not so.
+    /// Allocates tables for the kinds of sectors of a structure. Returns `None` unless all of its nodes face a surface
+    /// of revolution.
     pub fn new(kinds: &[Tables], gap: &GapLaw, solver: Solver) -> Option<Self> {
         let GapLaw::Revolution(gap) = gap else { return None };
         let law = solver.properties();
@@ -84,7 +85,7 @@ impl Blade {
         Some(Self { trial, tally, lowest: of_nodes(), begun: of_nodes(), floors: of_nodes(), kinds })
     }
 
-    /// Fills the tables from those of all rows. Does not allocate.
+    /// Fills the tables from the tables of all contact rows, without allocating.
     pub fn fill(&mut self, kinds: &[Tables]) {
         for (BladeTables { rows, levels, constant }, tables) in self.kinds.iter_mut().zip(kinds) {
             levels.iter_mut().zip(&tables.levels).for_each(|(level, from)| level.fill(rows, from));
@@ -94,8 +95,8 @@ impl Blade {
 
     /// Starts a span of all sectors, with gaps (m) of all nodes in rows of `lanes` lanes.
     pub fn begin_span(&mut self, gaps: &[f64], lanes: usize, sectors: usize) {
-        let least = |row: &[f64]| row[..sectors].iter().copied().fold(f64::INFINITY, f64::min);
-        Eight::spread(gaps.chunks_exact(lanes).map(least), f64::NEG_INFINITY, &mut self.lowest);
+        let smallest = |row: &[f64]| row[..sectors].iter().copied().fold(f64::INFINITY, f64::min);
+        Eight::spread(gaps.chunks_exact(lanes).map(smallest), f64::NEG_INFINITY, &mut self.lowest);
     }
 
     /// Starts a span of a sector with these gaps (m) of its nodes, and finds which smallest gaps are needed.
@@ -128,10 +129,11 @@ pub(crate) struct BladeInSpan<'a> {
     place: BladePlace<'a>,
     pub control: StepControl,
     goal: StepGoal,
-    /// Prescribed motion of the tried step, and the motion over which forces at its points do work.
+    /// Prescribed motion at the points of the tried step, and the motion over which the forces there do work.
     motions: [MotionIncrement; POINTS],
     drives: [PointDrive; POINTS],
-    /// True if displacements and gaps at the start of the step are known, and the reach without contact.
+    /// True if the displacements and gaps at the start of the step are known; and true if the reach without contact is
+    /// known.
     known: bool,
     reach_known: bool,
 }
@@ -192,12 +194,12 @@ impl<'a> BladeInSpan<'a> {
 }
 
 impl<'a> BladePlace<'a> {
-    fn given(&self, drives: &[PointDrive; POINTS]) -> FacedSurface<'a> {
+    fn faced_surface(&self, drives: &[PointDrive; POINTS]) -> FacedSurface<'a> {
         FacedSurface { surface: self.gap.faced().0, drives: *drives, friction: self.parameters.friction }
     }
 }
 
-/// Prescribed motion of a sector at the fraction `theta` of a span, and from its start.
+/// Prescribed motion of a sector at the fraction `theta` of a span, and the motion since the start of the span.
 fn drive_at(place: &BladePlace, theta: f64) -> (PointDrive, MotionIncrement) {
     let (drive, motion) = place.course.at(theta);
     let (_, layout) = place.gap.faced();
@@ -254,7 +256,7 @@ impl SpanSteps for BladeInSpan<'_> {
         for (drive, theta) in drives.iter_mut().zip([step.from, step.from + step.length]) {
             *drive = drive_at(&self.place, theta).0;
         }
-        match trial.find_clearance(rows, &self.place.given(&drives), floors, &tally.lowest) {
+        match trial.find_clearance(rows, &self.place.faced_surface(&drives), floors, &tally.lowest) {
             Clearance::Unknown => return false,
             Clearance::Needed => {
                 let result = self.attempt(step, ForceInterpolation::Polynomial);
@@ -270,21 +272,21 @@ impl SpanSteps for BladeInSpan<'_> {
 
     fn attempt(&mut self, step: SpanStep, kind: ForceInterpolation) -> TrialResult {
         self.find_drives(step, kind);
-        let given = self.place.given(&self.drives);
+        let faced = self.place.faced_surface(&self.drives);
         let tables = &self.blade.kinds[self.place.kind];
         let trial = &mut self.blade.trial;
-        trial.begin(&tables.rows, self.known, &given);
+        trial.begin(&tables.rows, self.known, &faced);
         self.known = true;
-        trial.attempt(&tables.rows, tables.level(step.level, kind), &given, self.goal.precision)
+        trial.attempt(&tables.rows, tables.level(step.level, kind), &faced, self.goal.precision)
     }
 
     fn accept(&mut self, step: SpanStep, kind: ForceInterpolation, result: &TrialResult) -> f64 {
-        let given = self.place.given(&self.drives);
+        let faced = self.place.faced_surface(&self.drives);
         let Blade { trial, kinds, tally, floors, .. } = &mut *self.blade;
         let BladeTables { rows, .. } = &kinds[self.place.kind];
         let level = kinds[self.place.kind].level(step.level, kind);
         let before = tally.work.closing;
-        trial.add(rows, level, (&given, &self.motions), tally);
+        trial.add(rows, level, (&faced, &self.motions), tally);
         let banked = match kind {
             ForceInterpolation::Constant => {
                 let dropped = trial.dropped(rows);
@@ -310,10 +312,10 @@ impl SpanSteps for BladeInSpan<'_> {
                 *drive = drive_at(&self.place, step.from + step.length * theta).0;
             }
             let part = &kinds[self.place.kind].levels[step.level + finer];
-            trial.follow((rows, level, part), (&given, &drives[..=parts]), tally);
+            trial.follow((rows, level, part), (&faced, &drives[..=parts]), tally);
         }
         tally.damping += trial.advance(level, pushes);
-        trial.leave(rows, level);
+        trial.begin_next_step(rows, level);
         self.reach_known &= !pushes;
         banked
     }

@@ -1,4 +1,4 @@
-//! The start of a step: displacements, gaps and sliding.
+//! Displacements, gaps and sliding at the start of a step.
 
 use super::columns::displace;
 use super::rows::BladeRows;
@@ -12,14 +12,14 @@ pub(super) struct FindStart<'a> {
     pub known: bool,
     pub trial: &'a mut BladeTrial,
     pub rows: &'a BladeRows,
-    pub given: &'a FacedSurface<'a>,
+    pub faced: &'a FacedSurface<'a>,
 }
 
 impl OctetKernel for FindStart<'_> {
     type Output = ();
     #[inline(always)]
     fn run<L: Octet>(self) {
-        let Self { known, trial, rows, given } = self;
+        let Self { known, trial, rows, faced } = self;
         let BladeTrial { start, angles, .. } = trial;
         let [q, v] = &start.modes;
         start.held.iter_mut().for_each(|held| held.fill(Eight::ZERO));
@@ -41,7 +41,7 @@ impl OctetKernel for FindStart<'_> {
                 }
             }
         }
-        let drive = &given.drives[0];
+        let drive = &faced.drives[0];
         // Nodes that vibrate more slowly than the rotor turns cannot reverse.
         let mut square = L::zero();
         for v in v {
@@ -63,8 +63,8 @@ impl OctetKernel for FindStart<'_> {
             let speed =
                 L::splat(spin) / per_radius + if reverses { L::load(&start.friction[block]) } else { L::zero() };
             let (forwards, backwards) = (L::zero().less(speed), speed.less(L::zero()));
-            let friction = L::select(forwards, L::splat(given.friction), L::zero());
-            L::select(backwards, L::splat(-given.friction), friction).store(&mut start.friction[block]);
+            let friction = L::select(forwards, L::splat(faced.friction), L::zero());
+            L::select(backwards, L::splat(-faced.friction), friction).store(&mut start.friction[block]);
             if known {
                 continue;
             }
@@ -73,10 +73,10 @@ impl OctetKernel for FindStart<'_> {
             closing.store(&mut start.moved[0][block]);
             around.store(&mut start.moved[1][block]);
             let at = L::load(&angles[block]) + L::splat(drive.turned) + around * per_radius;
-            let [shape, slope, _] = given.surface.of_octet::<L>(at);
+            let [shape, slope, _] = faced.surface.evaluate_octet::<L>(at);
             let factor = L::splat(drive.factor);
             (L::splat(drive.clearance) + shape * factor + closing).store(&mut start.gaps[block]);
-            // σ of a node that pushes is the one for which its force was found.
+            // A node in contact keeps the σ with which its force was computed.
             let pushes = L::zero().less(L::load(&start.multipliers[block]));
             let sigma = slope * factor * per_radius;
             L::select(pushes, L::load(&start.sigma[block]), sigma).store(&mut start.sigma[block]);

@@ -4,7 +4,7 @@ use crate::math::octet::{Eight, Octet};
 use crate::scene::shape::CompiledShape;
 use crate::time::galerkin::basis::POINTS;
 
-/// Prescribed motion at a point of a step, and what it leaves of the gap.
+/// Prescribed motion at a point of a step, and the resulting clearance.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct PointDrive {
     /// Angle of the rotor relative to the shape (rad).
@@ -18,7 +18,7 @@ pub(crate) struct PointDrive {
     pub rotor: (f64, f64),
 }
 
-/// Surface of revolution that all nodes of a blade face, past which only the rotor turns.
+/// Surface of revolution that all nodes of a blade face. The rotor turns past the surface but does not whirl.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FacedSurface<'a> {
     /// Shape of the surface.
@@ -32,7 +32,7 @@ pub(crate) struct FacedSurface<'a> {
 impl CompiledShape {
     /// Shape (m), slope (m/rad) and curvature (m/rad²) at eight angles (rad), without the factor.
     #[inline(always)]
-    pub(crate) fn of_octet<L: Octet>(&self, angles: L) -> [L; 3] {
+    pub(crate) fn evaluate_octet<L: Octet>(&self, angles: L) -> [L; 3] {
         match self {
             Self::Circular => [L::zero(); 3],
             Self::TwoLobe { height, width, phase } => {

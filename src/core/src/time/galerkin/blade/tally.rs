@@ -1,4 +1,4 @@
-//! Contacts of a blade over a span, added up in blocks of nodes.
+//! Integrals over a span of the contacts of a blade, in blocks of nodes.
 
 use super::level::BladeLevel;
 use super::rows::BladeRows;
@@ -20,9 +20,10 @@ pub(crate) struct BladeTally {
     /// ∫λ dt and ∫|F_t| dt (N·s).
     normal: Vec<Eight>,
     tangential: Vec<Eight>,
-    /// ∫ of the force along the closing displacement and around (N·s).
+    /// ∫ of the components of the force along the closing and the circumferential displacement (N·s).
     force: [Vec<Eight>; 2],
-    /// ∫ of the force and of its moment in fixed directions (N·s, N·m·s), and λ-weighted ∫ of its point (m·N·s).
+    /// ∫ of the force (N·s) and its moment (N·m·s) in fixed directions, and λ-weighted ∫ of its point of application
+    /// (m·N·s).
     fixed_force: [Vec<Eight>; 3],
     moment: [Vec<Eight>; 3],
     point: [Vec<Eight>; 3],
@@ -76,7 +77,7 @@ impl BladeTally {
         self.lowest[node / 8].0[node % 8]
     }
 
-    /// Mean contact of a node over a span (s); `None` without contact.
+    /// Mean contact of a node over a span of `span` seconds; `None` without contact.
     pub fn event(&self, rows: &BladeRows, at: ContactMember, span: f64) -> Option<ContactEvent> {
         let (block, i) = (at.node / 8, at.node % 8);
         let of = |values: &[Eight]| values[block].0[i];
@@ -103,12 +104,13 @@ pub(super) struct AddStep<'a> {
     pub trial: &'a BladeTrial,
     pub rows: &'a BladeRows,
     pub level: &'a BladeLevel,
-    pub given: &'a FacedSurface<'a>,
-    /// Motion over which forces at the points do work.
+    pub faced: &'a FacedSurface<'a>,
+    /// Motion over which the forces at the points do work.
     pub motions: &'a [MotionIncrement; POINTS],
 }
 
-/// Sine and cosine in blocks of eight: rotation of the angles of the nodes by that of the rotor, and a series for the displacement around.
+/// Sines and cosines of the angles of nodes, in blocks of eight: angle addition for the rotor angle, and a power series
+/// for the small angle of the circumferential displacement.
 struct Directions<L> {
     sine: L,
     cosine: L,
@@ -126,7 +128,7 @@ impl<L: Octet> Directions<L> {
         Self { sine: sine * small_cosine + cosine * small_sine, cosine: cosine * small_cosine - sine * small_sine }
     }
 
-    /// Fixed components of (radial, tangential).
+    /// Fixed components of a vector with these radial and tangential components.
     #[inline(always)]
     fn fixed(&self, radial: L, tangential: L) -> [L; 2] {
         [radial * self.cosine - tangential * self.sine, radial * self.sine + tangential * self.cosine]
@@ -146,7 +148,7 @@ impl OctetKernel for AddStep<'_> {
 impl AddStep<'_> {
     #[inline(always)]
     fn add_block<L: Octet>(&mut self, block: usize) {
-        let Self { tally, trial, rows, level, given, motions } = self;
+        let Self { tally, trial, rows, level, faced, motions } = self;
         let count = level.points() + 1;
         let of = |start: &[Eight], lanes: &[Eight]| -> [L; POINTS] {
             let mut values = [L::zero(); POINTS];
@@ -199,8 +201,8 @@ impl AddStep<'_> {
             let normal = multiplier * size;
             normals[i] = normal;
             let [closing, around] = [forces[0][i], forces[1][i]];
-            // Friction is what a force has beyond λ' (1, σ).
-            let friction = match given.friction == 0.0 {
+            // The friction force is the force minus its normal part λ' (1, σ).
+            let friction = match faced.friction == 0.0 {
                 true => [L::zero(); 2],
                 false => [closing - multiplier, around - multiplier * sigma],
             };
@@ -214,9 +216,9 @@ impl AddStep<'_> {
             work[1] = work[1] + closing * over[0] + around * over[1];
             work[2] = work[2] - multiplier * weights_of(i, &gaps);
             if !motion.casing_rests() {
-                let at = L::load(&trial.angles[block]) + L::splat(given.drives[i].turned) + moved[1][i] * per_radius;
-                let [shape, slope, _] = given.surface.of_octet::<L>(at);
-                let turned = slope * L::splat(given.drives[i].factor * motion.shape_rotation);
+                let at = L::load(&trial.angles[block]) + L::splat(faced.drives[i].turned) + moved[1][i] * per_radius;
+                let [shape, slope, _] = faced.surface.evaluate_octet::<L>(at);
+                let turned = slope * L::splat(faced.drives[i].factor * motion.shape_rotation);
                 let opened = L::splat(motion.opening) + shape * L::splat(motion.shape_factor) - turned;
                 work[3] = work[3] - multiplier * opened;
             }
@@ -227,13 +229,13 @@ impl AddStep<'_> {
             add(&mut tally.force[1][block], duration * around);
             let radial_move = L::zero() - moved[0][i] / (steepness * steepness);
             let axial_move = slope * moved[0][i] / (steepness * steepness);
-            let frame = Directions::new(angles, given.drives[i].rotor, moved[1][i] * per_radius);
+            let frame = Directions::new(angles, faced.drives[i].rotor, moved[1][i] * per_radius);
             let (arm, height) = (radius + radial_move, L::load(&rows.axial[block]) + axial_move);
             let (radial, tangent, axial) =
                 (L::zero() - closing, around / (L::splat(1.0) + radial_move * per_radius), slope * closing);
             let in_plane = frame.fixed(radial, tangent);
             let place = frame.fixed(arm, L::zero());
-            // (arm, 0, height) × (radial, tangent, axial) in the directions of the node.
+            // Cross product of (arm, 0, height) and (radial, tangential, axial) in the directions of the node.
             let moment = frame.fixed(L::zero() - height * tangent, height * radial - arm * axial);
             for c in [0, 1] {
                 add(&mut tally.fixed_force[c][block], duration * in_plane[c]);
@@ -264,7 +266,7 @@ impl AddStep<'_> {
     }
 }
 
-/// Largest value of the polynomial through values at the points of a step, at the points and between them.
+/// Largest value within the step of the polynomial through values at its points.
 #[inline(always)]
 fn peak_of<L: Octet>(level: &BladeLevel, values: &[L; POINTS]) -> L {
     let count = level.points() + 1;

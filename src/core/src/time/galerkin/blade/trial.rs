@@ -1,5 +1,6 @@
 //! Scratch memory and results of trials of a blade.
 
+use super::accept::{Advance, BeginNextStep, FindModalForces};
 use super::level::BladeLevel;
 use super::minima::{FindMinima, Follow, PARTS};
 use super::reach::{Clearance, Energy, FindClearance, FindReach};
@@ -7,7 +8,6 @@ use super::rows::BladeRows;
 use super::solve::Attempt;
 use super::start::FindStart;
 use super::surface::{FacedSurface, PointDrive};
-use super::take::{Advance, FindModalForces, Leave};
 use super::tally::{AddStep, BladeTally};
 use crate::geometry::wrench::MotionIncrement;
 use crate::math::octet::Eight;
@@ -23,20 +23,20 @@ use nalgebra::Vector2;
 pub(super) struct StartContacts {
     /// q and q̇.
     pub modes: [Vec<Eight>; 2],
-    /// Forces along the closing displacement and around (N), and λ'.
+    /// Forces along the closing and the circumferential displacement (N), and λ'.
     pub forces: [Vec<Eight>; 2],
     pub multipliers: Vec<Eight>,
     /// Change of λ' per second over the last step.
     pub slopes: Vec<Eight>,
-    /// Displacements by the flexibility of modes without inertia (m).
+    /// Displacements of the modes without inertia under the forces (m).
     pub held: [Vec<Eight>; 2],
-    /// Closing displacement, displacement around, F and σ.
+    /// Closing and circumferential displacement (m), F (m) and σ.
     pub moved: [Vec<Eight>; 2],
     pub gaps: Vec<Eight>,
     pub sigma: Vec<Eight>,
-    /// µ, negative where the node slides towards negative displacements around.
+    /// µ; negative if the node slides towards negative circumferential displacements.
     pub friction: Vec<Eight>,
-    /// True if a force acts.
+    /// True if a contact force acts.
     pub pushed: bool,
 }
 
@@ -44,7 +44,7 @@ pub(super) struct StartContacts {
 #[derive(Debug, Clone)]
 pub(crate) struct BladeTrial {
     pub(super) start: StartContacts,
-    /// Angles of the nodes from the origin of the rotor (rad).
+    /// Angles of the nodes in the frame of the rotor (rad).
     pub(super) angles: Vec<Eight>,
     /// Sines and cosines of these angles.
     pub(super) directions_of_nodes: [Vec<Eight>; 2],
@@ -52,28 +52,31 @@ pub(crate) struct BladeTrial {
     pub(super) modal_forces: [Vec<Eight>; MOST],
     /// Modal displacements at the points.
     pub(super) modal: [Vec<Eight>; MOST],
-    /// Closing displacements and displacements around.
+    /// Closing and circumferential displacements (m).
     pub(super) moved: [Vec<Eight>; 2],
-    /// Displacements around about which the shape of the surface is expanded, beyond those without forces.
+    /// Circumferential displacements about which the shape of the surface is expanded, relative to the motion without
+    /// forces (m).
     pub(super) held: Vec<Eight>,
-    /// Clearance and shape, σ, and half the curvature per square of the displacement around.
+    /// Clearance including the shape (m), σ, and the coefficient of the squared circumferential displacement in F
+    /// (1/m).
     pub(super) clear: Vec<Eight>,
     pub(super) sigma: Vec<Eight>,
     pub(super) bend: Vec<Eight>,
-    /// F without forces, and the part of it that comes from curvature.
+    /// F without forces, and the contribution of the curvature to F (m).
     pub(super) open: Vec<Eight>,
     pub(super) curved: Vec<Eight>,
-    /// Displacements around by the forces.
+    /// Circumferential displacements that the forces cause (m).
     pub(super) turned: Vec<Eight>,
-    /// Force per λ'.
+    /// Components of the force per unit λ'.
     pub(super) directions: [Vec<Eight>; 2],
-    /// F and displacements around of all lanes per λ' of each lane.
+    /// F and circumferential displacements of all lanes per unit λ' of each lane.
     pub(super) closing: Vec<Eight>,
     pub(super) around: Vec<Eight>,
-    /// Columns of the contact problem of the members.
+    /// Columns of the contact problem, and its members.
     pub(super) matrix: Vec<Eight>,
     pub(super) members: Vec<usize>,
-    /// Masks of the members, of lanes with columns, and of open lanes that penetrate without forces.
+    /// Masks of the members, of the lanes whose columns are computed, and of the open lanes that penetrate without
+    /// forces.
     pub(super) active: Vec<u8>,
     pub(super) prepared: Vec<u8>,
     pub(super) later: Vec<u8>,
@@ -81,16 +84,16 @@ pub(crate) struct BladeTrial {
     pub(super) gaps: Vec<Eight>,
     pub(super) multipliers: Vec<Eight>,
     pub(super) forces: [Vec<Eight>; 2],
-    /// Nodes that may come closer between the points; modes, displacements and gaps within the step.
+    /// Mask of the nodes that may come closer between the points; their modes, displacements and gaps within the step.
     pub(super) followed: Vec<u8>,
     pub(super) path_modes: [Vec<Eight>; 2],
     pub(super) path_moved: [Vec<Eight>; 2],
     pub(super) path_gaps: Vec<Eight>,
-    /// Impulse errors, along the closing displacement and then around.
+    /// Impulse errors along the closing displacement, then along the circumferential one (N·s).
     pub(super) impulses: Vec<Eight>,
-    /// True if a force acts in the step.
+    /// True if a contact force acts in the step.
     pub(super) pushes: bool,
-    /// Largest closing displacements and displacements around without contact.
+    /// Largest closing and circumferential displacements at any time without contact (m).
     pub(super) reach: [Vec<Eight>; 2],
     instructions: InstructionSet,
 }
@@ -165,7 +168,7 @@ impl BladeTrial {
             let force = rows.in_plane(vector3_at(&state.forces, node));
             let (block, at) = (node / 8, node % 8);
             (0..2).for_each(|along| start.forces[along][block].0[at] = force[along]);
-            // A force λ' ∇F has λ' along the closing displacement, and friction adds to it.
+            // The closing component of λ' ∇F is λ'; friction adds to this component.
             let normal = vector3_at(&state.normals, node);
             start.multipliers[block].0[at] = state.multipliers[node] * -normal[0];
             start.sigma[block].0[at] = if normal[0] < 0.0 { normal[1] / -normal[0] } else { 0.0 };
@@ -173,7 +176,7 @@ impl BladeTrial {
         }
     }
 
-    /// Writes the state at the end of a span, and the gaps (m), which must be known.
+    /// Writes the state at the end of a span, and the gaps (m). The gaps must be known.
     pub fn write(&self, rows: &BladeRows, state: &mut SectorState) {
         let flat = |blocks: &[Eight], to: &mut [f64]| {
             to.iter_mut().zip(blocks.iter().flat_map(|block| block.0)).for_each(|(to, value)| *to = value);
@@ -197,9 +200,9 @@ impl BladeTrial {
         state.gaps_known = true;
     }
 
-    /// Finds what a step needs of its start; displacements and gaps as well, unless they are known.
-    pub fn begin(&mut self, rows: &BladeRows, known: bool, given: &FacedSurface) {
-        self.instructions.run_octets(FindStart { known, trial: self, rows, given });
+    /// Computes the quantities at the start of a step, including displacements and gaps unless they are known.
+    pub fn begin(&mut self, rows: &BladeRows, known: bool, faced: &FacedSurface) {
+        self.instructions.run_octets(FindStart { known, trial: self, rows, faced });
     }
 
     /// Tries a step.
@@ -207,10 +210,10 @@ impl BladeTrial {
         &mut self,
         rows: &BladeRows,
         level: &BladeLevel,
-        given: &FacedSurface,
+        faced: &FacedSurface,
         precision: f64,
     ) -> TrialResult {
-        self.instructions.run_octets(Attempt { trial: self, rows, level, given, precision })
+        self.instructions.run_octets(Attempt { trial: self, rows, level, faced, precision })
     }
 
     /// Adds the tried step to the sums of a span.
@@ -218,19 +221,20 @@ impl BladeTrial {
         &self,
         rows: &BladeRows,
         level: &BladeLevel,
-        (given, motions): (&FacedSurface, &[MotionIncrement; POINTS]),
+        (faced, motions): (&FacedSurface, &[MotionIncrement; POINTS]),
         tally: &mut BladeTally,
     ) {
-        self.instructions.run_octets(AddStep { tally, trial: self, rows, level, given, motions });
+        self.instructions.run_octets(AddStep { tally, trial: self, rows, level, faced, motions });
     }
 
-    /// Finds the modal forces of the tried step.
+    /// Computes the modal forces of the tried step.
     pub fn find_modal_forces(&mut self, rows: &BladeRows, level: &BladeLevel) {
         self.instructions.run_octets(FindModalForces { trial: self, rows, level });
     }
 
-    /// Finds the nodes that may come closer between the points of the tried step than at them, by more than a fraction of `tolerance` (m)
-    /// and to below one of these gaps (m). Returns whether there are any.
+    /// Finds the nodes that may come closer between the points of the tried step than at the points, by more than a
+    /// fraction of `tolerance` (m), and whose smallest gap may be below `floors` (m). Returns whether there are such
+    /// nodes.
     pub fn find_minima(
         &mut self,
         (rows, level): (&BladeRows, &BladeLevel),
@@ -241,15 +245,16 @@ impl BladeTrial {
         self.instructions.run_octets(FindMinima { trial: self, rows, level, tally, floors, tolerance })
     }
 
-    /// Records the smallest gaps of these nodes within the tried step, with the prescribed motion at the ends of equal parts.
+    /// Records the smallest gaps of these nodes within the tried step. `drives` is the prescribed motion at the ends of
+    /// equal parts of the step.
     pub fn follow(
         &mut self,
         (rows, level, part): (&BladeRows, &BladeLevel, &BladeLevel),
-        (given, drives): (&FacedSurface, &[PointDrive]),
+        (faced, drives): (&FacedSurface, &[PointDrive]),
         tally: &mut BladeTally,
     ) {
         let pushes = self.pushes;
-        self.instructions.run_octets(Follow { trial: self, rows, level, part, given, drives, tally, pushes });
+        self.instructions.run_octets(Follow { trial: self, rows, level, part, faced, drives, tally, pushes });
     }
 
     /// Advances the modes over the tried step, or over a step without forces, and returns the damping loss (J).
@@ -257,26 +262,26 @@ impl BladeTrial {
         self.instructions.run_octets(Advance { trial: self, level, pushes })
     }
 
-    /// Makes the contacts at the end of the tried step those at the start of the next.
-    pub fn leave(&mut self, rows: &BladeRows, level: &BladeLevel) {
-        self.instructions.run_octets(Leave { trial: self, rows, level });
+    /// Makes the contacts at the end of the tried step the contacts at the start of the next step.
+    pub fn begin_next_step(&mut self, rows: &BladeRows, level: &BladeLevel) {
+        self.instructions.run_octets(BeginNextStep { trial: self, rows, level });
     }
 
-    /// Finds the largest closing displacement and the largest displacement around of each node (m) at any time without contact.
+    /// Finds the largest closing and circumferential displacement of each node (m) at any time without contact.
     pub fn find_reach(&mut self, rows: &BladeRows) {
         self.instructions.run_octets(FindReach { trial: self, rows });
     }
 
-    /// Finds what is known of the gaps while the rotor turns from the first to the second given angle past the resting surface. Smallest gaps
-    /// are needed below `floors` and below those known so far, `lowest` (m).
+    /// Bounds the gaps while the rotor turns past the resting surface, from the angle of the first drive to that of the
+    /// second. A smallest gap is needed if it is below `floors` and below `lowest`, the smallest gap so far (m).
     pub fn find_clearance(
         &self,
         rows: &BladeRows,
-        given: &FacedSurface,
+        faced: &FacedSurface,
         floors: &[Eight],
         lowest: &[Eight],
     ) -> Clearance {
-        self.instructions.run_octets(FindClearance { trial: self, rows, given, floors, lowest })
+        self.instructions.run_octets(FindClearance { trial: self, rows, faced, floors, lowest })
     }
 
     /// Kinetic and strain energy at the start of the step (J).
@@ -284,7 +289,7 @@ impl BladeTrial {
         self.instructions.run_octets(Energy { trial: self, rows })
     }
 
-    /// ½ΔfᵀGΔf, the energy lost by the change from the forces at the start to a constant force (J).
+    /// Returns ½ΔfᵀGΔf, the energy lost when the forces change from those at the start to constant forces (J).
     pub fn dropped(&self, rows: &BladeRows) -> f64 {
         let change = |along: usize, node: usize| {
             let at = |forces: &[Eight]| forces[node / 8].0[node % 8];

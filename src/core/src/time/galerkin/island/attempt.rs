@@ -1,4 +1,5 @@
-//! Tries a step of an island: motion, gaps and forces in turn until they agree, and the judgement of the step.
+//! Tries a step of an island: evaluates motion, gaps and forces in turn until they are consistent, then assesses the
+//! step.
 
 use super::{Island, IslandInSpan, IslandSector, SectorInStep};
 use crate::time::galerkin::carrier::CarrierIntegrator;
@@ -8,7 +9,7 @@ use crate::time::galerkin::trial::{ForceInterpolation, Obstacle, TrialResult};
 
 /// Largest number of gap evaluations in one trial of a single sector. The last one is exact except for curvature.
 const PASSES_OF_ONE: usize = 6;
-/// Largest number of gap evaluations in one trial of several sectors, which move each other.
+/// Largest number of gap evaluations in one trial of several sectors whose motions are coupled.
 const PASSES: usize = 16;
 
 /// Gaps of an island at the points of a step.
@@ -105,7 +106,7 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         }
     }
 
-    /// Finds the gaps at all points, of sectors that are far or of those that are not.
+    /// Computes the gaps at all points, either of the far sectors or of the near sectors.
     pub(super) fn find_gaps(
         &mut self,
         step: SpanStep,
@@ -152,7 +153,7 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         }
     }
 
-    /// Rechecks sectors that are far. Returns whether one of them touches; it is then no longer far.
+    /// Rechecks the far sectors. Returns whether one of them touches, and marks that sector as near.
     fn recheck_far_sectors(&mut self, step: SpanStep, kind: ForceInterpolation, points: usize) -> bool {
         if !self.island.sectors.iter().any(|one| one.far) {
             return false;
@@ -233,8 +234,8 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         result
     }
 
-    /// Tries a step of a higher degree in which no sticking contact changes its status, if there are tables for it; returns the result if
-    /// none does.
+    /// Tries a step of a higher degree, if there are tables for it. Returns the result if no sticking contact changes
+    /// its status within the step.
     fn attempt_steady(&mut self, step: SpanStep, kind: ForceInterpolation) -> Option<TrialResult> {
         if kind == ForceInterpolation::Constant || !self.island.is_single() {
             return None;
@@ -284,7 +285,7 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         result.error = errors.fold(result.error, f64::max);
     }
 
-    /// Returns the largest depth of open nodes between the points of a step (m).
+    /// Returns the largest penetration of open nodes between the points of a step (m).
     fn depth(&mut self, step: SpanStep, points: usize) -> f64 {
         let (mut deepest, is_single) = (0.0_f64, self.island.is_single());
         self.surroundings.bend(&self.island.carriers, 0);

@@ -30,7 +30,7 @@ pub(super) struct FreeMotion {
     end_velocities: Sums<1>,
     /// Summed amplitudes of the modes that the step does not resolve (m).
     unresolved_amplitudes: Sums<1>,
-    /// True if the two belong to the tried step.
+    /// True if the velocities and the amplitudes belong to the tried step.
     pub(super) is_known: bool,
 }
 

@@ -1,4 +1,4 @@
-//! The end of an accepted step: modes, contacts and energy.
+//! Advances modes and contacts to the end of an accepted step.
 
 use super::columns::sum;
 use super::level::BladeLevel;
@@ -25,7 +25,7 @@ impl OctetKernel for Advance<'_> {
     }
 }
 
-/// Finds the modal forces of the tried step, as polynomials.
+/// Computes the modal forces of the tried step, as polynomials.
 pub(super) struct FindModalForces<'a> {
     pub trial: &'a mut BladeTrial,
     pub rows: &'a BladeRows,
@@ -124,14 +124,14 @@ impl Advance<'_> {
     }
 }
 
-/// Makes the end of a step the start of the next.
-pub(super) struct Leave<'a> {
+/// Makes the contacts at the end of a step the contacts at the start of the next step.
+pub(super) struct BeginNextStep<'a> {
     pub trial: &'a mut BladeTrial,
     pub rows: &'a BladeRows,
     pub level: &'a BladeLevel,
 }
 
-impl OctetKernel for Leave<'_> {
+impl OctetKernel for BeginNextStep<'_> {
     type Output = ();
     #[inline(always)]
     fn run<L: Octet>(self) {
