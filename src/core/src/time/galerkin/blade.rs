@@ -17,6 +17,8 @@ mod start;
 mod surface;
 mod take;
 mod tally;
+#[cfg(test)]
+mod tests;
 mod trial;
 
 pub(crate) use span::{Blade, BladeInSpan, BladePlace};
