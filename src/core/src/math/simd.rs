@@ -20,9 +20,19 @@ pub enum InstructionSet {
     Avx512,
 }
 
+#[cfg(test)]
+thread_local! {
+    /// Instruction set that a test uses instead of the widest one, on its thread.
+    pub(crate) static CHOSEN: std::cell::Cell<Option<InstructionSet>> = const { std::cell::Cell::new(None) };
+}
+
 impl InstructionSet {
     /// Returns the widest instruction set of the processor.
     pub fn detect() -> Self {
+        #[cfg(test)]
+        if let Some(chosen) = CHOSEN.get() {
+            return chosen;
+        }
         #[cfg(target_arch = "x86_64")]
         {
             if std::arch::is_x86_feature_detected!("avx512f") {

@@ -22,6 +22,8 @@ mod span;
 mod start;
 mod surface;
 mod tally;
+#[cfg(test)]
+mod tests;
 mod trial;
 
 pub(crate) use span::{Blade, BladeInSpan, BladePlace};

@@ -65,8 +65,9 @@ impl Blade {
     pub fn new(kinds: &[Tables], gap: &GapLaw, solver: Solver) -> Option<Self> {
         let GapLaw::Revolution(gap) = gap else { return None };
         let law = solver.properties();
-        let degree = kinds.first()?.levels[0].basis.degree;
-        if law.sticks || !law.complementary || !law.constant_friction || degree == 1 {
+        // Mistuned sectors may differ in degree.
+        let degrees = || kinds.iter().map(|tables| tables.levels[0].basis.degree);
+        if law.sticks || !law.complementary || !law.constant_friction || degrees().any(|degree| degree == 1) {
             return None;
         }
         if gap.members().len() != kinds[0].nodes() || gap.is_shifted() {
@@ -74,13 +75,13 @@ impl Blade {
         }
         let of = |tables: &Tables| {
             let rows = BladeRows::new(tables.shapes(), tables.rows.error_form(), gap.slopes(), &gap.layout);
-            let level = |kind| BladeLevel::new(&rows, degree, kind);
+            let level = |kind| BladeLevel::new(&rows, tables.levels[0].basis.degree, kind);
             let levels = tables.levels.iter().map(|_| level(ForceInterpolation::Polynomial)).collect();
             BladeTables { levels, constant: level(ForceInterpolation::Constant), rows }
         };
         let kinds: Vec<_> = kinds.iter().map(of).collect();
-        let rows = &kinds[0].rows;
-        let (trial, tally) = (BladeTrial::new(rows, degree), BladeTally::new(rows));
+        let rows = &kinds.first()?.rows;
+        let (trial, tally) = (BladeTrial::new(rows, degrees().max()?), BladeTally::new(rows));
         let of_nodes = || vec![Eight::ZERO; rows.blocks];
         Some(Self { trial, tally, lowest: of_nodes(), begun: of_nodes(), floors: of_nodes(), kinds })
     }
@@ -136,6 +137,8 @@ pub(crate) struct BladeInSpan<'a> {
     /// known.
     known: bool,
     reach_known: bool,
+    /// Number of blocks of lanes of the last trial in this span.
+    tried: usize,
 }
 
 impl<'a> BladeInSpan<'a> {
@@ -159,6 +162,7 @@ impl<'a> BladeInSpan<'a> {
             drives: Default::default(),
             known: false,
             reach_known: false,
+            tried: 0,
         }
     }
 
@@ -171,9 +175,9 @@ impl<'a> BladeInSpan<'a> {
         }
     }
 
-    /// Returns whether a gap of the last trial is not a number.
+    /// Returns whether a gap of the last trial in this span is not a number.
     pub fn is_lost(&self) -> bool {
-        self.blade.trial.is_lost()
+        self.blade.trial.is_lost(self.tried)
     }
 
     /// Finds the prescribed motion at the points of a step.
@@ -277,7 +281,9 @@ impl SpanSteps for BladeInSpan<'_> {
         let trial = &mut self.blade.trial;
         trial.begin(&tables.rows, self.known, &faced);
         self.known = true;
-        trial.attempt(&tables.rows, tables.level(step.level, kind), &faced, self.goal.precision)
+        let level = tables.level(step.level, kind);
+        self.tried = level.blocks;
+        trial.attempt(&tables.rows, level, &faced, self.goal.precision)
     }
 
     fn accept(&mut self, step: SpanStep, kind: ForceInterpolation, result: &TrialResult) -> f64 {

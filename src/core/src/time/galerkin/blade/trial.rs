@@ -306,9 +306,9 @@ impl BladeTrial {
         0.5 * sum
     }
 
-    /// Returns whether a gap of the tried step is not a number.
-    pub fn is_lost(&self) -> bool {
-        self.gaps.iter().any(|block| block.0.iter().any(|gap| gap.is_nan()))
+    /// Returns whether a gap of the tried step, which has this number of blocks of lanes, is not a number.
+    pub fn is_lost(&self, blocks: usize) -> bool {
+        self.gaps[..blocks].iter().any(|block| block.0.iter().any(|gap| gap.is_nan()))
     }
 
     /// True if a force acts in the tried step.
