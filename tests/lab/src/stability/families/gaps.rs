@@ -317,8 +317,8 @@ fn scaled(exponent: i32, method: StabilityMethod, friction: f64) -> Result<Vec<C
 
 /// Number of runs of which the fastest is timed.
 const REPEATS: usize = 3;
-/// Resolution of the clock of processor time, per step (s).
-const LEAST_TIME: f64 = 5e-7;
+/// Resolution of the clock of processor time (10 ms), per step (s).
+const LEAST_TIME: f64 = 5e-5;
 
 /// Returns 2ⁿ, including denormals.
 fn power_of_two(exponent: i32) -> f64 {
