@@ -317,7 +317,7 @@ fn scaled(exponent: i32, method: StabilityMethod, friction: f64) -> Result<Vec<C
 
 /// Number of runs of which the fastest is timed.
 const REPEATS: usize = 3;
-/// Resolution of the clock of processor time (10 ms), per step (s).
+/// Resolution of the clock of processor time (a scheduler tick, up to 10 ms), per step (s).
 const LEAST_TIME: f64 = 5e-5;
 
 /// Returns 2ⁿ, including denormals.
