@@ -2,6 +2,7 @@
 
 use tiprub_core::scene::method::Solver;
 use tiprub_core::{CoSimulation, Result, Scene, Simulation};
+use tiprub_study::error::clock;
 
 use super::super::{
     CaseEnd, Cases, Check, Expected, StabilityCase,
@@ -317,8 +318,8 @@ fn scaled(exponent: i32, method: StabilityMethod, friction: f64) -> Result<Vec<C
 
 /// Number of runs of which the fastest is timed.
 const REPEATS: usize = 3;
-/// Resolution of the clock of processor time (a scheduler tick, up to 10 ms), per step (s).
-const LEAST_TIME: f64 = 5e-5;
+/// Shortest time per step that is compared (s).
+const LEAST_TIME: f64 = 5e-7;
 
 /// Returns 2ⁿ, including denormals.
 fn power_of_two(exponent: i32) -> f64 {
@@ -340,23 +341,12 @@ fn small_rub(exponent: i32, method: StabilityMethod, friction: f64) -> Result<(V
     let mut simulation = Simulation::new(&scene)?;
     simulation.initialise(0.0)?;
     let mut forces = Vec::new();
-    let clock = processor_time();
+    let before = clock::now();
     for index in 0..count {
         let swing = 0.5 - 0.5 * (f64::from(index) * length * 2.5e3).cos();
         set(&mut simulation, "casing_radius_change", -1.1 * GAP * swing * scale)?;
         simulation.do_step(simulation.time(), length)?;
         forces.extend((0..12).map(|sector| simulation.system().multiplier(0, sector)));
     }
-    Ok((forces, (processor_time() - clock) / f64::from(count)))
-}
-
-/// Returns the processor time of the only working thread of this process (s), as the system reports it; 0 if it does
-/// not.
-pub(crate) fn processor_time() -> f64 {
-    let reported = std::fs::read_to_string("/proc/self/schedstat").unwrap_or_default();
-    reported
-        .split_whitespace()
-        .next()
-        .and_then(|text| text.parse::<f64>().ok())
-        .map_or(0.0, |nanoseconds| 1e-9 * nanoseconds)
+    Ok((forces, (clock::now() - before).as_secs_f64() / f64::from(count)))
 }

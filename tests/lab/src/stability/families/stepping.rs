@@ -3,6 +3,7 @@
 
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::{CoSimulation, Result, Scene, Simulation};
+use tiprub_study::error::clock;
 
 use super::{
     super::{
@@ -10,7 +11,6 @@ use super::{
         models::{GAP, SeededRandom, StabilityMethod, Tower, allowed, blade, bumps, round, with_methods, with_step},
         observe::{MASSLESS_RETURN, StabilityWatch, apart, begin, bits, displacements, real, set, steps},
     },
-    gaps::processor_time,
     limits::massless_step,
 };
 
@@ -267,13 +267,13 @@ fn long() -> Vec<StabilityCase> {
 
 fn drift(method: StabilityMethod, steps: f64) -> Result<(Vec<Check>, String)> {
     let (mut simulation, step) = kicked(method, 2e-6)?;
-    let (before, clock) = (energy(&simulation), processor_time());
+    let (before, start) = (energy(&simulation), clock::now());
     let mut most: f64 = 0.0;
     for _ in 0..100 {
         simulation.do_step(simulation.time(), 0.01 * steps * step)?;
         most = most.max((energy(&simulation) / before - 1.0).abs());
     }
-    let time = (processor_time() - clock) / steps;
+    let time = (clock::now() - start).as_secs_f64() / steps;
     let remark = format!("largest drift {most:.1e} over {steps:e} steps of {step:.2e} s, {:.0} ns each", 1e9 * time);
     // Adaptive steps multiply each mode by a matrix whose determinant is 1 to rounding; the rounding adds up over 2.5e5
     // steps of 80 µs.
