@@ -23,7 +23,7 @@ use crate::math::vector::{Vector3, set_vector3_at, vector3_at};
 use crate::scene::method::Solver;
 use judgement::FreeMotion;
 pub use judgement::TrialResult;
-pub(crate) use judgement::{KINK, NEAR};
+pub(crate) use judgement::{FALLING, KINK, NEAR};
 use minima::Minima;
 use nalgebra::DMatrix;
 pub(crate) use obstacle::node_by_node;

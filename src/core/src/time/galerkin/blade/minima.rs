@@ -1,79 +1,187 @@
 //! Smallest gaps between the points of a step, for nodes that stay open.
 //!
 //! The polynomial through F at the points shows which nodes may come closer between the points. For these nodes, all
-//! modes are evaluated exactly at the ends of equal parts of the step. A parabola through three of these gaps gives the
-//! smallest gap.
+//! modes are evaluated exactly at the ends of equal parts of the step. Polynomials through these gaps give the smallest
+//! gap. The amplitudes of the modes determine the number of parts.
 
 use super::columns::{displace, sum};
 use super::level::BladeLevel;
 use super::rows::BladeRows;
 use super::surface::{FacedSurface, PointDrive};
 use super::tally::BladeTally;
-use super::trial::BladeTrial;
+use super::trial::{BladeTrial, StartContacts};
 use crate::math::octet::{Eight, Octet, OctetKernel, both};
 use crate::time::galerkin::basis::POINTS;
 use crate::time::galerkin::response::TERMS;
-use crate::time::galerkin::trial::NEAR;
+use crate::time::galerkin::trial::{FALLING, NEAR};
 
-/// Number of halvings of a step into the parts at whose ends the motion is evaluated.
-pub(super) const FINER: usize = 4;
-/// Number of parts of a step.
-pub(super) const PARTS: usize = 1 << FINER;
+/// Smallest and largest number of halvings of a step into the parts at whose ends the motion is evaluated.
+const FEWEST_HALVINGS: usize = 2;
+pub(super) const MOST_HALVINGS: usize = 7;
+/// Largest number of parts of a step.
+pub(super) const PARTS: usize = 1 << MOST_HALVINGS;
+/// Displacements of up to this number of followed nodes per block of eight are computed node by node.
+const FEW_PER_BLOCK: usize = 4;
 /// Nodes are followed if they may come closer between the points by more than this fraction of the tolerance.
 const FOLLOW_FRACTION: f64 = 0.1;
+/// Largest bound on the interpolation error between the ends of parts, as a fraction of the tolerance.
+const PARTS_FRACTION: f64 = 0.3;
+
+/// Largest error of the motion of a mode between points relative to its amplitude.
+const UNRESOLVED: f64 = 3.0;
+/// Coefficients of x⁴ and x⁵ in the error of five gaps at equal distances, near the middle: the neglected fourth
+/// derivative, and the error of their third derivative.
+const OF_PARTS: [f64; 2] = [1.0 / 384.0, 1.0 / 48.0];
+/// Coefficient of x⁴ in the error of the cubic through the points of a step. It holds for the parabola as well, because
+/// the points of a step follow the moments of the motion.
+const OF_STEP: [f64; 2] = [1.0 / 384.0, 0.0];
+
+impl BladeTrial {
+    /// Largest error of interpolating the closing displacement of a node between the points of the tried step (m).
+    pub(super) fn unresolved_motion(&mut self, rows: &BladeRows, level: &BladeLevel) -> f64 {
+        self.find_interpolation_error(rows, level.step, OF_STEP)
+    }
+
+    /// Number of halvings of the tried step into the parts in which nodes are followed: between the ends of these parts,
+    /// the bound on the interpolation error is below a fraction of `tolerance` (m).
+    pub(super) fn halvings_to_parts(&mut self, rows: &BladeRows, level: &BladeLevel, tolerance: f64) -> usize {
+        let is_fine = |halvings: &usize| {
+            let length = level.step * fraction(1, 1 << halvings);
+            self.find_interpolation_error(rows, length, OF_PARTS) <= PARTS_FRACTION * tolerance
+        };
+        (FEWEST_HALVINGS..MOST_HALVINGS).find(is_fine).unwrap_or(MOST_HALVINGS)
+    }
+}
 
 /// Finds the nodes that may come closer between the points than at the points, with a smallest gap that an output
-/// needs. Returns whether there are such nodes.
+/// needs. Returns whether there are such nodes. Records the gaps of the others at the points, and the gaps of all nodes
+/// at the end of the step.
 pub(super) struct FindMinima<'a> {
     pub trial: &'a mut BladeTrial,
     pub rows: &'a BladeRows,
     pub level: &'a BladeLevel,
-    pub tally: &'a BladeTally,
+    pub tally: &'a mut BladeTally,
     /// Gaps below which the smallest gaps are needed (m).
     pub floors: &'a [Eight],
-    /// Largest displacement error of a step (m).
+    /// Largest displacement error of a step (m), and largest error of the motion between the points (m).
     pub tolerance: f64,
+    pub unresolved: f64,
 }
 
 impl OctetKernel for FindMinima<'_> {
     type Output = bool;
     #[inline(always)]
     fn run<L: Octet>(self) -> bool {
-        let Self { trial, rows, level, tally, floors, tolerance } = self;
-        let (basis, count) = (&level.basis, level.basis.count());
-        let slopes = both(|end| if end == 0 { basis.slopes_at(0.0) } else { basis.slopes_at(1.0) });
+        let Self { trial, rows, level, tally, floors, tolerance, unresolved } = self;
         let mut found = false;
+        // A second look, with a bound for each node, drops most of the nodes that a bound for all nodes has selected.
+        let bounds = &mut trial.path_moved[0];
+        bounds.fill(Eight([unresolved; 8]));
+        for look in 0..2 {
+            found = false;
+            for block in 0..rows.blocks {
+                trial.followed[block] = choose::<L>(trial, (rows, level, block), tally, floors[block], tolerance);
+                found |= trial.followed[block] != 0;
+            }
+            if !found || look == 1 {
+                break;
+            }
+            displace::<L, 1>(&rows.magnitudes[0], rows.blocks, [&trial.path_modes[0]], &mut trial.path_moved[0]);
+        }
         for block in 0..rows.blocks {
-            let mut gaps = [L::zero(); POINTS];
-            gaps[0] = L::load(&trial.start.gaps[block]);
-            let mut pushes = L::zero().less(L::load(&trial.start.multipliers[block]));
-            let (mut low, mut ends) = (gaps[0], [gaps[0]; 2]);
-            for point in 1..count {
-                let lane = (point - 1) * rows.blocks + block;
-                gaps[point] = L::load(&trial.gaps[lane]);
-                pushes |= L::zero().less(L::load(&trial.multipliers[lane]));
-                low = low.min(gaps[point]);
-                ends[1] = gaps[point];
+            let (followed, last) = (trial.followed[block], level.points() - 1);
+            let mut lowest = L::load(&tally.lowest[block]);
+            for point in 0..level.points() {
+                let lane = point * rows.blocks + block;
+                let (steepness, sigma) = (L::load(&rows.steepness[block]), L::load(&trial.sigma[lane]));
+                let gap = L::load(&trial.gaps[lane]) / (steepness * steepness + sigma * sigma).sqrt();
+                let exact = if point == last { 0xff } else { !followed };
+                lowest = L::select(exact, lowest.min(gap), lowest);
             }
-            let left = sum(&gaps[..count], &basis.left_out).abs() * L::splat(NEAR);
-            let mut within = L::splat(f64::INFINITY);
-            for place in &basis.between {
-                within = within.min(sum(&gaps[..count], place));
-            }
-            let deeper = low - within;
-            let at_end = ends[1].less(ends[0]);
-            let slope = L::select(at_end, sum(&gaps[..count], &slopes[1]), sum(&gaps[..count], &slopes[0])).abs();
-            #[expect(clippy::cast_precision_loss, reason = "few parts")]
-            let falls = !L::zero().less(deeper) & (left * L::splat(PARTS as f64)).less(slope);
-            let comes = L::splat(FOLLOW_FRACTION * tolerance).less(deeper.max(L::zero()) + left);
-            let size = L::load(&rows.steepness[block]);
-            let bar = L::load(&floors[block]).min(L::load(&tally.lowest[block]));
-            let matters = ((low.min(within) - left) / size).less(bar);
-            let chosen = comes & matters & !falls & !pushes & rows.valid(block);
-            trial.followed[block] = chosen;
-            found |= chosen != 0;
+            lowest.store(&mut tally.lowest[block]);
         }
         found
+    }
+}
+
+/// Selects the nodes of a block that may come closer between the points of the step.
+#[inline(always)]
+fn choose<L: Octet>(
+    trial: &BladeTrial,
+    (rows, level, block): (&BladeRows, &BladeLevel, usize),
+    tally: &BladeTally,
+    floor: Eight,
+    tolerance: f64,
+) -> u8 {
+    let (basis, count) = (&level.basis, level.points() + 1);
+    let slopes = both(|end| if end == 0 { basis.slopes_at(0.0) } else { basis.slopes_at(1.0) });
+    let mut gaps = [L::zero(); POINTS];
+    gaps[0] = L::load(&trial.start.gaps[block]);
+    let mut pushes = L::zero().less(L::load(&trial.start.multipliers[block]));
+    let (mut low, mut ends) = (gaps[0], [gaps[0]; 2]);
+    let mut steepest = L::load(&trial.start.sigma[block]).abs();
+    for point in 1..count {
+        let lane = (point - 1) * rows.blocks + block;
+        gaps[point] = L::load(&trial.gaps[lane]);
+        pushes |= L::zero().less(L::load(&trial.multipliers[lane]));
+        low = low.min(gaps[point]);
+        ends[1] = gaps[point];
+        steepest = steepest.max(L::load(&trial.sigma[lane]).abs());
+    }
+    let unresolved = L::load(&trial.path_moved[0][block]);
+    let left = sum(&gaps[..count], &basis.left_out).abs() * L::splat(NEAR) + unresolved;
+    let mut within = L::splat(f64::INFINITY);
+    for place in &basis.between {
+        within = within.min(sum(&gaps[..count], place));
+    }
+    let deeper = low - within;
+    let at_end = ends[1].less(ends[0]);
+    let slope = L::select(at_end, sum(&gaps[..count], &slopes[1]), sum(&gaps[..count], &slopes[0])).abs();
+    let falls = !L::zero().less(deeper) & (left * L::splat(FALLING)).less(slope);
+    let comes = L::splat(FOLLOW_FRACTION * tolerance).less(deeper.max(L::zero()) + left);
+    let steepness = L::load(&rows.steepness[block]);
+    let size = (steepness * steepness + steepest * steepest).sqrt();
+    let bar = L::load(&floor).min(L::load(&tally.lowest[block]));
+    let matters = ((low.min(within) - left) / size).less(bar);
+    comes & matters & !falls & !pushes & rows.valid(block)
+}
+
+/// Bounds the error of interpolating the motion of all modes between points at a distance (m): the largest over the
+/// nodes of the closing displacement. The modal forces must be known and the modes not yet advanced.
+pub(super) struct FindInterpolationError<'a> {
+    pub trial: &'a mut BladeTrial,
+    pub rows: &'a BladeRows,
+    /// Distance (s), and coefficients of x⁴ and x⁵ in the error of a mode relative to its amplitude, with x = ω times
+    /// the distance. The error of a mode is at most [`UNRESOLVED`] times its amplitude.
+    pub length: f64,
+    pub terms: [f64; 2],
+    /// True if forces act in the step.
+    pub pushes: bool,
+}
+
+impl OctetKernel for FindInterpolationError<'_> {
+    type Output = f64;
+    #[inline(always)]
+    fn run<L: Octet>(self) -> f64 {
+        let Self { trial, rows, length, terms, pushes } = self;
+        let BladeTrial { start: StartContacts { modes: [q, v], .. }, modal_forces, path_modes, .. } = trial;
+        let [rates, per_frequency, squares] = &rows.rates;
+        let mut error = L::zero();
+        for (k, largest) in rows.largest.iter().enumerate() {
+            let (q, v, per_frequency) = (L::load(&q[k]), L::load(&v[k]), L::load(&per_frequency[k]));
+            let turned = (v + L::load(&rates[k]) * q) * per_frequency;
+            let mut amplitude = (q * q + turned * turned).sqrt();
+            if pushes {
+                let [a, b, c] = modal_forces.each_ref().map(|force| L::load(&force[k]).abs());
+                amplitude = amplitude + (a + b + c) * per_frequency * per_frequency * L::splat(2.0);
+            }
+            let square = L::load(&squares[k]) * L::splat(length * length);
+            let share = square * square * (L::splat(terms[0]) + square.sqrt() * L::splat(terms[1]));
+            let of_mode = amplitude * share.min(L::splat(UNRESOLVED));
+            of_mode.store(&mut path_modes[0][k]);
+            error = error + L::load(largest) * of_mode;
+        }
+        error.total()
     }
 }
 
@@ -121,11 +229,9 @@ impl Follow<'_> {
     /// that forces on other nodes cause.
     #[inline(always)]
     fn find_gaps<L: Octet>(&mut self, end: usize, parts: usize) {
+        self.displace_followed::<L>();
         let Self { trial, rows, level, faced, drives, pushes, .. } = self;
-        let BladeTrial { start, path_modes, path_moved, path_gaps, forces, multipliers, angles, .. } = &mut **trial;
-        for along in [0, 1] {
-            displace::<L, 1>(&rows.shapes[along], rows.blocks, [&path_modes[0]], &mut path_moved[along]);
-        }
+        let BladeTrial { start, path_moved, path_gaps, forces, multipliers, angles, followed, .. } = &mut **trial;
         if *pushes {
             let weights = level.basis.weights_at(fraction(end, parts));
             for (along, node) in (0..2).flat_map(|along| (0..rows.nodes).map(move |node| (along, node))) {
@@ -148,7 +254,7 @@ impl Follow<'_> {
             }
         }
         let drive = &drives[end];
-        for block in 0..rows.blocks {
+        for block in (0..rows.blocks).filter(|block| followed[*block] != 0) {
             let per_radius = L::load(&rows.per_radius[block]);
             let [closing, around] = both(|along| L::load(&path_moved[along][block]));
             let [shape, slope, _] = faced
@@ -159,6 +265,34 @@ impl Follow<'_> {
             let open = L::splat(drive.clearance) + shape * factor + closing;
             let gap = open / (steepness * steepness + sigma * sigma).sqrt();
             gap.store(&mut path_gaps[end * rows.blocks + block]);
+        }
+    }
+
+    /// Finds the displacements of the followed nodes, one by one if they are few.
+    #[inline(always)]
+    fn displace_followed<L: Octet>(&mut self) {
+        let Self { trial, rows, .. } = self;
+        let BladeTrial { path_modes, path_moved, followed, .. } = &mut **trial;
+        let count: u32 = followed.iter().map(|nodes| nodes.count_ones()).sum();
+        for (along, moved) in path_moved.iter_mut().enumerate() {
+            if count as usize > FEW_PER_BLOCK * rows.blocks {
+                displace::<L, 1>(&rows.shapes[along], rows.blocks, [&path_modes[0]], moved);
+                continue;
+            }
+            for (block, moved) in moved.iter_mut().enumerate() {
+                let mut nodes = followed[block];
+                while nodes != 0 {
+                    let i = nodes.trailing_zeros() as usize;
+                    nodes &= nodes - 1;
+                    let first = (along * rows.nodes + 8 * block + i) * rows.mode_blocks;
+                    let shapes = &rows.by_row[first..][..rows.mode_blocks];
+                    let mut sum = L::zero();
+                    for (shape, mode) in shapes.iter().zip(&path_modes[0]) {
+                        sum = sum + L::load(shape) * L::load(mode);
+                    }
+                    moved.0[i] = sum.total();
+                }
+            }
         }
     }
 
@@ -191,25 +325,49 @@ impl Follow<'_> {
         }
     }
 
-    /// Records the smallest gaps, each at the end of a part or at the vertex of a parabola through three such gaps.
+    /// Records the smallest gaps, each at the end of a part or at the vertex of a polynomial near the end of a part.
     #[inline(always)]
     fn record<L: Octet>(&mut self, parts: usize) {
         let Self { trial, rows, tally, .. } = self;
         for block in 0..rows.blocks {
-            if trial.followed[block] == 0 {
+            let followed = trial.followed[block];
+            if followed == 0 {
                 continue;
             }
             let gap = |end: usize| L::load(&trial.path_gaps[end * rows.blocks + block]);
             let mut lowest = L::load(&tally.lowest[block]);
             for end in 1..parts {
-                let [before, here, after] = [gap(end - 1), gap(end), gap(end + 1)];
-                let (bend, tilt) = (before - here * L::splat(2.0) + after, before - after);
-                let is_vertex = !before.less(here) & !after.less(here) & L::zero().less(bend);
-                let vertex = here - tilt * tilt / (bend * L::splat(8.0));
-                let least = L::select(is_vertex, vertex, here);
-                lowest = L::select(trial.followed[block], lowest.min(least), lowest);
+                let near @ [before, here, after] = [gap(end - 1), gap(end), gap(end + 1)];
+                let is_lowest = followed & !before.less(here) & !after.less(here);
+                if is_lowest == 0 {
+                    continue;
+                }
+                let far = (end > 1 && end + 1 < parts).then(|| [gap(end - 2), gap(end + 2)]);
+                lowest = L::select(is_lowest, lowest.min(vertex(near, far)), lowest);
             }
             lowest.store(&mut tally.lowest[block]);
         }
     }
+}
+
+/// Smallest value near the middle one of three values at equal distances, none of which is below it: that of the parabola
+/// through the three or, with the two values beyond them, of a cubic with the derivatives of the polynomial through five.
+#[inline(always)]
+fn vertex<L: Octet>([before, here, after]: [L; 3], far: Option<[L; 2]>) -> L {
+    let (bend, tilt) = (before - here * L::splat(2.0) + after, after - before);
+    let (slope, bend, third) = match far {
+        None => (tilt * L::splat(0.5), bend, L::zero()),
+        Some([first, last]) => {
+            let wide = first - here * L::splat(2.0) + last;
+            (
+                tilt * L::splat(2.0 / 3.0) - (last - first) * L::splat(1.0 / 12.0),
+                bend * L::splat(4.0 / 3.0) - wide * L::splat(1.0 / 12.0),
+                (last - first) * L::splat(0.5) - tilt,
+            )
+        }
+    };
+    let at = L::zero() - slope / bend;
+    let value = here + at * (slope + at * (bend * L::splat(0.5) + at * third * L::splat(1.0 / 6.0)));
+    let is_near = L::zero().less(bend) & at.abs().less(L::splat(1.0));
+    L::select(is_near, here.min(value), here)
 }

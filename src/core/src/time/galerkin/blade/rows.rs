@@ -13,6 +13,8 @@ pub(crate) struct BladeRows {
     pub rates: [Vec<Eight>; 3],
     /// Magnitudes of `shapes`.
     pub magnitudes: [Vec<Eight>; 2],
+    /// Largest magnitude over the nodes of the closing displacement of each mode.
+    pub largest: Vec<Eight>,
     /// Number of contact nodes, and number of blocks of eight that hold them.
     pub nodes: usize,
     pub blocks: usize,
@@ -69,6 +71,7 @@ impl BladeRows {
                 of_modes(&|w, _| w * w),
             ],
             magnitudes: [Vec::new(), Vec::new()],
+            largest: vec![Eight::ZERO; Eight::blocks(count)],
             nodes,
             blocks,
             mode_blocks: Eight::blocks(count),
@@ -94,6 +97,9 @@ impl BladeRows {
         }
         rows.magnitudes =
             rows.shapes.each_ref().map(|shapes| shapes.iter().map(|block| Eight(block.0.map(f64::abs))).collect());
+        let largest = |blocks: &[Eight]| blocks.iter().flat_map(|block| block.0).fold(0.0, f64::max);
+        let largest: Vec<f64> = rows.magnitudes[0].chunks_exact(blocks).map(largest).collect();
+        Eight::spread(largest.into_iter(), 0.0, &mut rows.largest);
         for node in 0..nodes {
             for along in [0, 1] {
                 let direction = rows.along(along, node);

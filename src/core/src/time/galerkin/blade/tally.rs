@@ -164,15 +164,10 @@ impl AddStep<'_> {
         let multipliers = of(&start.multipliers, &trial.multipliers);
         let steepness = L::load(&rows.steepness[block]);
         let length = |sigma: L| (steepness * steepness + sigma * sigma).sqrt();
-        let mut lowest = L::load(&tally.lowest[block]);
         let mut any = 0;
-        for point in 0..count {
-            any |= L::zero().less(multipliers[point]);
-            if point > 0 {
-                lowest = lowest.min(gaps[point] / length(sigmas[point]));
-            }
+        for multiplier in &multipliers[..count] {
+            any |= L::zero().less(*multiplier);
         }
-        lowest.store(&mut tally.lowest[block]);
         if any == 0 {
             return;
         }

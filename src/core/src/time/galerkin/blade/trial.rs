@@ -2,7 +2,7 @@
 
 use super::accept::{Advance, BeginNextStep, FindModalForces};
 use super::level::BladeLevel;
-use super::minima::{FindMinima, Follow, PARTS};
+use super::minima::{FindInterpolationError, FindMinima, Follow, PARTS};
 use super::reach::{Clearance, Energy, FindClearance, FindReach};
 use super::rows::BladeRows;
 use super::solve::Attempt;
@@ -234,15 +234,22 @@ impl BladeTrial {
 
     /// Finds the nodes that may come closer between the points of the tried step than at the points, by more than a
     /// fraction of `tolerance` (m), and whose smallest gap may be below `floors` (m). Returns whether there are such
-    /// nodes.
+    /// nodes, and records the gaps of the others. There are none if the tolerance is infinite.
     pub fn find_minima(
         &mut self,
         (rows, level): (&BladeRows, &BladeLevel),
-        tally: &BladeTally,
+        tally: &mut BladeTally,
         floors: &[Eight],
         tolerance: f64,
     ) -> bool {
-        self.instructions.run_octets(FindMinima { trial: self, rows, level, tally, floors, tolerance })
+        let unresolved = if tolerance.is_finite() { self.unresolved_motion(rows, level) } else { 0.0 };
+        self.instructions.run_octets(FindMinima { trial: self, rows, level, tally, floors, tolerance, unresolved })
+    }
+
+    /// Bounds the interpolation error (m) of all modes between points at a distance `length` (s).
+    pub(super) fn find_interpolation_error(&mut self, rows: &BladeRows, length: f64, terms: [f64; 2]) -> f64 {
+        let pushes = self.pushes;
+        self.instructions.run_octets(FindInterpolationError { trial: self, rows, length, terms, pushes })
     }
 
     /// Records the smallest gaps of these nodes within the tried step. `drives` is the prescribed motion at the ends of

@@ -4,7 +4,7 @@
 //! exactly: all modes at the ends of eighths of the step, and cubics through their displacements and velocities in between. If a
 //! contact is closed at a point, only the gaps at the points are used.
 
-use super::judgement::NEAR;
+use super::judgement::{FALLING, NEAR};
 use super::{ForceInterpolation, Obstacle, Trial};
 use crate::math::cubic::{evaluate, interior_minimum};
 use crate::math::vector::Vector3;
@@ -73,8 +73,7 @@ impl Trial {
             let minimum = interior_minimum(&cubic);
             let lowest = gaps[..basis.count()].iter().copied().fold(f64::INFINITY, f64::min);
             let deeper = minimum.map_or(0.0, |theta| lowest - evaluate(&cubic, theta));
-            // Near its lower end the gap falls within one part by more than the interpolation error.
-            let falls = minimum.is_none() && slope.abs() > left * real(PARTS);
+            let falls = minimum.is_none() && slope.abs() > left * FALLING;
             if !falls && deeper + left > SHARE * tolerance {
                 self.minima.at[node] = minimum.unwrap_or(lower);
                 found = true;
