@@ -119,8 +119,11 @@ impl Simulation {
             let of_sets = &mut self.outputs.energies;
             let now = self.system.energies_now(|set, (kinetic, strain)| of_sets[set].now = kinetic + strain);
             (energies, conserved) = (now, kinetic + strain);
-            for (set, energy) in self.outputs.energies.iter_mut().enumerate() {
-                energy.conserved = self.system.mechanical_energy(set);
+            match &mut self.outputs.energies[..] {
+                [only] => only.conserved = conserved,
+                sets => sets.iter_mut().enumerate().for_each(|(set, energy)| {
+                    energy.conserved = self.system.mechanical_energy(set);
+                }),
             }
         }
         for pair in 0..self.outputs.slave_shares.len() {

@@ -50,9 +50,14 @@ impl ModalBank {
     /// (`forces[row · lanes + sector]`, N) and the modal loads.
     pub(crate) fn energies_now(&mut self, forces: &[f64]) -> (f64, f64) {
         let (mut kinetic, mut strain) = (0.0, 0.0);
-        self.gather_disk(forces);
+        let needs_forces = !self.scheme.properties().stores_velocity;
+        if needs_forces {
+            self.gather_disk(forces);
+        }
         for group in 0..self.groups {
-            self.gather_forces(group, forces);
+            if needs_forces {
+                self.gather_forces(group, forces);
+            }
             let velocities = &self.velocities[self.set_of(group) * self.modes..];
             let modes = self.coefficients(group).iter().zip(velocities);
             let mut add = |(k, velocity): (&ModeCoefficients, &Velocity), position: f64, increment: f64, force: f64| {

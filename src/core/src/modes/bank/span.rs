@@ -30,9 +30,11 @@ impl ModalBank {
             let index = self.index(mode, sector);
             (self.state.position[index], self.state.increment[index]) = (*q, v * self.step);
         }
+        let is_loaded = forces.iter().any(|force| *force != 0.0);
         for mode in position.len()..self.modes {
             let shapes = &self.contact_modes[mode * self.rows..][..self.rows];
-            let force: f64 = shapes.iter().zip(forces).map(|(shape, force)| shape * force).sum();
+            let forces = shapes.iter().zip(if is_loaded { forces } else { &[] });
+            let force: f64 = forces.map(|(shape, force)| shape * force).fold(0.0, |sum, term| sum + term);
             let (index, frequency) = (self.index(mode, sector), self.frequency(mode, sector));
             self.state.position[index] = force / (frequency * frequency);
         }

@@ -6,7 +6,7 @@ use super::reach::Clearance;
 use super::rows::BladeRows;
 use super::surface::{FacedSurface, PointDrive};
 use super::tally::BladeTally;
-use super::trial::BladeTrial;
+use super::trial::{BladeTrial, NodeAngles};
 use crate::contact::ContactParameters;
 use crate::geometry::GapLaw;
 use crate::geometry::revolution::RevolutionGap;
@@ -35,6 +35,8 @@ struct BladeTables {
 #[derive(Debug, Clone)]
 pub(crate) struct Blade {
     kinds: Vec<BladeTables>,
+    /// Angles of the nodes of each sector.
+    angles: Vec<NodeAngles>,
     trial: BladeTrial,
     pub tally: BladeTally,
     /// Smallest gaps of the nodes over all sectors so far (m); gaps of the current sector at the start of the span (m);
@@ -83,7 +85,8 @@ impl Blade {
         let rows = &kinds.first()?.rows;
         let (trial, tally) = (BladeTrial::new(rows, degrees().max()?), BladeTally::new(rows));
         let of_nodes = || vec![Eight::ZERO; rows.blocks];
-        Some(Self { trial, tally, lowest: of_nodes(), begun: of_nodes(), floors: of_nodes(), kinds })
+        let angles = (0..gap.layout.lanes).map(|sector| NodeAngles::new(&gap.layout, sector)).collect();
+        Some(Self { trial, tally, lowest: of_nodes(), begun: of_nodes(), floors: of_nodes(), angles, kinds })
     }
 
     /// Fills the tables from the tables of all contact rows, without allocating.
@@ -150,9 +153,8 @@ impl<'a> BladeInSpan<'a> {
         goal: StepGoal,
         state: &SectorState,
     ) -> Self {
-        let (_, layout) = place.gap.faced();
         let rows = &blade.kinds[place.kind].rows;
-        blade.trial.read(rows, state, |node| layout.angles[node * layout.lanes + place.sector]);
+        blade.trial.read(rows, state, &blade.angles[place.sector]);
         Self {
             blade,
             place,
@@ -212,7 +214,8 @@ fn drive_at(place: &BladePlace, theta: f64) -> (PointDrive, MotionIncrement) {
         factor: drive.shape_factor,
         clearance: layout.clearances[place.sector] + drive.gap_offset + drive.radius_change,
         speed: drive.speed,
-        rotor: libm::sincos(drive.rotor_angle),
+        rotor_angle: drive.rotor_angle,
+        rotor: (0.0, 1.0),
     };
     (point, motion)
 }
@@ -287,6 +290,9 @@ impl SpanSteps for BladeInSpan<'_> {
     }
 
     fn accept(&mut self, step: SpanStep, kind: ForceInterpolation, result: &TrialResult) -> f64 {
+        if self.blade.trial.pushes() {
+            self.drives.iter_mut().for_each(|drive| drive.rotor = libm::sincos(drive.rotor_angle));
+        }
         let faced = self.place.faced_surface(&self.drives);
         let Blade { trial, kinds, tally, floors, .. } = &mut *self.blade;
         let BladeTables { rows, .. } = &kinds[self.place.kind];

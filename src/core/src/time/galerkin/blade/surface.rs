@@ -13,8 +13,9 @@ pub(crate) struct PointDrive {
     pub factor: f64,
     /// Clearance without the shape (m).
     pub clearance: f64,
-    /// Speed of the rotor (rad/s), and sine and cosine of its angle.
+    /// Speed of the rotor (rad/s), its angle (rad), and sine and cosine of the angle if contact forces act.
     pub speed: f64,
+    pub rotor_angle: f64,
     pub rotor: (f64, f64),
 }
 

@@ -9,6 +9,7 @@ use super::solve::Attempt;
 use super::start::FindStart;
 use super::surface::{FacedSurface, PointDrive};
 use super::tally::{AddStep, BladeTally};
+use crate::geometry::layout::Layout;
 use crate::geometry::wrench::MotionIncrement;
 use crate::math::octet::Eight;
 use crate::math::simd::InstructionSet;
@@ -17,6 +18,27 @@ use crate::time::galerkin::basis::{MOST, POINTS};
 use crate::time::galerkin::state::SectorState;
 use crate::time::galerkin::trial::TrialResult;
 use nalgebra::Vector2;
+
+/// Angles of the nodes of a sector in the frame of the rotor (rad), and their sines and cosines.
+#[derive(Debug, Clone)]
+pub(super) struct NodeAngles {
+    angles: Vec<Eight>,
+    sines: Vec<Eight>,
+    cosines: Vec<Eight>,
+}
+
+impl NodeAngles {
+    /// Angles of a sector.
+    pub fn new(layout: &Layout, sector: usize) -> Self {
+        let angles: Vec<f64> = layout.angles.chunks_exact(layout.lanes).map(|row| row[sector]).collect();
+        let of = |values: &dyn Fn(f64) -> f64| {
+            let mut target = vec![Eight::ZERO; Eight::blocks(angles.len())];
+            Eight::spread(angles.iter().map(|angle| values(*angle)), 0.0, &mut target);
+            target
+        };
+        Self { angles: of(&|angle| angle), sines: of(&libm::sin), cosines: of(&libm::cos) }
+    }
+}
 
 /// Contacts at the start of a step, in blocks of nodes.
 #[derive(Debug, Clone)]
@@ -152,13 +174,11 @@ impl BladeTrial {
         }
     }
 
-    /// Reads the state of a sector at the start of a span; its nodes have these angles in the rotating frame (rad).
-    pub fn read(&mut self, rows: &BladeRows, state: &SectorState, angle: impl Fn(usize) -> f64) {
-        Eight::spread((0..rows.nodes).map(&angle), 0.0, &mut self.angles);
-        for (node, (sine, cosine)) in (0..rows.nodes).map(|node| libm::sincos(angle(node))).enumerate() {
-            let [sines, cosines] = &mut self.directions_of_nodes;
-            (sines[node / 8].0[node % 8], cosines[node / 8].0[node % 8]) = (sine, cosine);
-        }
+    /// Reads the state of a sector at the start of a span, whose nodes are at these angles.
+    pub fn read(&mut self, rows: &BladeRows, state: &SectorState, angles: &NodeAngles) {
+        self.angles.copy_from_slice(&angles.angles);
+        self.directions_of_nodes[0].copy_from_slice(&angles.sines);
+        self.directions_of_nodes[1].copy_from_slice(&angles.cosines);
         let start = &mut self.start;
         Eight::spread(state.position.iter().copied(), 0.0, &mut start.modes[0]);
         Eight::spread(state.velocity.iter().copied(), 0.0, &mut start.modes[1]);
