@@ -27,8 +27,9 @@ const FOLLOW_FRACTION: f64 = 0.1;
 /// Largest bound on the interpolation error between the ends of parts, as a fraction of the tolerance.
 const PARTS_FRACTION: f64 = 0.3;
 
-/// Largest error of the motion of a mode between points relative to its amplitude.
-const UNRESOLVED: f64 = 3.0;
+/// Largest error of the motion of a mode between points relative to its amplitude: neither the motion nor its
+/// interpolation exceeds the amplitude.
+const UNRESOLVED: f64 = 2.0;
 /// Coefficients of x⁴ and x⁵ in the error of five gaps at equal distances, near the middle: the neglected fourth
 /// derivative, and the error of their third derivative.
 const OF_PARTS: [f64; 2] = [1.0 / 384.0, 1.0 / 48.0];
