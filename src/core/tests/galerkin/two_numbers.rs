@@ -1,10 +1,10 @@
 //! Compares steps of blades with two numbers per node with the general steps, which use three. Inputs for a whirl that
 //! stays zero select the general steps for the same motion.
 
-use super::{H, SECTORS, apart, scene};
+use super::{H, SECTORS, allocations_of, apart, scene};
 use tiprub_core::scene::method::Scheme;
 use tiprub_core::scene::settings::{Meridian, Shape};
-use tiprub_core::{Rom, Scene, Simulation};
+use tiprub_core::{CoSimulation, Rom, Scene, Simulation};
 use tiprub_test_models::{RADIUS, element, go, modal, node, real, set, started};
 
 const STEPS: u32 = 80;
@@ -127,5 +127,38 @@ fn mistuned_sectors_may_differ_in_degree() {
         let distance = apart(&displacements(false, factor), &displacements(true, factor));
         println!("{factor}: {distance:.1e}");
         assert!(distance < 2e-3, "{factor}: {distance:e}");
+    }
+}
+
+/// A blade whose nodes fill three blocks of eight.
+fn blade_of_many_nodes(nodes: u32) -> Rom {
+    let bending = [850.0, 2300.0, 3100.0, 5200.0, 9000.0, 15_000.0, 24_000.0, 40_000.0];
+    let local = (0..3 * nodes).map(|mode| 45_000.0 + 5000.0 * f64::from(mode));
+    let frequencies: Vec<f64> = bending.into_iter().chain(local).collect();
+    let place = |index: u32| [RADIUS + 3e-4 * f64::from(index), 0.02 * f64::from(index % 3), 4e-3 * f64::from(index)];
+    let nodes = (0..nodes).map(|index| node(format!("tip_{index}"), place(index), 0.03 * f64::from(index) - 0.2));
+    let shape = |row: usize, mode: usize| match mode.checked_sub(bending.len()) {
+        None => [1.0, 4.0, 1.6][row % 3] * (0.07 * row as f64 + 1.3 * mode as f64 + 2.1 * (row % 3) as f64).cos(),
+        Some(local) if local == row => 40.0,
+        Some(local) => 0.3 * (local as f64 + 1.9 * row as f64).sin(),
+    };
+    Rom { sectors: SECTORS, damping_ratio: 0.005, ..modal("blade", &frequencies, shape, nodes.collect()) }
+}
+
+#[test]
+fn steps_of_many_nodes_allocate_only_warnings() {
+    for whirl in [false, true] {
+        let mut scene = scene(Scheme::Galerkin, H, 1e-3);
+        scene.roms[0] = blade_of_many_nodes(18);
+        scene.settings.structures[0].whirl = whirl;
+        let mut simulation = started(&scene);
+        let mut contacts = 0;
+        for step in 0..50 {
+            let allocations = allocations_of(|| go(&mut simulation, H));
+            let warnings = simulation.take_notes();
+            assert!(allocations == 0 || !warnings.is_empty(), "step {step}, whirl {whirl}: {allocations} allocations");
+            contacts += simulation.system().events().len();
+        }
+        assert!(contacts > 0, "whirl {whirl}");
     }
 }
