@@ -12,9 +12,14 @@ const STEPS: u32 = 80;
 /// A change of the scene, and the inputs that the importer sets before a communication step.
 type Case = (&'static str, fn(&mut Scene), fn(&mut Simulation, u32));
 
-const CASES: [Case; 7] = [
+const CASES: [Case; 8] = [
     ("two lobes", |_| (), |_, _| ()),
     ("without friction", |scene| scene.settings.contacts[0].friction = 0.0, |_, _| ()),
+    (
+        "friction that ends during contact",
+        |_| (),
+        |simulation, n| set(simulation, "friction_coefficient", if n % 8 < 5 { 0.15 } else { 0.0 }),
+    ),
     ("meridian", |scene| scene.settings.contacts[0].meridian = Meridian::Contour, |_, _| ()),
     (
         "lobes, and a casing that moves",
@@ -67,7 +72,8 @@ fn values(scene: &Scene, drive: fn(&mut Simulation, u32)) -> Values {
         for sector in 1..=SECTORS {
             forces.extend((0..3).map(|node| element(&simulation, &format!("blade[{sector}].normal_force"), node)));
         }
-        forces.push(1e3 * simulation.system().ledger().friction_loss.value());
+        let ledger = simulation.system().ledger();
+        forces.extend([&ledger.friction_loss, &ledger.curvature_work].map(|work| 1e3 * work.value()));
     }
     let ledger = simulation.system().ledger();
     let (kinetic, strain) = simulation.system().energies();

@@ -4,7 +4,7 @@ use super::basis::{TimeBasis, real};
 use super::carrier::CarrierIntegrator;
 use super::compliance::Lanes;
 use super::level::StepTables;
-use super::record::{PairRecord, SpanRecord, SurfacePlace};
+use super::record::{FORCE_ROUNDING, PairRecord, SpanRecord, SurfacePlace};
 use super::surroundings::{AcceptedStep, CarriersInStep, LaneStep, Witness};
 use super::trial::{ForceInterpolation, Obstacle, SlidingState, Trial, node_by_node};
 use crate::contact::ContactParameters;
@@ -385,7 +385,9 @@ impl ObstacleView<'_> {
             let point = gap.contact_point(at, moved, place);
             self.record.implausible |= !gap.is_plausible(node, trial.gap(i, node), normal);
             // With the normal for which the force was found: the effect of its rotation since then is curvature work, not heat.
-            let tangential = if slides { trial.friction_force(i, node) } else { Vector3::zeros() };
+            let tangential = trial.friction_force(i, node);
+            let is_real = slides || tangential.amax() > FORCE_ROUNDING * multiplier;
+            let tangential = if is_real { tangential } else { Vector3::zeros() };
             let wrench = gap.wrench(at, point, force);
             let duration = step.level.step * step.kind.weight(basis, i);
             let weights = step.kind.work_weights(basis, i);

@@ -69,6 +69,10 @@ impl MotionCourse {
     }
 }
 
+/// Rounding error of a contact force without friction, as a fraction of the force. A larger tangential part is from before the
+/// friction coefficient became zero.
+pub(crate) const FORCE_ROUNDING: f64 = 1e-12;
+
 /// Contact of one node over a span.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct NodeTally {

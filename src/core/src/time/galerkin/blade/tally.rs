@@ -12,6 +12,7 @@ use crate::system::ContactEvent;
 use crate::system::contact_view::ContactMember;
 use crate::system::work::ContactWork;
 use crate::time::galerkin::basis::POINTS;
+use crate::time::galerkin::record::FORCE_ROUNDING;
 use crate::time::galerkin::trial::ForceInterpolation;
 
 /// Sums over a span for each node.
@@ -197,10 +198,11 @@ impl AddStep<'_> {
             normals[i] = normal;
             let [closing, around] = [forces[0][i], forces[1][i]];
             // The friction force is the force minus its normal part λ' (1, σ).
-            let friction = match faced.friction == 0.0 {
-                true => [L::zero(); 2],
-                false => [closing - multiplier, around - multiplier * sigma],
-            };
+            let mut friction = [closing - multiplier, around - multiplier * sigma];
+            if faced.friction == 0.0 {
+                let rounding = multiplier * L::splat(FORCE_ROUNDING);
+                friction = friction.map(|part| L::select(rounding.less(part.abs()), part, L::zero()));
+            }
             let tangential = (friction[0] * friction[0] * steepness * steepness + friction[1] * friction[1]).sqrt();
             let motion = &motions[i];
             let spin = radius * L::splat(motion.turn);
