@@ -6,7 +6,7 @@
 
 use nalgebra::DMatrix;
 
-use super::linear::{AddColumns, AddMagnitudes};
+use super::linear::AddColumns;
 use super::one_contact::{self, length};
 use crate::math::simd::InstructionSet;
 
@@ -180,9 +180,8 @@ impl ScaledProblem {
             }
             let factors = std::array::from_fn(|k| self.reaction[3 * contact + k]);
             let columns = &self.matrix[3 * contact * order..(3 * contact + 3) * order];
-            self.instructions.run(AddColumns { columns, factors, target: &mut self.relative[..order] });
-            let terms = AddColumns { columns, factors, target: &mut self.magnitude[..order] };
-            self.instructions.run(AddMagnitudes(terms));
+            self.instructions.run(AddColumns::<false> { columns, factors, target: &mut self.relative[..order] });
+            self.instructions.run(AddColumns::<true> { columns, factors, target: &mut self.magnitude[..order] });
         }
         for magnitude in &mut self.magnitude[..order] {
             *magnitude = magnitude.min(self.ceiling);
@@ -196,7 +195,7 @@ impl ScaledProblem {
             let factors: [f64; 3] = std::array::from_fn(|k| direction[3 * contact + k]);
             if factors.iter().any(|factor| *factor != 0.0) {
                 let columns = &self.matrix[3 * contact * order..(3 * contact + 3) * order];
-                self.instructions.run(AddColumns { columns, factors, target });
+                self.instructions.run(AddColumns::<false> { columns, factors, target });
             }
         }
     }
@@ -231,7 +230,7 @@ impl ScaledProblem {
         for i in 0..3 {
             self.reaction[k + i] = if relaxation < 1.0 { old[i] + factors[i] } else { new[i] };
         }
-        self.instructions.run(AddColumns { columns, factors, target: &mut self.relative[..order] });
+        self.instructions.run(AddColumns::<false> { columns, factors, target: &mut self.relative[..order] });
     }
 
     /// Largest residual of all contacts; infinite if a value is NaN.
