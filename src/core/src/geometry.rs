@@ -160,7 +160,7 @@ impl GapLaw {
             Self::Fixed(law) => law.gaps.len(),
             Self::Revolution(law) => law.layout.nodes(),
             Self::Spline(law) => law.layout.nodes(),
-            Self::Open(law) => law.positions().len(),
+            Self::Open(law) => law.positions.len(),
         }
     }
 
@@ -170,7 +170,7 @@ impl GapLaw {
             Self::Fixed(law) => (0..law.gaps.len()).collect(),
             Self::Revolution(law) => law.nodes.clone(),
             Self::Spline(law) => law.nodes.clone(),
-            Self::Open(law) => law.nodes().to_vec(),
+            Self::Open(law) => law.nodes.clone(),
         }
     }
 
@@ -242,7 +242,7 @@ impl GapLaw {
             Self::Fixed(_) | Self::Revolution(_) => 0.0,
             Self::Spline(law) => largest(&mut law.layout.radii.iter().copied()),
             // Its displacements contain the whole flight.
-            Self::Open(law) => 8.0 * largest(&mut law.positions().iter().map(|place| length(*place))),
+            Self::Open(law) => 8.0 * largest(&mut law.positions.iter().map(|place| length(*place))),
         };
         64.0 * f64::EPSILON * far
     }
@@ -346,7 +346,7 @@ impl GapLaw {
             Self::Fixed(law) => 1e-9 * law.gaps[node].abs(),
             Self::Revolution(RevolutionGap { layout, .. }) => CURVED * layout.radii[node],
             Self::Spline(law) => CURVED * law.layout.radii[node],
-            Self::Open(law) => CURVED * law.largest(),
+            Self::Open(law) => CURVED * law.largest,
         }
     }
 
@@ -359,7 +359,7 @@ impl GapLaw {
     /// surfaces; no limit for fixed obstacles.
     pub(crate) fn largest_displacement(&self) -> f64 {
         if let Self::Open(law) = self {
-            return law.largest();
+            return law.largest;
         }
         let radii = self.layout().map(|layout| layout.radii.iter());
         radii.map_or(f64::INFINITY, |radii| SMALL * radii.fold(f64::INFINITY, |low: f64, radius| low.min(*radius)))
@@ -372,7 +372,7 @@ impl GapLaw {
             Self::Fixed(_) => true,
             Self::Revolution(law) => gap > -SMALL * law.layout.radii[node] && normal[1].abs() <= -normal[0],
             Self::Spline(law) => gap > -SMALL * law.layout.radii[node] && faces_inwards(normal),
-            Self::Open(law) => gap > -law.largest(),
+            Self::Open(law) => gap > -law.largest,
         }
     }
 

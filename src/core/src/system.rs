@@ -176,13 +176,13 @@ impl System {
     /// The coating of a pair.
     pub fn coating(&self, pair: usize) -> Option<&Coating> {
         let structure = self.pairs[pair].structure();
-        self.groups.get(self.sets.of(structure))?.law().coating()
+        self.groups.get(self.sets.of(structure))?.law.coating()
     }
 
     /// Contacts whose forces acted over the last step and whose work was recorded for it: those of that step or, for schemes
     /// whose contact forces act later, those of the previous step.
     pub fn acted(&self) -> &[ContactEvent] {
-        if self.settings.scheme.properties().delays_contact { &self.events.before } else { &self.events.now }
+        self.events.at(self.when_acted())
     }
 
     /// Active contacts of the last step.
@@ -301,7 +301,7 @@ impl System {
     pub(crate) fn retire_events(&mut self) {
         self.events.shift();
         self.events.now.clear();
-        if self.groups.iter().any(|group| group.law().starts_from_forces()) {
+        if self.groups.iter().any(|group| group.law.starts_from_forces()) {
             self.structures.iter_mut().for_each(|structure| structure.history.keep_forces());
         }
         for event in &self.events.before {
@@ -318,7 +318,7 @@ impl System {
     /// motion `drives`, one per pair.
     pub fn start(&mut self, drives: &[PrescribedMotion]) {
         self.structures.iter_mut().for_each(Structure::start);
-        self.groups.iter_mut().filter_map(|group| group.law_mut().coating_mut()).for_each(Coating::reset);
+        self.groups.iter_mut().filter_map(|group| group.law.coating_mut()).for_each(Coating::reset);
         self.events.now.clear();
         self.events.before.clear();
         self.pairs.iter_mut().zip(drives).for_each(|(pair, drive)| pair.start(drive));

@@ -123,17 +123,13 @@ impl ContactSolver {
         self.size
     }
 
-    /// Largest number of nodes.
-    pub fn capacity(&self) -> usize {
-        self.gaps.len()
-    }
-
     /// Sets the number of nodes of the next problems. Does not allocate.
     ///
     /// # Panics
     /// If `size` exceeds the capacity.
     pub fn set_size(&mut self, size: usize) {
-        assert!(size <= self.capacity(), "{size} contact nodes exceed the solver capacity of {}", self.capacity());
+        let capacity = self.gaps.len();
+        assert!(size <= capacity, "{size} contact nodes exceed the solver capacity of {capacity}");
         self.size = size;
         self.multipliers[size..].fill(0.0);
         self.active[size..].fill(false);
@@ -179,7 +175,7 @@ impl ContactSolver {
             let largest =
                 self.multipliers[..self.size].iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
             let (count, last) = self.count_infeasible(scale, largest);
-            if count == 0 && !self.yielding.is_softened() && self.redundant_contact_violated(scale) {
+            if count == 0 && !self.yielding.softened && self.redundant_contact_violated(scale) {
                 self.yielding.soften(&mut self.delassus, self.size);
                 (best, patience) = (usize::MAX, PATIENCE);
                 continue;

@@ -97,7 +97,7 @@ impl ContactLaw for Coated {
         self.angles[contact] = at.angle();
         self.problem.gaps[contact] = at.gap();
         self.problem.monotone &= friction == 0.0;
-        self.problem.closed[contact] = at.was_closed(self.coating.thickness());
+        self.problem.closed[contact] = at.was_closed(self.coating.thickness);
         if let Some(cut) = &mut self.cut {
             let along = at.sliding().direction;
             let sense = along.dot(&directions[1]);

@@ -89,7 +89,8 @@ struct CellContact {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Coating {
     rod: RodMaterial,
-    thickness: f64,
+    /// Thickness h₀ (m).
+    pub(super) thickness: f64,
     around: usize,
     /// Contact nodes per blade.
     nodes: usize,
@@ -269,11 +270,6 @@ impl Coating {
     pub fn worn_volume(&self) -> f64 {
         let cells = self.rows.iter().zip(self.plastic.chunks(self.around));
         cells.map(|(row, plastic)| row.area * plastic.iter().sum::<f64>()).sum::<f64>() * self.thickness
-    }
-
-    /// Thickness h₀ (m).
-    pub fn thickness(&self) -> f64 {
-        self.thickness
     }
 
     /// Removes all wear.

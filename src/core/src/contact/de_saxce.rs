@@ -97,11 +97,6 @@ impl CoulombSolver {
         }
     }
 
-    /// Largest number of contacts.
-    pub fn capacity(&self) -> usize {
-        self.capacity
-    }
-
     /// Solves for the first `size` contacts. If all methods fail, or the input is not finite, `solved` is false and the reactions are
     /// finite and admissible, but not in equilibrium.
     ///

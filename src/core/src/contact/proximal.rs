@@ -46,7 +46,7 @@ pub(crate) struct Yielding {
     /// ε.
     share: f64,
     /// True if the diagonal of the matrix differs from D.
-    softened: bool,
+    pub(super) softened: bool,
 }
 
 impl Yielding {
@@ -59,11 +59,6 @@ impl Yielding {
     /// Begins a problem with a new matrix.
     pub fn begin(&mut self) {
         self.softened = false;
-    }
-
-    /// Returns whether contacts have been softened.
-    pub(crate) fn is_softened(&self) -> bool {
-        self.softened
     }
 
     /// Makes each of the first `size` contacts yield slightly by itself.

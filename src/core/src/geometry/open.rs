@@ -54,13 +54,14 @@ impl OpenSurface {
 #[derive(Debug, Clone, PartialEq)]
 pub struct OpenGap {
     /// Undeformed positions of the contact nodes of the structure (m).
-    positions: Vec<Vector3>,
+    pub(crate) positions: Vec<Vector3>,
     /// Contact nodes that can touch the surface.
-    nodes: Vec<usize>,
+    pub(crate) nodes: Vec<usize>,
     /// The surface.
     pub surface: OpenSurface,
-    /// Largest displacement that counts as small (m).
-    largest: f64,
+    /// Largest displacement and penetration that count as small (m): a tenth of the smallest extent of the contact nodes and of their
+    /// surfaces.
+    pub largest: f64,
 }
 
 impl OpenGap {
@@ -73,22 +74,6 @@ impl OpenGap {
     /// Takes into account another pair of the same structure, whose surface has this extent (m).
     pub fn beside(self, extent: f64) -> Self {
         Self { largest: self.largest.min(SMALL * extent), ..self }
-    }
-
-    /// Returns the contact nodes of the pair.
-    pub fn nodes(&self) -> &[usize] {
-        &self.nodes
-    }
-
-    /// Undeformed positions of the contact nodes of the structure (m).
-    pub fn positions(&self) -> &[Vector3] {
-        &self.positions
-    }
-
-    /// Largest displacement and penetration that count as small (m): a tenth of the smallest extent of the contact nodes and of their
-    /// surfaces.
-    pub fn largest(&self) -> f64 {
-        self.largest
     }
 
     /// Returns the point of the surface at a closest point (m).

@@ -29,11 +29,11 @@ pub struct RevolutionGap {
     /// Positions of the contact nodes of the structure.
     pub layout: Layout,
     /// Contact nodes that can touch the surface.
-    pub(super) nodes: Vec<usize>,
+    pub(crate) nodes: Vec<usize>,
     /// Meridional slope per contact node of the structure.
-    slopes: Vec<f64>,
+    pub(crate) slopes: Vec<f64>,
     /// True if the shaft centre moves.
-    shaft_moves: bool,
+    pub(crate) shaft_moves: bool,
     /// Scratch of one row if the shaft centre moves: the position of the node from the axis of the casing along its own directions (m).
     arms: [Vec<f64>; 2],
 }
@@ -68,24 +68,9 @@ impl RevolutionGap {
         Self { nodes, ..self }
     }
 
-    /// Contact nodes that can touch the surface.
-    pub fn members(&self) -> &[usize] {
-        &self.nodes
-    }
-
     /// Shape of the surface, and positions of the nodes.
     pub(crate) fn faced(&self) -> (&CompiledShape, &Layout) {
         (&self.surface, &self.layout)
-    }
-
-    /// Returns whether the shaft centre moves.
-    pub(crate) fn is_shifted(&self) -> bool {
-        self.shaft_moves
-    }
-
-    /// Meridional slope of the surface per contact node of the structure.
-    pub fn slopes(&self) -> &[f64] {
-        &self.slopes
     }
 
     /// Replaces the contact nodes by points at other places, with the slopes of the surface there.

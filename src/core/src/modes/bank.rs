@@ -136,7 +136,8 @@ struct BankCoefficients {
 /// Identical sectors in modal coordinates, uncoupled or coupled to a disk, stepped together.
 #[derive(Debug, Clone)]
 pub struct ModalBank {
-    instruction_set: InstructionSet,
+    /// Instruction set of the hot loops.
+    pub(crate) instruction_set: InstructionSet,
     /// Modes of one sector; of coupled sectors, those of nodal diameter 0.
     model: ModalModel,
     options: BankOptions,
@@ -252,9 +253,9 @@ impl ModalBank {
                 loss: vec![0.0; chunks * width],
                 modal_load_before: vec![0.0; load_len(options.loads)],
                 excited_before: vec![0.0; excitation.as_ref().map_or(0, |excitation| excitation.now.len())],
-                speed: coupling.as_ref().map_or(0.0, Coupling::speed),
-                temperature: coupling.as_ref().map_or(0.0, Coupling::temperature),
-                heat_before: vec![0.0; heat.as_ref().map_or(0, HeatLoads::remembered)],
+                speed: coupling.as_ref().map_or(0.0, |coupling| coupling.speed),
+                temperature: coupling.as_ref().map_or(0.0, |coupling| coupling.temperature),
+                heat_before: vec![0.0; heat.as_ref().map_or(0, |heat| heat.now.len())],
                 stiffened: vec![0.0; if softening { model.quasi_static.min(modes) } else { 0 }],
             },
             modal_load: vec![0.0; load_len(special || options.loads)],
@@ -301,11 +302,6 @@ impl ModalBank {
     /// Modes of one sector; of coupled sectors, those of nodal diameter 0.
     pub fn model(&self) -> &ModalModel {
         &self.model
-    }
-
-    /// Instruction set of the hot loops.
-    pub(crate) fn instruction_set(&self) -> InstructionSet {
-        self.instruction_set
     }
 
     /// Returns the coupling of the sectors; `None` if they are uncoupled.

@@ -141,7 +141,7 @@ impl Simulation {
 fn of_points(law: GapLaw, rom: &Rom, watched: &WatchedPoints) -> Result<Option<(GapLaw, Vec<Raised>)>> {
     let mut places: Vec<[f64; 3]> = watched.points.iter().map(|point| point.position).collect();
     let on_contour = |law: &RevolutionGap| -> Vec<(f64, f64)> {
-        places.iter().map(|place| contour(&rom.contact_nodes, law.slopes(), law.members(), place[2])).collect()
+        places.iter().map(|place| contour(&rom.contact_nodes, &law.slopes, &law.nodes, place[2])).collect()
     };
     let around = |places: &[[f64; 3]], layout: &Layout| {
         Layout::of_places(places, rom.sectors, &layout.clearances[..rom.sectors], layout.lanes)

@@ -3,7 +3,6 @@
 use tiprub_cosim::persist::{Persist, StateReader, StateWriter};
 
 use super::contact_view::ContactMember;
-use super::pair::When;
 use super::{Bodies, ContactEvent, ContactPair, StepFailure, Structure, SurfaceCarrier, System, sum_of};
 use crate::geometry::surface_spline::ClosestPoint;
 use crate::geometry::wrench::At;
@@ -103,7 +102,7 @@ impl System {
             let structure = pair.structure();
             let modes = self.structures[structure].modes();
             let mut moved = modes.displacement().iter().zip(modes.displacement_before());
-            if moved.any(|(now, before)| (now - before).abs() > gap.largest()) {
+            if moved.any(|(now, before)| (now - before).abs() > gap.largest) {
                 return Err(StepFailure::TooFast { structure });
             }
         }
@@ -158,8 +157,8 @@ impl System {
     pub fn save(&self, writer: &mut StateWriter) {
         self.step_size().save(writer);
         self.structures.iter().for_each(|structure| structure.save(writer));
-        self.pairs.iter().for_each(|pair| pair.state().save(writer));
-        self.groups.iter().for_each(|group| group.law().save(writer));
+        self.pairs.iter().for_each(|pair| pair.prescribed.save(writer));
+        self.groups.iter().for_each(|group| group.law.save(writer));
         self.counted.save(writer);
     }
 
@@ -187,8 +186,8 @@ impl System {
         if started && endless.is_none() {
             reader.refuse("a gap is not finite");
         }
-        self.pairs.iter().for_each(|pair| pair.state().check(reader));
-        self.groups.iter().for_each(|group| group.law().check(reader));
+        self.pairs.iter().for_each(|pair| pair.prescribed.check(reader));
+        self.groups.iter().for_each(|group| group.law.check(reader));
         self.counted.check(reader);
         (step, endless.unwrap_or(0))
     }
@@ -233,8 +232,8 @@ impl System {
             }
             structure.restore(reader);
         }
-        self.pairs.iter_mut().for_each(|pair| pair.state_mut().restore(reader));
-        self.groups.iter_mut().for_each(|group| group.law_mut().restore(reader));
+        self.pairs.iter_mut().for_each(|pair| pair.prescribed.restore(reader));
+        self.groups.iter_mut().for_each(|group| group.law.restore(reader));
         self.counted.restore(reader);
         self.rebuild_events();
     }
@@ -251,7 +250,7 @@ impl System {
                         let force = structure.vector3(&history.force.now, node, sector);
                         let point = structure.vector3(&history.points, node, sector);
                         let of = &self.pairs[pair];
-                        let wrench = of.gap().wrench(At { node, index, drive: of.drive(When::Now) }, point, force);
+                        let wrench = of.gap().wrench(At { node, index, drive: of.drive_now() }, point, force);
                         let at = ContactMember { structure: number, pair, node, sector, index };
                         let coating = history.coating_force[index];
                         self.events.now.push(ContactEvent::new(at, normal, force, coating, point, wrench));
@@ -270,7 +269,7 @@ impl ContactPair {
             return;
         };
         let Ok([touching, carrier]) = structures.get_disjoint_mut([self.structure(), structure]) else { return };
-        let rotor_angle = self.drive(When::Now).rotor_angle;
+        let rotor_angle = self.drive_now().rotor_angle;
         for &node in self.nodes() {
             for sector in 0..touching.modes().sectors() {
                 let force = touching.vector3(&touching.history.passing.lasting, node, sector);

@@ -40,8 +40,8 @@ pub fn fill(matrix: &mut DMatrix<f64>, bank: &ModalBank, nodes: usize, block: &D
 #[inline(never)]
 fn fill_disk(matrix: &mut DMatrix<f64>, bank: &ModalBank, disk: &Disk, block: &DelassusBlock) {
     match block.per {
-        1 => bank.instruction_set().run(FillDisk::<1> { matrix, disk, block }),
-        _ => bank.instruction_set().run(FillDisk::<3> { matrix, disk, block }),
+        1 => bank.instruction_set.run(FillDisk::<1> { matrix, disk, block }),
+        _ => bank.instruction_set.run(FillDisk::<3> { matrix, disk, block }),
     }
 }
 

@@ -3,7 +3,6 @@
 use super::carrier::Reaction;
 use super::contact_view::{Bodies, ContactMember};
 use super::delassus::{DelassusBlock, fill};
-use super::pair::When;
 use super::{ContactEvent, StepFailure, Structure};
 use crate::contact::Law;
 use crate::contact::coating::Coating;
@@ -53,7 +52,7 @@ pub(crate) struct ContactGroup {
     sides: Vec<GroupSide>,
     /// Structures that carry the surfaces of the contacts.
     reactions: Vec<Reaction>,
-    law: Law,
+    pub(crate) law: Law,
     /// The current contacts, structure by structure and sector by sector.
     members: Vec<ContactMember>,
     rows: Vec<Vector3>,
@@ -106,16 +105,6 @@ impl ContactGroup {
     /// Structures whose nodes are in contact.
     pub fn structures(&self) -> impl Iterator<Item = usize> {
         self.sides.iter().map(|side| side.structure)
-    }
-
-    /// The contact law.
-    pub fn law(&self) -> &Law {
-        &self.law
-    }
-
-    /// The contact law, to restore its state.
-    pub(crate) fn law_mut(&mut self) -> &mut Law {
-        &mut self.law
     }
 
     /// Selects another solver. A coating has the same law for all solvers.
@@ -416,7 +405,7 @@ impl ContactGroup {
             of.history.multiplier[index] = normal;
             of.history.coating_force[index] = share;
             let gap = bodies.pairs[pair].gap();
-            let at = At { node, index, drive: bodies.pairs[pair].drive(When::Now) };
+            let at = At { node, index, drive: bodies.pairs[pair].drive_now() };
             // The point at which the gap was evaluated, whose normal has no moment about the axis of a round casing.
             let point = gap.contact_point(at, moved, of.history.geometry.now.place_at(index));
             let wrench = gap.wrench(at, point, force);
@@ -453,7 +442,7 @@ impl GroupSide {
             // Every force moves every sector.
             Some(disk) => {
                 let (sectors, [across, around, along]) = (bank.sectors(), &normals.normal);
-                let nodes = disk.moved().chunks_exact(3 * lanes).zip(self.response.chunks_exact_mut(lanes));
+                let nodes = disk.moved.chunks_exact(3 * lanes).zip(self.response.chunks_exact_mut(lanes));
                 let normals = across.chunks_exact(lanes).zip(around.chunks_exact(lanes)).zip(along.chunks_exact(lanes));
                 for ((moved, response), ((across, around), along)) in nodes.zip(normals) {
                     for lane in 0..sectors {

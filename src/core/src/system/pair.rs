@@ -36,11 +36,11 @@ pub struct PairParts {
 
 /// Prescribed motion over the last steps.
 #[derive(Debug, Clone, PartialEq, Default)]
-struct Prescribed {
+pub(crate) struct Prescribed {
     /// At the last step, and at the previous step.
-    drive: Two<PrescribedMotion>,
+    pub(crate) drive: Two<PrescribedMotion>,
     /// Change over the last step, and over the previous step.
-    motion: Two<MotionIncrement>,
+    pub(crate) motion: Two<MotionIncrement>,
 }
 
 persist_fields!(Prescribed { drive, motion });
@@ -52,7 +52,7 @@ pub struct ContactPair {
     pub(crate) parts: PairParts,
     /// Contact nodes of the pair.
     nodes: Vec<usize>,
-    prescribed: Prescribed,
+    pub(crate) prescribed: Prescribed,
     /// Prescribed motion in the middle of the current span, and the growth of the shape, if a scheme needs them.
     pub(crate) middle: (PrescribedMotion, ShapeGrowth),
 }
@@ -92,33 +92,10 @@ impl ContactPair {
         &mut self.parts.gap
     }
 
-    /// Prescribed motion at the step before the last.
-    pub(crate) fn drive_before(&self) -> &PrescribedMotion {
-        self.drive(When::Before)
-    }
-
     /// Prescribed motion at the last step.
-    pub fn drive_now(&self) -> &PrescribedMotion {
-        self.drive(When::Now)
-    }
-
-    /// Prescribed motion at the last step, or one earlier.
     #[inline(always)]
-    pub(crate) fn drive(&self, when: When) -> &PrescribedMotion {
-        match when {
-            When::Now => &self.prescribed.drive.now,
-            When::Before => &self.prescribed.drive.before,
-        }
-    }
-
-    /// Prescribed motion over the last step.
-    pub(crate) fn motion(&self) -> &MotionIncrement {
-        &self.prescribed.motion.now
-    }
-
-    /// Prescribed motion over the step before the last.
-    pub(crate) fn motion_before(&self) -> &MotionIncrement {
-        &self.prescribed.motion.before
+    pub fn drive_now(&self) -> &PrescribedMotion {
+        &self.prescribed.drive.now
     }
 
     /// Starts with the prescribed motion `drive`, without earlier motion.
@@ -138,16 +115,6 @@ impl ContactPair {
     /// Scales the last change of prescribed motion by `ratio`, for another step size.
     pub(crate) fn stretch(&mut self, ratio: f64) {
         self.prescribed.motion.now = self.prescribed.motion.now.over(ratio);
-    }
-
-    /// Prescribed motion, as a part of the saved state.
-    pub(crate) fn state(&self) -> &impl tiprub_cosim::persist::Persist {
-        &self.prescribed
-    }
-
-    /// Prescribed motion, to restore it.
-    pub(crate) fn state_mut(&mut self) -> &mut impl tiprub_cosim::persist::Persist {
-        &mut self.prescribed
     }
 
     /// Directions of the frame of a node at a rotor angle (rad); fixed directions if nothing rotates.
@@ -195,13 +162,4 @@ pub(crate) enum SearchStart {
     PreviousStep,
     /// The positions of the nodes.
     Positions,
-}
-
-/// Selects one of two times.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum When {
-    /// The last step.
-    Now,
-    /// One step earlier.
-    Before,
 }

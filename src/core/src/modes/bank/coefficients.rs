@@ -96,7 +96,7 @@ impl ModalBank {
     pub fn set_speed(&mut self, speed: f64, temperature: f64) -> f64 {
         let Some(coupling) = &self.coupling else { return 0.0 };
         let same = |one: f64, other: f64| one.to_bits() == other.to_bits();
-        if same(coupling.speed(), speed) && same(coupling.temperature(), temperature) {
+        if same(coupling.speed, speed) && same(coupling.temperature, temperature) {
             return 0.0;
         }
         let before = self.energies();

@@ -19,8 +19,10 @@ pub struct Coupling {
     spin: ModalSpin,
     stiffening: bool,
     coriolis: bool,
-    speed: f64,
-    temperature: f64,
+    /// Current speed (rad/s).
+    pub(super) speed: f64,
+    /// Current temperature (K).
+    pub(super) temperature: f64,
     /// ΔK, row by row.
     stiffness: Vec<f64>,
     /// (Ω/h) G, row by row.
@@ -30,7 +32,7 @@ pub struct Coupling {
     /// Square of the frequency factor of every set; it multiplies ΔK of a mistuned sector.
     squares: Vec<f64>,
     /// Number of modes, from the lowest, that ΔK couples.
-    coupled: usize,
+    pub(super) coupled: usize,
     /// Stiffness of each mode as a fraction of the reference stiffness if it softens without being coupled, otherwise 1.
     shares: Vec<f64>,
     work: Vec<f64>,
@@ -60,16 +62,6 @@ impl Coupling {
         }
     }
 
-    /// Current speed (rad/s).
-    pub fn speed(&self) -> f64 {
-        self.speed
-    }
-
-    /// Current temperature (K).
-    pub fn temperature(&self) -> f64 {
-        self.temperature
-    }
-
     /// Returns whether anything couples the modes at the current speed.
     pub(crate) fn is_active(&self) -> bool {
         (self.coriolis && self.speed != 0.0) || self.is_stiffened()
@@ -83,11 +75,6 @@ impl Coupling {
     /// Returns whether heat softens the modes.
     pub fn softens(&self) -> bool {
         self.spin.softening.is_some()
-    }
-
-    /// Number of modes, from the lowest, that ΔK couples.
-    pub(crate) fn coupled_modes(&self) -> usize {
-        self.coupled
     }
 
     /// Stiffness of a mode that ΔK does not couple, as a fraction of the reference stiffness; 1 for coupled modes.

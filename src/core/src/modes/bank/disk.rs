@@ -78,7 +78,7 @@ pub struct Disk {
     asked_force: Vec<Complexes>,
     asked_nodes: Vec<bool>,
     /// Displacements caused by the requested forces (m), `[row][lane of sector]`.
-    moved: Vec<f64>,
+    pub(crate) moved: Vec<f64>,
 }
 
 impl Disk {
@@ -194,11 +194,6 @@ impl Disk {
         let mut moved = std::mem::take(&mut self.moved);
         self.synthesise(&mut moved);
         self.moved = moved;
-    }
-
-    /// Displacements that the requested forces would cause (m), `[row][lane of sector]`.
-    pub(crate) fn moved(&self) -> &[f64] {
-        &self.moved
     }
 
     /// Computes the spectrum of contact forces (sector, node, N).

@@ -261,7 +261,8 @@ impl SpanRecord {
     pub(crate) fn begin_courses(&mut self, pairs: &[ContactPair], span: f64) {
         for own in &mut self.pairs {
             let pair = &pairs[own.pair];
-            own.course = MotionCourse::new(pair.drive_before(), &pair.middle.0, pair.middle.1, pair.drive_now(), span);
+            own.course =
+                MotionCourse::new(&pair.prescribed.drive.before, &pair.middle.0, pair.middle.1, pair.drive_now(), span);
         }
     }
 

@@ -11,7 +11,7 @@ impl CoatedProblem {
         if self.solve_linear() {
             return true;
         }
-        if !self.yielding.is_softened() {
+        if !self.yielding.softened {
             self.yielding.soften(&mut self.delassus, self.size);
             return self.solve_linear();
         }

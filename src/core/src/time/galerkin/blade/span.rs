@@ -70,11 +70,11 @@ impl Blade {
         if law.sticks || !law.complementary || !law.constant_friction || degrees().any(|degree| degree == 1) {
             return None;
         }
-        if gap.members().len() != kinds[0].nodes() || gap.is_shifted() {
+        if gap.nodes.len() != kinds[0].nodes() || gap.shaft_moves {
             return None;
         }
         let of = |tables: &Tables| {
-            let rows = BladeRows::new(tables.shapes(), tables.rows.error_form(), gap.slopes(), &gap.layout);
+            let rows = BladeRows::new(tables.shapes(), tables.rows.error_form(), &gap.slopes, &gap.layout);
             let level = |kind| BladeLevel::new(&rows, tables.levels[0].basis.degree, kind);
             let levels = tables.levels.iter().map(|_| level(ForceInterpolation::Polynomial)).collect();
             BladeTables { levels, constant: level(ForceInterpolation::Constant), rows }
