@@ -53,7 +53,7 @@ pub enum SectorModel<'a> {
 }
 
 /// Optional features of a bank; a feature that is off takes neither time nor memory.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct BankOptions {
     /// Factor on the frequencies of every sector (mistuning); empty if all sectors are tuned.
     pub frequency_factors: Vec<f64>,
@@ -65,21 +65,8 @@ pub struct BankOptions {
     pub coupling: Option<(ModalSpin, bool, bool)>,
     /// Loads of an engine order.
     pub excitation: Option<Excitation>,
-    /// True if G = Φ diag(c) Φᵀ is stored; a slave with many contact rows uses its modes instead.
-    pub flexibility: bool,
-}
-
-impl Default for BankOptions {
-    fn default() -> Self {
-        Self {
-            frequency_factors: Vec::new(),
-            loads: false,
-            expansion: Vec::new(),
-            coupling: None,
-            excitation: None,
-            flexibility: true,
-        }
-    }
+    /// True if G = Φ diag(c) Φᵀ is not stored; a slave with many contact rows uses its modes instead.
+    pub uses_modes: bool,
 }
 
 /// All state variables, except those of a [`Disk`].
@@ -241,7 +228,7 @@ impl ModalBank {
             lane_coefficients: vec![BankCoefficients::default(); if special { state_len } else { 0 }],
             flexibility: vec![
                 DMatrix::zeros(rows, rows);
-                if options.flexibility && coupled.is_none() { sets } else { 0 }
+                if !options.uses_modes && coupled.is_none() { sets } else { 0 }
             ],
             scheme: Scheme::default(),
             step: 0.0,

@@ -31,12 +31,6 @@ pub fn most_moved(sizes: impl Iterator<Item = f64>) -> usize {
     most.0
 }
 
-impl Excitation {
-    fn acts_on(&self, mode: usize) -> bool {
-        self.mode.is_none_or(|own| own == mode)
-    }
-}
-
 /// (cos, sin)(2πks/N).
 fn wave(order: u64, sector: usize, sectors: usize) -> [f64; 2] {
     let turn = order * sector as u64 % sectors as u64;
@@ -88,7 +82,7 @@ impl ModalExcitation {
         let row = self.excitation.row.unwrap_or_else(most);
         self.load.fill(0.0);
         for (mode, load) in self.load.chunks_exact_mut(self.parts).take(shapes.ncols()).enumerate() {
-            if self.excitation.acts_on(mode) {
+            if self.excitation.mode.is_none_or(|own| own == mode) {
                 load.copy_from_slice(&parts_of(&shapes[(row, mode)])[..self.parts]);
             }
         }

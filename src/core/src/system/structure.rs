@@ -115,7 +115,7 @@ impl Structure {
     /// Creates a structure that carries surfaces, whose control points the rows of `model` move; `loads`: with loads in addition
     /// to contact forces.
     pub(crate) fn carrying(model: &ModalModel, loads: bool) -> Self {
-        let options = BankOptions { loads, flexibility: false, ..BankOptions::default() };
+        let options = BankOptions { loads, uses_modes: true, ..BankOptions::default() };
         let modes = ModalBank::new(SectorModel::Uncoupled(model, 1), options);
         let rows = modes.rows() * modes.lanes();
         Self {

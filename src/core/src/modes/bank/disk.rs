@@ -53,7 +53,7 @@ impl DiskState {
 #[derive(Debug, Clone)]
 pub struct Disk {
     instruction_set: InstructionSet,
-    model: CyclicModel,
+    pub(super) model: CyclicModel,
     fourier: Fourier,
     rows: usize,
     /// Largest number of modes of a nodal diameter.
@@ -75,8 +75,8 @@ pub struct Disk {
     /// Requested forces: (sector, node, force).
     asked: Vec<(usize, usize, Vector3)>,
     /// Spectrum and contact nodes of the requested forces.
-    asked_force: Vec<Complexes>,
-    asked_nodes: Vec<bool>,
+    pub(super) asked_force: Vec<Complexes>,
+    pub(super) asked_nodes: Vec<bool>,
     /// Displacements caused by the requested forces (m), `[row][lane of sector]`.
     pub(crate) moved: Vec<f64>,
 }
@@ -125,10 +125,6 @@ impl Disk {
     /// Returns the modes of the disk.
     pub fn model(&self) -> &CyclicModel {
         &self.model
-    }
-
-    pub(super) fn set_damping_ratio(&mut self, damping_ratio: f64, own: &[f64]) {
-        self.model.set_damping_ratio(damping_ratio, own);
     }
 
     /// Computes the flexibility from the coefficients of all modes, `[n][mode]`.
@@ -215,11 +211,6 @@ impl Disk {
         self.gather(
             all.map(|(sector, node)| (sector, node, strided_vector3(forces, 3 * node * lanes + sector, lanes))),
         );
-    }
-
-    /// Modal force (re, im) of the collected forces on one mode.
-    pub(super) fn gathered_force(&self, mode: usize, n: usize) -> [f64; 2] {
-        self.modal_force(mode, n, &self.asked_nodes, &self.asked_force)
     }
 
     /// Modal force (re, im) of a spectrum of contact forces on one mode.

@@ -78,7 +78,7 @@ impl ModalBank {
     pub(super) fn act_expanded(&mut self) {
         let Some(heat) = self.heat.take() else { return };
         for (sector, excess) in heat.excess.iter().enumerate().filter(|(_, excess)| **excess != 0.0) {
-            self.act_on_modes(sector, &heat.now, *excess);
+            self.act_on_modes(sector, &heat.now, |k, load| k.load_compliance() * load * excess);
         }
         self.heat = Some(heat);
     }
