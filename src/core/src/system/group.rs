@@ -265,7 +265,7 @@ impl ContactGroup {
             let block =
                 DelassusBlock { members: &self.members[side.span.clone()], rows, columns, per, first: side.span.start };
             let structure = &bodies.structures[side.structure];
-            fill(matrix, structure.modes(), structure.nodes(), &block);
+            fill(matrix, structure.modes(), &block);
         }
         if !self.reactions.is_empty() {
             self.add_reactions(bodies, per);
