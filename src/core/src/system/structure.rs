@@ -95,21 +95,7 @@ impl Structure {
         pair_of: Vec<Option<usize>>,
         has_places: bool,
     ) -> Self {
-        let modes = ModalBank::new(model, options);
-        let contacts = pair_of.len() * modes.lanes();
-        let rows = modes.rows() * modes.lanes();
-        Self {
-            history: ContactHistory::new(Geometry::new(contacts, has_places), contacts, rows),
-            pulling: Pulling::new(pair_of.len()),
-            lowest: vec![f64::INFINITY; modes.lanes()],
-            delayed: Vec::new(),
-            step_control: StepControl::new(modes.sectors(), contacts),
-            lowest_in_span: Vec::new(),
-            needed_minima: NeededMinima::default(),
-            pair_of,
-            lanes: modes.lanes(),
-            modes,
-        }
+        Self::new(ModalBank::new(model, options), pair_of, has_places, Vec::new())
     }
 
     /// Creates a structure that carries surfaces, whose control points the rows of `model` move; `loads`: with loads in addition
@@ -117,16 +103,21 @@ impl Structure {
     pub(crate) fn carrying(model: &ModalModel, loads: bool) -> Self {
         let options = BankOptions { loads, uses_modes: true, ..BankOptions::default() };
         let modes = ModalBank::new(SectorModel::Uncoupled(model, 1), options);
-        let rows = modes.rows() * modes.lanes();
+        Self::new(modes, Vec::new(), false, vec![0.0; model.len()])
+    }
+
+    fn new(modes: ModalBank, pair_of: Vec<Option<usize>>, has_places: bool, delayed: Vec<f64>) -> Self {
+        let (contacts, rows) = (pair_of.len() * modes.lanes(), modes.rows() * modes.lanes());
+        let touches = !pair_of.is_empty();
         Self {
-            history: ContactHistory::new(Geometry::new(0, false), 0, rows),
-            pair_of: Vec::new(),
-            pulling: Pulling::default(),
-            lowest: Vec::new(),
-            delayed: vec![0.0; model.len()],
-            step_control: StepControl::default(),
+            history: ContactHistory::new(Geometry::new(contacts, has_places), contacts, rows),
+            pulling: Pulling::new(pair_of.len()),
+            lowest: vec![f64::INFINITY; if touches { modes.lanes() } else { 0 }],
+            delayed,
+            step_control: StepControl::new(if touches { modes.sectors() } else { 0 }, contacts),
             lowest_in_span: Vec::new(),
             needed_minima: NeededMinima::default(),
+            pair_of,
             lanes: modes.lanes(),
             modes,
         }
