@@ -32,7 +32,7 @@ const SOFTENING: f64 = 1e-10;
 /// Softened contacts whose remainder exceeds this fraction of the largest gap are not closed.
 const PINCHED: f64 = 1e-6;
 /// Golden ratio: the fractional parts of its multiples are evenly distributed.
-const GOLDEN: f64 = 1.618_033_988_749_895;
+pub(super) const GOLDEN: f64 = 1.618_033_988_749_895;
 
 /// Regularisation of contacts; allocates only when created.
 #[derive(Debug, Clone)]

@@ -5,6 +5,7 @@
 
 use super::surface_spline::{ClosestPoint, Projection, SurfaceSpline};
 use super::{Gap, Geometry, Vector3};
+use crate::math::real;
 use crate::math::vector::{length, vector3_at};
 use crate::scene::ranges::SMALL;
 
@@ -22,26 +23,19 @@ pub struct OpenSurface {
     pub surface: SurfaceSpline,
     /// Undeformed control points (m).
     undeformed: Vec<Vector3>,
-    /// Control points in use.
-    control: Vec<Vector3>,
 }
 
 impl OpenSurface {
     /// Creates the undeformed surface.
     pub fn new(surface: SurfaceSpline) -> Self {
-        let undeformed = surface.control_points().to_vec();
-        Self { surface, control: undeformed.clone(), undeformed }
+        Self { undeformed: surface.control_points().to_vec(), surface }
     }
 
     /// Displaces the control points by `moved` (m, three per control point; empty for a rigid surface).
     pub(super) fn follow(&mut self, moved: &[f64]) {
-        if moved.is_empty() {
-            return;
+        if !moved.is_empty() {
+            self.surface.place_control_points(|index| self.undeformed[index] + vector3_at(moved, index));
         }
-        for (index, (point, undeformed)) in self.control.iter_mut().zip(&self.undeformed).enumerate() {
-            *point = undeformed + vector3_at(moved, index);
-        }
-        self.surface.set_control_points(&self.control);
     }
 
     /// Longest side of the bounding box of its undeformed control points (m).
@@ -133,8 +127,7 @@ impl OpenGap {
     /// mean.
     pub(crate) fn is_distorted(&self, displacement: &[f64]) -> bool {
         let (moved, _) = displacement.as_chunks::<3>();
-        #[expect(clippy::cast_precision_loss, reason = "node counts are far below 2^52")]
-        let share = 1.0 / moved.len() as f64;
+        let share = 1.0 / real(moved.len());
         (0..3).any(|i| {
             let mean = share * moved.iter().map(|moved| moved[i]).sum::<f64>();
             moved.iter().any(|moved| (moved[i] - mean).abs() > self.largest)

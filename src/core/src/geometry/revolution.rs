@@ -147,9 +147,7 @@ impl RevolutionGap {
 
     /// See [`super::GapLaw::is_clear`].
     pub(super) fn is_clear(&self, at: At<'_>, turned: f64, reach: Vector3) -> bool {
-        let (node, drive) = (at.node, at.drive);
-        let seen = self.layout.angles[at.index] - drive.shape_rotation;
-        let (from, to) = (seen + drive.rotor_angle.min(turned), seen + drive.rotor_angle.max(turned));
+        let (node, drive, [from, to]) = (at.node, at.drive, self.swept(at, turned));
         let around = reach[1] * self.layout.per_radius[node];
         let shape = self.surface.least_between(from - around, to + around);
         let clearance = self.layout.clearances[at.index % self.layout.lanes] + drive.gap_offset + drive.radius_change;
@@ -158,11 +156,15 @@ impl RevolutionGap {
         !self.shaft_moves && drive.shape_factor >= 0.0 && left > 0.0
     }
 
+    /// Angles of an undisplaced node from the origin of the shape (rad), the smaller first, before and after the rotor turns to `turned` (rad).
+    fn swept(&self, at: At<'_>, turned: f64) -> [f64; 2] {
+        let (seen, angle) = (self.layout.angles[at.index] - at.drive.shape_rotation, at.drive.rotor_angle);
+        [seen + angle.min(turned), seen + angle.max(turned)]
+    }
+
     /// See [`super::GapLaw::approach`].
     pub(super) fn approach(&self, at: At<'_>, turned: f64, reach: Vector3) -> f64 {
-        let (node, drive) = (at.node, at.drive);
-        let seen = self.layout.angles[at.index] - drive.shape_rotation;
-        let (from, to) = (seen + drive.rotor_angle.min(turned), seen + drive.rotor_angle.max(turned));
+        let (node, drive, [from, to]) = (at.node, at.drive, self.swept(at, turned));
         let around = reach[1] * self.layout.per_radius[node];
         let ends = self.surface.evaluate(from).0.min(self.surface.evaluate(to).0);
         let dip = drive.shape_factor * (ends - self.surface.lowest_between(from - around, to + around));

@@ -29,6 +29,7 @@ mod projection;
 pub use patch::{Evaluation, Weights};
 pub use projection::Projection;
 
+use crate::math::real;
 use crate::math::vector::Vector3;
 use crate::scene::settings::{Closure, Interpolation};
 use crate::{Error, Result};
@@ -235,7 +236,13 @@ impl SurfaceSpline {
     /// # Panics
     /// Wrong number of points.
     pub fn set_control_points(&mut self, control: &[Vector3]) {
-        self.control.copy_from_slice(control);
+        assert_eq!(control.len(), self.control.len(), "one control point per data point");
+        self.place_control_points(|index| control[index]);
+    }
+
+    /// Places every control point by its index (m).
+    pub(super) fn place_control_points(&mut self, place: impl Fn(usize) -> Vector3) {
+        self.control.iter_mut().enumerate().for_each(|(index, point)| *point = place(index));
         self.fill_mesh();
     }
 
@@ -352,9 +359,4 @@ fn split(value: f64, count: usize) -> (usize, f64) {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 ≤ value ≤ count")]
     let whole = (value as usize).min(count - 1);
     (whole, value - real(whole))
-}
-
-#[expect(clippy::cast_precision_loss, reason = "grids are far smaller than 2^52")]
-fn real(count: usize) -> f64 {
-    count as f64
 }

@@ -35,7 +35,7 @@ pub(crate) fn both<T>(of: impl Fn(usize) -> T) -> [T; 2] {
 }
 
 /// Adding and subtracting this rounds to the nearest integer (1.5·2⁵²).
-const ROUNDER: f64 = 6_755_399_441_055_744.0;
+pub(crate) const ROUNDER: f64 = 6_755_399_441_055_744.0;
 
 /// Eight numbers in registers. A mask has bit `i` set where number `i` is selected.
 pub(crate) trait Octet:
@@ -90,8 +90,6 @@ pub(crate) trait Octet:
     /// Cody-Waite reduction x = k ln 2 + r with |r| ≤ ½ ln 2, Taylor polynomial of degree 13 in two parts, scaling by exponent bits.
     #[inline(always)]
     fn exp_of_negative(self) -> Self {
-        const LN2_HIGH: f64 = 0.693_147_180_369_123_8;
-        const LN2_LOW: f64 = 1.908_214_929_270_587_7e-10;
         let x = self.max(Self::splat(-700.0));
         let shifted = x * Self::splat(std::f64::consts::LOG2_E) + Self::splat(ROUNDER);
         let k = shifted - Self::splat(ROUNDER);
@@ -106,8 +104,12 @@ pub(crate) trait Octet:
     }
 }
 
+/// ln 2 in two parts, the first of which has few digits.
+pub(crate) const LN2_HIGH: f64 = 0.693_147_180_369_123_8;
+pub(crate) const LN2_LOW: f64 = 1.908_214_929_270_587_7e-10;
+
 /// 1/n!.
-const INVERSE_FACTORIALS: [f64; 14] = [
+pub(crate) const INVERSE_FACTORIALS: [f64; 14] = [
     1.0,
     1.0,
     0.5,

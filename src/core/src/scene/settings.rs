@@ -13,6 +13,7 @@ use std::sync::Arc;
 use tiprub_cosim::warning::Topic;
 
 use crate::Rom;
+use crate::math::real;
 use crate::scene::method::Solver;
 pub use blades::{ExcitationSettings, ForceDirection, InitialSettings};
 pub use coating::{CoatingSettings, CuttingSettings};
@@ -187,9 +188,7 @@ impl ContactSettings {
         if self.gap != 0.0 || self.sector_gaps.is_empty() {
             return self.gap;
         }
-        #[expect(clippy::cast_precision_loss, reason = "at most as many as sectors")]
-        let count = self.sector_gaps.len() as f64;
-        self.sector_gaps.iter().sum::<f64>() / count
+        self.sector_gaps.iter().sum::<f64>() / real(self.sector_gaps.len())
     }
 }
 

@@ -119,7 +119,7 @@ impl WatchedPair {
         let at = At { node: point, index: point * lanes + sector, drive };
         let moved = Vector3::new(moved[0] + outwards, moved[1] / longer, moved[2]);
         match &mut self.law {
-            GapLaw::Spline(law) => law.gap_of_one(at, moved),
+            GapLaw::Spline(law) => law.gap_to_current(at, moved).distance,
             law => law.gap(at, moved, None).distance,
         }
     }

@@ -12,9 +12,10 @@ mod linear;
 
 use nalgebra::DMatrix;
 
-use super::{Branch, CellContact, RodMaterial, number};
+use super::{Branch, CellContact, RodMaterial};
 use crate::contact::active_set::SolverOutcome;
-use crate::contact::proximal::{ROUNDS, Yielding};
+use crate::contact::proximal::{GOLDEN, ROUNDS, Yielding};
+use crate::math::real;
 
 /// Depths and forces within this fraction of their scale count as zero.
 const ZERO_FRACTION: f64 = 1e-12;
@@ -22,8 +23,6 @@ const ZERO_FRACTION: f64 = 1e-12;
 const ROUNDING: f64 = 1e-15;
 /// Block exchanges allowed without progress before the path is followed.
 const PATIENCE: usize = 8;
-/// Golden ratio: the fractional parts of its multiples are evenly distributed.
-const GOLDEN: f64 = 1.618_033_988_749_895;
 
 /// One step of the path.
 #[derive(Debug, Clone, Copy)]
@@ -194,7 +193,7 @@ impl CoatedProblem {
         self.reached[1][..self.size].fill(0.0);
         for node in 0..self.size {
             // Different for every node, so that rods do not close at the same point of the path.
-            let apart = 1.0 + (GOLDEN * number(node + 1)).fract();
+            let apart = 1.0 + (GOLDEN * real(node + 1)).fract();
             self.reached[0][node] = self.gaps[node].max(0.0) + apart * self.thickness;
         }
         let limit = 100 + 20 * (self.size + 2 * self.contacts.len());
