@@ -10,7 +10,7 @@ mod grid;
 mod support;
 mod watched;
 
-use nalgebra::DMatrix;
+use nalgebra::{ComplexField, DMatrix};
 use tiprub_cosim::{ThermalPatch, bounds, shown};
 
 use crate::scene::ranges;
@@ -236,8 +236,8 @@ impl Rom {
                 bounds::within(&format!("ROM array `{name}`, node {}", index + 1), value, 0.0, most)?;
             }
         }
-        symmetric("mass", &self.mass, 1.0)?;
-        symmetric("stiffness", &self.stiffness, 1.0)?;
+        symmetric("mass", &self.mass, "symmetric", 1.0)?;
+        symmetric("stiffness", &self.stiffness, "symmetric", 1.0)?;
         if self.mass.clone().cholesky().is_none() {
             return refuse("ROM array `mass`", "not positive definite");
         }
@@ -296,13 +296,13 @@ impl Rom {
     fn validate_spin(&self) -> Result<()> {
         let Some(spin) = &self.extras.spin else { return Ok(()) };
         let order = self.order();
-        for (name, matrix, sign) in [
-            ("stiffness_speed2", &spin.stiffness_speed2, 1.0),
-            ("stiffness_speed4", &spin.stiffness_speed4, 1.0),
-            ("coriolis", &spin.coriolis, -1.0),
+        for (name, matrix, kind, sign) in [
+            ("stiffness_speed2", &spin.stiffness_speed2, "symmetric", 1.0),
+            ("stiffness_speed4", &spin.stiffness_speed4, "symmetric", 1.0),
+            ("coriolis", &spin.coriolis, "skew-symmetric", -1.0),
         ] {
             array(name, matrix, (order, order), bounds::MATRIX)?;
-            symmetric(name, matrix, sign)?;
+            symmetric(name, matrix, kind, sign)?;
         }
         let loads =
             [("centrifugal_load", &spin.centrifugal_load), ("centrifugal_load_speed4", &spin.centrifugal_load_speed4)];
@@ -349,30 +349,43 @@ fn refuse(what: impl ToString, problem: impl ToString) -> Result<()> {
 }
 
 /// Checks the shape of an array, and that its entries are finite, and small enough that squares do not overflow.
-fn array(name: &str, matrix: &DMatrix<f64>, expected: (usize, usize), most: f64) -> Result<()> {
+fn array<T: ComplexField<RealField = f64>>(
+    name: &str,
+    matrix: &DMatrix<T>,
+    expected: (usize, usize),
+    most: f64,
+) -> Result<()> {
     let what = format!("ROM array `{name}`");
     if matrix.shape() != expected {
         return refuse(what, format!("shape {:?} found, {expected:?} expected", matrix.shape()));
     }
-    let Some(index) = matrix.iter().position(|value| value.is_nan() || value.abs() > most) else { return Ok(()) };
-    let (row, column, value) = (index % matrix.nrows(), index / matrix.nrows(), matrix[index]);
-    refuse(
-        what,
-        if value.is_finite() {
-            format!("entry {} at ({row}, {column}) is outside ±{}", shown(value), shown(most))
-        } else {
-            format!("non-finite entry at ({row}, {column})")
-        },
-    )
+    let is_invalid = |value: &T| size(value).is_nan() || size(value) > most;
+    let Some(index) = matrix.iter().position(is_invalid) else { return Ok(()) };
+    let (row, column, value) = (index % matrix.nrows(), index / matrix.nrows(), size(&matrix[index]));
+    let problem = if value.is_finite() {
+        format!("entry of magnitude {} at ({row}, {column}) exceeds {}", shown(value), shown(most))
+    } else {
+        format!("non-finite entry at ({row}, {column})")
+    };
+    refuse(what, problem)
 }
 
-/// Checks that a matrix is symmetric (`sign` 1) or skew-symmetric (−1).
-fn symmetric(name: &str, matrix: &DMatrix<f64>, sign: f64) -> Result<()> {
-    let asymmetry = (matrix - matrix.transpose() * sign).amax();
-    if asymmetry <= 1e-8 * matrix.amax() {
+/// Checks that a matrix is Hermitian, or symmetric if it is real (`sign` 1), or skew-symmetric (−1).
+fn symmetric<T: ComplexField<RealField = f64>>(name: &str, matrix: &DMatrix<T>, kind: &str, sign: f64) -> Result<()> {
+    let (asymmetry, most) = (largest(&(matrix - matrix.adjoint() * T::from_real(sign))), largest(matrix));
+    if asymmetry <= 1e-8 * most {
         return Ok(());
     }
-    let kind = if sign > 0.0 { "symmetric" } else { "skew-symmetric" };
-    let problem = format!("not {kind}: deviation {asymmetry:.3e}, largest entry {:.3e}", matrix.amax());
+    let problem = format!("not {kind}: deviation {asymmetry:.3e}, largest entry {most:.3e}");
     refuse(format!("ROM array `{name}`"), problem)
+}
+
+/// Magnitude of an entry.
+fn size<T: ComplexField<RealField = f64>>(value: &T) -> f64 {
+    libm::hypot(value.clone().real(), value.clone().imaginary())
+}
+
+/// Largest magnitude of an entry.
+fn largest<T: ComplexField<RealField = f64>>(matrix: &DMatrix<T>) -> f64 {
+    matrix.iter().fold(0.0, |most: f64, value| most.max(size(value)))
 }
