@@ -258,16 +258,7 @@ impl GapLaw {
 
     /// Returns normals and closest points of the nodes of a structure with this pair only, with rows of `lanes` lanes.
     pub fn geometry(&self, lanes: usize) -> Geometry {
-        let mut geometry = Geometry::new(self.nodes() * lanes, self.spline().is_some());
-        self.prepare(lanes, &mut geometry);
-        geometry
-    }
-
-    /// Writes the constant values, with rows of `lanes` lanes.
-    pub fn prepare(&self, lanes: usize, geometry: &mut Geometry) {
-        if let Self::Fixed(law) = self {
-            law.prepare(lanes, geometry);
-        }
+        Geometry::new(self.nodes() * lanes, self.spline().is_some())
     }
 
     /// Returns the gap of one node displaced by `moved` (m, own directions) to the current surface. For open surfaces the search starts at
@@ -295,7 +286,7 @@ impl GapLaw {
     ) {
         let guess = before.map(|before| &before.places[..]);
         match self {
-            Self::Fixed(law) => law.evaluate(displacement, gap),
+            Self::Fixed(law) => law.evaluate(displacement, geometry, gap),
             Self::Revolution(law) => law.evaluate(drive, displacement, geometry, gap),
             Self::Spline(law) => law.evaluate(drive, displacement, moved, guess, geometry, gap),
             Self::Open(law) => law.evaluate(displacement, moved, guess, geometry, gap),

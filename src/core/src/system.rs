@@ -163,7 +163,7 @@ impl System {
         let groups: Vec<ContactGroup> = of_sets.into_iter().enumerate().filter_map(group).collect();
         let contacts = structures.iter().map(|structure| structure.gaps().len()).sum();
         let room = || Vec::with_capacity(contacts);
-        let mut system = Self {
+        Self {
             groups,
             settings,
             events: Two { now: room(), before: room() },
@@ -172,14 +172,7 @@ impl System {
             sets,
             structures,
             pairs,
-        };
-        for pair in &system.pairs {
-            let structure = &mut system.structures[pair.structure()];
-            let lanes = structure.modes().lanes();
-            pair.gap().prepare(lanes, &mut structure.history.geometry.now);
-            pair.gap().prepare(lanes, &mut structure.history.geometry.before);
         }
-        system
     }
 
     /// The structures.
@@ -239,11 +232,6 @@ impl System {
         self.structures.iter().flat_map(Structure::gaps)
     }
 
-    /// Time-stepping scheme.
-    pub fn scheme(&self) -> Scheme {
-        self.settings.scheme
-    }
-
     /// Length of the internal step (s).
     pub fn step_size(&self) -> f64 {
         self.structures[0].modes().step()
@@ -257,11 +245,6 @@ impl System {
     /// Returns the work of adaptive steps, summed over all sectors.
     pub fn effort(&self) -> &Effort {
         &self.counted.effort
-    }
-
-    /// Number of accepted steps, summed over all sectors for adaptive steps.
-    pub fn steps_taken(&self) -> u64 {
-        self.counted.effort.steps
     }
 
     /// Number of attempted steps, including accepted ones.

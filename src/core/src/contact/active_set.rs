@@ -65,7 +65,8 @@ impl SolverOutcome {
 /// `size` entries (the leading block of the matrix).
 #[derive(Debug, Clone)]
 pub struct ContactSolver {
-    size: usize,
+    /// Number of nodes of the current problem.
+    pub(super) size: usize,
     /// Delassus matrix (m/N), filled by the caller.
     pub delassus: DMatrix<f64>,
     /// True if the symmetric part of the matrix is positive semidefinite, as without friction: a solution is found whenever there is one.
@@ -118,11 +119,6 @@ impl ContactSolver {
         }
     }
 
-    /// Number of nodes of the current problem.
-    pub fn size(&self) -> usize {
-        self.size
-    }
-
     /// Sets the number of nodes of the next problems. Does not allocate.
     ///
     /// # Panics
@@ -149,7 +145,7 @@ impl ContactSolver {
     /// Solves the complementarity problem on all nodes; `active` is the initial guess and contains the resulting set on return.
     pub fn lcp(&mut self) -> SolverOutcome {
         let scale = self.gaps[..self.size].iter().fold(0.0, |largest: f64, gap| largest.max(gap.abs()));
-        self.yielding.begin();
+        self.yielding.softened = false;
         let mut outcome = self.exchange(scale);
         if !outcome.solved {
             let driven = self.drive_all(scale, drive_limit(self.size));

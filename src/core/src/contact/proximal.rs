@@ -56,11 +56,6 @@ impl Yielding {
         Self { predicted: zeros(), own: zeros(), centre: zeros(), share: 0.0, softened: false }
     }
 
-    /// Begins a problem with a new matrix.
-    pub fn begin(&mut self) {
-        self.softened = false;
-    }
-
     /// Makes each of the first `size` contacts yield slightly by itself.
     pub fn soften(&mut self, matrix: &mut DMatrix<f64>, size: usize) {
         self.softened = true;

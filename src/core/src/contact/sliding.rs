@@ -84,10 +84,10 @@ impl<R: SlidingRule> ContactLaw for SlidingLaw<R> {
     }
 
     fn multipliers(&self) -> &[f64] {
-        &self.0.multipliers[..self.0.size()]
+        &self.0.multipliers[..self.0.size]
     }
 
     fn gaps(&self) -> &[f64] {
-        &self.0.gaps[..self.0.size()]
+        &self.0.gaps[..self.0.size]
     }
 }

@@ -152,10 +152,10 @@ impl SurfaceSpline {
             Interpolation::Spline => {
                 let ring = match ends {
                     Ends::Smooth => InterpolationRow::closed(around),
-                    Ends::Meeting => InterpolationRow::free_ends_meeting(around),
-                    Ends::Open => InterpolationRow::free_ends(around),
+                    Ends::Meeting => InterpolationRow::free_ends(around, 0),
+                    Ends::Open => InterpolationRow::free_ends(around, around - 1),
                 };
-                [ring, InterpolationRow::free_ends(along)]
+                [ring, InterpolationRow::free_ends(along, along - 1)]
             }
         };
         let mut surface = Self {

@@ -31,7 +31,9 @@ impl System {
                 self.mechanical[set] = self.mechanical_energy(set);
             }
             self.find_lasting(old, step);
-            self.structures.iter_mut().for_each(|structure| structure.carry_over(scheme, step));
+            self.structures
+                .iter_mut()
+                .for_each(|structure| structure.modes.resample(scheme, step, &structure.history.passing.lasting));
             // The gap of the previous step is extrapolated along its own slope, not along the motion of the modes.
             self.counted.witnessed = self.counted.steps + 2;
             let ratio = step / old;
@@ -57,7 +59,7 @@ impl System {
     /// Sets the step size `step` (s) without conversion of the state, before the first step.
     pub(crate) fn set_first_step(&mut self, step: f64) {
         let scheme = self.settings.scheme;
-        self.structures.iter_mut().for_each(|structure| structure.set_step(scheme, step));
+        self.structures.iter_mut().for_each(|structure| structure.modes.set_step(scheme, step));
     }
 
     /// Instantaneous kinetic and strain energy of all structures (J), ½q̇ᵀMq̇ and ½qᵀKq, between steps only. `each` is called
@@ -67,7 +69,10 @@ impl System {
         self.find_lasting(step, step);
         let Self { sets, structures, .. } = self;
         sum_of((0..sets.count()).map(|set| {
-            let own = sum_of(sets.members(set).iter().map(|member| structures[*member].energies_now()));
+            let own = sum_of(sets.members(set).iter().map(|member| {
+                let Structure { modes, history, .. } = &mut structures[*member];
+                modes.energies_now(&history.passing.lasting)
+            }));
             each(set, own);
             own
         }))
@@ -228,7 +233,7 @@ impl System {
         step.restore(reader);
         for structure in &mut self.structures {
             if step > 0.0 {
-                structure.set_step(self.settings.scheme, step);
+                structure.modes.set_step(self.settings.scheme, step);
             }
             structure.restore(reader);
         }

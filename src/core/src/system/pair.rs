@@ -9,7 +9,7 @@ use crate::geometry::frame::PolarFrame;
 use crate::geometry::surface_spline::ClosestPoint;
 use crate::geometry::wrench::MotionIncrement;
 use crate::geometry::{GapLaw, PrescribedMotion};
-use crate::system::history::Two;
+use crate::system::history::{ContactHistory, Two};
 
 /// The structure that carries the surface of a pair.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -141,16 +141,19 @@ impl ContactPair {
     /// Finds the gaps of the nodes at the current displacements. The search for closest points begins at `start`.
     pub(crate) fn find_gaps(&mut self, structures: &mut [Structure], start: SearchStart) {
         let Self { parts: PairParts { structure, gap, carrier, .. }, prescribed, .. } = self;
-        let drive = &prescribed.drive.now;
-        let Some(SurfaceCarrier { structure: carrier, first_row }) = carrier else {
-            return structures[*structure].find_gaps(gap, drive, &[], start);
-        };
         let points = gap.spline().map_or(0, |surface| surface.control_points().len());
-        let Ok([structure, carrier]) = structures.get_disjoint_mut([*structure, *carrier]) else {
-            unreachable!("a structure does not carry the surface that it touches")
+        let (structure, moved) = match carrier {
+            None => (&mut structures[*structure], &[][..]),
+            Some(SurfaceCarrier { structure: carrier, first_row }) => {
+                let Ok([structure, carrier]) = structures.get_disjoint_mut([*structure, *carrier]) else {
+                    unreachable!("a structure does not carry the surface that it touches")
+                };
+                (structure, &carrier.modes.displacement()[*first_row..][..3 * points])
+            }
         };
-        let moved = &carrier.modes().displacement()[*first_row..][..3 * points];
-        structure.find_gaps(gap, drive, moved, start);
+        let ContactHistory { gap: gaps, geometry: Two { now, before }, .. } = &mut structure.history;
+        let before = (start == SearchStart::PreviousStep).then_some(&*before);
+        gap.evaluate(&prescribed.drive.now, structure.modes.displacement(), moved, before, now, &mut gaps.now);
     }
 }
 

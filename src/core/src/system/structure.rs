@@ -3,13 +3,12 @@
 use tiprub_cosim::persist::{Persist, StateReader, StateWriter};
 use tiprub_cosim::persist_fields;
 
-use crate::geometry::{GapLaw, Geometry, PrescribedMotion, Vector3};
+use crate::geometry::{Geometry, Vector3};
 use crate::math::vector::{set_strided_vector3, strided_vector3, vector3_at};
 use crate::modes::bank::{BankOptions, LANES, ModalBank, SectorModel};
 use crate::modes::modal::ModalModel;
 use crate::scene::method::Scheme;
 use crate::system::history::ContactHistory;
-use crate::system::pair::SearchStart;
 use crate::system::pulling::Pulling;
 
 /// Penetrations below this count as zero (m): the squares of the resulting values leave the range of double precision, and such
@@ -266,14 +265,6 @@ impl Structure {
         }
     }
 
-    /// Finds the gaps of the nodes of a pair whose surface has moved.
-    #[inline(always)]
-    pub(crate) fn find_gaps(&mut self, gap: &mut GapLaw, drive: &PrescribedMotion, moved: &[f64], start: SearchStart) {
-        let ContactHistory { gap: gaps, geometry, .. } = &mut self.history;
-        let before = (start == SearchStart::PreviousStep).then_some(&geometry.before);
-        gap.evaluate(drive, self.modes.displacement(), moved, before, &mut geometry.now, &mut gaps.now);
-    }
-
     /// Sets the contact force on a node to zero.
     pub(crate) fn forget_force(&mut self, node: usize, sector: usize) {
         let (index, lanes) = (self.index(node, sector), self.lanes);
@@ -305,21 +296,6 @@ impl Structure {
             start += chunk.len();
         }
         None
-    }
-
-    /// Sets the step size (s), at rest or without conversion of the state.
-    pub(crate) fn set_step(&mut self, scheme: Scheme, step: f64) {
-        self.modes.set_step(scheme, step);
-    }
-
-    /// Converts the state to another step size under the persistent contact forces.
-    pub(crate) fn carry_over(&mut self, scheme: Scheme, step: f64) {
-        self.modes.resample(scheme, step, &self.history.passing.lasting);
-    }
-
-    /// Instantaneous kinetic and strain energy under the persistent contact forces (J).
-    pub(crate) fn energies_now(&mut self) -> (f64, f64) {
-        self.modes.energies_now(&self.history.passing.lasting)
     }
 
     /// Largest displacement of a control point (m).

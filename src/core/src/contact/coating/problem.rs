@@ -34,12 +34,13 @@ enum PathStep {
 /// The contact problem of one group of blades on a coating; allocates only when created.
 ///
 /// Per group: [`clear`](Self::clear), [`Coating::locate`](super::Coating::locate) for each blade, fill `delassus`, `gaps`
-/// and (as a guess) `closed` of the first [`size`](Self::size) nodes, then [`solve`](Self::solve).
+/// and (as a guess) `closed` of its nodes, then [`solve`](Self::solve).
 #[derive(Debug, Clone)]
 pub struct CoatedProblem {
     rod: RodMaterial,
     thickness: f64,
-    size: usize,
+    /// Number of nodes of the group.
+    pub(super) size: usize,
     /// Normal gap of node i per multiplier of node j (m/N), friction included; capacity × capacity, the leading
     /// `size` × `size` part in use.
     pub delassus: DMatrix<f64>,
@@ -105,11 +106,6 @@ impl CoatedProblem {
         self.closed.fill(false);
     }
 
-    /// Number of nodes of the group.
-    pub fn size(&self) -> usize {
-        self.size
-    }
-
     /// Adds the nodes of another blade; returns its first node.
     pub(super) fn append_nodes(&mut self, nodes: usize) -> usize {
         let first = self.size;
@@ -151,7 +147,7 @@ impl CoatedProblem {
         for node in 0..self.size {
             self.closed[node] |= self.gaps[node] < -self.thickness;
         }
-        self.yielding.begin();
+        self.yielding.softened = false;
         self.factorisations = 0;
     }
 

@@ -354,7 +354,7 @@ fn coupled_blades_contact_their_own_cells() {
         for blade in blades {
             coating.locate(&mut problem, &[TAU / 4.0 * real(blade) + 0.2; 2]);
         }
-        assert_eq!(problem.size(), 4);
+        assert_eq!(problem.size, 4);
         for (place, blade) in blades.iter().enumerate() {
             for end in 0..2 {
                 problem.gaps[2 * place + end] = gaps[2 * blade + end];
