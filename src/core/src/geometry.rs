@@ -180,7 +180,7 @@ impl GapLaw {
         match self {
             Self::Fixed(_) | Self::Revolution(_) => None,
             Self::Spline(law) => Some(&law.surface),
-            Self::Open(law) => Some(&law.surface.surface),
+            Self::Open(law) => Some(&law.surface),
         }
     }
 
@@ -256,11 +256,6 @@ impl GapLaw {
         }
     }
 
-    /// Returns normals and closest points of the nodes of a structure with this pair only, with rows of `lanes` lanes.
-    pub fn geometry(&self, lanes: usize) -> Geometry {
-        Geometry::new(self.nodes() * lanes, self.spline().is_some())
-    }
-
     /// Returns the gap of one node displaced by `moved` (m, own directions) to the current surface. For open surfaces the search starts at
     /// `guess`, if there is one.
     pub fn gap(&mut self, at: At<'_>, moved: Vector3, guess: Option<ClosestPoint>) -> Gap {
@@ -298,7 +293,7 @@ impl GapLaw {
         match self {
             Self::Fixed(_) | Self::Revolution(_) => {}
             Self::Spline(law) => law.follow(factor, moved),
-            Self::Open(law) => law.surface.follow(moved),
+            Self::Open(law) => law.follow(moved),
         }
     }
 

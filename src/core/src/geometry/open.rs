@@ -16,19 +16,33 @@ const CLEARANCE: f64 = 1e-2;
 /// the surface may be curved, and of the largest small displacement.
 const BEHIND_EDGE: [f64; 2] = [1e-3, 1e-6];
 
-/// A surface through the contact grid of a structure, in fixed directions.
+/// Contact nodes described in fixed directions, facing a surface.
 #[derive(Debug, Clone, PartialEq)]
-pub struct OpenSurface {
-    /// The current surface.
+pub struct OpenGap {
+    /// Undeformed positions of the contact nodes of the structure (m).
+    pub(crate) positions: Vec<Vector3>,
+    /// Contact nodes that can touch the surface.
+    pub(crate) nodes: Vec<usize>,
+    /// The current surface through the contact grid of a structure, in fixed directions.
     pub surface: SurfaceSpline,
     /// Undeformed control points (m).
     undeformed: Vec<Vector3>,
+    /// Largest displacement and penetration that count as small (m): a tenth of the smallest extent of the contact nodes and of their
+    /// surfaces.
+    pub largest: f64,
 }
 
-impl OpenSurface {
-    /// Creates the undeformed surface.
-    pub fn new(surface: SurfaceSpline) -> Self {
-        Self { undeformed: surface.control_points().to_vec(), surface }
+impl OpenGap {
+    /// Creates the gap function of `nodes` of the contact nodes at `positions` (m).
+    pub fn new(positions: Vec<Vector3>, nodes: Vec<usize>, surface: SurfaceSpline) -> Self {
+        let undeformed = surface.control_points().to_vec();
+        let smallest = extent(&undeformed).min(extent(&positions));
+        Self { positions, nodes, surface, undeformed, largest: SMALL * smallest }
+    }
+
+    /// Takes into account another pair of the same structure, with the undeformed `surface`.
+    pub fn beside(self, surface: &SurfaceSpline) -> Self {
+        Self { largest: self.largest.min(SMALL * extent(surface.control_points())), ..self }
     }
 
     /// Displaces the control points by `moved` (m, three per control point; empty for a rigid surface).
@@ -38,41 +52,9 @@ impl OpenSurface {
         }
     }
 
-    /// Longest side of the bounding box of its undeformed control points (m).
-    pub fn extent(&self) -> f64 {
-        extent(&self.undeformed)
-    }
-}
-
-/// Contact nodes described in fixed directions, facing a surface.
-#[derive(Debug, Clone, PartialEq)]
-pub struct OpenGap {
-    /// Undeformed positions of the contact nodes of the structure (m).
-    pub(crate) positions: Vec<Vector3>,
-    /// Contact nodes that can touch the surface.
-    pub(crate) nodes: Vec<usize>,
-    /// The surface.
-    pub surface: OpenSurface,
-    /// Largest displacement and penetration that count as small (m): a tenth of the smallest extent of the contact nodes and of their
-    /// surfaces.
-    pub largest: f64,
-}
-
-impl OpenGap {
-    /// Creates the gap function of `nodes` of the contact nodes at `positions` (m).
-    pub fn new(positions: Vec<Vector3>, nodes: Vec<usize>, surface: OpenSurface) -> Self {
-        let smallest = surface.extent().min(extent(&positions));
-        Self { positions, nodes, surface, largest: SMALL * smallest }
-    }
-
-    /// Takes into account another pair of the same structure, whose surface has this extent (m).
-    pub fn beside(self, extent: f64) -> Self {
-        Self { largest: self.largest.min(SMALL * extent), ..self }
-    }
-
     /// Returns the point of the surface at a closest point (m).
     pub fn contact_point(&self, place: ClosestPoint) -> Vector3 {
-        self.surface.surface.evaluate(place).point
+        self.surface.evaluate(place).point
     }
 
     /// Computes gaps (m), normals and closest points of the nodes for the displacements of the contact rows (m), for a surface whose
@@ -86,7 +68,7 @@ impl OpenGap {
         geometry: &mut Geometry,
         gap: &mut [f64],
     ) {
-        self.surface.follow(moved);
+        self.follow(moved);
         for &node in &self.nodes {
             let found = self.gap(node, vector3_at(displacement, node), guess.map(|places| places[node]));
             (gap[node], geometry.places[node]) = (found.distance, found.foot);
@@ -97,7 +79,7 @@ impl OpenGap {
     /// Returns the gap of one node displaced by `moved` (m) to the current surface. The caller detects a NaN gap: the model no longer
     /// describes such a state.
     pub(super) fn gap(&self, node: usize, moved: Vector3, guess: Option<ClosestPoint>) -> Gap {
-        let surface = &self.surface.surface;
+        let surface = &self.surface;
         let point = self.positions[node] + moved;
         let start = guess.unwrap_or_else(|| surface.locate(point));
         let mut found = surface.project(point, start);

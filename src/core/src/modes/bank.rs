@@ -127,7 +127,7 @@ pub struct ModalBank {
     pub(crate) instruction_set: InstructionSet,
     /// Modes of one sector; of coupled sectors, those of nodal diameter 0.
     model: ModalModel,
-    options: BankOptions,
+    pub(crate) options: BankOptions,
     sectors: usize,
     /// Number of groups: sectors or nodal diameters.
     groups: usize,
@@ -145,7 +145,7 @@ pub struct ModalBank {
     /// `[row][mode]`.
     contact_rows: Vec<f64>,
     /// Number of sets of coefficients: one for all sectors, or one per sector with mistuning or per nodal diameter.
-    sets: usize,
+    pub(crate) sets: usize,
     /// Coefficients, `[set][mode]`; the default for modes that a group does not have.
     coefficients: Vec<ModeCoefficients>,
     /// Velocity coefficients, `[set][mode]`; quasi-static modes have none.
@@ -306,11 +306,6 @@ impl ModalBank {
     /// Step size of the current coefficients (s).
     pub fn step(&self) -> f64 {
         self.step
-    }
-
-    /// Number of sets of coefficients: one for all sectors, or one per sector with mistuning or per nodal diameter.
-    pub(crate) fn sets(&self) -> usize {
-        self.sets
     }
 
     /// Index of the set of coefficients of a group.

@@ -131,7 +131,7 @@ impl ContactPrediction for ContactView<'_> {
         self.structure.history.geometry.now.normal_at(self.member.index)
     }
     fn parameters(&self) -> &ContactParameters {
-        self.pair.parameters()
+        &self.pair.parts.parameters
     }
     fn slip(&self) -> Vector3 {
         let rigid = self.pair.gap().rigid_velocity(self.at(), self.displacement());

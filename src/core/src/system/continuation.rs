@@ -248,15 +248,14 @@ impl System {
         self.events.now.clear();
         for (number, structure) in self.structures.iter().enumerate() {
             for sector in 0..structure.modes().sectors() {
-                for (node, pair) in structure.pair_of.iter().enumerate() {
-                    let (Some(pair), index) = (*pair, structure.index(node, sector)) else { continue };
-                    let (history, normal) = (&structure.history, structure.history.multiplier[index]);
+                for at in structure.contacts(number, sector) {
+                    let (history, ContactMember { pair, node, index, .. }) = (&structure.history, at);
+                    let normal = history.multiplier[index];
                     if normal != 0.0 {
                         let force = structure.vector3(&history.force.now, node, sector);
                         let point = structure.vector3(&history.points, node, sector);
                         let of = &self.pairs[pair];
                         let wrench = of.gap().wrench(At { node, index, drive: of.drive_now() }, point, force);
-                        let at = ContactMember { structure: number, pair, node, sector, index };
                         let coating = history.coating_force[index];
                         self.events.now.push(ContactEvent::new(at, normal, force, coating, point, wrench));
                     }

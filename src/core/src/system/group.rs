@@ -132,11 +132,7 @@ impl ContactGroup {
         let (structure, mut next) = (self.sides[0].structure, 0);
         while let Some(sector) = bodies.structures[structure].touching_from(next) {
             self.members.clear();
-            let of = &bodies.structures[structure];
-            let nodes = of.pair_of.iter().enumerate();
-            let nodes = nodes.filter_map(|(node, pair)| pair.map(|pair| (node, pair)));
-            let member = |(node, pair)| ContactMember { structure, pair, node, sector, index: of.index(node, sector) };
-            self.members.extend(nodes.map(member));
+            self.members.extend(bodies.structures[structure].contacts(structure, sector));
             self.sides[0].span = 0..self.members.len();
             self.find_forces(bodies, found)?;
             self.apply(bodies, found);
@@ -199,12 +195,7 @@ impl ContactGroup {
             let (first, structure) = (self.members.len(), side.structure);
             let of = &bodies.structures[structure];
             for sector in 0..of.modes().sectors() {
-                for (node, pair) in of.pair_of.iter().enumerate() {
-                    let index = of.index(node, sector);
-                    if let (true, Some(pair)) = (side.chosen[index], *pair) {
-                        self.members.push(ContactMember { structure, pair, node, sector, index });
-                    }
-                }
+                self.members.extend(of.contacts(structure, sector).filter(|member| side.chosen[member.index]));
             }
             side.span = first..self.members.len();
         }
@@ -325,17 +316,13 @@ impl ContactGroup {
     fn respond_of_carriers(&mut self, bodies: &Bodies) {
         for side in &mut self.sides {
             let structure = &bodies.structures[side.structure];
-            let sectors = structure.modes().sectors();
-            for (node, pair) in structure.pair_of.iter().enumerate() {
-                let Some(pair) = pair.filter(|pair| bodies.pairs[*pair].carrier().is_some()) else { continue };
-                for sector in 0..sectors {
-                    let index = structure.index(node, sector);
-                    let at = ContactMember { structure: side.structure, pair, node, sector, index };
+            for sector in 0..structure.modes().sectors() {
+                for at in structure.contacts(side.structure, sector) {
                     let posed = bodies.pose(at);
                     let Some(spot) = posed.spot() else { continue };
                     let carrier = self.reactions.iter().find(|one| one.structure == spot.carrier.structure);
                     let moved = carrier.map_or(Vector3::zeros(), |reaction| reaction.responded(spot));
-                    side.response[index] -= structure.history.geometry.now.normal_at(index).dot(&moved);
+                    side.response[at.index] -= structure.history.geometry.now.normal_at(at.index).dot(&moved);
                 }
             }
         }

@@ -81,16 +81,6 @@ impl ContactPair {
         self.parts.carrier
     }
 
-    /// Parameters of the contact law.
-    pub fn parameters(&self) -> &ContactParameters {
-        &self.parts.parameters
-    }
-
-    /// The gap function, for evaluation.
-    pub(crate) fn gap_mut(&mut self) -> &mut GapLaw {
-        &mut self.parts.gap
-    }
-
     /// Prescribed motion at the last step.
     #[inline(always)]
     pub fn drive_now(&self) -> &PrescribedMotion {

@@ -8,6 +8,7 @@ use crate::math::vector::{set_strided_vector3, strided_vector3, vector3_at};
 use crate::modes::bank::{BankOptions, LANES, ModalBank, SectorModel};
 use crate::modes::modal::ModalModel;
 use crate::scene::method::Scheme;
+use crate::system::contact_view::ContactMember;
 use crate::system::history::ContactHistory;
 use crate::system::pulling::Pulling;
 
@@ -157,6 +158,12 @@ impl Structure {
     #[inline(always)]
     pub fn index(&self, node: usize, sector: usize) -> usize {
         node * self.lanes + sector
+    }
+
+    /// Contacts of a sector of this structure, which has the number `structure`.
+    pub(crate) fn contacts(&self, structure: usize, sector: usize) -> impl Iterator<Item = ContactMember> {
+        let pairs = self.pair_of.iter().enumerate().filter_map(|(node, pair)| Some((node, (*pair)?)));
+        pairs.map(move |(node, pair)| ContactMember { structure, pair, node, sector, index: self.index(node, sector) })
     }
 
     /// Gaps at the current step (m), `[node · lanes + lane]`; padding lanes are infinite.

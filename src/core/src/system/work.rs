@@ -223,23 +223,18 @@ impl System {
 
     fn enter_loads(&mut self) {
         for (set, ledger) in self.counted.ledgers.iter_mut().enumerate() {
-            let (mut work, mut excitation, mut stiffening) = (0.0, 0.0, 0.0);
+            let mut done = [0.0; 3];
             for member in self.sets.members(set) {
-                work += self.structures[*member].modes_mut().finish_loads();
-                excitation += self.structures[*member].modes_mut().finish_excitation();
-                stiffening += self.structures[*member].modes_mut().finish_stiffening();
+                let modes = self.structures[*member].modes_mut();
+                let (loads, excitation) = (modes.finish_loads(), modes.finish_excitation());
+                let own = [modes.finish_stiffening(), excitation, loads];
+                done.iter_mut().zip(own).for_each(|(sum, work)| *sum += work);
             }
-            if stiffening != 0.0 {
-                ledger.stiffening_work.add(stiffening);
-                ledger.turnover.add(stiffening.abs());
-            }
-            if excitation != 0.0 {
-                ledger.excitation_work.add(excitation);
-                ledger.turnover.add(excitation.abs());
-            }
-            if work != 0.0 {
-                ledger.load_work.add(work);
-                ledger.turnover.add(work.abs());
+            let Ledger { stiffening_work, excitation_work, load_work, turnover, .. } = ledger;
+            let sums = [stiffening_work, excitation_work, load_work].into_iter().zip(done);
+            for (sum, work) in sums.filter(|(_, work)| *work != 0.0) {
+                sum.add(work);
+                turnover.add(work.abs());
             }
         }
     }
@@ -276,7 +271,7 @@ impl System {
         };
         let work = force.work();
         let opposed = work.heat;
-        let cutting = pair.parameters().cutting;
+        let cutting = pair.parts.parameters.cutting;
         let cut = if cutting > 0.0 { opposed * share_cut(event, cutting) } else { 0.0 };
         let heat = opposed - cut;
         let turned = if self.settings.solver.sticks() { heat.min(0.0) } else { 0.0 };

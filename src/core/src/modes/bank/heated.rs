@@ -30,10 +30,6 @@ impl HeatLoads {
             now: vec![0.0; if factors.is_empty() { 0 } else { modes }],
         })
     }
-
-    pub(super) fn rest(&mut self) {
-        self.now.fill(0.0);
-    }
 }
 
 impl ModalBank {

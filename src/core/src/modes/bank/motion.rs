@@ -138,7 +138,7 @@ impl ModalBank {
             excitation.now.fill(0.0);
         }
         if let Some(heat) = &mut self.heat {
-            heat.rest();
+            heat.now.fill(0.0);
         }
         if let Some(disk) = &mut self.disk {
             disk.state.rest();

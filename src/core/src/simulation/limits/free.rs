@@ -192,7 +192,7 @@ fn seen_by(
     for (member, node) in met.nodes.iter().enumerate() {
         let pair = laws.iter().position(|law| law.nodes.contains(node));
         let Some((law, modes)) = pair.and_then(|pair| Some((&laws[pair], of(pair)?))) else { continue };
-        for (point, weight) in law.surface.surface.weights(met.geometry.places[*node]).iter() {
+        for (point, weight) in law.surface.weights(met.geometry.places[*node]).iter() {
             for component in 0..3 {
                 let row = modes.contact_modes.row(3 * point + component) * weight;
                 let mut target = contact_modes.row_mut(3 * member + component);
