@@ -20,12 +20,12 @@ use nalgebra::DMatrix;
 use super::proximal::{ROUNDS, Yielding};
 use crate::math::simd::InstructionSet;
 
-/// Pivots below this fraction of the diagonal entry of their node belong to redundant contacts (coincident nodes).
-const REDUNDANT_PIVOT: f64 = 1e-12;
+/// Pivots below this fraction of the diagonal entry of their node, or of their column, belong to redundant contacts (coincident nodes).
+pub(super) const REDUNDANT_PIVOT: f64 = 1e-12;
 /// Gaps and multipliers within this fraction of their scale count as zero.
 const ZERO_FRACTION: f64 = 1e-13;
-/// Block exchanges allowed without progress before Murty's rule takes over.
-const PATIENCE: usize = 8;
+/// Block exchanges allowed without progress before a method that is certain to end takes over.
+pub(super) const PATIENCE: usize = 8;
 
 /// Largest problem on which the least-index rule may try every active set.
 const ENUMERABLE: usize = 14;

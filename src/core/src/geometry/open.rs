@@ -57,9 +57,7 @@ impl OpenGap {
         self.surface.evaluate(place).point
     }
 
-    /// Computes gaps (m), normals and closest points of the nodes for the displacements of the contact rows (m), for a surface whose
-    /// control points are displaced by `moved` (m; empty for a rigid surface). The search starts from `guess`, or from the nearest data
-    /// point.
+    /// See [`super::GapLaw::evaluate`]; without a `guess` the search starts from the nearest data point.
     pub fn evaluate(
         &mut self,
         displacement: &[f64],

@@ -24,7 +24,7 @@ use crate::{Result, Rom};
 /// Contact nodes of equally spaced sectors facing a surface of revolution.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RevolutionGap {
-    pub(super) surface: CompiledShape,
+    pub(crate) surface: CompiledShape,
     instruction_set: InstructionSet,
     /// Positions of the contact nodes of the structure.
     pub layout: Layout,
@@ -66,11 +66,6 @@ impl RevolutionGap {
     /// Restricts the gap function to these contact nodes of the structure.
     pub fn of_nodes(self, nodes: Vec<usize>) -> Self {
         Self { nodes, ..self }
-    }
-
-    /// Shape of the surface, and positions of the nodes.
-    pub(crate) fn faced(&self) -> (&CompiledShape, &Layout) {
-        (&self.surface, &self.layout)
     }
 
     /// Replaces the contact nodes by points at other places, with the slopes of the surface there.

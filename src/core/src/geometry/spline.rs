@@ -84,9 +84,8 @@ impl SplineGap {
         });
     }
 
-    /// Computes gaps (m), normals and closest points of all nodes, for the displacements of the contact rows (m) and of the control points.
-    /// `guess` contains the closest points of the previous step; with `None` the search starts from the angle. Nodes out of reach have no
-    /// surface to touch and are reported by [`SplineGap::out_of_reach`].
+    /// See [`super::GapLaw::evaluate`]; without a `guess` the search starts from the angle. Nodes out of reach have no surface to touch and
+    /// are reported by [`SplineGap::out_of_reach`].
     pub fn evaluate(
         &mut self,
         drive: &PrescribedMotion,

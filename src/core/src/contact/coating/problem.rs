@@ -13,7 +13,7 @@ mod linear;
 use nalgebra::DMatrix;
 
 use super::{Branch, CellContact, RodMaterial};
-use crate::contact::active_set::SolverOutcome;
+use crate::contact::active_set::{PATIENCE, SolverOutcome};
 use crate::contact::proximal::{GOLDEN, ROUNDS, Yielding};
 use crate::math::real;
 
@@ -21,8 +21,6 @@ use crate::math::real;
 const ZERO_FRACTION: f64 = 1e-12;
 /// Rounding of a depth relative to the depths whose difference it is.
 const ROUNDING: f64 = 1e-15;
-/// Block exchanges allowed without progress before the path is followed.
-const PATIENCE: usize = 8;
 
 /// One step of the path.
 #[derive(Debug, Clone, Copy)]

@@ -24,7 +24,8 @@ pub(super) struct ScaledProblem {
     pub(super) size: usize,
     /// Ŵ by columns, 3·size rows.
     matrix: Vec<f64>,
-    free: Vec<f64>,
+    /// Predicted relative displacements û.
+    pub(super) free: Vec<f64>,
     pub(super) friction: Vec<f64>,
     unit: Vec<f64>,
     /// r̂.
@@ -129,11 +130,6 @@ impl ScaledProblem {
     /// Ŵ(row, column).
     pub(super) fn entry(&self, row: usize, column: usize) -> f64 {
         self.matrix[column * self.order() + row]
-    }
-
-    /// Predicted relative displacement, entry k.
-    pub(super) fn predicted(&self, k: usize) -> f64 {
-        self.free[k]
     }
 
     /// Inverse stiffness of the normal and of the tangents in the residual: the diagonal of Ŵ.

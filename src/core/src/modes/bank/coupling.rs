@@ -95,7 +95,9 @@ impl Coupling {
         let heated = self.heated();
         // Modes without inertia, and those that the step does not resolve, keep the stiffness of the reference speed: ΔK is
         // explicit, and at ωh ≈ π even a small ΔK would make them grow. With heat they soften by `shares`.
-        self.coupled = dynamic.min(self.resolved(step, frequencies));
+        let largest = self.squares.iter().fold(0.0_f64, |most, square| most.max(*square));
+        let is_resolved = |frequency: &&f64| largest * **frequency * **frequency * step * step <= 4.0;
+        self.coupled = dynamic.min(frequencies.iter().take_while(is_resolved).count());
         let dynamic = self.coupled;
         if self.stiffening {
             let (square, reference) = (speed * speed, self.spin.reference_speed * self.spin.reference_speed);
@@ -254,12 +256,6 @@ impl Coupling {
             0.5 * position(row) * sum
         };
         self.squares[set] * (0..modes).map(row).sum::<f64>()
-    }
-
-    /// Number of modes, from the lowest, with ωh ≤ 2 in every sector.
-    fn resolved(&self, step: f64, frequencies: &[f64]) -> usize {
-        let largest = self.squares.iter().fold(0.0_f64, |most, square| most.max(*square));
-        frequencies.iter().take_while(|frequency| largest * *frequency * *frequency * step * step <= 4.0).count()
     }
 }
 

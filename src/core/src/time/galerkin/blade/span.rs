@@ -150,7 +150,7 @@ impl<'a> BladeInSpan<'a> {
         goal: StepGoal,
         state: &SectorState,
     ) -> Self {
-        let (_, layout) = place.gap.faced();
+        let layout = &place.gap.layout;
         let rows = &blade.kinds[place.kind].rows;
         blade.trial.read(rows, state, |node| layout.angles[node * layout.lanes + place.sector]);
         Self {
@@ -199,14 +199,14 @@ impl<'a> BladeInSpan<'a> {
 
 impl<'a> BladePlace<'a> {
     fn faced_surface(&self, drives: &[PointDrive; POINTS]) -> FacedSurface<'a> {
-        FacedSurface { surface: self.gap.faced().0, drives: *drives, friction: self.parameters.friction }
+        FacedSurface { surface: &self.gap.surface, drives: *drives, friction: self.parameters.friction }
     }
 }
 
 /// Prescribed motion of a sector at the fraction `theta` of a span, and the motion since the start of the span.
 fn drive_at(place: &BladePlace, theta: f64) -> (PointDrive, MotionIncrement) {
     let (drive, motion) = place.course.at(theta);
-    let (_, layout) = place.gap.faced();
+    let layout = &place.gap.layout;
     let point = PointDrive {
         turned: drive.rotor_angle - drive.shape_rotation,
         factor: drive.shape_factor,
