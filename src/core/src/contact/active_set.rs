@@ -262,14 +262,7 @@ impl ContactSolver {
 
     fn correct_gaps(&mut self) {
         let size = self.size;
-        if size < LARGE {
-            for row in 0..size {
-                let terms = self.members.iter().map(|column| self.delassus[(row, *column)] * self.multipliers[*column]);
-                self.corrected[row] = self.gaps[row] + terms.sum::<f64>();
-            }
-            return;
-        }
-        // The same sums with columns as the outer loop; they start from −0 like the sum of an iterator.
+        // Starts from −0 like the sum of an iterator.
         self.corrected[..size].fill(-0.0);
         for member in &self.members {
             let (multiplier, column) = (self.multipliers[*member], self.delassus.column(*member));

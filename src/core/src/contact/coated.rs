@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 
 use super::{ContactLaw, ContactPrediction, fill_sliding, fill_tangents};
 use crate::contact::active_set::SolverOutcome;
-use crate::contact::coating::{BladePassage, CoatedProblem, Coating};
+use crate::contact::coating::{CoatedProblem, Coating};
 use crate::math::vector::Vector3;
 
 /// A coating with its wear, and the contact problem of its blades. Groups are whole blades, whose nodes share cells.
@@ -116,8 +116,7 @@ impl ContactLaw for Coated {
                 continue;
             };
             let first = blade * nodes;
-            let passage = BladePassage { blade: contacts[first].sector, angles, slid: &slid[first..][..nodes] };
-            self.coating.locate_cut(&mut self.problem, passage);
+            self.coating.locate_cut(&mut self.problem, contacts[first].sector, angles, &slid[first..][..nodes]);
         }
         let (outcome, tangential) = (self.problem.solve(), self.coating.tangential_ratio());
         for contact in 0..self.size {

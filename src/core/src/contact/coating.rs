@@ -16,7 +16,6 @@ mod tip;
 
 use std::f64::consts::TAU;
 
-pub(crate) use cutting::BladePassage;
 use cutting::CoatingCut;
 use nalgebra::DMatrix;
 pub use problem::CoatedProblem;

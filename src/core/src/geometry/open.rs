@@ -48,7 +48,7 @@ impl OpenGap {
     /// Displaces the control points by `moved` (m, three per control point; empty for a rigid surface).
     pub(super) fn follow(&mut self, moved: &[f64]) {
         if !moved.is_empty() {
-            self.surface.place_control_points(|index| self.undeformed[index] + vector3_at(moved, index));
+            self.surface.set_control_points(|index| self.undeformed[index] + vector3_at(moved, index));
         }
     }
 

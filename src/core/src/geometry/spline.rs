@@ -78,7 +78,7 @@ impl SplineGap {
             return;
         }
         self.factor = factor;
-        self.surface.place_control_points(|index| {
+        self.surface.set_control_points(|index| {
             let shaped = self.shape.get(index).map_or(self.round[index], |shape| self.round[index] + factor * shape);
             if moved.is_empty() { shaped } else { shaped + vector3_at(moved, index) }
         });

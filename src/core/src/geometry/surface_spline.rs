@@ -230,19 +230,10 @@ impl SurfaceSpline {
         Ok(())
     }
 
-    /// Replaces the control points (m), for example by those of the undeformed surface plus a linear combination of interpolated mode
-    /// shapes.
-    ///
-    /// # Panics
-    /// Wrong number of points.
-    pub fn set_control_points(&mut self, control: &[Vector3]) {
-        assert_eq!(control.len(), self.control.len(), "one control point per data point");
-        self.place_control_points(|index| control[index]);
-    }
-
-    /// Places every control point by its index (m).
-    pub(super) fn place_control_points(&mut self, place: impl Fn(usize) -> Vector3) {
-        self.control.iter_mut().enumerate().for_each(|(index, point)| *point = place(index));
+    /// Replaces every control point (m) by a function of its index, for example by that of the undeformed surface plus a linear combination of
+    /// interpolated mode shapes.
+    pub fn set_control_points(&mut self, of: impl Fn(usize) -> Vector3) {
+        self.control.iter_mut().enumerate().for_each(|(index, point)| *point = of(index));
         self.fill_mesh();
     }
 
