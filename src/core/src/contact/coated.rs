@@ -13,7 +13,7 @@ use crate::math::vector::Vector3;
 #[derive(Debug, Clone)]
 pub(crate) struct Coated {
     coating: Coating,
-    problem: CoatedProblem,
+    problem: Box<CoatedProblem>,
     size: usize,
     /// Angles of the contacts on the casing (rad).
     angles: Vec<f64>,
@@ -45,7 +45,7 @@ struct CutContact {
 impl Coated {
     /// Allocates for `contacts` contacts, all of whole blades.
     pub fn new(coating: Coating, contacts: usize) -> Self {
-        let mut problem = coating.problem(contacts / coating.nodes());
+        let mut problem = Box::new(coating.problem(contacts / coating.nodes()));
         let cut = coating.is_cut().then(|| CutContacts {
             matrix: DMatrix::zeros(3 * contacts, 3 * contacts),
             contacts: vec![CutContact::default(); contacts],

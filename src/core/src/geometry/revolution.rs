@@ -24,6 +24,7 @@ use crate::{Result, Rom};
 /// Contact nodes of equally spaced sectors facing a surface of revolution.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RevolutionGap {
+    /// Shape of the surface.
     pub(crate) surface: CompiledShape,
     instruction_set: InstructionSet,
     /// Positions of the contact nodes of the structure.

@@ -234,23 +234,33 @@ pub(crate) mod wide {
     #[derive(Clone, Copy)]
     pub(crate) struct Avx2([__m256d; 2]);
 
+    /// Defines a method of one instruction, on one register or on each of two.
+    macro_rules! instruction {
+        (one $name:ident($($other:ident)?) $instruction:ident) => {
+            #[inline(always)]
+            fn $name(self $(, $other: Self)?) -> Self {
+                // SAFETY: see the module.
+                Self(unsafe { $instruction(self.0 $(, $other.0)?) })
+            }
+        };
+        (two $name:ident($($other:ident)?) $instruction:ident) => {
+            #[inline(always)]
+            fn $name(self $(, $other: Self)?) -> Self {
+                // SAFETY: see the module.
+                Self(both(|half| unsafe { $instruction(self.0[half] $(, $other.0[half])?) }))
+            }
+        };
+    }
+
     macro_rules! operator {
         ($name:ident, $call:ident, $long:ident, $short:ident) => {
             impl $name for Avx512 {
                 type Output = Self;
-                #[inline(always)]
-                fn $call(self, other: Self) -> Self {
-                    // SAFETY: see the module.
-                    Self(unsafe { $long(self.0, other.0) })
-                }
+                instruction!(one $call(other) $long);
             }
             impl $name for Avx2 {
                 type Output = Self;
-                #[inline(always)]
-                fn $call(self, other: Self) -> Self {
-                    // SAFETY: see the module.
-                    Self(both(|half| unsafe { $short(self.0[half], other.0[half]) }))
-                }
+                instruction!(two $call(other) $short);
             }
         };
     }
@@ -260,6 +270,10 @@ pub(crate) mod wide {
     operator!(Div, div, _mm512_div_pd, _mm256_div_pd);
 
     impl Octet for Avx512 {
+        instruction!(one abs() _mm512_abs_pd);
+        instruction!(one sqrt() _mm512_sqrt_pd);
+        instruction!(one max(other) _mm512_max_pd);
+        instruction!(one min(other) _mm512_min_pd);
         #[inline(always)]
         fn load(from: &Eight) -> Self {
             // SAFETY: see the module; `Eight` is aligned to 64 bytes.
@@ -274,26 +288,6 @@ pub(crate) mod wide {
         fn splat(value: f64) -> Self {
             // SAFETY: see the module.
             Self(unsafe { _mm512_set1_pd(value) })
-        }
-        #[inline(always)]
-        fn abs(self) -> Self {
-            // SAFETY: see the module.
-            Self(unsafe { _mm512_abs_pd(self.0) })
-        }
-        #[inline(always)]
-        fn sqrt(self) -> Self {
-            // SAFETY: see the module.
-            Self(unsafe { _mm512_sqrt_pd(self.0) })
-        }
-        #[inline(always)]
-        fn max(self, other: Self) -> Self {
-            // SAFETY: see the module.
-            Self(unsafe { _mm512_max_pd(self.0, other.0) })
-        }
-        #[inline(always)]
-        fn min(self, other: Self) -> Self {
-            // SAFETY: see the module.
-            Self(unsafe { _mm512_min_pd(self.0, other.0) })
         }
         #[inline(always)]
         fn less(self, other: Self) -> u8 {
@@ -331,6 +325,9 @@ pub(crate) mod wide {
     }
 
     impl Octet for Avx2 {
+        instruction!(two sqrt() _mm256_sqrt_pd);
+        instruction!(two max(other) _mm256_max_pd);
+        instruction!(two min(other) _mm256_min_pd);
         #[inline(always)]
         fn load(from: &Eight) -> Self {
             let (halves, _) = from.0.as_chunks::<4>();
@@ -356,21 +353,6 @@ pub(crate) mod wide {
             Self(both(|half| unsafe {
                 _mm256_and_pd(self.0[half], _mm256_castsi256_pd(_mm256_set1_epi64x(0x7fff_ffff_ffff_ffff)))
             }))
-        }
-        #[inline(always)]
-        fn sqrt(self) -> Self {
-            // SAFETY: see the module.
-            Self(both(|half| unsafe { _mm256_sqrt_pd(self.0[half]) }))
-        }
-        #[inline(always)]
-        fn max(self, other: Self) -> Self {
-            // SAFETY: see the module.
-            Self(both(|half| unsafe { _mm256_max_pd(self.0[half], other.0[half]) }))
-        }
-        #[inline(always)]
-        fn min(self, other: Self) -> Self {
-            // SAFETY: see the module.
-            Self(both(|half| unsafe { _mm256_min_pd(self.0[half], other.0[half]) }))
         }
         #[inline(always)]
         fn less(self, other: Self) -> u8 {
