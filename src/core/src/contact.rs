@@ -1,5 +1,5 @@
-//! Contact laws: the forces of one group of coupled contacts for given predicted gaps and Delassus matrix. Each law has a file here, a
-//! variant of `Law`, and, if an importer may choose it, a row of the enumeration of solvers.
+//! Contact laws: the forces of one group of coupled contacts for given predicted gaps and Delassus matrix. Each law has a variant of `Law`
+//! and, if an importer may choose it, a row of the enumeration of solvers.
 //!
 //! Each law owns its matrix, its unknowns and its state. The group fills in the Delassus matrix W = C_Nᵀ A⁻¹ C_NT along the directions of
 //! the law, poses the contacts one after the other, and calls the law's solver.
@@ -8,10 +8,7 @@ pub mod active_set;
 mod coated;
 pub mod coating;
 mod coulomb;
-mod cutting;
 pub mod de_saxce;
-mod film;
-mod lcp;
 mod proximal;
 mod sliding;
 
@@ -28,10 +25,7 @@ use crate::scene::method::Solver;
 use crate::scene::settings::ContactSettings;
 use coated::Coated;
 use coulomb::Coulomb;
-use cutting::CuttingLaw;
-use film::Film;
-use lcp::Lcp;
-use sliding::SlidingLaw;
+use sliding::{Film, Lcp, SlidingLaw};
 
 /// Parameters of the law of a contact pair.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -137,10 +131,8 @@ pub(crate) enum Law {
     Lcp(SlidingLaw<Lcp>),
     /// Complementarity with stick and slip.
     Coulomb(Coulomb),
-    /// Complementarity on an abradable coating that is pressed in.
+    /// Complementarity on an abradable coating.
     Coated(Coated),
-    /// Complementarity on an abradable coating that is cut.
-    Cutting(CuttingLaw),
 }
 
 /// Evaluates the same expression for every law.
@@ -151,7 +143,6 @@ macro_rules! each_law {
             Law::Lcp($law) => $call,
             Law::Coulomb($law) => $call,
             Law::Coated($law) => $call,
-            Law::Cutting($law) => $call,
         }
     };
 }
@@ -176,7 +167,6 @@ impl Law {
     /// Allocates for groups of up to `contacts` contacts; on a coating for whole blades.
     pub fn new(solver: Solver, coating: Option<Coating>, contacts: usize) -> Self {
         match (coating, solver) {
-            (Some(coating), _) if coating.is_cut() => Self::Cutting(CuttingLaw::new(coating, contacts)),
             (Some(coating), _) => Self::Coated(Coated::new(coating, contacts)),
             (None, Solver::Film) => Self::Film(SlidingLaw::new(contacts)),
             (None, Solver::Lcp) => Self::Lcp(SlidingLaw::new(contacts)),

@@ -160,7 +160,7 @@ impl GapLaw {
             Self::Fixed(law) => law.gaps.len(),
             Self::Revolution(law) => law.layout.nodes(),
             Self::Spline(law) => law.layout.nodes(),
-            Self::Open(law) => law.positions().len(),
+            Self::Open(law) => law.positions.len(),
         }
     }
 
@@ -170,7 +170,7 @@ impl GapLaw {
             Self::Fixed(law) => (0..law.gaps.len()).collect(),
             Self::Revolution(law) => law.nodes.clone(),
             Self::Spline(law) => law.nodes.clone(),
-            Self::Open(law) => law.nodes().to_vec(),
+            Self::Open(law) => law.nodes.clone(),
         }
     }
 
@@ -180,7 +180,7 @@ impl GapLaw {
         match self {
             Self::Fixed(_) | Self::Revolution(_) => None,
             Self::Spline(law) => Some(&law.surface),
-            Self::Open(law) => Some(&law.surface.surface),
+            Self::Open(law) => Some(&law.surface),
         }
     }
 
@@ -242,7 +242,7 @@ impl GapLaw {
             Self::Fixed(_) | Self::Revolution(_) => 0.0,
             Self::Spline(law) => largest(&mut law.layout.radii.iter().copied()),
             // Its displacements contain the whole flight.
-            Self::Open(law) => 8.0 * largest(&mut law.positions().iter().map(|place| length(*place))),
+            Self::Open(law) => 8.0 * largest(&mut law.positions.iter().map(|place| length(*place))),
         };
         64.0 * f64::EPSILON * far
     }
@@ -253,20 +253,6 @@ impl GapLaw {
             Self::Fixed(_) | Self::Open(_) => f64::INFINITY,
             Self::Revolution(law) => law.surface.angular_scale(),
             Self::Spline(law) => law.angular_scale,
-        }
-    }
-
-    /// Returns normals and closest points of the nodes of a structure with this pair only, with rows of `lanes` lanes.
-    pub fn geometry(&self, lanes: usize) -> Geometry {
-        let mut geometry = Geometry::new(self.nodes() * lanes, self.spline().is_some());
-        self.prepare(lanes, &mut geometry);
-        geometry
-    }
-
-    /// Writes the constant values, with rows of `lanes` lanes.
-    pub fn prepare(&self, lanes: usize, geometry: &mut Geometry) {
-        if let Self::Fixed(law) = self {
-            law.prepare(lanes, geometry);
         }
     }
 
@@ -295,7 +281,7 @@ impl GapLaw {
     ) {
         let guess = before.map(|before| &before.places[..]);
         match self {
-            Self::Fixed(law) => law.evaluate(displacement, gap),
+            Self::Fixed(law) => law.evaluate(displacement, geometry, gap),
             Self::Revolution(law) => law.evaluate(drive, displacement, geometry, gap),
             Self::Spline(law) => law.evaluate(drive, displacement, moved, guess, geometry, gap),
             Self::Open(law) => law.evaluate(displacement, moved, guess, geometry, gap),
@@ -307,7 +293,7 @@ impl GapLaw {
         match self {
             Self::Fixed(_) | Self::Revolution(_) => {}
             Self::Spline(law) => law.follow(factor, moved),
-            Self::Open(law) => law.surface.follow(moved),
+            Self::Open(law) => law.follow(moved),
         }
     }
 
@@ -346,7 +332,7 @@ impl GapLaw {
             Self::Fixed(law) => 1e-9 * law.gaps[node].abs(),
             Self::Revolution(RevolutionGap { layout, .. }) => CURVED * layout.radii[node],
             Self::Spline(law) => CURVED * law.layout.radii[node],
-            Self::Open(law) => CURVED * law.largest(),
+            Self::Open(law) => CURVED * law.largest,
         }
     }
 
@@ -359,7 +345,7 @@ impl GapLaw {
     /// surfaces; no limit for fixed obstacles.
     pub(crate) fn largest_displacement(&self) -> f64 {
         if let Self::Open(law) = self {
-            return law.largest();
+            return law.largest;
         }
         let radii = self.layout().map(|layout| layout.radii.iter());
         radii.map_or(f64::INFINITY, |radii| SMALL * radii.fold(f64::INFINITY, |low: f64, radius| low.min(*radius)))
@@ -372,7 +358,7 @@ impl GapLaw {
             Self::Fixed(_) => true,
             Self::Revolution(law) => gap > -SMALL * law.layout.radii[node] && normal[1].abs() <= -normal[0],
             Self::Spline(law) => gap > -SMALL * law.layout.radii[node] && faces_inwards(normal),
-            Self::Open(law) => gap > -law.largest(),
+            Self::Open(law) => gap > -law.largest,
         }
     }
 

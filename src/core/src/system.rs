@@ -4,11 +4,9 @@ pub(crate) mod carrier;
 pub(crate) mod contact_view;
 pub(crate) mod continuation;
 pub(crate) mod delassus;
-pub(crate) mod effort;
 pub(crate) mod event;
 pub(crate) mod failure;
 pub(crate) mod group;
-pub(crate) mod growth;
 pub(crate) mod history;
 pub(crate) mod ledger;
 pub(crate) mod losses;
@@ -29,17 +27,15 @@ use crate::modes::modal::ModalModel;
 use crate::scene::method::{Scheme, Solver};
 use crate::system::history::Two;
 pub(crate) use contact_view::Bodies;
-pub use effort::Effort;
 pub use event::ContactEvent;
 pub use failure::StepFailure;
 use group::Reach;
 pub(crate) use group::{ContactGroup, GroupSolution};
-pub(crate) use growth::ShapeGrowth;
 pub use ledger::Ledger;
 use losses::LargestLosses;
 pub use losses::Loss;
-pub(crate) use pair::SearchStart;
 pub use pair::{ContactPair, PairParts, SurfaceCarrier};
+pub(crate) use pair::{SearchStart, ShapeGrowth};
 pub use sets::StructureSets;
 pub(crate) use sets::joined;
 pub use small::Curved;
@@ -64,6 +60,34 @@ pub struct SystemSettings {
     pub solver: Solver,
     /// True if the damping loss is collected, without which the energy balance does not close.
     pub ledger: bool,
+}
+
+/// Counters of the work of time integration.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Effort {
+    /// Number of accepted steps.
+    pub steps: u64,
+    /// Number of steps without a trial, because no contact was possible.
+    pub flights: u64,
+    /// Number of trials, including accepted ones.
+    pub trials: u64,
+    /// Number of contact problems for which no solution was found.
+    pub unsolved: u64,
+    /// Number of trials with a constant force.
+    pub constant: u64,
+    /// Number of shortest steps that miss the tolerance.
+    pub missed: u64,
+    /// Number of factorised linear systems.
+    pub factorisations: u64,
+}
+
+persist_fields!(Effort { steps, flights, trials, unsolved, constant, missed, factorisations });
+
+impl Effort {
+    /// Number of attempted steps, with and without contact.
+    pub fn tried(&self) -> u64 {
+        self.trials + self.flights
+    }
 }
 
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -139,7 +163,7 @@ impl System {
         let groups: Vec<ContactGroup> = of_sets.into_iter().enumerate().filter_map(group).collect();
         let contacts = structures.iter().map(|structure| structure.gaps().len()).sum();
         let room = || Vec::with_capacity(contacts);
-        let mut system = Self {
+        Self {
             groups,
             settings,
             events: Two { now: room(), before: room() },
@@ -148,14 +172,7 @@ impl System {
             sets,
             structures,
             pairs,
-        };
-        for pair in &system.pairs {
-            let structure = &mut system.structures[pair.structure()];
-            let lanes = structure.modes().lanes();
-            pair.gap().prepare(lanes, &mut structure.history.geometry.now);
-            pair.gap().prepare(lanes, &mut structure.history.geometry.before);
         }
-        system
     }
 
     /// The structures.
@@ -176,13 +193,13 @@ impl System {
     /// The coating of a pair.
     pub fn coating(&self, pair: usize) -> Option<&Coating> {
         let structure = self.pairs[pair].structure();
-        self.groups.get(self.sets.of(structure))?.law().coating()
+        self.groups.get(self.sets.of(structure))?.law.coating()
     }
 
     /// Contacts whose forces acted over the last step and whose work was recorded for it: those of that step or, for schemes
     /// whose contact forces act later, those of the previous step.
     pub fn acted(&self) -> &[ContactEvent] {
-        if self.settings.scheme.properties().delays_contact { &self.events.before } else { &self.events.now }
+        self.events.at(self.when_acted())
     }
 
     /// Active contacts of the last step.
@@ -215,11 +232,6 @@ impl System {
         self.structures.iter().flat_map(Structure::gaps)
     }
 
-    /// Time-stepping scheme.
-    pub fn scheme(&self) -> Scheme {
-        self.settings.scheme
-    }
-
     /// Length of the internal step (s).
     pub fn step_size(&self) -> f64 {
         self.structures[0].modes().step()
@@ -233,11 +245,6 @@ impl System {
     /// Returns the work of adaptive steps, summed over all sectors.
     pub fn effort(&self) -> &Effort {
         &self.counted.effort
-    }
-
-    /// Number of accepted steps, summed over all sectors for adaptive steps.
-    pub fn steps_taken(&self) -> u64 {
-        self.counted.effort.steps
     }
 
     /// Number of attempted steps, including accepted ones.
@@ -301,7 +308,7 @@ impl System {
     pub(crate) fn retire_events(&mut self) {
         self.events.shift();
         self.events.now.clear();
-        if self.groups.iter().any(|group| group.law().starts_from_forces()) {
+        if self.groups.iter().any(|group| group.law.starts_from_forces()) {
             self.structures.iter_mut().for_each(|structure| structure.history.keep_forces());
         }
         for event in &self.events.before {
@@ -318,7 +325,7 @@ impl System {
     /// motion `drives`, one per pair.
     pub fn start(&mut self, drives: &[PrescribedMotion]) {
         self.structures.iter_mut().for_each(Structure::start);
-        self.groups.iter_mut().filter_map(|group| group.law_mut().coating_mut()).for_each(Coating::reset);
+        self.groups.iter_mut().filter_map(|group| group.law.coating_mut()).for_each(Coating::reset);
         self.events.now.clear();
         self.events.before.clear();
         self.pairs.iter_mut().zip(drives).for_each(|(pair, drive)| pair.start(drive));

@@ -87,7 +87,7 @@ pub fn run(scene: &Scene, schedule: &Schedule, given: RunInputs<'_>, progress: &
     warnings.extend(simulation.take_notes());
     let system = simulation.system();
     let effort = (system.settings().scheme.properties().adaptive).then(|| *system.effort());
-    Ok(NativeRun { recording, stepping, slowest, internal_steps: system.steps_taken(), effort, warnings })
+    Ok(NativeRun { recording, stepping, slowest, internal_steps: system.effort().steps, effort, warnings })
 }
 
 /// Returns the current values of all numeric outputs, in the order of the table.

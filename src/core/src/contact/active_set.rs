@@ -20,12 +20,12 @@ use nalgebra::DMatrix;
 use super::proximal::{ROUNDS, Yielding};
 use crate::math::simd::InstructionSet;
 
-/// Pivots below this fraction of the diagonal entry of their node belong to redundant contacts (coincident nodes).
-const REDUNDANT_PIVOT: f64 = 1e-12;
+/// Pivots below this fraction of the diagonal entry of their node, or of their column, belong to redundant contacts (coincident nodes).
+pub(super) const REDUNDANT_PIVOT: f64 = 1e-12;
 /// Gaps and multipliers within this fraction of their scale count as zero.
 const ZERO_FRACTION: f64 = 1e-13;
-/// Block exchanges allowed without progress before Murty's rule takes over.
-const PATIENCE: usize = 8;
+/// Block exchanges allowed without progress before a method that is certain to end takes over.
+pub(super) const PATIENCE: usize = 8;
 
 /// Largest problem on which the least-index rule may try every active set.
 const ENUMERABLE: usize = 14;
@@ -65,7 +65,8 @@ impl SolverOutcome {
 /// `size` entries (the leading block of the matrix).
 #[derive(Debug, Clone)]
 pub struct ContactSolver {
-    size: usize,
+    /// Number of nodes of the current problem.
+    pub(super) size: usize,
     /// Delassus matrix (m/N), filled by the caller.
     pub delassus: DMatrix<f64>,
     /// True if the symmetric part of the matrix is positive semidefinite, as without friction: a solution is found whenever there is one.
@@ -118,22 +119,13 @@ impl ContactSolver {
         }
     }
 
-    /// Number of nodes of the current problem.
-    pub fn size(&self) -> usize {
-        self.size
-    }
-
-    /// Largest number of nodes.
-    pub fn capacity(&self) -> usize {
-        self.gaps.len()
-    }
-
     /// Sets the number of nodes of the next problems. Does not allocate.
     ///
     /// # Panics
     /// If `size` exceeds the capacity.
     pub fn set_size(&mut self, size: usize) {
-        assert!(size <= self.capacity(), "{size} contact nodes exceed the solver capacity of {}", self.capacity());
+        let capacity = self.gaps.len();
+        assert!(size <= capacity, "{size} contact nodes exceed the solver capacity of {capacity}");
         self.size = size;
         self.multipliers[size..].fill(0.0);
         self.active[size..].fill(false);
@@ -153,7 +145,7 @@ impl ContactSolver {
     /// Solves the complementarity problem on all nodes; `active` is the initial guess and contains the resulting set on return.
     pub fn lcp(&mut self) -> SolverOutcome {
         let scale = self.gaps[..self.size].iter().fold(0.0, |largest: f64, gap| largest.max(gap.abs()));
-        self.yielding.begin();
+        self.yielding.softened = false;
         let mut outcome = self.exchange(scale);
         if !outcome.solved {
             let driven = self.drive_all(scale, drive_limit(self.size));
@@ -179,7 +171,7 @@ impl ContactSolver {
             let largest =
                 self.multipliers[..self.size].iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
             let (count, last) = self.count_infeasible(scale, largest);
-            if count == 0 && !self.yielding.is_softened() && self.redundant_contact_violated(scale) {
+            if count == 0 && !self.yielding.softened && self.redundant_contact_violated(scale) {
                 self.yielding.soften(&mut self.delassus, self.size);
                 (best, patience) = (usize::MAX, PATIENCE);
                 continue;
@@ -270,14 +262,7 @@ impl ContactSolver {
 
     fn correct_gaps(&mut self) {
         let size = self.size;
-        if size < LARGE {
-            for row in 0..size {
-                let terms = self.members.iter().map(|column| self.delassus[(row, *column)] * self.multipliers[*column]);
-                self.corrected[row] = self.gaps[row] + terms.sum::<f64>();
-            }
-            return;
-        }
-        // The same sums with columns as the outer loop; they start from −0 like the sum of an iterator.
+        // Starts from −0 like the sum of an iterator.
         self.corrected[..size].fill(-0.0);
         for member in &self.members {
             let (multiplier, column) = (self.multipliers[*member], self.delassus.column(*member));

@@ -16,7 +16,6 @@ mod tip;
 
 use std::f64::consts::TAU;
 
-pub(crate) use cutting::BladePassage;
 use cutting::CoatingCut;
 use nalgebra::DMatrix;
 pub use problem::CoatedProblem;
@@ -25,6 +24,7 @@ pub use tip::BladeTip;
 use tiprub_cosim::persist::{Persist, StateReader, StateWriter};
 use tiprub_cosim::shown;
 
+use crate::math::real;
 use crate::scene::settings::CoatingSettings;
 use crate::{Error, Result};
 
@@ -89,7 +89,8 @@ struct CellContact {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Coating {
     rod: RodMaterial,
-    thickness: f64,
+    /// Thickness h₀ (m).
+    pub(super) thickness: f64,
     around: usize,
     /// Contact nodes per blade.
     nodes: usize,
@@ -118,19 +119,19 @@ impl Coating {
                 "Give at least two cells per blade around the circumference and one along the axis",
             ));
         }
-        let width = (extent[1] - extent[0]) / number(along);
+        let width = (extent[1] - extent[0]) / real(along);
         let row = |index: usize| {
-            let centre = extent[0] + (number(index) + 0.5) * width;
+            let centre = extent[0] + (real(index) + 0.5) * width;
             let (nodes, weights) = neighbours(axial, &order, centre);
             let mean = |of: &[f64]| weights[0] * of[nodes[0]] + weights[1] * of[nodes[1]];
             let radius = mean(radii);
-            let arc = radius * TAU / number(around);
+            let arc = radius * TAU / real(around);
             let covers = if settings.cutting.is_some() { 0.0 } else { mean(widths) / arc };
             CellRow { nodes, weights, area: arc * width, axial: centre, radius, width, covers }
         };
         let rows: Vec<CellRow> = (0..along).map(row).collect();
         // The cells of a band are up to one cell wider than the band.
-        let pitch = number(around) / number(blades);
+        let pitch = real(around) / real(blades);
         if let Some(row) = rows.iter().find(|row| row.covers.is_nan() || row.covers + 1.0 > pitch) {
             return Err(Error::invalid(
                 "contact.coating.contact_width",
@@ -215,12 +216,12 @@ impl Coating {
 
     /// Width of a cell around the circumference (rad).
     fn width(&self) -> f64 {
-        TAU / number(self.around)
+        TAU / real(self.around)
     }
 
     /// Angle (rad, in the fixed frame) and axial position (m) of the centre of a cell.
     pub fn centre(&self, cell: usize) -> (f64, f64) {
-        let angle = (number(cell % self.around) + 0.5) * TAU / number(self.around);
+        let angle = (real(cell % self.around) + 0.5) * TAU / real(self.around);
         (angle, self.rows[cell / self.around].axial)
     }
 
@@ -256,7 +257,7 @@ impl Coating {
             return;
         }
         for (mean, plastic) in out.iter_mut().zip(self.plastic.chunks(self.around)) {
-            *mean = self.thickness * plastic.iter().sum::<f64>() / number(self.around);
+            *mean = self.thickness * plastic.iter().sum::<f64>() / real(self.around);
         }
     }
 
@@ -269,11 +270,6 @@ impl Coating {
     pub fn worn_volume(&self) -> f64 {
         let cells = self.rows.iter().zip(self.plastic.chunks(self.around));
         cells.map(|(row, plastic)| row.area * plastic.iter().sum::<f64>()).sum::<f64>() * self.thickness
-    }
-
-    /// Thickness h₀ (m).
-    pub fn thickness(&self) -> f64 {
-        self.thickness
     }
 
     /// Removes all wear.
@@ -342,11 +338,11 @@ fn neighbours(axial: &[f64], order: &[usize], position: f64) -> ([usize; 2], [f6
 /// 0 to 1). Both follow from one number, so that they agree at a border, where rounding decides.
 fn place(angle: f64, around: usize) -> (usize, f64) {
     let turns = angle / TAU;
-    let places = (turns - turns.floor()) * number(around);
+    let places = (turns - turns.floor()) * real(around);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 ≤ value ≤ cells around")]
     // The fraction of a tiny negative angle rounds to 1.
     let index = (places as usize).min(around - 1);
-    (index, places - number(index))
+    (index, places - real(index))
 }
 
 /// Calls `take` for the cells covered by a band of this width (in cells) with its middle at an angle (rad): with the place of each cell
@@ -369,11 +365,4 @@ fn covered(angle: f64, width: f64, around: usize, mut take: impl FnMut(usize, f6
         cell = if cell + 1 == around { 0 } else { cell + 1 };
         edge += 1.0;
     }
-}
-
-/// Converts a count to a factor.
-fn number(count: usize) -> f64 {
-    #[expect(clippy::cast_precision_loss, reason = "counts of cells are far below 2^52")]
-    let number = count as f64;
-    number
 }

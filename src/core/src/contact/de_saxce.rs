@@ -97,11 +97,6 @@ impl CoulombSolver {
         }
     }
 
-    /// Largest number of contacts.
-    pub fn capacity(&self) -> usize {
-        self.capacity
-    }
-
     /// Solves for the first `size` contacts. If all methods fail, or the input is not finite, `solved` is false and the reactions are
     /// finite and admissible, but not in equilibrium.
     ///
@@ -112,26 +107,20 @@ impl CoulombSolver {
         self.problem.size = size;
         self.newton.factorisations = 0;
         let order = 3 * size;
+        let mut run = SolverOutcome { residual: f64::INFINITY, ..SolverOutcome::direct(false, 0) };
         if !self.problem.load(&self.delassus, &self.free, &self.friction, &self.reactions) {
             self.reactions[..order].fill(0.0);
             self.relative[..order].copy_from_slice(&self.free[..order]);
-            return SolverOutcome { residual: f64::INFINITY, ..SolverOutcome::direct(false, 0) };
+            return run;
         }
-        let mut run = SolverProgress { sweeps: 0, residual: f64::INFINITY };
         self.iterate(&mut run);
         self.problem.store(&mut self.reactions, &mut self.relative);
         let factorisations = self.newton.factorisations;
-        SolverOutcome {
-            solved: run.residual <= TOLERANCE,
-            factorisations,
-            sweeps: run.sweeps,
-            residual: run.residual,
-            fallback: factorisations > 0,
-        }
+        SolverOutcome { solved: run.residual <= TOLERANCE, factorisations, fallback: factorisations > 0, ..run }
     }
 
     /// Alternates sweeps and Newton attempts; ends with the best reactions found.
-    fn iterate(&mut self, run: &mut SolverProgress) {
+    fn iterate(&mut self, run: &mut SolverOutcome) {
         self.problem.refresh();
         run.residual = self.problem.residual();
         if run.residual <= TOLERANCE {
@@ -197,7 +186,7 @@ impl CoulombSolver {
     }
 
     /// Sweeps until the problem is solved, or until Newton's method is likely to be cheaper.
-    fn sweep_round(&mut self, round: u32, run: &mut SolverProgress) {
+    fn sweep_round(&mut self, round: u32, run: &mut SolverOutcome) {
         let least = SWEEPS << round;
         let relaxation = RELAXATION[round as usize % RELAXATION.len()];
         let mut history = [f64::INFINITY; RATE_SPAN];
@@ -235,12 +224,6 @@ impl CoulombSolver {
         let sweep = active * self.problem.order() as f64 + 60.0 * active;
         EXPECTED_FACTORISATIONS * factorisation / sweep.max(1.0)
     }
-}
-
-/// Progress of one solve.
-struct SolverProgress {
-    sweeps: usize,
-    residual: f64,
 }
 
 #[cfg(test)]

@@ -32,7 +32,7 @@ const SOFTENING: f64 = 1e-10;
 /// Softened contacts whose remainder exceeds this fraction of the largest gap are not closed.
 const PINCHED: f64 = 1e-6;
 /// Golden ratio: the fractional parts of its multiples are evenly distributed.
-const GOLDEN: f64 = 1.618_033_988_749_895;
+pub(super) const GOLDEN: f64 = 1.618_033_988_749_895;
 
 /// Regularisation of contacts; allocates only when created.
 #[derive(Debug, Clone)]
@@ -46,7 +46,7 @@ pub(crate) struct Yielding {
     /// ε.
     share: f64,
     /// True if the diagonal of the matrix differs from D.
-    softened: bool,
+    pub(super) softened: bool,
 }
 
 impl Yielding {
@@ -54,16 +54,6 @@ impl Yielding {
     pub fn new(contacts: usize) -> Self {
         let zeros = || vec![0.0; contacts];
         Self { predicted: zeros(), own: zeros(), centre: zeros(), share: 0.0, softened: false }
-    }
-
-    /// Begins a problem with a new matrix.
-    pub fn begin(&mut self) {
-        self.softened = false;
-    }
-
-    /// Returns whether contacts have been softened.
-    pub(crate) fn is_softened(&self) -> bool {
-        self.softened
     }
 
     /// Makes each of the first `size` contacts yield slightly by itself.

@@ -24,6 +24,25 @@ pub(crate) trait SlidingRule {
     }
 }
 
+/// Forward-increment Lagrange multipliers (eqs 10-11 of the paper): equality on the nodes that penetrate in the prediction. Penetration is
+/// detected once; neither a negative λ nor a penetration caused elsewhere is checked again.
+#[derive(Debug, Clone)]
+pub(crate) struct Film;
+
+impl SlidingRule for Film {
+    const IS_ITERATIVE: bool = false;
+
+    fn solve(solver: &mut ContactSolver) -> SolverOutcome {
+        solver.film()
+    }
+}
+
+/// Signorini's law on all contacts of a group: 0 ≤ λ ⟂ g + Wλ ≥ 0.
+#[derive(Debug, Clone)]
+pub(crate) struct Lcp;
+
+impl SlidingRule for Lcp {}
+
 /// A law of sliding contacts, started from the closed contacts of the previous step.
 #[derive(Debug, Clone)]
 pub(crate) struct SlidingLaw<R>(ContactSolver, PhantomData<R>);
@@ -65,10 +84,10 @@ impl<R: SlidingRule> ContactLaw for SlidingLaw<R> {
     }
 
     fn multipliers(&self) -> &[f64] {
-        &self.0.multipliers[..self.0.size()]
+        &self.0.multipliers[..self.0.size]
     }
 
     fn gaps(&self) -> &[f64] {
-        &self.0.gaps[..self.0.size()]
+        &self.0.gaps[..self.0.size]
     }
 }

@@ -2,6 +2,7 @@
 
 use super::frame::PolarFrame;
 use super::{PrescribedMotion, Vector3};
+use crate::math::real;
 use crate::{Error, Result, Rom};
 
 /// Contact nodes of equally spaced sectors; arrays that differ by sector are `[node · lanes + lane]`.
@@ -104,7 +105,5 @@ impl Layout {
 
 /// Angle of sector `sector` of `sectors` (rad).
 pub(crate) fn sector_angle(sector: usize, sectors: usize) -> f64 {
-    #[expect(clippy::cast_precision_loss, reason = "sector counts are far below 2^52")]
-    let fraction = sector as f64 / sectors as f64;
-    std::f64::consts::TAU * fraction
+    std::f64::consts::TAU * (real(sector) / real(sectors))
 }

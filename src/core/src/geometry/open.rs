@@ -5,6 +5,7 @@
 
 use super::surface_spline::{ClosestPoint, Projection, SurfaceSpline};
 use super::{Gap, Geometry, Vector3};
+use crate::math::real;
 use crate::math::vector::{length, vector3_at};
 use crate::scene::ranges::SMALL;
 
@@ -15,90 +16,48 @@ const CLEARANCE: f64 = 1e-2;
 /// the surface may be curved, and of the largest small displacement.
 const BEHIND_EDGE: [f64; 2] = [1e-3, 1e-6];
 
-/// A surface through the contact grid of a structure, in fixed directions.
-#[derive(Debug, Clone, PartialEq)]
-pub struct OpenSurface {
-    /// The current surface.
-    pub surface: SurfaceSpline,
-    /// Undeformed control points (m).
-    undeformed: Vec<Vector3>,
-    /// Control points in use.
-    control: Vec<Vector3>,
-}
-
-impl OpenSurface {
-    /// Creates the undeformed surface.
-    pub fn new(surface: SurfaceSpline) -> Self {
-        let undeformed = surface.control_points().to_vec();
-        Self { surface, control: undeformed.clone(), undeformed }
-    }
-
-    /// Displaces the control points by `moved` (m, three per control point; empty for a rigid surface).
-    pub(super) fn follow(&mut self, moved: &[f64]) {
-        if moved.is_empty() {
-            return;
-        }
-        for (index, (point, undeformed)) in self.control.iter_mut().zip(&self.undeformed).enumerate() {
-            *point = undeformed + vector3_at(moved, index);
-        }
-        self.surface.set_control_points(&self.control);
-    }
-
-    /// Longest side of the bounding box of its undeformed control points (m).
-    pub fn extent(&self) -> f64 {
-        extent(&self.undeformed)
-    }
-}
-
 /// Contact nodes described in fixed directions, facing a surface.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OpenGap {
     /// Undeformed positions of the contact nodes of the structure (m).
-    positions: Vec<Vector3>,
+    pub(crate) positions: Vec<Vector3>,
     /// Contact nodes that can touch the surface.
-    nodes: Vec<usize>,
-    /// The surface.
-    pub surface: OpenSurface,
-    /// Largest displacement that counts as small (m).
-    largest: f64,
+    pub(crate) nodes: Vec<usize>,
+    /// The current surface through the contact grid of a structure, in fixed directions.
+    pub surface: SurfaceSpline,
+    /// Undeformed control points (m).
+    undeformed: Vec<Vector3>,
+    /// Largest displacement and penetration that count as small (m): a tenth of the smallest extent of the contact nodes and of their
+    /// surfaces.
+    pub largest: f64,
 }
 
 impl OpenGap {
     /// Creates the gap function of `nodes` of the contact nodes at `positions` (m).
-    pub fn new(positions: Vec<Vector3>, nodes: Vec<usize>, surface: OpenSurface) -> Self {
-        let smallest = surface.extent().min(extent(&positions));
-        Self { positions, nodes, surface, largest: SMALL * smallest }
+    pub fn new(positions: Vec<Vector3>, nodes: Vec<usize>, surface: SurfaceSpline) -> Self {
+        let undeformed = surface.control_points().to_vec();
+        let smallest = extent(&undeformed).min(extent(&positions));
+        Self { positions, nodes, surface, undeformed, largest: SMALL * smallest }
     }
 
-    /// Takes into account another pair of the same structure, whose surface has this extent (m).
-    pub fn beside(self, extent: f64) -> Self {
-        Self { largest: self.largest.min(SMALL * extent), ..self }
+    /// Takes into account another pair of the same structure, with the undeformed `surface`.
+    pub fn beside(self, surface: &SurfaceSpline) -> Self {
+        Self { largest: self.largest.min(SMALL * extent(surface.control_points())), ..self }
     }
 
-    /// Returns the contact nodes of the pair.
-    pub fn nodes(&self) -> &[usize] {
-        &self.nodes
-    }
-
-    /// Undeformed positions of the contact nodes of the structure (m).
-    pub fn positions(&self) -> &[Vector3] {
-        &self.positions
-    }
-
-    /// Largest displacement and penetration that count as small (m): a tenth of the smallest extent of the contact nodes and of their
-    /// surfaces.
-    pub fn largest(&self) -> f64 {
-        self.largest
+    /// Displaces the control points by `moved` (m, three per control point; empty for a rigid surface).
+    pub(super) fn follow(&mut self, moved: &[f64]) {
+        if !moved.is_empty() {
+            self.surface.set_control_points(|index| self.undeformed[index] + vector3_at(moved, index));
+        }
     }
 
     /// Returns the point of the surface at a closest point (m).
     pub fn contact_point(&self, place: ClosestPoint) -> Vector3 {
-        self.surface.surface.evaluate(place).point
+        self.surface.evaluate(place).point
     }
 
-    /// Computes gaps (m), normals and closest points of the nodes for the displacements of the contact rows (m), for a surface whose
-    /// control points are displaced by `moved` (m; empty for a rigid surface). The search starts from `guess`, or from the nearest data
-    /// point.
+    /// See [`super::GapLaw::evaluate`]; without a `guess` the search starts from the nearest data point.
     pub fn evaluate(
         &mut self,
         displacement: &[f64],
@@ -107,7 +66,7 @@ impl OpenGap {
         geometry: &mut Geometry,
         gap: &mut [f64],
     ) {
-        self.surface.follow(moved);
+        self.follow(moved);
         for &node in &self.nodes {
             let found = self.gap(node, vector3_at(displacement, node), guess.map(|places| places[node]));
             (gap[node], geometry.places[node]) = (found.distance, found.foot);
@@ -118,7 +77,7 @@ impl OpenGap {
     /// Returns the gap of one node displaced by `moved` (m) to the current surface. The caller detects a NaN gap: the model no longer
     /// describes such a state.
     pub(super) fn gap(&self, node: usize, moved: Vector3, guess: Option<ClosestPoint>) -> Gap {
-        let surface = &self.surface.surface;
+        let surface = &self.surface;
         let point = self.positions[node] + moved;
         let start = guess.unwrap_or_else(|| surface.locate(point));
         let mut found = surface.project(point, start);
@@ -148,8 +107,7 @@ impl OpenGap {
     /// mean.
     pub(crate) fn is_distorted(&self, displacement: &[f64]) -> bool {
         let (moved, _) = displacement.as_chunks::<3>();
-        #[expect(clippy::cast_precision_loss, reason = "node counts are far below 2^52")]
-        let share = 1.0 / moved.len() as f64;
+        let share = 1.0 / real(moved.len());
         (0..3).any(|i| {
             let mean = share * moved.iter().map(|moved| moved[i]).sum::<f64>();
             moved.iter().any(|moved| (moved[i] - mean).abs() > self.largest)

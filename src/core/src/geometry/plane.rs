@@ -22,17 +22,11 @@ impl FixedGap {
         Gap { distance: self.gaps[node] + normal.dot(&moved), normal, foot: ClosestPoint::default() }
     }
 
-    /// Computes gaps (m) for the displacements of the contact rows of one structure (m).
-    pub(super) fn evaluate(&self, displacement: &[f64], gap: &mut [f64]) {
+    /// Computes gaps (m) for the displacements of the contact rows of one structure (m), and writes the normals.
+    pub(super) fn evaluate(&self, displacement: &[f64], geometry: &mut Geometry, gap: &mut [f64]) {
         for (node, (normal, initial)) in self.normals.iter().zip(&self.gaps).enumerate() {
             gap[node] = initial + normal.dot(&vector3_at(displacement, node));
-        }
-    }
-
-    /// Writes the normals, with rows of `lanes` lanes.
-    pub(super) fn prepare(&self, lanes: usize, geometry: &mut Geometry) {
-        for (node, normal) in self.normals.iter().enumerate() {
-            geometry.set_normal(node * lanes, *normal);
+            geometry.set_normal(node, *normal);
         }
     }
 }

@@ -24,16 +24,17 @@ use crate::{Result, Rom};
 /// Contact nodes of equally spaced sectors facing a surface of revolution.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RevolutionGap {
-    pub(super) surface: CompiledShape,
+    /// Shape of the surface.
+    pub(crate) surface: CompiledShape,
     instruction_set: InstructionSet,
     /// Positions of the contact nodes of the structure.
     pub layout: Layout,
     /// Contact nodes that can touch the surface.
-    pub(super) nodes: Vec<usize>,
+    pub(crate) nodes: Vec<usize>,
     /// Meridional slope per contact node of the structure.
-    slopes: Vec<f64>,
+    pub(crate) slopes: Vec<f64>,
     /// True if the shaft centre moves.
-    shaft_moves: bool,
+    pub(crate) shaft_moves: bool,
     /// Scratch of one row if the shaft centre moves: the position of the node from the axis of the casing along its own directions (m).
     arms: [Vec<f64>; 2],
 }
@@ -66,26 +67,6 @@ impl RevolutionGap {
     /// Restricts the gap function to these contact nodes of the structure.
     pub fn of_nodes(self, nodes: Vec<usize>) -> Self {
         Self { nodes, ..self }
-    }
-
-    /// Contact nodes that can touch the surface.
-    pub fn members(&self) -> &[usize] {
-        &self.nodes
-    }
-
-    /// Shape of the surface, and positions of the nodes.
-    pub(crate) fn faced(&self) -> (&CompiledShape, &Layout) {
-        (&self.surface, &self.layout)
-    }
-
-    /// Returns whether the shaft centre moves.
-    pub(crate) fn is_shifted(&self) -> bool {
-        self.shaft_moves
-    }
-
-    /// Meridional slope of the surface per contact node of the structure.
-    pub fn slopes(&self) -> &[f64] {
-        &self.slopes
     }
 
     /// Replaces the contact nodes by points at other places, with the slopes of the surface there.
@@ -162,9 +143,7 @@ impl RevolutionGap {
 
     /// See [`super::GapLaw::is_clear`].
     pub(super) fn is_clear(&self, at: At<'_>, turned: f64, reach: Vector3) -> bool {
-        let (node, drive) = (at.node, at.drive);
-        let seen = self.layout.angles[at.index] - drive.shape_rotation;
-        let (from, to) = (seen + drive.rotor_angle.min(turned), seen + drive.rotor_angle.max(turned));
+        let (node, drive, [from, to]) = (at.node, at.drive, self.swept(at, turned));
         let around = reach[1] * self.layout.per_radius[node];
         let shape = self.surface.least_between(from - around, to + around);
         let clearance = self.layout.clearances[at.index % self.layout.lanes] + drive.gap_offset + drive.radius_change;
@@ -173,11 +152,15 @@ impl RevolutionGap {
         !self.shaft_moves && drive.shape_factor >= 0.0 && left > 0.0
     }
 
+    /// Angles of an undisplaced node from the origin of the shape (rad), the smaller first, before and after the rotor turns to `turned` (rad).
+    fn swept(&self, at: At<'_>, turned: f64) -> [f64; 2] {
+        let (seen, angle) = (self.layout.angles[at.index] - at.drive.shape_rotation, at.drive.rotor_angle);
+        [seen + angle.min(turned), seen + angle.max(turned)]
+    }
+
     /// See [`super::GapLaw::approach`].
     pub(super) fn approach(&self, at: At<'_>, turned: f64, reach: Vector3) -> f64 {
-        let (node, drive) = (at.node, at.drive);
-        let seen = self.layout.angles[at.index] - drive.shape_rotation;
-        let (from, to) = (seen + drive.rotor_angle.min(turned), seen + drive.rotor_angle.max(turned));
+        let (node, drive, [from, to]) = (at.node, at.drive, self.swept(at, turned));
         let around = reach[1] * self.layout.per_radius[node];
         let ends = self.surface.evaluate(from).0.min(self.surface.evaluate(to).0);
         let dip = drive.shape_factor * (ends - self.surface.lowest_between(from - around, to + around));

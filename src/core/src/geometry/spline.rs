@@ -35,8 +35,6 @@ pub struct SplineGap {
     pub shape_size: f64,
     /// Deviation of a ring through this number of points from a circle (m).
     pub ripple: f64,
-    /// Control points in use.
-    control: Vec<Vector3>,
     factor: f64,
     /// Revolutions of the rotor over the current step.
     pub turned: f64,
@@ -54,7 +52,6 @@ impl SplineGap {
         shape: Vec<Vector3>,
         angular_scale: f64,
     ) -> Self {
-        let round = surface.control_points().to_vec();
         let largest = shape.iter().fold(0.0, |most: f64, change| most.max(change.dot(change)));
         let radius = layout.radii.iter().fold(0.0, |most: f64, radius| most.max(*radius));
         Self {
@@ -65,9 +62,8 @@ impl SplineGap {
             first_node: 0,
             layout,
             nominal_clearance,
+            round: surface.control_points().to_vec(),
             surface,
-            control: round.clone(),
-            round,
             shape,
             angular_scale,
             factor: 0.0,
@@ -82,19 +78,14 @@ impl SplineGap {
             return;
         }
         self.factor = factor;
-        self.control.copy_from_slice(&self.round);
-        for (point, shape) in self.control.iter_mut().zip(&self.shape) {
-            *point += factor * shape;
-        }
-        for (index, point) in self.control.iter_mut().enumerate().take(moved.len() / 3) {
-            *point += vector3_at(moved, index);
-        }
-        self.surface.set_control_points(&self.control);
+        self.surface.set_control_points(|index| {
+            let shaped = self.shape.get(index).map_or(self.round[index], |shape| self.round[index] + factor * shape);
+            if moved.is_empty() { shaped } else { shaped + vector3_at(moved, index) }
+        });
     }
 
-    /// Computes gaps (m), normals and closest points of all nodes, for the displacements of the contact rows (m) and of the control points.
-    /// `guess` contains the closest points of the previous step; with `None` the search starts from the angle. Nodes out of reach have no
-    /// surface to touch and are reported by [`SplineGap::out_of_reach`].
+    /// See [`super::GapLaw::evaluate`]; without a `guess` the search starts from the angle. Nodes out of reach have no surface to touch and
+    /// are reported by [`SplineGap::out_of_reach`].
     pub fn evaluate(
         &mut self,
         drive: &PrescribedMotion,
@@ -147,18 +138,14 @@ impl SplineGap {
         Self { nodes: (0..layout.nodes()).collect(), layout, ..self }
     }
 
-    /// Gap (m) of one node displaced by `moved` (m) to the current surface; infinite beyond its edges.
-    pub(crate) fn gap_of_one(&self, at: At<'_>, moved: Vector3) -> f64 {
-        match self.project(at, moved, None).0 {
-            Projection::Found { gap, .. } => gap.distance,
-            Projection::BeyondEdge { .. } => NOTHING_TO_TOUCH,
-            Projection::Lost => f64::NAN,
-        }
-    }
-
     /// Returns the gap of one node displaced by `moved` (m); the surface is rigid.
     pub(super) fn gap(&mut self, at: At<'_>, moved: Vector3) -> Gap {
         self.follow(at.drive.shape_factor, &[]);
+        self.gap_to_current(at, moved)
+    }
+
+    /// Returns the gap of one node displaced by `moved` (m) to the current surface; infinite beyond its edges.
+    pub(crate) fn gap_to_current(&self, at: At<'_>, moved: Vector3) -> Gap {
         let inwards = Gap { normal: -Vector3::x(), ..Gap::NOTHING };
         match self.project(at, moved, None) {
             (Projection::Found { gap, .. }, frame) => Gap { normal: frame.local(gap.normal), ..gap },
@@ -249,18 +236,14 @@ pub(crate) fn faces_inwards(normal: Vector3) -> bool {
 
 impl Persist for ClosestPoint {
     fn save(&self, writer: &mut StateWriter) {
-        for part in self.patch {
-            u64::try_from(part).unwrap_or(u64::MAX).save(writer);
-        }
+        self.patch.map(|part| part as u64).save(writer);
         self.s.save(writer);
         self.t.save(writer);
     }
     fn restore(&mut self, reader: &mut StateReader) {
-        for part in &mut self.patch {
-            let mut value = 0_u64;
-            value.restore(reader);
-            *part = usize::try_from(value).unwrap_or(0);
-        }
+        let mut patch = [0_u64; 2];
+        patch.restore(reader);
+        self.patch = patch.map(|part| usize::try_from(part).unwrap_or(0));
         self.s.restore(reader);
         self.t.restore(reader);
     }

@@ -29,6 +29,7 @@ mod projection;
 pub use patch::{Evaluation, Weights};
 pub use projection::Projection;
 
+use crate::math::real;
 use crate::math::vector::Vector3;
 use crate::scene::settings::{Closure, Interpolation};
 use crate::{Error, Result};
@@ -151,10 +152,10 @@ impl SurfaceSpline {
             Interpolation::Spline => {
                 let ring = match ends {
                     Ends::Smooth => InterpolationRow::closed(around),
-                    Ends::Meeting => InterpolationRow::free_ends_meeting(around),
-                    Ends::Open => InterpolationRow::free_ends(around),
+                    Ends::Meeting => InterpolationRow::free_ends(around, 0),
+                    Ends::Open => InterpolationRow::free_ends(around, around - 1),
                 };
-                [ring, InterpolationRow::free_ends(along)]
+                [ring, InterpolationRow::free_ends(along, along - 1)]
             }
         };
         let mut surface = Self {
@@ -229,13 +230,10 @@ impl SurfaceSpline {
         Ok(())
     }
 
-    /// Replaces the control points (m), for example by those of the undeformed surface plus a linear combination of interpolated mode
-    /// shapes.
-    ///
-    /// # Panics
-    /// Wrong number of points.
-    pub fn set_control_points(&mut self, control: &[Vector3]) {
-        self.control.copy_from_slice(control);
+    /// Replaces every control point (m) by a function of its index, for example by that of the undeformed surface plus a linear combination of
+    /// interpolated mode shapes.
+    pub fn set_control_points(&mut self, of: impl Fn(usize) -> Vector3) {
+        self.control.iter_mut().enumerate().for_each(|(index, point)| *point = of(index));
         self.fill_mesh();
     }
 
@@ -352,9 +350,4 @@ fn split(value: f64, count: usize) -> (usize, f64) {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 ≤ value ≤ count")]
     let whole = (value as usize).min(count - 1);
     (whole, value - real(whole))
-}
-
-#[expect(clippy::cast_precision_loss, reason = "grids are far smaller than 2^52")]
-fn real(count: usize) -> f64 {
-    count as f64
 }

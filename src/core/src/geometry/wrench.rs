@@ -68,36 +68,34 @@ impl MotionIncrement {
 
     /// Returns the sum of this step and the one before.
     pub fn since(&self, before: &Self) -> Self {
-        Self {
-            step: self.step + before.step,
-            turn: self.turn + before.turn,
-            shaft: self.shaft + before.shaft,
-            opening: self.opening + before.opening,
-            shape_factor: self.shape_factor + before.shape_factor,
-            shape_rotation: self.shape_rotation + before.shape_rotation,
-        }
+        self.combined(before, |own, before| own + before)
     }
 
     /// Returns the difference of this motion and another.
     pub fn less(&self, other: &Self) -> Self {
-        self.since(&other.over(-1.0))
+        self.combined(other, |own, other| own - other)
+    }
+
+    /// Returns the change at the same rates over a step `ratio` times as long.
+    pub fn over(&self, ratio: f64) -> Self {
+        self.combined(self, |own, _| ratio * own)
+    }
+
+    #[inline(always)]
+    fn combined(&self, other: &Self, of: impl Fn(f64, f64) -> f64) -> Self {
+        Self {
+            step: of(self.step, other.step),
+            turn: of(self.turn, other.turn),
+            shaft: self.shaft.zip_map(&other.shaft, &of),
+            opening: of(self.opening, other.opening),
+            shape_factor: of(self.shape_factor, other.shape_factor),
+            shape_rotation: of(self.shape_rotation, other.shape_rotation),
+        }
     }
 
     /// Returns whether no input moves the casing.
     pub(crate) fn casing_rests(&self) -> bool {
         self.opening == 0.0 && self.shape_factor == 0.0 && self.shape_rotation == 0.0
-    }
-
-    /// Returns the change at the same rates over a step `ratio` times as long.
-    pub fn over(&self, ratio: f64) -> Self {
-        Self {
-            step: ratio * self.step,
-            turn: ratio * self.turn,
-            shaft: ratio * self.shaft,
-            opening: ratio * self.opening,
-            shape_factor: ratio * self.shape_factor,
-            shape_rotation: ratio * self.shape_rotation,
-        }
     }
 }
 

@@ -35,7 +35,7 @@ pub(crate) fn both<T>(of: impl Fn(usize) -> T) -> [T; 2] {
 }
 
 /// Adding and subtracting this rounds to the nearest integer (1.5·2⁵²).
-const ROUNDER: f64 = 6_755_399_441_055_744.0;
+pub(crate) const ROUNDER: f64 = 6_755_399_441_055_744.0;
 
 /// Eight numbers in registers. A mask has bit `i` set where number `i` is selected.
 pub(crate) trait Octet:
@@ -90,8 +90,6 @@ pub(crate) trait Octet:
     /// Cody-Waite reduction x = k ln 2 + r with |r| ≤ ½ ln 2, Taylor polynomial of degree 13 in two parts, scaling by exponent bits.
     #[inline(always)]
     fn exp_of_negative(self) -> Self {
-        const LN2_HIGH: f64 = 0.693_147_180_369_123_8;
-        const LN2_LOW: f64 = 1.908_214_929_270_587_7e-10;
         let x = self.max(Self::splat(-700.0));
         let shifted = x * Self::splat(std::f64::consts::LOG2_E) + Self::splat(ROUNDER);
         let k = shifted - Self::splat(ROUNDER);
@@ -106,8 +104,12 @@ pub(crate) trait Octet:
     }
 }
 
+/// ln 2 in two parts, the first of which has few digits.
+pub(crate) const LN2_HIGH: f64 = 0.693_147_180_369_123_8;
+pub(crate) const LN2_LOW: f64 = 1.908_214_929_270_587_7e-10;
+
 /// 1/n!.
-const INVERSE_FACTORIALS: [f64; 14] = [
+pub(crate) const INVERSE_FACTORIALS: [f64; 14] = [
     1.0,
     1.0,
     0.5,
@@ -232,23 +234,33 @@ pub(crate) mod wide {
     #[derive(Clone, Copy)]
     pub(crate) struct Avx2([__m256d; 2]);
 
+    /// Defines a method of one instruction, on one register or on each of two.
+    macro_rules! instruction {
+        (one $name:ident($($other:ident)?) $instruction:ident) => {
+            #[inline(always)]
+            fn $name(self $(, $other: Self)?) -> Self {
+                // SAFETY: see the module.
+                Self(unsafe { $instruction(self.0 $(, $other.0)?) })
+            }
+        };
+        (two $name:ident($($other:ident)?) $instruction:ident) => {
+            #[inline(always)]
+            fn $name(self $(, $other: Self)?) -> Self {
+                // SAFETY: see the module.
+                Self(both(|half| unsafe { $instruction(self.0[half] $(, $other.0[half])?) }))
+            }
+        };
+    }
+
     macro_rules! operator {
         ($name:ident, $call:ident, $long:ident, $short:ident) => {
             impl $name for Avx512 {
                 type Output = Self;
-                #[inline(always)]
-                fn $call(self, other: Self) -> Self {
-                    // SAFETY: see the module.
-                    Self(unsafe { $long(self.0, other.0) })
-                }
+                instruction!(one $call(other) $long);
             }
             impl $name for Avx2 {
                 type Output = Self;
-                #[inline(always)]
-                fn $call(self, other: Self) -> Self {
-                    // SAFETY: see the module.
-                    Self(both(|half| unsafe { $short(self.0[half], other.0[half]) }))
-                }
+                instruction!(two $call(other) $short);
             }
         };
     }
@@ -258,6 +270,10 @@ pub(crate) mod wide {
     operator!(Div, div, _mm512_div_pd, _mm256_div_pd);
 
     impl Octet for Avx512 {
+        instruction!(one abs() _mm512_abs_pd);
+        instruction!(one sqrt() _mm512_sqrt_pd);
+        instruction!(one max(other) _mm512_max_pd);
+        instruction!(one min(other) _mm512_min_pd);
         #[inline(always)]
         fn load(from: &Eight) -> Self {
             // SAFETY: see the module; `Eight` is aligned to 64 bytes.
@@ -272,26 +288,6 @@ pub(crate) mod wide {
         fn splat(value: f64) -> Self {
             // SAFETY: see the module.
             Self(unsafe { _mm512_set1_pd(value) })
-        }
-        #[inline(always)]
-        fn abs(self) -> Self {
-            // SAFETY: see the module.
-            Self(unsafe { _mm512_abs_pd(self.0) })
-        }
-        #[inline(always)]
-        fn sqrt(self) -> Self {
-            // SAFETY: see the module.
-            Self(unsafe { _mm512_sqrt_pd(self.0) })
-        }
-        #[inline(always)]
-        fn max(self, other: Self) -> Self {
-            // SAFETY: see the module.
-            Self(unsafe { _mm512_max_pd(self.0, other.0) })
-        }
-        #[inline(always)]
-        fn min(self, other: Self) -> Self {
-            // SAFETY: see the module.
-            Self(unsafe { _mm512_min_pd(self.0, other.0) })
         }
         #[inline(always)]
         fn less(self, other: Self) -> u8 {
@@ -329,6 +325,9 @@ pub(crate) mod wide {
     }
 
     impl Octet for Avx2 {
+        instruction!(two sqrt() _mm256_sqrt_pd);
+        instruction!(two max(other) _mm256_max_pd);
+        instruction!(two min(other) _mm256_min_pd);
         #[inline(always)]
         fn load(from: &Eight) -> Self {
             let (halves, _) = from.0.as_chunks::<4>();
@@ -354,21 +353,6 @@ pub(crate) mod wide {
             Self(both(|half| unsafe {
                 _mm256_and_pd(self.0[half], _mm256_castsi256_pd(_mm256_set1_epi64x(0x7fff_ffff_ffff_ffff)))
             }))
-        }
-        #[inline(always)]
-        fn sqrt(self) -> Self {
-            // SAFETY: see the module.
-            Self(both(|half| unsafe { _mm256_sqrt_pd(self.0[half]) }))
-        }
-        #[inline(always)]
-        fn max(self, other: Self) -> Self {
-            // SAFETY: see the module.
-            Self(both(|half| unsafe { _mm256_max_pd(self.0[half], other.0[half]) }))
-        }
-        #[inline(always)]
-        fn min(self, other: Self) -> Self {
-            // SAFETY: see the module.
-            Self(both(|half| unsafe { _mm256_min_pd(self.0[half], other.0[half]) }))
         }
         #[inline(always)]
         fn less(self, other: Self) -> u8 {

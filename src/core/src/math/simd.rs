@@ -5,7 +5,7 @@
 
 #[cfg(target_arch = "x86_64")]
 use super::octet::wide::{Avx2, Avx512};
-use super::octet::{OctetKernel, Portable};
+use super::octet::{Octet, OctetKernel, Portable};
 
 /// Instruction set for which the hot loops are compiled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,25 +52,17 @@ impl InstructionSet {
             Self::Baseline => kernel.run::<Portable>(),
             // SAFETY: the variants are only created by `detect`, after the processor reported the feature.
             #[cfg(target_arch = "x86_64")]
-            Self::Avx2 => unsafe { octets_with_avx2(kernel) },
+            Self::Avx2 => unsafe { with_avx2(kernel) },
             // SAFETY: as above.
             #[cfg(target_arch = "x86_64")]
-            Self::Avx512 => unsafe { octets_with_avx512(kernel) },
+            Self::Avx512 => unsafe { with_avx512(kernel) },
         }
     }
 
     /// Runs `kernel` compiled for this instruction set.
     #[inline]
     pub fn run(self, kernel: impl Kernel) {
-        match self {
-            Self::Baseline => kernel.run(),
-            // SAFETY: the variants are only created by `detect`, after the processor reported the feature.
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx2 => unsafe { with_avx2(kernel) },
-            // SAFETY: as above.
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx512 => unsafe { with_avx512(kernel) },
-        }
+        self.run_octets(AnyWidth(kernel));
     }
 }
 
@@ -80,26 +72,26 @@ pub trait Kernel {
     fn run(self);
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn with_avx2(kernel: impl Kernel) {
-    kernel.run();
+/// A kernel that leaves the width of its loops to the compiler.
+struct AnyWidth<K>(K);
+
+impl<K: Kernel> OctetKernel for AnyWidth<K> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Octet>(self) {
+        self.0.run();
+    }
 }
 
 #[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f")]
-fn with_avx512(kernel: impl Kernel) {
-    kernel.run();
-}
-
-#[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn octets_with_avx2<K: OctetKernel>(kernel: K) -> K::Output {
+fn with_avx2<K: OctetKernel>(kernel: K) -> K::Output {
     kernel.run::<Avx2>()
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f")]
-fn octets_with_avx512<K: OctetKernel>(kernel: K) -> K::Output {
+fn with_avx512<K: OctetKernel>(kernel: K) -> K::Output {
     kernel.run::<Avx512>()
 }

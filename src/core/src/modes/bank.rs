@@ -53,7 +53,7 @@ pub enum SectorModel<'a> {
 }
 
 /// Optional features of a bank; a feature that is off takes neither time nor memory.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct BankOptions {
     /// Factor on the frequencies of every sector (mistuning); empty if all sectors are tuned.
     pub frequency_factors: Vec<f64>,
@@ -65,21 +65,8 @@ pub struct BankOptions {
     pub coupling: Option<(ModalSpin, bool, bool)>,
     /// Loads of an engine order.
     pub excitation: Option<Excitation>,
-    /// True if G = Φ diag(c) Φᵀ is stored; a slave with many contact rows uses its modes instead.
-    pub flexibility: bool,
-}
-
-impl Default for BankOptions {
-    fn default() -> Self {
-        Self {
-            frequency_factors: Vec::new(),
-            loads: false,
-            expansion: Vec::new(),
-            coupling: None,
-            excitation: None,
-            flexibility: true,
-        }
-    }
+    /// True if G = Φ diag(c) Φᵀ is not stored; a slave with many contact rows uses its modes instead.
+    pub uses_modes: bool,
 }
 
 /// All state variables, except those of a [`Disk`].
@@ -136,10 +123,11 @@ struct BankCoefficients {
 /// Identical sectors in modal coordinates, uncoupled or coupled to a disk, stepped together.
 #[derive(Debug, Clone)]
 pub struct ModalBank {
-    instruction_set: InstructionSet,
+    /// Instruction set of the hot loops.
+    pub(crate) instruction_set: InstructionSet,
     /// Modes of one sector; of coupled sectors, those of nodal diameter 0.
     model: ModalModel,
-    options: BankOptions,
+    pub(crate) options: BankOptions,
     sectors: usize,
     /// Number of groups: sectors or nodal diameters.
     groups: usize,
@@ -157,7 +145,7 @@ pub struct ModalBank {
     /// `[row][mode]`.
     contact_rows: Vec<f64>,
     /// Number of sets of coefficients: one for all sectors, or one per sector with mistuning or per nodal diameter.
-    sets: usize,
+    pub(crate) sets: usize,
     /// Coefficients, `[set][mode]`; the default for modes that a group does not have.
     coefficients: Vec<ModeCoefficients>,
     /// Velocity coefficients, `[set][mode]`; quasi-static modes have none.
@@ -240,7 +228,7 @@ impl ModalBank {
             lane_coefficients: vec![BankCoefficients::default(); if special { state_len } else { 0 }],
             flexibility: vec![
                 DMatrix::zeros(rows, rows);
-                if options.flexibility && coupled.is_none() { sets } else { 0 }
+                if !options.uses_modes && coupled.is_none() { sets } else { 0 }
             ],
             scheme: Scheme::default(),
             step: 0.0,
@@ -252,9 +240,9 @@ impl ModalBank {
                 loss: vec![0.0; chunks * width],
                 modal_load_before: vec![0.0; load_len(options.loads)],
                 excited_before: vec![0.0; excitation.as_ref().map_or(0, |excitation| excitation.now.len())],
-                speed: coupling.as_ref().map_or(0.0, Coupling::speed),
-                temperature: coupling.as_ref().map_or(0.0, Coupling::temperature),
-                heat_before: vec![0.0; heat.as_ref().map_or(0, HeatLoads::remembered)],
+                speed: coupling.as_ref().map_or(0.0, |coupling| coupling.speed),
+                temperature: coupling.as_ref().map_or(0.0, |coupling| coupling.temperature),
+                heat_before: vec![0.0; heat.as_ref().map_or(0, |heat| heat.now.len())],
                 stiffened: vec![0.0; if softening { model.quasi_static.min(modes) } else { 0 }],
             },
             modal_load: vec![0.0; load_len(special || options.loads)],
@@ -303,11 +291,6 @@ impl ModalBank {
         &self.model
     }
 
-    /// Instruction set of the hot loops.
-    pub(crate) fn instruction_set(&self) -> InstructionSet {
-        self.instruction_set
-    }
-
     /// Returns the coupling of the sectors; `None` if they are uncoupled.
     #[inline(always)]
     pub fn disk(&self) -> Option<&Disk> {
@@ -323,11 +306,6 @@ impl ModalBank {
     /// Step size of the current coefficients (s).
     pub fn step(&self) -> f64 {
         self.step
-    }
-
-    /// Number of sets of coefficients: one for all sectors, or one per sector with mistuning or per nodal diameter.
-    pub(crate) fn sets(&self) -> usize {
-        self.sets
     }
 
     /// Index of the set of coefficients of a group.

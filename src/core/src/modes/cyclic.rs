@@ -9,6 +9,7 @@
 use nalgebra::{Complex, DMatrix};
 use tiprub_cosim::shown;
 
+use crate::math::real;
 use crate::modes::modal::{ModalModel, ModeNumber, eigenmodes, fill_ratios};
 use crate::{Error, Result, Rom};
 
@@ -163,9 +164,7 @@ impl CyclicModel {
 /// w_n: 1/√N for real amplitudes, √(2/N) for complex ones.
 fn weight(nodal_diameter: usize, sectors: usize) -> f64 {
     let share = if nodal_diameter == 0 || 2 * nodal_diameter == sectors { 1.0 } else { 2.0 };
-    #[expect(clippy::cast_precision_loss, reason = "sector counts are far below 2^52")]
-    let count = sectors as f64;
-    libm::sqrt(share / count)
+    libm::sqrt(share / real(sectors))
 }
 
 impl ModeNumber for Complex<f64> {

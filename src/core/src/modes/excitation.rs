@@ -11,6 +11,7 @@ use nalgebra::DMatrix;
 
 use super::cyclic::CyclicModel;
 use super::modal::ModalModel;
+use crate::math::real;
 
 /// Definition of an excitation: engine order, loaded modes and contact row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,17 +32,10 @@ pub fn most_moved(sizes: impl Iterator<Item = f64>) -> usize {
     most.0
 }
 
-impl Excitation {
-    fn acts_on(&self, mode: usize) -> bool {
-        self.mode.is_none_or(|own| own == mode)
-    }
-}
-
 /// (cos, sin)(2πks/N).
-fn wave(order: u64, sector: usize, sectors: usize) -> [f64; 2] {
-    let turn = order * sector as u64 % sectors as u64;
-    #[expect(clippy::cast_precision_loss, reason = "sector counts are far below 2^52")]
-    let angle = std::f64::consts::TAU * (turn as f64 / sectors as f64);
+fn wave(order: u32, sector: usize, sectors: usize) -> [f64; 2] {
+    let turn = order as usize * sector % sectors;
+    let angle = std::f64::consts::TAU * (real(turn) / real(sectors));
     let (sine, cosine) = libm::sincos(angle);
     [cosine, sine]
 }
@@ -88,7 +82,7 @@ impl ModalExcitation {
         let row = self.excitation.row.unwrap_or_else(most);
         self.load.fill(0.0);
         for (mode, load) in self.load.chunks_exact_mut(self.parts).take(shapes.ncols()).enumerate() {
-            if self.excitation.acts_on(mode) {
+            if self.excitation.mode.is_none_or(|own| own == mode) {
                 load.copy_from_slice(&parts_of(&shapes[(row, mode)])[..self.parts]);
             }
         }
@@ -99,22 +93,20 @@ impl ModalExcitation {
         let Some(disk) = disk else {
             let sectors = self.groups.len();
             for (sector, pattern) in self.pattern.iter_mut().enumerate() {
-                *pattern = wave(u64::from(order), sector, sectors);
+                *pattern = wave(order, sector, sectors);
             }
             return;
         };
         let alias = order as usize % disk.sectors;
         let n = alias.min(disk.sectors - alias);
         self.groups = n..n + 1;
-        #[expect(clippy::cast_precision_loss, reason = "sector counts are far below 2^52")]
-        let count = disk.sectors as f64;
         // A real mode has no imaginary part.
         let [share, turning] = match (disk.is_real(n), 2 * alias > disk.sectors) {
             (true, _) => [1.0, 0.0],
             (false, true) => [0.5, 1.0],
             (false, false) => [0.5, -1.0],
         };
-        self.share = share * count;
+        self.share = share * real(disk.sectors);
         self.pattern.copy_from_slice(&[[1.0, 0.0], [0.0, turning]]);
         self.fill(&disk.diameters[n].contact_modes, |shape| [shape.re, -turning.abs() * shape.im]);
     }

@@ -5,6 +5,7 @@
 use nalgebra::{ComplexField, DMatrix, Scalar, SymmetricEigen};
 use tiprub_cosim::shown;
 
+use crate::math::real;
 use crate::modes::schemes::{ModeCoefficients, Velocity};
 use crate::scene::method::Scheme;
 use crate::scene::rom::cholesky;
@@ -361,8 +362,7 @@ fn unresolved_eigenvalue<T: ModeNumber>(stiffness: &DMatrix<T>, shapes: &DMatrix
             magnitude += libm::hypot(term.clone().real(), term.imaginary());
         }
     }
-    #[expect(clippy::cast_precision_loss, reason = "orders are far below 2^52")]
-    let rounding = T::ROUNDING * f64::EPSILON * stiffness.nrows() as f64 * magnitude;
+    let rounding = T::ROUNDING * f64::EPSILON * real(stiffness.nrows()) * magnitude;
     if quotient > rounding { quotient } else { 0.0 }
 }
 

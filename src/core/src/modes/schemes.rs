@@ -1,6 +1,6 @@
 //! Time-stepping coefficients per mode, and the energy each scheme conserves.
 //!
-//! Both schemes are the two-step recurrence q⁺ = a q + b q⁻ + c f. It is stepped in summed form,
+//! Schemes with fixed steps are the two-step recurrence q⁺ = a q + b q⁻ + c f. It is stepped in summed form,
 //!
 //! ```text
 //! d⁺ = β d − κ q + c f,   q⁺ = q + d⁺,   with d = q − q⁻, β = −b, κ = 1 − a − b = c ω²,
@@ -8,8 +8,9 @@
 //!
 //! which needs the same work and does not lose the small restoring term κ q in the rounding of a ≈ 2.
 //!
-//! * central differences (eq. 9 of the paper): β = (1 − ξωh)/(1 + ξωh), κ = ω²h²/(1 + ξωh), c = h²/(1 + ξωh);
-//! * modal-exact: β = e^(−2ξωh), κ = 1 − 2e^(−ξωh) cos ω_d h + e^(−2ξωh), c = κ/ω².
+//! * central differences (eq. 9 of the paper): β = (1 − ξωh)/(1 + ξωh), κ = ω²h²/(1 + ξωh), c = h²/(1 + ξωh), stable for ωh < 2;
+//! * modal-exact, exact in free flight and at rest under a constant force: β = e^(−2ξωh), κ = 1 − 2e^(−ξωh) cos ω_d h + e^(−2ξωh),
+//!   c = κ/ω².
 //!
 //! Either recurrence is m̃ (q⁺ − 2q + q⁻)/h² + d̃ (q⁺ − q⁻)/(2h) + ω² q = f with m̃ = h²(1 + β)/(2c) and d̃ = h(1 − β)/c.
 //! Multiplication by (q⁺ − q⁻)/2 gives the energy balance, which closes to rounding: E = ½ m̃ (d/h)² + ½ ω² q q⁻ changes by f (q⁺
@@ -20,11 +21,7 @@
 //!   quasi-static, q = φᵀf/ω² (β = 0, κ = 1, c = 1/ω²), so that contact acts through their residual flexibility alone; the
 //!   other modes are stepped by modal-exact and take the contact force one step later, which makes them explicit. The
 //!   force f of time n does the work f (u⁺ − u⁻)/2, known with q(n+1), which changes the same E; a static mode contributes only ½ ω² q q⁻.
-
-mod central_difference;
-mod galerkin;
-mod massless_boundary;
-mod modal_exact;
+//! * continuous Galerkin ([`crate::time::galerkin`]) stores (q, d) with d = hq̇; the energies are ½(d/h)² and ½ω²q².
 
 use crate::scene::method::Scheme;
 
@@ -33,6 +30,33 @@ struct Recurrence {
     beta: f64,
     kappa: f64,
     compliance: f64,
+}
+
+impl Recurrence {
+    fn central_difference(frequency: f64, damping_ratio: f64, step: f64) -> Self {
+        let divisor = 1.0 + damping_ratio * frequency * step;
+        let square = frequency * step;
+        Self {
+            beta: (1.0 - damping_ratio * frequency * step) / divisor,
+            kappa: square * square / divisor,
+            compliance: step * step / divisor,
+        }
+    }
+
+    fn modal_exact(frequency: f64, damping_ratio: f64, step: f64) -> Self {
+        if frequency <= 0.0 {
+            return Self { beta: 1.0, kappa: 0.0, compliance: step * step };
+        }
+        let decay = damping_ratio * frequency * step;
+        let beta = libm::exp(-2.0 * decay);
+        // 1 − 2e^(−x) cos θ + e^(−2x) without cancellation.
+        let fallen = libm::expm1(-decay);
+        let sine = libm::sin(0.5 * damped_frequency(frequency, damping_ratio) * step);
+        let kappa = fallen * fallen + 4.0 * libm::exp(-decay) * sine * sine;
+        // Written with (ωh)² so that neither tiny nor huge frequencies overflow.
+        let angle = frequency * step;
+        Self { beta, kappa, compliance: step * step * (kappa / (angle * angle)) }
+    }
 }
 
 impl Scheme {
@@ -96,11 +120,15 @@ pub struct ModeCoefficients {
 impl ModeCoefficients {
     /// Coefficients for angular frequency ω (rad/s, 0 for a rigid-body mode), damping ratio 0 ≤ ξ < 1 and step h (s).
     pub fn new(scheme: Scheme, frequency: f64, damping_ratio: f64, step: f64) -> Self {
+        let spring = 0.5 * frequency * frequency;
         let Recurrence { beta, kappa, compliance } = match scheme {
-            Scheme::Galerkin => return galerkin::state(frequency, step),
-            Scheme::CentralDifference => central_difference::recurrence(frequency, damping_ratio, step),
+            // Only [`crate::time::galerkin`] moves these modes by forces.
+            Scheme::Galerkin => {
+                return Self { beta: 1.0, inertia: 0.5 / (step * step), spring, ..Self::default() };
+            }
+            Scheme::CentralDifference => Recurrence::central_difference(frequency, damping_ratio, step),
             // Massless-boundary: its modes with inertia.
-            Scheme::ModalExact | Scheme::MasslessBoundary => modal_exact::recurrence(frequency, damping_ratio, step),
+            Scheme::ModalExact | Scheme::MasslessBoundary => Recurrence::modal_exact(frequency, damping_ratio, step),
         };
         Self {
             beta,
@@ -108,7 +136,7 @@ impl ModeCoefficients {
             compliance,
             loss: (1.0 - beta) / (4.0 * compliance),
             inertia: (1.0 + beta) / (4.0 * compliance),
-            spring: 0.5 * frequency * frequency,
+            spring,
             ..Self::default()
         }
     }
@@ -116,10 +144,12 @@ impl ModeCoefficients {
     /// Coefficients of a mode that has inertia under the scheme (`dynamic`) or is quasi-static.
     pub(crate) fn of_mode(scheme: Scheme, dynamic: bool, frequency: f64, damping_ratio: f64, step: f64) -> Self {
         if !dynamic {
-            return massless_boundary::quasi_static(frequency);
+            let square = frequency * frequency;
+            return Self { kappa: 1.0, compliance: 1.0 / square, spring: 0.5 * square, ..Self::default() };
         }
         let mode = Self::new(scheme, frequency, damping_ratio, step);
-        if scheme.properties().delays_contact { massless_boundary::delay(mode) } else { mode }
+        let delays = scheme.properties().delays_contact;
+        if delays { Self { compliance: 0.0, delayed: mode.compliance, ..mode } } else { mode }
     }
 
     /// Coefficients of a mode whose stiffness, inertia and damping are multiplied by `share`.

@@ -7,17 +7,15 @@
 
 mod cyclic;
 mod grid;
-mod support;
 mod watched;
 
-use nalgebra::DMatrix;
+use nalgebra::{ComplexField, DMatrix};
 use tiprub_cosim::{ThermalPatch, bounds, shown};
 
 use crate::scene::ranges;
 use crate::{Error, Result};
 pub use cyclic::Harmonic;
 pub(crate) use cyclic::cholesky;
-pub use support::{SUPPORT_ROWS, SupportRows};
 pub use watched::{STRESSES, WatchedPoints, von_mises};
 
 /// Largest number of sectors of a ROM. Bladed disks have tens to a few hundred; a damaged or malicious file must not exhaust the memory,
@@ -124,6 +122,24 @@ pub struct Spin {
     pub centrifugal_load_speed4: Vec<f64>,
     /// Largest |Ω| for which K₁ and K₂ were fitted (rad/s).
     pub largest_speed: f64,
+}
+
+/// Forces along x, y, z (N) and moments about x, y, z through the origin (N·m).
+pub const SUPPORT_ROWS: usize = 6;
+
+/// Rows of the finite-element equations at the held nodes, which a reduction omits: R = S_K q + S_M q̈ − S_T T is force and moment of the
+/// support on the structure, in fixed directions and about the origin.
+///
+/// With the six rigid motions r of the held nodes s and the displacements u = Vq of the others f, S_K = rᵀK_sf V, S_M = rᵀM_sf V, and S_T =
+/// rᵀf_s with the loads f per kelvin of each patch.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SupportRows {
+    /// S_K, 6 × n (N or N·m per unit coordinate).
+    pub stiffness: DMatrix<f64>,
+    /// S_M, 6 × n (kg or kg·m for coordinates that are displacements).
+    pub mass: DMatrix<f64>,
+    /// S_T, 6 × patches (N/K or N·m/K); no columns without thermal loads.
+    pub thermal: DMatrix<f64>,
 }
 
 /// Thermal loads of one structure.
@@ -236,8 +252,8 @@ impl Rom {
                 bounds::within(&format!("ROM array `{name}`, node {}", index + 1), value, 0.0, most)?;
             }
         }
-        symmetric("mass", &self.mass, 1.0)?;
-        symmetric("stiffness", &self.stiffness, 1.0)?;
+        symmetric("mass", &self.mass, "symmetric", 1.0)?;
+        symmetric("stiffness", &self.stiffness, "symmetric", 1.0)?;
         if self.mass.clone().cholesky().is_none() {
             return refuse("ROM array `mass`", "not positive definite");
         }
@@ -296,13 +312,13 @@ impl Rom {
     fn validate_spin(&self) -> Result<()> {
         let Some(spin) = &self.extras.spin else { return Ok(()) };
         let order = self.order();
-        for (name, matrix, sign) in [
-            ("stiffness_speed2", &spin.stiffness_speed2, 1.0),
-            ("stiffness_speed4", &spin.stiffness_speed4, 1.0),
-            ("coriolis", &spin.coriolis, -1.0),
+        for (name, matrix, kind, sign) in [
+            ("stiffness_speed2", &spin.stiffness_speed2, "symmetric", 1.0),
+            ("stiffness_speed4", &spin.stiffness_speed4, "symmetric", 1.0),
+            ("coriolis", &spin.coriolis, "skew-symmetric", -1.0),
         ] {
             array(name, matrix, (order, order), bounds::MATRIX)?;
-            symmetric(name, matrix, sign)?;
+            symmetric(name, matrix, kind, sign)?;
         }
         let loads =
             [("centrifugal_load", &spin.centrifugal_load), ("centrifugal_load_speed4", &spin.centrifugal_load_speed4)];
@@ -340,6 +356,21 @@ impl Rom {
         }
         Ok(())
     }
+
+    fn validate_support(&self) -> Result<()> {
+        let Some(support) = &self.extras.support else { return Ok(()) };
+        let patches = self.extras.thermal.as_ref().map_or(0, |thermal| thermal.patches.len());
+        let order = self.order();
+        array("support_stiffness", &support.stiffness, (SUPPORT_ROWS, order), bounds::MATRIX)?;
+        array("support_mass", &support.mass, (SUPPORT_ROWS, order), bounds::MATRIX)?;
+        array("support_thermal", &support.thermal, (SUPPORT_ROWS, patches), ranges::THERMAL_LOAD)?;
+        if self.sectors != 1 {
+            let problem = format!("not supported for a ROM with {} sectors", self.sectors);
+            let remedy = "Remove it, or use a ROM with one sector";
+            return Err(Error::invalid("ROM array `support_stiffness`", problem, remedy));
+        }
+        Ok(())
+    }
 }
 
 /// Rejects data of a ROM.
@@ -349,30 +380,43 @@ fn refuse(what: impl ToString, problem: impl ToString) -> Result<()> {
 }
 
 /// Checks the shape of an array, and that its entries are finite, and small enough that squares do not overflow.
-fn array(name: &str, matrix: &DMatrix<f64>, expected: (usize, usize), most: f64) -> Result<()> {
+fn array<T: ComplexField<RealField = f64>>(
+    name: &str,
+    matrix: &DMatrix<T>,
+    expected: (usize, usize),
+    most: f64,
+) -> Result<()> {
     let what = format!("ROM array `{name}`");
     if matrix.shape() != expected {
         return refuse(what, format!("shape {:?} found, {expected:?} expected", matrix.shape()));
     }
-    let Some(index) = matrix.iter().position(|value| value.is_nan() || value.abs() > most) else { return Ok(()) };
-    let (row, column, value) = (index % matrix.nrows(), index / matrix.nrows(), matrix[index]);
-    refuse(
-        what,
-        if value.is_finite() {
-            format!("entry {} at ({row}, {column}) is outside ±{}", shown(value), shown(most))
-        } else {
-            format!("non-finite entry at ({row}, {column})")
-        },
-    )
+    let is_invalid = |value: &T| size(value).is_nan() || size(value) > most;
+    let Some(index) = matrix.iter().position(is_invalid) else { return Ok(()) };
+    let (row, column, value) = (index % matrix.nrows(), index / matrix.nrows(), size(&matrix[index]));
+    let problem = if value.is_finite() {
+        format!("entry of magnitude {} at ({row}, {column}) exceeds {}", shown(value), shown(most))
+    } else {
+        format!("non-finite entry at ({row}, {column})")
+    };
+    refuse(what, problem)
 }
 
-/// Checks that a matrix is symmetric (`sign` 1) or skew-symmetric (−1).
-fn symmetric(name: &str, matrix: &DMatrix<f64>, sign: f64) -> Result<()> {
-    let asymmetry = (matrix - matrix.transpose() * sign).amax();
-    if asymmetry <= 1e-8 * matrix.amax() {
+/// Checks that a matrix is Hermitian, or symmetric if it is real (`sign` 1), or skew-symmetric (−1).
+fn symmetric<T: ComplexField<RealField = f64>>(name: &str, matrix: &DMatrix<T>, kind: &str, sign: f64) -> Result<()> {
+    let (asymmetry, most) = (largest(&(matrix - matrix.adjoint() * T::from_real(sign))), largest(matrix));
+    if asymmetry <= 1e-8 * most {
         return Ok(());
     }
-    let kind = if sign > 0.0 { "symmetric" } else { "skew-symmetric" };
-    let problem = format!("not {kind}: deviation {asymmetry:.3e}, largest entry {:.3e}", matrix.amax());
+    let problem = format!("not {kind}: deviation {asymmetry:.3e}, largest entry {most:.3e}");
     refuse(format!("ROM array `{name}`"), problem)
+}
+
+/// Magnitude of an entry.
+fn size<T: ComplexField<RealField = f64>>(value: &T) -> f64 {
+    libm::hypot(value.clone().real(), value.clone().imaginary())
+}
+
+/// Largest magnitude of an entry.
+fn largest<T: ComplexField<RealField = f64>>(matrix: &DMatrix<T>) -> f64 {
+    matrix.iter().fold(0.0, |most: f64, value| most.max(size(value)))
 }

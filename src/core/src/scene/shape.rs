@@ -4,6 +4,8 @@
 //! fixed frame; positive s opens the clearance. The kernels need s and its slope ds/dθ for each contact node.
 
 use crate::math::cubic::{evaluate, interior_minimum};
+use crate::math::octet::{INVERSE_FACTORIALS, LN2_HIGH, LN2_LOW, ROUNDER};
+use crate::math::real;
 use crate::scene::settings::Shape;
 use crate::{Error, Result};
 
@@ -111,8 +113,7 @@ impl CompiledShape {
             Self::Circular => std::f64::consts::PI,
             Self::Lobes { order, .. } => 1.0 / order,
             Self::TwoLobe { width, .. } => *width,
-            #[expect(clippy::cast_precision_loss, reason = "tables are far shorter than 2^52")]
-            Self::Table { knots, .. } => std::f64::consts::TAU / knots.len() as f64,
+            Self::Table { knots, .. } => spacing(knots.len()),
         }
     }
 
@@ -187,9 +188,6 @@ impl CompiledShape {
     }
 }
 
-/// Adding and subtracting this rounds to the nearest integer (1.5·2⁵²).
-const ROUNDER: f64 = 6_755_399_441_055_744.0;
-
 #[inline(always)]
 fn two_lobe(height: f64, width: f64, phase: f64, angle: f64) -> (f64, f64) {
     // mod(x, 1) − ½ is the distance of x − ½ from its nearest integer.
@@ -205,31 +203,12 @@ fn two_lobe(height: f64, width: f64, phase: f64, angle: f64) -> (f64, f64) {
 /// exponent bits. Below −700 it stays at e^(−700).
 #[inline(always)]
 fn exp_of_negative(x: f64) -> f64 {
-    const LN2_HIGH: f64 = 0.693_147_180_369_123_8;
-    const LN2_LOW: f64 = 1.908_214_929_270_587_7e-10;
-    /// 1/n! from n = 13 down to 0.
-    const TAYLOR: [f64; 14] = [
-        1.0 / 6_227_020_800.0,
-        1.0 / 479_001_600.0,
-        1.0 / 39_916_800.0,
-        1.0 / 3_628_800.0,
-        1.0 / 362_880.0,
-        1.0 / 40_320.0,
-        1.0 / 5_040.0,
-        1.0 / 720.0,
-        1.0 / 120.0,
-        1.0 / 24.0,
-        1.0 / 6.0,
-        0.5,
-        1.0,
-        1.0,
-    ];
     let x = if x > -700.0 { x } else { -700.0 };
     let shifted = x * std::f64::consts::LOG2_E + ROUNDER;
     let k = shifted - ROUNDER;
     let r = (x - k * LN2_HIGH) - k * LN2_LOW;
-    let mut sum = TAYLOR[0];
-    for coefficient in &TAYLOR[1..] {
+    let mut sum = INVERSE_FACTORIALS[13];
+    for coefficient in INVERSE_FACTORIALS[..13].iter().rev() {
         sum = sum * r + coefficient;
     }
     // The low bits of `shifted` are k; moved to the exponent field they multiply by 2^k.
@@ -237,11 +216,14 @@ fn exp_of_negative(x: f64) -> f64 {
     sum * scale
 }
 
+/// Angle between the knots of a table (rad).
+fn spacing(count: usize) -> f64 {
+    std::f64::consts::TAU / real(count)
+}
+
 /// Smallest value between two angles of a periodic cubic spline, at a knot or between two; infinite if it has no minimum there.
 fn lowest_of_spline(knots: &[[f64; 2]], from: f64, to: f64) -> f64 {
-    #[expect(clippy::cast_precision_loss, reason = "tables are far shorter than 2^52")]
-    let count = knots.len() as f64;
-    let spacing = std::f64::consts::TAU / count;
+    let (count, spacing) = (real(knots.len()), spacing(knots.len()));
     let (first, last) = ((from / spacing).floor(), (to / spacing).floor());
     let mut lowest = f64::INFINITY;
     let mut place = first;
@@ -271,8 +253,7 @@ fn hermite(knots: &[[f64; 2]], index: usize, spacing: f64) -> [f64; 4] {
 
 /// Largest |d²s/dθ²| (m/rad²): at a knot, from either side.
 fn largest_curvature(knots: &[[f64; 2]]) -> f64 {
-    #[expect(clippy::cast_precision_loss, reason = "tables are far shorter than 2^52")]
-    let spacing = std::f64::consts::TAU / knots.len() as f64;
+    let spacing = spacing(knots.len());
     let next = knots.iter().cycle().skip(1);
     let both = knots.iter().zip(next).map(|([a, slope_a], [b, slope_b])| {
         let rise = 6.0 * (b - a) / spacing;
@@ -284,9 +265,7 @@ fn largest_curvature(knots: &[[f64; 2]]) -> f64 {
 /// Returns the segment of a periodic cubic (Hermite form) at `angle`: its coefficients, the position of the angle as a
 /// fraction of the segment, and the length of the segment (rad).
 fn spline_part(knots: &[[f64; 2]], angle: f64) -> ([f64; 4], f64, f64) {
-    #[expect(clippy::cast_precision_loss, reason = "tables are far shorter than 2^52")]
-    let count = knots.len() as f64;
-    let spacing = std::f64::consts::TAU / count;
+    let (count, spacing) = (real(knots.len()), spacing(knots.len()));
     let place = angle / spacing;
     let floor = place.floor();
     // rem_euclid keeps the index in range for any angle, so that the cast cannot truncate.
@@ -313,8 +292,7 @@ fn periodic_spline(values: &[f64]) -> Result<Vec<[f64; 2]>> {
             "Give the radius change (m) at equally spaced angles around the circumference",
         ));
     }
-    #[expect(clippy::cast_precision_loss, reason = "tables are far shorter than 2^52")]
-    let spacing = std::f64::consts::TAU / count as f64;
+    let spacing = spacing(count);
     let right: Vec<f64> =
         (0..count).map(|i| 3.0 * (values[(i + 1) % count] - values[(i + count - 1) % count]) / spacing).collect();
     // Diagonally dominant: Gauss-Seidel converges by a factor of 4 a sweep; 60 sweeps are far below rounding.

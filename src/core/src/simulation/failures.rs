@@ -137,11 +137,11 @@ impl Simulation {
     fn unsolved(&self, structure: usize, name: &str, with_friction: &str) -> (String, String) {
         let sets = self.system.sets();
         let felt = |pair: &ContactPair| sets.of(pair.structure()) == sets.of(structure);
-        if self.system.pairs().iter().any(|pair| felt(pair) && pair.parameters().cutting > 0.0) {
+        if self.system.pairs().iter().any(|pair| felt(pair) && pair.parts.parameters.cutting > 0.0) {
             let problem = format!("the contact problem of {name} has no solution{}", self.instability(structure));
             return (problem, "Use a larger `normal_ratio`, less friction or another internal step".to_owned());
         }
-        if self.system.pairs().iter().any(|pair| felt(pair) && pair.parameters().friction > 0.0) {
+        if self.system.pairs().iter().any(|pair| felt(pair) && pair.parts.parameters.friction > 0.0) {
             return (format!("the contact problem of {name} has no solution"), with_friction.to_owned());
         }
         (

@@ -150,7 +150,7 @@ impl Simulation {
     /// time of q.
     pub(super) fn load(&mut self, offset: f64) {
         let hold = self.holds();
-        let (scheme, step) = (self.system.scheme(), self.system.step_size());
+        let (scheme, step) = (self.system.settings.scheme, self.system.step_size());
         for body in 0..self.compiled.bodies.len() {
             let rotor = &self.state.inputs.rotors[body];
             let (speed, temperature) = (rotor.spin.at(offset), rotor.temperature_at(offset));

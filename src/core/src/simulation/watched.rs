@@ -119,7 +119,7 @@ impl WatchedPair {
         let at = At { node: point, index: point * lanes + sector, drive };
         let moved = Vector3::new(moved[0] + outwards, moved[1] / longer, moved[2]);
         match &mut self.law {
-            GapLaw::Spline(law) => law.gap_of_one(at, moved),
+            GapLaw::Spline(law) => law.gap_to_current(at, moved).distance,
             law => law.gap(at, moved, None).distance,
         }
     }
@@ -141,7 +141,7 @@ impl Simulation {
 fn of_points(law: GapLaw, rom: &Rom, watched: &WatchedPoints) -> Result<Option<(GapLaw, Vec<Raised>)>> {
     let mut places: Vec<[f64; 3]> = watched.points.iter().map(|point| point.position).collect();
     let on_contour = |law: &RevolutionGap| -> Vec<(f64, f64)> {
-        places.iter().map(|place| contour(&rom.contact_nodes, law.slopes(), law.members(), place[2])).collect()
+        places.iter().map(|place| contour(&rom.contact_nodes, &law.slopes, &law.nodes, place[2])).collect()
     };
     let around = |places: &[[f64; 3]], layout: &Layout| {
         Layout::of_places(places, rom.sectors, &layout.clearances[..rom.sectors], layout.lanes)

@@ -1,7 +1,6 @@
 //! A contact before its force is known, together with its structure and its pair.
 
 use super::carrier::Spot;
-use super::pair::When;
 use super::{ContactPair, StepFailure, Structure};
 use crate::contact::{ContactParameters, ContactPrediction};
 use crate::geometry::wrench::At;
@@ -94,13 +93,13 @@ impl ContactView<'_> {
     #[inline(always)]
     pub(crate) fn spot(&self) -> Option<Spot<'_>> {
         self.pair.carrier()?;
-        let (index, rotor_angle) = (self.member.index, self.pair.drive(When::Now).rotor_angle);
+        let (index, rotor_angle) = (self.member.index, self.pair.drive_now().rotor_angle);
         self.pair.spot(index, self.structure.history.geometry.now.places[index], rotor_angle)
     }
 
     #[inline(always)]
     fn at(&self) -> At<'_> {
-        At { node: self.member.node, index: self.member.index, drive: self.pair.drive(When::Now) }
+        At { node: self.member.node, index: self.member.index, drive: self.pair.drive_now() }
     }
 
     /// Checks that small displacements can describe the contact.
@@ -132,7 +131,7 @@ impl ContactPrediction for ContactView<'_> {
         self.structure.history.geometry.now.normal_at(self.member.index)
     }
     fn parameters(&self) -> &ContactParameters {
-        self.pair.parameters()
+        &self.pair.parts.parameters
     }
     fn slip(&self) -> Vector3 {
         let rigid = self.pair.gap().rigid_velocity(self.at(), self.displacement());

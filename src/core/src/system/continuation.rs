@@ -3,7 +3,6 @@
 use tiprub_cosim::persist::{Persist, StateReader, StateWriter};
 
 use super::contact_view::ContactMember;
-use super::pair::When;
 use super::{Bodies, ContactEvent, ContactPair, StepFailure, Structure, SurfaceCarrier, System, sum_of};
 use crate::geometry::surface_spline::ClosestPoint;
 use crate::geometry::wrench::At;
@@ -32,7 +31,9 @@ impl System {
                 self.mechanical[set] = self.mechanical_energy(set);
             }
             self.find_lasting(old, step);
-            self.structures.iter_mut().for_each(|structure| structure.carry_over(scheme, step));
+            self.structures
+                .iter_mut()
+                .for_each(|structure| structure.modes.resample(scheme, step, &structure.history.passing.lasting));
             // The gap of the previous step is extrapolated along its own slope, not along the motion of the modes.
             self.counted.witnessed = self.counted.steps + 2;
             let ratio = step / old;
@@ -58,7 +59,7 @@ impl System {
     /// Sets the step size `step` (s) without conversion of the state, before the first step.
     pub(crate) fn set_first_step(&mut self, step: f64) {
         let scheme = self.settings.scheme;
-        self.structures.iter_mut().for_each(|structure| structure.set_step(scheme, step));
+        self.structures.iter_mut().for_each(|structure| structure.modes.set_step(scheme, step));
     }
 
     /// Instantaneous kinetic and strain energy of all structures (J), ½q̇ᵀMq̇ and ½qᵀKq, between steps only. `each` is called
@@ -68,7 +69,10 @@ impl System {
         self.find_lasting(step, step);
         let Self { sets, structures, .. } = self;
         sum_of((0..sets.count()).map(|set| {
-            let own = sum_of(sets.members(set).iter().map(|member| structures[*member].energies_now()));
+            let own = sum_of(sets.members(set).iter().map(|member| {
+                let Structure { modes, history, .. } = &mut structures[*member];
+                modes.energies_now(&history.passing.lasting)
+            }));
             each(set, own);
             own
         }))
@@ -103,7 +107,7 @@ impl System {
             let structure = pair.structure();
             let modes = self.structures[structure].modes();
             let mut moved = modes.displacement().iter().zip(modes.displacement_before());
-            if moved.any(|(now, before)| (now - before).abs() > gap.largest()) {
+            if moved.any(|(now, before)| (now - before).abs() > gap.largest) {
                 return Err(StepFailure::TooFast { structure });
             }
         }
@@ -158,8 +162,8 @@ impl System {
     pub fn save(&self, writer: &mut StateWriter) {
         self.step_size().save(writer);
         self.structures.iter().for_each(|structure| structure.save(writer));
-        self.pairs.iter().for_each(|pair| pair.state().save(writer));
-        self.groups.iter().for_each(|group| group.law().save(writer));
+        self.pairs.iter().for_each(|pair| pair.prescribed.save(writer));
+        self.groups.iter().for_each(|group| group.law.save(writer));
         self.counted.save(writer);
     }
 
@@ -187,8 +191,8 @@ impl System {
         if started && endless.is_none() {
             reader.refuse("a gap is not finite");
         }
-        self.pairs.iter().for_each(|pair| pair.state().check(reader));
-        self.groups.iter().for_each(|group| group.law().check(reader));
+        self.pairs.iter().for_each(|pair| pair.prescribed.check(reader));
+        self.groups.iter().for_each(|group| group.law.check(reader));
         self.counted.check(reader);
         (step, endless.unwrap_or(0))
     }
@@ -229,12 +233,12 @@ impl System {
         step.restore(reader);
         for structure in &mut self.structures {
             if step > 0.0 {
-                structure.set_step(self.settings.scheme, step);
+                structure.modes.set_step(self.settings.scheme, step);
             }
             structure.restore(reader);
         }
-        self.pairs.iter_mut().for_each(|pair| pair.state_mut().restore(reader));
-        self.groups.iter_mut().for_each(|group| group.law_mut().restore(reader));
+        self.pairs.iter_mut().for_each(|pair| pair.prescribed.restore(reader));
+        self.groups.iter_mut().for_each(|group| group.law.restore(reader));
         self.counted.restore(reader);
         self.rebuild_events();
     }
@@ -244,15 +248,14 @@ impl System {
         self.events.now.clear();
         for (number, structure) in self.structures.iter().enumerate() {
             for sector in 0..structure.modes().sectors() {
-                for (node, pair) in structure.pair_of.iter().enumerate() {
-                    let (Some(pair), index) = (*pair, structure.index(node, sector)) else { continue };
-                    let (history, normal) = (&structure.history, structure.history.multiplier[index]);
+                for at in structure.contacts(number, sector) {
+                    let (history, ContactMember { pair, node, index, .. }) = (&structure.history, at);
+                    let normal = history.multiplier[index];
                     if normal != 0.0 {
                         let force = structure.vector3(&history.force.now, node, sector);
                         let point = structure.vector3(&history.points, node, sector);
                         let of = &self.pairs[pair];
-                        let wrench = of.gap().wrench(At { node, index, drive: of.drive(When::Now) }, point, force);
-                        let at = ContactMember { structure: number, pair, node, sector, index };
+                        let wrench = of.gap().wrench(At { node, index, drive: of.drive_now() }, point, force);
                         let coating = history.coating_force[index];
                         self.events.now.push(ContactEvent::new(at, normal, force, coating, point, wrench));
                     }
@@ -270,7 +273,7 @@ impl ContactPair {
             return;
         };
         let Ok([touching, carrier]) = structures.get_disjoint_mut([self.structure(), structure]) else { return };
-        let rotor_angle = self.drive(When::Now).rotor_angle;
+        let rotor_angle = self.drive_now().rotor_angle;
         for &node in self.nodes() {
             for sector in 0..touching.modes().sectors() {
                 let force = touching.vector3(&touching.history.passing.lasting, node, sector);

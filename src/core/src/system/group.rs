@@ -3,7 +3,6 @@
 use super::carrier::Reaction;
 use super::contact_view::{Bodies, ContactMember};
 use super::delassus::{DelassusBlock, fill};
-use super::pair::When;
 use super::{ContactEvent, StepFailure, Structure};
 use crate::contact::Law;
 use crate::contact::coating::Coating;
@@ -53,7 +52,7 @@ pub(crate) struct ContactGroup {
     sides: Vec<GroupSide>,
     /// Structures that carry the surfaces of the contacts.
     reactions: Vec<Reaction>,
-    law: Law,
+    pub(crate) law: Law,
     /// The current contacts, structure by structure and sector by sector.
     members: Vec<ContactMember>,
     rows: Vec<Vector3>,
@@ -108,16 +107,6 @@ impl ContactGroup {
         self.sides.iter().map(|side| side.structure)
     }
 
-    /// The contact law.
-    pub fn law(&self) -> &Law {
-        &self.law
-    }
-
-    /// The contact law, to restore its state.
-    pub(crate) fn law_mut(&mut self) -> &mut Law {
-        &mut self.law
-    }
-
     /// Selects another solver. A coating has the same law for all solvers.
     pub(crate) fn set_solver(&mut self, solver: Solver, structures: &[Structure]) {
         if self.law.coating().is_none() {
@@ -143,11 +132,7 @@ impl ContactGroup {
         let (structure, mut next) = (self.sides[0].structure, 0);
         while let Some(sector) = bodies.structures[structure].touching_from(next) {
             self.members.clear();
-            let of = &bodies.structures[structure];
-            let nodes = of.pair_of.iter().enumerate();
-            let nodes = nodes.filter_map(|(node, pair)| pair.map(|pair| (node, pair)));
-            let member = |(node, pair)| ContactMember { structure, pair, node, sector, index: of.index(node, sector) };
-            self.members.extend(nodes.map(member));
+            self.members.extend(bodies.structures[structure].contacts(structure, sector));
             self.sides[0].span = 0..self.members.len();
             self.find_forces(bodies, found)?;
             self.apply(bodies, found);
@@ -210,12 +195,7 @@ impl ContactGroup {
             let (first, structure) = (self.members.len(), side.structure);
             let of = &bodies.structures[structure];
             for sector in 0..of.modes().sectors() {
-                for (node, pair) in of.pair_of.iter().enumerate() {
-                    let index = of.index(node, sector);
-                    if let (true, Some(pair)) = (side.chosen[index], *pair) {
-                        self.members.push(ContactMember { structure, pair, node, sector, index });
-                    }
-                }
+                self.members.extend(of.contacts(structure, sector).filter(|member| side.chosen[member.index]));
             }
             side.span = first..self.members.len();
         }
@@ -276,7 +256,7 @@ impl ContactGroup {
             let block =
                 DelassusBlock { members: &self.members[side.span.clone()], rows, columns, per, first: side.span.start };
             let structure = &bodies.structures[side.structure];
-            fill(matrix, structure.modes(), structure.nodes(), &block);
+            fill(matrix, structure.modes(), &block);
         }
         if !self.reactions.is_empty() {
             self.add_reactions(bodies, per);
@@ -336,17 +316,13 @@ impl ContactGroup {
     fn respond_of_carriers(&mut self, bodies: &Bodies) {
         for side in &mut self.sides {
             let structure = &bodies.structures[side.structure];
-            let sectors = structure.modes().sectors();
-            for (node, pair) in structure.pair_of.iter().enumerate() {
-                let Some(pair) = pair.filter(|pair| bodies.pairs[*pair].carrier().is_some()) else { continue };
-                for sector in 0..sectors {
-                    let index = structure.index(node, sector);
-                    let at = ContactMember { structure: side.structure, pair, node, sector, index };
+            for sector in 0..structure.modes().sectors() {
+                for at in structure.contacts(side.structure, sector) {
                     let posed = bodies.pose(at);
                     let Some(spot) = posed.spot() else { continue };
                     let carrier = self.reactions.iter().find(|one| one.structure == spot.carrier.structure);
                     let moved = carrier.map_or(Vector3::zeros(), |reaction| reaction.responded(spot));
-                    side.response[index] -= structure.history.geometry.now.normal_at(index).dot(&moved);
+                    side.response[at.index] -= structure.history.geometry.now.normal_at(at.index).dot(&moved);
                 }
             }
         }
@@ -416,7 +392,7 @@ impl ContactGroup {
             of.history.multiplier[index] = normal;
             of.history.coating_force[index] = share;
             let gap = bodies.pairs[pair].gap();
-            let at = At { node, index, drive: bodies.pairs[pair].drive(When::Now) };
+            let at = At { node, index, drive: bodies.pairs[pair].drive_now() };
             // The point at which the gap was evaluated, whose normal has no moment about the axis of a round casing.
             let point = gap.contact_point(at, moved, of.history.geometry.now.place_at(index));
             let wrench = gap.wrench(at, point, force);
@@ -453,7 +429,7 @@ impl GroupSide {
             // Every force moves every sector.
             Some(disk) => {
                 let (sectors, [across, around, along]) = (bank.sectors(), &normals.normal);
-                let nodes = disk.moved().chunks_exact(3 * lanes).zip(self.response.chunks_exact_mut(lanes));
+                let nodes = disk.moved.chunks_exact(3 * lanes).zip(self.response.chunks_exact_mut(lanes));
                 let normals = across.chunks_exact(lanes).zip(around.chunks_exact(lanes)).zip(along.chunks_exact(lanes));
                 for ((moved, response), ((across, around), along)) in nodes.zip(normals) {
                     for lane in 0..sectors {

@@ -24,6 +24,24 @@ impl<T: Clone> Two<T> {
     pub fn shift(&mut self) {
         std::mem::swap(&mut self.now, &mut self.before);
     }
+
+    /// Value of one of the two steps.
+    #[inline(always)]
+    pub(crate) fn at(&self, when: When) -> &T {
+        match when {
+            When::Now => &self.now,
+            When::Before => &self.before,
+        }
+    }
+}
+
+/// Selects one of two times.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum When {
+    /// The last step.
+    Now,
+    /// One step earlier.
+    Before,
 }
 
 /// An array at three times. The current values and those one step before are part of a saved state.

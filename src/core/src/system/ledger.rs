@@ -6,80 +6,63 @@
 
 use tiprub_cosim::{Sum, persist_fields};
 
-/// Work and losses since the start (J).
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Ledger {
-    /// Kinetic plus strain energy at the start.
-    pub initial: f64,
-    /// Loss by modal damping.
-    pub damping_loss: Sum,
-    /// Friction heat: µλ times the slip, which includes the rigid motion.
-    pub friction_loss: Sum,
-    /// Energy that the contact nodes lose when a gap closes within a step.
-    pub impact_loss: Sum,
-    /// Work of the coating's normal force on the approaching blades.
-    pub wear_work: Sum,
-    /// Work of cutting the coating: specific cutting energy times volume.
-    pub cutting_work: Sum,
-    /// Energy consumed by the wear of the cells, not part of the balance: ∫(Y + Kε_p) dε_p of compressed cells, and
-    /// `cutting_work`, cell by cell, of cut cells.
-    pub wear_energy: Sum,
-    /// Work of centrifugal, thermal and nodal-diameter loads.
-    pub load_work: Sum,
-    /// Work of the excitation of blades.
-    pub excitation_work: Sum,
-    /// Work of the shaft through the contacts, −∫ torque dθ_r; for obstacles at rest, the work of sliding along them.
-    pub shaft_work: Sum,
-    /// Work of the shaft on rotors whose modes depend on the speed: change of strain energy by stiffening.
-    pub stiffening_work: Sum,
-    /// Work of whirl, −∫ F·de.
-    pub whirl_work: Sum,
-    /// Work of axial shift.
-    pub shift_work: Sum,
-    /// Work of the prescribed motion of the casing along the contact normals.
-    pub casing_work: Sum,
-    /// Difference between the work of contact forces in the scheme and all other terms: normals turn and surfaces curve within a
-    /// step. It vanishes with the step length.
-    pub curvature_work: Sum,
-    /// Energy added or removed when the state is converted to another step size.
-    pub step_change: Sum,
-    /// Sum of the magnitudes of all external work, the scale of the residual.
-    pub turnover: Sum,
-    /// Sum of the magnitudes of the work that contact forces do on the structures, in both directions.
-    pub contact_work: Sum,
-}
+/// Defines the ledger from the list of its sums.
+macro_rules! ledger {
+    ($count:literal: $($(#[$text:meta])* $sum:ident),* $(,)?) => {
+        /// Work and losses since the start (J).
+        #[derive(Debug, Clone, Copy, PartialEq, Default)]
+        pub struct Ledger {
+            /// Kinetic plus strain energy at the start.
+            pub initial: f64,
+            $($(#[$text])* pub $sum: Sum,)*
+        }
 
-/// Lists every sum of the ledger once; a missing field is a compile error.
-macro_rules! sums_of_ledger {
-    ($count:literal: $($sum:ident),* $(,)?) => {
         persist_fields!(Ledger { initial, $($sum),* });
 
         impl Ledger {
             fn sums(&mut self) -> [&mut Sum; $count] {
-                let Self { initial: _, $($sum),* } = self;
-                [$($sum),*]
+                [$(&mut self.$sum),*]
             }
         }
     };
 }
 
-sums_of_ledger! { 17:
+ledger! { 17:
+    /// Loss by modal damping.
     damping_loss,
+    /// Friction heat: µλ times the slip, which includes the rigid motion.
     friction_loss,
+    /// Energy that the contact nodes lose when a gap closes within a step.
     impact_loss,
+    /// Work of the coating's normal force on the approaching blades.
     wear_work,
+    /// Work of cutting the coating: specific cutting energy times volume.
     cutting_work,
+    /// Energy consumed by the wear of the cells, not part of the balance: ∫(Y + Kε_p) dε_p of compressed cells, and
+    /// `cutting_work`, cell by cell, of cut cells.
     wear_energy,
+    /// Work of centrifugal, thermal and nodal-diameter loads.
     load_work,
+    /// Work of the excitation of blades.
     excitation_work,
+    /// Work of the shaft through the contacts, −∫ torque dθ_r; for obstacles at rest, the work of sliding along them.
     shaft_work,
+    /// Work of the shaft on rotors whose modes depend on the speed: change of strain energy by stiffening.
     stiffening_work,
+    /// Work of whirl, −∫ F·de.
     whirl_work,
+    /// Work of axial shift.
     shift_work,
+    /// Work of the prescribed motion of the casing along the contact normals.
     casing_work,
+    /// Difference between the work of contact forces in the scheme and all other terms: normals turn and surfaces curve within a
+    /// step. It vanishes with the step length.
     curvature_work,
+    /// Energy added or removed when the state is converted to another step size.
     step_change,
+    /// Sum of the magnitudes of all external work, the scale of the residual.
     turnover,
+    /// Sum of the magnitudes of the work that contact forces do on the structures, in both directions.
     contact_work,
 }
 

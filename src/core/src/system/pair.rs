@@ -4,13 +4,12 @@ use tiprub_cosim::persist_fields;
 
 use super::Structure;
 use super::carrier::Spot;
-use super::growth::ShapeGrowth;
 use crate::contact::ContactParameters;
 use crate::geometry::frame::PolarFrame;
 use crate::geometry::surface_spline::ClosestPoint;
 use crate::geometry::wrench::MotionIncrement;
 use crate::geometry::{GapLaw, PrescribedMotion};
-use crate::system::history::Two;
+use crate::system::history::{ContactHistory, Two};
 
 /// The structure that carries the surface of a pair.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,11 +35,11 @@ pub struct PairParts {
 
 /// Prescribed motion over the last steps.
 #[derive(Debug, Clone, PartialEq, Default)]
-struct Prescribed {
+pub(crate) struct Prescribed {
     /// At the last step, and at the previous step.
-    drive: Two<PrescribedMotion>,
+    pub(crate) drive: Two<PrescribedMotion>,
     /// Change over the last step, and over the previous step.
-    motion: Two<MotionIncrement>,
+    pub(crate) motion: Two<MotionIncrement>,
 }
 
 persist_fields!(Prescribed { drive, motion });
@@ -52,7 +51,7 @@ pub struct ContactPair {
     pub(crate) parts: PairParts,
     /// Contact nodes of the pair.
     nodes: Vec<usize>,
-    prescribed: Prescribed,
+    pub(crate) prescribed: Prescribed,
     /// Prescribed motion in the middle of the current span, and the growth of the shape, if a scheme needs them.
     pub(crate) middle: (PrescribedMotion, ShapeGrowth),
 }
@@ -82,43 +81,10 @@ impl ContactPair {
         self.parts.carrier
     }
 
-    /// Parameters of the contact law.
-    pub fn parameters(&self) -> &ContactParameters {
-        &self.parts.parameters
-    }
-
-    /// The gap function, for evaluation.
-    pub(crate) fn gap_mut(&mut self) -> &mut GapLaw {
-        &mut self.parts.gap
-    }
-
-    /// Prescribed motion at the step before the last.
-    pub(crate) fn drive_before(&self) -> &PrescribedMotion {
-        self.drive(When::Before)
-    }
-
     /// Prescribed motion at the last step.
-    pub fn drive_now(&self) -> &PrescribedMotion {
-        self.drive(When::Now)
-    }
-
-    /// Prescribed motion at the last step, or one earlier.
     #[inline(always)]
-    pub(crate) fn drive(&self, when: When) -> &PrescribedMotion {
-        match when {
-            When::Now => &self.prescribed.drive.now,
-            When::Before => &self.prescribed.drive.before,
-        }
-    }
-
-    /// Prescribed motion over the last step.
-    pub(crate) fn motion(&self) -> &MotionIncrement {
-        &self.prescribed.motion.now
-    }
-
-    /// Prescribed motion over the step before the last.
-    pub(crate) fn motion_before(&self) -> &MotionIncrement {
-        &self.prescribed.motion.before
+    pub fn drive_now(&self) -> &PrescribedMotion {
+        &self.prescribed.drive.now
     }
 
     /// Starts with the prescribed motion `drive`, without earlier motion.
@@ -138,16 +104,6 @@ impl ContactPair {
     /// Scales the last change of prescribed motion by `ratio`, for another step size.
     pub(crate) fn stretch(&mut self, ratio: f64) {
         self.prescribed.motion.now = self.prescribed.motion.now.over(ratio);
-    }
-
-    /// Prescribed motion, as a part of the saved state.
-    pub(crate) fn state(&self) -> &impl tiprub_cosim::persist::Persist {
-        &self.prescribed
-    }
-
-    /// Prescribed motion, to restore it.
-    pub(crate) fn state_mut(&mut self) -> &mut impl tiprub_cosim::persist::Persist {
-        &mut self.prescribed
     }
 
     /// Directions of the frame of a node at a rotor angle (rad); fixed directions if nothing rotates.
@@ -175,16 +131,19 @@ impl ContactPair {
     /// Finds the gaps of the nodes at the current displacements. The search for closest points begins at `start`.
     pub(crate) fn find_gaps(&mut self, structures: &mut [Structure], start: SearchStart) {
         let Self { parts: PairParts { structure, gap, carrier, .. }, prescribed, .. } = self;
-        let drive = &prescribed.drive.now;
-        let Some(SurfaceCarrier { structure: carrier, first_row }) = carrier else {
-            return structures[*structure].find_gaps(gap, drive, &[], start);
-        };
         let points = gap.spline().map_or(0, |surface| surface.control_points().len());
-        let Ok([structure, carrier]) = structures.get_disjoint_mut([*structure, *carrier]) else {
-            unreachable!("a structure does not carry the surface that it touches")
+        let (structure, moved) = match carrier {
+            None => (&mut structures[*structure], &[][..]),
+            Some(SurfaceCarrier { structure: carrier, first_row }) => {
+                let Ok([structure, carrier]) = structures.get_disjoint_mut([*structure, *carrier]) else {
+                    unreachable!("a structure does not carry the surface that it touches")
+                };
+                (structure, &carrier.modes.displacement()[*first_row..][..3 * points])
+            }
         };
-        let moved = &carrier.modes().displacement()[*first_row..][..3 * points];
-        structure.find_gaps(gap, drive, moved, start);
+        let ContactHistory { gap: gaps, geometry: Two { now, before }, .. } = &mut structure.history;
+        let before = (start == SearchStart::PreviousStep).then_some(&*before);
+        gap.evaluate(&prescribed.drive.now, structure.modes.displacement(), moved, before, now, &mut gaps.now);
     }
 }
 
@@ -197,11 +156,28 @@ pub(crate) enum SearchStart {
     Positions,
 }
 
-/// Selects one of two times.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum When {
-    /// The last step.
-    Now,
-    /// One step earlier.
-    Before,
+/// Growth of the shape of a surface over a span: a factor that is linear in time, times ½(1 − cos(πt/T)) until T.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct ShapeGrowth {
+    /// Factor at the start and the end.
+    pub factors: [f64; 2],
+    /// Time since the growth began (s), at the start and the end.
+    pub elapsed: [f64; 2],
+    /// T (s), 0 for a shape that is complete from the start.
+    pub length: f64,
+}
+
+impl ShapeGrowth {
+    /// Fraction of the shape that has grown after a time `elapsed` (s) of `length` (s). Negative times, which rounding may cause
+    /// in a first step, count as zero.
+    pub fn share(elapsed: f64, length: f64) -> f64 {
+        let elapsed = elapsed.max(0.0);
+        if elapsed >= length { 1.0 } else { 0.5 * (1.0 - libm::cos(std::f64::consts::PI * elapsed / length)) }
+    }
+
+    /// Factor at the fraction `theta` of the span.
+    pub fn at(&self, theta: f64) -> f64 {
+        let between = |ends: [f64; 2]| ends[0] + theta * (ends[1] - ends[0]);
+        between(self.factors) * Self::share(between(self.elapsed), self.length)
+    }
 }

@@ -49,7 +49,7 @@ impl Pulling {
 impl System {
     /// Records the forces of the last step, if a law allows pulling forces.
     pub(crate) fn count_pulling(&mut self) {
-        if self.groups.iter().all(|group| group.law().is_iterative()) {
+        if self.groups.iter().all(|group| group.law.is_iterative()) {
             return;
         }
         let (step, mut last) = (self.step_size(), usize::MAX);

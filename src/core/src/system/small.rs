@@ -36,7 +36,7 @@ impl System {
     /// # Errors
     /// Coordinates that are not finite; displacements beyond a tenth of the radius; relative displacements of nodes on open
     /// surfaces beyond a tenth of their extent; displacements around the axis for which u_θ²/2r reaches the clearance
-    /// ([`System::most_curved`]).
+    /// ([`System::most_curved_of`]).
     pub(crate) fn check_state(&self) -> Result<(), StepFailure> {
         if self.structures.iter().any(|structure| !structure.modes().is_finite()) {
             return Err(StepFailure::NonFinite);
@@ -50,7 +50,8 @@ impl System {
             }
         }
         self.pairs.iter().try_for_each(|pair| self.check_small(pair))?;
-        match self.most_curved() {
+        let more = |most: Curved, one: Curved| if one.share() > most.share() { one } else { most };
+        match (0..self.structures.len()).filter_map(|structure| self.most_curved_of(structure)).reduce(more) {
             Some(curved) if curved.share() >= 1.0 => Err(StepFailure::Curved(curved)),
             _ => Ok(()),
         }
@@ -68,16 +69,10 @@ impl System {
         beyond.map_or(Ok(()), |index| Err(StepFailure::Implausible { structure, sector: index % modes.lanes() }))
     }
 
-    /// Returns the node with the largest error of linear kinematics. A node that moves by u_θ along its tangent is u_θ²/2r
+    /// Returns the node of one structure with the largest error of linear kinematics. A node that moves by u_θ along its tangent is u_θ²/2r
     /// further from the axis, which a gap linear in the displacements neglects. On a spline the positions are exact, but a
     /// bending blade shortens by at least this amount, which its modes, being straight lines, neglect: the measure applies there
     /// too. `None` if nothing turns around an axis.
-    pub(crate) fn most_curved(&self) -> Option<Curved> {
-        let more = |most: Curved, one: Curved| if one.share() > most.share() { one } else { most };
-        (0..self.structures.len()).filter_map(|structure| self.most_curved_of(structure)).reduce(more)
-    }
-
-    /// Returns the node of one structure with the largest error of linear kinematics.
     pub(crate) fn most_curved_of(&self, structure: usize) -> Option<Curved> {
         let mut most: Option<Curved> = None;
         for pair in self.pairs.iter().filter(|pair| pair.structure() == structure) {

@@ -3,13 +3,13 @@
 use tiprub_cosim::persist::{Persist, StateReader, StateWriter};
 use tiprub_cosim::persist_fields;
 
-use crate::geometry::{GapLaw, Geometry, PrescribedMotion, Vector3};
+use crate::geometry::{Geometry, Vector3};
 use crate::math::vector::{set_strided_vector3, strided_vector3, vector3_at};
 use crate::modes::bank::{BankOptions, LANES, ModalBank, SectorModel};
 use crate::modes::modal::ModalModel;
 use crate::scene::method::Scheme;
+use crate::system::contact_view::ContactMember;
 use crate::system::history::ContactHistory;
-use crate::system::pair::SearchStart;
 use crate::system::pulling::Pulling;
 
 /// Penetrations below this count as zero (m): the squares of the resulting values leave the range of double precision, and such
@@ -95,38 +95,29 @@ impl Structure {
         pair_of: Vec<Option<usize>>,
         has_places: bool,
     ) -> Self {
-        let modes = ModalBank::new(model, options);
-        let contacts = pair_of.len() * modes.lanes();
-        let rows = modes.rows() * modes.lanes();
-        Self {
-            history: ContactHistory::new(Geometry::new(contacts, has_places), contacts, rows),
-            pulling: Pulling::new(pair_of.len()),
-            lowest: vec![f64::INFINITY; modes.lanes()],
-            delayed: Vec::new(),
-            step_control: StepControl::new(modes.sectors(), contacts),
-            lowest_in_span: Vec::new(),
-            needed_minima: NeededMinima::default(),
-            pair_of,
-            lanes: modes.lanes(),
-            modes,
-        }
+        Self::new(ModalBank::new(model, options), pair_of, has_places, Vec::new())
     }
 
     /// Creates a structure that carries surfaces, whose control points the rows of `model` move; `loads`: with loads in addition
     /// to contact forces.
     pub(crate) fn carrying(model: &ModalModel, loads: bool) -> Self {
-        let options = BankOptions { loads, flexibility: false, ..BankOptions::default() };
+        let options = BankOptions { loads, uses_modes: true, ..BankOptions::default() };
         let modes = ModalBank::new(SectorModel::Uncoupled(model, 1), options);
-        let rows = modes.rows() * modes.lanes();
+        Self::new(modes, Vec::new(), false, vec![0.0; model.len()])
+    }
+
+    fn new(modes: ModalBank, pair_of: Vec<Option<usize>>, has_places: bool, delayed: Vec<f64>) -> Self {
+        let (contacts, rows) = (pair_of.len() * modes.lanes(), modes.rows() * modes.lanes());
+        let touches = !pair_of.is_empty();
         Self {
-            history: ContactHistory::new(Geometry::new(0, false), 0, rows),
-            pair_of: Vec::new(),
-            pulling: Pulling::default(),
-            lowest: Vec::new(),
-            delayed: vec![0.0; model.len()],
-            step_control: StepControl::default(),
+            history: ContactHistory::new(Geometry::new(contacts, has_places), contacts, rows),
+            pulling: Pulling::new(pair_of.len()),
+            lowest: vec![f64::INFINITY; if touches { modes.lanes() } else { 0 }],
+            delayed,
+            step_control: StepControl::new(if touches { modes.sectors() } else { 0 }, contacts),
             lowest_in_span: Vec::new(),
             needed_minima: NeededMinima::default(),
+            pair_of,
             lanes: modes.lanes(),
             modes,
         }
@@ -167,6 +158,12 @@ impl Structure {
     #[inline(always)]
     pub fn index(&self, node: usize, sector: usize) -> usize {
         node * self.lanes + sector
+    }
+
+    /// Contacts of a sector of this structure, which has the number `structure`.
+    pub(crate) fn contacts(&self, structure: usize, sector: usize) -> impl Iterator<Item = ContactMember> {
+        let pairs = self.pair_of.iter().enumerate().filter_map(|(node, pair)| Some((node, (*pair)?)));
+        pairs.map(move |(node, pair)| ContactMember { structure, pair, node, sector, index: self.index(node, sector) })
     }
 
     /// Gaps at the current step (m), `[node · lanes + lane]`; padding lanes are infinite.
@@ -275,14 +272,6 @@ impl Structure {
         }
     }
 
-    /// Finds the gaps of the nodes of a pair whose surface has moved.
-    #[inline(always)]
-    pub(crate) fn find_gaps(&mut self, gap: &mut GapLaw, drive: &PrescribedMotion, moved: &[f64], start: SearchStart) {
-        let ContactHistory { gap: gaps, geometry, .. } = &mut self.history;
-        let before = (start == SearchStart::PreviousStep).then_some(&geometry.before);
-        gap.evaluate(drive, self.modes.displacement(), moved, before, &mut geometry.now, &mut gaps.now);
-    }
-
     /// Sets the contact force on a node to zero.
     pub(crate) fn forget_force(&mut self, node: usize, sector: usize) {
         let (index, lanes) = (self.index(node, sector), self.lanes);
@@ -314,21 +303,6 @@ impl Structure {
             start += chunk.len();
         }
         None
-    }
-
-    /// Sets the step size (s), at rest or without conversion of the state.
-    pub(crate) fn set_step(&mut self, scheme: Scheme, step: f64) {
-        self.modes.set_step(scheme, step);
-    }
-
-    /// Converts the state to another step size under the persistent contact forces.
-    pub(crate) fn carry_over(&mut self, scheme: Scheme, step: f64) {
-        self.modes.resample(scheme, step, &self.history.passing.lasting);
-    }
-
-    /// Instantaneous kinetic and strain energy under the persistent contact forces (J).
-    pub(crate) fn energies_now(&mut self) -> (f64, f64) {
-        self.modes.energies_now(&self.history.passing.lasting)
     }
 
     /// Largest displacement of a control point (m).

@@ -4,7 +4,6 @@
 //! distance: it changes by no more than the motion of the node and of the surface, plus the prescribed motion of both. If a gap
 //! changes by more, it is not a distance, and the step fails.
 
-use super::pair::When;
 use super::{ContactEvent, StepFailure, System};
 use crate::math::vector::{Vector3, length};
 
@@ -43,7 +42,7 @@ impl System {
     /// under the shape of the casing.
     pub(crate) fn explained_by_drive(&self, pair: usize) -> f64 {
         let pair = &self.pairs[pair];
-        let (drive, motion) = (pair.drive(When::Now), pair.motion().since(pair.motion_before()));
+        let (drive, motion) = (pair.drive_now(), pair.prescribed.motion.now.since(&pair.prescribed.motion.before));
         // The larger of the rotations relative to the casing and to its shape.
         let turned = motion.turn.abs().max((motion.turn - motion.shape_rotation).abs());
         let off_centre = libm::hypot(drive.shaft[0], drive.shaft[1]);

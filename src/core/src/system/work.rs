@@ -1,10 +1,10 @@
 //! Entries of a step in the energy ledger.
 
-use super::pair::When;
 use super::{ContactEvent, StepFailure, System};
 use crate::geometry::surface_spline::ClosestPoint;
 use crate::geometry::wrench::{At, MotionIncrement};
-use crate::geometry::{GapLaw, Geometry, Vector3};
+use crate::geometry::{GapLaw, Vector3};
+use crate::system::history::{Two, When};
 use crate::system::ledger::Ledger;
 
 /// Work of contacts over a step (J).
@@ -152,12 +152,13 @@ impl System {
     /// [`StepFailure::Unexplained`] for the first contact whose gap is not a distance.
     pub(crate) fn enter_work(&mut self) -> Result<(), StepFailure> {
         let when = self.when_acted();
-        let mut events = std::mem::take(self.acted_mut(when));
+        let mut events = std::mem::take(&mut self.events);
+        let acted = if when == When::Now { &mut events.now } else { &mut events.before };
         let outcome = match self.sets.count() {
-            1 => self.enter_contacts::<false>(&mut events, when),
-            _ => self.enter_contacts::<true>(&mut events, when),
+            1 => self.enter_contacts::<false>(acted, when),
+            _ => self.enter_contacts::<true>(acted, when),
         };
-        *self.acted_mut(when) = events;
+        self.events = events;
         self.enter_loads();
         outcome
     }
@@ -179,7 +180,8 @@ impl System {
                     self.enter(set, total);
                     (set, total) = (own, ContactWork::default());
                 }
-                motion = self.pairs[of].motion().centred(self.pairs[of].motion_before());
+                let Two { now, before } = &self.pairs[of].prescribed.motion;
+                motion = now.centred(before);
                 explained = self.explained_by_drive(of);
             }
             let moved = self.relative_motion(event, when);
@@ -201,13 +203,6 @@ impl System {
         outcome
     }
 
-    fn acted_mut(&mut self, when: When) -> &mut Vec<ContactEvent> {
-        match when {
-            When::Now => &mut self.events.now,
-            When::Before => &mut self.events.before,
-        }
-    }
-
     /// Returns the step in which the contacts that acted over the last step were found.
     pub(crate) fn when_acted(&self) -> When {
         if self.settings.scheme.properties().delays_contact { When::Before } else { When::Now }
@@ -217,7 +212,7 @@ impl System {
     pub(crate) fn remove_cut(&mut self) {
         for (group, ledger) in self.groups.iter_mut().zip(&mut self.counted.ledgers) {
             let Some(structure) = group.structures().next() else { continue };
-            let Some(coating) = group.law_mut().coating_mut().filter(|coating| coating.is_cut()) else { continue };
+            let Some(coating) = group.law.coating_mut().filter(|coating| coating.is_cut()) else { continue };
             for event in self.events.now.iter().filter(|event| event.structure == structure) {
                 let place = self.pairs[event.pair].nodes().iter().position(|node| *node == event.node);
                 place.into_iter().for_each(|node| coating.slid(event.sector, node, event.slid));
@@ -228,23 +223,18 @@ impl System {
 
     fn enter_loads(&mut self) {
         for (set, ledger) in self.counted.ledgers.iter_mut().enumerate() {
-            let (mut work, mut excitation, mut stiffening) = (0.0, 0.0, 0.0);
+            let mut done = [0.0; 3];
             for member in self.sets.members(set) {
-                work += self.structures[*member].modes_mut().finish_loads();
-                excitation += self.structures[*member].modes_mut().finish_excitation();
-                stiffening += self.structures[*member].modes_mut().finish_stiffening();
+                let modes = self.structures[*member].modes_mut();
+                let (loads, excitation) = (modes.finish_loads(), modes.finish_excitation());
+                let own = [modes.finish_stiffening(), excitation, loads];
+                done.iter_mut().zip(own).for_each(|(sum, work)| *sum += work);
             }
-            if stiffening != 0.0 {
-                ledger.stiffening_work.add(stiffening);
-                ledger.turnover.add(stiffening.abs());
-            }
-            if excitation != 0.0 {
-                ledger.excitation_work.add(excitation);
-                ledger.turnover.add(excitation.abs());
-            }
-            if work != 0.0 {
-                ledger.load_work.add(work);
-                ledger.turnover.add(work.abs());
+            let Ledger { stiffening_work, excitation_work, load_work, turnover, .. } = ledger;
+            let sums = [stiffening_work, excitation_work, load_work].into_iter().zip(done);
+            for (sum, work) in sums.filter(|(_, work)| *work != 0.0) {
+                sum.add(work);
+                turnover.add(work.abs());
             }
         }
     }
@@ -260,14 +250,14 @@ impl System {
     fn work_of(&self, event: &ContactEvent, moved: Vector3, motion: &MotionIncrement, when: When) -> ContactWork {
         let (structure, pair) = (&self.structures[event.structure], &self.pairs[event.pair]);
         let (node, index) = (event.node, structure.index(event.node, event.sector));
-        let (geometry, gaps) = (self.geometry_of(event, when), &structure.history.gap);
+        let (geometry, gaps) = (structure.history.geometry.at(when), &structure.history.gap);
         let normal = geometry.normal_at(index);
         // A node that passes a free edge had no gap to close, so its motion is the approach.
         let (now, oldest) = (gaps.now[index], gaps.oldest[index]);
         let approach = if oldest.is_finite() { -0.5 * (now - oldest) } else { -normal.dot(&moved) };
         let force = WorkingForce {
             gap: pair.gap(),
-            at: At { node, index, drive: pair.drive(when) },
+            at: At { node, index, drive: pair.prescribed.drive.at(when) },
             point: event.point,
             place: geometry.place_at(index),
             normal,
@@ -281,7 +271,7 @@ impl System {
         };
         let work = force.work();
         let opposed = work.heat;
-        let cutting = pair.parameters().cutting;
+        let cutting = pair.parts.parameters.cutting;
         let cut = if cutting > 0.0 { opposed * share_cut(event, cutting) } else { 0.0 };
         let heat = opposed - cut;
         let turned = if self.settings.solver.sticks() { heat.min(0.0) } else { 0.0 };
@@ -293,15 +283,6 @@ impl System {
             uncut,
             worn: event.coating * approach,
             ..work
-        }
-    }
-
-    /// Normals and places for which a contact was found.
-    fn geometry_of(&self, event: &ContactEvent, when: When) -> &Geometry {
-        let geometry = &self.structures[event.structure].history.geometry;
-        match when {
-            When::Now => &geometry.now,
-            When::Before => &geometry.before,
         }
     }
 
@@ -320,8 +301,8 @@ impl System {
     #[inline(never)]
     fn less_of_carrier(&self, event: &ContactEvent, when: When, moved: Vector3) -> Vector3 {
         let (pair, index) = (&self.pairs[event.pair], self.structures[event.structure].index(event.node, event.sector));
-        let place = self.geometry_of(event, when).places[index];
-        let Some(spot) = pair.spot(index, place, pair.drive(when).rotor_angle) else { return moved };
+        let place = self.structures[event.structure].history.geometry.at(when).places[index];
+        let Some(spot) = pair.spot(index, place, pair.prescribed.drive.at(when).rotor_angle) else { return moved };
         let carrier = &self.structures[spot.carrier.structure];
         let (now, oldest) = (carrier.modes().displacement(), &carrier.history.passing.oldest);
         moved - spot.interpolate(|row| 0.5 * (now[row] - oldest[row]))

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
 use tiprub_core::contact::ContactParameters;
-use tiprub_core::geometry::open::{OpenGap, OpenSurface};
+use tiprub_core::geometry::open::OpenGap;
 use tiprub_core::geometry::surface_spline::SurfaceSpline;
 use tiprub_core::geometry::{FixedGap, GapLaw, PrescribedMotion, Vector3};
 use tiprub_core::modes::bank::SectorModel;
@@ -343,7 +343,7 @@ fn swinging_plane(scheme: Scheme, friction: f64, settings: SystemSettings) -> Sy
     let surface = SurfaceSpline::open(&grid, 4, 4, Interpolation::Spline).unwrap();
     let plane = masses(&[(SWING, 0, 1.0)], 48, 0);
     let positions = vec![-DEPTH * Vector3::z(), 0.1 * Vector3::x()];
-    let gap = GapLaw::Open(Box::new(OpenGap::new(positions, vec![0], OpenSurface::new(surface))));
+    let gap = GapLaw::Open(Box::new(OpenGap::new(positions, vec![0], surface)));
     let touching = StructureParts::Touching(SectorModel::Uncoupled(&model, 1), Box::default());
     let carrier = Some(SurfaceCarrier { structure: 1, first_row: 0 });
     let parameters = ContactParameters { friction, ..ContactParameters::FRICTIONLESS };

@@ -1,7 +1,7 @@
 //! Optional features: a ledger that closes, states that continue, laws of mechanics.
 
 use crate::checks::{allocates_nothing, disturb, ledger_closes, state_continues};
-use tiprub_core::geometry::PrescribedMotion;
+use tiprub_core::geometry::{Geometry, PrescribedMotion};
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::settings::{LoadSettings, PatchSettings, Shape, SplineSettings};
 use tiprub_core::{CoSimulation, Scene, Simulation};
@@ -196,7 +196,7 @@ fn complementarity_holds_over_a_long_rub_of_the_whole_casing() {
                 ..PrescribedMotion::default()
             };
             let (mut law, mut gaps) = (system.pairs()[0].gap().clone(), system.structures()[0].gaps().to_vec());
-            let mut geometry = law.geometry(lanes);
+            let mut geometry = Geometry::new(law.nodes() * lanes, law.spline().is_some());
             let moved = system.structures().get(1).map_or(&[][..], |slave| slave.modes().displacement());
             law.evaluate(&drive, system.bank().displacement(), moved, None, &mut geometry, &mut gaps);
             let off = gaps.iter().zip(system.gaps()).filter(|(gap, _)| gap.is_finite());

@@ -54,7 +54,7 @@ fn displacement_limit_scales_with_the_smallest_surface() {
 
 fn largest_of_pairs(scene: &Scene) -> Vec<f64> {
     let largest = |pair: &tiprub_core::system::ContactPair| match pair.gap() {
-        tiprub_core::geometry::GapLaw::Open(gap) => gap.largest(),
+        tiprub_core::geometry::GapLaw::Open(gap) => gap.largest,
         other => panic!("{other:?}"),
     };
     started(scene).system().pairs().iter().map(largest).collect()

@@ -2,7 +2,7 @@
 //! angle, every input has its work, and the forces on master and slave are opposite.
 
 use tiprub_core::geometry::wrench::{At, MotionIncrement};
-use tiprub_core::geometry::{GapLaw, PrescribedMotion, Vector3};
+use tiprub_core::geometry::{GapLaw, Geometry, PrescribedMotion, Vector3};
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::settings::{PatchSettings, Shape, SplineSettings};
 use tiprub_core::{CoSimulation, Scene, Simulation};
@@ -110,7 +110,7 @@ fn looked(
     drive: &PrescribedMotion,
     displacement: &[f64],
 ) -> (f64, Vector3, Vec<tiprub_core::geometry::surface_spline::ClosestPoint>) {
-    let mut geometry = law.geometry(lanes);
+    let mut geometry = Geometry::new(law.nodes() * lanes, law.spline().is_some());
     let mut gap = vec![f64::INFINITY; law.nodes() * lanes];
     law.evaluate(drive, displacement, &[], None, &mut geometry, &mut gap);
     (gap[0], geometry.normal_at(0), geometry.places.clone())

@@ -233,7 +233,7 @@ fn virtual_work_is_the_same_on_the_surface_and_on_the_data() {
             let mut control = displacement.clone();
             surface.interpolate(&mut control);
             let mut moved = surface.clone();
-            moved.set_control_points(&control);
+            moved.set_control_points(|index| control[index]);
             let (mut forces, mut work, mut size) = (vec![Vector3::zeros(); count], 0.0, 0.0);
             for index in 0..30 {
                 let (mut place, force) = (anywhere(&mut random, &surface), Vector3::from(random.vector(1.0)));

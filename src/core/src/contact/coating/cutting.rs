@@ -34,17 +34,6 @@ struct Chip {
     force: f64,
 }
 
-/// Motion of a blade along the coating.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct BladePassage<'a> {
-    /// Index of the blade.
-    pub blade: usize,
-    /// Angles of its contact nodes on the casing (rad).
-    pub angles: &'a [f64],
-    /// Sliding distance of each node over the step (m), positive towards increasing angles.
-    pub slid: &'a [f64],
-}
-
 /// State of cutting of a coating.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct CoatingCut {
@@ -125,14 +114,15 @@ impl Coating {
         self.cutting.as_ref().map_or(0.0, |cutting| cutting.tangential)
     }
 
-    /// Like [`Coating::locate`], for a blade that cuts: the one or two cells of each row that contain its path of the step.
-    pub(crate) fn locate_cut(&self, problem: &mut CoatedProblem, way: BladePassage) {
+    /// Like [`Coating::locate`], for a blade that cuts: the one or two cells of each row that contain its path of the step. `angles` of its
+    /// contact nodes on the casing (rad); `slid`: sliding distance of each node over the step (m), positive towards increasing angles.
+    pub(crate) fn locate_cut(&self, problem: &mut CoatedProblem, blade: usize, angles: &[f64], slid: &[f64]) {
         let Some(cutting) = &self.cutting else { return };
         let first = problem.append_nodes(self.nodes);
         for (index, row) in self.rows.iter().enumerate() {
-            let (angle, [a, b]) = (row.angle(way.angles), row.nodes);
-            let slid = row.weights[0] * way.slid[a] + row.weights[1] * way.slid[b];
-            let edge = cutting.edges[way.blade * self.rows.len() + index];
+            let (angle, [a, b]) = (row.angle(angles), row.nodes);
+            let slid = row.weights[0] * slid[a] + row.weights[1] * slid[b];
+            let edge = cutting.edges[blade * self.rows.len() + index];
             let mut append = |place: usize, share: f64, faced: bool| {
                 let cell = index * self.around + place;
                 let known = edge.cell == cell as u64 + 1 && edge.sense.total_cmp(&sense(slid)).is_eq();
@@ -143,7 +133,7 @@ impl Coating {
                     area: row.width * self.thickness * share,
                     plastic: if known { edge.ahead } else { self.plastic[cell] },
                     branch: Branch::Free,
-                    blade: way.blade,
+                    blade,
                     row: index,
                     faced,
                 });

@@ -12,18 +12,15 @@ mod linear;
 
 use nalgebra::DMatrix;
 
-use super::{Branch, CellContact, RodMaterial, number};
-use crate::contact::active_set::SolverOutcome;
-use crate::contact::proximal::{ROUNDS, Yielding};
+use super::{Branch, CellContact, RodMaterial};
+use crate::contact::active_set::{PATIENCE, SolverOutcome};
+use crate::contact::proximal::{GOLDEN, ROUNDS, Yielding};
+use crate::math::real;
 
 /// Depths and forces within this fraction of their scale count as zero.
 const ZERO_FRACTION: f64 = 1e-12;
 /// Rounding of a depth relative to the depths whose difference it is.
 const ROUNDING: f64 = 1e-15;
-/// Block exchanges allowed without progress before the path is followed.
-const PATIENCE: usize = 8;
-/// Golden ratio: the fractional parts of its multiples are evenly distributed.
-const GOLDEN: f64 = 1.618_033_988_749_895;
 
 /// One step of the path.
 #[derive(Debug, Clone, Copy)]
@@ -35,12 +32,13 @@ enum PathStep {
 /// The contact problem of one group of blades on a coating; allocates only when created.
 ///
 /// Per group: [`clear`](Self::clear), [`Coating::locate`](super::Coating::locate) for each blade, fill `delassus`, `gaps`
-/// and (as a guess) `closed` of the first [`size`](Self::size) nodes, then [`solve`](Self::solve).
+/// and (as a guess) `closed` of its nodes, then [`solve`](Self::solve).
 #[derive(Debug, Clone)]
 pub struct CoatedProblem {
     rod: RodMaterial,
     thickness: f64,
-    size: usize,
+    /// Number of nodes of the group.
+    pub(super) size: usize,
     /// Normal gap of node i per multiplier of node j (m/N), friction included; capacity × capacity, the leading
     /// `size` × `size` part in use.
     pub delassus: DMatrix<f64>,
@@ -106,11 +104,6 @@ impl CoatedProblem {
         self.closed.fill(false);
     }
 
-    /// Number of nodes of the group.
-    pub fn size(&self) -> usize {
-        self.size
-    }
-
     /// Adds the nodes of another blade; returns its first node.
     pub(super) fn append_nodes(&mut self, nodes: usize) -> usize {
         let first = self.size;
@@ -152,7 +145,7 @@ impl CoatedProblem {
         for node in 0..self.size {
             self.closed[node] |= self.gaps[node] < -self.thickness;
         }
-        self.yielding.begin();
+        self.yielding.softened = false;
         self.factorisations = 0;
     }
 
@@ -194,7 +187,7 @@ impl CoatedProblem {
         self.reached[1][..self.size].fill(0.0);
         for node in 0..self.size {
             // Different for every node, so that rods do not close at the same point of the path.
-            let apart = 1.0 + (GOLDEN * number(node + 1)).fract();
+            let apart = 1.0 + (GOLDEN * real(node + 1)).fract();
             self.reached[0][node] = self.gaps[node].max(0.0) + apart * self.thickness;
         }
         let limit = 100 + 20 * (self.size + 2 * self.contacts.len());

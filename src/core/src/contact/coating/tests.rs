@@ -33,18 +33,18 @@ fn material(
 
 /// A tip on radius 1, as wide as a cell.
 fn tip(settings: &CoatingSettings, axial: &[f64]) -> BladeTip {
-    BladeTip::new(axial, &vec![1.0; axial.len()], TAU / number(settings.cells_around))
+    BladeTip::new(axial, &vec![1.0; axial.len()], TAU / real(settings.cells_around))
 }
 
 /// One blade with nodes at z = 0, 1, ...
 fn coating(settings: &CoatingSettings, nodes: usize) -> Coating {
-    let axial: Vec<f64> = (0..nodes).map(number).collect();
-    Coating::new(settings, &tip(settings, &axial).with_extent([-0.2, number(nodes) - 0.8]), 1).unwrap()
+    let axial: Vec<f64> = (0..nodes).map(real).collect();
+    Coating::new(settings, &tip(settings, &axial).with_extent([-0.2, real(nodes) - 0.8]), 1).unwrap()
 }
 
 /// The middle of a cell, where a tip as wide as a cell covers only this cell.
 fn middle(settings: &CoatingSettings) -> f64 {
-    0.5 * TAU / number(settings.cells_around)
+    0.5 * TAU / real(settings.cells_around)
 }
 
 fn set_wear(coating: &mut Coating, plastic: &[f64]) {
@@ -238,13 +238,13 @@ fn covered_cell_fractions_sum_to_the_tip_width() {
         let width = random.scale(1e-3, 30.0);
         let mut found = Vec::new();
         covered(angle, width, around, |cell, share| found.push((cell, share)));
-        assert!(number(found.len()) <= width.floor() + 2.0);
+        assert!(real(found.len()) <= width.floor() + 2.0);
         assert!((found.iter().map(|(_, share)| share).sum::<f64>() - width).abs() < 1e-12 * (1.0 + width));
-        let middle = angle / TAU * number(around);
+        let middle = angle / TAU * real(around);
         for cell in 0..around {
             let expected: f64 = (-4..=4)
                 .map(|turn| {
-                    let edge = number(cell) + f64::from(turn) * number(around);
+                    let edge = real(cell) + f64::from(turn) * real(around);
                     ((edge + 1.0).min(middle + 0.5 * width) - edge.max(middle - 0.5 * width)).max(0.0)
                 })
                 .sum();
@@ -277,7 +277,7 @@ fn patch_width_is_thickness_over_cosine_of_stagger() {
     for (stagger, radius) in [(0.0_f64, 0.25), (1.0, 0.25), (-1.0, 0.25), (1.0, 2.5)] {
         let (chord, thickness) = (0.06, 2e-3);
         let node = |index: usize| {
-            let (along, share) = (chord * number(index) / 4.0, if index.is_multiple_of(4) { 0.125 } else { 0.25 });
+            let (along, share) = (chord * real(index) / 4.0, if index.is_multiple_of(4) { 0.125 } else { 0.25 });
             // On both sides of the angle at which counting restarts.
             let angle = (along * stagger.sin() / radius).rem_euclid(TAU);
             let (area, length) = (share * chord * thickness, share * chord);
@@ -321,9 +321,9 @@ fn wear_map_round_trips_bit_for_bit() {
     let mut worn = coating(&settings, 2);
     for step in 0..50 {
         let mut problem = worn.problem(1);
-        worn.locate(&mut problem, &[0.37 * number(step), 0.37 * number(step) + 0.2]);
+        worn.locate(&mut problem, &[0.37 * real(step), 0.37 * real(step) + 0.2]);
         problem.delassus.copy_from_slice(&[1.0, 0.2, 0.3, 1.5]);
-        problem.gaps.copy_from_slice(&[-0.5 - 0.004 * number(step), 0.1 - 0.01 * number(step)]);
+        problem.gaps.copy_from_slice(&[-0.5 - 0.004 * real(step), 0.1 - 0.01 * real(step)]);
         assert!(problem.solve().solved);
         worn.commit(&problem);
     }
@@ -352,9 +352,9 @@ fn coupled_blades_contact_their_own_cells() {
     let solve = |blades: [usize; 2], w: &DMatrix<f64>| {
         let mut problem = coating.problem(3);
         for blade in blades {
-            coating.locate(&mut problem, &[TAU / 4.0 * number(blade) + 0.2; 2]);
+            coating.locate(&mut problem, &[TAU / 4.0 * real(blade) + 0.2; 2]);
         }
-        assert_eq!(problem.size(), 4);
+        assert_eq!(problem.size, 4);
         for (place, blade) in blades.iter().enumerate() {
             for end in 0..2 {
                 problem.gaps[2 * place + end] = gaps[2 * blade + end];

@@ -7,14 +7,14 @@ use crate::math::simd::Kernel;
 /// Columns factorised together: their multipliers stay in the first-level cache while the rest is updated.
 pub(super) const PANEL: usize = 8;
 
-/// `target += columns · factors` for three neighbouring columns.
-pub(super) struct AddColumns<'a> {
+/// `target += columns · factors` for three neighbouring columns; with `MAGNITUDES` absolute values of the products are added.
+pub(super) struct AddColumns<'a, const MAGNITUDES: bool> {
     pub(super) columns: &'a [f64],
     pub(super) factors: [f64; 3],
     pub(super) target: &'a mut [f64],
 }
 
-impl Kernel for AddColumns<'_> {
+impl<const MAGNITUDES: bool> Kernel for AddColumns<'_, MAGNITUDES> {
     #[inline(always)]
     fn run(self) {
         let rows = self.target.len();
@@ -22,25 +22,9 @@ impl Kernel for AddColumns<'_> {
         let (second, third) = rest.split_at(rows);
         let third = &third[..rows];
         let [a, b, c] = self.factors;
+        let term = |value: f64| if MAGNITUDES { value.abs() } else { value };
         for row in 0..rows {
-            self.target[row] += first[row] * a + second[row] * b + third[row] * c;
-        }
-    }
-}
-
-/// Adds absolute values of the products instead: the magnitude of the terms in a sum.
-pub(super) struct AddMagnitudes<'a>(pub(super) AddColumns<'a>);
-
-impl Kernel for AddMagnitudes<'_> {
-    #[inline(always)]
-    fn run(self) {
-        let AddColumns { columns, factors: [a, b, c], target } = self.0;
-        let rows = target.len();
-        let (first, rest) = columns.split_at(rows);
-        let (second, third) = rest.split_at(rows);
-        let third = &third[..rows];
-        for row in 0..rows {
-            target[row] += (first[row] * a).abs() + (second[row] * b).abs() + (third[row] * c).abs();
+            self.target[row] += term(first[row] * a) + term(second[row] * b) + term(third[row] * c);
         }
     }
 }

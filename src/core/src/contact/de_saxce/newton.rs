@@ -136,7 +136,7 @@ impl Newton {
         for (local, contact) in self.active.iter().enumerate() {
             for i in 0..3 {
                 self.right[3 * local + i] =
-                    proximal * problem.reaction[3 * contact + i] - problem.predicted(3 * contact + i);
+                    proximal * problem.reaction[3 * contact + i] - problem.free[3 * contact + i];
             }
         }
         for (column, source) in self.active.iter().enumerate() {

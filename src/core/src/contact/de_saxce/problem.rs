@@ -6,7 +6,7 @@
 
 use nalgebra::DMatrix;
 
-use super::linear::{AddColumns, AddMagnitudes};
+use super::linear::AddColumns;
 use super::one_contact::{self, length};
 use crate::math::simd::InstructionSet;
 
@@ -24,7 +24,8 @@ pub(super) struct ScaledProblem {
     pub(super) size: usize,
     /// Ŵ by columns, 3·size rows.
     matrix: Vec<f64>,
-    free: Vec<f64>,
+    /// Predicted relative displacements û.
+    pub(super) free: Vec<f64>,
     pub(super) friction: Vec<f64>,
     unit: Vec<f64>,
     /// r̂.
@@ -131,11 +132,6 @@ impl ScaledProblem {
         self.matrix[column * self.order() + row]
     }
 
-    /// Predicted relative displacement, entry k.
-    pub(super) fn predicted(&self, k: usize) -> f64 {
-        self.free[k]
-    }
-
     /// Inverse stiffness of the normal and of the tangents in the residual: the diagonal of Ŵ.
     pub(super) fn flexibility(&self, contact: usize) -> (f64, f64) {
         let k = 3 * contact;
@@ -180,9 +176,8 @@ impl ScaledProblem {
             }
             let factors = std::array::from_fn(|k| self.reaction[3 * contact + k]);
             let columns = &self.matrix[3 * contact * order..(3 * contact + 3) * order];
-            self.instructions.run(AddColumns { columns, factors, target: &mut self.relative[..order] });
-            let terms = AddColumns { columns, factors, target: &mut self.magnitude[..order] };
-            self.instructions.run(AddMagnitudes(terms));
+            self.instructions.run(AddColumns::<false> { columns, factors, target: &mut self.relative[..order] });
+            self.instructions.run(AddColumns::<true> { columns, factors, target: &mut self.magnitude[..order] });
         }
         for magnitude in &mut self.magnitude[..order] {
             *magnitude = magnitude.min(self.ceiling);
@@ -196,7 +191,7 @@ impl ScaledProblem {
             let factors: [f64; 3] = std::array::from_fn(|k| direction[3 * contact + k]);
             if factors.iter().any(|factor| *factor != 0.0) {
                 let columns = &self.matrix[3 * contact * order..(3 * contact + 3) * order];
-                self.instructions.run(AddColumns { columns, factors, target });
+                self.instructions.run(AddColumns::<false> { columns, factors, target });
             }
         }
     }
@@ -231,7 +226,7 @@ impl ScaledProblem {
         for i in 0..3 {
             self.reaction[k + i] = if relaxation < 1.0 { old[i] + factors[i] } else { new[i] };
         }
-        self.instructions.run(AddColumns { columns, factors, target: &mut self.relative[..order] });
+        self.instructions.run(AddColumns::<false> { columns, factors, target: &mut self.relative[..order] });
     }
 
     /// Largest residual of all contacts; infinite if a value is NaN.

@@ -49,14 +49,9 @@ impl InterpolationRow {
         line
     }
 
-    /// Creates the problem of a row with free ends at the first and the last point.
-    pub(crate) fn free_ends(count: usize) -> Self {
-        Self { kind: RowEnds::Free { last: count - 1 }, pivots: pivots(&vec![4.0; count - 2]) }
-    }
-
-    /// Creates the problem of a row whose free ends meet at the first point.
-    pub(crate) fn free_ends_meeting(count: usize) -> Self {
-        Self { kind: RowEnds::Free { last: 0 }, pivots: pivots(&vec![4.0; count - 1]) }
+    /// Creates the problem of a row of `count` data points with free ends at point 0 and at point `last`: the last one, or 0 if the ends meet.
+    pub(crate) fn free_ends(count: usize, last: usize) -> Self {
+        Self { kind: RowEnds::Free { last }, pivots: pivots(&vec![4.0; count - if last == 0 { 1 } else { 2 }]) }
     }
 
     /// Converts data points to control points, at `start`, `start + stride`, …

@@ -86,6 +86,7 @@ fn sum_of_three(value: [f64; 4]) -> Vector3 {
 }
 
 /// Independent control points that replace a window of four in one direction, with their weights.
+#[derive(Default)]
 struct Fold {
     indices: [usize; 4],
     values: [f64; 4],
@@ -93,10 +94,6 @@ struct Fold {
 }
 
 impl Fold {
-    fn new() -> Self {
-        Self { indices: [0; 4], values: [0.0; 4], len: 0 }
-    }
-
     fn add(&mut self, index: usize, value: f64) {
         let known = self.indices[..self.len].iter().position(|candidate| *candidate == index);
         let slot = known.unwrap_or(self.len);
@@ -199,7 +196,7 @@ impl SurfaceSpline {
 
     fn fold_around(&self, place: ClosestPoint) -> Fold {
         let (count, p, values) = (self.around, place.patch[0], cubic(place.s)[0]);
-        let mut fold = Fold::new();
+        let mut fold = Fold::default();
         for (offset, value) in values.into_iter().enumerate() {
             // Control point p + offset − 1.
             match (self.ends, p + offset) {
@@ -214,7 +211,7 @@ impl SurfaceSpline {
 
     fn fold_along(&self, place: ClosestPoint) -> Fold {
         let (count, q, values) = (self.along, place.patch[1], cubic_and_beyond(place.t)[0]);
-        let mut fold = Fold::new();
+        let mut fold = Fold::default();
         for (offset, value) in values.into_iter().enumerate() {
             match q + offset {
                 0 => fold.add_phantom(0, 1, value),
@@ -227,7 +224,7 @@ impl SurfaceSpline {
 
     fn fold_facet(&self, place: ClosestPoint) -> (Fold, Fold) {
         let [p, q] = place.patch;
-        let (mut around, mut along) = (Fold::new(), Fold::new());
+        let (mut around, mut along) = (Fold::default(), Fold::default());
         around.add(p, 1.0 - place.s);
         around.add((p + 1) % self.around, place.s);
         along.add(q, 1.0 - place.t);

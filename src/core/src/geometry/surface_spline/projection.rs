@@ -8,6 +8,7 @@
 use super::foot::{CONVEX, DEGENERATE, FootPoint, HeldBound, Room, noise, solve};
 use super::{ClosestPoint, EDGE_TOLERANCE, Ends, SurfaceSpline};
 use crate::geometry::Gap;
+use crate::math::real;
 use crate::math::vector::{Vector3, length};
 use crate::scene::settings::Interpolation;
 
@@ -138,7 +139,7 @@ impl SurfaceSpline {
     /// Returns the sheet around a place: a facet, or everything up to the edges and the seam.
     #[inline]
     pub(super) fn room(&self, place: ClosestPoint) -> Room {
-        let [p, q] = place.patch.map(super::real);
+        let [p, q] = place.patch.map(real);
         if self.interpolation == Interpolation::Facets {
             let side = |patch: usize, count: usize| {
                 let low = if patch == 0 { -EDGE_TOLERANCE } else { 0.0 };
@@ -149,10 +150,10 @@ impl SurfaceSpline {
         }
         let around = match self.ends {
             Ends::Smooth => [f64::NEG_INFINITY, f64::INFINITY],
-            Ends::Meeting => [-p, super::real(self.around) - p],
-            Ends::Open => [-p - EDGE_TOLERANCE, super::real(self.around - 1) - p + EDGE_TOLERANCE],
+            Ends::Meeting => [-p, real(self.around) - p],
+            Ends::Open => [-p - EDGE_TOLERANCE, real(self.around - 1) - p + EDGE_TOLERANCE],
         };
-        [around, [-q - self.reach, super::real(self.along - 1) - q + self.reach]]
+        [around, [-q - self.reach, real(self.along - 1) - q + self.reach]]
     }
 
     /// Expresses a place with parameters beyond its patch in the patch that contains it.
@@ -161,14 +162,14 @@ impl SurfaceSpline {
         if self.interpolation == Interpolation::Facets || ((0.0..1.0).contains(&s) && (0.0..1.0).contains(&t)) {
             return ClosestPoint { patch, s, t };
         }
-        let [p, q] = patch.map(super::real);
-        let whole = super::real(self.around);
+        let [p, q] = patch.map(real);
+        let whole = real(self.around);
         let mut column = p + s.floor();
         if self.ends == Ends::Smooth {
             column -= whole * (column / whole).floor();
         }
-        let column = column.clamp(0.0, super::real(self.columns() - 1));
-        let ring = (q + t.floor()).clamp(0.0, super::real(self.along - 2));
+        let column = column.clamp(0.0, real(self.columns() - 1));
+        let ring = (q + t.floor()).clamp(0.0, real(self.along - 2));
         let s = match self.ends {
             Ends::Smooth => s - s.floor(),
             Ends::Meeting | Ends::Open => s - (column - p),
@@ -192,7 +193,7 @@ impl SurfaceSpline {
 
     /// Finds the minimum of f on the sheet of `start`.
     pub(super) fn descend(&self, x: Vector3, start: ClosestPoint) -> Option<FootPoint> {
-        let longest = (0.125 * super::real(self.around)).max(1.0);
+        let longest = (0.125 * real(self.around)).max(1.0);
         let mut foot = FootPoint::at(self, x, start);
         let rounding = self.rounding(x, &foot);
         for _ in 0..MAX_ITERATIONS {

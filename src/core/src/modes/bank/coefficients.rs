@@ -96,7 +96,7 @@ impl ModalBank {
     pub fn set_speed(&mut self, speed: f64, temperature: f64) -> f64 {
         let Some(coupling) = &self.coupling else { return 0.0 };
         let same = |one: f64, other: f64| one.to_bits() == other.to_bits();
-        if same(coupling.speed(), speed) && same(coupling.temperature(), temperature) {
+        if same(coupling.speed, speed) && same(coupling.temperature, temperature) {
             return 0.0;
         }
         let before = self.energies();
@@ -109,12 +109,11 @@ impl ModalBank {
     }
 
     /// Sets the modal damping ratio of all modes; the first modes of a sector or nodal diameter get the ratios `own`
-    /// (takes effect with
-    /// the next [`ModalBank::set_step`]).
+    /// (takes effect with the next [`ModalBank::set_step`]).
     pub(crate) fn set_damping_ratio(&mut self, damping_ratio: f64, own: &[f64]) {
         fill_ratios(&mut self.model.damping_ratios, damping_ratio, own, 1);
         if let Some(disk) = &mut self.disk {
-            disk.set_damping_ratio(damping_ratio, own);
+            disk.model.set_damping_ratio(damping_ratio, own);
         }
     }
 
@@ -136,7 +135,7 @@ impl ModalBank {
         for mode in 0..self.modes {
             let shapes = || self.contact_modes[mode * self.rows..][..self.rows].iter().enumerate();
             let mut force = match &self.disk {
-                Some(disk) => disk.gathered_force(mode, group),
+                Some(disk) => disk.modal_force(mode, group, &disk.asked_nodes, &disk.asked_force),
                 None if touched => [shapes().map(|(row, shape)| shape * of_row(row)).sum(), 0.0],
                 None => [0.0; 2],
             };
@@ -148,10 +147,7 @@ impl ModalBank {
             if self.heat.is_some() {
                 force[0] += self.heat_before(mode, group);
             }
-            self.modal_force[mode * self.parts] = force[0];
-            if self.parts == 2 {
-                self.modal_force[mode * self.parts + 1] = force[1];
-            }
+            self.modal_force[mode * self.parts..][..self.parts].copy_from_slice(&force[..self.parts]);
         }
         self.add_coupling_force(group);
         if let Some(coupling) = self.coupling.as_ref().filter(|coupling| coupling.softens()) {

@@ -72,7 +72,9 @@ impl ModalBank {
     pub fn correct(&mut self, sector: usize, force: &[f64]) {
         self.project(force);
         if self.coupling.is_some() {
-            self.respond(sector);
+            let modal_force = std::mem::take(&mut self.modal_force);
+            self.respond(sector, &modal_force, |k, force| k.compliance * force);
+            self.modal_force = modal_force;
             self.move_modes(sector);
         } else {
             self.respond_and_move(sector);
@@ -92,8 +94,7 @@ impl ModalBank {
 
     /// Finds the displacement of the contact rows of a single structure by contact forces given as modal forces (m).
     pub(crate) fn response_to_modal(&mut self, modal_force: &[f64], displacement: &mut [f64]) {
-        self.modal_force.copy_from_slice(modal_force);
-        self.respond(0);
+        self.respond(0, modal_force, |k, force| k.compliance * force);
         displacement.fill(0.0);
         let (matrix, values) = (&self.contact_modes[..], &self.correction[..]);
         self.instruction_set.run(Accumulate { sums: displacement, matrix, values });
@@ -101,24 +102,35 @@ impl ModalBank {
 
     /// Corrects a single structure for contact forces given as modal forces, using the response of its rows to them.
     pub(crate) fn correct_modal(&mut self, modal_force: &[f64], response: &[f64]) {
-        self.modal_force.copy_from_slice(modal_force);
-        self.respond(0);
+        self.respond(0, modal_force, |k, force| k.compliance * force);
         self.move_modes(0);
         for (displacement, response) in self.state.displacement.iter_mut().zip(response) {
             *displacement += response;
         }
     }
 
-    /// `correction` ← T c φᵀf.
-    fn respond(&mut self, sector: usize) {
+    /// `correction` ← T c f for modal forces f, with the response c f of each mode.
+    fn respond(&mut self, sector: usize, forces: &[f64], response: impl Fn(&ModeCoefficients, f64) -> f64) {
         let (modes, set) = (self.modes, self.set_of(sector));
         let coefficients = &self.coefficients[set * modes..][..modes];
-        for ((correction, force), k) in self.correction.iter_mut().zip(&self.modal_force).zip(coefficients) {
-            *correction = k.compliance * force;
+        for ((correction, force), k) in self.correction.iter_mut().zip(forces).zip(coefficients) {
+            *correction = response(k, *force);
         }
         if let Some(coupling) = &mut self.coupling {
             coupling.transform(set, &mut self.correction);
         }
+    }
+
+    /// Moves one uncoupled sector after the prediction by the response to modal forces.
+    pub(super) fn act_on_modes(
+        &mut self,
+        sector: usize,
+        forces: &[f64],
+        response: impl Fn(&ModeCoefficients, f64) -> f64,
+    ) {
+        self.respond(sector, forces, response);
+        self.move_modes(sector);
+        self.move_rows(sector);
     }
 
     /// Applies contact forces of the previous step (`forces[row · lanes + sector]`, N) after the prediction (massless-boundary).
@@ -130,7 +142,9 @@ impl ModalBank {
             }
             if force.iter().any(|force| *force != 0.0) {
                 self.project(&force);
-                self.act_delayed_modal_force(sector);
+                let modal_force = std::mem::take(&mut self.modal_force);
+                self.act_delayed_modal(sector, &modal_force);
+                self.modal_force = modal_force;
             }
         }
         self.moved = force;
@@ -138,17 +152,6 @@ impl ModalBank {
 
     /// Applies modal forces of the previous step to one sector after the prediction.
     pub(crate) fn act_delayed_modal(&mut self, sector: usize, modal_force: &[f64]) {
-        self.modal_force.copy_from_slice(modal_force);
-        self.act_delayed_modal_force(sector);
-    }
-
-    fn act_delayed_modal_force(&mut self, sector: usize) {
-        let (modes, set) = (self.modes, self.set_of(sector));
-        let coefficients = &self.coefficients[set * modes..][..modes];
-        for ((correction, force), k) in self.correction.iter_mut().zip(&self.modal_force).zip(coefficients) {
-            *correction = k.delayed * force;
-        }
-        self.move_modes(sector);
-        self.move_rows(sector);
+        self.act_on_modes(sector, modal_force, |k, force| k.delayed * force);
     }
 }

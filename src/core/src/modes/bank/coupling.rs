@@ -19,8 +19,10 @@ pub struct Coupling {
     spin: ModalSpin,
     stiffening: bool,
     coriolis: bool,
-    speed: f64,
-    temperature: f64,
+    /// Current speed (rad/s).
+    pub(super) speed: f64,
+    /// Current temperature (K).
+    pub(super) temperature: f64,
     /// ΔK, row by row.
     stiffness: Vec<f64>,
     /// (Ω/h) G, row by row.
@@ -30,7 +32,7 @@ pub struct Coupling {
     /// Square of the frequency factor of every set; it multiplies ΔK of a mistuned sector.
     squares: Vec<f64>,
     /// Number of modes, from the lowest, that ΔK couples.
-    coupled: usize,
+    pub(super) coupled: usize,
     /// Stiffness of each mode as a fraction of the reference stiffness if it softens without being coupled, otherwise 1.
     shares: Vec<f64>,
     work: Vec<f64>,
@@ -60,16 +62,6 @@ impl Coupling {
         }
     }
 
-    /// Current speed (rad/s).
-    pub fn speed(&self) -> f64 {
-        self.speed
-    }
-
-    /// Current temperature (K).
-    pub fn temperature(&self) -> f64 {
-        self.temperature
-    }
-
     /// Returns whether anything couples the modes at the current speed.
     pub(crate) fn is_active(&self) -> bool {
         (self.coriolis && self.speed != 0.0) || self.is_stiffened()
@@ -83,11 +75,6 @@ impl Coupling {
     /// Returns whether heat softens the modes.
     pub fn softens(&self) -> bool {
         self.spin.softening.is_some()
-    }
-
-    /// Number of modes, from the lowest, that ΔK couples.
-    pub(crate) fn coupled_modes(&self) -> usize {
-        self.coupled
     }
 
     /// Stiffness of a mode that ΔK does not couple, as a fraction of the reference stiffness; 1 for coupled modes.
@@ -108,7 +95,9 @@ impl Coupling {
         let heated = self.heated();
         // Modes without inertia, and those that the step does not resolve, keep the stiffness of the reference speed: ΔK is
         // explicit, and at ωh ≈ π even a small ΔK would make them grow. With heat they soften by `shares`.
-        self.coupled = dynamic.min(self.resolved(step, frequencies));
+        let largest = self.squares.iter().fold(0.0_f64, |most, square| most.max(*square));
+        let is_resolved = |frequency: &&f64| largest * **frequency * **frequency * step * step <= 4.0;
+        self.coupled = dynamic.min(frequencies.iter().take_while(is_resolved).count());
         let dynamic = self.coupled;
         if self.stiffening {
             let (square, reference) = (speed * speed, self.spin.reference_speed * self.spin.reference_speed);
@@ -267,12 +256,6 @@ impl Coupling {
             0.5 * position(row) * sum
         };
         self.squares[set] * (0..modes).map(row).sum::<f64>()
-    }
-
-    /// Number of modes, from the lowest, with ωh ≤ 2 in every sector.
-    fn resolved(&self, step: f64, frequencies: &[f64]) -> usize {
-        let largest = self.squares.iter().fold(0.0_f64, |most, square| most.max(*square));
-        frequencies.iter().take_while(|frequency| largest * *frequency * *frequency * step * step <= 4.0).count()
     }
 }
 

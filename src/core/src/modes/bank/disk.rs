@@ -53,7 +53,7 @@ impl DiskState {
 #[derive(Debug, Clone)]
 pub struct Disk {
     instruction_set: InstructionSet,
-    model: CyclicModel,
+    pub(super) model: CyclicModel,
     fourier: Fourier,
     rows: usize,
     /// Largest number of modes of a nodal diameter.
@@ -75,10 +75,10 @@ pub struct Disk {
     /// Requested forces: (sector, node, force).
     asked: Vec<(usize, usize, Vector3)>,
     /// Spectrum and contact nodes of the requested forces.
-    asked_force: Vec<Complexes>,
-    asked_nodes: Vec<bool>,
+    pub(super) asked_force: Vec<Complexes>,
+    pub(super) asked_nodes: Vec<bool>,
     /// Displacements caused by the requested forces (m), `[row][lane of sector]`.
-    moved: Vec<f64>,
+    pub(crate) moved: Vec<f64>,
 }
 
 impl Disk {
@@ -125,10 +125,6 @@ impl Disk {
     /// Returns the modes of the disk.
     pub fn model(&self) -> &CyclicModel {
         &self.model
-    }
-
-    pub(super) fn set_damping_ratio(&mut self, damping_ratio: f64, own: &[f64]) {
-        self.model.set_damping_ratio(damping_ratio, own);
     }
 
     /// Computes the flexibility from the coefficients of all modes, `[n][mode]`.
@@ -196,11 +192,6 @@ impl Disk {
         self.moved = moved;
     }
 
-    /// Displacements that the requested forces would cause (m), `[row][lane of sector]`.
-    pub(crate) fn moved(&self) -> &[f64] {
-        &self.moved
-    }
-
     /// Computes the spectrum of contact forces (sector, node, N).
     fn gather(&mut self, forces: impl Iterator<Item = (usize, usize, Vector3)>) {
         self.asked.clear();
@@ -220,11 +211,6 @@ impl Disk {
         self.gather(
             all.map(|(sector, node)| (sector, node, strided_vector3(forces, 3 * node * lanes + sector, lanes))),
         );
-    }
-
-    /// Modal force (re, im) of the collected forces on one mode.
-    pub(super) fn gathered_force(&self, mode: usize, n: usize) -> [f64; 2] {
-        self.modal_force(mode, n, &self.asked_nodes, &self.asked_force)
     }
 
     /// Modal force (re, im) of a spectrum of contact forces on one mode.

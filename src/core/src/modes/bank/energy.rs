@@ -1,7 +1,6 @@
 //! Energies of the modes, damping losses, and the work of loads.
 
 use super::ModalBank;
-use crate::modes::schemes::{ModeCoefficients, Velocity};
 
 impl ModalBank {
     /// Kinetic and strain energy of all sectors (J), in the form that the scheme conserves (see [`crate::modes::schemes`]).
@@ -23,21 +22,12 @@ impl ModalBank {
         let (mut kinetic, mut strain) = sums;
         // The strain energy belongs to one time, or to two.
         let lag = self.scheme.strain_lag();
-        let mut add = |k: &ModeCoefficients, position: f64, increment: f64| {
+        let coefficients = self.coefficients(group);
+        self.each_part(group, |mode, _, position, increment| {
+            let k = &coefficients[mode];
             kinetic += k.inertia * (increment * increment);
             strain += k.spring * (position * (position - lag * increment));
-        };
-        let coefficients = self.coefficients(group);
-        if self.disk.is_none() {
-            coefficients
-                .iter()
-                .zip(self.stored(group))
-                .for_each(|(k, (position, increment))| add(k, position, increment));
-        } else {
-            for (k, [position, increment]) in coefficients.iter().zip(self.amplitudes_of(group)) {
-                (0..2).for_each(|part| add(k, position[part], increment[part]));
-            }
-        }
+        });
         if let Some(coupling) = &self.coupling {
             let position = |mode| self.modal_state(mode, group).0;
             let before = |mode| position(mode) - self.modal_state(mode, group).1;
@@ -58,22 +48,13 @@ impl ModalBank {
             if needs_forces {
                 self.gather_forces(group, forces);
             }
-            let velocities = &self.velocities[self.set_of(group) * self.modes..];
-            let modes = self.coefficients(group).iter().zip(velocities);
-            let mut add = |(k, velocity): (&ModeCoefficients, &Velocity), position: f64, increment: f64, force: f64| {
-                let velocity = velocity.of(position, increment, force);
+            let (velocities, coefficients) =
+                (&self.velocities[self.set_of(group) * self.modes..], self.coefficients(group));
+            self.each_part(group, |mode, part, position, increment| {
+                let velocity = velocities[mode].of(position, increment, self.modal_force[mode * self.parts + part]);
                 kinetic += 0.5 * velocity * velocity;
-                strain += k.spring * (position * position);
-            };
-            if self.disk.is_none() {
-                let all = modes.zip(self.stored(group)).zip(&self.modal_force);
-                all.for_each(|((mode, (position, increment)), force)| add(mode, position, increment, *force));
-            } else {
-                let all = modes.zip(self.amplitudes_of(group)).zip(self.modal_force.as_chunks::<2>().0);
-                for ((mode, [position, increment]), force) in all {
-                    (0..2).for_each(|part| add(mode, position[part], increment[part], force[part]));
-                }
-            }
+                strain += coefficients[mode].spring * (position * position);
+            });
             if let Some(coupling) = &self.coupling {
                 let position = |mode| self.modal_state(mode, group).0;
                 strain += coupling.strain(self.set_of(group), position, position);

@@ -21,23 +21,9 @@ impl ModalBank {
     pub(super) fn act_excited(&mut self) {
         let Some(excitation) = self.excitation.take() else { return };
         for (sector, force) in excitation.now.iter().enumerate().filter(|(_, force)| **force != 0.0) {
-            self.act_on_modes(sector, &excitation.load, *force);
+            self.act_on_modes(sector, &excitation.load, |k, load| k.load_compliance() * load * force);
         }
         self.excitation = Some(excitation);
-    }
-
-    /// Adds the effect of `factor` times prescribed modal loads to the predicted step of one uncoupled sector.
-    pub(super) fn act_on_modes(&mut self, sector: usize, loads: &[f64], factor: f64) {
-        let (modes, set) = (self.modes, self.set_of(sector));
-        let coefficients = &self.coefficients[set * modes..][..modes];
-        for ((correction, load), k) in self.correction.iter_mut().zip(loads).zip(coefficients) {
-            *correction = k.load_compliance() * load * factor;
-        }
-        if let Some(coupling) = &mut self.coupling {
-            coupling.transform(set, &mut self.correction);
-        }
-        self.move_modes(sector);
-        self.move_rows(sector);
     }
 
     /// Adds the effect of the excitation to the predicted step of a nodal diameter and to the spectrum of its displacements.

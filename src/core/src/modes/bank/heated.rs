@@ -16,7 +16,7 @@ pub(super) struct HeatLoads {
     /// Square of the factor of each sector minus 1; empty if all sectors are equal.
     excess: Vec<f64>,
     /// T K̂ e in the current step; empty if all sectors are equal.
-    now: Vec<f64>,
+    pub(super) now: Vec<f64>,
 }
 
 impl HeatLoads {
@@ -29,15 +29,6 @@ impl HeatLoads {
             excess: factors.iter().map(|factor| factor * factor - 1.0).collect(),
             now: vec![0.0; if factors.is_empty() { 0 } else { modes }],
         })
-    }
-
-    /// Number of modes whose load of the previous step is stored.
-    pub(super) fn remembered(&self) -> usize {
-        self.now.len()
-    }
-
-    pub(super) fn rest(&mut self) {
-        self.now.fill(0.0);
     }
 }
 
@@ -83,7 +74,7 @@ impl ModalBank {
     pub(super) fn act_expanded(&mut self) {
         let Some(heat) = self.heat.take() else { return };
         for (sector, excess) in heat.excess.iter().enumerate().filter(|(_, excess)| **excess != 0.0) {
-            self.act_on_modes(sector, &heat.now, *excess);
+            self.act_on_modes(sector, &heat.now, |k, load| k.load_compliance() * load * excess);
         }
         self.heat = Some(heat);
     }
@@ -112,7 +103,7 @@ impl ModalBank {
     /// keep their recurrence and have the static displacement of the softened structure.
     pub(super) fn relax(&mut self) {
         let Some(coupling) = self.coupling.as_ref().filter(|coupling| coupling.softens()) else { return };
-        let (modes, first) = (self.model.len(), coupling.coupled_modes());
+        let (modes, first) = (self.model.len(), coupling.coupled);
         for (index, coefficients) in
             self.coefficients.iter_mut().enumerate().filter(|(index, _)| index % modes >= first)
         {

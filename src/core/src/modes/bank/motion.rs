@@ -14,18 +14,14 @@ impl ModalBank {
         self.amplitudes_at(self.index(mode, group), mode, group)
     }
 
-    /// Modal positions and increments (re, im) of the modes of a group, in their order.
-    pub(super) fn amplitudes_of(&self, group: usize) -> impl Iterator<Item = [[f64; 2]; 2]> {
-        let (first, stride) = (self.index(0, group), self.parts * self.width);
-        (0..self.modes).map(move |mode| self.amplitudes_at(first + mode * stride, mode, group))
-    }
-
-    /// Positions and increments of the modes of an uncoupled sector, in their order.
+    /// Calls `each` with mode, part, position and increment of every part of the amplitudes of a group, in the order of the modes.
     #[inline(always)]
-    pub(super) fn stored(&self, group: usize) -> impl Iterator<Item = (f64, f64)> {
-        let first = self.index(0, group);
-        let (position, increment) = (&self.state.position[first..], &self.state.increment[first..]);
-        position.iter().step_by(self.width).copied().zip(increment.iter().step_by(self.width).copied())
+    pub(super) fn each_part(&self, group: usize, mut each: impl FnMut(usize, usize, f64, f64)) {
+        let (first, stride) = (self.index(0, group), self.parts * self.width);
+        for mode in 0..self.modes {
+            let [position, increment] = self.amplitudes_at(first + mode * stride, mode, group);
+            (0..self.parts).for_each(|part| each(mode, part, position[part], increment[part]));
+        }
     }
 
     #[inline(always)]
@@ -142,7 +138,7 @@ impl ModalBank {
             excitation.now.fill(0.0);
         }
         if let Some(heat) = &mut self.heat {
-            heat.rest();
+            heat.now.fill(0.0);
         }
         if let Some(disk) = &mut self.disk {
             disk.state.rest();

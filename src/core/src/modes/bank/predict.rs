@@ -102,7 +102,9 @@ impl<const WIDTH: usize, const LOSS: bool, const SPECIAL: bool> Kernel for Predi
             };
             if WIDTH == 1 && rows > WIDE {
                 modes.advance::<WIDTH, 0, LOSS, SPECIAL>(position, before, increment, loss, displacement);
-                modes.recover_wide(position, &mut displacement[..rows]);
+                let sums = &mut displacement[..rows];
+                sums.fill(0.0);
+                Accumulate { sums, matrix: shapes, values: position }.run();
                 continue;
             }
             // Nine rows (three contact nodes) fit the registers of the widest set; further rows need further passes.
@@ -208,13 +210,6 @@ impl ChunkModes<'_> {
             add_rows(&mut sums, &shapes[first..], q);
         }
         self.store(&sums, displacement)
-    }
-
-    /// Recovers the displacements of all contact rows of a single structure, with rows as the vector direction.
-    #[inline(always)]
-    fn recover_wide(&self, position: &[f64], displacement: &mut [f64]) {
-        displacement.fill(0.0);
-        Accumulate { sums: displacement, matrix: self.shapes, values: position }.run();
     }
 
     #[inline(always)]

@@ -63,11 +63,6 @@ impl ModalBank {
         }
     }
 
-    /// Returns whether there are modal loads in addition to contact forces.
-    pub(crate) fn is_loaded(&self) -> bool {
-        self.options.loads
-    }
-
     /// Makes the current modal loads those at the start of a span.
     pub(crate) fn begin_loads(&mut self) {
         if self.options.loads {

@@ -11,9 +11,9 @@
 //! sector s turned by +2π/N about z; n > 0 is a wave e^(i n 2π s/N).
 
 use nalgebra::{Complex, ComplexField, DMatrix};
-use tiprub_cosim::{bounds, shown};
+use tiprub_cosim::bounds;
 
-use super::{Rom, refuse};
+use super::{Rom, largest, refuse, symmetric};
 use crate::Result;
 use crate::scene::ranges;
 
@@ -72,44 +72,30 @@ impl Rom {
     }
 
     fn validate_harmonic(&self, nodal_diameter: usize, harmonic: &Harmonic) -> Result<()> {
-        let refuse = |array: &str, problem: String| refuse(format!("ROM array `{array}_{nodal_diameter}`"), problem);
-        let order = harmonic.mass.nrows();
-        let arrays = [
-            ("mass", &harmonic.mass, (order, order)),
-            ("stiffness", &harmonic.stiffness, (order, order)),
-            ("contact_map", &harmonic.contact_map, (3 * self.contact_nodes.len(), order)),
-        ];
-        for (name, matrix, expected) in arrays {
-            if order == 0 || matrix.shape() != expected {
-                return refuse(name, format!("shape {:?} found, {expected:?} expected", matrix.shape()));
-            }
-            if let Some(index) = matrix.iter().position(|value| !(value.re.is_finite() && value.im.is_finite())) {
-                let (row, column) = (index % matrix.nrows(), index / matrix.nrows());
-                return refuse(name, format!("non-finite entry at ({row}, {column})"));
-            }
-            let largest = largest_entry(matrix);
-            let most = if name == "contact_map" { ranges::MAP } else { bounds::MATRIX };
-            if largest > most {
-                return refuse(name, format!("an entry of magnitude {} exceeds {}", shown(largest), shown(most)));
-            }
+        let name = |array: &str| format!("{array}_{nodal_diameter}");
+        let Harmonic { mass, stiffness, contact_map } = harmonic;
+        let (order, rows) = (mass.nrows(), 3 * self.contact_nodes.len());
+        if order == 0 {
+            return refuse(format!("ROM array `{}`", name("mass")), format!("shape {:?} is empty", mass.shape()));
+        }
+        for (array, matrix, height, most) in [
+            (name("mass"), mass, order, bounds::MATRIX),
+            (name("stiffness"), stiffness, order, bounds::MATRIX),
+            (name("contact_map"), contact_map, rows, ranges::MAP),
+        ] {
+            super::array(&array, matrix, (height, order), most)?;
             // With half a turn of phase from sector to sector there is no travelling wave.
             let imaginary = matrix.iter().fold(0.0, |most: f64, value| most.max(value.im.abs()));
-            if 2 * nodal_diameter == self.sectors && imaginary > 1e-8 * largest {
-                return refuse(
-                    name,
-                    format!("imaginary part {imaginary:.3e}, but the arrays of nodal diameter sectors/2 must be real"),
-                );
+            if 2 * nodal_diameter == self.sectors && imaginary > 1e-8 * largest(matrix) {
+                let problem =
+                    format!("imaginary part {imaginary:.3e}, but the arrays of nodal diameter sectors/2 must be real");
+                return refuse(format!("ROM array `{array}`"), problem);
             }
         }
-        for (name, matrix) in [("mass", &harmonic.mass), ("stiffness", &harmonic.stiffness)] {
-            let asymmetry = largest_entry(&(matrix - matrix.adjoint()));
-            let largest = largest_entry(matrix);
-            if asymmetry > 1e-8 * largest {
-                return refuse(name, format!("not Hermitian: deviation {asymmetry:.3e}, largest entry {largest:.3e}"));
-            }
-        }
-        if cholesky(&harmonic.mass).is_none() {
-            return refuse("mass", "not positive definite".to_owned());
+        symmetric(&name("mass"), mass, "Hermitian", 1.0)?;
+        symmetric(&name("stiffness"), stiffness, "Hermitian", 1.0)?;
+        if cholesky(mass).is_none() {
+            return refuse(format!("ROM array `{}`", name("mass")), "not positive definite");
         }
         Ok(())
     }
@@ -125,8 +111,4 @@ pub(crate) fn cholesky<T: ComplexField<RealField = f64>>(matrix: &DMatrix<T>) ->
         real > 0.0 && imaginary.abs() <= 1e-8 * real
     };
     (0..lower.nrows()).all(real).then_some(lower)
-}
-
-fn largest_entry(matrix: &DMatrix<Complex<f64>>) -> f64 {
-    matrix.iter().fold(0.0, |most: f64, value| most.max(libm::hypot(value.re, value.im)))
 }

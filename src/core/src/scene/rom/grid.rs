@@ -2,6 +2,7 @@
 
 use super::{ContactGrid, ContactNode, DisplacementFrame, Rom};
 use crate::Result;
+use crate::math::real;
 
 /// Nodes closer than this fraction of the longest edge of an open grid are the same node.
 const SAME_NODE: f64 = 1e-9;
@@ -60,13 +61,11 @@ fn refuse(problem: String) -> Result<()> {
 
 /// Checks for rings in order of increasing z, with nodes equally spaced about z.
 fn closed_ring(grid: ContactGrid, nodes: &[ContactNode]) -> Result<()> {
-    #[expect(clippy::cast_precision_loss, reason = "grids are far smaller than 2^52")]
-    let step = std::f64::consts::TAU / grid.around as f64;
+    let step = std::f64::consts::TAU / real(grid.around);
     for (along, ring) in nodes.chunks(grid.around).enumerate() {
         let (first, axial) = (nodes[0].position[1], ring[0].position[2]);
         for (i, node) in ring.iter().enumerate() {
-            #[expect(clippy::cast_precision_loss, reason = "grids are far smaller than 2^52")]
-            let turns = (node.position[1] - first - step * i as f64) / std::f64::consts::TAU;
+            let turns = (node.position[1] - first - step * real(i)) / std::f64::consts::TAU;
             let off = (turns - turns.round()).abs() * std::f64::consts::TAU;
             if off > 1e-3 * step || (node.position[2] - axial).abs() > 1e-3 * step * node.position[0] {
                 return refuse(format!("node {} of ring {} is not at its grid position", i + 1, along + 1));

@@ -48,6 +48,10 @@ const FREE: RelatedFeature = ("a free master", |at| at.is_free());
 const ALL_FREE: RelatedFeature = ("a scene with free masters only", |at| at.contacts().all(|at| at.is_free()));
 const COUPLED: RelatedFeature = ("a ROM whose sectors are coupled by harmonics", |at| at.rom().is_cyclic());
 
+const CARRIED_CASING: RelatedFeature = ("`surface.structure` of a surface around an axis", |at| {
+    at.contacts().any(|at| at.carrier().is_some() && !at.is_free())
+});
+
 /// Rules of structures, surfaces and contacts.
 static PARTS: &[FeatureRule] = rules! {
     [SPEED, FACTORS, STIFFENING, GROWTH, CORIOLIS, WHIRL, AXIAL_SHIFT, SOFTENING, EXCITATION, INITIAL] needs
@@ -70,7 +74,9 @@ static PARTS: &[FeatureRule] = rules! {
         ("a structure with `motion = \"still\"`", |at| at.carrier().is_some_and(|own| own.motion == BodyMotion::Still)),
         "only a stationary structure can carry a surface",
         "Name a stationary structure, or remove the line for a rigid surface";
-    [CARRIED] excludes ("a structure that is the master of a contact", |at| at.carrier_touches()),
+    [CARRIED] excludes ("a structure that is the master of a contact", |at| {
+            at.relations.carriers[at.index].is_some_and(|carrier| at.relations.touches(carrier))
+        }),
         "a structure cannot be the master of one contact and carry the surface of another",
         "Make it the master of both contacts, and put the surfaces on the structures that it can touch";
     [RIGID] needs FREE,
@@ -94,7 +100,7 @@ static PARTS: &[FeatureRule] = rules! {
     [HEAT] needs ("`contact.friction` above 0", |at| at.contact().friction > 0.0),
         "without friction there is no heat to distribute",
         "Give the contact a friction coefficient (friction > 0), or remove the line";
-    [COATING] excludes ("a contact that is solved together with another one", |at| at.is_coupled()),
+    [COATING] excludes ("a contact that is solved together with another one", |at| at.relations.is_coupled(at.settings, at.index)),
         "contacts of one structure, or of surfaces on one flexible structure, act on each other",
         "Remove the coating, or use a separate structure and a separate surface for this contact";
     [MODULUS, YIELD, HARDENING] excludes ("`contact.coating.cutting`", |at| at.is_cut()),
@@ -116,14 +122,10 @@ static VARIABLES: &[FeatureRule] = rules! {
     [STRESS, MODES, TIPS] needs ("`outputs.watched_sectors`", |at| !at.outputs().watched_sectors.is_empty()),
         "it is reported for watched sectors only",
         "Add a sector to `watched_sectors`, or remove the line";
-    [DISPLACEMENT] needs ("`surface.structure` of a surface around an axis", |at| {
-            at.contacts().any(|at| at.carrier().is_some() && !at.is_free())
-        }),
+    [DISPLACEMENT] needs CARRIED_CASING,
         "the output is a radial displacement: a rigid surface does not deform, and an open surface has no axis",
         "Give the surface around a rotor a `structure`, or remove the line";
-    [SUPPORT] needs ("`surface.structure` of a surface around an axis", |at| {
-            at.contacts().any(|at| at.carrier().is_some() && !at.is_free())
-        }),
+    [SUPPORT] needs CARRIED_CASING,
         "a rigid surface has no separate support: its reaction is the contact force",
         "Give the surface around a rotor a `structure`, or remove the line";
     [MODES, TIPS, CASING_FORCES] excludes ALL_FREE,
@@ -189,7 +191,7 @@ static METHODS: &[FeatureRule] = rules! {
         "it makes the highest modes quasi-static, three per contact node, and at least one other mode must remain",
         "Use more modes or fewer contact nodes, or \"modal-exact\"";
     [MASSLESS] excludes
-        ("several surfaces on one flexible structure", |at| at.contacts().any(|at| at.shares_carrier())),
+        ("several surfaces on one flexible structure", |at| at.contacts().any(|at| at.relations.shares_carrier(at.settings, at.index))),
         "the largest stable step is unknown in this case",
         "Use \"modal-exact\" or \"central-difference\", or rigid surfaces";
 };
@@ -299,14 +301,13 @@ impl FeatureRule {
 
 impl SceneSettings {
     /// Checks the rules of structures, surfaces and contacts, whose names are already checked.
-    pub(super) fn check_parts(&self) -> Result<()> {
-        check(PARTS, self.place(&Relations::of(self)), path)
+    pub(super) fn check_parts(&self, relations: &Relations) -> Result<()> {
+        check(PARTS, self.place(relations), path)
     }
 
     /// Checks the rules of outputs, inputs, scheme and solver.
-    pub(super) fn check_whole(&self) -> Result<()> {
-        let relations = Relations::of(self);
-        [PRESETS, VARIABLES, METHODS].into_iter().try_for_each(|rules| check(rules, self.place(&relations), path))
+    pub(super) fn check_whole(&self, relations: &Relations) -> Result<()> {
+        [PRESETS, VARIABLES, METHODS].into_iter().try_for_each(|rules| check(rules, self.place(relations), path))
     }
 
     /// Returns the rule that excludes a scheme from this scene, with its reason; `roms` may be empty before they are known.

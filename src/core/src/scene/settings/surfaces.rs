@@ -80,10 +80,10 @@ pub enum Interpolation {
 #[serde(deny_unknown_fields)]
 pub struct SplineSettings {
     /// Number of data points around the circumference; that of the structure's contact grid if the surface has a structure.
-    #[serde(default = "default_around", skip_serializing_if = "is_default_around")]
+    #[serde(default = "count::<AROUND>", skip_serializing_if = "is::<AROUND>")]
     pub around: usize,
     /// Number of rings of data points along the axis; that of the structure's contact grid if the surface has a structure.
-    #[serde(default = "default_along", skip_serializing_if = "is_default_along")]
+    #[serde(default = "count::<ALONG>", skip_serializing_if = "is::<ALONG>")]
     pub along: usize,
     /// Closure around the circumference.
     #[serde(default, skip_serializing_if = "is_default")]
@@ -95,29 +95,20 @@ pub struct SplineSettings {
 
 impl Default for SplineSettings {
     fn default() -> Self {
-        Self {
-            around: default_around(),
-            along: default_along(),
-            closure: Closure::default(),
-            interpolation: Interpolation::default(),
-        }
+        Self { around: AROUND, along: ALONG, closure: Closure::default(), interpolation: Interpolation::default() }
     }
 }
 
-fn default_around() -> usize {
-    72
+/// Default numbers of data points around the circumference and along the axis.
+const AROUND: usize = 72;
+const ALONG: usize = 5;
+
+fn count<const N: usize>() -> usize {
+    N
 }
 
-fn default_along() -> usize {
-    5
-}
-
-fn is_default_around(around: &usize) -> bool {
-    *around == default_around()
-}
-
-fn is_default_along(along: &usize) -> bool {
-    *along == default_along()
+fn is<const N: usize>(count: &usize) -> bool {
+    *count == N
 }
 
 /// Patches for friction power: equal parts of the circumference and of the axial extent of the contact.
@@ -127,16 +118,8 @@ pub struct PatchSettings {
     /// Number of parts around the circumference, the first from θ = 0.
     pub around: usize,
     /// Number of parts along the axis.
-    #[serde(default = "one_part", skip_serializing_if = "is_one_part")]
+    #[serde(default = "count::<1>", skip_serializing_if = "is::<1>")]
     pub along: usize,
-}
-
-fn one_part() -> usize {
-    1
-}
-
-fn is_one_part(parts: &usize) -> bool {
-    *parts == one_part()
 }
 
 /// One surface: around the z axis and parallel to the tip contour of its rotor, or through the open contact grid of a structure if its

@@ -53,11 +53,11 @@ impl SceneSettings {
             surface.validate((self, &names), &format!("surface[{}]", index + 1))?;
         }
         self.validate_unique_names()?;
-        self.validate_contact_names()?;
-        self.check_parts()?;
-        self.validate_pairs()?;
-        self.check_whole()?;
         let relations = Relations::of(self);
+        self.validate_contact_names(&relations)?;
+        self.check_parts(&relations)?;
+        self.validate_pairs(&relations)?;
+        self.check_whole(&relations)?;
         for (index, contact) in self.contacts.iter().enumerate() {
             let master = structure(self, relations.masters[index]);
             let flies = master.is_some_and(|master| master.motion == BodyMotion::Free);
@@ -96,8 +96,7 @@ impl SceneSettings {
         Ok(())
     }
 
-    fn validate_contact_names(&self) -> Result<()> {
-        let relations = Relations::of(self);
+    fn validate_contact_names(&self, relations: &Relations) -> Result<()> {
         for (index, contact) in self.contacts.iter().enumerate() {
             let master = relations.masters[index].is_none().then_some(("master", &contact.master));
             let slave = relations.surfaces[index].is_none().then_some(("slave", &contact.slave));
@@ -143,8 +142,7 @@ impl StructureSettings {
         }
         within(&format!("{at}.softening"), self.softening, 0.0, ranges::SOFTENING)?;
         for (index, factor) in self.frequency_factors.iter().enumerate() {
-            let [low, high] = ranges::FREQUENCY_FACTORS;
-            within(&format!("{at}.frequency_factors[{}]", index + 1), *factor, low, high)?;
+            between(&format!("{at}.frequency_factors[{}]", index + 1), *factor, ranges::FREQUENCY_FACTORS)?;
         }
         if let Some(load) = &self.load {
             at_most(&format!("{at}.load.amplitude"), load.amplitude, ranges::LINE_LOAD)?;
@@ -204,14 +202,12 @@ impl SurfaceSettings {
         within(&format!("{at}.ramp_time"), self.ramp_time, 0.0, bounds::TIME)?;
         self.validate_carrier(known, at)?;
         if let Some(SplineSettings { around, along, .. }) = self.spline {
-            let ([least_around, most_around], [least_along, most_along]) =
-                (ranges::SPLINE_AROUND, ranges::SPLINE_ALONG);
-            count(&format!("{at}.spline.around"), around, least_around, most_around)?;
-            count(&format!("{at}.spline.along"), along, least_along, most_along)?;
+            count(&format!("{at}.spline.around"), around, ranges::SPLINE_AROUND)?;
+            count(&format!("{at}.spline.along"), along, ranges::SPLINE_ALONG)?;
         }
         if let Some(patches) = self.patches {
-            count(&format!("{at}.patches.around"), patches.around, 1, bounds::PATCHES)?;
-            count(&format!("{at}.patches.along"), patches.along, 1, bounds::PATCHES)?;
+            count(&format!("{at}.patches.around"), patches.around, [1, bounds::PATCHES])?;
+            count(&format!("{at}.patches.along"), patches.along, [1, bounds::PATCHES])?;
             product(&format!("{at}.patches"), "patches", patches.around, patches.along, bounds::PATCHES)?;
         }
         self.validate_shape(at)
@@ -248,7 +244,7 @@ impl SurfaceSettings {
             Shape::TwoLobe { depth, width, phase } => {
                 at_most(&format!("{at}.shape.depth"), *depth, ranges::DEPTH)?;
                 at_most(&format!("{at}.shape.phase"), *phase, ranges::ANGLE)?;
-                within(&format!("{at}.shape.width"), *width, ranges::LOBE_WIDTH[0], ranges::LOBE_WIDTH[1])
+                between(&format!("{at}.shape.width"), *width, ranges::LOBE_WIDTH)
             }
             Shape::Table { radius_change } => {
                 crate::scene::shape::CompiledShape::new(&Shape::Table { radius_change: radius_change.clone() }, 0.0)
@@ -289,23 +285,20 @@ impl ContactSettings {
 
 impl CoatingSettings {
     fn validate(&self, at: &str) -> Result<()> {
-        let ([thinnest, thickest], [softest, stiffest]) = (ranges::THICKNESS, ranges::MODULUS);
-        within(&format!("{at}.thickness"), self.thickness, thinnest, thickest)?;
+        between(&format!("{at}.thickness"), self.thickness, ranges::THICKNESS)?;
         if let Some(cutting) = &self.cutting {
-            let ([least, most], [pulling, pushing]) = (ranges::CUTTING_ENERGY, ranges::NORMAL_RATIO);
-            within(&format!("{at}.cutting.specific_energy"), cutting.specific_energy, least, most)?;
-            within(&format!("{at}.cutting.normal_ratio"), cutting.normal_ratio, pulling, pushing)?;
+            between(&format!("{at}.cutting.specific_energy"), cutting.specific_energy, ranges::CUTTING_ENERGY)?;
+            between(&format!("{at}.cutting.normal_ratio"), cutting.normal_ratio, ranges::NORMAL_RATIO)?;
         } else {
-            within(&format!("{at}.modulus"), self.modulus, softest, stiffest)?;
+            between(&format!("{at}.modulus"), self.modulus, ranges::MODULUS)?;
         }
         within(&format!("{at}.yield_stress"), self.yield_stress, 0.0, ranges::STRESS)?;
         within(&format!("{at}.hardening"), self.hardening, 0.0, ranges::STRESS)?;
         if let Some(width) = self.contact_width {
-            let [narrowest, widest] = ranges::CONTACT_WIDTH;
-            within(&format!("{at}.contact_width"), width, narrowest, widest)?;
+            between(&format!("{at}.contact_width"), width, ranges::CONTACT_WIDTH)?;
         }
-        count(&format!("{at}.cells_around"), self.cells_around, 2, ranges::CELLS)?;
-        count(&format!("{at}.cells_along"), self.cells_along, 1, ranges::CELLS)?;
+        count(&format!("{at}.cells_around"), self.cells_around, [2, ranges::CELLS])?;
+        count(&format!("{at}.cells_along"), self.cells_along, [1, ranges::CELLS])?;
         product(at, "cells", self.cells_around, self.cells_along, ranges::CELLS)
     }
 }
@@ -318,7 +311,12 @@ fn gap(field: &str, value: f64) -> Result<()> {
     within(field, value, 0.0, ranges::POSITION)
 }
 
-fn count(field: &str, value: usize, least: usize, most: usize) -> Result<()> {
+fn between(field: &str, value: f64, range: [f64; 2]) -> Result<()> {
+    within(field, value, range[0], range[1])
+}
+
+fn count(field: &str, value: usize, range: [usize; 2]) -> Result<()> {
+    let [least, most] = range;
     if (least..=most).contains(&value) {
         Ok(())
     } else {

@@ -2,7 +2,7 @@
 
 use super::{Compiled, MAX_COUPLED};
 use crate::geometry::layout::Layout;
-use crate::geometry::open::{OpenGap, OpenSurface};
+use crate::geometry::open::OpenGap;
 use crate::geometry::surface_spline::SurfaceSpline;
 use crate::geometry::{GapLaw, RevolutionGap};
 use crate::modes::modal::ModalModel;
@@ -96,18 +96,18 @@ impl Compiled {
         let positions = rom.contact_nodes.iter().map(|node| node.position.into()).collect();
         let mut gap = OpenGap::new(positions, plan.nodes.clone(), self.open_surface(plan)?);
         for (_, other) in self.plan.pairs_of(plan.body) {
-            gap = gap.beside(self.open_surface(other)?.extent());
+            gap = gap.beside(&self.open_surface(other)?);
         }
         Ok(GapLaw::Open(Box::new(gap)))
     }
 
     /// Creates the undeformed surface through an open contact grid.
-    fn open_surface(&self, plan: &PairPlan) -> Result<OpenSurface> {
+    fn open_surface(&self, plan: &PairPlan) -> Result<SurfaceSpline> {
         let Some(rom) = plan.grid.map(|grid| &self.scene.roms[grid]) else { unreachable!("validated") };
         let Some(grid) = rom.extras.grid else { unreachable!("checked") };
         let data: Vec<[f64; 3]> = rom.contact_nodes.iter().map(|node| node.position).collect();
         let spline = self.scene.settings.surfaces[plan.surface].spline.unwrap_or_default();
-        Ok(OpenSurface::new(SurfaceSpline::open(&data, grid.around, grid.along, spline.interpolation)?))
+        SurfaceSpline::open(&data, grid.around, grid.along, spline.interpolation)
     }
 
     /// Returns the modes of each carrier at the control points of its surfaces, one surface after the other.

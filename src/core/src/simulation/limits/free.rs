@@ -149,8 +149,8 @@ impl FlightCheck<'_> {
 /// the largest.
 fn flight(laws: &mut [OpenGap], velocity: Vector3, frictions: &[f64], largest: f64) -> Vec<NodesInside> {
     let speed = length(velocity);
-    let Some(extent) = laws.first().map(OpenGap::largest).filter(|_| speed != 0.0) else { return Vec::new() };
-    let nodes = laws[0].positions().len();
+    let Some(extent) = laws.first().map(|law| law.largest).filter(|_| speed != 0.0) else { return Vec::new() };
+    let nodes = laws[0].positions.len();
     // `largest` is a tenth of the extent.
     let spacing = 10.0 * SPACING * extent / speed;
     let mut displacement = vec![0.0; 3 * nodes];
@@ -169,7 +169,7 @@ fn flight(laws: &mut [OpenGap], velocity: Vector3, frictions: &[f64], largest: f
         }
         let direction = |node: &usize| {
             let normal = geometry.normal_at(*node);
-            let own = laws.iter().position(|law| law.nodes().contains(node)).map_or(largest, |law| frictions[law]);
+            let own = laws.iter().position(|law| law.nodes.contains(node)).map_or(largest, |law| frictions[law]);
             let share = if own < largest { own / largest } else { 1.0 };
             (normal, share * Sliding::new(velocity, normal).direction)
         };
@@ -190,9 +190,9 @@ fn seen_by(
     let first = (0..laws.len()).find_map(of)?;
     let mut contact_modes = DMatrix::zeros(3 * met.nodes.len(), first.len());
     for (member, node) in met.nodes.iter().enumerate() {
-        let pair = laws.iter().position(|law| law.nodes().contains(node));
+        let pair = laws.iter().position(|law| law.nodes.contains(node));
         let Some((law, modes)) = pair.and_then(|pair| Some((&laws[pair], of(pair)?))) else { continue };
-        for (point, weight) in law.surface.surface.weights(met.geometry.places[*node]).iter() {
+        for (point, weight) in law.surface.weights(met.geometry.places[*node]).iter() {
             for component in 0..3 {
                 let row = modes.contact_modes.row(3 * point + component) * weight;
                 let mut target = contact_modes.row_mut(3 * member + component);

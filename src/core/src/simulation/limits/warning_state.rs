@@ -102,7 +102,7 @@ impl Simulation {
         for carrier in 0..self.compiled.carriers.len() {
             let of = Subject::Carrier(carrier);
             let frequency = self.compiled.carriers[carrier].model.largest_frequency();
-            self.report(limits::unresolved_modes(frequency, self.system.scheme(), step), of, step);
+            self.report(limits::unresolved_modes(frequency, self.system.settings.scheme, step), of, step);
             if self.compiled.carriers[carrier].loads.nodal.is_some() {
                 self.warn_of_turn(of, step * self.state.inputs.carriers[carrier].load_phase.rate().abs());
             }
@@ -120,7 +120,7 @@ impl Simulation {
 
     /// Warns of a scheme that makes resonances too large if the load turns far in one internal step (rad).
     fn warn_of_turn(&mut self, of: Subject, turn: f64) {
-        let scheme = self.system.scheme();
+        let scheme = self.system.settings.scheme;
         let coarse = scheme.properties().resonance_error.filter(|error| turn > error.resolved_turn);
         let kind = coarse.map(|error| WarningKind::CoarseExcitation {
             scheme,

@@ -189,7 +189,7 @@ pub fn internal_steps(table: &mut TableBuilder, settings: &SceneSettings) {
     let (unit, read) = (Some((&TIME, settings.time.step)), scalar(|view| view.system.step_size()));
     let internal = table.output("internal_step", Span::Point, unit, step_text, read);
     internal.quantity(Quantity::InternalStep).variability = Variability::Discrete;
-    let read = count(|view| view.system.steps_taken());
+    let read = count(|view| view.system.effort().steps);
     table.output("internal_steps", Span::Total, None, count_text, read).variability = Variability::Discrete;
     for (name, text, read) in EFFORTS.into_iter().filter(|_| with_tolerance) {
         table.output(name, Span::Total, None, text, count(read)).variability = Variability::Discrete;

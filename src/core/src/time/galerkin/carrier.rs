@@ -83,7 +83,7 @@ impl CarrierIntegrator {
             touches: vec![false; lanes.len()],
             frames: vec![PolarFrame::FIXED; lanes.len()],
             force: vec![0.0; stride],
-            body: if bank.is_loaded() { body.loaded() } else { body },
+            body: if bank.options.loads { body.loaded() } else { body },
         }
     }
 

@@ -101,7 +101,7 @@ impl Obstacle for ObstacleView<'_> {
         let Some(number) = self.record.pair_of[node] else { return Gap::NOTHING };
         let PairRecord { pair, drives, .. } = &self.record.pairs[number];
         let at = At { node, index: self.record.index(node), drive: &drives[point].0 };
-        let gap = self.pairs[*pair].gap_mut().gap(at, moved, Some(self.record.places[point][node]));
+        let gap = self.pairs[*pair].parts.gap.gap(at, moved, Some(self.record.places[point][node]));
         self.record.places[point][node] = gap.foot;
         gap
     }
@@ -170,7 +170,7 @@ impl Obstacle for ObstacleView<'_> {
 
     fn turns(&self) -> bool {
         let mut pairs = self.record.pairs.iter().map(|own| &self.pairs[own.pair]);
-        pairs.any(|pair| pair.gap().slides_anywhere() && pair.parameters().friction != 0.0)
+        pairs.any(|pair| pair.gap().slides_anywhere() && pair.parts.parameters.friction != 0.0)
     }
 
     fn prepare_compliance(&mut self, lanes: Lanes, chosen: &[bool], normals: &[f64]) -> bool {
@@ -203,7 +203,7 @@ impl Obstacle for ObstacleView<'_> {
     }
 
     fn parameters(&self, node: usize) -> &ContactParameters {
-        self.pair(node).map_or(&ContactParameters::FRICTIONLESS, |(pair, _)| pair.parameters())
+        self.pair(node).map_or(&ContactParameters::FRICTIONLESS, |(pair, _)| &pair.parts.parameters)
     }
 
     fn drift(&self, node: usize, step_point: usize, moved: Vector3) -> Vector3 {
@@ -374,7 +374,7 @@ impl ObstacleView<'_> {
         let (trial, basis) = (step.trial, &step.level.basis);
         let (mut tally, mut work) = (self.record.tallies[node], self.record.work);
         let PairRecord { pair, drives, motions, .. } = &self.record.pairs[pair];
-        let (gap, slides) = (self.pairs[*pair].gap(), self.pairs[*pair].parameters().friction != 0.0);
+        let (gap, slides) = (self.pairs[*pair].gap(), self.pairs[*pair].parts.parameters.friction != 0.0);
         tally.peak = tally.peak.max(trial.peak(basis, step.kind, node));
         let mut heats = 0.0;
         for i in (0..=trial.points()).filter(|i| trial.multiplier(*i, node) != 0.0) {

@@ -5,9 +5,9 @@ use crate::geometry::surface_spline::ClosestPoint;
 use crate::geometry::wrench::{MotionIncrement, Wrench};
 use crate::geometry::{PrescribedMotion, Vector3};
 use crate::math::vector::{ZERO, length};
+use crate::system::ShapeGrowth;
 use crate::system::carrier::Spot;
 use crate::system::contact_view::ContactMember;
-use crate::system::growth::ShapeGrowth;
 use crate::system::pair::ContactPair;
 use crate::system::work::{ContactWork, WorkingForce};
 use crate::system::{ContactEvent, StepFailure, Structure};
@@ -265,7 +265,8 @@ impl SpanRecord {
     pub(crate) fn begin_courses(&mut self, pairs: &[ContactPair], span: f64) {
         for own in &mut self.pairs {
             let pair = &pairs[own.pair];
-            own.course = MotionCourse::new(pair.drive_before(), &pair.middle.0, pair.middle.1, pair.drive_now(), span);
+            own.course =
+                MotionCourse::new(&pair.prescribed.drive.before, &pair.middle.0, pair.middle.1, pair.drive_now(), span);
         }
     }
 

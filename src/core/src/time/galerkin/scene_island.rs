@@ -222,7 +222,7 @@ impl SceneIsland {
         let (structure, sector, pair) = (record.structure, record.sector, *pair);
         let GapLaw::Revolution(gap) = pairs[pair].gap() else { return Ok(()) };
         blade.choose_minima(&structures[structure].needed_minima, sector, |node| record.tallies[node].lowest);
-        let place = BladePlace { kind: *kind, sector, gap, parameters: *pairs[pair].parameters(), course };
+        let place = BladePlace { kind: *kind, sector, gap, parameters: pairs[pair].parts.parameters, course };
         let mut steps = BladeInSpan::begin(blade, place, *control, goal, state);
         let outcome = integrate(&mut steps, &mut counted.effort);
         steps.write(state);
@@ -392,7 +392,7 @@ fn kinds_of(bank: &ModalBank) -> Vec<ContactModes> {
         return vec![coordinates.seen_at(&shapes)];
     }
     let count = bank.model().inertial_modes();
-    (0..bank.sets()).map(|set| modes_of(bank, set, count)).collect()
+    (0..bank.sets).map(|set| modes_of(bank, set, count)).collect()
 }
 
 /// Modes with inertia of a sector, and the flexibility of the others.

@@ -1,17 +1,16 @@
 //! The linear equations of one combination of branches.
 
 use super::CoatedProblem;
+use crate::contact::active_set::REDUNDANT_PIVOT;
 use crate::contact::coating::{Branch, CellContact};
 
-/// Pivots below this fraction of their column belong to redundant contacts (coincident nodes).
-const REDUNDANT_PIVOT: f64 = 1e-12;
 impl CoatedProblem {
     /// Solves for gaps and forces of the present branches; redundant contacts are softened first.
     pub(super) fn solve_branches(&mut self) -> bool {
         if self.solve_linear() {
             return true;
         }
-        if !self.yielding.is_softened() {
+        if !self.yielding.softened {
             self.yielding.soften(&mut self.delassus, self.size);
             return self.solve_linear();
         }

@@ -111,7 +111,7 @@ proptest! {
         let w = p_matrix(&entries, 4 * blades);
         let mut problem = coating.problem(blades);
         for blade in 0..blades {
-            coating.locate(&mut problem, &[number(blade), number(blade) + 0.1, number(blade), number(blade) - 0.1]);
+            coating.locate(&mut problem, &[real(blade), real(blade) + 0.1, real(blade), real(blade) - 0.1]);
         }
         problem.delassus.copy_from(&w);
         problem.gaps.copy_from_slice(&gaps[..4 * blades]);
@@ -314,7 +314,7 @@ fn path_is_independent_of_the_unit_of_length() {
             let mut coating = Coating::new(&settings, &tip(&settings, &[0.0, 0.5, 1.0]), 2).unwrap();
             set_wear(&mut coating, &plastic);
             let mut problem = coating.problem(2);
-            (0..2).for_each(|blade| coating.locate(&mut problem, &[3.0 * number(blade); 3]));
+            (0..2).for_each(|blade| coating.locate(&mut problem, &[3.0 * real(blade); 3]));
             problem.delassus.copy_from(&(&w * unit));
             problem.gaps.copy_from_slice((&gaps * unit).as_slice());
             problem.guess();
@@ -333,9 +333,9 @@ fn path_does_not_cycle_when_rods_move_identically() {
     for (n, modulus, yields, pushes, draws) in [(3, 8.0, 0.25, 1.25, -0.75), (4, 64.0, 0.5, 1.75, -2.25)] {
         for (worn, depth) in [0.0, 0.25, 0.5].into_iter().flat_map(|worn| [0.25, 0.5, 1.0, 4.0, 8.0].map(|d| (worn, d)))
         {
-            let axial: Vec<f64> = (0..n).map(number).collect();
+            let axial: Vec<f64> = (0..n).map(real).collect();
             let settings = material(modulus, yields * modulus, 0.0, 8, 3);
-            let tip = tip(&settings, &axial).with_extent([-0.5, number(n) - 0.5]);
+            let tip = tip(&settings, &axial).with_extent([-0.5, real(n) - 0.5]);
             let mut coating = Coating::new(&settings, &tip, 1).unwrap();
             set_wear(&mut coating, &[worn]);
             let mut problem = coating.problem(1);
@@ -372,7 +372,7 @@ fn path_is_followed_through_repeated_unloading() {
         problem.gaps.copy_from_slice((random.matrix(4, 1) * 2.0).as_slice());
         problem.guess();
         assert!(problem.follow_path(), "{}", problem.factorisations);
-        most = most.max(number(problem.factorisations) / number(4 + 2 * problem.contacts.len()));
+        most = most.max(real(problem.factorisations) / real(4 + 2 * problem.contacts.len()));
     }
     assert!(most > 1.2, "{most}");
 }

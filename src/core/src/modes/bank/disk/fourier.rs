@@ -5,6 +5,7 @@
 //! sector s moves by E − O and sector N − s by E + O, so that only half of the sectors need sums. For even N, the sums over even
 //! and over odd n also give sectors N/2 ± s, and a quarter is enough.
 
+use crate::math::real;
 use crate::math::simd::Kernel;
 use crate::math::vector::Vector3;
 use crate::modes::bank::LANES;
@@ -163,11 +164,7 @@ impl Fourier {
 /// Sine and cosine of 2π·index/count; the symmetries of the circle hold exactly.
 pub(crate) fn sine_cosine(index: usize, count: usize) -> (f64, f64) {
     let (quarter, rest) = (4 * (index % count) / count, 4 * (index % count) % count);
-    let angle = |part: usize| {
-        #[expect(clippy::cast_precision_loss, reason = "sector counts are far below 2^52")]
-        let fraction = part as f64 / count as f64;
-        std::f64::consts::FRAC_PI_2 * fraction
-    };
+    let angle = |part: usize| std::f64::consts::FRAC_PI_2 * (real(part) / real(count));
     let (sine, cosine) = if 2 * rest == count {
         (std::f64::consts::FRAC_1_SQRT_2, std::f64::consts::FRAC_1_SQRT_2)
     } else if 2 * rest < count {

@@ -96,26 +96,11 @@ impl<'a> ScenePlace<'a> {
         structure(self.settings, self.relations.carriers[self.index])
     }
 
-    /// Returns whether that structure is also the master of a contact.
-    pub(super) fn carrier_touches(&self) -> bool {
-        self.relations.carriers[self.index].is_some_and(|carrier| self.relations.touches(carrier))
-    }
-
     /// Returns whether the master of this contact has several contacts.
     pub(super) fn has_other_contacts(&self) -> bool {
         let Some(master) = self.relations.masters[self.index] else { return false };
         let own = self.relations.contacts[master].iter();
         own.filter(|contact| self.relations.masters[**contact] == Some(master)).count() > 1
-    }
-
-    /// Returns whether the contact is solved together with that of another pair.
-    pub(super) fn is_coupled(&self) -> bool {
-        self.relations.is_coupled(self.settings, self.index)
-    }
-
-    /// Returns whether another pair has its surface on the same flexible structure.
-    pub(super) fn shares_carrier(&self) -> bool {
-        self.relations.shares_carrier(self.settings, self.index)
     }
 
     /// Returns the ROM of the master of a contact.

@@ -342,8 +342,9 @@ const OF_FREE_MASTERS: &[(&str, Change)] = &[
 ];
 
 fn check(scene: &Scene, solver: Solver) -> crate::Result<()> {
-    scene.settings.check_parts()?;
-    scene.settings.check_whole()?;
+    let relations = super::Relations::of(&scene.settings);
+    scene.settings.check_parts(&relations)?;
+    scene.settings.check_whole(&relations)?;
     scene.check_roms()?;
     scene.check_methods(scene.settings.time.scheme, solver)
 }

@@ -19,12 +19,20 @@ impl SceneSettings {
     }
 
     /// Checks that every structure and every surface takes part; a surface belongs to one pair.
-    pub(super) fn validate_pairs(&self) -> Result<()> {
-        let relations = Relations::of(self);
+    pub(super) fn validate_pairs(&self, relations: &Relations) -> Result<()> {
         let carriers: HashSet<&str> = self.surfaces.iter().filter_map(|surface| surface.structure.as_deref()).collect();
         for (index, structure) in self.structures.iter().enumerate() {
-            let part = [relations.touches(index), carriers.contains(structure.name.as_str())];
-            structure.validate_part(part, format!("structure[{}]", index + 1))?;
+            let (name, at) = (&structure.name, format!("structure[{}]", index + 1));
+            if relations.touches(index) || carriers.contains(name.as_str()) {
+                continue;
+            }
+            if structure.motion == BodyMotion::Free {
+                let problem = format!("the free structure `{name}` is not the master of any contact");
+                let remedy = "Make it the master of a [[contact]], or remove it";
+                return Err(Error::invalid(format!("{at}.motion"), problem, remedy));
+            }
+            let remedy = "Make it the `master` of a [[contact]] or the `structure` of a [[surface]], or remove it";
+            return Err(Error::invalid(format!("{at}.name"), format!("`{name}` is not part of any contact"), remedy));
         }
         let mut counts = vec![0; self.surfaces.len()];
         relations.surfaces.iter().flatten().for_each(|surface| counts[*surface] += 1);
@@ -39,24 +47,5 @@ impl SceneSettings {
             }
         }
         Ok(())
-    }
-}
-
-impl StructureSettings {
-    /// Checks that a structure is a master or carries a surface.
-    fn validate_part(&self, part: [bool; 2], at: String) -> Result<()> {
-        let (name, what) = (&self.name, format!("{at}.name"));
-        match part {
-            [false, false] if self.motion == BodyMotion::Free => Err(Error::invalid(
-                format!("{at}.motion"),
-                format!("the free structure `{name}` is not the master of any contact"),
-                "Make it the master of a [[contact]], or remove it",
-            )),
-            [false, false] => {
-                let remedy = "Make it the `master` of a [[contact]] or the `structure` of a [[surface]], or remove it";
-                Err(Error::invalid(what, format!("`{name}` is not part of any contact"), remedy))
-            }
-            _ => Ok(()),
-        }
     }
 }

@@ -72,11 +72,11 @@ impl Blade {
         if law.sticks || !law.complementary || !law.constant_friction || degrees().any(|degree| degree == 1) {
             return None;
         }
-        if gap.members().len() != kinds[0].nodes() || gap.is_shifted() {
+        if gap.nodes.len() != kinds[0].nodes() || gap.shaft_moves {
             return None;
         }
         let of = |tables: &Tables| {
-            let rows = BladeRows::new(tables.shapes(), tables.rows.error_form(), gap.slopes(), &gap.layout);
+            let rows = BladeRows::new(tables.shapes(), tables.rows.error_form(), &gap.slopes, &gap.layout);
             let level = |kind| BladeLevel::new(&rows, tables.levels[0].basis.degree, kind);
             let levels = tables.levels.iter().map(|_| level(ForceInterpolation::Polynomial)).collect();
             BladeTables { levels, constant: level(ForceInterpolation::Constant), rows }
@@ -201,14 +201,14 @@ impl<'a> BladeInSpan<'a> {
 
 impl<'a> BladePlace<'a> {
     fn faced_surface(&self, drives: &[PointDrive; POINTS]) -> FacedSurface<'a> {
-        FacedSurface { surface: self.gap.faced().0, drives: *drives, friction: self.parameters.friction }
+        FacedSurface { surface: &self.gap.surface, drives: *drives, friction: self.parameters.friction }
     }
 }
 
 /// Prescribed motion of a sector at the fraction `theta` of a span, and the motion since the start of the span.
 fn drive_at(place: &BladePlace, theta: f64) -> (PointDrive, MotionIncrement) {
     let (drive, motion) = place.course.at(theta);
-    let (_, layout) = place.gap.faced();
+    let layout = &place.gap.layout;
     let point = PointDrive {
         turned: drive.rotor_angle - drive.shape_rotation,
         factor: drive.shape_factor,
