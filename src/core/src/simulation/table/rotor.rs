@@ -1,6 +1,6 @@
 //! Outputs of a rotor, one row each with its reader.
 
-use tiprub_cosim::variables::{Quantity, Span, VariableUnit};
+use tiprub_cosim::variables::{NO_CLEARANCE, Quantity, Span, VariableUnit};
 
 use super::builder::{NominalUnit, TableBuilder};
 use super::parts::{BodyFacts, TableFacts, refuse};
@@ -12,7 +12,7 @@ use crate::simulation::units::{ANGLE, FORCE, LENGTH, LINE_LOAD, PRESSURE, STRESS
 pub fn angle(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts) {
     let index = body.index;
     let text = format!("Angle of {} about +z", parts.rotor(body));
-    let read = scalar(move |view| view.rotor_angle(index));
+    let read = scalar(move |view| view.simulation.state.inputs.rotors[index].total_angle(view.elapsed));
     let angle = table.output("rotor_angle", Span::Point, Some((&ANGLE, 1.0)), text, read);
     angle.display(0).quantity(Quantity::RotorAngle);
 }
@@ -103,7 +103,7 @@ fn watched_points(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts
     {
         let index = body.index;
         let text = format!("Displacement of watched points, {name} ({})", names.join(", "));
-        let read = each(move |view, point| view.watched_displacement(index, sector - 1, point, axis));
+        let read = each(move |view, point| view.simulation.watched_row(index, 3 * point + axis, sector - 1));
         let row =
             table.output(format!("blade[{sector}].{name}_displacement"), Span::Point, nominal(parts, body), text, read);
         row.elements(names.len()).display(1);
@@ -117,7 +117,7 @@ fn watched_points(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts
         names.join(", "),
         untouched(parts, body)
     );
-    let read = each(move |view, point| view.watched_clearance(index, sector - 1, point));
+    let read = each(move |view, point| view.simulation.outputs.watched_gaps.clearance(index, point, sector - 1));
     let name = format!("blade[{sector}].watched_clearance");
     let row = table.output(name, Span::Point, nominal(parts, body), text, read);
     row.elements(names.len()).display(1);
@@ -142,7 +142,7 @@ fn tips(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts, sector: 
     for (axis, name) in COMPONENTS[usize::from(body.rom.frame == DisplacementFrame::Cartesian)].into_iter().enumerate()
     {
         let text = format!("Displacement of contact nodes, {name} ({})", node_list(body));
-        let read = each(move |view, node| view.displacement(index, sector - 1, node, axis));
+        let read = each(move |view, node| view.modes(index).row(3 * node + axis, sector - 1));
         let name = format!("blade[{sector}].tip_{name}_displacement");
         let row = table.output(name, Span::Point, nominal(parts, body), text, read);
         row.elements(body.rom.contact_nodes.len()).display(1);
@@ -240,7 +240,7 @@ pub(crate) fn watched_rows(
     let mut add =
         |quantity, name, span, unit, text, read| rows.push(NodeRow { quantity, name, span, unit, text, read });
     let text = "Clearance normal to the casing at the communication point";
-    let read = each(move |view, node| view.clearance(body, node, sector));
+    let read = each(move |view, node| view.system.structures()[body].gap(node, sector).min(NO_CLEARANCE));
     add(Quantity::Clearance(sector), "clearance", Span::Point, gap, text, read);
     let text = "Smallest clearance within the communication step";
     let read = each(move |view, node| view.lowest_at(body, node, sector));
@@ -250,7 +250,9 @@ pub(crate) fn watched_rows(
     add(Quantity::NormalForce(sector), "normal_force", Span::Mean, force, text, read);
     if friction {
         let text = "Magnitude of the friction force (axial part included), mean over the communication step";
-        let read = each(move |view, node| view.mean * view.tangential_impulse(body, node, sector));
+        let read = each(move |view, node| {
+            view.mean * view.window.bodies[body].tangential_impulse[view.index(body, node, sector)]
+        });
         add(Quantity::TangentialForce(sector), "tangential_force", Span::Mean, force, text, read);
     }
     if instantaneous {
