@@ -3,11 +3,11 @@
 use std::ffi::{CString, c_char};
 
 use super::Boolean;
+use crate::Load;
 use crate::boundary::{
     self, Fmi2Logger, ImporterEnvironment, In, InstanceHandle, Instantiation, Out, Sink, StateHandle, TextArgument,
     guard, instantiate, refuse_instantiation, release, state,
 };
-use crate::load::Load;
 use crate::location;
 use crate::shared::{accessors, shared_functions};
 use crate::slave::order::fmi2 as order;
