@@ -1,6 +1,23 @@
 //! The library inside the FMU of a scene: [`tiprub_core::Simulation`] behind the C ABIs of `tiprub-fmi-facade`.
 #![warn(unreachable_pub)]
 
-mod rub;
+use std::path::Path;
 
-tiprub_fmi_facade::library!(rub::load);
+use tiprub_core::Simulation;
+use tiprub_cosim::{CoSimulation, Diagnostic, Result};
+use tiprub_fmi_facade::Loaded;
+
+/// Reads the scene in the resources; the unit compiles it.
+fn load(resources: &Path) -> Result<Loaded, Diagnostic> {
+    let loaded = tiprub_format::load_resources(resources)?;
+    let scene = loaded.scene;
+    let unit = move || -> Result<Box<dyn CoSimulation>> { Ok(Box::new(Simulation::new(scene)?)) };
+    Ok(Loaded {
+        unit: Box::new(unit),
+        token: loaded.token,
+        fmi3_arrays: loaded.fmi3_arrays,
+        release: tiprub_format::LIBRARY_RELEASE,
+    })
+}
+
+tiprub_fmi_facade::library!(load);

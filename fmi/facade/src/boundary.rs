@@ -2,19 +2,17 @@
 //! around every call.
 
 mod calls;
-mod derivatives;
 mod float_environment;
 mod instance;
 mod log;
 mod panics;
 mod pointers;
 
-pub(crate) use calls::{StateHandle, set_debug_logging, strings};
-pub(crate) use calls::{get, set, state};
-pub(crate) use derivatives::{ADJOINT, DIRECTIONAL, derivatives};
+pub(crate) use calls::{ADJOINT, DIRECTIONAL, StateHandle, derivatives, get, set, set_debug_logging, state, strings};
 pub use instance::InstanceHandle;
-pub(crate) use instance::{Callbacks, Instantiation, enter, instantiate, release};
-pub(crate) use instance::{guard, refuse_instantiation, unsupported};
+pub(crate) use instance::{
+    Callbacks, Instantiation, enter, guard, instantiate, refuse_instantiation, release, unsupported,
+};
 pub(crate) use log::Sink;
 pub use log::{Fmi2Logger, Fmi3Logger};
 pub(crate) use pointers::Out;

@@ -102,31 +102,32 @@ macro_rules! accessor {
     };
 }
 
-/// Defines the getters and setters of all types of variables. A row lists the names and rules of the functions, the
+/// Defines the getters and setters of all types of variables. A row lists the names of the functions, the
 /// name of the type, the C type, the type of the values and the conversions. The first row lists the functions for
 /// strings, and the name of their array of values for messages.
 macro_rules! accessors {
     (
         $n_values:tt $get_string:ident $set_string:ident $argument:literal;
-        $($get:ident $get_rule:ident $set:ident $set_rule:ident $name:literal $c:ty, $rust:ty, $out:expr, $in:expr;)*
+        $($get:ident $set:ident $name:literal $c:ty, $rust:ty, $out:expr, $in:expr;)*
     ) => {
         $(
             $crate::shared::accessor! { $n_values $get Out<$c>, |instance, references, values| {
                 let convert: fn($rust) -> $c = $out;
-                boundary::get((instance, &order::$get_rule, $name), references, values, convert)
+                boundary::get((instance, &order::getter(stringify!($get)), $name), references, values, convert)
             }}
             $crate::shared::accessor! { $n_values $set In<$c>, |instance, references, values| {
                 let convert: fn(&$c) -> $rust = $in;
-                let target = (instance, &order::$set_rule, $name);
+                let target = (instance, &order::setter(stringify!($set)), $name);
                 boundary::set(target, references, values, |value| Ok(convert(value)))
             }}
         )*
         $crate::shared::accessor! { $n_values $get_string Out<*const c_char>, |instance, references, values| {
-            boundary::strings((instance, &order::GET_STRING), references, values)
+            boundary::strings((instance, &order::getter(stringify!($get_string))), references, values)
         }}
         $crate::shared::accessor! { $n_values $set_string In<TextArgument>, |instance, references, values| {
             let convert = |value: &TextArgument| value.required($argument).map(str::to_owned);
-            boundary::set((instance, &order::SET_STRING, "String"), references, values, convert)
+            let target = (instance, &order::setter(stringify!($set_string)), "String");
+            boundary::set(target, references, values, convert)
         }}
     };
 }

@@ -15,7 +15,7 @@ use std::path::Path;
 use tiprub_cosim::warning::Severity;
 use tiprub_cosim::{CoSimulation, Diagnostic, Warning};
 
-use crate::load::Load;
+use crate::Load;
 
 pub(crate) use access::{AccessRequest, FmiValue};
 pub(crate) use phase::{ExperimentTimes, InstancePhase};

@@ -7,7 +7,7 @@ use tiprub_shell::{Failure, Result, schedule::Schedule};
 use super::{
     UnpackedFmu, VariableType,
     api::{Fmi2Api, Fmi2Callbacks, InstancePointer},
-    slave::{HostedSlave, MessageList, OutputGroup, c_text, check},
+    slave::{HostedSlave, MessageList, OutputGroup, c_text, call},
 };
 
 /// Co-simulation slave of fmi2Type.
@@ -61,7 +61,7 @@ fn logger() -> *const c_void {
 
 /// One FMI 2.0 co-simulation instance; freed when dropped.
 pub(super) struct Fmi2Slave {
-    component: InstancePointer,
+    instance: InstancePointer,
     messages: Box<MessageList>,
     /// The FMU may keep the pointer to these callbacks.
     _callbacks: Box<Fmi2Callbacks>,
@@ -85,78 +85,57 @@ impl Fmi2Slave {
         let token = c_text(&fmu.description.token)?;
         let resources = c_text(&file_uri(&fmu.resources().to_string_lossy(), cfg!(windows)))?;
         // SAFETY: all strings outlive the call, and the callbacks outlive the instance.
-        let component = unsafe {
+        let instance = unsafe {
             (api.fmi2Instantiate)(name.as_ptr(), CO_SIMULATION, token.as_ptr(), resources.as_ptr(), &*callbacks, 0, 0)
         };
-        if component.is_null() {
+        if instance.is_null() {
             return Err(Failure::new("FMU", format!("fmi2Instantiate failed{}", messages.last_words()), ""));
         }
-        Ok(Self { component, messages, _callbacks: callbacks, api })
+        Ok(Self { instance, messages, _callbacks: callbacks, api })
     }
 }
 
 impl Drop for Fmi2Slave {
     fn drop(&mut self) {
-        // SAFETY: the component is alive until here and not used afterwards.
-        unsafe { (self.api.fmi2FreeInstance)(self.component) }
+        // SAFETY: the instance is alive until here and not used afterwards.
+        unsafe { (self.api.fmi2FreeInstance)(self.instance) }
     }
 }
 
 impl HostedSlave for Fmi2Slave {
     fn initialise(&mut self, schedule: &Schedule) -> Result<()> {
-        // SAFETY: a live component, in the order that the standard requires.
-        let (setup, enter, exit) = unsafe {
-            (
-                (self.api.fmi2SetupExperiment)(self.component, 0, 0.0, schedule.start, 1, schedule.stop),
-                (self.api.fmi2EnterInitializationMode)(self.component),
-                (self.api.fmi2ExitInitializationMode)(self.component),
-            )
-        };
-        check("fmi2SetupExperiment", None, setup, &self.messages)?;
-        check("fmi2EnterInitializationMode", None, enter, &self.messages)?;
-        check("fmi2ExitInitializationMode", None, exit, &self.messages)
+        call!(self.fmi2SetupExperiment(0, 0.0, schedule.start, 1, schedule.stop), None)?;
+        call!(self.fmi2EnterInitializationMode(), None)?;
+        call!(self.fmi2ExitInitializationMode(), None)
     }
 
     fn do_step(&mut self, time: f64, step: f64) -> Result<()> {
-        // SAFETY: a live component in step mode.
-        let status = unsafe { (self.api.fmi2DoStep)(self.component, time, step, 1) };
-        check("fmi2DoStep", Some(time), status, &self.messages)
+        call!(self.fmi2DoStep(time, step, 1), Some(time))
     }
 
     fn read(&mut self, group: &OutputGroup, values: &mut Vec<f64>) -> Result<()> {
         let (references, count) = (group.references.as_ptr(), group.references.len());
-        match group.kind {
-            VariableType::Float64 => {
-                let at = values.len();
-                values.resize(at + count, 0.0);
-                // SAFETY: `count` references and `count` values behind the pointers.
-                let status =
-                    unsafe { (self.api.fmi2GetReal)(self.component, references, count, values[at..].as_mut_ptr()) };
-                check("fmi2GetReal", None, status, &self.messages)
-            }
-            _ => {
-                let boolean = group.kind == VariableType::Boolean;
-                let get = if boolean { self.api.fmi2GetBoolean } else { self.api.fmi2GetInteger };
-                let mut integers = vec![0_i32; count];
-                // SAFETY: `count` references and `count` values behind the pointers.
-                let status = unsafe { get(self.component, references, count, integers.as_mut_ptr()) };
-                check(if boolean { "fmi2GetBoolean" } else { "fmi2GetInteger" }, None, status, &self.messages)?;
-                values.extend(integers.into_iter().map(f64::from));
-                Ok(())
-            }
+        if group.kind == VariableType::Float64 {
+            let at = values.len();
+            values.resize(at + count, 0.0);
+            return call!(self.fmi2GetReal(references, count, values[at..].as_mut_ptr()), None);
         }
+        let mut integers = vec![0_i32; count];
+        if group.kind == VariableType::Boolean {
+            call!(self.fmi2GetBoolean(references, count, integers.as_mut_ptr()), None)?;
+        } else {
+            call!(self.fmi2GetInteger(references, count, integers.as_mut_ptr()), None)?;
+        }
+        values.extend(integers.into_iter().map(f64::from));
+        Ok(())
     }
 
     fn set_real(&mut self, reference: u32, value: f64) -> Result<()> {
-        // SAFETY: one reference and one value behind the pointers.
-        let status = unsafe { (self.api.fmi2SetReal)(self.component, &raw const reference, 1, &raw const value) };
-        check("fmi2SetReal", None, status, &self.messages)
+        call!(self.fmi2SetReal(&raw const reference, 1, &raw const value), None)
     }
 
     fn terminate(&mut self) -> Result<()> {
-        // SAFETY: a live component in step mode.
-        let status = unsafe { (self.api.fmi2Terminate)(self.component) };
-        check("fmi2Terminate", None, status, &self.messages)
+        call!(self.fmi2Terminate(), None)
     }
 
     fn messages(&self) -> Vec<String> {

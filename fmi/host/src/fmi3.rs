@@ -7,7 +7,7 @@ use tiprub_shell::{Failure, Result, schedule::Schedule};
 use super::{
     UnpackedFmu, VariableType,
     api::{Fmi3Api, InstancePointer, ReferencePointer},
-    slave::{HostedSlave, MessageList, OutputGroup, c_text, check},
+    slave::{HostedSlave, MessageList, OutputGroup, c_text, call, check},
 };
 
 /// Logger; the environment is the message list of the slave.
@@ -91,34 +91,14 @@ impl Drop for Fmi3Slave {
 
 impl HostedSlave for Fmi3Slave {
     fn initialise(&mut self, schedule: &Schedule) -> Result<()> {
-        // SAFETY: a live instance, in the order that the standard requires.
-        let (enter, exit) = unsafe {
-            (
-                (self.api.fmi3EnterInitializationMode)(self.instance, false, 0.0, schedule.start, true, schedule.stop),
-                (self.api.fmi3ExitInitializationMode)(self.instance),
-            )
-        };
-        check("fmi3EnterInitializationMode", None, enter, &self.messages)?;
-        check("fmi3ExitInitializationMode", None, exit, &self.messages)
+        call!(self.fmi3EnterInitializationMode(false, 0.0, schedule.start, true, schedule.stop), None)?;
+        call!(self.fmi3ExitInitializationMode(), None)
     }
 
     fn do_step(&mut self, time: f64, step: f64) -> Result<()> {
-        let (mut event, mut terminate, mut early) = (false, false, false);
-        let mut last_time = f64::NAN;
-        // SAFETY: a live instance in step mode, four valid output locations.
-        let status = unsafe {
-            (self.api.fmi3DoStep)(
-                self.instance,
-                time,
-                step,
-                true,
-                &raw mut event,
-                &raw mut terminate,
-                &raw mut early,
-                &raw mut last_time,
-            )
-        };
-        check("fmi3DoStep", Some(time), status, &self.messages)?;
+        let ([mut event, mut terminate, mut early], mut last_time) = ([false; 3], f64::NAN);
+        let flags = [&raw mut event, &raw mut terminate, &raw mut early];
+        call!(self.fmi3DoStep(time, step, true, flags[0], flags[1], flags[2], &raw mut last_time), Some(time))?;
         if terminate || early || last_time.to_bits() != (time + step).to_bits() {
             return Err(Failure::new(
                 "FMU",
@@ -150,15 +130,11 @@ impl HostedSlave for Fmi3Slave {
     }
 
     fn set_real(&mut self, reference: u32, value: f64) -> Result<()> {
-        // SAFETY: one reference and one value behind the pointers.
-        let status = unsafe { (self.api.fmi3SetFloat64)(self.instance, &raw const reference, 1, &raw const value, 1) };
-        check("fmi3SetFloat64", None, status, &self.messages)
+        call!(self.fmi3SetFloat64(&raw const reference, 1, &raw const value, 1), None)
     }
 
     fn terminate(&mut self) -> Result<()> {
-        // SAFETY: a live instance in step mode.
-        let status = unsafe { (self.api.fmi3Terminate)(self.instance) };
-        check("fmi3Terminate", None, status, &self.messages)
+        call!(self.fmi3Terminate(), None)
     }
 
     fn messages(&self) -> Vec<String> {

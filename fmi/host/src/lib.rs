@@ -211,16 +211,7 @@ impl UnpackedFmu {
     /// # Errors
     /// A library that cannot be loaded, or a call with a status worse than Warning; the FMU's messages are included.
     pub fn simulate(&self, schedule: &Schedule, progress: &dyn Fn(usize)) -> Result<ImportedRun> {
-        slave::drive(&mut *self.instance()?, &self.description, schedule, progress)
-    }
-
-    /// Creates an instance of the FMU, of either version.
-    fn instance(&self) -> Result<Box<dyn slave::HostedSlave>> {
-        match self.description.fmi_version.as_str() {
-            "2.0" => Ok(Box::new(fmi2::Fmi2Slave::new(self)?)),
-            "3.0" => Ok(Box::new(fmi3::Fmi3Slave::new(self)?)),
-            other => Err(Failure::new("FMU", format!("FMI version {other} is not supported"), "Use FMI 2.0 or 3.0")),
-        }
+        Session::new(self)?.run(schedule, progress)
     }
 }
 

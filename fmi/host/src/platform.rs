@@ -25,60 +25,46 @@ struct PlatformFacts {
     /// Folder of FMI 2.0 (section 2.3); it defines none for Arm, where the folder of FMI 3.0 is used, as newer
     /// importers expect.
     fmi2: &'static str,
-    extension: &'static str,
-    format: BinaryFormat,
-    architecture: Architecture,
-    /// `std::env::consts::OS` and `ARCH`.
-    here: (&'static str, &'static str),
+    /// `std::env::consts::ARCH`, and the same in the header of a library.
+    architecture: (&'static str, Architecture),
+    system: SystemFacts,
 }
 
-const FACTS: [PlatformFacts; 5] = [
-    PlatformFacts {
-        platform: Platform::X86_64Linux,
-        tuple: "x86_64-linux",
-        fmi2: "linux64",
-        extension: "so",
-        format: BinaryFormat::Elf,
-        architecture: Architecture::X86_64,
-        here: ("linux", "x86_64"),
-    },
-    PlatformFacts {
-        platform: Platform::X86_64Windows,
-        tuple: "x86_64-windows",
-        fmi2: "win64",
-        extension: "dll",
-        format: BinaryFormat::Pe,
-        architecture: Architecture::X86_64,
-        here: ("windows", "x86_64"),
-    },
-    PlatformFacts {
-        platform: Platform::Aarch64Linux,
-        tuple: "aarch64-linux",
-        fmi2: "aarch64-linux",
-        extension: "so",
-        format: BinaryFormat::Elf,
-        architecture: Architecture::Aarch64,
-        here: ("linux", "aarch64"),
-    },
-    PlatformFacts {
-        platform: Platform::X86_64Darwin,
-        tuple: "x86_64-darwin",
-        fmi2: "darwin64",
-        extension: "dylib",
-        format: BinaryFormat::MachO,
-        architecture: Architecture::X86_64,
-        here: ("macos", "x86_64"),
-    },
-    PlatformFacts {
-        platform: Platform::Aarch64Darwin,
-        tuple: "aarch64-darwin",
-        fmi2: "aarch64-darwin",
-        extension: "dylib",
-        format: BinaryFormat::MachO,
-        architecture: Architecture::Aarch64,
-        here: ("macos", "aarch64"),
-    },
-];
+/// Names and file type of an operating system.
+struct SystemFacts {
+    /// `std::env::consts::OS`.
+    name: &'static str,
+    extension: &'static str,
+    format: BinaryFormat,
+}
+
+const LINUX: SystemFacts = SystemFacts { name: "linux", extension: "so", format: BinaryFormat::Elf };
+const WINDOWS: SystemFacts = SystemFacts { name: "windows", extension: "dll", format: BinaryFormat::Pe };
+const MACOS: SystemFacts = SystemFacts { name: "macos", extension: "dylib", format: BinaryFormat::MachO };
+
+const X86_64: (&str, Architecture) = ("x86_64", Architecture::X86_64);
+const AARCH64: (&str, Architecture) = ("aarch64", Architecture::Aarch64);
+
+/// One row per platform, in their order.
+macro_rules! platform_facts {
+    ($($platform:ident $tuple:literal $fmi2:literal $architecture:ident $system:ident;)*) => {
+        [$(PlatformFacts {
+            platform: Platform::$platform,
+            tuple: $tuple,
+            fmi2: $fmi2,
+            architecture: $architecture,
+            system: $system,
+        }),*]
+    };
+}
+
+const FACTS: [PlatformFacts; 5] = platform_facts! {
+    X86_64Linux "x86_64-linux" "linux64" X86_64 LINUX;
+    X86_64Windows "x86_64-windows" "win64" X86_64 WINDOWS;
+    Aarch64Linux "aarch64-linux" "aarch64-linux" AARCH64 LINUX;
+    X86_64Darwin "x86_64-darwin" "darwin64" X86_64 MACOS;
+    Aarch64Darwin "aarch64-darwin" "aarch64-darwin" AARCH64 MACOS;
+};
 
 impl Platform {
     /// All platforms, in the order in which an FMU contains them.
@@ -99,7 +85,7 @@ impl Platform {
     /// Returns the platform this program was compiled for, if it is in the list.
     pub fn here() -> Option<Self> {
         let here = (std::env::consts::OS, std::env::consts::ARCH);
-        FACTS.iter().find(|facts| facts.here == here).map(|facts| facts.platform)
+        FACTS.iter().find(|facts| (facts.system.name, facts.architecture.0) == here).map(|facts| facts.platform)
     }
 
     /// Returns the name, which is the platform tuple of FMI 3.0 (section 2.5.1.4.1).
@@ -109,12 +95,12 @@ impl Platform {
 
     /// Returns the file name of an installed library.
     pub fn file_name(self) -> String {
-        format!("{}.{}", self.facts().tuple, self.facts().extension)
+        format!("{}.{}", self.facts().tuple, self.facts().system.extension)
     }
 
     /// Returns the path inside an FMU of `version` (`"2.0"` or `"3.0"`) of the library of `identifier`.
     pub fn place(self, version: &str, identifier: &str) -> String {
-        let PlatformFacts { tuple, fmi2, extension, .. } = self.facts();
+        let PlatformFacts { tuple, fmi2, system: SystemFacts { extension, .. }, .. } = self.facts();
         let folder = if version.starts_with('2') { fmi2 } else { tuple };
         format!("binaries/{folder}/{identifier}.{extension}")
     }
@@ -129,10 +115,9 @@ impl Platform {
             return None;
         }
         let found = (file.format(), file.architecture());
-        FACTS
-            .iter()
-            .find(|facts| (facts.format, facts.architecture) == found && file.kind() == object::ObjectKind::Dynamic)
-            .map(|facts| facts.platform)
+        let is_dynamic = file.kind() == object::ObjectKind::Dynamic;
+        let mut rows = FACTS.iter().filter(|_| is_dynamic);
+        rows.find(|facts| (facts.system.format, facts.architecture.1) == found).map(|facts| facts.platform)
     }
 }
 

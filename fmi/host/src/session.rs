@@ -1,10 +1,12 @@
 //! One instance of an imported FMU, driven call by call.
 
+use std::time::{Duration, Instant};
+
 use tiprub_core::scene::settings::ExperimentSettings;
-use tiprub_shell::{Failure, Result, schedule::Schedule};
+use tiprub_shell::{Failure, Result, recording::Recording, schedule::Schedule};
 
 use super::{
-    UnpackedFmu,
+    ImportedRun, ImportedVariable, UnpackedFmu, fmi2, fmi3,
     slave::{self, HostedSlave, OutputGroup},
 };
 
@@ -28,7 +30,14 @@ impl<'a> Session<'a> {
     /// # Errors
     /// Same as [`UnpackedFmu::simulate`].
     pub fn new(fmu: &'a UnpackedFmu) -> Result<Self> {
-        let slave = fmu.instance()?;
+        let slave: Box<dyn HostedSlave> = match fmu.description.fmi_version.as_str() {
+            "2.0" => Box::new(fmi2::Fmi2Slave::new(fmu)?),
+            "3.0" => Box::new(fmi3::Fmi3Slave::new(fmu)?),
+            other => {
+                let problem = format!("FMI version {other} is not supported");
+                return Err(Failure::new("FMU", problem, "Use FMI 2.0 or 3.0"));
+            }
+        };
         Ok(Self { fmu, slave, groups: slave::group_outputs(&fmu.description) })
     }
 
@@ -67,9 +76,32 @@ impl<'a> Session<'a> {
     /// An error of the FMU.
     pub fn outputs(&mut self) -> Result<Vec<f64>> {
         let mut values = Vec::new();
-        for group in &self.groups {
-            self.slave.read(group, &mut values)?;
-        }
+        self.read(&mut values)?;
         Ok(values)
+    }
+
+    fn read(&mut self, values: &mut Vec<f64>) -> Result<()> {
+        self.groups.iter().try_for_each(|group| self.slave.read(group, values))
+    }
+
+    /// Initialises, steps over the schedule, records all numeric outputs at every communication point, and terminates.
+    pub(crate) fn run(&mut self, schedule: &Schedule, progress: &dyn Fn(usize)) -> Result<ImportedRun> {
+        let names = self.fmu.description.numeric_outputs().flat_map(ImportedVariable::scalar_names).collect();
+        let mut recording = Recording::with_columns(names, schedule.count + 1)?;
+        let mut stepping = Duration::ZERO;
+        self.slave.initialise(schedule)?;
+        for index in 0..=schedule.count {
+            let time = schedule.time(index);
+            recording.times.push(time);
+            self.read(&mut recording.values)?;
+            progress(index);
+            if index < schedule.count {
+                let clock = Instant::now();
+                self.slave.do_step(time, schedule.time(index + 1) - time)?;
+                stepping += clock.elapsed();
+            }
+        }
+        self.slave.terminate()?;
+        Ok(ImportedRun { recording, stepping, messages: self.slave.messages() })
     }
 }

@@ -1,14 +1,13 @@
-//! The parts of an importer that both FMI versions share: the run over communication points.
+//! The parts of an importer that both FMI versions share.
 
 use std::{
     cell::RefCell,
     ffi::{CStr, CString},
-    time::{Duration, Instant},
 };
 
-use tiprub_shell::{Failure, Result, recording::Recording, schedule::Schedule};
+use tiprub_shell::{Failure, Result, schedule::Schedule};
 
-use super::{ImportedDescription, ImportedRun, VariableType};
+use super::{ImportedDescription, VariableType};
 
 /// Neighbouring outputs of one type, read in one call.
 pub(super) struct OutputGroup {
@@ -34,35 +33,6 @@ pub(super) trait HostedSlave {
     fn terminate(&mut self) -> Result<()>;
     /// Returns everything the FMU logged.
     fn messages(&self) -> Vec<String>;
-}
-
-/// Initialises, steps over the schedule, records all numeric outputs at every communication point, and terminates.
-pub(super) fn drive(
-    slave: &mut dyn HostedSlave,
-    description: &ImportedDescription,
-    schedule: &Schedule,
-    progress: &dyn Fn(usize),
-) -> Result<ImportedRun> {
-    let groups = group_outputs(description);
-    let names = description.numeric_outputs().flat_map(super::ImportedVariable::scalar_names).collect();
-    let mut recording = Recording::with_columns(names, schedule.count + 1)?;
-    let mut stepping = Duration::ZERO;
-    slave.initialise(schedule)?;
-    for index in 0..=schedule.count {
-        let time = schedule.time(index);
-        recording.times.push(time);
-        for group in &groups {
-            slave.read(group, &mut recording.values)?;
-        }
-        progress(index);
-        if index < schedule.count {
-            let clock = Instant::now();
-            slave.do_step(time, schedule.time(index + 1) - time)?;
-            stepping += clock.elapsed();
-        }
-    }
-    slave.terminate()?;
-    Ok(ImportedRun { recording, stepping, messages: slave.messages() })
 }
 
 pub(super) fn group_outputs(description: &ImportedDescription) -> Vec<OutputGroup> {
@@ -111,6 +81,17 @@ pub(super) fn check(function: &str, time: Option<f64>, status: i32, messages: &M
     let at = time.map(|time| format!(" at t = {time} s")).unwrap_or_default();
     Err(Failure::new("FMU", format!("{function}{at} returned {status_name}{}", messages.last_words()), ""))
 }
+
+/// Calls a function of the instance of a slave and checks its status; the time (s) appears in messages.
+macro_rules! call {
+    ($slave:ident.$function:ident($($argument:expr),* $(,)?), $time:expr) => {{
+        // SAFETY: the instance is alive, and its functions are called in the order that the standard requires; every
+        // pointer is to as many values as the count beside it, or to one value.
+        let status = unsafe { ($slave.api.$function)($slave.instance $(, $argument)*) };
+        $crate::slave::check(stringify!($function), $time, status, &$slave.messages)
+    }};
+}
+pub(super) use call;
 
 /// Converts a string for C.
 pub(super) fn c_text(text: &str) -> Result<CString> {

@@ -51,7 +51,7 @@ pub fn table() -> VariableTable {
     use Causality::*;
     use Variability::*;
     let metres = |variable: Variable| Variable { unit: Some(&METRE), display: Some(1), ..variable };
-    let mut variables = vec![
+    let variables = vec![
         Variable { unit: Some(&SECOND), ..variable("time", DataType::Real, Independent, Continuous) },
         Variable {
             unit: Some(&SPEED),
@@ -101,11 +101,6 @@ pub fn table() -> VariableTable {
         Variable { start: Some(StartValue::Integer(36)), ..variable("sectors", DataType::Integer, Local, Constant) },
         Variable { span: Span::Total, ..variable("wall_time", DataType::Real, Local, Discrete) },
     ];
-    let mut reference = 0;
-    for variable in &mut variables {
-        variable.reference = reference;
-        reference += u32::try_from(variable.len()).unwrap();
-    }
     VariableTable::new(variables).unwrap()
 }
 

@@ -40,21 +40,30 @@ const SINGULAR: f64 = 1e-10;
 /// Directions of the closed contacts of one group: (normal, slip direction) per node.
 pub type ContactDirections = Vec<(Vector3, Vector3)>;
 
+/// Contacts of a structure that are all closed and slide.
+#[derive(Debug, Clone, Copy)]
+pub struct SlidingContacts<'a> {
+    model: &'a ModalModel,
+    friction: f64,
+    directions: &'a ContactDirections,
+}
+
+impl<'a> SlidingContacts<'a> {
+    /// Creates the contacts of `directions` with a friction coefficient.
+    pub fn new(model: &'a ModalModel, friction: f64, directions: &'a ContactDirections) -> Self {
+        Self { model, friction, directions }
+    }
+}
+
 /// Largest step (s) that central differences allow: 2/ω_max; infinite without a vibrating mode.
 pub fn central_difference_limit(model: &ModalModel) -> f64 {
     2.0 / model.largest_frequency()
 }
 
 /// Returns W for one group with all nodes closed: rows normals, columns n − µ t.
-pub fn delassus(
-    model: &ModalModel,
-    scheme: Scheme,
-    step: f64,
-    friction: f64,
-    directions: &ContactDirections,
-) -> DMatrix<f64> {
-    let (normals, forces) = directional_modes(model, friction, directions);
-    let compliance: Vec<f64> = model.coefficients(scheme, step).iter().map(|mode| mode.compliance).collect();
+pub fn delassus(contacts: SlidingContacts, scheme: Scheme, step: f64) -> DMatrix<f64> {
+    let (normals, forces) = directional_modes(contacts.model, contacts.friction, contacts.directions);
+    let compliance: Vec<f64> = contacts.model.coefficients(scheme, step).iter().map(|mode| mode.compliance).collect();
     let scaled = DMatrix::from_fn(forces.nrows(), forces.ncols(), |row, mode| forces[(row, mode)] * compliance[mode]);
     normals * scaled.transpose()
 }
@@ -131,7 +140,8 @@ pub fn check_solvable(
 ) -> Result<(), ErrorKind> {
     let solvable = |friction: f64| {
         steps_to_check(model.largest_frequency(), step).all(|step| {
-            let at = |directions| is_solvable(&delassus(model, scheme, step, friction, directions));
+            let at =
+                |directions| is_solvable(&delassus(SlidingContacts::new(model, friction, directions), scheme, step));
             senses.iter().all(at)
         })
     };
@@ -158,7 +168,9 @@ pub fn check_solvable_together(
     let solvable = |friction: f64| {
         steps_to_check(frequency, step).all(|step| {
             diameters.iter().zip(senses).all(|(model, senses)| {
-                let lowest = |directions| lowest_eigenvalue(&delassus(model, scheme, step, friction, directions));
+                let lowest = |directions| {
+                    lowest_eigenvalue(&delassus(SlidingContacts::new(model, friction, directions), scheme, step))
+                };
                 senses.iter().all(|directions| lowest(directions).is_some_and(|lowest| lowest > -SINGULAR))
             })
         })
@@ -349,7 +361,8 @@ mod tests {
     fn solvability_is_checked_for_shorter_steps() {
         // At h = 1e-3 the stiff mode is static and Grt ≈ 0; at small h it moves freely and turns the tip inwards.
         let model = model(&[100.0, 1e5], &[[1.0, 0.0, 0.0], [0.9, -2.0, 0.0]], 0.0);
-        let solvable = |step| is_solvable(&delassus(&model, Scheme::ModalExact, step, 1.1, &radial()));
+        let solvable =
+            |step| is_solvable(&delassus(SlidingContacts::new(&model, 1.1, &radial()), Scheme::ModalExact, step));
         assert!(solvable(1e-3) && !solvable(1e-6));
         let refusal = check_solvable(&model, Scheme::ModalExact, 1e-3, 1.1, &[radial()]).unwrap_err().to_string();
         // Free masses: 1 + 0.9² − µ·0.9·2 > 0.

@@ -155,13 +155,13 @@ macro_rules! persist_as_slice {
     ($([$($generics:tt)*] $container:ty;)*) => {$(
         impl<$($generics)*> Persist for $container {
             fn save(&self, writer: &mut StateWriter) {
-                self.as_slice().save(writer);
+                self[..].save(writer);
             }
             fn restore(&mut self, reader: &mut StateReader) {
-                self.as_mut_slice().restore(reader);
+                self[..].restore(reader);
             }
             fn check(&self, reader: &mut StateReader) {
-                self.as_slice().check(reader);
+                self[..].check(reader);
             }
         }
     )*};
@@ -170,6 +170,7 @@ macro_rules! persist_as_slice {
 persist_as_slice! {
     [T: Persist] Vec<T>;
     [T: Persist, const N: usize] [T; N];
+    [] crate::VariableValues;
 }
 
 /// Implements [`Persist`] for a struct from the list of its fields; a missing field is a compile error. `field.part` saves this part of a
@@ -202,6 +203,22 @@ pub fn to_bytes(values: &[&dyn Persist]) -> Vec<u8> {
     let mut bytes = vec![0; write(&mut [])];
     write(&mut bytes);
     bytes
+}
+
+/// Returns the error of a saved state that cannot be restored.
+///
+/// # Errors
+/// Always.
+pub fn damaged<T>(problem: impl std::fmt::Display) -> crate::Result<T> {
+    Err(crate::Error::state(problem))
+}
+
+/// Checks the length of a saved state (bytes) of its `owner`, such as "this scene".
+///
+/// # Errors
+/// Another length than the expected one.
+pub fn check_length(found: usize, expected: usize, owner: &str) -> crate::Result<()> {
+    if found == expected { Ok(()) } else { damaged(format!("it has {found} bytes, but {owner} needs {expected}")) }
 }
 
 /// FNV-1a hash of bytes, for fingerprints and checksums of saved states (not for security).

@@ -1,6 +1,6 @@
 //! Interface between a simulation with a table of variables and the code that drives it.
 
-use crate::variables::{Causality, Value, Variable, VariableTable};
+use crate::variables::{Causality, DataType, StartValue, Value, Variable, VariableTable};
 use crate::{Result, VariableValues, Warning};
 
 /// Result of one call of [`CoSimulation::advance`].
@@ -120,7 +120,7 @@ pub trait CoSimulation: Send {
     /// # Errors
     /// Unknown reference, or a variable of another type.
     fn real(&self, reference: u32) -> Result<f64> {
-        self.variables().real(reference)
+        Ok(self.variables().stored(reference, DataType::Real)?.1)
     }
 
     /// Returns an integer or an item of an enumeration.
@@ -128,7 +128,8 @@ pub trait CoSimulation: Send {
     /// # Errors
     /// Same as [`CoSimulation::real`].
     fn integer(&self, reference: u32) -> Result<i32> {
-        self.variables().integer(reference)
+        #[expect(clippy::cast_possible_truncation, reason = "integers are stored as the i32 they were set from")]
+        self.variables().stored(reference, DataType::Integer).map(|(_, value)| value as i32)
     }
 
     /// Returns a truth value.
@@ -136,7 +137,7 @@ pub trait CoSimulation: Send {
     /// # Errors
     /// Same as [`CoSimulation::real`].
     fn boolean(&self, reference: u32) -> Result<bool> {
-        self.variables().boolean(reference)
+        Ok(self.variables().stored(reference, DataType::Boolean)?.1 != 0.0)
     }
 
     /// Returns a text.
@@ -144,7 +145,10 @@ pub trait CoSimulation: Send {
     /// # Errors
     /// Same as [`CoSimulation::real`].
     fn string(&self, reference: u32) -> Result<&str> {
-        self.variables().string(reference)
+        match &self.variables().stored(reference, DataType::String)?.0.start {
+            Some(StartValue::String(text)) => Ok(text),
+            _ => Ok(""),
+        }
     }
 
     /// Returns whether the unit has been initialised, after which fixed parameters cannot be set.

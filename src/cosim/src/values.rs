@@ -4,7 +4,6 @@ use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 
 use crate::Result;
-use crate::persist::{Persist, StateReader, StateWriter};
 use crate::variables::{DataType, Quantity, StartValue, Variable, VariableTable};
 
 /// Variables of a unit with their current values, which it dereferences to: one number per value reference.
@@ -59,46 +58,14 @@ impl VariableValues {
         }
     }
 
-    fn stored(&self, reference: u32, wanted: DataType) -> Result<(&Variable, f64)> {
+    /// Returns the variable of a reference and the number that is stored for it.
+    ///
+    /// # Errors
+    /// Unknown reference, or a variable of another type than `wanted`.
+    pub(crate) fn stored(&self, reference: u32, wanted: DataType) -> Result<(&Variable, f64)> {
         let (variable, element) = self.table.locate(reference)?;
         variable.check_type(element, wanted)?;
         Ok((variable, self.values[reference as usize]))
-    }
-
-    /// Returns one element of a real variable.
-    ///
-    /// # Errors
-    /// Unknown reference, or a variable of another type.
-    pub fn real(&self, reference: u32) -> Result<f64> {
-        Ok(self.stored(reference, DataType::Real)?.1)
-    }
-
-    /// Returns an integer or an item of an enumeration.
-    ///
-    /// # Errors
-    /// Same as [`VariableValues::real`].
-    pub fn integer(&self, reference: u32) -> Result<i32> {
-        #[expect(clippy::cast_possible_truncation, reason = "integers are stored as the i32 they were set from")]
-        self.stored(reference, DataType::Integer).map(|(_, value)| value as i32)
-    }
-
-    /// Returns a truth value.
-    ///
-    /// # Errors
-    /// Same as [`VariableValues::real`].
-    pub fn boolean(&self, reference: u32) -> Result<bool> {
-        Ok(self.stored(reference, DataType::Boolean)?.1 != 0.0)
-    }
-
-    /// Returns a text.
-    ///
-    /// # Errors
-    /// Same as [`VariableValues::real`].
-    pub fn string(&self, reference: u32) -> Result<&str> {
-        match &self.stored(reference, DataType::String)?.0.start {
-            Some(StartValue::String(text)) => Ok(text),
-            _ => Ok(""),
-        }
     }
 }
 
@@ -113,17 +80,5 @@ impl Deref for VariableValues {
 impl DerefMut for VariableValues {
     fn deref_mut(&mut self) -> &mut [f64] {
         &mut self.values
-    }
-}
-
-impl Persist for VariableValues {
-    fn save(&self, writer: &mut StateWriter) {
-        self.values.save(writer);
-    }
-    fn restore(&mut self, reader: &mut StateReader) {
-        self.values.restore(reader);
-    }
-    fn check(&self, reader: &mut StateReader) {
-        self.values.check(reader);
     }
 }

@@ -181,7 +181,7 @@ pub enum StartValue {
 pub struct Variable {
     /// Structured name, for example `blade[1].clearance`.
     pub name: String,
-    /// First value reference.
+    /// First value reference, which [`VariableTable::new`] assigns.
     pub reference: u32,
     /// `None` for a scalar, number of elements for an array.
     pub dimension: Option<usize>,
@@ -240,6 +240,19 @@ setters! {
     starts(values: Vec<f64>) { dimension = Some(values.len()), start = Some(StartValue::Real(values)) }
     /// Sets type and start value.
     kind(kind: DataType, start: StartValue) { kind = kind, start = Some(start) }
+    /// Makes it a continuous real input with a start value.
+    input(value: f64) { causality = Causality::Input, start = Some(StartValue::Real(vec![value])) }
+    /// Makes it a fixed parameter that is an item of an enumeration.
+    choice(choices: &'static Enumeration, value: i32) {
+        kind = DataType::Enumeration(choices), start = Some(StartValue::Integer(value)),
+        causality = Causality::Parameter, variability = Variability::Fixed
+    }
+    /// Makes it a constant.
+    constant(kind: DataType, value: StartValue) {
+        kind = kind, start = Some(value), causality = Causality::Local, variability = Variability::Constant
+    }
+    /// Sets the relation to the communication step.
+    span(span: Span) { span = span }
     /// Sets role and variability.
     role(causality: Causality, variability: Variability) { causality = causality, variability = variability }
     /// Sets the quantity.
@@ -248,10 +261,10 @@ setters! {
 
 impl Variable {
     /// Creates the row of a continuous real output.
-    pub fn output(name: String, reference: u32, description: String) -> Self {
+    pub fn output(name: String, description: String) -> Self {
         Self {
             name,
-            reference,
+            reference: 0,
             dimension: None,
             kind: DataType::Real,
             causality: Causality::Output,

@@ -1,10 +1,9 @@
 //! Complete state of a simulation, and its bytes.
 
 use tiprub_cosim::persist::fingerprint;
-use tiprub_cosim::{CoSimulation, Error, Result, Sum, persist_fields};
+use tiprub_cosim::{Sum, persist_fields};
 
 use crate::course::InputCourse;
-use crate::simulation::ThermalSimulation;
 
 /// Number of bytes of the fingerprint of the model, before the state.
 pub(crate) const FINGERPRINT_BYTES: usize = 8;
@@ -69,20 +68,6 @@ persist_fields!(ThermalState {
     exchanged,
     initial_heat,
 });
-
-impl ThermalSimulation {
-    pub(crate) fn check_size(&self, found: usize) -> Result<()> {
-        let expected = self.state_size();
-        if found == expected {
-            return Ok(());
-        }
-        damaged(format!("it has {found} bytes, but this model needs {expected}"))
-    }
-}
-
-pub(crate) fn damaged<T>(problem: impl std::fmt::Display) -> Result<T> {
-    Err(Error::state(problem))
-}
 
 /// Returns the fingerprint of a model's numbers.
 pub(crate) fn fingerprint_of<'a>(arrays: impl Iterator<Item = &'a [f64]>) -> u64 {

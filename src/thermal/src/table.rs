@@ -66,61 +66,23 @@ pub(crate) enum Item {
     RelativeResidual,
 }
 
-/// Builder of the table with its items.
+/// Rows of the table with their items.
 #[derive(Default)]
 struct ThermalTableBuilder {
     variables: Vec<Variable>,
     items: Vec<Item>,
-    next: u32,
 }
 
 impl ThermalTableBuilder {
     fn push(&mut self, item: Item, name: &str, unit: Option<&'static VariableUnit>, text: &str) -> &mut Variable {
-        self.close();
         self.items.push(item);
-        let row = Variable::output(name.into(), self.next, text.into());
-        self.variables.push(Variable { unit, ..row });
+        self.variables.push(Variable { unit, ..Variable::output(name.into(), text.into()) });
         self.variables.last_mut().expect("just pushed")
     }
-
-    /// Sets the references of the last row, which are known once it is complete.
-    fn close(&mut self) {
-        if let Some(last) = self.variables.last() {
-            self.next = last.reference + u32::try_from(last.len()).unwrap_or(u32::MAX);
-        }
-    }
-
-    fn input(
-        &mut self,
-        item: Item,
-        name: &str,
-        unit: Option<&'static VariableUnit>,
-        value: f64,
-        text: &str,
-    ) -> &mut Variable {
-        let variable = self.push(item, name, unit, text);
-        variable.causality = Causality::Input;
-        variable.start = Some(StartValue::Real(vec![value]));
-        variable
-    }
-
-    fn choice(&mut self, item: Item, name: &str, kind: &'static Enumeration, text: &str) {
-        let variable = self.push(item, name, None, text);
-        variable.kind(DataType::Enumeration(kind), StartValue::Integer(1));
-        variable.role(Causality::Parameter, Variability::Fixed);
-    }
-
-    fn constant(&mut self, name: &str, unit: &'static VariableUnit, value: f64, text: &str) {
-        let variable = self.push(Item::Constant, name, Some(unit), text);
-        variable.kind(DataType::Real, StartValue::Real(vec![value])).role(Causality::Local, Variability::Constant);
-    }
-
-    fn output(&mut self, item: Item, name: &str, unit: &'static VariableUnit, span: Span, text: &str) -> &mut Variable {
-        let variable = self.push(item, name, Some(unit), text);
-        variable.span = span;
-        variable
-    }
 }
+
+/// Name and description of the gas and of the air.
+const FILMS: [(&str, &str); 2] = [("gas", "gas inside"), ("ambient", "air outside")];
 
 /// Builds the table of a model, with the items of its rows.
 pub(crate) fn build(model: &ConductionModel) -> Result<(VariableTable, Vec<Item>)> {
@@ -137,42 +99,55 @@ pub(crate) fn build(model: &ConductionModel) -> Result<(VariableTable, Vec<Item>
 fn inputs(table: &mut ThermalTableBuilder, patches: usize) {
     let text = "Heat flow into each patch, spread over its heated surface; constant over the step, or linear if a \
                 derivative is set";
-    let heat = table.input(Item::Heat, "casing_heat", Some(&WATT), 0.0, text);
+    let heat = table.push(Item::Heat, "casing_heat", Some(&WATT), text).input(0.0);
     heat.starts(vec![0.0; patches]).nominal(100.0).range(*HEAT.start(), *HEAT.end());
-    for (index, (name, what)) in [("gas", "gas inside"), ("ambient", "air outside")].into_iter().enumerate() {
+    for (index, (name, what)) in FILMS.into_iter().enumerate() {
         let text = format!(
             "Temperature of the {what} above the reference; reached at the end of the step (input_interpolation)"
         );
-        let film = table.input(Item::Film(index), &format!("{name}_temperature"), Some(&KELVIN), 0.0, &text);
+        let film = table.push(Item::Film(index), &format!("{name}_temperature"), Some(&KELVIN), &text).input(0.0);
         film.nominal(100.0).range(*TEMPERATURES.start(), *TEMPERATURES.end());
     }
-    for (index, (name, what)) in [("gas", "gas inside"), ("ambient", "air outside")].into_iter().enumerate() {
+    for (index, (name, what)) in FILMS.into_iter().enumerate() {
         let text =
             format!("Factor on the film coefficient of the {what}; constant over the step, 0 means no convection");
-        let factor = table.input(Item::Factor(index), &format!("{name}_convection_factor"), None, 1.0, &text);
+        let factor = table.push(Item::Factor(index), &format!("{name}_convection_factor"), None, &text).input(1.0);
         factor.range(*FACTORS.start(), *FACTORS.end());
     }
 }
 
 fn parameters(table: &mut ThermalTableBuilder, model: &ConductionModel) {
     let text = "Initial temperature above the reference for a uniform start";
-    let initial = table.input(Item::InitialTemperature, "initial_temperature", Some(&KELVIN), 0.0, text);
+    let initial = table.push(Item::InitialTemperature, "initial_temperature", Some(&KELVIN), text).input(0.0);
     initial.role(Causality::Parameter, Variability::Fixed).range(*TEMPERATURES.start(), *TEMPERATURES.end());
-    table.choice(Item::InitialState, "initial_state", &INITIAL_STATES, "Initial temperatures");
+    table.push(Item::InitialState, "initial_state", None, "Initial temperatures").choice(&INITIAL_STATES, 1);
     let text = "Temperatures of gas and air between communication points";
-    table.choice(Item::Interpolation, "input_interpolation", &INTERPOLATIONS, text);
+    table.push(Item::Interpolation, "input_interpolation", None, text).choice(&INTERPOLATIONS, 1);
     let name = table.push(Item::Constant, "model_name", None, "Name of the model");
-    name.kind(DataType::String, StartValue::String(model.name.clone())).role(Causality::Local, Variability::Constant);
-    table.constant("heat_capacity", &CAPACITY, model.heat_capacity, "Total heat capacity");
-    let text = "Film coefficient times area of the gas inside, at a factor of 1";
-    table.constant("gas_conductance", &CONDUCTANCE, model.gas_conductance(), text);
-    let text = "Film coefficient times area of the air outside, at a factor of 1";
-    table.constant("ambient_conductance", &CONDUCTANCE, model.ambient_conductance(), text);
+    name.constant(DataType::String, StartValue::String(model.name.clone()));
+    for (name, unit, value, text) in [
+        ("heat_capacity", &CAPACITY, model.heat_capacity, "Total heat capacity"),
+        (
+            "gas_conductance",
+            &CONDUCTANCE,
+            model.gas_conductance(),
+            "Film coefficient times area of the gas inside, at a factor of 1",
+        ),
+        (
+            "ambient_conductance",
+            &CONDUCTANCE,
+            model.ambient_conductance(),
+            "Film coefficient times area of the air outside, at a factor of 1",
+        ),
+    ] {
+        let constant = table.push(Item::Constant, name, Some(unit), text);
+        constant.constant(DataType::Real, StartValue::Real(vec![value]));
+    }
 }
 
 fn temperatures(table: &mut ThermalTableBuilder, patches: usize) {
     let kelvin = |table: &mut ThermalTableBuilder, item, name: &str, text: &str| {
-        table.output(item, name, &KELVIN, Span::Point, text).nominal = Some(100.0);
+        table.push(item, name, Some(&KELVIN), text).nominal = Some(100.0);
     };
     let mut row = 0;
     for (name, text) in [
@@ -186,30 +161,29 @@ fn temperatures(table: &mut ThermalTableBuilder, patches: usize) {
     kelvin(table, Item::Rows(row), "temperature_mean", "Mean temperature of the whole volume above the reference");
     let text = "Largest temperature of the heated surface above the reference, at the corners of its elements";
     kelvin(table, Item::Hottest, "temperature_max", text);
-    for (index, (name, what)) in [("gas", "gas inside"), ("ambient", "air outside")].into_iter().enumerate() {
+    for (index, (name, what)) in FILMS.into_iter().enumerate() {
         let text = format!("Mean temperature above the reference of the surface in contact with the {what}");
         kelvin(table, Item::Rows(row + 1 + index), &format!("{name}_surface_temperature"), &text);
     }
 }
 
 fn heat(table: &mut ThermalTableBuilder) {
-    for (index, (name, what)) in [("gas", "gas inside"), ("ambient", "air outside")].into_iter().enumerate() {
+    for (index, (name, what)) in FILMS.into_iter().enumerate() {
         let text = format!("Heat flow from the {what} into the casing, mean over the communication step");
-        table.output(Item::Power(index), &format!("{name}_power"), &WATT, Span::Mean, &text);
+        table.push(Item::Power(index), &format!("{name}_power"), Some(&WATT), &text).span(Span::Mean);
     }
-    table.output(Item::Stored, "stored_heat", &JOULE, Span::Point, "Heat stored above the reference");
+    table.push(Item::Stored, "stored_heat", Some(&JOULE), "Heat stored above the reference");
     for (index, (name, what)) in
         [("supplied", "into the patches"), ("gas", "from the gas inside"), ("ambient", "from the air outside")]
             .into_iter()
             .enumerate()
     {
         let text = format!("Heat {what} since the start");
-        table.output(Item::Total(index), &format!("{name}_heat"), &JOULE, Span::Total, &text);
+        table.push(Item::Total(index), &format!("{name}_heat"), Some(&JOULE), &text).span(Span::Total);
     }
     let text = "Heat stored minus the sum of the heat stored at the start and all heat supplied since; zero except for rounding";
-    table.output(Item::Residual, "energy_residual", &JOULE, Span::Total, text);
+    table.push(Item::Residual, "energy_residual", Some(&JOULE), text).span(Span::Total);
     let text = "Ratio of energy_residual to the initial heat plus the sum of the absolute heat exchanged in each \
                 communication step";
-    let residual = table.push(Item::RelativeResidual, "energy_residual_relative", None, text);
-    residual.span = Span::Total;
+    table.push(Item::RelativeResidual, "energy_residual_relative", None, text).span(Span::Total);
 }

@@ -1,14 +1,14 @@
 //! The simulation as a co-simulation unit. A communication step is one internal step, so there is no time in between at which it could end,
 //! and outputs always belong to the last communication point.
 
-use tiprub_cosim::persist::{Persist, StateReader, StateWriter, to_bytes};
+use tiprub_cosim::persist::{Persist, StateReader, StateWriter, check_length, damaged, to_bytes};
 use tiprub_cosim::variables::{Causality, Value, Variable};
 use tiprub_cosim::{CoSimulation, Error, Result, StepProgress, Sum, VariableValues, Warning, bounds, shown};
 
 use crate::course::InputCourse;
 use crate::outputs::stored;
 use crate::simulation::ThermalSimulation;
-use crate::state::{CREATED, FAILED, FINGERPRINT_BYTES, LARGEST, READY, ThermalState, damaged};
+use crate::state::{CREATED, FAILED, FINGERPRINT_BYTES, LARGEST, READY, ThermalState};
 use crate::table::{HEAT, Item, TEMPERATURES};
 
 /// Largest difference between a communication point and the time of the simulation, as a fraction of H, as in the
@@ -190,7 +190,7 @@ impl CoSimulation for ThermalSimulation {
     }
 
     fn save_state(&self, buffer: &mut [u8]) -> Result<()> {
-        self.check_size(buffer.len())?;
+        check_length(buffer.len(), self.state_size(), "this model")?;
         let (head, body) = buffer.split_at_mut(FINGERPRINT_BYTES);
         head.copy_from_slice(&self.fingerprint.to_le_bytes());
         self.state.save(&mut StateWriter::new(body));
@@ -198,7 +198,7 @@ impl CoSimulation for ThermalSimulation {
     }
 
     fn restore_state(&mut self, buffer: &[u8]) -> Result<()> {
-        self.check_size(buffer.len())?;
+        check_length(buffer.len(), self.state_size(), "this model")?;
         let (head, body) = buffer.split_at(FINGERPRINT_BYTES);
         if head != self.fingerprint.to_le_bytes() {
             return damaged("it belongs to another model");

@@ -10,7 +10,7 @@ use tiprub_cosim::shown_time;
 use super::float_environment::StandardFloats;
 use super::log::{Log, Sink};
 use super::{ImporterEnvironment, IntermediateUpdate, TextArgument, panics};
-use crate::load::Load;
+use crate::Load;
 use crate::slave::order::{self, CallRule};
 use crate::slave::{Dialect, FmiStatus, InstancePhase, Refusal, Result, Slave};
 

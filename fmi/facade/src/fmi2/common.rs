@@ -3,11 +3,11 @@
 use std::ffi::{CString, c_char};
 
 use super::Boolean;
+use crate::Load;
 use crate::boundary::{
     self, Fmi2Logger, ImporterEnvironment, In, InstanceHandle, Instantiation, Out, Sink, StateHandle, TextArgument,
     guard, instantiate, refuse_instantiation, release, state,
 };
-use crate::load::Load;
 use crate::location;
 use crate::shared::{accessors, shared_functions};
 use crate::slave::order::fmi2 as order;
@@ -108,9 +108,9 @@ shared_functions! {
 
 accessors! {
     [] fmi2GetString fmi2SetString "value";
-    fmi2GetReal GET_REAL fmi2SetReal SET_REAL "Real" f64, f64, |value| value, |value| *value;
-    fmi2GetInteger GET_INTEGER fmi2SetInteger SET_INTEGER "Integer" i32, i32, |value| value, |value| *value;
-    fmi2GetBoolean GET_BOOLEAN fmi2SetBoolean SET_BOOLEAN "Boolean" Boolean, bool, Boolean::from, |value| *value != 0;
+    fmi2GetReal fmi2SetReal "Real" f64, f64, |value| value, |value| *value;
+    fmi2GetInteger fmi2SetInteger "Integer" i32, i32, |value| value, |value| *value;
+    fmi2GetBoolean fmi2SetBoolean "Boolean" Boolean, bool, Boolean::from, |value| *value != 0;
 }
 
 /// Implements `fmi2CancelStep`: there is never an asynchronous step.

@@ -3,11 +3,11 @@
 use std::ffi::c_char;
 
 use super::Boolean;
+use crate::Load;
 use crate::boundary::{
     self, Callbacks, Fmi3Logger, ImporterEnvironment, In, InstanceHandle, Instantiation, IntermediateUpdate, Out, Sink,
     StateHandle, TextArgument, guard, instantiate, refuse_instantiation, release, state,
 };
-use crate::load::Load;
 use crate::location;
 use crate::shared::shared_functions;
 use crate::slave::order::fmi3 as order;

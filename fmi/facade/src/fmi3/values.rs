@@ -11,9 +11,9 @@ use crate::slave::{AccessRequest, FmiStatus, Refusal};
 
 accessors! {
     [nValues] fmi3GetString fmi3SetString "values";
-    fmi3GetFloat64 GET_FLOAT64 fmi3SetFloat64 SET_FLOAT64 "Float64" f64, f64, |value| value, |value| *value;
-    fmi3GetInt64 GET_INT64 fmi3SetInt64 SET_INT64 "Int64" i64, i64, |value| value, |value| *value;
-    fmi3GetBoolean GET_BOOLEAN fmi3SetBoolean SET_BOOLEAN "Boolean" Boolean, bool, Boolean::from, |value| *value != 0;
+    fmi3GetFloat64 fmi3SetFloat64 "Float64" f64, f64, |value| value, |value| *value;
+    fmi3GetInt64 fmi3SetInt64 "Int64" i64, i64, |value| value, |value| *value;
+    fmi3GetBoolean fmi3SetBoolean "Boolean" Boolean, bool, Boolean::from, |value| *value != 0;
 }
 
 /// Handles a type that no variable has: every reference is rejected with a message that states its actual type; a call
@@ -45,32 +45,32 @@ macro_rules! without_variables {
             nValueReferences: usize,
             $($argument: $type,)*
         ) -> FmiStatus {
-            no_variable(instance, &order::$rule, $name, (valueReferences, nValueReferences))
+            no_variable(instance, &order::$rule(stringify!($function)), $name, (valueReferences, nValueReferences))
         }
     )*};
 }
 
 without_variables! {
-    fmi3GetFloat32 GET_FLOAT32 "Float32" _values: Out<f32>, _nValues: usize;
-    fmi3SetFloat32 SET_FLOAT32 "Float32" _values: In<f32>, _nValues: usize;
-    fmi3GetInt8 GET_INT8 "Int8" _values: Out<i8>, _nValues: usize;
-    fmi3SetInt8 SET_INT8 "Int8" _values: In<i8>, _nValues: usize;
-    fmi3GetUInt8 GET_UINT8 "UInt8" _values: Out<u8>, _nValues: usize;
-    fmi3SetUInt8 SET_UINT8 "UInt8" _values: In<u8>, _nValues: usize;
-    fmi3GetInt16 GET_INT16 "Int16" _values: Out<i16>, _nValues: usize;
-    fmi3SetInt16 SET_INT16 "Int16" _values: In<i16>, _nValues: usize;
-    fmi3GetUInt16 GET_UINT16 "UInt16" _values: Out<u16>, _nValues: usize;
-    fmi3SetUInt16 SET_UINT16 "UInt16" _values: In<u16>, _nValues: usize;
-    fmi3GetInt32 GET_INT32 "Int32" _values: Out<i32>, _nValues: usize;
-    fmi3SetInt32 SET_INT32 "Int32" _values: In<i32>, _nValues: usize;
-    fmi3GetUInt32 GET_UINT32 "UInt32" _values: Out<u32>, _nValues: usize;
-    fmi3SetUInt32 SET_UINT32 "UInt32" _values: In<u32>, _nValues: usize;
-    fmi3GetUInt64 GET_UINT64 "UInt64" _values: Out<u64>, _nValues: usize;
-    fmi3SetUInt64 SET_UINT64 "UInt64" _values: In<u64>, _nValues: usize;
-    fmi3GetBinary GET_BINARY "Binary" _sizes: Out<usize>, _values: Out<*const u8>, _nValues: usize;
-    fmi3SetBinary SET_BINARY "Binary" _sizes: In<usize>, _values: In<*const u8>, _nValues: usize;
-    fmi3GetClock GET_CLOCK "Clock" _values: Out<Boolean>;
-    fmi3SetClock SET_CLOCK "Clock" _values: In<Boolean>;
+    fmi3GetFloat32 getter "Float32" _values: Out<f32>, _nValues: usize;
+    fmi3SetFloat32 setter "Float32" _values: In<f32>, _nValues: usize;
+    fmi3GetInt8 getter "Int8" _values: Out<i8>, _nValues: usize;
+    fmi3SetInt8 setter "Int8" _values: In<i8>, _nValues: usize;
+    fmi3GetUInt8 getter "UInt8" _values: Out<u8>, _nValues: usize;
+    fmi3SetUInt8 setter "UInt8" _values: In<u8>, _nValues: usize;
+    fmi3GetInt16 getter "Int16" _values: Out<i16>, _nValues: usize;
+    fmi3SetInt16 setter "Int16" _values: In<i16>, _nValues: usize;
+    fmi3GetUInt16 getter "UInt16" _values: Out<u16>, _nValues: usize;
+    fmi3SetUInt16 setter "UInt16" _values: In<u16>, _nValues: usize;
+    fmi3GetInt32 getter "Int32" _values: Out<i32>, _nValues: usize;
+    fmi3SetInt32 setter "Int32" _values: In<i32>, _nValues: usize;
+    fmi3GetUInt32 getter "UInt32" _values: Out<u32>, _nValues: usize;
+    fmi3SetUInt32 setter "UInt32" _values: In<u32>, _nValues: usize;
+    fmi3GetUInt64 getter "UInt64" _values: Out<u64>, _nValues: usize;
+    fmi3SetUInt64 setter "UInt64" _values: In<u64>, _nValues: usize;
+    fmi3GetBinary getter "Binary" _sizes: Out<usize>, _values: Out<*const u8>, _nValues: usize;
+    fmi3SetBinary setter "Binary" _sizes: In<usize>, _values: In<*const u8>, _nValues: usize;
+    fmi3GetClock getter "Clock" _values: Out<Boolean>;
+    fmi3SetClock setter "Clock" _values: In<Boolean>;
 }
 
 /// Defines derivatives with respect to inputs over the last communication step, which require the parameter

@@ -1,5 +1,5 @@
-//! The call order of both standards as data: one row per exported function that takes an instance, with the phases in
-//! which it is allowed.
+//! The call order of both standards as data: the phases in which each exported function that takes an instance is
+//! allowed; functions that read values of different types share a row, and so do those that set values.
 //!
 //! Sources: FMI 2.0.4, section 4.2.4 (state machine of calling sequence, table of functions against states) and FMI
 //! 3.0.2, sections 2.3 and 4.2. Functions such as `fmi3EnterEventMode` belong to capabilities that this FMU does not
@@ -49,14 +49,20 @@ impl CallRule {
 pub(crate) const NOWHERE: States = 0;
 /// Phases in which the whole state can be saved and restored.
 const SETTABLE: States = INSTANTIATED | INITIALISING | STEPPING | FAILED | TERMINATED;
-/// Phases in which values can be read.
-const READABLE: States = SETTABLE | UPDATING;
-/// Phases in which values can be set.
-const WRITABLE: States = INSTANTIATED | INITIALISING | STEPPING | UPDATING;
 
-/// One `const` per row.
+/// One `const` per row, after the phases in which values of any type can be read and set.
 macro_rules! table {
-    ($($constant:ident $name:literal $states:expr;)*) => {
+    (getters $getters:expr; setters $setters:expr; $($constant:ident $name:literal $states:expr;)*) => {
+        /// Returns the row of a function that reads values of one type.
+        pub(crate) const fn getter(name: &'static str) -> CallRule {
+            CallRule { name, states: $getters }
+        }
+
+        /// Returns the row of a function that sets values of one type.
+        pub(crate) const fn setter(name: &'static str) -> CallRule {
+            CallRule { name, states: $setters }
+        }
+
         $(pub(crate) const $constant: CallRule = CallRule { name: $name, states: $states };)*
     };
 }
@@ -67,6 +73,8 @@ pub(crate) mod fmi2 {
     use super::*;
 
     table! {
+        getters SETTABLE;
+        setters INSTANTIATED | INITIALISING | STEPPING;
         SET_DEBUG_LOGGING "fmi2SetDebugLogging" ANY;
         FREE_INSTANCE "fmi2FreeInstance" ANY;
         SETUP_EXPERIMENT "fmi2SetupExperiment" INSTANTIATED;
@@ -74,14 +82,6 @@ pub(crate) mod fmi2 {
         EXIT_INITIALIZATION_MODE "fmi2ExitInitializationMode" INITIALISING;
         TERMINATE "fmi2Terminate" STEPPING | FAILED;
         RESET "fmi2Reset" SETTABLE;
-        GET_REAL "fmi2GetReal" SETTABLE;
-        GET_INTEGER "fmi2GetInteger" SETTABLE;
-        GET_BOOLEAN "fmi2GetBoolean" SETTABLE;
-        GET_STRING "fmi2GetString" SETTABLE;
-        SET_REAL "fmi2SetReal" INSTANTIATED | INITIALISING | STEPPING;
-        SET_INTEGER "fmi2SetInteger" INSTANTIATED | INITIALISING | STEPPING;
-        SET_BOOLEAN "fmi2SetBoolean" INSTANTIATED | INITIALISING | STEPPING;
-        SET_STRING "fmi2SetString" INSTANTIATED | INITIALISING | STEPPING;
         GET_FMU_STATE "fmi2GetFMUstate" SETTABLE;
         SET_FMU_STATE "fmi2SetFMUstate" SETTABLE;
         FREE_FMU_STATE "fmi2FreeFMUstate" SETTABLE;
@@ -105,40 +105,14 @@ pub(crate) mod fmi3 {
     use super::*;
 
     table! {
+        getters SETTABLE | UPDATING;
+        setters INSTANTIATED | INITIALISING | STEPPING | UPDATING;
         SET_DEBUG_LOGGING "fmi3SetDebugLogging" ANY;
         FREE_INSTANCE "fmi3FreeInstance" SETTABLE;
         ENTER_INITIALIZATION_MODE "fmi3EnterInitializationMode" INSTANTIATED;
         EXIT_INITIALIZATION_MODE "fmi3ExitInitializationMode" INITIALISING;
         TERMINATE "fmi3Terminate" STEPPING | FAILED;
         RESET "fmi3Reset" SETTABLE;
-        GET_FLOAT32 "fmi3GetFloat32" READABLE;
-        GET_FLOAT64 "fmi3GetFloat64" READABLE;
-        GET_INT8 "fmi3GetInt8" READABLE;
-        GET_UINT8 "fmi3GetUInt8" READABLE;
-        GET_INT16 "fmi3GetInt16" READABLE;
-        GET_UINT16 "fmi3GetUInt16" READABLE;
-        GET_INT32 "fmi3GetInt32" READABLE;
-        GET_UINT32 "fmi3GetUInt32" READABLE;
-        GET_INT64 "fmi3GetInt64" READABLE;
-        GET_UINT64 "fmi3GetUInt64" READABLE;
-        GET_BOOLEAN "fmi3GetBoolean" READABLE;
-        GET_STRING "fmi3GetString" READABLE;
-        GET_BINARY "fmi3GetBinary" READABLE;
-        GET_CLOCK "fmi3GetClock" READABLE;
-        SET_FLOAT32 "fmi3SetFloat32" WRITABLE;
-        SET_FLOAT64 "fmi3SetFloat64" WRITABLE;
-        SET_INT8 "fmi3SetInt8" WRITABLE;
-        SET_UINT8 "fmi3SetUInt8" WRITABLE;
-        SET_INT16 "fmi3SetInt16" WRITABLE;
-        SET_UINT16 "fmi3SetUInt16" WRITABLE;
-        SET_INT32 "fmi3SetInt32" WRITABLE;
-        SET_UINT32 "fmi3SetUInt32" WRITABLE;
-        SET_INT64 "fmi3SetInt64" WRITABLE;
-        SET_UINT64 "fmi3SetUInt64" WRITABLE;
-        SET_BOOLEAN "fmi3SetBoolean" WRITABLE;
-        SET_STRING "fmi3SetString" WRITABLE;
-        SET_BINARY "fmi3SetBinary" WRITABLE;
-        SET_CLOCK "fmi3SetClock" WRITABLE;
         GET_FMU_STATE "fmi3GetFMUState" SETTABLE;
         SET_FMU_STATE "fmi3SetFMUState" SETTABLE;
         FREE_FMU_STATE "fmi3FreeFMUState" SETTABLE;

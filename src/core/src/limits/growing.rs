@@ -4,7 +4,7 @@ use nalgebra::Complex;
 
 use super::held::HeldContacts;
 use super::secular;
-use super::{ContactDirections, is_solvable};
+use super::{SlidingContacts, is_solvable};
 use crate::modes::modal::ModalModel;
 use crate::scene::method::Scheme;
 
@@ -52,30 +52,16 @@ impl GrowthRates {
 
 /// Computes the growth with all contacts of `directions` closed and sliding; `None` without friction, for models too large for dense
 /// eigenvalues, and if the contacts are redundant.
-pub fn growth(
-    model: &ModalModel,
-    scheme: Scheme,
-    step: f64,
-    friction: f64,
-    directions: &ContactDirections,
-) -> Option<GrowthRates> {
-    let continuous = continuous(model, scheme, step, friction, directions)?;
-    stepped(model, scheme, step, friction, directions, continuous)
+pub fn growth(contacts: SlidingContacts, scheme: Scheme, step: f64) -> Option<GrowthRates> {
+    stepped(contacts, scheme, step, continuous(contacts, scheme, step)?)
 }
 
 /// Computes the growth of the differential equations, exact to a small part of what counts as rounding at steps up to `step` (s); `None` as
 /// with [`growth`].
-pub fn continuous(
-    model: &ModalModel,
-    scheme: Scheme,
-    step: f64,
-    friction: f64,
-    directions: &ContactDirections,
-) -> Option<Fastest> {
-    let unit = balanced(model, step);
-    let quasi_static = scheme.properties().quasi_static;
-    let held = || HeldContacts::continuous(model, quasi_static, unit, friction, directions);
-    fastest_held(&is_looked_at(model, friction).then(held)?, unit)
+pub fn continuous(contacts: SlidingContacts, scheme: Scheme, step: f64) -> Option<Fastest> {
+    let unit = balanced(contacts.model, step);
+    let held = || HeldContacts::continuous(contacts, scheme.properties().quasi_static, unit);
+    fastest_held(&contacts.are_looked_at().then(held)?, unit)
 }
 
 /// Time (s) up to `step` with which the matrices of the differential equations are well balanced: up to ω_max h = 2.
@@ -92,32 +78,20 @@ fn fastest_held(held: &HeldContacts, unit: f64) -> Option<Fastest> {
 /// Computes the growth without the mass of the contact nodes, with their highest modes quasi-static: the limit of contact nodes without
 /// lumped mass. `None` if the model has no other mode with inertia, and if the remaining flexibility of the contacts is no P-matrix with
 /// this friction: then the limit has no solution, and unbounded growth would not be visible.
-pub fn without_node_mass(
-    model: &ModalModel,
-    step: f64,
-    friction: f64,
-    directions: &ContactDirections,
-) -> Option<Fastest> {
-    if !is_looked_at(model, friction) {
+pub fn without_node_mass(contacts: SlidingContacts, step: f64) -> Option<Fastest> {
+    if !contacts.are_looked_at() {
         return None;
     }
-    let unit = balanced(model, step);
-    let held = HeldContacts::continuous(model, true, unit, friction, directions);
+    let unit = balanced(contacts.model, step);
+    let held = HeldContacts::continuous(contacts, true, unit);
     let has_limit = !held.modes.is_empty() && held.residual.as_ref().is_some_and(is_solvable);
     fastest_held(has_limit.then_some(&held)?, unit).filter(|found| found.rate.is_finite())
 }
 
 /// Computes [`growth`] for a known growth of the differential equations.
-pub fn stepped(
-    model: &ModalModel,
-    scheme: Scheme,
-    step: f64,
-    friction: f64,
-    directions: &ContactDirections,
-    continuous: Fastest,
-) -> Option<GrowthRates> {
-    let held = || HeldContacts::stepped(model, scheme, step, friction, directions);
-    let eigenvalues = eigenvalues(&is_looked_at(model, friction).then(held)?)?;
+pub fn stepped(contacts: SlidingContacts, scheme: Scheme, step: f64, continuous: Fastest) -> Option<GrowthRates> {
+    let held = || HeldContacts::stepped(contacts, scheme, step);
+    let eigenvalues = eigenvalues(&contacts.are_looked_at().then(held)?)?;
     let found = fastest_stepped(&eigenvalues);
     Some(GrowthRates {
         continuous: continuous.rate,
@@ -152,8 +126,10 @@ fn fastest_stepped(eigenvalues: &[Complex<f64>]) -> Fastest {
     Fastest { rate: 0.5 * libm::log1p(gain), frequency }
 }
 
-fn is_looked_at(model: &ModalModel, friction: f64) -> bool {
-    friction != 0.0 && model.len() <= GROWTH_UP_TO
+impl SlidingContacts<'_> {
+    fn are_looked_at(&self) -> bool {
+        self.friction != 0.0 && self.model.len() <= GROWTH_UP_TO
+    }
 }
 
 /// Steps at which growth is checked, from `largest` down to the step that resolves every mode well (at most 12 octaves).
@@ -174,7 +150,7 @@ fn eigenvalues(held: &HeldContacts) -> Option<Vec<Complex<f64>>> {
 mod tests {
     use super::*;
     use crate::limits::tests::{model, radial};
-    use crate::limits::{delassus, directional_modes, secular};
+    use crate::limits::{ContactDirections, delassus, directional_modes, secular};
     use crate::math::vector::Vector3;
     use nalgebra::{DMatrix, DVector};
     use tiprub_test_models::SeededRandom;
@@ -224,8 +200,12 @@ mod tests {
             let directions: ContactDirections =
                 (0..contacts).map(|_| (-Vector3::x(), random.of(&[1.0, -1.0]) * Vector3::y())).collect();
             let held = [
-                HeldContacts::continuous(&model, scheme.properties().quasi_static, step, friction, &directions),
-                HeldContacts::stepped(&model, scheme, step, friction, &directions),
+                HeldContacts::continuous(
+                    SlidingContacts::new(&model, friction, &directions),
+                    scheme.properties().quasi_static,
+                    step,
+                ),
+                HeldContacts::stepped(SlidingContacts::new(&model, friction, &directions), scheme, step),
             ];
             tried += 1.0;
             let [Some(continuous), Some(stepped)] = held.each_ref().map(secular::eigenvalues) else { continue };
@@ -258,7 +238,7 @@ mod tests {
         let dynamic = model.dynamic_modes(scheme);
         let coefficients = model.coefficients(scheme, step);
         let (normals, forces) = directional_modes(model, FRICTION, directions);
-        let inverse = delassus(model, scheme, step, FRICTION, directions).try_inverse().unwrap();
+        let inverse = delassus(SlidingContacts::new(model, FRICTION, directions), scheme, step).try_inverse().unwrap();
         let (mut now, mut increment) = (DVector::from_element(dynamic, 1.0), DVector::zeros(dynamic));
         let (mut contact, mut growth) = (DVector::zeros(directions.len()), 0.0);
         for index in 0..4000 {
@@ -289,7 +269,9 @@ mod tests {
             while compared < 8 {
                 let model = anything(&mut random, 1);
                 let step = random.scale(0.3, 1.9) / model.largest_frequency();
-                let Some(found) = growth(&model, scheme, step, FRICTION, &radial()) else { continue };
+                let Some(found) = growth(SlidingContacts::new(&model, FRICTION, &radial()), scheme, step) else {
+                    continue;
+                };
                 if model.frequencies[0] > 0.0 && found.stepped * step > 0.05 {
                     let rate = stepped_through(&model, scheme, step, &radial());
                     assert!((rate - found.stepped * step).abs() < 2e-3, "{scheme:?}: {rate}, {found:?}, {step:e}");
@@ -305,7 +287,7 @@ mod tests {
         for scheme in [Scheme::CentralDifference, Scheme::ModalExact] {
             let model = model(&[900.0, 2300.0, 8000.0], &shapes, 0.0);
             // Friction so small that it has no effect but enables the check.
-            let found = growth(&model, scheme, 1e-4, 1e-12, &radial()).unwrap();
+            let found = growth(SlidingContacts::new(&model, 1e-12, &radial()), scheme, 1e-4).unwrap();
             assert!(found.continuous.abs() < 1e-6 && found.stepped.abs() < 1e-6, "{found:?}");
             assert!(found.added() < 1e-6 && !found.is_flutter());
         }
@@ -317,7 +299,7 @@ mod tests {
         // eigenvalues of the constrained equations, computed independently with NumPy.
         let shapes = [[-0.1, -0.5, 0.0], [-0.3, 1.0, 0.0], [0.9, -0.8, 0.0]];
         let model = model(&[1000.0, 1050.0, 5000.0], &shapes, 0.0);
-        let rate = |step| growth(&model, Scheme::ModalExact, step, 0.4, &radial()).unwrap();
+        let rate = |step| growth(SlidingContacts::new(&model, 0.4, &radial()), Scheme::ModalExact, step).unwrap();
         let (coarse, fine) = (rate(2e-5), rate(1e-5));
         let continuous = fine.continuous;
         assert!((continuous - 178.5158).abs() < 1e-3, "{continuous}");
@@ -336,7 +318,7 @@ mod tests {
         let shapes = [[1.0, 0.2, 0.0], [0.3, -0.8, 0.1], [0.7, 0.4, 0.0], [0.2, 0.9, 0.0]];
         let model = model(&[900.0, 2300.0, 8000.0, 90_000.0], &shapes, 0.005);
         for step in [1e-7, 1e-6, 1e-5, 1e-4, 1e-3] {
-            let found = growth(&model, Scheme::ModalExact, step, 0.1, &radial()).unwrap();
+            let found = growth(SlidingContacts::new(&model, 0.1, &radial()), Scheme::ModalExact, step).unwrap();
             assert!(found.continuous < -1.0 && !found.is_flutter(), "h = {step}: {found:?}");
         }
     }
@@ -345,7 +327,7 @@ mod tests {
     #[test]
     fn massless_node_that_locks_up_has_no_growth_rate() {
         let leaning = ModalModel { quasi_static: 1, ..model(&[1e3, 1e5], &[[1.0, 0.2, 0.0], [0.5, -1.0, 0.0]], 0.01) };
-        let found = |friction: f64| without_node_mass(&leaning, 1e-5, friction, &radial());
+        let found = |friction: f64| without_node_mass(SlidingContacts::new(&leaning, friction, &radial()), 1e-5);
         assert!(found(0.49).is_some() && found(0.51).is_none(), "{:?}, {:?}", found(0.49), found(0.51));
     }
 }

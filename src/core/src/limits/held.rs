@@ -2,8 +2,7 @@
 
 use nalgebra::{Complex, DMatrix};
 
-use super::{ContactDirections, directional_modes};
-use crate::modes::modal::ModalModel;
+use super::{SlidingContacts, directional_modes};
 use crate::scene::method::Scheme;
 
 /// (s² + a s + b) q = (1 + γs) c φ_fᵀF of each mode, while the contacts have zero gap: Σ φ_n q + R F = 0.
@@ -23,10 +22,8 @@ pub(crate) struct HeldContacts {
 impl HeldContacts {
     /// Creates the modes of a model, the highest of them quasi-static or not, with all contacts of `directions` closed and sliding.
     fn new(
-        model: &ModalModel,
+        SlidingContacts { model, friction, directions }: SlidingContacts,
         quasi_static: bool,
-        friction: f64,
-        directions: &ContactDirections,
         mode: impl Fn(usize) -> [f64; 3],
         late: f64,
     ) -> Self {
@@ -50,35 +47,23 @@ impl HeldContacts {
     }
 
     /// Creates the problem of the differential equations, with s per `step` (s) and the highest modes quasi-static or not.
-    pub fn continuous(
-        model: &ModalModel,
-        quasi_static: bool,
-        step: f64,
-        friction: f64,
-        directions: &ContactDirections,
-    ) -> Self {
+    pub fn continuous(contacts: SlidingContacts, quasi_static: bool, step: f64) -> Self {
         let mode = |mode: usize| {
-            let angle = step * model.frequencies[mode];
-            [2.0 * model.damping_ratios[mode] * angle, angle * angle, step * step]
+            let angle = step * contacts.model.frequencies[mode];
+            [2.0 * contacts.model.damping_ratios[mode] * angle, angle * angle, step * step]
         };
-        Self::new(model, quasi_static, friction, directions, mode, 0.0)
+        Self::new(contacts, quasi_static, mode, 0.0)
     }
 
     /// Creates the problem of the recurrence q⁺ = q + d⁺, d⁺ = βd − κq + cφ_fᵀF, which multiplies a motion by 1 + s per step.
-    pub fn stepped(
-        model: &ModalModel,
-        scheme: Scheme,
-        step: f64,
-        friction: f64,
-        directions: &ContactDirections,
-    ) -> Self {
+    pub fn stepped(contacts: SlidingContacts, scheme: Scheme, step: f64) -> Self {
         let mode = |mode: usize| {
-            let found = model.coefficient(mode, 1.0, scheme, step);
+            let found = contacts.model.coefficient(mode, 1.0, scheme, step);
             [1.0 - found.beta + found.kappa, found.kappa, found.load_compliance()]
         };
         let properties = scheme.properties();
         let late = if properties.delays_contact { 1.0 } else { 0.0 };
-        Self::new(model, properties.quasi_static, friction, directions, mode, late)
+        Self::new(contacts, properties.quasi_static, mode, late)
     }
 
     /// Number of contacts.

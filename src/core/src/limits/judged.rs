@@ -95,7 +95,7 @@ pub(crate) fn share_of(model: &ModalModel, directions: &ContactDirections, frequ
 mod tests {
     use super::*;
     use crate::limits::tests::radial;
-    use crate::limits::{delassus, growth};
+    use crate::limits::{SlidingContacts, delassus, growth};
     use nalgebra::{DMatrix, DVector};
     use tiprub_test_models::SeededRandom;
 
@@ -120,7 +120,8 @@ mod tests {
         let (normals, forces) = directional_modes(model, friction, &radial());
         let square = |mode: usize| model.frequencies[mode] * model.frequencies[mode];
         let bent = DVector::from_fn(model.len(), |mode, _| forces[(0, mode)] / square(mode));
-        let (yielding, within) = ((&normals * &bent)[0], delassus(model, scheme, step, friction, &radial())[0]);
+        let (yielding, within) =
+            ((&normals * &bent)[0], delassus(SlidingContacts::new(model, friction, &radial()), scheme, step)[0]);
         if yielding <= 0.0 || within <= 0.0 {
             return None;
         }
@@ -157,7 +158,9 @@ mod tests {
             let (friction, product) = (random.scale(0.02, 1.5), random.scale(0.1, 1.9));
             let step = product / model.largest_frequency()
                 * if scheme == Scheme::ModalExact { random.scale(1.0, 5.0) } else { 1.0 };
-            let Some(growth) = growth(&model, scheme, step, friction, &radial()) else { continue };
+            let Some(growth) = growth(SlidingContacts::new(&model, friction, &radial()), scheme, step) else {
+                continue;
+            };
             if growth.continuous > -1e-3 / step / 5e3 {
                 continue;
             }

@@ -49,7 +49,9 @@ mod tests {
         assert!((least / (along / across) - 1.0).abs() < 1e-12 && own(&never).is_infinite(), "{least}");
         // Below it no motion grows without oscillation, above it one does.
         let diverges = |friction: f64| {
-            let growth = limits::growth(&model, Scheme::ModalExact, 1e-6, friction, &locking).unwrap();
+            let growth =
+                limits::growth(limits::SlidingContacts::new(&model, friction, &locking), Scheme::ModalExact, 1e-6)
+                    .unwrap();
             growth.is_flutter() && growth.frequency == 0.0
         };
         assert!(!diverges(0.99 * least) && diverges(1.01 * least));

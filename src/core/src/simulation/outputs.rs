@@ -92,19 +92,19 @@ impl Outputs {
 
 /// Data that outputs are read from, for all outputs at one instant.
 pub(crate) struct OutputView<'a> {
-    simulation: &'a Simulation,
+    pub(super) simulation: &'a Simulation,
     pub system: &'a System,
     pub window: &'a StepWindow,
     /// 1/elapsed time of the communication step, 0 at its start (1/s).
     pub mean: f64,
     /// Elapsed time of the communication step (s).
-    elapsed: f64,
+    pub elapsed: f64,
     /// Instantaneous kinetic and strain energy (J), if the ledger is kept.
     pub energies: (f64, f64),
     /// Energy that the scheme conserves (J), if the ledger is kept.
     pub conserved: f64,
     /// Work and losses of all structures.
-    ledger: Ledger,
+    pub ledger: Ledger,
 }
 
 impl Simulation {
@@ -156,17 +156,9 @@ fn smallest<'a>(values: impl Iterator<Item = &'a f64>) -> f64 {
 }
 
 impl OutputView<'_> {
-    pub fn rotor_angle(&self, body: usize) -> f64 {
-        self.simulation.state.inputs.rotors[body].total_angle(self.elapsed)
-    }
-
     /// Fraction of the friction heat of a pair that flows into the surface carrier; 1 if the scene does not specify it.
     pub(crate) fn slave_share(&self, pair: usize) -> f64 {
         self.simulation.outputs.slave_shares[pair]
-    }
-
-    pub fn ledger(&self) -> &Ledger {
-        &self.ledger
     }
 
     /// Returns the largest relative residual of any set of structures that influence each other.
@@ -178,11 +170,6 @@ impl OutputView<'_> {
         });
         let larger = |largest: f64, one: f64| if one.abs() > largest.abs() { one } else { largest };
         relative.reduce(larger).unwrap_or_default()
-    }
-
-    /// Returns the largest number of internal steps tried within one communication step.
-    pub(crate) fn most_tried(&self) -> u64 {
-        self.simulation.state.clock.most_tried
     }
 
     /// Reads a value of the coating of a pair; empty without a coating.
@@ -201,7 +188,7 @@ impl OutputView<'_> {
         self.system.structures()[body].modes()
     }
 
-    fn index(&self, body: usize, node: usize, sector: usize) -> usize {
+    pub fn index(&self, body: usize, node: usize, sector: usize) -> usize {
         self.system.structures()[body].index(node, sector)
     }
 
@@ -236,21 +223,8 @@ impl OutputView<'_> {
         values.iter().skip(sector).step_by(self.modes(body).lanes())
     }
 
-    pub fn clearance(&self, body: usize, node: usize, sector: usize) -> f64 {
-        self.system.structures()[body].gap(node, sector).min(NO_CLEARANCE)
-    }
-
     pub fn normal_impulse(&self, body: usize, node: usize, sector: usize) -> f64 {
         self.window.bodies[body].normal_impulse[self.index(body, node, sector)]
-    }
-
-    /// Returns the normal impulse of all nodes of all structures.
-    pub(crate) fn whole_normal_impulse(&self) -> f64 {
-        self.window.bodies.iter().flat_map(|body| &body.normal_impulse).sum()
-    }
-
-    pub(crate) fn tangential_impulse(&self, body: usize, node: usize, sector: usize) -> f64 {
-        self.window.bodies[body].tangential_impulse[self.index(body, node, sector)]
     }
 
     /// Friction force of the last internal step (N).
@@ -285,11 +259,6 @@ impl OutputView<'_> {
         self.simulation.compiled.bodies[body].senses[mode] * self.modes(body).modal_state(mode, sector).0
     }
 
-    /// Displacement of a contact node of a sector along an axis of its frame (m).
-    pub fn displacement(&self, body: usize, sector: usize, node: usize, axis: usize) -> f64 {
-        self.modes(body).row(3 * node + axis, sector)
-    }
-
     /// Force (N) or moment (N·m) of the support on a structure that carries surfaces, mean over the communication step.
     pub fn support(&self, carrier: usize, row: usize) -> f64 {
         let Compiled { carriers, bodies, .. } = &self.simulation.compiled;
@@ -305,11 +274,6 @@ impl OutputView<'_> {
         let heat: f64 = heated.sum();
         let lining = row.checked_sub(3).map_or(0.0, |axis| own.lining[axis]);
         self.mean * (sum - self.elapsed * heat + lining)
-    }
-
-    /// Displacement of a watched point of a sector along an axis of its frame (m).
-    pub(crate) fn watched_displacement(&self, body: usize, sector: usize, point: usize, axis: usize) -> f64 {
-        self.simulation.watched_row(body, 3 * point + axis, sector)
     }
 
     /// Component of the stress at a place of a sector (Pa): stress by displacements, and the static stress by heat and growth of the full
@@ -328,11 +292,6 @@ impl OutputView<'_> {
     /// Equivalent stress of von Mises at a place of a sector (Pa).
     pub fn von_mises(&self, body: usize, sector: usize, place: usize) -> f64 {
         von_mises([0, 1, 2, 3, 4, 5].map(|component| self.stress(body, sector, place, component)))
-    }
-
-    /// Clearance of a watched point of a sector (m).
-    pub fn watched_clearance(&self, body: usize, sector: usize, point: usize) -> f64 {
-        self.simulation.outputs.watched_gaps.clearance(body, point, sector)
     }
 
     /// Computes |(2/N) Σ_b u_b e^(−i n θ_b)| (1/N for n = 0 and n = N/2) of the radial displacement of the middle node, or of the mean over

@@ -3,7 +3,7 @@
 //! Layout, little-endian: magic (8 bytes), format version (u64), scene fingerprint (u64), payload, FNV-1a checksum of all preceding bytes
 //! (u64).
 
-use tiprub_cosim::persist::{Persist, StateReader, StateWriter, fingerprint};
+use tiprub_cosim::persist::{Persist, StateReader, StateWriter, check_length, damaged, fingerprint};
 use tiprub_cosim::variables::Causality;
 use tiprub_cosim::{VariableValues, persist_fields, shown};
 
@@ -11,11 +11,12 @@ use super::clock::{Clock, SAME_STEP, SimulationPhase};
 use super::inputs::Inputs;
 use super::window::StepWindow;
 use super::{Compiled, Simulation};
-use crate::{Error, Result};
+use crate::scene::settings::SceneSettings;
+use crate::{Result, Scene};
 
 const MAGIC: [u8; 8] = *b"tiprubST";
 const VERSION: u64 = 14;
-const CHECKSUM_BYTES: usize = 8;
+pub(super) const CHECKSUM_BYTES: usize = 8;
 /// Upper bound on all values of a structure and of its ledger, in any unit; squares and products stay far from overflow.
 const LARGEST: f64 = 1e50;
 
@@ -102,8 +103,38 @@ impl SimulationState {
     }
 }
 
-fn damaged<T>(problem: impl std::fmt::Display) -> Result<T> {
-    Err(Error::state(problem))
+/// Hash of everything that determines the results of a scene.
+pub(super) fn fingerprint_of(scene: &Scene) -> u64 {
+    // Silenced warnings and accepted values do not change results.
+    let settings = SceneSettings { silence: Vec::new(), accept_implausible: false, ..scene.settings.clone() };
+    let mut hash = fingerprint(format!("{settings:?}").as_bytes(), 0);
+    for rom in &scene.roms {
+        let mut matrices = vec![&rom.mass, &rom.stiffness, &rom.contact_map];
+        if let Some(spin) = &rom.extras.spin {
+            matrices.extend([&spin.stiffness_speed2, &spin.stiffness_speed4, &spin.coriolis]);
+            let loads = format!("{:?} {:?}", spin.centrifugal_load, spin.centrifugal_load_speed4);
+            hash = fingerprint(loads.as_bytes(), hash);
+        }
+        matrices.extend(rom.extras.thermal.iter().map(|thermal| &thermal.loads));
+        matrices.extend(rom.extras.watched.iter().map(|watched| &watched.map));
+        matrices.extend(rom.extras.support.iter().flat_map(|own| [&own.stiffness, &own.mass, &own.thermal]));
+        for matrix in matrices {
+            for value in matrix.iter() {
+                hash = fingerprint(&value.to_bits().to_le_bytes(), hash);
+            }
+        }
+        for harmonic in &rom.extras.harmonics {
+            for matrix in [&harmonic.mass, &harmonic.stiffness, &harmonic.contact_map] {
+                for value in matrix.iter().flat_map(|value| [value.re, value.im]) {
+                    hash = fingerprint(&value.to_bits().to_le_bytes(), hash);
+                }
+            }
+        }
+        let patches = rom.extras.thermal.as_ref().map(|thermal| &thermal.patches);
+        let rest = format!("{} {:?} {:?} {:?}", rom.sectors, rom.contact_nodes, rom.extras.grid, patches);
+        hash = fingerprint(rest.as_bytes(), hash);
+    }
+    hash
 }
 
 impl Simulation {
@@ -113,25 +144,7 @@ impl Simulation {
         writer.written() + CHECKSUM_BYTES
     }
 
-    /// Implements [`tiprub_cosim::CoSimulation::save_state`].
-    pub(super) fn save_to(&self, buffer: &mut [u8]) -> Result<()> {
-        self.check_size(buffer.len())?;
-        let end = buffer.len() - CHECKSUM_BYTES;
-        self.write(&mut StateWriter::new(&mut buffer[..end]));
-        let checksum = fingerprint(&buffer[..end], 0);
-        buffer[end..].copy_from_slice(&checksum.to_le_bytes());
-        Ok(())
-    }
-
-    fn check_size(&self, found: usize) -> Result<()> {
-        let expected = self.state_size;
-        if found == expected {
-            return Ok(());
-        }
-        damaged(format!("it has {found} bytes, but this scene needs {expected}"))
-    }
-
-    fn write(&self, writer: &mut StateWriter) {
+    pub(super) fn write(&self, writer: &mut StateWriter) {
         [u64::from_le_bytes(MAGIC), VERSION, self.compiled.fingerprint].save(writer);
         self.state.save(writer);
         self.system.save(writer);
@@ -148,7 +161,7 @@ impl Simulation {
 
     /// Implements [`tiprub_cosim::CoSimulation::restore_state`].
     pub(super) fn restore_checked(&mut self, buffer: &[u8]) -> Result<()> {
-        self.check_size(buffer.len())?;
+        check_length(buffer.len(), self.state_size, "this scene")?;
         let (content, checksum) = buffer.split_at(buffer.len() - CHECKSUM_BYTES);
         if content[..MAGIC.len()] != MAGIC {
             return damaged("it was not saved by tiprub");

@@ -1,12 +1,13 @@
 //! The simulation as a co-simulation unit.
 
-use tiprub_cosim::persist::{Persist, StateReader, to_bytes};
+use tiprub_cosim::persist::{Persist, StateReader, StateWriter, check_length, fingerprint, to_bytes};
 use tiprub_cosim::variables::{Causality, Quantity, Value};
 use tiprub_cosim::{CoSimulation, StepProgress, VariableValues, bounds};
 
 use super::Simulation;
 use super::clock::{Clock, Communication, SimulationPhase};
 use super::drive::{Input, RotorAngle};
+use super::state::CHECKSUM_BYTES;
 use crate::system::StepFailure;
 use crate::{Error, Result, Warning};
 
@@ -247,7 +248,11 @@ impl CoSimulation for Simulation {
     }
 
     fn save_state(&self, buffer: &mut [u8]) -> Result<()> {
-        self.save_to(buffer)
+        check_length(buffer.len(), self.state_size, "this scene")?;
+        let (content, checksum) = buffer.split_at_mut(buffer.len() - CHECKSUM_BYTES);
+        self.write(&mut StateWriter::new(content));
+        checksum.copy_from_slice(&fingerprint(content, 0).to_le_bytes());
+        Ok(())
     }
 
     fn restore_state(&mut self, buffer: &[u8]) -> Result<()> {

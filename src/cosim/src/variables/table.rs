@@ -35,27 +35,20 @@ fn check_count(variables: &[Variable]) -> Result<()> {
 }
 
 impl VariableTable {
-    /// Creates a table from rows whose references are consecutive, starting at 0.
+    /// Creates a table of rows and assigns consecutive references, starting at 0.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if references are not consecutive, a name occurs twice, or there are more than [`bounds::VALUES`] values.
-    pub fn new(variables: Vec<Variable>) -> Result<Self> {
+    /// [`Error::Invalid`] if a name occurs twice, or there are more than [`bounds::VALUES`] values.
+    pub fn new(mut variables: Vec<Variable>) -> Result<Self> {
         check_count(&variables)?;
-        let (mut rows, mut names) = (Vec::new(), HashSet::with_capacity(variables.len()));
-        for (row, variable) in variables.iter().enumerate() {
-            let expected = u32::try_from(rows.len()).unwrap_or(u32::MAX);
-            let repeated = !names.insert(variable.name.as_str());
-            if variable.reference != expected || repeated {
-                return Err(Error::invalid(
-                    format!("variable `{}`", variable.name),
-                    format!("reference {} instead of {expected}, or duplicate name", variable.reference),
-                    "Give consecutive references and unique names",
-                ));
+        let (mut rows, mut places, mut names) = (Vec::new(), BTreeMap::new(), HashSet::new());
+        for (row, variable) in variables.iter_mut().enumerate() {
+            variable.reference = u32::try_from(rows.len()).unwrap_or(u32::MAX);
+            if !names.insert(variable.name.clone()) {
+                let what = format!("variable `{}`", variable.name);
+                return Err(Error::invalid(what, "the name occurs twice", "Give unique names"));
             }
             rows.extend(std::iter::repeat_n(u32::try_from(row).unwrap_or(u32::MAX), variable.len()));
-        }
-        let mut places = BTreeMap::new();
-        for (row, variable) in variables.iter().enumerate() {
             places.entry((variable.quantity, variable.of)).or_insert(row);
         }
         Ok(Self { variables, rows, places })

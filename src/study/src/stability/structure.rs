@@ -3,7 +3,7 @@
 
 use tiprub_core::geometry::Vector3;
 use tiprub_core::limits::{
-    self, ContactDirections, Fastest, GrowthRates, judged::SetGrowth, lock_up, massless::MasslessCheck,
+    self, ContactDirections, Fastest, GrowthRates, SlidingContacts, judged::SetGrowth, lock_up, massless::MasslessCheck,
 };
 use tiprub_core::modes::{cyclic::CyclicModel, modal::ModalModel};
 use tiprub_core::scene::method::Scheme;
@@ -169,7 +169,9 @@ impl<'a> SingleStructure<'a> {
             for nodes in self.combinations() {
                 for model in 0..self.models.len() {
                     let (seen, directions) = self.seen(model, &nodes, sense);
-                    let Some(found) = limits::growth(&seen, scheme, step, sliding.friction, &directions) else {
+                    let Some(found) =
+                        limits::growth(SlidingContacts::new(&seen, sliding.friction, &directions), scheme, step)
+                    else {
                         continue;
                     };
                     let own = self.physical(&seen, scheme, step, sliding.friction, &directions, &found);
@@ -219,7 +221,7 @@ impl<'a> SingleStructure<'a> {
         found: &GrowthRates,
     ) -> Fastest {
         let own = Fastest { rate: found.continuous, frequency: found.frequency };
-        let without = || limits::without_node_mass(seen, step, friction, directions);
+        let without = || limits::without_node_mass(SlidingContacts::new(seen, friction, directions), step);
         if scheme.properties().delays_contact { own } else { without().unwrap_or(own) }
     }
 
@@ -331,7 +333,7 @@ impl<'a> SingleStructure<'a> {
         // Independent of the duration of contact.
         let grows = |nodes: &Vec<usize>, sense: usize| {
             let (seen, directions) = self.seen(0, nodes, sense);
-            let found = limits::growth(&seen, scheme, step, sliding.friction, &directions);
+            let found = limits::growth(SlidingContacts::new(&seen, sliding.friction, &directions), scheme, step);
             found.is_some_and(|found| SetGrowth::new(&seen, scheme, step, &directions, found).allowed().is_finite())
         };
         self.combinations().iter().all(|nodes| !sliding.senses().any(|sense| grows(nodes, sense)))

@@ -13,7 +13,7 @@ use crate::geometry::Sliding;
 use crate::geometry::open::OpenGap;
 use crate::geometry::{GapLaw, Geometry, Vector3};
 use crate::limits::finding::{Checked, ErrorKind, Finding, Subject, WarningKind};
-use crate::limits::{self, ContactDirections};
+use crate::limits::{self, ContactDirections, SlidingContacts};
 use crate::math::vector::length;
 use crate::modes::modal::ModalModel;
 use crate::modes::modal::fill_ratios;
@@ -130,12 +130,12 @@ impl FlightCheck<'_> {
         let Parameters { scheme, damping_ratios, mode_damping, .. } = self.parameters;
         let mut model = self.compiled.bodies[self.body].model.with_nodes(&met.nodes);
         fill_ratios(&mut model.damping_ratios, damping_ratios[self.body], &mode_damping[self.body], 1);
-        let mut matrix = limits::delassus(&model, *scheme, step, friction, &met.directions);
+        let mut matrix = limits::delassus(SlidingContacts::new(&model, friction, &met.directions), *scheme, step);
         for carrier in self.compiled.carriers_of(self.body) {
             let Some(mut seen) = seen_by(carrier, met, laws, carriers) else { continue };
             let place = self.compiled.bodies.len() + carrier;
             fill_ratios(&mut seen.damping_ratios, damping_ratios[place], &mode_damping[place], 1);
-            matrix += limits::delassus(&seen, *scheme, step, friction, &met.directions);
+            matrix += limits::delassus(SlidingContacts::new(&seen, friction, &met.directions), *scheme, step);
         }
         let diagonal = matrix.diagonal();
         if let Some(jammed) = (0..met.nodes.len()).find(|member| diagonal[*member] <= 0.0) {

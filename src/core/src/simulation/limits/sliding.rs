@@ -5,7 +5,7 @@ use super::checking::Checking;
 use super::in_range;
 use crate::limits::finding::{ClosedContact, ErrorKind, StepGrowth, WarningKind};
 use crate::limits::judged::{self, SetGrowth};
-use crate::limits::{self, ContactDirections, Fastest, lock_up};
+use crate::limits::{self, ContactDirections, Fastest, SlidingContacts, lock_up};
 use crate::modes::modal::ModalModel;
 use crate::simulation::clock::SAME_STEP;
 
@@ -163,15 +163,12 @@ impl Checking<'_> {
             let mut most: Option<FastestGrowth> = None;
             for model in 0..self.models.len() {
                 let (seen, directions) = self.closed_at(model, &nodes, sign);
+                let contacts = SlidingContacts::new(&seen, self.friction, &directions);
                 let largest = self.parameters.step;
-                let Some(continuous) = limits::continuous(&seen, scheme, largest, self.friction, &directions) else {
+                let Some(continuous) = limits::continuous(contacts, scheme, largest) else {
                     continue;
                 };
-                let without = if properties.quasi_static {
-                    None
-                } else {
-                    limits::without_node_mass(&seen, largest, self.friction, &directions)
-                };
+                let without = if properties.quasi_static { None } else { limits::without_node_mass(contacts, largest) };
                 let physical = without.unwrap_or(continuous);
                 if physical.rate > noise {
                     let with_mass = without.map(|_| continuous);
@@ -183,7 +180,7 @@ impl Checking<'_> {
                 if properties.adaptive {
                     continue;
                 }
-                let found = limits::stepped(&seen, scheme, expected, self.friction, &directions, continuous);
+                let found = limits::stepped(contacts, scheme, expected, continuous);
                 let Some(growth) = found else { continue };
                 if most.as_ref().is_none_or(|most| growth.stepped > most.judged.growth.stepped) {
                     let judged = SetGrowth::new(&seen, scheme, expected, &directions, growth);
@@ -198,7 +195,8 @@ impl Checking<'_> {
     fn judged(&self, watched: &FastestGrowth, step: f64, sign: f64) -> Option<SetGrowth> {
         let (seen, directions) = self.closed_at(watched.model, &watched.nodes, sign);
         let (scheme, friction) = (self.parameters.scheme, self.friction);
-        let growth = limits::stepped(&seen, scheme, step, friction, &directions, watched.continuous)?;
+        let growth =
+            limits::stepped(SlidingContacts::new(&seen, friction, &directions), scheme, step, watched.continuous)?;
         Some(SetGrowth::new(&seen, scheme, step, &directions, growth))
     }
 

@@ -21,16 +21,18 @@ pub(crate) const RAMPED: &str = "; reached at the end of the communication step 
 const RAMPED_ANGLE: &str =
     "; reached at the end of the communication step (see input_interpolation), so do not wrap it to one turn";
 
+/// Unit; `None` for dimensionless numbers and texts.
+type Unit = Option<&'static VariableUnit>;
+
 /// Unit with a typical magnitude; `None` for dimensionless numbers.
 pub(crate) type NominalUnit = Option<(&'static VariableUnit, f64)>;
 
-/// Collects rows and assigns references.
+/// Collects rows.
 #[derive(Default)]
 pub(crate) struct TableBuilder {
     variables: Vec<Variable>,
     /// Readers of the outputs, in the order of the outputs.
     readers: Vec<OutputReader>,
-    next: u32,
     /// Index of the structure or pair of the next rows, and the prefix of their names.
     of: usize,
     prefix: String,
@@ -53,41 +55,24 @@ impl TableBuilder {
         name: impl Into<String>,
         description: impl Into<String>,
     ) -> &mut Variable {
-        self.close();
         let name = format!("{}{}", self.prefix, name.into());
-        self.variables.push(Variable { of: self.of, ..Variable::output(name, self.next, description.into()) });
+        self.variables.push(Variable { of: self.of, ..Variable::output(name, description.into()) });
         let variable = self.variables.last_mut().unwrap_or_else(|| unreachable!("just pushed"));
         variable.quantity(quantity)
     }
 
-    /// Counts the references of the last row, whose dimension is now known.
-    fn close(&mut self) {
-        self.next = self
-            .variables
-            .last()
-            .map_or(0, |last| last.reference.saturating_add(u32::try_from(last.len()).unwrap_or(u32::MAX)));
-    }
-
-    pub fn input(
-        &mut self,
-        quantity: Quantity,
-        name: &str,
-        unit: Option<&'static VariableUnit>,
-        start: f64,
-        text: &str,
-    ) -> &mut Variable {
-        let variable = self.push(quantity, name, text);
-        (variable.causality, variable.unit) = (Causality::Input, unit);
-        variable.start = Some(StartValue::Real(vec![start]));
+    pub fn input(&mut self, quantity: Quantity, name: &str, unit: Unit, start: f64, text: &str) -> &mut Variable {
+        let variable = self.push(quantity, name, text).input(start);
+        variable.unit = unit;
         if unit == Some(&ANGLE) { variable.range(-TURNED, TURNED) } else { variable }
     }
 
     /// Adds an input that moves or loads a structure and therefore never jumps.
-    pub(crate) fn moving_input(
+    pub fn moving_input(
         &mut self,
         quantity: Quantity,
         name: &str,
-        unit: Option<&'static VariableUnit>,
+        unit: Unit,
         start: f64,
         text: &str,
     ) -> &mut Variable {
@@ -96,20 +81,12 @@ impl TableBuilder {
         variable
     }
 
-    pub fn parameter(
-        &mut self,
-        quantity: Quantity,
-        name: &str,
-        unit: Option<&'static VariableUnit>,
-        start: f64,
-        text: &str,
-    ) -> &mut Variable {
+    pub fn parameter(&mut self, quantity: Quantity, name: &str, unit: Unit, start: f64, text: &str) -> &mut Variable {
         self.input(quantity, name, unit, start, text).role(Causality::Parameter, Variability::Fixed)
     }
 
     pub fn choice(&mut self, quantity: Quantity, name: &str, choices: &'static Enumeration, start: i32, text: &str) {
-        let kind = DataType::Enumeration(choices);
-        self.parameter(quantity, name, None, 0.0, text).kind(kind, StartValue::Integer(start));
+        self.push(quantity, name, text).choice(choices, start);
     }
 
     /// Adds a parameter that is a whole number.
@@ -128,8 +105,7 @@ impl TableBuilder {
         read: OutputReader,
     ) -> &mut Variable {
         self.readers.push(read);
-        let variable = self.push(Quantity::Output, name, text);
-        variable.span = span;
+        let variable = self.push(Quantity::Output, name, text).span(span);
         (variable.unit, variable.nominal) = unit.unzip();
         variable
     }
@@ -209,8 +185,7 @@ impl TableBuilder {
     /// Adds the name of the scene.
     pub(crate) fn scene_name(&mut self, settings: &SceneSettings) {
         let name = self.push(Quantity::SceneName, "scene", "Name of the scene from which this FMU was generated");
-        name.kind(DataType::String, StartValue::String(settings.name.clone()))
-            .role(Causality::Local, Variability::Constant);
+        name.constant(DataType::String, StartValue::String(settings.name.clone()));
     }
 
     /// Adds the time, the independent variable.

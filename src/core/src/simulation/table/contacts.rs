@@ -21,7 +21,7 @@ pub fn totals(table: &mut TableBuilder, friction: bool) {
     let peak = table.output("normal_force_peak", Span::Window, Some((&FORCE, 100.0)), text, read);
     peak.quantity(Quantity::NormalForcePeak);
     let text = "Sum of the normal impulses of all contact nodes within the communication step";
-    let read = scalar(|view| view.whole_normal_impulse());
+    let read = scalar(|view| view.window.bodies.iter().flat_map(|body| &body.normal_impulse).sum());
     table.output("normal_impulse", Span::Window, Some((&IMPULSE, 1e-3)), text, read);
     if friction {
         let text = "Friction power, mean over the communication step";
@@ -45,7 +45,7 @@ type Energy = (&'static str, Span, Quantity, &'static str, fn(&OutputView) -> f6
 /// Defines rows of the energy ledger: quantity, name, term, text, and whether a scene has the row.
 macro_rules! terms {
     ($($quantity:ident $name:literal $($term:ident).+ $text:expr, $exists:expr;)*) => {
-        [$(($name, Span::Total, Quantity::$quantity, $text, |view| view.ledger().$($term).+(), $exists)),*]
+        [$(($name, Span::Total, Quantity::$quantity, $text, |view| view.ledger.$($term).+(), $exists)),*]
     };
 }
 
@@ -120,7 +120,7 @@ pub fn energies(table: &mut TableBuilder, parts: &TableFacts) {
         let text = if name == "stiffening_work" && softens(parts) { SOFTENED } else { text };
         table.output(name, span, Some((&ENERGY, 1.0)), text, scalar(read)).quantity(quantity);
     }
-    let read = scalar(|view| view.ledger().residual(view.conserved));
+    let read = scalar(|view| view.ledger.residual(view.conserved));
     let text = "Residual of the energy balance";
     table.output("energy_residual", Span::Point, Some((&ENERGY, 1.0)), text, read);
     let text = "Residual of the energy balance relative to the initial energy plus all work exchanged";
@@ -166,7 +166,7 @@ const EFFORTS: [Count; 3] = [
     (
         "internal_steps_max",
         "Largest number of trial internal steps of all blades together in any communication step since the start",
-        |view| view.most_tried(),
+        |view| view.simulation.state.clock.most_tried,
     ),
     (
         "missed_steps",

@@ -196,7 +196,7 @@ fn wear(table: &mut TableBuilder, parts: &TableFacts, pair: &PairFacts, coating:
         table.belongs_to_all();
         let text = "Energy consumed by wear of the coating since the start; supplied by the shaft if the coating is \
                     cut, and not in the energy balance if it is pressed in";
-        let read = scalar(|view| view.ledger().wear_energy.value());
+        let read = scalar(|view| view.ledger.wear_energy.value());
         table.output("wear_energy", Span::Total, Some((&ENERGY, 1.0)), text, read);
         table.belongs(index, parts.of_pair(pair));
     }

@@ -1,6 +1,6 @@
 //! Outputs of a rotor, one row each with its reader.
 
-use tiprub_cosim::variables::{Quantity, Span, VariableUnit};
+use tiprub_cosim::variables::{NO_CLEARANCE, Quantity, Span, VariableUnit};
 
 use super::builder::{NominalUnit, TableBuilder};
 use super::parts::{BodyFacts, TableFacts, refuse};
@@ -12,7 +12,7 @@ use crate::simulation::units::{ANGLE, FORCE, LENGTH, LINE_LOAD, PRESSURE, STRESS
 pub fn angle(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts) {
     let index = body.index;
     let text = format!("Angle of {} about +z", parts.rotor(body));
-    let read = scalar(move |view| view.rotor_angle(index));
+    let read = scalar(move |view| view.simulation.state.inputs.rotors[index].total_angle(view.elapsed));
     let angle = table.output("rotor_angle", Span::Point, Some((&ANGLE, 1.0)), text, read);
     angle.display(0).quantity(Quantity::RotorAngle);
 }
@@ -28,7 +28,7 @@ pub fn clearances(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts
     let index = body.index;
     let text = format!(
         "Smallest clearance over all sectors within the communication step, per contact node ({}){}",
-        node_list(body),
+        names(&body.rom.contact_nodes),
         untouched(parts, body)
     );
     let read = each(move |view, node| view.lowest_of_node(index, node));
@@ -42,9 +42,8 @@ fn untouched(parts: &TableFacts, body: &BodyFacts) -> &'static str {
     if paired < body.rom.contact_nodes.len() { "; 1e9 m at nodes in no contact pair" } else { "" }
 }
 
-fn node_list(body: &BodyFacts) -> String {
-    let names: Vec<&str> = body.rom.contact_nodes.iter().map(|node| node.name.as_str()).collect();
-    names.join(", ")
+fn names(points: &[ContactNode]) -> String {
+    points.iter().map(|point| point.name.as_str()).collect::<Vec<_>>().join(", ")
 }
 
 pub fn watched(table: &mut TableBuilder, parts: &TableFacts) -> Result<()> {
@@ -83,7 +82,7 @@ fn watch(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts, sector:
         tips(table, parts, body, sector);
     }
     patches(table, body, sector);
-    let list = node_list(body);
+    let list = names(&body.rom.contact_nodes);
     for row in watched_rows(parts, body, sector - 1, [nominal(parts, body), Some((&FORCE, 100.0))]) {
         let untouched = if row.is_length() { untouched(parts, body) } else { "" };
         let text = format!("{} ({list}){untouched}", row.text);
@@ -98,29 +97,26 @@ const COMPONENTS: [[&str; 3]; 2] = [["radial", "tangential", "axial"], ["x", "y"
 /// Adds displacements and clearances of the watched points of a ROM.
 fn watched_points(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts, sector: usize) {
     let Some(watched) = &body.rom.extras.watched else { return };
-    let names: Vec<&str> = watched.points.iter().map(|point| point.name.as_str()).collect();
-    for (axis, name) in COMPONENTS[usize::from(body.rom.frame == DisplacementFrame::Cartesian)].into_iter().enumerate()
-    {
+    let (list, count) = (names(&watched.points), watched.points.len());
+    for (axis, name) in COMPONENTS[body.rom.frame as usize].into_iter().enumerate() {
         let index = body.index;
-        let text = format!("Displacement of watched points, {name} ({})", names.join(", "));
-        let read = each(move |view, point| view.watched_displacement(index, sector - 1, point, axis));
+        let text = format!("Displacement of watched points, {name} ({list})");
+        let read = each(move |view, point| view.simulation.watched_row(index, 3 * point + axis, sector - 1));
         let row =
             table.output(format!("blade[{sector}].{name}_displacement"), Span::Point, nominal(parts, body), text, read);
-        row.elements(names.len()).display(1);
+        row.elements(count).display(1);
     }
     if body.rom.frame == DisplacementFrame::Cartesian {
         return;
     }
     let index = body.index;
-    let text = format!(
-        "Clearance of watched points normal to the casing at the communication point ({}){}",
-        names.join(", "),
-        untouched(parts, body)
-    );
-    let read = each(move |view, point| view.watched_clearance(index, sector - 1, point));
+    let untouched = untouched(parts, body);
+    let text =
+        format!("Clearance of watched points normal to the casing at the communication point ({list}){untouched}");
+    let read = each(move |view, point| view.simulation.outputs.watched_gaps.clearance(index, point, sector - 1));
     let name = format!("blade[{sector}].watched_clearance");
     let row = table.output(name, Span::Point, nominal(parts, body), text, read);
-    row.elements(names.len()).display(1);
+    row.elements(count).display(1);
 }
 
 /// Adds amplitudes of the lowest modes.
@@ -139,10 +135,9 @@ fn modes(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts, sector:
 /// Adds displacements of the contact nodes.
 fn tips(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts, sector: usize) {
     let index = body.index;
-    for (axis, name) in COMPONENTS[usize::from(body.rom.frame == DisplacementFrame::Cartesian)].into_iter().enumerate()
-    {
-        let text = format!("Displacement of contact nodes, {name} ({})", node_list(body));
-        let read = each(move |view, node| view.displacement(index, sector - 1, node, axis));
+    for (axis, name) in COMPONENTS[body.rom.frame as usize].into_iter().enumerate() {
+        let text = format!("Displacement of contact nodes, {name} ({})", names(&body.rom.contact_nodes));
+        let read = each(move |view, node| view.modes(index).row(3 * node + axis, sector - 1));
         let name = format!("blade[{sector}].tip_{name}_displacement");
         let row = table.output(name, Span::Point, nominal(parts, body), text, read);
         row.elements(body.rom.contact_nodes.len()).display(1);
@@ -159,17 +154,14 @@ const STRESS_COMPONENTS: [[&str; STRESSES]; 2] = [
 fn stresses(table: &mut TableBuilder, body: &BodyFacts, sector: usize) {
     let Some(stress) = &body.rom.extras.stress else { return };
     let (index, places) = (body.index, stress.points.len());
-    let names: Vec<&str> = stress.points.iter().map(|point| point.name.as_str()).collect();
-    let list = names.join(", ");
+    let list = names(&stress.points);
     let mut add = |name: String, text: String, read: OutputReader| {
         let row = table.output(format!("blade[{sector}].{name}"), Span::Point, Some((&STRESS, 1e8)), text, read);
         row.elements(places).display(0);
     };
     let read = each(move |view, place| view.von_mises(index, sector - 1, place));
     add("von_mises_stress".to_owned(), format!("Von Mises equivalent stress ({list})"), read);
-    for (component, name) in
-        STRESS_COMPONENTS[usize::from(body.rom.frame == DisplacementFrame::Cartesian)].into_iter().enumerate()
-    {
+    for (component, name) in STRESS_COMPONENTS[body.rom.frame as usize].into_iter().enumerate() {
         let text = format!(
             "{} stress, {} ({list})",
             if component < 3 { "Normal" } else { "Shear" },
@@ -196,7 +188,7 @@ fn patches(table: &mut TableBuilder, body: &BodyFacts, sector: usize) {
             continue;
         }
         let (index, count) = (body.index, extents.len());
-        let list = node_list(body);
+        let list = names(&body.rom.contact_nodes);
         let text =
             format!("Normal contact {quantity} at the centre of each patch ({list}), mean over the communication step");
         let read = each(move |view, node| view.mean * view.normal_impulse(index, node, sector - 1) / extents[node]);
@@ -240,7 +232,7 @@ pub(crate) fn watched_rows(
     let mut add =
         |quantity, name, span, unit, text, read| rows.push(NodeRow { quantity, name, span, unit, text, read });
     let text = "Clearance normal to the casing at the communication point";
-    let read = each(move |view, node| view.clearance(body, node, sector));
+    let read = each(move |view, node| view.system.structures()[body].gap(node, sector).min(NO_CLEARANCE));
     add(Quantity::Clearance(sector), "clearance", Span::Point, gap, text, read);
     let text = "Smallest clearance within the communication step";
     let read = each(move |view, node| view.lowest_at(body, node, sector));
@@ -250,7 +242,9 @@ pub(crate) fn watched_rows(
     add(Quantity::NormalForce(sector), "normal_force", Span::Mean, force, text, read);
     if friction {
         let text = "Magnitude of the friction force (axial part included), mean over the communication step";
-        let read = each(move |view, node| view.mean * view.tangential_impulse(body, node, sector));
+        let read = each(move |view, node| {
+            view.mean * view.window.bodies[body].tangential_impulse[view.index(body, node, sector)]
+        });
         add(Quantity::TangentialForce(sector), "tangential_force", Span::Mean, force, text, read);
     }
     if instantaneous {

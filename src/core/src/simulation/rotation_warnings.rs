@@ -1,4 +1,4 @@
-//! Warning at the start of tips that slide more slowly than they vibrate, if the law does not model sticking.
+//! Warnings at the start of rotors that turn fast with the stiffness at rest, and of tips that slide more slowly than they vibrate.
 
 use nalgebra::DMatrix;
 use tiprub_cosim::shown;
@@ -9,12 +9,25 @@ use super::compile::Compiled;
 use super::limits::Parameters;
 use crate::Warning;
 use crate::modes::modal::ModalModel;
+use crate::scene::rom::DisplacementFrame;
+use crate::scene::settings::BodyMotion;
 use crate::scene::shape::CompiledShape;
+
+/// Largest Ω/ω₁ without a warning. The lowest frequency rises as ω₁(Ω)² ≈ ω₁² + BΩ² (Southwell). Rotor 37 has B = 5.7 (865 Hz at rest, 1102
+/// Hz at 1800 rad/s), so at 0.2 a fifth of its stiffness is neglected.
+const SLOW: f64 = 0.2;
 
 /// Angles at which a shape is sampled.
 const ANGLES: u32 = 720;
 
 impl Simulation {
+    /// Warns of rotors whose stiffness at speed differs from the stiffness at rest that the scene gives them.
+    pub(super) fn warn_of_fast_rotation(&mut self) {
+        let speeds = self.speeds().into_iter().enumerate();
+        let warnings = speeds.filter_map(|(body, speed)| self.compiled.fast_rotation(body, speed));
+        self.diagnostics.warnings.extend(warnings);
+    }
+
     /// Warns of tips that slide more slowly than they vibrate: they stick at times, which the sliding law does not model.
     pub(super) fn warn_of_sticking(&mut self, parameters: &Parameters) {
         for body in 0..self.compiled.bodies.len() {
@@ -48,6 +61,31 @@ impl Simulation {
 }
 
 impl Compiled {
+    /// Returns the warning for a rotor that starts at `speed` (rad/s).
+    fn fast_rotation(&self, body: usize, speed: f64) -> Option<Warning> {
+        let (structure, rom) = self.body(body);
+        let ratio = speed.abs() / self.bodies[body].lowest_frequency();
+        let turns = structure.motion == BodyMotion::Rotating && rom.frame == DisplacementFrame::Cylindrical;
+        if !turns || structure.spin.stiffening || ratio <= SLOW {
+            return None;
+        }
+        let problem = format!(
+            "{} starts at a speed of {} rad/s, {ratio:.2} times its first natural frequency, but has the stiffness of a rotor \
+             at rest. Centrifugal stiffening and growth can change contact forces by tens of per cent",
+            self.rotor_name(body),
+            shown(speed),
+        );
+        let remedy = if rom.extras.spin.is_some() {
+            "Set `spin = { stiffening = true, growth = true }` for the structure and `time.scheme = \"modal-exact\"`"
+        } else if self.bodies[body].disk.is_some() {
+            "Reduce matrices that were computed at speed and silence this warning, because coupled sectors do not \
+             support spin effects"
+        } else {
+            "Use a ROM with spin matrices (reduce --spin), `spin = { stiffening = true, growth = true }` and `time.scheme = \"modal-exact\"`"
+        };
+        Some(Warning::new(Topic::StiffnessAtRest, problem, remedy))
+    }
+
     /// Speed (rad/s) below which tips may vibrate faster than they slide. The vibration is that of the lowest mode with an amplitude of the
     /// clearance or of the inward extent of the shape, or that after a release from the same depth with this friction coefficient.
     pub(super) fn slow_sliding(&self, body: usize, friction: f64) -> f64 {
