@@ -1,9 +1,9 @@
 //! Finds the shared libraries for the FMUs.
 //!
 //! In this order: the files and directories given with `--library`; for a tiprub that runs from a cargo target directory of the workspace, a fresh
-//! build of the fmi crate alone (profile `fmu`, so that features of other crates do not affect it); else the libraries beside the executable, where
-//! an installation puts them, one for each platform; else, for a tiprub that cargo installed, a library built from the same sources, which is cached
-//! in the user's cache directory. Platform, unit and sources of a library are read from its content.
+//! build of the fmi crate ([`LibraryBuild`]); else the libraries beside the executable, where an installation puts them, one for each platform; else,
+//! for a tiprub that cargo installed, a library built from the same sources, which is cached in the user's cache directory. Platform, unit and
+//! sources of a library are read from its content.
 
 mod build;
 
@@ -88,6 +88,17 @@ fn release(bytes: &[u8]) -> Option<String> {
     Some(text.iter().take_while(|byte| matches!(byte, 0x20..0x7f)).map(|byte| char::from(*byte)).collect())
 }
 
+/// Build of a library in the cargo target directory from which the program runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LibraryBuild {
+    /// As in a release: the crate alone (profile `fmu`, so that features of other crates do not affect it), with whole-program optimisation and
+    /// without paths of this machine.
+    Released,
+    /// From the crates that were compiled for the program, which takes seconds instead of minutes. The library gives the same bits, but it is larger
+    /// and contains paths of this machine.
+    Shared,
+}
+
 /// Code of the FMU for one platform.
 #[derive(Debug, Clone)]
 pub struct Library {
@@ -102,9 +113,14 @@ pub struct Library {
 /// # Errors
 /// There is no library, the build failed, a file is not a shared library for a known platform, two are for one platform, or none is for a requested
 /// platform.
-pub fn load(unit: LibraryUnit, arguments: &LibraryArguments, console: &Console) -> Result<Vec<Library>> {
+pub fn load(
+    unit: LibraryUnit,
+    kind: LibraryBuild,
+    arguments: &LibraryArguments,
+    console: &Console,
+) -> Result<Vec<Library>> {
     let mut found: BTreeMap<Platform, (PathBuf, Vec<u8>)> = BTreeMap::new();
-    let (files, _build) = find(unit, arguments, console)?;
+    let (files, _build) = find(unit, kind, arguments, console)?;
     for path in files {
         let bytes =
             tiprub_format::read_file(&path, LARGEST).map_err(|error| Failure::file(&path, "cannot be read", &error))?;
@@ -223,14 +239,24 @@ fn origin<'a>(unit: LibraryUnit, executable: &'a Path, sources: Option<&'a Path>
 }
 
 /// Finds the files; also returns their directory if it is temporary, so that it lives until they are read.
-fn find(unit: LibraryUnit, arguments: &LibraryArguments, console: &Console) -> Result<(Vec<PathBuf>, Option<TempDir>)> {
+fn find(
+    unit: LibraryUnit,
+    kind: LibraryBuild,
+    arguments: &LibraryArguments,
+    console: &Console,
+) -> Result<(Vec<PathBuf>, Option<TempDir>)> {
     if !arguments.library.is_empty() {
         return Ok((given_libraries(arguments)?, None));
     }
     let (executable, cache) = (env::current_exe().unwrap_or_default(), RomCache::of_user());
     let sources = WORKSPACE.map(Path::new).filter(|workspace| workspace.join("fmi/Cargo.toml").is_file());
     match origin(unit, &executable, sources, cache.directory()) {
-        Origin::Target { sources, target } => Ok((vec![build::build(unit, sources, target, console)?], None)),
+        Origin::Target { sources, target } => {
+            // Crates of other profiles and targets are not those that the library needs.
+            let shares = kind == LibraryBuild::Shared && executable.parent() == Some(&target.join("release"));
+            let kind = if shares { LibraryBuild::Shared } else { LibraryBuild::Released };
+            Ok((vec![build::build(unit, kind, sources, target, console)?], None))
+        }
         Origin::Installed(files) => Ok((files, None)),
         Origin::Kept(file) => Ok((vec![file], None)),
         Origin::Sources(sources) => build::build_once(unit, sources, cache.directory(), console),

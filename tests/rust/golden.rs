@@ -10,12 +10,13 @@ mod scenes;
 
 use std::fmt::Write as _;
 use std::fs;
+use std::path::Path;
 
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::{CoSimulation, Scene, Simulation};
 use tiprub_cosim::variables::{Causality, DataType, Variable};
 use tiprub_tests::scene::UnpackedResources;
-use tiprub_tests::{OK, fmi2, fmi3, root, shipped};
+use tiprub_tests::{OK, fmi2, fmi3, root, shared, shipped};
 
 /// Returns the lengths of the communication steps (s): internal steps of one and two lengths, and back.
 fn lengths() -> impl Iterator<Item = f64> {
@@ -194,10 +195,9 @@ fn every_scene_matches_its_golden_bits() {
     assert_eq!(found.lines().count(), expected.lines().count());
 }
 
-#[test]
-fn fmi2_and_fmi3_match_the_core_bit_for_bit() {
-    let path = shipped();
-    let (api2, api3) = (fmi2::load(&path), fmi3::load(&path));
+/// Checks both interfaces of a library.
+fn assert_matches_the_core(library: &Path) {
+    let (api2, api3) = (fmi2::load(library), fmi3::load(library));
     for scene in scenes::all() {
         let resources = UnpackedResources::of(&scene, false);
         let mut two = fmi2::Fmi2TestSlave::initialised(&api2, &resources);
@@ -206,6 +206,29 @@ fn fmi2_and_fmi3_match_the_core_bit_for_bit() {
         three.initialise();
         assert_eq!(run(&scene, &mut three, false).0, native(&scene, false).0, "FMI 3.0, {}", scene.settings.name);
     }
+}
+
+#[test]
+fn fmi2_and_fmi3_match_the_core_bit_for_bit() {
+    assert_matches_the_core(&shipped());
+}
+
+/// The library of the demo, which is compiled with other options, gives the bits of the released one.
+#[test]
+fn library_of_the_demo_matches_the_released_one() {
+    let (demo, released) = (shared(), shipped());
+    assert_ne!(fs::read(&demo).unwrap(), fs::read(&released).unwrap(), "both paths lead to the same library");
+    assert_matches_the_core(&demo);
+    let scene = scenes::around_blades(scenes::PRESET);
+    let resources = UnpackedResources::of(&scene, false);
+    let [demo, released] = [demo, released].map(|path| {
+        let api = fmi3::load(&path);
+        let mut slave = fmi3::Fmi3TestSlave::new(&api, &resources);
+        slave.initialise();
+        let (digest, last) = run(&scene, &mut slave, false);
+        (digest, last.into_iter().map(f64::to_bits).collect::<Vec<_>>())
+    });
+    assert_eq!(demo, released);
 }
 
 #[test]

@@ -66,6 +66,19 @@ pub fn thermal() -> PathBuf {
     library_of(("tiprub-fmi-thermal", "libtiprub_thermal_fmi.so", "TIPRUB_LIBRARY_THERMAL"), "fmu", &[])
 }
 
+/// Builds the library of the demo as `tiprub demo` does, and returns its path.
+#[track_caller]
+pub fn shared() -> PathBuf {
+    let executable = std::env::current_exe().expect("a test has a path");
+    let target = executable.ancestors().find(|directory| directory.join(".rustc_info.json").is_file());
+    let target = target.expect("tests run from a target directory of cargo");
+    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    command.current_dir(root()).args(["build", "--quiet", "--release", "--lib", "-p", "tiprub", "-p", "tiprub-fmi"]);
+    let output = command.arg("--target-dir").arg(target).output().expect("cargo can be run");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    target.join("release/libtiprub_fmi.so")
+}
+
 /// One message that an importer received.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Message {

@@ -26,7 +26,7 @@ use tiprub_study::estimate::{self, Estimate};
 use crate::{
     cli::DemoArguments,
     fmu::{FmiVersion, FmuPackage},
-    library,
+    library::{self, LibraryBuild, LibraryUnit},
     report::{
         input::{ImportedSummary, ReportFile, ReportInput},
         page,
@@ -78,7 +78,7 @@ pub fn run(arguments: &DemoArguments, console: &Console) -> Result<CommandOutcom
     let mut watch = Stopwatch::default();
 
     let libraries = watch.measure("building the FMU library", || {
-        library::load(library::LibraryUnit::Scene, &arguments.libraries, console)
+        library::load(LibraryUnit::Scene, LibraryBuild::Shared, &arguments.libraries, console)
     })?;
     let reduction = watch.measure("reducing the blade", || reduction::rotor37(&Rotor37Options::default(), console))?;
     let scene = write_inputs(directory, &reduction, &scene_text)?;

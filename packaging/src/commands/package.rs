@@ -12,7 +12,7 @@ use tiprub_shell::{
 use crate::{
     cli::{FmiChoice, PackageArguments},
     fmu::{FmiVersion, FmuPackage},
-    library::{self, LibraryUnit},
+    library::{self, LibraryBuild, LibraryUnit},
 };
 
 /// Loads the scene, finds the library, and writes the archives.
@@ -23,10 +23,11 @@ pub fn run(arguments: &PackageArguments, console: &Console) -> Result<CommandOut
     // Problems of the command line are reported before any work; a library is built only after the scene was accepted.
     targets(arguments.fmi, &arguments.output, "model")?;
     let given = !arguments.libraries.library.is_empty();
-    let libraries = given.then(|| library::load(LibraryUnit::Scene, &arguments.libraries, console)).transpose()?;
+    let load = || library::load(LibraryUnit::Scene, LibraryBuild::Released, &arguments.libraries, console);
+    let libraries = given.then(load).transpose()?;
     let scene = arguments.options.load(&arguments.scene, &arguments.cache.cache(), console)?;
     let targets = targets(arguments.fmi, &arguments.output, &scene.settings.name)?;
-    let libraries = libraries.map_or_else(|| library::load(LibraryUnit::Scene, &arguments.libraries, console), Ok)?;
+    let libraries = libraries.map_or_else(load, Ok)?;
     let package =
         FmuPackage::new(&scene, &libraries).map_err(|failure| scene_source::located(&arguments.scene, failure))?;
     let arrays = (arguments.arrays || arguments.scalars).then_some(arguments.arrays);

@@ -15,7 +15,7 @@ use tiprub_shell::{
 
 use crate::{
     commands::package::{size, targets},
-    library::{self, LibraryUnit},
+    library::{self, LibraryBuild, LibraryUnit},
     shared_arguments::MaterialChoice,
     thermal_arguments::ThermalArguments,
     thermal_fmu::ThermalPackage,
@@ -67,7 +67,7 @@ pub fn run(arguments: &ThermalArguments, console: &Console) -> Result<CommandOut
         reduce_mesh_conduction(&own.mesh, (own.set.as_deref(), heated), casing.patches, &options, listener)
     })?;
     console.warn_texts(&own.map_or(Vec::new(), |own| own.warnings));
-    let libraries = library::load(LibraryUnit::Thermal, &arguments.libraries, console)?;
+    let libraries = library::load(LibraryUnit::Thermal, LibraryBuild::Released, &arguments.libraries, console)?;
     let package = ThermalPackage::new(&reduced.model, &libraries)?;
     for (version, path) in &targets {
         console.print_progress(format_args!("Writing {}", path.display()));

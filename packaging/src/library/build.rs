@@ -14,7 +14,7 @@ use tiprub_fmi_host::Platform;
 use tiprub_format::{LIBRARY_MARK, LIBRARY_RELEASE};
 use tiprub_shell::{Failure, Result, console::Console, output_file};
 
-use super::{LARGEST, LibraryUnit, holds, is_library};
+use super::{LARGEST, LibraryBuild, LibraryUnit, holds, is_library};
 
 /// Number of lines of cargo's stderr for the error message.
 const LINES_KEPT: usize = 30;
@@ -40,7 +40,7 @@ pub(super) fn build_once(
     console.print_progress(
         "Building the FMU library from the sources of tiprub; this takes a few minutes and is done only once",
     );
-    let built = build(unit, workspace, target.path(), console)?;
+    let built = build(unit, LibraryBuild::Released, workspace, target.path(), console)?;
     let bytes =
         tiprub_format::read_file(&built, LARGEST).map_err(|error| Failure::file(&built, "cannot be read", &error))?;
     if !holds(&bytes, LIBRARY_RELEASE.as_bytes()) {
@@ -67,17 +67,23 @@ pub(super) fn cargo_target(executable: &Path) -> Option<&Path> {
     executable.ancestors().skip(1).find(|directory| directory.join(".rustc_info.json").is_file())
 }
 
-/// Builds only the crate of the unit, and returns the library that cargo reports.
-pub(super) fn build(unit: LibraryUnit, workspace: &Path, target: &Path, console: &Console) -> Result<PathBuf> {
+/// Builds the crate of the unit, and returns the library that cargo reports.
+pub(super) fn build(
+    unit: LibraryUnit,
+    kind: LibraryBuild,
+    workspace: &Path,
+    target: &Path,
+    console: &Console,
+) -> Result<PathBuf> {
     let task = console.task("Building the FMU library", None);
     let failed = |problem: String, remedy: &str| Failure::new("building the FMU library", problem, remedy);
     let mut child = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
-        .args(["build", "--package", unit.names().0, "--profile", "fmu", "--message-format", "json-render-diagnostics"])
+        .args(["build", "--package", unit.names().0, "--message-format", "json-render-diagnostics"])
         .arg("--manifest-path")
         .arg(workspace.join("Cargo.toml"))
         .arg("--target-dir")
         .arg(target)
-        .args(without_builder_paths(workspace))
+        .args(options(kind, workspace))
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
@@ -106,6 +112,17 @@ pub(super) fn build(unit: LibraryUnit, workspace: &Path, target: &Path, console:
     }
     artifact(&messages.join().unwrap_or_default(), unit.names().1)
         .ok_or_else(|| failed("cargo reported no shared library".into(), "Use --library FILE"))
+}
+
+/// Returns the cargo options for this kind of build. A shared library is built together with the program, because the features of dependencies, and
+/// with them the compiled crates, depend on all packages of a build.
+fn options(kind: LibraryBuild, workspace: &Path) -> Vec<String> {
+    let options: &[&str] = match kind {
+        LibraryBuild::Released => &["--profile", "fmu"],
+        LibraryBuild::Shared => &["--release", "--lib", "--package", env!("CARGO_PKG_NAME")],
+    };
+    let paths = if kind == LibraryBuild::Released { without_builder_paths(workspace) } else { Vec::new() };
+    options.iter().copied().map(String::from).chain(paths).collect()
 }
 
 /// Returns cargo options that keep the paths of cargo's home, its registry and the workspace, and with them the user name and the host of the

@@ -44,6 +44,10 @@ fn arguments(library: &[PathBuf], platform: &[Platform]) -> LibraryArguments {
     LibraryArguments { library: library.to_vec(), platform }
 }
 
+fn load(unit: LibraryUnit, arguments: &LibraryArguments, console: &Console) -> Result<Vec<Library>> {
+    super::load(unit, LibraryBuild::Released, arguments, console)
+}
+
 #[test]
 fn selects_libraries_of_a_directory_by_their_content() {
     let root = tempfile::tempdir().unwrap();
