@@ -147,7 +147,10 @@ impl ModalBank {
             if self.heat.is_some() {
                 force[0] += self.heat_before(mode, group);
             }
-            self.modal_force[mode * self.parts..][..self.parts].copy_from_slice(&force[..self.parts]);
+            self.modal_force[mode * self.parts] = force[0];
+            if self.parts == 2 {
+                self.modal_force[mode * self.parts + 1] = force[1];
+            }
         }
         self.add_coupling_force(group);
         if let Some(coupling) = self.coupling.as_ref().filter(|coupling| coupling.softens()) {
