@@ -21,7 +21,7 @@ pub mod unresolved;
 pub(crate) mod wording;
 
 pub use growing::{Fastest, GrowthRates, continuous, growth, stepped, without_node_mass};
-pub(crate) use growing::{GROWTH_UP_TO, growth_steps};
+pub(crate) use growing::{GROWTH_NOISE, GROWTH_UP_TO, growth_steps};
 
 use nalgebra::DMatrix;
 

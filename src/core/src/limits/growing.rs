@@ -9,7 +9,7 @@ use crate::modes::modal::ModalModel;
 use crate::scene::method::Scheme;
 
 /// Growth per step below this is rounding of the eigenvalue solver.
-const GROWTH_NOISE: f64 = 1e-7;
+pub(crate) const GROWTH_NOISE: f64 = 1e-7;
 /// Largest number of modes for which growth rates are computed.
 pub(crate) const GROWTH_UP_TO: usize = 150;
 

@@ -9,9 +9,11 @@
 //! Smith, Journal of the ACM 17, 1970). Rounding of E counts as part of |P|. If a disc is too large nothing is returned.
 
 use super::held::HeldContacts;
-use nalgebra::Complex;
+use nalgebra::{Complex, SMatrix};
 
 type Number = Complex<f64>;
+/// A number for each pair of contacts.
+type Square<T, const K: usize> = SMatrix<T, K, K>;
 
 /// Largest radius of a disc that contains an eigenvalue, of an accepted result; far below the growth per step that counts as rounding.
 const RADIUS: f64 = 1e-9;
@@ -67,31 +69,31 @@ fn of_pair(s: Number, [y, z]: ZeroPair) -> (Number, Number) {
 }
 
 /// Determinant by expansion along rows from `row` on, without the columns of the set `taken`; the permanent if `sign` is 1.
-fn expand<const K: usize>(matrix: &[[Number; K]; K], sign: f64, row: usize, taken: usize) -> Number {
+fn expand<const K: usize>(matrix: &Square<Number, K>, sign: f64, row: usize, taken: usize) -> Number {
     let mut sum = Complex::new(if row == K { 1.0 } else { 0.0 }, 0.0);
     let mut next = 1.0;
     for column in (0..K).filter(|column| row < K && taken >> column & 1 == 0) {
-        sum += matrix[row][column] * expand(matrix, sign, row + 1, taken | 1 << column) * next;
+        sum += matrix[(row, column)] * expand(matrix, sign, row + 1, taken | 1 << column) * next;
         next *= sign;
     }
     sum
 }
 
-fn determinant<const K: usize>(matrix: &[[Number; K]; K]) -> Number {
+fn determinant<const K: usize>(matrix: &Square<Number, K>) -> Number {
     expand(matrix, -1.0, 0, 0)
 }
 
-fn permanent<const K: usize>(matrix: &[[f64; K]; K]) -> f64 {
-    expand(&matrix.map(|row| row.map(|value| Complex::new(value, 0.0))), 1.0, 0, 0).re
+fn permanent<const K: usize>(matrix: &Square<f64, K>) -> f64 {
+    expand(&matrix.map(|value| Complex::new(value, 0.0)), 1.0, 0, 0).re
 }
 
 /// The contact problem of K contacts.
 struct Secular<const K: usize> {
     /// Poles of the modes with contact participation, with c φ_n φ_fᵀ.
-    modes: Vec<(ZeroPair, [[f64; K]; K])>,
+    modes: Vec<(ZeroPair, Square<f64, K>)>,
     /// Poles of the decoupled modes, which are eigenvalues.
     apart: Vec<Number>,
-    residual: [[f64; K]; K],
+    residual: Square<f64, K>,
     /// γ.
     late: f64,
     /// Leading coefficient of P.
@@ -106,31 +108,28 @@ impl<const K: usize> Secular<K> {
         let mut largest = 0.0_f64;
         for (mode, [damping, stiffness, weight]) in held.modes.iter().enumerate() {
             let entry = |i: usize, j: usize| weight * held.normals[(i, mode)] * held.forces[(j, mode)];
-            let seen: [[f64; K]; K] = std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)));
-            largest = seen.iter().flatten().fold(largest, |most, value| most.max(value.abs()));
+            let seen = Square::<f64, K>::from_fn(entry);
+            largest = seen.iter().fold(largest, |most, value| most.max(value.abs()));
             modes.push((roots(*damping, *stiffness), seen));
         }
-        let is_seen =
-            |(_, seen): &(ZeroPair, [[f64; K]; K])| seen.iter().flatten().any(|value| value.abs() > UNSEEN * largest);
+        let is_seen = |(_, seen): &(ZeroPair, Square<f64, K>)| seen.iter().any(|value| value.abs() > UNSEEN * largest);
         let (mut modes, apart): (Vec<_>, Vec<_>) = modes.into_iter().partition(is_seen);
         modes.sort_by(|a, b| a.0[0].norm_sqr().total_cmp(&b.0[0].norm_sqr()));
-        let residual =
-            std::array::from_fn(|i| std::array::from_fn(|j| held.residual.as_ref().map_or(0.0, |r| r[(i, j)])));
+        let residual = Square::from_fn(|i, j| held.residual.as_ref().map_or(0.0, |residual| residual[(i, j)]));
         let pairs = if held.residual.is_some() { modes.len() } else { modes.len().checked_sub(K)? };
         let apart = apart.into_iter().flat_map(|(poles, _)| poles).collect();
         let mut problem = Self { modes, apart, residual, late: held.late, lead: 0.0, pairs };
         let (leading, sizes) = if held.residual.is_some() { (residual, residual) } else { problem.summed() };
-        let lead = determinant(&leading.map(|row| row.map(|value| Complex::new(value, 0.0)))).re;
-        let size = permanent(&sizes.map(|row| row.map(f64::abs)));
+        let lead = determinant(&leading.map(|value| Complex::new(value, 0.0))).re;
+        let size = permanent(&sizes.map(f64::abs));
         problem.lead = lead;
         (lead.abs() > CANCELLED * size).then_some(problem)
     }
 
     /// Σ c φ_n φ_fᵀ, and the sum of its absolute values.
-    fn summed(&self) -> ([[f64; K]; K], [[f64; K]; K]) {
-        let sum = |of: &dyn Fn(f64) -> f64| {
-            std::array::from_fn(|i| std::array::from_fn(|j| self.modes.iter().map(|(_, seen)| of(seen[i][j])).sum()))
-        };
+    fn summed(&self) -> (Square<f64, K>, Square<f64, K>) {
+        let sum =
+            |of: &dyn Fn(f64) -> f64| Square::from_fn(|i, j| self.modes.iter().map(|(_, seen)| of(seen[(i, j)])).sum());
         (sum(&|value| value), sum(&f64::abs))
     }
 
@@ -162,30 +161,22 @@ impl<const K: usize> Secular<K> {
     /// 1/(P'/P − `others`), the step of Newton's iteration that avoids the other zeros.
     fn step(&self, s: Number, others: Number) -> Number {
         let zero = Complex::new(0.0, 0.0);
-        let (mut value, mut rate) = ([[zero; K]; K], [[zero; K]; K]);
+        let (mut value, mut rate) = (Square::<_, K>::repeat(zero), Square::<_, K>::repeat(zero));
         let mut poles = zero;
         for (pole, seen) in &self.modes {
             let (pair, both) = of_pair(s, *pole);
             let bent = pair * both;
             poles += pair;
-            for i in 0..K {
-                for j in 0..K {
-                    value[i][j] += both * seen[i][j];
-                    rate[i][j] -= bent * seen[i][j];
-                }
-            }
+            value += seen.map(|entry| both * entry);
+            rate -= seen.map(|entry| bent * entry);
         }
         let gain = s * self.late + 1.0;
         let mut turned = zero;
-        for i in 0..K {
-            for j in 0..K {
-                rate[i][j] = rate[i][j] * gain + value[i][j] * self.late;
-                value[i][j] = value[i][j] * gain + self.residual[i][j];
-            }
-        }
+        rate = rate.zip_map(&value, |rate, value| rate * gain + value * self.late);
+        value = value.zip_map(&self.residual, |value, residual| value * gain + residual);
         for row in 0..K {
             let mut replaced = value;
-            replaced[row] = rate[row];
+            replaced.set_row(row, &rate.row(row));
             turned += determinant(&replaced);
         }
         let found = determinant(&value);
@@ -233,17 +224,13 @@ impl<const K: usize> Secular<K> {
     /// Radius of the disc about a zero; NaN if there is none.
     fn radius(&self, zeros: &[ZeroPair], index: usize, member: usize) -> f64 {
         let s = zeros[index][member];
-        let (mut value, mut sizes) = ([[Complex::new(0.0, 0.0); K]; K], [[0.0; K]; K]);
+        let (mut value, mut sizes) = (Square::repeat(Complex::new(0.0, 0.0)), Square::<f64, K>::zeros());
         let mut ratio = 1.0;
         for (mode, (pole, seen)) in self.modes.iter().enumerate() {
             let (_, both) = of_pair(s, *pole);
             let gain = (s * self.late + 1.0) * both;
-            for i in 0..K {
-                for j in 0..K {
-                    value[i][j] += gain * seen[i][j];
-                    sizes[i][j] += size(gain) * seen[i][j].abs();
-                }
-            }
+            value += seen.map(|entry| gain * entry);
+            sizes += seen.map(|entry| size(gain) * entry.abs());
             ratio /= both.norm_sqr();
             match zeros.get(mode) {
                 Some(_) if mode == index => ratio /= (s - zeros[index][1 - member]).norm_sqr(),
@@ -251,12 +238,8 @@ impl<const K: usize> Secular<K> {
                 None => {}
             }
         }
-        for i in 0..K {
-            for j in 0..K {
-                value[i][j] += self.residual[i][j];
-                sizes[i][j] += self.residual[i][j].abs();
-            }
-        }
+        value = value.zip_map(&self.residual, |value, residual| value + residual);
+        sizes += self.residual.abs();
         #[expect(clippy::cast_precision_loss, reason = "mode counts are far below 2^52")]
         let (count, terms) = (2.0 * zeros.len() as f64, (K * (self.modes.len() + 20)) as f64);
         let rounding = terms * f64::EPSILON * permanent(&sizes);

@@ -23,9 +23,6 @@ use nalgebra::DMatrix;
 /// and all nodes together.
 const ALL_COMBINATIONS_UP_TO: usize = 3;
 
-/// Growth per step below this is rounding of the eigenvalue solver.
-const GROWTH_NOISE: f64 = 1e-7;
-
 /// Number of angles at which a flexible surface carrier is checked.
 const CARRIER_ANGLES: u32 = 48;
 
@@ -192,7 +189,7 @@ impl<'a> Checking<'a> {
                 let parts = directions.len() / own.nrows();
                 let all = DMatrix::identity(parts, parts).kronecker(&own);
                 let found = limits::cutting::growth(model, &directions, &all, coating.tangential_ratio())?;
-                (found.rate > GROWTH_NOISE / self.parameters.step).then_some(found)
+                (found.rate > limits::GROWTH_NOISE / self.parameters.step).then_some(found)
             };
             self.models.iter().filter_map(of).max_by(|a, b| a.rate.total_cmp(&b.rate))
         };

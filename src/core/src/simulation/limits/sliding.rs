@@ -158,7 +158,7 @@ impl Checking<'_> {
         let (mut watched, mut physics) = (Vec::new(), Physics::default());
         let scheme = self.parameters.scheme;
         let properties = scheme.properties();
-        let noise = 1e-7 / self.parameters.step;
+        let noise = limits::GROWTH_NOISE / self.parameters.step;
         for nodes in self.combinations() {
             let mut most: Option<FastestGrowth> = None;
             for model in 0..self.models.len() {
