@@ -91,7 +91,7 @@ fn write_scene(out: &Path, seed: u64) -> Result<()> {
 fn load(arguments: &RandomArguments, console: &Console, directory: &Path) -> Result<LibraryFaces> {
     let chosen =
         LibraryArguments { library: arguments.library.iter().cloned().collect(), ..LibraryArguments::default() };
-    let libraries = library::load(library::LibraryUnit::Scene, &chosen, console)?;
+    let libraries = library::load(library::LibraryUnit::Scene, library::LibraryBuild::Released, &chosen, console)?;
     let here = tiprub_fmi_host::Platform::here();
     let fitting = libraries.into_iter().find(|library| Some(library.platform) == here);
     let fitting = fitting.ok_or_else(|| {

@@ -79,7 +79,7 @@ fn verdict(table: &StabilityTable, directory: &std::path::Path) -> Option<Failur
 fn package(arguments: &LabStabilityArguments, console: &Console) -> Result<tempfile::TempDir> {
     let chosen =
         LibraryArguments { library: arguments.library.iter().cloned().collect(), ..LibraryArguments::default() };
-    let libraries = library::load(library::LibraryUnit::Scene, &chosen, console)?;
+    let libraries = library::load(library::LibraryUnit::Scene, library::LibraryBuild::Released, &chosen, console)?;
     let directory = tempfile::tempdir()
         .map_err(|error| Failure::file(&std::env::temp_dir(), "cannot create a temporary directory", &error))?;
     for name in values::SCENES {
