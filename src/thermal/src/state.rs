@@ -1,6 +1,6 @@
 //! Complete state of a simulation, and its bytes.
 
-use tiprub_cosim::persist::fingerprint;
+use tiprub_cosim::persist::fingerprint_numbers;
 use tiprub_cosim::{CoSimulation, Error, Result, Sum, persist_fields};
 
 use crate::course::InputCourse;
@@ -86,5 +86,5 @@ pub(crate) fn damaged<T>(problem: impl std::fmt::Display) -> Result<T> {
 
 /// Returns the fingerprint of a model's numbers.
 pub(crate) fn fingerprint_of<'a>(arrays: impl Iterator<Item = &'a [f64]>) -> u64 {
-    arrays.flatten().fold(0, |seed, value| fingerprint(&value.to_bits().to_le_bytes(), seed))
+    arrays.fold(0, |seed, values| fingerprint_numbers(values, seed))
 }

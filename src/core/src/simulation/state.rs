@@ -1,6 +1,6 @@
 //! Saved states: a header that identifies the scene, the payload, and a checksum.
 //!
-//! Layout, little-endian: magic (8 bytes), format version (u64), scene fingerprint (u64), payload, FNV-1a checksum of all preceding bytes
+//! Layout, little-endian: magic (8 bytes), format version (u64), scene fingerprint (u64), payload, hash of all preceding bytes
 //! (u64).
 
 use tiprub_cosim::persist::{Persist, StateReader, StateWriter, fingerprint};
@@ -14,7 +14,7 @@ use super::{Compiled, Simulation};
 use crate::{Error, Result};
 
 const MAGIC: [u8; 8] = *b"tiprubST";
-const VERSION: u64 = 14;
+const VERSION: u64 = 15;
 const CHECKSUM_BYTES: usize = 8;
 /// Upper bound on all values of a structure and of its ledger, in any unit; squares and products stay far from overflow.
 const LARGEST: f64 = 1e50;
