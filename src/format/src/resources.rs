@@ -153,6 +153,13 @@ pub fn write_checks(checks: &[u8]) -> Vec<u8> {
 }
 
 /// Returns the results in a file that [`write_checks`] of this release wrote, otherwise none.
+///
+/// # Examples
+/// ```
+/// let file = tiprub_format::write_checks(b"results");
+/// assert_eq!(tiprub_format::read_checks(&file), b"results");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn read_checks(file: &[u8]) -> &[u8] {
     let results = file.strip_prefix(LIBRARY_RELEASE.as_bytes()).and_then(|rest| rest.strip_prefix(b"\n"));
     results.unwrap_or_default()
