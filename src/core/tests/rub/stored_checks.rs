@@ -45,8 +45,11 @@ fn found(simulation: &Simulation) -> Found {
 
 fn replace(simulation: &mut Simulation, name: &str, value: f64) {
     let reference = reference(simulation, name);
-    let item = Value::Integer(value as i64);
-    simulation.set(reference, Value::Real(value)).or_else(|_| simulation.set(reference, item)).unwrap();
+    if simulation.set(reference, Value::Real(value)).is_err() {
+        // An item of an enumeration.
+        let item = (1_i32..9).find(|item| f64::from(*item) == value).unwrap();
+        simulation.set(reference, Value::Integer(item.into())).unwrap();
+    }
 }
 
 /// Checksum at the end.
@@ -62,7 +65,7 @@ fn altered(checks: &[u8]) -> Vec<u8> {
     let word = |place: usize| u64::from_le_bytes(checks[8 * place..][..8].try_into().unwrap());
     let (mut altered, mut place) = (checks.to_vec(), 2);
     while 8 * (place + 1) < checks.len() {
-        let count = word(place + 2) as usize;
+        let count = usize::try_from(word(place + 2)).unwrap();
         for number in place + 3..place + 3 + count {
             let other = f64::from_bits(word(number)) * 0.5;
             altered[8 * number..][..8].copy_from_slice(&other.to_le_bytes());
