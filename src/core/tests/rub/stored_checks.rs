@@ -47,7 +47,7 @@ fn replace(simulation: &mut Simulation, name: &str, value: f64) {
     let reference = reference(simulation, name);
     if simulation.set(reference, Value::Real(value)).is_err() {
         // An item of an enumeration.
-        let item = (1_i32..9).find(|item| f64::from(*item) == value).unwrap();
+        let item = (1_i32..9).find(|item| (f64::from(*item) - value).abs() < 0.5).unwrap();
         simulation.set(reference, Value::Integer(item.into())).unwrap();
     }
 }
