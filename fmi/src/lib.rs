@@ -10,8 +10,12 @@ use tiprub_fmi_facade::Loaded;
 /// Reads the scene in the resources; the unit compiles it.
 fn load(resources: &Path) -> Result<Loaded, Diagnostic> {
     let loaded = tiprub_format::load_resources(resources)?;
-    let scene = loaded.scene;
-    let unit = move || -> Result<Box<dyn CoSimulation>> { Ok(Box::new(Simulation::new(scene)?)) };
+    let (scene, checks) = (loaded.scene, loaded.checks);
+    let unit = move || -> Result<Box<dyn CoSimulation>> {
+        let mut simulation = Simulation::new(scene)?;
+        simulation.use_checks(&checks);
+        Ok(Box::new(simulation))
+    };
     Ok(Loaded {
         unit: Box::new(unit),
         token: loaded.token,

@@ -2,7 +2,7 @@
 
 use std::{env, path::Path};
 
-use tiprub_core::{CoSimulation, Rom, Scene, Simulation};
+use tiprub_core::{CoSimulation, Scene, Simulation};
 use tiprub_cosim::variables::Quantity;
 use tiprub_cosim::warning::{self, Warning};
 use tiprub_fmi_host::archive::{self, ArchiveEntry};
@@ -79,8 +79,8 @@ impl FmiVersion {
 #[derive(Debug)]
 pub struct FmuPackage<'a> {
     scene: &'a Scene,
-    /// ROMs in the form that the FMU contains.
-    roms: Vec<Rom>,
+    /// Scene in the form that the FMU contains.
+    packed: Scene,
     simulation: Simulation,
     libraries: &'a [Library],
     reference_csv: String,
@@ -97,7 +97,8 @@ impl<'a> FmuPackage<'a> {
     pub fn new(scene: &'a Scene, libraries: &'a [Library]) -> Result<Self> {
         let in_scene = |error| Failure::from_core(format!("scene `{}`", scene.settings.name), error);
         let mut schedule = Schedule::new(&scene.settings.experiment, None, None)?;
-        let mut simulation = Simulation::new(scene).map_err(in_scene)?;
+        let packed = tiprub_format::packed_scene(scene);
+        let mut simulation = Simulation::new(&packed).map_err(in_scene)?;
         simulation.initialise(schedule.start).map_err(in_scene)?;
         let mut warnings = [simulation.warnings(), &schedule.warnings()].concat();
         warnings.retain(|warning| !scene.settings.is_silenced(warning.topic()));
@@ -106,18 +107,11 @@ impl<'a> FmuPackage<'a> {
             schedule.count = reference_steps;
             schedule.stop = schedule.start + reference_steps as f64 * schedule.step;
         }
-        let reference_csv = native::run(scene, &schedule, RunInputs::default(), &|_| {})?.recording.to_csv();
+        let checks = simulation.checks();
+        let given = RunInputs { checks: &checks, ..RunInputs::default() };
+        let reference_csv = native::run(&packed, &schedule, given, &|_| {})?.recording.to_csv();
         let generated = generation_date(env::var("SOURCE_DATE_EPOCH").ok().as_deref())?;
-        Ok(Self {
-            scene,
-            roms: tiprub_format::packed_roms(scene),
-            simulation,
-            libraries,
-            reference_csv,
-            reference_steps,
-            warnings,
-            generated,
-        })
+        Ok(Self { scene, packed, simulation, libraries, reference_csv, reference_steps, warnings, generated })
     }
 
     /// Returns the warnings of the initialisation (which an FMU instance would log) and of the default experiment.
@@ -155,8 +149,12 @@ impl<'a> FmuPackage<'a> {
 
     /// Returns the files of the .fmu in their order.
     fn entries(&self, version: FmiVersion, arrays: bool) -> Vec<ArchiveEntry> {
-        let resources = tiprub_format::resource_files(self.scene, arrays);
+        let mut resources = tiprub_format::resource_files(self.scene, arrays);
         let token = tiprub_format::instantiation_token(&resources);
+        let checks = self.simulation.checks();
+        if !checks.is_empty() {
+            resources.push((tiprub_format::CHECKS_FILE.to_owned(), tiprub_format::write_checks(&checks)));
+        }
         let description = self.description(&token, arrays);
         let reference = Some((self.reference_csv.as_str(), self.reference_steps));
         contents(version, &description, self.libraries, resources, reference, SCENE)
@@ -198,7 +196,7 @@ impl<'a> FmuPackage<'a> {
             patches_of_roms: settings.surfaces.iter().all(|surface| surface.patches.is_none()),
             table: self.simulation.table(),
             fmi3_arrays: arrays,
-            structures: structures.zip(&self.roms).collect(),
+            structures: structures.zip(&self.packed.roms).collect(),
             features: scene_features::features(self.scene),
             limits: scene_features::limits(self.scene),
             warnings: warning::texts(self.simulation.warnings()),

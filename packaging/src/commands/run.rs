@@ -41,19 +41,24 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<CommandOutcome
         let problem = "cannot be used with --json, as both write to stdout";
         return Err(Failure::usage("--csv -", problem, "Give a file to --csv"));
     }
-    let scene = arguments.options.load(&arguments.scene, &arguments.cache.cache(), console)?;
+    let cache = arguments.cache.cache();
+    let scene = arguments.options.load(&arguments.scene, &cache, console)?;
     let schedule = Schedule::new(&scene.settings.experiment, arguments.stop, arguments.step)?;
     let history = arguments.inputs.as_deref().map(InputHistory::read).transpose()?;
+    let known = cache.checks(&scene);
     let clock = Instant::now();
     let run = {
         let task = console.task(&format!("Running {}", scene.settings.name), Some(schedule.count as u64));
-        let given = RunInputs { settings: &arguments.set, history: history.as_ref() };
+        let given = RunInputs { settings: &arguments.set, history: history.as_ref(), checks: &known };
         let run = native::run(&scene, &schedule, given, &|done| task.at(done as u64));
         // The message refers to the step in the file, unless the command line sets another one.
         let is_set = arguments.step.is_some() || arguments.set.iter().any(|(name, _)| name == "internal_step_max");
         run.map_err(|failure| if is_set { failure } else { scene_source::located(&arguments.scene, failure) })?
     };
     let wall = clock.elapsed().as_secs_f64();
+    if run.checks != known {
+        cache.keep_checks(&scene, &run.checks);
+    }
     if let Some(path) = arguments.csv.as_deref().filter(|_| !to_stdout) {
         run.recording.write_csv(path)?;
     }

@@ -9,6 +9,7 @@ mod contour;
 mod diagnostics;
 mod drive;
 mod failures;
+mod fingerprint;
 mod inputs;
 mod limits;
 mod loads;

@@ -21,7 +21,8 @@ mod thermal_file;
 pub use input::{open_file, read_file};
 pub use load::{LARGEST_ROM, load_scene, load_settings};
 pub use resources::{
-    Resources, SCENE_FILE, instantiation_token, largest_resource, load_resources, packed_roms, resource_files,
+    CHECKS_FILE, LARGEST_CHECKS, Resources, SCENE_FILE, instantiation_token, largest_resource, load_resources,
+    packed_scene, read_checks, resource_files, write_checks,
 };
 pub use rom_file::{read_rom, write_rom};
 pub use rom_layout::{ARRAYS, ArrayLayout, METADATA, MetadataLayout};

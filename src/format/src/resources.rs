@@ -11,13 +11,17 @@ use tiprub_core::scene::settings::{SceneSettings, SpinSettings, StructureSetting
 use tiprub_core::{Rom, Scene};
 
 use crate::load::{LARGEST_ROM, LARGEST_SCENE, RomBytes, file_error, read_bytes, text_error};
-use crate::{Result, parse_scene, read_rom, write_rom, write_scene};
+use crate::{LIBRARY_RELEASE, Result, parse_scene, read_file, read_rom, write_rom, write_scene};
 
 /// File name of the scene inside `resources/`.
 pub const SCENE_FILE: &str = "scene.toml";
 /// File name of the packaging options inside `resources/`.
 pub(crate) const PACKAGE_FILE: &str = "package.toml";
+/// File name of the stored results of slow checks inside `resources/`.
+pub const CHECKS_FILE: &str = "checks.bin";
 /// Maximum size of that file (bytes).
+pub const LARGEST_CHECKS: u64 = 64 << 20;
+/// Maximum size of the packaging options (bytes).
 const LARGEST_PACKAGE: u64 = 1 << 12;
 /// Suffix of the names of ROM files and thermal models.
 const ARRAYS_END: &str = ".safetensors";
@@ -36,6 +40,8 @@ pub struct Resources {
     pub token: String,
     /// True if the FMI 3.0 description has arrays (otherwise scalars, as in FMI 2.0).
     pub fmi3_arrays: bool,
+    /// Results of slow checks for [`Simulation::use_checks`](tiprub_core::Simulation::use_checks); empty if there are none of this release.
+    pub checks: Vec<u8>,
 }
 
 /// Returns the maximum size (bytes) of a file of this name inside `resources/`; `None` if the file is not read.
@@ -50,6 +56,7 @@ pub fn largest_resource(name: &str) -> Option<u64> {
     match name {
         SCENE_FILE => Some(LARGEST_SCENE),
         PACKAGE_FILE => Some(LARGEST_PACKAGE),
+        CHECKS_FILE => Some(LARGEST_CHECKS),
         _ => name.ends_with(ARRAYS_END).then_some(LARGEST_ROM),
     }
 }
@@ -77,13 +84,10 @@ struct PackageFile {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn resource_files(scene: &Scene, fmi3_arrays: bool) -> Vec<(String, Vec<u8>)> {
-    let mut settings = scene.settings.clone();
-    for index in 0..settings.structures.len() {
-        settings.structures[index].rom = rom_file_name(scene, index);
-    }
+    let Scene { settings, roms } = packed_scene(scene);
     let mut files = vec![(SCENE_FILE.to_owned(), write_scene(&settings).into_bytes())];
-    for (structure, rom) in settings.structures.iter().zip(packed_roms(scene)) {
-        files.push((structure.rom.clone(), write_rom(&rom)));
+    for (structure, rom) in settings.structures.iter().zip(&roms) {
+        files.push((structure.rom.clone(), write_rom(rom)));
     }
     files.push(package_file(fmi3_arrays));
     files
@@ -110,20 +114,55 @@ pub(crate) fn check_directory(directory: &Path) -> Result<()> {
     Err(file_error(directory, "directory not found (the FMU's resources are expected here)", INTACT))
 }
 
-/// Returns the ROMs of a scene as an FMU holds them: without the data that this scene does not use.
+/// Returns a scene as an FMU holds it: with the names of the ROM files in the FMU, and without the data that this scene does not use.
 ///
 /// # Examples
 /// ```
 /// # let scene = tiprub_test_models::rub(2);
 ///
 /// // This scene has no effects of spin: the packed ROM has no spin matrices.
-/// let roms = tiprub_format::packed_roms(&scene);
-/// assert!(roms[0].extras.spin.is_none());
+/// let packed = tiprub_format::packed_scene(&scene);
+/// assert!(packed.roms[0].extras.spin.is_none());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn packed_roms(scene: &Scene) -> Vec<Rom> {
+pub fn packed_scene(scene: &Scene) -> Scene {
+    let mut settings = scene.settings.clone();
+    for index in 0..settings.structures.len() {
+        settings.structures[index].rom = rom_file_name(scene, index);
+    }
     let structures = scene.settings.structures.iter().zip(&scene.roms);
-    structures.map(|(structure, rom)| Rom { extras: needed(structure, rom, &scene.settings), ..rom.clone() }).collect()
+    let roms =
+        structures.map(|(structure, rom)| Rom { extras: needed(structure, rom, &scene.settings), ..rom.clone() });
+    Scene { roms: roms.collect(), settings }
+}
+
+/// Returns results of slow checks as the content of a file that only this release reads.
+///
+/// # Examples
+/// ```
+/// # let scene = tiprub_test_models::rub(2);
+/// # let mut simulation = tiprub_core::Simulation::new(&scene)?;
+/// # tiprub_core::CoSimulation::initialise(&mut simulation, 0.0)?;
+/// let file = tiprub_format::write_checks(&simulation.checks());
+/// assert_eq!(tiprub_format::read_checks(&file), simulation.checks());
+/// assert!(tiprub_format::read_checks(b"of another release").is_empty());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn write_checks(checks: &[u8]) -> Vec<u8> {
+    [LIBRARY_RELEASE.as_bytes(), b"\n", checks].concat()
+}
+
+/// Returns the results in a file that [`write_checks`] of this release wrote, otherwise none.
+///
+/// # Examples
+/// ```
+/// let file = tiprub_format::write_checks(b"results");
+/// assert_eq!(tiprub_format::read_checks(&file), b"results");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn read_checks(file: &[u8]) -> &[u8] {
+    let results = file.strip_prefix(LIBRARY_RELEASE.as_bytes()).and_then(|rest| rest.strip_prefix(b"\n"));
+    results.unwrap_or_default()
 }
 
 /// Returns the ROM without the data of effects that are off.
@@ -245,7 +284,9 @@ pub fn load_resources(directory: &Path) -> Result<Resources> {
     }
     let fmi3_arrays = read_package(directory, &mut files)?;
     let token = instantiation_token(&files);
-    Ok(Resources { scene: Scene { settings, roms }, token, fmi3_arrays })
+    // Without this file the checks are repeated.
+    let checks = read_file(&directory.join(CHECKS_FILE), LARGEST_CHECKS).unwrap_or_default();
+    Ok(Resources { scene: Scene { settings, roms }, token, fmi3_arrays, checks: read_checks(&checks).to_vec() })
 }
 
 fn read_into(directory: &Path, name: &str, files: &mut Vec<(String, Vec<u8>)>) -> Result<String> {

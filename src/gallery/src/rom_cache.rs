@@ -1,4 +1,4 @@
-//! Cache of reduced built-in models in the user's cache directory.
+//! Cache of reduced built-in models, and of the results of slow checks of scenes, in the user's cache directory.
 //!
 //! The key of a file consists of everything that determines its content: the options of the model, the sources, the release and the file format. A
 //! file is always verified: its first line repeats the key and states the SHA-256 of the ROM file that follows; if either does not match, the model
@@ -14,7 +14,7 @@ use std::{
 
 use etcetera::BaseStrategy;
 use sha2::{Digest, Sha256};
-use tiprub_core::Rom;
+use tiprub_core::{Rom, Scene};
 use tiprub_shell::{Result, console::Console, output_file};
 
 /// Version of the layout of cached files.
@@ -27,6 +27,10 @@ const VARIABLE: &str = "TIPRUB_CACHE";
 const LARGEST: u64 = tiprub_format::LARGEST_ROM + (1 << 10);
 /// Number of versions of one model that are cached: several options and releases may be in use side by side.
 const KEPT: usize = 4;
+/// Start and end of the names of files with results of checks, and the number of these files.
+const CHECKS: &str = "scene";
+const CHECKS_END: &str = ".checks";
+const KEPT_CHECKS: usize = 16;
 
 /// Cache directory, if there is one.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -94,8 +98,34 @@ impl RomCache {
         if let Err(failure) = kept {
             console.print_progress(format_args!("Model {name} is not cached: {failure}"));
         }
-        prune(directory, name);
+        prune(directory, name, ".rom", KEPT);
         Ok(rom)
+    }
+
+    /// Returns the results of slow checks of the last run of a scene, for
+    /// [`Simulation::use_checks`](tiprub_core::Simulation::use_checks); empty if none are cached.
+    pub fn checks(&self, scene: &Scene) -> Vec<u8> {
+        let read = |path: PathBuf| {
+            // Reading a pipe might block.
+            let file = fs::metadata(&path).is_ok_and(|data| data.is_file());
+            file.then(|| tiprub_format::read_file(&path, tiprub_format::LARGEST_CHECKS).ok()).flatten()
+        };
+        let file = self.checks_path(scene).and_then(read).unwrap_or_default();
+        tiprub_format::read_checks(&file).to_vec()
+    }
+
+    /// Caches the results of slow checks of a scene; files that cannot be written do not stop the work.
+    pub fn keep_checks(&self, scene: &Scene, checks: &[u8]) {
+        let (Some(directory), Some(path)) = (&self.directory, self.checks_path(scene)) else { return };
+        let _ = output_file::only_a_file(&path)
+            .and_then(|()| output_file::write(&path, tiprub_format::write_checks(checks)));
+        prune(directory, CHECKS, CHECKS_END, KEPT_CHECKS);
+    }
+
+    /// One file per scene. Each result in it has a key of its own, which includes models and parameters.
+    fn checks_path(&self, scene: &Scene) -> Option<PathBuf> {
+        let key = digest(format!("{:?}", scene.settings).as_bytes());
+        Some(self.directory.as_ref()?.join(format!("{CHECKS}-{}{CHECKS_END}", &key[..32])))
     }
 }
 
@@ -143,12 +173,12 @@ fn read(path: &Path, key: &str) -> Result<Rom, Option<String>> {
     tiprub_format::read_rom(rom, &path.display().to_string()).map_err(|error| Some(error.to_string()))
 }
 
-/// Removes the oldest versions of a model beyond [`KEPT`]. Files that cannot be removed stay.
-fn prune(directory: &Path, name: &str) {
+/// Removes the oldest versions of a file beyond `kept`. Files that cannot be removed stay.
+fn prune(directory: &Path, name: &str, end: &str, kept: usize) {
     let Ok(entries) = fs::read_dir(directory) else { return };
     let is_version = |path: &Path| {
         let file = path.file_name().and_then(|file| file.to_str()).unwrap_or_default();
-        let key = file.strip_prefix(name).and_then(|rest| rest.strip_prefix('-')?.strip_suffix(".rom"));
+        let key = file.strip_prefix(name).and_then(|rest| rest.strip_prefix('-')?.strip_suffix(end));
         key.is_some_and(|key| key.len() == 32 && key.bytes().all(|byte| byte.is_ascii_hexdigit()))
     };
     let mut versions: Vec<(SystemTime, PathBuf)> = entries
@@ -157,7 +187,7 @@ fn prune(directory: &Path, name: &str) {
         .filter_map(|entry| Some((entry.metadata().ok()?.modified().ok()?, entry.path())))
         .collect();
     versions.sort();
-    for (_, path) in versions.iter().rev().skip(KEPT) {
+    for (_, path) in versions.iter().rev().skip(kept) {
         let _ = fs::remove_file(path);
     }
 }

@@ -23,6 +23,8 @@ pub struct NativeRun {
     pub effort: Option<Effort>,
     /// Warnings of the initialisation, the run and the schedule.
     pub warnings: Vec<Warning>,
+    /// Results of slow checks for [`RunInputs`] of the next run.
+    pub checks: Vec<u8>,
 }
 
 /// Inputs of a run besides its scene.
@@ -32,6 +34,8 @@ pub struct RunInputs<'a> {
     pub settings: &'a [(String, String)],
     /// Inputs over time.
     pub history: Option<&'a InputHistory>,
+    /// Results of slow checks of an earlier run; without effect if they belong to other scenes or parameters.
+    pub checks: &'a [u8],
 }
 
 /// Runs `scene` over the schedule with replaced start values and inputs over time.
@@ -45,6 +49,7 @@ pub fn run(scene: &Scene, schedule: &Schedule, given: RunInputs<'_>, progress: &
     let mut scene = scene.clone();
     scene.settings.experiment.communication_step = schedule.time(1) - schedule.time(0);
     let mut simulation = Simulation::new(&scene).map_err(in_scene)?;
+    simulation.use_checks(given.checks);
     for (variable, value) in given.settings {
         if given.history.is_some_and(|history| history.holds(variable)) {
             let problem = "the file given with --inputs also has a column for this variable";
@@ -58,6 +63,7 @@ pub fn run(scene: &Scene, schedule: &Schedule, given: RunInputs<'_>, progress: &
         driver.start(&mut simulation, schedule.start)?;
     }
     simulation.initialise(schedule.start).map_err(in_scene)?;
+    let checks = simulation.checks();
     // Warnings of the start; those of the run are reported as its notes.
     let mut warnings = [simulation.warnings(), &schedule.warnings()].concat();
     warnings.extend(given.history.map(|history| history.warnings(schedule.step)).unwrap_or_default());
@@ -87,7 +93,8 @@ pub fn run(scene: &Scene, schedule: &Schedule, given: RunInputs<'_>, progress: &
     warnings.extend(simulation.take_notes());
     let system = simulation.system();
     let effort = (system.settings().scheme.properties().adaptive).then(|| *system.effort());
-    Ok(NativeRun { recording, stepping, slowest, internal_steps: system.effort().steps, effort, warnings })
+    let internal_steps = system.effort().steps;
+    Ok(NativeRun { recording, stepping, slowest, internal_steps, effort, warnings, checks })
 }
 
 /// Returns the current values of all numeric outputs, in the order of the table.

@@ -1,6 +1,6 @@
 //! Complete state of a simulation, and its bytes.
 
-use tiprub_cosim::persist::fingerprint;
+use tiprub_cosim::persist::fingerprint_numbers;
 use tiprub_cosim::{Sum, persist_fields};
 
 use crate::course::InputCourse;
@@ -71,5 +71,5 @@ persist_fields!(ThermalState {
 
 /// Returns the fingerprint of a model's numbers.
 pub(crate) fn fingerprint_of<'a>(arrays: impl Iterator<Item = &'a [f64]>) -> u64 {
-    arrays.flatten().fold(0, |seed, value| fingerprint(&value.to_bits().to_le_bytes(), seed))
+    arrays.fold(0, |seed, values| fingerprint_numbers(values, seed))
 }

@@ -138,6 +138,23 @@ fn rejects_damaged_resources() {
     summary("resources");
 }
 
+/// Stored checks give the messages of an FMU without them; a damaged file has no effect.
+#[test]
+fn stored_checks_change_no_message() {
+    let api = fmi2::load(&shipped());
+    let resources = UnpackedResources::new(false);
+    let log = || fmi2::Fmi2TestSlave::initialised(&api, &resources).log();
+    let without = log();
+    let loaded = tiprub_format::load_resources(resources.path()).expect("valid resources");
+    let mut simulation = tiprub_core::Simulation::new(loaded.scene).expect("a valid scene");
+    simulation.initialise(0.0).expect("a valid scene");
+    let file = tiprub_format::write_checks(&simulation.checks());
+    for content in [file.clone(), file[..file.len() / 2].to_vec(), b"damaged".to_vec()] {
+        std::fs::write(resources.path().join(tiprub_format::CHECKS_FILE), content).expect("writable");
+        assert_eq!(log(), without);
+    }
+}
+
 #[test]
 fn every_function_rejects_a_null_instance() {
     let path = shipped();

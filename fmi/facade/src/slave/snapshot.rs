@@ -1,15 +1,15 @@
 //! Saved states: everything that determines the future of an instance, as bytes.
 //!
 //! Layout, little-endian: magic (8 bytes), version u32, length of the token u32, token, phase u8, flag of a defined
-//! stop time u8, two zero bytes, time f64, stop time f64, length of the core's state u64, the core's state, FNV-1a 64
-//! of everything before. The length is the same for all states of an FMU.
+//! stop time u8, two zero bytes, time f64, stop time f64, length of the core's state u64, the core's state, hash of
+//! everything before (u64). The length is the same for all states of an FMU.
 
 use tiprub_cosim::persist::fingerprint;
 
 use super::{ExperimentTimes, InstancePhase, Refusal, Result, Slave};
 
 const MAGIC: &[u8; 8] = b"tiprubST";
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 const CHECKSUM: usize = 8;
 
 /// One saved state.
@@ -83,8 +83,16 @@ impl Slave {
     /// # Errors
     /// A handle that this instance did not return.
     pub(crate) fn save(&mut self, existing: Option<SnapshotHandle>) -> Result<SnapshotHandle> {
-        let bytes = self.encode()?;
-        self.store(existing, bytes)
+        let index = existing.map(|handle| self.index(handle)).transpose()?;
+        // A replaced state is written in its place, without new memory.
+        let mut bytes = index.map(|index| std::mem::take(&mut *self.snapshots[index])).unwrap_or_default();
+        let outcome = self.encode(&mut bytes);
+        if let Some(index) = index {
+            *self.snapshots[index] = bytes;
+            return outcome.map(|()| &raw const *self.snapshots[index]);
+        }
+        outcome?;
+        self.store(None, bytes)
     }
 
     fn store(&mut self, existing: Option<SnapshotHandle>, bytes: SavedState) -> Result<SnapshotHandle> {
@@ -155,25 +163,28 @@ impl Slave {
         self.store(existing, bytes.to_vec())
     }
 
-    fn encode(&self) -> Result<SavedState> {
-        let size = self.serialised_size();
-        let mut out = Vec::with_capacity(size);
-        out.extend(MAGIC);
-        out.extend(VERSION.to_le_bytes());
-        out.extend(u32::try_from(self.token.len()).map_err(damaged)?.to_le_bytes());
-        out.extend(self.token.as_bytes());
-        encode_phase(&self.phase, &mut out);
+    /// Writes the state over `out`, which stays unchanged if that fails.
+    fn encode(&self, out: &mut SavedState) -> Result<()> {
+        let mut head = SavedState::with_capacity(256);
+        head.extend(MAGIC);
+        head.extend(VERSION.to_le_bytes());
+        head.extend(u32::try_from(self.token.len()).map_err(damaged)?.to_le_bytes());
+        head.extend(self.token.as_bytes());
+        encode_phase(&self.phase, &mut head);
         let state = self.unit.state_size();
-        out.extend(u64::try_from(state).map_err(damaged)?.to_le_bytes());
-        let start = out.len();
-        out.resize(start + state, 0);
+        head.extend(u64::try_from(state).map_err(damaged)?.to_le_bytes());
+        out.resize(self.serialised_size(), 0);
+        let target = &mut out[head.len()..][..state];
         match &self.phase {
             // Outputs computed in Initialization Mode are computed again when they are requested.
-            InstancePhase::Initialising { before: Some(before), .. } => out[start..].copy_from_slice(before),
-            _ => self.unit.save_state(&mut out[start..])?,
+            InstancePhase::Initialising { before: Some(before), .. } => target.copy_from_slice(before),
+            _ => self.unit.save_state(target)?,
         }
-        out.extend(fingerprint(&out, 0).to_le_bytes());
-        Ok(out)
+        out[..head.len()].copy_from_slice(&head);
+        let end = out.len() - CHECKSUM;
+        let checksum = fingerprint(&out[..end], 0);
+        out[end..].copy_from_slice(&checksum.to_le_bytes());
+        Ok(())
     }
 
     fn decode<'a>(&self, bytes: &'a [u8]) -> Result<(InstancePhase, &'a [u8])> {

@@ -198,7 +198,7 @@ impl Compiled {
         };
         let carriers = plan.carriers.iter().map(carrier).collect::<Result<_>>()?;
         let mut compiled = Self {
-            fingerprint: super::state::fingerprint_of(&scene),
+            fingerprint: super::fingerprint::of_scene(&scene),
             patches: plan.pairs.iter().map(|pair| HeatPatches::new(&scene, &plan, pair)).collect(),
             linings: Vec::new(),
             supports_adaptive: scene.check_methods(Scheme::ADAPTIVE, complementary(&scene.settings)).is_ok(),

@@ -2,7 +2,7 @@
 
 use tiprub_cosim::warning::Warning;
 
-use super::limits::{Limits, Parameters, WarningState};
+use super::limits::{KnownChecks, Limits, Parameters, WarningState};
 use crate::scene::settings::SceneSettings;
 
 /// Warnings of a run, and the limits for its parameters. They follow from the saved state.
@@ -18,13 +18,22 @@ pub(crate) struct Diagnostics {
     pub prepared: Option<Parameters>,
     /// Limits for the parameters that were checked last.
     pub limits: Option<Limits>,
+    /// Stored results of slow checks.
+    pub known: KnownChecks,
 }
 
 impl Diagnostics {
     /// Creates diagnostics without warnings, for a number of masters.
     pub fn new(bodies: usize) -> Self {
         let (warnings, notes) = (Vec::new(), Vec::new());
-        Self { warnings, notes, reported: WarningState::new(bodies), prepared: None, limits: None }
+        Self {
+            warnings,
+            notes,
+            reported: WarningState::new(bodies),
+            prepared: None,
+            limits: None,
+            known: KnownChecks::default(),
+        }
     }
 
     /// Discards the warnings.

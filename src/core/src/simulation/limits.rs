@@ -3,8 +3,11 @@
 mod checking;
 mod closing;
 mod free;
+mod known;
 mod sliding;
 mod warning_state;
+
+use std::cell::RefCell;
 
 use tiprub_cosim::variables::Quantity;
 
@@ -22,6 +25,8 @@ use crate::system::System;
 use crate::{Error, Result, Warning};
 use checking::Checking;
 use closing::Closing;
+use known::BodyChecks;
+pub(super) use known::KnownChecks;
 use sliding::Sense;
 pub(super) use warning_state::WarningState;
 
@@ -127,14 +132,54 @@ impl Simulation {
     /// Checks limits unless the same parameters were checked last; returns warnings. If the parameters are rejected, the previous limits
     /// stay.
     pub(super) fn check_limits(&mut self, parameters: &Parameters) -> Result<Vec<Finding>> {
-        let found = |limits: &Limits| limits.warnings(&parameters.speeds).map_err(|error| self.compiled.error(&error));
-        if let Some(limits) = self.diagnostics.limits.as_ref().filter(|limits| limits.cover(parameters)) {
-            return found(limits);
-        }
-        let limits = self.compiled.limits(parameters, &self.system);
-        let warnings = found(&limits)?;
-        self.diagnostics.limits = Some(limits);
+        let is_known = self.diagnostics.limits.as_ref().is_some_and(|limits| limits.cover(parameters));
+        let computed = (!is_known).then(|| self.computed_limits(parameters));
+        let limits = computed.as_ref().or(self.diagnostics.limits.as_ref());
+        let found = limits.map_or(Ok(Vec::new()), |limits| limits.warnings(&parameters.speeds));
+        let warnings = found.map_err(|error| self.compiled.error(&error))?;
+        self.diagnostics.limits = computed.or(self.diagnostics.limits.take());
         Ok(warnings)
+    }
+
+    fn computed_limits(&mut self, parameters: &Parameters) -> Limits {
+        let known = RefCell::new(std::mem::take(&mut self.diagnostics.known));
+        known.borrow_mut().begin();
+        let limits = self.compiled.limits(parameters, &self.system, &known);
+        self.diagnostics.known = known.into_inner();
+        limits
+    }
+
+    /// Uses results of slow checks that [`Simulation::checks`] returned, possibly in another process: the next initialisation with the same
+    /// scene and parameters does not repeat these checks. Bytes that are damaged, or belong to other scenes, parameters or versions, have no
+    /// effect.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::{CoSimulation, Simulation};
+    /// # let scene = tiprub_test_models::rub(2);
+    /// let mut first = Simulation::new(&scene)?;
+    /// first.initialise(0.0)?;
+    /// let mut second = Simulation::new(&scene)?;
+    /// second.use_checks(&first.checks());
+    /// second.initialise(0.0)?;
+    /// assert_eq!(first.warnings(), second.warnings());
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
+    pub fn use_checks(&mut self, checks: &[u8]) {
+        self.diagnostics.known = KnownChecks::from_bytes(checks);
+    }
+
+    /// Returns the results of slow checks of the last initialisation for [`Simulation::use_checks`]; empty if there were none.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// assert!(Simulation::new(&scene)?.checks().is_empty());
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
+    pub fn checks(&self) -> Vec<u8> {
+        self.diagnostics.known.to_bytes()
     }
 
     /// Updates the limits after a state with other parameters was restored. Before initialisation nothing has been computed from
@@ -143,7 +188,7 @@ impl Simulation {
         let parameters = self.parameters();
         let known = self.diagnostics.limits.as_ref().is_some_and(|limits| limits.are_of(&parameters));
         if !self.state.clock.is_created() && !known {
-            self.diagnostics.limits = Some(self.compiled.limits(&parameters, &self.system));
+            self.diagnostics.limits = Some(self.computed_limits(&parameters));
         }
     }
 
@@ -264,15 +309,15 @@ impl Compiled {
         })
     }
 
-    fn limits(&self, parameters: &Parameters, system: &System) -> Limits {
+    fn limits(&self, parameters: &Parameters, system: &System, known: &RefCell<KnownChecks>) -> Limits {
         let of = |body: usize| match self.bodies[body].translations {
             Some(_) => self.free_limits(body, parameters, system),
-            None => self.rotor_limits(body, parameters, system),
+            None => self.rotor_limits(body, parameters, system, BodyChecks::new(known, self, body, parameters)),
         };
         Limits { parameters: parameters.clone(), bodies: (0..self.bodies.len()).map(of).collect() }
     }
 
-    fn rotor_limits(&self, body: usize, parameters: &Parameters, system: &System) -> BodyLimits {
+    fn rotor_limits(&self, body: usize, parameters: &Parameters, system: &System, known: BodyChecks<'_>) -> BodyLimits {
         let parts = &self.bodies[body];
         let mut models = match &parts.disk {
             Some(disk) => (0..disk.diameters.len()).map(|diameter| disk.paired(diameter)).collect(),
@@ -289,7 +334,7 @@ impl Compiled {
             fill_ratios(&mut model.damping_ratios, ratio, own, copies(diameter));
             model.frequencies.iter_mut().for_each(|frequency| *frequency *= stiffest);
         }
-        let at = Checking::new(self, system, body, models, parameters);
+        let at = Checking::new(self, system, models, parameters, known);
         let expected = self.expected_step(parameters.step);
         let of = at.subject();
         if parameters.scheme.properties().adaptive {

@@ -1,6 +1,6 @@
 //! Saved states: a header that identifies the scene, the payload, and a checksum.
 //!
-//! Layout, little-endian: magic (8 bytes), format version (u64), scene fingerprint (u64), payload, FNV-1a checksum of all preceding bytes
+//! Layout, little-endian: magic (8 bytes), format version (u64), scene fingerprint (u64), payload, hash of all preceding bytes
 //! (u64).
 
 use tiprub_cosim::persist::{Persist, StateReader, StateWriter, check_length, damaged, fingerprint};
@@ -11,11 +11,10 @@ use super::clock::{Clock, SAME_STEP, SimulationPhase};
 use super::inputs::Inputs;
 use super::window::StepWindow;
 use super::{Compiled, Simulation};
-use crate::scene::settings::SceneSettings;
-use crate::{Result, Scene};
+use crate::Result;
 
 const MAGIC: [u8; 8] = *b"tiprubST";
-const VERSION: u64 = 14;
+const VERSION: u64 = 15;
 pub(super) const CHECKSUM_BYTES: usize = 8;
 /// Upper bound on all values of a structure and of its ledger, in any unit; squares and products stay far from overflow.
 const LARGEST: f64 = 1e50;
@@ -101,40 +100,6 @@ impl SimulationState {
         }
         damaged("an input causes a motion that is out of range")
     }
-}
-
-/// Hash of everything that determines the results of a scene.
-pub(super) fn fingerprint_of(scene: &Scene) -> u64 {
-    // Silenced warnings and accepted values do not change results.
-    let settings = SceneSettings { silence: Vec::new(), accept_implausible: false, ..scene.settings.clone() };
-    let mut hash = fingerprint(format!("{settings:?}").as_bytes(), 0);
-    for rom in &scene.roms {
-        let mut matrices = vec![&rom.mass, &rom.stiffness, &rom.contact_map];
-        if let Some(spin) = &rom.extras.spin {
-            matrices.extend([&spin.stiffness_speed2, &spin.stiffness_speed4, &spin.coriolis]);
-            let loads = format!("{:?} {:?}", spin.centrifugal_load, spin.centrifugal_load_speed4);
-            hash = fingerprint(loads.as_bytes(), hash);
-        }
-        matrices.extend(rom.extras.thermal.iter().map(|thermal| &thermal.loads));
-        matrices.extend(rom.extras.watched.iter().map(|watched| &watched.map));
-        matrices.extend(rom.extras.support.iter().flat_map(|own| [&own.stiffness, &own.mass, &own.thermal]));
-        for matrix in matrices {
-            for value in matrix.iter() {
-                hash = fingerprint(&value.to_bits().to_le_bytes(), hash);
-            }
-        }
-        for harmonic in &rom.extras.harmonics {
-            for matrix in [&harmonic.mass, &harmonic.stiffness, &harmonic.contact_map] {
-                for value in matrix.iter().flat_map(|value| [value.re, value.im]) {
-                    hash = fingerprint(&value.to_bits().to_le_bytes(), hash);
-                }
-            }
-        }
-        let patches = rom.extras.thermal.as_ref().map(|thermal| &thermal.patches);
-        let rest = format!("{} {:?} {:?} {:?}", rom.sectors, rom.contact_nodes, rom.extras.grid, patches);
-        hash = fingerprint(rest.as_bytes(), hash);
-    }
-    hash
 }
 
 impl Simulation {

@@ -13,5 +13,6 @@ mod robustness;
 mod rub;
 mod spin;
 mod states;
+mod stored_checks;
 mod tangent;
 mod values;

@@ -6,10 +6,11 @@ use std::path::Path;
 use nalgebra::DMatrix;
 use tiprub_core::scene::rom::{ContactGrid, ContactNode, DisplacementFrame, RomExtras, Spin, Thermal};
 use tiprub_core::scene::settings::{BodyMotion, LoadSettings, SpinSettings, StructureSettings};
-use tiprub_core::{Rom, Scene};
+use tiprub_core::{CoSimulation, Rom, Scene, Simulation};
 use tiprub_cosim::ThermalPatch;
 use tiprub_format::{
-    instantiation_token, load_resources, load_scene, read_rom, resource_files, write_rom, write_scene,
+    CHECKS_FILE, instantiation_token, load_resources, load_scene, packed_scene, read_rom, resource_files, write_checks,
+    write_rom, write_scene,
 };
 use tiprub_test_models::{node, structure};
 
@@ -118,6 +119,40 @@ fn rejects_damaged_resources_with_their_path() {
         };
         refused(&change, &["structure[1].rom"]);
     }
+}
+
+/// Stored checks are found by an instance that reads the resources; without a usable file there are none, and no error.
+#[test]
+fn stored_checks_are_read_unless_they_are_missing_or_damaged() {
+    let directory = tempfile::tempdir().unwrap();
+    let scene = tiprub_test_models::rub(2);
+    let files = resource_files(&scene, false);
+    write(directory.path(), &files);
+    let mut packed = Simulation::new(packed_scene(&scene)).unwrap();
+    packed.initialise(0.0).unwrap();
+    let file = directory.path().join(CHECKS_FILE);
+    fs::write(&file, write_checks(&packed.checks())).unwrap();
+    let read = load_resources(directory.path()).unwrap();
+    assert_eq!((&read.checks, &read.token), (&packed.checks(), &instantiation_token(&files)));
+    // The scene that is read has the same keys.
+    let (mut first, mut altered) = (Simulation::new(read.scene).unwrap(), packed.checks());
+    first.initialise(0.0).unwrap();
+    assert_eq!(first.checks(), packed.checks());
+    altered.reverse();
+    for content in [b"tiprub library of another release\n".to_vec(), Vec::new(), packed.checks()] {
+        fs::write(&file, content).unwrap();
+        assert!(load_resources(directory.path()).unwrap().checks.is_empty());
+    }
+    fs::write(&file, write_checks(&altered)).unwrap();
+    let damaged = load_resources(directory.path()).unwrap();
+    let mut again = Simulation::new(damaged.scene).unwrap();
+    again.use_checks(&damaged.checks);
+    again.initialise(0.0).unwrap();
+    assert_eq!((again.checks(), again.warnings()), (first.checks(), first.warnings()));
+    fs::File::create(&file).and_then(|file| file.set_len(1 << 30)).unwrap();
+    assert!(load_resources(directory.path()).unwrap().checks.is_empty());
+    fs::remove_file(&file).unwrap();
+    assert!(load_resources(directory.path()).unwrap().checks.is_empty());
 }
 
 #[test]

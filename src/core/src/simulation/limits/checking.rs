@@ -1,12 +1,13 @@
 //! Checks of a rotating structure for one set of parameters: solvability, growth of sliding contact, and effects of casings.
 
 use super::Parameters;
+use super::known::{BodyChecks, CheckPart};
 use crate::geometry::frame::PolarFrame;
 use crate::geometry::spline::SplineGap;
 use crate::geometry::{GapLaw, Vector3};
 use crate::limits::finding::{Checked, ErrorKind, Finding, Subject, WarningKind};
 use crate::limits::massless::MasslessLimit;
-use crate::limits::{self, ContactDirections, massless};
+use crate::limits::{self, ContactDirections, Fastest, massless};
 use crate::math::vector::vector3_at;
 use crate::modes::cyclic::CyclicModel;
 use crate::modes::modal::ModalModel;
@@ -18,6 +19,7 @@ use crate::simulation::compile::Compiled;
 use crate::simulation::plan::PairPlan;
 use crate::system::System;
 use nalgebra::DMatrix;
+use std::cell::LazyCell;
 
 /// Up to this number of contact nodes, every combination is checked; for more nodes, single nodes, neighbouring pairs,
 /// and all nodes together.
@@ -98,16 +100,19 @@ pub(super) struct Checking<'a> {
     pub(super) parameters: &'a Parameters,
     /// Largest friction coefficient.
     pub(super) friction: f64,
+    /// Stored results.
+    pub(super) known: BodyChecks<'a>,
 }
 
 impl<'a> Checking<'a> {
     pub(super) fn new(
         compiled: &'a Compiled,
         system: &'a System,
-        body: usize,
         models: Vec<ModalModel>,
         parameters: &'a Parameters,
+        known: BodyChecks<'a>,
     ) -> Self {
+        let body = known.body;
         let own = compiled.body(body).1.contact_nodes.len();
         let meets = |node: &usize| compiled.plan.pairs_of(body).any(|(_, pair)| pair.nodes.contains(node));
         let nodes: Vec<usize> = (0..own).filter(meets).collect();
@@ -124,6 +129,7 @@ impl<'a> Checking<'a> {
             body,
             nodes,
             parameters,
+            known,
         }
     }
 
@@ -159,12 +165,15 @@ impl<'a> Checking<'a> {
         let unresolved = limits::check_step(self.largest_frequency(), scheme, step).map_err(own)?;
         let senses: Vec<Vec<ContactDirections>> =
             self.models.iter().map(|model| [1.0, -1.0].map(|sense| self.directions(model, sense)).into()).collect();
-        if self.disk().is_some() {
-            limits::check_solvable_together(&self.models, scheme, largest, self.friction, &senses)
-        } else {
-            limits::check_solvable(&self.models[0], scheme, largest, self.friction, &senses[0])
+        let solvable = || match self.disk() {
+            Some(_) => limits::check_solvable_together(&self.models, scheme, largest, self.friction, &senses),
+            None => limits::check_solvable(&self.models[0], scheme, largest, self.friction, &senses[0]),
+        };
+        let mut refused = None;
+        let mut checked = || solvable().map_err(|error| refused = Some(error)).ok().map(|()| [1.0]);
+        if self.known.get(CheckPart::Solvable, &[], &mut checked).is_none() {
+            refused.map_or_else(solvable, Err).map_err(own)?;
         }
-        .map_err(own)?;
         let of_carriers = self.compiled.unresolved_carriers(self.body, scheme, step)?;
         let first = unresolved.into_iter().chain(self.not_looked_at()).map(|kind| kind.of(self.subject()));
         let last = carriers.into_iter().chain(more).map(|kind| kind.of(self.subject()));
@@ -193,8 +202,12 @@ impl<'a> Checking<'a> {
             };
             self.models.iter().filter_map(of).max_by(|a, b| a.rate.total_cmp(&b.rate))
         };
-        let both = [1.0, -1.0].into_iter().filter_map(growth);
-        both.max_by(|a, b| a.rate.total_cmp(&b.rate)).map(WarningKind::CuttingGrowth)
+        let fastest = || {
+            let both = [1.0, -1.0].into_iter().filter_map(growth);
+            both.max_by(|a, b| a.rate.total_cmp(&b.rate)).map(|found| [found.rate, found.frequency])
+        };
+        let [rate, frequency] = self.known.get(CheckPart::Cutting, &[], fastest)?;
+        Some(WarningKind::CuttingGrowth(Fastest { rate, frequency }))
     }
 
     /// Checks whether the compliance of the surface carriers makes the contact problem unsolvable, at the expected step
@@ -207,10 +220,10 @@ impl<'a> Checking<'a> {
         let places = |(gap, _, modes): &(&SplineGap, usize, ModalModel)| {
             (0..CARRIER_ANGLES).map(|place| carrier_at(gap, modes, &gap.nodes, carrier_angle(place))).collect()
         };
-        let places: Vec<Vec<_>> = carried.iter().map(places).collect();
-        let worst_at = |step: f64| {
+        let places = LazyCell::new(|| carried.iter().map(places).collect::<Vec<Vec<_>>>());
+        let compute = |step: f64| {
             let (mut worst, mut at) = (0.0, 0.0);
-            for ((_, _, modes), places) in carried.iter().zip(&places) {
+            for ((_, _, modes), places) in carried.iter().zip(places.iter()) {
                 for (place, seen) in (0..).zip(places) {
                     for sense in [1.0, -1.0] {
                         let ratio = lowest_ratio(seen, modes, self.parameters.scheme, step, sense * self.friction);
@@ -220,12 +233,12 @@ impl<'a> Checking<'a> {
                     }
                 }
             }
-            (worst < -1e-9).then_some(WarningKind::CasingSolvability {
-                friction: self.friction,
-                step,
-                eigenvalue: worst,
-                angle: at,
-            })
+            Some([worst, at])
+        };
+        let worst_at = |step: f64| {
+            let [eigenvalue, angle] = self.known.get(CheckPart::Carriers, &[step.to_bits()], || compute(step))?;
+            let friction = self.friction;
+            (eigenvalue < -1e-9).then_some(WarningKind::CasingSolvability { friction, step, eigenvalue, angle })
         };
         let largest = carried.iter().map(|(_, _, modes)| modes.largest_frequency()).fold(0.0, f64::max);
         let is_other = |step: &f64| (step - expected).abs() > SAME_STEP * expected;

@@ -3,9 +3,10 @@
 
 use super::checking::Checking;
 use super::in_range;
+use super::known::CheckPart;
 use crate::limits::finding::{ClosedContact, ErrorKind, StepGrowth, WarningKind};
 use crate::limits::judged::{self, SetGrowth};
-use crate::limits::{self, ContactDirections, Fastest, SlidingContacts, lock_up};
+use crate::limits::{self, ContactDirections, Fastest, GrowthRates, SlidingContacts, lock_up};
 use crate::modes::modal::ModalModel;
 use crate::simulation::clock::SAME_STEP;
 
@@ -132,6 +133,51 @@ impl Physics {
     }
 }
 
+/// Growth of one model with some nodes closed.
+struct SetGrowths {
+    continuous: Fastest,
+    /// Growth without the mass of the contact nodes, if it counts and exists.
+    without: Option<Fastest>,
+    /// Fraction of the contact displacement that this motion contributes.
+    share: f64,
+    /// Smallest friction coefficient at which the tip locks up.
+    least: Option<f64>,
+    /// Growth by the steps; `None` for adaptive steps.
+    judged: Option<SetGrowth>,
+}
+
+impl SetGrowths {
+    /// Returns the growth as numbers; NaN stands for `None`.
+    fn numbers(self) -> [f64; 12] {
+        let without = self.without.map_or([f64::NAN; 2], |found| [found.rate, found.frequency]);
+        let judged = self.judged.map_or([f64::NAN; 6], numbers);
+        let ([without, frequency], [a, b, c, d, e, f]) = (without, judged);
+        let Fastest { rate, frequency: with_mass } = self.continuous;
+        [rate, with_mass, without, frequency, self.share, self.least.unwrap_or(f64::NAN), a, b, c, d, e, f]
+    }
+
+    fn of_numbers([rate, frequency, without, other, share, least, judged @ ..]: [f64; 12]) -> Self {
+        Self {
+            continuous: Fastest { rate, frequency },
+            without: (!without.is_nan()).then_some(Fastest { rate: without, frequency: other }),
+            share,
+            least: (!least.is_nan()).then_some(least),
+            judged: (!judged[2].is_nan()).then(|| judgement(judged)),
+        }
+    }
+}
+
+/// Returns the growth of a set as numbers.
+fn numbers(judged: SetGrowth) -> [f64; 6] {
+    let GrowthRates { continuous, frequency, stepped, swing, noise } = judged.growth;
+    [continuous, frequency, stepped, swing, noise, judged.share]
+}
+
+fn judgement(numbers: [f64; 6]) -> SetGrowth {
+    let [continuous, frequency, stepped, swing, noise, share] = numbers;
+    SetGrowth { growth: GrowthRates { continuous, frequency, stepped, swing, noise }, share }
+}
+
 impl Checking<'_> {
     /// Checks growth of sliding contact in one sense, at the expected step (s) and at all others.
     pub(super) fn sense(&self, sense: usize, expected: f64) -> Sense {
@@ -141,13 +187,21 @@ impl Checking<'_> {
         let sign = [1.0, -1.0][sense];
         let (watched, physics) = self.watched(expected, sign);
         let steps = looked_at(self.largest_frequency(), self.parameters.step);
+        let compute = |step: f64| {
+            let judged = (0..watched.len()).filter_map(|one| Some((one, self.judged(&watched[one], step, sign)?)));
+            let (one, judged) = judged.reduce(|known, found| {
+                if known.1.within(judged::TOLD) <= found.1.within(judged::TOLD) { known } else { found }
+            })?;
+            let [continuous, frequency, stepped, swing, noise, share] = numbers(judged);
+            #[expect(clippy::cast_precision_loss, reason = "the number of sets of contacts is far below 2^52")]
+            Some([one as f64, continuous, frequency, stepped, swing, noise, share])
+        };
         let most_at = |step: f64| {
-            let judged = watched.iter().filter_map(|one| Some((one.nodes.as_slice(), self.judged(one, step, sign)?)));
-            judged.reduce(
-                |known, found| {
-                    if known.1.within(judged::TOLD) <= found.1.within(judged::TOLD) { known } else { found }
-                },
-            )
+            let details = [sense as u64, expected.to_bits(), step.to_bits()];
+            let [one, judged @ ..] = self.known.get(CheckPart::Step, &details, || compute(step))?;
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small index")]
+            let watched = watched.get(one as usize)?;
+            Some((watched.nodes.as_slice(), judgement(judged)))
         };
         let looked: Vec<_> = steps.into_iter().map(|step| (step, most_at(step))).collect();
         Sense { ranges: self.added(&looked, sign), ..self.growth(physics, sign, expected) }
@@ -156,40 +210,54 @@ impl Checking<'_> {
     /// Checks growth at the expected step; adaptive steps add none, and nothing has to be watched at other steps.
     fn watched(&self, expected: f64, sign: f64) -> (Vec<FastestGrowth>, Physics) {
         let (mut watched, mut physics) = (Vec::new(), Physics::default());
-        let scheme = self.parameters.scheme;
-        let properties = scheme.properties();
         let noise = limits::GROWTH_NOISE / self.parameters.step;
         for nodes in self.combinations() {
             let mut most: Option<FastestGrowth> = None;
             for model in 0..self.models.len() {
-                let (seen, directions) = self.closed_at(model, &nodes, sign);
-                let contacts = SlidingContacts::new(&seen, self.friction, &directions);
-                let largest = self.parameters.step;
-                let Some(continuous) = limits::continuous(contacts, scheme, largest) else {
-                    continue;
-                };
-                let without = if properties.quasi_static { None } else { limits::without_node_mass(contacts, largest) };
+                let Some(found) = self.set_growth(model, &nodes, sign, expected) else { continue };
+                let SetGrowths { continuous, without, share, least, judged } = found;
                 let physical = without.unwrap_or(continuous);
                 if physical.rate > noise {
                     let with_mass = without.map(|_| continuous);
-                    let share = judged::share_of(&seen, &directions, physical.frequency);
                     physics.add(Flutter { found: physical, nodes: nodes.clone(), with_mass, share });
                 }
-                let least = lock_up::least_friction(&seen, &directions).filter(|least| *least < self.friction);
+                let least = least.filter(|least| *least < self.friction);
                 least.into_iter().for_each(|least| physics.note_lock_up(least, &nodes));
-                if properties.adaptive {
-                    continue;
-                }
-                let found = limits::stepped(contacts, scheme, expected, continuous);
-                let Some(growth) = found else { continue };
-                if most.as_ref().is_none_or(|most| growth.stepped > most.judged.growth.stepped) {
-                    let judged = SetGrowth::new(&seen, scheme, expected, &directions, growth);
+                let Some(judged) = judged else { continue };
+                if most.as_ref().is_none_or(|most| judged.growth.stepped > most.judged.growth.stepped) {
                     most = Some(FastestGrowth { nodes: nodes.clone(), model, continuous, judged });
                 }
             }
             watched.extend(most);
         }
         (watched, physics)
+    }
+
+    /// Returns the growth of one of the models with some nodes closed, at the expected step (s); `None` if it is not checked.
+    fn set_growth(&self, model: usize, nodes: &[usize], sign: f64, expected: f64) -> Option<SetGrowths> {
+        let numbers = [model as u64, sign.to_bits(), expected.to_bits()].into_iter();
+        let details: Vec<u64> = numbers.chain(nodes.iter().map(|node| *node as u64)).collect();
+        let compute = || self.computed_growth(model, nodes, sign, expected).map(SetGrowths::numbers);
+        self.known.get(CheckPart::Set, &details, compute).map(SetGrowths::of_numbers)
+    }
+
+    fn computed_growth(&self, model: usize, nodes: &[usize], sign: f64, expected: f64) -> Option<SetGrowths> {
+        let (scheme, friction, largest) = (self.parameters.scheme, self.friction, self.parameters.step);
+        let properties = scheme.properties();
+        let (seen, directions) = self.closed_at(model, nodes, sign);
+        let contacts = SlidingContacts::new(&seen, friction, &directions);
+        let continuous = limits::continuous(contacts, scheme, largest)?;
+        let without = if properties.quasi_static { None } else { limits::without_node_mass(contacts, largest) };
+        let share = judged::share_of(&seen, &directions, without.unwrap_or(continuous).frequency);
+        let stepped = || limits::stepped(contacts, scheme, expected, continuous);
+        let growth = if properties.adaptive { None } else { stepped() };
+        Some(SetGrowths {
+            continuous,
+            without,
+            share,
+            least: lock_up::least_friction(&seen, &directions),
+            judged: growth.map(|growth| SetGrowth::new(&seen, scheme, expected, &directions, growth)),
+        })
     }
 
     fn judged(&self, watched: &FastestGrowth, step: f64, sign: f64) -> Option<SetGrowth> {

@@ -1,0 +1,136 @@
+//! Results of slow checks that are stored, so that a later start with the same scene and parameters does not repeat them.
+//!
+//! Each result has a key: a hash of the scene with its ROMs, of the parameters, and of the part of the check. Results with other keys are never
+//! found, so that a stored result is used only for exactly the same check.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use tiprub_cosim::persist::{fingerprint, to_bytes};
+
+use super::Parameters;
+use crate::simulation::compile::Compiled;
+
+/// First word of stored results, and version of their layout and of the checks.
+const MAGIC: u64 = u64::from_le_bytes(*b"tiprubCK");
+const VERSION: u64 = 1;
+
+/// Hash of everything that a result depends on.
+type Key = [u64; 2];
+
+/// Results by their keys; a result without numbers stands for `None`.
+type Results = BTreeMap<Key, Vec<u64>>;
+
+/// Part of the checks of a structure.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum CheckPart {
+    /// Growth of one of the models with some nodes closed.
+    Set,
+    /// Growth that a step adds.
+    Step,
+    /// Unique solution of the contact problem.
+    Solvable,
+    /// Effect of the surface carriers.
+    Carriers,
+    /// Growth while blades cut.
+    Cutting,
+}
+
+/// Stored results, and those of the last check.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct KnownChecks {
+    stored: Arc<Results>,
+    used: Results,
+}
+
+impl KnownChecks {
+    /// Reads results that [`KnownChecks::to_bytes`] wrote; there are none if the bytes are damaged or from another version.
+    pub(crate) fn from_bytes(bytes: &[u8]) -> Self {
+        Self { stored: Arc::new(read(bytes).unwrap_or_default()), used: Results::new() }
+    }
+
+    /// Returns the results of the last check as bytes; none if nothing was checked.
+    pub(crate) fn to_bytes(&self) -> Vec<u8> {
+        if self.used.is_empty() {
+            return Vec::new();
+        }
+        let mut words = vec![MAGIC, VERSION];
+        for ([first, second], numbers) in &self.used {
+            words.extend([*first, *second, numbers.len() as u64]);
+            words.extend(numbers);
+        }
+        let mut bytes = to_bytes(&[&words]);
+        bytes.extend(fingerprint(&bytes, 0).to_le_bytes());
+        bytes
+    }
+
+    /// Forgets which results were used by the previous check.
+    pub(super) fn begin(&mut self) {
+        self.used.clear();
+    }
+}
+
+/// Reads results; `None` if the bytes are damaged.
+fn read(bytes: &[u8]) -> Option<Results> {
+    let (content, checksum) = bytes.split_last_chunk()?;
+    if fingerprint(content, 0) != u64::from_le_bytes(*checksum) {
+        return None;
+    }
+    let (words, rest) = content.as_chunks();
+    let mut words = words.iter().map(|word| u64::from_le_bytes(*word));
+    if !rest.is_empty() || words.next() != Some(MAGIC) || words.next() != Some(VERSION) {
+        return None;
+    }
+    let mut results = Results::new();
+    while let Some(first) = words.next() {
+        let (second, count) = (words.next()?, usize::try_from(words.next()?).ok()?);
+        let numbers: Vec<u64> = words.by_ref().take(count).collect();
+        results.insert([first, second], (numbers.len() == count).then_some(numbers)?);
+    }
+    Some(results)
+}
+
+/// Results for one structure with some parameters.
+pub(super) struct BodyChecks<'a> {
+    known: &'a RefCell<KnownChecks>,
+    /// The structure.
+    pub(super) body: usize,
+    /// Hash of the scene, the structure and the parameters.
+    key: Key,
+}
+
+impl<'a> BodyChecks<'a> {
+    pub(super) fn new(
+        known: &'a RefCell<KnownChecks>,
+        compiled: &Compiled,
+        body: usize,
+        parameters: &Parameters,
+    ) -> Self {
+        // The sense of slip is a part of the check, and the modes follow from the speeds at which they have their stiffness.
+        let parameters = Parameters { speeds: Vec::new(), ..parameters.clone() };
+        let version = env!("CARGO_PKG_VERSION");
+        let text = format!("{version} {:x} {body} {:?} {parameters:?}", compiled.fingerprint, compiled.references());
+        Self { known, body, key: [1, 2].map(|seed| fingerprint(text.as_bytes(), seed)) }
+    }
+
+    /// Returns the numbers of a part of the check: stored ones with the same key, or those of `compute`.
+    pub(super) fn get<const N: usize>(
+        &self,
+        part: CheckPart,
+        details: &[u64],
+        compute: impl FnOnce() -> Option<[f64; N]>,
+    ) -> Option<[f64; N]> {
+        let [first, second] = self.key;
+        let bytes = to_bytes(&[&vec![first, second, part as u64], &details.to_vec()]);
+        let key = [1, 2].map(|seed| fingerprint(&bytes, seed));
+        let stored = self.known.borrow().stored.get(&key).cloned();
+        let numbers = stored.filter(|numbers| numbers.is_empty() || numbers.len() == N).unwrap_or_else(|| {
+            let computed = compute();
+            computed.iter().flatten().map(|number| number.to_bits()).collect()
+        });
+        let found = <[u64; N]>::try_from(numbers.as_slice()).ok().map(|bits| bits.map(f64::from_bits));
+        self.known.borrow_mut().used.insert(key, numbers);
+        found
+    }
+}
