@@ -3,7 +3,7 @@
 //!
 //! `GOLDEN=write cargo test -p tiprub-tests --release --test golden` rewrites the table. Do this only for an intended
 //! change, and give the reason in the commit. If the digest differs and the adjacent numbers hardly do, only rounding
-//! has changed.
+//! has changed. A second table holds the work of the solver in some of the scenes.
 
 #[path = "golden/scenes.rs"]
 mod scenes;
@@ -206,6 +206,46 @@ fn assert_matches_the_core(library: &Path) {
         three.initialise();
         assert_eq!(run(&scene, &mut three, false).0, native(&scene, false).0, "FMI 3.0, {}", scene.settings.name);
     }
+}
+
+/// Scenes whose work is counted: blades with two and with three numbers per node, mistuned, sticking, and in an elastic
+/// casing, with adaptive and with fixed steps.
+const COUNTED: [&str; 7] = [
+    "galerkin",
+    "galerkin_mistuned_lobes",
+    "galerkin_whirl_spline",
+    "galerkin_coulomb",
+    "galerkin_flexible_warm",
+    "flexible_warm",
+    "coupled_lcp",
+];
+
+/// The solver does no more work than before: numbers of steps, trials and factorisations are unchanged.
+#[test]
+fn work_of_the_solver_is_unchanged() {
+    let mut found = String::new();
+    for scene in scenes::all().iter().filter(|scene| COUNTED.contains(&scene.settings.name.as_str())) {
+        let mut simulation = Simulation::new(scene).unwrap();
+        simulation.initialise(0.0).unwrap();
+        run(scene, &mut simulation, false);
+        let system = simulation.system();
+        let effort = system.effort();
+        writeln!(
+            found,
+            "{}: steps {} flights {} trials {} unsolved {} constant {} missed {} factorisations {}",
+            scene.settings.name,
+            system.steps() + effort.steps,
+            effort.flights,
+            effort.trials,
+            effort.unsolved,
+            effort.constant,
+            effort.missed,
+            system.factorisations(),
+        )
+        .unwrap();
+    }
+    assert_eq!(found.lines().count(), COUNTED.len());
+    assert_eq!(found, held("work.txt", &found), "see the head of this file");
 }
 
 #[test]

@@ -361,15 +361,15 @@ fn refusals(field: &str) -> &'static [&'static [&'static str]] {
             &["`contact_meridional_slopes`", "between -1000 and 1000"],
             &["`contact_meridional_slopes`", "their positions rise"],
         ],
-        "rom.map" => &[&["`contact_map`", "outside ±1e15"], &["µ"], &["small displacements"]],
+        "rom.map" => &[&["`contact_map`", "exceeds 1e15"], &["µ"], &["small displacements"]],
         "shape.width" => &[&["surface[1].shape.width", "between 0.001 and 0.25"]],
         "rom.mass" => &[
-            &["`mass`", "outside ±1e30"],
+            &["`mass`", "exceeds 1e30"],
             &["`mass`", "not positive definite"],
             &["`mass` and `stiffness`", "orders of magnitude"],
         ],
         "rom.stiffness" => &[
-            &["`stiffness`", "outside ±1e30"],
+            &["`stiffness`", "exceeds 1e30"],
             &["`mass` and `stiffness`", "orders of magnitude"],
             &["`stiffness`", "not positive semidefinite"],
             &["µ", "no unique solution", "Use no friction"],
