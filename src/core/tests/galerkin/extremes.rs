@@ -37,7 +37,7 @@ fn apart(found: &[(Vec<f64>, f64)], others: &[(Vec<f64>, f64)]) -> (f64, f64) {
 /// A change of the scene, and the inputs that the importer sets before a communication step.
 type ExtremesCase = (&'static str, fn(&mut Scene), fn(&mut Simulation, u32));
 
-const CASES: [ExtremesCase; 5] = [
+const CASES: [ExtremesCase; 6] = [
     ("rub", |_| (), |_, _| ()),
     // Blades touch at first, then they swing freely past lobes that come close.
     (
@@ -53,6 +53,12 @@ const CASES: [ExtremesCase; 5] = [
             let radius_change = (0..24).map(|i| -1.5e-4 * (f64::from(i) * 0.9).sin().max(0.0)).collect();
             scene.settings.surfaces[0].shape = Shape::Table { radius_change };
         },
+        wide,
+    ),
+    // The smallest gaps are anywhere in a step, also close to its ends.
+    (
+        "at rest past many lobes",
+        |scene| scene.settings.surfaces[0].shape = Shape::Lobes { amplitude: 3e-4, order: 9, phase: 0.05 },
         wide,
     ),
 ];

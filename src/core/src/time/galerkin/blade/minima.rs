@@ -16,7 +16,7 @@ use crate::time::galerkin::response::TERMS;
 use crate::time::galerkin::trial::{FALLING, NEAR};
 
 /// Smallest and largest number of halvings of a step into the parts at whose ends the motion is evaluated.
-const FEWEST_HALVINGS: usize = 2;
+pub(super) const FEWEST_HALVINGS: usize = 2;
 pub(super) const MOST_HALVINGS: usize = 7;
 /// Largest number of parts of a step.
 pub(super) const PARTS: usize = 1 << MOST_HALVINGS;
@@ -31,11 +31,17 @@ const PARTS_FRACTION: f64 = 0.3;
 /// interpolation exceeds the amplitude.
 const UNRESOLVED: f64 = 2.0;
 /// Coefficients of x⁴ and x⁵ in the error of five gaps at equal distances, near the middle: the neglected fourth
-/// derivative, and the error of their third derivative.
+/// derivative, and the error of their third derivative. Near the first and the last of the gaps, the second coefficient is
+/// at most half as large again.
 const OF_PARTS: [f64; 2] = [1.0 / 384.0, 1.0 / 48.0];
 /// Coefficient of x⁴ in the error of the cubic through the points of a step. It holds for the parabola as well, because
 /// the points of a step follow the moments of the motion.
 const OF_STEP: [f64; 2] = [1.0 / 384.0, 0.0];
+
+/// First three derivatives at the first of five values at equal distances, as weights of the differences of the other four
+/// from the first.
+const FROM_END: [[f64; 4]; 3] =
+    [[4.0, -3.0, 4.0 / 3.0, -0.25], [-26.0 / 3.0, 9.5, -14.0 / 3.0, 11.0 / 12.0], [9.0, -12.0, 7.0, -1.5]];
 
 impl BladeTrial {
     /// Largest error of interpolating the closing displacement of a node between the points of the tried step (m).
@@ -346,6 +352,14 @@ impl Follow<'_> {
                 let far = (end > 1 && end + 1 < parts).then(|| [gap(end - 2), gap(end + 2)]);
                 lowest = L::select(is_lowest, lowest.min(vertex(near, far)), lowest);
             }
+            for backwards in [false, true] {
+                let from_end = |place: usize| gap(if backwards { parts - place } else { place });
+                let near @ [here, next, ..] = [0, 1, 2, 3, 4].map(from_end);
+                let is_lowest = followed & !next.less(here);
+                if is_lowest != 0 {
+                    lowest = L::select(is_lowest, lowest.min(vertex_from_end(near)), lowest);
+                }
+            }
             lowest.store(&mut tally.lowest[block]);
         }
     }
@@ -368,7 +382,29 @@ fn vertex<L: Octet>([before, here, after]: [L; 3], far: Option<[L; 2]>) -> L {
         }
     };
     let at = L::zero() - slope / bend;
+    L::select(at.abs().less(L::splat(1.0)), here.min(cubic_vertex(here, [slope, bend, third])), here)
+}
+
+/// Smallest value within the first interval of five values at equal distances: that of a cubic with the derivatives of the
+/// polynomial through the five.
+#[inline(always)]
+fn vertex_from_end<L: Octet>(values: [L; 5]) -> L {
+    let here = values[0];
+    let derivatives = FROM_END.map(|weights| {
+        // Differences of close values round least.
+        let terms = values[1..].iter().zip(weights);
+        terms.fold(L::zero(), |sum, (value, weight)| sum + (*value - here) * L::splat(weight))
+    });
+    let [slope, bend, _] = derivatives;
+    let at = L::zero() - slope / bend;
+    let is_inside = L::zero().less(at) & at.less(L::splat(1.0));
+    L::select(is_inside, here.min(cubic_vertex(here, derivatives)), here)
+}
+
+/// Value of a cubic with these derivatives near its origin, `here`, at the vertex of its parabola; `here` if it has none.
+#[inline(always)]
+fn cubic_vertex<L: Octet>(here: L, [slope, bend, third]: [L; 3]) -> L {
+    let at = L::zero() - slope / bend;
     let value = here + at * (slope + at * (bend * L::splat(0.5) + at * third * L::splat(1.0 / 6.0)));
-    let is_near = L::zero().less(bend) & at.abs().less(L::splat(1.0));
-    L::select(is_near, here.min(value), here)
+    L::select(L::zero().less(bend), value, here)
 }
