@@ -74,8 +74,9 @@ fn of_rom(rom: &Rom, seed: u64) -> u64 {
     stress_thermal.iter().chain(stress_centrifugal).for_each(|matrix| hash.matrix(matrix));
     thermal.iter().for_each(|Thermal { loads, .. }| hash.matrix(loads));
     let patches = thermal.as_ref().map(|thermal| &thermal.patches);
+    let optional = [watched.is_some(), stress.is_some(), stress_thermal.is_some(), stress_centrifugal.is_some()];
     hash.text(&format!(
-        "{sectors} {frame:?} {damping_ratio:?} {contact_nodes:?} {grid:?} {patches:?} {basis:?} {rows:?}"
+        "{sectors} {frame:?} {damping_ratio:?} {contact_nodes:?} {grid:?} {patches:?} {basis:?} {rows:?} {optional:?}"
     ));
     hash.0
 }
