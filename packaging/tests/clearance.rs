@@ -14,7 +14,7 @@ fn minima(scene: &Scene, parts: u32) -> Vec<f64> {
     let mut simulation = Simulation::new(scene).unwrap();
     simulation.initialise(0.0).unwrap();
     let variable = simulation.table().find("blade[1].clearance_minimum").unwrap();
-    let (first, nodes) = (variable.reference, variable.len() as u32);
+    let (first, nodes) = (variable.reference, u32::try_from(variable.len()).unwrap());
     let mut found = Vec::new();
     for step in 0..STEPS {
         let mut lowest = vec![f64::INFINITY; nodes as usize];

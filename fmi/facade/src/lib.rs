@@ -1,5 +1,5 @@
 //! The C ABIs of FMI 2.0 (44 functions) and FMI 3.0 (75 functions) over one version-independent slave, for any
-//! [`CoSimulation`](tiprub_cosim::CoSimulation).
+//! [`CoSimulation`].
 //!
 //! ```text
 //! fmi2/  fmi3/     one expression per exported function, no unsafe block; shared.rs defines functions of both versions
