@@ -312,11 +312,11 @@ impl SpanSteps for BladeInSpan<'_> {
         if pushes {
             trial.find_modal_forces(rows, level);
         }
-        // The polynomials of a step that misses the tolerance do not describe the motion between its points.
+        // If a step misses the tolerance, its polynomials do not describe the motion between its points.
         let is_resolved = result.resolves_motion(kind, self.goal.tolerance);
         let tolerance = if is_resolved { self.goal.tolerance } else { f64::INFINITY };
         if trial.find_minima((rows, level), tally, floors, tolerance) {
-            let finer = trial.halvings_to_parts(rows, level, self.goal.tolerance).min(HALVINGS - step.level);
+            let finer = trial.find_halvings(rows, level, self.goal.tolerance).min(HALVINGS - step.level);
             let parts = 1_usize << finer;
             let mut drives = [PointDrive::default(); PARTS + 1];
             for (end, drive) in drives[..=parts].iter_mut().enumerate() {
