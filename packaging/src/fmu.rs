@@ -79,7 +79,7 @@ impl FmiVersion {
 #[derive(Debug)]
 pub struct FmuPackage<'a> {
     scene: &'a Scene,
-    /// Scene in the form that the FMU contains.
+    /// Scene as the FMU contains it.
     packed: Scene,
     simulation: Simulation,
     libraries: &'a [Library],

@@ -1,9 +1,10 @@
 //! Finds the shared libraries for the FMUs.
 //!
-//! In this order: the files and directories given with `--library`; for a tiprub that runs from a cargo target directory of the workspace, a fresh
-//! build of the fmi crate ([`LibraryBuild`]); else the libraries beside the executable, where an installation puts them, one for each platform; else,
-//! for a tiprub that cargo installed, a library built from the same sources, which is cached in the user's cache directory. Platform, unit and
-//! sources of a library are read from its content.
+//! In this order: the files and directories given with `--library`; for a tiprub that runs from a cargo target
+//! directory of the workspace, a fresh build of the fmi crate ([`LibraryBuild`]); otherwise the libraries beside the
+//! executable, where an installation puts them, one for each platform; otherwise, for a tiprub that cargo installed, a
+//! library built from the same sources, which is cached in the user's cache directory. The content of a library shows
+//! its platform, unit and sources.
 
 mod build;
 
@@ -91,11 +92,11 @@ fn release(bytes: &[u8]) -> Option<String> {
 /// Build of a library in the cargo target directory from which the program runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LibraryBuild {
-    /// As in a release: the crate alone (profile `fmu`, so that features of other crates do not affect it), with whole-program optimisation and
-    /// without paths of this machine.
+    /// Build as in a release, with profile `fmu` and whole-program optimisation. The crate is built alone, so that
+    /// features of other crates do not affect it. The library contains no paths of this machine.
     Released,
-    /// From the crates that were compiled for the program, which takes seconds instead of minutes. The library gives the same bits, but it is larger
-    /// and contains paths of this machine.
+    /// Build from the crates that were compiled for the program, which takes seconds instead of minutes. The library
+    /// gives the same bits, but it is larger and contains paths of this machine.
     Shared,
 }
 
@@ -252,7 +253,7 @@ fn find(
     let sources = WORKSPACE.map(Path::new).filter(|workspace| workspace.join("fmi/Cargo.toml").is_file());
     match origin(unit, &executable, sources, cache.directory()) {
         Origin::Target { sources, target } => {
-            // Crates of other profiles and targets are not those that the library needs.
+            // The library cannot share crates of another profile or target.
             let shares = kind == LibraryBuild::Shared && executable.parent() == Some(&target.join("release"));
             let kind = if shares { LibraryBuild::Shared } else { LibraryBuild::Released };
             Ok((vec![build::build(unit, kind, sources, target, console)?], None))

@@ -9,7 +9,8 @@ use tiprub_model::{Rotor37Options, reduce_rotor37};
 const STEP: f64 = 8e-5;
 const STEPS: u32 = 131;
 
-/// Smallest clearance (m) of each node of the first blade in each communication step, which is divided into `parts`.
+/// Smallest clearance (m) of each node of the first blade in each communication step. Each step is divided into
+/// `parts`.
 fn minima(scene: &Scene, parts: u32) -> Vec<f64> {
     let mut simulation = Simulation::new(scene).unwrap();
     simulation.initialise(0.0).unwrap();
@@ -30,7 +31,8 @@ fn minima(scene: &Scene, parts: u32) -> Vec<f64> {
     found
 }
 
-/// Every output is within the tolerance of 10⁻³ of the clearance, also between the points of long steps.
+/// Long and short communication steps give the same smallest clearances: each is within the tolerance of 10⁻³ of the
+/// clearance.
 #[test]
 fn smallest_clearances_do_not_depend_on_the_communication_step() {
     let rom = reduce_rotor37(&Rotor37Options::default(), &|_| {}).unwrap().rom;

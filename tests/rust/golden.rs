@@ -195,7 +195,7 @@ fn every_scene_matches_its_golden_bits() {
     assert_eq!(found.lines().count(), expected.lines().count());
 }
 
-/// Checks both interfaces of a library.
+/// Compares the core with both FMI versions of a library.
 fn assert_matches_the_core(library: &Path) {
     let (api2, api3) = (fmi2::load(library), fmi3::load(library));
     for scene in scenes::all() {
@@ -253,7 +253,7 @@ fn fmi2_and_fmi3_match_the_core_bit_for_bit() {
     assert_matches_the_core(&shipped());
 }
 
-/// The library of the demo, which is compiled with other options, gives the bits of the released one.
+/// The library of the demo is compiled with other options, but gives the same bits as the released library.
 #[test]
 fn library_of_the_demo_matches_the_released_one() {
     let (demo, released) = (shared(), shipped());

@@ -25,7 +25,7 @@ struct PlatformFacts {
     /// Folder of FMI 2.0 (section 2.3); it defines none for Arm, where the folder of FMI 3.0 is used, as newer
     /// importers expect.
     fmi2: &'static str,
-    /// `std::env::consts::ARCH`, and the same in the header of a library.
+    /// `std::env::consts::ARCH`, and the architecture in the header of a library.
     architecture: (&'static str, Architecture),
     system: SystemFacts,
 }
@@ -45,7 +45,7 @@ const MACOS: SystemFacts = SystemFacts { name: "macos", extension: "dylib", form
 const X86_64: (&str, Architecture) = ("x86_64", Architecture::X86_64);
 const AARCH64: (&str, Architecture) = ("aarch64", Architecture::Aarch64);
 
-/// One row per platform, in their order.
+/// Defines one row per platform, in the order of [`Platform`].
 macro_rules! platform_facts {
     ($($platform:ident $tuple:literal $fmi2:literal $architecture:ident $system:ident;)*) => {
         [$(PlatformFacts {

@@ -84,7 +84,7 @@ impl<'a> Session<'a> {
         self.groups.iter().try_for_each(|group| self.slave.read(group, values))
     }
 
-    /// Initialises, steps over the schedule, records all numeric outputs at every communication point, and terminates.
+    /// Runs the instance over the schedule and terminates it; records all numeric outputs at every communication point.
     pub(crate) fn run(&mut self, schedule: &Schedule, progress: &dyn Fn(usize)) -> Result<ImportedRun> {
         let names = self.fmu.description.numeric_outputs().flat_map(ImportedVariable::scalar_names).collect();
         let mut recording = Recording::with_columns(names, schedule.count + 1)?;

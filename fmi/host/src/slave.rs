@@ -82,11 +82,11 @@ pub(super) fn check(function: &str, time: Option<f64>, status: i32, messages: &M
     Err(Failure::new("FMU", format!("{function}{at} returned {status_name}{}", messages.last_words()), ""))
 }
 
-/// Calls a function of the instance of a slave and checks its status; the time (s) appears in messages.
+/// Calls an FMI function of the slave's instance and checks its status. Error messages contain the time (s).
 macro_rules! call {
     ($slave:ident.$function:ident($($argument:expr),* $(,)?), $time:expr) => {{
-        // SAFETY: the instance is alive, and its functions are called in the order that the standard requires; every
-        // pointer is to as many values as the count beside it, or to one value.
+        // SAFETY: the instance is alive, and its functions are called in the order that the standard requires. Every
+        // pointer points to as many values as the count beside it states, or to one value.
         let status = unsafe { ($slave.api.$function)($slave.instance $(, $argument)*) };
         $crate::slave::check(stringify!($function), $time, status, &$slave.messages)
     }};

@@ -114,8 +114,8 @@ pub(super) fn build(
         .ok_or_else(|| failed("cargo reported no shared library".into(), "Use --library FILE"))
 }
 
-/// Returns the cargo options for this kind of build. A shared library is built together with the program, because the features of dependencies, and
-/// with them the compiled crates, depend on all packages of a build.
+/// Returns the cargo options for this kind of build. A shared library is built together with the program, because all
+/// packages of a build determine the features of dependencies, and the features determine the compiled crates.
 fn options(kind: LibraryBuild, workspace: &Path) -> Vec<String> {
     let options: &[&str] = match kind {
         LibraryBuild::Released => &["--profile", "fmu"],

@@ -1,5 +1,5 @@
-//! Contact laws: the forces of one group of coupled contacts for given predicted gaps and Delassus matrix. Each law has a variant of `Law`
-//! and, if an importer may choose it, a row of the enumeration of solvers.
+//! Contact laws: the forces of one group of coupled contacts for given predicted gaps and Delassus matrix. Each law has
+//! a variant of `Law` and, if an importer may choose it, an item in the enumeration of solvers.
 //!
 //! Each law owns its matrix, its unknowns and its state. The group fills in the Delassus matrix W = C_Nᵀ A⁻¹ C_NT along the directions of
 //! the law, poses the contacts one after the other, and calls the law's solver.
@@ -131,7 +131,7 @@ pub(crate) enum Law {
     Lcp(SlidingLaw<Lcp>),
     /// Complementarity with stick and slip.
     Coulomb(Coulomb),
-    /// Complementarity on an abradable coating.
+    /// Contact with an abradable coating.
     Coated(Coated),
 }
 

@@ -18,7 +18,7 @@ impl<'a> StateWriter<'a> {
         self.at
     }
 
-    /// Returns the place of the next `count` bytes; `None` beyond the end of the buffer.
+    /// Returns the next `count` bytes of the buffer; `None` beyond its end.
     fn next(&mut self, count: usize) -> Option<&mut [u8]> {
         let from = self.at;
         self.at += count;
@@ -68,7 +68,7 @@ impl<'a> StateReader<'a> {
         self.infinite
     }
 
-    /// Returns the next `count` values of N bytes; none if the buffer ends before the last.
+    /// Returns the next `count` values of N bytes; an empty slice if the buffer ends before the last value.
     fn next<const N: usize>(&mut self, count: usize) -> &'a [[u8; N]] {
         let from = self.at;
         self.at += count * N;
@@ -90,7 +90,7 @@ pub trait Persist {
     /// state is checked in this way before anything is changed.
     fn check(&self, reader: &mut StateReader);
 
-    /// Appends values one after the other.
+    /// Saves values one after the other.
     fn save_all(values: &[Self], writer: &mut StateWriter)
     where
         Self: Sized,
@@ -104,7 +104,7 @@ pub trait Persist {
     {
         values.iter_mut().for_each(|value| value.restore(reader));
     }
-    /// Checks the bytes of values one after the other.
+    /// Checks the saved bytes of values one after the other.
     fn check_all(values: &[Self], reader: &mut StateReader)
     where
         Self: Sized,
@@ -116,7 +116,8 @@ pub trait Persist {
 /// Largest valid step counter; no run comes near it.
 const MAX_COUNT: u64 = 1 << 53;
 
-/// Implements [`Persist`] for numbers, with the check of numbers that were read. Many numbers are copied at once.
+/// Implements [`Persist`] for a type of numbers, with the function that checks numbers from a saved state. Slices of
+/// numbers are copied in one pass.
 macro_rules! persist_numbers {
     ($($number:ty, $check:expr;)*) => {$(
         impl Persist for $number {
@@ -159,7 +160,8 @@ persist_numbers! {
     i32, |_: &[[u8; 4]], _: &mut StateReader| {};
 }
 
-/// Counts infinite numbers and rejects other numbers that are out of range. Without branches, so that it takes no longer than a copy.
+/// Counts infinite numbers and rejects other numbers that are out of range. The loop has no branches, so it takes no
+/// longer than a copy.
 fn check_reals(bytes: &[[u8; 8]], reader: &mut StateReader) {
     let (mut infinite, mut beyond) = (0_u64, 0_u64);
     for bytes in bytes {
@@ -272,46 +274,48 @@ pub fn damaged<T>(problem: impl std::fmt::Display) -> crate::Result<T> {
     Err(crate::Error::state(problem))
 }
 
-/// Checks the length of a saved state (bytes) of its `owner`, such as "this scene".
+/// Checks the length (bytes) of a saved state; `owner` names what the state belongs to, such as "this scene".
 ///
 /// # Errors
-/// Another length than the expected one.
+/// The length differs from the expected one.
 pub fn check_length(found: usize, expected: usize, owner: &str) -> crate::Result<()> {
     if found == expected { Ok(()) } else { damaged(format!("it has {found} bytes, but {owner} needs {expected}")) }
 }
 
-/// Number of words that are hashed side by side.
+/// Number of hashes that are computed side by side and combined at the end.
 const LANES: usize = 8;
 
-/// Hash of bytes, for fingerprints and checksums of saved states (not for security). A change of one word always changes it.
+/// Hash of bytes, for fingerprints and checksums of saved states (not for security). Every change of a single word
+/// changes the hash.
 pub fn fingerprint(bytes: &[u8], seed: u64) -> u64 {
     let (words, last) = bytes.as_chunks();
     let mut rest = [0; 8];
     rest[..last.len()].copy_from_slice(last);
-    let end = mixed(bytes.len() as u64, u64::from_le_bytes(rest));
-    hashed(words, u64::from_le_bytes, mixed(seed, end))
+    let end = mix(bytes.len() as u64, u64::from_le_bytes(rest));
+    hash_words(words, u64::from_le_bytes, mix(seed, end))
 }
 
-/// [`fingerprint`] of the bits of numbers.
+/// Hash of the bits of numbers, for the same purposes as [`fingerprint`].
 pub fn fingerprint_numbers(values: &[f64], seed: u64) -> u64 {
-    hashed(values, f64::to_bits, mixed(seed, values.len() as u64))
+    hash_words(values, f64::to_bits, mix(seed, values.len() as u64))
 }
 
-fn hashed<T: Copy>(words: &[T], bits: impl Fn(T) -> u64, seed: u64) -> u64 {
-    let mut lanes: [u64; LANES] = std::array::from_fn(|lane| mixed(seed, lane as u64));
+fn hash_words<T: Copy>(words: &[T], bits: impl Fn(T) -> u64, seed: u64) -> u64 {
+    let mut lanes: [u64; LANES] = std::array::from_fn(|lane| mix(seed, lane as u64));
     let mut take = |words: &[T]| {
         for (lane, word) in lanes.iter_mut().zip(words) {
-            *lane = mixed(*lane, bits(*word));
+            *lane = mix(*lane, bits(*word));
         }
     };
     let (blocks, rest) = words.as_chunks::<LANES>();
     blocks.iter().for_each(|block| take(block));
     take(rest);
-    let hash = lanes.into_iter().fold(seed, mixed);
-    mixed(hash, hash >> 32)
+    let hash = lanes.into_iter().fold(seed, mix);
+    mix(hash, hash >> 32)
 }
 
-/// One step of the hash: a bijection of both arguments. The product spreads bits upwards, the rotation returns them to the low end.
-fn mixed(hash: u64, word: u64) -> u64 {
+/// Adds a word to a hash. The result is a bijection of either argument. The product spreads bits upwards, and the
+/// rotation returns them to the low end.
+fn mix(hash: u64, word: u64) -> u64 {
     (hash ^ word).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29)
 }

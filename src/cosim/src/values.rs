@@ -58,7 +58,7 @@ impl VariableValues {
         }
     }
 
-    /// Returns the variable of a reference and the number that is stored for it.
+    /// Returns the variable that has a reference, and its stored number.
     ///
     /// # Errors
     /// Unknown reference, or a variable of another type than `wanted`.

@@ -181,7 +181,7 @@ pub enum StartValue {
 pub struct Variable {
     /// Structured name, for example `blade[1].clearance`.
     pub name: String,
-    /// First value reference, which [`VariableTable::new`] assigns.
+    /// First value reference; [`VariableTable::new`] assigns it.
     pub reference: u32,
     /// `None` for a scalar, number of elements for an array.
     pub dimension: Option<usize>,
@@ -240,14 +240,14 @@ setters! {
     starts(values: Vec<f64>) { dimension = Some(values.len()), start = Some(StartValue::Real(values)) }
     /// Sets type and start value.
     kind(kind: DataType, start: StartValue) { kind = kind, start = Some(start) }
-    /// Makes it a continuous real input with a start value.
+    /// Makes a continuous real variable an input with a start value.
     input(value: f64) { causality = Causality::Input, start = Some(StartValue::Real(vec![value])) }
-    /// Makes it a fixed parameter that is an item of an enumeration.
+    /// Makes the variable a fixed parameter whose value is an item of an enumeration.
     choice(choices: &'static Enumeration, value: i32) {
         kind = DataType::Enumeration(choices), start = Some(StartValue::Integer(value)),
         causality = Causality::Parameter, variability = Variability::Fixed
     }
-    /// Makes it a constant.
+    /// Makes the variable a constant.
     constant(kind: DataType, value: StartValue) {
         kind = kind, start = Some(value), causality = Causality::Local, variability = Variability::Constant
     }

@@ -19,7 +19,7 @@ pub const SCENE_FILE: &str = "scene.toml";
 pub(crate) const PACKAGE_FILE: &str = "package.toml";
 /// File name of the stored results of slow checks inside `resources/`.
 pub const CHECKS_FILE: &str = "checks.bin";
-/// Maximum size of that file (bytes).
+/// Maximum size of the stored results (bytes).
 pub const LARGEST_CHECKS: u64 = 64 << 20;
 /// Maximum size of the packaging options (bytes).
 const LARGEST_PACKAGE: u64 = 1 << 12;
@@ -40,7 +40,8 @@ pub struct Resources {
     pub token: String,
     /// True if the FMI 3.0 description has arrays (otherwise scalars, as in FMI 2.0).
     pub fmi3_arrays: bool,
-    /// Results of slow checks for [`Simulation::use_checks`](tiprub_core::Simulation::use_checks); empty if there are none of this release.
+    /// Results of slow checks for [`Simulation::use_checks`](tiprub_core::Simulation::use_checks); empty if this
+    /// release has stored none.
     pub checks: Vec<u8>,
 }
 
@@ -114,7 +115,8 @@ pub(crate) fn check_directory(directory: &Path) -> Result<()> {
     Err(file_error(directory, "directory not found (the FMU's resources are expected here)", INTACT))
 }
 
-/// Returns a scene as an FMU holds it: with the names of the ROM files in the FMU, and without the data that this scene does not use.
+/// Returns a scene as an FMU contains it: with the names of the ROM files in the FMU, and without data that the scene
+/// does not use.
 ///
 /// # Examples
 /// ```
@@ -136,7 +138,7 @@ pub fn packed_scene(scene: &Scene) -> Scene {
     Scene { roms: roms.collect(), settings }
 }
 
-/// Returns results of slow checks as the content of a file that only this release reads.
+/// Returns the content of a file with results of slow checks. Only this release reads the results.
 ///
 /// # Examples
 /// ```
@@ -152,7 +154,7 @@ pub fn write_checks(checks: &[u8]) -> Vec<u8> {
     [LIBRARY_RELEASE.as_bytes(), b"\n", checks].concat()
 }
 
-/// Returns the results in a file that [`write_checks`] of this release wrote, otherwise none.
+/// Returns the results in a file that [`write_checks`] of this release wrote; empty for any other file.
 ///
 /// # Examples
 /// ```

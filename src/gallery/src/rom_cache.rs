@@ -26,11 +26,11 @@ const VARIABLE: &str = "TIPRUB_CACHE";
 /// Largest file (bytes): the first line and a ROM.
 const LARGEST: u64 = tiprub_format::LARGEST_ROM + (1 << 10);
 /// Number of versions of one model that are cached: several options and releases may be in use side by side.
-const KEPT: usize = 4;
-/// Start and end of the names of files with results of checks, and the number of these files.
-const CHECKS: &str = "scene";
-const CHECKS_END: &str = ".checks";
-const KEPT_CHECKS: usize = 16;
+const MAX_VERSIONS: usize = 4;
+/// Prefix and suffix of the names of files with results of checks, and the maximum number of these files.
+const CHECKS_PREFIX: &str = "scene";
+const CHECKS_SUFFIX: &str = ".checks";
+const MAX_CHECK_FILES: usize = 16;
 
 /// Cache directory, if there is one.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -98,7 +98,7 @@ impl RomCache {
         if let Err(failure) = kept {
             console.print_progress(format_args!("Model {name} is not cached: {failure}"));
         }
-        prune(directory, name, ".rom", KEPT);
+        prune(directory, name, ".rom", MAX_VERSIONS);
         Ok(rom)
     }
 
@@ -114,18 +114,19 @@ impl RomCache {
         tiprub_format::read_checks(&file).to_vec()
     }
 
-    /// Caches the results of slow checks of a scene; files that cannot be written do not stop the work.
+    /// Caches the results of slow checks of a scene. If the file cannot be written, the run continues without it.
     pub fn keep_checks(&self, scene: &Scene, checks: &[u8]) {
         let (Some(directory), Some(path)) = (&self.directory, self.checks_path(scene)) else { return };
         let _ = output_file::only_a_file(&path)
             .and_then(|()| output_file::write(&path, tiprub_format::write_checks(checks)));
-        prune(directory, CHECKS, CHECKS_END, KEPT_CHECKS);
+        prune(directory, CHECKS_PREFIX, CHECKS_SUFFIX, MAX_CHECK_FILES);
     }
 
-    /// One file per scene. Each result in it has a key of its own, which includes models and parameters.
+    /// Returns the path of the file of a scene. Each result in the file has a separate key, which includes models and
+    /// parameters.
     fn checks_path(&self, scene: &Scene) -> Option<PathBuf> {
         let key = digest(format!("{:?}", scene.settings).as_bytes());
-        Some(self.directory.as_ref()?.join(format!("{CHECKS}-{}{CHECKS_END}", &key[..32])))
+        Some(self.directory.as_ref()?.join(format!("{CHECKS_PREFIX}-{}{CHECKS_SUFFIX}", &key[..32])))
     }
 }
 
@@ -173,7 +174,7 @@ fn read(path: &Path, key: &str) -> Result<Rom, Option<String>> {
     tiprub_format::read_rom(rom, &path.display().to_string()).map_err(|error| Some(error.to_string()))
 }
 
-/// Removes the oldest versions of a file beyond `kept`. Files that cannot be removed stay.
+/// Removes all versions of a file except the newest `kept`. Ignores files that cannot be removed.
 fn prune(directory: &Path, name: &str, end: &str, kept: usize) {
     let Ok(entries) = fs::read_dir(directory) else { return };
     let is_version = |path: &Path| {
@@ -323,11 +324,11 @@ mod tests {
     fn old_versions_are_removed_and_other_models_kept() {
         let bench = Bench::new();
         bench.get("a-fine", 0.5);
-        for version in 0..KEPT + 3 {
+        for version in 0..MAX_VERSIONS + 3 {
             bench.get("a", version as f64);
         }
-        assert_eq!(bench.files().len(), KEPT + 1);
-        assert!(bench.files()[KEPT].file_name().unwrap().to_str().unwrap().starts_with("a-fine"));
+        assert_eq!(bench.files().len(), MAX_VERSIONS + 1);
+        assert!(bench.files()[MAX_VERSIONS].file_name().unwrap().to_str().unwrap().starts_with("a-fine"));
     }
 
     #[test]

@@ -23,7 +23,7 @@ pub struct NativeRun {
     pub effort: Option<Effort>,
     /// Warnings of the initialisation, the run and the schedule.
     pub warnings: Vec<Warning>,
-    /// Results of slow checks for [`RunInputs`] of the next run.
+    /// Results of slow checks, for [`RunInputs::checks`] of the next run.
     pub checks: Vec<u8>,
 }
 
@@ -34,7 +34,8 @@ pub struct RunInputs<'a> {
     pub settings: &'a [(String, String)],
     /// Inputs over time.
     pub history: Option<&'a InputHistory>,
-    /// Results of slow checks of an earlier run; without effect if they belong to other scenes or parameters.
+    /// Results of slow checks of an earlier run. They have no effect if they belong to another scene or other
+    /// parameters.
     pub checks: &'a [u8],
 }
 

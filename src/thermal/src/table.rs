@@ -81,7 +81,7 @@ impl ThermalTableBuilder {
     }
 }
 
-/// Name and description of the gas and of the air.
+/// Prefix of variable names, and description, of the gas and of the air.
 const FILMS: [(&str, &str); 2] = [("gas", "gas inside"), ("ambient", "air outside")];
 
 /// Builds the table of a model, with the items of its rows.

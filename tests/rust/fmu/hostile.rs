@@ -138,7 +138,7 @@ fn rejects_damaged_resources() {
     summary("resources");
 }
 
-/// Stored checks give the messages of an FMU without them; a damaged file has no effect.
+/// An FMU with stored checks gives the same messages as one without them. A damaged file has no effect.
 #[test]
 fn stored_checks_change_no_message() {
     let api = fmi2::load(&shipped());

@@ -1,5 +1,5 @@
 //! The call order of both standards as data: the phases in which each exported function that takes an instance is
-//! allowed; functions that read values of different types share a row, and so do those that set values.
+//! allowed. All functions that read values share one row, and all functions that set values share another.
 //!
 //! Sources: FMI 2.0.4, section 4.2.4 (state machine of calling sequence, table of functions against states) and FMI
 //! 3.0.2, sections 2.3 and 4.2. Functions such as `fmi3EnterEventMode` belong to capabilities that this FMU does not
@@ -50,7 +50,7 @@ pub(crate) const NOWHERE: States = 0;
 /// Phases in which the whole state can be saved and restored.
 const SETTABLE: States = INSTANTIATED | INITIALISING | STEPPING | FAILED | TERMINATED;
 
-/// One `const` per row, after the phases in which values of any type can be read and set.
+/// Defines the rows of a version: one for all getters, one for all setters, and one `const` for each other function.
 macro_rules! table {
     (getters $getters:expr; setters $setters:expr; $($constant:ident $name:literal $states:expr;)*) => {
         /// Returns the row of a function that reads values of one type.

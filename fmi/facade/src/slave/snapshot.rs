@@ -84,7 +84,7 @@ impl Slave {
     /// A handle that this instance did not return.
     pub(crate) fn save(&mut self, existing: Option<SnapshotHandle>) -> Result<SnapshotHandle> {
         let index = existing.map(|handle| self.index(handle)).transpose()?;
-        // A replaced state is written in its place, without new memory.
+        // A new state replaces an existing one in the same memory.
         let mut bytes = index.map(|index| std::mem::take(&mut *self.snapshots[index])).unwrap_or_default();
         let outcome = self.encode(&mut bytes);
         if let Some(index) = index {
@@ -163,7 +163,7 @@ impl Slave {
         self.store(existing, bytes.to_vec())
     }
 
-    /// Writes the state over `out`, which stays unchanged if that fails.
+    /// Replaces the content of `out` with the state. If this fails, an existing state in `out` stays unchanged.
     fn encode(&self, out: &mut SavedState) -> Result<()> {
         let mut head = SavedState::with_capacity(256);
         head.extend(MAGIC);

@@ -20,11 +20,12 @@ use nalgebra::DMatrix;
 use super::proximal::{ROUNDS, Yielding};
 use crate::math::simd::InstructionSet;
 
-/// Pivots below this fraction of the diagonal entry of their node, or of their column, belong to redundant contacts (coincident nodes).
+/// Pivots below this fraction of the diagonal entry of their node, or of their column, belong to redundant contacts
+/// (coincident nodes).
 pub(super) const REDUNDANT_PIVOT: f64 = 1e-12;
 /// Gaps and multipliers within this fraction of their scale count as zero.
 const ZERO_FRACTION: f64 = 1e-13;
-/// Block exchanges allowed without progress before a method that is certain to end takes over.
+/// Number of block exchanges without progress after which a method takes over that always terminates.
 pub(super) const PATIENCE: usize = 8;
 
 /// Largest problem on which the least-index rule may try every active set.
@@ -262,7 +263,7 @@ impl ContactSolver {
 
     fn correct_gaps(&mut self) {
         let size = self.size;
-        // Starts from −0 like the sum of an iterator.
+        // The sum of an iterator also starts from −0.
         self.corrected[..size].fill(-0.0);
         for member in &self.members {
             let (multiplier, column) = (self.multipliers[*member], self.delassus.column(*member));

@@ -1,6 +1,6 @@
-//! Contact with an abradable coating and the hard casing behind it. A coating that is pressed in consists of rods that are free, elastic or
-//! yielding, with Coulomb friction. On a coating that is cut the tangential force is 1/κ of the normal force, on the hard casing µ of it,
-//! both against the slip.
+//! Contact with an abradable coating and the hard casing behind it. A coating that is compressed consists of rods that
+//! are free, elastic or yielding, with Coulomb friction. On a coating that is cut, the tangential force is 1/κ times
+//! the normal force. On the hard casing it is µ times the normal force. Both act against the slip.
 
 use nalgebra::DMatrix;
 
@@ -32,7 +32,7 @@ struct CutContacts {
     slid: Vec<f64>,
 }
 
-/// Data of one contact.
+/// A contact on a coating that is cut.
 #[derive(Debug, Clone, Copy, Default)]
 struct CutContact {
     /// Coulomb coefficient of the hard casing.
@@ -56,7 +56,8 @@ impl Coated {
         Self { coating, problem, size: 0, angles, multipliers, cut }
     }
 
-    /// Fills in gaps per normal force with its tangential force: on the hard casing, and on the coating that is cut.
+    /// Fills the matrices of gaps per normal force, which include its tangential force: one for the hard casing, one
+    /// for the cut coating.
     fn fill(&mut self) {
         let tangential = self.coating.tangential_ratio();
         let (Some(of), Some(cut)) = (&self.cut, &mut self.problem.cut) else { return };
@@ -152,8 +153,8 @@ impl ContactLaw for Coated {
         Some(&mut self.coating)
     }
 
-    /// If the coating is cut, records the cut of the last solution; the material is removed once the sliding distance is known
-    /// ([`Coating::cut`]).
+    /// If the coating is cut, records the cut of the last solution; the material is removed once the sliding distance
+    /// is known ([`Coating::cut`]).
     fn commit(&mut self) -> f64 {
         let Some(cut) = &self.cut else { return self.coating.commit(&self.problem) };
         self.coating.take_chips(&self.problem, &cut.slid);

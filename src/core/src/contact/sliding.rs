@@ -24,8 +24,9 @@ pub(crate) trait SlidingRule {
     }
 }
 
-/// Forward-increment Lagrange multipliers (eqs 10-11 of the paper): equality on the nodes that penetrate in the prediction. Penetration is
-/// detected once; neither a negative λ nor a penetration caused elsewhere is checked again.
+/// Forward-increment Lagrange multipliers (eqs 10-11 of the paper): the gaps of all nodes that penetrate in the
+/// prediction become zero. Penetration is detected once. The law checks neither for negative λ nor for new penetration
+/// of other nodes.
 #[derive(Debug, Clone)]
 pub(crate) struct Film;
 

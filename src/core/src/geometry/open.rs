@@ -23,12 +23,12 @@ pub struct OpenGap {
     pub(crate) positions: Vec<Vector3>,
     /// Contact nodes that can touch the surface.
     pub(crate) nodes: Vec<usize>,
-    /// The current surface through the contact grid of a structure, in fixed directions.
+    /// Current surface through the contact grid of a structure, in fixed directions.
     pub surface: SurfaceSpline,
     /// Undeformed control points (m).
     undeformed: Vec<Vector3>,
-    /// Largest displacement and penetration that count as small (m): a tenth of the smallest extent of the contact nodes and of their
-    /// surfaces.
+    /// Largest displacement and penetration that count as small (m): a tenth of the smallest extent of the contact
+    /// nodes and of their surfaces.
     pub largest: f64,
 }
 
@@ -40,7 +40,8 @@ impl OpenGap {
         Self { positions, nodes, surface, undeformed, largest: SMALL * smallest }
     }
 
-    /// Takes into account another pair of the same structure, with the undeformed `surface`.
+    /// Includes the extent of the undeformed `surface` of another pair of the same structure in the limit of small
+    /// displacements.
     pub fn beside(self, surface: &SurfaceSpline) -> Self {
         Self { largest: self.largest.min(SMALL * extent(surface.control_points())), ..self }
     }

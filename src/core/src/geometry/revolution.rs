@@ -102,7 +102,7 @@ impl RevolutionGap {
     /// Returns the displacement of the surface along the normal by its prescribed motion (m), at a node displaced by `moved` (m) whose normal has the
     /// radial part `facing`: n_r/(n_r N) times the outward displacement.
     pub fn surface_motion(&self, at: At<'_>, moved: Vector3, facing: f64, motion: &MotionIncrement) -> f64 {
-        if motion.casing_rests() {
+        if motion.is_casing_at_rest() {
             return 0.0;
         }
         let (angle, drive) = (self.angle(at, moved), at.drive);
@@ -152,7 +152,8 @@ impl RevolutionGap {
         !self.shaft_moves && drive.shape_factor >= 0.0 && left > 0.0
     }
 
-    /// Angles of an undisplaced node from the origin of the shape (rad), the smaller first, before and after the rotor turns to `turned` (rad).
+    /// Returns the angles of an undisplaced node from the origin of the shape (rad) before and after the rotor turns to
+    /// `turned` (rad), in ascending order.
     fn swept(&self, at: At<'_>, turned: f64) -> [f64; 2] {
         let (seen, angle) = (self.layout.angles[at.index] - at.drive.shape_rotation, at.drive.rotor_angle);
         [seen + angle.min(turned), seen + angle.max(turned)]

@@ -84,8 +84,8 @@ impl SplineGap {
         });
     }
 
-    /// See [`super::GapLaw::evaluate`]; without a `guess` the search starts from the angle. Nodes out of reach have no surface to touch and
-    /// are reported by [`SplineGap::out_of_reach`].
+    /// See [`super::GapLaw::evaluate`]; without a `guess` the search starts from the angle. Nodes out of reach have no
+    /// surface to touch and are reported by [`SplineGap::out_of_reach`].
     pub fn evaluate(
         &mut self,
         drive: &PrescribedMotion,
@@ -199,7 +199,7 @@ impl SplineGap {
         place: ClosestPoint,
         motion: &MotionIncrement,
     ) -> f64 {
-        if motion.casing_rests() {
+        if motion.is_casing_at_rest() {
             return 0.0;
         }
         let angle = self.layout.angles[at.index] + at.drive.rotor_angle - at.drive.shape_rotation;

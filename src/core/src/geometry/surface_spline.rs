@@ -230,8 +230,8 @@ impl SurfaceSpline {
         Ok(())
     }
 
-    /// Replaces every control point (m) by a function of its index, for example by that of the undeformed surface plus a linear combination of
-    /// interpolated mode shapes.
+    /// Sets every control point (m) to the value of a function of its index, for example to the undeformed control
+    /// point plus a linear combination of interpolated mode shapes.
     pub fn set_control_points(&mut self, of: impl Fn(usize) -> Vector3) {
         self.control.iter_mut().enumerate().for_each(|(index, point)| *point = of(index));
         self.fill_mesh();

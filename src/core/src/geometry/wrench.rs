@@ -94,7 +94,7 @@ impl MotionIncrement {
     }
 
     /// Returns whether no input moves the casing.
-    pub(crate) fn casing_rests(&self) -> bool {
+    pub(crate) fn is_casing_at_rest(&self) -> bool {
         self.opening == 0.0 && self.shape_factor == 0.0 && self.shape_rotation == 0.0
     }
 }

@@ -61,7 +61,7 @@ pub fn growth(contacts: SlidingContacts, scheme: Scheme, step: f64) -> Option<Gr
 pub fn continuous(contacts: SlidingContacts, scheme: Scheme, step: f64) -> Option<Fastest> {
     let unit = balanced(contacts.model, step);
     let held = || HeldContacts::continuous(contacts, scheme.properties().quasi_static, unit);
-    fastest_held(&contacts.are_looked_at().then(held)?, unit)
+    fastest_held(&contacts.are_checked().then(held)?, unit)
 }
 
 /// Time (s) up to `step` with which the matrices of the differential equations are well balanced: up to ω_max h = 2.
@@ -79,7 +79,7 @@ fn fastest_held(held: &HeldContacts, unit: f64) -> Option<Fastest> {
 /// lumped mass. `None` if the model has no other mode with inertia, and if the remaining flexibility of the contacts is no P-matrix with
 /// this friction: then the limit has no solution, and unbounded growth would not be visible.
 pub fn without_node_mass(contacts: SlidingContacts, step: f64) -> Option<Fastest> {
-    if !contacts.are_looked_at() {
+    if !contacts.are_checked() {
         return None;
     }
     let unit = balanced(contacts.model, step);
@@ -91,7 +91,7 @@ pub fn without_node_mass(contacts: SlidingContacts, step: f64) -> Option<Fastest
 /// Computes [`growth`] for a known growth of the differential equations.
 pub fn stepped(contacts: SlidingContacts, scheme: Scheme, step: f64, continuous: Fastest) -> Option<GrowthRates> {
     let held = || HeldContacts::stepped(contacts, scheme, step);
-    let eigenvalues = eigenvalues(&contacts.are_looked_at().then(held)?)?;
+    let eigenvalues = eigenvalues(&contacts.are_checked().then(held)?)?;
     let found = fastest_stepped(&eigenvalues);
     Some(GrowthRates {
         continuous: continuous.rate,
@@ -127,7 +127,7 @@ fn fastest_stepped(eigenvalues: &[Complex<f64>]) -> Fastest {
 }
 
 impl SlidingContacts<'_> {
-    fn are_looked_at(&self) -> bool {
+    fn are_checked(&self) -> bool {
         self.friction != 0.0 && self.model.len() <= GROWTH_UP_TO
     }
 }

@@ -104,7 +104,7 @@ pub(crate) trait Octet:
     }
 }
 
-/// ln 2 in two parts, the first of which has few digits.
+/// ln 2 as the sum of two parts. The first part has few significant bits.
 pub(crate) const LN2_HIGH: f64 = 0.693_147_180_369_123_8;
 pub(crate) const LN2_LOW: f64 = 1.908_214_929_270_587_7e-10;
 

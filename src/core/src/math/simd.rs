@@ -72,7 +72,7 @@ pub trait Kernel {
     fn run(self);
 }
 
-/// A kernel that leaves the width of its loops to the compiler.
+/// A kernel whose SIMD width the compiler chooses.
 struct AnyWidth<K>(K);
 
 impl<K: Kernel> OctetKernel for AnyWidth<K> {

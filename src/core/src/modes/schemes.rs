@@ -8,9 +8,10 @@
 //!
 //! which needs the same work and does not lose the small restoring term κ q in the rounding of a ≈ 2.
 //!
-//! * central differences (eq. 9 of the paper): β = (1 − ξωh)/(1 + ξωh), κ = ω²h²/(1 + ξωh), c = h²/(1 + ξωh), stable for ωh < 2;
-//! * modal-exact, exact in free flight and at rest under a constant force: β = e^(−2ξωh), κ = 1 − 2e^(−ξωh) cos ω_d h + e^(−2ξωh),
-//!   c = κ/ω².
+//! * central differences (eq. 9 of the paper): β = (1 − ξωh)/(1 + ξωh), κ = ω²h²/(1 + ξωh), c = h²/(1 + ξωh), stable
+//!   for ωh < 2;
+//! * modal-exact, which is exact in free vibration and at rest under a constant force: β = e^(−2ξωh), κ = 1 − 2e^(−ξωh)
+//!   cos ω_d h + e^(−2ξωh), c = κ/ω².
 //!
 //! Either recurrence is m̃ (q⁺ − 2q + q⁻)/h² + d̃ (q⁺ − q⁻)/(2h) + ω² q = f with m̃ = h²(1 + β)/(2c) and d̃ = h(1 − β)/c.
 //! Multiplication by (q⁺ − q⁻)/2 gives the energy balance, which closes to rounding: E = ½ m̃ (d/h)² + ½ ω² q q⁻ changes by f (q⁺
@@ -122,7 +123,7 @@ impl ModeCoefficients {
     pub fn new(scheme: Scheme, frequency: f64, damping_ratio: f64, step: f64) -> Self {
         let spring = 0.5 * frequency * frequency;
         let Recurrence { beta, kappa, compliance } = match scheme {
-            // Only [`crate::time::galerkin`] moves these modes by forces.
+            // In this scheme only [`crate::time::galerkin`] applies forces to the modes.
             Scheme::Galerkin => {
                 return Self { beta: 1.0, inertia: 0.5 / (step * step), spring, ..Self::default() };
             }

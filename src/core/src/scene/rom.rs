@@ -124,14 +124,15 @@ pub struct Spin {
     pub largest_speed: f64,
 }
 
-/// Forces along x, y, z (N) and moments about x, y, z through the origin (N·m).
+/// Number of components of a support force: forces along x, y, z (N) and moments about x, y, z through the origin
+/// (N·m).
 pub const SUPPORT_ROWS: usize = 6;
 
-/// Rows of the finite-element equations at the held nodes, which a reduction omits: R = S_K q + S_M q̈ − S_T T is force and moment of the
-/// support on the structure, in fixed directions and about the origin.
+/// Rows of the finite-element equations at the constrained nodes, which a reduction omits. R = S_K q + S_M q̈ − S_T T
+/// contains the force and the moment of the support on the structure, in fixed directions and about the origin.
 ///
-/// With the six rigid motions r of the held nodes s and the displacements u = Vq of the others f, S_K = rᵀK_sf V, S_M = rᵀM_sf V, and S_T =
-/// rᵀf_s with the loads f per kelvin of each patch.
+/// With the six rigid motions r of the constrained nodes s and the displacements u = Vq of the free nodes f, S_K =
+/// rᵀK_sf V and S_M = rᵀM_sf V. S_T = rᵀf_s contains the loads f per kelvin of each patch.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SupportRows {
     /// S_K, 6 × n (N or N·m per unit coordinate).

@@ -88,21 +88,21 @@ pub struct LoadSettings {
 pub enum ForceDirection {
     /// Away from the axis.
     Radial,
-    /// Around the axis, with increasing angle.
+    /// Around the axis, towards increasing angles.
     Tangential,
     /// Along the axis.
     Axial,
 }
 
-/// Aerodynamic excitation by an engine order: the force on blade j of N is amplitude·cos(order·(θ_r + 2π(j − 1)/N) − phase), a stationary
-/// pattern.
+/// Aerodynamic excitation by an engine order: the force on blade j of N is amplitude·cos(order·(θ_r + 2π(j − 1)/N) −
+/// phase), a stationary pattern.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ExcitationSettings {
     /// Start value of the engine order.
     pub order: u32,
-    /// The only mode family (1-based) that is loaded: by the modal load of the force at `node`, or, without a node, at the component of a
-    /// contact node that the mode moves most. All modes are loaded if absent.
+    /// Mode family (1-based) that is loaded; all modes if absent. The load is the modal load of the force at `node`.
+    /// Without a node, the force acts on the displacement component of a contact node that the mode moves most.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mode: Option<usize>,
     /// Contact node at which the force acts.
@@ -119,8 +119,8 @@ pub struct ExcitationSettings {
     pub phase: f64,
 }
 
-/// Initial displacement and velocity of the blades in one mode family, as those of the component of a contact node that the mode moves
-/// most.
+/// Initial displacement and velocity of the blades in one mode family, given for the displacement component of a
+/// contact node that the mode moves most.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct InitialSettings {
@@ -129,7 +129,8 @@ pub struct InitialSettings {
     /// Sector (1-based) that moves alone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sector: Option<usize>,
-    /// Nodal diameter n: blade j of N moves with cos(2πn(j − 1)/N − phase); all blades move alike if neither this nor `sector` is given.
+    /// Nodal diameter n: blade j of N moves with cos(2πn(j − 1)/N − phase). All blades have the same motion if neither
+    /// this nor `sector` is given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub nodal_diameter: Option<usize>,
     /// Phase of that pattern (rad).

@@ -1,4 +1,4 @@
-//! Hash of settings and ROMs, stored in saved states and part of the keys of stored checks.
+//! Hash of settings and ROMs. Saved states and the keys of stored checks contain it.
 
 use nalgebra::DMatrix;
 use tiprub_cosim::persist::{fingerprint, fingerprint_numbers};
@@ -12,11 +12,12 @@ pub fn of_scene(scene: &Scene) -> u64 {
     // Silenced warnings and accepted values do not change results.
     let settings = SceneSettings { silence: Vec::new(), accept_implausible: false, ..scene.settings.clone() };
     let seed = fingerprint(format!("{settings:?}").as_bytes(), 0);
-    scene.roms.iter().fold(seed, |seed, rom| of_rom(rom, seed))
+    scene.roms.iter().fold(seed, |seed, rom| rom_hash(rom, seed))
 }
 
-/// Hash of a ROM: of all its numbers, and of its other data as text. Origin and quality of a reduction do not change results.
-fn of_rom(rom: &Rom, seed: u64) -> u64 {
+/// Hash of a ROM: of all its numbers, and of its other data as text. Origin and quality of the reduction are left out,
+/// because they do not change results.
+fn rom_hash(rom: &Rom, seed: u64) -> u64 {
     let Rom {
         name: _,
         origin: _,

@@ -149,9 +149,9 @@ impl Simulation {
         limits
     }
 
-    /// Uses results of slow checks that [`Simulation::checks`] returned, possibly in another process: the next initialisation with the same
-    /// scene and parameters does not repeat these checks. Bytes that are damaged, or belong to other scenes, parameters or versions, have no
-    /// effect.
+    /// Uses results of slow checks that [`Simulation::checks`] returned, possibly in another process. The next
+    /// initialisation with the same scene and parameters does not repeat these checks. Bytes have no effect if they are
+    /// damaged or belong to another scene, other parameters or another version.
     ///
     /// # Examples
     /// ```
@@ -169,7 +169,8 @@ impl Simulation {
         self.diagnostics.known = KnownChecks::from_bytes(checks);
     }
 
-    /// Returns the results of slow checks of the last initialisation for [`Simulation::use_checks`]; empty if there were none.
+    /// Returns the results of slow checks of the last initialisation, for [`Simulation::use_checks`]; empty if there
+    /// are none.
     ///
     /// # Examples
     /// ```

@@ -1,4 +1,5 @@
-//! Warnings at the start of rotors that turn fast with the stiffness at rest, and of tips that slide more slowly than they vibrate.
+//! Warnings at the start: of rotors that rotate fast but have the stiffness at rest, and of tips that slide more slowly
+//! than they vibrate.
 
 use nalgebra::DMatrix;
 use tiprub_cosim::shown;
@@ -13,15 +14,15 @@ use crate::scene::rom::DisplacementFrame;
 use crate::scene::settings::BodyMotion;
 use crate::scene::shape::CompiledShape;
 
-/// Largest Ω/ω₁ without a warning. The lowest frequency rises as ω₁(Ω)² ≈ ω₁² + BΩ² (Southwell). Rotor 37 has B = 5.7 (865 Hz at rest, 1102
-/// Hz at 1800 rad/s), so at 0.2 a fifth of its stiffness is neglected.
+/// Largest Ω/ω₁ without a warning. The lowest frequency rises as ω₁(Ω)² ≈ ω₁² + BΩ² (Southwell). Rotor 37 has B = 5.7
+/// (865 Hz at rest, 1102 Hz at 1800 rad/s), so at 0.2 a fifth of its stiffness is neglected.
 const SLOW: f64 = 0.2;
 
 /// Angles at which a shape is sampled.
 const ANGLES: u32 = 720;
 
 impl Simulation {
-    /// Warns of rotors whose stiffness at speed differs from the stiffness at rest that the scene gives them.
+    /// Warns of rotors that have the stiffness at rest although their speed changes it noticeably.
     pub(super) fn warn_of_fast_rotation(&mut self) {
         let speeds = self.speeds().into_iter().enumerate();
         let warnings = speeds.filter_map(|(body, speed)| self.compiled.fast_rotation(body, speed));

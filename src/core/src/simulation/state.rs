@@ -1,7 +1,7 @@
 //! Saved states: a header that identifies the scene, the payload, and a checksum.
 //!
-//! Layout, little-endian: magic (8 bytes), format version (u64), scene fingerprint (u64), payload, hash of all preceding bytes
-//! (u64).
+//! Layout, little-endian: magic (8 bytes), format version (u64), scene fingerprint (u64), payload, hash of all
+//! preceding bytes (u64).
 
 use tiprub_cosim::persist::{Persist, StateReader, StateWriter, check_length, damaged, fingerprint};
 use tiprub_cosim::variables::Causality;

@@ -60,8 +60,8 @@ impl<const PER: usize> Kernel for FillDisk<'_, PER> {
     }
 }
 
-/// Fills W from the displacements (padded to four) of the second node per unit of the three force components at the first; `None` for nodes
-/// that do not influence each other.
+/// Fills W from `flexibility`: the displacements (padded to four) of the second node per unit of the three force
+/// components at the first node, or `None` for nodes that do not influence each other.
 #[inline(always)]
 fn fill_block<const PER: usize>(
     matrix: &mut DMatrix<f64>,

@@ -3,7 +3,8 @@
 use super::Curved;
 use super::losses::Loss;
 
-/// Reason why a step failed. Structures, sectors, nodes and sets of structures that influence each other count from 0.
+/// Reason why a step failed. Structures, sectors, nodes, and sets of structures that influence each other, are numbered
+/// from 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(missing_docs, reason = "the comment of a variant describes its numbers")]
 pub enum StepFailure {
@@ -18,24 +19,24 @@ pub enum StepFailure {
     TooFast { structure: usize },
     /// A node passes a free edge and is already behind the surface.
     BehindEdge { structure: usize, node: usize },
-    /// Normals turn and surfaces curve so much within steps that this adds energy that no input supplies: the added `work` (J), and all
-    /// energy `exchanged` (J).
+    /// Turning normals and curved surfaces add energy within steps that no input supplies: the added `work` (J), and
+    /// the total energy `exchanged` (J).
     Unbalanced { set: usize, work: f64, exchanged: f64 },
-    /// Friction, impacts or cutting, which can only dissipate energy, have supplied energy: the energy `given` since the largest loss (J),
-    /// and the energy `exchanged`, with which it is compared (J).
+    /// Friction, impacts or cutting, which can only dissipate energy, have supplied energy: the energy `given` since
+    /// the largest loss (J), and the total energy `exchanged` (J), the reference for it.
     Gives { set: usize, loss: Loss, given: f64, exchanged: f64 },
     /// A node moves so far around the axis that the error of linear kinematics is as large as its clearance.
     Curved(Curved),
     /// A node has left a surface around an axis beyond the extrapolated part of its edge.
     OutOfReach { structure: usize, node: usize, sector: usize },
-    /// A gap has changed by more than the motion of node and surface explains, so it is not a distance: its change over two steps, the
-    /// `jump` (m), and the change that the motion explains (m).
+    /// A gap has changed by more than the motion of node and surface explains, so it is not a distance: its change over
+    /// two steps, `jump` (m), and the change that the motion explains, `explained` (m).
     Unexplained { structure: usize, node: usize, sector: usize, jump: f64, explained: f64 },
-    /// A law that checks for penetration only once holds nodes closed that the other nodes push away: the node with the largest pulling
-    /// impulse, and this impulse as a fraction of the largest impulse of a node.
+    /// A law that checks for penetration only once keeps nodes closed although the other nodes push them away: the node
+    /// with the largest pulling impulse, and this impulse as a fraction of the largest impulse of a node.
     Pulls { structure: usize, node: usize, share: f64 },
-    /// A law that checks for penetration only once leaves a node deep inside the surface: the node that was deepest inside, and its depth as
-    /// a fraction of the clearance.
+    /// A law that checks for penetration only once does not resolve a deep penetration: the node with the deepest
+    /// penetration, and its depth as a fraction of the clearance.
     LeftInside { structure: usize, node: usize, share: f64 },
     /// The limit of attempted steps is exceeded.
     Exhausted,

@@ -55,8 +55,8 @@ ledger! { 17:
     shift_work,
     /// Work of the prescribed motion of the casing along the contact normals.
     casing_work,
-    /// Difference between the work of contact forces in the scheme and all other terms: normals turn and surfaces curve within a
-    /// step. It vanishes with the step length.
+    /// Difference between the work of contact forces in the scheme and all other terms, caused by turning normals and
+    /// curved surfaces within a step. It vanishes with the step length.
     curvature_work,
     /// Energy added or removed when the state is converted to another step size.
     step_change,

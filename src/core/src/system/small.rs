@@ -69,10 +69,10 @@ impl System {
         beyond.map_or(Ok(()), |index| Err(StepFailure::Implausible { structure, sector: index % modes.lanes() }))
     }
 
-    /// Returns the node of one structure with the largest error of linear kinematics. A node that moves by u_θ along its tangent is u_θ²/2r
-    /// further from the axis, which a gap linear in the displacements neglects. On a spline the positions are exact, but a
-    /// bending blade shortens by at least this amount, which its modes, being straight lines, neglect: the measure applies there
-    /// too. `None` if nothing turns around an axis.
+    /// Returns the node of one structure with the largest error of linear kinematics. A node that moves by u_θ along
+    /// its tangent is u_θ²/2r further from the axis, which a gap linear in the displacements neglects. On a spline the
+    /// positions are exact, but a bending blade shortens by at least this amount, which its modes, being straight
+    /// lines, neglect: the measure applies there too. `None` if nothing turns around an axis.
     pub(crate) fn most_curved_of(&self, structure: usize) -> Option<Curved> {
         let mut most: Option<Curved> = None;
         for pair in self.pairs.iter().filter(|pair| pair.structure() == structure) {

@@ -160,7 +160,7 @@ impl Structure {
         node * self.lanes + sector
     }
 
-    /// Contacts of a sector of this structure, which has the number `structure`.
+    /// Returns the contacts of a sector; `structure` is the index of this structure.
     pub(crate) fn contacts(&self, structure: usize, sector: usize) -> impl Iterator<Item = ContactMember> {
         let pairs = self.pair_of.iter().enumerate().filter_map(|(node, pair)| Some((node, (*pair)?)));
         pairs.map(move |(node, pair)| ContactMember { structure, pair, node, sector, index: self.index(node, sector) })

@@ -1,4 +1,4 @@
-//! Stored results of slow checks give the same findings to the bit, and are used only for the same scene and parameters.
+//! Stored results of slow checks give bitwise the same findings, and are used only for the same scene and parameters.
 
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::{CoSimulation, Scene, Simulation};
@@ -6,7 +6,7 @@ use tiprub_cosim::persist::fingerprint;
 use tiprub_cosim::variables::Value;
 use tiprub_test_models::{self as models, coating, disk, flexible, reference};
 
-/// A blade with friction, on an elastic ring, with a coating that it cuts, and a bladed disk.
+/// Scenes with friction: blades in a rigid casing, in an elastic ring and against a coating, and a bladed disk.
 fn scenes() -> Vec<(&'static str, Scene)> {
     let rotor = |change: fn(&mut Scene)| {
         let mut scene = models::rub(4);
@@ -52,7 +52,7 @@ fn replace(simulation: &mut Simulation, name: &str, value: f64) {
     }
 }
 
-/// Checksum at the end.
+/// Writes the correct checksum at the end.
 fn sealed(mut checks: Vec<u8>) -> Vec<u8> {
     let end = checks.len() - 8;
     let checksum = fingerprint(&checks[..end], 0);
@@ -60,7 +60,7 @@ fn sealed(mut checks: Vec<u8>) -> Vec<u8> {
     checks
 }
 
-/// Results with the same keys and other numbers, which show whether they are used.
+/// Replaces the numbers of results and keeps their keys, so that a test sees whether the results are used.
 fn altered(checks: &[u8]) -> Vec<u8> {
     let word = |place: usize| u64::from_le_bytes(checks[8 * place..][..8].try_into().unwrap());
     let (mut altered, mut place) = (checks.to_vec(), 2);
@@ -81,13 +81,13 @@ fn stored_checks_give_the_same_findings_to_the_bit() {
         let first = start(&scene, &[], &[]);
         assert!(first.0.len() > 200, "{name}: {}", first.0.len());
         assert_eq!(start(&scene, &first.0, &[]), first, "{name}");
-        // Other numbers with the same keys remain, which shows that nothing was computed.
+        // A start keeps altered numbers with the same keys, so it computes nothing.
         let other = altered(&first.0);
         assert!(other != first.0 && start(&scene, &other, &[]).0 == other, "{name}");
     }
 }
 
-/// Every parameter that the checks depend on has its own keys: altered results of other parameters have no effect.
+/// The keys contain every parameter that affects the checks: altered results of other parameters have no effect.
 #[test]
 fn changed_parameters_are_checked_again() {
     let central = Scheme::ALL.iter().position(|scheme| *scheme == Scheme::CentralDifference).unwrap() + 1;
@@ -99,7 +99,7 @@ fn changed_parameters_are_checked_again() {
             ("internal_step_max", 0.9e-7),
             ("scheme", central as f64),
         ] {
-            // The scheme needs short steps.
+            // Central differences need short steps.
             let set = [set, ("internal_step_max", set.1.min(1e-7))];
             assert_eq!(start(&scene, &stored, &set), start(&scene, &[], &set), "{name}: {set:?}");
         }
@@ -161,7 +161,7 @@ fn damaged_checks_are_computed_again() {
         damaged.push(stored.clone());
         damaged.last_mut().unwrap()[index] ^= 1;
     }
-    // Complete, with a correct checksum, but without the last numbers or from another version.
+    // The last two have a correct checksum. One lacks its last numbers, and the other comes from another version.
     damaged.push(sealed(stored[..stored.len() - 16].to_vec()));
     damaged.push(stored.clone());
     damaged.last_mut().unwrap()[8] ^= 1;

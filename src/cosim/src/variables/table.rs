@@ -35,7 +35,7 @@ fn check_count(variables: &[Variable]) -> Result<()> {
 }
 
 impl VariableTable {
-    /// Creates a table of rows and assigns consecutive references, starting at 0.
+    /// Creates a table of variables and assigns them consecutive references, starting at 0.
     ///
     /// # Errors
     /// [`Error::Invalid`] if a name occurs twice, or there are more than [`bounds::VALUES`] values.

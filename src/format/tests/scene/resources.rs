@@ -121,7 +121,8 @@ fn rejects_damaged_resources_with_their_path() {
     }
 }
 
-/// Stored checks are found by an instance that reads the resources; without a usable file there are none, and no error.
+/// An instance that reads the resources finds the stored checks. If the file is missing or damaged, it finds none and
+/// reports no error.
 #[test]
 fn stored_checks_are_read_unless_they_are_missing_or_damaged() {
     let directory = tempfile::tempdir().unwrap();

@@ -114,8 +114,9 @@ impl Coating {
         self.cutting.as_ref().map_or(0.0, |cutting| cutting.tangential)
     }
 
-    /// Like [`Coating::locate`], for a blade that cuts: the one or two cells of each row that contain its path of the step. `angles` of its
-    /// contact nodes on the casing (rad); `slid`: sliding distance of each node over the step (m), positive towards increasing angles.
+    /// Finds the one or two cells of each row that a cutting blade passes in the step, as [`Coating::locate`] does for
+    /// other blades. `angles`: angles of its contact nodes on the casing (rad). `slid`: sliding distance of each node
+    /// over the step (m), positive towards increasing angles.
     pub(crate) fn locate_cut(&self, problem: &mut CoatedProblem, blade: usize, angles: &[f64], slid: &[f64]) {
         let Some(cutting) = &self.cutting else { return };
         let first = problem.append_nodes(self.nodes);

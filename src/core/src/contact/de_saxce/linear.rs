@@ -7,7 +7,8 @@ use crate::math::simd::Kernel;
 /// Columns factorised together: their multipliers stay in the first-level cache while the rest is updated.
 pub(super) const PANEL: usize = 8;
 
-/// `target += columns · factors` for three neighbouring columns; with `MAGNITUDES` absolute values of the products are added.
+/// Adds `columns · factors` to `target` for three neighbouring columns; with `MAGNITUDES` it adds the absolute values
+/// of the products.
 pub(super) struct AddColumns<'a, const MAGNITUDES: bool> {
     pub(super) columns: &'a [f64],
     pub(super) factors: [f64; 3],

@@ -49,7 +49,8 @@ impl InterpolationRow {
         line
     }
 
-    /// Creates the problem of a row of `count` data points with free ends at point 0 and at point `last`: the last one, or 0 if the ends meet.
+    /// Creates the problem of a row of `count` data points with free ends at point 0 and at point `last`, which is the
+    /// last point, or 0 if the ends meet.
     pub(crate) fn free_ends(count: usize, last: usize) -> Self {
         Self { kind: RowEnds::Free { last }, pivots: pivots(&vec![4.0; count - if last == 0 { 1 } else { 2 }]) }
     }

@@ -14,7 +14,8 @@ impl ModalBank {
         self.amplitudes_at(self.index(mode, group), mode, group)
     }
 
-    /// Calls `each` with mode, part, position and increment of every part of the amplitudes of a group, in the order of the modes.
+    /// Calls `each` with mode, part, position and increment of every part of the amplitudes of a group, in the order of
+    /// the modes.
     #[inline(always)]
     pub(super) fn each_part(&self, group: usize, mut each: impl FnMut(usize, usize, f64, f64)) {
         let (first, stride) = (self.index(0, group), self.parts * self.width);

@@ -80,10 +80,10 @@ pub enum Interpolation {
 #[serde(deny_unknown_fields)]
 pub struct SplineSettings {
     /// Number of data points around the circumference; that of the structure's contact grid if the surface has a structure.
-    #[serde(default = "count::<AROUND>", skip_serializing_if = "is::<AROUND>")]
+    #[serde(default = "default_count::<AROUND>", skip_serializing_if = "is_default_count::<AROUND>")]
     pub around: usize,
     /// Number of rings of data points along the axis; that of the structure's contact grid if the surface has a structure.
-    #[serde(default = "count::<ALONG>", skip_serializing_if = "is::<ALONG>")]
+    #[serde(default = "default_count::<ALONG>", skip_serializing_if = "is_default_count::<ALONG>")]
     pub along: usize,
     /// Closure around the circumference.
     #[serde(default, skip_serializing_if = "is_default")]
@@ -103,11 +103,11 @@ impl Default for SplineSettings {
 const AROUND: usize = 72;
 const ALONG: usize = 5;
 
-fn count<const N: usize>() -> usize {
+fn default_count<const N: usize>() -> usize {
     N
 }
 
-fn is<const N: usize>(count: &usize) -> bool {
+fn is_default_count<const N: usize>(count: &usize) -> bool {
     *count == N
 }
 
@@ -118,7 +118,7 @@ pub struct PatchSettings {
     /// Number of parts around the circumference, the first from θ = 0.
     pub around: usize,
     /// Number of parts along the axis.
-    #[serde(default = "count::<1>", skip_serializing_if = "is::<1>")]
+    #[serde(default = "default_count::<1>", skip_serializing_if = "is_default_count::<1>")]
     pub along: usize,
 }
 

@@ -1,7 +1,7 @@
-//! Results of slow checks that are stored, so that a later start with the same scene and parameters does not repeat them.
+//! Stored results of slow checks. A later start with the same scene and parameters does not repeat these checks.
 //!
-//! Each result has a key: a hash of the scene with its ROMs, of the parameters, and of the part of the check. Results with other keys are never
-//! found, so that a stored result is used only for exactly the same check.
+//! Each result has a key: a hash of the scene with its ROMs, of the parameters, and of the part of the check. A stored
+//! result is used only for a check with the same key.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -19,7 +19,7 @@ const VERSION: u64 = 1;
 /// Hash of everything that a result depends on.
 type Key = [u64; 2];
 
-/// Results by their keys; a result without numbers stands for `None`.
+/// Results by their keys. A result without numbers represents `None`.
 type Results = BTreeMap<Key, Vec<u64>>;
 
 /// Part of the checks of a structure.
@@ -29,7 +29,7 @@ pub(super) enum CheckPart {
     Set,
     /// Growth that a step adds.
     Step,
-    /// Unique solution of the contact problem.
+    /// Whether the contact problem has a unique solution.
     Solvable,
     /// Effect of the surface carriers.
     Carriers,
@@ -37,7 +37,7 @@ pub(super) enum CheckPart {
     Cutting,
 }
 
-/// Stored results, and those of the last check.
+/// Stored results, and the results of the last check.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct KnownChecks {
     stored: Arc<Results>,
@@ -45,12 +45,12 @@ pub(crate) struct KnownChecks {
 }
 
 impl KnownChecks {
-    /// Reads results that [`KnownChecks::to_bytes`] wrote; there are none if the bytes are damaged or from another version.
+    /// Reads results that [`KnownChecks::to_bytes`] wrote; reads none if the bytes are damaged or from another version.
     pub(crate) fn from_bytes(bytes: &[u8]) -> Self {
         Self { stored: Arc::new(read(bytes).unwrap_or_default()), used: Results::new() }
     }
 
-    /// Returns the results of the last check as bytes; none if nothing was checked.
+    /// Returns the results of the last check as bytes; empty if nothing was checked.
     pub(crate) fn to_bytes(&self) -> Vec<u8> {
         if self.used.is_empty() {
             return Vec::new();
@@ -65,7 +65,7 @@ impl KnownChecks {
         bytes
     }
 
-    /// Forgets which results were used by the previous check.
+    /// Begins a check: removes the results of the previous one.
     pub(super) fn begin(&mut self) {
         self.used.clear();
     }
@@ -107,14 +107,15 @@ impl<'a> BodyChecks<'a> {
         body: usize,
         parameters: &Parameters,
     ) -> Self {
-        // The sense of slip is a part of the check, and the modes follow from the speeds at which they have their stiffness.
+        // Speeds are left out: each check depends on the sense of slip separately, and the reference speeds of the
+        // stiffness determine the modes.
         let parameters = Parameters { speeds: Vec::new(), ..parameters.clone() };
         let version = env!("CARGO_PKG_VERSION");
         let text = format!("{version} {:x} {body} {:?} {parameters:?}", compiled.fingerprint, compiled.references());
         Self { known, body, key: [1, 2].map(|seed| fingerprint(text.as_bytes(), seed)) }
     }
 
-    /// Returns the numbers of a part of the check: stored ones with the same key, or those of `compute`.
+    /// Returns the numbers of a part of the check: the stored numbers with the same key, or the result of `compute`.
     pub(super) fn get<const N: usize>(
         &self,
         part: CheckPart,

@@ -133,10 +133,10 @@ impl Physics {
     }
 }
 
-/// Growth of one model with some nodes closed.
-struct SetGrowths {
+/// Growth of one model while some nodes are closed.
+struct ModelGrowth {
     continuous: Fastest,
-    /// Growth without the mass of the contact nodes, if it counts and exists.
+    /// Growth without the mass of the contact nodes; `None` if there is none, or if the scheme makes it irrelevant.
     without: Option<Fastest>,
     /// Fraction of the contact displacement that this motion contributes.
     share: f64,
@@ -146,34 +146,35 @@ struct SetGrowths {
     judged: Option<SetGrowth>,
 }
 
-impl SetGrowths {
-    /// Returns the growth as numbers; NaN stands for `None`.
-    fn numbers(self) -> [f64; 12] {
+impl ModelGrowth {
+    /// Converts the growth to numbers; NaN represents `None`.
+    fn to_numbers(&self) -> [f64; 12] {
         let without = self.without.map_or([f64::NAN; 2], |found| [found.rate, found.frequency]);
-        let judged = self.judged.map_or([f64::NAN; 6], numbers);
+        let judged = self.judged.map_or([f64::NAN; 6], growth_to_numbers);
         let ([without, frequency], [a, b, c, d, e, f]) = (without, judged);
         let Fastest { rate, frequency: with_mass } = self.continuous;
         [rate, with_mass, without, frequency, self.share, self.least.unwrap_or(f64::NAN), a, b, c, d, e, f]
     }
 
-    fn of_numbers([rate, frequency, without, other, share, least, judged @ ..]: [f64; 12]) -> Self {
+    fn from_numbers([rate, frequency, without, other, share, least, judged @ ..]: [f64; 12]) -> Self {
         Self {
             continuous: Fastest { rate, frequency },
             without: (!without.is_nan()).then_some(Fastest { rate: without, frequency: other }),
             share,
             least: (!least.is_nan()).then_some(least),
-            judged: (!judged[2].is_nan()).then(|| judgement(judged)),
+            judged: (!judged[2].is_nan()).then(|| growth_from_numbers(judged)),
         }
     }
 }
 
-/// Returns the growth of a set as numbers.
-fn numbers(judged: SetGrowth) -> [f64; 6] {
+/// Converts the growth of a set of closed nodes to numbers.
+fn growth_to_numbers(judged: SetGrowth) -> [f64; 6] {
     let GrowthRates { continuous, frequency, stepped, swing, noise } = judged.growth;
     [continuous, frequency, stepped, swing, noise, judged.share]
 }
 
-fn judgement(numbers: [f64; 6]) -> SetGrowth {
+/// Inverse of [`growth_to_numbers`].
+fn growth_from_numbers(numbers: [f64; 6]) -> SetGrowth {
     let [continuous, frequency, stepped, swing, noise, share] = numbers;
     SetGrowth { growth: GrowthRates { continuous, frequency, stepped, swing, noise }, share }
 }
@@ -192,7 +193,7 @@ impl Checking<'_> {
             let (one, judged) = judged.reduce(|known, found| {
                 if known.1.within(judged::TOLD) <= found.1.within(judged::TOLD) { known } else { found }
             })?;
-            let [continuous, frequency, stepped, swing, noise, share] = numbers(judged);
+            let [continuous, frequency, stepped, swing, noise, share] = growth_to_numbers(judged);
             #[expect(clippy::cast_precision_loss, reason = "the number of sets of contacts is far below 2^52")]
             Some([one as f64, continuous, frequency, stepped, swing, noise, share])
         };
@@ -201,7 +202,7 @@ impl Checking<'_> {
             let [one, judged @ ..] = self.known.get(CheckPart::Step, &details, || compute(step))?;
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small index")]
             let watched = watched.get(one as usize)?;
-            Some((watched.nodes.as_slice(), judgement(judged)))
+            Some((watched.nodes.as_slice(), growth_from_numbers(judged)))
         };
         let looked: Vec<_> = steps.into_iter().map(|step| (step, most_at(step))).collect();
         Sense { ranges: self.added(&looked, sign), ..self.growth(physics, sign, expected) }
@@ -215,7 +216,7 @@ impl Checking<'_> {
             let mut most: Option<FastestGrowth> = None;
             for model in 0..self.models.len() {
                 let Some(found) = self.set_growth(model, &nodes, sign, expected) else { continue };
-                let SetGrowths { continuous, without, share, least, judged } = found;
+                let ModelGrowth { continuous, without, share, least, judged } = found;
                 let physical = without.unwrap_or(continuous);
                 if physical.rate > noise {
                     let with_mass = without.map(|_| continuous);
@@ -233,15 +234,16 @@ impl Checking<'_> {
         (watched, physics)
     }
 
-    /// Returns the growth of one of the models with some nodes closed, at the expected step (s); `None` if it is not checked.
-    fn set_growth(&self, model: usize, nodes: &[usize], sign: f64, expected: f64) -> Option<SetGrowths> {
+    /// Returns the growth of one of the models with some nodes closed, at the expected step (s); `None` if it is not
+    /// checked.
+    fn set_growth(&self, model: usize, nodes: &[usize], sign: f64, expected: f64) -> Option<ModelGrowth> {
         let numbers = [model as u64, sign.to_bits(), expected.to_bits()].into_iter();
         let details: Vec<u64> = numbers.chain(nodes.iter().map(|node| *node as u64)).collect();
-        let compute = || self.computed_growth(model, nodes, sign, expected).map(SetGrowths::numbers);
-        self.known.get(CheckPart::Set, &details, compute).map(SetGrowths::of_numbers)
+        let compute = || self.computed_growth(model, nodes, sign, expected).map(|growth| growth.to_numbers());
+        self.known.get(CheckPart::Set, &details, compute).map(ModelGrowth::from_numbers)
     }
 
-    fn computed_growth(&self, model: usize, nodes: &[usize], sign: f64, expected: f64) -> Option<SetGrowths> {
+    fn computed_growth(&self, model: usize, nodes: &[usize], sign: f64, expected: f64) -> Option<ModelGrowth> {
         let (scheme, friction, largest) = (self.parameters.scheme, self.friction, self.parameters.step);
         let properties = scheme.properties();
         let (seen, directions) = self.closed_at(model, nodes, sign);
@@ -251,7 +253,7 @@ impl Checking<'_> {
         let share = judged::share_of(&seen, &directions, without.unwrap_or(continuous).frequency);
         let stepped = || limits::stepped(contacts, scheme, expected, continuous);
         let growth = if properties.adaptive { None } else { stepped() };
-        Some(SetGrowths {
+        Some(ModelGrowth {
             continuous,
             without,
             share,

@@ -42,7 +42,7 @@ impl MotionCourse {
 
     /// Returns whether only the rotor moves.
     pub(crate) fn only_turns(&self) -> bool {
-        self.parts.iter().all(|part| part.casing_rests() && part.shaft == Vector3::zeros())
+        self.parts.iter().all(|part| part.is_casing_at_rest() && part.shaft == Vector3::zeros())
     }
 
     /// Motion from the start of the span to its fraction `theta`.
@@ -69,8 +69,8 @@ impl MotionCourse {
     }
 }
 
-/// Rounding error of a contact force without friction, as a fraction of the force. A larger tangential part is from before the
-/// friction coefficient became zero.
+/// Rounding error of a contact force without friction, as a fraction of the force. A larger tangential part stems from
+/// the time before the friction coefficient became zero.
 pub(crate) const FORCE_ROUNDING: f64 = 1e-12;
 
 /// Contact of one node over a span.

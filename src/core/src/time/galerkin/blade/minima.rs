@@ -16,27 +16,27 @@ use crate::time::galerkin::response::TERMS;
 use crate::time::galerkin::trial::{FALLING, NEAR};
 
 /// Smallest and largest number of halvings of a step into the parts at whose ends the motion is evaluated.
-pub(super) const FEWEST_HALVINGS: usize = 2;
-pub(super) const MOST_HALVINGS: usize = 7;
+pub(super) const MIN_HALVINGS: usize = 2;
+const MAX_HALVINGS: usize = 7;
 /// Largest number of parts of a step.
-pub(super) const PARTS: usize = 1 << MOST_HALVINGS;
-/// Displacements of up to this number of followed nodes per block of eight are computed node by node.
+pub(super) const PARTS: usize = 1 << MAX_HALVINGS;
+/// If at most this number of nodes per block of eight is followed, their displacements are computed node by node.
 const FEW_PER_BLOCK: usize = 4;
 /// Nodes are followed if they may come closer between the points by more than this fraction of the tolerance.
 const FOLLOW_FRACTION: f64 = 0.1;
 /// Largest bound on the interpolation error between the ends of parts, as a fraction of the tolerance.
 const PARTS_FRACTION: f64 = 0.3;
 
-/// Largest error of the motion of a mode between points relative to its amplitude: neither the motion nor its
-/// interpolation exceeds the amplitude.
+/// Largest error of the interpolated motion of a mode relative to its amplitude. Neither the motion nor its
+/// interpolation exceeds the amplitude, so the error is at most twice as large.
 const UNRESOLVED: f64 = 2.0;
-/// Coefficients of x⁴ and x⁵ in the error of five gaps at equal distances, near the middle: the neglected fourth
-/// derivative, and the error of their third derivative. Near the first and the last of the gaps, the second coefficient is
-/// at most half as large again.
-const OF_PARTS: [f64; 2] = [1.0 / 384.0, 1.0 / 48.0];
+/// Coefficients of x⁴ and x⁵ in the interpolation error near the middle one of five gaps at equal distances. The
+/// neglected fourth derivative causes the x⁴ term, and the error of the third derivative the x⁵ term. Near the first and
+/// the last gap, the second coefficient is at most half as large again.
+const PART_ERROR: [f64; 2] = [1.0 / 384.0, 1.0 / 48.0];
 /// Coefficient of x⁴ in the error of the cubic through the points of a step. It holds for the parabola as well, because
 /// the points of a step follow the moments of the motion.
-const OF_STEP: [f64; 2] = [1.0 / 384.0, 0.0];
+const STEP_ERROR: [f64; 2] = [1.0 / 384.0, 0.0];
 
 /// First three derivatives at the first of five values at equal distances, as weights of the differences of the other four
 /// from the first.
@@ -44,24 +44,25 @@ const FROM_END: [[f64; 4]; 3] =
     [[4.0, -3.0, 4.0 / 3.0, -0.25], [-26.0 / 3.0, 9.5, -14.0 / 3.0, 11.0 / 12.0], [9.0, -12.0, 7.0, -1.5]];
 
 impl BladeTrial {
-    /// Largest error of interpolating the closing displacement of a node between the points of the tried step (m).
+    /// Returns the largest interpolation error of the closing displacement of a node between the points of the tried
+    /// step (m).
     pub(super) fn unresolved_motion(&mut self, rows: &BladeRows, level: &BladeLevel) -> f64 {
-        self.find_interpolation_error(rows, level.step, OF_STEP)
+        self.find_interpolation_error(rows, level.step, STEP_ERROR)
     }
 
-    /// Number of halvings of the tried step into the parts in which nodes are followed: between the ends of these parts,
-    /// the bound on the interpolation error is below a fraction of `tolerance` (m).
-    pub(super) fn halvings_to_parts(&mut self, rows: &BladeRows, level: &BladeLevel, tolerance: f64) -> usize {
+    /// Returns how often the tried step is halved into the parts in which nodes are followed. Between the ends of these
+    /// parts, the bound on the interpolation error is below a fraction of `tolerance` (m).
+    pub(super) fn find_halvings(&mut self, rows: &BladeRows, level: &BladeLevel, tolerance: f64) -> usize {
         let is_fine = |halvings: &usize| {
             let length = level.step * fraction(1, 1 << halvings);
-            self.find_interpolation_error(rows, length, OF_PARTS) <= PARTS_FRACTION * tolerance
+            self.find_interpolation_error(rows, length, PART_ERROR) <= PARTS_FRACTION * tolerance
         };
-        (FEWEST_HALVINGS..MOST_HALVINGS).find(is_fine).unwrap_or(MOST_HALVINGS)
+        (MIN_HALVINGS..MAX_HALVINGS).find(is_fine).unwrap_or(MAX_HALVINGS)
     }
 }
 
-/// Finds the nodes that may come closer between the points than at the points, with a smallest gap that an output
-/// needs. Returns whether there are such nodes. Records the gaps of the others at the points, and the gaps of all nodes
+/// Finds the nodes that may come closer between the points than at the points, and whose smallest gap an output needs.
+/// Returns whether there are such nodes. Records the gaps of all other nodes at the points, and the gaps of all nodes
 /// at the end of the step.
 pub(super) struct FindMinima<'a> {
     pub trial: &'a mut BladeTrial,
@@ -81,7 +82,8 @@ impl OctetKernel for FindMinima<'_> {
     fn run<L: Octet>(self) -> bool {
         let Self { trial, rows, level, tally, floors, tolerance, unresolved } = self;
         let mut found = false;
-        // A second look, with a bound for each node, drops most of the nodes that a bound for all nodes has selected.
+        // The first round uses one bound for all nodes. The second uses a bound for each node, and drops most of the
+        // nodes.
         let bounds = &mut trial.path_moved[0];
         bounds.fill(Eight([unresolved; 8]));
         for look in 0..2 {
@@ -153,13 +155,13 @@ fn choose<L: Octet>(
     comes & matters & !falls & !pushes & rows.valid(block)
 }
 
-/// Bounds the error of interpolating the motion of all modes between points at a distance (m): the largest over the
-/// nodes of the closing displacement. The modal forces must be known and the modes not yet advanced.
+/// Bounds the interpolation error of the motion of all modes between points at equal distances: returns the largest
+/// bound for the closing displacement of a node (m). The modal forces must be known and the modes not yet advanced.
 pub(super) struct FindInterpolationError<'a> {
     pub trial: &'a mut BladeTrial,
     pub rows: &'a BladeRows,
-    /// Distance (s), and coefficients of x⁴ and x⁵ in the error of a mode relative to its amplitude, with x = ω times
-    /// the distance. The error of a mode is at most [`UNRESOLVED`] times its amplitude.
+    /// Distance of the points (s), and coefficients of x⁴ and x⁵ in the error of a mode relative to its amplitude. x is
+    /// ω times the distance. The error of a mode is at most [`UNRESOLVED`] times its amplitude.
     pub length: f64,
     pub terms: [f64; 2],
     /// True if forces act in the step.
@@ -184,9 +186,9 @@ impl OctetKernel for FindInterpolationError<'_> {
             }
             let square = L::load(&squares[k]) * L::splat(length * length);
             let share = square * square * (L::splat(terms[0]) + square.sqrt() * L::splat(terms[1]));
-            let of_mode = amplitude * share.min(L::splat(UNRESOLVED));
-            of_mode.store(&mut path_modes[0][k]);
-            error = error + L::load(largest) * of_mode;
+            let mode_error = amplitude * share.min(L::splat(UNRESOLVED));
+            mode_error.store(&mut path_modes[0][k]);
+            error = error + L::load(largest) * mode_error;
         }
         error.total()
     }
@@ -275,7 +277,7 @@ impl Follow<'_> {
         }
     }
 
-    /// Finds the displacements of the followed nodes, one by one if they are few.
+    /// Finds the displacements of the followed nodes, node by node if there are few of them.
     #[inline(always)]
     fn displace_followed<L: Octet>(&mut self) {
         let Self { trial, rows, .. } = self;
@@ -365,8 +367,9 @@ impl Follow<'_> {
     }
 }
 
-/// Smallest value near the middle one of three values at equal distances, none of which is below it: that of the parabola
-/// through the three or, with the two values beyond them, of a cubic with the derivatives of the polynomial through five.
+/// Returns the smallest value near the middle one of three values at equal distances; the middle value is the lowest.
+/// It belongs to the parabola through the three values. With the two values beyond them, it belongs to a cubic that has
+/// the derivatives of the polynomial through all five.
 #[inline(always)]
 fn vertex<L: Octet>([before, here, after]: [L; 3], far: Option<[L; 2]>) -> L {
     let (bend, tilt) = (before - here * L::splat(2.0) + after, after - before);

@@ -1,7 +1,7 @@
 //! Integration of a blade over a span.
 
 use super::level::BladeLevel;
-use super::minima::{FEWEST_HALVINGS, PARTS};
+use super::minima::{MIN_HALVINGS, PARTS};
 use super::reach::Clearance;
 use super::rows::BladeRows;
 use super::surface::{FacedSurface, PointDrive};
@@ -312,16 +312,16 @@ impl SpanSteps for BladeInSpan<'_> {
         if pushes {
             trial.find_modal_forces(rows, level);
         }
-        // The polynomials of a step that misses the tolerance do not describe the motion between its points. There are no tables
-        // for parts of the shortest steps, whose points are close together.
-        let has_parts = step.level + FEWEST_HALVINGS <= HALVINGS;
+        // If a step misses the tolerance, its polynomials do not describe the motion between its points. There are no
+        // tables for parts of the shortest steps, whose points are close together.
+        let has_parts = step.level + MIN_HALVINGS <= HALVINGS;
         let tolerance = if has_parts && result.resolves_motion(kind, self.goal.tolerance) {
             self.goal.tolerance
         } else {
             f64::INFINITY
         };
         if trial.find_minima((rows, level), tally, floors, tolerance) {
-            let finer = trial.halvings_to_parts(rows, level, self.goal.tolerance).min(HALVINGS - step.level);
+            let finer = trial.find_halvings(rows, level, self.goal.tolerance).min(HALVINGS - step.level);
             let parts = 1_usize << finer;
             let mut drives = [PointDrive::default(); PARTS + 1];
             for (end, drive) in drives[..=parts].iter_mut().enumerate() {

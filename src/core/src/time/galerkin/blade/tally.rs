@@ -212,7 +212,7 @@ impl AddStep<'_> {
             work[0] = work[0] - around * spin;
             work[1] = work[1] + closing * over[0] + around * over[1];
             work[2] = work[2] - multiplier * weights_of(i, &gaps);
-            if !motion.casing_rests() {
+            if !motion.is_casing_at_rest() {
                 let at = L::load(&trial.angles[block]) + L::splat(faced.drives[i].turned) + moved[1][i] * per_radius;
                 let [shape, slope, _] = faced.surface.evaluate_octet::<L>(at);
                 let turned = slope * L::splat(faced.drives[i].factor * motion.shape_rotation);

@@ -28,7 +28,7 @@ pub(super) struct NodeAngles {
 }
 
 impl NodeAngles {
-    /// Angles of a sector.
+    /// Computes the angles of the nodes of a sector.
     pub fn new(layout: &Layout, sector: usize) -> Self {
         let angles: Vec<f64> = layout.angles.chunks_exact(layout.lanes).map(|row| row[sector]).collect();
         let of = |values: &dyn Fn(f64) -> f64| {
@@ -174,7 +174,7 @@ impl BladeTrial {
         }
     }
 
-    /// Reads the state of a sector at the start of a span, whose nodes are at these angles.
+    /// Reads the state of a sector at the start of a span; `angles` belong to the nodes of this sector.
     pub fn read(&mut self, rows: &BladeRows, state: &SectorState, angles: &NodeAngles) {
         self.angles.copy_from_slice(&angles.angles);
         self.directions_of_nodes[0].copy_from_slice(&angles.sines);

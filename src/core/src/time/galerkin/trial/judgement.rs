@@ -23,8 +23,9 @@ const BEND: f64 = 0.5;
 const OPENING: f64 = 30.0;
 /// A step is shortened if the gap of a node between the points may be below this multiple of the interpolation error.
 pub(crate) const NEAR: f64 = 4.0;
-/// A gap whose polynomial changes monotonically is smallest at an end of the step if its slope over the whole step
-/// exceeds the bound on the interpolation error by this factor. Modes that the points do not resolve need a large factor.
+/// Ratio of slope to interpolation error above which a gap with a monotonic polynomial is smallest at an end of the
+/// step. The slope is that over the whole step, and the error is its bound. Modes that the points do not resolve need a
+/// large ratio.
 pub(crate) const FALLING: f64 = 16.0;
 /// Free motion of the contact rows over a step of degree 1.
 #[derive(Debug, Clone)]
