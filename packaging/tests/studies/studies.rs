@@ -545,12 +545,20 @@ fn built_in_models_are_cached_unless_disabled() {
     assert_eq!(fs::read(root.path().join("out.csv")).unwrap(), first, "a kept model gives the same bits");
     assert!(run(kept, &["--no-cache"]).contains("Reducing"));
     assert!(run("", &[]).contains("Reducing"), "an empty TIPRUB_CACHE keeps nothing");
-    let file = fs::read_dir(kept).unwrap().next().unwrap().unwrap().path();
-    let mut bytes = fs::read(&file).unwrap();
-    let last = bytes.len() - 1;
-    bytes[last] ^= 1;
-    fs::write(&file, bytes).unwrap();
+    let damage = |extension: &str| {
+        let files: Vec<_> = fs::read_dir(kept).unwrap().map(|entry| entry.unwrap().path()).collect();
+        let file = files.iter().find(|path| path.extension().is_some_and(|ending| ending == extension)).unwrap();
+        let mut bytes = fs::read(file).unwrap();
+        let last = bytes.len() - 1;
+        bytes[last] ^= 1;
+        fs::write(file, bytes).unwrap();
+    };
+    damage("rom");
     let repaired = run(kept, &[]);
     assert!(repaired.contains("is damaged; reducing the model again") && repaired.contains("Reducing"), "{repaired}");
     assert_eq!(fs::read(root.path().join("out.csv")).unwrap(), first);
+    damage("checks");
+    let checked_again = run(kept, &[]);
+    assert!(!checked_again.contains("Reducing"), "{checked_again}");
+    assert_eq!(fs::read(root.path().join("out.csv")).unwrap(), first, "damaged checks are made again");
 }
