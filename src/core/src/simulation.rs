@@ -10,6 +10,7 @@ mod diagnostics;
 mod drive;
 mod failures;
 mod fingerprint;
+mod free_spans;
 mod inputs;
 mod limits;
 mod loads;
@@ -33,7 +34,7 @@ mod window;
 use tiprub_cosim::variables::Quantity;
 use tiprub_cosim::{CoSimulation, VariableValues};
 
-use crate::system::System;
+use crate::system::{Structure, System};
 use crate::time::{Recurrence, TimeStepper};
 use crate::{Result, Scene};
 use clock::{Clock, SimulationPhase};
@@ -91,6 +92,9 @@ impl Simulation {
         let mut system = compiled.system()?;
         let outputs = &compiled.scene.settings.outputs;
         system.structures.iter_mut().for_each(|one| one.need_minima(&outputs.watched_sectors, outputs.all_sectors));
+        if compiled.scene.settings.time.scheme.properties().adaptive {
+            system.structures.iter_mut().for_each(Structure::make_room_for_open_steps);
+        }
         let sets = system.sets().count();
         let state = SimulationState {
             inputs: Inputs::new(&compiled),

@@ -88,6 +88,17 @@ impl Effort {
     pub fn tried(&self) -> u64 {
         self.trials + self.flights
     }
+
+    /// Adds the counters of further steps.
+    pub(crate) fn add(&mut self, other: &Self) {
+        self.steps += other.steps;
+        self.flights += other.flights;
+        self.trials += other.trials;
+        self.unsolved += other.unsolved;
+        self.constant += other.constant;
+        self.missed += other.missed;
+        self.factorisations += other.factorisations;
+    }
 }
 
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -114,6 +125,20 @@ impl RunTotals {
     }
 }
 
+/// Spans between which nothing but the rotors moves, and with steady speed. Steps within them do not end at communication
+/// points.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct FreeSpans {
+    /// True if the run is within them.
+    pub runs: bool,
+    /// Time of their beginning (s).
+    pub since: f64,
+    /// Length of each (s).
+    pub span: f64,
+}
+
+persist_fields!(FreeSpans { runs, since, span });
+
 /// Structures, the contact pairs between them, and the groups of contacts that can influence each other.
 #[derive(Debug, Clone)]
 pub struct System {
@@ -125,6 +150,7 @@ pub struct System {
     pub(crate) settings: SystemSettings,
     pub(crate) events: Two<Vec<ContactEvent>>,
     pub(crate) counted: RunTotals,
+    pub(crate) free_spans: FreeSpans,
     /// Energy of each set before a change of the step size (J).
     mechanical: Vec<f64>,
 }
@@ -168,6 +194,7 @@ impl System {
             settings,
             events: Two { now: room(), before: room() },
             counted: RunTotals::new(vec![Ledger::default(); sets.count()]),
+            free_spans: FreeSpans::default(),
             mechanical: vec![0.0; sets.count()],
             sets,
             structures,
@@ -235,6 +262,11 @@ impl System {
     /// Length of the internal step (s).
     pub fn step_size(&self) -> f64 {
         self.structures[0].modes().step()
+    }
+
+    /// Returns whether the run is within free spans.
+    pub(crate) fn runs_freely(&self) -> bool {
+        self.free_spans.runs
     }
 
     /// Number of internal steps, or of spans if sectors are integrated with adaptive steps.
@@ -325,6 +357,7 @@ impl System {
     /// motion `drives`, one per pair.
     pub fn start(&mut self, drives: &[PrescribedMotion]) {
         self.structures.iter_mut().for_each(Structure::start);
+        self.free_spans = FreeSpans::default();
         self.groups.iter_mut().filter_map(|group| group.law.coating_mut()).for_each(Coating::reset);
         self.events.now.clear();
         self.events.before.clear();
@@ -340,13 +373,23 @@ impl System {
     /// Kinetic plus strain energy of a set (J), in the form that the scheme conserves.
     pub(crate) fn mechanical_energy(&self, set: usize) -> f64 {
         let members = self.sets.members(set).iter();
-        let (kinetic, strain) = sum_of(members.map(|member| self.structures[*member].modes().energies()));
+        let (kinetic, strain) = sum_of(members.map(|member| self.energies_of(&self.structures[*member])));
         kinetic + strain
     }
 
     /// Kinetic and strain energy of all structures (J), in the form that the scheme conserves and the energy balance uses.
     pub fn energies(&self) -> (f64, f64) {
-        sum_of(self.structures.iter().map(|structure| structure.modes().energies()))
+        sum_of(self.structures.iter().map(|structure| self.energies_of(structure)))
+    }
+
+    /// Energies of a structure (J); in free spans, the sum of both at the starts of the open steps, to which the ledger
+    /// belongs.
+    fn energies_of(&self, structure: &Structure) -> (f64, f64) {
+        if self.free_spans.runs {
+            (structure.step_control.energies.iter().sum(), 0.0)
+        } else {
+            structure.modes().energies()
+        }
     }
 
     /// Makes the current modal state the initial state again, for a first step of another length.

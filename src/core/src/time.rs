@@ -14,6 +14,18 @@ use crate::system::{StepFailure, System};
 use galerkin::stepper::Galerkin;
 pub use recurrence::Recurrence;
 
+/// A part of free time, from one internal point to the next (s since the beginning of the free spans). In free spans,
+/// nothing but the rotors moves, with steady speed, and steps do not end at internal points.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FreePart {
+    /// Start (s).
+    pub from: f64,
+    /// End (s).
+    pub to: f64,
+    /// Length of the spans (s).
+    pub span: f64,
+}
+
 /// A method that advances a system in time.
 pub trait Stepper {
     /// Fills the tables for internal steps of length `step` (s). Does not allocate.
@@ -34,6 +46,32 @@ pub trait Stepper {
     /// the rotor. Returns false, without any change, if something may come near or if blades vibrate by more than the tolerance.
     fn fly(&mut self, _system: &mut System, _drives: &[PrescribedMotion], _turns: &[f64], _length: f64) -> bool {
         false
+    }
+
+    /// Returns whether steps need not end at internal points while nothing but the rotors moves.
+    fn runs_freely(&self) -> bool {
+        false
+    }
+
+    /// Advances the system by a part of free time, to the time described by `drives`, one per contact pair.
+    ///
+    /// # Errors
+    /// A [`StepFailure`]; the state is undefined afterwards.
+    fn step_freely(
+        &mut self,
+        _system: &mut System,
+        _drives: &[PrescribedMotion],
+        _part: FreePart,
+    ) -> Result<(), StepFailure> {
+        Ok(())
+    }
+
+    /// Ends the open steps at a time (s since the beginning of the free spans).
+    ///
+    /// # Errors
+    /// A [`StepFailure`]; the state is undefined afterwards.
+    fn close_steps(&mut self, _system: &mut System, _time: f64) -> Result<(), StepFailure> {
+        Ok(())
     }
 
     /// Makes the current modal loads those at the start of the next step, if the method interpolates loads.

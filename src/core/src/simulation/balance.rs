@@ -3,6 +3,7 @@
 use tiprub_cosim::shown_time;
 use tiprub_cosim::warning::Topic;
 
+use super::outputs::SetEnergy;
 use super::{Simulation, SimulationPhase};
 use crate::limits::finding::Subject;
 use crate::scene::method::{Scheme, Solver};
@@ -82,7 +83,9 @@ impl Simulation {
         };
         let bound = factor.max(ENERGY_FACTOR) * (self.state.initial_energies[set] + self.supplied(set))
             + ENERGY_SLACK * self.system.ledgers()[set].scale();
-        self.outputs.energies[set].now <= bound
+        // The ledger belongs to the starts of open steps.
+        let SetEnergy { now, conserved } = self.outputs.energies[set];
+        (if self.system.runs_freely() { conserved } else { now }) <= bound
     }
 
     /// Returns the energy that forces times velocities have supplied to a set (J).

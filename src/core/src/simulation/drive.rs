@@ -140,6 +140,13 @@ impl RotorAngle {
     pub fn shift(&mut self, length: f64) {
         self.since -= length;
     }
+
+    /// Corrects the time since the origin to `elapsed` (s) if it is the same within a fraction.
+    pub(super) fn keep_elapsed(&mut self, elapsed: f64, fraction: f64) {
+        if (self.since + elapsed).abs() <= fraction * elapsed {
+            self.since = -elapsed;
+        }
+    }
 }
 
 #[cfg(test)]

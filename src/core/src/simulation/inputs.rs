@@ -195,7 +195,7 @@ macro_rules! ways_to_inputs {
             }
 
             /// Returns all inputs that move or load a structure. A jump of such an input would excite vibration.
-            fn $moving(&$($mutable)? self) -> impl Iterator<Item = &$($mutable)? Input> {
+            pub(super) fn $moving(&$($mutable)? self) -> impl Iterator<Item = &$($mutable)? Input> {
                 let rotors = self.rotors.$iter().flat_map(|rotor| {
                     let RotorInputs { shaft, excitation, temperature, .. } = rotor;
                     shaft.$iter().chain(excitation.$iter()).chain(temperature.$iter())

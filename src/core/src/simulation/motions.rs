@@ -45,6 +45,13 @@ impl SimulationState {
         }
     }
 
+    /// Returns the motion of a pair at an offset from the start of the communication step (s), with a shape that is fully
+    /// grown.
+    pub(super) fn ungrown(&self, compiled: &Compiled, pair: usize, offset: f64) -> PrescribedMotion {
+        let shape_factor = self.inputs.pairs[pair].shape_factor.at(offset);
+        PrescribedMotion { shape_factor, ..self.drive(compiled, pair, [offset, self.clock.time]) }
+    }
+
     /// Returns the rotation of the rotor relative to the shape of a pair until an offset (rad).
     pub fn turn(&self, compiled: &Compiled, pair: usize, offset: f64) -> f64 {
         let rotor = &self.inputs.rotors[compiled.plan.pairs[pair].body];

@@ -190,11 +190,16 @@ impl Simulation {
         self.note_missed(time);
         self.state.clock.most_tried =
             self.state.clock.most_tried.max(self.system.steps_tried() - self.state.clock.step.tried);
-        self.state.inputs.rotors.iter_mut().for_each(|rotor| rotor.angle.rebase(&rotor.speed, offset));
+        if !self.system.free_spans.runs {
+            self.state.inputs.rotors.iter_mut().for_each(|rotor| rotor.angle.rebase(&rotor.speed, offset));
+        }
         self.compute_outputs();
         self.check_outputs(time).inspect_err(|_| self.state.clock.phase = SimulationPhase::Failed)?;
         self.check_energy(time)?;
         self.state.inputs.shift(offset);
+        if self.system.free_spans.runs {
+            self.keep_angles(time);
+        }
         self.state.clock.finish(time);
         Ok(())
     }

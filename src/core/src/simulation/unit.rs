@@ -29,6 +29,9 @@ impl CoSimulation for Simulation {
             self.state.values[reference as usize] = before;
             outcome?;
             self.warn_of_friction(&parameters);
+            if self.system.free_spans.runs {
+                self.end_open_steps()?;
+            }
             self.tangent.follow_anew();
             self.apply_friction(&parameters);
         }
@@ -105,6 +108,7 @@ impl CoSimulation for Simulation {
         self.settle();
         self.launch();
         self.system.start(&self.motions.drives);
+        self.expect_free_spans();
         self.check_initial_state()?;
         self.check_initial_gaps()?;
         self.state.window.open(self.system.structures());
@@ -159,7 +163,12 @@ impl CoSimulation for Simulation {
     /// Does nothing unless sectors take adaptive steps, inputs rest, and no contact can close.
     fn fly_ahead(&mut self) {
         let last = self.state.clock.step.count.saturating_sub(1);
-        if !self.is_stepping() || !self.is_marched() || self.state.clock.step.done > 0 || last < 2 {
+        if self.stepper.runs_freely()
+            || !self.is_stepping()
+            || !self.is_marched()
+            || self.state.clock.step.done > 0
+            || last < 2
+        {
             return;
         }
         let point = self.state.clock.step.point(last);
@@ -188,10 +197,10 @@ impl CoSimulation for Simulation {
             // The mark includes the inputs set meanwhile.
             self.set_mark();
         }
-        let next = self.state.clock.step.done + 1;
+        let (next, free) = self.next_point()?;
         let (from, to) = (self.state.clock.step.reached(), self.state.clock.step.point(next));
         let ([before, _], [offset, time]) = (from, to);
-        if self.is_marched() {
+        if self.is_marched() && free.is_none() {
             let middle = [0, 1].map(|i| 0.5 * (from[i] + to[i]));
             for pair in 0..self.motions.drives.len() {
                 let middle = self.state.drive(&self.compiled, pair, middle);
@@ -204,13 +213,18 @@ impl CoSimulation for Simulation {
             self.stepper.begin_loads(&mut self.system);
             self.load(offset);
         }
-        match self.stepper.step(&mut self.system, &self.motions.drives) {
+        let outcome = match free {
+            Some(part) => self.stepper.step_freely(&mut self.system, &self.motions.drives, part),
+            None => self.stepper.step(&mut self.system, &self.motions.drives),
+        };
+        match outcome {
             Ok(()) => {}
             Err(StepFailure::Exhausted) => return Err(self.abandon_step()),
             Err(failure) => return Err(self.fail(failure, time)),
         }
         let places = (&self.compiled.patches[..], &self.compiled.linings[..]);
-        self.state.window.add(&self.system, places, self.system.step_size());
+        let length = free.map_or_else(|| self.system.step_size(), |part| part.to - part.from);
+        self.state.window.add(&self.system, places, length);
         self.state.clock.step.done = next;
         let finished = next == self.state.clock.step.count;
         if finished {
@@ -291,13 +305,15 @@ impl Simulation {
         let (variable, element) = self.state.values.table().locate(reference)?;
         let (quantity, of) = (variable.quantity, variable.of);
         let (stepping, at_once) = (self.is_in_step(), self.acts_at_once(quantity));
-        if stepping {
-            self.tangent.forget();
-        }
         let Some(mut input) = self.state.inputs.get(quantity, of, element).copied() else { return Ok(()) };
         let (offset, length) = (self.state.clock.offset_now(), self.state.clock.step.length);
+        let (rests, value) = (input.stays(offset), input.value);
         change(&mut input);
+        if rests && input.slope == 0.0 && input.value.to_bits() == value.to_bits() {
+            return Ok(());
+        }
         if stepping {
+            self.tangent.forget();
             self.check_course(variable, element, &input, at_once, [offset, length])?;
         }
         if at_once || self.state.clock.is_created() {

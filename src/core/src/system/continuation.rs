@@ -165,6 +165,7 @@ impl System {
         self.pairs.iter().for_each(|pair| pair.prescribed.save(writer));
         self.groups.iter().for_each(|group| group.law.save(writer));
         self.counted.save(writer);
+        self.free_spans.save(writer);
     }
 
     /// Reads over a saved state and rejects invalid values. Returns its step size (s) and the number of its infinite gaps. Gaps
@@ -194,6 +195,7 @@ impl System {
         self.pairs.iter().for_each(|pair| pair.prescribed.check(reader));
         self.groups.iter().for_each(|group| group.law.check(reader));
         self.counted.check(reader);
+        self.free_spans.check(reader);
         (step, endless.unwrap_or(0))
     }
 
@@ -240,6 +242,7 @@ impl System {
         self.pairs.iter_mut().for_each(|pair| pair.prescribed.restore(reader));
         self.groups.iter_mut().for_each(|group| group.law.restore(reader));
         self.counted.restore(reader);
+        self.free_spans.restore(reader);
         self.rebuild_events();
     }
 

@@ -40,9 +40,30 @@ pub(crate) struct Prescribed {
     pub(crate) drive: Two<PrescribedMotion>,
     /// Change over the last step, and over the previous step.
     pub(crate) motion: Two<MotionIncrement>,
+    /// At the beginning of the free spans or of the last internal step, with a shape that is fully grown.
+    pub(crate) begun: PrescribedMotion,
+    /// Time since the growth of the shape began, at that beginning, and duration of the growth (s).
+    pub(crate) growth: [f64; 2],
 }
 
-persist_fields!(Prescribed { drive, motion });
+persist_fields!(Prescribed { drive, motion, begun, growth });
+
+impl Prescribed {
+    /// Motion and growth of the shape between two times (s since the beginning of the free spans), in which nothing else
+    /// moves but the rotor.
+    pub fn in_free_spans(&self, from: f64, length: f64) -> ([PrescribedMotion; 3], ShapeGrowth) {
+        let (Self { begun, growth: [elapsed, duration], .. }, from_angle) = (self, self.begun.speed * from);
+        let grown = elapsed + from;
+        let at = |after: f64| PrescribedMotion {
+            rotor_angle: begun.rotor_angle + from_angle % std::f64::consts::TAU + begun.speed * after,
+            shape_factor: begun.shape_factor * ShapeGrowth::share(grown + after, *duration),
+            ..*begun
+        };
+        let growth =
+            ShapeGrowth { factors: [begun.shape_factor; 2], elapsed: [grown, grown + length], length: *duration };
+        ([0.0, 0.5 * length, length].map(at), growth)
+    }
+}
 
 /// A contact pair with its prescribed motion.
 #[derive(Debug, Clone)]
@@ -89,12 +110,12 @@ impl ContactPair {
 
     /// Starts with the prescribed motion `drive`, without earlier motion.
     pub(crate) fn start(&mut self, drive: &PrescribedMotion) {
-        self.prescribed = Prescribed { drive: Two::new(*drive), motion: Two::default() };
+        self.prescribed = Prescribed { drive: Two::new(*drive), begun: *drive, ..Prescribed::default() };
     }
 
     /// Starts a step of length `step` (s) to the prescribed motion `drive`.
     pub(crate) fn move_to(&mut self, drive: &PrescribedMotion, step: f64) {
-        let Prescribed { drive: drives, motion } = &mut self.prescribed;
+        let Prescribed { drive: drives, motion, .. } = &mut self.prescribed;
         (drives.before, motion.before) = (drives.now, motion.now);
         drives.now = *drive;
         motion.now = MotionIncrement::between(&drives.before, drive, step);

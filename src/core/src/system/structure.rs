@@ -71,9 +71,12 @@ pub struct StepControl {
     pub slopes: Vec<f64>,
     /// Normals for which the contact forces were found, `[row · lanes + lane]`.
     pub normals: Vec<f64>,
+    /// Open steps of the sectors, one after the other, and the energies at their starts (J), in free spans.
+    pub open_steps: Vec<f64>,
+    pub energies: Vec<f64>,
 }
 
-persist_fields!(StepControl { bank, largest, level, slopes, normals });
+persist_fields!(StepControl { bank, largest, level, slopes, normals, open_steps, energies });
 
 impl StepControl {
     fn new(sectors: usize, contacts: usize) -> Self {
@@ -83,6 +86,8 @@ impl StepControl {
             level: vec![0; sectors],
             slopes: vec![0.0; 3 * contacts],
             normals: vec![0.0; 3 * contacts],
+            open_steps: Vec::new(),
+            energies: vec![0.0; sectors],
         }
     }
 }
@@ -235,6 +240,7 @@ impl Structure {
         self.step_control.level.fill(0);
         self.step_control.slopes.fill(0.0);
         self.step_control.normals.fill(0.0);
+        self.step_control.open_steps.fill(0.0);
     }
 
     /// Uses gaps and predictions at the start as those of the previous steps.
@@ -288,6 +294,12 @@ impl Structure {
                 *lowest = if *lowest <= *gap || lowest.is_nan() { *lowest } else { *gap };
             }
         }
+    }
+
+    /// Includes the current gaps in the smallest gaps within the last span.
+    pub(crate) fn include_gaps_now(&mut self) {
+        let ends = self.lowest_in_span.iter_mut().zip(&self.history.gap.now);
+        ends.for_each(|(lowest, gap)| *lowest = lowest.min(*gap));
     }
 
     /// Returns the first sector from `first` on in which a node penetrates. NaN counts as penetrating, so that the solver reports it.

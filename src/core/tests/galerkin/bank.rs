@@ -2,6 +2,7 @@
 
 use super::{SECTORS, scene};
 use crate::guide::{self, print_row};
+use tiprub_core::Simulation;
 use tiprub_core::scene::method::Scheme;
 use tiprub_core::scene::settings::Shape;
 use tiprub_test_models::{go, real, set, started};
@@ -17,7 +18,11 @@ fn blades_conserve_energy_over_thousands_of_impacts() {
         scene.settings.contacts[0].friction = 0.0;
         scene.settings.structures[0].damping_ratio = Some(0.0);
         let mut simulation = started(&scene);
-        let energy = |simulation: &_| real(simulation, "kinetic_energy") + real(simulation, "strain_energy");
+        // The impact loss belongs to the starts of open steps, like these energies.
+        let energy = |simulation: &Simulation| {
+            let (kinetic, strain) = simulation.system().energies();
+            kinetic + strain
+        };
         let mut largest = 0.0_f64;
         for radius in [-1.4e-4, -2.8e-4, -4.2e-4, -5.6e-4, -7e-4, -3.2e-4] {
             set(&mut simulation, "casing_radius_change", radius);

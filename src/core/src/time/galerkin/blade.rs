@@ -12,6 +12,9 @@
 
 mod accept;
 mod columns;
+mod dense;
+mod follow;
+mod free;
 mod judge;
 mod level;
 mod minima;
@@ -21,9 +24,12 @@ mod solve;
 mod span;
 mod start;
 mod surface;
+mod tables;
 mod tally;
 #[cfg(test)]
 mod tests;
 mod trial;
 
+pub(crate) use free::stored_len;
 pub(crate) use span::{Blade, BladeInSpan, BladePlace};
+pub(crate) use tables::SpanKind;

@@ -112,15 +112,14 @@ impl Island {
         Self::new(tables, vec![sector], Vec::new(), Vec::new())
     }
 
-    /// Fills the tables for spans of length `span` (s). Returns false if the tables are already valid for this length.
-    pub fn set_span(&mut self, span: f64) -> bool {
+    /// Fills the tables for spans of length `span` (s).
+    pub fn set_span(&mut self, span: f64) {
         if span.to_bits() == self.span.to_bits() {
-            return false;
+            return;
         }
         self.span = span;
         self.tables.iter_mut().flatten().for_each(|tables| tables.set_span(span));
         self.shared_bodies_mut().for_each(|body| body.set_span(span));
-        true
     }
 
     /// Returns whether the island is a single sector on rigid surfaces.

@@ -1,7 +1,10 @@
 //! An island of a scene: the sectors and carriers that it consists of, their state, and the record of their contacts.
 
+mod contacts;
+mod free;
+
 use super::basis::MOST;
-use super::blade::{Blade, BladeInSpan, BladePlace};
+use super::blade::{Blade, BladeInSpan, BladePlace, SpanKind};
 use super::carrier::{CarrierIntegrator, coordinates};
 use super::compliance::Lanes;
 use super::disk::CoupledDisk;
@@ -15,7 +18,7 @@ use super::surroundings::{CarriersInStep, Surroundings};
 use super::tables::{HALVINGS, Tables};
 use crate::geometry::wrench::At;
 use crate::geometry::{GapLaw, PrescribedMotion};
-use crate::math::vector::{set_strided_vector3, set_vector3_at, vector3_at};
+use crate::math::vector::vector3_at;
 use crate::modes::bank::{Disk, ModalBank};
 use crate::modes::coordinates::ContactModes;
 use crate::system::contact_view::ContactMember;
@@ -43,6 +46,8 @@ pub(crate) struct SceneIsland {
     goal: StepGoal,
     /// Steps of sectors that face one surface of revolution.
     blade: Option<Box<Blade>>,
+    /// Number of numbers that store an open step of a sector; 0 if steps end at internal points.
+    stored: usize,
     /// Free flight of each kind of a single sector.
     flights: Vec<FreeFlight>,
 }
@@ -131,12 +136,18 @@ impl SceneIsland {
             Some((_, pair)) if takes_turns && own().nth(1).is_none() => Blade::new(&tables[0], pair.gap(), solver),
             _ => None,
         };
+        let first = &structures[touching[0]];
+        let stored = match &blade {
+            Some(blade) if blade.runs_freely() && !first.step_control.open_steps.is_empty() => first.open_step_len(),
+            _ => 0,
+        };
         let precision = if takes_turns { PRECISION } else { CLOSE * PRECISION };
         Self {
             set,
             island: Island::new(tables, sectors, disks, carriers),
             records,
             blade: blade.map(Box::new),
+            stored,
             turns: if takes_turns { structures[touching[0]].modes().sectors() } else { 1 },
             goal: StepGoal { tolerance, precision: (precision * tolerance).max(rounding), most: u64::MAX },
             flights,
@@ -153,12 +164,10 @@ impl SceneIsland {
         self.records[0].structure
     }
 
-    /// Fills the tables for spans of length `span` (s).
+    /// Uses tables for spans of length `span` (s).
     pub fn set_span(&mut self, span: f64) {
-        if self.island.set_span(span)
-            && let Some(blade) = &mut self.blade
-        {
-            blade.fill(&self.island.tables[0]);
+        if self.blade.is_none() {
+            self.island.set_span(span);
         }
     }
 
@@ -171,6 +180,7 @@ impl SceneIsland {
         self.records.iter_mut().for_each(|record| record.begin_courses(&system.pairs, span));
         if let Some(blade) = &mut self.blade {
             let structure = &system.structures[self.records[0].structure];
+            blade.set_span(SpanKind::Bounded, span);
             blade.begin_span(&structure.history.gap.before, structure.lanes(), self.turns);
             return (0..self.turns).try_for_each(|turn| self.step_blade(turn, system, span, most_tried));
         }
@@ -218,12 +228,12 @@ impl SceneIsland {
             return Ok(());
         };
         let (IslandSector { table: [_, kind], state, .. }, record) = (&mut sectors[0], &mut records[0]);
-        let PairRecord { pair, course, .. } = &record.pairs[0];
-        let (structure, sector, pair) = (record.structure, record.sector, *pair);
+        let PairRecord { pair, course, .. } = record.pairs[0];
+        let (structure, sector) = (record.structure, record.sector);
         let GapLaw::Revolution(gap) = pairs[pair].gap() else { return Ok(()) };
         blade.choose_minima(&structures[structure].needed_minima, sector, |node| record.tallies[node].lowest);
         let place = BladePlace { kind: *kind, sector, gap, parameters: pairs[pair].parts.parameters, course };
-        let mut steps = BladeInSpan::begin(blade, place, *control, goal, state);
+        let mut steps = BladeInSpan::begin(blade, place, *control, goal, Some(state));
         let outcome = integrate(&mut steps, &mut counted.effort);
         steps.write(state);
         *control = steps.control;
@@ -240,10 +250,7 @@ impl SceneIsland {
             return Err(StepFailure::Implausible { structure, sector });
         }
         self.write(structures);
-        outcome.map_err(|stopped| match stopped {
-            Stopped::Exhausted => StepFailure::Exhausted,
-            Stopped::Unsolved => StepFailure::Unsolved { structure, sector },
-        })
+        outcome.map_err(|stopped| stopped.failure(structure, sector))
     }
 
     /// Selects the sector whose turn it is.
@@ -278,6 +285,11 @@ impl SceneIsland {
             bank.read_sector(0, &mut position[..dynamic], &mut velocity[..dynamic]);
             bank.read_loads(&mut carrier.body.loads);
         }
+        self.read_control(structures);
+    }
+
+    /// Reads the step control of the first sector before a span.
+    fn read_control(&mut self, structures: &[Structure]) {
         let SpanRecord { structure, sector, .. } = self.records[0];
         let control = &structures[structure].step_control;
         self.island.control = StepControl {
@@ -293,7 +305,12 @@ impl SceneIsland {
         let Island { sectors, tables, control, disks, carriers, .. } = &mut self.island;
         for (one, record) in sectors.iter_mut().zip(&self.records) {
             let (structure, sector) = (&mut structures[record.structure], record.sector);
-            structure.write_contacts(sector, &one.state, |node| record.tallies[node].lowest);
+            let lowest = |node: usize| record.tallies[node].lowest;
+            if self.blade.is_some() && !one.state.is_loaded() && !structure.is_loaded(sector) {
+                structure.write_lowest(sector, lowest);
+            } else {
+                structure.write_contacts(sector, &one.state, lowest);
+            }
             let of = &mut structure.step_control;
             (of.bank[sector], of.largest[sector]) = (control.bank, control.largest);
             of.level[sector] = control.level as u64;
@@ -385,6 +402,16 @@ impl SceneIsland {
     }
 }
 
+impl Stopped {
+    /// Converts the reason why a sector was not integrated to the end.
+    fn failure(self, structure: usize, sector: usize) -> StepFailure {
+        match self {
+            Self::Exhausted => StepFailure::Exhausted,
+            Self::Unsolved => StepFailure::Unsolved { structure, sector },
+        }
+    }
+}
+
 /// Modes of the sectors, one entry per kind of sector.
 fn kinds_of(bank: &ModalBank) -> Vec<ContactModes> {
     if let Some(disk) = bank.disk() {
@@ -409,35 +436,5 @@ fn modes_of(bank: &ModalBank, sector: usize, count: usize) -> ContactModes {
         damping_ratios: model.damping_ratios[..count].to_vec(),
         shapes: model.contact_modes.columns(0, count).into_owned(),
         residual,
-    }
-}
-
-impl Structure {
-    /// Reads the contacts of a sector before a span.
-    pub(crate) fn read_contacts(&self, sector: usize, state: &mut SectorState) {
-        for node in 0..self.nodes() {
-            let index = self.index(node, sector);
-            state.multipliers[node] = self.history.multiplier[index];
-            state.gaps[node] = self.history.gap.before[index];
-            let (normals, slopes) = (&self.step_control.normals, &self.step_control.slopes);
-            set_vector3_at(&mut state.normals, node, self.vector3(normals, node, sector));
-            set_vector3_at(&mut state.slopes, node, self.vector3(slopes, node, sector));
-            set_vector3_at(&mut state.forces, node, self.vector3(&self.history.force.now, node, sector));
-        }
-        state.gaps_known = true;
-    }
-
-    /// Writes the contacts of a sector after a span, and the smallest gap of each node during the span (m).
-    pub(crate) fn write_contacts(&mut self, sector: usize, state: &SectorState, lowest: impl Fn(usize) -> f64) {
-        let lanes = self.lanes();
-        for node in 0..self.nodes() {
-            let index = self.index(node, sector);
-            self.history.multiplier[index] = state.multipliers[node];
-            self.lowest_in_span[index] = lowest(node);
-            let first = 3 * node * lanes + sector;
-            set_strided_vector3(&mut self.history.force.now, first, lanes, vector3_at(&state.forces, node));
-            set_strided_vector3(&mut self.step_control.normals, first, lanes, vector3_at(&state.normals, node));
-            set_strided_vector3(&mut self.step_control.slopes, first, lanes, vector3_at(&state.slopes, node));
-        }
     }
 }

@@ -25,6 +25,21 @@ pub struct SpanStep {
     pub length: f64,
 }
 
+impl SpanStep {
+    /// The step of a level after `done` parts of the span, of which there are [`WHOLE`].
+    pub(crate) fn new(level: usize, done: u64) -> Self {
+        Self { level, from: share(done, WHOLE), length: share(units_of(level), WHOLE) }
+    }
+}
+
+/// Number of the shortest steps in a span.
+pub(crate) const WHOLE: u64 = 1 << HALVINGS;
+
+/// Number of the shortest steps in a step of a level.
+pub(crate) fn units_of(level: usize) -> u64 {
+    WHOLE >> level
+}
+
 /// Tolerance and limits of the steps of a sector.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepGoal {
@@ -77,31 +92,42 @@ pub trait SpanSteps {
 /// # Errors
 /// [`Stopped`] if the span is not integrated to its end; the state is then the state after the last accepted step.
 pub(crate) fn integrate(steps: &mut impl SpanSteps, effort: &mut Effort) -> Result<(), Stopped> {
-    Integration { steps }.integrate(effort)
+    let mut done = 0;
+    while done < WHOLE {
+        done = take_step(steps, done, effort)?;
+    }
+    Ok(())
+}
+
+/// Takes the next step after `done` parts of a span, and returns the parts done then.
+///
+/// # Errors
+/// [`Stopped`] if no step is taken.
+pub(crate) fn take_step(steps: &mut impl SpanSteps, done: u64, effort: &mut Effort) -> Result<u64, Stopped> {
+    StepChoice { steps }.take(done, effort)
 }
 
 /// Choice of the steps of a span.
-struct Integration<'a, S> {
+struct StepChoice<'a, S> {
     steps: &'a mut S,
 }
 
-impl<S: SpanSteps> Integration<'_, S> {
-    fn integrate(&mut self, effort: &mut Effort) -> Result<(), Stopped> {
-        const WHOLE: u64 = 1 << HALVINGS;
-        let (goal, count, mut done) = (self.steps.goal(), self.steps.count(), 0_u64);
-        while done < WHOLE {
+impl<S: SpanSteps> StepChoice<'_, S> {
+    fn take(&mut self, done: u64, effort: &mut Effort) -> Result<u64, Stopped> {
+        let (goal, count) = (self.steps.goal(), self.steps.count());
+        loop {
             let level = self.steps.control().level;
             // A shortest step may need two trials.
             let next = count * if level == HALVINGS { 2 } else { 1 };
             if effort.tried().saturating_add(next) > goal.most {
                 return Err(Stopped::Exhausted);
             }
-            let units = WHOLE >> level;
-            let step = SpanStep { level, from: share(done, WHOLE), length: share(units, WHOLE) };
+            let (step, end) = (SpanStep::new(level, done), done + units_of(level));
+            let is_even = end.is_multiple_of(2 * units_of(level));
             if self.steps.fly(step) {
-                (effort.steps, effort.flights, done) = (effort.steps + count, effort.flights + count, done + units);
-                self.steps.control().level -= usize::from(level > 0 && done.is_multiple_of(2 * units));
-                continue;
+                (effort.steps, effort.flights) = (effort.steps + count, effort.flights + count);
+                self.steps.control().level -= usize::from(level > 0 && is_even);
+                return Ok(end);
             }
             let (result, kind) = self.try_step(step, effort);
             if self.is_too_long(step, kind, &result, goal.tolerance) && level < HALVINGS {
@@ -114,13 +140,13 @@ impl<S: SpanSteps> Integration<'_, S> {
             effort.missed += count * u64::from(result.misses(goal.tolerance));
             let left = self.steps.accept(step, kind, &result);
             self.steps.control().bank += left;
-            (effort.steps, done) = (effort.steps + count, done + units);
-            let even = done.is_multiple_of(2 * units);
-            if level > 0 && even && kind == ForceInterpolation::Polynomial && result.error < LENGTHEN * goal.tolerance {
+            effort.steps += count;
+            let is_accurate = kind == ForceInterpolation::Polynomial && result.error < LENGTHEN * goal.tolerance;
+            if level > 0 && is_even && is_accurate {
                 self.steps.control().level -= 1;
             }
+            return Ok(end);
         }
-        Ok(())
     }
 
     /// Returns whether a step has no solution, misses the tolerance or a contact between its points, or needs more energy than the

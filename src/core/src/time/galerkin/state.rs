@@ -38,6 +38,11 @@ impl SectorState {
         }
     }
 
+    /// Returns whether a contact pushes.
+    pub(crate) fn is_loaded(&self) -> bool {
+        self.multipliers.iter().any(|multiplier| *multiplier != 0.0)
+    }
+
     /// Copies everything about the contacts, but not the modes.
     pub(crate) fn copy_contacts(&mut self, from: &Self) {
         self.forces.copy_from_slice(&from.forces);

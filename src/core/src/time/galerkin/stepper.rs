@@ -2,8 +2,8 @@
 
 use super::scene_island::SceneIsland;
 use crate::geometry::PrescribedMotion;
-use crate::system::{SearchStart, StepFailure, System};
-use crate::time::Stepper;
+use crate::system::{SearchStart, StepFailure, Structure, System};
+use crate::time::{FreePart, Stepper};
 
 /// Tables and scratch memory for adaptive steps of all islands of a system.
 #[derive(Debug, Clone)]
@@ -49,10 +49,7 @@ impl Stepper for Galerkin {
         system.counted.factorisations += system.counted.effort.factorisations - factorisations;
         system.check_travel()?;
         system.find_gaps(SearchStart::PreviousStep);
-        for structure in &mut system.structures {
-            let ends = structure.lowest_in_span.iter_mut().zip(&structure.history.gap.now);
-            ends.for_each(|(lowest, gap)| *lowest = lowest.min(*gap));
-        }
+        system.structures.iter_mut().for_each(Structure::include_gaps_now);
         system.check_edges()?;
         system.counted.steps += 1;
         Ok(())
@@ -73,6 +70,45 @@ impl Stepper for Galerkin {
         system.find_gaps(SearchStart::PreviousStep);
         system.counted.steps += 1;
         true
+    }
+
+    fn runs_freely(&self) -> bool {
+        self.islands.iter().all(SceneIsland::runs_freely)
+    }
+
+    fn step_freely(
+        &mut self,
+        system: &mut System,
+        drives: &[PrescribedMotion],
+        part: FreePart,
+    ) -> Result<(), StepFailure> {
+        for (pair, drive) in system.pairs.iter_mut().zip(drives) {
+            pair.move_to(drive, part.to - part.from);
+        }
+        system.events.shift();
+        system.events.now.clear();
+        let factorisations = system.counted.effort.factorisations;
+        self.islands.iter_mut().try_for_each(|island| island.integrate_freely(system, part))?;
+        system.counted.factorisations += system.counted.effort.factorisations - factorisations;
+        system.check_travel()?;
+        system.structures.iter_mut().for_each(|structure| {
+            structure.find_lowest();
+            structure.include_gaps_now();
+        });
+        system.check_edges()?;
+        system.counted.steps += 1;
+        Ok(())
+    }
+
+    fn close_steps(&mut self, system: &mut System, time: f64) -> Result<(), StepFailure> {
+        let (span, factorisations) = (system.free_spans.span, system.counted.effort.factorisations);
+        self.islands
+            .iter_mut()
+            .try_for_each(|island| island.close_steps(system, FreePart { from: time, to: time, span }))?;
+        system.counted.factorisations += system.counted.effort.factorisations - factorisations;
+        system.free_spans.runs = false;
+        system.find_gaps(SearchStart::PreviousStep);
+        Ok(())
     }
 
     fn begin_loads(&mut self, system: &mut System) {

@@ -101,6 +101,6 @@ pub fn shortest(span: f64) -> f64 {
 }
 
 /// `span` divided by 2 `halvings` times (s).
-fn halved(span: f64, halvings: usize) -> f64 {
+pub(super) fn halved(span: f64, halvings: usize) -> f64 {
     libm::ldexp(span, -i32::try_from(halvings).unwrap_or(i32::MAX))
 }

@@ -8,6 +8,20 @@ use crate::time::galerkin::level::StepTables;
 use crate::time::galerkin::response::TERMS;
 use crate::time::galerkin::trial::ForceInterpolation;
 
+/// √(3/5), the outer Gauss points of three on −1 … 1.
+const GAUSS: f64 = 0.774_596_669_241_483_4;
+
+/// Weights of integrals over a part of a step.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct PartWeights {
+    /// Weights of the work of forces at the points: ∫L_i L_k′ dθ over the part.
+    pub work: [[f64; POINTS]; POINTS],
+    /// Durations of the impulses of these forces (s).
+    pub durations: [f64; POINTS],
+    /// Ends of the part, as fractions of the step.
+    pub ends: [f64; 2],
+}
+
 /// Tables for one step length. A lane is one node at one point of the step. Lanes are stored point by point, in blocks
 /// of eight nodes.
 #[derive(Debug, Clone)]
@@ -19,9 +33,8 @@ pub(crate) struct BladeLevel {
     pub blocks: usize,
     /// Coefficients of q and q̇ in the displacement at each point.
     pub free: [[Vec<Eight>; 2]; MOST],
-    /// Weights of the work of forces at the points, and durations of their impulses (s).
-    pub work: [[f64; POINTS]; POINTS],
-    pub durations: [f64; POINTS],
+    /// Weights of integrals over the whole step.
+    pub whole: PartWeights,
     /// Coefficients of (q, q̇, p_a) in q and q̇ at the end, and in the damping loss.
     pub end: [[Vec<Eight>; TERMS]; 2],
     pub loss: Vec<Eight>,
@@ -48,8 +61,11 @@ impl BladeLevel {
             step: 0.0,
             blocks,
             free: std::array::from_fn(|_| [of_modes(), of_modes()]),
-            work: std::array::from_fn(|i| kind.work_weights(&basis, i)),
-            durations: [0.0; POINTS],
+            whole: PartWeights {
+                work: std::array::from_fn(|i| kind.work_weights(&basis, i)),
+                durations: [0.0; POINTS],
+                ends: [0.0, 1.0],
+            },
             end: [0, 1].map(|_| std::array::from_fn(|_| of_modes())),
             loss: vec![Eight::ZERO; TERMS * (TERMS + 1) / 2 * rows.mode_blocks],
             damped: false,
@@ -64,7 +80,7 @@ impl BladeLevel {
     pub fn fill(&mut self, rows: &BladeRows, tables: &StepTables) {
         (self.step, self.damped) = (tables.step, tables.damped);
         let (points, degree) = (self.points(), self.basis.degree);
-        self.durations = match self.kind {
+        self.whole.durations = match self.kind {
             ForceInterpolation::Polynomial => self.basis.weights.map(|weight| weight * tables.step),
             ForceInterpolation::Constant => [0.0, tables.step, 0.0, 0.0],
         };
@@ -110,10 +126,37 @@ impl BladeLevel {
         }
     }
 
+    /// Weights of integrals over the part of the step between two fractions of it.
+    pub fn part(&self, ends: [f64; 2]) -> PartWeights {
+        let (share, middle) = (ends[1] - ends[0], 0.5 * (ends[0] + ends[1]));
+        let mut part = PartWeights { ends, ..PartWeights::default() };
+        if self.kind == ForceInterpolation::Constant {
+            (part.work[1][0], part.work[1][1]) = (-share, share);
+            part.durations[1] = share * self.step;
+            return part;
+        }
+        // Gauss points and weights, exact up to degree 5.
+        for (place, weight) in [(-GAUSS, 5.0 / 18.0), (0.0, 4.0 / 9.0), (GAUSS, 5.0 / 18.0)] {
+            let theta = middle + 0.5 * share * place;
+            let (values, slopes) = (self.basis.weights_at(theta), self.basis.slopes_at(theta));
+            for (i, value) in values.iter().enumerate() {
+                let weighted = share * weight * value;
+                part.durations[i] += weighted * self.step;
+                part.work[i].iter_mut().zip(slopes).for_each(|(sum, slope)| *sum += weighted * slope);
+            }
+        }
+        part
+    }
+
     /// Number of points at which forces are unknown.
     #[inline(always)]
     pub fn points(&self) -> usize {
         if self.kind == ForceInterpolation::Constant { 1 } else { self.basis.degree }
+    }
+
+    /// Fraction of the step at the point of the lanes with this number.
+    pub fn place(&self, point: usize) -> f64 {
+        if self.kind == ForceInterpolation::Constant { 1.0 } else { self.basis.points[point + 1] }
     }
 
     /// Displacements of all lanes per unit force on one lane: closing and circumferential displacements for a force

@@ -31,7 +31,7 @@ impl OctetKernel for FindReach<'_> {
     }
 }
 
-/// Bound on the gaps of all nodes over a step without contact.
+/// Bound on the gaps of all nodes over a step or a part of it without contact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Clearance {
     /// A node may touch.
@@ -44,7 +44,7 @@ pub(super) enum Clearance {
 
 /// See [`BladeTrial::find_clearance`].
 pub(super) struct FindClearance<'a> {
-    pub trial: &'a BladeTrial,
+    pub trial: &'a mut BladeTrial,
     pub rows: &'a BladeRows,
     pub faced: &'a FacedSurface<'a>,
     pub floors: &'a [Eight],
@@ -81,7 +81,9 @@ impl OctetKernel for FindClearance<'_> {
             }
             // The gap is F/N with N ≥ M; on a flank below 45° N ≤ √2 M.
             let smallest = left / (L::load(&rows.steepness[block]) * L::splat(std::f64::consts::SQRT_2));
-            needed |= smallest.less(L::load(&floors[block]).min(L::load(&lowest[block]))) & valid;
+            let of_block = smallest.less(L::load(&floors[block]).min(L::load(&lowest[block]))) & valid;
+            trial.followed[block] = of_block;
+            needed |= of_block;
         }
         if needed == 0 { Clearance::Wide } else { Clearance::Needed }
     }

@@ -1,11 +1,14 @@
 //! Integration of a blade over a span.
 
-use super::level::BladeLevel;
-use super::minima::{MIN_HALVINGS, PARTS};
+use super::dense::ModeResponse;
+use super::free::{OpenStep, Progress};
+use super::level::PartWeights;
+use super::minima::{MAX_HALVINGS, MIN_HALVINGS, PARTS};
 use super::reach::Clearance;
 use super::rows::BladeRows;
 use super::surface::{FacedSurface, PointDrive};
-use super::tally::BladeTally;
+use super::tables::{BladeTables, SpanKind};
+use super::tally::{AddStep, BladeTally, Sums};
 use super::trial::{BladeTrial, NodeAngles};
 use crate::contact::ContactParameters;
 use crate::geometry::GapLaw;
@@ -14,6 +17,7 @@ use crate::geometry::wrench::MotionIncrement;
 use crate::math::octet::Eight;
 use crate::scene::method::Solver;
 use crate::system::structure::NeededMinima;
+use crate::system::work::ContactWork;
 use crate::time::galerkin::basis::POINTS;
 use crate::time::galerkin::island::StepControl;
 use crate::time::galerkin::record::MotionCourse;
@@ -21,29 +25,35 @@ use crate::time::galerkin::span::{SpanStep, SpanSteps, StepGoal};
 use crate::time::galerkin::state::SectorState;
 use crate::time::galerkin::tables::{HALVINGS, Tables};
 use crate::time::galerkin::trial::{ForceInterpolation, TrialResult};
-
-/// Tables of one kind of sector.
-#[derive(Debug, Clone)]
-struct BladeTables {
-    rows: BladeRows,
-    levels: Vec<BladeLevel>,
-    /// Steps of the shortest length with a constant force.
-    constant: BladeLevel,
-}
+use std::mem::{replace, take};
 
 /// Tables of a blade for all kinds of its sectors, its trials, and sums over a span. Allocates only on creation.
 #[derive(Debug, Clone)]
 pub(crate) struct Blade {
-    kinds: Vec<BladeTables>,
+    pub(super) kinds: Vec<BladeTables>,
     /// Angles of the nodes of each sector.
     angles: Vec<NodeAngles>,
-    trial: BladeTrial,
+    pub(super) trial: BladeTrial,
     pub tally: BladeTally,
     /// Smallest gaps of the nodes over all sectors so far (m); gaps of the current sector at the start of the span (m);
     /// and gaps below which the smallest gaps of the current sector are needed (m).
     lowest: Vec<Eight>,
-    begun: Vec<Eight>,
-    floors: Vec<Eight>,
+    pub(super) begun: Vec<Eight>,
+    pub(super) floors: Vec<Eight>,
+    /// Responses of the modes that are kept, and the index of the last one found.
+    pub(super) responses: Vec<ModeResponse>,
+    pub(super) next_response: usize,
+}
+
+/// What is recorded of the steps of a span.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Recorded {
+    /// All.
+    All,
+    /// The part between two fractions of the span; a step that ends later stays open.
+    Part([f64; 2]),
+    /// Only the work.
+    Work,
 }
 
 /// A sector, and the surface that it faces.
@@ -58,7 +68,7 @@ pub(crate) struct BladePlace<'a> {
     /// Parameters of the contact.
     pub parameters: ContactParameters,
     /// Prescribed motion over the span.
-    pub course: &'a MotionCourse,
+    pub course: MotionCourse,
 }
 
 impl Blade {
@@ -75,26 +85,20 @@ impl Blade {
         if gap.nodes.len() != kinds[0].nodes() || gap.shaft_moves {
             return None;
         }
-        let of = |tables: &Tables| {
-            let rows = BladeRows::new(tables.shapes(), tables.rows.error_form(), &gap.slopes, &gap.layout);
-            let level = |kind| BladeLevel::new(&rows, tables.levels[0].basis.degree, kind);
-            let levels = tables.levels.iter().map(|_| level(ForceInterpolation::Polynomial)).collect();
-            BladeTables { levels, constant: level(ForceInterpolation::Constant), rows }
-        };
-        let kinds: Vec<_> = kinds.iter().map(of).collect();
+        let degree = degrees().max()?;
+        let kinds: Vec<_> = kinds.iter().map(|tables| BladeTables::new(tables, gap)).collect();
         let rows = &kinds.first()?.rows;
-        let (trial, tally) = (BladeTrial::new(rows, degrees().max()?), BladeTally::new(rows));
+        let (trial, tally) = (BladeTrial::new(rows, degree), BladeTally::new(rows));
         let of_nodes = || vec![Eight::ZERO; rows.blocks];
         let angles = (0..gap.layout.lanes).map(|sector| NodeAngles::new(&gap.layout, sector)).collect();
-        Some(Self { trial, tally, lowest: of_nodes(), begun: of_nodes(), floors: of_nodes(), angles, kinds })
+        let responses = ModeResponse::several(rows);
+        let [lowest, begun, floors] = [of_nodes(), of_nodes(), of_nodes()];
+        Some(Self { trial, tally, lowest, begun, floors, angles, responses, next_response: 0, kinds })
     }
 
-    /// Fills the tables from the tables of all contact rows, without allocating.
-    pub fn fill(&mut self, kinds: &[Tables]) {
-        for (BladeTables { rows, levels, constant }, tables) in self.kinds.iter_mut().zip(kinds) {
-            levels.iter_mut().zip(&tables.levels).for_each(|(level, from)| level.fill(rows, from));
-            constant.fill(rows, &tables.levels[HALVINGS]);
-        }
+    /// Uses tables for spans of this length (s). Does not allocate.
+    pub fn set_span(&mut self, kind: SpanKind, span: f64) {
+        self.kinds.iter_mut().for_each(|tables| tables.set_span(kind, span));
     }
 
     /// Starts a span of all sectors, with gaps (m) of all nodes in rows of `lanes` lanes.
@@ -121,6 +125,12 @@ impl Blade {
         }
     }
 
+    /// Returns whether the modes of all kinds vibrate, as steps need that do not end at communication points.
+    pub fn runs_freely(&self) -> bool {
+        let mut modes = self.kinds.iter().flat_map(|tables| &tables.rows.rates[1]).flat_map(|block| block.0);
+        modes.all(f64::is_finite)
+    }
+
     /// Rows of the sectors of a kind.
     pub fn rows(&self, kind: usize) -> &BladeRows {
         &self.kinds[kind].rows
@@ -129,32 +139,41 @@ impl Blade {
 
 /// A sector of a blade during a span.
 pub(crate) struct BladeInSpan<'a> {
-    blade: &'a mut Blade,
-    place: BladePlace<'a>,
+    pub(super) blade: &'a mut Blade,
+    pub(super) place: BladePlace<'a>,
     pub control: StepControl,
-    goal: StepGoal,
+    pub(super) goal: StepGoal,
     /// Prescribed motion at the points of the tried step, and the motion over which the forces there do work.
     motions: [MotionIncrement; POINTS],
     drives: [PointDrive; POINTS],
     /// True if the displacements and gaps at the start of the step are known; and true if the reach without contact is
     /// known.
-    known: bool,
-    reach_known: bool,
+    pub(super) known: bool,
+    pub(super) reach_known: bool,
     /// Number of blocks of lanes of the last trial in this span.
     tried: usize,
+    pub(super) recorded: Recorded,
+    pub(super) open: Option<OpenStep>,
+    pub(super) progress: Progress,
+    /// True if the open step is not the one that was recalled.
+    pub(super) is_new: bool,
+    /// True if the current part of free time lies within a step without contact that was recalled.
+    pub(super) is_between: bool,
 }
 
 impl<'a> BladeInSpan<'a> {
-    /// Begins a span of a sector from a state.
+    /// Begins a span of a sector from a state; without one, an open step must be recalled.
     pub fn begin(
         blade: &'a mut Blade,
         place: BladePlace<'a>,
         control: StepControl,
         goal: StepGoal,
-        state: &SectorState,
+        state: Option<&SectorState>,
     ) -> Self {
-        let rows = &blade.kinds[place.kind].rows;
-        blade.trial.read(rows, state, &blade.angles[place.sector]);
+        blade.trial.turn_to(&blade.angles[place.sector]);
+        if let Some(state) = state {
+            blade.trial.read(&blade.kinds[place.kind].rows, state);
+        }
         Self {
             blade,
             place,
@@ -165,13 +184,24 @@ impl<'a> BladeInSpan<'a> {
             known: false,
             reach_known: false,
             tried: 0,
+            recorded: Recorded::All,
+            open: None,
+            progress: Progress::default(),
+            is_new: true,
+            is_between: false,
         }
     }
 
     /// Writes the state at the end of the span.
     pub fn write(&mut self, state: &mut SectorState) {
-        let Blade { kinds, trial, lowest, tally, .. } = &mut *self.blade;
-        trial.write(&kinds[self.place.kind].rows, state);
+        let Blade { kinds, trial, .. } = &mut *self.blade;
+        BladeTrial::write(&kinds[self.place.kind].rows, &trial.start, state);
+        self.keep_lowest();
+    }
+
+    /// Includes the smallest gaps of the sector in those of all sectors.
+    pub(super) fn keep_lowest(&mut self) {
+        let Blade { lowest, tally, .. } = &mut *self.blade;
         for (lowest, own) in lowest.as_mut_slice().iter_mut().zip(&tally.lowest) {
             lowest.0.iter_mut().zip(own.0).for_each(|(lowest, own)| *lowest = lowest.min(own));
         }
@@ -182,8 +212,13 @@ impl<'a> BladeInSpan<'a> {
         self.blade.trial.is_lost(self.tried)
     }
 
-    /// Finds the prescribed motion at the points of a step.
-    fn find_drives(&mut self, step: SpanStep, kind: ForceInterpolation) {
+    /// Prescribed motion at a fraction of the span, and the motion since the start of the span.
+    pub(super) fn drive_at(&self, theta: f64) -> (PointDrive, MotionIncrement) {
+        drive_at(&self.place, theta)
+    }
+
+    /// Finds the prescribed motion at the points of a step, and the motion over which the forces there do work.
+    pub(super) fn find_drives(&mut self, step: SpanStep, kind: ForceInterpolation, weights: &PartWeights) {
         let level = self.blade.kinds[self.place.kind].level(step.level, kind);
         let count = level.points() + 1;
         let mut moved = [MotionIncrement::default(); POINTS];
@@ -192,15 +227,102 @@ impl<'a> BladeInSpan<'a> {
                 if kind == ForceInterpolation::Constant { [0.0, 1.0][point] } else { level.basis.points[point] };
             (self.drives[point], moved[point]) = drive_at(&self.place, step.from + step.length * theta);
         }
-        for (motion, weights) in self.motions.iter_mut().zip(&level.work).take(count) {
+        for (motion, weights) in self.motions.iter_mut().zip(&weights.work).take(count) {
             let terms = (0..count).map(|k| moved[k].less(&moved[0]).over(weights[k]));
             *motion = terms.fold(MotionIncrement::default(), |sum, term| sum.since(&term));
         }
     }
+
+    /// Adds the tried step, or a part of it, to sums.
+    pub(super) fn add(&mut self, step: SpanStep, kind: ForceInterpolation, part: &PartWeights, sums: Sums) {
+        if self.blade.trial.pushes() && sums != Sums::Work {
+            self.drives.iter_mut().for_each(|drive| drive.rotor = libm::sincos(drive.rotor_angle));
+        }
+        let faced = &self.place.faced_surface(&self.drives);
+        let Blade { trial, kinds, tally, .. } = &mut *self.blade;
+        let tables = &kinds[self.place.kind];
+        let (rows, level, motions) = (&tables.rows, tables.level(step.level, kind), &self.motions);
+        AddStep { tally, trial, rows, level, faced, motions, part, sums }.add();
+    }
+
+    /// Bounds the gaps of a flight between the first two drives. Returns whether some are needed; these nodes are followed.
+    pub(super) fn needs_gaps(&mut self, drives: &[PointDrive; POINTS]) -> bool {
+        self.find_clearance(drives) != Clearance::Wide
+    }
+
+    fn find_clearance(&mut self, drives: &[PointDrive; POINTS]) -> Clearance {
+        let faced = self.place.faced_surface(drives);
+        let Blade { trial, kinds, floors, tally, .. } = &mut *self.blade;
+        trial.find_clearance(&kinds[self.place.kind].rows, &faced, floors, &tally.lowest)
+    }
+
+    /// Records the smallest gaps of a tried step between two fractions of it. If it is not resolved, its polynomials do
+    /// not describe the motion between its points.
+    pub(super) fn record_gaps(&mut self, step: SpanStep, kind: ForceInterpolation, is_resolved: bool, ends: [f64; 2]) {
+        let Blade { trial, kinds, tally, floors, .. } = &mut *self.blade;
+        let tables = &kinds[self.place.kind];
+        let tolerance = if is_resolved { self.goal.tolerance } else { f64::INFINITY };
+        if trial.find_minima((&tables.rows, tables.level(step.level, kind)), tally, floors, tolerance, ends) {
+            self.follow(step, kind, ends);
+        }
+    }
+
+    /// Records the smallest gaps of the followed nodes between two fractions of a step.
+    pub(super) fn follow(&mut self, step: SpanStep, kind: ForceInterpolation, ends: [f64; 2]) {
+        let place = &self.place;
+        let Blade { trial, kinds, tally, .. } = &mut *self.blade;
+        let tables = &mut kinds[place.kind];
+        tables.prepare(step.level, kind);
+        let halvings = trial.find_halvings(&tables.rows, tables.level(step.level, kind), self.goal.tolerance);
+        let finer = halvings.min(HALVINGS - step.level);
+        let parts = 1_usize << finer;
+        let mut drives = [PointDrive::default(); PARTS + 1];
+        for (end, drive) in drives[..=parts].iter_mut().enumerate() {
+            #[expect(clippy::cast_precision_loss, reason = "few parts")]
+            let theta = end as f64 / parts as f64;
+            *drive = drive_at(place, step.from + step.length * theta).0;
+        }
+        let halves = 0..=finer;
+        halves.clone().for_each(|halvings| tables.prepare(step.level + halvings, ForceInterpolation::Polynomial));
+        let last = tables.level(step.level + finer, ForceInterpolation::Polynomial);
+        let mut levels = [last; MAX_HALVINGS + 1];
+        for (halvings, level) in halves.zip(&mut levels) {
+            *level = tables.level(step.level + halvings, ForceInterpolation::Polynomial);
+        }
+        let faced = place.faced_surface(&self.drives);
+        let level = tables.level(step.level, kind);
+        trial.follow((&tables.rows, level, &levels[..=finer]), (&faced, &drives[..=parts]), tally, ends);
+    }
+
+    /// Goes to the end of a step; a flight has no kind.
+    pub(super) fn advance(&mut self, step: SpanStep, kind: Option<ForceInterpolation>) {
+        let Blade { trial, kinds, tally, .. } = &mut *self.blade;
+        let tables = &mut kinds[self.place.kind];
+        let interpolation = kind.unwrap_or(ForceInterpolation::Polynomial);
+        tables.prepare(step.level, interpolation);
+        let level = tables.level(step.level, interpolation);
+        let pushes = kind.is_some() && trial.pushes();
+        tally.damping += trial.advance(level, pushes);
+        if kind.is_some() {
+            trial.begin_next_step(&tables.rows, level);
+        }
+        self.known = kind.is_some();
+        self.reach_known &= !pushes;
+    }
+
+    /// Returns whether a step ends within the recorded part of the span.
+    fn ends_within(&self, step: SpanStep) -> bool {
+        !matches!(self.recorded, Recorded::Part(ends) if step.from + step.length > ends[1])
+    }
+
+    /// Energy of the sector at the start of the step (J).
+    pub(super) fn energy_at_start(&self) -> f64 {
+        self.blade.trial.energy(&self.blade.kinds[self.place.kind].rows)
+    }
 }
 
 impl<'a> BladePlace<'a> {
-    fn faced_surface(&self, drives: &[PointDrive; POINTS]) -> FacedSurface<'a> {
+    pub(super) fn faced_surface(&self, drives: &[PointDrive; POINTS]) -> FacedSurface<'a> {
         FacedSurface { surface: &self.gap.surface, drives: *drives, friction: self.parameters.friction }
     }
 }
@@ -220,12 +342,6 @@ fn drive_at(place: &BladePlace, theta: f64) -> (PointDrive, MotionIncrement) {
     (point, motion)
 }
 
-impl BladeTables {
-    fn level(&self, level: usize, kind: ForceInterpolation) -> &BladeLevel {
-        if kind == ForceInterpolation::Constant { &self.constant } else { &self.levels[level] }
-    }
-}
-
 impl SpanSteps for BladeInSpan<'_> {
     fn goal(&self) -> StepGoal {
         self.goal
@@ -236,13 +352,12 @@ impl SpanSteps for BladeInSpan<'_> {
     }
 
     fn largest_energy(&mut self) -> f64 {
-        let energy = self.blade.trial.energy(&self.blade.kinds[self.place.kind].rows);
-        self.control.largest = self.control.largest.max(energy);
+        self.control.largest = self.control.largest.max(self.energy_at_start());
         self.control.largest
     }
 
     fn length(&self, level: usize) -> f64 {
-        self.blade.kinds[self.place.kind].levels[level].step
+        self.blade.kinds[self.place.kind].length(level)
     }
 
     fn count(&self) -> u64 {
@@ -250,35 +365,43 @@ impl SpanSteps for BladeInSpan<'_> {
     }
 
     fn fly(&mut self, step: SpanStep) -> bool {
-        let Blade { trial, kinds, floors, tally, .. } = &mut *self.blade;
-        let rows = &kinds[self.place.kind].rows;
-        if trial.is_pushed() || !self.place.course.only_turns() {
+        if self.blade.trial.is_pushed() || !self.place.course.only_turns() {
             return false;
         }
         if !self.reach_known {
-            trial.find_reach(rows);
+            self.blade.trial.find_reach(&self.blade.kinds[self.place.kind].rows);
             self.reach_known = true;
+        }
+        if matches!(self.recorded, Recorded::Part(_)) && self.is_quiet() {
+            self.open = Some(OpenStep::endless(step.level, step.from, self.energy_at_start()));
+            return true;
         }
         let mut drives = [PointDrive::default(); POINTS];
         for (drive, theta) in drives.iter_mut().zip([step.from, step.from + step.length]) {
             *drive = drive_at(&self.place, theta).0;
         }
-        match trial.find_clearance(rows, &self.place.faced_surface(&drives), floors, &tally.lowest) {
-            Clearance::Unknown => return false,
-            Clearance::Needed => {
-                let result = self.attempt(step, ForceInterpolation::Polynomial);
-                self.accept(step, ForceInterpolation::Polynomial, &result);
-            }
-            Clearance::Wide => {
-                tally.damping += trial.advance(&kinds[self.place.kind].levels[step.level], false);
-                self.known = false;
-            }
+        let clearance = self.find_clearance(&drives);
+        if clearance == Clearance::Unknown {
+            return false;
+        }
+        if !self.ends_within(step) {
+            let (work, energy) = (ContactWork::default(), self.energy_at_start());
+            self.open = Some(OpenStep { step, kind: None, is_resolved: true, work, energy });
+        } else if clearance == Clearance::Needed && self.recorded != Recorded::Work {
+            let result = self.attempt(step, ForceInterpolation::Polynomial);
+            self.accept(step, ForceInterpolation::Polynomial, &result);
+            // The state does not depend on what is recorded.
+            self.known &= self.recorded == Recorded::All;
+        } else {
+            self.advance(step, None);
         }
         true
     }
 
     fn attempt(&mut self, step: SpanStep, kind: ForceInterpolation) -> TrialResult {
-        self.find_drives(step, kind);
+        self.blade.kinds[self.place.kind].prepare(step.level, kind);
+        let whole = self.blade.kinds[self.place.kind].level(step.level, kind).whole;
+        self.find_drives(step, kind, &whole);
         let faced = self.place.faced_surface(&self.drives);
         let tables = &self.blade.kinds[self.place.kind];
         let trial = &mut self.blade.trial;
@@ -290,51 +413,38 @@ impl SpanSteps for BladeInSpan<'_> {
     }
 
     fn accept(&mut self, step: SpanStep, kind: ForceInterpolation, result: &TrialResult) -> f64 {
-        if self.blade.trial.pushes() {
-            self.drives.iter_mut().for_each(|drive| drive.rotor = libm::sincos(drive.rotor_angle));
-        }
-        let faced = self.place.faced_surface(&self.drives);
-        let Blade { trial, kinds, tally, floors, .. } = &mut *self.blade;
-        let BladeTables { rows, .. } = &kinds[self.place.kind];
-        let level = kinds[self.place.kind].level(step.level, kind);
-        let before = tally.work.closing;
-        trial.add(rows, level, (&faced, &self.motions), tally);
+        let (is_open, whole) =
+            (!self.ends_within(step), self.blade.kinds[self.place.kind].level(step.level, kind).whole);
+        let records = !is_open && self.recorded != Recorded::Work;
+        let before = take(&mut self.blade.tally.work);
+        self.add(step, kind, &whole, if records { Sums::All } else { Sums::Work });
+        let Blade { trial, kinds, tally, .. } = &mut *self.blade;
+        let tables = &kinds[self.place.kind];
         let banked = match kind {
             ForceInterpolation::Constant => {
-                let dropped = trial.dropped(rows);
-                tally.work.dropped += dropped;
-                dropped + tally.work.closing - before
+                tally.work.dropped += trial.dropped(&tables.rows);
+                tally.work.dropped + tally.work.closing
             }
             ForceInterpolation::Polynomial if result.switches => -result.switched,
             ForceInterpolation::Polynomial => 0.0,
         };
-        let pushes = trial.pushes();
-        if pushes {
-            trial.find_modal_forces(rows, level);
+        if trial.pushes() {
+            trial.find_modal_forces(&tables.rows, tables.level(step.level, kind));
         }
-        // If a step misses the tolerance, its polynomials do not describe the motion between its points. There are no
-        // tables for parts of the shortest steps, whose points are close together.
+        // There are no tables for parts of the shortest steps, whose points are close together.
         let has_parts = step.level + MIN_HALVINGS <= HALVINGS;
-        let tolerance = if has_parts && result.resolves_motion(kind, self.goal.tolerance) {
-            self.goal.tolerance
-        } else {
-            f64::INFINITY
-        };
-        if trial.find_minima((rows, level), tally, floors, tolerance) {
-            let finer = trial.find_halvings(rows, level, self.goal.tolerance).min(HALVINGS - step.level);
-            let parts = 1_usize << finer;
-            let mut drives = [PointDrive::default(); PARTS + 1];
-            for (end, drive) in drives[..=parts].iter_mut().enumerate() {
-                #[expect(clippy::cast_precision_loss, reason = "few parts")]
-                let theta = end as f64 / parts as f64;
-                *drive = drive_at(&self.place, step.from + step.length * theta).0;
-            }
-            let part = &kinds[self.place.kind].levels[step.level + finer];
-            trial.follow((rows, level, part), (&faced, &drives[..=parts]), tally);
+        let is_resolved = has_parts && result.resolves_motion(kind, self.goal.tolerance);
+        let work = replace(&mut tally.work, before);
+        if is_open {
+            let energy = self.energy_at_start();
+            self.open = Some(OpenStep { step, kind: Some(kind), is_resolved, work, energy });
+            return banked;
         }
-        tally.damping += trial.advance(level, pushes);
-        trial.begin_next_step(rows, level);
-        self.reach_known &= !pushes;
+        tally.work.add(&work);
+        if records {
+            self.record_gaps(step, kind, is_resolved, [0.0, 1.0]);
+        }
+        self.advance(step, Some(kind));
         banked
     }
 }

@@ -1,6 +1,6 @@
 //! Integrals over a span of the contacts of a blade, in blocks of nodes.
 
-use super::level::BladeLevel;
+use super::level::{BladeLevel, PartWeights};
 use super::rows::BladeRows;
 use super::surface::FacedSurface;
 use super::trial::BladeTrial;
@@ -99,7 +99,18 @@ impl BladeTally {
     }
 }
 
-/// Adds an accepted step to the sums of a span.
+/// Sums to which a step is added.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Sums {
+    /// The sums of the span and the work.
+    All,
+    /// The sums of the span.
+    OfSpan,
+    /// The work.
+    Work,
+}
+
+/// Adds a step, or a part of it, to the sums of a span.
 pub(super) struct AddStep<'a> {
     pub tally: &'a mut BladeTally,
     pub trial: &'a BladeTrial,
@@ -108,6 +119,9 @@ pub(super) struct AddStep<'a> {
     pub faced: &'a FacedSurface<'a>,
     /// Motion over which the forces at the points do work.
     pub motions: &'a [MotionIncrement; POINTS],
+    /// Weights of the part of the step.
+    pub part: &'a PartWeights,
+    pub sums: Sums,
 }
 
 /// Sines and cosines of the angles of nodes, in blocks of eight: angle addition for the rotor angle, and a power series
@@ -147,9 +161,15 @@ impl OctetKernel for AddStep<'_> {
 }
 
 impl AddStep<'_> {
+    /// Adds the step or the part of it.
+    pub fn add(self) {
+        let instructions = self.trial.instructions;
+        instructions.run_octets(self);
+    }
+
     #[inline(always)]
     fn add_block<L: Octet>(&mut self, block: usize) {
-        let Self { tally, trial, rows, level, faced, motions } = self;
+        let Self { tally, trial, rows, level, faced, motions, part, sums } = self;
         let count = level.points() + 1;
         let of = |start: &[Eight], lanes: &[Eight]| -> [L; POINTS] {
             let mut values = [L::zero(); POINTS];
@@ -184,7 +204,7 @@ impl AddStep<'_> {
         let weights_of = |i: usize, values: &[L; POINTS]| {
             let mut sum = L::zero();
             for k in 0..count {
-                sum = sum + values[k] * L::splat(level.work[i][k]);
+                sum = sum + values[k] * L::splat(part.work[i][k]);
             }
             sum
         };
@@ -193,7 +213,7 @@ impl AddStep<'_> {
                 continue;
             }
             let (multiplier, sigma) = (multipliers[i], sigmas[i]);
-            let (size, duration) = (length(sigma), L::splat(level.durations[i]));
+            let (size, duration) = (length(sigma), L::splat(part.durations[i]));
             let normal = multiplier * size;
             normals[i] = normal;
             let [closing, around] = [forces[0][i], forces[1][i]];
@@ -219,6 +239,9 @@ impl AddStep<'_> {
                 let opened = L::splat(motion.opening) + shape * L::splat(motion.shape_factor) - turned;
                 work[3] = work[3] - multiplier * opened;
             }
+            if *sums == Sums::Work {
+                continue;
+            }
             let add = |sum: &mut Eight, value: L| (L::load(sum) + value).store(sum);
             add(&mut tally.normal[block], duration * normal);
             add(&mut tally.tangential[block], duration * tangential);
@@ -242,12 +265,19 @@ impl AddStep<'_> {
             add(&mut tally.fixed_force[2][block], duration * axial);
             add(&mut tally.moment[2][block], duration * radius * around);
             add(&mut tally.point[2][block], duration * normal * height);
-            let deep = (gaps[i] / size).less(radius * L::splat(-SMALL)) | L::splat(1.0).less(sigma.abs());
-            tally.implausible |= deep & L::zero().less(multiplier) != 0;
+            if level.basis.points[i] <= part.ends[1] {
+                let deep = (gaps[i] / size).less(radius * L::splat(-SMALL)) | L::splat(1.0).less(sigma.abs());
+                tally.implausible |= deep & L::zero().less(multiplier) != 0;
+            }
         }
-        (L::load(&tally.heat[block]) + heat_of_nodes).store(&mut tally.heat[block]);
-        let peak = peak_of(level, &normals);
-        peak.max(L::load(&tally.peak[block])).store(&mut tally.peak[block]);
+        if *sums != Sums::Work {
+            (L::load(&tally.heat[block]) + heat_of_nodes).store(&mut tally.heat[block]);
+            let peak = peak_of(level, &normals, part.ends);
+            peak.max(L::load(&tally.peak[block])).store(&mut tally.peak[block]);
+        }
+        if *sums == Sums::OfSpan {
+            return;
+        }
         let [shaft, exact, closing, casing] = [work[0].total(), work[1].total(), work[2].total(), work[3].total()];
         let work = ContactWork {
             shaft,
@@ -263,13 +293,15 @@ impl AddStep<'_> {
     }
 }
 
-/// Largest value within the step of the polynomial through values at its points.
+/// Largest value within a part of the step of the polynomial through values at its points.
 #[inline(always)]
-fn peak_of<L: Octet>(level: &BladeLevel, values: &[L; POINTS]) -> L {
+fn peak_of<L: Octet>(level: &BladeLevel, values: &[L; POINTS], ends: [f64; 2]) -> L {
     let count = level.points() + 1;
     let mut peak = L::zero();
-    for value in &values[..count] {
-        peak = peak.max(*value);
+    for (value, point) in values[..count].iter().zip(level.basis.points) {
+        if level.kind == ForceInterpolation::Constant || (ends[0]..=ends[1]).contains(&point) {
+            peak = peak.max(*value);
+        }
     }
     if level.kind == ForceInterpolation::Constant {
         return peak;
@@ -285,6 +317,13 @@ fn peak_of<L: Octet>(level: &BladeLevel, values: &[L; POINTS]) -> L {
     let square = c * c - L::splat(3.0) * b * d;
     let theta = b / (square.max(L::zero()).sqrt() - c);
     let value = a + theta * (b + theta * (c + theta * d));
-    let is_inside = L::zero().less(square) & L::zero().less(theta) & theta.less(L::splat(1.0));
-    L::select(is_inside, peak.max(value), peak)
+    let is_inside = L::zero().less(square) & L::splat(ends[0]).less(theta) & theta.less(L::splat(ends[1]));
+    let mut peak = L::select(is_inside, peak.max(value), peak);
+    for end in ends {
+        if !level.basis.points[..count].contains(&end) {
+            let end = L::splat(end);
+            peak = peak.max(a + end * (b + end * (c + end * d)));
+        }
+    }
+    peak
 }

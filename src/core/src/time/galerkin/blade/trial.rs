@@ -1,20 +1,20 @@
 //! Scratch memory and results of trials of a blade.
 
 use super::accept::{Advance, BeginNextStep, FindModalForces};
+use super::follow::Follow;
 use super::level::BladeLevel;
-use super::minima::{FindInterpolationError, FindMinima, Follow, PARTS};
+use super::minima::{FindInterpolationError, FindMinima, PARTS};
 use super::reach::{Clearance, Energy, FindClearance, FindReach};
 use super::rows::BladeRows;
 use super::solve::Attempt;
 use super::start::FindStart;
 use super::surface::{FacedSurface, PointDrive};
-use super::tally::{AddStep, BladeTally};
+use super::tally::BladeTally;
 use crate::geometry::layout::Layout;
-use crate::geometry::wrench::MotionIncrement;
 use crate::math::octet::Eight;
 use crate::math::simd::InstructionSet;
 use crate::math::vector::{Vector3, set_vector3_at, vector3_at};
-use crate::time::galerkin::basis::{MOST, POINTS};
+use crate::time::galerkin::basis::MOST;
 use crate::time::galerkin::state::SectorState;
 use crate::time::galerkin::trial::TrialResult;
 use nalgebra::Vector2;
@@ -66,6 +66,11 @@ pub(super) struct StartContacts {
 #[derive(Debug, Clone)]
 pub(crate) struct BladeTrial {
     pub(super) start: StartContacts,
+    /// Contacts and modes at a time within the accepted step, and rates of the gaps (m/s).
+    pub(super) sample: StartContacts,
+    pub(super) rates: Vec<Eight>,
+    /// Rates at the previous time.
+    pub(super) rates_before: Vec<Eight>,
     /// Angles of the nodes in the frame of the rotor (rad).
     pub(super) angles: Vec<Eight>,
     /// Sines and cosines of these angles.
@@ -117,7 +122,7 @@ pub(crate) struct BladeTrial {
     pub(super) pushes: bool,
     /// Largest closing and circumferential displacements at any time without contact (m).
     pub(super) reach: [Vec<Eight>; 2],
-    instructions: InstructionSet,
+    pub(super) instructions: InstructionSet,
 }
 
 impl BladeTrial {
@@ -128,18 +133,10 @@ impl BladeTrial {
         let of_modes = || vec![Eight::ZERO; rows.mode_blocks];
         let count = degree * rows.nodes;
         Self {
-            start: StartContacts {
-                modes: [of_modes(), of_modes()],
-                forces: [of_nodes(), of_nodes()],
-                multipliers: of_nodes(),
-                slopes: of_nodes(),
-                held: [of_nodes(), of_nodes()],
-                moved: [of_nodes(), of_nodes()],
-                gaps: of_nodes(),
-                sigma: of_nodes(),
-                friction: of_nodes(),
-                pushed: false,
-            },
+            start: StartContacts::new(nodes, rows.mode_blocks),
+            sample: StartContacts::new(nodes, rows.mode_blocks),
+            rates: of_nodes(),
+            rates_before: of_nodes(),
             angles: of_nodes(),
             directions_of_nodes: [of_nodes(), of_nodes()],
             modal_forces: std::array::from_fn(|_| of_modes()),
@@ -174,11 +171,15 @@ impl BladeTrial {
         }
     }
 
-    /// Reads the state of a sector at the start of a span; `angles` belong to the nodes of this sector.
-    pub fn read(&mut self, rows: &BladeRows, state: &SectorState, angles: &NodeAngles) {
+    /// Selects the sector of these angles.
+    pub fn turn_to(&mut self, angles: &NodeAngles) {
         self.angles.copy_from_slice(&angles.angles);
         self.directions_of_nodes[0].copy_from_slice(&angles.sines);
         self.directions_of_nodes[1].copy_from_slice(&angles.cosines);
+    }
+
+    /// Reads the state of a sector at the start of a span.
+    pub fn read(&mut self, rows: &BladeRows, state: &SectorState) {
         let start = &mut self.start;
         Eight::spread(state.position.iter().copied(), 0.0, &mut start.modes[0]);
         Eight::spread(state.velocity.iter().copied(), 0.0, &mut start.modes[1]);
@@ -196,19 +197,18 @@ impl BladeTrial {
         }
     }
 
-    /// Writes the state at the end of a span, and the gaps (m). The gaps must be known.
-    pub fn write(&self, rows: &BladeRows, state: &mut SectorState) {
+    /// Writes modes and contacts to a state. The gaps must be known.
+    pub(super) fn write(rows: &BladeRows, contacts: &StartContacts, state: &mut SectorState) {
         let flat = |blocks: &[Eight], to: &mut [f64]| {
             to.iter_mut().zip(blocks.iter().flat_map(|block| block.0)).for_each(|(to, value)| *to = value);
         };
-        flat(&self.start.modes[0], &mut state.position);
-        flat(&self.start.modes[1], &mut state.velocity);
+        flat(&contacts.modes[0], &mut state.position);
+        flat(&contacts.modes[1], &mut state.velocity);
         for node in 0..rows.nodes {
             let (block, i) = (node / 8, node % 8);
-            let start = &self.start;
+            let StartContacts { multipliers, sigma, gaps, forces: [closing, around], .. } = contacts;
             let [multiplier, sigma, gap, closing, around] =
-                [&start.multipliers, &start.sigma, &start.gaps, &start.forces[0], &start.forces[1]]
-                    .map(|values| values[block].0[i]);
+                [multipliers, sigma, gaps, closing, around].map(|values| values[block].0[i]);
             let steepness = rows.steepness[block].0[i];
             let length = (steepness * steepness + sigma * sigma).sqrt();
             set_vector3_at(&mut state.forces, node, rows.in_space(node, Vector2::new(closing, around)));
@@ -236,17 +236,6 @@ impl BladeTrial {
         self.instructions.run_octets(Attempt { trial: self, rows, level, faced, precision })
     }
 
-    /// Adds the tried step to the sums of a span.
-    pub fn add(
-        &self,
-        rows: &BladeRows,
-        level: &BladeLevel,
-        (faced, motions): (&FacedSurface, &[MotionIncrement; POINTS]),
-        tally: &mut BladeTally,
-    ) {
-        self.instructions.run_octets(AddStep { tally, trial: self, rows, level, faced, motions });
-    }
-
     /// Computes the modal forces of the tried step.
     pub fn find_modal_forces(&mut self, rows: &BladeRows, level: &BladeLevel) {
         self.instructions.run_octets(FindModalForces { trial: self, rows, level });
@@ -261,9 +250,19 @@ impl BladeTrial {
         tally: &mut BladeTally,
         floors: &[Eight],
         tolerance: f64,
+        ends: [f64; 2],
     ) -> bool {
         let unresolved = if tolerance.is_finite() { self.unresolved_motion(rows, level) } else { 0.0 };
-        self.instructions.run_octets(FindMinima { trial: self, rows, level, tally, floors, tolerance, unresolved })
+        self.instructions.run_octets(FindMinima {
+            trial: self,
+            rows,
+            level,
+            tally,
+            floors,
+            tolerance,
+            unresolved,
+            ends,
+        })
     }
 
     /// Bounds the interpolation error (m) of all modes between points at a distance `length` (s).
@@ -276,12 +275,13 @@ impl BladeTrial {
     /// equal parts of the step.
     pub fn follow(
         &mut self,
-        (rows, level, part): (&BladeRows, &BladeLevel, &BladeLevel),
+        (rows, level, halves): (&BladeRows, &BladeLevel, &[&BladeLevel]),
         (faced, drives): (&FacedSurface, &[PointDrive]),
         tally: &mut BladeTally,
+        ends: [f64; 2],
     ) {
         let pushes = self.pushes;
-        self.instructions.run_octets(Follow { trial: self, rows, level, part, faced, drives, tally, pushes });
+        self.instructions.run_octets(Follow { trial: self, rows, level, halves, faced, drives, tally, pushes, ends });
     }
 
     /// Advances the modes over the tried step, or over a step without forces, and returns the damping loss (J).
@@ -300,9 +300,10 @@ impl BladeTrial {
     }
 
     /// Bounds the gaps while the rotor turns past the resting surface, from the angle of the first drive to that of the
-    /// second. A smallest gap is needed if it is below `floors` and below `lowest`, the smallest gap so far (m).
+    /// second. A smallest gap is needed if it is below `floors` and below `lowest`, the smallest gap so far (m); the
+    /// followed nodes are then those whose smallest gaps are needed.
     pub fn find_clearance(
-        &self,
+        &mut self,
         rows: &BladeRows,
         faced: &FacedSurface,
         floors: &[Eight],

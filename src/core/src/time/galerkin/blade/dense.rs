@@ -1,0 +1,217 @@
+//! State of a blade at any time within an accepted step.
+
+use super::columns::displace;
+use super::level::BladeLevel;
+use super::rows::BladeRows;
+use super::surface::FacedSurface;
+use super::trial::{BladeTrial, StartContacts};
+use crate::math::octet::{Eight, Octet, OctetKernel, both};
+use crate::time::galerkin::basis::POINTS;
+use crate::time::galerkin::trial::ForceInterpolation;
+
+/// Response of the modes after a time: q = A q₀ + B q̇₀ and q̇ = −ω²B q₀ + C q̇₀ without forces.
+#[derive(Debug, Clone)]
+pub(super) struct ModeResponse {
+    /// Kind of the sector, and time since the start of the step (s).
+    of: (usize, u64),
+    /// A, B (s) and C.
+    terms: [Vec<Eight>; 3],
+}
+
+impl ModeResponse {
+    /// Allocates the response of modes.
+    pub fn new(rows: &BladeRows) -> Self {
+        Self { of: (usize::MAX, 0), terms: std::array::from_fn(|_| vec![Eight::ZERO; rows.mode_blocks]) }
+    }
+
+    /// Returns whether the response is that of a kind of sectors after a time (s).
+    pub fn is_of(&self, kind: usize, time: f64) -> bool {
+        self.of == (kind, time.to_bits())
+    }
+
+    /// Computes the response of a kind of sectors after a time (s).
+    pub fn find(&mut self, rows: &BladeRows, kind: usize, time: f64) {
+        self.of = (kind, time.to_bits());
+        let [rates, per_frequency, _] = &rows.rates;
+        for (k, (rates, per_frequency)) in rates.iter().zip(per_frequency).enumerate() {
+            for (i, (rate, per_frequency)) in rates.0.into_iter().zip(per_frequency.0).enumerate() {
+                let (sine, cosine) = if per_frequency > 0.0 { libm::sincos(time / per_frequency) } else { (0.0, 0.0) };
+                let decay = libm::exp(-rate * time);
+                let (swing, lag) = (decay * cosine, decay * rate * per_frequency * sine);
+                self.terms[0][k].0[i] = swing + lag;
+                self.terms[1][k].0[i] = decay * per_frequency * sine;
+                self.terms[2][k].0[i] = swing - lag;
+            }
+        }
+    }
+}
+
+/// Finds modes, forces and gaps at a time within the accepted step.
+pub(super) struct Sample<'a> {
+    pub trial: &'a mut BladeTrial,
+    pub rows: &'a BladeRows,
+    /// Table of the step.
+    pub level: &'a BladeLevel,
+    /// Response of the modes after the time since the start of the step.
+    pub response: &'a ModeResponse,
+    /// That time (s).
+    pub time: f64,
+    /// The first drive is the prescribed motion at that time.
+    pub faced: &'a FacedSurface<'a>,
+    /// Speed of the rotor relative to the shape (rad/s), and rate of the factor on the shape (1/s).
+    pub relative_speed: f64,
+    pub factor_rate: f64,
+    /// True if forces act in the step.
+    pub pushes: bool,
+}
+
+impl OctetKernel for Sample<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<L: Octet>(mut self) {
+        self.find_modes::<L>();
+        let BladeTrial { start, sample, .. } = &mut *self.trial;
+        if !self.pushes {
+            sample.multipliers.fill(Eight::ZERO);
+            sample.forces.iter_mut().for_each(|forces| forces.fill(Eight::ZERO));
+        }
+        sample.slopes.copy_from_slice(&start.slopes);
+        for along in [0, 1] {
+            displace::<L, 1>(&self.rows.shapes[along], self.rows.blocks, [&sample.modes[0]], &mut sample.moved[along]);
+            displace::<L, 1>(&self.rows.shapes[along], self.rows.blocks, [&sample.modes[1]], &mut sample.held[along]);
+        }
+        let mut weights = [0.0; POINTS];
+        if self.pushes {
+            weights = match self.level.kind {
+                ForceInterpolation::Polynomial => self.level.basis.weights_at(self.time / self.level.step),
+                ForceInterpolation::Constant => [0.0, 1.0, 0.0, 0.0],
+            };
+            self.find_forces::<L>(&weights);
+        }
+        self.find_gaps::<L>(&weights);
+    }
+}
+
+impl Sample<'_> {
+    /// Finds q and q̇. The response to the polynomial force is a polynomial plus free vibration.
+    #[inline(always)]
+    fn find_modes<L: Octet>(&mut self) {
+        let Self { trial, rows, level, response, time, pushes, .. } = self;
+        let BladeTrial { start, sample, modal_forces, .. } = &mut **trial;
+        let per_step = 1.0 / level.step;
+        for k in 0..rows.mode_blocks {
+            let [a, b, c] = [0, 1, 2].map(|term| L::load(&response.terms[term][k]));
+            let [q, v] = both(|of| L::load(&start.modes[of][k]));
+            let (square, twice_rate) = (L::load(&rows.rates[2][k]), L::load(&rows.rates[0][k]) * L::splat(2.0));
+            let mut steady = [L::zero(); 3];
+            if *pushes {
+                let per_square = L::splat(1.0) / square.max(L::splat(f64::MIN_POSITIVE));
+                let [one, two, three] = [0, 1, 2].map(|term| L::load(&modal_forces[term][k]));
+                steady[2] = three * L::splat(per_step * per_step) * per_square;
+                steady[1] = (two * L::splat(per_step) - L::splat(2.0) * twice_rate * steady[2]) * per_square;
+                steady[0] = (one - twice_rate * steady[1] - L::splat(2.0) * steady[2]) * per_square;
+            }
+            let (left, rate) = (q - steady[0], v - steady[1]);
+            let time = L::splat(*time);
+            let position = steady[0] + time * (steady[1] + time * steady[2]) + a * left + b * rate;
+            let velocity = steady[1] + L::splat(2.0) * time * steady[2] - square * b * left + c * rate;
+            position.store(&mut sample.modes[0][k]);
+            velocity.store(&mut sample.modes[1][k]);
+        }
+    }
+
+    /// Interpolates multipliers and forces, and adds the displacements that the forces hold.
+    #[inline(always)]
+    fn find_forces<L: Octet>(&mut self, weights: &[f64; POINTS]) {
+        let Self { trial, rows, level, .. } = self;
+        let BladeTrial { start, sample, multipliers, forces, .. } = &mut **trial;
+        for block in 0..rows.blocks {
+            let at = |start: &[Eight], lanes: &[Eight]| {
+                let mut sum = L::splat(weights[0]) * L::load(&start[block]);
+                for point in 0..level.points() {
+                    sum = sum + L::splat(weights[point + 1]) * L::load(&lanes[point * rows.blocks + block]);
+                }
+                sum
+            };
+            let multiplier = at(&start.multipliers, multipliers);
+            let acts = L::zero().less(multiplier) & rows.valid(block);
+            L::select(acts, multiplier, L::zero()).store(&mut sample.multipliers[block]);
+            for along in [0, 1] {
+                L::select(acts, at(&start.forces[along], &forces[along]), L::zero())
+                    .store(&mut sample.forces[along][block]);
+            }
+            let mut nodes = acts;
+            while nodes != 0 {
+                let i = nodes.trailing_zeros() as usize;
+                nodes &= nodes - 1;
+                for (along, seen) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                    let force = L::splat(sample.forces[along][block].0[i]);
+                    let column = &rows.flexibility[along][seen][(8 * block + i) * rows.blocks..][..rows.blocks];
+                    for (moved, flexibility) in sample.moved[seen].iter_mut().zip(column) {
+                        (L::load(moved) + L::load(flexibility) * force).store(moved);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Finds the gaps F, their rates and σ. For nodes in contact during the step, F is the polynomial through its values at
+    /// the points, but not below them, because the points follow fast modes only in the mean.
+    #[inline(always)]
+    fn find_gaps<L: Octet>(&mut self, weights: &[f64; POINTS]) {
+        let Self { trial, rows, level, faced, pushes, .. } = self;
+        let BladeTrial { start, sample, multipliers, gaps, angles, rates, .. } = &mut **trial;
+        let drive = &faced.drives[0];
+        let [speed, factor_rate] = [self.relative_speed, self.factor_rate].map(L::splat);
+        let slopes = level.basis.slopes_at(self.time / level.step).map(|slope| slope / level.step);
+        for block in 0..rows.blocks {
+            let per_radius = L::load(&rows.per_radius[block]);
+            let [closing, around] = both(|along| L::load(&sample.moved[along][block]));
+            let at = L::load(&angles[block]) + L::splat(drive.turned) + around * per_radius;
+            let [shape, slope, _] = faced.surface.evaluate_octet::<L>(at);
+            let factor = L::splat(drive.factor);
+            let mut gap = L::splat(drive.clearance) + shape * factor + closing;
+            let [closing_rate, around_rate] = both(|along| L::load(&sample.held[along][block]));
+            let mut rate = closing_rate + shape * factor_rate + slope * factor * (speed + around_rate * per_radius);
+            if *pushes {
+                let first = L::load(&start.gaps[block]);
+                let mut touches = L::zero().less(L::load(&start.multipliers[block]));
+                let (mut lowest, mut value, mut change) =
+                    (first, L::splat(weights[0]) * first, L::splat(slopes[0]) * first);
+                for point in 0..level.points() {
+                    let lane = point * rows.blocks + block;
+                    touches |= L::zero().less(L::load(&multipliers[lane]));
+                    let at_point = L::load(&gaps[lane]);
+                    lowest = lowest.min(at_point);
+                    value = value + L::splat(weights[point + 1]) * at_point;
+                    change = change + L::splat(slopes[point + 1]) * at_point;
+                }
+                gap = L::select(touches, value.max(lowest), gap);
+                rate = L::select(touches, change, rate);
+            }
+            let (sigma, steepness) = (slope * factor * per_radius, L::load(&rows.steepness[block]));
+            (rate / (steepness * steepness + sigma * sigma).sqrt()).store(&mut rates[block]);
+            gap.store(&mut sample.gaps[block]);
+            sigma.store(&mut sample.sigma[block]);
+        }
+    }
+}
+
+impl StartContacts {
+    /// Allocates contacts and modes for a number of blocks of nodes and of modes.
+    pub fn new(nodes: usize, modes: usize) -> Self {
+        let of_nodes = || vec![Eight::ZERO; nodes];
+        Self {
+            modes: [vec![Eight::ZERO; modes], vec![Eight::ZERO; modes]],
+            forces: [of_nodes(), of_nodes()],
+            multipliers: of_nodes(),
+            slopes: of_nodes(),
+            held: [of_nodes(), of_nodes()],
+            moved: [of_nodes(), of_nodes()],
+            gaps: of_nodes(),
+            sigma: of_nodes(),
+            friction: of_nodes(),
+            pushed: false,
+        }
+    }
+}

@@ -1,0 +1,449 @@
+//! Steps of a blade that do not end at communication points: the blade may be within an accepted step whose end lies
+//! ahead.
+
+use super::dense::{ModeResponse, Sample};
+use super::follow::RecordBetween;
+use super::minima::STEP_ERROR;
+use super::rows::BladeRows;
+use super::span::{Blade, BladeInSpan, Recorded};
+use super::surface::PointDrive;
+use super::tables::SpanKind;
+use super::tally::Sums;
+use super::trial::BladeTrial;
+use crate::math::octet::Eight;
+use crate::system::Effort;
+use crate::system::work::ContactWork;
+use crate::time::FreePart;
+use crate::time::galerkin::basis::{MOST, POINTS};
+use crate::time::galerkin::record::MotionCourse;
+use crate::time::galerkin::span::{SpanStep, Stopped, WHOLE, integrate, take_step, units_of};
+use crate::time::galerkin::state::SectorState;
+use crate::time::galerkin::tables::HALVINGS;
+use crate::time::galerkin::trial::ForceInterpolation;
+
+/// Numbers of responses of the modes that are kept; steps of few lengths contain a time.
+pub(super) const RESPONSES: usize = 8;
+/// Numbers of a stored step beside its arrays.
+const NUMBERS: usize = 28;
+/// A step that has begun this fraction of a span before a time is closed without integration (rounding of times).
+const BEGUN: f64 = 1e-9;
+/// Fraction of a span over which rates of the prescribed motion are found.
+const RATE_SHARE: f64 = 1.0 / 64.0;
+/// Fraction of the angular scale of a shape within which it is a cubic, with an error below 1e-4 of the smallest clearance.
+const CUBIC_TURN: f64 = 0.125;
+/// Code of an endless flight.
+const ENDLESS: f64 = 3.0;
+
+/// An accepted step at whose start the modes still are.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct OpenStep {
+    pub step: SpanStep,
+    /// Interpolation of the forces; `None` in a flight without a trial.
+    pub kind: Option<ForceInterpolation>,
+    /// True if the polynomials of the step describe the motion between its points.
+    pub is_resolved: bool,
+    /// Work of the whole step (J).
+    pub work: ContactWork,
+    /// Kinetic and strain energy at its start (J).
+    pub energy: f64,
+}
+
+/// Place of a blade among the free spans since their beginning.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Progress {
+    /// Number of spans before the current one, and parts of it that are passed ([`WHOLE`] in all).
+    pub spans: u64,
+    pub done: u64,
+    /// Effort for the open step.
+    pub effort: Effort,
+}
+
+impl OpenStep {
+    /// A flight without an end, because no contact is possible until an input changes.
+    pub fn endless(level: usize, from: f64, energy: f64) -> Self {
+        let step = SpanStep { level, from, length: f64::INFINITY };
+        Self { step, kind: None, is_resolved: true, work: ContactWork::default(), energy }
+    }
+
+    fn is_endless(&self) -> bool {
+        self.step.length == f64::INFINITY
+    }
+}
+
+impl BladeInSpan<'_> {
+    /// Continues with the open step or the next one until a step contains the end of a part of free time. `course` is the
+    /// prescribed motion over the span of a number.
+    ///
+    /// # Errors
+    /// [`Stopped`] if a step is not solved.
+    pub fn integrate_freely(
+        &mut self,
+        part: FreePart,
+        course: impl Fn(u64) -> MotionCourse,
+        effort: &mut Effort,
+    ) -> Result<(), Stopped> {
+        loop {
+            if let Some(open) = self.open.filter(OpenStep::is_endless) {
+                let begun = (count(self.progress.spans) + open.step.from) * part.span;
+                self.record_endless(FreePart { from: part.from.max(begun), ..part }, course);
+                return Ok(());
+            }
+            self.place.course = course(self.progress.spans);
+            let begun = count(self.progress.spans) * part.span;
+            let ends = [part.from, part.to].map(|time| (time - begun) / part.span);
+            self.recorded = Recorded::Part(ends);
+            while self.progress.done < WHOLE {
+                if let Some(open) = self.open {
+                    if open.is_endless() {
+                        break;
+                    }
+                    let end = open.step.from + open.step.length;
+                    let is_last = end > ends[1];
+                    // The part may be within a step without contact that was open before.
+                    self.is_between = is_last && !self.is_new && !self.pushes() && self.turns_little(ends);
+                    if !self.is_between {
+                        self.record_part(open, [ends[0].max(open.step.from), ends[1].min(end)]);
+                    }
+                    if is_last {
+                        return Ok(());
+                    }
+                    self.pass(open, effort);
+                    continue;
+                }
+                let mut tried = Effort::default();
+                let done = take_step(self, self.progress.done, &mut tried)?;
+                if self.open.is_some() {
+                    self.progress.effort = tried;
+                } else {
+                    effort.add(&tried);
+                    self.progress.done = done;
+                }
+            }
+            if self.open.is_none() {
+                (self.progress.spans, self.progress.done) = (self.progress.spans + 1, 0);
+            }
+        }
+    }
+
+    /// Goes to the end of the open step.
+    fn pass(&mut self, open: OpenStep, effort: &mut Effort) {
+        (self.open, self.is_new) = (None, true);
+        effort.add(&self.progress.effort);
+        self.progress.done += units_of(open.step.level);
+        self.blade.tally.work.add(&open.work);
+        self.advance(open.step, open.kind);
+    }
+
+    /// Records the contacts and smallest gaps of a part of the open step; `ends` are fractions of the span.
+    fn record_part(&mut self, open: OpenStep, ends: [f64; 2]) {
+        let OpenStep { step, kind, .. } = open;
+        let within = ends.map(|end| ((end - step.from) / step.length).clamp(0.0, 1.0));
+        if within[0] >= within[1] {
+            return;
+        }
+        let Some(kind) = kind else {
+            let mut drives = [PointDrive::default(); POINTS];
+            drives.iter_mut().zip(ends).for_each(|(drive, theta)| *drive = self.drive_at(theta).0);
+            if self.needs_gaps(&drives) {
+                self.follow(step, ForceInterpolation::Polynomial, within);
+            }
+            return;
+        };
+        self.blade.kinds[self.place.kind].prepare(step.level, kind);
+        let weights = self.blade.kinds[self.place.kind].level(step.level, kind).part(within);
+        self.find_drives(step, kind, &weights);
+        self.add(step, kind, &weights, Sums::OfSpan);
+        self.record_gaps(step, kind, open.is_resolved, within);
+    }
+
+    /// Records the smallest gaps in a part of an endless flight.
+    fn record_endless(&mut self, part: FreePart, course: impl Fn(u64) -> MotionCourse) {
+        let first = (part.from / part.span).floor();
+        self.place.course = course(whole(first));
+        let [from, to] = [part.from, part.to].map(|time| self.drive_at(time / part.span - first).0);
+        let (gap, kind) = (self.place.gap, self.place.kind);
+        let Blade { trial, kinds, floors, tally, .. } = &mut *self.blade;
+        let rows = &kinds[kind].rows;
+        let turns = (to.turned - from.turned).abs() >= std::f64::consts::TAU;
+        for node in 0..rows.nodes {
+            let of = |blocks: &[Eight]| blocks[node / 8].0[node % 8];
+            let (least, steepness) = (from.clearance - of(&trial.reach[0]), of(&rows.steepness));
+            let lowest = (least + from.factor * gap.surface.least()) / steepness;
+            if lowest >= of(floors).min(of(&tally.lowest)) {
+                continue;
+            }
+            let (angle, around) = (of(&trial.angles), of(&trial.reach[1]) * of(&rows.per_radius));
+            let ends = [from.turned.min(to.turned) - around, from.turned.max(to.turned) + around];
+            let passed = || gap.surface.lowest_between(angle + ends[0], angle + ends[1]);
+            let lowest = if turns { lowest } else { (least + from.factor * passed()) / steepness };
+            let target = &mut tally.lowest[node / 8].0[node % 8];
+            *target = target.min(lowest);
+        }
+    }
+
+    /// Returns whether no contact is possible while nothing but the rotor moves, and the vibration is smaller than the
+    /// tolerance. The reach must be known.
+    pub(super) fn is_quiet(&self) -> bool {
+        let Blade { trial, kinds, .. } = &*self.blade;
+        let rows = &kinds[self.place.kind].rows;
+        let reach = |along: usize, node: usize| trial.reach[along][node / 8].0[node % 8];
+        let is_still = |node: usize| reach(0, node).max(reach(1, node)) <= self.goal.tolerance;
+        if !(0..rows.nodes).all(is_still) {
+            return false;
+        }
+        let (drive, least) = (self.drive_at(0.0).0, self.place.gap.surface.least());
+        let left = drive.clearance + drive.factor * least;
+        drive.factor >= 0.0 && (0..rows.nodes).all(|node| left > reach(0, node))
+    }
+
+    /// Writes the state at the end of a part of free time, which the open step contains.
+    pub fn write_sample(&mut self, part: FreePart, course: impl Fn(u64) -> MotionCourse, state: &mut SectorState) {
+        let Some(OpenStep { step, kind, .. }) = self.open else { return };
+        let (kind_of_sector, begun) = (self.place.kind, count(self.progress.spans) * part.span);
+        let time = ((part.to - begun) - step.from * part.span).max(0.0);
+        let last = if self.open.is_some_and(|open| open.is_endless()) {
+            whole((part.to / part.span).floor())
+        } else {
+            self.progress.spans
+        };
+        self.place.course = course(last);
+        let mut drives = [PointDrive::default(); POINTS];
+        let theta = (part.to - count(last) * part.span) / part.span;
+        let (drive, before) = (self.drive_at(theta).0, self.drive_at(theta - RATE_SHARE).0);
+        let per_second = 1.0 / (RATE_SHARE * part.span);
+        let relative_speed = (drive.turned - before.turned) * per_second;
+        let factor_rate = (drive.factor - before.factor) * per_second;
+        drives[0] = drive;
+        let faced = self.place.faced_surface(&drives);
+        let interpolation = kind.unwrap_or(ForceInterpolation::Polynomial);
+        let blade = &mut *self.blade;
+        blade.kinds[kind_of_sector].prepare(step.level, interpolation);
+        let tables = &blade.kinds[kind_of_sector];
+        let place = blade.responses.iter().position(|response| response.is_of(kind_of_sector, time));
+        let place = place.unwrap_or_else(|| {
+            blade.next_response = (blade.next_response + 1) % RESPONSES;
+            blade.responses[blade.next_response].find(&tables.rows, kind_of_sector, time);
+            blade.next_response
+        });
+        let (instructions, pushes) = (blade.trial.instructions, kind.is_some() && blade.trial.pushes());
+        let length = part.to - part.from;
+        instructions.run_octets(Sample {
+            trial: &mut blade.trial,
+            rows: &tables.rows,
+            level: tables.level(step.level, interpolation),
+            response: &blade.responses[place],
+            time,
+            faced: &faced,
+            relative_speed,
+            factor_rate,
+            pushes,
+        });
+        BladeTrial::write(&tables.rows, &blade.trial.sample, state);
+        if self.is_between && self.record_between(length) {
+            let begun = begun + step.from * part.span;
+            let length = step.length * part.span;
+            let ends = [part.from, part.to].map(|time| ((time - begun) / length).clamp(0.0, 1.0));
+            self.follow(step, interpolation, ends);
+        }
+        self.keep_lowest();
+    }
+
+    /// Records the smallest gaps of a part of free time of a length (s) from gaps and their rates at its ends, where the
+    /// error is small enough. Returns whether nodes are left; these are followed.
+    fn record_between(&mut self, length: f64) -> bool {
+        let Blade { trial, kinds, tally, floors, begun, .. } = &mut *self.blade;
+        let (rows, tolerance) = (&kinds[self.place.kind].rows, self.goal.tolerance);
+        // A flight has no forces.
+        trial.pushes = false;
+        let error = trial.find_interpolation_error(rows, length, STEP_ERROR);
+        let instructions = trial.instructions;
+        instructions.run_octets(RecordBetween { trial, rows, tally, floors, begun, length, error, tolerance })
+    }
+
+    /// Returns whether forces act in the open step.
+    fn pushes(&self) -> bool {
+        self.open.is_some_and(|open| open.kind.is_some()) && self.blade.trial.pushes
+    }
+
+    /// Returns whether the rotor turns so little between two fractions of the span that the shape is a cubic there.
+    fn turns_little(&self, ends: [f64; 2]) -> bool {
+        let [from, to] = ends.map(|end| self.drive_at(end).0.turned);
+        (to - from).abs() < CUBIC_TURN * self.place.gap.surface.angular_scale()
+    }
+
+    /// Goes from the start of the open step to a time within it (s since the beginning of the free spans), with steps that
+    /// end there, and writes the state. `course` is the prescribed motion between two such times.
+    ///
+    /// # Errors
+    /// [`Stopped`] if a step is not solved.
+    pub fn close(
+        &mut self,
+        part: FreePart,
+        course: impl Fn([f64; 2]) -> MotionCourse,
+        effort: &mut Effort,
+        state: &mut SectorState,
+    ) -> Result<(), Stopped> {
+        let flight = self.open.filter(|open| open.kind.is_none());
+        if let Some(OpenStep { energy, .. }) = flight {
+            // The state within a flight is exact.
+            self.write_sample(part, |spans| course([count(spans) * part.span, count(spans + 1) * part.span]), state);
+            effort.add(&self.progress.effort);
+            let trial = &mut self.blade.trial;
+            trial.start.modes.clone_from(&trial.sample.modes);
+            self.blade.tally.damping += energy - self.energy_at_start();
+            return Ok(());
+        }
+        if let Some(OpenStep { step, .. }) = self.open.take() {
+            let begun = (count(self.progress.spans) + step.from) * part.span;
+            let length = part.to - begun;
+            if length > BEGUN * part.span {
+                self.blade.set_span(SpanKind::Bounded, length);
+                self.place.course = course([begun, part.to]);
+                (self.recorded, self.control.level) = (Recorded::Work, 0);
+                integrate(self, effort)?;
+            }
+        }
+        BladeTrial::write(&self.blade.kinds[self.place.kind].rows, &self.blade.trial.start, state);
+        Ok(())
+    }
+
+    /// Rate of the gap of a node at the end of the part of free time (m/s).
+    pub fn gap_rate(&self, node: usize) -> f64 {
+        self.blade.trial.rates[node / 8].0[node % 8]
+    }
+
+    /// Energy at the start of the open step (J).
+    pub fn energy(&self) -> f64 {
+        self.open.map_or(0.0, |open| open.energy)
+    }
+
+    /// Stores the open step in numbers, of which there are [`stored_len`], unless they hold it.
+    pub fn store(&mut self, numbers: &mut [f64]) {
+        let (head, arrays) = numbers.split_at_mut(NUMBERS);
+        let (rates, arrays) = arrays.split_at_mut(8 * self.blade.trial.rates.len());
+        let blocks = self.blade.trial.rates.iter().zip(rates.as_chunks_mut().0);
+        blocks.for_each(|(block, numbers)| *numbers = block.0);
+        if !self.is_new {
+            return;
+        }
+        let Some(OpenStep { step, kind, is_resolved, work, energy }) = self.open else { return };
+        let flag = |is: bool| f64::from(u8::from(is));
+        let Progress { spans, done, effort } = self.progress;
+        let code = match kind {
+            None => 0.0,
+            Some(ForceInterpolation::Polynomial) => 1.0,
+            Some(ForceInterpolation::Constant) => 2.0,
+        };
+        let code = if self.open.is_some_and(|open| open.is_endless()) { ENDLESS } else { code };
+        let counts = [effort.steps, effort.flights, effort.trials, effort.unsolved];
+        let more = [effort.constant, effort.missed, effort.factorisations];
+        let values = [1.0, count(spans), count(done), count(step.level as u64), code]
+            .into_iter()
+            .chain([is_resolved, self.known, self.reach_known, self.blade.trial.pushes].map(flag))
+            .chain([flag(self.blade.trial.start.pushed), energy])
+            .chain([
+                work.shaft,
+                work.casing,
+                work.heat,
+                work.closing,
+                work.dropped,
+                work.exact,
+                work.turnover,
+                work.moved,
+            ])
+            .chain(counts.map(count))
+            .chain(more.map(count));
+        head.iter_mut().zip(values).for_each(|(to, value)| *to = value);
+        self.blade.trial.each_stored(kind.is_some(), arrays, |block, numbers| *numbers = block.0);
+    }
+
+    /// Reads an open step from numbers. Returns false if they hold none.
+    pub fn recall(&mut self, numbers: &mut [f64]) -> bool {
+        if numbers[0] == 0.0 {
+            return false;
+        }
+        self.is_new = false;
+        let whole = |index: usize| whole(numbers[index]);
+        let is = |index: usize| numbers[index] != 0.0;
+        let level = usize::try_from(whole(3)).unwrap_or(0).min(HALVINGS);
+        let effort = Effort {
+            steps: whole(19),
+            flights: whole(20),
+            trials: whole(21),
+            unsolved: whole(22),
+            constant: whole(23),
+            missed: whole(24),
+            factorisations: whole(25),
+        };
+        self.progress = Progress { spans: whole(1), done: whole(2).min(WHOLE - 1), effort };
+        let kind = match whole(4) {
+            0 | 3 => None,
+            2 => Some(ForceInterpolation::Constant),
+            _ => Some(ForceInterpolation::Polynomial),
+        };
+        (self.known, self.reach_known) = (is(6), is(7));
+        let trial = &mut self.blade.trial;
+        (trial.pushes, trial.start.pushed) = (is(8), is(9));
+        let work = ContactWork {
+            shaft: numbers[11],
+            casing: numbers[12],
+            heat: numbers[13],
+            closing: numbers[14],
+            dropped: numbers[15],
+            exact: numbers[16],
+            turnover: numbers[17],
+            moved: numbers[18],
+            ..ContactWork::default()
+        };
+        let mut step = SpanStep::new(level, self.progress.done);
+        if numbers[4] == ENDLESS {
+            step.length = f64::INFINITY;
+        }
+        self.open = Some(OpenStep { step, kind, is_resolved: is(5), work, energy: numbers[10] });
+        let (_, arrays) = numbers.split_at_mut(NUMBERS);
+        let (rates, arrays) = arrays.split_at_mut(8 * trial.rates.len());
+        trial.rates_before.iter_mut().zip(rates.as_chunks().0).for_each(|(block, numbers)| block.0 = *numbers);
+        trial.each_stored(kind.is_some(), arrays, |block, numbers| block.0 = *numbers);
+        true
+    }
+}
+
+/// Number of numbers that store an open step of a blade with these numbers of nodes and modes with inertia.
+pub(crate) fn stored_len(nodes: usize, modes: usize) -> usize {
+    NUMBERS + 8 * ((11 + 7 * MOST) * Eight::blocks(nodes) + (2 + MOST) * Eight::blocks(modes))
+}
+
+impl BladeTrial {
+    /// Calls a function with each block that an open step needs, and its numbers. A flight without a trial needs no lanes.
+    fn each_stored(&mut self, is_tried: bool, numbers: &mut [f64], of: impl Fn(&mut Eight, &mut [f64; 8])) {
+        let Self { start, moved, sigma, gaps, multipliers, forces, modal_forces, reach, .. } = self;
+        let contacts = [&mut start.multipliers, &mut start.slopes, &mut start.gaps, &mut start.sigma];
+        let all = start.modes.iter_mut().chain(&mut start.forces).chain(&mut start.moved).chain(contacts).chain(reach);
+        let lanes = [sigma, gaps, multipliers].into_iter().chain(moved).chain(forces).chain(modal_forces);
+        let mut rest = numbers.as_chunks_mut().0;
+        for blocks in all.chain(lanes.filter(|_| is_tried)) {
+            let (own, others) = rest.split_at_mut(blocks.len());
+            blocks.iter_mut().zip(own).for_each(|(block, numbers)| of(block, numbers));
+            rest = others;
+        }
+    }
+}
+
+/// Converts a count to a number.
+#[expect(clippy::cast_precision_loss, reason = "counts are below 2^52")]
+fn count(value: u64) -> f64 {
+    value as f64
+}
+
+/// Converts a stored count back.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "conversion saturates, and NaN becomes 0")]
+fn whole(value: f64) -> u64 {
+    value as u64
+}
+
+impl ModeResponse {
+    /// Allocates responses of modes.
+    pub fn several(rows: &BladeRows) -> Vec<Self> {
+        vec![Self::new(rows); RESPONSES]
+    }
+}

@@ -1,0 +1,170 @@
+//! Steps that do not end at communication points: results do not depend on the communication step, inputs act at once,
+//! saved states continue with equal bits.
+
+use super::{apart, print_row, scene};
+use tiprub_core::scene::method::Scheme;
+use tiprub_core::{CoSimulation, Scene, Simulation};
+use tiprub_test_models::{bits, element, go, real, saved, set, started};
+
+/// Steps whose multiples are exact times.
+const TICK: f64 = 1.0 / 131_072.0;
+
+/// Order of the clearance (m).
+const CLEARANCE: f64 = 4e-4;
+
+fn rub(tolerance: f64) -> Scene {
+    scene(Scheme::Galerkin, 4e-5, tolerance)
+}
+
+/// Displacements and gaps at the current time, and counters of the steps so far.
+fn instant(simulation: &Simulation) -> (Vec<u64>, Vec<u64>) {
+    let system = simulation.system();
+    let values = system.bank().displacement().iter().chain(system.gaps());
+    let others = ["rotor_angle", "strain_energy"].map(|name| real(simulation, name));
+    let effort = *system.effort();
+    (
+        values.chain(&others).map(|value| value.to_bits()).collect(),
+        vec![effort.steps, effort.flights, effort.trials, effort.constant, effort.missed, effort.factorisations],
+    )
+}
+
+/// Runs to the times after 64, 256 and 512 ticks in communication steps of these numbers of ticks, one after the other.
+fn run(scene: &Scene, ticks: &[u32]) -> Vec<(Vec<u64>, Vec<u64>)> {
+    let mut simulation = started(scene);
+    let (mut reached, mut at, mut turns) = (0, Vec::new(), ticks.iter().cycle());
+    for until in [64, 256, 512] {
+        while reached < until {
+            let step = (*turns.next().unwrap()).min(until - reached);
+            go(&mut simulation, f64::from(step) * TICK);
+            reached += step;
+        }
+        at.push(instant(&simulation));
+    }
+    at
+}
+
+#[test]
+fn results_do_not_depend_on_the_communication_step() {
+    for tolerance in [1e-2, 1e-4] {
+        let scene = rub(tolerance);
+        let expected = run(&scene, &[1]);
+        assert!(expected[2].1[2] > 400, "{:?}", expected[2].1);
+        for ticks in [&[2][..], &[16], &[64], &[1, 3, 17, 5, 40]] {
+            let found = run(&scene, ticks);
+            for (found, expected) in found.iter().zip(&expected) {
+                assert_eq!(found.1, expected.1, "{ticks:?}: counters");
+                let differ = found.0.iter().zip(&expected.0).filter(|(a, b)| a != b).count();
+                assert_eq!(differ, 0, "{ticks:?}: {differ} of {} values", found.0.len());
+            }
+        }
+    }
+}
+
+fn force_of(simulation: &Simulation, sector: usize) -> f64 {
+    (0..3).map(|node| element(simulation, &format!("blade[{sector}].normal_force"), node)).sum()
+}
+
+/// The same rub, once in free spans and once in spans that end at internal points, because of a limit on the number of
+/// steps that is never reached.
+#[test]
+fn free_spans_are_as_accurate_as_others() {
+    let results = |tolerance: f64, bounded: bool| {
+        let mut simulation = started(&rub(tolerance));
+        if bounded {
+            let reference = simulation.table().find("max_internal_steps").unwrap().reference;
+            simulation.set_integer(reference, 1_000_000).unwrap();
+        }
+        let (mut moved, mut impulse, mut heat, mut most, mut lowest) = (Vec::new(), 0.0, 0.0, 0.0, f64::INFINITY);
+        for _ in 0..600 {
+            go(&mut simulation, 1e-5);
+            moved.extend_from_slice(simulation.system().bank().displacement());
+            impulse += 1e-5 * (1..=4).map(|sector| force_of(&simulation, sector)).sum::<f64>();
+            heat += 1e-5 * real(&simulation, "friction_power");
+            most = real(&simulation, "friction_power").max(most);
+            lowest = lowest.min(real(&simulation, "clearance_minimum"));
+        }
+        let ledger = simulation.system().ledger();
+        let (kinetic, strain) = simulation.system().energies();
+        let residual = ledger.residual(kinetic + strain).abs() / ledger.scale();
+        (moved, [impulse, heat, lowest, ledger.friction_loss.value()], residual, most)
+    };
+    let (exact, sums, _, most) = results(1e-7, true);
+    for tolerance in [1e-2, 1e-3, 1e-4] {
+        let [free, bounded] = [false, true].map(|bounded| results(tolerance, bounded));
+        let [own, other] = [&free, &bounded].map(|found| apart(&found.0, &exact));
+        print_row!("tolerance {tolerance:.0e}: {own:.1e} in free spans, {other:.1e} in bounded ones");
+        assert!(own < tolerance, "{own:e}, bounded {other:e}");
+        assert!(free.2 < 1e-13, "{:e}", free.2);
+        for (index, (found, expected)) in free.1.iter().zip(sums).take(3).enumerate() {
+            let error = if index == 2 { (found - expected) / CLEARANCE } else { found / expected - 1.0 };
+            assert!(error.abs() < 2.0 * tolerance, "{tolerance:e}, {index}: {found} {expected}");
+        }
+        // The ledger belongs to the starts of open steps.
+        let (heat, lost) = (free.1[1], free.1[3]);
+        assert!((heat - lost).abs() < 4e-5 * most, "{tolerance:e}: {heat} {lost} {most}");
+    }
+}
+
+#[test]
+fn saved_states_continue_with_equal_bits_within_an_open_step() {
+    let mut simulation = started(&rub(1e-3));
+    for _ in 0..100 {
+        go(&mut simulation, 1.3e-5);
+    }
+    let state = saved(&simulation);
+    let mut other = started(&rub(1e-3));
+    other.restore_state(&state).unwrap();
+    assert!(saved(&other) == state);
+    for _ in 0..50 {
+        go(&mut simulation, 1.3e-5);
+        go(&mut other, 1.3e-5);
+        assert_eq!(bits(&simulation), bits(&other));
+    }
+    assert!(saved(&other) == saved(&simulation));
+}
+
+#[test]
+fn a_value_set_again_changes_nothing() {
+    let run = |sets: bool| {
+        let mut simulation = started(&rub(1e-3));
+        for _ in 0..100 {
+            if sets {
+                for name in ["speed", "casing_radius_change"] {
+                    let value = real(&simulation, name);
+                    set(&mut simulation, name, value);
+                }
+            }
+            go(&mut simulation, 1.3e-5);
+        }
+        (bits(&simulation), *simulation.system().effort())
+    };
+    assert_eq!(run(true), run(false));
+}
+
+/// Inputs that change at some communication points end the open steps there.
+#[test]
+fn inputs_that_change_now_and_then_keep_the_tolerance() {
+    let run = |tolerance: f64, every: u32| {
+        let mut simulation = started(&rub(tolerance));
+        let speed = real(&simulation, "speed");
+        let mut moved = Vec::new();
+        for n in 0..300 {
+            if n % every == every - 1 {
+                set(&mut simulation, "speed", speed * (1.0 + 1e-3 * f64::from(n / every % 3)));
+                set(&mut simulation, "casing_radius_change", -1e-6 * f64::from(n / every % 2));
+            }
+            go(&mut simulation, 2e-5);
+            moved.extend_from_slice(simulation.system().bank().displacement());
+        }
+        let ledger = simulation.system().ledger();
+        let (kinetic, strain) = simulation.system().energies();
+        (moved, ledger.residual(kinetic + strain).abs() / ledger.scale())
+    };
+    for every in [1, 2, 3, 10, 41] {
+        let (exact, _) = run(1e-6, every);
+        let (moved, residual) = run(1e-3, every);
+        let error = apart(&moved, &exact);
+        print_row!("inputs change every {every} steps: {error:.1e}");
+        assert!(error < 1e-3 && residual < 1e-13, "{every}: {error:e} {residual:e}");
+    }
+}
