@@ -398,7 +398,7 @@ impl Variable {
     }
 
     /// Returns whether a saved state can contain the value. The range of inputs is that of their current values, not of the set ones.
-    pub fn can_have(&self, value: f64) -> bool {
+    pub(crate) fn can_have(&self, value: f64) -> bool {
         let in_range = |value| !self.is_settable() || self.check_range(0, value).is_ok();
         #[expect(clippy::cast_possible_truncation, reason = "compared with the value")]
         let integer = Some(value as i32).filter(|number| (f64::from(*number) - value).abs() == 0.0);
