@@ -16,6 +16,8 @@ pub struct VariableValues {
     values: Vec<f64>,
 }
 
+crate::persist_fields!(VariableValues { values, .. });
+
 impl VariableValues {
     /// Creates the store with all start values.
     pub fn new(table: VariableTable) -> Self {

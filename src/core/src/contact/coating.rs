@@ -283,23 +283,24 @@ impl Coating {
 impl Persist for Coating {
     fn save(&self, writer: &mut StateWriter) {
         self.plastic.save(writer);
-        self.cutting.iter().for_each(|cutting| cutting.save(writer));
+        self.cutting.save(writer);
     }
     fn restore(&mut self, reader: &mut StateReader) {
         self.plastic.restore(reader);
-        self.cutting.iter_mut().for_each(|cutting| cutting.restore(reader));
+        self.cutting.restore(reader);
+        self.cutting.iter_mut().for_each(CoatingCut::forget);
     }
     fn check(&self, reader: &mut StateReader) {
-        let mut bytes = reader.clone();
+        let mut saved = self.clone();
+        saved.restore(&mut reader.clone());
         self.plastic.check(reader);
-        for _ in &self.plastic {
-            let mut strain = 0.0_f64;
-            strain.restore(&mut bytes);
-            if strain < 0.0 {
-                reader.refuse("the coating is thicker than when new");
-            }
+        self.cutting.check(reader);
+        if saved.plastic.iter().any(|strain| *strain < 0.0) {
+            reader.refuse("the coating is thicker than when new");
         }
-        self.cutting.iter().for_each(|cutting| cutting.check(reader, self.plastic.len()));
+        if saved.cutting.iter().any(|cutting| cutting.is_outside(saved.plastic.len())) {
+            reader.refuse("a blade cuts outside the coating");
+        }
     }
 }
 

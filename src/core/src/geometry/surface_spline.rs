@@ -29,6 +29,8 @@ mod projection;
 pub use patch::{Evaluation, Weights};
 pub use projection::Projection;
 
+use tiprub_cosim::persist_fields;
+
 use crate::math::real;
 use crate::math::vector::Vector3;
 use crate::scene::settings::{Closure, Interpolation};
@@ -72,6 +74,8 @@ pub struct ClosestPoint {
     /// by rounding at the edges of an open surface.
     pub t: f64,
 }
+
+persist_fields!(ClosestPoint { patch, s, t });
 
 /// A surface through around × along data points, index `along · around + i`. A closed surface has rings in order of increasing z, with the
 /// points of a ring at angles that increase by 2π/around about z; an open surface is a quadrilateral grid of any shape, with "around" and
