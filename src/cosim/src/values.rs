@@ -10,7 +10,7 @@ use crate::{Result, shown};
 /// Variables of a unit with their current values, which it dereferences to: one number per value reference.
 ///
 /// Integers, items and truth values are stored as numbers; texts are constants of the table.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct VariableValues {
     table: Arc<VariableTable>,
     values: Vec<f64>,

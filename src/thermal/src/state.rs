@@ -18,7 +18,7 @@ pub(crate) const READY: u64 = 1;
 pub(crate) const FAILED: u64 = 2;
 
 /// State of a simulation.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct ThermalState {
     pub(crate) phase: u64,
     /// Time (s).
@@ -66,21 +66,8 @@ impl ThermalState {
     /// Creates the state before initialisation, with start values.
     pub(crate) fn new(mut values: VariableValues, patches: usize, order: usize) -> Self {
         values.reset();
-        Self {
-            phase: CREATED,
-            time: 0.0,
-            values,
-            heat: vec![Input::default(); patches],
-            films: [Input::default(); 2],
-            factors_used: [1.0; 2],
-            coordinates: vec![0.0; order],
-            last_length: 0.0,
-            last_ramped: false,
-            powers: [0.0; 2],
-            totals: [Sum::default(); 3],
-            exchanged: 0.0,
-            initial_heat: 0.0,
-        }
+        let heat = vec![Input::default(); patches];
+        Self { values, heat, factors_used: [1.0; 2], coordinates: vec![0.0; order], ..Self::default() }
     }
 
     /// Returns the value of the variable of an item; `items` are those of the table.
