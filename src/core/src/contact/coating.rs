@@ -203,11 +203,6 @@ impl Coating {
         self.nodes
     }
 
-    /// Number of cells; cell `row · around + i` is the i-th of its axial row.
-    pub fn cells(&self) -> usize {
-        self.plastic.len()
-    }
-
     /// Angle (rad) by which blades may turn in a step without skipping a cell: the width of a cell, or of the narrowest part of a tip.
     pub fn stride(&self) -> f64 {
         let narrowest = self.rows.iter().fold(f64::INFINITY, |narrowest, row| row.covers.min(narrowest));
@@ -219,13 +214,7 @@ impl Coating {
         TAU / real(self.around)
     }
 
-    /// Angle (rad, in the fixed frame) and axial position (m) of the centre of a cell.
-    pub fn centre(&self, cell: usize) -> (f64, f64) {
-        let angle = (real(cell % self.around) + 0.5) * TAU / real(self.around);
-        (angle, self.rows[cell / self.around].axial)
-    }
-
-    /// Wear depth of a cell (m).
+    /// Wear depth of a cell (m); cell `row · around + i` is the i-th of its axial row.
     pub fn wear_depth(&self, cell: usize) -> f64 {
         self.plastic[cell] * self.thickness
     }
