@@ -93,24 +93,6 @@ impl ThermalSimulation {
         &self.model
     }
 
-    /// Returns 1/λ of all coordinates (s), the slowest first, at the convection factors of the last step; infinite
-    /// for constant coordinates.
-    ///
-    /// # Examples
-    /// ```
-    /// # use tiprub_cosim::CoSimulation;
-    /// # use tiprub_thermal::ThermalSimulation;
-    /// # let model = tiprub_test_models::wall();
-    /// # let mut simulation = ThermalSimulation::new(model)?;
-    /// # simulation.initialise(0.0)?;
-    /// let slowest = simulation.time_constants().into_iter().fold(0.0, f64::max);
-    /// println!("steady after about {:.0} s", 5.0 * slowest);
-    /// # Ok::<(), tiprub_cosim::Error>(())
-    /// ```
-    pub fn time_constants(&self) -> Vec<f64> {
-        self.operator.rates.iter().map(|rate| 1.0 / rate).collect()
-    }
-
     /// Solves λ z = load.
     pub(crate) fn start_steady(&mut self) -> Result<()> {
         let rates = &self.operator.rates;
