@@ -15,7 +15,6 @@ mod sliding;
 use std::ops::{Deref, DerefMut};
 
 use nalgebra::DMatrix;
-use tiprub_cosim::persist::{Persist, StateReader, StateWriter};
 
 use crate::contact::active_set::SolverOutcome;
 use crate::contact::coating::Coating;
@@ -218,17 +217,4 @@ fn fill_tangents(at: &impl ContactPrediction, rows: &mut [Vector3], columns: &mu
     let [first, second] = tangents(normal);
     rows.copy_from_slice(&[normal, first, second]);
     columns.copy_from_slice(rows);
-}
-
-/// The state of a law is the wear of its coating.
-impl Persist for Law {
-    fn save(&self, writer: &mut StateWriter) {
-        self.coating().into_iter().for_each(|coating| coating.save(writer));
-    }
-    fn restore(&mut self, reader: &mut StateReader) {
-        self.coating_mut().into_iter().for_each(|coating| coating.restore(reader));
-    }
-    fn check(&self, reader: &mut StateReader) {
-        self.coating().into_iter().for_each(|coating| coating.check(reader));
-    }
 }

@@ -376,7 +376,6 @@ fn allocates_only_during_construction() {
         let allocations = counting::allocations_of(|| {
             surface.interpolate(&mut values);
             surface.set_control_points(|index| values[index]);
-            surface.transfer(&mut values);
             surface.set_data(&points).unwrap();
             for start in &starts {
                 let x = 0.998 * surface.evaluate(*start).point;

@@ -8,6 +8,7 @@
 
 pub mod bounds;
 mod error;
+mod input;
 mod patch;
 pub mod persist;
 mod sum;
@@ -17,6 +18,7 @@ pub mod variables;
 pub mod warning;
 
 pub use error::{Diagnostic, Error, Result, shown, shown_time};
+pub use input::Input;
 pub use patch::ThermalPatch;
 pub use sum::Sum;
 pub use unit::{CoSimulation, StepProgress};

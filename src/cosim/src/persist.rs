@@ -157,6 +157,7 @@ macro_rules! persist_numbers {
 persist_numbers! {
     f64, check_reals;
     u64, check_counts;
+    usize, check_counts;
     i32, |_: &[[u8; 4]], _: &mut StateReader| {};
 }
 
@@ -216,32 +217,40 @@ macro_rules! persist_as_slice {
     ($([$($generics:tt)*] $container:ty;)*) => {$(
         impl<$($generics)*> Persist for $container {
             fn save(&self, writer: &mut StateWriter) {
-                self[..].save(writer);
+                self.as_slice().save(writer);
             }
             fn restore(&mut self, reader: &mut StateReader) {
-                self[..].restore(reader);
+                self.as_mut_slice().restore(reader);
             }
             fn check(&self, reader: &mut StateReader) {
-                self[..].check(reader);
+                self.as_slice().check(reader);
             }
         }
     )*};
 }
 
+// An optional part exists for the whole life of its owner, or never.
 persist_as_slice! {
     [T: Persist] Vec<T>;
+    [T: Persist] Option<T>;
     [T: Persist, const N: usize] [T; N];
-    [] crate::VariableValues;
 }
 
-/// Implements [`Persist`] for a struct from the list of its fields; a missing field is a compile error. `field.part` saves this part of a
-/// field, such as the components of a vector: `force.data.0`.
+/// Implements [`Persist`] for a struct from the list of its fields; a missing field is a compile error, unless the list ends with `..`
+/// because the other fields are not part of the state. `field.part` saves this part of a field, such as the components of a vector:
+/// `force.data.0`.
 #[macro_export]
 macro_rules! persist_fields {
-    ($name:ident { $($field:ident $(. $part:tt)*),+ $(,)? }) => {
-        impl $crate::persist::Persist for $name {
+    ($name:ident $(<$generic:ident>)? { $($field:ident $(. $part:tt)*),+ , .. }) => {
+        $crate::persist_fields!($name $(<$generic>)? [, ..] $($field $(. $part)*),+);
+    };
+    ($name:ident $(<$generic:ident>)? { $($field:ident $(. $part:tt)*),+ $(,)? }) => {
+        $crate::persist_fields!($name $(<$generic>)? [] $($field $(. $part)*),+);
+    };
+    ($name:ident $(<$generic:ident>)? [$($rest:tt)*] $($field:ident $(. $part:tt)*),+) => {
+        impl $(<$generic: $crate::persist::Persist>)? $crate::persist::Persist for $name $(<$generic>)? {
             fn save(&self, writer: &mut $crate::persist::StateWriter) {
-                let Self { $($field: _),+ } = self;
+                let Self { $($field: _),+ $($rest)* } = self;
                 $($crate::persist::Persist::save(&self.$field$(.$part)*, writer);)+
             }
             fn restore(&mut self, reader: &mut $crate::persist::StateReader) {

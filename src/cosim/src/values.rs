@@ -3,17 +3,20 @@
 use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 
-use crate::Result;
+use crate::persist::damaged;
 use crate::variables::{DataType, Quantity, StartValue, Variable, VariableTable};
+use crate::{Result, shown};
 
 /// Variables of a unit with their current values, which it dereferences to: one number per value reference.
 ///
 /// Integers, items and truth values are stored as numbers; texts are constants of the table.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct VariableValues {
     table: Arc<VariableTable>,
     values: Vec<f64>,
 }
+
+crate::persist_fields!(VariableValues { values, .. });
 
 impl VariableValues {
     /// Creates the store with all start values.
@@ -37,6 +40,20 @@ impl VariableValues {
     /// Returns the first element of a variable, or 0 without this variable.
     pub fn value_of(&self, quantity: Quantity, of: usize) -> f64 {
         self.elements(quantity, of).map_or(0.0, |elements| elements[0])
+    }
+
+    /// Checks values from a saved state: parameters could have been set, and outputs read.
+    ///
+    /// # Errors
+    /// A value that its variable cannot have.
+    pub fn check_values(&self) -> Result<()> {
+        for variable in self.table.variables() {
+            let values = &self.values[variable.reference as usize..][..variable.len()];
+            if let Some(value) = values.iter().find(|value| !variable.can_have(**value)) {
+                return damaged(format!("`{}` has the invalid value {}", variable.name, shown(*value)));
+            }
+        }
+        Ok(())
     }
 
     /// Replaces all values and returns the previous ones.

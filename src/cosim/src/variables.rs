@@ -16,7 +16,7 @@ pub use table::VariableTable;
 pub const NO_CLEARANCE: f64 = 1e9;
 
 /// Role of a variable, as in the FMI standards.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Causality {
     /// The independent variable, time.
     Independent,
@@ -25,13 +25,14 @@ pub enum Causality {
     /// Set by the importer before the simulation (and during it if tunable).
     Parameter,
     /// Computed output.
+    #[default]
     Output,
     /// Computed or constant, not intended for connections.
     Local,
 }
 
 /// When a variable may change, as in the FMI standards.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Variability {
     /// Never.
     Constant,
@@ -42,13 +43,15 @@ pub enum Variability {
     /// At communication points only.
     Discrete,
     /// Continuously.
+    #[default]
     Continuous,
 }
 
 /// Data type of a variable.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum DataType {
     /// f64.
+    #[default]
     Real,
     /// i32.
     Integer,
@@ -151,9 +154,10 @@ macro_rules! units {
 }
 
 /// Relation of a value to the last communication step.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Span {
     /// Value at the communication point.
+    #[default]
     Point,
     /// Mean over the communication step (impulse / H).
     Mean,
@@ -177,7 +181,7 @@ pub enum StartValue {
 }
 
 /// One row of the table.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Variable {
     /// Structured name, for example `blade[1].clearance`.
     pub name: String,
@@ -262,24 +266,7 @@ setters! {
 impl Variable {
     /// Creates the row of a continuous real output.
     pub fn output(name: String, description: String) -> Self {
-        Self {
-            name,
-            reference: 0,
-            dimension: None,
-            kind: DataType::Real,
-            causality: Causality::Output,
-            variability: Variability::Continuous,
-            span: Span::Point,
-            unit: None,
-            display: None,
-            min: None,
-            max: None,
-            nominal: None,
-            start: None,
-            description,
-            quantity: Quantity::Output,
-            of: 0,
-        }
+        Self { name, description, ..Self::default() }
     }
 
     /// Number of elements (1 for a scalar).
@@ -398,7 +385,7 @@ impl Variable {
     }
 
     /// Returns whether a saved state can contain the value. The range of inputs is that of their current values, not of the set ones.
-    pub fn can_have(&self, value: f64) -> bool {
+    pub(crate) fn can_have(&self, value: f64) -> bool {
         let in_range = |value| !self.is_settable() || self.check_range(0, value).is_ok();
         #[expect(clippy::cast_possible_truncation, reason = "compared with the value")]
         let integer = Some(value as i32).filter(|number| (f64::from(*number) - value).abs() == 0.0);

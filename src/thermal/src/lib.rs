@@ -7,7 +7,6 @@
 #![warn(unreachable_pub)]
 #![forbid(unsafe_code)]
 
-mod course;
 mod exponential;
 mod model;
 mod operator;

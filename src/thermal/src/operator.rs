@@ -52,11 +52,29 @@ impl DiagonalOperator {
         }
     }
 
-    /// Computes the φ functions of all coordinates for a step of `length` (s).
-    pub(crate) fn fill_phi(&self, length: f64, phi: &mut [Phi]) {
-        for (phi, rate) in phi.iter_mut().zip(&self.rates) {
-            *phi = Phi::new(-rate * length);
+    /// Advances coordinates over a step of `length` (s) under `heat` (W) and temperatures of gas and air (K) at its beginning and its end,
+    /// linear in between. Returns the heat supplied, from the gas and from the air (J).
+    pub(crate) fn advance(
+        &self,
+        length: f64,
+        coordinates: &mut [f64],
+        heat: [&[f64]; 2],
+        films: [[f64; 2]; 2],
+    ) -> [f64; 3] {
+        let mean = |start: f64, end: f64| 0.5 * (start + end) * length;
+        let supplied = heat[0].iter().zip(heat[1]).map(|(start, end)| mean(*start, *end)).sum();
+        let [gas, air] = [0, 1].map(|film| self.conductances[film] * mean(films[0][film], films[1][film]));
+        let mut heats = [supplied, gas, air];
+        for (coordinate, z) in coordinates.iter_mut().enumerate() {
+            let [start, end] = [0, 1].map(|side| self.load(coordinate, heat[side], films[side]));
+            let phi = Phi::new(-self.rates[coordinate] * length);
+            let [next, integral] = phi.step(length, *z, start, end - start);
+            *z = next;
+            for (flow, film) in heats[1..].iter_mut().zip(&self.films) {
+                *flow -= film[coordinate] * integral;
+            }
         }
+        heats
     }
 
     /// Returns the load of `heat` (W) and of the temperatures of gas and air (K) on one coordinate.

@@ -55,11 +55,11 @@ impl ThermalSimulation {
     /// Computes the values of all outputs.
     pub(crate) fn compute_outputs(&mut self) {
         for row in 0..self.items.len() {
-            let variable = &self.values.table().variables()[row];
+            let variable = &self.state.values.table().variables()[row];
             let (first, count) = (variable.reference as usize, variable.len());
             for element in 0..count {
                 if let Some(value) = self.output(self.items[row], element) {
-                    self.values[first + element] = value;
+                    self.state.values[first + element] = value;
                 }
             }
         }

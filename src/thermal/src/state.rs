@@ -1,9 +1,9 @@
 //! Complete state of a simulation, and its bytes.
 
 use tiprub_cosim::persist::fingerprint_numbers;
-use tiprub_cosim::{Sum, persist_fields};
+use tiprub_cosim::{Input, Sum, VariableValues, persist_fields};
 
-use crate::course::InputCourse;
+use crate::table::Item;
 
 /// Number of bytes of the fingerprint of the model, before the state.
 pub(crate) const FINGERPRINT_BYTES: usize = 8;
@@ -18,21 +18,17 @@ pub(crate) const READY: u64 = 1;
 pub(crate) const FAILED: u64 = 2;
 
 /// State of a simulation.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct ThermalState {
     pub(crate) phase: u64,
     /// Time (s).
     pub(crate) time: f64,
-    /// Parameters in the order of [`crate::table`]: initial temperature (K), item of the initial state, item of the interpolation.
-    pub(crate) initial_temperature: f64,
-    pub(crate) initial_state: i32,
-    pub(crate) interpolation: i32,
+    /// Variables with their values; for inputs and parameters, the set values.
+    pub(crate) values: VariableValues,
     /// Heat of the patches (W).
-    pub(crate) heat: Vec<InputCourse>,
+    pub(crate) heat: Vec<Input>,
     /// Temperatures of gas and air (K).
-    pub(crate) films: [InputCourse; 2],
-    /// Set convection factors.
-    pub(crate) factors: [f64; 2],
+    pub(crate) films: [Input; 2],
     /// Factors of the last step, which define the eigenvectors of the coordinates.
     pub(crate) factors_used: [f64; 2],
     /// Coordinates z.
@@ -53,12 +49,9 @@ pub(crate) struct ThermalState {
 persist_fields!(ThermalState {
     phase,
     time,
-    initial_temperature,
-    initial_state,
-    interpolation,
+    values,
     heat,
     films,
-    factors,
     factors_used,
     coordinates,
     last_length,
@@ -68,6 +61,26 @@ persist_fields!(ThermalState {
     exchanged,
     initial_heat,
 });
+
+impl ThermalState {
+    /// Creates the state before initialisation, with start values.
+    pub(crate) fn new(mut values: VariableValues, patches: usize, order: usize) -> Self {
+        values.reset();
+        let heat = vec![Input::default(); patches];
+        Self { values, heat, factors_used: [1.0; 2], coordinates: vec![0.0; order], ..Self::default() }
+    }
+
+    /// Returns the value of the variable of an item; `items` are those of the table.
+    pub(crate) fn value(&self, items: &[Item], item: Item) -> f64 {
+        let row = items.iter().position(|other| *other == item);
+        row.map_or(0.0, |row| self.values[self.values.table().variables()[row].reference as usize])
+    }
+
+    /// Returns the set convection factors of the gas and of the air.
+    pub(crate) fn set_factors(&self, items: &[Item]) -> [f64; 2] {
+        [0, 1].map(|film| self.value(items, Item::Factor(film)))
+    }
+}
 
 /// Returns the fingerprint of a model's numbers.
 pub(crate) fn fingerprint_of<'a>(arrays: impl Iterator<Item = &'a [f64]>) -> u64 {

@@ -43,6 +43,11 @@ static INTERPOLATIONS: Enumeration = Enumeration {
     ],
 };
 
+/// Number of the initial state `steady`.
+pub(crate) const STEADY: f64 = 2.0;
+/// Number of the interpolation `hold`.
+pub(crate) const HOLD: f64 = 2.0;
+
 /// Quantity of a variable, with an item for each row in the order of the table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Item {

@@ -4,24 +4,15 @@
 use tiprub_cosim::variables::Variable;
 use tiprub_cosim::{CoSimulation, Error, Result};
 
-use crate::exponential::Phi;
-use crate::operator::DiagonalOperator;
 use crate::simulation::ThermalSimulation;
 use crate::table::Item;
-
-/// Changes of coordinates, their integrals over the step, and heats.
-struct ThermalChange {
-    coordinates: Vec<f64>,
-    /// Heat supplied, from the gas and from the air (J).
-    heats: [f64; 3],
-}
 
 impl ThermalSimulation {
     /// Returns the rate of an output at the communication point.
     pub(crate) fn rate(&self, item: Item, element: usize) -> f64 {
         let (state, operator) = (&self.state, &self.operator);
-        let heat: Vec<f64> = state.heat.iter().map(|course| course.reached).collect();
-        let films = state.films.map(|course| course.reached);
+        let heat: Vec<f64> = state.heat.iter().map(|input| input.at(0.0)).collect();
+        let films = state.films.map(|input| input.at(0.0));
         let rate = |coordinate: usize| {
             operator.load(coordinate, &heat, films) - operator.rates[coordinate] * state.coordinates[coordinate]
         };
@@ -64,40 +55,22 @@ impl ThermalSimulation {
                 }
             }
         }
-        let change = self.change(length, &heat, films);
+        // A ramp begins where the previous step ended, whatever value is set.
+        let begin = if self.state.last_ramped { [0.0; 2] } else { films };
+        let mut change = vec![0.0; self.model.order()];
+        let heats = self.operator.advance(length, &mut change, [&heat, &heat], [begin, films]);
         for (&output, sensitivity) in outputs.iter().zip(sensitivity) {
-            let (variable, element) = self.values.table().locate(output)?;
+            let (variable, element) = self.table().locate(output)?;
             let item = self.item(variable);
             *sensitivity = match item {
-                Item::Power(film) => change.heats[1 + film] / length,
+                Item::Power(film) => heats[1 + film] / length,
                 Item::Residual | Item::RelativeResidual => 0.0,
                 _ => self
-                    .linear(item, element, &change.coordinates, change.heats)
+                    .linear(item, element, &change, heats)
                     .ok_or_else(|| refused(variable, "it is not an output"))?,
             };
         }
         Ok(())
-    }
-
-    fn change(&self, length: f64, heat: &[f64], films: [f64; 2]) -> ThermalChange {
-        let operator: &DiagonalOperator = &self.operator;
-        // A ramp begins where the previous step ended, whatever value is set.
-        let ramped = self.state.last_ramped;
-        let begin = if ramped { [0.0; 2] } else { films };
-        let share = if ramped { 0.5 } else { 1.0 };
-        let flows = [0, 1].map(|film| operator.conductances[film] * films[film] * share * length);
-        let mut change =
-            ThermalChange { coordinates: Vec::new(), heats: [heat.iter().sum::<f64>() * length, flows[0], flows[1]] };
-        for (coordinate, rate) in operator.rates.iter().enumerate() {
-            let start = operator.load(coordinate, heat, begin);
-            let end = operator.load(coordinate, heat, films);
-            let [next, integral] = Phi::new(-rate * length).step(length, 0.0, start, end - start);
-            change.coordinates.push(next);
-            for film in 0..2 {
-                change.heats[1 + film] -= operator.films[film][coordinate] * integral;
-            }
-        }
-        change
     }
 }
 

@@ -3,13 +3,12 @@
 
 use tiprub_cosim::persist::{Persist, StateReader, StateWriter, check_length, damaged, to_bytes};
 use tiprub_cosim::variables::{Causality, Value, Variable};
-use tiprub_cosim::{CoSimulation, Error, Result, StepProgress, Sum, VariableValues, Warning, bounds, shown};
+use tiprub_cosim::{CoSimulation, Error, Input, Result, StepProgress, Sum, VariableValues, Warning, bounds, shown};
 
-use crate::course::InputCourse;
 use crate::outputs::stored;
 use crate::simulation::ThermalSimulation;
 use crate::state::{CREATED, FAILED, FINGERPRINT_BYTES, LARGEST, READY, ThermalState};
-use crate::table::{HEAT, Item, TEMPERATURES};
+use crate::table::{FACTORS, HEAT, HOLD, Item, STEADY, TEMPERATURES};
 
 /// Largest difference between a communication point and the time of the simulation, as a fraction of H, as in the
 /// contact unit.
@@ -17,7 +16,7 @@ const TIME_TOLERANCE: f64 = 1e-3;
 
 impl CoSimulation for ThermalSimulation {
     fn variables(&self) -> &VariableValues {
-        &self.values
+        &self.state.values
     }
 
     fn is_initialised(&self) -> bool {
@@ -26,27 +25,20 @@ impl CoSimulation for ThermalSimulation {
 
     fn set(&mut self, reference: u32, value: Value) -> Result<()> {
         let (variable, element) = self.check(reference, value)?;
-        let (item, number, state) = (self.item(variable), value.number(), &mut self.state);
-        #[expect(clippy::cast_possible_truncation, reason = "checked to be an item")]
-        let choice = number as i32;
-        match item {
-            Item::Heat => state.heat[element].set(number),
-            Item::Film(index) => state.films[index].set(number),
-            Item::Factor(index) => state.factors[index] = number,
-            Item::InitialTemperature => state.initial_temperature = number,
-            Item::InitialState => state.initial_state = choice,
-            Item::Interpolation => state.interpolation = choice,
+        match self.item(variable) {
+            Item::Heat => self.state.heat[element].ask(value.number(), 0.0),
+            Item::Film(index) => self.state.films[index].ask(value.number(), 0.0),
             _ => {}
         }
-        self.values[reference as usize] = number;
+        self.state.values[reference as usize] = value.number();
         Ok(())
     }
 
     fn set_input_derivative(&mut self, reference: u32, order: i32, value: f64) -> Result<()> {
         let (variable, element) = self.check_input_derivative(reference, order, value)?;
         match self.item(variable) {
-            Item::Heat => self.state.heat[element].set_slope(value),
-            Item::Film(index) => self.state.films[index].set_slope(value),
+            Item::Heat => self.state.heat[element].ask_slope(value, 0.0),
+            Item::Film(index) => self.state.films[index].ask_slope(value, 0.0),
             Item::Factor(_) if value == 0.0 => {}
             _ => {
                 let what = format!("derivative of `{}`", variable.name);
@@ -77,16 +69,15 @@ impl CoSimulation for ThermalSimulation {
 
     fn initialise(&mut self, start_time: f64) -> Result<()> {
         bounds::at_most("start time", start_time, bounds::TIME)?;
-        let state = &mut self.state;
-        state.phase = CREATED;
-        state.factors_used = state.factors;
-        state.heat.iter_mut().chain(&mut state.films).for_each(InputCourse::start);
+        self.state.phase = CREATED;
+        self.state.factors_used = self.state.set_factors(&self.items);
+        self.state.heat.iter_mut().chain(&mut self.state.films).for_each(Input::take);
         self.follow_factors();
-        if self.state.initial_state == 2 {
+        if self.state.value(&self.items, Item::InitialState) >= STEADY {
             self.start_steady()?;
         } else {
             // The uniform temperature is the first coordinate of the model.
-            let first = self.model.heat_capacity.sqrt() * self.state.initial_temperature;
+            let first = self.model.heat_capacity.sqrt() * self.state.value(&self.items, Item::InitialTemperature);
             let row = self.operator.vectors.row(0);
             self.state.coordinates.iter_mut().zip(row.iter()).for_each(|(z, share)| *z = share * first);
         }
@@ -100,9 +91,8 @@ impl CoSimulation for ThermalSimulation {
     }
 
     fn reset(&mut self) {
-        self.state = ThermalState::new(self.model.patches.len(), self.model.order());
+        self.state = ThermalState::new(self.state.values.clone(), self.model.patches.len(), self.model.order());
         self.under_way = None;
-        self.values.reset();
         self.follow_factors();
     }
 
@@ -129,10 +119,10 @@ impl CoSimulation for ThermalSimulation {
             let remedy = "Start the step at the current time of the simulation";
             return Err(Error::invalid("start of the communication step", problem, remedy));
         }
-        let heat = self.state.heat.iter().map(|course| (course, &HEAT, false));
-        let films = self.state.films.iter().map(|course| (course, &TEMPERATURES, true));
-        for (course, range, ramp) in heat.chain(films) {
-            let [_, end] = course.over(step_size, ramp);
+        let heat = self.state.heat.iter().map(|input| (input, &HEAT));
+        let films = self.state.films.iter().map(|input| (input, &TEMPERATURES));
+        for (input, range) in heat.chain(films) {
+            let end = input.requested_value(step_size);
             if !range.contains(&end) {
                 let problem =
                     format!("its derivative leads to {} at the end of the step, which is out of range", shown(end));
@@ -153,25 +143,27 @@ impl CoSimulation for ThermalSimulation {
             return Err(Error::invalid("step", "no step was begun", "Begin a step first"));
         };
         self.change_factors();
-        let ramp = self.state.interpolation == 1;
-        let [heat_start, heat_end] = &mut self.heat;
-        for ((course, start), end) in self.state.heat.iter().zip(heat_start).zip(heat_end) {
-            [*start, *end] = course.over(length, false);
-        }
-        let films = self.state.films.map(|course| course.over(length, ramp));
-        self.operator.fill_phi(length, &mut self.phi);
-        let flows = self.march(length, films);
-        let supplied: f64 = self.heat[0].iter().zip(&self.heat[1]).map(|(a, b)| 0.5 * (a + b) * length).sum();
+        let ramp = self.state.value(&self.items, Item::Interpolation) < HOLD;
         let state = &mut self.state;
-        for (total, heat) in state.totals.iter_mut().zip([supplied, flows[0], flows[1]]) {
+        state.heat.iter_mut().for_each(Input::take);
+        for film in &mut state.films {
+            if ramp { film.aim(0.0, length) } else { film.take() }
+        }
+        for (heat, offset) in self.heat.iter_mut().zip([0.0, length]) {
+            heat.iter_mut().zip(&state.heat).for_each(|(heat, input)| *heat = input.at(offset));
+        }
+        let films = [0.0, length].map(|offset| state.films.map(|film| film.at(offset)));
+        let heat = [&self.heat[0][..], &self.heat[1]];
+        let heats = self.operator.advance(length, &mut state.coordinates, heat, films);
+        for (total, heat) in state.totals.iter_mut().zip(heats) {
             total.add(heat);
             state.exchanged += heat.abs();
         }
-        state.powers = flows.map(|heat| heat / length);
-        state.heat.iter_mut().chain(&mut state.films).for_each(|course| course.shift(length));
+        state.powers = [heats[1] / length, heats[2] / length];
+        state.heat.iter_mut().chain(&mut state.films).for_each(|input| input.shift(length));
         (state.time, state.last_length, state.last_ramped) = (end, length, ramp);
         self.compute_outputs();
-        if let Some(wrong) = self.values.iter().position(|value| !value.is_finite()) {
+        if let Some(wrong) = self.state.values.iter().position(|value| !value.is_finite()) {
             self.state.phase = FAILED;
             let remedy = format!("Check heat and convection factors; value reference {wrong} became non-finite first");
             return Err(Error::non_finite(end - length, end, remedy));
@@ -211,13 +203,16 @@ impl CoSimulation for ThermalSimulation {
         }
         let mut state = self.state.clone();
         state.restore(&mut StateReader::new(body));
-        let items = [state.initial_state, state.interpolation].iter().all(|item| (1..=2).contains(item));
-        let factors =
-            state.factors.iter().chain(&state.factors_used).all(|factor| crate::table::FACTORS.contains(factor));
-        if reader.infinite() > 0 || state.phase > FAILED || !items || !factors || state.last_length < 0.0 {
+        state.values.check_values()?;
+        let factors = [state.set_factors(&self.items), state.factors_used];
+        let factors_fit = factors.iter().flatten().all(|factor| FACTORS.contains(factor));
+        let endless = state.heat.iter().chain(&state.films).filter(|input| !input.is_ramp()).count();
+        if reader.infinite() != endless || state.phase > FAILED || !factors_fit || state.last_length < 0.0 {
             return damaged("it contains invalid values");
         }
-        self.adopt(state);
+        self.state = state;
+        self.under_way = None;
+        self.follow_factors();
         Ok(())
     }
 

@@ -54,7 +54,10 @@ pub(super) extern "C" fn fmi2DoStep(
     communicationStepSize: f64,
     _noSetFMUStatePriorToCurrentPoint: Boolean,
 ) -> FmiStatus {
-    guard(c, &order::DO_STEP, |slave| slave.step(currentCommunicationPoint, communicationStepSize))
+    guard(c, &order::DO_STEP, |slave| {
+        slave.begin_step(currentCommunicationPoint, communicationStepSize, false)?;
+        slave.finish_step().map(drop)
+    })
 }
 
 /// Answers a status request. No step is ever pending, so most status kinds have no information and return `fmi2Discard`

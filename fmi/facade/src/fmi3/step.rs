@@ -54,16 +54,10 @@ fn step(instance: InstanceHandle, current: f64, size: f64, missing: Option<&str>
         if let Some(name) = missing {
             return Err(Refusal::error(format!("argument {name} is NULL. Pass a pointer to a variable for it")));
         }
-        let partial = instance.callbacks.is_some_and(|callbacks| callbacks.early_return_allowed);
+        slave.begin_step(current, size, instance.callbacks.is_some_and(|callbacks| callbacks.early_return_allowed))?;
         let Some(callbacks @ Callbacks { update: Some(update), .. }) = instance.callbacks else {
-            let early = if partial {
-                slave.step_partially(current, size)?
-            } else {
-                slave.step(current, size).map(|()| false)?
-            };
-            return Ok((FmiStatus::Ok, (None, early, slave.time())));
+            return Ok((FmiStatus::Ok, (None, slave.finish_step()?, slave.time())));
         };
-        slave.begin_step(current, size, partial)?;
         Ok((FmiStatus::Ok, (Some((callbacks, update)), false, slave.time())))
     });
     match begun {

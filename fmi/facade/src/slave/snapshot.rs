@@ -1,15 +1,16 @@
 //! Saved states: everything that determines the future of an instance, as bytes.
 //!
-//! Layout, little-endian: magic (8 bytes), version u32, length of the token u32, token, phase u8, flag of a defined
-//! stop time u8, two zero bytes, time f64, stop time f64, length of the core's state u64, the core's state, hash of
-//! everything before (u64). The length is the same for all states of an FMU.
+//! Layout, little-endian: magic (8 bytes), version (u64), token, phase ([`SavedPhase`]), the core's state, hash of everything before (u64). The
+//! length is the same for all states of an FMU.
 
-use tiprub_cosim::persist::fingerprint;
+use tiprub_cosim::persist::{Persist, StateReader, check_length, fingerprint, to_bytes};
+use tiprub_cosim::persist_fields;
 
 use super::{ExperimentTimes, InstancePhase, Refusal, Result, Slave};
 
-const MAGIC: &[u8; 8] = b"tiprubST";
-const VERSION: u32 = 2;
+const MAGIC: &[u8] = b"tiprubST";
+const VERSION: u64 = 3;
+const VERSION_BYTES: usize = 8;
 const CHECKSUM: usize = 8;
 
 /// One saved state.
@@ -24,56 +25,51 @@ fn damaged(problem: impl std::fmt::Display) -> Refusal {
     ))
 }
 
-/// Reads fields from the front of a byte string.
-struct SnapshotReader<'a>(&'a [u8]);
-
-impl<'a> SnapshotReader<'a> {
-    fn take(&mut self, count: usize) -> Result<&'a [u8]> {
-        let (front, rest) = self.0.split_at_checked(count).ok_or_else(|| damaged("it ends too early"))?;
-        self.0 = rest;
-        Ok(front)
-    }
-
-    fn array<const N: usize>(&mut self) -> Result<[u8; N]> {
-        let mut bytes = [0; N];
-        bytes.copy_from_slice(self.take(N)?);
-        Ok(bytes)
-    }
-
-    fn length(&mut self) -> Result<usize> {
-        usize::try_from(u64::from_le_bytes(self.array()?)).map_err(damaged)
-    }
+/// Phase as it is saved.
+#[derive(Default)]
+struct SavedPhase {
+    /// Number of the phase, in the order of a run.
+    number: u64,
+    has_stop: bool,
+    /// Start time, or the time at which stepping ended (s).
+    time: f64,
+    /// Stop time (s), 0 without one.
+    stop: f64,
 }
 
-/// Writes the fields of a phase: tag, time, stop time.
-fn encode_phase(phase: &InstancePhase, out: &mut SavedState) {
-    let (tag, time, stop) = match *phase {
-        InstancePhase::Instantiated { experiment } => (0, experiment.start, experiment.stop),
-        InstancePhase::Initialising { experiment, .. } => (1, experiment.start, experiment.stop),
-        InstancePhase::Stepping { stop } | InstancePhase::Updating { stop, .. } => (2, 0.0, stop),
-        InstancePhase::Failed { last_good } => (3, last_good, None),
-        InstancePhase::Terminated { time } => (4, time, None),
-    };
-    out.extend([tag, u8::from(stop.is_some()), 0, 0]);
-    out.extend(time.to_le_bytes());
-    out.extend(stop.unwrap_or(0.0).to_le_bytes());
-}
+persist_fields!(SavedPhase { number, has_stop, time, stop });
 
-fn decode_phase(reader: &mut SnapshotReader<'_>) -> Result<InstancePhase> {
-    let [tag, has_stop, unused @ ..] = reader.array::<4>()?;
-    let [time, stop] = [f64::from_le_bytes(reader.array()?), f64::from_le_bytes(reader.array()?)];
-    if has_stop > 1 || unused != [0; 2] || !time.is_finite() || !stop.is_finite() {
-        return Err(damaged("its times or flags are invalid"));
+impl SavedPhase {
+    fn of(phase: &InstancePhase) -> Self {
+        let (number, time, stop) = match *phase {
+            InstancePhase::Instantiated { experiment } => (0, experiment.start, experiment.stop),
+            InstancePhase::Initialising { experiment, .. } => (1, experiment.start, experiment.stop),
+            InstancePhase::Stepping { stop } | InstancePhase::Updating { stop, .. } => (2, 0.0, stop),
+            InstancePhase::Failed { last_good } => (3, last_good, None),
+            InstancePhase::Terminated { time } => (4, time, None),
+        };
+        Self { number, has_stop: stop.is_some(), time, stop: stop.unwrap_or(0.0) }
     }
-    let stop = (has_stop == 1).then_some(stop);
-    let experiment = ExperimentTimes { start: time, stop };
-    match tag {
-        0 => Ok(InstancePhase::Instantiated { experiment }),
-        1 => Ok(InstancePhase::Initialising { experiment, before: None }),
-        2 => Ok(InstancePhase::Stepping { stop }),
-        3 => Ok(InstancePhase::Failed { last_good: time }),
-        4 => Ok(InstancePhase::Terminated { time }),
-        _ => Err(damaged("its phase is unknown")),
+
+    /// Reads the phase from its bytes; `None` if they are not those of a phase.
+    fn read(bytes: &[u8]) -> Option<InstancePhase> {
+        let (mut saved, mut reader) = (Self::default(), StateReader::new(bytes));
+        saved.check(&mut reader);
+        if reader.fault().is_some() || reader.infinite() > 0 {
+            return None;
+        }
+        saved.restore(&mut StateReader::new(bytes));
+        let Self { number, has_stop, time, stop } = saved;
+        let stop = has_stop.then_some(stop);
+        let experiment = ExperimentTimes { start: time, stop };
+        match number {
+            0 => Some(InstancePhase::Instantiated { experiment }),
+            1 => Some(InstancePhase::Initialising { experiment, before: None }),
+            2 => Some(InstancePhase::Stepping { stop }),
+            3 => Some(InstancePhase::Failed { last_good: time }),
+            4 => Some(InstancePhase::Terminated { time }),
+            _ => None,
+        }
     }
 }
 
@@ -151,7 +147,8 @@ impl Slave {
 
     /// Returns the length of every saved state of this FMU (bytes).
     pub(crate) fn serialised_size(&self) -> usize {
-        MAGIC.len() + 4 + 4 + self.token.len() + 4 + 8 + 8 + 8 + self.unit.state_size() + CHECKSUM
+        let phase = to_bytes(&[&SavedPhase::default()]).len();
+        MAGIC.len() + VERSION_BYTES + self.token.len() + phase + self.unit.state_size() + CHECKSUM
     }
 
     /// Creates a saved state from bytes that [`Slave::serialised`] returned, possibly in another process.
@@ -165,55 +162,47 @@ impl Slave {
 
     /// Replaces the content of `out` with the state. If this fails, an existing state in `out` stays unchanged.
     fn encode(&self, out: &mut SavedState) -> Result<()> {
-        let mut head = SavedState::with_capacity(256);
-        head.extend(MAGIC);
-        head.extend(VERSION.to_le_bytes());
-        head.extend(u32::try_from(self.token.len()).map_err(damaged)?.to_le_bytes());
-        head.extend(self.token.as_bytes());
-        encode_phase(&self.phase, &mut head);
-        let state = self.unit.state_size();
-        head.extend(u64::try_from(state).map_err(damaged)?.to_le_bytes());
+        let phase = to_bytes(&[&SavedPhase::of(&self.phase)]);
+        let head = [MAGIC, &VERSION.to_le_bytes(), self.token.as_bytes(), &phase].concat();
         out.resize(self.serialised_size(), 0);
-        let target = &mut out[head.len()..][..state];
+        let (content, checksum) = out.split_at_mut(self.serialised_size() - CHECKSUM);
+        let (front, target) = content.split_at_mut(head.len());
         match &self.phase {
             // Outputs computed in Initialization Mode are computed again when they are requested.
             InstancePhase::Initialising { before: Some(before), .. } => target.copy_from_slice(before),
             _ => self.unit.save_state(target)?,
         }
-        out[..head.len()].copy_from_slice(&head);
-        let end = out.len() - CHECKSUM;
-        let checksum = fingerprint(&out[..end], 0);
-        out[end..].copy_from_slice(&checksum.to_le_bytes());
+        front.copy_from_slice(&head);
+        checksum.copy_from_slice(&fingerprint(content, 0).to_le_bytes());
         Ok(())
     }
 
     fn decode<'a>(&self, bytes: &'a [u8]) -> Result<(InstancePhase, &'a [u8])> {
-        let mut reader = SnapshotReader(bytes);
-        if reader.take(MAGIC.len())? != MAGIC {
+        check_length(bytes.len(), self.serialised_size(), "this FMU")?;
+        let (content, checksum) = bytes.split_at(bytes.len() - CHECKSUM);
+        let (head, state) = content.split_at(content.len() - self.unit.state_size());
+        let (magic, head) = head.split_at(MAGIC.len());
+        let (token, phase) = head[VERSION_BYTES..].split_at(self.token.len());
+        let mut version = 0_u64;
+        version.restore(&mut StateReader::new(head));
+        if magic != MAGIC {
             return Err(damaged("it is not a tiprub state"));
         }
-        let version = u32::from_le_bytes(reader.array()?);
         if version != VERSION {
             return Err(damaged(format!("it has format version {version}, but this FMU reads version {VERSION}")));
         }
-        let length = usize::try_from(u32::from_le_bytes(reader.array()?)).map_err(damaged)?;
-        let token = String::from_utf8_lossy(reader.take(length)?);
-        if token != self.token.as_str() {
+        if token != self.token.as_bytes() {
+            let token = String::from_utf8_lossy(token);
             return Err(damaged(format!(
                 "it belongs to the FMU with token \"{token}\", but this FMU has token \"{}\"",
                 self.token
             )));
         }
-        if bytes.len() != self.serialised_size() {
-            return Err(damaged(format!("it has {} bytes instead of {}", bytes.len(), self.serialised_size())));
-        }
-        let (content, tail) = bytes.split_at(bytes.len() - CHECKSUM);
-        if fingerprint(content, 0).to_le_bytes() != tail {
+        if fingerprint(content, 0).to_le_bytes() != checksum {
             return Err(damaged("its checksum does not match its content"));
         }
-        let phase = decode_phase(&mut reader)?;
-        let state = reader.length()?;
-        Ok((phase, reader.take(state)?))
+        let phase = SavedPhase::read(phase).ok_or_else(|| damaged("its phase or its times are invalid"))?;
+        Ok((phase, state))
     }
 }
 
@@ -221,23 +210,19 @@ impl Slave {
 mod tests {
     use super::*;
 
-    /// Returns the tag, the flag of the stop time, two zero bytes, the time and the stop time as bytes.
-    fn bytes(head: [u8; 4], time: f64, stop: f64) -> Vec<u8> {
-        [&head[..], &time.to_le_bytes(), &stop.to_le_bytes()].concat()
-    }
-
     #[test]
-    fn rejects_invalid_encoded_phases() {
-        let read = |bytes: &[u8]| decode_phase(&mut SnapshotReader(bytes)).is_ok();
-        for tag in 0..5 {
-            assert!(read(&bytes([tag, 1, 0, 0], 0.25, 1.0)) && read(&bytes([tag, 0, 0, 0], 0.25, 0.0)), "{tag}");
-            for head in [[tag, 2, 0, 0], [tag, 0, 1, 0], [tag, 0, 0, 1], [tag + 5, 0, 0, 0]] {
-                assert!(!read(&bytes(head, 0.25, 0.0)), "{head:?}");
-            }
+    fn rejects_invalid_saved_phases() {
+        let saved = |number, time, stop| to_bytes(&[&SavedPhase { number, has_stop: true, time, stop }]);
+        let is_read = |bytes: &[u8]| SavedPhase::read(bytes).is_some();
+        for number in 0..5 {
+            let good = saved(number, 0.25, 1.0);
+            assert!(is_read(&good) && !is_read(&saved(number + 5, 0.25, 1.0)), "{number}");
+            let mut flag = good;
+            flag[8] = 2;
+            assert!(!is_read(&flag), "{number}");
             for wrong in [f64::NAN, f64::INFINITY] {
-                assert!(!read(&bytes([tag, 1, 0, 0], wrong, 1.0)) && !read(&bytes([tag, 1, 0, 0], 0.25, wrong)));
+                assert!(!is_read(&saved(number, wrong, 1.0)) && !is_read(&saved(number, 0.25, wrong)));
             }
         }
-        assert!(!read(&bytes([0; 4], 0.0, 0.0)[..19]));
     }
 }

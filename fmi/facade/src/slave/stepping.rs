@@ -124,24 +124,12 @@ impl Slave {
         Ok(())
     }
 
-    /// Computes a whole communication step.
+    /// Computes the communication step that was begun, as far as the maximum number of internal steps permits; returns whether it ended
+    /// early, which only a step that was begun as partial can.
     ///
     /// # Errors
-    /// Same as [`Slave::begin_step`] and [`Slave::advance`].
-    pub(crate) fn step(&mut self, current_time: f64, step_size: f64) -> Result<()> {
-        self.begin_step(current_time, step_size, false)?;
-        self.unit.fly_ahead();
-        while !self.advance()?.finished {}
-        self.end_step(false)
-    }
-
-    /// Computes a communication step as far as the maximum number of internal steps permits; returns whether it ended
-    /// early.
-    ///
-    /// # Errors
-    /// Same as [`Slave::step`]; [`FmiStatus::Discard`] if not even one internal step is permitted.
-    pub(crate) fn step_partially(&mut self, current_time: f64, step_size: f64) -> Result<bool> {
-        self.begin_step(current_time, step_size, true)?;
+    /// Same as [`Slave::advance`] and [`Slave::end_step`].
+    pub(crate) fn finish_step(&mut self) -> Result<bool> {
         self.unit.fly_ahead();
         loop {
             match self.advance_partially()? {

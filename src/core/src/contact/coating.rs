@@ -203,11 +203,6 @@ impl Coating {
         self.nodes
     }
 
-    /// Number of cells; cell `row · around + i` is the i-th of its axial row.
-    pub fn cells(&self) -> usize {
-        self.plastic.len()
-    }
-
     /// Angle (rad) by which blades may turn in a step without skipping a cell: the width of a cell, or of the narrowest part of a tip.
     pub fn stride(&self) -> f64 {
         let narrowest = self.rows.iter().fold(f64::INFINITY, |narrowest, row| row.covers.min(narrowest));
@@ -219,13 +214,7 @@ impl Coating {
         TAU / real(self.around)
     }
 
-    /// Angle (rad, in the fixed frame) and axial position (m) of the centre of a cell.
-    pub fn centre(&self, cell: usize) -> (f64, f64) {
-        let angle = (real(cell % self.around) + 0.5) * TAU / real(self.around);
-        (angle, self.rows[cell / self.around].axial)
-    }
-
-    /// Wear depth of a cell (m).
+    /// Wear depth of a cell (m); cell `row · around + i` is the i-th of its axial row.
     pub fn wear_depth(&self, cell: usize) -> f64 {
         self.plastic[cell] * self.thickness
     }
@@ -283,23 +272,24 @@ impl Coating {
 impl Persist for Coating {
     fn save(&self, writer: &mut StateWriter) {
         self.plastic.save(writer);
-        self.cutting.iter().for_each(|cutting| cutting.save(writer));
+        self.cutting.save(writer);
     }
     fn restore(&mut self, reader: &mut StateReader) {
         self.plastic.restore(reader);
-        self.cutting.iter_mut().for_each(|cutting| cutting.restore(reader));
+        self.cutting.restore(reader);
+        self.cutting.iter_mut().for_each(CoatingCut::forget);
     }
     fn check(&self, reader: &mut StateReader) {
-        let mut bytes = reader.clone();
+        let mut saved = self.clone();
+        saved.restore(&mut reader.clone());
         self.plastic.check(reader);
-        for _ in &self.plastic {
-            let mut strain = 0.0_f64;
-            strain.restore(&mut bytes);
-            if strain < 0.0 {
-                reader.refuse("the coating is thicker than when new");
-            }
+        self.cutting.check(reader);
+        if saved.plastic.iter().any(|strain| *strain < 0.0) {
+            reader.refuse("the coating is thicker than when new");
         }
-        self.cutting.iter().for_each(|cutting| cutting.check(reader, self.plastic.len()));
+        if saved.cutting.iter().any(|cutting| cutting.is_outside(saved.plastic.len())) {
+            reader.refuse("a blade cuts outside the coating");
+        }
     }
 }
 

@@ -1,7 +1,5 @@
 //! Gaps to a surface through data points: closest point, normal, and the place at which the force is transferred.
 
-use tiprub_cosim::persist::{Persist, StateReader, StateWriter};
-
 use super::frame::PolarFrame;
 use super::layout::Layout;
 use super::surface_spline::{ClosestPoint, Projection, SurfaceSpline};
@@ -232,27 +230,4 @@ impl SplineGap {
 /// Returns whether a normal in the directions of a node is that of a casing seen from inside, on a flank below 45°.
 pub(crate) fn faces_inwards(normal: Vector3) -> bool {
     length(Vector3::new(0.0, normal[1], normal[2])) <= -normal[0]
-}
-
-impl Persist for ClosestPoint {
-    fn save(&self, writer: &mut StateWriter) {
-        self.patch.map(|part| part as u64).save(writer);
-        self.s.save(writer);
-        self.t.save(writer);
-    }
-    fn restore(&mut self, reader: &mut StateReader) {
-        let mut patch = [0_u64; 2];
-        patch.restore(reader);
-        self.patch = patch.map(|part| usize::try_from(part).unwrap_or(0));
-        self.s.restore(reader);
-        self.t.restore(reader);
-    }
-    /// Checks the numbers only: the surface is unknown here.
-    fn check(&self, reader: &mut StateReader) {
-        let mut place = *self;
-        place.restore(reader);
-        if !(place.s.is_finite() && place.t.is_finite()) {
-            reader.refuse("the surface position of a contact node is not finite");
-        }
-    }
 }

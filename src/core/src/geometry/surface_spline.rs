@@ -12,8 +12,8 @@
 //!
 //! A free end is the phantom control point Q₋₁ = 2 Q₀ − Q₁, so that phantoms depend on the others and there is exactly one control point
 //! per data point, with the same index. Displacements of the data points become displacements of the control points by
-//! [`SurfaceSpline::interpolate`], and forces at a place become forces on the data points by [`SurfaceSpline::weights`] and
-//! [`SurfaceSpline::transfer`], the transposes of these maps: virtual work is exact.
+//! [`SurfaceSpline::interpolate`]. [`SurfaceSpline::weights`] give the displacement at a place and distribute a force there over the
+//! control points: virtual work is exact.
 //!
 //! A surface around the axis does not end at its first and last ring: it continues along its tangents, S(s, t) = S(s, 1) + (t − 1) S_t(s,
 //! 1), for [`REACH`] of its axial extent. Since S_tt = 0 at the edge the continuation is as smooth as the rest: points, derivatives and
@@ -28,6 +28,8 @@ mod projection;
 
 pub use patch::{Evaluation, Weights};
 pub use projection::Projection;
+
+use tiprub_cosim::persist_fields;
 
 use crate::math::real;
 use crate::math::vector::Vector3;
@@ -72,6 +74,8 @@ pub struct ClosestPoint {
     /// by rounding at the edges of an open surface.
     pub t: f64,
 }
+
+persist_fields!(ClosestPoint { patch, s, t });
 
 /// A surface through around × along data points, index `along · around + i`. A closed surface has rings in order of increasing z, with the
 /// points of a ring at angles that increase by 2π/around about z; an open surface is a quadrilateral grid of any shape, with "around" and

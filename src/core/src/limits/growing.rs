@@ -1,6 +1,7 @@
 //! Growth of closed sliding contact: by the differential equations, and by the scheme.
 
 use nalgebra::Complex;
+use tiprub_cosim::persist_fields;
 
 use super::held::HeldContacts;
 use super::secular;
@@ -14,7 +15,7 @@ pub(crate) const GROWTH_NOISE: f64 = 1e-7;
 pub(crate) const GROWTH_UP_TO: usize = 150;
 
 /// The motion e^(st) that grows fastest.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Fastest {
     /// Re s (1/s).
     pub rate: f64,
@@ -23,7 +24,7 @@ pub struct Fastest {
 }
 
 /// Growth rates of closed sliding contact.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct GrowthRates {
     /// Rate of the constrained differential equations (1/s); positive means flutter.
     pub continuous: f64,
@@ -36,6 +37,9 @@ pub struct GrowthRates {
     /// Rates below this are rounding of the eigenvalue solver (1/s).
     pub noise: f64,
 }
+
+persist_fields!(Fastest { rate, frequency });
+persist_fields!(GrowthRates { continuous, frequency, stepped, swing, noise });
 
 impl GrowthRates {
     /// Growth that the scheme adds to that of the differential equations (1/s), 0 if it adds none.

@@ -6,7 +6,9 @@
 //! the blade. Displacements below [`TOLERANCE`] of the clearance do not matter: so growth at a rate σ matters for ln(1/tolerance)/σ, and
 //! for a shorter time if contact opens sooner.
 
-use super::{ContactDirections, GrowthRates, directional_modes};
+use tiprub_cosim::persist_fields;
+
+use super::{ContactDirections, GrowthRates, SlidingContacts, directional_modes};
 use crate::modes::modal::ModalModel;
 use crate::scene::method::Scheme;
 
@@ -20,7 +22,7 @@ pub(crate) const REFUSED: f64 = 0.05;
 const BELOW: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// Growth of one set of closed contacts at one step.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SetGrowth {
     /// Growth rates of the set.
     pub growth: GrowthRates,
@@ -28,23 +30,19 @@ pub struct SetGrowth {
     pub share: f64,
 }
 
+persist_fields!(SetGrowth { growth, share });
+
 /// Samples that turn by more than this per step (rad) do not represent a motion of the differential equations.
 const ALTERNATES: f64 = 0.9 * std::f64::consts::PI;
 
 impl SetGrowth {
-    /// Computes the growth of a model under a scheme with a step (s), with all contacts of `directions` closed.
-    pub fn new(
-        model: &ModalModel,
-        scheme: Scheme,
-        step: f64,
-        directions: &ContactDirections,
-        growth: GrowthRates,
-    ) -> Self {
+    /// Computes the growth of a model under a scheme with a step (s), with all contacts closed.
+    pub fn new(contacts: SlidingContacts, scheme: Scheme, step: f64, growth: GrowthRates) -> Self {
         // Contact forces that act a step late cause motions of their own, above the frequencies of all modes. So do motions that change
         // sign from step to step. With central differences the sampled frequency is higher than the frequency of the motion.
         let is_of_step = scheme.properties().delays_contact || growth.swing * step > ALTERNATES;
-        let frequency = growth.swing.min(model.largest_frequency());
-        let share = if is_of_step { 1.0 } else { share_of(model, directions, frequency) };
+        let frequency = growth.swing.min(contacts.model.largest_frequency());
+        let share = if is_of_step { 1.0 } else { share_of(contacts.model, contacts.directions, frequency) };
         Self { growth, share }
     }
 
@@ -158,13 +156,13 @@ mod tests {
             let (friction, product) = (random.scale(0.02, 1.5), random.scale(0.1, 1.9));
             let step = product / model.largest_frequency()
                 * if scheme == Scheme::ModalExact { random.scale(1.0, 5.0) } else { 1.0 };
-            let Some(growth) = growth(SlidingContacts::new(&model, friction, &radial()), scheme, step) else {
-                continue;
-            };
+            let directions = radial();
+            let contacts = SlidingContacts::new(&model, friction, &directions);
+            let Some(growth) = growth(contacts, scheme, step) else { continue };
             if growth.continuous > -1e-3 / step / 5e3 {
                 continue;
             }
-            let judged = SetGrowth::new(&model, scheme, step, &radial(), growth);
+            let judged = SetGrowth::new(contacts, scheme, step, growth);
             let steps = 3000;
             let closed = step * f64::from(steps);
             if judged.allowed() > closed {
@@ -194,7 +192,9 @@ mod tests {
         }
         // A force that acts a step late causes motions of its own, which no mode bounds.
         let growth = GrowthRates { continuous: -1.0, frequency: 0.0, stepped: 1.0, swing: 1430.0, noise: 0.0 };
-        let share = |scheme: Scheme| SetGrowth::new(&model, scheme, 1e-5, &radial(), growth).share;
+        let directions = radial();
+        let contacts = SlidingContacts::new(&model, 0.0, &directions);
+        let share = |scheme: Scheme| SetGrowth::new(contacts, scheme, 1e-5, growth).share;
         let [exact, massless] = [Scheme::ModalExact, Scheme::MasslessBoundary].map(share);
         assert!((exact - 0.2).abs() < 1e-15 && (massless - 1.0).abs() < 1e-15, "{exact}, {massless}");
     }

@@ -135,8 +135,7 @@ fn of_sectors(rom: &Rom) -> Option<Slip> {
     if rom.frame != DisplacementFrame::Cylindrical {
         return None;
     }
-    #[expect(clippy::cast_precision_loss, reason = "at most 10 000 sectors")]
-    let pitch = std::f64::consts::TAU / rom.sectors as f64;
+    let pitch = std::f64::consts::TAU / crate::math::real(rom.sectors);
     let line: Vec<[f64; 2]> = developed(rom);
     let (low, high) =
         line.iter().fold((0.0_f64, 0.0_f64), |(low, high), [angle, _]| (low.min(*angle), high.max(*angle)));

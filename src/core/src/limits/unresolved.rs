@@ -48,8 +48,7 @@ pub fn limit(model: &ModalModel, directions: &[[f64; 3]]) -> f64 {
         (0..directions.len()).map(|node| (node, total(node))).filter(|(_, total)| *total > 0.0).collect();
     let mut modes: Vec<usize> = (0..model.len()).filter(vibrating).collect();
     modes.sort_by(|a, b| model.frequencies[*b].total_cmp(&model.frequencies[*a]));
-    #[expect(clippy::cast_precision_loss, reason = "node counts are far below 2^52")]
-    let enough = SHARE * totals.len() as f64;
+    let enough = SHARE * crate::math::real(totals.len());
     let mut passed = 0.0;
     for mode in &modes {
         passed += totals.iter().map(|(node, total)| seen(*mode, *node) / total).sum::<f64>();

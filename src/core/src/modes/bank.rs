@@ -385,27 +385,18 @@ impl ModalBank {
     fn loaded_groups(&self) -> usize {
         if self.disk.is_some() { 1 } else { self.sectors }
     }
+}
 
-    /// Saves the state (not the step size).
-    pub fn save(&self, writer: &mut StateWriter) {
+/// Everything but the step size, which [`ModalBank::set_step`] sets before a state is restored.
+impl Persist for ModalBank {
+    fn save(&self, writer: &mut StateWriter) {
         self.state.save(writer);
         if let Some(disk) = &self.disk {
             self.increment_before.save(writer);
             disk.state.save(writer);
         }
     }
-
-    /// Reads over a saved state and rejects invalid values.
-    pub fn check(&self, reader: &mut StateReader) {
-        self.state.check(reader);
-        if let Some(disk) = &self.disk {
-            self.increment_before.check(reader);
-            disk.state.check(reader);
-        }
-    }
-
-    /// Restores a saved state, after [`ModalBank::set_step`].
-    pub fn restore(&mut self, reader: &mut StateReader) {
+    fn restore(&mut self, reader: &mut StateReader) {
         self.state.restore(reader);
         if let Some(disk) = &mut self.disk {
             self.increment_before.restore(reader);
@@ -413,6 +404,13 @@ impl ModalBank {
         }
         if self.coupling.is_some() && self.step > 0.0 {
             self.refresh_coupling();
+        }
+    }
+    fn check(&self, reader: &mut StateReader) {
+        self.state.check(reader);
+        if let Some(disk) = &self.disk {
+            self.increment_before.check(reader);
+            disk.state.check(reader);
         }
     }
 }

@@ -15,7 +15,7 @@ use crate::{Error, Result, Rom};
 const RIGID_FRACTION: f64 = 1e-13;
 
 /// Modes of the reduced pencil (K, M), mass-normalised; complex (`T`) for nodal diameters of coupled sectors.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct ModalModel<T: Scalar = f64> {
     /// Undamped angular frequencies ω (rad/s), ascending; exactly 0 for rigid-body modes.
     pub frequencies: Vec<f64>,

@@ -18,8 +18,7 @@ use crate::{Error, Result, Rom};
 /// Modal load per kelvin of coupled sectors, on nodal diameter 0; empty if the scene does not heat them.
 pub(crate) fn disk_heat(structure: &StructureSettings, rom: &Rom, model: &ModalModel) -> Vec<f64> {
     let Some(load) = whole_load(structure, rom).filter(|_| rom.is_cyclic()) else { return Vec::new() };
-    #[expect(clippy::cast_precision_loss, reason = "sector counts are far below 2^52")]
-    let all = libm::sqrt(rom.sectors as f64);
+    let all = libm::sqrt(crate::math::real(rom.sectors));
     model.modal_load(&load).into_iter().map(|load| all * load).collect()
 }
 
@@ -373,8 +372,7 @@ fn launch(bank: &mut ModalBank, one: &InitialSettings, displacement: f64, veloci
             let most = shape(most_moved((0..bank.rows()).map(|row| shape(row).abs())));
             let sectors = bank.sectors();
             for sector in (0..sectors).filter(|sector| one.sector.is_none_or(|own| own == sector + 1)) {
-                #[expect(clippy::cast_precision_loss, reason = "sector counts are far below 2^52")]
-                let angle = std::f64::consts::TAU * ((n * sector % sectors) as f64 / sectors as f64);
+                let angle = crate::geometry::sector_angle(n * sector % sectors, sectors);
                 let share = if one.sector.is_some() { 1.0 } else { libm::cos(angle - one.phase) } / most;
                 bank.add_amplitude(mode, sector, [share * displacement, 0.0], [share * velocity, 0.0]);
             }

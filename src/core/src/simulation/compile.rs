@@ -61,7 +61,7 @@ pub fn complementary(settings: &SceneSettings) -> Solver {
 }
 
 /// A master: a structure with contact nodes.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct CompiledBody {
     /// Modes, at the reference speed if spin stiffens the structure; for coupled sectors those of nodal diameter 0.
     pub model: ModalModel,
@@ -139,22 +139,7 @@ impl CompiledBody {
             (modes(structure, rom, [0.0; 2])?, None)
         };
         let disk = rom.is_cyclic().then(|| CyclicModel::with_zero(rom, ratio, model.clone())).transpose()?;
-        Ok(Self {
-            model,
-            disk,
-            translations,
-            reference_speed: 0.0,
-            reference_temperature: 0.0,
-            stiffness_range: None,
-            centrifugal: Vec::new(),
-            disk_heat: Vec::new(),
-            expansion: Vec::new(),
-            watched: DMatrix::zeros(0, 0),
-            stress: DMatrix::zeros(0, 0),
-            stress_heat: Vec::new(),
-            stress_growth: Vec::new(),
-            senses: Vec::new(),
-        })
+        Ok(Self { model, disk, translations, ..Self::default() })
     }
 
     /// Largest angular frequency (rad/s), over all nodal diameters if sectors are coupled.

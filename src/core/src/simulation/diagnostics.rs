@@ -6,7 +6,7 @@ use super::limits::{KnownChecks, Limits, Parameters, WarningState};
 use crate::scene::settings::SceneSettings;
 
 /// Warnings of a run, and the limits for its parameters. They follow from the saved state.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Diagnostics {
     /// Warnings since the start.
     pub warnings: Vec<Warning>,
@@ -25,15 +25,7 @@ pub(crate) struct Diagnostics {
 impl Diagnostics {
     /// Creates diagnostics without warnings, for a number of masters.
     pub fn new(bodies: usize) -> Self {
-        let (warnings, notes) = (Vec::new(), Vec::new());
-        Self {
-            warnings,
-            notes,
-            reported: WarningState::new(bodies),
-            prepared: None,
-            limits: None,
-            known: KnownChecks::default(),
-        }
+        Self { reported: WarningState::new(bodies), ..Self::default() }
     }
 
     /// Discards the warnings.

@@ -4,7 +4,6 @@
 
 use super::Simulation;
 use super::clock::Communication;
-use super::drive::Input;
 use super::inputs::Inputs;
 use crate::Result;
 use crate::geometry::PrescribedMotion;
@@ -116,12 +115,5 @@ impl Inputs {
     fn stay(&self, offset: f64) -> bool {
         let rotors = self.rotors.iter().flat_map(|rotor| [&rotor.speed, &rotor.spin]);
         self.moving().chain(rotors).all(|input| input.stays(offset))
-    }
-}
-
-impl Input {
-    /// Returns whether the acting value is the requested one from an offset on.
-    pub(super) fn stays(&self, offset: f64) -> bool {
-        self.slope == 0.0 && self.rate() == 0.0 && self.at(offset).to_bits() == self.value.to_bits()
     }
 }

@@ -2,6 +2,7 @@
 
 use super::inputs::CarrierInputs;
 use crate::Rom;
+use crate::math::real;
 use crate::modes::modal::ModalModel;
 use crate::scene::settings::StructureSettings;
 
@@ -15,8 +16,7 @@ pub fn centrifugal(structure: &StructureSettings, rom: &Rom, model: &ModalModel)
     let fourth = model.modal_load(&spin.centrifugal_load_speed4);
     let share = if structure.spin.stiffening { 1.0 } else { 0.0 };
     // This is the load of one sector, equal on all N sectors; an amplitude of nodal diameter 0 moves each by 1/√N.
-    #[expect(clippy::cast_precision_loss, reason = "sector counts are far below 2^52")]
-    let all = if rom.is_cyclic() { libm::sqrt(rom.sectors as f64) } else { 1.0 };
+    let all = if rom.is_cyclic() { libm::sqrt(real(rom.sectors)) } else { 1.0 };
     second.into_iter().zip(fourth).map(|(second, fourth)| [all * second, all * share * fourth]).collect()
 }
 
@@ -73,8 +73,7 @@ impl CarrierLoads {
 /// Modal load of the line load cos(nθ − φ) (N/m of circumference, outwards), distributed over the rings of the contact grid.
 fn nodal_load(rom: &Rom, model: &ModalModel, order: u32, phase: f64) -> Vec<f64> {
     let Some(grid) = rom.extras.grid else { return vec![0.0; model.len()] };
-    #[expect(clippy::cast_precision_loss, reason = "grids are far smaller than 2^52")]
-    let share = std::f64::consts::TAU / (grid.around as f64 * grid.along as f64);
+    let share = std::f64::consts::TAU / (real(grid.around) * real(grid.along));
     let force = |node: usize| {
         let position = rom.contact_nodes[node].position;
         position[0] * share * libm::cos(f64::from(order) * position[1] - phase)

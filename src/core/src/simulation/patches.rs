@@ -65,8 +65,7 @@ impl HeatPatches {
 
 /// Returns the index of the one of `parts` equal parts of [0, 1] that contains `share`.
 fn part(share: f64, parts: usize) -> usize {
-    #[expect(clippy::cast_precision_loss, reason = "part counts are far below 2^52")]
-    let place = share * parts as f64;
+    let place = share * crate::math::real(parts);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 0 … parts − 1")]
     let index = place.max(0.0) as usize;
     index.min(parts - 1)

@@ -5,6 +5,7 @@ use crate::geometry::frame::PolarFrame;
 use crate::geometry::layout::Layout;
 use crate::geometry::spline::SplineGap;
 use crate::geometry::surface_spline::SurfaceSpline;
+use crate::math::real;
 use crate::modes::modal::ModalModel;
 use crate::scene::rom::{ContactNode, DisplacementFrame};
 use crate::scene::settings::{ContactSettings, SplineSettings, SurfaceSettings};
@@ -149,8 +150,7 @@ fn rigid_grid(settings: SplineSettings, contour: &TipContour) -> DataGrid {
     let [first, last] = contour.extent();
     let margin = contour.margin();
     let (low, length) = (first - margin, last - first + 2.0 * margin);
-    #[expect(clippy::cast_precision_loss, reason = "grids are far smaller than 2^52")]
-    let ring = |ring: usize| low + length * ring as f64 / (settings.along - 1) as f64;
+    let ring = |ring: usize| low + length * real(ring) / real(settings.along - 1);
     let rings = (0..settings.along).map(ring).collect();
     DataGrid { around: settings.around, first_node: 0, first_angle: 0.0, rings }
 }
@@ -160,8 +160,7 @@ fn data(grid: &DataGrid, radius: impl Fn(f64, f64) -> f64) -> Vec<[f64; 3]> {
     let mut points = Vec::with_capacity(grid.rings.len() * grid.around);
     for z in &grid.rings {
         for index in 0..grid.around {
-            #[expect(clippy::cast_precision_loss, reason = "grids are far smaller than 2^52")]
-            let angle = grid.first_angle + std::f64::consts::TAU * index as f64 / grid.around as f64;
+            let angle = grid.first_angle + std::f64::consts::TAU * real(index) / real(grid.around);
             let (sine, cosine) = libm::sincos(angle);
             let radius = radius(*z, angle);
             points.push([radius * cosine, radius * sine, *z]);
@@ -194,8 +193,7 @@ impl Lining {
         let contour = TipContour::new(master, nodes);
         let grid = carried_grid(rom, share, &contour)?;
         let rings = grid.rings.iter().zip(rom.contact_nodes[grid.first_node..].chunks(grid.around));
-        #[expect(clippy::cast_precision_loss, reason = "grids are far smaller than 2^52")]
-        let mean = |ring: &[ContactNode]| ring.iter().map(|node| node.position[0]).sum::<f64>() / grid.around as f64;
+        let mean = |ring: &[ContactNode]| ring.iter().map(|node| node.position[0]).sum::<f64>() / real(grid.around);
         let rings = rings.map(|(z, ring)| [*z, contour.radius(*z) + contact.nominal_gap() - mean(ring)]);
         Ok(Self { carrier, rings: rings.collect() })
     }

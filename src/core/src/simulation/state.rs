@@ -5,7 +5,7 @@
 
 use tiprub_cosim::persist::{Persist, StateReader, StateWriter, check_length, damaged, fingerprint};
 use tiprub_cosim::variables::Causality;
-use tiprub_cosim::{VariableValues, persist_fields, shown};
+use tiprub_cosim::{VariableValues, persist_fields};
 
 use super::clock::{Clock, SAME_STEP, SimulationPhase};
 use super::inputs::Inputs;
@@ -14,7 +14,7 @@ use super::{Compiled, Simulation};
 use crate::Result;
 
 const MAGIC: [u8; 8] = *b"tiprubST";
-const VERSION: u64 = 15;
+const VERSION: u64 = 16;
 pub(super) const CHECKSUM_BYTES: usize = 8;
 /// Upper bound on all values of a structure and of its ledger, in any unit; squares and products stay far from overflow.
 const LARGEST: f64 = 1e50;
@@ -49,17 +49,6 @@ impl SimulationState {
         reader.up_to(largest);
         window.check(reader);
         infinite
-    }
-
-    /// Checks that parameters and inputs could have been set, and outputs could have been read.
-    fn check_values(&self) -> Result<()> {
-        for variable in self.values.table().variables() {
-            let values = &self.values[variable.reference as usize..][..variable.len()];
-            if let Some(value) = values.iter().find(|value| !variable.can_have(**value)) {
-                return damaged(format!("`{}` has the invalid value {}", variable.name, shown(*value)));
-            }
-        }
-        Ok(())
     }
 
     /// Checks that inputs are within their ranges, with a margin for rounding, now and at the end of the current step.
@@ -191,7 +180,7 @@ impl Simulation {
         if !state.clock.is_consistent(step, state.values[self.compiled.references.step_max]) {
             return damaged("its times and step counters contradict each other");
         }
-        state.check_values()?;
+        state.values.check_values()?;
         state.check_inputs()?;
         Ok(step)
     }

@@ -163,7 +163,7 @@ impl System {
         self.step_size().save(writer);
         self.structures.iter().for_each(|structure| structure.save(writer));
         self.pairs.iter().for_each(|pair| pair.prescribed.save(writer));
-        self.groups.iter().for_each(|group| group.law.save(writer));
+        self.groups.iter().filter_map(|group| group.law.coating()).for_each(|coating| coating.save(writer));
         self.counted.save(writer);
         self.free_spans.save(writer);
     }
@@ -179,7 +179,8 @@ impl System {
         let mut endless = Some(0);
         for structure in &self.structures {
             let mut saved = structure.history.clone();
-            structure.check(reader, &mut saved);
+            saved.restore(&mut reader.clone());
+            structure.check(reader);
             let places = [&saved.geometry.now.places, &saved.geometry.before.places];
             if !places.into_iter().all(|places| self.places_exist(structure, places)) {
                 reader.refuse("the surface position of a contact node does not exist");
@@ -193,7 +194,7 @@ impl System {
             reader.refuse("a gap is not finite");
         }
         self.pairs.iter().for_each(|pair| pair.prescribed.check(reader));
-        self.groups.iter().for_each(|group| group.law.check(reader));
+        self.groups.iter().filter_map(|group| group.law.coating()).for_each(|coating| coating.check(reader));
         self.counted.check(reader);
         self.free_spans.check(reader);
         (step, endless.unwrap_or(0))
@@ -240,7 +241,7 @@ impl System {
             structure.restore(reader);
         }
         self.pairs.iter_mut().for_each(|pair| pair.prescribed.restore(reader));
-        self.groups.iter_mut().for_each(|group| group.law.restore(reader));
+        self.groups.iter_mut().filter_map(|group| group.law.coating_mut()).for_each(|coating| coating.restore(reader));
         self.counted.restore(reader);
         self.free_spans.restore(reader);
         self.rebuild_events();

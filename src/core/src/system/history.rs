@@ -1,6 +1,5 @@
 //! Values of one structure's contact nodes: current, one step before, and the oldest that a step still needs.
 
-use tiprub_cosim::persist::{Persist, StateReader, StateWriter};
 use tiprub_cosim::persist_fields;
 
 use crate::geometry::Geometry;
@@ -13,6 +12,8 @@ pub struct Two<T> {
     /// Value of the step before.
     pub before: T,
 }
+
+persist_fields!(Two<T> { now, .. });
 
 impl<T: Clone> Two<T> {
     /// Both entries with the same value.
@@ -55,6 +56,8 @@ pub struct Three {
     pub oldest: Vec<f64>,
 }
 
+persist_fields!(Three { now, before, .. });
+
 impl Three {
     /// All entries with the same value.
     pub fn new(len: usize, value: f64) -> Self {
@@ -65,33 +68,6 @@ impl Three {
     pub fn shift(&mut self) {
         std::mem::swap(&mut self.oldest, &mut self.before);
         std::mem::swap(&mut self.before, &mut self.now);
-    }
-}
-
-impl<T: Persist> Persist for Two<T> {
-    fn save(&self, writer: &mut StateWriter) {
-        self.now.save(writer);
-    }
-    fn restore(&mut self, reader: &mut StateReader) {
-        self.now.restore(reader);
-    }
-    fn check(&self, reader: &mut StateReader) {
-        self.now.check(reader);
-    }
-}
-
-impl Persist for Three {
-    fn save(&self, writer: &mut StateWriter) {
-        self.now.save(writer);
-        self.before.save(writer);
-    }
-    fn restore(&mut self, reader: &mut StateReader) {
-        self.now.restore(reader);
-        self.before.restore(reader);
-    }
-    fn check(&self, reader: &mut StateReader) {
-        self.now.check(reader);
-        self.before.check(reader);
     }
 }
 
@@ -113,7 +89,7 @@ pub(crate) struct ContactHistory {
     pub points: Vec<f64>,
     /// Predicted displacements of the contact rows (m), for schemes whose contact forces act one step later.
     pub predicted: Two<Vec<f64>>,
-    /// Data that is not part of the saved state.
+    /// Data that is not part of the saved state: every step writes them before it reads them.
     pub passing: Passing,
 }
 
@@ -126,14 +102,7 @@ pub(crate) struct Passing {
     pub lasting: Vec<f64>,
 }
 
-/// Nothing is saved: every step writes the values before it reads them.
-impl Persist for Passing {
-    fn save(&self, _: &mut StateWriter) {}
-    fn restore(&mut self, _: &mut StateReader) {}
-    fn check(&self, _: &mut StateReader) {}
-}
-
-persist_fields!(ContactHistory { gap, geometry, multiplier, coating_force, force, points, predicted, passing });
+persist_fields!(ContactHistory { gap, geometry, multiplier, coating_force, force, points, predicted, .. });
 
 impl ContactHistory {
     /// State without any contact so far: `contacts` nodes in all lanes, `rows` displacements.

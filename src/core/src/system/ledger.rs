@@ -78,6 +78,10 @@ impl Ledger {
         [self.shaft_work, self.stiffening_work, self.whirl_work, self.shift_work, self.casing_work]
     }
 
+    fn losses(&self) -> [Sum; 5] {
+        [self.damping_loss, self.friction_loss, self.impact_loss, self.wear_work, self.cutting_work]
+    }
+
     /// Returns the sum of the entries of two sets of structures.
     pub fn with(mut self, other: &Self) -> Self {
         self.initial += other.initial;
@@ -90,24 +94,17 @@ impl Ledger {
     pub fn residual(&self, mechanical: f64) -> f64 {
         let mut balance = Sum::default();
         balance.add(self.initial);
-        self.inputs().into_iter().for_each(|work| balance.add(work.value()));
-        balance.add(self.curvature_work.value());
-        balance.add(self.step_change.value());
-        balance.add(-self.damping_loss.value());
-        balance.add(-self.friction_loss.value());
-        balance.add(-self.impact_loss.value());
-        balance.add(-self.wear_work.value());
-        balance.add(-self.cutting_work.value());
-        balance.add(self.load_work.value());
-        balance.add(self.excitation_work.value());
+        let gains = self.inputs().into_iter().chain([self.curvature_work, self.step_change]);
+        gains.for_each(|work| balance.add(work.value()));
+        self.losses().into_iter().for_each(|loss| balance.add(-loss.value()));
+        [self.load_work, self.excitation_work].into_iter().for_each(|work| balance.add(work.value()));
         balance.add(-mechanical);
         balance.value()
     }
 
     /// Returns the sum of all supplied and lost energy (J).
     pub fn exchanged(&self) -> f64 {
-        let losses = [self.damping_loss, self.friction_loss, self.impact_loss, self.wear_work, self.cutting_work];
-        self.scale() + losses.iter().map(|loss| loss.value().abs()).sum::<f64>()
+        self.scale() + self.losses().iter().map(|loss| loss.value().abs()).sum::<f64>()
     }
 
     /// Energy supplied to vibration since the start by forces times velocities (J): work of inputs and loads and step changes,

@@ -1,6 +1,5 @@
 //! One structure: its modes, its contact nodes and their history, and the forces on surfaces that it carries.
 
-use tiprub_cosim::persist::{Persist, StateReader, StateWriter};
 use tiprub_cosim::persist_fields;
 
 use crate::geometry::{Geometry, Vector3};
@@ -76,6 +75,8 @@ pub struct StepControl {
     pub energies: Vec<f64>,
 }
 
+// Everything that determines the future, except the step size; it is restored after the step size has been set.
+persist_fields!(Structure { history, modes, delayed, step_control, pulling, .. });
 persist_fields!(StepControl { bank, largest, level, slopes, normals, open_steps, energies });
 
 impl StepControl {
@@ -322,33 +323,5 @@ impl Structure {
         let rows = self.modes.displacement();
         let square = |point: usize| vector3_at(rows, point).norm_squared();
         (0..rows.len() / 3).map(square).fold(0.0, f64::max).sqrt()
-    }
-
-    /// Writes everything that determines the future, except the step size.
-    pub(crate) fn save(&self, writer: &mut StateWriter) {
-        self.modes.save(writer);
-        self.delayed.save(writer);
-        self.step_control.save(writer);
-        self.pulling.save(writer);
-        self.history.save(writer);
-    }
-
-    /// Reads over a saved state and rejects invalid values; stores its history in `saved`.
-    pub(crate) fn check(&self, reader: &mut StateReader, saved: &mut ContactHistory) {
-        self.modes.check(reader);
-        self.delayed.check(reader);
-        self.step_control.check(reader);
-        self.pulling.check(reader);
-        saved.restore(&mut reader.clone());
-        self.history.check(reader);
-    }
-
-    /// Restores a saved state, after the step size has been set.
-    pub(crate) fn restore(&mut self, reader: &mut StateReader) {
-        self.modes.restore(reader);
-        self.delayed.restore(reader);
-        self.step_control.restore(reader);
-        self.pulling.restore(reader);
-        self.history.restore(reader);
     }
 }

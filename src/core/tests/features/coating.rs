@@ -93,12 +93,11 @@ fn a_blade_cuts_a_groove_and_then_runs_free_in_it() {
         let plastic = coating.wear_depth(cell) / THICKNESS;
         volume * (YIELD * plastic + 0.5 * HARDENING * plastic * plastic)
     };
-    let total: f64 = (0..coating.cells()).map(stored).sum();
+    let total: f64 = (0..360 * 20).map(stored).sum();
     assert!((total - works.iter().sum::<f64>()).abs() < 1e-12 * total, "{total} J, {works:?} J");
     // Worn where the rotor comes close, unworn on the opposite side.
-    for cell in 0..coating.cells() {
-        let (angle, _) = coating.centre(cell);
-        let depth = depth(angle);
+    for cell in 0..360 * 20 {
+        let depth = depth((f64::from(u32::try_from(cell % 360).unwrap()) + 0.5) * TAU / 360.0);
         let worn = coating.wear_depth(cell);
         assert!(worn <= depth.max(0.0) + 1e-5 && (depth > 0.0 || worn < 1e-12), "cell {cell}: {worn} of {depth}");
     }

@@ -25,7 +25,7 @@ fn scenes() -> Vec<(&'static str, Scene)> {
     ]
 }
 
-/// Numbers of all checks, and the findings as text.
+/// Results of all checks as bytes, and the findings as text.
 type Found = (Vec<u8>, String);
 
 /// Starts a scene with stored results and replaced parameters.
@@ -60,17 +60,15 @@ fn sealed(mut checks: Vec<u8>) -> Vec<u8> {
     checks
 }
 
-/// Replaces the numbers of results and keeps their keys, so that a test sees whether the results are used.
+/// Changes one bit of each result and keeps its key, so that a test sees whether the results are used.
 fn altered(checks: &[u8]) -> Vec<u8> {
-    let word = |place: usize| u64::from_le_bytes(checks[8 * place..][..8].try_into().unwrap());
-    let (mut altered, mut place) = (checks.to_vec(), 2);
-    while 8 * (place + 1) < checks.len() {
-        let count = usize::try_from(word(place + 2)).unwrap();
-        for number in place + 3..place + 3 + count {
-            let other = f64::from_bits(word(number)) * 0.5;
-            altered[8 * number..][..8].copy_from_slice(&other.to_le_bytes());
-        }
-        place += 3 + count;
+    let word = |place: usize| u64::from_le_bytes(checks[place..][..8].try_into().unwrap());
+    let (mut altered, mut place) = (checks.to_vec(), 16);
+    while place + 8 < checks.len() {
+        let length = usize::try_from(word(place + 16)).unwrap();
+        place += 24;
+        altered[place..][..length.min(1)].iter_mut().for_each(|byte| *byte ^= 1);
+        place += length;
     }
     sealed(altered)
 }
@@ -81,7 +79,7 @@ fn stored_checks_give_the_same_findings_to_the_bit() {
         let first = start(&scene, &[], &[]);
         assert!(first.0.len() > 200, "{name}: {}", first.0.len());
         assert_eq!(start(&scene, &first.0, &[]), first, "{name}");
-        // A start keeps altered numbers with the same keys, so it computes nothing.
+        // A start keeps altered results with the same keys, so it computes nothing.
         let other = altered(&first.0);
         assert!(other != first.0 && start(&scene, &other, &[]).0 == other, "{name}");
     }
@@ -161,7 +159,7 @@ fn damaged_checks_are_computed_again() {
         damaged.push(stored.clone());
         damaged.last_mut().unwrap()[index] ^= 1;
     }
-    // The last two have a correct checksum. One lacks its last numbers, and the other comes from another version.
+    // The last two have a correct checksum. One lacks its last bytes, and the other comes from another version.
     damaged.push(sealed(stored[..stored.len() - 16].to_vec()));
     damaged.push(stored.clone());
     damaged.last_mut().unwrap()[8] ^= 1;

@@ -43,8 +43,8 @@ fn at(index: usize, around: usize, along: usize) -> ClosestPoint {
 }
 
 #[test]
-fn interpolation_and_forces_do_equal_work() {
-    let (mut off, mut partition, mut work) = (0.0_f64, 0.0_f64, 0.0_f64);
+fn interpolation_is_exact_and_weights_add_up_to_one() {
+    let (mut off, mut partition) = (0.0_f64, 0.0_f64);
     for (around, along) in GRIDS {
         for kind in KINDS {
             let (surface, points) = open(around, along, kind);
@@ -56,25 +56,11 @@ fn interpolation_and_forces_do_equal_work() {
                 let place = place(random.below(around - 1), random.below(along - 1), random.unit(), random.unit());
                 let weights = surface.weights(place);
                 partition = partition.max((weights.iter().map(|(_, weight)| weight).sum::<f64>() - 1.0).abs());
-                // Work of a force at the point on displacements of the data points, in both forms.
-                let (force, mut forces) = (Vector3::from(random.vector(1.0)), vec![Vector3::zeros(); around * along]);
-                let moved: Vec<Vector3> = (0..around * along).map(|_| random.vector(1.0).into()).collect();
-                let mut control = moved.clone();
-                surface.interpolate(&mut control);
-                let mut direct = 0.0;
-                for (index, weight) in weights.iter() {
-                    direct += weight * force.dot(&control[index]);
-                    forces[index] = weight * force;
-                }
-                surface.transfer(&mut forces);
-                let back: f64 = forces.iter().zip(&moved).map(|(force, moved)| force.dot(moved)).sum();
-                work = work.max((direct - back).abs());
             }
         }
     }
     assert_below("interpolation (m)", off, 4e-16);
     assert_below("partition of unity", partition, 2e-15);
-    assert_below("virtual work", work, 2e-14);
 }
 
 #[test]

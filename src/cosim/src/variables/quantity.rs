@@ -1,7 +1,7 @@
 //! Quantities by which code finds variables without their names.
 
 /// Quantity of a variable, for code other than the reader of an output.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub enum Quantity {
     /// Simulated time.
     Time,
@@ -113,5 +113,6 @@ pub enum Quantity {
     /// Current internal step.
     InternalStep,
     /// Output that only its reader uses.
+    #[default]
     Output,
 }

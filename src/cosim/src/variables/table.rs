@@ -6,7 +6,7 @@ use super::{Quantity, Variable};
 use crate::{Error, Result, bounds};
 
 /// The table: variables in order of their references, which start at 0 (time) without gaps.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct VariableTable {
     variables: Vec<Variable>,
     /// Row of each value reference.

@@ -333,8 +333,9 @@ impl<'a> SingleStructure<'a> {
         // Independent of the duration of contact.
         let grows = |nodes: &Vec<usize>, sense: usize| {
             let (seen, directions) = self.seen(0, nodes, sense);
-            let found = limits::growth(SlidingContacts::new(&seen, sliding.friction, &directions), scheme, step);
-            found.is_some_and(|found| SetGrowth::new(&seen, scheme, step, &directions, found).allowed().is_finite())
+            let contacts = SlidingContacts::new(&seen, sliding.friction, &directions);
+            let found = limits::growth(contacts, scheme, step);
+            found.is_some_and(|found| SetGrowth::new(contacts, scheme, step, found).allowed().is_finite())
         };
         self.combinations().iter().all(|nodes| !sliding.senses().any(|sense| grows(nodes, sense)))
     }

@@ -6,7 +6,7 @@
 //! depth of the part ahead does not. The path of one step may lie in two cells, each with its fraction of the path. Forces therefore do not
 //! depend on the width of cells.
 
-use tiprub_cosim::persist::{Persist, StateReader, StateWriter};
+use tiprub_cosim::persist_fields;
 
 use super::{Branch, CellContact, CellRow, CoatedProblem, Coating, RodMaterial, place};
 use crate::scene::settings::CuttingSettings;
@@ -22,7 +22,8 @@ struct Edge {
     sense: f64,
 }
 
-tiprub_cosim::persist_fields!(Edge { cell, ahead, sense });
+persist_fields!(Edge { cell, ahead, sense });
+persist_fields!(CoatingCut { edges, .. });
 
 /// Material removed from a cell in a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -74,32 +75,16 @@ impl CoatingCut {
         self.forget();
     }
 
-    pub(super) fn save(&self, writer: &mut StateWriter) {
-        self.edges.save(writer);
-    }
-
-    pub(super) fn restore(&mut self, reader: &mut StateReader) {
-        self.edges.restore(reader);
-        self.forget();
-    }
-
     /// Discards the results of the current step.
-    fn forget(&mut self) {
+    pub(super) fn forget(&mut self) {
         self.next.fill(Edge::default());
         self.chips.clear();
         self.ways.fill(0.0);
     }
 
-    pub(super) fn check(&self, reader: &mut StateReader, cells: usize) {
-        let mut bytes = reader.clone();
-        self.edges.check(reader);
-        for _ in &self.edges {
-            let mut edge = Edge::default();
-            edge.restore(&mut bytes);
-            if edge.cell > cells as u64 || edge.ahead < 0.0 || edge.sense.abs() > 1.0 {
-                reader.refuse("a blade cuts outside the coating");
-            }
-        }
+    /// Returns whether an edge is outside a coating with a number of cells.
+    pub(super) fn is_outside(&self, cells: usize) -> bool {
+        self.edges.iter().any(|edge| edge.cell > cells as u64 || edge.ahead < 0.0 || edge.sense.abs() > 1.0)
     }
 }
 

@@ -48,7 +48,8 @@ fn middle(settings: &CoatingSettings) -> f64 {
 }
 
 fn set_wear(coating: &mut Coating, plastic: &[f64]) {
-    let bytes: Vec<u8> = (0..coating.cells()).flat_map(|cell| plastic[cell % plastic.len()].to_le_bytes()).collect();
+    let bytes: Vec<u8> =
+        (0..coating.plastic.len()).flat_map(|cell| plastic[cell % plastic.len()].to_le_bytes()).collect();
     coating.restore(&mut StateReader::new(&bytes));
 }
 
@@ -147,17 +148,17 @@ proptest! {
         path in prop::collection::vec((-1.0..0.3_f64, -1.0..0.3_f64, -20.0..20.0_f64), 1..40),
     ) {
         let mut coating = coating(&settings, 2);
-        let (mut before, mut volume) = (vec![0.0; coating.cells()], 0.0);
+        let (mut before, mut volume) = (vec![0.0; coating.plastic.len()], 0.0);
         for (first, second, angle) in path {
             let mut problem = coating.problem(1);
             coating.locate(&mut problem, &[angle, angle + 0.1]);
             problem.delassus.copy_from_slice(&[1.0, 0.2, 0.3, 1.5]);
             problem.gaps.copy_from_slice(&[first, second]);
             prop_assert!(problem.solve().solved);
-            let unchanged: Vec<f64> = (0..coating.cells()).map(|cell| coating.wear_depth(cell)).collect();
+            let unchanged: Vec<f64> = (0..coating.plastic.len()).map(|cell| coating.wear_depth(cell)).collect();
             prop_assert_eq!(&unchanged, &before, "solving wears nothing");
             prop_assert!(coating.commit(&problem) >= 0.0);
-            let after: Vec<f64> = (0..coating.cells()).map(|cell| coating.wear_depth(cell)).collect();
+            let after: Vec<f64> = (0..coating.plastic.len()).map(|cell| coating.wear_depth(cell)).collect();
             prop_assert!(before.iter().zip(&after).all(|(before, after)| after >= before && *after <= THICKNESS));
             prop_assert!(coating.worn_volume() >= volume);
             let largest = after.iter().copied().fold(0.0, f64::max);
@@ -192,7 +193,7 @@ fn interpolation_does_the_same_work_on_both_sides() {
     assert!(problem.solve().solved);
     for (row, (cell, force)) in coating.rows.iter().zip(problem.loaded_cells()) {
         assert!((force - width * row.width * depth(row.axial) / THICKNESS).abs() < 1e-15);
-        assert!((coating.centre(cell).1 - row.axial).abs() < 1e-15);
+        assert!((coating.rows[cell / coating.around].axial - row.axial).abs() < 1e-15);
     }
     let total: f64 = problem.loaded_cells().map(|(_, force)| force).sum();
     let (sum, moment) = (0..4).fold((0.0, 0.0), |(sum, moment), node| {
@@ -223,8 +224,8 @@ fn cells_follow_the_angle_of_the_blade() {
     // Swept across the seam: the middle row is between its nodes; the outer rows are beyond the nodes at 0.2 and 0.8.
     assert_eq!(cells(-0.6 * cell, 1.0 * cell + 0.4 * cell), [9, 10, 21]);
     assert_eq!(cells(TAU - 0.6 * cell, 1.4 * cell), [9, 10, 21], "however the angles are wrapped");
-    for index in 0..coating.cells() {
-        let (angle, _) = coating.centre(index);
+    for index in 0..coating.plastic.len() {
+        let angle = (real(index % 10) + 0.5) * cell;
         assert_eq!(cells(angle, angle)[index / 10], index);
     }
 }
@@ -327,10 +328,10 @@ fn wear_map_round_trips_bit_for_bit() {
         assert!(problem.solve().solved);
         worn.commit(&problem);
     }
-    let mut bytes = vec![0; 8 * worn.cells()];
+    let mut bytes = vec![0; 8 * worn.plastic.len()];
     let mut writer = StateWriter::new(&mut bytes);
     worn.save(&mut writer);
-    assert_eq!(writer.written(), 8 * worn.cells());
+    assert_eq!(writer.written(), 8 * worn.plastic.len());
     let mut other = coating(&settings, 2);
     assert_ne!(other, worn);
     other.restore(&mut StateReader::new(&bytes));
@@ -386,7 +387,8 @@ fn coupled_blades_contact_their_own_cells() {
     assert!((solve([0, 1], &alone).gaps[0] - forward.gaps[0]).abs() > 1e-3);
     let mut worn = coating.clone();
     worn.commit(&forward);
-    let places: Vec<usize> = (0..worn.cells()).filter(|cell| worn.wear_depth(*cell) > 0.0).map(|c| c % 16).collect();
+    let places: Vec<usize> =
+        (0..worn.plastic.len()).filter(|cell| worn.wear_depth(*cell) > 0.0).map(|c| c % 16).collect();
     assert!(!places.is_empty() && places.iter().all(|place| [0, 4].contains(place)), "{places:?}");
 }
 

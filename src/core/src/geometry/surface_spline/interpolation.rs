@@ -1,8 +1,7 @@
-//! The interpolation problem in one direction, and its transpose.
+//! The interpolation problem in one direction.
 //!
 //! (Q_{i−1} + 4 Q_i + Q_{i+1})/6 = P_i with cyclic indices, or between free ends: a zero second derivative at an end means Q_end = P_end,
-//! and the remaining system is tridiagonal. Both matrices are symmetric, so that the transposed problem uses the same factor. O(n), in
-//! place.
+//! and the remaining system is tridiagonal. O(n), in place.
 
 use super::SurfaceSpline;
 use crate::math::vector::Vector3;
@@ -75,26 +74,6 @@ impl InterpolationRow {
         }
     }
 
-    /// Converts forces on control points to forces on data points: the transpose of [`InterpolationRow::interpolate`].
-    pub fn transfer(&self, forces: &mut [Vector3], start: usize, stride: usize) {
-        match &self.kind {
-            RowEnds::Facets => {}
-            RowEnds::Closed { correction } => self.solve_closed(correction, forces, start, stride),
-            RowEnds::Free { last } => {
-                let inner = start + stride;
-                let unknowns = self.pivots.len();
-                self.solve_tridiagonal(forces, inner, stride);
-                if unknowns > 0 {
-                    forces[start] -= forces[inner];
-                    forces[start + last * stride] -= forces[inner + (unknowns - 1) * stride];
-                }
-                for index in 0..unknowns {
-                    forces[inner + index * stride] *= 6.0;
-                }
-            }
-        }
-    }
-
     fn solve_closed(&self, correction: &[f64], values: &mut [Vector3], start: usize, stride: usize) {
         let last = start + (self.pivots.len() - 1) * stride;
         self.solve_tridiagonal(values, start, stride);
@@ -144,16 +123,5 @@ impl SurfaceSpline {
         assert_eq!(values.len(), self.around * self.along, "one value per data point");
         (0..self.along).for_each(|ring| self.lines[0].interpolate(values, ring * self.around, 1));
         (0..self.around).for_each(|column| self.lines[1].interpolate(values, column, self.around));
-    }
-
-    /// Converts forces on the control points to forces on the data points with the same virtual work, in place: the transpose of
-    /// [`SurfaceSpline::interpolate`].
-    ///
-    /// # Panics
-    /// Wrong number of values.
-    pub fn transfer(&self, forces: &mut [Vector3]) {
-        assert_eq!(forces.len(), self.around * self.along, "one force per control point");
-        (0..self.around).for_each(|column| self.lines[1].transfer(forces, column, self.around));
-        (0..self.along).for_each(|ring| self.lines[0].transfer(forces, ring * self.around, 1));
     }
 }

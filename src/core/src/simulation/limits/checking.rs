@@ -7,7 +7,7 @@ use crate::geometry::spline::SplineGap;
 use crate::geometry::{GapLaw, Vector3};
 use crate::limits::finding::{Checked, ErrorKind, Finding, Subject, WarningKind};
 use crate::limits::massless::MasslessLimit;
-use crate::limits::{self, ContactDirections, Fastest, massless};
+use crate::limits::{self, ContactDirections, massless};
 use crate::math::vector::vector3_at;
 use crate::modes::cyclic::CyclicModel;
 use crate::modes::modal::ModalModel;
@@ -170,7 +170,7 @@ impl<'a> Checking<'a> {
             None => limits::check_solvable(&self.models[0], scheme, largest, self.friction, &senses[0]),
         };
         let mut refused = None;
-        let mut checked = || solvable().map_err(|error| refused = Some(error)).ok().map(|()| [1.0]);
+        let mut checked = || solvable().map_err(|error| refused = Some(error)).ok().map(|()| true);
         if self.known.get(CheckPart::Solvable, &[], &mut checked).is_none() {
             refused.map_or_else(solvable, Err).map_err(own)?;
         }
@@ -204,10 +204,9 @@ impl<'a> Checking<'a> {
         };
         let fastest = || {
             let both = [1.0, -1.0].into_iter().filter_map(growth);
-            both.max_by(|a, b| a.rate.total_cmp(&b.rate)).map(|found| [found.rate, found.frequency])
+            both.max_by(|a, b| a.rate.total_cmp(&b.rate))
         };
-        let [rate, frequency] = self.known.get(CheckPart::Cutting, &[], fastest)?;
-        Some(WarningKind::CuttingGrowth(Fastest { rate, frequency }))
+        self.known.get(CheckPart::Cutting, &[], fastest).map(WarningKind::CuttingGrowth)
     }
 
     /// Checks whether the compliance of the surface carriers makes the contact problem unsolvable, at the expected step

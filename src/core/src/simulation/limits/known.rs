@@ -7,20 +7,20 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use tiprub_cosim::persist::{fingerprint, to_bytes};
+use tiprub_cosim::persist::{Persist, StateReader, fingerprint, to_bytes};
 
 use super::Parameters;
 use crate::simulation::compile::Compiled;
 
 /// First word of stored results, and version of their layout and of the checks.
 const MAGIC: u64 = u64::from_le_bytes(*b"tiprubCK");
-const VERSION: u64 = 1;
+const VERSION: u64 = 2;
 
 /// Hash of everything that a result depends on.
 type Key = [u64; 2];
 
-/// Results by their keys. A result without numbers represents `None`.
-type Results = BTreeMap<Key, Vec<u64>>;
+/// Bytes of the results by their keys. A result without bytes represents `None`.
+type Results = BTreeMap<Key, Vec<u8>>;
 
 /// Part of the checks of a structure.
 #[derive(Debug, Clone, Copy)]
@@ -55,12 +55,11 @@ impl KnownChecks {
         if self.used.is_empty() {
             return Vec::new();
         }
-        let mut words = vec![MAGIC, VERSION];
-        for ([first, second], numbers) in &self.used {
-            words.extend([*first, *second, numbers.len() as u64]);
-            words.extend(numbers);
+        let mut bytes = to_bytes(&[&[MAGIC, VERSION]]);
+        for (key, result) in &self.used {
+            bytes.extend(to_bytes(&[key, &result.len()]));
+            bytes.extend(result);
         }
-        let mut bytes = to_bytes(&[&words]);
         bytes.extend(fingerprint(&bytes, 0).to_le_bytes());
         bytes
     }
@@ -77,16 +76,17 @@ fn read(bytes: &[u8]) -> Option<Results> {
     if fingerprint(content, 0) != u64::from_le_bytes(*checksum) {
         return None;
     }
-    let (words, rest) = content.as_chunks();
-    let mut words = words.iter().map(|word| u64::from_le_bytes(*word));
-    if !rest.is_empty() || words.next() != Some(MAGIC) || words.next() != Some(VERSION) {
-        return None;
-    }
+    let mut rest = content.strip_prefix(&to_bytes(&[&[MAGIC, VERSION]])[..])?;
     let mut results = Results::new();
-    while let Some(first) = words.next() {
-        let (second, count) = (words.next()?, usize::try_from(words.next()?).ok()?);
-        let numbers: Vec<u64> = words.by_ref().take(count).collect();
-        results.insert([first, second], (numbers.len() == count).then_some(numbers)?);
+    while !rest.is_empty() {
+        let (mut key, mut length) = (Key::default(), 0_usize);
+        let (head, others) = rest.split_at_checked(to_bytes(&[&key, &length]).len())?;
+        let reader = &mut StateReader::new(head);
+        key.restore(reader);
+        length.restore(reader);
+        let (result, others) = others.split_at_checked(length)?;
+        results.insert(key, result.to_vec());
+        rest = others;
     }
     Some(results)
 }
@@ -115,23 +115,25 @@ impl<'a> BodyChecks<'a> {
         Self { known, body, key: [1, 2].map(|seed| fingerprint(text.as_bytes(), seed)) }
     }
 
-    /// Returns the numbers of a part of the check: the stored numbers with the same key, or the result of `compute`.
-    pub(super) fn get<const N: usize>(
+    /// Returns the result of a part of the check: the stored one with the same key, or that of `compute`.
+    pub(super) fn get<T: Persist + Default>(
         &self,
         part: CheckPart,
         details: &[u64],
-        compute: impl FnOnce() -> Option<[f64; N]>,
-    ) -> Option<[f64; N]> {
+        compute: impl FnOnce() -> Option<T>,
+    ) -> Option<T> {
         let [first, second] = self.key;
         let bytes = to_bytes(&[&vec![first, second, part as u64], &details.to_vec()]);
         let key = [1, 2].map(|seed| fingerprint(&bytes, seed));
         let stored = self.known.borrow().stored.get(&key).cloned();
-        let numbers = stored.filter(|numbers| numbers.is_empty() || numbers.len() == N).unwrap_or_else(|| {
-            let computed = compute();
-            computed.iter().flatten().map(|number| number.to_bits()).collect()
-        });
-        let found = <[u64; N]>::try_from(numbers.as_slice()).ok().map(|bits| bits.map(f64::from_bits));
-        self.known.borrow_mut().used.insert(key, numbers);
+        let mut value = T::default();
+        let length = to_bytes(&[&value]).len();
+        let result = stored
+            .filter(|result| result.is_empty() || result.len() == length)
+            .unwrap_or_else(|| compute().map_or_else(Vec::new, |computed| to_bytes(&[&computed])));
+        value.restore(&mut StateReader::new(&result));
+        let found = (!result.is_empty()).then_some(value);
+        self.known.borrow_mut().used.insert(key, result);
         found
     }
 }

@@ -6,9 +6,10 @@ use super::in_range;
 use super::known::CheckPart;
 use crate::limits::finding::{ClosedContact, ErrorKind, StepGrowth, WarningKind};
 use crate::limits::judged::{self, SetGrowth};
-use crate::limits::{self, ContactDirections, Fastest, GrowthRates, SlidingContacts, lock_up};
+use crate::limits::{self, ContactDirections, Fastest, SlidingContacts, lock_up};
 use crate::modes::modal::ModalModel;
 use crate::simulation::clock::SAME_STEP;
+use tiprub_cosim::persist_fields;
 
 /// Growth by this factor before contact opens turns an insignificant motion, a thousandth of the clearance, into one as large as the
 /// clearance.
@@ -134,50 +135,33 @@ impl Physics {
 }
 
 /// Growth of one model while some nodes are closed.
+#[derive(Default)]
 struct ModelGrowth {
     continuous: Fastest,
-    /// Growth without the mass of the contact nodes; `None` if there is none, or if the scheme makes it irrelevant.
-    without: Option<Fastest>,
+    /// Growth without the mass of the contact nodes, if `neglects_mass`; otherwise the same as `continuous`, because there is none, or because
+    /// the scheme makes it irrelevant.
+    physical: Fastest,
+    neglects_mass: bool,
     /// Fraction of the contact displacement that this motion contributes.
     share: f64,
-    /// Smallest friction coefficient at which the tip locks up.
-    least: Option<f64>,
-    /// Growth by the steps; `None` for adaptive steps.
-    judged: Option<SetGrowth>,
+    /// Smallest friction coefficient at which the tip locks up; infinite if there is none.
+    least: f64,
+    /// Growth by the steps, if they are not adaptive (`is_judged`).
+    judged: SetGrowth,
+    is_judged: bool,
 }
 
-impl ModelGrowth {
-    /// Converts the growth to numbers; NaN represents `None`.
-    fn to_numbers(&self) -> [f64; 12] {
-        let without = self.without.map_or([f64::NAN; 2], |found| [found.rate, found.frequency]);
-        let judged = self.judged.map_or([f64::NAN; 6], growth_to_numbers);
-        let ([without, frequency], [a, b, c, d, e, f]) = (without, judged);
-        let Fastest { rate, frequency: with_mass } = self.continuous;
-        [rate, with_mass, without, frequency, self.share, self.least.unwrap_or(f64::NAN), a, b, c, d, e, f]
-    }
+persist_fields!(ModelGrowth { continuous, physical, neglects_mass, share, least, judged, is_judged });
 
-    fn from_numbers([rate, frequency, without, other, share, least, judged @ ..]: [f64; 12]) -> Self {
-        Self {
-            continuous: Fastest { rate, frequency },
-            without: (!without.is_nan()).then_some(Fastest { rate: without, frequency: other }),
-            share,
-            least: (!least.is_nan()).then_some(least),
-            judged: (!judged[2].is_nan()).then(|| growth_from_numbers(judged)),
-        }
-    }
+/// A set of closed nodes to which a step adds most growth.
+#[derive(Default)]
+struct MostGrown {
+    /// Index of the set.
+    set: usize,
+    judged: SetGrowth,
 }
 
-/// Converts the growth of a set of closed nodes to numbers.
-fn growth_to_numbers(judged: SetGrowth) -> [f64; 6] {
-    let GrowthRates { continuous, frequency, stepped, swing, noise } = judged.growth;
-    [continuous, frequency, stepped, swing, noise, judged.share]
-}
-
-/// Inverse of [`growth_to_numbers`].
-fn growth_from_numbers(numbers: [f64; 6]) -> SetGrowth {
-    let [continuous, frequency, stepped, swing, noise, share] = numbers;
-    SetGrowth { growth: GrowthRates { continuous, frequency, stepped, swing, noise }, share }
-}
+persist_fields!(MostGrown { set, judged });
 
 impl Checking<'_> {
     /// Checks growth of sliding contact in one sense, at the expected step (s) and at all others.
@@ -189,20 +173,16 @@ impl Checking<'_> {
         let (watched, physics) = self.watched(expected, sign);
         let steps = looked_at(self.largest_frequency(), self.parameters.step);
         let compute = |step: f64| {
-            let judged = (0..watched.len()).filter_map(|one| Some((one, self.judged(&watched[one], step, sign)?)));
-            let (one, judged) = judged.reduce(|known, found| {
+            let judged = (0..watched.len()).filter_map(|set| Some((set, self.judged(&watched[set], step, sign)?)));
+            let (set, judged) = judged.reduce(|known, found| {
                 if known.1.within(judged::TOLD) <= found.1.within(judged::TOLD) { known } else { found }
             })?;
-            let [continuous, frequency, stepped, swing, noise, share] = growth_to_numbers(judged);
-            #[expect(clippy::cast_precision_loss, reason = "the number of sets of contacts is far below 2^52")]
-            Some([one as f64, continuous, frequency, stepped, swing, noise, share])
+            Some(MostGrown { set, judged })
         };
         let most_at = |step: f64| {
             let details = [sense as u64, expected.to_bits(), step.to_bits()];
-            let [one, judged @ ..] = self.known.get(CheckPart::Step, &details, || compute(step))?;
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small index")]
-            let watched = watched.get(one as usize)?;
-            Some((watched.nodes.as_slice(), growth_from_numbers(judged)))
+            let MostGrown { set, judged } = self.known.get(CheckPart::Step, &details, || compute(step))?;
+            Some((watched.get(set)?.nodes.as_slice(), judged))
         };
         let looked: Vec<_> = steps.into_iter().map(|step| (step, most_at(step))).collect();
         Sense { ranges: self.added(&looked, sign), ..self.growth(physics, sign, expected) }
@@ -216,16 +196,15 @@ impl Checking<'_> {
             let mut most: Option<FastestGrowth> = None;
             for model in 0..self.models.len() {
                 let Some(found) = self.set_growth(model, &nodes, sign, expected) else { continue };
-                let ModelGrowth { continuous, without, share, least, judged } = found;
-                let physical = without.unwrap_or(continuous);
+                let ModelGrowth { continuous, physical, neglects_mass, share, least, judged, is_judged } = found;
                 if physical.rate > noise {
-                    let with_mass = without.map(|_| continuous);
+                    let with_mass = neglects_mass.then_some(continuous);
                     physics.add(Flutter { found: physical, nodes: nodes.clone(), with_mass, share });
                 }
-                let least = least.filter(|least| *least < self.friction);
-                least.into_iter().for_each(|least| physics.note_lock_up(least, &nodes));
-                let Some(judged) = judged else { continue };
-                if most.as_ref().is_none_or(|most| judged.growth.stepped > most.judged.growth.stepped) {
+                if least < self.friction {
+                    physics.note_lock_up(least, &nodes);
+                }
+                if is_judged && most.as_ref().is_none_or(|most| judged.growth.stepped > most.judged.growth.stepped) {
                     most = Some(FastestGrowth { nodes: nodes.clone(), model, continuous, judged });
                 }
             }
@@ -239,8 +218,7 @@ impl Checking<'_> {
     fn set_growth(&self, model: usize, nodes: &[usize], sign: f64, expected: f64) -> Option<ModelGrowth> {
         let numbers = [model as u64, sign.to_bits(), expected.to_bits()].into_iter();
         let details: Vec<u64> = numbers.chain(nodes.iter().map(|node| *node as u64)).collect();
-        let compute = || self.computed_growth(model, nodes, sign, expected).map(|growth| growth.to_numbers());
-        self.known.get(CheckPart::Set, &details, compute).map(ModelGrowth::from_numbers)
+        self.known.get(CheckPart::Set, &details, || self.computed_growth(model, nodes, sign, expected))
     }
 
     fn computed_growth(&self, model: usize, nodes: &[usize], sign: f64, expected: f64) -> Option<ModelGrowth> {
@@ -250,24 +228,26 @@ impl Checking<'_> {
         let contacts = SlidingContacts::new(&seen, friction, &directions);
         let continuous = limits::continuous(contacts, scheme, largest)?;
         let without = if properties.quasi_static { None } else { limits::without_node_mass(contacts, largest) };
-        let share = judged::share_of(&seen, &directions, without.unwrap_or(continuous).frequency);
+        let physical = without.unwrap_or(continuous);
         let stepped = || limits::stepped(contacts, scheme, expected, continuous);
         let growth = if properties.adaptive { None } else { stepped() };
         Some(ModelGrowth {
             continuous,
-            without,
-            share,
-            least: lock_up::least_friction(&seen, &directions),
-            judged: growth.map(|growth| SetGrowth::new(&seen, scheme, expected, &directions, growth)),
+            physical,
+            neglects_mass: without.is_some(),
+            share: judged::share_of(&seen, &directions, physical.frequency),
+            least: lock_up::least_friction(&seen, &directions).unwrap_or(f64::INFINITY),
+            judged: growth.map_or_else(SetGrowth::default, |growth| SetGrowth::new(contacts, scheme, expected, growth)),
+            is_judged: growth.is_some(),
         })
     }
 
     fn judged(&self, watched: &FastestGrowth, step: f64, sign: f64) -> Option<SetGrowth> {
         let (seen, directions) = self.closed_at(watched.model, &watched.nodes, sign);
         let (scheme, friction) = (self.parameters.scheme, self.friction);
-        let growth =
-            limits::stepped(SlidingContacts::new(&seen, friction, &directions), scheme, step, watched.continuous)?;
-        Some(SetGrowth::new(&seen, scheme, step, &directions, growth))
+        let contacts = SlidingContacts::new(&seen, friction, &directions);
+        let growth = limits::stepped(contacts, scheme, step, watched.continuous)?;
+        Some(SetGrowth::new(contacts, scheme, step, growth))
     }
 
     /// Returns one of the models observed at closed nodes (at both parts of a nodal diameter), and their directions.

@@ -13,7 +13,7 @@ use tiprub_cosim::warning::{Topic, Warning};
 const MATERIAL: f64 = 1.5;
 
 /// Warnings reported since the start.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct WarningState {
     /// Topic, part of the scene, and magnitude: the length of a step (s), an angle (rad) or a fraction.
     reported: BTreeMap<(Topic, Subject), f64>,
