@@ -29,6 +29,8 @@ persist_fields!(Input { value, slope, since, reached, rate, from, end, until });
 impl Input {
     /// Requests a value at `offset`; a derivative requested earlier ends.
     pub fn ask(&mut self, value: f64, offset: f64) {
+        // A number too small for full precision acts as zero.
+        let value = if value.is_subnormal() { 0.0 } else { value };
         (self.value, self.slope, self.since) = (value, 0.0, offset);
     }
 

@@ -349,7 +349,7 @@ fn tables(
         ),
         table(&["degree", "µ", "problems", "initially unsolved", "finally unsolved"], &problems),
         table(
-            &["without contact, in one step", "without contact, span by span", "with a rub"],
+            &["without contact", "with a rub"],
             &[long.map(|time| format!("{time:.3} ms")).to_vec()],
         ),
         table(&["degree", "µ", "problems", "no solution", "several"], &solutions),
