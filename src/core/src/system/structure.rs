@@ -10,6 +10,7 @@ use crate::modes::modal::ModalModel;
 use crate::scene::method::Scheme;
 use crate::system::contact_view::ContactMember;
 use crate::system::history::ContactHistory;
+use crate::system::nearness::Nearness;
 use crate::system::pulling::Pulling;
 
 /// Penetrations below this count as zero (m): the squares of the resulting values leave the range of double precision, and such
@@ -38,6 +39,8 @@ pub struct Structure {
     pub(crate) lowest_in_span: Vec<f64>,
     /// Selection of the smallest gaps that outputs need.
     pub(crate) needed_minima: NeededMinima,
+    /// Bounds of gaps that are not evaluated in every step.
+    pub(crate) nearness: Nearness,
 }
 
 /// Smallest gaps within spans that outputs need. The stored values of other smallest gaps may be too large.
@@ -117,6 +120,7 @@ impl Structure {
             step_control: StepControl::new(if touches { modes.sectors() } else { 0 }, contacts),
             lowest_in_span: Vec::new(),
             needed_minima: NeededMinima::default(),
+            nearness: Nearness::default(),
             pair_of,
             lanes: modes.lanes(),
             modes,
@@ -230,6 +234,7 @@ impl Structure {
         self.delayed.fill(0.0);
         self.history.clear();
         self.pulling.clear();
+        self.nearness.clear();
         self.step_control.bank.fill(0.0);
         self.step_control.largest.fill(0.0);
         self.step_control.level.fill(0);
@@ -318,6 +323,7 @@ impl Structure {
         self.delayed.save(writer);
         self.step_control.save(writer);
         self.pulling.save(writer);
+        self.nearness.save(writer);
         self.history.save(writer);
     }
 
@@ -327,6 +333,7 @@ impl Structure {
         self.delayed.check(reader);
         self.step_control.check(reader);
         self.pulling.check(reader);
+        self.nearness.check(reader);
         saved.restore(&mut reader.clone());
         self.history.check(reader);
     }
@@ -337,6 +344,7 @@ impl Structure {
         self.delayed.restore(reader);
         self.step_control.restore(reader);
         self.pulling.restore(reader);
+        self.nearness.restore(reader);
         self.history.restore(reader);
     }
 }
