@@ -45,9 +45,6 @@ impl Persist for Nearness {
     fn restore(&mut self, reader: &mut StateReader) {
         self.free.restore(reader);
         self.skipped.restore(reader);
-        if self.is_suspended {
-            self.clear();
-        }
     }
     fn check(&self, reader: &mut StateReader) {
         self.free.check(reader);
