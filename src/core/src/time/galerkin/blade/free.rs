@@ -419,7 +419,8 @@ impl BladeTrial {
         let Self { start, moved, sigma, gaps, multipliers, forces, modal_forces, reach, .. } = self;
         let contacts = [&mut start.multipliers, &mut start.slopes, &mut start.gaps, &mut start.sigma];
         let all = start.modes.iter_mut().chain(&mut start.forces).chain(&mut start.moved).chain(contacts).chain(reach);
-        let lanes = [sigma, gaps, multipliers, &mut start.friction].into_iter().chain(moved).chain(forces).chain(modal_forces);
+        let lanes =
+            [sigma, gaps, multipliers, &mut start.friction].into_iter().chain(moved).chain(forces).chain(modal_forces);
         let mut rest = numbers.as_chunks_mut().0;
         for blocks in all.chain(lanes.filter(|_| is_tried)) {
             let (own, others) = rest.split_at_mut(blocks.len());
