@@ -15,7 +15,8 @@ const SAME_TIME: f64 = 1e-9;
 
 impl Simulation {
     /// Returns the number of the internal point at which the next internal step ends, and the part of free time until then
-    /// (`None` outside free spans). Within free spans, only steps that may end early have internal points. If free spans cannot continue, this ends the open steps.
+    /// (`None` outside free spans). Within free spans, only the last internal step of a communication step has a start of its own, for the
+    /// mean forces of the last internal step; steps that may end early have all internal points. If free spans cannot continue, this ends the open steps.
     ///
     /// # Errors
     /// If the open steps cannot be ended.
@@ -24,7 +25,7 @@ impl Simulation {
         if !(self.stepper.runs_freely() && self.enter_free_spans()?) {
             return Ok((done + 1, None));
         }
-        let next = if partial { done + 1 } else { count };
+        let next = if !partial && done == 0 && count > 1 { count - 1 } else { done + 1 };
         let (step, FreeSpans { since, span, .. }) = (self.state.clock.step, self.system.free_spans);
         let part = FreePart { from: step.reached()[1] - since, to: step.time(next) - since, span };
         Ok((next, Some(part)))
