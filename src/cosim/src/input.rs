@@ -73,14 +73,14 @@ impl Input {
         }
     }
 
-    /// Whether the acting line ends at a given time.
+    /// Returns whether the acting line ends at a given time.
     pub fn is_ramp(&self) -> bool {
         self.until < f64::INFINITY
     }
 
-    /// Returns whether the acting value is the requested one from an offset on.
+    /// Returns whether the input rests from an offset (s) on, at the requested value.
     #[inline]
-    pub fn stays(&self, offset: f64) -> bool {
+    pub fn rests_from(&self, offset: f64) -> bool {
         self.slope == 0.0 && self.rate == 0.0 && self.at(offset).to_bits() == self.value.to_bits()
     }
 

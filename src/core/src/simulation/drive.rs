@@ -56,8 +56,8 @@ impl RotorAngle {
         self.since -= length;
     }
 
-    /// Corrects the time since the origin to `elapsed` (s) if it is the same within a fraction.
-    pub(super) fn keep_elapsed(&mut self, elapsed: f64, fraction: f64) {
+    /// Sets the time since the origin to `elapsed` (s) if both agree within a fraction of it.
+    pub(super) fn correct_elapsed(&mut self, elapsed: f64, fraction: f64) {
         if (self.since + elapsed).abs() <= fraction * elapsed {
             self.since = -elapsed;
         }

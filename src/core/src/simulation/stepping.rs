@@ -190,15 +190,15 @@ impl Simulation {
         self.note_missed(time);
         self.state.clock.most_tried =
             self.state.clock.most_tried.max(self.system.steps_tried() - self.state.clock.step.tried);
-        if !self.system.free_spans.runs {
+        if !self.system.steady_phase.active {
             self.state.inputs.rotors.iter_mut().for_each(|rotor| rotor.angle.rebase(&rotor.speed, offset));
         }
         self.compute_outputs();
         self.check_outputs(time).inspect_err(|_| self.state.clock.phase = SimulationPhase::Failed)?;
         self.check_energy(time)?;
         self.state.inputs.shift(offset);
-        if self.system.free_spans.runs {
-            self.keep_angles(time);
+        if self.system.steady_phase.active {
+            self.correct_angle_times(time);
         }
         self.state.clock.finish(time);
         Ok(())

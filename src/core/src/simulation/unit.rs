@@ -29,7 +29,7 @@ impl CoSimulation for Simulation {
             self.state.values[reference as usize] = before;
             outcome?;
             self.warn_of_friction(&parameters);
-            if self.system.free_spans.runs {
+            if self.system.steady_phase.active {
                 self.end_open_steps()?;
             }
             self.tangent.follow_anew();
@@ -108,7 +108,7 @@ impl CoSimulation for Simulation {
         self.settle();
         self.launch();
         self.system.start(&self.motions.drives);
-        self.expect_free_spans();
+        self.prepare_steady_phase();
         self.check_initial_state()?;
         self.check_initial_gaps()?;
         self.state.window.open(self.system.structures());
@@ -163,7 +163,7 @@ impl CoSimulation for Simulation {
     /// Does nothing unless sectors take adaptive steps, inputs rest, and no contact can close.
     fn fly_ahead(&mut self) {
         let last = self.state.clock.step.count.saturating_sub(1);
-        if self.stepper.runs_freely()
+        if self.stepper.supports_steady_phase()
             || !self.is_stepping()
             || !self.is_marched()
             || self.state.clock.step.done > 0
@@ -197,10 +197,10 @@ impl CoSimulation for Simulation {
             // The mark includes the inputs set meanwhile.
             self.set_mark();
         }
-        let (next, free) = self.next_point()?;
+        let (next, interval) = self.next_point()?;
         let (from, to) = (self.state.clock.step.reached(), self.state.clock.step.point(next));
         let ([before, _], [offset, time]) = (from, to);
-        if self.is_marched() && free.is_none() {
+        if self.is_marched() && interval.is_none() {
             let middle = [0, 1].map(|i| 0.5 * (from[i] + to[i]));
             for pair in 0..self.motions.drives.len() {
                 let middle = self.state.drive(&self.compiled, pair, middle);
@@ -213,8 +213,8 @@ impl CoSimulation for Simulation {
             self.stepper.begin_loads(&mut self.system);
             self.load(offset);
         }
-        let outcome = match free {
-            Some(part) => self.stepper.step_freely(&mut self.system, &self.motions.drives, part),
+        let outcome = match interval {
+            Some(interval) => self.stepper.step_in_steady_phase(&mut self.system, &self.motions.drives, interval),
             None => self.stepper.step(&mut self.system, &self.motions.drives),
         };
         match outcome {
@@ -223,7 +223,7 @@ impl CoSimulation for Simulation {
             Err(failure) => return Err(self.fail(failure, time)),
         }
         let places = (&self.compiled.patches[..], &self.compiled.linings[..]);
-        let length = free.map_or_else(|| self.system.step_size(), |part| part.to - part.from);
+        let length = interval.map_or_else(|| self.system.step_size(), |interval| interval.to - interval.from);
         self.state.window.add(&self.system, places, length);
         self.state.clock.step.done = next;
         let finished = next == self.state.clock.step.count;
@@ -307,7 +307,7 @@ impl Simulation {
         let (stepping, at_once) = (self.is_in_step(), self.acts_at_once(quantity));
         let Some(mut input) = self.state.inputs.get(quantity, of, element).copied() else { return Ok(()) };
         let (offset, length) = (self.state.clock.offset_now(), self.state.clock.step.length);
-        let (rests, value) = (input.stays(offset), input.value);
+        let (rests, value) = (input.rests_from(offset), input.value);
         change(&mut input);
         if rests && input.slope == 0.0 && input.value.to_bits() == value.to_bits() {
             return Ok(());

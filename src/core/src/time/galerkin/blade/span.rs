@@ -1,9 +1,9 @@
 //! Integration of a blade over a span.
 
 use super::dense::ModeResponse;
-use super::free::{OpenStep, Progress};
 use super::level::PartWeights;
 use super::minima::{MAX_HALVINGS, MIN_HALVINGS, PARTS};
+use super::open_step::{OpenStep, Progress};
 use super::reach::Clearance;
 use super::rows::BladeRows;
 use super::surface::{FacedSurface, PointDrive};
@@ -126,7 +126,7 @@ impl Blade {
     }
 
     /// Returns whether the modes of all kinds vibrate, as steps need that do not end at communication points.
-    pub fn runs_freely(&self) -> bool {
+    pub fn supports_steady_phase(&self) -> bool {
         let mut modes = self.kinds.iter().flat_map(|tables| &tables.rows.rates[1]).flat_map(|block| block.0);
         modes.all(f64::is_finite)
     }

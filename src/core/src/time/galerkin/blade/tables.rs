@@ -26,7 +26,7 @@ pub(crate) enum SpanKind {
     /// A span that ends at an internal point of the communication step.
     Bounded,
     /// A span that does not depend on the communication step.
-    Free,
+    Steady,
 }
 
 /// Tables for a span that is halved repeatedly.

@@ -13,7 +13,7 @@ use super::trial::BladeTrial;
 use crate::math::octet::Eight;
 use crate::system::Effort;
 use crate::system::work::ContactWork;
-use crate::time::FreePart;
+use crate::time::SteadyInterval;
 use crate::time::galerkin::basis::{MOST, POINTS};
 use crate::time::galerkin::record::MotionCourse;
 use crate::time::galerkin::span::{SpanStep, Stopped, WHOLE, integrate, take_step, units_of};
@@ -76,16 +76,16 @@ impl BladeInSpan<'_> {
     ///
     /// # Errors
     /// [`Stopped`] if a step is not solved.
-    pub fn integrate_freely(
+    pub fn integrate_steady_interval(
         &mut self,
-        part: FreePart,
+        part: SteadyInterval,
         course: impl Fn(u64) -> MotionCourse,
         effort: &mut Effort,
     ) -> Result<(), Stopped> {
         loop {
             if let Some(open) = self.open.filter(OpenStep::is_endless) {
                 let begun = (count(self.progress.spans) + open.step.from) * part.span;
-                self.record_endless(FreePart { from: part.from.max(begun), ..part }, course);
+                self.record_endless(SteadyInterval { from: part.from.max(begun), ..part }, course);
                 return Ok(());
             }
             self.place.course = course(self.progress.spans);
@@ -157,7 +157,7 @@ impl BladeInSpan<'_> {
     }
 
     /// Records the smallest gaps in a part of an endless flight.
-    fn record_endless(&mut self, part: FreePart, course: impl Fn(u64) -> MotionCourse) {
+    fn record_endless(&mut self, part: SteadyInterval, course: impl Fn(u64) -> MotionCourse) {
         let first = (part.from / part.span).floor();
         self.place.course = course(whole(first));
         let [from, to] = [part.from, part.to].map(|time| self.drive_at(time / part.span - first).0);
@@ -197,7 +197,12 @@ impl BladeInSpan<'_> {
     }
 
     /// Writes the state at the end of a part of free time, which the open step contains.
-    pub fn write_sample(&mut self, part: FreePart, course: impl Fn(u64) -> MotionCourse, state: &mut SectorState) {
+    pub fn write_sample(
+        &mut self,
+        part: SteadyInterval,
+        course: impl Fn(u64) -> MotionCourse,
+        state: &mut SectorState,
+    ) {
         let Some(OpenStep { step, kind, .. }) = self.open else { return };
         let (kind_of_sector, begun) = (self.place.kind, count(self.progress.spans) * part.span);
         let time = ((part.to - begun) - step.from * part.span).max(0.0);
@@ -278,7 +283,7 @@ impl BladeInSpan<'_> {
     /// [`Stopped`] if a step is not solved.
     pub fn close(
         &mut self,
-        part: FreePart,
+        part: SteadyInterval,
         course: impl Fn([f64; 2]) -> MotionCourse,
         effort: &mut Effort,
         state: &mut SectorState,
