@@ -64,7 +64,7 @@ impl Simulation {
         for (index, pair) in self.compiled.plan.pairs.iter().enumerate() {
             let mut rotation = self.state.inputs.pairs[index].shape_rotation;
             if !self.holds() {
-                rotation.aim(0.0, self.state.inputs.extrapolation_time(step_size));
+                rotation.ramp(0.0, self.state.inputs.extrapolation_time(step_size));
             }
             let speed = &self.state.inputs.rotors[pair.body].speed;
             self.check_turning(index, step, step_size, speed, rotation.rate())?;
@@ -85,7 +85,7 @@ impl Simulation {
             let phase = rotor.excitation.get(1).map_or(0.0, |phase| {
                 let mut phase = *phase;
                 if !self.holds() {
-                    phase.aim(0.0, self.state.inputs.extrapolation_time(step_size));
+                    phase.ramp(0.0, self.state.inputs.extrapolation_time(step_size));
                 }
                 phase.rate()
             });

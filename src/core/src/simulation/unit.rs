@@ -37,7 +37,7 @@ impl CoSimulation for Simulation {
         }
         if let Value::Real(value) = value {
             let offset = self.state.clock.offset_now();
-            self.change_input(reference, |input| input.ask(value, offset))?;
+            self.change_input(reference, |input| input.request(value, offset))?;
         }
         self.state.values[reference as usize] = value.number();
         if let Value::Integer(_) = value {
@@ -50,7 +50,7 @@ impl CoSimulation for Simulation {
     fn set_input_derivative(&mut self, reference: u32, order: i32, value: f64) -> Result<()> {
         self.check_input_derivative(reference, order, value)?;
         let offset = self.state.clock.offset_now();
-        self.change_input(reference, |input| input.ask_slope(value, offset))
+        self.change_input(reference, |input| input.request_slope(value, offset))
     }
 
     /// Clearances and the rotor angle have a rate of their own; the rate of other outputs is their change since the previous communication
@@ -129,8 +129,8 @@ impl CoSimulation for Simulation {
         for variable in self.state.values.table().variables().iter().filter(|variable| variable.is_settable()) {
             for element in 0..variable.len() {
                 if let Some(input) = self.state.inputs.get_mut(variable.quantity, variable.of, element) {
-                    input.ask(self.state.values[variable.reference as usize + element], 0.0);
-                    input.take();
+                    input.request(self.state.values[variable.reference as usize + element], 0.0);
+                    input.act_immediately();
                 }
             }
         }
@@ -317,9 +317,9 @@ impl Simulation {
             self.check_course(variable, element, &input, at_once, [offset, length])?;
         }
         if at_once || self.state.clock.is_created() {
-            input.take();
+            input.act_immediately();
         } else if stepping {
-            input.aim(offset, self.state.inputs.until);
+            input.ramp(offset, self.state.inputs.until);
         }
         if stepping {
             self.check_motion(quantity, of, &input)?;
