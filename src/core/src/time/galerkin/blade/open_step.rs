@@ -18,7 +18,7 @@ use crate::system::work::ContactWork;
 use crate::time::SteadyInterval;
 use crate::time::galerkin::basis::{MOST, POINTS};
 use crate::time::galerkin::record::MotionCourse;
-use crate::time::galerkin::span::{SpanStep, Stopped, WHOLE, integrate, take_step, units_of};
+use crate::time::galerkin::span::{SpanStep, Stopped, UNITS_PER_SPAN, integrate, take_step, units_per_step};
 use crate::time::galerkin::state::SectorState;
 use crate::time::galerkin::tables::HALVINGS;
 use crate::time::galerkin::trial::ForceInterpolation;
@@ -56,7 +56,7 @@ pub(super) struct OpenStep {
 pub(super) struct SpanProgress {
     /// Number of completed spans.
     pub spans: u64,
-    /// Completed shortest steps of the current span, of which there are [`WHOLE`].
+    /// Completed units of the current span, of which there are [`UNITS_PER_SPAN`].
     pub done: u64,
     /// Effort of the open step, which is counted when it ends.
     pub effort: Effort,
@@ -96,7 +96,7 @@ impl BladeInSpan<'_> {
             let begun = to_real(self.progress.spans) * interval.span;
             let ends = [interval.from, interval.to].map(|time| (time - begun) / interval.span);
             self.recorded = RecordScope::Interval(ends);
-            while self.progress.done < WHOLE {
+            while self.progress.done < UNITS_PER_SPAN {
                 if let Some(open) = self.open {
                     if open.is_unbounded() {
                         break;
@@ -134,7 +134,7 @@ impl BladeInSpan<'_> {
     fn finish_open_step(&mut self, open: OpenStep, effort: &mut Effort) {
         (self.open, self.has_changed) = (None, true);
         effort.add(&self.progress.effort);
-        self.progress.done += units_of(open.step.level);
+        self.progress.done += units_per_step(open.step.level);
         self.blade.tally.work.add(&open.work);
         self.advance(open.step, open.kind);
     }
@@ -389,7 +389,7 @@ impl BladeInSpan<'_> {
             missed: counter(24),
             factorisations: counter(25),
         };
-        self.progress = SpanProgress { spans: counter(1), done: counter(2).min(WHOLE - 1), effort };
+        self.progress = SpanProgress { spans: counter(1), done: counter(2).min(UNITS_PER_SPAN - 1), effort };
         let kind = match counter(4) {
             0 | 3 => None,
             2 => Some(ForceInterpolation::Constant),
