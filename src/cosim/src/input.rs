@@ -30,6 +30,8 @@ persist_fields!(Input { value, slope, since, reached, rate, from, end, until });
 impl Input {
     /// Requests a value from `offset` on, and a derivative of 0.
     pub fn request(&mut self, value: f64, offset: f64) {
+        // Subnormal numbers lack full precision.
+        let value = if value.is_subnormal() { 0.0 } else { value };
         (self.value, self.slope, self.since) = (value, 0.0, offset);
     }
 

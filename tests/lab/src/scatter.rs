@@ -299,7 +299,7 @@ fn tables(
     ratios: &[[f64; 3]; 4],
     left: &[Left],
     (kept, problems, solutions): (&[Option<SectorEnergy>], &[Problems], &[Solutions]),
-    (long, hour): ([f64; 3], &Mission),
+    (long, hour): ([f64; 2], &Mission),
 ) -> String {
     let ratios: Vec<Vec<String>> = TOLERANCES
         .iter()
@@ -348,10 +348,7 @@ fn tables(
             &kept,
         ),
         table(&["degree", "µ", "problems", "initially unsolved", "finally unsolved"], &problems),
-        table(
-            &["without contact, in one step", "without contact, span by span", "with a rub"],
-            &[long.map(|time| format!("{time:.3} ms")).to_vec()],
-        ),
+        table(&["without contact", "with a rub"], &[long.map(|time| format!("{time:.3} ms")).to_vec()]),
         table(&["degree", "µ", "problems", "no solution", "several"], &solutions),
         table(
             &[

@@ -380,9 +380,8 @@ fn quick_random_rub_study_meets_tolerance_and_energy_bounds() {
         fs::read_to_string(root.path().join("out/scatter.md")).unwrap().lines().count(),
         6 + 5 + 5 + 10 + 3 + 10 + 3 + 6
     );
-    let [flown, spans, rub] =
-        [0, 1, 2].map(|index: usize| results["milliseconds_of_long_steps"][index].as_f64().unwrap());
-    assert!(flown < 0.1 * spans.min(rub), "{results:#}");
+    let [flown, rub] = [0, 1].map(|index: usize| results["milliseconds_of_long_steps"][index].as_f64().unwrap());
+    assert!(flown < 0.1 * rub, "{results:#}");
     let mission = &results["mission"];
     assert!(mission["steps"] == 360 && mission["of_them_rubbing"] == 1, "{mission:#}");
     assert!(

@@ -138,6 +138,8 @@ fn rotors() -> Vec<Scene> {
             scene.settings.outputs.wear = true;
         }),
         galerkin("galerkin", &[]),
+        galerkin("galerkin_steady", &[]),
+        galerkin("galerkin_steady_mistuned_lobes", &[mistuned, lobes]),
         galerkin("galerkin_whirl_spline", &[spline, shaft]),
         galerkin("galerkin_mistuned_lobes", &[mistuned, lobes]),
         galerkin("galerkin_flexible_warm", &[warm, shaft]),

@@ -37,31 +37,24 @@ impl Machine {
         }
     }
 
-    /// Returns the processor time (s) of `count` communication steps, span by span if `by_spans`.
-    fn go(&mut self, count: u32, by_spans: bool) -> tiprub_core::Result<f64> {
+    /// Returns the processor time (s) of `count` communication steps.
+    fn go(&mut self, count: u32) -> tiprub_core::Result<f64> {
         let before = clock::now();
         for _ in 0..count {
-            let start = f64::from(self.done) * LONG;
-            if by_spans {
-                self.simulation.begin_step(start, LONG)?;
-                while !self.simulation.advance()?.finished {}
-            } else {
-                self.simulation.do_step(start, LONG)?;
-            }
+            self.simulation.do_step(f64::from(self.done) * LONG, LONG)?;
             self.done += 1;
         }
         Ok((clock::now() - before).as_secs_f64())
     }
 }
 
-/// Returns the time of a communication step (ms): in one free flight, span by span, and with a rub.
-pub(super) fn long_steps(steps: u32) -> tiprub_core::Result<[f64; 3]> {
+/// Returns the time of a communication step (ms): without contact, and with a rub.
+pub(super) fn long_steps(steps: u32) -> tiprub_core::Result<[f64; 2]> {
     let mut machine = Machine::new()?;
-    let mut taken = [0.0; 3];
-    let kinds = [(WIDE[0], 100 * steps, false), (WIDE[0], steps, true), (WIDE[1], steps, false)];
-    for (taken, (wide, count, by_spans)) in taken.iter_mut().zip(kinds) {
+    let mut taken = [0.0; 2];
+    for (taken, (wide, count)) in taken.iter_mut().zip([(WIDE[0], 100 * steps), (WIDE[1], steps)]) {
         machine.open(wide)?;
-        *taken = 1e3 * machine.go(count, by_spans)? / f64::from(count);
+        *taken = 1e3 * machine.go(count)? / f64::from(count);
     }
     Ok(taken)
 }
@@ -88,13 +81,13 @@ pub(super) fn hour(part: u32) -> tiprub_core::Result<Mission> {
     let (steps, rubbing) = (HOUR / part, RUBBING / part);
     let mut machine = Machine::new()?;
     let quiet = (steps - rubbing) / 2;
-    let before = machine.go(quiet, false)?;
+    let before = machine.go(quiet)?;
     let effort = *machine.simulation.system().effort();
     machine.open(WIDE[1])?;
-    let rub = machine.go(rubbing, false)?;
+    let rub = machine.go(rubbing)?;
     let after = *machine.simulation.system().effort();
     machine.open(WIDE[0])?;
-    let rest = machine.go(steps - rubbing - quiet, false)?;
+    let rest = machine.go(steps - rubbing - quiet)?;
     let system = machine.simulation.system();
     let (ledger, (kinetic, strain)) = (system.ledger(), system.energies());
     Ok(Mission {

@@ -157,6 +157,7 @@ impl DenseOutput<'_> {
 
     /// Finds the gaps F, their rates and σ. For nodes in contact during the step, F is the polynomial through its values at
     /// the points, bounded below by the smallest of these values, because the points follow fast modes only in the mean.
+    /// Where a force acts, F is the smallest of these values, and σ follows from the direction of the force.
     #[inline(always)]
     fn find_gaps<L: Octet>(&mut self, weights: &[f64; POINTS]) {
         let Self { trial, rows, level, faced, pushes, .. } = self;
@@ -170,6 +171,7 @@ impl DenseOutput<'_> {
             let at = L::load(&angles[block]) + L::splat(drive.turned) + around * per_radius;
             let [shape, slope, _] = faced.surface.evaluate_octet::<L>(at);
             let factor = L::splat(drive.factor);
+            let (mut sigma, steepness) = (slope * factor * per_radius, L::load(&rows.steepness[block]));
             let mut gap = L::splat(drive.clearance) + shape * factor + closing;
             let [closing_rate, around_rate] = both(|along| L::load(&sample.held[along][block]));
             let mut rate = closing_rate + shape * factor_rate + slope * factor * (speed + around_rate * per_radius);
@@ -186,10 +188,14 @@ impl DenseOutput<'_> {
                     value = value + L::splat(weights[point + 1]) * at_point;
                     change = change + L::splat(slopes[point + 1]) * at_point;
                 }
+                let pushes = L::zero().less(L::load(&sample.multipliers[block]));
                 gap = L::select(touches, value.max(lowest), gap);
+                gap = L::select(pushes, lowest, gap);
                 rate = L::select(touches, change, rate);
+                let around = L::load(&sample.forces[1][block]) / L::load(&sample.multipliers[block]);
+                let of_force = around + L::load(&start.friction[block]) * steepness;
+                sigma = L::select(pushes, of_force, sigma);
             }
-            let (sigma, steepness) = (slope * factor * per_radius, L::load(&rows.steepness[block]));
             (rate / (steepness * steepness + sigma * sigma).sqrt()).store(&mut rates[block]);
             gap.store(&mut sample.gaps[block]);
             sigma.store(&mut sample.sigma[block]);

@@ -424,7 +424,7 @@ impl BladeInSpan<'_> {
 
 /// Length of an array that stores an open step of a blade with these numbers of nodes and of modes with inertia.
 pub(crate) fn stored_len(nodes: usize, modes: usize) -> usize {
-    HEADER_LEN + 8 * ((11 + 7 * MOST) * Eight::blocks(nodes) + (2 + MOST) * Eight::blocks(modes))
+    HEADER_LEN + 8 * ((12 + 7 * MOST) * Eight::blocks(nodes) + (2 + MOST) * Eight::blocks(modes))
 }
 
 impl BladeTrial {
@@ -434,7 +434,8 @@ impl BladeTrial {
         let Self { start, moved, sigma, gaps, multipliers, forces, modal_forces, reach, .. } = self;
         let contacts = [&mut start.multipliers, &mut start.slopes, &mut start.gaps, &mut start.sigma];
         let all = start.modes.iter_mut().chain(&mut start.forces).chain(&mut start.moved).chain(contacts).chain(reach);
-        let lanes = [sigma, gaps, multipliers].into_iter().chain(moved).chain(forces).chain(modal_forces);
+        let lanes =
+            [sigma, gaps, multipliers, &mut start.friction].into_iter().chain(moved).chain(forces).chain(modal_forces);
         let mut rest = numbers.as_chunks_mut().0;
         for blocks in all.chain(lanes.filter(|_| is_tried)) {
             let (own, others) = rest.split_at_mut(blocks.len());
