@@ -10,7 +10,6 @@ mod diagnostics;
 mod drive;
 mod failures;
 mod fingerprint;
-mod free_spans;
 mod inputs;
 mod limits;
 mod loads;
@@ -22,6 +21,7 @@ mod pulling;
 mod rotation_warnings;
 mod spline_surface;
 mod state;
+mod steady_phase;
 mod step_control;
 mod stepping;
 mod table;
@@ -93,7 +93,7 @@ impl Simulation {
         let outputs = &compiled.scene.settings.outputs;
         system.structures.iter_mut().for_each(|one| one.need_minima(&outputs.watched_sectors, outputs.all_sectors));
         if compiled.scene.settings.time.scheme.properties().adaptive {
-            system.structures.iter_mut().for_each(Structure::make_room_for_open_steps);
+            system.structures.iter_mut().for_each(Structure::allocate_open_steps);
         }
         let sets = system.sets().count();
         let state = SimulationState {

@@ -128,19 +128,19 @@ impl RunTotals {
     }
 }
 
-/// Spans between which nothing but the rotors moves, and with steady speed. Steps within them do not end at communication
-/// points.
+/// Part of a run in which all inputs rest and the rotors turn at constant speed. It is divided into spans of equal length
+/// from its start. Its steps do not end at communication points.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(crate) struct FreeSpans {
-    /// True if the run is within them.
-    pub runs: bool,
-    /// Time of their beginning (s).
+pub(crate) struct SteadyPhase {
+    /// True if the run is in a steady phase.
+    pub active: bool,
+    /// Start of the phase (s).
     pub since: f64,
-    /// Length of each (s).
+    /// Length of the spans (s).
     pub span: f64,
 }
 
-persist_fields!(FreeSpans { runs, since, span });
+persist_fields!(SteadyPhase { active, since, span });
 
 /// Structures, the contact pairs between them, and the groups of contacts that can influence each other.
 #[derive(Debug, Clone)]
@@ -153,7 +153,7 @@ pub struct System {
     pub(crate) settings: SystemSettings,
     pub(crate) events: Two<Vec<ContactEvent>>,
     pub(crate) counted: RunTotals,
-    pub(crate) free_spans: FreeSpans,
+    pub(crate) steady_phase: SteadyPhase,
     /// Energy of each set before a change of the step size (J).
     mechanical: Vec<f64>,
 }
@@ -198,7 +198,7 @@ impl System {
             settings,
             events: Two { now: room(), before: room() },
             counted: RunTotals::new(vec![Ledger::default(); sets.count()]),
-            free_spans: FreeSpans::default(),
+            steady_phase: SteadyPhase::default(),
             mechanical: vec![0.0; sets.count()],
             sets,
             structures,
@@ -268,9 +268,9 @@ impl System {
         self.structures[0].modes().step()
     }
 
-    /// Returns whether the run is within free spans.
-    pub(crate) fn runs_freely(&self) -> bool {
-        self.free_spans.runs
+    /// Returns whether the run is in a steady phase.
+    pub(crate) fn is_in_steady_phase(&self) -> bool {
+        self.steady_phase.active
     }
 
     /// Number of internal steps, or of spans if sectors are integrated with adaptive steps.
@@ -370,7 +370,7 @@ impl System {
     /// motion `drives`, one per pair.
     pub fn start(&mut self, drives: &[PrescribedMotion]) {
         self.structures.iter_mut().for_each(Structure::start);
-        self.free_spans = FreeSpans::default();
+        self.steady_phase = SteadyPhase::default();
         self.groups.iter_mut().filter_map(|group| group.law.coating_mut()).for_each(Coating::reset);
         self.events.now.clear();
         self.events.before.clear();
@@ -386,19 +386,19 @@ impl System {
     /// Kinetic plus strain energy of a set (J), in the form that the scheme conserves.
     pub(crate) fn mechanical_energy(&self, set: usize) -> f64 {
         let members = self.sets.members(set).iter();
-        let (kinetic, strain) = sum_of(members.map(|member| self.energies_of(&self.structures[*member])));
+        let (kinetic, strain) = sum_of(members.map(|member| self.conserved_energies(&self.structures[*member])));
         kinetic + strain
     }
 
     /// Kinetic and strain energy of all structures (J), in the form that the scheme conserves and the energy balance uses.
     pub fn energies(&self) -> (f64, f64) {
-        sum_of(self.structures.iter().map(|structure| self.energies_of(structure)))
+        sum_of(self.structures.iter().map(|structure| self.conserved_energies(structure)))
     }
 
-    /// Energies of a structure (J); in free spans, the sum of both at the starts of the open steps, to which the ledger
-    /// belongs.
-    fn energies_of(&self, structure: &Structure) -> (f64, f64) {
-        if self.free_spans.runs {
+    /// Kinetic and strain energy of a structure (J). In a steady phase, the first number is the sum of both at the starts
+    /// of the open steps, to which the ledger belongs, and the second is 0.
+    fn conserved_energies(&self, structure: &Structure) -> (f64, f64) {
+        if self.steady_phase.active {
             (structure.step_control.energies.iter().sum(), 0.0)
         } else {
             structure.modes().energies()

@@ -14,10 +14,10 @@ use crate::system::{StepFailure, System};
 use galerkin::stepper::Galerkin;
 pub use recurrence::Recurrence;
 
-/// A part of free time, from one internal point to the next (s since the beginning of the free spans). In free spans,
-/// nothing but the rotors moves, with steady speed, and steps do not end at internal points.
+/// An interval of a steady phase, between two internal points. In a steady phase, all inputs rest, the rotors turn at
+/// constant speed, and steps do not end at internal points. Times are counted from the start of the phase.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FreePart {
+pub struct SteadyInterval {
     /// Start (s).
     pub from: f64,
     /// End (s).
@@ -48,25 +48,26 @@ pub trait Stepper {
         false
     }
 
-    /// Returns whether steps need not end at internal points while nothing but the rotors moves.
-    fn runs_freely(&self) -> bool {
+    /// Returns whether steps can pass internal points in a steady phase.
+    fn supports_steady_phase(&self) -> bool {
         false
     }
 
-    /// Advances the system by a part of free time, to the time described by `drives`, one per contact pair.
+    /// Advances the system by an interval of a steady phase, to the prescribed motion `drives` at its end, one per contact
+    /// pair.
     ///
     /// # Errors
     /// A [`StepFailure`]; the state is undefined afterwards.
-    fn step_freely(
+    fn step_in_steady_phase(
         &mut self,
         _system: &mut System,
         _drives: &[PrescribedMotion],
-        _part: FreePart,
+        _interval: SteadyInterval,
     ) -> Result<(), StepFailure> {
         Ok(())
     }
 
-    /// Ends the open steps at a time (s since the beginning of the free spans).
+    /// Ends the open steps at a time (s since the start of the steady phase), and the phase.
     ///
     /// # Errors
     /// A [`StepFailure`]; the state is undefined afterwards.

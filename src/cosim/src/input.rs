@@ -2,10 +2,11 @@
 
 use crate::persist_fields;
 
-/// One real input: the line requested by the importer, and the acting line.
+/// One real input over time: the line requested by the importer, and the line that acts on the model (acting line).
 ///
-/// Both are the same if a value acts immediately. Otherwise the acting line goes from the value reached to the value of the requested line
-/// at the end of the communication step: it is always continuous. Times are offsets from the start of the communication step (s).
+/// Both are the same if a value acts immediately. Otherwise the acting line is a ramp from the value reached to the
+/// requested value at the end of the communication step, so it is continuous. Times are offsets from the start of the
+/// communication step (s). Values have the unit of the input.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Input {
     /// Requested value at the time `since`.
@@ -19,7 +20,7 @@ pub struct Input {
     /// First time derivative between `from` and `until`.
     rate: f64,
     from: f64,
-    /// Acting value at the time `until`, to the last bit.
+    /// Acting value at and after the time `until`.
     end: f64,
     until: f64,
 }
@@ -27,20 +28,20 @@ pub struct Input {
 persist_fields!(Input { value, slope, since, reached, rate, from, end, until });
 
 impl Input {
-    /// Requests a value at `offset`; a derivative requested earlier ends.
-    pub fn ask(&mut self, value: f64, offset: f64) {
-        // A number too small for full precision acts as zero.
+    /// Requests a value from `offset` on, and a derivative of 0.
+    pub fn request(&mut self, value: f64, offset: f64) {
+        // Subnormal numbers lack full precision.
         let value = if value.is_subnormal() { 0.0 } else { value };
         (self.value, self.slope, self.since) = (value, 0.0, offset);
     }
 
     /// Requests a derivative from `offset` on.
-    pub fn ask_slope(&mut self, slope: f64, offset: f64) {
+    pub fn request_slope(&mut self, slope: f64, offset: f64) {
         (self.value, self.slope, self.since) = (self.requested_value(offset), slope, offset);
     }
 
     /// Copies the requested line of another input.
-    pub fn follow(&mut self, other: &Self) {
+    pub fn copy_request(&mut self, other: &Self) {
         (self.value, self.slope, self.since) = (other.value, other.slope, other.since);
     }
 
@@ -50,13 +51,13 @@ impl Input {
     }
 
     /// Makes the requested line act immediately.
-    pub fn take(&mut self) {
+    pub fn act_immediately(&mut self) {
         (self.reached, self.rate, self.from) = (self.value, self.slope, self.since);
         self.until = f64::INFINITY;
     }
 
     /// Ramps from the value reached at `offset` to the requested value at `until`.
-    pub fn aim(&mut self, offset: f64, until: f64) {
+    pub fn ramp(&mut self, offset: f64, until: f64) {
         let (reached, end) = (self.at(offset), self.requested_value(until));
         (self.reached, self.from) = (reached, offset);
         (self.end, self.until) = (end, until);
@@ -75,14 +76,14 @@ impl Input {
         }
     }
 
-    /// Whether the acting line ends at a given time.
+    /// Returns whether the acting line ends at a given time.
     pub fn is_ramp(&self) -> bool {
         self.until < f64::INFINITY
     }
 
-    /// Returns whether the acting value is the requested one from an offset on.
+    /// Returns whether the input rests from an offset (s) on, at the requested value.
     #[inline]
-    pub fn stays(&self, offset: f64) -> bool {
+    pub fn rests_from(&self, offset: f64) -> bool {
         self.slope == 0.0 && self.rate == 0.0 && self.at(offset).to_bits() == self.value.to_bits()
     }
 
@@ -92,7 +93,7 @@ impl Input {
         self.rate
     }
 
-    /// Ends the communication step of length `length`: times now count from its end, where a ramp ends.
+    /// Ends a communication step of length `length` (s): times now count from its end. A ramp that has not ended stops there.
     pub fn shift(&mut self, length: f64) {
         if self.is_ramp() {
             (self.reached, self.rate, self.from) = (self.at(length), 0.0, length);
@@ -109,8 +110,8 @@ mod tests {
 
     fn held(value: f64) -> Input {
         let mut input = Input::default();
-        input.ask(value, 0.0);
-        input.take();
+        input.request(value, 0.0);
+        input.act_immediately();
         input
     }
 
@@ -125,9 +126,9 @@ mod tests {
         let mut input = held(0.1);
         for (value, length) in [(0.7, 1e-3), (-1.0 / 3.0, 3e-7), (-1.0 / 3.0, 1e-4), (0.2, 7.0)] {
             let before = input.at(0.0);
-            input.ask(value, 0.0);
+            input.request(value, 0.0);
             assert_eq!(input.at(0.0).to_bits(), before.to_bits(), "nothing jumps");
-            input.aim(0.0, length);
+            input.ramp(0.0, length);
             assert_eq!(input.at(0.0).to_bits(), before.to_bits(), "nothing jumps");
             assert!((input.at(0.5 * length) - 0.5 * (before + value)).abs() < 1e-15);
             assert_eq!(input.at(length).to_bits(), value.to_bits());
@@ -141,31 +142,31 @@ mod tests {
         let (mut input, slope, length) = (held(1.0), 2.5, 0.125);
         for step in 0..4 {
             let start = 1.0 + slope * length * f64::from(step);
-            input.ask(start, 0.0);
-            input.ask_slope(slope, 0.0);
-            input.aim(0.0, length);
+            input.request(start, 0.0);
+            input.request_slope(slope, 0.0);
+            input.ramp(0.0, length);
             same([input.at(0.0), input.at(0.0625), input.rate()], [start, start + slope * 0.0625, slope]);
             input.shift(length);
         }
         // The input continues along that line until another value is requested, also after a step that ended early.
-        input.aim(0.0, length);
+        input.ramp(0.0, length);
         input.shift(0.0625);
-        input.aim(0.0, 0.0625);
+        input.ramp(0.0, 0.0625);
         same([input.at(0.0625)], [1.0 + slope * length * 5.0]);
     }
 
     #[test]
     fn value_set_within_a_ramp_redirects_the_ramp() {
         let mut input = held(0.0);
-        input.ask(1.0, 0.0);
-        input.aim(0.0, 1.0);
-        input.ask(-1.0, 0.25);
-        input.aim(0.25, 1.0);
+        input.request(1.0, 0.0);
+        input.ramp(0.0, 1.0);
+        input.request(-1.0, 0.25);
+        input.ramp(0.25, 1.0);
         same([input.at(0.25), input.at(0.625), input.at(1.0)], [0.25, -0.375, -1.0]);
         // Ended early: the remaining change is distributed over the whole next step.
         input.shift(0.625);
         same([input.at(0.0)], [-0.375]);
-        input.aim(0.0, 2.0);
+        input.ramp(0.0, 2.0);
         same([input.at(1.0), input.at(2.0)], [-0.6875, -1.0]);
     }
 }

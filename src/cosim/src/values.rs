@@ -42,10 +42,10 @@ impl VariableValues {
         self.elements(quantity, of).map_or(0.0, |elements| elements[0])
     }
 
-    /// Checks values from a saved state: parameters could have been set, and outputs read.
+    /// Checks the values of a saved state.
     ///
     /// # Errors
-    /// A value that its variable cannot have.
+    /// A value that the type or the range of its variable excludes.
     pub fn check_values(&self) -> Result<()> {
         for variable in self.table.variables() {
             let values = &self.values[variable.reference as usize..][..variable.len()];

@@ -52,8 +52,9 @@ impl DiagonalOperator {
         }
     }
 
-    /// Advances coordinates over a step of `length` (s) under `heat` (W) and temperatures of gas and air (K) at its beginning and its end,
-    /// linear in between. Returns the heat supplied, from the gas and from the air (J).
+    /// Advances coordinates over a step of `length` (s). `heat` (W) and the temperatures `films` of gas and air (K) are given
+    /// at its start and its end, and linear in between. Returns the supplied heat, and the heat from the gas and from the
+    /// air (J).
     pub(crate) fn advance(
         &self,
         length: f64,

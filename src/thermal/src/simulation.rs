@@ -122,7 +122,7 @@ impl ThermalSimulation {
 
     /// Changes to the set factors, with the same temperatures.
     pub(crate) fn change_factors(&mut self) {
-        let set = self.state.set_factors(&self.items);
+        let set = self.state.convection_factors(&self.items);
         if set.map(f64::to_bits) == self.operator.factors.map(f64::to_bits) {
             return;
         }

@@ -76,8 +76,8 @@ impl ThermalState {
         row.map_or(0.0, |row| self.values[self.values.table().variables()[row].reference as usize])
     }
 
-    /// Returns the set convection factors of the gas and of the air.
-    pub(crate) fn set_factors(&self, items: &[Item]) -> [f64; 2] {
+    /// Returns the convection factors of the gas and of the air that the importer has set.
+    pub(crate) fn convection_factors(&self, items: &[Item]) -> [f64; 2] {
         [0, 1].map(|film| self.value(items, Item::Factor(film)))
     }
 }

@@ -26,8 +26,8 @@ impl CoSimulation for ThermalSimulation {
     fn set(&mut self, reference: u32, value: Value) -> Result<()> {
         let (variable, element) = self.check(reference, value)?;
         match self.item(variable) {
-            Item::Heat => self.state.heat[element].ask(value.number(), 0.0),
-            Item::Film(index) => self.state.films[index].ask(value.number(), 0.0),
+            Item::Heat => self.state.heat[element].request(value.number(), 0.0),
+            Item::Film(index) => self.state.films[index].request(value.number(), 0.0),
             _ => {}
         }
         self.state.values[reference as usize] = value.number();
@@ -37,8 +37,8 @@ impl CoSimulation for ThermalSimulation {
     fn set_input_derivative(&mut self, reference: u32, order: i32, value: f64) -> Result<()> {
         let (variable, element) = self.check_input_derivative(reference, order, value)?;
         match self.item(variable) {
-            Item::Heat => self.state.heat[element].ask_slope(value, 0.0),
-            Item::Film(index) => self.state.films[index].ask_slope(value, 0.0),
+            Item::Heat => self.state.heat[element].request_slope(value, 0.0),
+            Item::Film(index) => self.state.films[index].request_slope(value, 0.0),
             Item::Factor(_) if value == 0.0 => {}
             _ => {
                 let what = format!("derivative of `{}`", variable.name);
@@ -70,8 +70,8 @@ impl CoSimulation for ThermalSimulation {
     fn initialise(&mut self, start_time: f64) -> Result<()> {
         bounds::at_most("start time", start_time, bounds::TIME)?;
         self.state.phase = CREATED;
-        self.state.factors_used = self.state.set_factors(&self.items);
-        self.state.heat.iter_mut().chain(&mut self.state.films).for_each(Input::take);
+        self.state.factors_used = self.state.convection_factors(&self.items);
+        self.state.heat.iter_mut().chain(&mut self.state.films).for_each(Input::act_immediately);
         self.follow_factors();
         if self.state.value(&self.items, Item::InitialState) >= STEADY {
             self.start_steady()?;
@@ -145,9 +145,9 @@ impl CoSimulation for ThermalSimulation {
         self.change_factors();
         let ramp = self.state.value(&self.items, Item::Interpolation) < HOLD;
         let state = &mut self.state;
-        state.heat.iter_mut().for_each(Input::take);
+        state.heat.iter_mut().for_each(Input::act_immediately);
         for film in &mut state.films {
-            if ramp { film.aim(0.0, length) } else { film.take() }
+            if ramp { film.ramp(0.0, length) } else { film.act_immediately() }
         }
         for (heat, offset) in self.heat.iter_mut().zip([0.0, length]) {
             heat.iter_mut().zip(&state.heat).for_each(|(heat, input)| *heat = input.at(offset));
@@ -204,10 +204,11 @@ impl CoSimulation for ThermalSimulation {
         let mut state = self.state.clone();
         state.restore(&mut StateReader::new(body));
         state.values.check_values()?;
-        let factors = [state.set_factors(&self.items), state.factors_used];
+        let factors = [state.convection_factors(&self.items), state.factors_used];
         let factors_fit = factors.iter().flatten().all(|factor| FACTORS.contains(factor));
-        let endless = state.heat.iter().chain(&state.films).filter(|input| !input.is_ramp()).count();
-        if reader.infinite() != endless || state.phase > FAILED || !factors_fit || state.last_length < 0.0 {
+        // Inputs without a ramp have an infinite end.
+        let infinite_ends = state.heat.iter().chain(&state.films).filter(|input| !input.is_ramp()).count();
+        if reader.infinite() != infinite_ends || state.phase > FAILED || !factors_fit || state.last_length < 0.0 {
             return damaged("it contains invalid values");
         }
         self.state = state;

@@ -25,7 +25,7 @@ fn damaged(problem: impl std::fmt::Display) -> Refusal {
     ))
 }
 
-/// Phase as it is saved.
+/// Phase of an instance in a saved state.
 #[derive(Default)]
 struct SavedPhase {
     /// Number of the phase, in the order of a run.
@@ -40,7 +40,7 @@ struct SavedPhase {
 persist_fields!(SavedPhase { number, has_stop, time, stop });
 
 impl SavedPhase {
-    fn of(phase: &InstancePhase) -> Self {
+    fn new(phase: &InstancePhase) -> Self {
         let (number, time, stop) = match *phase {
             InstancePhase::Instantiated { experiment } => (0, experiment.start, experiment.stop),
             InstancePhase::Initialising { experiment, .. } => (1, experiment.start, experiment.stop),
@@ -51,7 +51,7 @@ impl SavedPhase {
         Self { number, has_stop: stop.is_some(), time, stop: stop.unwrap_or(0.0) }
     }
 
-    /// Reads the phase from its bytes; `None` if they are not those of a phase.
+    /// Reads the phase from its bytes. Returns `None` if they are invalid.
     fn read(bytes: &[u8]) -> Option<InstancePhase> {
         let (mut saved, mut reader) = (Self::default(), StateReader::new(bytes));
         saved.check(&mut reader);
@@ -162,7 +162,7 @@ impl Slave {
 
     /// Replaces the content of `out` with the state. If this fails, an existing state in `out` stays unchanged.
     fn encode(&self, out: &mut SavedState) -> Result<()> {
-        let phase = to_bytes(&[&SavedPhase::of(&self.phase)]);
+        let phase = to_bytes(&[&SavedPhase::new(&self.phase)]);
         let head = [MAGIC, &VERSION.to_le_bytes(), self.token.as_bytes(), &phase].concat();
         out.resize(self.serialised_size(), 0);
         let (content, checksum) = out.split_at_mut(self.serialised_size() - CHECKSUM);

@@ -124,8 +124,8 @@ impl Slave {
         Ok(())
     }
 
-    /// Computes the communication step that was begun, as far as the maximum number of internal steps permits; returns whether it ended
-    /// early, which only a step that was begun as partial can.
+    /// Computes the communication step that was begun, within the maximum number of internal steps. Returns whether the step
+    /// ended early, which is possible only for a partial step.
     ///
     /// # Errors
     /// Same as [`Slave::advance`] and [`Slave::end_step`].

@@ -83,9 +83,9 @@ impl Simulation {
         };
         let bound = factor.max(ENERGY_FACTOR) * (self.state.initial_energies[set] + self.supplied(set))
             + ENERGY_SLACK * self.system.ledgers()[set].scale();
-        // The ledger belongs to the starts of open steps.
+        // In a steady phase, the ledger belongs to the starts of the open steps, like the conserved energy.
         let SetEnergy { now, conserved } = self.outputs.energies[set];
-        (if self.system.runs_freely() { conserved } else { now }) <= bound
+        (if self.system.is_in_steady_phase() { conserved } else { now }) <= bound
     }
 
     /// Returns the energy that forces times velocities have supplied to a set (J).

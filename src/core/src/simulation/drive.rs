@@ -56,8 +56,8 @@ impl RotorAngle {
         self.since -= length;
     }
 
-    /// Corrects the time since the origin to `elapsed` (s) if it is the same within a fraction.
-    pub(super) fn keep_elapsed(&mut self, elapsed: f64, fraction: f64) {
+    /// Sets the time since the origin to `elapsed` (s) if both agree within a fraction of it.
+    pub(super) fn correct_elapsed(&mut self, elapsed: f64, fraction: f64) {
         if (self.since + elapsed).abs() <= fraction * elapsed {
             self.since = -elapsed;
         }
@@ -70,8 +70,8 @@ mod tests {
 
     fn held(value: f64) -> Input {
         let mut input = Input::default();
-        input.ask(value, 0.0);
-        input.take();
+        input.request(value, 0.0);
+        input.act_immediately();
         input
     }
 
@@ -81,8 +81,8 @@ mod tests {
         let mut speed = held(start);
         let mut rotor = RotorAngle::new(7.0);
         for _ in 0..1000 {
-            speed.ask_slope(slope, 0.0);
-            speed.take();
+            speed.request_slope(slope, 0.0);
+            speed.act_immediately();
             rotor.rebase(&speed, length);
             rotor.shift(length);
             speed.shift(length);
@@ -111,8 +111,8 @@ mod tests {
         let mut speed = held(10.0);
         let mut rotor = RotorAngle::new(0.0);
         rotor.rebase(&speed, 0.25);
-        speed.ask(-2.0, 0.25);
-        speed.take();
+        speed.request(-2.0, 0.25);
+        speed.act_immediately();
         assert!((rotor.total(&speed, 1.0) - (2.5 - 1.5)).abs() < 1e-14);
     }
 }

@@ -96,8 +96,8 @@ impl RotorInputs {
 
     /// From `offset` on, ramps growth and stiffening to the speed at `until`.
     pub(crate) fn lead_spin(&mut self, offset: f64, until: f64, hold: bool) {
-        self.spin.follow(&self.speed);
-        if hold { self.spin.take() } else { self.spin.aim(offset, until) }
+        self.spin.copy_request(&self.speed);
+        if hold { self.spin.act_immediately() } else { self.spin.ramp(offset, until) }
     }
 }
 
@@ -136,7 +136,7 @@ impl Inputs {
         let until = self.extrapolation_time(length);
         self.until = until;
         if !hold {
-            self.moving_mut().for_each(|input| input.aim(0.0, until));
+            self.moving_mut().for_each(|input| input.ramp(0.0, until));
         }
         self.rotors.iter_mut().for_each(|rotor| rotor.lead_spin(0.0, until, hold));
     }
@@ -166,7 +166,7 @@ impl Inputs {
         (self.extrapolation, self.until) = (0.0, 0.0);
         for pair in &mut self.pairs {
             pair.shape_factor.value = 1.0;
-            pair.shape_factor.take();
+            pair.shape_factor.act_immediately();
         }
     }
 }

@@ -45,9 +45,9 @@ impl SimulationState {
         }
     }
 
-    /// Returns the motion of a pair at an offset from the start of the communication step (s), with a shape that is fully
+    /// Returns the motion of a pair at an offset from the start of the communication step (s), as if the shape were fully
     /// grown.
-    pub(super) fn ungrown(&self, compiled: &Compiled, pair: usize, offset: f64) -> PrescribedMotion {
+    pub(super) fn motion_without_growth(&self, compiled: &Compiled, pair: usize, offset: f64) -> PrescribedMotion {
         let shape_factor = self.inputs.pairs[pair].shape_factor.at(offset);
         PrescribedMotion { shape_factor, ..self.drive(compiled, pair, [offset, self.clock.time]) }
     }

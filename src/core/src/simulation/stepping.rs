@@ -64,7 +64,7 @@ impl Simulation {
         for (index, pair) in self.compiled.plan.pairs.iter().enumerate() {
             let mut rotation = self.state.inputs.pairs[index].shape_rotation;
             if !self.holds() {
-                rotation.aim(0.0, self.state.inputs.extrapolation_time(step_size));
+                rotation.ramp(0.0, self.state.inputs.extrapolation_time(step_size));
             }
             let speed = &self.state.inputs.rotors[pair.body].speed;
             self.check_turning(index, step, step_size, speed, rotation.rate())?;
@@ -85,7 +85,7 @@ impl Simulation {
             let phase = rotor.excitation.get(1).map_or(0.0, |phase| {
                 let mut phase = *phase;
                 if !self.holds() {
-                    phase.aim(0.0, self.state.inputs.extrapolation_time(step_size));
+                    phase.ramp(0.0, self.state.inputs.extrapolation_time(step_size));
                 }
                 phase.rate()
             });
@@ -190,15 +190,15 @@ impl Simulation {
         self.note_missed(time);
         self.state.clock.most_tried =
             self.state.clock.most_tried.max(self.system.steps_tried() - self.state.clock.step.tried);
-        if !self.system.free_spans.runs {
+        if !self.system.steady_phase.active {
             self.state.inputs.rotors.iter_mut().for_each(|rotor| rotor.angle.rebase(&rotor.speed, offset));
         }
         self.compute_outputs();
         self.check_outputs(time).inspect_err(|_| self.state.clock.phase = SimulationPhase::Failed)?;
         self.check_energy(time)?;
         self.state.inputs.shift(offset);
-        if self.system.free_spans.runs {
-            self.keep_angles(time);
+        if self.system.steady_phase.active {
+            self.correct_angle_times(time);
         }
         self.state.clock.finish(time);
         Ok(())

@@ -224,7 +224,7 @@ impl Simulation {
         let Some(input) = inputs.get_mut(variable.quantity, variable.of, element) else { return };
         input.value += by;
         if variable.quantity == Quantity::Speed || hold {
-            input.take();
+            input.act_immediately();
         }
         if variable.quantity == Quantity::Speed {
             let rotor = &mut inputs.rotors[variable.of];

@@ -29,7 +29,7 @@ impl CoSimulation for Simulation {
             self.state.values[reference as usize] = before;
             outcome?;
             self.warn_of_friction(&parameters);
-            if self.system.free_spans.runs {
+            if self.system.steady_phase.active {
                 self.end_open_steps()?;
             }
             self.tangent.follow_anew();
@@ -37,7 +37,7 @@ impl CoSimulation for Simulation {
         }
         if let Value::Real(value) = value {
             let offset = self.state.clock.offset_now();
-            self.change_input(reference, |input| input.ask(value, offset))?;
+            self.change_input(reference, |input| input.request(value, offset))?;
         }
         self.state.values[reference as usize] = value.number();
         if let Value::Integer(_) = value {
@@ -50,7 +50,7 @@ impl CoSimulation for Simulation {
     fn set_input_derivative(&mut self, reference: u32, order: i32, value: f64) -> Result<()> {
         self.check_input_derivative(reference, order, value)?;
         let offset = self.state.clock.offset_now();
-        self.change_input(reference, |input| input.ask_slope(value, offset))
+        self.change_input(reference, |input| input.request_slope(value, offset))
     }
 
     /// Clearances and the rotor angle have a rate of their own; the rate of other outputs is their change since the previous communication
@@ -108,7 +108,7 @@ impl CoSimulation for Simulation {
         self.settle();
         self.launch();
         self.system.start(&self.motions.drives);
-        self.expect_free_spans();
+        self.prepare_steady_phase();
         self.check_initial_state()?;
         self.check_initial_gaps()?;
         self.state.window.open(self.system.structures());
@@ -129,8 +129,8 @@ impl CoSimulation for Simulation {
         for variable in self.state.values.table().variables().iter().filter(|variable| variable.is_settable()) {
             for element in 0..variable.len() {
                 if let Some(input) = self.state.inputs.get_mut(variable.quantity, variable.of, element) {
-                    input.ask(self.state.values[variable.reference as usize + element], 0.0);
-                    input.take();
+                    input.request(self.state.values[variable.reference as usize + element], 0.0);
+                    input.act_immediately();
                 }
             }
         }
@@ -163,7 +163,7 @@ impl CoSimulation for Simulation {
     /// Does nothing unless sectors take adaptive steps, inputs rest, and no contact can close.
     fn fly_ahead(&mut self) {
         let last = self.state.clock.step.count.saturating_sub(1);
-        if self.stepper.runs_freely()
+        if self.stepper.supports_steady_phase()
             || !self.is_stepping()
             || !self.is_marched()
             || self.state.clock.step.done > 0
@@ -197,10 +197,10 @@ impl CoSimulation for Simulation {
             // The mark includes the inputs set meanwhile.
             self.set_mark();
         }
-        let (next, free) = self.next_point()?;
+        let (next, interval) = self.next_point()?;
         let (from, to) = (self.state.clock.step.reached(), self.state.clock.step.point(next));
         let ([before, _], [offset, time]) = (from, to);
-        if self.is_marched() && free.is_none() {
+        if self.is_marched() && interval.is_none() {
             let middle = [0, 1].map(|i| 0.5 * (from[i] + to[i]));
             for pair in 0..self.motions.drives.len() {
                 let middle = self.state.drive(&self.compiled, pair, middle);
@@ -213,8 +213,8 @@ impl CoSimulation for Simulation {
             self.stepper.begin_loads(&mut self.system);
             self.load(offset);
         }
-        let outcome = match free {
-            Some(part) => self.stepper.step_freely(&mut self.system, &self.motions.drives, part),
+        let outcome = match interval {
+            Some(interval) => self.stepper.step_in_steady_phase(&mut self.system, &self.motions.drives, interval),
             None => self.stepper.step(&mut self.system, &self.motions.drives),
         };
         match outcome {
@@ -223,7 +223,7 @@ impl CoSimulation for Simulation {
             Err(failure) => return Err(self.fail(failure, time)),
         }
         let places = (&self.compiled.patches[..], &self.compiled.linings[..]);
-        let length = free.map_or_else(|| self.system.step_size(), |part| part.to - part.from);
+        let length = interval.map_or_else(|| self.system.step_size(), |interval| interval.to - interval.from);
         self.state.window.add(&self.system, places, length);
         self.state.clock.step.done = next;
         let finished = next == self.state.clock.step.count;
@@ -307,7 +307,7 @@ impl Simulation {
         let (stepping, at_once) = (self.is_in_step(), self.acts_at_once(quantity));
         let Some(mut input) = self.state.inputs.get(quantity, of, element).copied() else { return Ok(()) };
         let (offset, length) = (self.state.clock.offset_now(), self.state.clock.step.length);
-        let (rests, value) = (input.stays(offset), input.value);
+        let (rests, value) = (input.rests_from(offset), input.value);
         change(&mut input);
         if rests && input.slope == 0.0 && input.value.to_bits() == value.to_bits() {
             return Ok(());
@@ -317,9 +317,9 @@ impl Simulation {
             self.check_course(variable, element, &input, at_once, [offset, length])?;
         }
         if at_once || self.state.clock.is_created() {
-            input.take();
+            input.act_immediately();
         } else if stepping {
-            input.aim(offset, self.state.inputs.until);
+            input.ramp(offset, self.state.inputs.until);
         }
         if stepping {
             self.check_motion(quantity, of, &input)?;

@@ -165,7 +165,7 @@ impl System {
         self.pairs.iter().for_each(|pair| pair.prescribed.save(writer));
         self.groups.iter().filter_map(|group| group.law.coating()).for_each(|coating| coating.save(writer));
         self.counted.save(writer);
-        self.free_spans.save(writer);
+        self.steady_phase.save(writer);
     }
 
     /// Reads over a saved state and rejects invalid values. Returns its step size (s) and the number of its infinite gaps. Gaps
@@ -196,7 +196,7 @@ impl System {
         self.pairs.iter().for_each(|pair| pair.prescribed.check(reader));
         self.groups.iter().filter_map(|group| group.law.coating()).for_each(|coating| coating.check(reader));
         self.counted.check(reader);
-        self.free_spans.check(reader);
+        self.steady_phase.check(reader);
         (step, endless.unwrap_or(0))
     }
 
@@ -243,7 +243,7 @@ impl System {
         self.pairs.iter_mut().for_each(|pair| pair.prescribed.restore(reader));
         self.groups.iter_mut().filter_map(|group| group.law.coating_mut()).for_each(|coating| coating.restore(reader));
         self.counted.restore(reader);
-        self.free_spans.restore(reader);
+        self.steady_phase.restore(reader);
         self.rebuild_events();
     }
 

@@ -89,7 +89,7 @@ pub(crate) struct ContactHistory {
     pub points: Vec<f64>,
     /// Predicted displacements of the contact rows (m), for schemes whose contact forces act one step later.
     pub predicted: Two<Vec<f64>>,
-    /// Data that is not part of the saved state: every step writes them before it reads them.
+    /// Data that is not part of the saved state: every step writes it before it reads it.
     pub passing: Passing,
 }
 

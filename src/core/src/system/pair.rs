@@ -40,18 +40,18 @@ pub(crate) struct Prescribed {
     pub(crate) drive: Two<PrescribedMotion>,
     /// Change over the last step, and over the previous step.
     pub(crate) motion: Two<MotionIncrement>,
-    /// At the beginning of the free spans or of the last internal step, with a shape that is fully grown.
+    /// At the start of the steady phase or of the last internal step, as if the shape were fully grown.
     pub(crate) begun: PrescribedMotion,
-    /// Time since the growth of the shape began, at that beginning, and duration of the growth (s).
+    /// Time since the growth of the shape began, at that start, and duration of the growth (s).
     pub(crate) growth: [f64; 2],
 }
 
 persist_fields!(Prescribed { drive, motion, begun, growth });
 
 impl Prescribed {
-    /// Motion and growth of the shape between two times (s since the beginning of the free spans), in which nothing else
-    /// moves but the rotor.
-    pub fn in_free_spans(&self, from: f64, length: f64) -> ([PrescribedMotion; 3], ShapeGrowth) {
+    /// Motion at the start, in the middle and at the end of an interval of a steady phase, and growth of the shape over
+    /// it. The interval begins at `from` (s since the start of the phase) and has a length (s).
+    pub fn in_steady_phase(&self, from: f64, length: f64) -> ([PrescribedMotion; 3], ShapeGrowth) {
         let (Self { begun, growth: [elapsed, duration], .. }, from_angle) = (self, self.begun.speed * from);
         let grown = elapsed + from;
         let at = |after: f64| PrescribedMotion {

@@ -73,8 +73,9 @@ pub struct StepControl {
     pub slopes: Vec<f64>,
     /// Normals for which the contact forces were found, `[row · lanes + lane]`.
     pub normals: Vec<f64>,
-    /// Open steps of the sectors, one after the other, and the energies at their starts (J), in free spans.
+    /// Open steps of the sectors in a steady phase, one after the other, each as numbers in SI units.
     pub open_steps: Vec<f64>,
+    /// Energies at the starts of the open steps (J).
     pub energies: Vec<f64>,
 }
 

@@ -5,9 +5,9 @@ mod bank;
 #[path = "../common/counting.rs"]
 mod counting;
 mod extremes;
-mod free_spans;
 #[path = "../../../../tests/guide.rs"]
 mod guide;
+mod steady_phase;
 mod sticking;
 mod two_numbers;
 

@@ -138,25 +138,25 @@ impl Physics {
 #[derive(Default)]
 struct ModelGrowth {
     continuous: Fastest,
-    /// Growth without the mass of the contact nodes, if `neglects_mass`; otherwise the same as `continuous`, because there is none, or because
-    /// the scheme makes it irrelevant.
+    /// Growth without the mass of the contact nodes if `neglects_mass` is true. Otherwise the same as `continuous`, because
+    /// the nodes have no mass, or because the scheme makes it irrelevant.
     physical: Fastest,
     neglects_mass: bool,
     /// Fraction of the contact displacement that this motion contributes.
     share: f64,
     /// Smallest friction coefficient at which the tip locks up; infinite if there is none.
     least: f64,
-    /// Growth by the steps, if they are not adaptive (`is_judged`).
+    /// Growth by fixed steps, valid if `is_judged` is true.
     judged: SetGrowth,
     is_judged: bool,
 }
 
 persist_fields!(ModelGrowth { continuous, physical, neglects_mass, share, least, judged, is_judged });
 
-/// A set of closed nodes to which a step adds most growth.
+/// The set of closed nodes whose growth by a step is largest.
 #[derive(Default)]
 struct MostGrown {
-    /// Index of the set.
+    /// Index of the set of nodes.
     set: usize,
     judged: SetGrowth,
 }

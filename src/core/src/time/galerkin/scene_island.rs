@@ -1,7 +1,7 @@
 //! An island of a scene: the sectors and carriers that it consists of, their state, and the record of their contacts.
 
 mod contacts;
-mod free;
+mod steady_phase;
 
 use super::basis::MOST;
 use super::blade::{Blade, BladeInSpan, BladePlace, SpanKind};
@@ -46,8 +46,8 @@ pub(crate) struct SceneIsland {
     goal: StepGoal,
     /// Steps of sectors that face one surface of revolution.
     blade: Option<Box<Blade>>,
-    /// Number of numbers that store an open step of a sector; 0 if steps end at internal points.
-    stored: usize,
+    /// Length of an array that stores an open step of a sector; 0 if all steps end at internal points.
+    open_step_len: usize,
     /// Free flight of each kind of a single sector.
     flights: Vec<FreeFlight>,
 }
@@ -137,8 +137,10 @@ impl SceneIsland {
             _ => None,
         };
         let first = &structures[touching[0]];
-        let stored = match &blade {
-            Some(blade) if blade.runs_freely() && !first.step_control.open_steps.is_empty() => first.open_step_len(),
+        let open_step_len = match &blade {
+            Some(blade) if blade.supports_steady_phase() && !first.step_control.open_steps.is_empty() => {
+                first.open_step_len()
+            }
             _ => 0,
         };
         let precision = if takes_turns { PRECISION } else { CLOSE * PRECISION };
@@ -147,7 +149,7 @@ impl SceneIsland {
             island: Island::new(tables, sectors, disks, carriers),
             records,
             blade: blade.map(Box::new),
-            stored,
+            open_step_len,
             turns: if takes_turns { structures[touching[0]].modes().sectors() } else { 1 },
             goal: StepGoal { tolerance, precision: (precision * tolerance).max(rounding), most: u64::MAX },
             flights,

@@ -26,18 +26,18 @@ pub struct SpanStep {
 }
 
 impl SpanStep {
-    /// The step of a level after `done` parts of the span, of which there are [`WHOLE`].
+    /// Returns the step of a level after `done` units of the span, of which there are [`UNITS_PER_SPAN`].
     pub(crate) fn new(level: usize, done: u64) -> Self {
-        Self { level, from: share(done, WHOLE), length: share(units_of(level), WHOLE) }
+        Self { level, from: share(done, UNITS_PER_SPAN), length: share(units_per_step(level), UNITS_PER_SPAN) }
     }
 }
 
-/// Number of the shortest steps in a span.
-pub(crate) const WHOLE: u64 = 1 << HALVINGS;
+/// Number of units in a span; a unit is a shortest step.
+pub(crate) const UNITS_PER_SPAN: u64 = 1 << HALVINGS;
 
-/// Number of the shortest steps in a step of a level.
-pub(crate) fn units_of(level: usize) -> u64 {
-    WHOLE >> level
+/// Number of units in a step of a level.
+pub(crate) fn units_per_step(level: usize) -> u64 {
+    UNITS_PER_SPAN >> level
 }
 
 /// Tolerance and limits of the steps of a sector.
@@ -93,16 +93,16 @@ pub trait SpanSteps {
 /// [`Stopped`] if the span is not integrated to its end; the state is then the state after the last accepted step.
 pub(crate) fn integrate(steps: &mut impl SpanSteps, effort: &mut Effort) -> Result<(), Stopped> {
     let mut done = 0;
-    while done < WHOLE {
+    while done < UNITS_PER_SPAN {
         done = take_step(steps, done, effort)?;
     }
     Ok(())
 }
 
-/// Takes the next step after `done` parts of a span, and returns the parts done then.
+/// Takes the next step after `done` units of a span, and returns the number of units at its end.
 ///
 /// # Errors
-/// [`Stopped`] if no step is taken.
+/// [`Stopped`] if no step is accepted.
 pub(crate) fn take_step(steps: &mut impl SpanSteps, done: u64, effort: &mut Effort) -> Result<u64, Stopped> {
     StepChoice { steps }.take(done, effort)
 }
@@ -122,8 +122,8 @@ impl<S: SpanSteps> StepChoice<'_, S> {
             if effort.tried().saturating_add(next) > goal.most {
                 return Err(Stopped::Exhausted);
             }
-            let (step, end) = (SpanStep::new(level, done), done + units_of(level));
-            let is_even = end.is_multiple_of(2 * units_of(level));
+            let (step, end) = (SpanStep::new(level, done), done + units_per_step(level));
+            let is_even = end.is_multiple_of(2 * units_per_step(level));
             if self.steps.fly(step) {
                 (effort.steps, effort.flights) = (effort.steps + count, effort.flights + count);
                 self.steps.control().level -= usize::from(level > 0 && is_even);

@@ -3,7 +3,7 @@
 use super::scene_island::SceneIsland;
 use crate::geometry::PrescribedMotion;
 use crate::system::{SearchStart, StepFailure, Structure, System};
-use crate::time::{FreePart, Stepper};
+use crate::time::{SteadyInterval, Stepper};
 
 /// Tables and scratch memory for adaptive steps of all islands of a system.
 #[derive(Debug, Clone)]
@@ -72,23 +72,23 @@ impl Stepper for Galerkin {
         true
     }
 
-    fn runs_freely(&self) -> bool {
-        self.islands.iter().all(SceneIsland::runs_freely)
+    fn supports_steady_phase(&self) -> bool {
+        self.islands.iter().all(SceneIsland::supports_steady_phase)
     }
 
-    fn step_freely(
+    fn step_in_steady_phase(
         &mut self,
         system: &mut System,
         drives: &[PrescribedMotion],
-        part: FreePart,
+        interval: SteadyInterval,
     ) -> Result<(), StepFailure> {
         for (pair, drive) in system.pairs.iter_mut().zip(drives) {
-            pair.move_to(drive, part.to - part.from);
+            pair.move_to(drive, interval.to - interval.from);
         }
         system.events.shift();
         system.events.now.clear();
         let factorisations = system.counted.effort.factorisations;
-        self.islands.iter_mut().try_for_each(|island| island.integrate_freely(system, part))?;
+        self.islands.iter_mut().try_for_each(|island| island.integrate_steady_interval(system, interval))?;
         system.counted.factorisations += system.counted.effort.factorisations - factorisations;
         system.check_travel()?;
         system.structures.iter_mut().for_each(|structure| {
@@ -101,12 +101,12 @@ impl Stepper for Galerkin {
     }
 
     fn close_steps(&mut self, system: &mut System, time: f64) -> Result<(), StepFailure> {
-        let (span, factorisations) = (system.free_spans.span, system.counted.effort.factorisations);
+        let (span, factorisations) = (system.steady_phase.span, system.counted.effort.factorisations);
         self.islands
             .iter_mut()
-            .try_for_each(|island| island.close_steps(system, FreePart { from: time, to: time, span }))?;
+            .try_for_each(|island| island.close_steps(system, SteadyInterval { from: time, to: time, span }))?;
         system.counted.factorisations += system.counted.effort.factorisations - factorisations;
-        system.free_spans.runs = false;
+        system.steady_phase.active = false;
         system.find_gaps(SearchStart::PreviousStep);
         Ok(())
     }

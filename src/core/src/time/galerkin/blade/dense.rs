@@ -1,4 +1,4 @@
-//! State of a blade at any time within an accepted step.
+//! State of a blade at any time within an accepted step (dense output).
 
 use super::columns::displace;
 use super::level::BladeLevel;
@@ -12,8 +12,8 @@ use crate::time::galerkin::trial::ForceInterpolation;
 /// Response of the modes after a time: q = A q₀ + B q̇₀ and q̇ = −ω²B q₀ + C q̇₀ without forces.
 #[derive(Debug, Clone)]
 pub(super) struct ModeResponse {
-    /// Kind of the sector, and time since the start of the step (s).
-    of: (usize, u64),
+    /// Kind of the sector, and bits of the time since the start of the step (s).
+    key: (usize, u64),
     /// A, B (s) and C.
     terms: [Vec<Eight>; 3],
 }
@@ -21,17 +21,17 @@ pub(super) struct ModeResponse {
 impl ModeResponse {
     /// Allocates the response of modes.
     pub fn new(rows: &BladeRows) -> Self {
-        Self { of: (usize::MAX, 0), terms: std::array::from_fn(|_| vec![Eight::ZERO; rows.mode_blocks]) }
+        Self { key: (usize::MAX, 0), terms: std::array::from_fn(|_| vec![Eight::ZERO; rows.mode_blocks]) }
     }
 
-    /// Returns whether the response is that of a kind of sectors after a time (s).
-    pub fn is_of(&self, kind: usize, time: f64) -> bool {
-        self.of == (kind, time.to_bits())
+    /// Returns whether the response belongs to a kind of sectors and a time (s).
+    pub fn matches(&self, kind: usize, time: f64) -> bool {
+        self.key == (kind, time.to_bits())
     }
 
     /// Computes the response of a kind of sectors after a time (s).
-    pub fn find(&mut self, rows: &BladeRows, kind: usize, time: f64) {
-        self.of = (kind, time.to_bits());
+    pub fn compute(&mut self, rows: &BladeRows, kind: usize, time: f64) {
+        self.key = (kind, time.to_bits());
         let [rates, per_frequency, _] = &rows.rates;
         for (k, (rates, per_frequency)) in rates.iter().zip(per_frequency).enumerate() {
             for (i, (rate, per_frequency)) in rates.0.into_iter().zip(per_frequency.0).enumerate() {
@@ -47,14 +47,14 @@ impl ModeResponse {
 }
 
 /// Finds modes, forces and gaps at a time within the accepted step.
-pub(super) struct Sample<'a> {
+pub(super) struct DenseOutput<'a> {
     pub trial: &'a mut BladeTrial,
     pub rows: &'a BladeRows,
     /// Table of the step.
     pub level: &'a BladeLevel,
     /// Response of the modes after the time since the start of the step.
     pub response: &'a ModeResponse,
-    /// That time (s).
+    /// Time since the start of the step (s).
     pub time: f64,
     /// The first drive is the prescribed motion at that time.
     pub faced: &'a FacedSurface<'a>,
@@ -65,7 +65,7 @@ pub(super) struct Sample<'a> {
     pub pushes: bool,
 }
 
-impl OctetKernel for Sample<'_> {
+impl OctetKernel for DenseOutput<'_> {
     type Output = ();
     #[inline(always)]
     fn run<L: Octet>(mut self) {
@@ -92,7 +92,7 @@ impl OctetKernel for Sample<'_> {
     }
 }
 
-impl Sample<'_> {
+impl DenseOutput<'_> {
     /// Finds q and q̇. The response to the polynomial force is a polynomial plus free vibration.
     #[inline(always)]
     fn find_modes<L: Octet>(&mut self) {
@@ -120,7 +120,7 @@ impl Sample<'_> {
         }
     }
 
-    /// Interpolates multipliers and forces, and adds the displacements that the forces hold.
+    /// Interpolates multipliers and forces, and adds the quasi-static displacements under these forces.
     #[inline(always)]
     fn find_forces<L: Octet>(&mut self, weights: &[f64; POINTS]) {
         let Self { trial, rows, level, .. } = self;
@@ -156,8 +156,8 @@ impl Sample<'_> {
     }
 
     /// Finds the gaps F, their rates and σ. For nodes in contact during the step, F is the polynomial through its values at
-    /// the points, but not below them, because the points follow fast modes only in the mean. Under a force, F is that of
-    /// the closed points, and σ is that of the force.
+    /// the points, bounded below by the smallest of these values, because the points follow fast modes only in the mean.
+    /// Where a force acts, F is the smallest of these values, and σ follows from the direction of the force.
     #[inline(always)]
     fn find_gaps<L: Octet>(&mut self, weights: &[f64; POINTS]) {
         let Self { trial, rows, level, faced, pushes, .. } = self;

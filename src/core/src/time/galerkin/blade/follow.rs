@@ -1,5 +1,5 @@
-//! Smallest gaps within a step: along the motion of all modes at the ends of equal parts of it, or between two times at
-//! which gaps and their rates are known.
+//! Smallest gaps within a step, from the motion of all modes at the ends of equal parts of the step, or from gaps and
+//! their rates at two times.
 
 use super::columns::displace;
 use super::level::BladeLevel;
@@ -12,11 +12,11 @@ use crate::math::octet::{Eight, Octet, OctetKernel, both};
 use crate::time::galerkin::response::TERMS;
 use std::ops::RangeInclusive;
 
-/// If at most this number of nodes per block of eight is followed, their displacements are computed node by node.
+/// Largest number of followed nodes per block of eight whose displacements are computed node by node.
 const FEW_PER_BLOCK: usize = 4;
 /// First three derivatives at the first of five values at equal distances, as weights of the differences of the other four
 /// from the first.
-const FROM_END: [[f64; 4]; 3] =
+const END_DERIVATIVES: [[f64; 4]; 3] =
     [[4.0, -3.0, 4.0 / 3.0, -0.25], [-26.0 / 3.0, 9.5, -14.0 / 3.0, 11.0 / 12.0], [9.0, -12.0, 7.0, -1.5]];
 
 /// Follows the nodes found by [`FindMinima`](super::minima::FindMinima). The modal forces must be known and the modes not yet advanced.
@@ -44,7 +44,7 @@ impl OctetKernel for Follow<'_> {
         for of in [0, 1] {
             self.trial.path_modes[of].copy_from_slice(&self.trial.start.modes[of]);
         }
-        let wanted = needed_ends(self.ends, parts);
+        let wanted = needed_part_ends(self.ends, parts);
         self.go_to::<L>(*wanted.start(), parts);
         for end in wanted.clone() {
             self.find_gaps::<L>(end, parts);
@@ -72,7 +72,7 @@ impl Follow<'_> {
 }
 
 /// Returns the ends of parts whose gaps determine the smallest gaps between two fractions of the step.
-fn needed_ends(ends: [f64; 2], parts: usize) -> RangeInclusive<usize> {
+fn needed_part_ends(ends: [f64; 2], parts: usize) -> RangeInclusive<usize> {
     let [from, to] = ends.map(|end| end * fraction(parts, 1));
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to the few parts")]
     let (first, last) = (from.floor() as usize, to.ceil() as usize);
@@ -153,7 +153,7 @@ impl Follow<'_> {
         }
     }
 
-    /// Advances the modes over one of the parts that `halvings` give, from the end of a part.
+    /// Advances the modes from the end of a part, over the step length halved `halvings` times.
     #[inline(always)]
     fn advance<L: Octet>(&mut self, halvings: usize, end: usize, parts: usize) {
         let Self { trial, halves, pushes, .. } = self;
@@ -229,9 +229,9 @@ impl Follow<'_> {
     }
 }
 
-/// Returns the smallest value near the middle one of three values at equal distances, and its distance from the middle;
-/// the middle value is the lowest. The smallest value belongs to the parabola through the three values. With the two values beyond them, it belongs to a cubic that has
-/// the derivatives of the polynomial through all five.
+/// Returns the place (relative to the middle) and value of the minimum near the middle one of three values at equal
+/// distances. The middle value must be the lowest. The minimum is that of the parabola through the three values. If the
+/// two values beyond them are known, it is that of a cubic with the derivatives of the polynomial through all five.
 #[inline(always)]
 fn vertex<L: Octet>([before, here, after]: [L; 3], far: Option<[L; 2]>) -> (L, L) {
     let (bend, tilt) = (before - here * L::splat(2.0) + after, after - before);
@@ -252,13 +252,13 @@ fn vertex<L: Octet>([before, here, after]: [L; 3], far: Option<[L; 2]>) -> (L, L
     (L::select(is_near, at, L::zero()), value)
 }
 
-/// Smallest value within the first interval of five values at equal distances, and its distance from the first: that of a
-/// cubic with the derivatives of the polynomial through the five.
+/// Returns the place and value of the minimum within the first interval of five values at equal distances. The minimum is
+/// that of a cubic with the derivatives of the polynomial through the five values.
 #[inline(always)]
 fn vertex_from_end<L: Octet>(values: [L; 5]) -> (L, L) {
     let here = values[0];
-    let derivatives = FROM_END.map(|weights| {
-        // Differences of close values round least.
+    let derivatives = END_DERIVATIVES.map(|weights| {
+        // Differences of similar values have the smallest rounding errors.
         let terms = values[1..].iter().zip(weights);
         terms.fold(L::zero(), |sum, (value, weight)| sum + (*value - here) * L::splat(weight))
     });
@@ -269,7 +269,8 @@ fn vertex_from_end<L: Octet>(values: [L; 5]) -> (L, L) {
     (L::select(is_inside, at, L::zero()), value)
 }
 
-/// Value of a cubic with these derivatives near its origin, `here`, at the vertex of its parabola; `here` if it has none.
+/// Returns the value of a cubic with the value `here` and these derivatives at its origin, at the vertex of its parabola.
+/// Returns `here` if the parabola has no minimum.
 #[inline(always)]
 fn cubic_vertex<L: Octet>(here: L, [slope, bend, third]: [L; 3]) -> L {
     let at = L::zero() - slope / bend;
@@ -277,23 +278,23 @@ fn cubic_vertex<L: Octet>(here: L, [slope, bend, third]: [L; 3]) -> L {
     L::select(L::zero().less(bend), value, here)
 }
 
-/// Records the smallest gaps between two times from gaps and rates at both, for nodes that stay open. Returns whether
-/// the error is too large for some nodes; these are followed.
-pub(super) struct RecordBetween<'a> {
+/// Records the smallest gaps of open nodes between two times, from cubics through the gaps and their rates at both.
+/// Returns whether the error is too large for some nodes; these are followed.
+pub(super) struct CubicMinima<'a> {
     pub trial: &'a mut BladeTrial,
     pub rows: &'a BladeRows,
     pub tally: &'a mut BladeTally,
     /// Gaps below which the smallest gaps are needed, and gaps at the first time (m).
     pub floors: &'a [Eight],
     pub begun: &'a [Eight],
-    /// Time between the two (s).
+    /// Time between both (s).
     pub length: f64,
     /// Largest error of the closing displacement, and largest displacement error of a step (m).
     pub error: f64,
     pub tolerance: f64,
 }
 
-impl OctetKernel for RecordBetween<'_> {
+impl OctetKernel for CubicMinima<'_> {
     type Output = bool;
     #[inline(always)]
     fn run<L: Octet>(self) -> bool {

@@ -8,7 +8,7 @@ use crate::time::galerkin::level::StepTables;
 use crate::time::galerkin::response::TERMS;
 use crate::time::galerkin::trial::ForceInterpolation;
 
-/// √(3/5), the outer Gauss points of three on −1 … 1.
+/// √(3/5), the distance of the outer two of three Gauss points from the middle of −1 … 1.
 const GAUSS: f64 = 0.774_596_669_241_483_4;
 
 /// Weights of integrals over a part of a step.
@@ -154,7 +154,7 @@ impl BladeLevel {
         if self.kind == ForceInterpolation::Constant { 1 } else { self.basis.degree }
     }
 
-    /// Fraction of the step at the point of the lanes with this number.
+    /// Place of a point with unknown forces, by its number, as a fraction of the step.
     pub fn place(&self, point: usize) -> f64 {
         if self.kind == ForceInterpolation::Constant { 1.0 } else { self.basis.points[point + 1] }
     }

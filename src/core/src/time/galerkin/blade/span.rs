@@ -1,9 +1,9 @@
 //! Integration of a blade over a span.
 
 use super::dense::ModeResponse;
-use super::free::{OpenStep, Progress};
 use super::level::PartWeights;
 use super::minima::{MAX_HALVINGS, MIN_HALVINGS, PARTS};
+use super::open_step::{OpenStep, SpanProgress};
 use super::reach::Clearance;
 use super::rows::BladeRows;
 use super::surface::{FacedSurface, PointDrive};
@@ -40,20 +40,20 @@ pub(crate) struct Blade {
     lowest: Vec<Eight>,
     pub(super) begun: Vec<Eight>,
     pub(super) floors: Vec<Eight>,
-    /// Responses of the modes that are kept, and the index of the last one found.
+    /// Cached responses of the modes, and the index of the last one computed.
     pub(super) responses: Vec<ModeResponse>,
     pub(super) next_response: usize,
 }
 
-/// What is recorded of the steps of a span.
+/// Results of the steps of a span that are recorded.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Recorded {
-    /// All.
+pub(super) enum RecordScope {
+    /// All results.
     All,
-    /// The part between two fractions of the span; a step that ends later stays open.
-    Part([f64; 2]),
-    /// Only the work.
-    Work,
+    /// Results between two fractions of the span. A step that ends later stays open.
+    Interval([f64; 2]),
+    /// The work without gaps, forces and impulses.
+    WorkOnly,
 }
 
 /// A sector, and the surface that it faces.
@@ -91,7 +91,7 @@ impl Blade {
         let (trial, tally) = (BladeTrial::new(rows, degree), BladeTally::new(rows));
         let of_nodes = || vec![Eight::ZERO; rows.blocks];
         let angles = (0..gap.layout.lanes).map(|sector| NodeAngles::new(&gap.layout, sector)).collect();
-        let responses = ModeResponse::several(rows);
+        let responses = ModeResponse::allocate_cache(rows);
         let [lowest, begun, floors] = [of_nodes(), of_nodes(), of_nodes()];
         Some(Self { trial, tally, lowest, begun, floors, angles, responses, next_response: 0, kinds })
     }
@@ -125,8 +125,8 @@ impl Blade {
         }
     }
 
-    /// Returns whether the modes of all kinds vibrate, as steps need that do not end at communication points.
-    pub fn runs_freely(&self) -> bool {
+    /// Returns whether steps can pass internal points in a steady phase. All modes must have a frequency above zero.
+    pub fn supports_steady_phase(&self) -> bool {
         let mut modes = self.kinds.iter().flat_map(|tables| &tables.rows.rates[1]).flat_map(|block| block.0);
         modes.all(f64::is_finite)
     }
@@ -152,17 +152,17 @@ pub(crate) struct BladeInSpan<'a> {
     pub(super) reach_known: bool,
     /// Number of blocks of lanes of the last trial in this span.
     tried: usize,
-    pub(super) recorded: Recorded,
+    pub(super) recorded: RecordScope,
     pub(super) open: Option<OpenStep>,
-    pub(super) progress: Progress,
-    /// True if the open step is not the one that was recalled.
-    pub(super) is_new: bool,
-    /// True if the current part of free time lies within a step without contact that was recalled.
-    pub(super) is_between: bool,
+    pub(super) progress: SpanProgress,
+    /// True if the open step differs from the stored one.
+    pub(super) has_changed: bool,
+    /// True if the current interval of the steady phase lies within a stored open step without contact.
+    pub(super) is_in_recalled_flight: bool,
 }
 
 impl<'a> BladeInSpan<'a> {
-    /// Begins a span of a sector from a state; without one, an open step must be recalled.
+    /// Begins a span of a sector from a state. Without a state, the caller must recall an open step.
     pub fn begin(
         blade: &'a mut Blade,
         place: BladePlace<'a>,
@@ -184,11 +184,11 @@ impl<'a> BladeInSpan<'a> {
             known: false,
             reach_known: false,
             tried: 0,
-            recorded: Recorded::All,
+            recorded: RecordScope::All,
             open: None,
-            progress: Progress::default(),
-            is_new: true,
-            is_between: false,
+            progress: SpanProgress::default(),
+            has_changed: true,
+            is_in_recalled_flight: false,
         }
     }
 
@@ -196,11 +196,11 @@ impl<'a> BladeInSpan<'a> {
     pub fn write(&mut self, state: &mut SectorState) {
         let Blade { kinds, trial, .. } = &mut *self.blade;
         BladeTrial::write(&kinds[self.place.kind].rows, &trial.start, state);
-        self.keep_lowest();
+        self.include_lowest();
     }
 
     /// Includes the smallest gaps of the sector in those of all sectors.
-    pub(super) fn keep_lowest(&mut self) {
+    pub(super) fn include_lowest(&mut self) {
         let Blade { lowest, tally, .. } = &mut *self.blade;
         for (lowest, own) in lowest.as_mut_slice().iter_mut().zip(&tally.lowest) {
             lowest.0.iter_mut().zip(own.0).for_each(|(lowest, own)| *lowest = lowest.min(own));
@@ -235,7 +235,7 @@ impl<'a> BladeInSpan<'a> {
 
     /// Adds the tried step, or a part of it, to sums.
     pub(super) fn add(&mut self, step: SpanStep, kind: ForceInterpolation, part: &PartWeights, sums: Sums) {
-        if self.blade.trial.pushes() && sums != Sums::Work {
+        if self.blade.trial.pushes() && sums != Sums::WorkOnly {
             self.drives.iter_mut().for_each(|drive| drive.rotor = libm::sincos(drive.rotor_angle));
         }
         let faced = &self.place.faced_surface(&self.drives);
@@ -294,7 +294,7 @@ impl<'a> BladeInSpan<'a> {
         trial.follow((&tables.rows, level, &levels[..=finer]), (&faced, &drives[..=parts]), tally, ends);
     }
 
-    /// Goes to the end of a step; a flight has no kind.
+    /// Advances the modes to the end of a step. `kind` is `None` for a flight.
     pub(super) fn advance(&mut self, step: SpanStep, kind: Option<ForceInterpolation>) {
         let Blade { trial, kinds, tally, .. } = &mut *self.blade;
         let tables = &mut kinds[self.place.kind];
@@ -312,7 +312,7 @@ impl<'a> BladeInSpan<'a> {
 
     /// Returns whether a step ends within the recorded part of the span.
     fn ends_within(&self, step: SpanStep) -> bool {
-        !matches!(self.recorded, Recorded::Part(ends) if step.from + step.length > ends[1])
+        !matches!(self.recorded, RecordScope::Interval(ends) if step.from + step.length > ends[1])
     }
 
     /// Energy of the sector at the start of the step (J).
@@ -372,8 +372,8 @@ impl SpanSteps for BladeInSpan<'_> {
             self.blade.trial.find_reach(&self.blade.kinds[self.place.kind].rows);
             self.reach_known = true;
         }
-        if matches!(self.recorded, Recorded::Part(_)) && self.is_quiet() {
-            self.open = Some(OpenStep::endless(step.level, step.from, self.energy_at_start()));
+        if matches!(self.recorded, RecordScope::Interval(_)) && self.stays_clear() {
+            self.open = Some(OpenStep::unbounded_flight(step.level, step.from, self.energy_at_start()));
             return true;
         }
         let mut drives = [PointDrive::default(); POINTS];
@@ -387,11 +387,11 @@ impl SpanSteps for BladeInSpan<'_> {
         if !self.ends_within(step) {
             let (work, energy) = (ContactWork::default(), self.energy_at_start());
             self.open = Some(OpenStep { step, kind: None, is_resolved: true, work, energy });
-        } else if clearance == Clearance::Needed && self.recorded != Recorded::Work {
+        } else if clearance == Clearance::Needed && self.recorded != RecordScope::WorkOnly {
             let result = self.attempt(step, ForceInterpolation::Polynomial);
             self.accept(step, ForceInterpolation::Polynomial, &result);
-            // The state does not depend on what is recorded.
-            self.known &= self.recorded == Recorded::All;
+            // The state must not depend on the scope of recording.
+            self.known &= self.recorded == RecordScope::All;
         } else {
             self.advance(step, None);
         }
@@ -415,9 +415,9 @@ impl SpanSteps for BladeInSpan<'_> {
     fn accept(&mut self, step: SpanStep, kind: ForceInterpolation, result: &TrialResult) -> f64 {
         let (is_open, whole) =
             (!self.ends_within(step), self.blade.kinds[self.place.kind].level(step.level, kind).whole);
-        let records = !is_open && self.recorded != Recorded::Work;
+        let records = !is_open && self.recorded != RecordScope::WorkOnly;
         let before = take(&mut self.blade.tally.work);
-        self.add(step, kind, &whole, if records { Sums::All } else { Sums::Work });
+        self.add(step, kind, &whole, if records { Sums::All } else { Sums::WorkOnly });
         let Blade { trial, kinds, tally, .. } = &mut *self.blade;
         let tables = &kinds[self.place.kind];
         let banked = match kind {

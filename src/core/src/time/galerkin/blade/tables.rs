@@ -16,8 +16,8 @@ pub(super) struct BladeTables {
     /// Tables of all contact rows for one length, from which the others are filled.
     general: StepTables,
     grids: [Grid; 2],
-    /// The grid in use.
-    of: usize,
+    /// Index of the grid in use.
+    in_use: usize,
 }
 
 /// Span whose steps the tables describe.
@@ -25,8 +25,8 @@ pub(super) struct BladeTables {
 pub(crate) enum SpanKind {
     /// A span that ends at an internal point of the communication step.
     Bounded,
-    /// A span that does not depend on the communication step.
-    Free,
+    /// A span of a steady phase, which does not depend on the communication step.
+    Steady,
 }
 
 /// Tables for a span that is halved repeatedly.
@@ -54,13 +54,13 @@ impl BladeTables {
             filled: [false; HALVINGS + 2],
         };
         let modes = tables.shapes().clone();
-        Self { general: StepTables::new(&modes, degree), modes, grids: [grid.clone(), grid], rows, of: 0 }
+        Self { general: StepTables::new(&modes, degree), modes, grids: [grid.clone(), grid], rows, in_use: 0 }
     }
 
     /// Uses tables for spans of this length (s).
     pub fn set_span(&mut self, kind: SpanKind, span: f64) {
-        self.of = kind as usize;
-        let grid = &mut self.grids[self.of];
+        self.in_use = kind as usize;
+        let grid = &mut self.grids[self.in_use];
         if grid.span.to_bits() != span.to_bits() {
             (grid.span, grid.filled) = (span, [false; HALVINGS + 2]);
         }
@@ -68,8 +68,8 @@ impl BladeTables {
 
     /// Fills the table of a level unless it is filled. Does not allocate.
     pub fn prepare(&mut self, level: usize, kind: ForceInterpolation) {
-        let Self { rows, modes, general, grids, of } = self;
-        let Grid { span, levels, constant, filled } = &mut grids[*of];
+        let Self { rows, modes, general, grids, in_use } = self;
+        let Grid { span, levels, constant, filled } = &mut grids[*in_use];
         let (entry, halvings, table) = match kind {
             ForceInterpolation::Polynomial => (level, level, &mut levels[level]),
             ForceInterpolation::Constant => (HALVINGS + 1, HALVINGS, constant),
@@ -83,12 +83,12 @@ impl BladeTables {
 
     /// Table of a level, which must be filled.
     pub fn level(&self, level: usize, kind: ForceInterpolation) -> &BladeLevel {
-        let grid = &self.grids[self.of];
+        let grid = &self.grids[self.in_use];
         if kind == ForceInterpolation::Constant { &grid.constant } else { &grid.levels[level] }
     }
 
     /// Length of the steps of a level (s).
     pub fn length(&self, level: usize) -> f64 {
-        halved(self.grids[self.of].span, level)
+        halved(self.grids[self.in_use].span, level)
     }
 }

@@ -102,12 +102,12 @@ impl BladeTally {
 /// Sums to which a step is added.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Sums {
-    /// The sums of the span and the work.
+    /// Sums of the span, and the work.
     All,
-    /// The sums of the span.
-    OfSpan,
+    /// Sums of the span without the work.
+    SpanOnly,
     /// The work.
-    Work,
+    WorkOnly,
 }
 
 /// Adds a step, or a part of it, to the sums of a span.
@@ -239,7 +239,7 @@ impl AddStep<'_> {
                 let opened = L::splat(motion.opening) + shape * L::splat(motion.shape_factor) - turned;
                 work[3] = work[3] - multiplier * opened;
             }
-            if *sums == Sums::Work {
+            if *sums == Sums::WorkOnly {
                 continue;
             }
             let add = |sum: &mut Eight, value: L| (L::load(sum) + value).store(sum);
@@ -270,12 +270,12 @@ impl AddStep<'_> {
                 tally.implausible |= deep & L::zero().less(multiplier) != 0;
             }
         }
-        if *sums != Sums::Work {
+        if *sums != Sums::WorkOnly {
             (L::load(&tally.heat[block]) + heat_of_nodes).store(&mut tally.heat[block]);
             let peak = peak_of(level, &normals, part.ends);
             peak.max(L::load(&tally.peak[block])).store(&mut tally.peak[block]);
         }
-        if *sums == Sums::OfSpan {
+        if *sums == Sums::SpanOnly {
             return;
         }
         let [shaft, exact, closing, casing] = [work[0].total(), work[1].total(), work[2].total(), work[3].total()];

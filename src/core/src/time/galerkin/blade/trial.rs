@@ -69,7 +69,7 @@ pub(crate) struct BladeTrial {
     /// Contacts and modes at a time within the accepted step, and rates of the gaps (m/s).
     pub(super) sample: StartContacts,
     pub(super) rates: Vec<Eight>,
-    /// Rates at the previous time.
+    /// Rates of the gaps at the previous time (m/s).
     pub(super) rates_before: Vec<Eight>,
     /// Angles of the nodes in the frame of the rotor (rad).
     pub(super) angles: Vec<Eight>,
@@ -171,7 +171,7 @@ impl BladeTrial {
         }
     }
 
-    /// Selects the sector of these angles.
+    /// Selects the sector whose nodes have these angles.
     pub fn turn_to(&mut self, angles: &NodeAngles) {
         self.angles.copy_from_slice(&angles.angles);
         self.directions_of_nodes[0].copy_from_slice(&angles.sines);

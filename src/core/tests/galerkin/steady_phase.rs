@@ -1,15 +1,15 @@
-//! Steps that do not end at communication points: results do not depend on the communication step, inputs act at once,
-//! saved states continue with equal bits.
+//! Steady phases, in which steps do not end at communication points: results do not depend on the communication step,
+//! inputs act immediately, and saved states continue with equal bits.
 
 use super::{apart, print_row, scene};
 use tiprub_core::scene::method::Scheme;
 use tiprub_core::{CoSimulation, Scene, Simulation};
 use tiprub_test_models::{bits, element, go, real, saved, set, started};
 
-/// Steps whose multiples are exact times.
+/// A communication step whose multiples are exact binary numbers (s).
 const TICK: f64 = 1.0 / 131_072.0;
 
-/// Order of the clearance (m).
+/// Order of magnitude of the clearance (m).
 const CLEARANCE: f64 = 4e-4;
 
 fn rub(tolerance: f64) -> Scene {
@@ -28,7 +28,7 @@ fn instant(simulation: &Simulation) -> (Vec<u64>, Vec<u64>) {
     )
 }
 
-/// Runs to the times after 64, 256 and 512 ticks in communication steps of these numbers of ticks, one after the other.
+/// Returns the results after 64, 256 and 512 ticks, with communication steps whose lengths cycle through `ticks`.
 fn run(scene: &Scene, ticks: &[u32]) -> Vec<(Vec<u64>, Vec<u64>)> {
     let mut simulation = started(scene);
     let (mut reached, mut at, mut turns) = (0, Vec::new(), ticks.iter().cycle());
@@ -64,10 +64,10 @@ fn force_of(simulation: &Simulation, sector: usize) -> f64 {
     (0..3).map(|node| element(simulation, &format!("blade[{sector}].normal_force"), node)).sum()
 }
 
-/// The same rub, once in free spans and once in spans that end at internal points, because of a limit on the number of
-/// steps that is never reached.
+/// Compares the same rub in a steady phase and in spans that end at internal points. A limit on the number of internal
+/// steps, which is never reached, causes the latter.
 #[test]
-fn free_spans_are_as_accurate_as_others() {
+fn steady_phases_are_as_accurate_as_bounded_spans() {
     let results = |tolerance: f64, bounded: bool| {
         let mut simulation = started(&rub(tolerance));
         if bounded {
@@ -90,17 +90,17 @@ fn free_spans_are_as_accurate_as_others() {
     };
     let (exact, sums, _, most) = results(1e-7, true);
     for tolerance in [1e-2, 1e-3, 1e-4] {
-        let [free, bounded] = [false, true].map(|bounded| results(tolerance, bounded));
-        let [own, other] = [&free, &bounded].map(|found| apart(&found.0, &exact));
-        print_row!("tolerance {tolerance:.0e}: {own:.1e} in free spans, {other:.1e} in bounded ones");
+        let [steady, bounded] = [false, true].map(|bounded| results(tolerance, bounded));
+        let [own, other] = [&steady, &bounded].map(|found| apart(&found.0, &exact));
+        print_row!("tolerance {tolerance:.0e}: {own:.1e} in a steady phase, {other:.1e} in bounded spans");
         assert!(own < tolerance, "{own:e}, bounded {other:e}");
-        assert!(free.2 < 1e-13, "{:e}", free.2);
-        for (index, (found, expected)) in free.1.iter().zip(sums).take(3).enumerate() {
+        assert!(steady.2 < 1e-13, "{:e}", steady.2);
+        for (index, (found, expected)) in steady.1.iter().zip(sums).take(3).enumerate() {
             let error = if index == 2 { (found - expected) / CLEARANCE } else { found / expected - 1.0 };
             assert!(error.abs() < 2.0 * tolerance, "{tolerance:e}, {index}: {found} {expected}");
         }
         // The ledger belongs to the starts of open steps.
-        let (heat, lost) = (free.1[1], free.1[3]);
+        let (heat, lost) = (steady.1[1], steady.1[3]);
         assert!((heat - lost).abs() < 4e-5 * most, "{tolerance:e}: {heat} {lost} {most}");
     }
 }
@@ -124,7 +124,7 @@ fn saved_states_continue_with_equal_bits_within_an_open_step() {
 }
 
 #[test]
-fn a_value_set_again_changes_nothing() {
+fn setting_the_same_value_again_changes_nothing() {
     let run = |sets: bool| {
         let mut simulation = started(&rub(1e-3));
         for _ in 0..100 {
@@ -141,9 +141,9 @@ fn a_value_set_again_changes_nothing() {
     assert_eq!(run(true), run(false));
 }
 
-/// Inputs that change at some communication points end the open steps there.
+/// Inputs that change at some communication points end the open steps at these points.
 #[test]
-fn inputs_that_change_now_and_then_keep_the_tolerance() {
+fn changes_of_inputs_keep_the_tolerance() {
     let run = |tolerance: f64, every: u32| {
         let mut simulation = started(&rub(tolerance));
         let speed = real(&simulation, "speed");

@@ -1,11 +1,13 @@
-//! Steps of a blade that do not end at communication points: the blade may be within an accepted step whose end lies
-//! ahead.
+//! Steps of a blade in a steady phase, which do not end at communication points.
+//!
+//! At a communication point, a blade is usually within an open step: a step that is accepted but has not ended. The modes
+//! stay at the start of the open step, and the state at the communication point is evaluated within the step.
 
-use super::dense::{ModeResponse, Sample};
-use super::follow::RecordBetween;
+use super::dense::{DenseOutput, ModeResponse};
+use super::follow::CubicMinima;
 use super::minima::STEP_ERROR;
 use super::rows::BladeRows;
-use super::span::{Blade, BladeInSpan, Recorded};
+use super::span::{Blade, BladeInSpan, RecordScope};
 use super::surface::PointDrive;
 use super::tables::SpanKind;
 use super::tally::Sums;
@@ -13,28 +15,29 @@ use super::trial::BladeTrial;
 use crate::math::octet::Eight;
 use crate::system::Effort;
 use crate::system::work::ContactWork;
-use crate::time::FreePart;
+use crate::time::SteadyInterval;
 use crate::time::galerkin::basis::{MOST, POINTS};
 use crate::time::galerkin::record::MotionCourse;
-use crate::time::galerkin::span::{SpanStep, Stopped, WHOLE, integrate, take_step, units_of};
+use crate::time::galerkin::span::{SpanStep, Stopped, UNITS_PER_SPAN, integrate, take_step, units_per_step};
 use crate::time::galerkin::state::SectorState;
 use crate::time::galerkin::tables::HALVINGS;
 use crate::time::galerkin::trial::ForceInterpolation;
 
-/// Numbers of responses of the modes that are kept; steps of few lengths contain a time.
-pub(super) const RESPONSES: usize = 8;
-/// Numbers of a stored step beside its arrays.
-const NUMBERS: usize = 28;
-/// A step that has begun this fraction of a span before a time is closed without integration (rounding of times).
-const BEGUN: f64 = 1e-9;
-/// Fraction of a span over which rates of the prescribed motion are found.
-const RATE_SHARE: f64 = 1.0 / 64.0;
-/// Fraction of the angular scale of a shape within which it is a cubic, with an error below 1e-4 of the smallest clearance.
+/// Number of cached responses of the modes. The sectors that share a response have steps of the same age, and few ages occur.
+pub(super) const CACHED_RESPONSES: usize = 8;
+/// Length of the header of a stored step, before its arrays.
+const HEADER_LEN: usize = 28;
+/// Fraction of a span below which a step is too short to be integrated (rounding of times).
+const NEGLIGIBLE_LENGTH: f64 = 1e-9;
+/// Fraction of a span over which a difference of the prescribed motion gives its rates.
+const RATE_FRACTION: f64 = 1.0 / 64.0;
+/// Fraction of the angular scale of a shape over which a cubic represents it, with an error below 1e-4 of the smallest
+/// clearance.
 const CUBIC_TURN: f64 = 0.125;
-/// Code of an endless flight.
-const ENDLESS: f64 = 3.0;
+/// Code of a flight without an end.
+const UNBOUNDED_FLIGHT: f64 = 3.0;
 
-/// An accepted step at whose start the modes still are.
+/// An accepted step that has not ended. The modes are those at its start.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct OpenStep {
     pub step: SpanStep,
@@ -48,66 +51,68 @@ pub(super) struct OpenStep {
     pub energy: f64,
 }
 
-/// Place of a blade among the free spans since their beginning.
+/// Progress of a blade since the start of the steady phase.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Progress {
-    /// Number of spans before the current one, and parts of it that are passed ([`WHOLE`] in all).
+pub(super) struct SpanProgress {
+    /// Number of completed spans.
     pub spans: u64,
+    /// Completed units of the current span, of which there are [`UNITS_PER_SPAN`].
     pub done: u64,
-    /// Effort for the open step.
+    /// Effort of the open step, which is counted when it ends.
     pub effort: Effort,
 }
 
 impl OpenStep {
-    /// A flight without an end, because no contact is possible until an input changes.
-    pub fn endless(level: usize, from: f64, energy: f64) -> Self {
+    /// Creates a flight without an end: no contact is possible until an input changes.
+    pub fn unbounded_flight(level: usize, from: f64, energy: f64) -> Self {
         let step = SpanStep { level, from, length: f64::INFINITY };
         Self { step, kind: None, is_resolved: true, work: ContactWork::default(), energy }
     }
 
-    fn is_endless(&self) -> bool {
+    fn is_unbounded(&self) -> bool {
         self.step.length == f64::INFINITY
     }
 }
 
 impl BladeInSpan<'_> {
-    /// Continues with the open step or the next one until a step contains the end of a part of free time. `course` is the
-    /// prescribed motion over the span of a number.
+    /// Takes steps until one of them contains the end of an interval of the steady phase. `course` returns the prescribed
+    /// motion over a span, by its number.
     ///
     /// # Errors
     /// [`Stopped`] if a step is not solved.
-    pub fn integrate_freely(
+    pub fn integrate_steady_interval(
         &mut self,
-        part: FreePart,
+        interval: SteadyInterval,
         course: impl Fn(u64) -> MotionCourse,
         effort: &mut Effort,
     ) -> Result<(), Stopped> {
         loop {
-            if let Some(open) = self.open.filter(OpenStep::is_endless) {
-                let begun = (count(self.progress.spans) + open.step.from) * part.span;
-                self.record_endless(FreePart { from: part.from.max(begun), ..part }, course);
+            if let Some(open) = self.open.filter(OpenStep::is_unbounded) {
+                let begun = (to_real(self.progress.spans) + open.step.from) * interval.span;
+                self.record_unbounded_flight(SteadyInterval { from: interval.from.max(begun), ..interval }, course);
                 return Ok(());
             }
             self.place.course = course(self.progress.spans);
-            let begun = count(self.progress.spans) * part.span;
-            let ends = [part.from, part.to].map(|time| (time - begun) / part.span);
-            self.recorded = Recorded::Part(ends);
-            while self.progress.done < WHOLE {
+            let begun = to_real(self.progress.spans) * interval.span;
+            let ends = [interval.from, interval.to].map(|time| (time - begun) / interval.span);
+            self.recorded = RecordScope::Interval(ends);
+            while self.progress.done < UNITS_PER_SPAN {
                 if let Some(open) = self.open {
-                    if open.is_endless() {
+                    if open.is_unbounded() {
                         break;
                     }
                     let end = open.step.from + open.step.length;
                     let is_last = end > ends[1];
-                    // The part may be within a step without contact that was open before.
-                    self.is_between = is_last && !self.is_new && !self.pushes() && self.turns_little(ends);
-                    if !self.is_between {
+                    // The interval may be within a step without contact that was already open before.
+                    self.is_in_recalled_flight =
+                        is_last && !self.has_changed && !self.pushes() && self.turns_little(ends);
+                    if !self.is_in_recalled_flight {
                         self.record_part(open, [ends[0].max(open.step.from), ends[1].min(end)]);
                     }
                     if is_last {
                         return Ok(());
                     }
-                    self.pass(open, effort);
+                    self.finish_open_step(open, effort);
                     continue;
                 }
                 let mut tried = Effort::default();
@@ -125,11 +130,11 @@ impl BladeInSpan<'_> {
         }
     }
 
-    /// Goes to the end of the open step.
-    fn pass(&mut self, open: OpenStep, effort: &mut Effort) {
-        (self.open, self.is_new) = (None, true);
+    /// Ends the open step: adds its work and effort, and advances the modes to its end.
+    fn finish_open_step(&mut self, open: OpenStep, effort: &mut Effort) {
+        (self.open, self.has_changed) = (None, true);
         effort.add(&self.progress.effort);
-        self.progress.done += units_of(open.step.level);
+        self.progress.done += units_per_step(open.step.level);
         self.blade.tally.work.add(&open.work);
         self.advance(open.step, open.kind);
     }
@@ -152,15 +157,15 @@ impl BladeInSpan<'_> {
         self.blade.kinds[self.place.kind].prepare(step.level, kind);
         let weights = self.blade.kinds[self.place.kind].level(step.level, kind).part(within);
         self.find_drives(step, kind, &weights);
-        self.add(step, kind, &weights, Sums::OfSpan);
+        self.add(step, kind, &weights, Sums::SpanOnly);
         self.record_gaps(step, kind, open.is_resolved, within);
     }
 
-    /// Records the smallest gaps in a part of an endless flight.
-    fn record_endless(&mut self, part: FreePart, course: impl Fn(u64) -> MotionCourse) {
-        let first = (part.from / part.span).floor();
-        self.place.course = course(whole(first));
-        let [from, to] = [part.from, part.to].map(|time| self.drive_at(time / part.span - first).0);
+    /// Records the smallest gaps in an interval of a flight without an end.
+    fn record_unbounded_flight(&mut self, interval: SteadyInterval, course: impl Fn(u64) -> MotionCourse) {
+        let first = (interval.from / interval.span).floor();
+        self.place.course = course(to_count(first));
+        let [from, to] = [interval.from, interval.to].map(|time| self.drive_at(time / interval.span - first).0);
         let (gap, kind) = (self.place.gap, self.place.kind);
         let Blade { trial, kinds, floors, tally, .. } = &mut *self.blade;
         let rows = &kinds[kind].rows;
@@ -181,9 +186,9 @@ impl BladeInSpan<'_> {
         }
     }
 
-    /// Returns whether no contact is possible while nothing but the rotor moves, and the vibration is smaller than the
-    /// tolerance. The reach must be known.
-    pub(super) fn is_quiet(&self) -> bool {
+    /// Returns whether no contact is possible in the steady phase, and the vibration is smaller than the tolerance. The
+    /// reach must be known.
+    pub(super) fn stays_clear(&self) -> bool {
         let Blade { trial, kinds, .. } = &*self.blade;
         let rows = &kinds[self.place.kind].rows;
         let reach = |along: usize, node: usize| trial.reach[along][node / 8].0[node % 8];
@@ -196,21 +201,26 @@ impl BladeInSpan<'_> {
         drive.factor >= 0.0 && (0..rows.nodes).all(|node| left > reach(0, node))
     }
 
-    /// Writes the state at the end of a part of free time, which the open step contains.
-    pub fn write_sample(&mut self, part: FreePart, course: impl Fn(u64) -> MotionCourse, state: &mut SectorState) {
+    /// Writes the state at the end of an interval of the steady phase, which the open step contains.
+    pub fn write_sample(
+        &mut self,
+        interval: SteadyInterval,
+        course: impl Fn(u64) -> MotionCourse,
+        state: &mut SectorState,
+    ) {
         let Some(OpenStep { step, kind, .. }) = self.open else { return };
-        let (kind_of_sector, begun) = (self.place.kind, count(self.progress.spans) * part.span);
-        let time = ((part.to - begun) - step.from * part.span).max(0.0);
-        let last = if self.open.is_some_and(|open| open.is_endless()) {
-            whole((part.to / part.span).floor())
+        let (kind_of_sector, begun) = (self.place.kind, to_real(self.progress.spans) * interval.span);
+        let time = ((interval.to - begun) - step.from * interval.span).max(0.0);
+        let last = if self.open.is_some_and(|open| open.is_unbounded()) {
+            to_count((interval.to / interval.span).floor())
         } else {
             self.progress.spans
         };
         self.place.course = course(last);
         let mut drives = [PointDrive::default(); POINTS];
-        let theta = (part.to - count(last) * part.span) / part.span;
-        let (drive, before) = (self.drive_at(theta).0, self.drive_at(theta - RATE_SHARE).0);
-        let per_second = 1.0 / (RATE_SHARE * part.span);
+        let theta = (interval.to - to_real(last) * interval.span) / interval.span;
+        let (drive, before) = (self.drive_at(theta).0, self.drive_at(theta - RATE_FRACTION).0);
+        let per_second = 1.0 / (RATE_FRACTION * interval.span);
         let relative_speed = (drive.turned - before.turned) * per_second;
         let factor_rate = (drive.factor - before.factor) * per_second;
         drives[0] = drive;
@@ -219,15 +229,15 @@ impl BladeInSpan<'_> {
         let blade = &mut *self.blade;
         blade.kinds[kind_of_sector].prepare(step.level, interpolation);
         let tables = &blade.kinds[kind_of_sector];
-        let place = blade.responses.iter().position(|response| response.is_of(kind_of_sector, time));
+        let place = blade.responses.iter().position(|response| response.matches(kind_of_sector, time));
         let place = place.unwrap_or_else(|| {
-            blade.next_response = (blade.next_response + 1) % RESPONSES;
-            blade.responses[blade.next_response].find(&tables.rows, kind_of_sector, time);
+            blade.next_response = (blade.next_response + 1) % CACHED_RESPONSES;
+            blade.responses[blade.next_response].compute(&tables.rows, kind_of_sector, time);
             blade.next_response
         });
         let (instructions, pushes) = (blade.trial.instructions, kind.is_some() && blade.trial.pushes());
-        let length = part.to - part.from;
-        instructions.run_octets(Sample {
+        let length = interval.to - interval.from;
+        instructions.run_octets(DenseOutput {
             trial: &mut blade.trial,
             rows: &tables.rows,
             level: tables.level(step.level, interpolation),
@@ -239,25 +249,25 @@ impl BladeInSpan<'_> {
             pushes,
         });
         BladeTrial::write(&tables.rows, &blade.trial.sample, state);
-        if self.is_between && self.record_between(length) {
-            let begun = begun + step.from * part.span;
-            let length = step.length * part.span;
-            let ends = [part.from, part.to].map(|time| ((time - begun) / length).clamp(0.0, 1.0));
+        if self.is_in_recalled_flight && self.record_cubic_minima(length) {
+            let begun = begun + step.from * interval.span;
+            let length = step.length * interval.span;
+            let ends = [interval.from, interval.to].map(|time| ((time - begun) / length).clamp(0.0, 1.0));
             self.follow(step, interpolation, ends);
         }
-        self.keep_lowest();
+        self.include_lowest();
     }
 
-    /// Records the smallest gaps of a part of free time of a length (s) from gaps and their rates at its ends, where the
-    /// error is small enough. Returns whether nodes are left; these are followed.
-    fn record_between(&mut self, length: f64) -> bool {
+    /// Records the smallest gaps over an interval with a length (s). Cubics through the gaps and their rates at both ends
+    /// give them where the error is small enough. Returns whether it is too large for some nodes; these are followed.
+    fn record_cubic_minima(&mut self, length: f64) -> bool {
         let Blade { trial, kinds, tally, floors, begun, .. } = &mut *self.blade;
         let (rows, tolerance) = (&kinds[self.place.kind].rows, self.goal.tolerance);
-        // A flight has no forces.
+        // No forces act in a flight.
         trial.pushes = false;
         let error = trial.find_interpolation_error(rows, length, STEP_ERROR);
         let instructions = trial.instructions;
-        instructions.run_octets(RecordBetween { trial, rows, tally, floors, begun, length, error, tolerance })
+        instructions.run_octets(CubicMinima { trial, rows, tally, floors, begun, length, error, tolerance })
     }
 
     /// Returns whether forces act in the open step.
@@ -271,22 +281,26 @@ impl BladeInSpan<'_> {
         (to - from).abs() < CUBIC_TURN * self.place.gap.surface.angular_scale()
     }
 
-    /// Goes from the start of the open step to a time within it (s since the beginning of the free spans), with steps that
-    /// end there, and writes the state. `course` is the prescribed motion between two such times.
+    /// Integrates from the start of the open step to the end of `interval` within it, with steps that end there, and
+    /// writes the state. `course` returns the prescribed motion between two times (s since the start of the steady phase).
     ///
     /// # Errors
     /// [`Stopped`] if a step is not solved.
     pub fn close(
         &mut self,
-        part: FreePart,
+        interval: SteadyInterval,
         course: impl Fn([f64; 2]) -> MotionCourse,
         effort: &mut Effort,
         state: &mut SectorState,
     ) -> Result<(), Stopped> {
         let flight = self.open.filter(|open| open.kind.is_none());
         if let Some(OpenStep { energy, .. }) = flight {
-            // The state within a flight is exact.
-            self.write_sample(part, |spans| course([count(spans) * part.span, count(spans + 1) * part.span]), state);
+            // The state within a flight is exact, so no new steps are needed.
+            self.write_sample(
+                interval,
+                |spans| course([to_real(spans) * interval.span, to_real(spans + 1) * interval.span]),
+                state,
+            );
             effort.add(&self.progress.effort);
             let trial = &mut self.blade.trial;
             trial.start.modes.clone_from(&trial.sample.modes);
@@ -294,12 +308,12 @@ impl BladeInSpan<'_> {
             return Ok(());
         }
         if let Some(OpenStep { step, .. }) = self.open.take() {
-            let begun = (count(self.progress.spans) + step.from) * part.span;
-            let length = part.to - begun;
-            if length > BEGUN * part.span {
+            let begun = (to_real(self.progress.spans) + step.from) * interval.span;
+            let length = interval.to - begun;
+            if length > NEGLIGIBLE_LENGTH * interval.span {
                 self.blade.set_span(SpanKind::Bounded, length);
-                self.place.course = course([begun, part.to]);
-                (self.recorded, self.control.level) = (Recorded::Work, 0);
+                self.place.course = course([begun, interval.to]);
+                (self.recorded, self.control.level) = (RecordScope::WorkOnly, 0);
                 integrate(self, effort)?;
             }
         }
@@ -307,7 +321,7 @@ impl BladeInSpan<'_> {
         Ok(())
     }
 
-    /// Rate of the gap of a node at the end of the part of free time (m/s).
+    /// Rate of the gap of a node at the end of the interval (m/s).
     pub fn gap_rate(&self, node: usize) -> f64 {
         self.blade.trial.rates[node / 8].0[node % 8]
     }
@@ -317,27 +331,27 @@ impl BladeInSpan<'_> {
         self.open.map_or(0.0, |open| open.energy)
     }
 
-    /// Stores the open step in numbers, of which there are [`stored_len`], unless they hold it.
+    /// Stores the rates of the gaps and, if it has changed, the open step in an array with a length of [`stored_len`].
     pub fn store(&mut self, numbers: &mut [f64]) {
-        let (head, arrays) = numbers.split_at_mut(NUMBERS);
+        let (head, arrays) = numbers.split_at_mut(HEADER_LEN);
         let (rates, arrays) = arrays.split_at_mut(8 * self.blade.trial.rates.len());
         let blocks = self.blade.trial.rates.iter().zip(rates.as_chunks_mut().0);
         blocks.for_each(|(block, numbers)| *numbers = block.0);
-        if !self.is_new {
+        if !self.has_changed {
             return;
         }
         let Some(OpenStep { step, kind, is_resolved, work, energy }) = self.open else { return };
         let flag = |is: bool| f64::from(u8::from(is));
-        let Progress { spans, done, effort } = self.progress;
+        let SpanProgress { spans, done, effort } = self.progress;
         let code = match kind {
             None => 0.0,
             Some(ForceInterpolation::Polynomial) => 1.0,
             Some(ForceInterpolation::Constant) => 2.0,
         };
-        let code = if self.open.is_some_and(|open| open.is_endless()) { ENDLESS } else { code };
+        let code = if self.open.is_some_and(|open| open.is_unbounded()) { UNBOUNDED_FLIGHT } else { code };
         let counts = [effort.steps, effort.flights, effort.trials, effort.unsolved];
         let more = [effort.constant, effort.missed, effort.factorisations];
-        let values = [1.0, count(spans), count(done), count(step.level as u64), code]
+        let values = [1.0, to_real(spans), to_real(done), to_real(step.level as u64), code]
             .into_iter()
             .chain([is_resolved, self.known, self.reach_known, self.blade.trial.pushes].map(flag))
             .chain([flag(self.blade.trial.start.pushed), energy])
@@ -351,32 +365,32 @@ impl BladeInSpan<'_> {
                 work.turnover,
                 work.moved,
             ])
-            .chain(counts.map(count))
-            .chain(more.map(count));
+            .chain(counts.map(to_real))
+            .chain(more.map(to_real));
         head.iter_mut().zip(values).for_each(|(to, value)| *to = value);
-        self.blade.trial.each_stored(kind.is_some(), arrays, |block, numbers| *numbers = block.0);
+        self.blade.trial.for_each_stored_block(kind.is_some(), arrays, |block, numbers| *numbers = block.0);
     }
 
-    /// Reads an open step from numbers. Returns false if they hold none.
+    /// Reads the open step from an array. Returns false if the array contains none.
     pub fn recall(&mut self, numbers: &mut [f64]) -> bool {
         if numbers[0] == 0.0 {
             return false;
         }
-        self.is_new = false;
-        let whole = |index: usize| whole(numbers[index]);
+        self.has_changed = false;
+        let counter = |index: usize| to_count(numbers[index]);
         let is = |index: usize| numbers[index] != 0.0;
-        let level = usize::try_from(whole(3)).unwrap_or(0).min(HALVINGS);
+        let level = usize::try_from(counter(3)).unwrap_or(0).min(HALVINGS);
         let effort = Effort {
-            steps: whole(19),
-            flights: whole(20),
-            trials: whole(21),
-            unsolved: whole(22),
-            constant: whole(23),
-            missed: whole(24),
-            factorisations: whole(25),
+            steps: counter(19),
+            flights: counter(20),
+            trials: counter(21),
+            unsolved: counter(22),
+            constant: counter(23),
+            missed: counter(24),
+            factorisations: counter(25),
         };
-        self.progress = Progress { spans: whole(1), done: whole(2).min(WHOLE - 1), effort };
-        let kind = match whole(4) {
+        self.progress = SpanProgress { spans: counter(1), done: counter(2).min(UNITS_PER_SPAN - 1), effort };
+        let kind = match counter(4) {
             0 | 3 => None,
             2 => Some(ForceInterpolation::Constant),
             _ => Some(ForceInterpolation::Polynomial),
@@ -396,26 +410,27 @@ impl BladeInSpan<'_> {
             ..ContactWork::default()
         };
         let mut step = SpanStep::new(level, self.progress.done);
-        if numbers[4] == ENDLESS {
+        if numbers[4] == UNBOUNDED_FLIGHT {
             step.length = f64::INFINITY;
         }
         self.open = Some(OpenStep { step, kind, is_resolved: is(5), work, energy: numbers[10] });
-        let (_, arrays) = numbers.split_at_mut(NUMBERS);
+        let (_, arrays) = numbers.split_at_mut(HEADER_LEN);
         let (rates, arrays) = arrays.split_at_mut(8 * trial.rates.len());
         trial.rates_before.iter_mut().zip(rates.as_chunks().0).for_each(|(block, numbers)| block.0 = *numbers);
-        trial.each_stored(kind.is_some(), arrays, |block, numbers| block.0 = *numbers);
+        trial.for_each_stored_block(kind.is_some(), arrays, |block, numbers| block.0 = *numbers);
         true
     }
 }
 
-/// Number of numbers that store an open step of a blade with these numbers of nodes and modes with inertia.
+/// Length of an array that stores an open step of a blade with these numbers of nodes and of modes with inertia.
 pub(crate) fn stored_len(nodes: usize, modes: usize) -> usize {
-    NUMBERS + 8 * ((12 + 7 * MOST) * Eight::blocks(nodes) + (2 + MOST) * Eight::blocks(modes))
+    HEADER_LEN + 8 * ((12 + 7 * MOST) * Eight::blocks(nodes) + (2 + MOST) * Eight::blocks(modes))
 }
 
 impl BladeTrial {
-    /// Calls a function with each block that an open step needs, and its numbers. A flight without a trial needs no lanes.
-    fn each_stored(&mut self, is_tried: bool, numbers: &mut [f64], of: impl Fn(&mut Eight, &mut [f64; 8])) {
+    /// Calls a function with each block of an open step and its place in an array. A flight without a trial has no values at
+    /// the points of a step.
+    fn for_each_stored_block(&mut self, is_tried: bool, numbers: &mut [f64], of: impl Fn(&mut Eight, &mut [f64; 8])) {
         let Self { start, moved, sigma, gaps, multipliers, forces, modal_forces, reach, .. } = self;
         let contacts = [&mut start.multipliers, &mut start.slopes, &mut start.gaps, &mut start.sigma];
         let all = start.modes.iter_mut().chain(&mut start.forces).chain(&mut start.moved).chain(contacts).chain(reach);
@@ -430,21 +445,21 @@ impl BladeTrial {
     }
 }
 
-/// Converts a count to a number.
+/// Converts a count to a real number.
 #[expect(clippy::cast_precision_loss, reason = "counts are below 2^52")]
-fn count(value: u64) -> f64 {
+fn to_real(value: u64) -> f64 {
     value as f64
 }
 
-/// Converts a stored count back.
+/// Converts a stored real number to a count.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "conversion saturates, and NaN becomes 0")]
-fn whole(value: f64) -> u64 {
+fn to_count(value: f64) -> u64 {
     value as u64
 }
 
 impl ModeResponse {
-    /// Allocates responses of modes.
-    pub fn several(rows: &BladeRows) -> Vec<Self> {
-        vec![Self::new(rows); RESPONSES]
+    /// Allocates the cached responses of the modes.
+    pub fn allocate_cache(rows: &BladeRows) -> Vec<Self> {
+        vec![Self::new(rows); CACHED_RESPONSES]
     }
 }
