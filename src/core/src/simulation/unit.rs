@@ -22,7 +22,8 @@ impl CoSimulation for Simulation {
 
     fn set(&mut self, reference: u32, value: Value) -> Result<()> {
         let (variable, _) = self.check(reference, value)?;
-        if variable.quantity == Quantity::Friction && self.is_initialised() {
+        let changes = value.number().to_bits() != self.state.values[reference as usize].to_bits();
+        if variable.quantity == Quantity::Friction && self.is_initialised() && changes {
             let before = std::mem::replace(&mut self.state.values[reference as usize], value.number());
             let parameters = self.parameters();
             let outcome = self.check_limits(&parameters);

@@ -223,8 +223,13 @@ impl Structure {
 
     /// Makes the current values the previous ones, before a step of a method that finds them within the step.
     pub(crate) fn begin_span(&mut self) {
-        self.history.gap.shift();
         self.history.geometry.shift();
+        self.begin_interval();
+    }
+
+    /// Begins an interval of a steady phase, in which normals and closest points are not found.
+    pub(crate) fn begin_interval(&mut self) {
+        self.history.gap.shift();
         self.modes.begin_span();
     }
 

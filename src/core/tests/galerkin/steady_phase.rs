@@ -3,8 +3,9 @@
 
 use super::{apart, print_row, scene};
 use tiprub_core::scene::method::Scheme;
+use tiprub_core::scene::settings::Shape;
 use tiprub_core::{CoSimulation, Scene, Simulation};
-use tiprub_test_models::{bits, element, go, real, saved, set, started};
+use tiprub_test_models::{SeededRandom, bits, element, go, real, saved, set, started};
 
 /// A communication step whose multiples are exact binary numbers (s).
 const TICK: f64 = 1.0 / 131_072.0;
@@ -129,7 +130,7 @@ fn setting_the_same_value_again_changes_nothing() {
         let mut simulation = started(&rub(1e-3));
         for _ in 0..100 {
             if sets {
-                for name in ["speed", "casing_radius_change"] {
+                for name in ["speed", "casing_radius_change", "friction_coefficient"] {
                     let value = real(&simulation, name);
                     set(&mut simulation, name, value);
                 }
@@ -167,4 +168,53 @@ fn changes_of_inputs_keep_the_tolerance() {
         print_row!("inputs change every {every} steps: {error:.1e}");
         assert!(error < 1e-3 && residual < 1e-13, "{every}: {error:e} {residual:e}");
     }
+}
+
+/// A casing with many bumps.
+fn bumpy(tolerance: f64) -> Scene {
+    let mut scene = rub(tolerance);
+    let radius_change = (0..24).map(|i| -4.5e-4 * (f64::from(i) * 0.9).sin().max(0.0)).collect();
+    scene.settings.surfaces[0].shape = Shape::Table { radius_change };
+    scene
+}
+
+/// A step that an input ends early has not lost the energy that it added to the bank.
+#[test]
+fn discarded_open_steps_supply_no_energy() {
+    for seed in [80, 81, 82] {
+        let mut random = SeededRandom(seed);
+        let mut simulation = started(&bumpy(1e-1));
+        let speed = real(&simulation, "speed");
+        for _ in 0..300 {
+            let length = random.scale(2e-6, 6e-5);
+            match random.below(9) {
+                0 => set(&mut simulation, "casing_radius_change", random.within(-3e-5, 3e-5)),
+                1 => set(&mut simulation, "speed", speed * random.within(0.9, 1.1)),
+                2 => set(&mut simulation, "casing_shape_factor", random.within(0.8, 1.2)),
+                3 => {
+                    let angle = real(&simulation, "casing_shape_rotation") + random.within(-0.01, 0.01);
+                    set(&mut simulation, "casing_shape_rotation", angle);
+                }
+                4 => set(&mut simulation, "friction_coefficient", random.within(0.05, 0.2)),
+                _ => {}
+            }
+            go(&mut simulation, length);
+            let loss = real(&simulation, "impact_loss") / simulation.system().ledger().scale().max(1e-9);
+            assert!(loss > -1e-9, "{seed}: {loss:e}");
+        }
+    }
+}
+
+/// Flights of the shortest steps have no parts in which gaps could be followed.
+#[test]
+fn shortest_flights_record_their_gaps() {
+    let mut simulation = Simulation::new(bumpy(1e-6)).unwrap();
+    set(&mut simulation, "casing_radius_change", 1e-4);
+    simulation.initialise(0.0).unwrap();
+    let mut lowest = f64::INFINITY;
+    for _ in 0..8192 {
+        go(&mut simulation, 1.0 / 1_048_576.0);
+        lowest = lowest.min(real(&simulation, "clearance_minimum"));
+    }
+    assert!(lowest.abs() < CLEARANCE, "{lowest:e}");
 }

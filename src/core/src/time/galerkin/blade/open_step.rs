@@ -49,6 +49,8 @@ pub(super) struct OpenStep {
     pub work: ContactWork,
     /// Kinetic and strain energy at its start (J).
     pub energy: f64,
+    /// Energy that it has added to the bank (J).
+    pub banked: f64,
 }
 
 /// Progress of a blade since the start of the steady phase.
@@ -63,18 +65,27 @@ pub(super) struct SpanProgress {
 }
 
 impl OpenStep {
-    /// Creates a flight without an end: no contact is possible until an input changes.
-    pub fn unbounded_flight(level: usize, from: f64, energy: f64) -> Self {
-        let step = SpanStep { level, from, length: f64::INFINITY };
-        Self { step, kind: None, is_resolved: true, work: ContactWork::default(), energy }
-    }
-
+    /// Returns whether this is a flight without an end: no contact is possible until an input changes.
     fn is_unbounded(&self) -> bool {
         self.step.length == f64::INFINITY
     }
 }
 
 impl BladeInSpan<'_> {
+    /// Opens a flight; its length is infinite if no contact is possible until an input changes.
+    pub(super) fn open_flight(&mut self, step: SpanStep) {
+        let (work, energy, start) = (ContactWork::default(), self.energy_at_start(), &mut self.blade.trial.start);
+        if !self.known {
+            // Unknown values must not be part of a saved state.
+            let [closing, around] = &mut start.moved;
+            [closing, around, &mut start.gaps, &mut start.sigma]
+                .into_iter()
+                .for_each(|blocks| blocks.fill(Eight::ZERO));
+        }
+        self.blade.trial.pushes = false;
+        self.open = Some(OpenStep { step, kind: None, is_resolved: true, work, energy, banked: 0.0 });
+    }
+
     /// Takes steps until one of them contains the end of an interval of the steady phase. `course` returns the prescribed
     /// motion over a span, by its number.
     ///
@@ -307,7 +318,9 @@ impl BladeInSpan<'_> {
             self.blade.tally.damping += energy - self.energy_at_start();
             return Ok(());
         }
-        if let Some(OpenStep { step, .. }) = self.open.take() {
+        if let Some(OpenStep { step, banked, .. }) = self.open.take() {
+            // This step is discarded.
+            self.control.bank -= banked;
             let begun = (to_real(self.progress.spans) + step.from) * interval.span;
             let length = interval.to - begun;
             if length > NEGLIGIBLE_LENGTH * interval.span {
@@ -340,7 +353,7 @@ impl BladeInSpan<'_> {
         if !self.has_changed {
             return;
         }
-        let Some(OpenStep { step, kind, is_resolved, work, energy }) = self.open else { return };
+        let Some(OpenStep { step, kind, is_resolved, work, energy, banked }) = self.open else { return };
         let flag = |is: bool| f64::from(u8::from(is));
         let SpanProgress { spans, done, effort } = self.progress;
         let code = match kind {
@@ -366,7 +379,8 @@ impl BladeInSpan<'_> {
                 work.moved,
             ])
             .chain(counts.map(to_real))
-            .chain(more.map(to_real));
+            .chain(more.map(to_real))
+            .chain([banked]);
         head.iter_mut().zip(values).for_each(|(to, value)| *to = value);
         self.blade.trial.for_each_stored_block(kind.is_some(), arrays, |block, numbers| *numbers = block.0);
     }
@@ -413,7 +427,7 @@ impl BladeInSpan<'_> {
         if numbers[4] == UNBOUNDED_FLIGHT {
             step.length = f64::INFINITY;
         }
-        self.open = Some(OpenStep { step, kind, is_resolved: is(5), work, energy: numbers[10] });
+        self.open = Some(OpenStep { step, kind, is_resolved: is(5), work, energy: numbers[10], banked: numbers[26] });
         let (_, arrays) = numbers.split_at_mut(HEADER_LEN);
         let (rates, arrays) = arrays.split_at_mut(8 * trial.rates.len());
         trial.rates_before.iter_mut().zip(rates.as_chunks().0).for_each(|(block, numbers)| block.0 = *numbers);

@@ -17,7 +17,6 @@ use crate::geometry::wrench::MotionIncrement;
 use crate::math::octet::Eight;
 use crate::scene::method::Solver;
 use crate::system::structure::NeededMinima;
-use crate::system::work::ContactWork;
 use crate::time::galerkin::basis::POINTS;
 use crate::time::galerkin::island::StepControl;
 use crate::time::galerkin::record::MotionCourse;
@@ -269,6 +268,10 @@ impl<'a> BladeInSpan<'a> {
 
     /// Records the smallest gaps of the followed nodes between two fractions of a step.
     pub(super) fn follow(&mut self, step: SpanStep, kind: ForceInterpolation, ends: [f64; 2]) {
+        // There are no tables for parts of the shortest steps, whose points are close together.
+        if step.level + MIN_HALVINGS > HALVINGS {
+            return;
+        }
         let place = &self.place;
         let Blade { trial, kinds, tally, .. } = &mut *self.blade;
         let tables = &mut kinds[place.kind];
@@ -373,7 +376,7 @@ impl SpanSteps for BladeInSpan<'_> {
             self.reach_known = true;
         }
         if matches!(self.recorded, RecordScope::Interval(_)) && self.stays_clear() {
-            self.open = Some(OpenStep::unbounded_flight(step.level, step.from, self.energy_at_start()));
+            self.open_flight(SpanStep { length: f64::INFINITY, ..step });
             return true;
         }
         let mut drives = [PointDrive::default(); POINTS];
@@ -385,8 +388,7 @@ impl SpanSteps for BladeInSpan<'_> {
             return false;
         }
         if !self.ends_within(step) {
-            let (work, energy) = (ContactWork::default(), self.energy_at_start());
-            self.open = Some(OpenStep { step, kind: None, is_resolved: true, work, energy });
+            self.open_flight(step);
         } else if clearance == Clearance::Needed && self.recorded != RecordScope::WorkOnly {
             let result = self.attempt(step, ForceInterpolation::Polynomial);
             self.accept(step, ForceInterpolation::Polynomial, &result);
@@ -430,14 +432,15 @@ impl SpanSteps for BladeInSpan<'_> {
         };
         if trial.pushes() {
             trial.find_modal_forces(&tables.rows, tables.level(step.level, kind));
+        } else if is_open {
+            trial.modal_forces.iter_mut().for_each(|modal| modal.fill(Eight::ZERO));
         }
-        // There are no tables for parts of the shortest steps, whose points are close together.
         let has_parts = step.level + MIN_HALVINGS <= HALVINGS;
         let is_resolved = has_parts && result.resolves_motion(kind, self.goal.tolerance);
         let work = replace(&mut tally.work, before);
         if is_open {
             let energy = self.energy_at_start();
-            self.open = Some(OpenStep { step, kind: Some(kind), is_resolved, work, energy });
+            self.open = Some(OpenStep { step, kind: Some(kind), is_resolved, work, energy, banked });
             return banked;
         }
         tally.work.add(&work);

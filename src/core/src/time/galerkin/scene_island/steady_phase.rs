@@ -25,7 +25,7 @@ impl SceneIsland {
         system: &mut System,
         interval: SteadyInterval,
     ) -> Result<(), StepFailure> {
-        system.sets.members(self.set).iter().for_each(|one| system.structures[*one].begin_span());
+        system.sets.members(self.set).iter().for_each(|one| system.structures[*one].begin_interval());
         let index = self.first_structure();
         if let Some(blade) = &mut self.blade {
             let structure = &mut system.structures[index];
