@@ -4,6 +4,7 @@ pub(crate) mod carrier;
 pub(crate) mod contact_view;
 pub(crate) mod continuation;
 pub(crate) mod delassus;
+mod effort;
 pub(crate) mod event;
 pub(crate) mod failure;
 pub(crate) mod group;
@@ -29,6 +30,7 @@ use crate::modes::modal::ModalModel;
 use crate::scene::method::{Scheme, Solver};
 use crate::system::history::Two;
 pub(crate) use contact_view::Bodies;
+pub use effort::Effort;
 pub use event::ContactEvent;
 pub use failure::StepFailure;
 use group::Reach;
@@ -63,45 +65,6 @@ pub struct SystemSettings {
     pub solver: Solver,
     /// True if the damping loss is collected, without which the energy balance does not close.
     pub ledger: bool,
-}
-
-/// Counters of the work of time integration.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Effort {
-    /// Number of accepted steps.
-    pub steps: u64,
-    /// Number of steps without a trial, because no contact was possible.
-    pub flights: u64,
-    /// Number of trials, including accepted ones.
-    pub trials: u64,
-    /// Number of contact problems for which no solution was found.
-    pub unsolved: u64,
-    /// Number of trials with a constant force.
-    pub constant: u64,
-    /// Number of shortest steps that miss the tolerance.
-    pub missed: u64,
-    /// Number of factorised linear systems.
-    pub factorisations: u64,
-}
-
-persist_fields!(Effort { steps, flights, trials, unsolved, constant, missed, factorisations });
-
-impl Effort {
-    /// Number of attempted steps, with and without contact.
-    pub fn tried(&self) -> u64 {
-        self.trials + self.flights
-    }
-
-    /// Adds the counters of further steps.
-    pub(crate) fn add(&mut self, other: &Self) {
-        self.steps += other.steps;
-        self.flights += other.flights;
-        self.trials += other.trials;
-        self.unsolved += other.unsolved;
-        self.constant += other.constant;
-        self.missed += other.missed;
-        self.factorisations += other.factorisations;
-    }
 }
 
 #[derive(Debug, Clone, PartialEq, Default)]

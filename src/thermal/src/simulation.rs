@@ -15,8 +15,8 @@ const UNCOOLED: f64 = 1e-13;
 
 /// Reduced model of heat conduction with its state.
 ///
-/// Life cycle: [`ThermalSimulation::new`] → set parameters and inputs → [`ThermalSimulation::initialise`] → any
-/// number of steps → ([`ThermalSimulation::reset`] and again). A communication step is one internal step, which is
+/// Life cycle: [`ThermalSimulation::new`] → set parameters and inputs → [`CoSimulation::initialise`](tiprub_cosim::CoSimulation::initialise) → any
+/// number of steps → ([`CoSimulation::reset`](tiprub_cosim::CoSimulation::reset) and again). A communication step is one internal step, which is
 /// exact.
 #[derive(Debug, Clone)]
 pub struct ThermalSimulation {

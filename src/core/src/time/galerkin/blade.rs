@@ -23,6 +23,7 @@ mod rows;
 mod solve;
 mod span;
 mod start;
+mod stored;
 mod surface;
 mod tables;
 mod tally;
@@ -30,6 +31,6 @@ mod tally;
 mod tests;
 mod trial;
 
-pub(crate) use open_step::stored_len;
 pub(crate) use span::{Blade, BladeInSpan, BladePlace};
+pub(crate) use stored::stored_len;
 pub(crate) use tables::SpanKind;

@@ -16,17 +16,14 @@ use crate::math::octet::Eight;
 use crate::system::Effort;
 use crate::system::work::ContactWork;
 use crate::time::SteadyInterval;
-use crate::time::galerkin::basis::{MOST, POINTS};
+use crate::time::galerkin::basis::POINTS;
 use crate::time::galerkin::record::MotionCourse;
 use crate::time::galerkin::span::{SpanStep, Stopped, UNITS_PER_SPAN, integrate, take_step, units_per_step};
 use crate::time::galerkin::state::SectorState;
-use crate::time::galerkin::tables::HALVINGS;
 use crate::time::galerkin::trial::ForceInterpolation;
 
 /// Number of cached responses of the modes. The sectors that share a response have steps of the same age, and few ages occur.
 pub(super) const CACHED_RESPONSES: usize = 8;
-/// Length of the header of a stored step, before its arrays.
-const HEADER_LEN: usize = 28;
 /// Fraction of a span below which a step is too short to be integrated (rounding of times).
 const NEGLIGIBLE_LENGTH: f64 = 1e-9;
 /// Fraction of a span over which a difference of the prescribed motion gives its rates.
@@ -34,8 +31,6 @@ const RATE_FRACTION: f64 = 1.0 / 64.0;
 /// Fraction of the angular scale of a shape over which a cubic represents it, with an error below 1e-4 of the smallest
 /// clearance.
 const CUBIC_TURN: f64 = 0.125;
-/// Code of a flight without an end.
-const UNBOUNDED_FLIGHT: f64 = 3.0;
 
 /// An accepted step that has not ended. The modes are those at its start.
 #[derive(Debug, Clone, Copy)]
@@ -66,7 +61,7 @@ pub(super) struct SpanProgress {
 
 impl OpenStep {
     /// Returns whether this is a flight without an end: no contact is possible until an input changes.
-    fn is_unbounded(&self) -> bool {
+    pub(super) fn is_unbounded(&self) -> bool {
         self.step.length == f64::INFINITY
     }
 }
@@ -343,131 +338,17 @@ impl BladeInSpan<'_> {
     pub fn energy(&self) -> f64 {
         self.open.map_or(0.0, |open| open.energy)
     }
-
-    /// Stores the rates of the gaps and, if it has changed, the open step in an array with a length of [`stored_len`].
-    pub fn store(&mut self, numbers: &mut [f64]) {
-        let (head, arrays) = numbers.split_at_mut(HEADER_LEN);
-        let (rates, arrays) = arrays.split_at_mut(8 * self.blade.trial.rates.len());
-        let blocks = self.blade.trial.rates.iter().zip(rates.as_chunks_mut().0);
-        blocks.for_each(|(block, numbers)| *numbers = block.0);
-        if !self.has_changed {
-            return;
-        }
-        let Some(OpenStep { step, kind, is_resolved, work, energy, banked }) = self.open else { return };
-        let flag = |is: bool| f64::from(u8::from(is));
-        let SpanProgress { spans, done, effort } = self.progress;
-        let code = match kind {
-            None => 0.0,
-            Some(ForceInterpolation::Polynomial) => 1.0,
-            Some(ForceInterpolation::Constant) => 2.0,
-        };
-        let code = if self.open.is_some_and(|open| open.is_unbounded()) { UNBOUNDED_FLIGHT } else { code };
-        let counts = [effort.steps, effort.flights, effort.trials, effort.unsolved];
-        let more = [effort.constant, effort.missed, effort.factorisations];
-        let values = [1.0, to_real(spans), to_real(done), to_real(step.level as u64), code]
-            .into_iter()
-            .chain([is_resolved, self.known, self.reach_known, self.blade.trial.pushes].map(flag))
-            .chain([flag(self.blade.trial.start.pushed), energy])
-            .chain([
-                work.shaft,
-                work.casing,
-                work.heat,
-                work.closing,
-                work.dropped,
-                work.exact,
-                work.turnover,
-                work.moved,
-            ])
-            .chain(counts.map(to_real))
-            .chain(more.map(to_real))
-            .chain([banked]);
-        head.iter_mut().zip(values).for_each(|(to, value)| *to = value);
-        self.blade.trial.for_each_stored_block(kind.is_some(), arrays, |block, numbers| *numbers = block.0);
-    }
-
-    /// Reads the open step from an array. Returns false if the array contains none.
-    pub fn recall(&mut self, numbers: &mut [f64]) -> bool {
-        if numbers[0] == 0.0 {
-            return false;
-        }
-        self.has_changed = false;
-        let counter = |index: usize| to_count(numbers[index]);
-        let is = |index: usize| numbers[index] != 0.0;
-        let level = usize::try_from(counter(3)).unwrap_or(0).min(HALVINGS);
-        let effort = Effort {
-            steps: counter(19),
-            flights: counter(20),
-            trials: counter(21),
-            unsolved: counter(22),
-            constant: counter(23),
-            missed: counter(24),
-            factorisations: counter(25),
-        };
-        self.progress = SpanProgress { spans: counter(1), done: counter(2).min(UNITS_PER_SPAN - 1), effort };
-        let kind = match counter(4) {
-            0 | 3 => None,
-            2 => Some(ForceInterpolation::Constant),
-            _ => Some(ForceInterpolation::Polynomial),
-        };
-        (self.known, self.reach_known) = (is(6), is(7));
-        let trial = &mut self.blade.trial;
-        (trial.pushes, trial.start.pushed) = (is(8), is(9));
-        let work = ContactWork {
-            shaft: numbers[11],
-            casing: numbers[12],
-            heat: numbers[13],
-            closing: numbers[14],
-            dropped: numbers[15],
-            exact: numbers[16],
-            turnover: numbers[17],
-            moved: numbers[18],
-            ..ContactWork::default()
-        };
-        let mut step = SpanStep::new(level, self.progress.done);
-        if numbers[4] == UNBOUNDED_FLIGHT {
-            step.length = f64::INFINITY;
-        }
-        self.open = Some(OpenStep { step, kind, is_resolved: is(5), work, energy: numbers[10], banked: numbers[26] });
-        let (_, arrays) = numbers.split_at_mut(HEADER_LEN);
-        let (rates, arrays) = arrays.split_at_mut(8 * trial.rates.len());
-        trial.rates_before.iter_mut().zip(rates.as_chunks().0).for_each(|(block, numbers)| block.0 = *numbers);
-        trial.for_each_stored_block(kind.is_some(), arrays, |block, numbers| block.0 = *numbers);
-        true
-    }
-}
-
-/// Length of an array that stores an open step of a blade with these numbers of nodes and of modes with inertia.
-pub(crate) fn stored_len(nodes: usize, modes: usize) -> usize {
-    HEADER_LEN + 8 * ((12 + 7 * MOST) * Eight::blocks(nodes) + (2 + MOST) * Eight::blocks(modes))
-}
-
-impl BladeTrial {
-    /// Calls a function with each block of an open step and its place in an array. A flight without a trial has no values at
-    /// the points of a step.
-    fn for_each_stored_block(&mut self, is_tried: bool, numbers: &mut [f64], of: impl Fn(&mut Eight, &mut [f64; 8])) {
-        let Self { start, moved, sigma, gaps, multipliers, forces, modal_forces, reach, .. } = self;
-        let contacts = [&mut start.multipliers, &mut start.slopes, &mut start.gaps, &mut start.sigma];
-        let all = start.modes.iter_mut().chain(&mut start.forces).chain(&mut start.moved).chain(contacts).chain(reach);
-        let lanes =
-            [sigma, gaps, multipliers, &mut start.friction].into_iter().chain(moved).chain(forces).chain(modal_forces);
-        let mut rest = numbers.as_chunks_mut().0;
-        for blocks in all.chain(lanes.filter(|_| is_tried)) {
-            let (own, others) = rest.split_at_mut(blocks.len());
-            blocks.iter_mut().zip(own).for_each(|(block, numbers)| of(block, numbers));
-            rest = others;
-        }
-    }
 }
 
 /// Converts a count to a real number.
 #[expect(clippy::cast_precision_loss, reason = "counts are below 2^52")]
-fn to_real(value: u64) -> f64 {
+pub(super) fn to_real(value: u64) -> f64 {
     value as f64
 }
 
 /// Converts a stored real number to a count.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "conversion saturates, and NaN becomes 0")]
-fn to_count(value: f64) -> u64 {
+pub(super) fn to_count(value: f64) -> u64 {
     value as u64
 }
 
