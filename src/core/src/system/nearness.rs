@@ -66,18 +66,18 @@ impl Nearness {
 
     /// Returns whether gaps may be skipped.
     #[inline(always)]
-    pub fn is_used(&self) -> bool {
+    pub(crate) fn is_used(&self) -> bool {
         !self.free.is_empty() && !self.is_suspended
     }
 
     /// Returns whether the current gap of a node is a lower bound.
     #[inline(always)]
-    pub fn is_skipped(&self, index: usize) -> bool {
+    pub(crate) fn is_skipped(&self, index: usize) -> bool {
         self.skipped.get(index).copied().unwrap_or(false)
     }
 
     /// Evaluates all gaps in every step from now on, or no longer.
-    pub fn suspend(&mut self, is_suspended: bool) {
+    pub(crate) fn suspend(&mut self, is_suspended: bool) {
         self.is_suspended = is_suspended;
         if is_suspended {
             self.clear();
@@ -92,7 +92,7 @@ impl Nearness {
 
     /// Free distance of a node after node and surface have moved by at most `travel` (m).
     #[inline(always)]
-    pub fn free_after(&self, index: usize, travel: f64) -> f64 {
+    pub(crate) fn free_after(&self, index: usize, travel: f64) -> f64 {
         self.free[index] - travel
     }
 

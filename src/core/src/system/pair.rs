@@ -51,7 +51,7 @@ persist_fields!(Prescribed { drive, motion, begun, growth });
 impl Prescribed {
     /// Motion at the start, in the middle and at the end of an interval of a steady phase, and growth of the shape over
     /// it. The interval begins at `from` (s since the start of the phase) and has a length (s).
-    pub fn in_steady_phase(&self, from: f64, length: f64) -> ([PrescribedMotion; 3], ShapeGrowth) {
+    pub(crate) fn in_steady_phase(&self, from: f64, length: f64) -> ([PrescribedMotion; 3], ShapeGrowth) {
         let (Self { begun, growth: [elapsed, duration], .. }, from_angle) = (self, self.begun.speed * from);
         let grown = elapsed + from;
         let at = |after: f64| PrescribedMotion {

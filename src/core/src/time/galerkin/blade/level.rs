@@ -169,7 +169,7 @@ impl BladeLevel {
 
     /// Displacements of all lanes per unit force on a node at the start of the step, in the order of [`Self::column`].
     #[inline(always)]
-    pub fn start_column(&self, node: usize) -> [&[Eight]; 4] {
+    pub(crate) fn start_column(&self, node: usize) -> [&[Eight]; 4] {
         let columns = &self.start_columns[4 * node * self.blocks..][..4 * self.blocks];
         quarters(columns, self.blocks)
     }

@@ -86,7 +86,7 @@ impl BladeInSpan<'_> {
     ///
     /// # Errors
     /// [`Stopped`] if a step is not solved.
-    pub fn integrate_steady_interval(
+    pub(crate) fn integrate_steady_interval(
         &mut self,
         interval: SteadyInterval,
         course: impl Fn(u64) -> MotionCourse,
@@ -208,7 +208,7 @@ impl BladeInSpan<'_> {
     }
 
     /// Writes the state at the end of an interval of the steady phase, which the open step contains.
-    pub fn write_sample(
+    pub(crate) fn write_sample(
         &mut self,
         interval: SteadyInterval,
         course: impl Fn(u64) -> MotionCourse,
@@ -354,7 +354,7 @@ pub(super) fn to_count(value: f64) -> u64 {
 
 impl ModeResponse {
     /// Allocates the cached responses of the modes.
-    pub fn allocate_cache(rows: &BladeRows) -> Vec<Self> {
+    pub(crate) fn allocate_cache(rows: &BladeRows) -> Vec<Self> {
         vec![Self::new(rows); CACHED_RESPONSES]
     }
 }

@@ -101,13 +101,13 @@ impl Blade {
     }
 
     /// Starts a span of all sectors, with gaps (m) of all nodes in rows of `lanes` lanes.
-    pub fn begin_span(&mut self, gaps: &[f64], lanes: usize, sectors: usize) {
+    pub(crate) fn begin_span(&mut self, gaps: &[f64], lanes: usize, sectors: usize) {
         let smallest = |row: &[f64]| row[..sectors].iter().copied().fold(f64::INFINITY, f64::min);
         Eight::spread(gaps.chunks_exact(lanes).map(smallest), f64::NEG_INFINITY, &mut self.lowest);
     }
 
     /// Starts a span of a sector with these gaps (m) of its nodes, and finds which smallest gaps are needed.
-    pub fn choose_minima(&mut self, needed: &NeededMinima, sector: usize, gap: impl Fn(usize) -> f64) {
+    pub(crate) fn choose_minima(&mut self, needed: &NeededMinima, sector: usize, gap: impl Fn(usize) -> f64) {
         let Self { kinds, tally, lowest, begun, floors, .. } = self;
         let nodes = kinds[0].rows.nodes;
         Eight::spread((0..nodes).map(&gap), f64::INFINITY, begun);
@@ -125,7 +125,7 @@ impl Blade {
     }
 
     /// Returns whether steps can pass internal points in a steady phase. All modes must have a frequency above zero.
-    pub fn supports_steady_phase(&self) -> bool {
+    pub(crate) fn supports_steady_phase(&self) -> bool {
         let mut modes = self.kinds.iter().flat_map(|tables| &tables.rows.rates[1]).flat_map(|block| block.0);
         modes.all(f64::is_finite)
     }
@@ -207,7 +207,7 @@ impl<'a> BladeInSpan<'a> {
     }
 
     /// Returns whether a gap of the last trial in this span is not a number.
-    pub fn is_lost(&self) -> bool {
+    pub(crate) fn is_lost(&self) -> bool {
         self.blade.trial.is_lost(self.tried)
     }
 

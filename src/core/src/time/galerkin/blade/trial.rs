@@ -172,7 +172,7 @@ impl BladeTrial {
     }
 
     /// Selects the sector whose nodes have these angles.
-    pub fn turn_to(&mut self, angles: &NodeAngles) {
+    pub(crate) fn turn_to(&mut self, angles: &NodeAngles) {
         self.angles.copy_from_slice(&angles.angles);
         self.directions_of_nodes[0].copy_from_slice(&angles.sines);
         self.directions_of_nodes[1].copy_from_slice(&angles.cosines);
@@ -237,14 +237,14 @@ impl BladeTrial {
     }
 
     /// Computes the modal forces of the tried step.
-    pub fn find_modal_forces(&mut self, rows: &BladeRows, level: &BladeLevel) {
+    pub(crate) fn find_modal_forces(&mut self, rows: &BladeRows, level: &BladeLevel) {
         self.instructions.run_octets(FindModalForces { trial: self, rows, level });
     }
 
     /// Finds the nodes that may come closer between the points of the tried step than at the points, by more than a
     /// fraction of `tolerance` (m), and whose smallest gap may be below `floors` (m). Returns whether there are such
     /// nodes, and records the gaps of the others. There are none if the tolerance is infinite.
-    pub fn find_minima(
+    pub(crate) fn find_minima(
         &mut self,
         (rows, level): (&BladeRows, &BladeLevel),
         tally: &mut BladeTally,
@@ -290,19 +290,19 @@ impl BladeTrial {
     }
 
     /// Makes the contacts at the end of the tried step the contacts at the start of the next step.
-    pub fn begin_next_step(&mut self, rows: &BladeRows, level: &BladeLevel) {
+    pub(crate) fn begin_next_step(&mut self, rows: &BladeRows, level: &BladeLevel) {
         self.instructions.run_octets(BeginNextStep { trial: self, rows, level });
     }
 
     /// Finds the largest closing and circumferential displacement of each node (m) at any time without contact.
-    pub fn find_reach(&mut self, rows: &BladeRows) {
+    pub(crate) fn find_reach(&mut self, rows: &BladeRows) {
         self.instructions.run_octets(FindReach { trial: self, rows });
     }
 
     /// Bounds the gaps while the rotor turns past the resting surface, from the angle of the first drive to that of the
     /// second. A smallest gap is needed if it is below `floors` and below `lowest`, the smallest gap so far (m); the
     /// followed nodes are then those whose smallest gaps are needed.
-    pub fn find_clearance(
+    pub(crate) fn find_clearance(
         &mut self,
         rows: &BladeRows,
         faced: &FacedSurface,
@@ -335,7 +335,7 @@ impl BladeTrial {
     }
 
     /// Returns whether a gap of the tried step, which has this number of blocks of lanes, is not a number.
-    pub fn is_lost(&self, blocks: usize) -> bool {
+    pub(crate) fn is_lost(&self, blocks: usize) -> bool {
         self.gaps[..blocks].iter().any(|block| block.0.iter().any(|gap| gap.is_nan()))
     }
 
@@ -345,7 +345,7 @@ impl BladeTrial {
     }
 
     /// True if a force acts at the start of the step.
-    pub fn is_pushed(&self) -> bool {
+    pub(crate) fn is_pushed(&self) -> bool {
         self.start.pushed
     }
 }

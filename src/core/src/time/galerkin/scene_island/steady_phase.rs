@@ -12,7 +12,7 @@ use crate::time::galerkin::record::MotionCourse;
 
 impl SceneIsland {
     /// Returns whether the steps of the sectors can pass internal points in a steady phase.
-    pub fn supports_steady_phase(&self) -> bool {
+    pub(crate) fn supports_steady_phase(&self) -> bool {
         self.open_step_len > 0
     }
 
@@ -20,7 +20,7 @@ impl SceneIsland {
     ///
     /// # Errors
     /// [`StepFailure`]; the state is then undefined.
-    pub fn integrate_steady_interval(
+    pub(crate) fn integrate_steady_interval(
         &mut self,
         system: &mut System,
         interval: SteadyInterval,
@@ -100,7 +100,7 @@ impl SceneIsland {
     ///
     /// # Errors
     /// [`StepFailure`]; the state is then undefined.
-    pub fn close_steps(&mut self, system: &mut System, interval: SteadyInterval) -> Result<(), StepFailure> {
+    pub(crate) fn close_steps(&mut self, system: &mut System, interval: SteadyInterval) -> Result<(), StepFailure> {
         for turn in 0..self.turns {
             self.aim(turn, &system.structures);
             let System { structures, pairs, counted, .. } = &mut *system;
