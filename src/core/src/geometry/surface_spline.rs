@@ -23,7 +23,6 @@
 mod creases;
 mod foot;
 mod interpolation;
-pub(crate) mod motion;
 mod patch;
 mod projection;
 

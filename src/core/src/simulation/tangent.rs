@@ -67,14 +67,11 @@ impl Simulation {
         self.state.values.value_of(Quantity::StepDerivatives, 0) > 1.5
     }
 
-    /// Allocates the state at the start of steps and lets all gaps be evaluated, if derivatives will be requested.
+    /// Allocates the state at the start of steps, if derivatives will be requested.
     pub(super) fn make_room_for_tangent(&mut self) {
         let size = if self.is_differentiated() { self.state_size } else { 0 };
         self.tangent.start.resize(size, 0);
         self.tangent.renew();
-        // Derivatives compare all gaps of two runs.
-        let structures = self.system.structures_mut().iter_mut();
-        structures.for_each(|structure| structure.nearness.suspend(size > 0));
     }
 
     /// Saves the state at the start of a communication step. Does not allocate.

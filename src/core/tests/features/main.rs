@@ -18,6 +18,5 @@ mod heat;
 mod initial;
 
 mod pairs;
-mod skipped;
 mod stress;
 mod support;
