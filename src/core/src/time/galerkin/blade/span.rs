@@ -136,6 +136,9 @@ impl Blade {
     }
 }
 
+/// The reach without contact is found again after this number of spans of a steady phase.
+const REACH_SPANS: u64 = 64;
+
 /// A sector of a blade during a span.
 pub(crate) struct BladeInSpan<'a> {
     pub(super) blade: &'a mut Blade,
@@ -371,7 +374,9 @@ impl SpanSteps for BladeInSpan<'_> {
         if self.blade.trial.is_pushed() || !self.place.course.only_turns() {
             return false;
         }
-        if !self.reach_known {
+        // Vibration decays in long flights.
+        let is_due = self.progress.done == 0 && self.progress.spans.is_multiple_of(REACH_SPANS);
+        if !self.reach_known || is_due && matches!(self.recorded, RecordScope::Interval(_)) {
             self.blade.trial.find_reach(&self.blade.kinds[self.place.kind].rows);
             self.reach_known = true;
         }
