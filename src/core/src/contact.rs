@@ -173,10 +173,15 @@ impl Law {
         }
     }
 
-    /// Calls [`ContactLaw::fill_directions`].
+    /// Calls [`ContactLaw::fill_directions`] for all contacts; `rows` and `columns` are those of the matrix.
     #[inline(always)]
-    pub(crate) fn fill_directions(&self, at: &impl ContactPrediction, rows: &mut [Vector3], columns: &mut [Vector3]) {
-        each_law!(self, law => law.fill_directions(at, rows, columns));
+    pub(crate) fn fill_all<P: ContactPrediction>(
+        &self,
+        rows: &mut [Vector3],
+        columns: &mut [Vector3],
+        contacts: impl Iterator<Item = P>,
+    ) {
+        each_law!(self, law => fill_all(law, rows, columns, contacts));
     }
 
     /// Calls [`ContactLaw::pose`] for all contacts; `rows` are all rows of the matrix.
@@ -193,6 +198,21 @@ fn pose_all<L: ContactLaw, P: ContactPrediction>(law: &mut L, rows: &[Vector3], 
     let directions = law.directions();
     for (contact, at) in contacts.enumerate() {
         law.pose(contact, &rows[directions * contact..][..directions], &at);
+    }
+}
+
+/// Fills the directions of all contacts of one law.
+#[inline(always)]
+fn fill_all<L: ContactLaw, P: ContactPrediction>(
+    law: &L,
+    rows: &mut [Vector3],
+    columns: &mut [Vector3],
+    contacts: impl Iterator<Item = P>,
+) {
+    let directions = law.directions();
+    for (contact, at) in contacts.enumerate() {
+        let span = directions * contact..directions * (contact + 1);
+        law.fill_directions(&at, &mut rows[span.clone()], &mut columns[span]);
     }
 }
 

@@ -91,6 +91,7 @@ impl Geometry {
     }
 
     /// Sets the unit normal of one node of one lane.
+    #[inline(always)]
     fn set_normal(&mut self, index: usize, normal: Vector3) {
         self.normal.iter_mut().zip(&normal).for_each(|(values, value)| values[index] = *value);
     }
@@ -382,6 +383,7 @@ impl GapLaw {
 
     /// Returns the sliding of the master along the surface, of a node displaced by `moved` (m, own directions). On surfaces around an axis
     /// axial slip is neglected, as in section 4.3 of the paper.
+    #[inline(always)]
     pub(crate) fn sliding(&self, at: At<'_>, moved: Vector3, vibration: Vibration, normal: Vector3) -> Sliding {
         let velocity = self.rigid_velocity(at, moved) + vibration.node - vibration.surface;
         match self {

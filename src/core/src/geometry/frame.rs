@@ -20,11 +20,13 @@ impl PolarFrame {
     }
 
     /// Returns the (radial, tangential, axial) components of a vector given in fixed directions.
+    #[inline(always)]
     pub fn local(self, v: Vector3) -> Vector3 {
         Vector3::new(v[0] * self.cosine + v[1] * self.sine, v[1] * self.cosine - v[0] * self.sine, v[2])
     }
 
     /// Returns the fixed components of a vector given as (radial, tangential, axial).
+    #[inline(always)]
     pub fn fixed(self, v: Vector3) -> Vector3 {
         Vector3::new(v[0] * self.cosine - v[1] * self.sine, v[0] * self.sine + v[1] * self.cosine, v[2])
     }

@@ -221,12 +221,9 @@ impl ContactGroup {
     /// Fills and solves the problem of the members.
     fn find_forces(&mut self, bodies: &Bodies, found: &mut GroupSolution) -> Result<(), StepFailure> {
         let per = self.law.directions();
-        for (contact, &member) in self.members.iter().enumerate() {
-            let at = bodies.pose(member);
-            at.check()?;
-            let span = per * contact..per * (contact + 1);
-            self.law.fill_directions(&at, &mut self.rows[span.clone()], &mut self.columns[span]);
-        }
+        self.members.iter().try_for_each(|&member| bodies.pose(member).check())?;
+        let contacts = self.members.iter().map(|&member| bodies.pose(member));
+        self.law.fill_all(&mut self.rows, &mut self.columns, contacts);
         self.law.begin(self.members.len());
         self.fill_delassus(bodies, per);
         self.law.pose_all(&self.rows, self.members.iter().map(|&member| bodies.pose(member)));

@@ -386,7 +386,7 @@ impl Trial {
         let values = LaneValues { lanes, without, multipliers, normals, moved };
         let prediction = LanePrediction { sliding, ..values.prediction(lane, obstacle) };
         let (mut row, mut column) = ([Vector3::zeros()], [Vector3::zeros()]);
-        self.law.fill_directions(&prediction, &mut row, &mut column);
+        self.law.fill_all(&mut row, &mut column, std::iter::once(prediction));
         let ([row], [direction]) = (row, column);
         self.rows[self.members.len()] = row;
         lanes.set(&mut self.directions, lane, direction);

@@ -146,7 +146,7 @@ impl Trial {
         let (mut axes, mut columns) = ([Vector3::zeros(); 3], [Vector3::zeros(); 3]);
         let Self { without, multipliers, normals, moved, .. } = &*self;
         let values = LaneValues { lanes, without, multipliers, normals, moved };
-        self.law.fill_directions(&values.prediction(lane, obstacle), &mut axes, &mut columns);
+        self.law.fill_all(&mut axes, &mut columns, std::iter::once(values.prediction(lane, obstacle)));
         own.axes[lane] = axes;
         self.members.push(lane);
         let columns = [0, 1, 2].map(|component| 3 * (lanes.nodes + lane) + component);
