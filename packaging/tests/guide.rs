@@ -10,9 +10,14 @@ use std::{collections::BTreeSet, fs, path::Path, process::Command};
 
 use guide::{blocks, holds, missing, numbers, pages, print_row};
 
-/// Returns the output of `tiprub ...`, line by line.
+/// Returns the output of `tiprub ...`, line by line. The command may use the scene file of the page "First scene".
 fn run(command: &str) -> Vec<String> {
-    run_in(tempfile::tempdir().unwrap().path(), command)
+    let root = tempfile::tempdir().unwrap();
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/first-scene.md");
+    let page = fs::read_to_string(page).unwrap();
+    let scene = page.split("```toml\n").nth(1).unwrap().split("```").next().unwrap();
+    fs::write(root.path().join("my_scene.toml"), scene).unwrap();
+    run_in(root.path(), command)
 }
 
 fn run_in(directory: &Path, command: &str) -> Vec<String> {

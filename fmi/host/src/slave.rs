@@ -86,7 +86,7 @@ pub(super) fn check(function: &str, time: Option<f64>, status: i32, messages: &M
 macro_rules! call {
     ($slave:ident.$function:ident($($argument:expr),* $(,)?), $time:expr) => {{
         // SAFETY: the instance is alive, and its functions are called in the order that the standard requires. Every
-        // pointer points to as many values as the count beside it states, or to one value.
+        // pointer refers to a single value, or to an array with as many values as the count that is passed with it.
         let status = unsafe { ($slave.api.$function)($slave.instance $(, $argument)*) };
         $crate::slave::check(stringify!($function), $time, status, &$slave.messages)
     }};

@@ -108,8 +108,9 @@ topics! {
         "Use the solver `coulomb` or a higher speed.";
     StiffnessAtRest "stiffness-at-rest"
         "The rotor turns faster than a fifth of its first natural frequency, but the scene uses its stiffness at rest."
-        "Set `spin = { stiffening = true, growth = true }` with a ROM that has spin matrices. No action is needed if \
-         the scene already has the gap and the stiffness at speed.";
+        "Reduce the blade with `--spin SPEED`, set `spin = { stiffening = true, growth = true }` for the structure, and \
+         use the scheme `modal-exact` with a `time.step`. No action is needed if the scene already has the gap and the \
+         stiffness at speed.";
     RigidContact "rigid-contact"
         "The quasi-static modes have no flexibility in some directions of the contact nodes, and contact in these \
          directions loses energy."

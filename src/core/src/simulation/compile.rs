@@ -363,7 +363,10 @@ impl Compiled {
                 shown(speed),
                 shown(spin.largest_speed)
             ),
-            "Reduce the structure again with a larger speed (`tiprub reduce --spin`), or remove `spin`",
+            format!(
+                "Reduce the structure again with the option `--spin {}`, or remove `spin`",
+                shown(speed.abs().ceil())
+            ),
         ))
     }
 

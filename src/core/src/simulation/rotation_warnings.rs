@@ -18,6 +18,11 @@ use crate::scene::shape::CompiledShape;
 /// (865 Hz at rest, 1102 Hz at 1800 rad/s), so at 0.2 a fifth of its stiffness is neglected.
 const SLOW: f64 = 0.2;
 
+/// Scene settings that include the effects of spin. The step suits built-in blades; the start rejects a step that is too
+/// long, with the longest one that is accepted.
+const SPIN_SETTINGS: &str = "set `spin = { stiffening = true, growth = true }` for the structure, and \
+                             `scheme = \"modal-exact\"` and `step = 2.5e-7` under `[time]`";
+
 /// Angles at which a shape is sampled.
 const ANGLES: u32 = 720;
 
@@ -72,17 +77,19 @@ impl Compiled {
         }
         let problem = format!(
             "{} starts at a speed of {} rad/s, {ratio:.2} times its first natural frequency, but has the stiffness of a rotor \
-             at rest. Centrifugal stiffening and growth can change contact forces by tens of per cent",
+             at rest. Centrifugal stiffening and growth can change contact forces by tens of per cent, and those of a light \
+             rub several times",
             self.rotor_name(body),
             shown(speed),
         );
         let remedy = if rom.extras.spin.is_some() {
-            "Set `spin = { stiffening = true, growth = true }` for the structure and `time.scheme = \"modal-exact\"`"
+            format!("In the scene, {SPIN_SETTINGS}")
         } else if self.bodies[body].disk.is_some() {
             "Reduce matrices that were computed at speed and silence this warning, because coupled sectors do not \
              support spin effects"
+                .to_owned()
         } else {
-            "Use a ROM with spin matrices (reduce --spin), `spin = { stiffening = true, growth = true }` and `time.scheme = \"modal-exact\"`"
+            format!("Reduce the blade with the option `--spin {}`, {SPIN_SETTINGS}", shown(speed.abs().ceil()))
         };
         Some(Warning::new(Topic::StiffnessAtRest, problem, remedy))
     }

@@ -174,9 +174,9 @@ fn warns_of_fast_rotor_with_stiffness_at_rest() {
     };
     scene.settings.silence.clear();
     scene.settings.time.scheme = Scheme::ModalExact;
-    assert!(remedy(&scene).unwrap().contains("reduce --spin"));
+    assert!(remedy(&scene).unwrap().contains("option `--spin "));
     scene.roms[0].extras.spin = Some(models::spin(scene.roms[0].order()));
-    assert!(remedy(&scene).unwrap().starts_with("Set `spin"));
+    assert!(remedy(&scene).unwrap().starts_with("In the scene, set `spin"));
     scene.settings.structures[0].spin.growth = true;
     assert!(remedy(&scene).is_some(), "growth alone leaves the stiffness of rest");
     scene.settings.structures[0].spin.stiffening = true;

@@ -223,7 +223,7 @@ fn derivatives_match_the_surface_point() {
 }
 
 #[test]
-fn virtual_work_is_the_same_on_the_surface_and_on_its_control_points() {
+fn virtual_work_agrees_on_surface_and_control_points() {
     let mut random = SeededRandom(4);
     let mut worst: f64 = 0.0;
     for (surface, _) in every_surface() {

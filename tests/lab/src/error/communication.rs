@@ -36,7 +36,7 @@ fn record(
     let interval = SHORTEST * multiple as f64;
     scene.settings.experiment.communication_step = interval;
     let time = &mut scene.settings.time;
-    (time.scheme, time.step, time.tolerance) = (Scheme::Galerkin, ADAPTIVE_STEP.min(interval), Some(tolerance));
+    (time.scheme, time.step, time.tolerance) = (Scheme::Galerkin, ADAPTIVE_STEP, Some(tolerance));
     scene.settings.contacts.iter_mut().for_each(|contact| contact.solver = Solver::Lcp);
     let mut simulation = Simulation::new(&scene)?;
     simulation.initialise(0.0)?;

@@ -216,7 +216,7 @@ static ROMS: &[FeatureRule] = rules! {
         "Use a ROM with sectors = 1";
     [STIFFENING, GROWTH, CORIOLIS] needs ("spin matrices in the ROM", |at| at.rom().extras.spin.is_some()),
         "they describe the effect of the speed on the structure",
-        "Reduce it with `tiprub reduce --spin`, or remove the line";
+        "Reduce it with the option `--spin SPEED` (largest speed, rad/s), or remove the line";
     [FACTORS, STIFFENING, CORIOLIS, SOFTENING] excludes COUPLED,
         "nodal-diameter modes assume identical sectors and do not depend on speed or temperature",
         "Remove the line, or use a ROM of uncoupled sectors (without harmonics)";
