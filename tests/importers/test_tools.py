@@ -50,7 +50,7 @@ def test_fmpy(paper, told, kind, fmi):
     columns = {}
     for name in OUTPUTS:
         columns[name] = result[name] if name in result.dtype.names else result[name.removesuffix("[2]")][:, 1]
-    told("FMPy", version_of("fmpy"), fmi, f"validated without a word; {judged(paper, columns)}")
+    told("FMPy", version_of("fmpy"), fmi, f"validated without errors; {judged(paper, columns)}")
 
 
 def references(file):
@@ -184,8 +184,8 @@ def test_fmi_sim(paper, told, tmp_path, kind, fmi):
     command += ["-s", "0", "-f", repr(STEP * STEPS), "--output-interval", repr(STEP)]
     run = subprocess.run(command, capture_output=True, text=True)
     if version == "0.7.0" and 'unknown field "quantity"' in run.stderr:
-        told("fmi-sim (rust-fmi)", version, fmi, "refused by its reader, which knows no quantity or unit of a variable")
-        pytest.skip("fmi-sim 0.7.0 knows no quantity or unit of a variable of FMI 3.0")
+        told("fmi-sim (rust-fmi)", version, fmi, "rejected: its reader does not support quantities and units of variables")
+        pytest.skip("fmi-sim 0.7.0 does not support quantities and units of variables of FMI 3.0")
     assert run.returncode == 0, run.stderr[-2000:]
     header, *rows = [line.split(",") for line in out.read_text().splitlines()]
     header = [name.strip('"') for name in header]
@@ -226,7 +226,7 @@ def test_fmi_library(paper, told, tmp_path, kind, fmi):
     assert words == [] and (fmi != "2.0" or run.stderr == ""), run.stderr
     # Each release tells its major and minor version by the name of its library.
     version = Path(library).resolve().name.split(".so.")[-1]
-    told("FMI Library", version, fmi, "read without a warning" + (" but of terminals" if run.stderr else ""))
+    told("FMI Library", version, fmi, "read without a warning" + (", except about terminals" if run.stderr else ""))
 
 
 def test_fmpy_sees_the_platforms(paper):

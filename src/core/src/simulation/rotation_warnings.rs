@@ -77,8 +77,8 @@ impl Compiled {
         }
         let problem = format!(
             "{} starts at a speed of {} rad/s, {ratio:.2} times its first natural frequency, but has the stiffness of a rotor \
-             at rest. Centrifugal stiffening and growth can change contact forces by tens of per cent, and those of a light \
-             rub several times",
+             at rest. Centrifugal stiffening and growth can double contact forces, and change the heat of a light rub \
+             several times",
             self.rotor_name(body),
             shown(speed),
         );
