@@ -75,7 +75,13 @@ pub(super) fn build(
     target: &Path,
     console: &Console,
 ) -> Result<PathBuf> {
-    let task = console.task("Building the FMU library", None);
+    let task = console.task(
+        match kind {
+            LibraryBuild::Released => "Building the FMU library (several minutes for new sources)",
+            LibraryBuild::Shared => "Building the FMU library",
+        },
+        None,
+    );
     let failed = |problem: String, remedy: &str| Failure::new("building the FMU library", problem, remedy);
     let mut child = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
         .args(["build", "--package", unit.names().0, "--message-format", "json-render-diagnostics"])
