@@ -150,6 +150,14 @@ impl CompiledShape {
         [value, slope, curvature]
     }
 
+    /// Largest magnitude of the curvature of s (m/rad²).
+    pub(crate) fn largest_curvature(&self) -> f64 {
+        match self {
+            Self::TwoLobe { height, width, .. } => 2.0 * height.abs() / (width * width),
+            _ => self.bumpiness().unwrap_or(0.0),
+        }
+    }
+
     /// Largest curvature with which s may bend below its chord (m/rad²); `None` if s is never negative.
     pub(crate) fn bumpiness(&self) -> Option<f64> {
         match self {
@@ -158,7 +166,7 @@ impl CompiledShape {
             // A bump of negative height only opens the clearance. Between two bumps, s is concave and lies above its
             // chords.
             Self::TwoLobe { height, .. } if *height < 0.0 => None,
-            Self::TwoLobe { height, width, .. } => Some(2.0 * height.abs() / (width * width)),
+            Self::TwoLobe { .. } => Some(self.largest_curvature()),
             Self::Table { curvature, .. } => Some(*curvature),
         }
     }

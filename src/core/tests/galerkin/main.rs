@@ -7,6 +7,7 @@ mod counting;
 mod extremes;
 #[path = "../../../../tests/guide.rs"]
 mod guide;
+mod penetration;
 mod steady_phase;
 mod sticking;
 mod two_numbers;

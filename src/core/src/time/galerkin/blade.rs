@@ -14,6 +14,7 @@ mod accept;
 mod columns;
 mod dense;
 mod follow;
+mod gaps;
 mod judge;
 mod level;
 mod minima;

@@ -1,6 +1,18 @@
 //! Linear combinations of columns and Gaussian elimination, in blocks of eight numbers.
 
 use crate::math::octet::{Eight, Octet};
+use crate::time::galerkin::basis::POINTS;
+
+/// Values of a block of nodes at the start of a step and at its points; `count` values in total.
+#[inline(always)]
+pub(super) fn values_at_points<L: Octet>(start: &[Eight], lanes: &[Eight], block: usize, count: usize) -> [L; POINTS] {
+    let mut values = [L::zero(); POINTS];
+    values[0] = L::load(&start[block]);
+    for point in 1..count {
+        values[point] = L::load(&lanes[(point - 1) * start.len() + block]);
+    }
+    values
+}
 
 /// `sums[p]` = Σ over modes of shape times `modes[p]`, for `B` blocks of nodes from `block`.
 #[inline(always)]
@@ -11,16 +23,39 @@ pub(super) fn add_modes<L: Octet, const P: usize, const B: usize>(
     modes: [&[Eight]; P],
 ) -> [[L; B]; P] {
     let mut sums = [[L::zero(); B]; P];
-    let count = shapes.len() / blocks;
-    for (mode, shape) in shapes.chunks_exact(blocks).enumerate().take(count) {
+    for (k, shapes) in shapes.chunks(8 * blocks).enumerate() {
+        let mut amounts = [&[0.0; 8]; P];
         for p in 0..P {
-            let amount = L::splat(modes[p][mode / 8].0[mode % 8]);
-            for b in 0..B {
-                sums[p][b] = sums[p][b] + L::load(&shape[block + b]) * amount;
+            amounts[p] = &modes[p][k].0;
+        }
+        if shapes.len() == 8 * blocks {
+            // The fixed number of turns needs no checks of bounds.
+            for i in 0..8 {
+                add_mode(&mut sums, &shapes[i * blocks + block..][..B], amounts, i);
+            }
+        } else {
+            for (i, shape) in shapes.chunks_exact(blocks).enumerate() {
+                add_mode(&mut sums, &shape[block..][..B], amounts, i);
             }
         }
     }
     sums
+}
+
+/// Adds the displacements of one mode.
+#[inline(always)]
+fn add_mode<L: Octet, const P: usize, const B: usize>(
+    sums: &mut [[L; B]; P],
+    shape: &[Eight],
+    amounts: [&[f64; 8]; P],
+    i: usize,
+) {
+    for p in 0..P {
+        let amount = L::splat(amounts[p][i]);
+        for b in 0..B {
+            sums[p][b] = sums[p][b] + L::load(&shape[b]) * amount;
+        }
+    }
 }
 
 /// Writes the displacements of all nodes, Σ over modes of shape times `modes[p]`, to the lanes of each point p.

@@ -3,7 +3,7 @@
 use super::columns::displace;
 use super::level::BladeLevel;
 use super::rows::BladeRows;
-use super::surface::FacedSurface;
+use super::surface::{DriveRate, FacedSurface};
 use super::trial::{BladeTrial, StartContacts};
 use crate::math::octet::{Eight, Octet, OctetKernel, both};
 use crate::time::galerkin::basis::POINTS;
@@ -32,7 +32,7 @@ impl ModeResponse {
     /// Computes the response of a kind of sectors after a time (s).
     pub fn compute(&mut self, rows: &BladeRows, kind: usize, time: f64) {
         self.key = (kind, time.to_bits());
-        let [rates, per_frequency, _] = &rows.rates;
+        let [rates, per_frequency, ..] = &rows.rates;
         for (k, (rates, per_frequency)) in rates.iter().zip(per_frequency).enumerate() {
             for (i, (rate, per_frequency)) in rates.0.into_iter().zip(per_frequency.0).enumerate() {
                 let (sine, cosine) = if per_frequency > 0.0 { libm::sincos(time / per_frequency) } else { (0.0, 0.0) };
@@ -58,9 +58,8 @@ pub(super) struct DenseOutput<'a> {
     pub time: f64,
     /// The first drive is the prescribed motion at that time.
     pub faced: &'a FacedSurface<'a>,
-    /// Speed of the rotor relative to the shape (rad/s), and rate of the factor on the shape (1/s).
-    pub relative_speed: f64,
-    pub factor_rate: f64,
+    /// Rates of the prescribed motion at that time.
+    pub rate: DriveRate,
     /// True if forces act in the step.
     pub pushes: bool,
 }
@@ -100,13 +99,15 @@ impl DenseOutput<'_> {
         let BladeTrial { start, sample, modal_forces, .. } = &mut **trial;
         let per_step = 1.0 / level.step;
         for k in 0..rows.mode_blocks {
-            let [a, b, c] = [0, 1, 2].map(|term| L::load(&response.terms[term][k]));
+            let [a, b] = both(|term| L::load(&response.terms[term][k]));
+            let c = L::load(&response.terms[2][k]);
             let [q, v] = both(|of| L::load(&start.modes[of][k]));
             let (square, twice_rate) = (L::load(&rows.rates[2][k]), L::load(&rows.rates[0][k]) * L::splat(2.0));
             let mut steady = [L::zero(); 3];
             if *pushes {
                 let per_square = L::splat(1.0) / square.max(L::splat(f64::MIN_POSITIVE));
-                let [one, two, three] = [0, 1, 2].map(|term| L::load(&modal_forces[term][k]));
+                let [one, two] = both(|term| L::load(&modal_forces[term][k]));
+                let three = L::load(&modal_forces[2][k]);
                 steady[2] = three * L::splat(per_step * per_step) * per_square;
                 steady[1] = (two * L::splat(per_step) - L::splat(2.0) * twice_rate * steady[2]) * per_square;
                 steady[0] = (one - twice_rate * steady[1] - L::splat(2.0) * steady[2]) * per_square;
@@ -163,7 +164,7 @@ impl DenseOutput<'_> {
         let Self { trial, rows, level, faced, pushes, .. } = self;
         let BladeTrial { start, sample, multipliers, gaps, angles, rates, .. } = &mut **trial;
         let drive = &faced.drives[0];
-        let [speed, factor_rate] = [self.relative_speed, self.factor_rate].map(L::splat);
+        let (speed, factor_rate) = (L::splat(self.rate.turned), L::splat(self.rate.factor));
         let slopes = level.basis.slopes_at(self.time / level.step).map(|slope| slope / level.step);
         for block in 0..rows.blocks {
             let per_radius = L::load(&rows.per_radius[block]);

@@ -1,168 +1,291 @@
-//! Smallest gaps within a step, from the motion of all modes at the ends of equal parts of the step, or from gaps and
-//! their rates at two times.
+//! Smallest gaps within a step, from cubics through the exact gaps and their rates at two times.
 
 use super::columns::displace;
 use super::level::BladeLevel;
-use super::minima::{PARTS_FRACTION, fraction};
+use super::minima::{FOLLOW_FRACTION, MAX_HALVINGS, PARTS_FRACTION, amplitude, fraction, interpolation_share};
 use super::rows::BladeRows;
-use super::surface::{FacedSurface, PointDrive};
-use super::tally::BladeTally;
+use super::surface::{DriveRate, FacedSurface, PointDrive};
 use super::trial::BladeTrial;
 use crate::math::octet::{Eight, Octet, OctetKernel, both};
 use crate::time::galerkin::response::TERMS;
-use std::ops::RangeInclusive;
 
 /// Largest number of followed nodes per block of eight whose displacements are computed node by node.
 const FEW_PER_BLOCK: usize = 4;
-/// First three derivatives at the first of five values at equal distances, as weights of the differences of the other four
-/// from the first.
-const END_DERIVATIVES: [[f64; 4]; 3] =
-    [[4.0, -3.0, 4.0 / 3.0, -0.25], [-26.0 / 3.0, 9.5, -14.0 / 3.0, 11.0 / 12.0], [9.0, -12.0, 7.0, -1.5]];
+/// Number of times in a step at which the motion is stored: its ends, and the middle of one part of each length.
+pub(super) const STORED_TIMES: usize = MAX_HALVINGS + 2;
 
-/// Follows the nodes found by [`FindMinima`](super::minima::FindMinima). The modal forces must be known and the modes not yet advanced.
-pub(super) struct Follow<'a> {
+/// Exact motion of the followed nodes at a time within a step.
+#[derive(Debug, Clone)]
+pub(super) struct PathPoint {
+    /// q and q̇.
+    pub modes: [Vec<Eight>; 2],
+    /// Gaps (m) and their rates (m/s).
+    pub gaps: Vec<Eight>,
+    pub rates: Vec<Eight>,
+}
+
+impl PathPoint {
+    /// Allocates for a number of blocks of nodes and of modes.
+    pub fn new(nodes: usize, modes: usize) -> Self {
+        let of = |blocks: usize| vec![Eight::ZERO; blocks];
+        Self { modes: [of(modes), of(modes)], gaps: of(nodes), rates: of(nodes) }
+    }
+}
+
+/// A part of a step: the step is halved `halvings` times, and `index` parts are before it.
+#[derive(Debug, Clone, Copy, Default)]
+struct Part {
+    halvings: usize,
+    index: usize,
+    /// Stored times of its two ends.
+    ends: [usize; 2],
+}
+
+impl Part {
+    /// Its ends, as fractions of the step.
+    #[inline(always)]
+    fn span(&self) -> [f64; 2] {
+        let length = fraction(1, 1 << self.halvings);
+        [fraction(self.index, 1) * length, fraction(self.index + 1, 1) * length]
+    }
+}
+
+/// Follows the nodes found by [`FindMinima`](super::minima::FindMinima): halves the step, and each part again, until the
+/// cubic through the gaps and rates at the ends of a part shows that its smallest gap is not needed, or is accurate
+/// enough to record its minimum. The modal forces must be known and the modes not yet advanced.
+pub(super) struct Follow<'a, D> {
     pub trial: &'a mut BladeTrial,
     pub rows: &'a BladeRows,
     pub level: &'a BladeLevel,
-    /// Tables for the lengths of the step, half of it, and so on to the length of a part.
+    /// Tables for the lengths of the step, half of it, and so on.
     pub halves: &'a [&'a BladeLevel],
     pub faced: &'a FacedSurface<'a>,
-    /// Prescribed motion at the end of each part.
-    pub drives: &'a [PointDrive],
-    pub tally: &'a mut BladeTally,
+    /// Prescribed motion and its rates at a fraction of the step.
+    pub drive_at: D,
+    /// Largest error of the cubic through the shape of the surface over the step (m).
+    pub shape_error: f64,
+    /// Smallest gaps so far (m).
+    pub lowest: &'a mut [Eight],
+    /// Gaps below which the smallest gaps are needed (m).
+    pub floors: &'a [Eight],
+    /// Largest displacement error of a step (m).
+    pub tolerance: f64,
     /// True if forces act in the step.
     pub pushes: bool,
     /// Ends of the part of the step whose gaps are recorded, as fractions of the step.
     pub ends: [f64; 2],
 }
 
-impl OctetKernel for Follow<'_> {
+impl<D: Fn(f64) -> (PointDrive, DriveRate)> OctetKernel for Follow<'_, D> {
     type Output = ();
     #[inline(always)]
     fn run<L: Octet>(mut self) {
-        let parts = self.drives.len() - 1;
         for of in [0, 1] {
-            self.trial.path_modes[of].copy_from_slice(&self.trial.start.modes[of]);
+            self.trial.path[0].modes[of].copy_from_slice(&self.trial.start.modes[of]);
         }
-        let wanted = needed_part_ends(self.ends, parts);
-        self.go_to::<L>(*wanted.start(), parts);
-        for end in wanted.clone() {
-            self.find_gaps::<L>(end, parts);
-            if end < *wanted.end() {
-                self.advance::<L>(self.halves.len() - 1, end, parts);
+        self.find_amplitudes::<L>();
+        self.find_gaps::<L>(0, 0.0);
+        self.advance::<L>(Part { ends: [0, 1], ..Part::default() }, 0);
+        self.find_gaps::<L>(1, 1.0);
+        let mut errors = [f64::NAN; MAX_HALVINGS + 1];
+        let mut left = [Part::default(); MAX_HALVINGS + 1];
+        left[0].ends = [0, 1];
+        let mut count = 1;
+        while count > 0 {
+            count -= 1;
+            let part = left[count];
+            let [begin, end] = part.span();
+            if end <= self.ends[0] || begin >= self.ends[1] {
+                continue;
             }
+            if errors[part.halvings].is_nan() {
+                errors[part.halvings] = self.interpolation_error::<L>(part.halvings);
+            }
+            if !self.needs_halving::<L>(part, errors[part.halvings]) {
+                continue;
+            }
+            let middle = 2 + part.halvings;
+            let [first, last] = part.ends;
+            self.advance::<L>(Part { ends: [first, middle], ..part }, 1);
+            self.find_gaps::<L>(middle, 0.5 * (begin + end));
+            let half = |index: usize, ends: [usize; 2]| Part { halvings: part.halvings + 1, index, ends };
+            left[count] = half(2 * part.index + 1, [middle, last]);
+            left[count + 1] = half(2 * part.index, [first, middle]);
+            count += 2;
         }
-        self.record::<L>(parts, wanted);
     }
 }
 
-impl Follow<'_> {
-    /// Advances the modes from the start of the step to the end of a part, in as few advances as possible.
+impl<D: Fn(f64) -> (PointDrive, DriveRate)> Follow<'_, D> {
+    /// Finds the amplitudes of the modes, times the largest closing displacement of a node per unit.
     #[inline(always)]
-    fn go_to<L: Octet>(&mut self, end: usize, parts: usize) {
-        let mut reached = 0;
-        for halvings in 0..self.halves.len() {
-            let size = parts >> halvings;
-            if reached + size <= end {
-                self.advance::<L>(halvings, reached, parts);
-                reached += size;
-            }
+    fn find_amplitudes<L: Octet>(&mut self) {
+        let BladeTrial { start, modal_forces, amplitudes, .. } = &mut *self.trial;
+        for (k, (target, largest)) in amplitudes.iter_mut().zip(&self.rows.largest).enumerate() {
+            (L::load(largest) * amplitude::<L>(self.rows, start, modal_forces, k, self.pushes)).store(target);
         }
     }
-}
 
-/// Returns the ends of parts whose gaps determine the smallest gaps between two fractions of the step.
-fn needed_part_ends(ends: [f64; 2], parts: usize) -> RangeInclusive<usize> {
-    let [from, to] = ends.map(|end| end * fraction(parts, 1));
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to the few parts")]
-    let (first, last) = (from.floor() as usize, to.ceil() as usize);
-    let first = if last == parts { first.min(parts - 2) } else { first };
-    let last = if first == 0 { last.max(2) } else { last };
-    first.saturating_sub(2)..=(last + 2).min(parts)
-}
-
-impl Follow<'_> {
-    /// Finds the gaps of the followed nodes after `end` of the `parts` parts, without the instantaneous displacements
-    /// that forces on other nodes cause.
+    /// Bounds the error of the cubic over a part (m).
     #[inline(always)]
-    fn find_gaps<L: Octet>(&mut self, end: usize, parts: usize) {
-        self.displace_followed::<L>();
-        let Self { trial, rows, level, faced, drives, pushes, .. } = self;
-        let BladeTrial { start, path_moved, path_gaps, forces, multipliers, angles, followed, .. } = &mut **trial;
-        if *pushes {
-            let weights = level.basis.weights_at(fraction(end, parts));
-            for (along, node) in (0..2).flat_map(|along| (0..rows.nodes).map(move |node| (along, node))) {
-                let (block, i) = (node / 8, node % 8);
-                let mut force = weights[0] * start.forces[along][block].0[i];
-                let mut acts = start.multipliers[block].0[i] > 0.0;
-                for point in 1..=level.points() {
-                    let lane = (point - 1) * rows.blocks + block;
-                    force += weights[point] * forces[along][lane].0[i];
-                    acts |= multipliers[lane].0[i] > 0.0;
-                }
-                if acts {
-                    for (seen, moved) in path_moved.iter_mut().enumerate() {
-                        let column = &rows.flexibility[along][seen][node * rows.blocks..][..rows.blocks];
-                        for (moved, flexibility) in moved.iter_mut().zip(column) {
-                            (L::load(moved) + L::load(flexibility) * L::splat(force)).store(moved);
-                        }
-                    }
-                }
-            }
+    fn interpolation_error<L: Octet>(&self, halvings: usize) -> f64 {
+        let share = fraction(1, 1 << halvings);
+        let (length, shape_error) = (L::splat(self.level.step * share), self.shape_error * share * share * share);
+        let mut error = L::zero();
+        for (amplitude, frequency) in self.trial.amplitudes.iter().zip(&self.rows.rates[3]) {
+            error = error + L::load(amplitude) * interpolation_share(L::load(frequency) * length);
         }
-        let drive = &drives[end];
+        error.total() + shape_error
+    }
+
+    /// Records the smallest gaps within a part if the cubics represent it. Returns whether it must be halved instead.
+    #[inline(always)]
+    fn needs_halving<L: Octet>(&mut self, part: Part, error: f64) -> bool {
+        let length = self.level.step * fraction(1, 1 << part.halvings);
+        let third = L::splat(length / 3.0);
+        let is_last = part.halvings + 1 == self.halves.len();
+        let is_accurate = is_last || error <= PARTS_FRACTION * self.tolerance;
+        let [begin, end] = part.span();
+        let [from, to] = self.ends.map(|fraction| L::splat((fraction - begin) / (end - begin)));
+        let Self { trial, rows, lowest, floors, tolerance, .. } = &mut *self;
+        for block in 0..rows.blocks {
+            let followed = trial.followed[block];
+            if followed == 0 {
+                continue;
+            }
+            let [before, after] = both(|end| &trial.path[part.ends[end]]);
+            let [first, last] = [before, after].map(|point| L::load(&point.gaps[block]));
+            let inner = [first + L::load(&before.rates[block]) * third, last - L::load(&after.rates[block]) * third];
+            let known = L::load(&lowest[block]);
+            let bar = L::load(&floors[block]).min(known) - L::splat(FOLLOW_FRACTION * *tolerance);
+            let dips = may_dip(first.min(last), inner[0].min(inner[1]), error, bar) & followed;
+            if dips == 0 {
+                continue;
+            }
+            if !is_accurate {
+                return true;
+            }
+            let (theta, value) = cubic_minimum([first, inner[0], inner[1], last]);
+            let within = dips & from.less(theta) & theta.less(to);
+            L::select(within, known.min(value), known).store(&mut lowest[block]);
+        }
+        false
+    }
+
+    /// Finds the gaps of the followed nodes and their rates at a stored time, without the instantaneous displacements
+    /// that forces on other nodes cause. Records the gaps if they are within the recorded part of the step.
+    #[inline(always)]
+    fn find_gaps<L: Octet>(&mut self, stored: usize, theta: f64) {
+        self.displace_followed::<L>(stored);
+        if self.pushes {
+            self.add_held::<L>(theta);
+        }
+        let (drive, rate) = (self.drive_at)(theta);
+        let Self { trial, rows, faced, ends, .. } = self;
+        let is_recorded = ends[0] <= theta && theta <= ends[1];
+        let BladeTrial { path, path_moved, angles, followed, .. } = &mut **trial;
         for block in (0..rows.blocks).filter(|block| followed[*block] != 0) {
             let per_radius = L::load(&rows.per_radius[block]);
             let [closing, around] = both(|along| L::load(&path_moved[along][block]));
-            let [shape, slope, _] = faced
-                .surface
-                .evaluate_octet::<L>(L::load(&angles[block]) + L::splat(drive.turned) + around * per_radius);
+            let [closing_rate, around_rate] = both(|along| L::load(&path_moved[along][rows.blocks + block]));
+            let at = L::load(&angles[block]) + L::splat(drive.turned) + around * per_radius;
+            let [shape, slope, _] = faced.surface.evaluate_octet::<L>(at);
             let factor = L::splat(drive.factor);
             let (sigma, steepness) = (slope * factor * per_radius, L::load(&rows.steepness[block]));
-            let open = L::splat(drive.clearance) + shape * factor + closing;
-            let gap = open / (steepness * steepness + sigma * sigma).sqrt();
-            gap.store(&mut path_gaps[end * rows.blocks + block]);
+            let size = (steepness * steepness + sigma * sigma).sqrt();
+            let gap = (L::splat(drive.clearance) + shape * factor + closing) / size;
+            let opening = L::splat(rate.clearance) + shape * L::splat(rate.factor) + closing_rate;
+            let change = (opening + slope * factor * (L::splat(rate.turned) + around_rate * per_radius)) / size;
+            gap.store(&mut path[stored].gaps[block]);
+            change.store(&mut path[stored].rates[block]);
+            if is_recorded {
+                let lowest = L::load(&self.lowest[block]);
+                L::select(followed[block], lowest.min(gap), lowest).store(&mut self.lowest[block]);
+            }
         }
     }
 
-    /// Finds the displacements of the followed nodes, node by node if there are few of them.
+    /// Finds the displacements and velocities of the followed nodes, node by node if there are few of them.
     #[inline(always)]
-    fn displace_followed<L: Octet>(&mut self) {
+    fn displace_followed<L: Octet>(&mut self, stored: usize) {
         let Self { trial, rows, .. } = self;
-        let BladeTrial { path_modes, path_moved, followed, .. } = &mut **trial;
+        let BladeTrial { path, path_moved, followed, .. } = &mut **trial;
+        let modes = &path[stored].modes;
         let count: u32 = followed.iter().map(|nodes| nodes.count_ones()).sum();
-        for (along, moved) in path_moved.iter_mut().enumerate() {
-            if count as usize > FEW_PER_BLOCK * rows.blocks {
-                displace::<L, 1>(&rows.shapes[along], rows.blocks, [&path_modes[0]], moved);
-                continue;
+        if count as usize > FEW_PER_BLOCK * rows.blocks {
+            for (shapes, moved) in rows.shapes.iter().zip(path_moved) {
+                displace::<L, 2>(shapes, rows.blocks, [&modes[0], &modes[1]], moved);
             }
-            for (block, moved) in moved.iter_mut().enumerate() {
-                let mut nodes = followed[block];
-                while nodes != 0 {
-                    let i = nodes.trailing_zeros() as usize;
-                    nodes &= nodes - 1;
-                    let first = (along * rows.nodes + 8 * block + i) * rows.mode_blocks;
-                    let shapes = &rows.by_row[first..][..rows.mode_blocks];
-                    let mut sum = L::zero();
-                    for (shape, mode) in shapes.iter().zip(&path_modes[0]) {
-                        sum = sum + L::load(shape) * L::load(mode);
-                    }
-                    moved.0[i] = sum.total();
+            return;
+        }
+        for block in 0..rows.blocks {
+            let mut nodes = followed[block];
+            while nodes != 0 {
+                let i = nodes.trailing_zeros() as usize;
+                nodes &= nodes - 1;
+                let row = |along: usize| {
+                    &rows.by_row[(along * rows.nodes + 8 * block + i) * rows.mode_blocks..][..rows.mode_blocks]
+                };
+                let shapes = [row(0), row(1)];
+                let mut sums = [L::zero(); 4];
+                for k in 0..rows.mode_blocks {
+                    let [position, velocity] = both(|of| L::load(&modes[of][k]));
+                    let [closing, around] = both(|along| L::load(&shapes[along][k]));
+                    sums[0] = sums[0] + closing * position;
+                    sums[1] = sums[1] + closing * velocity;
+                    sums[2] = sums[2] + around * position;
+                    sums[3] = sums[3] + around * velocity;
+                }
+                for (place, sum) in sums.into_iter().enumerate() {
+                    path_moved[place / 2][(place % 2) * rows.blocks + block].0[i] = sum.total();
                 }
             }
         }
     }
 
-    /// Advances the modes from the end of a part, over the step length halved `halvings` times.
+    /// Adds the quasi-static displacements under the forces at a fraction of the step, and their rates.
     #[inline(always)]
-    fn advance<L: Octet>(&mut self, halvings: usize, end: usize, parts: usize) {
+    fn add_held<L: Octet>(&mut self, theta: f64) {
+        let Self { trial, rows, level, .. } = self;
+        let BladeTrial { start, path_moved, forces, multipliers, .. } = &mut **trial;
+        let (weights, slopes) = (level.basis.weights_at(theta), level.basis.slopes_at(theta));
+        for (along, node) in (0..2).flat_map(|along| (0..rows.nodes).map(move |node| (along, node))) {
+            let (block, i) = (node / 8, node % 8);
+            let first = start.forces[along][block].0[i];
+            let (mut force, mut change) = (weights[0] * first, slopes[0] * first);
+            let mut acts = start.multipliers[block].0[i] > 0.0;
+            for point in 1..=level.points() {
+                let lane = (point - 1) * rows.blocks + block;
+                force += weights[point] * forces[along][lane].0[i];
+                change += slopes[point] * forces[along][lane].0[i];
+                acts |= multipliers[lane].0[i] > 0.0;
+            }
+            if !acts {
+                continue;
+            }
+            for (seen, moved) in path_moved.iter_mut().enumerate() {
+                let column = &rows.flexibility[along][seen][node * rows.blocks..][..rows.blocks];
+                let (positions, velocities) = moved.split_at_mut(rows.blocks);
+                for (moved, amount) in [(positions, force), (velocities, change / level.step)] {
+                    for (moved, flexibility) in moved.iter_mut().zip(column) {
+                        (L::load(moved) + L::load(flexibility) * L::splat(amount)).store(moved);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Advances the modes from the start of a part, over its length halved `halvings` times, to its second stored time.
+    #[inline(always)]
+    fn advance<L: Octet>(&mut self, part: Part, halvings: usize) {
         let Self { trial, halves, pushes, .. } = self;
-        let table = halves[halvings];
-        let BladeTrial { path_modes: [position, velocity], modal_forces, .. } = &mut **trial;
-        let (from, length) = (L::splat(fraction(end, parts)), L::splat(fraction(1, 1 << halvings)));
-        for k in 0..position.len() {
+        let table = halves[part.halvings + halvings];
+        let BladeTrial { path, modal_forces, .. } = &mut **trial;
+        let [first, last] = part.ends;
+        let (from, length) = (L::splat(part.span()[0]), L::splat(fraction(1, 1 << (part.halvings + halvings))));
+        for k in 0..self.rows.mode_blocks {
             let mut terms = [L::zero(); TERMS];
-            (terms[0], terms[1]) = (L::load(&position[k]), L::load(&velocity[k]));
+            (terms[0], terms[1]) = (L::load(&path[first].modes[0][k]), L::load(&path[first].modes[1][k]));
             let mut count = 2;
             if *pushes {
                 let (a, b) = (L::load(&modal_forces[0][k]), L::load(&modal_forces[1][k]));
@@ -172,110 +295,15 @@ impl Follow<'_> {
                 terms[4] = length * length * c;
                 count = TERMS;
             }
-            let mut ends = [L::zero(); 2];
-            for (end, table) in ends.iter_mut().zip(&table.end) {
+            for (target, table) in path[last].modes.iter_mut().zip(&table.end) {
+                let mut end = L::zero();
                 for (term, row) in terms[..count].iter().zip(table) {
-                    *end = *end + L::load(&row[k]) * *term;
+                    end = end + L::load(&row[k]) * *term;
                 }
+                end.store(&mut target[k]);
             }
-            ends[0].store(&mut position[k]);
-            ends[1].store(&mut velocity[k]);
         }
     }
-
-    /// Records the smallest gaps, each at the end of a part or at the vertex of a polynomial near the end of a part.
-    #[inline(always)]
-    fn record<L: Octet>(&mut self, parts: usize, known: RangeInclusive<usize>) {
-        let Self { trial, rows, tally, ends, .. } = self;
-        let [from, to] = ends.map(|end| end * fraction(parts, 1));
-        let within = |place: L| !place.less(L::splat(from)) & !L::splat(to).less(place);
-        for block in 0..rows.blocks {
-            let followed = trial.followed[block];
-            if followed == 0 {
-                continue;
-            }
-            let gap = |end: usize| L::load(&trial.path_gaps[end * rows.blocks + block]);
-            let mut lowest = L::load(&tally.lowest[block]);
-            for end in known.start() + 1..*known.end() {
-                let near @ [before, here, after] = [gap(end - 1), gap(end), gap(end + 1)];
-                let is_lowest = followed & !before.less(here) & !after.less(here);
-                if is_lowest == 0 {
-                    continue;
-                }
-                let far =
-                    (known.contains(&(end + 2)) && end >= known.start() + 2).then(|| [gap(end - 2), gap(end + 2)]);
-                for (at, value) in [(L::zero(), here), vertex(near, far)] {
-                    let counts = is_lowest & within(L::splat(fraction(end, 1)) + at);
-                    lowest = L::select(counts, lowest.min(value), lowest);
-                }
-            }
-            for backwards in [false, true] {
-                if !known.contains(&if backwards { parts } else { 0 }) {
-                    continue;
-                }
-                let from_end = |place: usize| gap(if backwards { parts - place } else { place });
-                let near @ [here, next, ..] = [0, 1, 2, 3, 4].map(from_end);
-                let is_lowest = followed & !next.less(here);
-                if is_lowest != 0 {
-                    for (at, value) in [(L::zero(), here), vertex_from_end(near)] {
-                        let place = if backwards { L::splat(fraction(parts, 1)) - at } else { at };
-                        let counts = is_lowest & within(place);
-                        lowest = L::select(counts, lowest.min(value), lowest);
-                    }
-                }
-            }
-            lowest.store(&mut tally.lowest[block]);
-        }
-    }
-}
-
-/// Returns the place (relative to the middle) and value of the minimum near the middle one of three values at equal
-/// distances. The middle value must be the lowest. The minimum is that of the parabola through the three values. If the
-/// two values beyond them are known, it is that of a cubic with the derivatives of the polynomial through all five.
-#[inline(always)]
-fn vertex<L: Octet>([before, here, after]: [L; 3], far: Option<[L; 2]>) -> (L, L) {
-    let (bend, tilt) = (before - here * L::splat(2.0) + after, after - before);
-    let (slope, bend, third) = match far {
-        None => (tilt * L::splat(0.5), bend, L::zero()),
-        Some([first, last]) => {
-            let wide = first - here * L::splat(2.0) + last;
-            (
-                tilt * L::splat(2.0 / 3.0) - (last - first) * L::splat(1.0 / 12.0),
-                bend * L::splat(4.0 / 3.0) - wide * L::splat(1.0 / 12.0),
-                (last - first) * L::splat(0.5) - tilt,
-            )
-        }
-    };
-    let at = L::zero() - slope / bend;
-    let is_near = at.abs().less(L::splat(1.0));
-    let value = L::select(is_near, cubic_vertex(here, [slope, bend, third]), here);
-    (L::select(is_near, at, L::zero()), value)
-}
-
-/// Returns the place and value of the minimum within the first interval of five values at equal distances. The minimum is
-/// that of a cubic with the derivatives of the polynomial through the five values.
-#[inline(always)]
-fn vertex_from_end<L: Octet>(values: [L; 5]) -> (L, L) {
-    let here = values[0];
-    let derivatives = END_DERIVATIVES.map(|weights| {
-        // Differences of similar values have the smallest rounding errors.
-        let terms = values[1..].iter().zip(weights);
-        terms.fold(L::zero(), |sum, (value, weight)| sum + (*value - here) * L::splat(weight))
-    });
-    let [slope, bend, _] = derivatives;
-    let at = L::zero() - slope / bend;
-    let is_inside = L::zero().less(at) & at.less(L::splat(1.0));
-    let value = L::select(is_inside, cubic_vertex(here, derivatives), here);
-    (L::select(is_inside, at, L::zero()), value)
-}
-
-/// Returns the value of a cubic with the value `here` and these derivatives at its origin, at the vertex of its parabola.
-/// Returns `here` if the parabola has no minimum.
-#[inline(always)]
-fn cubic_vertex<L: Octet>(here: L, [slope, bend, third]: [L; 3]) -> L {
-    let at = L::zero() - slope / bend;
-    let value = here + at * (slope + at * (bend * L::splat(0.5) + at * third * L::splat(1.0 / 6.0)));
-    L::select(L::zero().less(bend), value, here)
 }
 
 /// Records the smallest gaps of open nodes between two times, from cubics through the gaps and their rates at both.
@@ -283,7 +311,8 @@ fn cubic_vertex<L: Octet>(here: L, [slope, bend, third]: [L; 3]) -> L {
 pub(super) struct CubicMinima<'a> {
     pub trial: &'a mut BladeTrial,
     pub rows: &'a BladeRows,
-    pub tally: &'a mut BladeTally,
+    /// Smallest gaps so far (m).
+    pub lowest: &'a mut [Eight],
     /// Gaps below which the smallest gaps are needed, and gaps at the first time (m).
     pub floors: &'a [Eight],
     pub begun: &'a [Eight],
@@ -298,7 +327,7 @@ impl OctetKernel for CubicMinima<'_> {
     type Output = bool;
     #[inline(always)]
     fn run<L: Octet>(self) -> bool {
-        let Self { trial, rows, tally, floors, begun, length, error, tolerance } = self;
+        let Self { trial, rows, lowest, floors, begun, length, error, tolerance } = self;
         let (mut found, third) = (0, L::splat(length / 3.0));
         for block in 0..rows.blocks {
             let (sigma, steepness) = (L::load(&trial.sample.sigma[block]), L::load(&rows.steepness[block]));
@@ -306,20 +335,15 @@ impl OctetKernel for CubicMinima<'_> {
             let last = L::load(&trial.sample.gaps[block]) / (steepness * steepness + sigma * sigma).sqrt();
             let inner =
                 [first + L::load(&trial.rates_before[block]) * third, last - L::load(&trial.rates[block]) * third];
-            // The cubic lies above the smallest of its four Bézier coefficients.
             let (ends, between) = (first.min(last), inner[0].min(inner[1]));
-            let bar = L::load(&floors[block]).min(L::load(&tally.lowest[block]));
-            let dips = between.less(ends + L::splat(error))
-                & (between.min(ends) - L::splat(error)).less(bar)
-                & rows.valid(block);
+            let bar = L::load(&floors[block]).min(L::load(&lowest[block]));
+            let dips = may_dip(ends, between, error, bar) & rows.valid(block);
             trial.followed[block] = 0;
             if dips != 0 {
-                let [slope, change] = [(inner[0] - first), (inner[1] - inner[0])].map(|part| part * L::splat(3.0));
-                let terms = [first, slope, change - slope, (last - first) - change];
-                let value = cubic_minimum(terms).min(ends);
+                let value = cubic_minimum([first, inner[0], inner[1], last]).1.min(ends);
                 if error <= PARTS_FRACTION * tolerance {
-                    let lowest = L::load(&tally.lowest[block]);
-                    L::select(dips, lowest.min(value), lowest).store(&mut tally.lowest[block]);
+                    let known = L::load(&lowest[block]);
+                    L::select(dips, known.min(value), known).store(&mut lowest[block]);
                 } else {
                     trial.followed[block] = dips;
                 }
@@ -330,12 +354,25 @@ impl OctetKernel for CubicMinima<'_> {
     }
 }
 
-/// Smallest value of a cubic within 0 ≤ θ ≤ 1 at which its slope is zero; infinite if there is none.
+/// Returns the nodes whose gap may be smaller between two times than at both, and smaller than `bar`. `ends` are the
+/// smaller gaps at the times, and `between` the smaller inner Bézier coefficients of the cubics.
 #[inline(always)]
-fn cubic_minimum<L: Octet>([a, b, c, d]: [L; 4]) -> L {
+fn may_dip<L: Octet>(ends: L, between: L, error: f64, bar: L) -> u8 {
+    // The error is at most 16θ²(1 − θ)² times the largest one; the inner coefficients have the weight 3θ(1 − θ).
+    let near_ends = ends + L::splat(error * (4.0 / 3.0));
+    between.less(near_ends) & (between.min(ends) - L::splat(error)).less(bar)
+}
+
+/// Returns the place within 0 < θ < 1 and the value of the minimum of a cubic with these Bézier coefficients; the value is
+/// infinite if there is none.
+#[inline(always)]
+fn cubic_minimum<L: Octet>([first, second, third, last]: [L; 4]) -> (L, L) {
+    let (slope, change) = ((second - first) * L::splat(3.0), (third - second) * L::splat(3.0));
+    let (square, cube) = (change - slope, (last - first) - change);
     // The slope b + 2cθ + 3dθ² rises through zero at θ = −b/(√(c² − 3bd) + c).
-    let square = c * c - L::splat(3.0) * b * d;
-    let theta = L::zero() - b / (square.max(L::zero()).sqrt() + c);
-    let is_inside = !square.less(L::zero()) & L::zero().less(theta) & theta.less(L::splat(1.0));
-    L::select(is_inside, a + theta * (b + theta * (c + theta * d)), L::splat(f64::INFINITY))
+    let root = square * square - L::splat(3.0) * slope * cube;
+    let theta = L::zero() - slope / (root.max(L::zero()).sqrt() + square);
+    let is_inside = !root.less(L::zero()) & L::zero().less(theta) & theta.less(L::splat(1.0));
+    let value = first + theta * (slope + theta * (square + theta * cube));
+    (theta, L::select(is_inside, value, L::splat(f64::INFINITY)))
 }

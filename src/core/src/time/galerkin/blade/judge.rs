@@ -1,7 +1,7 @@
 //! Assesses a solved step of a blade: its error, the energy of contacts that open or close, and nodes that nearly touch
 //! between the points of the step (near misses).
 
-use super::columns::sum;
+use super::columns::{sum, values_at_points};
 use super::solve::Attempt;
 use crate::math::octet::{Eight, Octet};
 use crate::time::galerkin::basis::{POINTS, TimeBasis};
@@ -18,16 +18,8 @@ impl Attempt<'_> {
         for block in 0..blocks {
             let valid = self.rows.valid(block);
             let trial = &mut *self.trial;
-            let of = |start: &[Eight], lanes: &[Eight]| -> [L; POINTS] {
-                let mut values = [L::zero(); POINTS];
-                values[0] = L::load(&start[block]);
-                for point in 1..count {
-                    values[point] = L::load(&lanes[(point - 1) * blocks + block]);
-                }
-                values
-            };
-            let multipliers = of(&trial.start.multipliers, &trial.multipliers);
-            let gaps = of(&trial.start.gaps, &trial.gaps);
+            let multipliers = values_at_points::<L>(&trial.start.multipliers, &trial.multipliers, block, count);
+            let gaps = values_at_points::<L>(&trial.start.gaps, &trial.gaps, block, count);
             let (mut any, mut all) = (0, valid);
             if trial.pushes {
                 for multiplier in &multipliers[..count] {
@@ -45,7 +37,7 @@ impl Attempt<'_> {
             }
             let mixed = any & !all;
             for along in [0, 1] {
-                let forces = of(&trial.start.forces[along], &trial.forces[along]);
+                let forces = values_at_points::<L>(&trial.start.forces[along], &trial.forces[along], block, count);
                 let left = sum(&forces[..count], &basis.left_out) * L::splat(self.level.step);
                 let mut impulse = left;
                 if mixed != 0 {

@@ -7,92 +7,87 @@
 use super::columns::{displace, sum};
 use super::level::BladeLevel;
 use super::rows::BladeRows;
-use super::tally::BladeTally;
 use super::trial::{BladeTrial, StartContacts};
 use crate::math::octet::{Eight, Octet, OctetKernel, both};
 use crate::time::galerkin::basis::{PLACES, POINTS};
 use crate::time::galerkin::trial::{FALLING, NEAR};
 
-/// Smallest and largest number of halvings of a step into the parts at whose ends the motion is evaluated.
-pub(super) const MIN_HALVINGS: usize = 2;
+/// Largest number of halvings of a step into parts.
 pub(super) const MAX_HALVINGS: usize = 7;
-/// Largest number of parts of a step.
-pub(super) const PARTS: usize = 1 << MAX_HALVINGS;
 /// Nodes are followed if they may come closer between the points by more than this fraction of the tolerance.
-const FOLLOW_FRACTION: f64 = 0.1;
-/// Largest bound on the interpolation error between the ends of parts, as a fraction of the tolerance.
+pub(super) const FOLLOW_FRACTION: f64 = 0.1;
+/// Largest bound on the error of a recorded minimum, as a fraction of the tolerance.
 pub(super) const PARTS_FRACTION: f64 = 0.3;
 
-/// Largest error of the interpolated motion of a mode relative to its amplitude. Neither the motion nor its
-/// interpolation exceeds the amplitude, so the error is at most twice as large.
-const UNRESOLVED: f64 = 2.0;
-/// Coefficients of x⁴ and x⁵ in the interpolation error near the middle one of five gaps at equal distances. The
-/// neglected fourth derivative causes the x⁴ term, and the error of the third derivative the x⁵ term. Near the first and
-/// the last gap, the second coefficient is at most half as large again.
-const PART_ERROR: [f64; 2] = [1.0 / 384.0, 1.0 / 48.0];
-/// Coefficient of x⁴ in the error of the cubic through the points of a step. It holds for the parabola as well, because
-/// the points of a step follow the moments of the motion.
-pub(super) const STEP_ERROR: [f64; 2] = [1.0 / 384.0, 0.0];
-
 impl BladeTrial {
-    /// Returns the largest interpolation error of the closing displacement of a node between the points of the tried
-    /// step (m).
-    pub(super) fn unresolved_motion(&mut self, rows: &BladeRows, level: &BladeLevel) -> f64 {
-        self.find_interpolation_error(rows, level.step, STEP_ERROR)
-    }
-
-    /// Returns how often the tried step is halved into the parts in which nodes are followed. Between the ends of these
-    /// parts, the bound on the interpolation error is below a fraction of `tolerance` (m).
-    pub(super) fn find_halvings(&mut self, rows: &BladeRows, level: &BladeLevel, tolerance: f64) -> usize {
-        let is_fine = |halvings: &usize| {
-            let length = level.step * fraction(1, 1 << halvings);
-            self.find_interpolation_error(rows, length, PART_ERROR) <= PARTS_FRACTION * tolerance
-        };
-        (MIN_HALVINGS..MAX_HALVINGS).find(is_fine).unwrap_or(MAX_HALVINGS)
+    /// Bounds the interpolation error (m) of all modes between points at a distance `length` (s).
+    pub(super) fn find_interpolation_error(&mut self, rows: &BladeRows, length: f64) -> f64 {
+        let pushes = self.pushes;
+        self.unresolved = None;
+        self.instructions.run_octets(FindInterpolationError { trial: self, rows, length, pushes })
     }
 }
 
-/// Finds the nodes that may come closer between the points than at the points, and whose smallest gap an output needs.
-/// Returns whether there are such nodes. Records the gaps of all other nodes at the points, and the gaps of all nodes
-/// at the end of the step.
-pub(super) struct FindMinima<'a> {
+/// Selects the nodes that stay open, may come closer between the points than at the points, and whose smallest gap may be
+/// below the smallest one so far and below a floor. Returns whether there are such nodes.
+pub(super) struct SelectFollowed<'a> {
     pub trial: &'a mut BladeTrial,
     pub rows: &'a BladeRows,
     pub level: &'a BladeLevel,
-    pub tally: &'a mut BladeTally,
-    /// Gaps below which the smallest gaps are needed (m).
+    /// Smallest gaps so far, and gaps below which the smallest gaps are needed (m).
+    pub lowest: &'a [Eight],
     pub floors: &'a [Eight],
     /// Largest displacement error of a step (m), and largest error of the motion between the points (m).
     pub tolerance: f64,
     pub unresolved: f64,
-    /// Ends of the part of the step whose gaps are recorded, as fractions of the step.
+    /// Ends of the part of the step that is searched, as fractions of the step.
     pub ends: [f64; 2],
 }
 
-impl OctetKernel for FindMinima<'_> {
+impl OctetKernel for SelectFollowed<'_> {
     type Output = bool;
     #[inline(always)]
     fn run<L: Octet>(self) -> bool {
-        let Self { trial, rows, level, tally, floors, tolerance, unresolved, ends } = self;
-        let mut found = false;
+        let Self { trial, rows, level, lowest, floors, tolerance, unresolved, ends } = self;
         // The first round uses one bound for all nodes. The second uses a bound for each node, and drops most of the
         // nodes.
         let bounds = &mut trial.path_moved[0];
         bounds.fill(Eight([unresolved; 8]));
         for look in 0..2 {
-            found = false;
+            let mut found = false;
             for block in 0..rows.blocks {
-                trial.followed[block] = choose::<L>(trial, (rows, level, block), tally, floors[block], tolerance, ends);
+                let bar = L::load(&floors[block]).min(L::load(&lowest[block]));
+                trial.followed[block] = choose::<L>(trial, (rows, level, block), bar, tolerance, ends);
                 found |= trial.followed[block] != 0;
             }
             if !found || look == 1 {
-                break;
+                return found;
             }
-            displace::<L, 1>(&rows.magnitudes[0], rows.blocks, [&trial.path_modes[0]], &mut trial.path_moved[0]);
+            displace::<L, 1>(&rows.magnitudes[0], rows.blocks, [&trial.mode_bounds], &mut trial.path_moved[0]);
         }
+        false
+    }
+}
+
+/// Records the gaps of all nodes at the end of the step, and at the other points those of the nodes that are not followed.
+pub(super) struct RecordPoints<'a> {
+    pub trial: &'a BladeTrial,
+    pub rows: &'a BladeRows,
+    pub level: &'a BladeLevel,
+    /// Smallest gaps so far (m).
+    pub lowest: &'a mut [Eight],
+    /// Ends of the part of the step whose gaps are recorded, as fractions of the step.
+    pub ends: [f64; 2],
+}
+
+impl OctetKernel for RecordPoints<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<L: Octet>(self) {
+        let Self { trial, rows, level, lowest, ends } = self;
         for block in 0..rows.blocks {
             let (followed, last) = (trial.followed[block], level.points() - 1);
-            let mut lowest = L::load(&tally.lowest[block]);
+            let mut least = L::load(&lowest[block]);
             for point in 0..level.points() {
                 if !(ends[0]..=ends[1]).contains(&level.place(point)) {
                     continue;
@@ -101,11 +96,10 @@ impl OctetKernel for FindMinima<'_> {
                 let (steepness, sigma) = (L::load(&rows.steepness[block]), L::load(&trial.sigma[lane]));
                 let gap = L::load(&trial.gaps[lane]) / (steepness * steepness + sigma * sigma).sqrt();
                 let exact = if point == last { 0xff } else { !followed };
-                lowest = L::select(exact, lowest.min(gap), lowest);
+                least = L::select(exact, least.min(gap), least);
             }
-            lowest.store(&mut tally.lowest[block]);
+            least.store(&mut lowest[block]);
         }
-        found
     }
 }
 
@@ -114,8 +108,7 @@ impl OctetKernel for FindMinima<'_> {
 fn choose<L: Octet>(
     trial: &BladeTrial,
     (rows, level, block): (&BladeRows, &BladeLevel, usize),
-    tally: &BladeTally,
-    floor: Eight,
+    bar: L,
     tolerance: f64,
     range: [f64; 2],
 ) -> u8 {
@@ -162,7 +155,6 @@ fn choose<L: Octet>(
     let comes = L::splat(FOLLOW_FRACTION * tolerance).less(deeper.max(L::zero()) + left);
     let steepness = L::load(&rows.steepness[block]);
     let size = (steepness * steepness + steepest * steepest).sqrt();
-    let bar = L::load(&floor).min(L::load(&tally.lowest[block]));
     let matters = ((low.min(within) - left) / size).less(bar);
     comes & matters & !falls & !pushes & rows.valid(block)
 }
@@ -172,10 +164,8 @@ fn choose<L: Octet>(
 pub(super) struct FindInterpolationError<'a> {
     pub trial: &'a mut BladeTrial,
     pub rows: &'a BladeRows,
-    /// Distance of the points (s), and coefficients of x⁴ and x⁵ in the error of a mode relative to its amplitude. x is
-    /// ω times the distance. The error of a mode is at most [`UNRESOLVED`] times its amplitude.
+    /// Distance of the points (s).
     pub length: f64,
-    pub terms: [f64; 2],
     /// True if forces act in the step.
     pub pushes: bool,
 }
@@ -184,26 +174,51 @@ impl OctetKernel for FindInterpolationError<'_> {
     type Output = f64;
     #[inline(always)]
     fn run<L: Octet>(self) -> f64 {
-        let Self { trial, rows, length, terms, pushes } = self;
-        let BladeTrial { start: StartContacts { modes: [q, v], .. }, modal_forces, path_modes, .. } = trial;
-        let [rates, per_frequency, squares] = &rows.rates;
+        let Self { trial, rows, length, pushes } = self;
+        let BladeTrial { start, modal_forces, mode_bounds, .. } = trial;
         let mut error = L::zero();
         for (k, largest) in rows.largest.iter().enumerate() {
-            let (q, v, per_frequency) = (L::load(&q[k]), L::load(&v[k]), L::load(&per_frequency[k]));
-            let turned = (v + L::load(&rates[k]) * q) * per_frequency;
-            let mut amplitude = (q * q + turned * turned).sqrt();
-            if pushes {
-                let [a, b, c] = modal_forces.each_ref().map(|force| L::load(&force[k]).abs());
-                amplitude = amplitude + (a + b + c) * per_frequency * per_frequency * L::splat(2.0);
-            }
-            let square = L::load(&squares[k]) * L::splat(length * length);
-            let share = square * square * (L::splat(terms[0]) + square.sqrt() * L::splat(terms[1]));
-            let mode_error = amplitude * share.min(L::splat(UNRESOLVED));
-            mode_error.store(&mut path_modes[0][k]);
+            let share = interpolation_share(L::load(&rows.rates[3][k]) * L::splat(length));
+            let mode_error = amplitude::<L>(rows, start, modal_forces, k, pushes) * share;
+            mode_error.store(&mut mode_bounds[k]);
             error = error + L::load(largest) * mode_error;
         }
         error.total()
     }
+}
+
+/// Bounds the amplitudes of eight modes in a step.
+#[inline(always)]
+pub(super) fn amplitude<L: Octet>(
+    rows: &BladeRows,
+    start: &StartContacts,
+    modal_forces: &[Vec<Eight>],
+    block: usize,
+    pushes: bool,
+) -> L {
+    let [rates, per_frequency, ..] = &rows.rates;
+    let [q, v] = both(|of| L::load(&start.modes[of][block]));
+    let per_frequency = L::load(&per_frequency[block]);
+    let turned = (v + L::load(&rates[block]) * q) * per_frequency;
+    let amplitude = (q * q + turned * turned).sqrt();
+    if !pushes {
+        return amplitude;
+    }
+    let mut force = L::zero();
+    for term in modal_forces {
+        force = force + L::load(&term[block]).abs();
+    }
+    amplitude + force * per_frequency * per_frequency * L::splat(2.0)
+}
+
+/// Bounds the error of the cubic between two times relative to the amplitude of a mode; `x` is its frequency times the
+/// distance of the times. It holds for the cubic through the points of a step, and for the parabola as well, because the
+/// points of a step follow the moments of the motion.
+#[inline(always)]
+pub(super) fn interpolation_share<L: Octet>(x: L) -> L {
+    let square = x * x;
+    // Neither the motion nor a cubic with its rates at both ends exceeds the amplitude by much.
+    (square * square * L::splat(1.0 / 384.0)).min(L::splat(2.0) + L::splat(0.3) * x)
 }
 
 /// Returns the quotient of two small integers.

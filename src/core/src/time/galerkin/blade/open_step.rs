@@ -5,7 +5,7 @@
 
 use super::dense::{DenseOutput, ModeResponse};
 use super::follow::CubicMinima;
-use super::minima::STEP_ERROR;
+use super::gaps::moving_drive_at;
 use super::rows::BladeRows;
 use super::span::{Blade, BladeInSpan, RecordScope};
 use super::surface::PointDrive;
@@ -26,11 +26,6 @@ use crate::time::galerkin::trial::ForceInterpolation;
 pub(super) const CACHED_RESPONSES: usize = 8;
 /// Fraction of a span below which a step is too short to be integrated (rounding of times).
 const NEGLIGIBLE_LENGTH: f64 = 1e-9;
-/// Fraction of a span over which a difference of the prescribed motion gives its rates.
-const RATE_FRACTION: f64 = 1.0 / 64.0;
-/// Fraction of the angular scale of a shape over which a cubic represents it, with an error below 1e-4 of the smallest
-/// clearance.
-const CUBIC_TURN: f64 = 0.125;
 
 /// An accepted step that has not ended. The modes are those at its start.
 #[derive(Debug, Clone, Copy)]
@@ -110,8 +105,7 @@ impl BladeInSpan<'_> {
                     let end = open.step.from + open.step.length;
                     let is_last = end > ends[1];
                     // The interval may be within a step without contact that was already open before.
-                    self.is_in_recalled_flight =
-                        is_last && !self.has_changed && !self.pushes() && self.turns_little(ends);
+                    self.is_in_recalled_flight = is_last && !self.has_changed && !self.pushes();
                     if !self.is_in_recalled_flight {
                         self.record_part(open, [ends[0].max(open.step.from), ends[1].min(end)]);
                     }
@@ -225,10 +219,8 @@ impl BladeInSpan<'_> {
         self.place.course = course(last);
         let mut drives = [PointDrive::default(); POINTS];
         let theta = (interval.to - to_real(last) * interval.span) / interval.span;
-        let (drive, before) = (self.drive_at(theta).0, self.drive_at(theta - RATE_FRACTION).0);
-        let per_second = 1.0 / (RATE_FRACTION * interval.span);
-        let relative_speed = (drive.turned - before.turned) * per_second;
-        let factor_rate = (drive.factor - before.factor) * per_second;
+        let (drive, rate) = moving_drive_at(&self.place, theta, interval.span);
+        let shape_error = self.place.cubic_error([theta - (interval.to - interval.from) / interval.span, theta]);
         drives[0] = drive;
         let faced = self.place.faced_surface(&drives);
         let interpolation = kind.unwrap_or(ForceInterpolation::Polynomial);
@@ -250,12 +242,11 @@ impl BladeInSpan<'_> {
             response: &blade.responses[place],
             time,
             faced: &faced,
-            relative_speed,
-            factor_rate,
+            rate,
             pushes,
         });
         BladeTrial::write(&tables.rows, &blade.trial.sample, state);
-        if self.is_in_recalled_flight && self.record_cubic_minima(length) {
+        if self.is_in_recalled_flight && self.record_cubic_minima(length, shape_error) {
             let begun = begun + step.from * interval.span;
             let length = step.length * interval.span;
             let ends = [interval.from, interval.to].map(|time| ((time - begun) / length).clamp(0.0, 1.0));
@@ -265,26 +256,30 @@ impl BladeInSpan<'_> {
     }
 
     /// Records the smallest gaps over an interval with a length (s). Cubics through the gaps and their rates at both ends
-    /// give them where the error is small enough. Returns whether it is too large for some nodes; these are followed.
-    fn record_cubic_minima(&mut self, length: f64) -> bool {
+    /// give them where the error is small enough; `shape_error` (m) is the part of the shape of the surface. Returns
+    /// whether the error is too large for some nodes; these are followed.
+    fn record_cubic_minima(&mut self, length: f64, shape_error: f64) -> bool {
         let Blade { trial, kinds, tally, floors, begun, .. } = &mut *self.blade;
         let (rows, tolerance) = (&kinds[self.place.kind].rows, self.goal.tolerance);
         // No forces act in a flight.
         trial.pushes = false;
-        let error = trial.find_interpolation_error(rows, length, STEP_ERROR);
+        let error = trial.find_interpolation_error(rows, length) + shape_error;
         let instructions = trial.instructions;
-        instructions.run_octets(CubicMinima { trial, rows, tally, floors, begun, length, error, tolerance })
+        instructions.run_octets(CubicMinima {
+            trial,
+            rows,
+            lowest: &mut tally.lowest,
+            floors,
+            begun,
+            length,
+            error,
+            tolerance,
+        })
     }
 
     /// Returns whether forces act in the open step.
     fn pushes(&self) -> bool {
         self.open.is_some_and(|open| open.kind.is_some()) && self.blade.trial.pushes
-    }
-
-    /// Returns whether the rotor turns so little between two fractions of the span that the shape is a cubic there.
-    fn turns_little(&self, ends: [f64; 2]) -> bool {
-        let [from, to] = ends.map(|end| self.drive_at(end).0.turned);
-        (to - from).abs() < CUBIC_TURN * self.place.gap.surface.angular_scale()
     }
 
     /// Integrates from the start of the open step to the end of `interval` within it, with steps that end there, and

@@ -18,7 +18,7 @@ impl OctetKernel for FindReach<'_> {
     fn run<L: Octet>(self) {
         let Self { trial, rows } = self;
         let BladeTrial { start, modal, reach, .. } = trial;
-        let ([q, v], [rates, per_frequency, _]) = (&start.modes, &rows.rates);
+        let ([q, v], [rates, per_frequency, ..]) = (&start.modes, &rows.rates);
         let amplitudes = &mut modal[0];
         for (k, amplitude) in amplitudes.iter_mut().enumerate() {
             let (q, v) = (L::load(&q[k]), L::load(&v[k]));

@@ -9,8 +9,8 @@ use nalgebra::{DMatrix, Vector2};
 /// Data of a blade that do not depend on the step length.
 #[derive(Debug, Clone)]
 pub(crate) struct BladeRows {
-    /// ξω, 1/ω_d and ω² of each mode.
-    pub rates: [Vec<Eight>; 3],
+    /// ξω, 1/ω_d, ω² and ω of each mode.
+    pub rates: [Vec<Eight>; 4],
     /// Magnitudes of `shapes`.
     pub magnitudes: [Vec<Eight>; 2],
     /// Largest magnitude over the nodes of the closing displacement of each mode.
@@ -69,6 +69,7 @@ impl BladeRows {
                 of_modes(&|w, ratio| ratio * w),
                 of_modes(&|w, ratio| 1.0 / (w * (1.0 - ratio * ratio).sqrt())),
                 of_modes(&|w, _| w * w),
+                of_modes(&|w, _| w),
             ],
             magnitudes: [Vec::new(), Vec::new()],
             largest: vec![Eight::ZERO; Eight::blocks(count)],

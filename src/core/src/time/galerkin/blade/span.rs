@@ -2,7 +2,6 @@
 
 use super::dense::ModeResponse;
 use super::level::PartWeights;
-use super::minima::{MAX_HALVINGS, MIN_HALVINGS, PARTS};
 use super::open_step::{OpenStep, SpanProgress};
 use super::reach::Clearance;
 use super::rows::BladeRows;
@@ -39,6 +38,7 @@ pub(crate) struct Blade {
     lowest: Vec<Eight>,
     pub(super) begun: Vec<Eight>,
     pub(super) floors: Vec<Eight>,
+    pub(super) depth_limits: Vec<Eight>,
     /// Cached responses of the modes, and the index of the last one computed.
     pub(super) responses: Vec<ModeResponse>,
     pub(super) next_response: usize,
@@ -91,8 +91,8 @@ impl Blade {
         let of_nodes = || vec![Eight::ZERO; rows.blocks];
         let angles = (0..gap.layout.lanes).map(|sector| NodeAngles::new(&gap.layout, sector)).collect();
         let responses = ModeResponse::allocate_cache(rows);
-        let [lowest, begun, floors] = [of_nodes(), of_nodes(), of_nodes()];
-        Some(Self { trial, tally, lowest, begun, floors, angles, responses, next_response: 0, kinds })
+        let [lowest, begun, floors, depth_limits] = [of_nodes(), of_nodes(), of_nodes(), of_nodes()];
+        Some(Self { trial, tally, lowest, begun, floors, depth_limits, angles, responses, next_response: 0, kinds })
     }
 
     /// Uses tables for spans of this length (s). Does not allocate.
@@ -147,7 +147,7 @@ pub(crate) struct BladeInSpan<'a> {
     pub(super) goal: StepGoal,
     /// Prescribed motion at the points of the tried step, and the motion over which the forces there do work.
     motions: [MotionIncrement; POINTS],
-    drives: [PointDrive; POINTS],
+    pub(super) drives: [PointDrive; POINTS],
     /// True if the displacements and gaps at the start of the step are known; and true if the reach without contact is
     /// known.
     pub(super) known: bool,
@@ -258,48 +258,6 @@ impl<'a> BladeInSpan<'a> {
         trial.find_clearance(&kinds[self.place.kind].rows, &faced, floors, &tally.lowest)
     }
 
-    /// Records the smallest gaps of a tried step between two fractions of it. If it is not resolved, its polynomials do
-    /// not describe the motion between its points.
-    pub(super) fn record_gaps(&mut self, step: SpanStep, kind: ForceInterpolation, is_resolved: bool, ends: [f64; 2]) {
-        let Blade { trial, kinds, tally, floors, .. } = &mut *self.blade;
-        let tables = &kinds[self.place.kind];
-        let tolerance = if is_resolved { self.goal.tolerance } else { f64::INFINITY };
-        if trial.find_minima((&tables.rows, tables.level(step.level, kind)), tally, floors, tolerance, ends) {
-            self.follow(step, kind, ends);
-        }
-    }
-
-    /// Records the smallest gaps of the followed nodes between two fractions of a step.
-    pub(super) fn follow(&mut self, step: SpanStep, kind: ForceInterpolation, ends: [f64; 2]) {
-        // There are no tables for parts of the shortest steps, whose points are close together.
-        if step.level + MIN_HALVINGS > HALVINGS {
-            return;
-        }
-        let place = &self.place;
-        let Blade { trial, kinds, tally, .. } = &mut *self.blade;
-        let tables = &mut kinds[place.kind];
-        tables.prepare(step.level, kind);
-        let halvings = trial.find_halvings(&tables.rows, tables.level(step.level, kind), self.goal.tolerance);
-        let finer = halvings.min(HALVINGS - step.level);
-        let parts = 1_usize << finer;
-        let mut drives = [PointDrive::default(); PARTS + 1];
-        for (end, drive) in drives[..=parts].iter_mut().enumerate() {
-            #[expect(clippy::cast_precision_loss, reason = "few parts")]
-            let theta = end as f64 / parts as f64;
-            *drive = drive_at(place, step.from + step.length * theta).0;
-        }
-        let halves = 0..=finer;
-        halves.clone().for_each(|halvings| tables.prepare(step.level + halvings, ForceInterpolation::Polynomial));
-        let last = tables.level(step.level + finer, ForceInterpolation::Polynomial);
-        let mut levels = [last; MAX_HALVINGS + 1];
-        for (halvings, level) in halves.zip(&mut levels) {
-            *level = tables.level(step.level + halvings, ForceInterpolation::Polynomial);
-        }
-        let faced = place.faced_surface(&self.drives);
-        let level = tables.level(step.level, kind);
-        trial.follow((&tables.rows, level, &levels[..=finer]), (&faced, &drives[..=parts]), tally, ends);
-    }
-
     /// Advances the modes to the end of a step. `kind` is `None` for a flight.
     pub(super) fn advance(&mut self, step: SpanStep, kind: Option<ForceInterpolation>) {
         let Blade { trial, kinds, tally, .. } = &mut *self.blade;
@@ -334,7 +292,7 @@ impl<'a> BladePlace<'a> {
 }
 
 /// Prescribed motion of a sector at the fraction `theta` of a span, and the motion since the start of the span.
-fn drive_at(place: &BladePlace, theta: f64) -> (PointDrive, MotionIncrement) {
+pub(super) fn drive_at(place: &BladePlace, theta: f64) -> (PointDrive, MotionIncrement) {
     let (drive, motion) = place.course.at(theta);
     let layout = &place.gap.layout;
     let point = PointDrive {
@@ -416,7 +374,12 @@ impl SpanSteps for BladeInSpan<'_> {
         self.known = true;
         let level = tables.level(step.level, kind);
         self.tried = level.blocks;
-        trial.attempt(&tables.rows, level, &faced, self.goal.precision)
+        let mut result = trial.attempt(&tables.rows, level, &faced, self.goal.precision);
+        let may_last = result.solved && !result.misses(self.goal.tolerance);
+        if kind == ForceInterpolation::Polynomial && may_last && step.level < HALVINGS {
+            self.find_depth(step, kind, &mut result);
+        }
+        result
     }
 
     fn accept(&mut self, step: SpanStep, kind: ForceInterpolation, result: &TrialResult) -> f64 {
@@ -440,8 +403,7 @@ impl SpanSteps for BladeInSpan<'_> {
         } else if is_open {
             trial.modal_forces.iter_mut().for_each(|modal| modal.fill(Eight::ZERO));
         }
-        let has_parts = step.level + MIN_HALVINGS <= HALVINGS;
-        let is_resolved = has_parts && result.resolves_motion(kind, self.goal.tolerance);
+        let is_resolved = result.resolves_motion(kind, self.goal.tolerance);
         let work = replace(&mut tally.work, before);
         if is_open {
             let energy = self.energy_at_start();

@@ -85,6 +85,7 @@ impl BladeInSpan<'_> {
         (self.known, self.reach_known) = (is(6), is(7));
         let trial = &mut self.blade.trial;
         (trial.pushes, trial.start.pushed) = (is(8), is(9));
+        (trial.forces_known, trial.unresolved) = (true, None);
         let work = ContactWork {
             shaft: numbers[11],
             casing: numbers[12],

@@ -19,6 +19,29 @@ pub(crate) struct PointDrive {
     pub rotor: (f64, f64),
 }
 
+/// Rates of the prescribed motion.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct DriveRate {
+    /// Rate of the angle of the rotor relative to the shape (rad/s).
+    pub turned: f64,
+    /// Rate of the factor on the shape (1/s).
+    pub factor: f64,
+    /// Rate of the clearance without the shape (m/s).
+    pub clearance: f64,
+}
+
+impl PointDrive {
+    /// Returns the rates of the motion from `before` to this one in a time (s).
+    pub fn rate_since(&self, before: &Self, time: f64) -> DriveRate {
+        let per_second = 1.0 / time;
+        DriveRate {
+            turned: (self.turned - before.turned) * per_second,
+            factor: (self.factor - before.factor) * per_second,
+            clearance: (self.clearance - before.clearance) * per_second,
+        }
+    }
+}
+
 /// Surface of revolution that all nodes of a blade face. The rotor turns past the surface but does not whirl.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FacedSurface<'a> {

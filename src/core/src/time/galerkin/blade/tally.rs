@@ -1,5 +1,6 @@
 //! Integrals over a span of the contacts of a blade, in blocks of nodes.
 
+use super::columns::values_at_points;
 use super::level::{BladeLevel, PartWeights};
 use super::rows::BladeRows;
 use super::surface::FacedSurface;
@@ -171,18 +172,10 @@ impl AddStep<'_> {
     fn add_block<L: Octet>(&mut self, block: usize) {
         let Self { tally, trial, rows, level, faced, motions, part, sums } = self;
         let count = level.points() + 1;
-        let of = |start: &[Eight], lanes: &[Eight]| -> [L; POINTS] {
-            let mut values = [L::zero(); POINTS];
-            values[0] = L::load(&start[block]);
-            for point in 1..count {
-                values[point] = L::load(&lanes[(point - 1) * rows.blocks + block]);
-            }
-            values
-        };
         let start = &trial.start;
-        let gaps = of(&start.gaps, &trial.gaps);
-        let sigmas = of(&start.sigma, &trial.sigma);
-        let multipliers = of(&start.multipliers, &trial.multipliers);
+        let gaps = values_at_points::<L>(&start.gaps, &trial.gaps, block, count);
+        let sigmas = values_at_points::<L>(&start.sigma, &trial.sigma, block, count);
+        let multipliers = values_at_points::<L>(&start.multipliers, &trial.multipliers, block, count);
         let steepness = L::load(&rows.steepness[block]);
         let length = |sigma: L| (steepness * steepness + sigma * sigma).sqrt();
         let mut any = 0;
@@ -192,8 +185,8 @@ impl AddStep<'_> {
         if any == 0 {
             return;
         }
-        let forces = both(|along| of(&start.forces[along], &trial.forces[along]));
-        let moved = both(|along| of(&start.moved[along], &trial.moved[along]));
+        let forces = both(|along| values_at_points::<L>(&start.forces[along], &trial.forces[along], block, count));
+        let moved = both(|along| values_at_points::<L>(&start.moved[along], &trial.moved[along], block, count));
         let radius = L::splat(1.0) / L::load(&rows.per_radius[block]);
         let per_radius = L::load(&rows.per_radius[block]);
         let slope = L::load(&rows.slopes[block]);

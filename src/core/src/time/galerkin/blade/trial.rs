@@ -1,15 +1,14 @@
 //! Scratch memory and results of trials of a blade.
 
 use super::accept::{Advance, BeginNextStep, FindModalForces};
-use super::follow::Follow;
+use super::follow::{PathPoint, STORED_TIMES};
 use super::level::BladeLevel;
-use super::minima::{FindInterpolationError, FindMinima, PARTS};
+use super::minima::SelectFollowed;
 use super::reach::{Clearance, Energy, FindClearance, FindReach};
 use super::rows::BladeRows;
 use super::solve::Attempt;
 use super::start::FindStart;
-use super::surface::{FacedSurface, PointDrive};
-use super::tally::BladeTally;
+use super::surface::FacedSurface;
 use crate::geometry::layout::Layout;
 use crate::math::octet::Eight;
 use crate::math::simd::InstructionSet;
@@ -18,6 +17,7 @@ use crate::time::galerkin::basis::MOST;
 use crate::time::galerkin::state::SectorState;
 use crate::time::galerkin::trial::TrialResult;
 use nalgebra::Vector2;
+use std::mem::replace;
 
 /// Angles of the nodes of a sector in the frame of the rotor (rad), and their sines and cosines.
 #[derive(Debug, Clone)]
@@ -111,15 +111,22 @@ pub(crate) struct BladeTrial {
     pub(super) gaps: Vec<Eight>,
     pub(super) multipliers: Vec<Eight>,
     pub(super) forces: [Vec<Eight>; 2],
-    /// Mask of the nodes that may come closer between the points; their modes, displacements and gaps within the step.
+    /// Mask of the nodes that may come closer between the points; their motion within the step; bounds for the modes; and
+    /// displacements (m), followed by velocities (m/s).
     pub(super) followed: Vec<u8>,
-    pub(super) path_modes: [Vec<Eight>; 2],
+    pub(super) path: Vec<PathPoint>,
+    pub(super) mode_bounds: Vec<Eight>,
+    pub(super) amplitudes: Vec<Eight>,
     pub(super) path_moved: [Vec<Eight>; 2],
-    pub(super) path_gaps: Vec<Eight>,
+    /// Smallest gaps of the followed nodes in the tried step (m).
+    pub(super) deepest: Vec<Eight>,
     /// Impulse errors along the closing displacement, then along the circumferential one (N·s).
     pub(super) impulses: Vec<Eight>,
     /// True if a contact force acts in the step.
     pub(super) pushes: bool,
+    /// True if the modal forces are those of the tried step; and the largest error of the motion between its points (m).
+    pub(super) forces_known: bool,
+    pub(super) unresolved: Option<f64>,
     /// Largest closing and circumferential displacements at any time without contact (m).
     pub(super) reach: [Vec<Eight>; 2],
     pub(super) instructions: InstructionSet,
@@ -161,9 +168,13 @@ impl BladeTrial {
             multipliers: of_lanes(),
             forces: [of_lanes(), of_lanes()],
             followed: vec![0; nodes],
-            path_modes: [of_modes(), of_modes()],
-            path_moved: [of_nodes(), of_nodes()],
-            path_gaps: vec![Eight::ZERO; (PARTS + 1) * nodes],
+            path: vec![PathPoint::new(nodes, rows.mode_blocks); STORED_TIMES],
+            mode_bounds: of_modes(),
+            amplitudes: of_modes(),
+            unresolved: None,
+            forces_known: false,
+            path_moved: [0, 1].map(|_| vec![Eight::ZERO; 2 * nodes]),
+            deepest: of_nodes(),
             impulses: vec![Eight::ZERO; 2 * nodes],
             pushes: false,
             reach: [of_nodes(), of_nodes()],
@@ -233,55 +244,40 @@ impl BladeTrial {
         faced: &FacedSurface,
         precision: f64,
     ) -> TrialResult {
+        (self.forces_known, self.unresolved) = (false, None);
         self.instructions.run_octets(Attempt { trial: self, rows, level, faced, precision })
     }
 
     /// Computes the modal forces of the tried step.
     pub(crate) fn find_modal_forces(&mut self, rows: &BladeRows, level: &BladeLevel) {
-        self.instructions.run_octets(FindModalForces { trial: self, rows, level });
+        if !replace(&mut self.forces_known, true) {
+            self.instructions.run_octets(FindModalForces { trial: self, rows, level });
+        }
     }
 
-    /// Finds the nodes that may come closer between the points of the tried step than at the points, by more than a
-    /// fraction of `tolerance` (m), and whose smallest gap may be below `floors` (m). Returns whether there are such
-    /// nodes, and records the gaps of the others. There are none if the tolerance is infinite.
-    pub(crate) fn find_minima(
+    /// Selects the nodes that may come closer between the points of the tried step than at the points, by more than a
+    /// fraction of `tolerance` (m), and whose smallest gap may be below `floors` and `lowest` (m). Returns whether there
+    /// are such nodes.
+    pub(super) fn select_followed(
         &mut self,
         (rows, level): (&BladeRows, &BladeLevel),
-        tally: &mut BladeTally,
-        floors: &[Eight],
+        [lowest, floors]: [&[Eight]; 2],
         tolerance: f64,
         ends: [f64; 2],
     ) -> bool {
-        let unresolved = if tolerance.is_finite() { self.unresolved_motion(rows, level) } else { 0.0 };
-        self.instructions.run_octets(FindMinima {
+        let unresolved = self.unresolved.unwrap_or_else(|| self.find_interpolation_error(rows, level.step));
+        self.unresolved = Some(unresolved);
+        let instructions = self.instructions;
+        instructions.run_octets(SelectFollowed {
             trial: self,
             rows,
             level,
-            tally,
+            lowest,
             floors,
             tolerance,
             unresolved,
             ends,
         })
-    }
-
-    /// Bounds the interpolation error (m) of all modes between points at a distance `length` (s).
-    pub(super) fn find_interpolation_error(&mut self, rows: &BladeRows, length: f64, terms: [f64; 2]) -> f64 {
-        let pushes = self.pushes;
-        self.instructions.run_octets(FindInterpolationError { trial: self, rows, length, terms, pushes })
-    }
-
-    /// Records the smallest gaps of these nodes within the tried step. `drives` is the prescribed motion at the ends of
-    /// equal parts of the step.
-    pub fn follow(
-        &mut self,
-        (rows, level, halves): (&BladeRows, &BladeLevel, &[&BladeLevel]),
-        (faced, drives): (&FacedSurface, &[PointDrive]),
-        tally: &mut BladeTally,
-        ends: [f64; 2],
-    ) {
-        let pushes = self.pushes;
-        self.instructions.run_octets(Follow { trial: self, rows, level, halves, faced, drives, tally, pushes, ends });
     }
 
     /// Advances the modes over the tried step, or over a step without forces, and returns the damping loss (J).

@@ -1,0 +1,129 @@
+//! Smallest gaps of the nodes of a tried step, between its points as well.
+
+use super::follow::Follow;
+use super::minima::{MAX_HALVINGS, RecordPoints};
+use super::span::{Blade, BladeInSpan, BladePlace, drive_at};
+use super::surface::{DriveRate, PointDrive};
+use super::tables::BladeTables;
+use super::trial::BladeTrial;
+use crate::math::octet::Eight;
+use crate::time::galerkin::basis::POINTS;
+use crate::time::galerkin::span::SpanStep;
+use crate::time::galerkin::tables::HALVINGS;
+use crate::time::galerkin::trial::{ForceInterpolation, TrialResult};
+use std::mem::take;
+
+/// Fraction of a span over which a difference of the prescribed motion gives its rates.
+const RATE_FRACTION: f64 = 1.0 / 64.0;
+
+impl BladeInSpan<'_> {
+    /// Records the smallest gaps of a tried step between two fractions of it. If it is not resolved, its polynomials do
+    /// not describe the motion between its points.
+    pub(super) fn record_gaps(&mut self, step: SpanStep, kind: ForceInterpolation, is_resolved: bool, ends: [f64; 2]) {
+        let Blade { trial, kinds, tally, floors, .. } = &mut *self.blade;
+        let tables = &kinds[self.place.kind];
+        let (rows, level) = (&tables.rows, tables.level(step.level, kind));
+        trial.followed.fill(0);
+        let found =
+            is_resolved && trial.select_followed((rows, level), [&tally.lowest, floors], self.goal.tolerance, ends);
+        let instructions = trial.instructions;
+        instructions.run_octets(RecordPoints { trial, rows, level, lowest: &mut tally.lowest, ends });
+        if found {
+            self.follow(step, kind, ends);
+        }
+    }
+
+    /// Records the smallest gaps of the followed nodes between two fractions of a step.
+    pub(super) fn follow(&mut self, step: SpanStep, kind: ForceInterpolation, ends: [f64; 2]) {
+        let Blade { trial, kinds, tally, floors, .. } = &mut *self.blade;
+        let path =
+            FollowedPath { place: &self.place, drives: &self.drives, step, kind, tolerance: self.goal.tolerance };
+        path.follow(trial, &mut kinds[self.place.kind], [&mut tally.lowest, floors], ends);
+    }
+
+    /// Finds how deep nodes that stay open penetrate between the points of the tried step.
+    pub(super) fn find_depth(&mut self, step: SpanStep, kind: ForceInterpolation, result: &mut TrialResult) {
+        let tolerance = self.goal.tolerance;
+        let Blade { trial, kinds, depth_limits, .. } = &mut *self.blade;
+        let tables = &mut kinds[self.place.kind];
+        if trial.pushes() {
+            trial.find_modal_forces(&tables.rows, tables.level(step.level, kind));
+        }
+        depth_limits.fill(Eight([-tolerance; 8]));
+        let mut deepest = take(&mut trial.deepest);
+        deepest.copy_from_slice(depth_limits);
+        let whole = [0.0, 1.0];
+        let level = tables.level(step.level, kind);
+        if trial.select_followed((&tables.rows, level), [&deepest, depth_limits], tolerance, whole) {
+            let path = FollowedPath { place: &self.place, drives: &self.drives, step, kind, tolerance };
+            path.follow(trial, tables, [&mut deepest, depth_limits], whole);
+            let least = deepest.iter().flat_map(|block| block.0).fold(f64::INFINITY, f64::min);
+            if least < -tolerance {
+                result.depth = result.depth.max(-least);
+            }
+        }
+        trial.deepest = deepest;
+    }
+}
+
+impl BladePlace<'_> {
+    /// Bounds the error (m) of the cubic through the shape of the surface and its rate at two fractions of the span.
+    pub(super) fn cubic_error(&self, ends: [f64; 2]) -> f64 {
+        let [from, to] = ends.map(|end| drive_at(self, end).0);
+        let (surface, turn) = (&self.gap.surface, (to.turned - from.turned).abs());
+        // A bump exp(−x²) has a fourth derivative of 6 times its curvature; a spline has a jump of its third derivative.
+        let curvature = surface.largest_curvature() * from.factor.abs().max(to.factor.abs());
+        curvature * turn * turn * (turn / surface.angular_scale()).min(1.0) / 64.0
+    }
+}
+
+/// Exact motion of the followed nodes of a tried step.
+struct FollowedPath<'a> {
+    place: &'a BladePlace<'a>,
+    drives: &'a [PointDrive; POINTS],
+    step: SpanStep,
+    kind: ForceInterpolation,
+    /// Largest displacement error of a step (m).
+    tolerance: f64,
+}
+
+impl FollowedPath<'_> {
+    /// Finds the smallest gaps between two fractions of the step. Those above `floors` are not needed (m).
+    fn follow(
+        &self,
+        trial: &mut BladeTrial,
+        tables: &mut BladeTables,
+        [lowest, floors]: [&mut [Eight]; 2],
+        ends: [f64; 2],
+    ) {
+        let Self { place, step, kind, .. } = *self;
+        tables.prepare(step.level, kind);
+        let finest = MAX_HALVINGS.min(HALVINGS - step.level);
+        (0..=finest).for_each(|halvings| tables.prepare(step.level + halvings, ForceInterpolation::Polynomial));
+        let halves: [_; MAX_HALVINGS + 1] =
+            std::array::from_fn(|k| tables.level(step.level + k.min(finest), ForceInterpolation::Polynomial));
+        let level = tables.level(step.level, kind);
+        let span = level.step / step.length;
+        let (instructions, pushes) = (trial.instructions, trial.pushes);
+        instructions.run_octets(Follow {
+            trial,
+            rows: &tables.rows,
+            level,
+            halves: &halves[..=finest],
+            faced: &place.faced_surface(self.drives),
+            drive_at: |theta| moving_drive_at(place, step.from + step.length * theta, span),
+            shape_error: place.cubic_error([step.from, step.from + step.length]),
+            lowest,
+            floors,
+            tolerance: self.tolerance,
+            pushes,
+            ends,
+        });
+    }
+}
+
+/// Prescribed motion of a sector at the fraction `theta` of a span of this length (s), and its rates.
+pub(super) fn moving_drive_at(place: &BladePlace, theta: f64, span: f64) -> (PointDrive, DriveRate) {
+    let [now, before] = [theta, theta - RATE_FRACTION].map(|theta| drive_at(place, theta).0);
+    (now, now.rate_since(&before, RATE_FRACTION * span))
+}
