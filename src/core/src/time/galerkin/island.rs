@@ -82,9 +82,8 @@ impl IslandSector {
 
     /// Returns the displacements of the contact rows (m) and the state.
     pub fn displacements(&mut self, tables: &[Vec<Tables>]) -> (&[f64], &SectorState) {
-        self.trial.forget();
         let rows = &tables[self.table[0]][self.table[1]].rows;
-        (self.trial.find_start(rows, &self.state), &self.state)
+        (self.trial.displacements(rows, &self.state), &self.state)
     }
 
     /// Returns the largest displacement of each contact row from rest (m) without contact.

@@ -141,6 +141,12 @@ impl ContactRows {
         self.add_up(&self.by_mode, [&state.position, &state.velocity], [one, two]);
     }
 
+    /// Finds displacements by the modes with inertia.
+    pub(crate) fn displacements(&self, state: &SectorState, sums: &mut Sums<2>) {
+        let [one, _] = &mut sums.rows;
+        self.add_up(&self.by_mode, [&state.position], [one]);
+    }
+
     /// Sums the amplitudes of the modes whose phase advances by more than `RESOLVED` within a step of this length (s),
     /// as displacements of the rows (m). For an infinite length, these are the largest displacements from rest at any
     /// time without contact.

@@ -176,23 +176,24 @@ impl Trial {
         self.known = true;
         rows.now(state, &mut self.now);
         let nodes = self.lanes.nodes;
-        for node in 0..nodes {
-            let [moved, velocity] = [0, 1].map(|set| self.now.vector3(set, node, nodes));
-            set_vector3_at(&mut self.start, node, moved);
-            set_vector3_at(&mut self.velocities, node, velocity);
-        }
+        (0..nodes).for_each(|node| set_vector3_at(&mut self.velocities, node, self.now.vector3(1, node, nodes)));
+        self.set_displacements(rows, state)
+    }
+
+    /// Returns the displacements of the rows in a state (m). The stored start values become outdated.
+    pub(crate) fn displacements(&mut self, rows: &ContactRows, state: &SectorState) -> &[f64] {
+        self.known = false;
+        rows.displacements(state, &mut self.now);
+        self.set_displacements(rows, state)
+    }
+
+    /// Adds the displacements by forces to those by the modes with inertia.
+    fn set_displacements(&mut self, rows: &ContactRows, state: &SectorState) -> &[f64] {
+        let nodes = self.lanes.nodes;
+        (0..nodes).for_each(|node| set_vector3_at(&mut self.start, node, self.now.vector3(0, node, nodes)));
         let (matrix, y) = (rows.residual(), &mut self.start);
         self.instructions.run(AddProduct { matrix, x: &state.forces, y });
         &self.start
-    }
-
-    /// Returns the largest displacement of each row from rest (m) without contact.
-    pub(crate) fn largest_displacements(&mut self, rows: &ContactRows, state: &SectorState) -> &[f64] {
-        let (sums, reach) = &mut self.reach;
-        rows.unresolved_amplitudes(f64::INFINITY, state, sums);
-        let nodes = self.lanes.nodes;
-        (0..nodes).for_each(|node| set_vector3_at(reach, node, sums.vector3(0, node, nodes)));
-        reach
     }
 
     /// Starts a trial: finds the displacements without forces at points 1 … s (unless the caller sets them, then `rows` is

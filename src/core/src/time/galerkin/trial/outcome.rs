@@ -3,10 +3,20 @@
 use super::{ForceInterpolation, Trial};
 use crate::math::vector::{Vector3, set_vector3_at, vector3_at};
 use crate::time::galerkin::basis::{MOST, TimeBasis};
+use crate::time::galerkin::rows::ContactRows;
 use crate::time::galerkin::state::SectorState;
 use nalgebra::DMatrix;
 
 impl Trial {
+    /// Returns the largest displacement of each row from rest (m) without contact.
+    pub(crate) fn largest_displacements(&mut self, rows: &ContactRows, state: &SectorState) -> &[f64] {
+        let (sums, reach) = &mut self.reach;
+        rows.unresolved_amplitudes(f64::INFINITY, state, sums);
+        let nodes = self.lanes.nodes;
+        (0..nodes).for_each(|node| set_vector3_at(reach, node, sums.vector3(0, node, nodes)));
+        reach
+    }
+
     /// Number of points at which forces are unknown: s, or 1 if the force is constant.
     pub fn points(&self) -> usize {
         self.lanes.points
