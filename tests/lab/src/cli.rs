@@ -14,8 +14,8 @@ use tiprub_study as study;
 use tiprub_study::arguments::{Speeds, StudyCommon, positive, speeds};
 
 use crate::{
-    bases, beside, conjugacy, convergence, coupling, cube, error, estimates, inputs, modes, random, refinement,
-    scatter, stability, stage, wear, witness,
+    bases, beside, conjugacy, convergence, coupling, cube, error, estimates, inputs, modes, penetration, random,
+    refinement, scatter, stability, stage, wear, witness,
 };
 
 /// Evidence for tiprub: studies of the built-in models and of standard problems.
@@ -87,6 +87,8 @@ pub enum LabCommand {
     /// Recovered stress of reduced blades in a rub, compared with the full finite-element model, for several numbers of
     /// modes.
     Stress(StudyCommon),
+    /// Penetration of contact nodes between the points of adaptive steps, from sampled displacements.
+    Penetration(StudyCommon),
     /// One blade in a coated casing whose radius decreases: wear lobes compared with blade vibrations per revolution.
     Wear(StudyCommon),
 }
@@ -304,6 +306,7 @@ impl LabCli {
             LabCommand::Scatter(common) => ("scatter", common),
             LabCommand::Witness(common) => ("witness", common),
             LabCommand::Stress(common) => ("stress", common),
+            LabCommand::Penetration(common) => ("penetration", common),
             LabCommand::Wear(common) => ("wear", common),
         };
         let directory = commands::study::directory(name, common);
@@ -335,6 +338,7 @@ impl LabCli {
             LabCommand::Scatter(common) => scatter::study(common, console),
             LabCommand::Witness(common) => witness::study(common, console),
             LabCommand::Stress(common) => witness::stress(common, console),
+            LabCommand::Penetration(common) => penetration::study(common, console),
             LabCommand::Wear(common) => wear::study(common, console),
             LabCommand::Stability(_) | LabCommand::Random(_) => unreachable!("`run` has answered it"),
         }

@@ -10,6 +10,7 @@
 //! - `scatter`: adaptive steps on random rubs and sectors;
 //! - `conjugacy`: forces, moments and work on both sides of contacts; `inputs`: effect of the communication step;
 //! - `coupling`: a rub and a shaft stepped alternately, with and without derivatives over the step;
+//! - `penetration`: gaps of adaptive steps, sampled between their points;
 //! - `wear`: one blade in a coating, wear lobes compared with its vibrations.
 
 #![warn(unreachable_pub)]
@@ -24,6 +25,7 @@ mod error;
 mod estimates;
 mod inputs;
 mod modes;
+mod penetration;
 mod random;
 mod refinement;
 mod scatter;

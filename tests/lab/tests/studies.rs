@@ -234,6 +234,17 @@ fn quick_wear_study_counts_lobes_and_vibrations() {
     assert_eq!(fs::read_to_string(root.path().join("out/wear.md")).unwrap().lines().count(), 2 + 6);
 }
 
+/// Open nodes stay outside the casing between the points of steps.
+#[test]
+fn quick_penetration_study_finds_no_missed_contact() {
+    let root = tempfile::tempdir().unwrap();
+    let json = study(root.path(), "penetration", &[]);
+    only_no(&json, &[]);
+    let rows = json["results"].as_array().unwrap();
+    assert_eq!(rows.len(), 6);
+    assert!(rows.iter().all(|row| row["touching"].as_u64() > Some(100)), "{rows:#?}");
+}
+
 /// The errors occur before any reduction, and no directory is created.
 #[test]
 fn rejects_unsupported_studies_before_running() {
@@ -260,6 +271,7 @@ fn rejects_unsupported_studies_before_running() {
         "stress",
         "bases",
         "scatter",
+        "penetration",
         "wear",
     ] {
         let reported = refuse(&[name, "--quick", "--out", "file/out"], 1);

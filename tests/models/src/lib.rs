@@ -12,6 +12,7 @@ pub mod several;
 mod single;
 mod wall;
 
+use std::cell::RefCell;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use nalgebra::{DMatrix, DVector};
@@ -109,6 +110,20 @@ pub fn rich_blade(sectors: usize) -> Rom {
         Some(local) if local - 1 == row => 14.0,
         Some(local) => 2.0 * (local as f64 + 1.9 * row as f64).sin(),
     })
+}
+
+/// Returns a blade with many random modes at high frequencies and little damping, so that it rings after impacts.
+pub fn ringing_blade(sectors: usize, seed: u64) -> Rom {
+    let random = RefCell::new(SeededRandom(seed));
+    let ringing = (0..30).map(|mode| 5e4 * 1.12_f64.powi(mode));
+    let local = (0..9).map(|mode| 2e6 + 1e5 * f64::from(mode));
+    let frequencies: Vec<f64> = [1.5e3, 6e3, 1.5e4].into_iter().chain(ringing).chain(local).collect();
+    let rom = blade_of(sectors, &frequencies, |row, mode| match mode.checked_sub(33) {
+        None if row.is_multiple_of(3) => 2.0 * random.borrow_mut().signed(),
+        Some(local) if local == row => 60.0,
+        _ => random.borrow_mut().signed(),
+    });
+    Rom { damping_ratio: 1e-4, ..rom }
 }
 
 /// Returns spin matrices for a blade: stiffening in proportion to the stiffness with some coupling, a skew matrix,
