@@ -23,6 +23,7 @@
 mod creases;
 mod foot;
 mod interpolation;
+pub(crate) mod motion;
 mod patch;
 mod projection;
 

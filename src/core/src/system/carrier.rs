@@ -1,9 +1,10 @@
 //! Effect of a group of contacts on the structure that carries their surfaces, computed with its modes contact by contact.
 
 use super::Structure;
-use super::pair::SurfaceCarrier;
+use super::pair::{ContactPair, SurfaceCarrier};
 use crate::geometry::Vector3;
 use crate::geometry::frame::PolarFrame;
+use crate::geometry::surface_spline::motion::largest_length;
 use crate::geometry::surface_spline::{ClosestPoint, SurfaceSpline, Weights};
 use crate::modes::bank::ModalBank;
 use nalgebra::DMatrix;
@@ -155,6 +156,13 @@ impl Reaction {
     /// Displacement of a place caused by the last [`Reaction::respond`], in the directions of the node (m).
     pub(crate) fn responded(&self, spot: Spot) -> Vector3 {
         spot.interpolate(|row| self.response[row])
+    }
+
+    /// Upper bound of the displacement of the surface of a pair by the last [`Reaction::respond`] (m).
+    pub(crate) fn surface_motion(&self, pair: &ContactPair) -> f64 {
+        let (Some(carrier), Some(surface)) = (pair.carrier(), pair.gap().spline()) else { return 0.0 };
+        let rows = &self.response[carrier.first_row..][..3 * surface.control_points().len()];
+        surface.amplification() * largest_length(rows)
     }
 
     /// Applies the forces of the solution passed to the last [`Reaction::respond`].
