@@ -15,8 +15,9 @@ mod energy;
 mod excited;
 mod heated;
 mod motion;
-mod predict;
+pub(crate) mod predict;
 mod span;
+pub(crate) mod surface;
 
 use nalgebra::DMatrix;
 use tiprub_cosim::persist::{Persist, StateReader, StateWriter};
@@ -31,6 +32,7 @@ use crate::scene::method::Scheme;
 use coupling::Coupling;
 pub use disk::Disk;
 use heated::HeatLoads;
+use surface::FlexibilityColumns;
 
 /// Lanes of one chunk: one 512-bit register of f64.
 pub(crate) const LANES: usize = 8;
@@ -65,7 +67,7 @@ pub struct BankOptions {
     pub coupling: Option<(ModalSpin, bool, bool)>,
     /// Loads of an engine order.
     pub excitation: Option<Excitation>,
-    /// True if G = Φ diag(c) Φᵀ is not stored; a slave with many contact rows uses its modes instead.
+    /// True if G = Φ diag(c) Φᵀ is not computed as a whole, because the structure has many contact rows.
     pub uses_modes: bool,
 }
 
@@ -155,6 +157,8 @@ pub struct ModalBank {
     lane_coefficients: Vec<BankCoefficients>,
     /// G per set: displacement of the contact rows per unit force held for one step (m/N), rows × rows.
     flexibility: Vec<DMatrix<f64>>,
+    /// Columns of G of a structure with many contact rows.
+    columns: FlexibilityColumns,
     coupling: Option<Coupling>,
     excitation: Option<ModalExcitation>,
     heat: Option<HeatLoads>,
@@ -230,6 +234,7 @@ impl ModalBank {
                 DMatrix::zeros(rows, rows);
                 if !options.uses_modes && coupled.is_none() { sets } else { 0 }
             ],
+            columns: FlexibilityColumns::new(if options.uses_modes { rows } else { 0 }),
             scheme: Scheme::default(),
             step: 0.0,
             state: BankState {

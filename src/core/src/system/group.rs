@@ -230,7 +230,7 @@ impl ContactGroup {
     }
 
     /// Fills and solves the problem of the members.
-    fn find_forces(&mut self, bodies: &Bodies, found: &mut GroupSolution) -> Result<(), StepFailure> {
+    fn find_forces(&mut self, bodies: &mut Bodies, found: &mut GroupSolution) -> Result<(), StepFailure> {
         let per = self.law.directions();
         self.members.iter().try_for_each(|&member| bodies.pose(member).check())?;
         let contacts = self.members.iter().map(|&member| bodies.pose(member));
@@ -252,7 +252,7 @@ impl ContactGroup {
     }
 
     /// Fills W of the group: structures with contact nodes by their flexibility, surface carriers by their modes.
-    fn fill_delassus(&mut self, bodies: &Bodies, per: usize) {
+    fn fill_delassus(&mut self, bodies: &mut Bodies, per: usize) {
         let matrix = self.law.matrix();
         if self.sides.len() > 1 {
             let size = per * self.members.len();
@@ -273,19 +273,18 @@ impl ContactGroup {
 
     /// Adds the part of the surface carriers.
     #[inline(never)]
-    fn add_reactions(&mut self, bodies: &Bodies, per: usize) {
+    fn add_reactions(&mut self, bodies: &mut Bodies, per: usize) {
         for reaction in &mut self.reactions {
             reaction.clear();
-            let of = &bodies.structures[reaction.structure];
             for (contact, &member) in self.members.iter().enumerate() {
                 let posed = bodies.pose(member);
                 let Some(spot) = posed.spot() else { continue };
                 if spot.carrier.structure == reaction.structure {
                     let span = per * contact..per * (contact + 1);
-                    reaction.see(of, contact, spot, &self.rows[span.clone()], &self.columns[span]);
+                    reaction.see(contact, spot, &self.rows[span.clone()], &self.columns[span]);
                 }
             }
-            reaction.add_delassus(of, self.law.matrix(), per);
+            reaction.add_delassus(&mut bodies.structures[reaction.structure], self.law.matrix(), per);
         }
     }
 
@@ -316,7 +315,7 @@ impl ContactGroup {
             let span = self.sides[side].span.clone();
             self.act(&mut bodies.structures[self.sides[side].structure], span);
         }
-        for reaction in &self.reactions {
+        for reaction in &mut self.reactions {
             reaction.apply(&mut bodies.structures[reaction.structure]);
         }
         if self.law.coating().is_some() {

@@ -39,6 +39,7 @@ impl ModalBank {
     }
 
     pub(super) fn refresh_coupling(&mut self) {
+        self.columns.forget();
         if let Some(coupling) = &mut self.coupling {
             let dynamic = self.model.dynamic_modes(self.scheme);
             let state = [self.state.speed, self.state.temperature];

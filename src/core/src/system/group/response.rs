@@ -19,7 +19,7 @@ impl ContactGroup {
         }
         let per = self.law.directions();
         for reaction in &mut self.reactions {
-            reaction.respond(&mut bodies.structures[reaction.structure], self.law.multipliers(), per);
+            reaction.respond(&bodies.structures[reaction.structure], self.law.multipliers(), per);
         }
         if !self.reactions.is_empty() {
             self.respond_of_carriers(bodies);
