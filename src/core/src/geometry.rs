@@ -98,7 +98,7 @@ impl Geometry {
 
     /// Sets the unit normal of one node of one lane.
     #[inline(always)]
-    fn set_normal(&mut self, index: usize, normal: Vector3) {
+    pub(crate) fn set_normal(&mut self, index: usize, normal: Vector3) {
         self.normal.iter_mut().zip(&normal).for_each(|(values, value)| values[index] = *value);
     }
 }

@@ -1,21 +1,30 @@
 //! Gaps to a surface through data points: closest point, normal, and the place at which the force is transferred.
 
+pub(crate) mod near;
+
 use super::frame::PolarFrame;
 use super::layout::Layout;
 use super::surface_spline::motion::largest_difference;
-use super::surface_spline::{ClosestPoint, Projection, SurfaceSpline};
+use super::surface_spline::{ClosestPoint, Projection, SurfaceSpline, split};
 use super::wrench::{At, MotionIncrement};
 use super::{Gap, Geometry, PrescribedMotion, Vector3};
+use crate::math::real;
 use crate::math::vector::{length, strided_vector3, vector3_at};
 
 /// Gap of a node without a surface to touch: infinite, so that it is never used as a distance.
 pub(crate) const NOTHING_TO_TOUCH: f64 = f64::INFINITY;
+
+/// Largest angle (rad) by which the closest point of a node lies beside its undisplaced position: a run ends at smaller displacements,
+/// because u²/2r then exceeds the clearance.
+const LARGEST_SHIFT: f64 = 0.06;
 
 /// Contact nodes of equally spaced sectors facing a surface spline.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SplineGap {
     /// Positions of the contact nodes of the structure.
     pub layout: Layout,
+    /// Directions of the contact nodes at rotor angle 0.
+    frames: Vec<PolarFrame>,
     /// Contact nodes that can touch the surface.
     pub nodes: Vec<usize>,
     /// Index of the first data point among the nodes of the contact grid that carries the surface.
@@ -32,9 +41,11 @@ pub struct SplineGap {
     pub angular_scale: f64,
     /// Largest change of a control point by the shape at factor 1 (m).
     pub shape_size: f64,
-    /// Bounds of [`SurfaceSpline::turning_rate`] for the round surface and for the shape at factor 1 (m/rad).
-    round_rate: f64,
-    shape_rate: f64,
+    /// Bounds of [`SurfaceSpline::turning_rates`] for the round surface and for the shape at factor 1 (m/rad).
+    round_rates: Vec<f64>,
+    shape_rates: Vec<f64>,
+    /// Smallest and largest angle of a node from the first node of its sector (rad).
+    spread: [f64; 2],
     /// Deviation of a ring through this number of points from a circle (m).
     pub ripple: f64,
     factor: f64,
@@ -59,11 +70,13 @@ impl SplineGap {
         let round = surface.control_points().to_vec();
         Self {
             shape_size: largest.sqrt(),
-            round_rate: surface.turning_rate(&round),
-            shape_rate: surface.turning_rate(&shape),
+            round_rates: surface.turning_rates(&round),
+            shape_rates: surface.turning_rates(&shape),
+            spread: spread(&layout),
             // The sagitta of a facet.
             ripple: 0.125 * radius * surface.spacing() * surface.spacing(),
             nodes: (0..layout.nodes()).collect(),
+            frames: frames(&layout),
             first_node: 0,
             layout,
             nominal_clearance,
@@ -103,91 +116,88 @@ impl SplineGap {
         self.follow(drive.shape_factor, moved);
         self.out_of_reach = None;
         let lanes = self.layout.lanes;
-        for slot in 0..self.nodes.len() {
-            let node = self.nodes[slot];
-            // Padding lanes are infinitely far away.
-            for lane in (0..lanes).filter(|lane| self.layout.clearances[*lane].is_finite()) {
-                let index = node * lanes + lane;
-                let local = strided_vector3(displacement, 3 * node * lanes + lane, lanes);
-                let start = guess.map(|places| self.surface.advance(places[index], self.turned));
-                let found = self.evaluate_from(At { node, index, drive }, local, start, geometry);
-                gap[index] = found;
-                if found == NOTHING_TO_TOUCH {
+        let nodes = self.nodes.iter().flat_map(|node| (0..lanes).map(move |lane| (*node, lane)));
+        // Padding lanes are infinitely far away.
+        for (node, lane) in nodes.filter(|(_, lane)| self.layout.clearances[*lane].is_finite()) {
+            let index = node * lanes + lane;
+            let local = strided_vector3(displacement, 3 * node * lanes + lane, lanes);
+            let at = At { node, index, drive };
+            let (projection, frame) = self.project(at, local, guess.map(|places| places[index]));
+            match projection {
+                Projection::Found { gap: found, .. } => {
+                    (gap[index], geometry.places[index]) = (found.distance, found.foot);
+                    geometry.set_normal(index, frame.local(found.normal));
+                }
+                Projection::BeyondEdge { place } => {
+                    gap[index] = NOTHING_TO_TOUCH;
+                    geometry.places[index] = place;
                     self.out_of_reach = self.out_of_reach.or(Some(index));
                 }
+                // The caller detects this: the model no longer describes such a state.
+                Projection::Lost => gap[index] = f64::NAN,
             }
         }
     }
 
-    /// Computes gap (m), normal and closest point of one node displaced by `local` (m) to the current surface, searched from `start` or
-    /// from the angle of the node. The gap is infinite beyond the extension of the surface, and NaN without closest point.
-    #[inline(always)]
-    pub(crate) fn evaluate_from(
-        &self,
-        at: At<'_>,
-        local: Vector3,
-        start: Option<ClosestPoint>,
-        geometry: &mut Geometry,
-    ) -> f64 {
-        let (projection, frame) = self.project(at, local, start);
-        match projection {
-            Projection::Found { gap: found, .. } => {
-                geometry.places[at.index] = found.foot;
-                geometry.set_normal(at.index, frame.local(found.normal));
-                found.distance
-            }
-            Projection::BeyondEdge { place } => {
-                geometry.places[at.index] = place;
-                NOTHING_TO_TOUCH
-            }
-            // The caller detects this: the model no longer describes such a state.
-            Projection::Lost => f64::NAN,
-        }
-    }
-
-    /// Upper bound of the change of any gap over a step (m) by everything except the displacement of its node. `rows` are the displacements
-    /// of the control points at the end and at the beginning of the step (m).
+    /// Computes upper bounds of the change of any gap of each sector over a step (m) by everything except the displacement of its node.
+    /// `rows` are the displacements of the control points at the end and at the beginning of the step (m).
     ///
     /// Let the rotor turn by an angle α relative to the shape. Apart from this rotation, a node moves by at most the changes of its
     /// clearance and of the shaft centre, plus (|α| + rotation of the shape) · |eccentricity|. The rotated surface differs from itself by
-    /// at most |α| times [`SurfaceSpline::turning_rate`], and it also deforms. A distance changes by no more than the sum of these terms.
-    pub(crate) fn gap_change(&self, drive: &PrescribedMotion, motion: &MotionIncrement, rows: [&[f64]; 2]) -> f64 {
+    /// at most |α| times [`SurfaceSpline::turning_rates`], and it also deforms. A distance changes by no more than the sum of these terms.
+    pub(crate) fn gap_changes(
+        &self,
+        drive: &PrescribedMotion,
+        motion: &MotionIncrement,
+        rows: [&[f64]; 2],
+        changes: &mut [f64],
+    ) {
         let turn = (motion.turn - motion.shape_rotation).abs();
         let off_centre = length(drive.shaft) + length(motion.shaft);
         let factor = drive.shape_factor.abs() + motion.shape_factor.abs();
         // The surface is that of the beginning while it turns.
-        let rate = self.round_rate + factor * self.shape_rate + self.surface.turning_rate_of_displacement(rows[1]);
+        let bent_rate = self.surface.turning_rate_of_displacement(rows[1]);
         let shifted = length(motion.shaft) + motion.opening.abs() + (turn + motion.shape_rotation.abs()) * off_centre;
         let bent = largest_difference(rows[0], rows[1]) + motion.shape_factor.abs() * self.shape_size;
-        shifted + turn * rate + self.surface.amplification() * bent
-    }
-
-    /// Returns the distance that node and surface may move before the node could touch the surface or leave its extension (m), if the node
-    /// has a gap (m) and a closest point `place` now; 0 in contact or near the end of the extension. The closest point moves along the
-    /// surface about as far as the node, so a third of the inner half of the extension keeps it far from the outer half.
-    pub(crate) fn free_distance(&self, gap: f64, place: ClosestPoint) -> f64 {
-        if gap.is_finite() && self.surface.is_far_from_edges(place) {
-            gap.min(self.surface.extension() / 6.0).max(0.0)
-        } else {
-            0.0
+        let common = shifted + turn * bent_rate + self.surface.amplification() * bent;
+        let (turned, margin) = (drive.rotor_angle - drive.shape_rotation, LARGEST_SHIFT + turn);
+        for (change, angle) in changes.iter_mut().zip(&self.layout.angles) {
+            let ends = self.spread.map(|offset| angle + turned + offset);
+            *change = common + turn * self.turning_rate(self.surface.patches_at(ends, margin), factor);
         }
     }
 
-    /// Returns the closest point of a node displaced by `moved` (m), searched from `start` or from its angle, and the directions
+    /// Largest bound of [`SurfaceSpline::turning_rates`] for the current surface in a range of patches around (m/rad), not reduced to one
+    /// turn, at a factor of the shape.
+    fn turning_rate(&self, [first, last]: [f64; 2], factor: f64) -> f64 {
+        let whole = real(self.surface.around());
+        let rate = |patch: f64| {
+            let (patch, _) = split(patch - whole * (patch / whole).floor(), self.surface.around());
+            self.round_rates[patch] + factor * self.shape_rates[patch]
+        };
+        let (mut patch, mut largest) = (first, 0.0_f64);
+        while patch <= last.min(first + whole) {
+            largest = largest.max(rate(patch));
+            patch += 1.0;
+        }
+        largest
+    }
+
+    /// Returns the closest point of a node displaced by `moved` (m), searched from its previous place or from its angle, and the directions
     /// of the node.
     #[inline(always)]
-    fn project(&self, at: At<'_>, moved: Vector3, start: Option<ClosestPoint>) -> (Projection, PolarFrame) {
+    fn project(&self, at: At<'_>, moved: Vector3, guess: Option<ClosestPoint>) -> (Projection, PolarFrame) {
         let angle = self.layout.angles[at.index] + at.drive.rotor_angle - at.drive.shape_rotation;
         let frame = PolarFrame::new(angle);
         let arm = self.arm(at.node, at.index % self.layout.lanes, at.drive, moved);
         let point = frame.fixed(arm + self.shaft_offset(angle, at.drive));
-        let start = start.unwrap_or_else(|| self.surface.locate(point));
+        let start = guess.map_or_else(|| self.surface.locate(point), |place| self.surface.advance(place, self.turned));
         (self.surface.project(point, start), frame)
     }
 
     /// Replaces the contact nodes by points at other places.
     pub(crate) fn of_points(self, layout: Layout) -> Self {
-        Self { nodes: (0..layout.nodes()).collect(), layout, ..self }
+        Self { nodes: (0..layout.nodes()).collect(), frames: frames(&layout), spread: spread(&layout), layout, ..self }
     }
 
     /// Returns the gap of one node displaced by `moved` (m); the surface is rigid.
@@ -279,6 +289,16 @@ impl SplineGap {
     pub fn frame(&self, index: usize, rotor_angle: f64) -> PolarFrame {
         PolarFrame::new(self.layout.angles[index] + rotor_angle)
     }
+}
+
+/// Smallest and largest angle of a node from the first node of its sector (rad).
+fn spread(layout: &Layout) -> [f64; 2] {
+    let offsets = layout.angles.chunks_exact(layout.lanes).map(|row| row[0] - layout.angles[0]);
+    offsets.fold([0.0; 2], |[low, high]: [f64; 2], offset| [low.min(offset), high.max(offset)])
+}
+
+fn frames(layout: &Layout) -> Vec<PolarFrame> {
+    layout.angles.iter().map(|angle| PolarFrame::new(*angle)).collect()
 }
 
 /// Returns whether a normal in the directions of a node is that of a casing seen from inside, on a flank below 45°.

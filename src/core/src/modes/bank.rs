@@ -174,6 +174,8 @@ pub struct ModalBank {
     modal_force: Vec<f64>,
     /// Scratch: change of the modal coordinates of the current sector.
     correction: Vec<f64>,
+    /// Scratch: rows of one sector with contact forces.
+    touched_rows: Vec<usize>,
     /// Scratch: displacements of the rows of one sector.
     moved: Vec<f64>,
     /// Scratch: modal coordinates and increments of one sector.
@@ -254,6 +256,7 @@ impl ModalBank {
             increment_before: vec![0.0; state_len],
             modal_force: vec![0.0; modes * parts],
             correction: vec![0.0; modes],
+            touched_rows: Vec::with_capacity(rows),
             moved: vec![0.0; rows],
             gathered: [vec![0.0; modes], vec![0.0; modes]],
             coupling,

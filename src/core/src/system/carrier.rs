@@ -8,6 +8,7 @@ use crate::geometry::Vector3;
 use crate::geometry::frame::PolarFrame;
 use crate::geometry::surface_spline::motion::largest_length;
 use crate::geometry::surface_spline::{ClosestPoint, SurfaceSpline, Weights};
+use crate::math::vector::vector3_at;
 use crate::modes::bank::ModalBank;
 use crate::modes::bank::predict::Accumulate;
 use crate::modes::bank::surface::padded;
@@ -182,6 +183,15 @@ impl Reaction {
         let matrix = &self.moved[..self.factors.len() * self.response.len()];
         let sums = &mut self.response[..];
         bank(of).instruction_set.run(Accumulate { sums, matrix, values: &self.factors });
+    }
+
+    /// Displacement of a place of a surface, whose rows begin at `first`, caused by the last [`Reaction::respond`], in fixed directions (m).
+    pub(crate) fn moved_at(&self, surface: &SurfaceSpline, place: ClosestPoint, first: usize) -> Vector3 {
+        let mut sum = Vector3::zeros();
+        for (point, weight) in surface.weights(place).iter() {
+            sum += weight * vector3_at(&self.response[first..], point);
+        }
+        sum
     }
 
     /// Displacement of a place caused by the last [`Reaction::respond`], in the directions of the node (m).

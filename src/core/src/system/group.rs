@@ -36,6 +36,8 @@ struct GroupSide {
     response: Vec<f64>,
     /// Upper bound of the motion of each node and its surface by the solution (m), `[node · lanes + lane]`; empty if no node is skipped.
     travel: Vec<f64>,
+    /// Gaps or their bounds after the solution (m); empty if no node is skipped.
+    after: Vec<f64>,
     /// Index range of the members among those of the group.
     span: std::ops::Range<usize>,
 }
@@ -92,6 +94,7 @@ impl ContactGroup {
                 chosen: vec![false; len],
                 response: vec![0.0; len],
                 travel: vec![0.0; structures[*structure].nearness.len()],
+                after: vec![0.0; structures[*structure].nearness.len()],
                 span: 0..0,
             }
         };
@@ -305,10 +308,14 @@ impl ContactGroup {
     fn apply(&mut self, bodies: &mut Bodies, found: &mut GroupSolution) {
         for side in &self.sides {
             let structure = &mut bodies.structures[side.structure];
+            if structure.nearness.is_used() {
+                structure.history.gap.now.copy_from_slice(&side.after);
+                structure.nearness.reduce(&side.travel);
+                continue;
+            }
             for (gap, response) in structure.history.gap.now.iter_mut().zip(&side.response) {
                 *gap += response;
             }
-            structure.nearness.reduce(&side.travel, &mut structure.history.gap.now);
         }
         self.record(bodies, found);
         for side in 0..self.sides.len() {

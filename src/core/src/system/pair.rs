@@ -161,8 +161,9 @@ impl ContactPair {
         let rows = carrier.first_row..carrier.first_row + 3 * gap.surface.control_points().len();
         let (structure, carrier) = two(structures, [*structure, carrier.structure]);
         let (now, before) = (&carrier.modes.displacement()[rows.clone()], &carrier.modes.displacement_before()[rows]);
-        let change = gap.gap_change(&prescribed.drive.now, &prescribed.motion.now, [now, before]);
-        structure.find_near_gaps(gap, &prescribed.drive.now, now, change);
+        let changes = &mut structure.nearness.changes;
+        gap.gap_changes(&prescribed.drive.now, &prescribed.motion.now, [now, before], changes);
+        structure.find_near_gaps(gap, &prescribed.drive.now, now);
     }
 
     /// Finds the gaps of the nodes at the current displacements. The search for closest points begins at `start`.
@@ -180,7 +181,7 @@ impl ContactPair {
         let before = (start == SearchStart::PreviousStep).then_some(&*before);
         gap.evaluate(&prescribed.drive.now, structure.modes.displacement(), moved, before, now, &mut gaps.now);
         if let Some(gap) = gap.spline_law().filter(|_| structure.nearness.is_used()) {
-            structure.note_all_evaluated(gap);
+            structure.note_all_evaluated(&gap.nodes);
         }
     }
 }

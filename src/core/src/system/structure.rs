@@ -177,6 +177,12 @@ impl Structure {
         pairs.map(move |(node, pair)| ContactMember { structure, pair, node, sector, index: self.index(node, sector) })
     }
 
+    /// Returns the contact at an index of the arrays over all nodes and lanes; `structure` is the index of this structure.
+    pub(crate) fn contact_at(&self, structure: usize, index: usize) -> Option<ContactMember> {
+        let (node, sector) = (index / self.lanes, index % self.lanes);
+        Some(ContactMember { structure, pair: self.pair_of[node]?, node, sector, index })
+    }
+
     /// Gaps at the current step (m), `[node · lanes + lane]`; padding lanes are infinite.
     pub fn gaps(&self) -> &[f64] {
         &self.history.gap.now

@@ -32,34 +32,41 @@ impl ContactGroup {
         for side in 0..self.sides.len() {
             let number = self.sides[side].structure;
             let structure = &bodies.structures[number];
-            for sector in 0..structure.modes().sectors() {
-                for at in structure.contacts(number, sector) {
-                    if !structure.nearness.is_skipped(at.index) {
-                        self.sides[side].response[at.index] -= self.approach_of_surface(bodies, at);
+            if structure.nearness.is_used() {
+                for index in structure.nearness.evaluated() {
+                    if let Some(at) = structure.contact_at(number, *index) {
+                        self.sides[side].response[*index] -= self.approach_of_surface(bodies, at);
                     }
                 }
+                self.add_surface_travel(side, bodies);
+                continue;
             }
-            self.add_surface_travel(side, bodies);
+            for sector in 0..structure.modes().sectors() {
+                for at in structure.contacts(number, sector) {
+                    self.sides[side].response[at.index] -= self.approach_of_surface(bodies, at);
+                }
+            }
         }
     }
 
     /// Displacement of the surface along its normal at a contact node, caused by the solution (m).
     fn approach_of_surface(&self, bodies: &Bodies, at: ContactMember) -> f64 {
-        let posed = bodies.pose(at);
-        let Some(spot) = posed.spot() else { return 0.0 };
-        let carrier = self.reactions.iter().find(|one| one.structure == spot.carrier.structure);
-        let moved = carrier.map_or(Vector3::zeros(), |reaction| reaction.responded(spot));
-        bodies.structures[at.structure].history.geometry.now.normal_at(at.index).dot(&moved)
+        let (pair, structure) = (&bodies.pairs[at.pair], &bodies.structures[at.structure]);
+        let (Some(carrier), Some(surface)) = (pair.carrier(), pair.gap().spline()) else { return 0.0 };
+        let Some(reaction) = self.reactions.iter().find(|one| one.structure == carrier.structure) else { return 0.0 };
+        let geometry = &structure.history.geometry.now;
+        if structure.nearness.is_used() {
+            let moved = reaction.moved_at(surface, geometry.places[at.index], carrier.first_row);
+            return structure.nearness.fixed_normal(at.index).dot(&moved);
+        }
+        let moved = bodies.pose(at).spot().map_or(Vector3::zeros(), |spot| reaction.responded(spot));
+        geometry.normal_at(at.index).dot(&moved)
     }
 
     /// Adds bounds of the motion of the surfaces to those of the nodes.
     fn add_surface_travel(&mut self, side: usize, bodies: &Bodies) {
         let side = &mut self.sides[side];
-        let structure = &bodies.structures[side.structure];
-        if !structure.nearness.is_used() {
-            return;
-        }
-        let lanes = structure.lanes();
+        let lanes = bodies.structures[side.structure].lanes();
         for pair in bodies.pairs.iter().filter(|pair| pair.structure() == side.structure) {
             let Some(carrier) = pair.carrier() else { continue };
             let reaction = self.reactions.iter().find(|one| one.structure == carrier.structure);
@@ -77,21 +84,27 @@ impl ContactGroup {
             if !bodies.structures[number].nearness.is_used() {
                 continue;
             }
+            let GroupSide { response, travel, after, .. } = &mut self.sides[side];
+            let structure = &bodies.structures[number];
+            structure.nearness.gaps_after(structure.gaps(), response, travel, after);
             for pair in bodies.pairs.iter().filter(|pair| pair.structure() == number && pair.carrier().is_some()) {
                 for minimum in 0..bodies.structures[number].minima_among(pair.nodes()) {
-                    while let Some(index) =
-                        self.sides[side].undecided(&bodies.structures[number], pair.nodes(), minimum)
-                    {
+                    let next = |side: &GroupSide, structure: &Structure| {
+                        structure.undecided(pair.nodes(), minimum, &side.after)
+                    };
+                    while let Some(index) = next(&self.sides[side], &bodies.structures[number]) {
                         bodies.structures[number].evaluate_skipped(pair, index);
-                        self.respond_of(side, bodies, index);
+                        let response = self.response_of(side, bodies, index);
+                        self.sides[side].response[index] = response;
+                        self.sides[side].after[index] = bodies.structures[number].gaps()[index] + response;
                     }
                 }
             }
         }
     }
 
-    /// Computes the change of the gap of one node by the solution (m), with the same operations as for all nodes.
-    fn respond_of(&mut self, side: usize, bodies: &Bodies, index: usize) {
+    /// Returns the change of the gap of one node by the solution (m), found with the same operations as for all nodes.
+    fn response_of(&self, side: usize, bodies: &Bodies, index: usize) -> f64 {
         let (number, span) = (self.sides[side].structure, self.sides[side].span.clone());
         let structure = &bodies.structures[number];
         let (node, sector) = (index / structure.lanes(), index % structure.lanes());
@@ -111,26 +124,11 @@ impl ContactGroup {
                 Some(disk) => response = normal.dot(&strided_vector3(&disk.moved, 3 * node * lanes + sector, lanes)),
             }
         }
-        if let Some(pair) = structure.pair_of[node] {
-            response -=
-                self.approach_of_surface(bodies, ContactMember { structure: number, pair, node, sector, index });
-        }
-        self.sides[side].response[index] = response;
+        response - structure.contact_at(number, index).map_or(0.0, |at| self.approach_of_surface(bodies, at))
     }
 }
 
 impl GroupSide {
-    /// Returns a skipped node that may be in contact or have a needed smallest gap after the solution (see [`Structure::undecided`]).
-    fn undecided(&self, structure: &Structure, nodes: &[usize], minimum: usize) -> Option<usize> {
-        structure.undecided(nodes, minimum, |structure, index| {
-            if structure.nearness.is_skipped(index) {
-                structure.nearness.free_after(index, self.travel[index])
-            } else {
-                structure.history.gap.now[index] + self.response[index]
-            }
-        })
-    }
-
     /// Computes the change of the gaps of this structure by forces on its own members.
     #[inline(never)]
     fn respond(&mut self, structure: &mut Structure, members: &[ContactMember], forces: &[Vector3]) {
