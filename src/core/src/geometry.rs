@@ -90,9 +90,15 @@ impl Geometry {
         Vector3::new(self.normal[0][index], self.normal[1][index], self.normal[2][index])
     }
 
+    /// Copies all normals and closest points of `other`, which belongs to the same structure.
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        self.normal.iter_mut().zip(&other.normal).for_each(|(own, other)| own.copy_from_slice(other));
+        self.places.copy_from_slice(&other.places);
+    }
+
     /// Sets the unit normal of one node of one lane.
     #[inline(always)]
-    fn set_normal(&mut self, index: usize, normal: Vector3) {
+    pub(crate) fn set_normal(&mut self, index: usize, normal: Vector3) {
         self.normal.iter_mut().zip(&normal).for_each(|(values, value)| values[index] = *value);
     }
 }
@@ -173,6 +179,11 @@ impl GapLaw {
             Self::Spline(law) => law.nodes.clone(),
             Self::Open(law) => law.nodes.clone(),
         }
+    }
+
+    /// Returns the gap function of nodes inside a surface through data points around an axis.
+    pub(crate) fn spline_law(&self) -> Option<&SplineGap> {
+        if let Self::Spline(law) = self { Some(law) } else { None }
     }
 
     /// Returns the surface through data points that the nodes can touch.

@@ -11,6 +11,7 @@ pub(crate) mod group;
 pub(crate) mod history;
 pub(crate) mod ledger;
 pub(crate) mod losses;
+pub(crate) mod nearness;
 pub(crate) mod pair;
 pub(crate) mod pulling;
 pub(crate) mod sets;
@@ -22,6 +23,7 @@ pub(crate) mod work;
 use tiprub_cosim::persist_fields;
 
 use crate::contact::coating::Coating;
+use crate::geometry::surface_spline::SurfaceSpline;
 use crate::geometry::{GapLaw, PrescribedMotion};
 use crate::modes::bank::{BankOptions, ModalBank, SectorModel};
 use crate::modes::modal::ModalModel;
@@ -36,6 +38,7 @@ pub(crate) use group::{ContactGroup, GroupSolution};
 pub use ledger::Ledger;
 use losses::LargestLosses;
 pub use losses::Loss;
+use nearness::Nearness;
 pub use pair::{ContactPair, PairParts, SurfaceCarrier};
 pub(crate) use pair::{SearchStart, ShapeGrowth};
 pub use sets::StructureSets;
@@ -141,6 +144,7 @@ impl System {
         for (pair, coating) in coatings {
             of_sets[sets.of(pairs[pair].structure())].get_or_insert(coating);
         }
+        allow_skipping(&mut structures, &pairs, |structure| of_sets[sets.of(structure)].is_some());
         let group = |(set, coating): (usize, Option<Coating>)| {
             let (reach, touching) = contact_reach(&structures, &pairs, &sets, set)?;
             let own = sets.pairs(set).iter();
@@ -299,6 +303,15 @@ impl System {
         }
     }
 
+    /// Finds the gap of every node that may be in contact or that outputs need, and the smallest gap of each lane.
+    pub(crate) fn find_near_gaps(&mut self) {
+        self.structures.iter_mut().for_each(Structure::keep_geometry);
+        for pair in &mut self.pairs {
+            pair.find_near_gaps(&mut self.structures);
+        }
+        self.structures.iter_mut().for_each(Structure::find_lowest);
+    }
+
     /// Makes the contacts of the last step those of the previous step.
     pub(crate) fn retire_events(&mut self) {
         self.events.shift();
@@ -401,6 +414,17 @@ fn made(part: StructureParts, own: &[usize], pairs: &[PairParts]) -> Structure {
     }
     let has_places = gaps().any(|(_, gap)| gap.spline().is_some());
     Structure::touching(model, options, pair_of, has_places)
+}
+
+/// Lets structures skip nodes that face surfaces of other structures. `is_coated` returns whether nodes share cells of a coating.
+fn allow_skipping(structures: &mut [Structure], pairs: &[ContactPair], is_coated: impl Fn(usize) -> bool) {
+    for pair in pairs {
+        let surface = pair.gap().spline_law().filter(|_| pair.carrier().is_some()).map(|gap| &gap.surface);
+        if surface.is_some_and(SurfaceSpline::is_smooth_ring) && !is_coated(pair.structure()) {
+            let structure = &mut structures[pair.structure()];
+            structure.nearness = Nearness::new(structure.nodes(), structure.lanes());
+        }
+    }
 }
 
 /// Finds the structures with contact nodes of a set, and how far their contacts are coupled; `None` without contact nodes.

@@ -19,6 +19,15 @@ impl PolarFrame {
         Self { sine, cosine }
     }
 
+    /// Returns the frame at the sum of the angles of two frames.
+    #[inline(always)]
+    pub fn turned(self, by: Self) -> Self {
+        Self {
+            sine: self.sine * by.cosine + self.cosine * by.sine,
+            cosine: self.cosine * by.cosine - self.sine * by.sine,
+        }
+    }
+
     /// Returns the (radial, tangential, axial) components of a vector given in fixed directions.
     #[inline(always)]
     pub fn local(self, v: Vector3) -> Vector3 {

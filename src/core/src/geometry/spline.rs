@@ -1,20 +1,30 @@
 //! Gaps to a surface through data points: closest point, normal, and the place at which the force is transferred.
 
+pub(crate) mod near;
+
 use super::frame::PolarFrame;
 use super::layout::Layout;
-use super::surface_spline::{ClosestPoint, Projection, SurfaceSpline};
+use super::surface_spline::motion::largest_difference;
+use super::surface_spline::{ClosestPoint, Projection, SurfaceSpline, split};
 use super::wrench::{At, MotionIncrement};
 use super::{Gap, Geometry, PrescribedMotion, Vector3};
+use crate::math::real;
 use crate::math::vector::{length, strided_vector3, vector3_at};
 
 /// Gap of a node without a surface to touch: infinite, so that it is never used as a distance.
 pub(crate) const NOTHING_TO_TOUCH: f64 = f64::INFINITY;
+
+/// Largest angle (rad) by which the closest point of a node lies beside its undisplaced position: a run ends at smaller displacements,
+/// because u²/2r then exceeds the clearance.
+const LARGEST_SHIFT: f64 = 0.06;
 
 /// Contact nodes of equally spaced sectors facing a surface spline.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SplineGap {
     /// Positions of the contact nodes of the structure.
     pub layout: Layout,
+    /// Directions of the contact nodes at rotor angle 0.
+    frames: Vec<PolarFrame>,
     /// Contact nodes that can touch the surface.
     pub nodes: Vec<usize>,
     /// Index of the first data point among the nodes of the contact grid that carries the surface.
@@ -31,6 +41,11 @@ pub struct SplineGap {
     pub angular_scale: f64,
     /// Largest change of a control point by the shape at factor 1 (m).
     pub shape_size: f64,
+    /// Bounds of [`SurfaceSpline::turning_rates`] for the round surface and for the shape at factor 1 (m/rad).
+    round_rates: Vec<f64>,
+    shape_rates: Vec<f64>,
+    /// Smallest and largest angle of a node from the first node of its sector (rad).
+    spread: [f64; 2],
     /// Deviation of a ring through this number of points from a circle (m).
     pub ripple: f64,
     factor: f64,
@@ -52,15 +67,20 @@ impl SplineGap {
     ) -> Self {
         let largest = shape.iter().fold(0.0, |most: f64, change| most.max(change.dot(change)));
         let radius = layout.radii.iter().fold(0.0, |most: f64, radius| most.max(*radius));
+        let round = surface.control_points().to_vec();
         Self {
             shape_size: largest.sqrt(),
+            round_rates: surface.turning_rates(&round),
+            shape_rates: surface.turning_rates(&shape),
+            spread: spread(&layout),
             // The sagitta of a facet.
             ripple: 0.125 * radius * surface.spacing() * surface.spacing(),
             nodes: (0..layout.nodes()).collect(),
+            frames: frames(&layout),
             first_node: 0,
             layout,
             nominal_clearance,
-            round: surface.control_points().to_vec(),
+            round,
             surface,
             shape,
             angular_scale,
@@ -119,6 +139,50 @@ impl SplineGap {
         }
     }
 
+    /// Computes upper bounds of the change of any gap of each sector over a step (m) by everything except the displacement of its node.
+    /// `rows` are the displacements of the control points at the end and at the beginning of the step (m).
+    ///
+    /// Let the rotor turn by an angle α relative to the shape. Apart from this rotation, a node moves by at most the changes of its
+    /// clearance and of the shaft centre, plus (|α| + rotation of the shape) · |eccentricity|. The rotated surface differs from itself by
+    /// at most |α| times [`SurfaceSpline::turning_rates`], and it also deforms. A distance changes by no more than the sum of these terms.
+    pub(crate) fn gap_changes(
+        &self,
+        drive: &PrescribedMotion,
+        motion: &MotionIncrement,
+        rows: [&[f64]; 2],
+        changes: &mut [f64],
+    ) {
+        let turn = (motion.turn - motion.shape_rotation).abs();
+        let off_centre = length(drive.shaft) + length(motion.shaft);
+        let factor = drive.shape_factor.abs() + motion.shape_factor.abs();
+        // The surface is that of the beginning while it turns.
+        let bent_rate = self.surface.turning_rate_of_displacement(rows[1]);
+        let shifted = length(motion.shaft) + motion.opening.abs() + (turn + motion.shape_rotation.abs()) * off_centre;
+        let bent = largest_difference(rows[0], rows[1]) + motion.shape_factor.abs() * self.shape_size;
+        let common = shifted + turn * bent_rate + self.surface.amplification() * bent;
+        let (turned, margin) = (drive.rotor_angle - drive.shape_rotation, LARGEST_SHIFT + turn);
+        for (change, angle) in changes.iter_mut().zip(&self.layout.angles) {
+            let ends = self.spread.map(|offset| angle + turned + offset);
+            *change = common + turn * self.turning_rate(self.surface.patches_at(ends, margin), factor);
+        }
+    }
+
+    /// Largest bound of [`SurfaceSpline::turning_rates`] for the current surface in a range of patches around (m/rad), not reduced to one
+    /// turn, at a factor of the shape.
+    fn turning_rate(&self, [first, last]: [f64; 2], factor: f64) -> f64 {
+        let whole = real(self.surface.around());
+        let rate = |patch: f64| {
+            let (patch, _) = split(patch - whole * (patch / whole).floor(), self.surface.around());
+            self.round_rates[patch] + factor * self.shape_rates[patch]
+        };
+        let (mut patch, mut largest) = (first, 0.0_f64);
+        while patch <= last.min(first + whole) {
+            largest = largest.max(rate(patch));
+            patch += 1.0;
+        }
+        largest
+    }
+
     /// Returns the closest point of a node displaced by `moved` (m), searched from its previous place or from its angle, and the directions
     /// of the node.
     #[inline(always)]
@@ -133,7 +197,7 @@ impl SplineGap {
 
     /// Replaces the contact nodes by points at other places.
     pub(crate) fn of_points(self, layout: Layout) -> Self {
-        Self { nodes: (0..layout.nodes()).collect(), layout, ..self }
+        Self { nodes: (0..layout.nodes()).collect(), frames: frames(&layout), spread: spread(&layout), layout, ..self }
     }
 
     /// Returns the gap of one node displaced by `moved` (m); the surface is rigid.
@@ -225,6 +289,16 @@ impl SplineGap {
     pub fn frame(&self, index: usize, rotor_angle: f64) -> PolarFrame {
         PolarFrame::new(self.layout.angles[index] + rotor_angle)
     }
+}
+
+/// Smallest and largest angle of a node from the first node of its sector (rad).
+fn spread(layout: &Layout) -> [f64; 2] {
+    let offsets = layout.angles.chunks_exact(layout.lanes).map(|row| row[0] - layout.angles[0]);
+    offsets.fold([0.0; 2], |[low, high]: [f64; 2], offset| [low.min(offset), high.max(offset)])
+}
+
+fn frames(layout: &Layout) -> Vec<PolarFrame> {
+    layout.angles.iter().map(|angle| PolarFrame::new(*angle)).collect()
 }
 
 /// Returns whether a normal in the directions of a node is that of a casing seen from inside, on a flank below 45°.

@@ -23,6 +23,7 @@
 mod creases;
 mod foot;
 mod interpolation;
+pub(crate) mod motion;
 mod patch;
 mod projection;
 
@@ -300,6 +301,7 @@ impl SurfaceSpline {
     }
 
     /// Returns the place `turns` revolutions further about z, a start value after the rotor has turned; closed surfaces only.
+    #[inline]
     pub fn advance(&self, place: ClosestPoint, turns: f64) -> ClosestPoint {
         let whole = real(self.around);
         let s = place.s + turns * whole;
@@ -350,7 +352,7 @@ fn mean_axial(points: &[[f64; 3]]) -> f64 {
 }
 
 /// Splits a value in [0, count] into a whole part below `count` and the rest.
-fn split(value: f64, count: usize) -> (usize, f64) {
+pub(crate) fn split(value: f64, count: usize) -> (usize, f64) {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 ≤ value ≤ count")]
     let whole = (value as usize).min(count - 1);
     (whole, value - real(whole))

@@ -15,8 +15,9 @@ mod energy;
 mod excited;
 mod heated;
 mod motion;
-mod predict;
+pub(crate) mod predict;
 mod span;
+pub(crate) mod surface;
 
 use nalgebra::DMatrix;
 use tiprub_cosim::persist::{Persist, StateReader, StateWriter};
@@ -31,6 +32,7 @@ use crate::scene::method::Scheme;
 use coupling::Coupling;
 pub use disk::Disk;
 use heated::HeatLoads;
+use surface::FlexibilityColumns;
 
 /// Lanes of one chunk: one 512-bit register of f64.
 pub(crate) const LANES: usize = 8;
@@ -65,7 +67,7 @@ pub struct BankOptions {
     pub coupling: Option<(ModalSpin, bool, bool)>,
     /// Loads of an engine order.
     pub excitation: Option<Excitation>,
-    /// True if G = Φ diag(c) Φᵀ is not stored; a slave with many contact rows uses its modes instead.
+    /// True if G = Φ diag(c) Φᵀ is not computed as a whole, because the structure has many contact rows.
     pub uses_modes: bool,
 }
 
@@ -155,6 +157,8 @@ pub struct ModalBank {
     lane_coefficients: Vec<BankCoefficients>,
     /// G per set: displacement of the contact rows per unit force held for one step (m/N), rows × rows.
     flexibility: Vec<DMatrix<f64>>,
+    /// Columns of G of a structure with many contact rows.
+    columns: FlexibilityColumns,
     coupling: Option<Coupling>,
     excitation: Option<ModalExcitation>,
     heat: Option<HeatLoads>,
@@ -170,6 +174,8 @@ pub struct ModalBank {
     modal_force: Vec<f64>,
     /// Scratch: change of the modal coordinates of the current sector.
     correction: Vec<f64>,
+    /// Scratch: rows of one sector with contact forces.
+    touched_rows: Vec<usize>,
     /// Scratch: displacements of the rows of one sector.
     moved: Vec<f64>,
     /// Scratch: modal coordinates and increments of one sector.
@@ -230,6 +236,7 @@ impl ModalBank {
                 DMatrix::zeros(rows, rows);
                 if !options.uses_modes && coupled.is_none() { sets } else { 0 }
             ],
+            columns: FlexibilityColumns::new(if options.uses_modes { rows } else { 0 }),
             scheme: Scheme::default(),
             step: 0.0,
             state: BankState {
@@ -249,6 +256,7 @@ impl ModalBank {
             increment_before: vec![0.0; state_len],
             modal_force: vec![0.0; modes * parts],
             correction: vec![0.0; modes],
+            touched_rows: Vec::with_capacity(rows),
             moved: vec![0.0; rows],
             gathered: [vec![0.0; modes], vec![0.0; modes]],
             coupling,

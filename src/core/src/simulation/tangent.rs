@@ -170,17 +170,17 @@ impl Simulation {
         self.system.pairs().iter().map(|pair| pair.gap().clearance()).fold(f64::INFINITY, f64::min)
     }
 
-    /// Returns normal impulses over the communication step (N·s) and gaps at its end (m) of all structures.
+    /// Returns normal impulses over the communication step (N·s) and evaluated gaps at its end (m) of all structures.
     fn touched(&self) -> [Vec<f64>; 2] {
         let impulses = self.state.window.bodies.iter().flat_map(|body| &body.normal_impulse).copied();
-        let gaps = self.system.structures().iter().flat_map(|structure| structure.gaps()).copied();
+        let gaps = self.system.structures().iter().flat_map(|structure| structure.evaluated_gaps());
         [impulses.collect(), gaps.collect()]
     }
 
-    /// Largest difference between the current gaps and those of a twin (m).
+    /// Largest difference between the current gaps and those of a twin (m), of nodes whose gaps were evaluated in both.
     fn gaps_moved(&self, twin: &Self) -> f64 {
         let both = self.system.structures().iter().zip(twin.system.structures());
-        let gaps = both.flat_map(|(own, other)| own.gaps().iter().zip(other.gaps()));
+        let gaps = both.flat_map(|(own, other)| own.evaluated_gaps().zip(other.evaluated_gaps()));
         gaps.map(|(own, other)| (own - other).abs()).filter(|moved| moved.is_finite()).fold(0.0, f64::max)
     }
 
@@ -274,7 +274,7 @@ fn bend(behind: &[Vec<f64>; 2], now: &[Vec<f64>; 2], ahead: &[Vec<f64>; 2]) -> f
         let (mut off, mut change) = (0.0, 0.0);
         for ((behind, now), ahead) in behind[which].iter().zip(&now[which]).zip(&ahead[which]) {
             let (before, after) = (now - behind, ahead - now);
-            // A node with no surface to touch, before or after, has no rate.
+            // A node without gap, before or after, has no rate.
             if before.is_finite() && after.is_finite() {
                 off += (after - before).abs();
                 change += before.abs() + after.abs();

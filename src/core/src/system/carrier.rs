@@ -1,11 +1,18 @@
 //! Effect of a group of contacts on the structure that carries their surfaces, computed with its modes contact by contact.
 
+mod kernels;
+
 use super::Structure;
-use super::pair::SurfaceCarrier;
+use super::pair::{ContactPair, SurfaceCarrier};
 use crate::geometry::Vector3;
 use crate::geometry::frame::PolarFrame;
+use crate::geometry::surface_spline::motion::largest_length;
 use crate::geometry::surface_spline::{ClosestPoint, SurfaceSpline, Weights};
+use crate::math::vector::vector3_at;
 use crate::modes::bank::ModalBank;
+use crate::modes::bank::predict::Accumulate;
+use crate::modes::bank::surface::padded;
+use kernels::{AddDelassus, MoveSurface};
 use nalgebra::DMatrix;
 
 /// Location at which a contact acts on a structure.
@@ -28,6 +35,14 @@ impl Spot<'_> {
         (weights, weights.indices.map(|point| self.carrier.first_row + 3 * point as usize))
     }
 
+    /// Writes the modal components along a direction of the contact node, from those along x, y, z.
+    pub fn components(&self, direction: Vector3, seen: [&[f64]; 3], to: &mut [f64]) {
+        let ([x, y, z], [a, b, c]) = (seen, self.frame.fixed(direction).into());
+        for (((to, x), y), z) in to.iter_mut().zip(x).zip(y).zip(z) {
+            *to = a * x + b * y + c * z;
+        }
+    }
+
     /// Interpolates values per row of the carrier, in the directions of the contact node.
     pub fn interpolate(&self, value: impl Fn(usize) -> f64) -> Vector3 {
         let mut sum = Vector3::zeros();
@@ -37,14 +52,19 @@ impl Spot<'_> {
         }
         self.frame.local(sum)
     }
+}
 
-    /// Writes the modal components along a direction of the contact node, from those along x, y, z.
-    pub fn components(&self, direction: Vector3, seen: [&[f64]; 3], to: &mut [f64]) {
-        let ([x, y, z], [a, b, c]) = (seen, self.frame.fixed(direction).into());
-        for (((to, x), y), z) in to.iter_mut().zip(x).zip(y).zip(z) {
-            *to = a * x + b * y + c * z;
-        }
-    }
+/// A contact on the surface of a structure.
+#[derive(Debug, Clone)]
+struct Touch {
+    /// Index of the contact in the group.
+    member: usize,
+    /// Control points around it.
+    weights: Weights,
+    /// First row of each control point.
+    firsts: [usize; 16],
+    /// Position of each control point among those that the contacts touch.
+    slots: [usize; 16],
 }
 
 /// Scratch memory of a group for one structure that carries surfaces.
@@ -53,13 +73,22 @@ pub struct Reaction {
     /// The structure.
     pub structure: usize,
     /// Contacts of the group that act on the structure.
-    members: Vec<usize>,
-    /// Modal components at the contacts along the rows and columns of the Delassus matrix.
-    rows: Vec<f64>,
-    columns: Vec<f64>,
-    /// Modal components at one place along x, y, z.
-    seen: [Vec<f64>; 3],
-    /// Modal forces, or modal displacements per unit force.
+    touches: Vec<Touch>,
+    /// Fixed directions of the rows and columns of the Delassus matrix, in the order of the contacts.
+    rows: Vec<Vector3>,
+    columns: Vec<Vector3>,
+    /// First rows of the control points that the contacts touch, and the position of each row in that list.
+    firsts: Vec<usize>,
+    slot_of: Vec<usize>,
+    /// Displacements of all rows of the structure per unit force along each column (m/N), `[column][row]`.
+    moved: Vec<f64>,
+    /// The same at the touched control points, `[position][component][column]`.
+    seen: Vec<f64>,
+    /// Negative multiplier of each column (N).
+    factors: Vec<f64>,
+    /// Load on the rows of the structure (N).
+    load: Vec<f64>,
+    /// Modal forces.
     force: Vec<f64>,
     /// Displacement of the rows of the structure by the forces of a solution (m).
     response: Vec<f64>,
@@ -74,82 +103,95 @@ impl Reaction {
     /// Allocates memory for up to `contacts` simultaneous contacts with `directions` directions each.
     pub fn new(structure: usize, of: &Structure, contacts: usize, directions: usize) -> Self {
         let (modes, rows) = (bank(of).modes(), bank(of).rows());
+        let columns = contacts * directions;
         Self {
             structure,
-            members: Vec::with_capacity(contacts),
-            rows: vec![0.0; contacts * directions * modes],
-            columns: vec![0.0; contacts * directions * modes],
-            seen: std::array::from_fn(|_| vec![0.0; modes]),
+            touches: Vec::with_capacity(contacts),
+            rows: Vec::with_capacity(columns),
+            columns: Vec::with_capacity(columns),
+            firsts: Vec::with_capacity(rows / 3),
+            slot_of: vec![usize::MAX; rows],
+            moved: vec![0.0; columns * padded(rows)],
+            seen: vec![0.0; padded(columns) * rows],
+            factors: Vec::with_capacity(columns),
+            load: vec![0.0; rows],
             force: vec![0.0; modes],
-            response: vec![0.0; rows],
+            response: vec![0.0; padded(rows)],
         }
     }
 
     /// Removes all contacts.
     pub fn clear(&mut self) {
-        self.members.clear();
+        for first in self.firsts.drain(..) {
+            self.slot_of[first] = usize::MAX;
+        }
+        self.touches.clear();
+        self.rows.clear();
+        self.columns.clear();
     }
 
-    /// Projects the modes on the gap and force directions of contact `member` of the group. The contact acts on this
-    /// structure.
-    pub fn see(&mut self, of: &Structure, member: usize, spot: Spot, normals: &[Vector3], forces: &[Vector3]) {
-        self.members.push(member);
-        let bank = bank(of);
-        let (modes, (weights, rows)) = (bank.modes(), spot.rows());
-        for (component, seen) in self.seen.iter_mut().enumerate() {
-            seen.fill(0.0);
-            for (first, weight) in rows[..weights.len].iter().zip(weights.values) {
-                let shapes = bank.contact_row(first + component);
-                seen.iter_mut().zip(shapes).for_each(|(sum, shape)| *sum += weight * shape);
+    /// Adds contact `member` of the group with its gap and force directions. The contact acts on this structure.
+    pub fn see(&mut self, member: usize, spot: Spot, normals: &[Vector3], forces: &[Vector3]) {
+        let (weights, firsts) = spot.rows();
+        let mut slots = [0; 16];
+        for (slot, first) in slots.iter_mut().zip(&firsts[..weights.len]) {
+            if self.slot_of[*first] == usize::MAX {
+                self.slot_of[*first] = self.firsts.len();
+                self.firsts.push(*first);
             }
+            *slot = self.slot_of[*first];
         }
-        let seen = self.seen.each_ref().map(|seen| &seen[..]);
-        for (directions, target) in [(normals, &mut self.rows), (forces, &mut self.columns)] {
-            for (index, direction) in directions.iter().enumerate() {
-                let target = &mut target[(member * directions.len() + index) * modes..][..modes];
-                spot.components(*direction, seen, target);
-            }
-        }
+        self.touches.push(Touch { member, weights, firsts, slots });
+        self.rows.extend(normals.iter().map(|normal| spot.frame.fixed(*normal)));
+        self.columns.extend(forces.iter().map(|force| spot.frame.fixed(*force)));
     }
 
     /// Adds the part of this structure to the Delassus matrix (m/N) of a group with `per` directions per contact.
-    pub(crate) fn add_delassus(&mut self, of: &Structure, matrix: &mut DMatrix<f64>, per: usize) {
-        let modes = self.force.len();
-        for at in 0..self.members.len() {
-            for column in per * self.members[at]..per * (self.members[at] + 1) {
-                let shapes = &self.columns[column * modes..][..modes];
-                for ((moved, shape), k) in self.force.iter_mut().zip(shapes).zip(bank(of).coefficients(0)) {
-                    *moved = k.compliance * shape;
-                }
-                for row in self.members.iter().flat_map(|member| per * member..per * (member + 1)) {
-                    let shapes = self.rows[row * modes..][..modes].iter();
-                    matrix[(row, column)] += shapes.zip(&self.force).map(|(shape, moved)| shape * moved).sum::<f64>();
+    pub(crate) fn add_delassus(&mut self, of: &mut Structure, matrix: &mut DMatrix<f64>, per: usize) {
+        self.firsts.iter().for_each(|first| of.modes_mut().find_columns(*first));
+        let (bank, count, width) = (bank(of), self.columns.len(), padded(self.columns.len()));
+        let (mut start, stride) = (0, padded(bank.rows()));
+        while start < self.touches.len() {
+            let first = &self.touches[start];
+            let same = |touch: &&Touch| touch.firsts == first.firsts && touch.weights.len == first.weights.len;
+            let end = start + self.touches[start..].iter().take_while(same).count();
+            let columns = per * start..per * end;
+            let moved = &mut self.moved[stride * columns.start..stride * columns.end];
+            let (touches, columns) = (&self.touches[start..end], &self.columns[columns]);
+            let flexibility = bank.columns();
+            bank.instruction_set.run(MoveSurface { touches, columns, per, flexibility, stride, moved });
+            start = end;
+        }
+        for (slot, first) in self.firsts.iter().enumerate() {
+            for component in 0..3 {
+                let target = &mut self.seen[(3 * slot + component) * width..][..width];
+                for (column, value) in target[..count].iter_mut().enumerate() {
+                    *value = self.moved[column * stride + first + component];
                 }
             }
         }
+        let Self { touches, rows, seen, .. } = self;
+        bank.instruction_set.run(AddDelassus { touches, rows, per, seen, width, matrix });
     }
 
-    /// Computes the modal force −Σ F_j λ_j of a solution with `per` directions per contact.
-    fn gather(&mut self, multipliers: &[f64], per: usize) {
-        let modes = self.force.len();
-        self.force.fill(0.0);
-        let columns = self.members.iter().flat_map(|member| per * member..per * (member + 1));
-        for (column, value) in columns.map(|column| (column, multipliers[column])) {
-            if value != 0.0 {
-                let shapes = &self.columns[column * modes..][..modes];
-                self.force.iter_mut().zip(shapes).for_each(|(sum, shape)| *sum -= value * shape);
-            }
-        }
+    /// Computes the displacements of the rows of the structure by the forces of a solution with `per` directions per contact.
+    pub fn respond(&mut self, of: &Structure, multipliers: &[f64], per: usize) {
+        self.factors.clear();
+        let columns = self.touches.iter().flat_map(|touch| per * touch.member..per * (touch.member + 1));
+        self.factors.extend(columns.map(|column| -multipliers[column]));
+        self.response.fill(0.0);
+        let matrix = &self.moved[..self.factors.len() * self.response.len()];
+        let sums = &mut self.response[..];
+        bank(of).instruction_set.run(Accumulate { sums, matrix, values: &self.factors });
     }
 
-    /// Adds the displacements of the structure's rows under the forces of a solution.
-    pub fn respond(&mut self, of: &mut Structure, multipliers: &[f64], per: usize) {
-        self.gather(multipliers, per);
-        if self.members.is_empty() {
-            self.response.fill(0.0);
-        } else {
-            of.modes_mut().response_to_modal(&self.force, &mut self.response);
+    /// Displacement of a place of a surface, whose rows begin at `first`, caused by the last [`Reaction::respond`], in fixed directions (m).
+    pub(crate) fn moved_at(&self, surface: &SurfaceSpline, place: ClosestPoint, first: usize) -> Vector3 {
+        let mut sum = Vector3::zeros();
+        for (point, weight) in surface.weights(place).iter() {
+            sum += weight * vector3_at(&self.response[first..], point);
         }
+        sum
     }
 
     /// Displacement of a place caused by the last [`Reaction::respond`], in the directions of the node (m).
@@ -157,10 +199,31 @@ impl Reaction {
         spot.interpolate(|row| self.response[row])
     }
 
+    /// Upper bound of the displacement of the surface of a pair by the last [`Reaction::respond`] (m).
+    pub(crate) fn surface_motion(&self, pair: &ContactPair) -> f64 {
+        let (Some(carrier), Some(surface)) = (pair.carrier(), pair.gap().spline()) else { return 0.0 };
+        let rows = &self.response[carrier.first_row..][..3 * surface.control_points().len()];
+        surface.amplification() * largest_length(rows)
+    }
+
     /// Applies the forces of the solution passed to the last [`Reaction::respond`].
-    pub fn apply(&self, of: &mut Structure) {
+    pub fn apply(&mut self, of: &mut Structure) {
+        for first in &self.firsts {
+            self.load[*first..first + 3].fill(0.0);
+        }
+        let per = self.columns.len() / self.touches.len().max(1);
+        for (column, (direction, factor)) in self.columns.iter().zip(&self.factors).enumerate() {
+            let touch = &self.touches[column / per];
+            let points = touch.firsts.iter().zip(&touch.weights.values).take(touch.weights.len);
+            for (first, weight) in points.filter(|_| *factor != 0.0) {
+                for (load, component) in self.load[*first..first + 3].iter_mut().zip(direction) {
+                    *load += factor * weight * component;
+                }
+            }
+        }
+        bank(of).modal_force_of(&self.load, &self.firsts, &mut self.force);
         of.delayed.copy_from_slice(&self.force);
-        if !self.members.is_empty() {
+        if !self.touches.is_empty() {
             of.modes_mut().correct_modal(&self.force, &self.response);
         }
     }

@@ -1,5 +1,7 @@
 //! Groups of contacts that influence each other: their Delassus matrix, their forces, and the effects on the structures.
 
+mod response;
+
 use super::carrier::Reaction;
 use super::contact_view::{Bodies, ContactMember};
 use super::delassus::{DelassusBlock, fill};
@@ -32,6 +34,10 @@ struct GroupSide {
     chosen: Vec<bool>,
     /// Change of all gaps of the structure by the solution (m), `[node · lanes + lane]`.
     response: Vec<f64>,
+    /// Upper bound of the motion of each node and its surface by the solution (m), `[node · lanes + lane]`; empty if no node is skipped.
+    travel: Vec<f64>,
+    /// Gaps or their bounds after the solution (m); empty if no node is skipped.
+    after: Vec<f64>,
     /// Index range of the members among those of the group.
     span: std::ops::Range<usize>,
 }
@@ -83,7 +89,14 @@ impl ContactGroup {
         let per = law.directions();
         let side = |structure: &usize| {
             let len = if reach == Reach::Sector { 0 } else { structures[*structure].gaps().len() };
-            GroupSide { structure: *structure, chosen: vec![false; len], response: vec![0.0; len], span: 0..0 }
+            GroupSide {
+                structure: *structure,
+                chosen: vec![false; len],
+                response: vec![0.0; len],
+                travel: vec![0.0; structures[*structure].nearness.len()],
+                after: vec![0.0; structures[*structure].nearness.len()],
+                span: 0..0,
+            }
         };
         let rows = touching.iter().map(|structure| structures[*structure].modes().rows()).max().unwrap_or(0);
         Self {
@@ -153,6 +166,7 @@ impl ContactGroup {
             self.list_members(bodies);
             self.find_forces(bodies, found)?;
             self.respond(bodies);
+            self.evaluate_reached(bodies);
             if !self.law.is_iterative() || !self.add_violated(bodies) {
                 break;
             }
@@ -219,7 +233,7 @@ impl ContactGroup {
     }
 
     /// Fills and solves the problem of the members.
-    fn find_forces(&mut self, bodies: &Bodies, found: &mut GroupSolution) -> Result<(), StepFailure> {
+    fn find_forces(&mut self, bodies: &mut Bodies, found: &mut GroupSolution) -> Result<(), StepFailure> {
         let per = self.law.directions();
         self.members.iter().try_for_each(|&member| bodies.pose(member).check())?;
         let contacts = self.members.iter().map(|&member| bodies.pose(member));
@@ -241,7 +255,7 @@ impl ContactGroup {
     }
 
     /// Fills W of the group: structures with contact nodes by their flexibility, surface carriers by their modes.
-    fn fill_delassus(&mut self, bodies: &Bodies, per: usize) {
+    fn fill_delassus(&mut self, bodies: &mut Bodies, per: usize) {
         let matrix = self.law.matrix();
         if self.sides.len() > 1 {
             let size = per * self.members.len();
@@ -262,19 +276,18 @@ impl ContactGroup {
 
     /// Adds the part of the surface carriers.
     #[inline(never)]
-    fn add_reactions(&mut self, bodies: &Bodies, per: usize) {
+    fn add_reactions(&mut self, bodies: &mut Bodies, per: usize) {
         for reaction in &mut self.reactions {
             reaction.clear();
-            let of = &bodies.structures[reaction.structure];
             for (contact, &member) in self.members.iter().enumerate() {
                 let posed = bodies.pose(member);
                 let Some(spot) = posed.spot() else { continue };
                 if spot.carrier.structure == reaction.structure {
                     let span = per * contact..per * (contact + 1);
-                    reaction.see(of, contact, spot, &self.rows[span.clone()], &self.columns[span]);
+                    reaction.see(contact, spot, &self.rows[span.clone()], &self.columns[span]);
                 }
             }
-            reaction.add_delassus(of, self.law.matrix(), per);
+            reaction.add_delassus(&mut bodies.structures[reaction.structure], self.law.matrix(), per);
         }
     }
 
@@ -290,46 +303,16 @@ impl ContactGroup {
         }
     }
 
-    /// Computes the change of every gap by the solution (m), for members and other nodes.
-    fn respond(&mut self, bodies: &mut Bodies) {
-        for side in &mut self.sides {
-            let (members, forces) = (&self.members[side.span.clone()], &self.forces[side.span.clone()]);
-            side.response.fill(0.0);
-            if !members.is_empty() {
-                side.respond(&mut bodies.structures[side.structure], members, forces);
-            }
-        }
-        let per = self.law.directions();
-        for reaction in &mut self.reactions {
-            reaction.respond(&mut bodies.structures[reaction.structure], self.law.multipliers(), per);
-        }
-        if !self.reactions.is_empty() {
-            self.respond_of_carriers(bodies);
-        }
-    }
-
-    /// Adds the changes of the gaps by the motion of the surface carriers.
-    #[inline(never)]
-    fn respond_of_carriers(&mut self, bodies: &Bodies) {
-        for side in &mut self.sides {
-            let structure = &bodies.structures[side.structure];
-            for sector in 0..structure.modes().sectors() {
-                for at in structure.contacts(side.structure, sector) {
-                    let posed = bodies.pose(at);
-                    let Some(spot) = posed.spot() else { continue };
-                    let carrier = self.reactions.iter().find(|one| one.structure == spot.carrier.structure);
-                    let moved = carrier.map_or(Vector3::zeros(), |reaction| reaction.responded(spot));
-                    side.response[at.index] -= structure.history.geometry.now.normal_at(at.index).dot(&moved);
-                }
-            }
-        }
-    }
-
     /// Applies the solution to all structures and records it.
     #[inline(always)]
     fn apply(&mut self, bodies: &mut Bodies, found: &mut GroupSolution) {
         for side in &self.sides {
             let structure = &mut bodies.structures[side.structure];
+            if structure.nearness.is_used() {
+                structure.history.gap.now.copy_from_slice(&side.after);
+                structure.nearness.reduce(&side.travel);
+                continue;
+            }
             for (gap, response) in structure.history.gap.now.iter_mut().zip(&side.response) {
                 *gap += response;
             }
@@ -339,7 +322,7 @@ impl ContactGroup {
             let span = self.sides[side].span.clone();
             self.act(&mut bodies.structures[self.sides[side].structure], span);
         }
-        for reaction in &self.reactions {
+        for reaction in &mut self.reactions {
             reaction.apply(&mut bodies.structures[reaction.structure]);
         }
         if self.law.coating().is_some() {
@@ -398,44 +381,6 @@ impl ContactGroup {
             set_strided_vector3(&mut of.history.force.now, first, lanes, force);
             set_strided_vector3(&mut of.history.points, first, lanes, point);
             found.events.push(ContactEvent::new(member, normal, force, share, point, wrench));
-        }
-    }
-}
-
-impl GroupSide {
-    /// Computes the change of the gaps of this structure by forces on its own members.
-    #[inline(never)]
-    fn respond(&mut self, structure: &mut Structure, members: &[ContactMember], forces: &[Vector3]) {
-        let nodes = structure.nodes();
-        if let Some(disk) = structure.modes_mut().disk_mut() {
-            disk.ask(members.iter().zip(forces).map(|(member, force)| (member.sector, member.node, *force)));
-        }
-        let normals = &structure.history.geometry.now;
-        let (bank, lanes) = (structure.modes(), structure.lanes());
-        match bank.disk() {
-            None => {
-                for (&ContactMember { node: column, sector, .. }, force) in members.iter().zip(forces) {
-                    let flexibility = bank.flexibility(sector);
-                    for node in 0..nodes {
-                        let index = node * lanes + sector;
-                        let moved = flexibility.fixed_view::<3, 3>(3 * node, 3 * column) * force;
-                        self.response[index] += normals.normal_at(index).dot(&moved);
-                    }
-                }
-            }
-            // Every force moves every sector.
-            Some(disk) => {
-                let (sectors, [across, around, along]) = (bank.sectors(), &normals.normal);
-                let nodes = disk.moved.chunks_exact(3 * lanes).zip(self.response.chunks_exact_mut(lanes));
-                let normals = across.chunks_exact(lanes).zip(around.chunks_exact(lanes)).zip(along.chunks_exact(lanes));
-                for ((moved, response), ((across, around), along)) in nodes.zip(normals) {
-                    for lane in 0..sectors {
-                        response[lane] = across[lane] * moved[lane]
-                            + around[lane] * moved[lanes + lane]
-                            + along[lane] * moved[2 * lanes + lane];
-                    }
-                }
-            }
         }
     }
 }

@@ -149,6 +149,23 @@ impl ContactPair {
         self.parts.gap.bend(factor, moved);
     }
 
+    /// Finds the gaps of the nodes that may be in contact or that outputs need, at the displacements of the next step.
+    pub(crate) fn find_near_gaps(&mut self, structures: &mut [Structure]) {
+        let is_skipping = structures[self.structure()].nearness.is_used();
+        let (Some(carrier), true) = (self.carrier(), is_skipping) else {
+            return self.find_gaps(structures, SearchStart::PreviousStep);
+        };
+        let Self { parts: PairParts { structure, gap: GapLaw::Spline(gap), .. }, prescribed, .. } = self else {
+            return self.find_gaps(structures, SearchStart::PreviousStep);
+        };
+        let rows = carrier.first_row..carrier.first_row + 3 * gap.surface.control_points().len();
+        let (structure, carrier) = two(structures, [*structure, carrier.structure]);
+        let (now, before) = (&carrier.modes.displacement()[rows.clone()], &carrier.modes.displacement_before()[rows]);
+        let changes = &mut structure.nearness.changes;
+        gap.gap_changes(&prescribed.drive.now, &prescribed.motion.now, [now, before], changes);
+        structure.find_near_gaps(gap, &prescribed.drive.now, now);
+    }
+
     /// Finds the gaps of the nodes at the current displacements. The search for closest points begins at `start`.
     pub(crate) fn find_gaps(&mut self, structures: &mut [Structure], start: SearchStart) {
         let Self { parts: PairParts { structure, gap, carrier, .. }, prescribed, .. } = self;
@@ -156,16 +173,25 @@ impl ContactPair {
         let (structure, moved) = match carrier {
             None => (&mut structures[*structure], &[][..]),
             Some(SurfaceCarrier { structure: carrier, first_row }) => {
-                let Ok([structure, carrier]) = structures.get_disjoint_mut([*structure, *carrier]) else {
-                    unreachable!("a structure does not carry the surface that it touches")
-                };
+                let (structure, carrier) = two(structures, [*structure, *carrier]);
                 (structure, &carrier.modes.displacement()[*first_row..][..3 * points])
             }
         };
         let ContactHistory { gap: gaps, geometry: Two { now, before }, .. } = &mut structure.history;
         let before = (start == SearchStart::PreviousStep).then_some(&*before);
         gap.evaluate(&prescribed.drive.now, structure.modes.displacement(), moved, before, now, &mut gaps.now);
+        if let Some(gap) = gap.spline_law().filter(|_| structure.nearness.is_used()) {
+            structure.note_all_evaluated(&gap.nodes);
+        }
     }
+}
+
+/// Returns a structure and the structure that carries the surface it touches.
+fn two(structures: &mut [Structure], indices: [usize; 2]) -> (&mut Structure, &Structure) {
+    let Ok([structure, carrier]) = structures.get_disjoint_mut(indices) else {
+        unreachable!("a structure does not carry the surface that it touches")
+    };
+    (structure, carrier)
 }
 
 /// Start of the search for closest points.

@@ -9,6 +9,7 @@ use crate::modes::modal::ModalModel;
 use crate::scene::method::Scheme;
 use crate::system::contact_view::ContactMember;
 use crate::system::history::ContactHistory;
+use crate::system::nearness::Nearness;
 use crate::system::pulling::Pulling;
 
 /// Penetrations below this count as zero (m): the squares of the resulting values leave the range of double precision, and such
@@ -37,6 +38,8 @@ pub struct Structure {
     pub(crate) lowest_in_span: Vec<f64>,
     /// Selection of the smallest gaps that outputs need.
     pub(crate) needed_minima: NeededMinima,
+    /// Bounds of gaps that are not evaluated in every step.
+    pub(crate) nearness: Nearness,
 }
 
 /// Smallest gaps within spans that outputs need. The stored values of other smallest gaps may be too large.
@@ -77,7 +80,7 @@ pub struct StepControl {
 }
 
 // Everything that determines the future, except the step size; it is restored after the step size has been set.
-persist_fields!(Structure { history, modes, delayed, step_control, pulling, .. });
+persist_fields!(Structure { history, modes, delayed, step_control, pulling, nearness, .. });
 persist_fields!(StepControl { bank, largest, level, slopes, normals, open_steps, energies });
 
 impl StepControl {
@@ -124,6 +127,7 @@ impl Structure {
             step_control: StepControl::new(if touches { modes.sectors() } else { 0 }, contacts),
             lowest_in_span: Vec::new(),
             needed_minima: NeededMinima::default(),
+            nearness: Nearness::default(),
             pair_of,
             lanes: modes.lanes(),
             modes,
@@ -173,9 +177,21 @@ impl Structure {
         pairs.map(move |(node, pair)| ContactMember { structure, pair, node, sector, index: self.index(node, sector) })
     }
 
+    /// Returns the contact at an index of the arrays over all nodes and lanes; `structure` is the index of this structure.
+    pub(crate) fn contact_at(&self, structure: usize, index: usize) -> Option<ContactMember> {
+        let (node, sector) = (index / self.lanes, index % self.lanes);
+        Some(ContactMember { structure, pair: self.pair_of[node]?, node, sector, index })
+    }
+
     /// Gaps at the current step (m), `[node · lanes + lane]`; padding lanes are infinite.
     pub fn gaps(&self) -> &[f64] {
         &self.history.gap.now
+    }
+
+    /// Gaps that were evaluated at the current step (m), as [`Structure::gaps`]; infinite for nodes whose gap is a lower bound.
+    pub(crate) fn evaluated_gaps(&self) -> impl Iterator<Item = f64> {
+        let gaps = self.history.gap.now.iter().enumerate();
+        gaps.map(|(index, gap)| if self.nearness.is_skipped(index) { f64::INFINITY } else { *gap })
     }
 
     /// Selects the smallest gaps that are needed: the gap of every node of the sectors `watched` (1-based) and, if
@@ -242,6 +258,7 @@ impl Structure {
         self.delayed.fill(0.0);
         self.history.clear();
         self.pulling.clear();
+        self.nearness.clear();
         self.step_control.bank.fill(0.0);
         self.step_control.largest.fill(0.0);
         self.step_control.level.fill(0);

@@ -2,7 +2,7 @@
 
 use super::Stepper;
 use crate::geometry::PrescribedMotion;
-use crate::system::{Bodies, GroupSolution, SearchStart, StepFailure, System};
+use crate::system::{Bodies, GroupSolution, StepFailure, System};
 
 /// Denormals are flushed every this many steps.
 const FLUSH_EVERY: u64 = 512;
@@ -24,7 +24,7 @@ impl Stepper for Recurrence {
         for (pair, drive) in system.pairs.iter_mut().zip(drives) {
             pair.move_to(drive, step);
         }
-        system.find_gaps(SearchStart::PreviousStep);
+        system.find_near_gaps();
         system.check_edges()?;
         // Eq. 11: contact forces that remove the penetration, and their effects, group by group.
         system.retire_events();

@@ -173,10 +173,15 @@ fn rejects_state_with_any_bit_changed_without_changes() {
 
 #[test]
 fn complementarity_holds_over_a_long_rub_of_the_whole_casing() {
-    for (name, feature) in
-        [("rigid", ("plain", (|_| {}) as fn(&mut Scene))), ("flexible", ("flexible casing", flexible))]
-    {
+    let plain = ("plain", (|_| {}) as fn(&mut Scene));
+    let elastic = ("flexible casing", flexible as fn(&mut Scene));
+    for (name, feature) in [("rigid", plain), ("flexible", elastic), ("flexible, skipping open nodes", elastic)] {
         let mut scene = scene_with(feature, Scheme::ModalExact, Solver::Lcp);
+        let is_skipping = name.contains("skipping");
+        if !is_skipping {
+            // The gaps of watched sectors are evaluated in every step.
+            scene.settings.outputs.watched_sectors = (1..=12).collect();
+        }
         // A round casing: gaps are affine in the displacements, so that they can be recomputed independently.
         scene.settings.surfaces[0].shape = Shape::Circular {};
         let mut simulation = started(&scene);
@@ -200,7 +205,9 @@ fn complementarity_holds_over_a_long_rub_of_the_whole_casing() {
             let moved = system.structures().get(1).map_or(&[][..], |slave| slave.modes().displacement());
             law.evaluate(&drive, system.bank().displacement(), moved, None, &mut geometry, &mut gaps);
             let off = gaps.iter().zip(system.gaps()).filter(|(gap, _)| gap.is_finite());
-            again = off.fold(again, |a, (gap, booked)| a.max((gap - booked).abs() / 3.56e-4));
+            // A gap that is not evaluated is a lower bound.
+            let error = |gap: f64, booked: f64| if is_skipping { booked - gap } else { (booked - gap).abs() };
+            again = off.fold(again, |a, (gap, booked)| a.max(error(*gap, *booked) / 3.56e-4));
             most = most.max(system.events().len());
             for (place, gap) in system.gaps().enumerate().filter(|(place, _)| place % lanes < 12) {
                 let multiplier = system.multiplier(place / lanes, place % lanes);

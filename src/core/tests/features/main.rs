@@ -18,5 +18,6 @@ mod heat;
 mod initial;
 
 mod pairs;
+mod skipped;
 mod stress;
 mod support;

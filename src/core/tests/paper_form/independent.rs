@@ -320,6 +320,8 @@ fn scene(factors: &[f64], friction: f64) -> Scene {
     scene.settings.structures[1].thermal = true;
     scene.settings.surfaces[0].shape = Shape::Circular {};
     scene.settings.contacts[0].friction = friction;
+    // The gaps of watched sectors are evaluated in every step.
+    scene.settings.outputs.watched_sectors = (1..=SECTORS).collect();
     scene
 }
 

@@ -48,20 +48,20 @@ impl FootPoint {
         Self { place, evaluation, residual, half_square: 0.5 * residual.dot(&residual), held: [HeldBound::No; 2] }
     }
 
-    #[inline]
+    #[inline(always)]
     pub fn gradient(&self) -> [f64; 2] {
         [-self.residual.dot(&self.evaluation.d_s), -self.residual.dot(&self.evaluation.d_t)]
     }
 
     /// First fundamental form [S_s·S_s, S_s·S_t, S_t·S_t].
-    #[inline]
+    #[inline(always)]
     pub(crate) fn metric(&self) -> [f64; 3] {
         let Evaluation { d_s, d_t, .. } = &self.evaluation;
         [d_s.dot(d_s), d_s.dot(d_t), d_t.dot(d_t)]
     }
 
     /// Second derivatives of f [ss, st, tt] and their determinant.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn hessian(&self, metric: [f64; 3]) -> ([f64; 3], f64) {
         let Evaluation { d_ss, d_st, d_tt, .. } = &self.evaluation;
         let bend = [d_ss, d_st, d_tt].map(|second| self.residual.dot(second));

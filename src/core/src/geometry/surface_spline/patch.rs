@@ -196,6 +196,11 @@ impl SurfaceSpline {
 
     fn fold_around(&self, place: ClosestPoint) -> Fold {
         let (count, p, values) = (self.around, place.patch[0], cubic(place.s)[0]);
+        if self.ends == Ends::Smooth {
+            let wrapped = |index: usize| if index < count { index } else { index - count };
+            let indices = [0, 1, 2, 3].map(|offset| wrapped(p + offset + count - 1));
+            return Fold { indices: indices.map(wrapped), values, len: 4 };
+        }
         let mut fold = Fold::default();
         for (offset, value) in values.into_iter().enumerate() {
             // Control point p + offset − 1.
@@ -210,16 +215,15 @@ impl SurfaceSpline {
     }
 
     fn fold_along(&self, place: ClosestPoint) -> Fold {
-        let (count, q, values) = (self.along, place.patch[1], cubic_and_beyond(place.t)[0]);
-        let mut fold = Fold::default();
-        for (offset, value) in values.into_iter().enumerate() {
-            match q + offset {
-                0 => fold.add_phantom(0, 1, value),
-                slot if slot == count + 1 => fold.add_phantom(count - 1, count - 2, value),
-                slot => fold.add(slot - 1, value),
-            }
-        }
-        fold
+        let (count, q, [a, b, c, d]) = (self.along, place.patch[1], cubic_and_beyond(place.t)[0]);
+        // A phantom beyond a free end is twice the end minus its neighbour.
+        let (first, values, len) = match (q == 0, q + 2 == count) {
+            (false, false) => (q - 1, [a, b, c, d], 4),
+            (true, false) => (0, [2.0 * a + b, c - a, d, 0.0], 3),
+            (false, true) => (q - 1, [a, b - d, c + 2.0 * d, 0.0], 3),
+            (true, true) => (0, [2.0 * a + b - d, c - a + 2.0 * d, 0.0, 0.0], 2),
+        };
+        Fold { indices: [first, first + 1, first + 2, first + 3], values, len }
     }
 
     fn fold_facet(&self, place: ClosestPoint) -> (Fold, Fold) {

@@ -6,7 +6,7 @@
 //! is projected onto the sheet between them; neighbouring sheets are then searched for a closer point.
 
 use super::foot::{CONVEX, DEGENERATE, FootPoint, HeldBound, Room, noise, solve};
-use super::{ClosestPoint, EDGE_TOLERANCE, Ends, SurfaceSpline};
+use super::{ClosestPoint, EDGE_TOLERANCE, Ends, Evaluation, SurfaceSpline};
 use crate::geometry::Gap;
 use crate::math::real;
 use crate::math::vector::{Vector3, length};
@@ -36,6 +36,8 @@ pub enum Projection {
 const STEP_TOLERANCE: f64 = 1e-11;
 /// Rounding of the coordinates of x − S, relative to |x| (and |x − S|).
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
+/// Newton steps up to this (in patches) end at the closest point within about [`STEP_TOLERANCE`], because errors are squared.
+const CLOSE: f64 = 1e-5;
 /// Largest number of corrections near a good start; one or two are usual.
 const MAX_CORRECTIONS: usize = 6;
 /// Largest number of iterations, far above the need of starts on the opposite side of the casing (about 30).
@@ -106,6 +108,31 @@ impl SurfaceSpline {
             foot = FootPoint::seen(x, place, self.evaluate_bicubic::<false>(place));
         }
         None
+    }
+
+    /// Finds the closest point to `x` (m) on a smooth surface around an axis, by one Newton step from `guess`. Its end is extrapolated to
+    /// second order instead of evaluated. Returns `None` if the step is too long for that.
+    #[inline(always)]
+    pub(crate) fn project_close(&self, x: Vector3, guess: ClosestPoint) -> Option<Gap> {
+        let foot = FootPoint::seen(x, guess, self.evaluate_bicubic::<true>(guess));
+        let metric = foot.metric();
+        let (hessian, determinant) = foot.hessian(metric);
+        let area = metric[0] * metric[2] - metric[1] * metric[1];
+        if !(area > DEGENERATE * metric[0] * metric[2] && hessian[0] > 0.0 && determinant > CONVEX * area) {
+            return None;
+        }
+        let [s, t] = solve(hessian, 1.0 / determinant, foot.gradient());
+        let ([low, high], place) =
+            (self.span(guess.patch[1]), ClosestPoint { s: guess.s + s, t: guess.t + t, ..guess });
+        let stays = (0.0..1.0).contains(&place.s) && (low..high).contains(&place.t);
+        if !(stays && s.abs() <= CLOSE && t.abs() <= CLOSE) {
+            return None;
+        }
+        let Evaluation { point, d_s, d_t, d_ss, d_st, d_tt } = foot.evaluation;
+        let moved = s * (d_s + (0.5 * s) * d_ss + t * d_st) + t * (d_t + (0.5 * t) * d_tt);
+        let across = (d_t + s * d_st + t * d_tt).cross(&(d_s + s * d_ss + t * d_st));
+        let normal = across * (1.0 / length(across));
+        Some(Gap { distance: (x - (point + moved)).dot(&normal), normal, foot: place })
     }
 
     /// Returns whether the seam of free ends is too far away for a closer point on its other side.
@@ -270,6 +297,13 @@ mod tests {
             let slowly = surface.descend(x, guess).unwrap().found();
             let Projection::Found { gap: expected, .. } = slowly else { panic!("{slowly:?}") };
             assert!((gap.distance - expected.distance).abs() < 1e-16, "{gap:?}, {expected:?}");
+            let mut near = || 0.7 * random.within(-CLOSE, CLOSE);
+            let guess = ClosestPoint { s: expected.foot.s + near(), t: expected.foot.t + near(), ..expected.foot };
+            let closely = surface.project_close(x, guess).unwrap();
+            // Coordinates of 0.25 m are rounded to 3e-17 m.
+            assert!((closely.distance - expected.distance).abs() < 4e-16, "{closely:?}, {expected:?}");
+            assert!((closely.normal - expected.normal).norm() < 1e-11, "{closely:?}, {expected:?}");
+            assert_eq!(surface.project_close(x, ClosestPoint { s: guess.s + 3.0 * CLOSE, ..guess }), None);
         }
     }
 }

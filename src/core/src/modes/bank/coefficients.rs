@@ -39,6 +39,7 @@ impl ModalBank {
     }
 
     pub(super) fn refresh_coupling(&mut self) {
+        self.columns.forget();
         if let Some(coupling) = &mut self.coupling {
             let dynamic = self.model.dynamic_modes(self.scheme);
             let state = [self.state.speed, self.state.temperature];
@@ -130,14 +131,16 @@ impl ModalBank {
     /// none for an empty slice), modal loads and spin.
     pub(super) fn gather_forces(&mut self, group: usize, forces: &[f64]) {
         let of_row = |row: usize| forces.get(row * self.lanes + group).copied().unwrap_or(0.0);
-        let touched = self.disk.is_none() && (0..self.rows).any(|row| of_row(row) != 0.0);
+        let has_forces = |row: &usize| self.disk.is_none() && of_row(*row) != 0.0;
+        self.touched_rows.clear();
+        self.touched_rows.extend((0..self.rows).filter(has_forces));
         let load = if group < self.loaded_groups() { &self.state.modal_load_before[..] } else { &[] };
         for mode in 0..self.modes {
-            let shapes = || self.contact_modes[mode * self.rows..][..self.rows].iter().enumerate();
+            let shapes = &self.contact_modes[mode * self.rows..][..self.rows];
+            let rows = self.touched_rows.iter();
             let mut force = match &self.disk {
-                Some(disk) => disk.modal_force(mode, group, &disk.asked_nodes, &disk.asked_force),
-                None if touched => [shapes().map(|(row, shape)| shape * of_row(row)).sum(), 0.0],
-                None => [0.0; 2],
+                Some(disk) => disk.asked_modal_force(mode, group),
+                None => [rows.fold(0.0, |sum, row| sum + shapes[*row] * of_row(*row)), 0.0],
             };
             force[0] += load.get(mode).copied().unwrap_or(0.0);
             if let Some(excitation) = &self.excitation {

@@ -92,25 +92,8 @@ impl ModalBank {
         }
     }
 
-    /// Finds the displacement of the contact rows of a single structure by contact forces given as modal forces (m).
-    pub(crate) fn response_to_modal(&mut self, modal_force: &[f64], displacement: &mut [f64]) {
-        self.respond(0, modal_force, |k, force| k.compliance * force);
-        displacement.fill(0.0);
-        let (matrix, values) = (&self.contact_modes[..], &self.correction[..]);
-        self.instruction_set.run(Accumulate { sums: displacement, matrix, values });
-    }
-
-    /// Corrects a single structure for contact forces given as modal forces, using the response of its rows to them.
-    pub(crate) fn correct_modal(&mut self, modal_force: &[f64], response: &[f64]) {
-        self.respond(0, modal_force, |k, force| k.compliance * force);
-        self.move_modes(0);
-        for (displacement, response) in self.state.displacement.iter_mut().zip(response) {
-            *displacement += response;
-        }
-    }
-
     /// `correction` ← T c f for modal forces f, with the response c f of each mode.
-    fn respond(&mut self, sector: usize, forces: &[f64], response: impl Fn(&ModeCoefficients, f64) -> f64) {
+    pub(super) fn respond(&mut self, sector: usize, forces: &[f64], response: impl Fn(&ModeCoefficients, f64) -> f64) {
         let (modes, set) = (self.modes, self.set_of(sector));
         let coefficients = &self.coefficients[set * modes..][..modes];
         for ((correction, force), k) in self.correction.iter_mut().zip(forces).zip(coefficients) {

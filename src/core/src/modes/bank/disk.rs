@@ -16,7 +16,7 @@ use crate::math::vector::{Vector3, strided_vector3};
 use crate::modes::cyclic::CyclicModel;
 use crate::modes::schemes::ModeCoefficients;
 use fourier::{Fourier, Synthesis};
-use pass::{Combination, Complexes, Gather, LaneCoefficients, Pass, modal_force};
+use pass::{Combination, Complexes, Gather, LaneCoefficients, ModalForces, Pass, modal_force};
 
 const NOTHING: Complexes = [[0.0; LANES]; 2];
 
@@ -77,6 +77,8 @@ pub struct Disk {
     /// Spectrum and contact nodes of the requested forces.
     pub(super) asked_force: Vec<Complexes>,
     pub(super) asked_nodes: Vec<bool>,
+    /// Modal forces of the forces on all rows, `[block][mode]`.
+    asked_modal: Vec<Complexes>,
     /// Displacements caused by the requested forces (m), `[row][lane of sector]`.
     pub(crate) moved: Vec<f64>,
 }
@@ -113,6 +115,7 @@ impl Disk {
             asked: Vec::with_capacity(sectors * rows / 3),
             asked_force: vec![NOTHING; blocks * rows],
             asked_nodes: vec![false; rows / 3],
+            asked_modal: vec![NOTHING; blocks * modes],
             moved: vec![0.0; rows * super::lanes(sectors)],
             model: model.clone(),
             fourier,
@@ -204,13 +207,28 @@ impl Disk {
         self.instruction_set.run(Gather { fourier, rows, forces, spectrum: &mut self.asked_force });
     }
 
-    /// Computes the spectrum of the forces on all contact nodes (`forces[row · lanes + sector]`, N).
+    /// Computes the spectrum and the modal forces of the forces on all contact nodes (`forces[row · lanes + sector]`, N).
     pub(super) fn gather_rows(&mut self, forces: &[f64], lanes: usize) {
         let (sectors, nodes) = (self.model.sectors, self.rows / 3);
         let all = (0..sectors).flat_map(|sector| (0..nodes).map(move |node| (sector, node)));
         self.gather(
-            all.map(|(sector, node)| (sector, node, strided_vector3(forces, 3 * node * lanes + sector, lanes))),
+            all.map(|(sector, node)| (sector, node, strided_vector3(forces, 3 * node * lanes + sector, lanes)))
+                .filter(|(.., force)| *force != Vector3::zeros()),
         );
+        let mut to = std::mem::take(&mut self.asked_modal);
+        self.find_modal_forces(to.as_flattened_mut().as_flattened_mut());
+        self.asked_modal = to;
+    }
+
+    /// Computes the modal forces of the gathered forces, `[block][mode][part][lane]`.
+    fn find_modal_forces(&self, to: &mut [f64]) {
+        let Self { modes, rows, shapes, asked_force: force, asked_nodes: touched, .. } = self;
+        self.instruction_set.run(ModalForces { modes: *modes, rows: *rows, shapes, force, touched, to });
+    }
+
+    /// Modal force (re, im) on one mode by the forces of [`Disk::gather_rows`].
+    pub(super) fn asked_modal_force(&self, mode: usize, n: usize) -> [f64; 2] {
+        self.asked_modal[n / LANES * self.modes + mode].map(|part| part[n % LANES])
     }
 
     /// Modal force (re, im) of a spectrum of contact forces on one mode.

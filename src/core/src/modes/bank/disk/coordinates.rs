@@ -1,6 +1,6 @@
 //! Coordinates of a disk as a plain array, in the order of the state of its modes; entries without a mode stay 0.
 
-use super::pass::{Combination, modal_force};
+use super::pass::Combination;
 use super::{Disk, LANES, complexes};
 use crate::math::vector::Vector3;
 use crate::modes::coordinates::Coordinates;
@@ -65,11 +65,7 @@ impl Disk {
             return to.fill(0.0);
         }
         self.gather(forces);
-        for (place, to) in to.chunks_exact_mut(2 * LANES).enumerate() {
-            let force = &self.asked_force[place / self.modes * self.rows..][..self.rows];
-            let shapes = &self.shapes[place * self.rows..][..self.rows];
-            to.copy_from_slice(modal_force(&self.asked_nodes, shapes, force).as_flattened());
-        }
+        self.find_modal_forces(to);
     }
 
     /// Returns |Ψ| of all rows for pairs of coordinates (rows × coordinates/2), from the `shapes` of sector 0.

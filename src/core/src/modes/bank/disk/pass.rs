@@ -248,6 +248,31 @@ pub(super) fn modal_force(touched: &[bool], shapes: &[Complexes], force: &[Compl
     sums
 }
 
+/// Modal forces of a spectrum of contact forces on all modes.
+pub(super) struct ModalForces<'a> {
+    pub modes: usize,
+    pub rows: usize,
+    /// `[block][mode][row]`.
+    pub shapes: &'a [Complexes],
+    /// `[block][row]`.
+    pub force: &'a [Complexes],
+    /// Contact nodes with forces.
+    pub touched: &'a [bool],
+    /// `[block][mode][part][lane]`.
+    pub to: &'a mut [f64],
+}
+
+impl Kernel for ModalForces<'_> {
+    #[inline(always)]
+    fn run(self) {
+        for (place, to) in self.to.chunks_exact_mut(2 * LANES).enumerate() {
+            let force = &self.force[place / self.modes * self.rows..][..self.rows];
+            let shapes = &self.shapes[place * self.rows..][..self.rows];
+            to.copy_from_slice(modal_force(self.touched, shapes, force).as_flattened());
+        }
+    }
+}
+
 /// Spectrum of the forces on some nodes.
 pub(super) struct Gather<'a> {
     pub fourier: &'a Fourier,

@@ -1,0 +1,94 @@
+//! Closest points of nodes that move little along the surface in a step.
+
+use super::SplineGap;
+use crate::geometry::frame::PolarFrame;
+use crate::geometry::surface_spline::{ClosestPoint, Projection};
+use crate::geometry::{Gap, PrescribedMotion, Vector3};
+
+/// A search for closest points of many nodes at one instant.
+pub(crate) struct NearSearch<'a> {
+    gap: &'a SplineGap,
+    drive: &'a PrescribedMotion,
+    /// Rotation of the rotor relative to the shape, and of the shape.
+    rotor: PolarFrame,
+    shape: PolarFrame,
+    /// Centre of the shaft in the directions of the shape (m).
+    centre: Vector3,
+    /// Largest distance over which a node may be skipped (m).
+    reach: f64,
+}
+
+/// Gap of a node, with the normal in its own directions and in fixed directions.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct NearGap {
+    /// Gap (m): infinite beyond the extension of the surface, NaN without closest point.
+    pub distance: f64,
+    /// Closest point.
+    pub place: ClosestPoint,
+    /// Unit normal in the directions of the node, and in fixed directions.
+    pub normal: Vector3,
+    pub fixed: Vector3,
+    /// Distance that node and surface may move before the node could touch (m).
+    pub free: f64,
+}
+
+impl<'a> NearSearch<'a> {
+    /// Prepares the search for the current surface and prescribed motion.
+    pub fn new(gap: &'a SplineGap, drive: &'a PrescribedMotion) -> Self {
+        let shape = PolarFrame::new(drive.shape_rotation);
+        let rotor = PolarFrame::new(drive.rotor_angle - drive.shape_rotation);
+        Self { gap, drive, rotor, shape, centre: shape.local(drive.shaft), reach: gap.surface.extension() / 6.0 }
+    }
+
+    /// Position of a node displaced by `local` (m) in the directions of the shape, and its own directions there.
+    #[inline(always)]
+    fn position(&self, node: usize, index: usize, local: Vector3) -> (Vector3, PolarFrame) {
+        let frame = self.gap.frames[index].turned(self.rotor);
+        let arm = self.gap.arm(node, index % self.gap.layout.lanes, self.drive, local);
+        (frame.fixed(arm) + self.centre, frame)
+    }
+
+    /// Finds the gap of a node displaced by `local` (m) from its closest point `before` one step earlier and the motion `drift` of that
+    /// point in the step, which is updated. Returns `None` if the point cannot be found with a single evaluation of the surface.
+    #[inline(always)]
+    pub fn find_closely(
+        &self,
+        [node, index]: [usize; 2],
+        local: Vector3,
+        before: ClosestPoint,
+        drift: &mut [f64; 2],
+    ) -> Option<NearGap> {
+        let (x, frame) = self.position(node, index, local);
+        let ClosestPoint { patch, s, t } = self.gap.surface.advance(before, self.gap.turned);
+        let guess = ClosestPoint { patch, s: s + drift[0], t: t + drift[1] };
+        let found = self.gap.surface.project_close(x, guess)?;
+        *drift = [found.foot.s - s, found.foot.t - t];
+        Some(self.near(found, frame))
+    }
+
+    /// Finds the gap of a node displaced by `local` (m) from its closest point `before` one step earlier, or from its angle, and the motion
+    /// of the closest point in the step.
+    pub fn find(&self, [node, index]: [usize; 2], local: Vector3, before: Option<ClosestPoint>) -> (NearGap, [f64; 2]) {
+        let (x, frame) = self.position(node, index, local);
+        let start = before.map(|before| self.gap.surface.advance(before, self.gap.turned));
+        let guess = start.unwrap_or_else(|| self.gap.surface.locate(x));
+        let nowhere = Gap { distance: f64::NAN, normal: -Vector3::x(), foot: guess };
+        let found = match self.gap.surface.project(x, guess) {
+            Projection::Found { gap, .. } => gap,
+            Projection::BeyondEdge { place } => Gap { distance: f64::INFINITY, foot: place, ..nowhere },
+            // The caller detects this: the model no longer describes such a state.
+            Projection::Lost => nowhere,
+        };
+        let (foot, is_near) = (found.foot, start.is_some_and(|start| start.patch == found.foot.patch));
+        let drift = if is_near { [foot.s - guess.s, foot.t - guess.t] } else { [0.0; 2] };
+        (self.near(found, frame), drift)
+    }
+
+    #[inline(always)]
+    fn near(&self, found: Gap, frame: PolarFrame) -> NearGap {
+        let Gap { distance, normal, foot } = found;
+        let is_free = distance.is_finite() && self.gap.surface.is_far_from_edges(foot);
+        let free = if is_free { distance.min(self.reach).max(0.0) } else { 0.0 };
+        NearGap { distance, place: foot, normal: frame.local(normal), fixed: self.shape.fixed(normal), free }
+    }
+}
