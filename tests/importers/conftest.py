@@ -1,4 +1,4 @@
-"""FMUs of the scenes that ship, and what they answer without FMI; one line of a table for each test."""
+"""Packages built-in scenes, runs them without FMI, and writes a table with one line per test."""
 
 import csv
 import os
@@ -19,8 +19,8 @@ found = []
 
 
 @pytest.fixture
-def told(request):
-    """Say what a tool did, for the table: told(tool, fmi, result)."""
+def record(request):
+    """Add a line to the table: record(tool, version, fmi, result)."""
 
     def line(tool, version, fmi, result):
         found.append((tool, version, fmi, result))
@@ -41,7 +41,7 @@ def tiprub(*arguments):
 
 @pytest.fixture(scope="session")
 def paper(tmp_path_factory):
-    """Rotor 37 as in the paper, three nodes: FMI 2, FMI 3 with scalars and with arrays, and the native run."""
+    """The paper's rotor 37 with three nodes: an FMI 2.0 FMU, FMI 3.0 FMUs with scalars and with arrays, and the run without FMI."""
     work = tmp_path_factory.mktemp("paper")
     files = SimpleNamespace(two=work / "two.fmu", three=work / "three.fmu", arrays=work / "arrays.fmu")
     for file, options in ((files.two, ["2"]), (files.three, ["3"]), (files.arrays, ["3", "--arrays"])):

@@ -54,10 +54,10 @@ def run(platform, file, steps):
 @pytest.mark.parametrize("fmi", ["2", "3"])
 @pytest.mark.parametrize("platform", ["x86_64-windows", "aarch64-linux"])
 @pytest.mark.parametrize("scene", SCENES)
-def test_bits_are_those_of_linux(fmus, told, scene, platform, fmi):
+def test_bits_are_those_of_linux(fmus, record, scene, platform, fmi):
     (file,) = (fmus / scene).glob(f"*_fmi{fmi}.fmu")
     here = run("x86_64-linux", file, SCENES[scene])
     assert here.count("\n") == SCENES[scene] + 2
     assert run(platform, file, SCENES[scene]) == here
     with_what = {"x86_64-windows": "wine", "aarch64-linux": "qemu-aarch64"}[platform]
-    told(f"{with_what}, `{scene}`", "", f"{fmi}.0", f"bits of x86-64 Linux in all outputs of {SCENES[scene]} steps")
+    record(f"{with_what}, `{scene}`", "", f"{fmi}.0", f"bits of x86-64 Linux in all outputs of {SCENES[scene]} steps")

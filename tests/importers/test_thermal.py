@@ -46,16 +46,16 @@ def judged(found, course):
     return "SSP 1.0, rub and casing: " + ("bits equal to a script" if apart == 0.0 else f"{apart:.0e} apart from a script")
 
 
-def test_ssp_by_ecos(package, told):
+def test_ssp_by_ecos(package, record):
     if not ssp.tbb():
         pytest.skip("Ecos needs libtbb.so.12: pip install tbb")
     file, course = package
-    told("Ecos (ecospy)", importlib.metadata.version("ecospy"), "2.0", judged(ssp.run_ecos(file, STEP, COUNT, PATCHES), course))
+    record("Ecos (ecospy)", importlib.metadata.version("ecospy"), "2.0", judged(ssp.run_ecos(file, STEP, COUNT, PATCHES), course))
 
 
-def test_ssp_by_fmpy(package, told):
+def test_ssp_by_fmpy(package, record):
     file, course = package
-    told("FMPy", importlib.metadata.version("fmpy"), "2.0", judged(ssp.run_fmpy(file, STEP, COUNT, PATCHES), course))
+    record("FMPy", importlib.metadata.version("fmpy"), "2.0", judged(ssp.run_fmpy(file, STEP, COUNT, PATCHES), course))
 
 
 def test_the_example_from_nothing():

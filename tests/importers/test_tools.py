@@ -1,4 +1,4 @@
-"""Importers that nobody here wrote run the packaged FMUs, and find what the program finds without FMI."""
+"""Independent importers run the packaged FMUs and get the results of a run without FMI."""
 
 import importlib.metadata
 import os
@@ -21,14 +21,14 @@ KINDS = [("two", "2.0"), ("three", "3.0"), ("arrays", "3.0 arrays")]
 
 
 def difference(native, found, name):
-    """Largest difference, of the largest native value."""
+    """Return the largest difference as a fraction of the largest value without FMI."""
     native, found = numpy.array(native), numpy.array(found)
     assert native.shape == found.shape, (name, native.shape, found.shape)
     return numpy.abs(native - found).max() / numpy.abs(native).max()
 
 
 def judged(paper, columns):
-    """The verdict over all columns; more than rounding fails."""
+    """Compare all columns. Fail if they differ by more than rounding."""
     worst = max(difference(paper.native[name], column, name) for name, column in columns.items())
     assert worst < 1e-9, worst
     return "bits equal" if worst == 0.0 else f"{worst:.0e} apart"
@@ -42,7 +42,7 @@ def version_of(package):
 
 
 @pytest.mark.parametrize("kind, fmi", KINDS)
-def test_fmpy(paper, told, kind, fmi):
+def test_fmpy(paper, record, kind, fmi):
     file = str(getattr(paper, kind))
     assert validate_fmu(file) == []
     outputs = sorted({name.split("[2]")[0] if fmi == "3.0 arrays" else name for name in OUTPUTS})
@@ -50,7 +50,7 @@ def test_fmpy(paper, told, kind, fmi):
     columns = {}
     for name in OUTPUTS:
         columns[name] = result[name] if name in result.dtype.names else result[name.removesuffix("[2]")][:, 1]
-    told("FMPy", version_of("fmpy"), fmi, f"validated without errors; {judged(paper, columns)}")
+    record("FMPy", version_of("fmpy"), fmi, f"validated without errors; {judged(paper, columns)}")
 
 
 def references(file):
@@ -58,7 +58,7 @@ def references(file):
 
 
 @pytest.mark.parametrize("kind, fmi", KINDS[:2])
-def test_fmuloader(paper, told, kind, fmi):
+def test_fmuloader(paper, record, kind, fmi):
     version = version_of("fmuloader")
     file = getattr(paper, kind)
     description = read_model_description(str(file))
@@ -85,7 +85,7 @@ def test_fmuloader(paper, told, kind, fmi):
         rows.append(list(read(wanted)))
     unit.terminate()
     unit.free_instance()
-    told("fmuloader", version, fmi, judged(paper, dict(zip(OUTPUTS, zip(*rows)))))
+    record("fmuloader", version, fmi, judged(paper, dict(zip(OUTPUTS, zip(*rows)))))
 
 
 # Ecos ends the process on errors of its own. It wants libtbb.so.12, which the package tbb brings.
@@ -106,7 +106,7 @@ with EcosSimulationStructure() as structure:
 
 
 @pytest.mark.parametrize("kind, fmi", KINDS[:2])
-def test_ecos(paper, told, kind, fmi):
+def test_ecos(paper, record, kind, fmi):
     version = version_of("ecospy")
     command = [sys.executable, "-c", ECOS, getattr(paper, kind), repr(STEP), str(STEPS), *OUTPUTS]
     run = subprocess.run(command, capture_output=True, text=True)
@@ -115,7 +115,7 @@ def test_ecos(paper, told, kind, fmi):
     assert run.returncode == 0, run.stderr
     rows = [line.split() for line in run.stdout.splitlines() if line[:1] in "-0123456789"]
     columns = {name: [float(row[index]) for row in rows] for index, name in enumerate(OUTPUTS)}
-    told("Ecos (ecospy)", version, fmi, judged(paper, columns))
+    record("Ecos (ecospy)", version, fmi, judged(paper, columns))
 
 
 LIBCOSIM = """
@@ -135,7 +135,7 @@ for index in range(int(steps)):
 """
 
 
-def test_libcosim(paper, told):
+def test_libcosim(paper, record):
     version = version_of("libcosimpy")
     wanted = [references(paper.two)[name] for name in OUTPUTS]
     command = [sys.executable, "-c", LIBCOSIM, paper.two, repr(STEP), STEPS, *wanted]
@@ -145,11 +145,11 @@ def test_libcosim(paper, told):
     # Among lines of its log; read after steps only.
     rows = [line.split() for line in run.stdout.splitlines() if line[:1] in "-0123456789"]
     columns = {name: paper.native[name][:1] + [float(row[index]) for row in rows] for index, name in enumerate(OUTPUTS)}
-    told("libcosim (libcosimpy)", version, "2.0", judged(paper, columns))
+    record("libcosim (libcosimpy)", version, "2.0", judged(paper, columns))
 
 
 @pytest.mark.parametrize("kind, fmi", KINDS[:2])
-def test_container(paper, told, tmp_path, kind, fmi):
+def test_container(paper, record, tmp_path, kind, fmi):
     """A container of the toolbox with two of our units, run by FMPy."""
     version = version_of("fmu-manipulation-toolbox")
     tool = Path(sys.executable).parent / "fmucontainer"
@@ -164,7 +164,7 @@ def test_container(paper, told, tmp_path, kind, fmi):
     assert container.exists(), made.stdout + made.stderr
     speed = {"speed": read_start(paper, kind)}
     result = simulate_fmu(str(container), stop_time=STEP * STEPS, output_interval=STEP, start_values=speed, output=OUTPUTS)
-    told("FMU Manipulation Toolbox", version, f"{fmi} in {fmi}", judged(paper, {name: result[name] for name in OUTPUTS}))
+    record("FMU Manipulation Toolbox", version, f"{fmi} in {fmi}", judged(paper, {name: result[name] for name in OUTPUTS}))
 
 
 def read_start(paper, kind):
@@ -173,7 +173,7 @@ def read_start(paper, kind):
 
 
 @pytest.mark.parametrize("kind, fmi", KINDS)
-def test_fmi_sim(paper, told, tmp_path, kind, fmi):
+def test_fmi_sim(paper, record, tmp_path, kind, fmi):
     tool = shutil.which("fmi-sim")
     if tool is None:
         pytest.skip("fmi-sim is not on the PATH (cargo install fmi-sim)")
@@ -184,14 +184,14 @@ def test_fmi_sim(paper, told, tmp_path, kind, fmi):
     command += ["-s", "0", "-f", repr(STEP * STEPS), "--output-interval", repr(STEP)]
     run = subprocess.run(command, capture_output=True, text=True)
     if version == "0.7.0" and 'unknown field "quantity"' in run.stderr:
-        told("fmi-sim (rust-fmi)", version, fmi, "rejected: its reader does not support quantities and units of variables")
+        record("fmi-sim (rust-fmi)", version, fmi, "rejected: its reader does not support quantities and units of variables")
         pytest.skip("fmi-sim 0.7.0 does not support quantities and units of variables of FMI 3.0")
     assert run.returncode == 0, run.stderr[-2000:]
     header, *rows = [line.split(",") for line in out.read_text().splitlines()]
     header = [name.strip('"') for name in header]
     columns = {name: [float(row[header.index(name)]) for row in rows] for name in OUTPUTS if name in header}
     assert set(columns) == {name for name in OUTPUTS if fmi != "3.0 arrays" or "[" not in name}, header
-    told("fmi-sim (rust-fmi)", version, fmi, judged(paper, columns))
+    record("fmi-sim (rust-fmi)", version, fmi, judged(paper, columns))
 
 
 # Level 3 of its log are warnings and worse, which it writes to stderr.
@@ -214,7 +214,7 @@ print(function(name + "_import_get_model_name", c_char_p, c_void_p)(unit).decode
 
 
 @pytest.mark.parametrize("kind, fmi", KINDS)
-def test_fmi_library(paper, told, tmp_path, kind, fmi):
+def test_fmi_library(paper, record, tmp_path, kind, fmi):
     library = os.environ.get("FMI_LIBRARY")
     if library is None:
         pytest.skip("the environment variable FMI_LIBRARY names no libfmilib_shared.so")
@@ -224,9 +224,9 @@ def test_fmi_library(paper, told, tmp_path, kind, fmi):
     # Version 3.0 reads terminals without the attributes that the standard requires of them.
     words = [line for line in run.stderr.splitlines() if not re.search("matchingRule|variableName|variableKind|memberName|'Terminal", line)]
     assert words == [] and (fmi != "2.0" or run.stderr == ""), run.stderr
-    # Each release tells its major and minor version by the name of its library.
+    # The file name of the library contains the version.
     version = Path(library).resolve().name.split(".so.")[-1]
-    told("FMI Library", version, fmi, "read without a warning" + (", except about terminals" if run.stderr else ""))
+    record("FMI Library", version, fmi, "read without a warning" + (", except about terminals" if run.stderr else ""))
 
 
 def test_fmpy_sees_the_platforms(paper):

@@ -150,7 +150,7 @@ impl CompiledShape {
         [value, slope, curvature]
     }
 
-    /// Largest magnitude of the curvature of s (m/rad²).
+    /// Returns the largest magnitude of the curvature of s (m/rad²).
     pub(crate) fn largest_curvature(&self) -> f64 {
         match self {
             Self::TwoLobe { height, width, .. } => 2.0 * height.abs() / (width * width),
@@ -158,7 +158,7 @@ impl CompiledShape {
         }
     }
 
-    /// Largest curvature with which s may bend below its chord (m/rad²); `None` if s is never negative.
+    /// Returns the largest curvature with which s may bend below its chord (m/rad²), or `None` if s is never negative.
     pub(crate) fn bumpiness(&self) -> Option<f64> {
         match self {
             Self::Circular => None,

@@ -18,8 +18,8 @@ use crate::scene::shape::CompiledShape;
 /// (865 Hz at rest, 1102 Hz at 1800 rad/s), so at 0.2 a fifth of its stiffness is neglected.
 const SLOW: f64 = 0.2;
 
-/// Scene settings that include the effects of spin. The step suits built-in blades; the start rejects a step that is too
-/// long, with the longest one that is accepted.
+/// Scene settings that include the effects of spin. The step suits built-in blades. If it is too long for a blade, the
+/// simulation rejects it at the start and prints the longest step that it accepts.
 const SPIN_SETTINGS: &str = "set `spin = { stiffening = true, growth = true }` for the structure, and \
                              `scheme = \"modal-exact\"` and `step = 2.5e-7` under `[time]`";
 
@@ -77,8 +77,7 @@ impl Compiled {
         }
         let problem = format!(
             "{} starts at a speed of {} rad/s, {ratio:.2} times its first natural frequency, but has the stiffness of a rotor \
-             at rest. Centrifugal stiffening and growth can double contact forces, and change the heat of a light rub \
-             several times",
+             at rest. Centrifugal stiffening and growth can double contact forces, and multiply the heat of a light rub",
             self.rotor_name(body),
             shown(speed),
         );

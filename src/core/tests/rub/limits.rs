@@ -178,7 +178,7 @@ fn warns_of_fast_rotor_with_stiffness_at_rest() {
     scene.roms[0].extras.spin = Some(models::spin(scene.roms[0].order()));
     assert!(remedy(&scene).unwrap().starts_with("In the scene, set `spin"));
     scene.settings.structures[0].spin.growth = true;
-    assert!(remedy(&scene).is_some(), "growth alone leaves the stiffness of rest");
+    assert!(remedy(&scene).is_some(), "growth alone does not include stiffening");
     scene.settings.structures[0].spin.stiffening = true;
     assert_eq!(remedy(&scene), None);
     let mut coupled = disk::with_rotor(disk::TestDisk::random(4, 2, 6, 0.3, 5).cyclic());

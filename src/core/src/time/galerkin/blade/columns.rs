@@ -3,7 +3,7 @@
 use crate::math::octet::{Eight, Octet};
 use crate::time::galerkin::basis::POINTS;
 
-/// Values of a block of nodes at the start of a step and at its points; `count` values in total.
+/// Returns the values of a block of nodes at the start of a step and at its points: `count` values in total.
 #[inline(always)]
 pub(super) fn values_at_points<L: Octet>(start: &[Eight], lanes: &[Eight], block: usize, count: usize) -> [L; POINTS] {
     let mut values = [L::zero(); POINTS];
@@ -29,7 +29,7 @@ pub(super) fn add_modes<L: Octet, const P: usize, const B: usize>(
             amounts[p] = &modes[p][k].0;
         }
         if shapes.len() == 8 * blocks {
-            // The fixed number of turns needs no checks of bounds.
+            // The fixed number of iterations avoids bounds checks.
             for i in 0..8 {
                 add_mode(&mut sums, &shapes[i * blocks + block..][..B], amounts, i);
             }

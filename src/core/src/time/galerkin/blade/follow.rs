@@ -2,7 +2,7 @@
 
 use super::columns::displace;
 use super::level::BladeLevel;
-use super::minima::{FOLLOW_FRACTION, MAX_HALVINGS, PARTS_FRACTION, amplitude, fraction, interpolation_share};
+use super::minima::{FOLLOW_FRACTION, MAX_HALVINGS, MINIMUM_FRACTION, amplitude, fraction, relative_error};
 use super::rows::BladeRows;
 use super::surface::{DriveRate, FacedSurface, PointDrive};
 use super::trial::BladeTrial;
@@ -32,17 +32,17 @@ impl PathPoint {
     }
 }
 
-/// A part of a step: the step is halved `halvings` times, and `index` parts are before it.
+/// Part of a step that is halved `halvings` times. `index` counts the parts from the start of the step.
 #[derive(Debug, Clone, Copy, Default)]
 struct Part {
     halvings: usize,
     index: usize,
-    /// Stored times of its two ends.
+    /// Indices of the stored times at both ends.
     ends: [usize; 2],
 }
 
 impl Part {
-    /// Its ends, as fractions of the step.
+    /// Returns both ends as fractions of the step.
     #[inline(always)]
     fn span(&self) -> [f64; 2] {
         let length = fraction(1, 1 << self.halvings);
@@ -50,19 +50,20 @@ impl Part {
     }
 }
 
-/// Follows the nodes found by [`FindMinima`](super::minima::FindMinima): halves the step, and each part again, until the
-/// cubic through the gaps and rates at the ends of a part shows that its smallest gap is not needed, or is accurate
-/// enough to record its minimum. The modal forces must be known and the modes not yet advanced.
+/// Finds the smallest gaps of the nodes that [`SelectFollowed`](super::minima::SelectFollowed) selects. A cubic connects the
+/// gaps and their rates at the ends of a part. Parts are halved, starting with the whole step, until the cubic shows that
+/// the smallest gap is not needed, or is accurate enough to record its minimum. The modal forces must be known, and the
+/// modes must still be those at the start of the step.
 pub(super) struct Follow<'a, D> {
     pub trial: &'a mut BladeTrial,
     pub rows: &'a BladeRows,
     pub level: &'a BladeLevel,
-    /// Tables for the lengths of the step, half of it, and so on.
+    /// Tables for the length of the step, half this length, and so on.
     pub halves: &'a [&'a BladeLevel],
     pub faced: &'a FacedSurface<'a>,
-    /// Prescribed motion and its rates at a fraction of the step.
+    /// Returns the prescribed motion and its rates at a fraction of the step.
     pub drive_at: D,
-    /// Largest error of the cubic through the shape of the surface over the step (m).
+    /// Largest error that the shape of the surface adds to a cubic over the whole step (m).
     pub shape_error: f64,
     /// Smallest gaps so far (m).
     pub lowest: &'a mut [Eight],
@@ -88,12 +89,12 @@ impl<D: Fn(f64) -> (PointDrive, DriveRate)> OctetKernel for Follow<'_, D> {
         self.advance::<L>(Part { ends: [0, 1], ..Part::default() }, 0);
         self.find_gaps::<L>(1, 1.0);
         let mut errors = [f64::NAN; MAX_HALVINGS + 1];
-        let mut left = [Part::default(); MAX_HALVINGS + 1];
-        left[0].ends = [0, 1];
+        let mut parts = [Part::default(); MAX_HALVINGS + 1];
+        parts[0].ends = [0, 1];
         let mut count = 1;
         while count > 0 {
             count -= 1;
-            let part = left[count];
+            let part = parts[count];
             let [begin, end] = part.span();
             if end <= self.ends[0] || begin >= self.ends[1] {
                 continue;
@@ -109,15 +110,15 @@ impl<D: Fn(f64) -> (PointDrive, DriveRate)> OctetKernel for Follow<'_, D> {
             self.advance::<L>(Part { ends: [first, middle], ..part }, 1);
             self.find_gaps::<L>(middle, 0.5 * (begin + end));
             let half = |index: usize, ends: [usize; 2]| Part { halvings: part.halvings + 1, index, ends };
-            left[count] = half(2 * part.index + 1, [middle, last]);
-            left[count + 1] = half(2 * part.index, [first, middle]);
+            parts[count] = half(2 * part.index + 1, [middle, last]);
+            parts[count + 1] = half(2 * part.index, [first, middle]);
             count += 2;
         }
     }
 }
 
 impl<D: Fn(f64) -> (PointDrive, DriveRate)> Follow<'_, D> {
-    /// Finds the amplitudes of the modes, times the largest closing displacement of a node per unit.
+    /// Computes the amplitude of each mode times the largest closing displacement of a node per unit amplitude.
     #[inline(always)]
     fn find_amplitudes<L: Octet>(&mut self) {
         let BladeTrial { start, modal_forces, amplitudes, .. } = &mut *self.trial;
@@ -129,22 +130,24 @@ impl<D: Fn(f64) -> (PointDrive, DriveRate)> Follow<'_, D> {
     /// Bounds the error of the cubic over a part (m).
     #[inline(always)]
     fn interpolation_error<L: Octet>(&self, halvings: usize) -> f64 {
-        let share = fraction(1, 1 << halvings);
-        let (length, shape_error) = (L::splat(self.level.step * share), self.shape_error * share * share * share);
+        let part = fraction(1, 1 << halvings);
+        let length = L::splat(self.level.step * part);
+        let shape_error = self.shape_error * part * part * part;
         let mut error = L::zero();
         for (amplitude, frequency) in self.trial.amplitudes.iter().zip(&self.rows.rates[3]) {
-            error = error + L::load(amplitude) * interpolation_share(L::load(frequency) * length);
+            error = error + L::load(amplitude) * relative_error(L::load(frequency) * length);
         }
         error.total() + shape_error
     }
 
-    /// Records the smallest gaps within a part if the cubics represent it. Returns whether it must be halved instead.
+    /// Records the smallest gaps within a part if the cubics are accurate enough. Returns whether the part must be halved
+    /// instead.
     #[inline(always)]
     fn needs_halving<L: Octet>(&mut self, part: Part, error: f64) -> bool {
         let length = self.level.step * fraction(1, 1 << part.halvings);
         let third = L::splat(length / 3.0);
         let is_last = part.halvings + 1 == self.halves.len();
-        let is_accurate = is_last || error <= PARTS_FRACTION * self.tolerance;
+        let is_accurate = is_last || error <= MINIMUM_FRACTION * self.tolerance;
         let [begin, end] = part.span();
         let [from, to] = self.ends.map(|fraction| L::splat((fraction - begin) / (end - begin)));
         let Self { trial, rows, lowest, floors, tolerance, .. } = &mut *self;
@@ -158,7 +161,7 @@ impl<D: Fn(f64) -> (PointDrive, DriveRate)> Follow<'_, D> {
             let inner = [first + L::load(&before.rates[block]) * third, last - L::load(&after.rates[block]) * third];
             let known = L::load(&lowest[block]);
             let bar = L::load(&floors[block]).min(known) - L::splat(FOLLOW_FRACTION * *tolerance);
-            let dips = may_dip(first.min(last), inner[0].min(inner[1]), error, bar) & followed;
+            let dips = find_dips(first.min(last), inner[0].min(inner[1]), error, bar) & followed;
             if dips == 0 {
                 continue;
             }
@@ -172,13 +175,13 @@ impl<D: Fn(f64) -> (PointDrive, DriveRate)> Follow<'_, D> {
         false
     }
 
-    /// Finds the gaps of the followed nodes and their rates at a stored time, without the instantaneous displacements
-    /// that forces on other nodes cause. Records the gaps if they are within the recorded part of the step.
+    /// Computes the gaps of the followed nodes and their rates at a stored time. Records the gaps if the time is within the
+    /// recorded part of the step.
     #[inline(always)]
     fn find_gaps<L: Octet>(&mut self, stored: usize, theta: f64) {
         self.displace_followed::<L>(stored);
         if self.pushes {
-            self.add_held::<L>(theta);
+            self.add_quasi_static::<L>(theta);
         }
         let (drive, rate) = (self.drive_at)(theta);
         let Self { trial, rows, faced, ends, .. } = self;
@@ -205,7 +208,7 @@ impl<D: Fn(f64) -> (PointDrive, DriveRate)> Follow<'_, D> {
         }
     }
 
-    /// Finds the displacements and velocities of the followed nodes, node by node if there are few of them.
+    /// Computes the displacements and velocities of the followed nodes, node by node if there are few of them.
     #[inline(always)]
     fn displace_followed<L: Octet>(&mut self, stored: usize) {
         let Self { trial, rows, .. } = self;
@@ -245,7 +248,7 @@ impl<D: Fn(f64) -> (PointDrive, DriveRate)> Follow<'_, D> {
 
     /// Adds the quasi-static displacements under the forces at a fraction of the step, and their rates.
     #[inline(always)]
-    fn add_held<L: Octet>(&mut self, theta: f64) {
+    fn add_quasi_static<L: Octet>(&mut self, theta: f64) {
         let Self { trial, rows, level, .. } = self;
         let BladeTrial { start, path_moved, forces, multipliers, .. } = &mut **trial;
         let (weights, slopes) = (level.basis.weights_at(theta), level.basis.slopes_at(theta));
@@ -275,7 +278,8 @@ impl<D: Fn(f64) -> (PointDrive, DriveRate)> Follow<'_, D> {
         }
     }
 
-    /// Advances the modes from the start of a part, over its length halved `halvings` times, to its second stored time.
+    /// Advances the modes from the start of a part to its second stored time. They are apart by the length of the part,
+    /// halved `halvings` times.
     #[inline(always)]
     fn advance<L: Octet>(&mut self, part: Part, halvings: usize) {
         let Self { trial, halves, pushes, .. } = self;
@@ -337,11 +341,11 @@ impl OctetKernel for CubicMinima<'_> {
                 [first + L::load(&trial.rates_before[block]) * third, last - L::load(&trial.rates[block]) * third];
             let (ends, between) = (first.min(last), inner[0].min(inner[1]));
             let bar = L::load(&floors[block]).min(L::load(&lowest[block]));
-            let dips = may_dip(ends, between, error, bar) & rows.valid(block);
+            let dips = find_dips(ends, between, error, bar) & rows.valid(block);
             trial.followed[block] = 0;
             if dips != 0 {
                 let value = cubic_minimum([first, inner[0], inner[1], last]).1.min(ends);
-                if error <= PARTS_FRACTION * tolerance {
+                if error <= MINIMUM_FRACTION * tolerance {
                     let known = L::load(&lowest[block]);
                     L::select(dips, known.min(value), known).store(&mut lowest[block]);
                 } else {
@@ -354,17 +358,17 @@ impl OctetKernel for CubicMinima<'_> {
     }
 }
 
-/// Returns the nodes whose gap may be smaller between two times than at both, and smaller than `bar`. `ends` are the
-/// smaller gaps at the times, and `between` the smaller inner Bézier coefficients of the cubics.
+/// Returns the nodes whose gap may be smaller between two times than at both times, and smaller than `bar`. `ends` contains
+/// the smaller of the gaps at both times, and `between` the smaller of the two inner Bézier coefficients of each cubic.
 #[inline(always)]
-fn may_dip<L: Octet>(ends: L, between: L, error: f64, bar: L) -> u8 {
-    // The error is at most 16θ²(1 − θ)² times the largest one; the inner coefficients have the weight 3θ(1 − θ).
+fn find_dips<L: Octet>(ends: L, between: L, error: f64, bar: L) -> u8 {
+    // At θ, the error is at most 16θ²(1 − θ)² times the largest error, and the inner coefficients have the weight 3θ(1 − θ).
     let near_ends = ends + L::splat(error * (4.0 / 3.0));
     between.less(near_ends) & (between.min(ends) - L::splat(error)).less(bar)
 }
 
-/// Returns the place within 0 < θ < 1 and the value of the minimum of a cubic with these Bézier coefficients; the value is
-/// infinite if there is none.
+/// Returns the place and value of the minimum of a cubic with these Bézier coefficients. The value is infinite if there is no
+/// minimum within 0 < θ < 1.
 #[inline(always)]
 fn cubic_minimum<L: Octet>([first, second, third, last]: [L; 4]) -> (L, L) {
     let (slope, change) = ((second - first) * L::splat(3.0), (third - second) * L::splat(3.0));

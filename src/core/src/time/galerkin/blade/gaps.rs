@@ -1,4 +1,4 @@
-//! Smallest gaps of the nodes of a tried step, between its points as well.
+//! Smallest gaps of the nodes within a tried step.
 
 use super::follow::Follow;
 use super::minima::{MAX_HALVINGS, RecordPoints};
@@ -13,12 +13,12 @@ use crate::time::galerkin::tables::HALVINGS;
 use crate::time::galerkin::trial::{ForceInterpolation, TrialResult};
 use std::mem::take;
 
-/// Fraction of a span over which a difference of the prescribed motion gives its rates.
+/// Rates of the prescribed motion are differences over this fraction of a span.
 const RATE_FRACTION: f64 = 1.0 / 64.0;
 
 impl BladeInSpan<'_> {
-    /// Records the smallest gaps of a tried step between two fractions of it. If it is not resolved, its polynomials do
-    /// not describe the motion between its points.
+    /// Records the smallest gaps between two fractions of a tried step. If the step does not resolve the motion, only the gaps
+    /// at the points are recorded.
     pub(super) fn record_gaps(&mut self, step: SpanStep, kind: ForceInterpolation, is_resolved: bool, ends: [f64; 2]) {
         let Blade { trial, kinds, tally, floors, .. } = &mut *self.blade;
         let tables = &kinds[self.place.kind];
@@ -41,7 +41,7 @@ impl BladeInSpan<'_> {
         path.follow(trial, &mut kinds[self.place.kind], [&mut tally.lowest, floors], ends);
     }
 
-    /// Finds how deep nodes that stay open penetrate between the points of the tried step.
+    /// Finds the largest penetration between the points of the tried step, of nodes that stay open.
     pub(super) fn find_depth(&mut self, step: SpanStep, kind: ForceInterpolation, result: &mut TrialResult) {
         let tolerance = self.goal.tolerance;
         let Blade { trial, kinds, depth_limits, .. } = &mut *self.blade;
@@ -67,17 +67,17 @@ impl BladeInSpan<'_> {
 }
 
 impl BladePlace<'_> {
-    /// Bounds the error (m) of the cubic through the shape of the surface and its rate at two fractions of the span.
-    pub(super) fn cubic_error(&self, ends: [f64; 2]) -> f64 {
+    /// Bounds the error (m) of a cubic that connects the shape of the surface and its rates at two fractions of the span.
+    pub(super) fn shape_error(&self, ends: [f64; 2]) -> f64 {
         let [from, to] = ends.map(|end| drive_at(self, end).0);
         let (surface, turn) = (&self.gap.surface, (to.turned - from.turned).abs());
-        // A bump exp(−x²) has a fourth derivative of 6 times its curvature; a spline has a jump of its third derivative.
+        // The largest fourth derivative of a bump exp(−x²) is six times its curvature. The third derivative of a spline jumps.
         let curvature = surface.largest_curvature() * from.factor.abs().max(to.factor.abs());
         curvature * turn * turn * (turn / surface.angular_scale()).min(1.0) / 64.0
     }
 }
 
-/// Exact motion of the followed nodes of a tried step.
+/// Finds the smallest gaps of the followed nodes from their exact motion within a tried step.
 struct FollowedPath<'a> {
     place: &'a BladePlace<'a>,
     drives: &'a [PointDrive; POINTS],
@@ -88,7 +88,7 @@ struct FollowedPath<'a> {
 }
 
 impl FollowedPath<'_> {
-    /// Finds the smallest gaps between two fractions of the step. Those above `floors` are not needed (m).
+    /// Records the smallest gaps between two fractions of the step in `lowest` (m). Gaps above `floors` (m) are not needed.
     fn follow(
         &self,
         trial: &mut BladeTrial,
@@ -111,8 +111,8 @@ impl FollowedPath<'_> {
             level,
             halves: &halves[..=finest],
             faced: &place.faced_surface(self.drives),
-            drive_at: |theta| moving_drive_at(place, step.from + step.length * theta, span),
-            shape_error: place.cubic_error([step.from, step.from + step.length]),
+            drive_at: |theta| drive_and_rate_at(place, step.from + step.length * theta, span),
+            shape_error: place.shape_error([step.from, step.from + step.length]),
             lowest,
             floors,
             tolerance: self.tolerance,
@@ -122,8 +122,8 @@ impl FollowedPath<'_> {
     }
 }
 
-/// Prescribed motion of a sector at the fraction `theta` of a span of this length (s), and its rates.
-pub(super) fn moving_drive_at(place: &BladePlace, theta: f64, span: f64) -> (PointDrive, DriveRate) {
+/// Returns the prescribed motion of a sector and its rates at the fraction `theta` of a span with this length (s).
+pub(super) fn drive_and_rate_at(place: &BladePlace, theta: f64, span: f64) -> (PointDrive, DriveRate) {
     let [now, before] = [theta, theta - RATE_FRACTION].map(|theta| drive_at(place, theta).0);
     (now, now.rate_since(&before, RATE_FRACTION * span))
 }

@@ -16,8 +16,8 @@ use crate::time::galerkin::trial::{FALLING, NEAR};
 pub(super) const MAX_HALVINGS: usize = 7;
 /// Nodes are followed if they may come closer between the points by more than this fraction of the tolerance.
 pub(super) const FOLLOW_FRACTION: f64 = 0.1;
-/// Largest bound on the error of a recorded minimum, as a fraction of the tolerance.
-pub(super) const PARTS_FRACTION: f64 = 0.3;
+/// Largest error bound of a recorded minimum, as a fraction of the tolerance.
+pub(super) const MINIMUM_FRACTION: f64 = 0.3;
 
 impl BladeTrial {
     /// Bounds the interpolation error (m) of all modes between points at a distance `length` (s).
@@ -28,8 +28,8 @@ impl BladeTrial {
     }
 }
 
-/// Selects the nodes that stay open, may come closer between the points than at the points, and whose smallest gap may be
-/// below the smallest one so far and below a floor. Returns whether there are such nodes.
+/// Selects the nodes that stay open and may come closer between the points than at the points, if their smallest gap may be
+/// below a floor and below the smallest gap so far. Returns whether there are such nodes.
 pub(super) struct SelectFollowed<'a> {
     pub trial: &'a mut BladeTrial,
     pub rows: &'a BladeRows,
@@ -69,7 +69,7 @@ impl OctetKernel for SelectFollowed<'_> {
     }
 }
 
-/// Records the gaps of all nodes at the end of the step, and at the other points those of the nodes that are not followed.
+/// Records the gaps of all nodes at the end of the step. At the other points, only the nodes that are not followed count.
 pub(super) struct RecordPoints<'a> {
     pub trial: &'a BladeTrial,
     pub rows: &'a BladeRows,
@@ -178,8 +178,8 @@ impl OctetKernel for FindInterpolationError<'_> {
         let BladeTrial { start, modal_forces, mode_bounds, .. } = trial;
         let mut error = L::zero();
         for (k, largest) in rows.largest.iter().enumerate() {
-            let share = interpolation_share(L::load(&rows.rates[3][k]) * L::splat(length));
-            let mode_error = amplitude::<L>(rows, start, modal_forces, k, pushes) * share;
+            let relative = relative_error(L::load(&rows.rates[3][k]) * L::splat(length));
+            let mode_error = amplitude::<L>(rows, start, modal_forces, k, pushes) * relative;
             mode_error.store(&mut mode_bounds[k]);
             error = error + L::load(largest) * mode_error;
         }
@@ -211,13 +211,13 @@ pub(super) fn amplitude<L: Octet>(
     amplitude + force * per_frequency * per_frequency * L::splat(2.0)
 }
 
-/// Bounds the error of the cubic between two times relative to the amplitude of a mode; `x` is its frequency times the
-/// distance of the times. It holds for the cubic through the points of a step, and for the parabola as well, because the
-/// points of a step follow the moments of the motion.
+/// Bounds the error of the cubic between two times, relative to the amplitude of a mode. `x` is the frequency of the mode
+/// times the time between them. The bound also holds for the cubic and the parabola through the points of a step, because
+/// these points preserve the moments of the motion.
 #[inline(always)]
-pub(super) fn interpolation_share<L: Octet>(x: L) -> L {
+pub(super) fn relative_error<L: Octet>(x: L) -> L {
     let square = x * x;
-    // Neither the motion nor a cubic with its rates at both ends exceeds the amplitude by much.
+    // The motion is bounded by the amplitude, and a cubic with its rates at both ends exceeds the amplitude only a little.
     (square * square * L::splat(1.0 / 384.0)).min(L::splat(2.0) + L::splat(0.3) * x)
 }
 

@@ -5,7 +5,7 @@
 
 use super::dense::{DenseOutput, ModeResponse};
 use super::follow::CubicMinima;
-use super::gaps::moving_drive_at;
+use super::gaps::drive_and_rate_at;
 use super::rows::BladeRows;
 use super::span::{Blade, BladeInSpan, RecordScope};
 use super::surface::PointDrive;
@@ -219,8 +219,8 @@ impl BladeInSpan<'_> {
         self.place.course = course(last);
         let mut drives = [PointDrive::default(); POINTS];
         let theta = (interval.to - to_real(last) * interval.span) / interval.span;
-        let (drive, rate) = moving_drive_at(&self.place, theta, interval.span);
-        let shape_error = self.place.cubic_error([theta - (interval.to - interval.from) / interval.span, theta]);
+        let (drive, rate) = drive_and_rate_at(&self.place, theta, interval.span);
+        let shape_error = self.place.shape_error([theta - (interval.to - interval.from) / interval.span, theta]);
         drives[0] = drive;
         let faced = self.place.faced_surface(&drives);
         let interpolation = kind.unwrap_or(ForceInterpolation::Polynomial);
@@ -255,9 +255,9 @@ impl BladeInSpan<'_> {
         self.include_lowest();
     }
 
-    /// Records the smallest gaps over an interval with a length (s). Cubics through the gaps and their rates at both ends
-    /// give them where the error is small enough; `shape_error` (m) is the part of the shape of the surface. Returns
-    /// whether the error is too large for some nodes; these are followed.
+    /// Records the smallest gaps over an interval with a length (s). They follow from cubics through the gaps and their rates
+    /// at both ends, if the error is small enough. `shape_error` (m) is the error that the shape of the surface causes.
+    /// Returns whether the error is too large for some nodes, which must be followed.
     fn record_cubic_minima(&mut self, length: f64, shape_error: f64) -> bool {
         let Blade { trial, kinds, tally, floors, begun, .. } = &mut *self.blade;
         let (rows, tolerance) = (&kinds[self.place.kind].rows, self.goal.tolerance);

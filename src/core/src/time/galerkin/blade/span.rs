@@ -375,8 +375,8 @@ impl SpanSteps for BladeInSpan<'_> {
         let level = tables.level(step.level, kind);
         self.tried = level.blocks;
         let mut result = trial.attempt(&tables.rows, level, &faced, self.goal.precision);
-        let may_last = result.solved && !result.misses(self.goal.tolerance);
-        if kind == ForceInterpolation::Polynomial && may_last && step.level < HALVINGS {
+        let is_acceptable = result.solved && !result.misses(self.goal.tolerance);
+        if kind == ForceInterpolation::Polynomial && is_acceptable && step.level < HALVINGS {
             self.find_depth(step, kind, &mut result);
         }
         result

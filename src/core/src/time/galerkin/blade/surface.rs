@@ -31,7 +31,7 @@ pub(super) struct DriveRate {
 }
 
 impl PointDrive {
-    /// Returns the rates of the motion from `before` to this one in a time (s).
+    /// Returns the mean rates of the motion from `before` to `self` within a time (s).
     pub fn rate_since(&self, before: &Self, time: f64) -> DriveRate {
         let per_second = 1.0 / time;
         DriveRate {

@@ -111,12 +111,15 @@ pub(crate) struct BladeTrial {
     pub(super) gaps: Vec<Eight>,
     pub(super) multipliers: Vec<Eight>,
     pub(super) forces: [Vec<Eight>; 2],
-    /// Mask of the nodes that may come closer between the points; their motion within the step; bounds for the modes; and
-    /// displacements (m), followed by velocities (m/s).
+    /// Mask of the followed nodes, which may come closer between the points.
     pub(super) followed: Vec<u8>,
+    /// Motion of the followed nodes at times within the step.
     pub(super) path: Vec<PathPoint>,
+    /// Largest interpolation error of each mode.
     pub(super) mode_bounds: Vec<Eight>,
+    /// Amplitude of each mode times its largest closing displacement of a node (m).
     pub(super) amplitudes: Vec<Eight>,
+    /// Closing and circumferential displacements (m), each followed by the velocities (m/s).
     pub(super) path_moved: [Vec<Eight>; 2],
     /// Smallest gaps of the followed nodes in the tried step (m).
     pub(super) deepest: Vec<Eight>,
@@ -124,8 +127,9 @@ pub(crate) struct BladeTrial {
     pub(super) impulses: Vec<Eight>,
     /// True if a contact force acts in the step.
     pub(super) pushes: bool,
-    /// True if the modal forces are those of the tried step; and the largest error of the motion between its points (m).
+    /// True if the modal forces are those of the tried step.
     pub(super) forces_known: bool,
+    /// Largest interpolation error of the motion between the points of the tried step (m), if it is known.
     pub(super) unresolved: Option<f64>,
     /// Largest closing and circumferential displacements at any time without contact (m).
     pub(super) reach: [Vec<Eight>; 2],
@@ -255,9 +259,9 @@ impl BladeTrial {
         }
     }
 
-    /// Selects the nodes that may come closer between the points of the tried step than at the points, by more than a
-    /// fraction of `tolerance` (m), and whose smallest gap may be below `floors` and `lowest` (m). Returns whether there
-    /// are such nodes.
+    /// Selects the nodes that may come closer between the points of the tried step than at the points. They count if they
+    /// come closer by more than a fraction of `tolerance` (m), and if their smallest gap may be below `floors` and `lowest`
+    /// (m). Returns whether there are such nodes.
     pub(super) fn select_followed(
         &mut self,
         (rows, level): (&BladeRows, &BladeLevel),
