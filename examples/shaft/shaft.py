@@ -1,18 +1,18 @@
-"""A rub on a shaft: the FMU of tiprub coupled to a beam shaft of ROSS that whirls, and to two spools that it brakes.
+"""A rub on a shaft: the FMU of tiprub coupled to a whirling beam shaft of ROSS, and to two spools that it brakes.
 
-Studies; without names all are done:
+Studies; all of them run if you name none:
   response   the shaft without rub against ROSS
-  errors     the orbit after a lost blade over H and way of coupling
+  errors     the orbit after the loss of a blade, for each H and coupling method
   stability  the longest communication step
-  books      energy and impulse across the coupling
-  rollback   bits after going back, here and in another process
-  blade-off  a blade is lost at speed
-  run-up     two spools and who brakes them
+  energy     energy and impulse across the coupling
+  rollback   bits after restoring a state, in the same and in another process
+  blade-off  loss of a blade at speed
+  run-up     two spools that a rub brakes
 """
 
 import os
 
-# Matrices are small: threads of the linear algebra would only wait for each other. Before NumPy is imported.
+# Matrices are small, so threads of the linear algebra would only wait for each other. Set this before importing NumPy.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import argparse
@@ -26,15 +26,15 @@ import studies
 from coupling import CouplingError
 from scenario import CLEARANCE, HERE, Shafts, package
 
-STUDIES = ["response", "errors", "stability", "books", "rollback", "blade-off", "run-up"]
-SCENES = {**dict.fromkeys(["errors", "stability", "books", "rollback", "blade-off"], "rub"), "run-up": "two_spools"}
+STUDIES = ["response", "errors", "stability", "energy", "rollback", "blade-off", "run-up"]
+SCENES = {**dict.fromkeys(["errors", "stability", "energy", "rollback", "blade-off"], "rub"), "run-up": "two_spools"}
 
 
 def arguments():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("studies", nargs="*", metavar="STUDY", help=f"which: {', '.join(STUDIES)}")
+    parser.add_argument("studies", nargs="*", metavar="STUDY", help=f"studies to run: {', '.join(STUDIES)}")
     parser.add_argument("--into", metavar="DIR", type=Path, default=Path("shaft"), help="directory of figures and tables (default: %(default)s)")
-    parser.add_argument("--quick", action="store_true", help="short runs and few steps: minutes become seconds, and figures coarse")
+    parser.add_argument("--quick", action="store_true", help="use short runs and few steps: fast, but figures are coarse")
     parser.add_argument("--shaft", choices=["ross", "disk"], default="ross", help="beam shaft of ROSS, or a disk on springs that needs no ROSS")
     parser.add_argument("--resume", help=argparse.SUPPRESS)
     found = parser.parse_args()
@@ -65,8 +65,8 @@ def study(name, asked, shafts, files, say):
         return studies.errors(rub, shafts, quick, say)
     if name == "stability":
         return studies.stability(rub, quick, say)
-    if name == "books":
-        return studies.books(rub, shafts, quick, say)
+    if name == "energy":
+        return studies.energy(rub, shafts, quick, say)
     if name == "rollback":
         return studies.rollback(rub, shafts, asked.into, quick, say)
     if name == "blade-off":

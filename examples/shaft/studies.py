@@ -1,4 +1,4 @@
-"""The studies: error, stability, energy and impulse, bits after going back, a lost blade, two spools. Each gives tables and what to draw."""
+"""Studies: error, stability, energy and impulse, bits after restoring a state, a lost blade, two spools. Each returns tables and data for figures."""
 
 import json
 import subprocess
@@ -40,8 +40,8 @@ def coupled(file, rotor, way, step, length, *, before=None, parameters=None, wat
 
 
 def response(shafts, say):
-    """Whirl under unbalance without rub, marched, against what ROSS says itself: displacement and tilt of the disk."""
-    header = ["speed (rad/s)", "whirl of ROSS for 1e-3 kg m (m)", "marched, largest difference / whirl", "tilt of ROSS (rad)", "difference / tilt"]
+    """Compare the integrated whirl under unbalance, without rub, with the steady response of ROSS: displacement and tilt of the disk."""
+    header = ["speed (rad/s)", "whirl of ROSS for 1e-3 kg m (m)", "largest difference / whirl", "tilt of ROSS (rad)", "difference / tilt"]
     table = Table("response", header)
     for speed in (400.0, 750.0, 1200.0, 1800.0, 2600.0):
         say(f"response: {speed:g} rad/s")
@@ -72,7 +72,7 @@ def errors(file, shafts, quick, say):
     def distance(one, other):
         return float(numpy.hypot(*(one - other).T).max())
 
-    table = Table("errors", ["way", "H (s)", "error / clearance", "steps of the rub per H", "derivatives per H", "not solved", "processor time (s)"])
+    table = Table("errors", ["method", "H (s)", "error / clearance", "steps of the rub per H", "derivatives per H", "not solved", "processor time (s)"])
     say(f"errors: the fine run, H = {fine:g} s")
     reference, _ = orbit(Way.NEWTON, fine, 1e-4)
     for what, step, tolerance in [("H twice as long", 2.0 * fine, 1e-4), ("tolerance ten times as large", fine, 1e-3)]:
@@ -94,19 +94,19 @@ def errors(file, shafts, quick, say):
 
 
 def steadiness(run, clearance=CLEARANCE):
-    """Mean place and largest departure from it over the last quarter, as shares of the clearance."""
+    """Return the mean position and the largest deviation from it in the last quarter, as fractions of the clearance."""
     last = run.values[-len(run.values) // 4 :, :2] / clearance
     mean = last.mean(axis=0)
     return mean, float(numpy.hypot(*(last - mean).T).max())
 
 
 def stability(file, quick, say, masses=None):
-    """Longest communication step with which a disk that is pressed against the casing comes to rest there, by mass and way."""
+    """Find the longest communication step with which a disk that is pressed against the casing comes to rest, for each mass and method."""
     masses = masses or ([1.0] if quick else [12.0, 1.0, 0.1])
     steps = [2e-4, 1e-4, 5e-5] if quick else [8e-4, 4e-4, 2e-4, 1e-4, 5e-5, 2.5e-5, 1.25e-5]
     length, fine = 1.2e-2, 5e-5
-    table = Table("stability", ["mass (kg)", "way", "longest stable H (s)", "linear theory (s)", "the next one"])
-    stiff = Table("stiffness", ["mass (kg)", "H (s)", "stiffness over a step, x (N/m)", "y (N/m)", "fixed point comes nearer by"])
+    table = Table("stability", ["mass (kg)", "method", "longest stable H (s)", "linear theory (s)", "behaviour at the next H"])
+    stiff = Table("stiffness", ["mass (kg)", "H (s)", "stiffness over a step, x (N/m)", "y (N/m)", "contraction factor of the fixed point"])
     for mass in masses:
         disk, before = pressed(mass)
         say(f"stability: {mass:g} kg, the fine run")
@@ -128,7 +128,7 @@ def stability(file, quick, say, masses=None):
 
 
 def longest(steps, told):
-    """The longest of rising steps up to which none goes wrong, and what is told of the next one; no step where the first goes wrong."""
+    """Return the longest of the rising steps below the first one that fails, and the report of that one. Return no step if the first one fails."""
     found = None
     for step in steps:
         said = told(step)
@@ -139,7 +139,7 @@ def longest(steps, told):
 
 
 def comes_to_rest(file, mass, way, step, length, wanted, say):
-    """Nothing where the disk comes to rest where it should, else what it does."""
+    """Return an empty text if the disk comes to rest at the expected position. Otherwise describe its motion."""
     say(f"stability: {mass:g} kg, {way.value}, H = {step:g} s")
     disk, before = pressed(mass)
     try:
@@ -147,7 +147,7 @@ def comes_to_rest(file, mass, way, step, length, wanted, say):
     except CouplingError:
         return "run failed"
     if swing >= wanted[1] + 0.1:
-        return f"swings by {swing:.2f}"
+        return f"oscillates by {swing:.2f}"
     off = numpy.hypot(*(found - wanted[0]))
     return f"is off by {off:.2f}" if off >= 0.1 else ""
 
@@ -158,16 +158,16 @@ def pad(matrix):
 
 
 def expected(disk, matrix, way, step):
-    """Does the linear theory call a step stable? Implicit ways whose iteration comes to an end are."""
+    """Return whether a step is stable in the linear theory. Implicit methods are stable if their iteration converges."""
     if way is Way.FIXED_POINT:
         return contraction(disk, pad(matrix), step) < 1.0
     return growth(disk, pad(matrix), way, step) < 1.0
 
 
-def books(file, shafts, quick, say):
-    """Energy and impulse across the coupling, by way: what one side gave and the other took."""
+def energy(file, shafts, quick, say):
+    """Compare energy and impulse on both sides of the coupling, for each method."""
     step, length = 5e-5, 2e-3 if quick else 1e-2
-    table = Table("books", ["energy (J)", *[way.value for way in Way]])
+    table = Table("energy", ["energy (J)", *[way.value for way in Way]])
     columns = []
     for way in Way:
         say(f"energy: {way.value}")
@@ -176,7 +176,7 @@ def books(file, shafts, quick, say):
         run = coupled(file, rotor, way, step, length, before=blade_off(0.5e-3), watch=TOLD)
         columns.append(balance(rotor, run, start))
     table.rows = [[name, *[column[name] for column in columns]] for name in columns[0]]
-    header = ["internal step (s)", "impulse handed over (N s)", "less the sum over internal steps", "forces × whirl (J)", "less whirl work"]
+    header = ["internal step (s)", "exchanged impulse (N s)", "minus the sum over internal steps", "forces × whirl (J)", "minus whirl work of the ledger"]
     impulse = Table("impulse", header)
     for inner in (1e-6, 5e-7):
         say(f"impulse: internal step {inner:g} s")
@@ -189,35 +189,35 @@ def books(file, shafts, quick, say):
 
 
 def whirl_work(run):
-    """Minus forces times the whirl that the rub was given (J)."""
+    """Return minus the forces times the whirl input of the rub (J)."""
     given = numpy.diff(numpy.vstack([[0.0, 0.0], run.values[:, :2]]), axis=0)
     return -float((run.outputs[:, :2] * given).sum())
 
 
 def balance(rotor, run, start):
-    """Energies of one run (J)."""
+    """Return the energies of one run (J)."""
     work, told = rotor.energies, dict(zip(TOLD, run.watched[-1]))
     shaft = -float(run.outputs[:, 4] @ run.values[:, 2]) * run.step
     lateral, turning = rotor.lateral_energy(), rotor.turning_energy() - start
-    # What the unbalance did in the last step is yet to be paid by the turning.
+    # The work of the unbalance in the last step reduces the rotational energy in the next step only.
     owed = float(rotor.state[2 * rotor.size + 2])
     stored = told["scheme_energy"] + told["friction_loss"] + told["damping_loss"] + told["impact_loss"] - told["curvature_work"]
     return {
         "whirl work, ledger of the rub": told["whirl_work"],
-        "forces × whirl given, less that": whirl_work(run) - told["whirl_work"],
-        "forces × whirl of the shaft, less that": -work["force"] - told["whirl_work"],
+        "forces × whirl input, minus this ledger": whirl_work(run) - told["whirl_work"],
+        "forces × whirl of the shaft, minus this ledger": -work["force"] - told["whirl_work"],
         "shaft work, ledger of the rub": told["shaft_work"],
-        "torque × speed given, less that": shaft - told["shaft_work"],
-        "torque × speed of the shaft, less that": -work["torque"] - told["shaft_work"],
+        "torque × speed input, minus this ledger": shaft - told["shaft_work"],
+        "torque × speed of the shaft, minus this ledger": -work["torque"] - told["shaft_work"],
         "work of moments on the tilt": work["moment"],
-        "lateral energy of the shaft, less its works": lateral
+        "lateral energy of the shaft, minus all work on it": lateral
         - (work["force"] + work["moment"] + work["load"] + work["unbalance"] - work["damping"]),
-        "all energy, less work of moments and curvature": lateral + work["damping"] + turning - owed + stored - work["moment"],
+        "total energy, minus work of moments and curvature work": lateral + work["damping"] + turning - owed + stored - work["moment"],
     }
 
 
 def replayed(file, rotor, run, fixed):
-    """Impulse (N s) as handed over, and summed over the internal steps of an instance that is led along the same whirl."""
+    """Return the exchanged impulse (N s), and the sum over the internal steps of an instance with the same whirl."""
     inner = fixed["internal_step_max"]
     parts = round(run.step / inner)
     with Rub(file, rotor.inputs, rotor.outputs, parameters=fixed) as rub:
@@ -226,7 +226,7 @@ def replayed(file, rotor, run, fixed):
         total = numpy.zeros(2)
         for end in run.values:
             for part in range(1, parts + 1):
-                # Whirl goes in a straight line, the speed is held.
+                # Whirl is linear over the step, and the speed is constant.
                 values = before + (end - before) * part / parts
                 values[2] = end[2]
                 total += inner * rub.step(values, inner)[:2]
@@ -235,10 +235,10 @@ def replayed(file, rotor, run, fixed):
 
 
 def rollback(file, shafts, into, quick, say):
-    """Bits of a run that goes back and is done again, in the same instance and in another process."""
+    """Restore a run in the same instance and in another process, repeat it, and compare the bits."""
     step, count = 5e-5, 60 if quick else 120
     half = count // 2
-    table = Table("rollback", ["way", "where", "communication steps done again", "values compared", "different bits"])
+    table = Table("rollback", ["method", "restored in", "repeated communication steps", "values compared", "different bits"])
     for way in (Way.RUB_FIRST, Way.NEWTON) if quick else (Way.RUB_FIRST, Way.FIXED_POINT, Way.NEWTON):
         say(f"bits: {way.value}")
         rotor = shafts.whirling()
@@ -258,18 +258,18 @@ def rollback(file, shafts, into, quick, say):
         other = elsewhere(file, shafts.kind, way, step, half, kept, into)
         table.rows.append([way.value, "another process", half, *compare(whole, other)])
         if not (numpy.abs(whole.outputs[:, 0]) > 1.0).any():
-            raise CouplingError("the run that goes back has no contact: it says nothing about bits")
+            raise CouplingError("the restored run has no contact, so it does not test the bits")
     return [table]
 
 
 def compare(one, other):
-    """Numbers compared, and how many of them differ in a bit."""
+    """Return how many numbers are compared, and how many of them differ in a bit."""
     pairs = [(getattr(one, name), getattr(other, name)) for name in ("values", "outputs", "states")]
     return sum(first.size for first, _ in pairs), sum(int((first.view(numpy.uint64) != second.view(numpy.uint64)).sum()) for first, second in pairs)
 
 
 def elsewhere(file, kind, way, step, count, kept, into):
-    """The rest of the run in a process of its own, which is told everything by files."""
+    """Run the second half in another process, which gets its data from files."""
     rub, rotor, last = kept
     state, answer = Path(into) / "rollback.state", Path(into) / "rollback.npz"
     state.write_bytes(rub)
@@ -286,7 +286,7 @@ def elsewhere(file, kind, way, step, count, kept, into):
 
 
 def resume(asked, shafts_of):
-    """What `elsewhere` asks of another process."""
+    """Run the second half on behalf of `elsewhere`."""
     asked, way = dict(asked), Way(asked["way"])
     answer = Path(asked["answer"])
     kept = numpy.load(answer)
@@ -300,7 +300,7 @@ def resume(asked, shafts_of):
 
 
 def lost_blade(file, shafts, quick, say):
-    """A blade is lost at speed: orbit, forces, moments, how the rotor slows down, and where the energy goes."""
+    """Lose a blade at speed: orbit, forces, moments, the deceleration of the rotor, and the energy balance."""
     step, length, at = 5e-5, 6e-3 if quick else 4e-2, 1e-3
     rotor = shafts.whirling()
     start = rotor.turning_energy()
@@ -323,17 +323,17 @@ def lost_blade(file, shafts, quick, say):
     facts = Table("blade_off_facts", ["quantity", "unit", "value"])
     forces = numpy.hypot(run.outputs[:, 0], run.outputs[:, 1])
     facts.rows = [
-        ["largest whirl", "of the clearance", radius.max()],
-        ["largest whirl without rub", "of the clearance", max(numpy.hypot(*row[1:]) for row in free.rows) / CLEARANCE],
+        ["largest whirl", "× clearance", radius.max()],
+        ["largest whirl without rub", "× clearance", max(numpy.hypot(*row[1:]) for row in free.rows) / CLEARANCE],
         ["largest force, mean over H", "N", forces.max()],
         ["largest moment, mean over H", "N m", numpy.hypot(run.outputs[:, 2], run.outputs[:, 3]).max()],
         ["largest braking torque, mean over H", "N m", -run.outputs[:, 4].min()],
-        ["speed lost", "rad/s", run.states[0][2 * rotor.size + 1] - rotor.speed],
-        ["turning energy lost", "J", start - rotor.turning_energy()],
-        ["of it to the rub (shaft work)", "J", told["shaft_work"]],
-        ["of it to the whirl (unbalance)", "J", work["unbalance"]],
+        ["loss of speed", "rad/s", run.states[0][2 * rotor.size + 1] - rotor.speed],
+        ["loss of rotational energy", "J", start - rotor.turning_energy()],
+        ["part that goes to the rub (shaft work)", "J", told["shaft_work"]],
+        ["part that goes to the whirl (unbalance)", "J", work["unbalance"]],
         ["friction heat", "J", told["friction_loss"]],
-        ["lost in bearings", "J", work["damping"]],
+        ["loss in bearings", "J", work["damping"]],
         ["whirl work, shaft to rub", "J", told["whirl_work"]],
         ["work of moments on the tilt", "J", work["moment"]],
         ["steps of the rub per H", "", run.tried],
@@ -344,14 +344,14 @@ def lost_blade(file, shafts, quick, say):
 
 
 def spools():
-    """Two spools that turn against each other; the drive of each would take it beyond the speed at which its blades ring."""
+    """Return two counter-rotating spools. Each drive accelerates its spool through the resonance of its blades."""
     return Spools(["low", "high"], [0.1, 0.08], [1700.0, -1600.0], [2400.0, -1900.0], [2000.0, -1950.0], 0.05)
 
 
 def run_up(file, quick, say):
-    """Two spools run up through the speeds at which their blades ring: who brakes, and torque against shaft work by way and H."""
+    """Run two spools up through the resonances of their blades, and compare torque with shaft work for each method and H."""
     length = 1e-2 if quick else 1.2e-1
-    header = ["way", "H (s)", "shaft work (J)", "torque × speed taken, less that (J)", "turning energy, less all works (J)", "speeds, error (rad/s)"]
+    header = ["method", "H (s)", "shaft work (J)", "torque × speed of the spools, minus shaft work (J)", "rotational energy, minus all work (J)", "error of the speeds (rad/s)"]
     table = Table("run_up", header)
 
     def one(way, step, length):
@@ -365,7 +365,7 @@ def run_up(file, quick, say):
 
     say("run-up: the fine run")
     fine, _, _ = one(Way.FIXED_POINT, 1e-5, 1e-2)
-    # Speed is all that comes in, and no derivatives are offered for it alone.
+    # Speed is the only input, and there are no step derivatives with respect to it.
     for way in (way for way in Way if way is not Way.NEWTON):
         for step in (1e-4,) if quick else (2e-4, 1e-4, 5e-5):
             say(f"run-up: {way.value}, H = {step:g} s")
