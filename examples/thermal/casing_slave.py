@@ -60,14 +60,14 @@ class CasingSlave(Fmi2Slave):
 
     def _get_fmu_state(self):
         model = self.model
-        books = [model.supplied, model.gas, model.ambient]
+        sums = [model.supplied, model.gas, model.ambient]
         parts = [model.amplitudes.real, model.amplitudes.imag, model.sides, self.heat, self.sides]
-        return {"books": books, "parts": [part.tolist() for part in parts]}
+        return {"sums": sums, "parts": [part.tolist() for part in parts]}
 
     def _set_fmu_state(self, state):
         model = self.model
         real, imaginary, sides, heat, given = map(numpy.array, state["parts"])
         model.amplitudes, model.sides = real + 1j * imaginary, sides
         self.heat[:], self.sides[:] = heat, given
-        model.supplied, model.gas, model.ambient = state["books"]
+        model.supplied, model.gas, model.ambient = state["sums"]
         self.now = model.patch

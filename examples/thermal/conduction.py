@@ -159,7 +159,7 @@ def _phis(x):
 
 
 class Conduction:
-    """Temperatures of the casing, and the books of its heat.
+    """Temperatures of the casing, and its energy balance.
 
     temperature: K above the reference, shape (sections, cells). patch: mean over the volume of each patch, shape (patches,).
     stored, supplied, gas, ambient: J, stored now and received since the start from `step`'s heat, gas and air.

@@ -19,10 +19,10 @@ import numpy
 
 
 class Fast(Protocol):
-    """The unit of short cycles. `total` is its own account of all it gave since its start: the books are held against that."""
+    """The FMU with short cycles. `total` is its own sum of all heat since the start, with which the energy balance is checked."""
 
     def step(self, length: float, values: numpy.ndarray) -> numpy.ndarray:
-        """A communication step towards these values; the mean fluxes over it."""
+        """Simulate a communication step with ramps to these values, and return the mean fluxes."""
 
     def total(self) -> float: ...
     def save(self) -> Any: ...
@@ -31,10 +31,10 @@ class Fast(Protocol):
 
 
 class Slow(Protocol):
-    """The unit that takes its time; it may be stepped by any length."""
+    """The slow FMU, which accepts steps of any length."""
 
     def step(self, length: float, fluxes: numpy.ndarray) -> None:
-        """A step under these fluxes, held."""
+        """Simulate a step with constant fluxes."""
 
     def values(self) -> numpy.ndarray: ...
     def save(self) -> Any: ...
@@ -96,7 +96,7 @@ class Journey:
     fast_steps: int = 0
     handed: float = 0.0  # flux times time that went into the slow unit, jumps included
     given: float = 0.0  # the same by the fast unit's own total, and over jumps by the line between its windows
-    in_windows: float = 0.0  # of `given`, what was stepped together
+    in_windows: float = 0.0  # part of `given` within windows
 
     @property
     def kept(self):
@@ -105,7 +105,7 @@ class Journey:
 
 @dataclass
 class _Window:
-    """Steps that both took together: fluxes of each, and what the fast unit's own total says."""
+    """Steps of both FMUs: the fluxes of each step, and the total of the fast FMU."""
 
     start: float
     fluxes: list
@@ -116,7 +116,7 @@ class _Window:
 
 
 def resolved(fast, slow, plan, stop, tell=lambda time: None):
-    """Both stepped together, all the way to `stop` (s)."""
+    """Simulate all cycles of both FMUs up to `stop` (s)."""
     journey = Journey()
     while len(journey.times) * plan.step < stop - 0.5 * plan.step:
         window = _together(fast, slow, plan, len(journey.times) * plan.step, 1, 1, journey)

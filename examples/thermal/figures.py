@@ -39,7 +39,7 @@ def couplings(file, ways):
 
 def step(file, rows):
     figure, axis = _axes(1, (5.5, 3.8))
-    for way, marker in (("together", "o"), ("in turn", "s")):
+    for way, marker in (("parallel", "o"), ("sequential", "s")):
         points = sorted((row[1], row[2]) for row in rows if row[0] == way)
         axis.loglog(*zip(*points), marker=marker, label=f"units stepped {way}")
     axis.set(xlabel="communication step H (s)", ylabel="error of temperatures (K)")

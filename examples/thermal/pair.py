@@ -42,7 +42,7 @@ class Casing:
         return self.unit.get(self._out)
 
     def supplied(self):
-        """Heat received from the rub since the start (J), by the books of the casing."""
+        """Return the heat received from the rub since the start (J), from the energy balance of the casing."""
         return float(self.unit.get(["supplied_heat"])[0])
 
 

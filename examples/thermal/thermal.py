@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""A rub heats its casing, the casing grows, the rub changes: the rub FMU coupled with a thermal FMU.
+"""Couple the FMU of a rub with a thermal FMU: the rub heats its casing, the casing grows, and the rub changes.
 
-Makes both units and an SSP package of the two, and shows
-  couplings  the pair stepped by a script (FMI 2.0 and 3.0), as SSP package by FMPy and by Ecos, and with a casing written in Python
-  choice     friction heat of finer models of the blades and of a step by tolerance, and what a revolution costs
-  step       what the communication step does, for units stepped together and in turn
-  jump       cycle jump against the fully resolved run: error against speed-up, by the tolerance of a jump
-  long       ten seconds by cycle jump, and the same with a finer model of the blades
-Figures (SVG) and tables (CSV) go into a directory.
+Creates both FMUs and an SSP package with them. Parts:
+  couplings  coupling by a script (FMI 2.0 and 3.0), as an SSP package in FMPy and Ecos, and with a casing written in Python
+  choice     friction heat and run time of a revolution for finer models of the blades and for adaptive steps
+  step       errors against the communication step, for the parallel and the sequential scheme
+  jump       error and speed-up of cycle jump for several tolerances, compared with the fully resolved run
+  long       ten seconds with cycle jump, also with a finer model of the blades
+Figures (SVG) and tables (CSV) are written to a directory.
 """
 
 import argparse
@@ -154,7 +154,7 @@ class Pair:
 
 
 def couplings(files, rub, casing, python, size):
-    """All ways to couple, at one communication step."""
+    """Compare all couplings with one communication step."""
     count, stop = size["couplings"] * CYCLE, size["couplings"] * REVOLUTION
     package = files.into / "thermal_rub.ssp"
     ssp.write(package, rub[2], casing[2], PATCHES, stop)
@@ -170,7 +170,7 @@ def couplings(files, rub, casing, python, size):
         except (RuntimeError, ImportError) as failure:
             failed[name] = str(failure)
     with Pair(rub[2], casing[2]) as (one, other):
-        ways["script, in turn"] = script(one, other, STEP, count, together=False, tell=progress("script, in turn", stop))
+        ways["script, sequential"] = script(one, other, STEP, count, together=False, tell=progress("script, sequential", stop))
     with Pair(rub[2], python) as (one, other):
         ways["script, casing in Python"] = script(one, other, STEP, count, tell=progress("casing in Python", stop))
     first = next(iter(ways.values()))
@@ -178,20 +178,20 @@ def couplings(files, rub, casing, python, size):
     for name, way in ways.items():
         apart = [float(numpy.abs(getattr(way, part) - getattr(first, part)).max()) for part in ("temperatures", "heat")]
         rows.append([name, *apart, way.friction, way.supplied, way.friction - way.supplied])
-    files.table("couplings", ["coupling", "temperatures apart (K)", "heat apart (W)", "friction heat (J)", "received (J)", "apart (J)"], rows)
+    files.table("couplings", ["coupling", "difference of temperatures (K)", "difference of heat (W)", "friction heat (J)", "received heat (J)", "difference (J)"], rows)
     for name, reason in failed.items():
         say(f"{name} did not run: {reason}")
     figures.couplings(files.into / "couplings.svg", ways)
 
 
 def choice(files, rub, size):
-    """Friction heat of a cold casing, over the second half of some revolutions."""
+    """Compare the friction heat into a cold casing over the second half of some revolutions, for several models."""
     half, rows = size["choice"] // 2, []
     finest = 'scheme = "galerkin"\nstep = 8.0e-5\ntolerance = 1.0e-3'
     cases = {
-        "as here": rub,
+        "model of the example": rub,
         "24 modes": files.rub("more-modes", ["--contact-patches", "5", "--contact-rows", "1", "--modes", "24", "--mesh", "16x2x20"], "step = 1.66e-6"),
-        "tolerance 1e-3 for the step": files.rub("tolerance", ROTOR, finest),
+        "adaptive steps, tolerance 1e-3": files.rub("tolerance", ROTOR, finest),
         "9 patches, 80 modes": files.rub("finer", None),
         "9 patches, 80 modes, half the step": files.rub("finer-halved", None, "step = 1.039e-6"),
     }
@@ -205,17 +205,17 @@ def choice(files, rub, size):
                 tell((index + 1) * REVOLUTION)
             power = (side.total() - before) / (half * REVOLUTION)
             rows.append([name, power, power / rows[0][1] - 1.0 if rows else 0.0, (time.process_time() - started) / (2 * half)])
-    files.table("choice", ["model", "heat into a cold casing (W)", "against the first", "processor time of a revolution (s)"], rows)
+    files.table("choice", ["model", "heat into a cold casing (W)", "relative difference", "processor time per revolution (s)"], rows)
 
 
 def step(files, rub, casing, size):
-    """Errors against the communication step, of what the casing has become after the same time."""
+    """Compare the temperatures of the casing after the same time, for several communication steps."""
     stop, found = size["step"] * REVOLUTION, {}
     for parts in (40, 20, 10, 4, 2, 1):
         for together in (False, True):
             if parts == 40 and together:
                 continue
-            name = f"{'together' if together else 'in turn'}, {parts} in a revolution"
+            name = f"{'parallel' if together else 'sequential'}, {parts} in a revolution"
             with Pair(rub[2], casing[2]) as (one, other):
                 found[together, parts] = script(one, other, REVOLUTION / parts, size["step"] * parts, together, progress(name, stop))
     limit, rows = found[False, 40], []
@@ -224,9 +224,9 @@ def step(files, rub, casing, size):
             continue
         error = float(numpy.abs(course.temperatures[-1] - limit.temperatures[-1]).max())
         rows.append(
-            ["together" if together else "in turn", REVOLUTION / parts, error, abs(course.friction / limit.friction - 1.0), (course.friction - course.supplied) / course.friction]
+            ["parallel" if together else "sequential", REVOLUTION / parts, error, abs(course.friction / limit.friction - 1.0), (course.friction - course.supplied) / course.friction]
         )
-    files.table("step", ["stepped", "H (s)", "error of temperatures (K)", "error of friction heat", "not yet handed over"], rows)
+    files.table("step", ["scheme", "H (s)", "error of temperatures (K)", "error of friction heat", "fraction of the heat that has not arrived"], rows)
     figures.step(files.into / "step.svg", rows)
 
 
@@ -235,7 +235,7 @@ def _plan(tolerance):
 
 
 def _journey(rub, casing, run, plan, stop, what):
-    """A journey, its heat received by the casing's own books, and its run time."""
+    """Return a run, its received heat in the energy balance of the casing, and its run time."""
     with Pair(rub, casing) as (one, other):
         started = time.monotonic()
         found = run(one, other, plan, stop, tell=progress(what, stop))
@@ -243,7 +243,7 @@ def _journey(rub, casing, run, plan, stop, what):
 
 
 def _apart(journey, truth):
-    """Largest difference of temperatures at the ends of all steps of the casing (K)."""
+    """Return the largest difference of temperatures at the ends of all steps of the casing (K)."""
     times, values = numpy.array(truth.times), numpy.array(truth.values)
     own = numpy.array(journey.values)
     columns = [numpy.interp(journey.times, times, values[:, k]) for k in range(values.shape[1])]
@@ -251,7 +251,7 @@ def _apart(journey, truth):
 
 
 def jump(files, rub, casing, size):
-    """Cycle jump at several tolerances, against every revolution resolved."""
+    """Compare cycle jump at several tolerances with a run in which every revolution is resolved."""
     stop = size["jump"]
     truth, supplied, seconds = _journey(rub[2], casing[2], resolved, _plan(1.0), stop, "fully resolved")
     files.course("jump-resolved", truth)
@@ -265,24 +265,24 @@ def jump(files, rub, casing, size):
         speed_up = truth.fast_steps / found.fast_steps
         error = abs(found.handed / numpy.interp(found.times[-1], truth.times, _handed(truth)) - 1.0)
         rows.append([tolerance, found.fast_steps / CYCLE, speed_up, kept, tried - kept, _apart(found, truth), error, supplied, _residual(found, supplied), seconds])
-    header = ["tolerance (K)", "revolutions of the rub", "speed-up", "jumps kept", "taken back", "error of temperatures (K)", "error of heat", "heat received (J)", "friction less received (J)", "run time (s)"]
+    header = ["tolerance (K)", "revolutions of the rub", "speed-up", "accepted jumps", "rejected jumps", "error of temperatures (K)", "error of heat", "received heat (J)", "friction heat minus received heat (J)", "run time (s)"]
     files.table("jump", header, rows)
     figures.jump(files.into / "jump.svg", truth, journeys, rows[1:])
 
 
 def _handed(truth):
-    """Heat handed over at the times of a resolved run (J)."""
+    """Return the heat exchanged until each time of a resolved run (J)."""
     lengths = numpy.diff([0.0, *truth.times])
     return numpy.cumsum(numpy.array(truth.fluxes).sum(axis=1) * lengths)
 
 
 def _residual(journey, supplied):
-    """Friction's share by the rub's own ledger, less what the casing says it received (J)."""
+    """Return the heat in the energy ledger of the rub minus the heat that the casing received (J)."""
     return journey.given - supplied
 
 
 def long(files, rub, finer, casing, size):
-    """Seconds of thermal time, with the model of the other parts and with the one that ships."""
+    """Simulate seconds with the model of the other parts and with the built-in model."""
     stop, rows, found = size["long"], [], {}
     for name, unit in (("5 patches, 12 modes", rub[2]), ("9 patches, 80 modes", finer[2])):
         journey, supplied, seconds = _journey(unit, casing[2], cycle_jump, _plan(size["tolerance"]), stop, f"long, {name}")
@@ -291,7 +291,7 @@ def long(files, rub, finer, casing, size):
         turns = journey.times[-1] / REVOLUTION
         share = journey.in_windows / journey.given
         rows.append([name, turns, journey.fast_steps / CYCLE, len(journey.kept), float(numpy.max(journey.values[-1])), supplied, share, _residual(journey, supplied), seconds])
-    header = ["rotor", "revolutions", "of them simulated", "jumps", "hottest patch (K)", "heat received (J)", "of it in windows", "friction less received (J)", "run time (s)"]
+    header = ["rotor", "revolutions", "simulated revolutions", "jumps", "hottest patch (K)", "received heat (J)", "fraction from windows", "friction heat minus received heat (J)", "run time (s)"]
     files.table("long", header, rows)
     figures.long(files.into / "long.svg", found, REVOLUTION)
 
