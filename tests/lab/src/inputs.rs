@@ -47,7 +47,7 @@ impl InputMethod {
     fn name(self) -> &'static str {
         match self {
             Self::Ramp => "ramp (default)",
-            Self::Derivatives => "derivatives given",
+            Self::Derivatives => "derivatives",
             Self::Hold => "hold",
         }
     }
