@@ -27,12 +27,13 @@ const TOLERANCES: [f64; 3] = [1e-2, 1e-3, 1e-4];
 /// Depths of the bumps in the rubs of rotor 37: as in the scene, and a heavy rub.
 const DEPTHS: [(&str, f64); 2] = [("light", 0.6), ("heavy", 1.2)];
 const SECTORS: usize = 4;
-/// Difference between a sampled gap and that of the product that counts as rounding, as a fraction of the clearance, and
-/// the share of gaps of open nodes that must agree: in steps in which a node also touches, the product's gap is a
-/// polynomial.
+/// Difference between a sampled gap and the gap of the product that counts as rounding, as a fraction of the clearance;
+/// and the fraction of open nodes whose gaps must agree. In steps in which a node also touches, the gap of the product is
+/// a polynomial, so it differs.
 const ROUNDING: f64 = 1e-11;
 const AGREEING: f64 = 0.9;
-/// Allowed penetration of open nodes, as a fraction of the tolerance: the search is exact within 0.3 of the tolerance.
+/// Largest penetration of open nodes, as a fraction of the tolerance. The error of the search is at most 0.3 of the
+/// tolerance.
 const ALLOWED: f64 = 1.3;
 
 /// A rub against two bumps.
@@ -51,7 +52,7 @@ struct Penetration {
     name: String,
     tolerance: f64,
     samples: u64,
-    /// Of nodes without a force, and of nodes with a force.
+    /// Deepest penetration of nodes without a force, and of nodes with a force.
     deepest: [f64; 2],
     /// Number of samples of open nodes whose gap agrees with that of the product.
     agreeing: u64,
@@ -76,7 +77,7 @@ struct Bumps {
 }
 
 impl Bumps {
-    /// Gap (m) of a tip displaced by `moved` (m; radial, tangential, axial) after the rotor has turned by an angle (rad).
+    /// Returns the gap (m) of a tip displaced by `moved` (m; radial, tangential, axial) after the rotor has turned by an angle (rad).
     fn gap(&self, tip: Tip, turned: f64, moved: [f64; 3]) -> f64 {
         let angle = (tip.angle + turned + moved[1] / tip.radius).rem_euclid(PI);
         let away = (angle / PI - 0.5) / self.width;
@@ -87,7 +88,7 @@ impl Bumps {
     }
 }
 
-/// Returns a random rub of blades whose modes at high frequencies ring after impacts.
+/// Returns a random rub of blades with lightly damped modes at high frequencies.
 fn random_rub(seed: u64, interval: f64) -> PenetrationCase {
     let mut scene = bumps(ringing_blade(SECTORS, seed));
     scene.settings.surfaces[0].shape = Shape::TwoLobe { depth: 1.2, width: 0.15, phase: 0.0 };
@@ -199,7 +200,7 @@ pub(crate) fn study(common: &StudyCommon, console: &Console) -> Result<Study> {
     if !common.quick {
         cases.extend(rotor_rubs(console, interval)?);
     }
-    let task = console.task("Rubs, sampled between the points of steps", Some(cases.len() as u64));
+    let task = console.task("Sampling rubs between the points of steps", Some(cases.len() as u64));
     let found = sweep::sweep(&cases, processors(), sample, |done| task.at(done as u64))?;
     drop(task);
     let [open, touching] = [0, 1].map(|of| found.iter().map(|one| one.deepest[of]).fold(0.0, f64::max));
@@ -210,13 +211,13 @@ pub(crate) fn study(common: &StudyCommon, console: &Console) -> Result<Study> {
         Statement::tested(
             "Nodes without a contact force penetrate by no more than 1.3 of the tolerance at any sample",
             open < ALLOWED,
-            format!("{open:.3} of the tolerance at most"),
+            format!("at most {open:.3} of the tolerance"),
         ),
         Statement::tested("Blades touch in every rub", touched == found.len(), format!("{touched} of {}", found.len())),
         Statement::tested(
-            "The gaps of open nodes agree with those of the product to rounding, but in steps in which they also touch",
+            "The gaps of open nodes agree with those of the product to rounding, except in steps in which they also touch",
             least > AGREEING,
-            format!("{:.2} % at least, in every rub", 100.0 * least),
+            format!("at least {:.2} % in every rub", 100.0 * least),
         ),
     ];
     let results: Vec<Value> = found
@@ -233,7 +234,7 @@ pub(crate) fn study(common: &StudyCommon, console: &Console) -> Result<Study> {
         title: "Penetration between the points of steps".into(),
         summary: format!(
             "All gaps of {} rubs with adaptive steps, every {:.1} µs: the deepest penetration as a fraction of the \
-             tolerance. Touching nodes penetrate by {touching:.2} of the tolerance at most.",
+             tolerance. Touching nodes penetrate by at most {touching:.2} of the tolerance.",
             found.len(),
             1e6 * interval
         ),

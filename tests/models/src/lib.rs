@@ -112,7 +112,7 @@ pub fn rich_blade(sectors: usize) -> Rom {
     })
 }
 
-/// Returns a blade with many random modes at high frequencies and little damping, so that it rings after impacts.
+/// Returns a blade with many lightly damped random modes at high frequencies, which impacts excite.
 pub fn ringing_blade(sectors: usize, seed: u64) -> Rom {
     let random = RefCell::new(SeededRandom(seed));
     let ringing = (0..30).map(|mode| 5e4 * 1.12_f64.powi(mode));
