@@ -164,10 +164,12 @@ fn run(case: &PenetrationCase) -> tiprub_core::Result<Penetration> {
                 let is_touching = structure.multiplier(node, sector) > 0.0;
                 found.samples += 1;
                 found.touched += u64::from(is_touching);
-                let deepest = &mut found.deepest[usize::from(is_touching)];
+                // Only in steps in which a node touches, its gap in the product is a polynomial.
+                let is_exact = (gap - structure.gap(node, sector)).abs() < ROUNDING * clearance;
+                let stays_open = !is_touching && is_exact;
+                found.agreeing += u64::from(stays_open);
+                let deepest = &mut found.deepest[usize::from(!stays_open)];
                 *deepest = deepest.max(-gap / (tolerance * clearance));
-                let apart = (gap - structure.gap(node, sector)).abs();
-                found.agreeing += u64::from(!is_touching && apart < ROUNDING * clearance);
             }
         }
     }
@@ -177,7 +179,7 @@ fn run(case: &PenetrationCase) -> tiprub_core::Result<Penetration> {
 /// Returns a table of the results.
 fn table(found: &[Penetration]) -> String {
     let mut page = String::from(
-        "| rub | tolerance | samples | with a force | deepest of open nodes / tolerance | of touching nodes / tolerance |\n\
+        "| rub | tolerance | samples | with a force | deepest / tolerance: open in the step | touching in the step |\n\
          |---|---|---|---|---|---|\n",
     );
     for one in found {
@@ -209,7 +211,7 @@ pub(crate) fn study(common: &StudyCommon, console: &Console) -> Result<Study> {
     let touched = found.iter().filter(|one| one.touched > 0).count();
     let statements = vec![
         Statement::tested(
-            "Nodes without a contact force penetrate by no more than 1.3 of the tolerance at any sample",
+            "Nodes that stay open in a step penetrate by no more than 1.3 of the tolerance at any sample",
             open < ALLOWED,
             format!("at most {open:.3} of the tolerance"),
         ),
@@ -234,7 +236,7 @@ pub(crate) fn study(common: &StudyCommon, console: &Console) -> Result<Study> {
         title: "Penetration between the points of steps".into(),
         summary: format!(
             "All gaps of {} rubs with adaptive steps, every {:.1} µs: the deepest penetration as a fraction of the \
-             tolerance. Touching nodes penetrate by at most {touching:.2} of the tolerance.",
+             tolerance. Nodes that touch in the step penetrate by at most {touching:.2} of the tolerance.",
             found.len(),
             1e6 * interval
         ),
