@@ -62,8 +62,9 @@ pub(super) struct Follow<'a, D> {
     pub faced: &'a FacedSurface<'a>,
     /// Prescribed motion and its rates at a fraction of the step.
     pub drive_at: D,
-    /// Largest error of the cubic through the shape of the surface over the step (m).
-    pub shape_error: f64,
+    /// Largest errors of the cubic through the shape of the surface over the step (m): the parts that are proportional to
+    /// the length of the interval, its square, and its cube.
+    pub shape_errors: [f64; 3],
     /// Smallest gaps so far (m).
     pub lowest: &'a mut [Eight],
     /// Gaps below which the smallest gaps are needed (m).
@@ -130,7 +131,8 @@ impl<D: Fn(f64) -> (PointDrive, DriveRate)> Follow<'_, D> {
     #[inline(always)]
     fn interpolation_error<L: Octet>(&self, halvings: usize) -> f64 {
         let share = fraction(1, 1 << halvings);
-        let (length, shape_error) = (L::splat(self.level.step * share), self.shape_error * share * share * share);
+        let length = L::splat(self.level.step * share);
+        let shape_error = self.shape_errors.iter().rev().fold(0.0, |sum, error| share * (sum + error));
         let mut error = L::zero();
         for (amplitude, frequency) in self.trial.amplitudes.iter().zip(&self.rows.rates[3]) {
             error = error + L::load(amplitude) * interpolation_share(L::load(frequency) * length);
