@@ -158,6 +158,15 @@ impl CompiledShape {
         }
     }
 
+    /// Returns the largest jump of the slope of s (m/rad).
+    pub(crate) fn largest_kink(&self) -> f64 {
+        match self {
+            // Where the bumps meet.
+            Self::TwoLobe { phase, .. } => 2.0 * self.evaluate(*phase).1.abs(),
+            _ => 0.0,
+        }
+    }
+
     /// Returns the largest curvature with which s may bend below its chord (m/rad²), or `None` if s is never negative.
     pub(crate) fn bumpiness(&self) -> Option<f64> {
         match self {

@@ -227,4 +227,28 @@ impl ShapeGrowth {
         let between = |ends: [f64; 2]| ends[0] + theta * (ends[1] - ends[0]);
         between(self.factors) * Self::share(between(self.elapsed), self.length)
     }
+
+    /// Returns the rate of the factor at the fraction `theta` of the span, per span.
+    pub fn rate_at(&self, theta: f64) -> f64 {
+        let Self { factors, elapsed: [from, to], length } = *self;
+        let (elapsed, change) = (from + theta * (to - from), factors[1] - factors[0]);
+        let phase = std::f64::consts::PI * elapsed / length;
+        let grows = 0.0 < elapsed && elapsed < length;
+        let share_rate = if grows { 0.5 * std::f64::consts::PI / length * libm::sin(phase) * (to - from) } else { 0.0 };
+        change * Self::share(elapsed, length) + (factors[0] + theta * change) * share_rate
+    }
+
+    /// Bounds the error of the cubic through the factor and its rate at two fractions of the span: the part that is
+    /// proportional to the squared length of the interval, and the part that is proportional to its fourth power.
+    pub fn cubic_errors(&self, ends: [f64; 2]) -> [f64; 2] {
+        let Self { factors, elapsed, length } = *self;
+        let [from, to] = ends.map(|end| elapsed[0] + end * (elapsed[1] - elapsed[0]));
+        if from.max(0.0) >= length {
+            return [0.0; 2];
+        }
+        let turn = std::f64::consts::PI * (to - from) / length;
+        let size = 0.5 * factors[0].abs().max(factors[1].abs()) * turn * turn;
+        // The growth begins and ends with a jump of its second derivative.
+        [if from < 0.0 || to > length { size / 32.0 } else { 0.0 }, size * turn * turn / 384.0]
+    }
 }

@@ -88,6 +88,31 @@ fn extremes_do_not_depend_on_the_longest_step() {
     }
 }
 
+/// A shape that grows within few steps, and bumps that meet in an edge, are no cubics over a step.
+#[test]
+fn smallest_gaps_agree_with_samples() {
+    const TICK: f64 = 1.0 / 4_194_304.0;
+    let lobes = Shape::Lobes { amplitude: 4.3e-4, order: 3, phase: -1.084 };
+    let edge = Shape::TwoLobe { depth: -1.34, width: 0.229, phase: -0.102 };
+    for (shape, speed, ramp_time) in [(lobes, 175.0, 1e-4), (edge, 609.0, 2e-3)] {
+        let mut scene = scene(Scheme::Galerkin, 8e-5, 1e-5);
+        scene.settings.surfaces[0].shape = shape;
+        scene.settings.surfaces[0].ramp_time = ramp_time;
+        scene.settings.structures[0].speed = speed;
+        let (mut simulation, mut sampled) = (started(&scene), started(&scene));
+        for window in 0..128 {
+            let mut lowest = sampled.system().gaps().copied().fold(f64::INFINITY, f64::min);
+            for _ in 0..64 {
+                go(&mut sampled, TICK);
+                lowest = sampled.system().gaps().copied().fold(lowest, f64::min);
+            }
+            go(&mut simulation, 64.0 * TICK);
+            let share = (real(&simulation, "clearance_minimum") - lowest) / (1e-5 * GAP);
+            assert!(share < 1.0, "{speed} rad/s, window {window}: {share} of the tolerance above the samples");
+        }
+    }
+}
+
 #[test]
 fn runs_with_friction_close_to_zero() {
     let end = |friction: f64| {

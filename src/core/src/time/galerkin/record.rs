@@ -40,6 +40,11 @@ impl MotionCourse {
         Self { before: *before, parts: [linear, quadratic], growth }
     }
 
+    /// Growth of the shape over the span.
+    pub(crate) fn growth(&self) -> &ShapeGrowth {
+        &self.growth
+    }
+
     /// Returns whether only the rotor moves.
     pub(crate) fn only_turns(&self) -> bool {
         self.parts.iter().all(|part| part.is_casing_at_rest() && part.shaft == Vector3::zeros())

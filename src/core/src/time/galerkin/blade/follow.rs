@@ -63,8 +63,9 @@ pub(super) struct Follow<'a, D> {
     pub faced: &'a FacedSurface<'a>,
     /// Returns the prescribed motion and its rates at a fraction of the step.
     pub drive_at: D,
-    /// Largest error that the shape of the surface adds to a cubic over the whole step (m).
-    pub shape_error: f64,
+    /// Largest errors that the shape of the surface adds to a cubic over the whole step (m): the parts that are
+    /// proportional to the length of the interval, to its square, and to its cube.
+    pub shape_errors: [f64; 3],
     /// Smallest gaps so far (m).
     pub lowest: &'a mut [Eight],
     /// Gaps below which the smallest gaps are needed (m).
@@ -130,9 +131,9 @@ impl<D: Fn(f64) -> (PointDrive, DriveRate)> Follow<'_, D> {
     /// Bounds the error of the cubic over a part (m).
     #[inline(always)]
     fn interpolation_error<L: Octet>(&self, halvings: usize) -> f64 {
-        let part = fraction(1, 1 << halvings);
-        let length = L::splat(self.level.step * part);
-        let shape_error = self.shape_error * part * part * part;
+        let share = fraction(1, 1 << halvings);
+        let length = L::splat(self.level.step * share);
+        let shape_error = self.shape_errors.iter().rev().fold(0.0, |sum, error| share * (sum + error));
         let mut error = L::zero();
         for (amplitude, frequency) in self.trial.amplitudes.iter().zip(&self.rows.rates[3]) {
             error = error + L::load(amplitude) * relative_error(L::load(frequency) * length);

@@ -67,13 +67,18 @@ impl BladeInSpan<'_> {
 }
 
 impl BladePlace<'_> {
-    /// Bounds the error (m) of a cubic that connects the shape of the surface and its rates at two fractions of the span.
-    pub(super) fn shape_error(&self, ends: [f64; 2]) -> f64 {
+    /// Bounds the error (m) of the cubic through the shape of the surface and its rate at two fractions of the span:
+    /// the parts that are proportional to the length of the interval, its square, and its cube or higher powers.
+    pub(super) fn shape_errors(&self, ends: [f64; 2]) -> [f64; 3] {
         let [from, to] = ends.map(|end| drive_at(self, end).0);
         let (surface, turn) = (&self.gap.surface, (to.turned - from.turned).abs());
-        // The largest fourth derivative of a bump exp(−x²) is six times its curvature. The third derivative of a spline jumps.
-        let curvature = surface.largest_curvature() * from.factor.abs().max(to.factor.abs());
-        curvature * turn * turn * (turn / surface.angular_scale()).min(1.0) / 64.0
+        let factor = from.factor.abs().max(to.factor.abs());
+        let [square, higher] = self.course.growth().cubic_errors(ends).map(|error| error * surface.largest_change());
+        // The third derivative of a spline jumps by up to 4 times its curvature per spacing of its knots. The fourth
+        // derivative of a bump exp(−x²) is 6 times its curvature.
+        let bend =
+            surface.largest_curvature() * factor * turn * turn * (turn / surface.angular_scale()).min(1.0) / 48.0;
+        [surface.largest_kink() * factor * turn / 8.0, square, higher + bend]
     }
 }
 
@@ -112,7 +117,7 @@ impl FollowedPath<'_> {
             halves: &halves[..=finest],
             faced: &place.faced_surface(self.drives),
             drive_at: |theta| drive_and_rate_at(place, step.from + step.length * theta, span),
-            shape_error: place.shape_error([step.from, step.from + step.length]),
+            shape_errors: place.shape_errors([step.from, step.from + step.length]),
             lowest,
             floors,
             tolerance: self.tolerance,
@@ -125,5 +130,6 @@ impl FollowedPath<'_> {
 /// Returns the prescribed motion of a sector and its rates at the fraction `theta` of a span with this length (s).
 pub(super) fn drive_and_rate_at(place: &BladePlace, theta: f64, span: f64) -> (PointDrive, DriveRate) {
     let [now, before] = [theta, theta - RATE_FRACTION].map(|theta| drive_at(place, theta).0);
-    (now, now.rate_since(&before, RATE_FRACTION * span))
+    let rate = now.rate_since(&before, RATE_FRACTION * span);
+    (now, DriveRate { factor: place.course.growth().rate_at(theta) / span, ..rate })
 }

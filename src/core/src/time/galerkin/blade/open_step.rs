@@ -220,7 +220,7 @@ impl BladeInSpan<'_> {
         let mut drives = [PointDrive::default(); POINTS];
         let theta = (interval.to - to_real(last) * interval.span) / interval.span;
         let (drive, rate) = drive_and_rate_at(&self.place, theta, interval.span);
-        let shape_error = self.place.shape_error([theta - (interval.to - interval.from) / interval.span, theta]);
+        let shape_errors = self.place.shape_errors([theta - (interval.to - interval.from) / interval.span, theta]);
         drives[0] = drive;
         let faced = self.place.faced_surface(&drives);
         let interpolation = kind.unwrap_or(ForceInterpolation::Polynomial);
@@ -246,7 +246,7 @@ impl BladeInSpan<'_> {
             pushes,
         });
         BladeTrial::write(&tables.rows, &blade.trial.sample, state);
-        if self.is_in_recalled_flight && self.record_cubic_minima(length, shape_error) {
+        if self.is_in_recalled_flight && self.record_cubic_minima(length, shape_errors.iter().sum()) {
             let begun = begun + step.from * interval.span;
             let length = step.length * interval.span;
             let ends = [interval.from, interval.to].map(|time| ((time - begun) / length).clamp(0.0, 1.0));
