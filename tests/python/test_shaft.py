@@ -192,16 +192,16 @@ def test_both_sides_book_the_same_energy_where_they_agree(after):
         assert numpy.abs(run.outputs).max(axis=0).min() > 10.0, "forces, both moments and the torque are there"
         scale, turned = abs(books["whirl work, ledger of the rub"]), abs(books["shaft work, ledger of the rub"])
         assert scale > 1.0 and turned > 100.0
-        assert abs(books["torque × speed given, less that"]) < 1e-11 * turned
-        assert abs(books["lateral energy of the shaft, less its works"]) < 1e-10 * scale
+        assert abs(books["torque × speed input, minus this ledger"]) < 1e-11 * turned
+        assert abs(books["lateral energy of the shaft, minus all work on it"]) < 1e-10 * scale
         assert abs(books["work of moments on the tilt"]) > 1e-3 * scale
         # The ledger of this scheme takes displacements as means of two internal steps: a share of about h times the frequency.
-        assert abs(books["forces × whirl given, less that"]) < 1e-2 * scale
-        gap = books["forces × whirl of the shaft, less that"] - books["forces × whirl given, less that"]
+        assert abs(books["forces × whirl input, minus this ledger"]) < 1e-2 * scale
+        gap = books["forces × whirl of the shaft, minus this ledger"] - books["forces × whirl input, minus this ledger"]
         if way.implicit:
             assert run.unsolved == 0
-            assert abs(gap) < 1e-4 * scale and abs(books["torque × speed of the shaft, less that"]) < 1e-6 * turned
-            whole = books["all energy, less work of moments and curvature"] + books["forces × whirl given, less that"]
+            assert abs(gap) < 1e-4 * scale and abs(books["torque × speed of the shaft, minus this ledger"]) < 1e-6 * turned
+            whole = books["total energy, minus work of moments and curvature work"] + books["forces × whirl input, minus this ledger"]
             assert abs(whole) < 1e-5 * scale, whole
         elif way in (Way.JACOBI, Way.PARTNER_FIRST):
             assert abs(gap) > 0.05 * scale, "what is told late is work that nobody did"
@@ -282,7 +282,7 @@ def test_what_is_missing_is_said(whirling, monkeypatch):
     assert "no study eror: there are response, errors, stability" in ask("eror").stderr
     assert "--quick" in ask("--help").stdout
     monkeypatch.setenv("TIPRUB", "/nowhere/tiprub")
-    refused = ask("books", "--into", str(Path(whirling.three).parent / "none"))
+    refused = ask("energy", "--into", str(Path(whirling.three).parent / "none"))
     assert refused.returncode == 1 and refused.stderr.splitlines()[-1].startswith("error: no tiprub program at /nowhere/tiprub")
 
 
