@@ -410,7 +410,9 @@ impl Persist for ModalBank {
             self.increment_before.restore(reader);
             disk.state.restore(reader);
         }
-        if self.coupling.is_some() && self.step > 0.0 {
+        let BankState { speed, temperature, .. } = self.state;
+        let has_changed = self.coupling.as_ref().is_some_and(|coupling| !coupling.is_at(speed, temperature));
+        if has_changed && self.step > 0.0 {
             self.refresh_coupling();
         }
     }

@@ -96,8 +96,7 @@ impl ModalBank {
     /// energy (J), which is work of the shaft and of heat.
     pub fn set_speed(&mut self, speed: f64, temperature: f64) -> f64 {
         let Some(coupling) = &self.coupling else { return 0.0 };
-        let same = |one: f64, other: f64| one.to_bits() == other.to_bits();
-        if same(coupling.speed, speed) && same(coupling.temperature, temperature) {
+        if coupling.is_at(speed, temperature) {
             return 0.0;
         }
         let before = self.energies();

@@ -87,6 +87,11 @@ impl Coupling {
         if self.spin.softening.is_some() { self.temperature - self.spin.reference_temperature } else { 0.0 }
     }
 
+    /// Returns whether the coupling is that of a speed (rad/s) and a temperature (K), to the bit.
+    pub(super) fn is_at(&self, speed: f64, temperature: f64) -> bool {
+        self.speed.to_bits() == speed.to_bits() && self.temperature.to_bits() == temperature.to_bits()
+    }
+
     /// Updates speed Ω (rad/s) and temperature (K) for step size h (s) and modes with these reference `frequencies` (rad/s), the
     /// first `dynamic` of which have inertia.
     pub fn refresh(&mut self, [speed, temperature]: [f64; 2], step: f64, dynamic: usize, frequencies: &[f64]) {
