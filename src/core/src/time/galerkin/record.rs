@@ -50,6 +50,28 @@ impl MotionCourse {
         self.parts.iter().all(|part| part.is_casing_at_rest() && part.shaft == Vector3::zeros())
     }
 
+    /// Prescribed motion at the fraction `theta` of the span, and the motion since its start, of a rotor whose shaft does not
+    /// move.
+    #[inline]
+    pub(crate) fn turning_at(&self, theta: f64) -> (TurningDrive, TurningMotion) {
+        let ([linear, quadratic], before) = (&self.parts, &self.before);
+        let combine = |linear: f64, quadratic: f64| theta * linear + theta * theta * quadratic;
+        let motion = TurningMotion {
+            turn: combine(linear.turn, quadratic.turn),
+            opening: combine(linear.opening, quadratic.opening),
+            shape_factor: self.growth.at(theta) - before.shape_factor,
+            shape_rotation: combine(linear.shape_rotation, quadratic.shape_rotation),
+        };
+        let drive = TurningDrive {
+            rotor_angle: before.rotor_angle + motion.turn,
+            speed: (linear.turn + 2.0 * theta * quadratic.turn) / linear.step,
+            opening: before.gap_offset + before.radius_change + motion.opening,
+            shape_factor: before.shape_factor + motion.shape_factor,
+            shape_rotation: before.shape_rotation + motion.shape_rotation,
+        };
+        (drive, motion)
+    }
+
     /// Motion from the start of the span to its fraction `theta`.
     fn motion(&self, theta: f64) -> MotionIncrement {
         let motion = self.parts[0].over(theta).since(&self.parts[1].over(theta * theta));
@@ -71,6 +93,46 @@ impl MotionCourse {
             shaft_velocity: (linear.shaft + 2.0 * theta * quadratic.shaft) / linear.step,
         };
         (drive, motion)
+    }
+}
+
+/// Prescribed motion of a rotor whose shaft does not move.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct TurningDrive {
+    /// Angle (rad) and speed (rad/s) of the rotor.
+    pub rotor_angle: f64,
+    pub speed: f64,
+    /// Increase of the clearance (m).
+    pub opening: f64,
+    /// Factor on the shape of the surface, and its rotation (rad).
+    pub shape_factor: f64,
+    pub shape_rotation: f64,
+}
+
+/// Change of the prescribed motion of a rotor whose shaft does not move.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct TurningMotion {
+    /// Rotation of the rotor (rad).
+    pub turn: f64,
+    /// Change of the clearance (m).
+    pub opening: f64,
+    /// Change of the factor on the shape of the surface, and rotation of the shape (rad).
+    pub shape_factor: f64,
+    pub shape_rotation: f64,
+}
+
+impl TurningMotion {
+    /// Adds `weight` times the motion from `from` to `to`.
+    pub fn add(&mut self, weight: f64, from: &Self, to: &Self) {
+        self.turn += weight * (to.turn - from.turn);
+        self.opening += weight * (to.opening - from.opening);
+        self.shape_factor += weight * (to.shape_factor - from.shape_factor);
+        self.shape_rotation += weight * (to.shape_rotation - from.shape_rotation);
+    }
+
+    /// Returns whether no input moves the casing.
+    pub fn is_casing_at_rest(&self) -> bool {
+        self.opening == 0.0 && self.shape_factor == 0.0 && self.shape_rotation == 0.0
     }
 }
 

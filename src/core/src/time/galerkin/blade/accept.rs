@@ -21,7 +21,11 @@ impl OctetKernel for Advance<'_> {
     type Output = f64;
     #[inline(always)]
     fn run<L: Octet>(mut self) -> f64 {
-        if self.pushes { self.finish::<L, TERMS>() } else { self.finish::<L, 2>() }
+        match (self.pushes, self.level.basis.degree) {
+            (false, _) => self.finish::<L, 2>(),
+            (true, 2) => self.finish::<L, { TERMS - 1 }>(),
+            _ => self.finish::<L, TERMS>(),
+        }
     }
 }
 
@@ -37,8 +41,8 @@ impl OctetKernel for FindModalForces<'_> {
     #[inline(always)]
     fn run<L: Octet>(self) {
         let Self { trial, rows, level } = self;
-        let BladeTrial { start, multipliers, forces, modal_forces, .. } = trial;
-        modal_forces.iter_mut().for_each(|modal| modal.fill(Eight::ZERO));
+        let BladeTrial { start, multipliers, forces, modal_forces, pushing, .. } = trial;
+        pushing.clear();
         let is_constant = level.kind == ForceInterpolation::Constant;
         for block in 0..rows.blocks {
             let mut any = if is_constant { 0 } else { L::zero().less(L::load(&start.multipliers[block])) };
@@ -67,19 +71,37 @@ impl OctetKernel for FindModalForces<'_> {
                     let i = nodes.trailing_zeros() as usize;
                     nodes &= nodes - 1;
                     let first = (along * rows.nodes + 8 * block + i) * rows.mode_blocks;
-                    let shapes = &rows.by_row[first..][..rows.mode_blocks];
-                    let (x, y, z) = (L::splat(terms[0].0[i]), L::splat(terms[1].0[i]), L::splat(terms[2].0[i]));
-                    let [one, two, three] = &mut *modal_forces;
-                    for (k, shape) in shapes.iter().enumerate() {
-                        let shape = L::load(shape);
-                        (L::load(&one[k]) + shape * x).store(&mut one[k]);
-                        (L::load(&two[k]) + shape * y).store(&mut two[k]);
-                        (L::load(&three[k]) + shape * z).store(&mut three[k]);
-                    }
+                    pushing.push((first, std::array::from_fn(|term| terms[term].0[i])));
                 }
             }
         }
+        match level.basis.degree {
+            2 => add_forces::<L, 2>(rows, pushing, modal_forces),
+            _ => add_forces::<L, MOST>(rows, pushing, modal_forces),
+        }
     }
+}
+
+/// Computes the polynomials of the modal forces from those of the nodal forces.
+#[inline(always)]
+fn add_forces<L: Octet, const TERMS: usize>(
+    rows: &BladeRows,
+    pushing: &[(usize, [f64; MOST])],
+    modal_forces: &mut [Vec<Eight>; MOST],
+) {
+    for k in 0..rows.mode_blocks {
+        let mut sums = [L::zero(); TERMS];
+        for (first, terms) in pushing {
+            let shape = L::load(&rows.by_row[first + k]);
+            for term in 0..TERMS {
+                sums[term] = sums[term] + shape * L::splat(terms[term]);
+            }
+        }
+        for (term, sum) in sums.iter().enumerate() {
+            sum.store(&mut modal_forces[term][k]);
+        }
+    }
+    modal_forces[TERMS..].iter_mut().for_each(|modal| modal.fill(Eight::ZERO));
 }
 
 impl Advance<'_> {

@@ -1,6 +1,6 @@
 //! Smallest gaps within a step, from cubics through the exact gaps and their rates at two times.
 
-use super::columns::displace;
+use super::columns::{add_modes, put};
 use super::level::BladeLevel;
 use super::minima::{FOLLOW_FRACTION, MAX_HALVINGS, MINIMUM_FRACTION, amplitude, fraction, relative_error};
 use super::rows::BladeRows;
@@ -9,8 +9,8 @@ use super::trial::BladeTrial;
 use crate::math::octet::{Eight, Octet, OctetKernel, both};
 use crate::time::galerkin::response::TERMS;
 
-/// Largest number of followed nodes per block of eight whose displacements are computed node by node.
-const FEW_PER_BLOCK: usize = 4;
+/// Largest number of followed nodes of a block of eight whose displacements are computed node by node.
+const FEW_PER_BLOCK: u32 = 3;
 /// Number of times in a step at which the motion is stored: its ends, and the middle of one part of each length.
 pub(super) const STORED_TIMES: usize = MAX_HALVINGS + 2;
 
@@ -70,6 +70,8 @@ pub(super) struct Follow<'a, D> {
     pub lowest: &'a mut [Eight],
     /// Gaps below which the smallest gaps are needed (m).
     pub floors: &'a [Eight],
+    /// Where a gap at an end of a part is below this (m), the cubic alone cannot show that the smallest gap is not needed.
+    pub deep: f64,
     /// Largest displacement error of a step (m).
     pub tolerance: f64,
     /// True if forces act in the step.
@@ -151,7 +153,7 @@ impl<D: Fn(f64) -> (PointDrive, DriveRate)> Follow<'_, D> {
         let is_accurate = is_last || error <= MINIMUM_FRACTION * self.tolerance;
         let [begin, end] = part.span();
         let [from, to] = self.ends.map(|fraction| L::splat((fraction - begin) / (end - begin)));
-        let Self { trial, rows, lowest, floors, tolerance, .. } = &mut *self;
+        let Self { trial, rows, lowest, floors, tolerance, deep, .. } = &mut *self;
         for block in 0..rows.blocks {
             let followed = trial.followed[block];
             if followed == 0 {
@@ -161,8 +163,10 @@ impl<D: Fn(f64) -> (PointDrive, DriveRate)> Follow<'_, D> {
             let [first, last] = [before, after].map(|point| L::load(&point.gaps[block]));
             let inner = [first + L::load(&before.rates[block]) * third, last - L::load(&after.rates[block]) * third];
             let known = L::load(&lowest[block]);
-            let bar = L::load(&floors[block]).min(known) - L::splat(FOLLOW_FRACTION * *tolerance);
-            let dips = find_dips(first.min(last), inner[0].min(inner[1]), error, bar) & followed;
+            let bar = (L::load(&floors[block]) - L::splat(FOLLOW_FRACTION * *tolerance)).min(known);
+            let ends = first.min(last);
+            let dips = find_dips(ends, inner[0].min(inner[1]), error, bar) | ends.less(L::splat(*deep));
+            let dips = dips & followed;
             if dips == 0 {
                 continue;
             }
@@ -215,15 +219,19 @@ impl<D: Fn(f64) -> (PointDrive, DriveRate)> Follow<'_, D> {
         let Self { trial, rows, .. } = self;
         let BladeTrial { path, path_moved, followed, .. } = &mut **trial;
         let modes = &path[stored].modes;
-        let count: u32 = followed.iter().map(|nodes| nodes.count_ones()).sum();
-        if count as usize > FEW_PER_BLOCK * rows.blocks {
-            for (shapes, moved) in rows.shapes.iter().zip(path_moved) {
-                displace::<L, 2>(shapes, rows.blocks, [&modes[0], &modes[1]], moved);
-            }
-            return;
-        }
         for block in 0..rows.blocks {
             let mut nodes = followed[block];
+            if nodes.count_ones() > FEW_PER_BLOCK {
+                for (shapes, moved) in rows.shapes.iter().zip(&mut *path_moved) {
+                    put::<L, 2, 1>(
+                        add_modes(shapes, rows.blocks, block, [&modes[0], &modes[1]]),
+                        rows.blocks,
+                        block,
+                        moved,
+                    );
+                }
+                continue;
+            }
             while nodes != 0 {
                 let i = nodes.trailing_zeros() as usize;
                 nodes &= nodes - 1;
@@ -286,6 +294,7 @@ impl<D: Fn(f64) -> (PointDrive, DriveRate)> Follow<'_, D> {
         let Self { trial, halves, pushes, .. } = self;
         let table = halves[part.halvings + halvings];
         let BladeTrial { path, modal_forces, .. } = &mut **trial;
+        let forced = if self.level.basis.degree == 2 { TERMS - 1 } else { TERMS };
         let [first, last] = part.ends;
         let (from, length) = (L::splat(part.span()[0]), L::splat(fraction(1, 1 << (part.halvings + halvings))));
         for k in 0..self.rows.mode_blocks {
@@ -298,7 +307,7 @@ impl<D: Fn(f64) -> (PointDrive, DriveRate)> Follow<'_, D> {
                 terms[2] = a + from * (b + from * c);
                 terms[3] = length * (b + L::splat(2.0) * from * c);
                 terms[4] = length * length * c;
-                count = TERMS;
+                count = forced;
             }
             for (target, table) in path[last].modes.iter_mut().zip(&table.end) {
                 let mut end = L::zero();

@@ -1,8 +1,8 @@
 //! Smallest gaps of the nodes within a tried step.
 
 use super::follow::Follow;
-use super::minima::{MAX_HALVINGS, RecordPoints};
-use super::span::{Blade, BladeInSpan, BladePlace, drive_at};
+use super::minima::{FOLLOW_FRACTION, MAX_HALVINGS, MINIMUM_FRACTION, RecordPoints};
+use super::span::{Blade, BladeInSpan, BladePlace, RecordScope, drive_at};
 use super::surface::{DriveRate, PointDrive};
 use super::tables::BladeTables;
 use super::trial::BladeTrial;
@@ -11,7 +11,6 @@ use crate::time::galerkin::basis::POINTS;
 use crate::time::galerkin::span::SpanStep;
 use crate::time::galerkin::tables::HALVINGS;
 use crate::time::galerkin::trial::{ForceInterpolation, TrialResult};
-use std::mem::take;
 
 /// Rates of the prescribed motion are differences over this fraction of a span.
 const RATE_FRACTION: f64 = 1.0 / 64.0;
@@ -20,12 +19,12 @@ impl BladeInSpan<'_> {
     /// Records the smallest gaps between two fractions of a tried step. If the step does not resolve the motion, only the gaps
     /// at the points are recorded.
     pub(super) fn record_gaps(&mut self, step: SpanStep, kind: ForceInterpolation, is_resolved: bool, ends: [f64; 2]) {
-        let Blade { trial, kinds, tally, floors, .. } = &mut *self.blade;
+        let Blade { trial, kinds, tally, floors, bars, .. } = &mut *self.blade;
         let tables = &kinds[self.place.kind];
         let (rows, level) = (&tables.rows, tables.level(step.level, kind));
         trial.followed.fill(0);
-        let found =
-            is_resolved && trial.select_followed((rows, level), [&tally.lowest, floors], self.goal.tolerance, ends);
+        find_bars(bars, floors, &tally.lowest);
+        let found = is_resolved && trial.select_followed((rows, level), bars, self.goal.tolerance, ends);
         let instructions = trial.instructions;
         instructions.run_octets(RecordPoints { trial, rows, level, lowest: &mut tally.lowest, ends });
         if found {
@@ -33,36 +32,70 @@ impl BladeInSpan<'_> {
         }
     }
 
-    /// Records the smallest gaps of the followed nodes between two fractions of a step.
+    /// Records the smallest gaps between two fractions of a step, of nodes that are followed.
     pub(super) fn follow(&mut self, step: SpanStep, kind: ForceInterpolation, ends: [f64; 2]) {
         let Blade { trial, kinds, tally, floors, .. } = &mut *self.blade;
-        let path =
-            FollowedPath { place: &self.place, drives: &self.drives, step, kind, tolerance: self.goal.tolerance };
+        let (tolerance, deep) = (self.goal.tolerance, f64::NEG_INFINITY);
+        let path = FollowedPath { place: &self.place, drives: &self.drives, step, kind, tolerance, deep };
         path.follow(trial, &mut kinds[self.place.kind], [&mut tally.lowest, floors], ends);
     }
 
-    /// Finds the largest penetration between the points of the tried step, of nodes that stay open.
-    pub(super) fn find_depth(&mut self, step: SpanStep, kind: ForceInterpolation, result: &mut TrialResult) {
-        let tolerance = self.goal.tolerance;
-        let Blade { trial, kinds, depth_limits, .. } = &mut *self.blade;
+    /// Finds the smallest gaps between the points of a tried step, of nodes that stay open, and whether they penetrate by more
+    /// than the tolerance. Other smallest gaps are only found if they may be recorded.
+    pub(super) fn find_least_gaps(&mut self, step: SpanStep, kind: ForceInterpolation, result: &mut TrialResult) {
+        let (tolerance, whole) = (self.goal.tolerance, [0.0, 1.0]);
+        let may_be_recorded = self.recorded != RecordScope::WorkOnly && self.ends_within(step);
+        let Blade { trial, kinds, tally, floors, bars, least, .. } = &mut *self.blade;
+        least.fill(Eight([f64::INFINITY; 8]));
+        trial.followed.fill(0);
+        if !result.solved || !result.resolves_motion(kind, tolerance) {
+            return;
+        }
+        // Gaps that are only recorded must not change which gaps below minus the tolerance are found.
+        let bar_for_depth = (MINIMUM_FRACTION + FOLLOW_FRACTION - 1.0) * tolerance;
+        bars.fill(Eight([f64::NEG_INFINITY; 8]));
+        if may_be_recorded {
+            find_bars(bars, floors, &tally.lowest);
+        }
+        bars.iter_mut().flat_map(|block| &mut block.0).for_each(|bar| *bar = bar.max(bar_for_depth));
         let tables = &mut kinds[self.place.kind];
         if trial.pushes() {
             trial.find_modal_forces(&tables.rows, tables.level(step.level, kind));
         }
-        depth_limits.fill(Eight([-tolerance; 8]));
-        let mut deepest = take(&mut trial.deepest);
-        deepest.copy_from_slice(depth_limits);
-        let whole = [0.0, 1.0];
         let level = tables.level(step.level, kind);
-        if trial.select_followed((&tables.rows, level), [&deepest, depth_limits], tolerance, whole) {
-            let path = FollowedPath { place: &self.place, drives: &self.drives, step, kind, tolerance };
-            path.follow(trial, tables, [&mut deepest, depth_limits], whole);
-            let least = deepest.iter().flat_map(|block| block.0).fold(f64::INFINITY, f64::min);
-            if least < -tolerance {
-                result.depth = result.depth.max(-least);
+        if trial.select_followed((&tables.rows, level), bars, tolerance, whole) {
+            let deep = bar_for_depth - FOLLOW_FRACTION * tolerance;
+            let path = FollowedPath { place: &self.place, drives: &self.drives, step, kind, tolerance, deep };
+            path.follow(trial, tables, [least, bars], whole);
+            let lowest = least.iter().flat_map(|block| block.0).fold(f64::INFINITY, f64::min);
+            if lowest < -tolerance && step.level < HALVINGS {
+                result.depth = result.depth.max(-lowest);
             }
         }
-        trial.deepest = deepest;
+    }
+
+    /// Records the smallest gaps of the tried step, as found by [`find_least_gaps`](Self::find_least_gaps), and the gaps at its
+    /// points.
+    pub(super) fn record_least_gaps(&mut self, step: SpanStep, kind: ForceInterpolation) {
+        let Blade { trial, kinds, tally, least, .. } = &mut *self.blade;
+        let tables = &kinds[self.place.kind];
+        let (rows, level) = (&tables.rows, tables.level(step.level, kind));
+        let (instructions, lowest) = (trial.instructions, &mut tally.lowest);
+        include(lowest, least);
+        instructions.run_octets(RecordPoints { trial, rows, level, lowest, ends: [0.0, 1.0] });
+    }
+}
+
+/// Finds the gaps below which smallest gaps are needed: those below the floor and below the smallest gap so far (m).
+fn find_bars(bars: &mut [Eight], floors: &[Eight], lowest: &[Eight]) {
+    bars.copy_from_slice(floors);
+    include(bars, lowest);
+}
+
+/// Replaces numbers by smaller ones.
+pub(super) fn include(numbers: &mut [Eight], others: &[Eight]) {
+    for (number, other) in numbers.iter_mut().zip(others) {
+        number.0.iter_mut().zip(other.0).for_each(|(number, other)| *number = number.min(other));
     }
 }
 
@@ -90,6 +123,8 @@ struct FollowedPath<'a> {
     kind: ForceInterpolation,
     /// Largest displacement error of a step (m).
     tolerance: f64,
+    /// See [`Follow::deep`].
+    deep: f64,
 }
 
 impl FollowedPath<'_> {
@@ -120,6 +155,7 @@ impl FollowedPath<'_> {
             shape_errors: place.shape_errors([step.from, step.from + step.length]),
             lowest,
             floors,
+            deep: self.deep,
             tolerance: self.tolerance,
             pushes,
             ends,

@@ -22,6 +22,14 @@ pub(crate) struct PartWeights {
     pub ends: [f64; 2],
 }
 
+/// Place of a block of lanes: point of the step (0 for the first after its start) and block of nodes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Place {
+    pub lane: usize,
+    pub point: usize,
+    pub block: usize,
+}
+
 /// Tables for one step length. A lane is one node at one point of the step. Lanes are stored point by point, in blocks
 /// of eight nodes.
 #[derive(Debug, Clone)]
@@ -74,6 +82,21 @@ impl BladeLevel {
             columns: vec![Eight::ZERO; points * rows.nodes * column],
             start_columns: vec![Eight::ZERO; rows.nodes * column],
         }
+    }
+
+    /// Returns the places of all blocks of lanes, in order.
+    #[inline(always)]
+    pub(super) fn places(&self, rows: &BladeRows) -> impl Iterator<Item = Place> + use<> {
+        let blocks = rows.blocks;
+        let (mut point, mut block) = (0, 0);
+        (0..self.blocks).map(move |lane| {
+            let place = Place { lane, point, block };
+            block += 1;
+            if block == blocks {
+                (point, block) = (point + 1, 0);
+            }
+            place
+        })
     }
 
     /// Fills the tables from the step tables of all contact rows, without allocating.

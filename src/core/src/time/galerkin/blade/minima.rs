@@ -28,15 +28,14 @@ impl BladeTrial {
     }
 }
 
-/// Selects the nodes that stay open and may come closer between the points than at the points, if their smallest gap may be
-/// below a floor and below the smallest gap so far. Returns whether there are such nodes.
+/// Selects the nodes that stay open and may come closer between the points than at the points, if their smallest gap is
+/// needed. Returns whether there are such nodes.
 pub(super) struct SelectFollowed<'a> {
     pub trial: &'a mut BladeTrial,
     pub rows: &'a BladeRows,
     pub level: &'a BladeLevel,
-    /// Smallest gaps so far, and gaps below which the smallest gaps are needed (m).
-    pub lowest: &'a [Eight],
-    pub floors: &'a [Eight],
+    /// Gaps below which the smallest gaps are needed (m).
+    pub bars: &'a [Eight],
     /// Largest displacement error of a step (m), and largest error of the motion between the points (m).
     pub tolerance: f64,
     pub unresolved: f64,
@@ -48,7 +47,7 @@ impl OctetKernel for SelectFollowed<'_> {
     type Output = bool;
     #[inline(always)]
     fn run<L: Octet>(self) -> bool {
-        let Self { trial, rows, level, lowest, floors, tolerance, unresolved, ends } = self;
+        let Self { trial, rows, level, bars, tolerance, unresolved, ends } = self;
         // The first round uses one bound for all nodes. The second uses a bound for each node, and drops most of the
         // nodes.
         let bounds = &mut trial.path_moved[0];
@@ -56,7 +55,7 @@ impl OctetKernel for SelectFollowed<'_> {
         for look in 0..2 {
             let mut found = false;
             for block in 0..rows.blocks {
-                let bar = L::load(&floors[block]).min(L::load(&lowest[block]));
+                let bar = L::load(&bars[block]);
                 trial.followed[block] = choose::<L>(trial, (rows, level, block), bar, tolerance, ends);
                 found |= trial.followed[block] != 0;
             }

@@ -4,6 +4,7 @@ use crate::geometry::layout::Layout;
 use crate::math::octet::Eight;
 use crate::math::vector::{Vector3, vector3_at};
 use crate::modes::coordinates::ContactModes;
+use crate::time::galerkin::basis::MOST;
 use nalgebra::{DMatrix, Vector2};
 
 /// Data of a blade that do not depend on the step length.
@@ -18,6 +19,8 @@ pub(crate) struct BladeRows {
     /// Number of contact nodes, and number of blocks of eight that hold them.
     pub nodes: usize,
     pub blocks: usize,
+    /// Mask of the entries of each block of lanes that belong to a node.
+    valid: Vec<u8>,
     /// Number of blocks of modes.
     pub mode_blocks: usize,
     /// Shapes mode by mode, along the closing and the circumferential displacement.
@@ -73,6 +76,9 @@ impl BladeRows {
             ],
             magnitudes: [Vec::new(), Vec::new()],
             largest: vec![Eight::ZERO; Eight::blocks(count)],
+            valid: (0..MOST * blocks)
+                .map(|lane| if nodes - 8 * (lane % blocks) >= 8 { 0xff } else { (1 << (nodes % 8)) - 1 })
+                .collect(),
             nodes,
             blocks,
             mode_blocks: Eight::blocks(count),
@@ -136,8 +142,7 @@ impl BladeRows {
     /// Mask of the entries of a block of nodes or lanes that belong to a node.
     #[inline(always)]
     pub fn valid(&self, block: usize) -> u8 {
-        let left = self.nodes - 8 * (block % self.blocks);
-        if left >= 8 { 0xff } else { (1 << left) - 1 }
+        self.valid[block]
     }
 
     /// Unit direction of the closing (`along` 0) or circumferential (1) displacement of a node.

@@ -1,7 +1,7 @@
 //! The contact problem of a step of a blade: forces that keep all nodes from penetrating at all points.
 
 use super::columns::{combine, displace, eliminate, eliminate_any};
-use super::level::BladeLevel;
+use super::level::{BladeLevel, Place};
 use super::rows::BladeRows;
 use super::surface::FacedSurface;
 use super::trial::BladeTrial;
@@ -74,12 +74,14 @@ impl Attempt<'_> {
         if !start.pushed || level.kind == ForceInterpolation::Constant {
             return;
         }
+        let width = level.blocks;
         let [closing, around] = moved;
+        let (closing, around) = (&mut closing[..width], &mut around[..width]);
         for node in 0..rows.nodes {
             if start.multipliers[node / 8].0[node % 8] > 0.0 {
                 let [a, b] = both(|along| L::splat(start.forces[along][node / 8].0[node % 8]));
                 let columns = level.start_column(node);
-                for block in 0..level.blocks {
+                for block in 0..width {
                     let ([aa, ab], [ba, bb]) =
                         (both(|i| L::load(&columns[i][block])), both(|i| L::load(&columns[2 + i][block])));
                     (L::load(&closing[block]) + (a * aa + b * ba)).store(&mut closing[block]);
@@ -94,10 +96,9 @@ impl Attempt<'_> {
     #[inline(always)]
     fn find_open_gaps<L: Octet>(&mut self) -> bool {
         let mut penetrates = false;
-        for lane in 0..self.level.blocks {
-            let (point, block) = (lane / self.rows.blocks, lane % self.rows.blocks);
-            let valid = self.rows.valid(lane);
-            let Self { trial, rows, faced, .. } = &mut *self;
+        let Self { trial, rows, faced, level, .. } = &mut *self;
+        for Place { lane, point, block } in level.places(rows) {
+            let valid = rows.valid(lane);
             let drive = &faced.drives[point + 1];
             let (per_radius, held) = (L::load(&rows.per_radius[block]), L::load(&trial.held[block]));
             let (closing, around) = (L::load(&trial.moved[0][lane]), L::load(&trial.moved[1][lane]));
@@ -125,8 +126,8 @@ impl Attempt<'_> {
     #[inline(always)]
     fn rest<L: Octet>(&mut self) {
         let Self { trial, rows, level, .. } = self;
-        for lane in 0..level.blocks {
-            let held = L::load(&trial.held[lane % rows.blocks]);
+        for Place { lane, block, .. } in level.places(rows) {
+            let held = L::load(&trial.held[block]);
             (L::load(&trial.open[lane]) + L::load(&trial.bend[lane]) * held * held).store(&mut trial.gaps[lane]);
         }
         trial.multipliers.fill(Eight::ZERO);
@@ -146,8 +147,7 @@ impl Attempt<'_> {
         if !trial.start.pushed || level.kind == ForceInterpolation::Constant {
             return;
         }
-        for lane in 0..level.blocks {
-            let (point, block) = (lane / rows.blocks, lane % rows.blocks);
+        for Place { lane, point, block } in level.places(rows) {
             let (now, slope) = (L::load(&trial.start.multipliers[block]), L::load(&trial.start.slopes[block]));
             let closed = L::zero().less(now);
             let expected = (now + slope * L::splat(level.basis.points[point + 1] * level.step)).max(L::zero());
@@ -161,9 +161,9 @@ impl Attempt<'_> {
     #[inline(always)]
     fn list_members<L: Octet>(&mut self) {
         let Self { trial, rows, level, .. } = &mut *self;
+        let width = level.blocks;
         trial.members.clear();
-        for lane in 0..level.blocks {
-            let (point, block) = (lane / rows.blocks, lane % rows.blocks);
+        for Place { lane, point, block } in level.places(rows) {
             let mut mask = trial.active[lane];
             while mask != 0 {
                 let at = mask.trailing_zeros() as usize;
@@ -177,13 +177,14 @@ impl Attempt<'_> {
                 let [a, b] = both(|along| L::splat(trial.directions[along][lane].0[at]));
                 let columns = level.column(point * rows.nodes + 8 * block + at);
                 let (closing, around) = (&mut trial.closing, &mut trial.around);
-                let closing = &mut closing[member * level.blocks..][..level.blocks];
-                let around = &mut around[member * level.blocks..][..level.blocks];
-                for i in 0..level.blocks {
+                let closing = &mut closing[member * width..][..width];
+                let around = &mut around[member * width..][..width];
+                let sigma = &trial.sigma[..width];
+                for i in 0..width {
                     let ([aa, ab], [ba, bb]) =
                         (both(|c| L::load(&columns[c][i])), both(|c| L::load(&columns[2 + c][i])));
                     let turned = a * ab + b * bb;
-                    ((a * aa + b * ba) + L::load(&trial.sigma[i]) * turned).store(&mut closing[i]);
+                    ((a * aa + b * ba) + L::load(&sigma[i]) * turned).store(&mut closing[i]);
                     turned.store(&mut around[i]);
                 }
             }
@@ -320,8 +321,8 @@ impl Attempt<'_> {
         let amount = |place: usize| multipliers[members[place] / 8].0[members[place] % 8];
         combine::<L>(None, around, members, amount, &mut turned[..width]);
         let mut over = 0;
-        for lane in 0..width {
-            let by = L::load(&turned[lane]) - L::load(&held[lane % self.rows.blocks]);
+        for Place { lane, block, .. } in self.level.places(self.rows) {
+            let by = L::load(&turned[lane]) - L::load(&held[block]);
             let change = L::load(&bend[lane]) * by * by - L::load(&curved[lane]);
             let valid = self.rows.valid(lane);
             over |= active[lane] & precision.less(change.abs());
@@ -330,8 +331,8 @@ impl Attempt<'_> {
         if over == 0 {
             return false;
         }
-        for lane in 0..width {
-            let by = L::load(&turned[lane]) - L::load(&held[lane % self.rows.blocks]);
+        for Place { lane, block, .. } in self.level.places(self.rows) {
+            let by = L::load(&turned[lane]) - L::load(&held[block]);
             let now = L::load(&bend[lane]) * by * by;
             let change = now - L::load(&curved[lane]);
             (L::load(&open[lane]) + change).store(&mut open[lane]);
@@ -343,14 +344,13 @@ impl Attempt<'_> {
     /// Writes the displacements, F and the forces of the solution.
     #[inline(always)]
     fn finish<L: Octet>(&mut self) {
-        let width = self.level.blocks;
         let BladeTrial {
             clear, sigma, bend, curved, gaps, moved, multipliers, directions, forces, held, turned, ..
         } = &mut *self.trial;
         let [closing, around] = moved;
-        for lane in 0..width {
+        for Place { lane, block, .. } in self.level.places(self.rows) {
             let turned = L::load(&turned[lane]);
-            let by = turned - L::load(&held[lane % self.rows.blocks]);
+            let by = turned - L::load(&held[block]);
             let straight = L::load(&gaps[lane]) - L::load(&curved[lane]);
             (straight - L::load(&clear[lane]) - L::load(&sigma[lane]) * by).store(&mut closing[lane]);
             (L::load(&around[lane]) + turned).store(&mut around[lane]);

@@ -1,6 +1,7 @@
 //! Integration of a blade over a span.
 
 use super::dense::ModeResponse;
+use super::gaps::include;
 use super::level::PartWeights;
 use super::open_step::{OpenStep, SpanProgress};
 use super::reach::Clearance;
@@ -12,16 +13,15 @@ use super::trial::{BladeTrial, NodeAngles};
 use crate::contact::ContactParameters;
 use crate::geometry::GapLaw;
 use crate::geometry::revolution::RevolutionGap;
-use crate::geometry::wrench::MotionIncrement;
 use crate::math::octet::Eight;
 use crate::scene::method::Solver;
 use crate::system::structure::NeededMinima;
 use crate::time::galerkin::basis::POINTS;
 use crate::time::galerkin::island::StepControl;
-use crate::time::galerkin::record::MotionCourse;
+use crate::time::galerkin::record::{MotionCourse, TurningMotion};
 use crate::time::galerkin::span::{SpanStep, SpanSteps, StepGoal};
 use crate::time::galerkin::state::SectorState;
-use crate::time::galerkin::tables::{HALVINGS, Tables};
+use crate::time::galerkin::tables::Tables;
 use crate::time::galerkin::trial::{ForceInterpolation, TrialResult};
 use std::mem::{replace, take};
 
@@ -38,7 +38,9 @@ pub(crate) struct Blade {
     lowest: Vec<Eight>,
     pub(super) begun: Vec<Eight>,
     pub(super) floors: Vec<Eight>,
-    pub(super) depth_limits: Vec<Eight>,
+    /// Gaps below which the smallest gaps of the tried step are needed (m), and those found; infinite if not needed.
+    pub(super) bars: Vec<Eight>,
+    pub(super) least: Vec<Eight>,
     /// Cached responses of the modes, and the index of the last one computed.
     pub(super) responses: Vec<ModeResponse>,
     pub(super) next_response: usize,
@@ -91,8 +93,8 @@ impl Blade {
         let of_nodes = || vec![Eight::ZERO; rows.blocks];
         let angles = (0..gap.layout.lanes).map(|sector| NodeAngles::new(&gap.layout, sector)).collect();
         let responses = ModeResponse::allocate_cache(rows);
-        let [lowest, begun, floors, depth_limits] = [of_nodes(), of_nodes(), of_nodes(), of_nodes()];
-        Some(Self { trial, tally, lowest, begun, floors, depth_limits, angles, responses, next_response: 0, kinds })
+        let [lowest, begun, floors, bars, least] = std::array::from_fn(|_| of_nodes());
+        Some(Self { trial, tally, lowest, begun, floors, bars, least, angles, responses, next_response: 0, kinds })
     }
 
     /// Uses tables for spans of this length (s). Does not allocate.
@@ -146,7 +148,7 @@ pub(crate) struct BladeInSpan<'a> {
     pub control: StepControl,
     pub(super) goal: StepGoal,
     /// Prescribed motion at the points of the tried step, and the motion over which the forces there do work.
-    motions: [MotionIncrement; POINTS],
+    motions: [TurningMotion; POINTS],
     pub(super) drives: [PointDrive; POINTS],
     /// True if the displacements and gaps at the start of the step are known; and true if the reach without contact is
     /// known.
@@ -204,9 +206,7 @@ impl<'a> BladeInSpan<'a> {
     /// Includes the smallest gaps of the sector in those of all sectors.
     pub(super) fn include_lowest(&mut self) {
         let Blade { lowest, tally, .. } = &mut *self.blade;
-        for (lowest, own) in lowest.as_mut_slice().iter_mut().zip(&tally.lowest) {
-            lowest.0.iter_mut().zip(own.0).for_each(|(lowest, own)| *lowest = lowest.min(own));
-        }
+        include(lowest, &tally.lowest);
     }
 
     /// Returns whether a gap of the last trial in this span is not a number.
@@ -215,7 +215,7 @@ impl<'a> BladeInSpan<'a> {
     }
 
     /// Prescribed motion at a fraction of the span, and the motion since the start of the span.
-    pub(super) fn drive_at(&self, theta: f64) -> (PointDrive, MotionIncrement) {
+    pub(super) fn drive_at(&self, theta: f64) -> (PointDrive, TurningMotion) {
         drive_at(&self.place, theta)
     }
 
@@ -223,22 +223,23 @@ impl<'a> BladeInSpan<'a> {
     pub(super) fn find_drives(&mut self, step: SpanStep, kind: ForceInterpolation, weights: &PartWeights) {
         let level = self.blade.kinds[self.place.kind].level(step.level, kind);
         let count = level.points() + 1;
-        let mut moved = [MotionIncrement::default(); POINTS];
+        let mut moved = [TurningMotion::default(); POINTS];
         for point in 0..count {
             let theta =
                 if kind == ForceInterpolation::Constant { [0.0, 1.0][point] } else { level.basis.points[point] };
             (self.drives[point], moved[point]) = drive_at(&self.place, step.from + step.length * theta);
         }
         for (motion, weights) in self.motions.iter_mut().zip(&weights.work).take(count) {
-            let terms = (0..count).map(|k| moved[k].less(&moved[0]).over(weights[k]));
-            *motion = terms.fold(MotionIncrement::default(), |sum, term| sum.since(&term));
+            *motion = TurningMotion::default();
+            moved[..count].iter().zip(weights).for_each(|(to, weight)| motion.add(*weight, &moved[0], to));
         }
     }
 
     /// Adds the tried step, or a part of it, to sums.
     pub(super) fn add(&mut self, step: SpanStep, kind: ForceInterpolation, part: &PartWeights, sums: Sums) {
         if self.blade.trial.pushes() && sums != Sums::WorkOnly {
-            self.drives.iter_mut().for_each(|drive| drive.rotor = libm::sincos(drive.rotor_angle));
+            let count = self.blade.kinds[self.place.kind].level(step.level, kind).points() + 1;
+            self.drives[..count].iter_mut().for_each(|drive| drive.rotor = libm::sincos(drive.rotor_angle));
         }
         let faced = &self.place.faced_surface(&self.drives);
         let Blade { trial, kinds, tally, .. } = &mut *self.blade;
@@ -275,7 +276,7 @@ impl<'a> BladeInSpan<'a> {
     }
 
     /// Returns whether a step ends within the recorded part of the span.
-    fn ends_within(&self, step: SpanStep) -> bool {
+    pub(super) fn ends_within(&self, step: SpanStep) -> bool {
         !matches!(self.recorded, RecordScope::Interval(ends) if step.from + step.length > ends[1])
     }
 
@@ -292,13 +293,12 @@ impl<'a> BladePlace<'a> {
 }
 
 /// Prescribed motion of a sector at the fraction `theta` of a span, and the motion since the start of the span.
-pub(super) fn drive_at(place: &BladePlace, theta: f64) -> (PointDrive, MotionIncrement) {
-    let (drive, motion) = place.course.at(theta);
-    let layout = &place.gap.layout;
+pub(super) fn drive_at(place: &BladePlace, theta: f64) -> (PointDrive, TurningMotion) {
+    let (drive, motion) = place.course.turning_at(theta);
     let point = PointDrive {
         turned: drive.rotor_angle - drive.shape_rotation,
         factor: drive.shape_factor,
-        clearance: layout.clearances[place.sector] + drive.gap_offset + drive.radius_change,
+        clearance: place.gap.layout.clearances[place.sector] + drive.opening,
         speed: drive.speed,
         rotor_angle: drive.rotor_angle,
         rotor: (0.0, 1.0),
@@ -375,10 +375,7 @@ impl SpanSteps for BladeInSpan<'_> {
         let level = tables.level(step.level, kind);
         self.tried = level.blocks;
         let mut result = trial.attempt(&tables.rows, level, &faced, self.goal.precision);
-        let is_acceptable = result.solved && !result.misses(self.goal.tolerance);
-        if kind == ForceInterpolation::Polynomial && is_acceptable && step.level < HALVINGS {
-            self.find_depth(step, kind, &mut result);
-        }
+        self.find_least_gaps(step, kind, &mut result);
         result
     }
 
@@ -412,7 +409,7 @@ impl SpanSteps for BladeInSpan<'_> {
         }
         tally.work.add(&work);
         if records {
-            self.record_gaps(step, kind, is_resolved, [0.0, 1.0]);
+            self.record_least_gaps(step, kind);
         }
         self.advance(step, Some(kind));
         banked

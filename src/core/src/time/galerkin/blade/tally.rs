@@ -6,14 +6,14 @@ use super::rows::BladeRows;
 use super::surface::FacedSurface;
 use super::trial::BladeTrial;
 use crate::geometry::Vector3;
-use crate::geometry::wrench::{MotionIncrement, Wrench};
+use crate::geometry::wrench::Wrench;
 use crate::math::octet::{Eight, Octet, OctetKernel, both};
 use crate::math::vector::ZERO;
 use crate::system::ContactEvent;
 use crate::system::contact_view::ContactMember;
 use crate::system::work::ContactWork;
 use crate::time::galerkin::basis::POINTS;
-use crate::time::galerkin::record::FORCE_ROUNDING;
+use crate::time::galerkin::record::{FORCE_ROUNDING, TurningMotion};
 use crate::time::galerkin::trial::ForceInterpolation;
 
 /// Sums over a span for each node.
@@ -119,7 +119,7 @@ pub(super) struct AddStep<'a> {
     pub level: &'a BladeLevel,
     pub faced: &'a FacedSurface<'a>,
     /// Motion over which the forces at the points do work.
-    pub motions: &'a [MotionIncrement; POINTS],
+    pub motions: &'a [TurningMotion; POINTS],
     /// Weights of the part of the step.
     pub part: &'a PartWeights,
     pub sums: Sums,

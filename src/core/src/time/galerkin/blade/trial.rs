@@ -75,6 +75,9 @@ pub(crate) struct BladeTrial {
     pub(super) angles: Vec<Eight>,
     /// Sines and cosines of these angles.
     pub(super) directions_of_nodes: [Vec<Eight>; 2],
+    /// Nodes with a force in the tried step: first block of the row of their shapes along the closing or the circumferential
+    /// displacement, and coefficients of θᵃ of the force along it (N).
+    pub(super) pushing: Vec<(usize, [f64; MOST])>,
     /// Coefficients of θᵃ of the modal forces.
     pub(super) modal_forces: [Vec<Eight>; MOST],
     /// Modal displacements at the points.
@@ -121,8 +124,6 @@ pub(crate) struct BladeTrial {
     pub(super) amplitudes: Vec<Eight>,
     /// Closing and circumferential displacements (m), each followed by the velocities (m/s).
     pub(super) path_moved: [Vec<Eight>; 2],
-    /// Smallest gaps of the followed nodes in the tried step (m).
-    pub(super) deepest: Vec<Eight>,
     /// Impulse errors along the closing displacement, then along the circumferential one (N·s).
     pub(super) impulses: Vec<Eight>,
     /// True if a contact force acts in the step.
@@ -150,6 +151,7 @@ impl BladeTrial {
             rates_before: of_nodes(),
             angles: of_nodes(),
             directions_of_nodes: [of_nodes(), of_nodes()],
+            pushing: Vec::with_capacity(2 * rows.nodes),
             modal_forces: std::array::from_fn(|_| of_modes()),
             modal: std::array::from_fn(|_| of_modes()),
             moved: [of_lanes(), of_lanes()],
@@ -178,7 +180,6 @@ impl BladeTrial {
             unresolved: None,
             forces_known: false,
             path_moved: [0, 1].map(|_| vec![Eight::ZERO; 2 * nodes]),
-            deepest: of_nodes(),
             impulses: vec![Eight::ZERO; 2 * nodes],
             pushes: false,
             reach: [of_nodes(), of_nodes()],
@@ -260,28 +261,19 @@ impl BladeTrial {
     }
 
     /// Selects the nodes that may come closer between the points of the tried step than at the points. They count if they
-    /// come closer by more than a fraction of `tolerance` (m), and if their smallest gap may be below `floors` and `lowest`
-    /// (m). Returns whether there are such nodes.
+    /// come closer by more than a fraction of `tolerance` (m), and if their smallest gap may be below `bars` (m). Returns
+    /// whether there are such nodes.
     pub(super) fn select_followed(
         &mut self,
         (rows, level): (&BladeRows, &BladeLevel),
-        [lowest, floors]: [&[Eight]; 2],
+        bars: &[Eight],
         tolerance: f64,
         ends: [f64; 2],
     ) -> bool {
         let unresolved = self.unresolved.unwrap_or_else(|| self.find_interpolation_error(rows, level.step));
         self.unresolved = Some(unresolved);
         let instructions = self.instructions;
-        instructions.run_octets(SelectFollowed {
-            trial: self,
-            rows,
-            level,
-            lowest,
-            floors,
-            tolerance,
-            unresolved,
-            ends,
-        })
+        instructions.run_octets(SelectFollowed { trial: self, rows, level, bars, tolerance, unresolved, ends })
     }
 
     /// Advances the modes over the tried step, or over a step without forces, and returns the damping loss (J).
