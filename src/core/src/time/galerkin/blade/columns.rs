@@ -14,79 +14,93 @@ pub(super) fn values_at_points<L: Octet>(start: &[Eight], lanes: &[Eight], block
     values
 }
 
-/// `sums[p]` = Σ over modes of shape times `modes[p]`, for `B` blocks of nodes from `block`.
+/// `sums[d][p]` = Σ over modes of the shapes along direction d times `modes[p]`, for `B` blocks of nodes from `block`. Several
+/// directions are summed in one loop, so that additions do not wait for each other.
 #[inline(always)]
-pub(super) fn add_modes<L: Octet, const P: usize, const B: usize>(
-    shapes: &[Eight],
+pub(super) fn add_modes<L: Octet, const D: usize, const P: usize, const B: usize>(
+    shapes: [&[Eight]; D],
     blocks: usize,
     block: usize,
     modes: [&[Eight]; P],
-) -> [[L; B]; P] {
-    let mut sums = [[L::zero(); B]; P];
-    for (k, shapes) in shapes.chunks(8 * blocks).enumerate() {
+) -> [[[L; B]; P]; D] {
+    let mut sums = [[[L::zero(); B]; P]; D];
+    let count = shapes[0].len() / blocks;
+    for k in 0..count.div_ceil(8) {
         let mut amounts = [&[0.0; 8]; P];
         for p in 0..P {
             amounts[p] = &modes[p][k].0;
         }
-        if shapes.len() == 8 * blocks {
-            // The fixed number of iterations avoids bounds checks.
+        let left = count - 8 * k;
+        if left >= 8 {
+            let mut own = shapes;
+            for d in 0..D {
+                // The fixed length avoids bounds checks.
+                own[d] = &shapes[d][8 * k * blocks..][..8 * blocks];
+            }
             for i in 0..8 {
-                add_mode(&mut sums, &shapes[i * blocks + block..][..B], amounts, i);
+                add_mode(&mut sums, own, i * blocks + block, amounts, i);
             }
         } else {
-            for (i, shape) in shapes.chunks_exact(blocks).enumerate() {
-                add_mode(&mut sums, &shape[block..][..B], amounts, i);
+            for i in 0..left {
+                add_mode(&mut sums, shapes, (8 * k + i) * blocks + block, amounts, i);
             }
         }
     }
     sums
 }
 
-/// Adds the displacements of one mode.
+/// Adds the displacements of one mode, whose shapes are at `place`.
 #[inline(always)]
-fn add_mode<L: Octet, const P: usize, const B: usize>(
-    sums: &mut [[L; B]; P],
-    shape: &[Eight],
+fn add_mode<L: Octet, const D: usize, const P: usize, const B: usize>(
+    sums: &mut [[[L; B]; P]; D],
+    shapes: [&[Eight]; D],
+    place: usize,
     amounts: [&[f64; 8]; P],
     i: usize,
 ) {
-    for p in 0..P {
-        let amount = L::splat(amounts[p][i]);
-        for b in 0..B {
-            sums[p][b] = sums[p][b] + L::load(&shape[b]) * amount;
+    for d in 0..D {
+        let shape = &shapes[d][place..][..B];
+        for p in 0..P {
+            let amount = L::splat(amounts[p][i]);
+            for b in 0..B {
+                sums[d][p][b] = sums[d][p][b] + L::load(&shape[b]) * amount;
+            }
         }
     }
 }
 
-/// Writes the displacements of all nodes, Σ over modes of shape times `modes[p]`, to the lanes of each point p.
+/// Writes the displacements of all nodes, Σ over modes of the shapes along each direction times `modes[p]`, to the lanes of
+/// each point p.
 #[inline(always)]
-pub(super) fn displace<L: Octet, const P: usize>(
-    shapes: &[Eight],
+pub(super) fn displace<L: Octet, const D: usize, const P: usize>(
+    shapes: [&[Eight]; D],
     blocks: usize,
     modes: [&[Eight]; P],
-    lanes: &mut [Eight],
+    mut lanes: [&mut [Eight]; D],
 ) {
     let mut block = 0;
     while block + 3 <= blocks {
-        put::<L, P, 3>(add_modes(shapes, blocks, block, modes), blocks, block, lanes);
+        put::<L, D, P, 3>(&add_modes(shapes, blocks, block, modes), blocks, block, &mut lanes);
         block += 3;
     }
     while block < blocks {
-        put::<L, P, 1>(add_modes(shapes, blocks, block, modes), blocks, block, lanes);
+        put::<L, D, P, 1>(&add_modes(shapes, blocks, block, modes), blocks, block, &mut lanes);
         block += 1;
     }
 }
 
 #[inline(always)]
-pub(super) fn put<L: Octet, const P: usize, const B: usize>(
-    sums: [[L; B]; P],
+pub(super) fn put<L: Octet, const D: usize, const P: usize, const B: usize>(
+    sums: &[[[L; B]; P]; D],
     blocks: usize,
     block: usize,
-    lanes: &mut [Eight],
+    lanes: &mut [&mut [Eight]; D],
 ) {
-    for (p, sums) in sums.into_iter().enumerate() {
-        for (b, sum) in sums.into_iter().enumerate() {
-            sum.store(&mut lanes[p * blocks + block + b]);
+    for d in 0..D {
+        for p in 0..P {
+            for b in 0..B {
+                sums[d][p][b].store(&mut lanes[d][p * blocks + block + b]);
+            }
         }
     }
 }

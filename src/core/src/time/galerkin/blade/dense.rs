@@ -69,15 +69,18 @@ impl OctetKernel for DenseOutput<'_> {
     #[inline(always)]
     fn run<L: Octet>(mut self) {
         self.find_modes::<L>();
-        let BladeTrial { start, sample, .. } = &mut *self.trial;
+        let BladeTrial { start, sample, path_moved, .. } = &mut *self.trial;
         if !self.pushes {
             sample.multipliers.fill(Eight::ZERO);
             sample.forces.iter_mut().for_each(|forces| forces.fill(Eight::ZERO));
         }
         sample.slopes.copy_from_slice(&start.slopes);
-        for along in [0, 1] {
-            displace::<L, 1>(&self.rows.shapes[along], self.rows.blocks, [&sample.modes[0]], &mut sample.moved[along]);
-            displace::<L, 1>(&self.rows.shapes[along], self.rows.blocks, [&sample.modes[1]], &mut sample.held[along]);
+        let ([closing, around], [closing_moved, around_moved]) = (&self.rows.shapes, path_moved);
+        let (blocks, modes) = (self.rows.blocks, [&sample.modes[0][..], &sample.modes[1]]);
+        displace::<L, 2, 2>([closing, around], blocks, modes, [closing_moved, around_moved]);
+        for (along, moved) in [&*closing_moved, &*around_moved].into_iter().enumerate() {
+            sample.moved[along].copy_from_slice(&moved[..blocks]);
+            sample.held[along].copy_from_slice(&moved[blocks..]);
         }
         let mut weights = [0.0; POINTS];
         if self.pushes {

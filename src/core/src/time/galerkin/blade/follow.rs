@@ -1,6 +1,6 @@
 //! Smallest gaps within a step, from cubics through the exact gaps and their rates at two times.
 
-use super::columns::{add_modes, put};
+use super::columns::{add_modes, displace, put};
 use super::level::BladeLevel;
 use super::minima::{FOLLOW_FRACTION, MAX_HALVINGS, MINIMUM_FRACTION, amplitude, fraction, relative_error};
 use super::rows::BladeRows;
@@ -87,7 +87,9 @@ impl<D: Fn(f64) -> (PointDrive, DriveRate)> OctetKernel for Follow<'_, D> {
         for of in [0, 1] {
             self.trial.path[0].modes[of].copy_from_slice(&self.trial.start.modes[of]);
         }
-        self.find_amplitudes::<L>();
+        if self.trial.unresolved.is_none() {
+            self.find_amplitudes::<L>();
+        }
         self.find_gaps::<L>(0, 0.0);
         self.advance::<L>(Part { ends: [0, 1], ..Part::default() }, 0);
         self.find_gaps::<L>(1, 1.0);
@@ -219,19 +221,21 @@ impl<D: Fn(f64) -> (PointDrive, DriveRate)> Follow<'_, D> {
         let Self { trial, rows, .. } = self;
         let BladeTrial { path, path_moved, followed, .. } = &mut **trial;
         let modes = &path[stored].modes;
+        let crowded = |block: usize| followed[block].count_ones() > FEW_PER_BLOCK;
+        let count = (0..rows.blocks).filter(|block| crowded(*block)).count();
+        let ([closing, around], [closing_moved, around_moved]) = (&rows.shapes, &mut *path_moved);
+        let (shapes, both_modes) = ([&closing[..], around], [&modes[0][..], &modes[1]]);
+        let mut moved = [&mut closing_moved[..], around_moved];
+        if count > 1 {
+            displace::<L, 2, 2>(shapes, rows.blocks, both_modes, moved);
+            return;
+        }
         for block in 0..rows.blocks {
-            let mut nodes = followed[block];
-            if nodes.count_ones() > FEW_PER_BLOCK {
-                for (shapes, moved) in rows.shapes.iter().zip(&mut *path_moved) {
-                    put::<L, 2, 1>(
-                        add_modes(shapes, rows.blocks, block, [&modes[0], &modes[1]]),
-                        rows.blocks,
-                        block,
-                        moved,
-                    );
-                }
+            if crowded(block) {
+                put::<L, 2, 2, 1>(&add_modes(shapes, rows.blocks, block, both_modes), rows.blocks, block, &mut moved);
                 continue;
             }
+            let mut nodes = followed[block];
             while nodes != 0 {
                 let i = nodes.trailing_zeros() as usize;
                 nodes &= nodes - 1;
@@ -249,7 +253,7 @@ impl<D: Fn(f64) -> (PointDrive, DriveRate)> Follow<'_, D> {
                     sums[3] = sums[3] + around * velocity;
                 }
                 for (place, sum) in sums.into_iter().enumerate() {
-                    path_moved[place / 2][(place % 2) * rows.blocks + block].0[i] = sum.total();
+                    moved[place / 2][(place % 2) * rows.blocks + block].0[i] = sum.total();
                 }
             }
         }
@@ -291,30 +295,37 @@ impl<D: Fn(f64) -> (PointDrive, DriveRate)> Follow<'_, D> {
     /// halved `halvings` times.
     #[inline(always)]
     fn advance<L: Octet>(&mut self, part: Part, halvings: usize) {
-        let Self { trial, halves, pushes, .. } = self;
+        match (self.pushes, self.level.basis.degree) {
+            (false, _) => self.advance_terms::<L, 2>(part, halvings),
+            (true, 2) => self.advance_terms::<L, { TERMS - 1 }>(part, halvings),
+            _ => self.advance_terms::<L, TERMS>(part, halvings),
+        }
+    }
+
+    /// Advances the modes under modal forces with `COUNT` − 2 coefficients.
+    #[inline(always)]
+    fn advance_terms<L: Octet, const COUNT: usize>(&mut self, part: Part, halvings: usize) {
+        let Self { trial, halves, .. } = self;
         let table = halves[part.halvings + halvings];
         let BladeTrial { path, modal_forces, .. } = &mut **trial;
-        let forced = if self.level.basis.degree == 2 { TERMS - 1 } else { TERMS };
         let [first, last] = part.ends;
         let (from, length) = (L::splat(part.span()[0]), L::splat(fraction(1, 1 << (part.halvings + halvings))));
         for k in 0..self.rows.mode_blocks {
             let mut terms = [L::zero(); TERMS];
             (terms[0], terms[1]) = (L::load(&path[first].modes[0][k]), L::load(&path[first].modes[1][k]));
-            let mut count = 2;
-            if *pushes {
+            if COUNT > 2 {
                 let (a, b) = (L::load(&modal_forces[0][k]), L::load(&modal_forces[1][k]));
                 let c = L::load(&modal_forces[2][k]);
                 terms[2] = a + from * (b + from * c);
                 terms[3] = length * (b + L::splat(2.0) * from * c);
                 terms[4] = length * length * c;
-                count = forced;
             }
-            for (target, table) in path[last].modes.iter_mut().zip(&table.end) {
+            for of in [0, 1] {
                 let mut end = L::zero();
-                for (term, row) in terms[..count].iter().zip(table) {
-                    end = end + L::load(&row[k]) * *term;
+                for term in 0..COUNT {
+                    end = end + L::load(&table.end[of][term][k]) * terms[term];
                 }
-                end.store(&mut target[k]);
+                end.store(&mut path[last].modes[of][k]);
             }
         }
     }

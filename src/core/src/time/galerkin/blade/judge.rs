@@ -3,11 +3,12 @@
 
 use super::columns::{sum, values_at_points};
 use super::solve::Attempt;
+use super::trial::BladeTrial;
 use crate::math::octet::{Eight, Octet};
 use crate::time::galerkin::basis::{POINTS, TimeBasis};
 use crate::time::galerkin::trial::{KINK, NEAR, TrialResult};
 
-impl Attempt<'_> {
+impl<const W: usize> Attempt<'_, W> {
     /// Computes the error, and finds contacts that open or close (switches) and near misses.
     #[inline(always)]
     pub(super) fn judge<L: Octet>(&mut self, result: &mut TrialResult) {
@@ -67,22 +68,45 @@ impl Attempt<'_> {
     /// Displacement error that the impulse errors cause (m).
     #[inline(always)]
     fn error<L: Octet>(&mut self) -> f64 {
-        let (rows, impulses) = (self.rows, &self.trial.impulses);
+        let (rows, BladeTrial { impulses, struck, .. }) = (self.rows, &mut *self.trial);
         let width = 2 * rows.blocks;
-        let mut square = 0.0;
+        struck.clear();
         for (along, node) in (0..2).flat_map(|along| (0..rows.nodes).map(move |node| (along, node))) {
             let impulse = impulses[along * rows.blocks + node / 8].0[node % 8];
             if impulse != 0.0 {
-                let form = &rows.error_form[(along * rows.nodes + node) * width..][..width];
-                let mut terms = L::zero();
-                for (a, b) in form.iter().zip(impulses) {
-                    terms = terms + L::load(a) * L::load(b);
-                }
-                square += impulse * terms.total();
+                struck.push(((along * rows.nodes + node) * width, impulse));
             }
         }
+        let mut terms = L::zero();
+        let mut first = 0;
+        while first + 3 <= width {
+            terms = terms + weigh::<L, 3>(&rows.error_form[first..], struck, &impulses[first..]);
+            first += 3;
+        }
+        while first < width {
+            terms = terms + weigh::<L, 1>(&rows.error_form[first..], struck, &impulses[first..]);
+            first += 1;
+        }
+        let square = terms.total();
         square.max(0.0).sqrt()
     }
+}
+
+/// Contribution of the first `B` blocks of impulse errors to the error form, of which the `struck` rows have an error.
+#[inline(always)]
+fn weigh<L: Octet, const B: usize>(form: &[Eight], struck: &[(usize, f64)], impulses: &[Eight]) -> L {
+    let mut sums = [L::zero(); B];
+    for (row, impulse) in struck {
+        let (entries, impulse) = (&form[*row..][..B], L::splat(*impulse));
+        for b in 0..B {
+            sums[b] = sums[b] + L::load(&entries[b]) * impulse;
+        }
+    }
+    let mut terms = L::zero();
+    for b in 0..B {
+        terms = terms + sums[b] * L::load(&impulses[b]);
+    }
+    terms
 }
 
 /// Returns whether a gap of the selected nodes comes near zero between the points, and the largest penetration there

@@ -48,23 +48,29 @@ impl OctetKernel for SelectFollowed<'_> {
     #[inline(always)]
     fn run<L: Octet>(self) -> bool {
         let Self { trial, rows, level, bars, tolerance, unresolved, ends } = self;
-        // The first round uses one bound for all nodes. The second uses a bound for each node, and drops most of the
-        // nodes.
+        // A coarse test with one bound for all nodes excludes most steps.
         let bounds = &mut trial.path_moved[0];
-        bounds.fill(Eight([unresolved; 8]));
-        for look in 0..2 {
-            let mut found = false;
-            for block in 0..rows.blocks {
-                let bar = L::load(&bars[block]);
-                trial.followed[block] = choose::<L>(trial, (rows, level, block), bar, tolerance, ends);
-                found |= trial.followed[block] != 0;
-            }
-            if !found || look == 1 {
-                return found;
-            }
-            displace::<L, 1>(&rows.magnitudes[0], rows.blocks, [&trial.mode_bounds], &mut trial.path_moved[0]);
+        bounds[..rows.blocks].fill(Eight([unresolved; 8]));
+        let mut candidates = 0;
+        for block in 0..rows.blocks {
+            trial.followed[block] = 0;
+            candidates |= GapsInStep::<L>::new(trial, rows, level, block).may_matter(L::load(&bars[block]));
         }
-        false
+        if candidates == 0 {
+            return false;
+        }
+        displace::<L, 1, 1>([&rows.magnitudes[0]], rows.blocks, [&trial.mode_bounds], [&mut trial.path_moved[0]]);
+        let mut found = 0;
+        for block in 0..rows.blocks {
+            let gaps = GapsInStep::<L>::new(trial, rows, level, block);
+            let bar = L::load(&bars[block]);
+            let candidates = gaps.may_matter(bar);
+            if candidates != 0 {
+                trial.followed[block] = candidates & gaps.choose(level, bar, tolerance, ends);
+                found |= trial.followed[block];
+            }
+        }
+        found != 0
     }
 }
 
@@ -102,60 +108,90 @@ impl OctetKernel for RecordPoints<'_> {
     }
 }
 
-/// Selects the nodes of a block that may come closer between the points of the step.
-#[inline(always)]
-fn choose<L: Octet>(
-    trial: &BladeTrial,
-    (rows, level, block): (&BladeRows, &BladeLevel, usize),
-    bar: L,
-    tolerance: f64,
-    range: [f64; 2],
-) -> u8 {
-    let (basis, count) = (&level.basis, level.points() + 1);
-    let slopes = both(|end| basis.slopes_at(range[end]));
-    let mut gaps = [L::zero(); POINTS];
-    gaps[0] = L::load(&trial.start.gaps[block]);
-    let mut pushes = L::zero().less(L::load(&trial.start.multipliers[block]));
-    let (mut low, mut ends) = (gaps[0], [gaps[0]; 2]);
-    let mut steepest = L::load(&trial.start.sigma[block]).abs();
-    for point in 1..count {
-        let lane = (point - 1) * rows.blocks + block;
-        gaps[point] = L::load(&trial.gaps[lane]);
-        pushes |= L::zero().less(L::load(&trial.multipliers[lane]));
-        low = low.min(gaps[point]);
-        ends[1] = gaps[point];
-        steepest = steepest.max(L::load(&trial.sigma[lane]).abs());
-    }
-    let unresolved = L::load(&trial.path_moved[0][block]);
-    let left = sum(&gaps[..count], &basis.left_out).abs() * L::splat(NEAR) + unresolved;
-    let mut within = L::splat(f64::INFINITY);
-    for (place, weights) in basis.between.iter().enumerate() {
-        let theta = (fraction(place, 1) + 0.5) / fraction(PLACES, 1);
-        if (range[0]..=range[1]).contains(&theta) {
-            within = within.min(sum(&gaps[..count], weights));
+/// Gaps of a block of nodes at the start and the points of a step.
+struct GapsInStep<L> {
+    /// F (m), and its smallest and largest value.
+    gaps: [L; POINTS],
+    low: L,
+    high: L,
+    /// M and the largest |σ|.
+    steepness: L,
+    steepest: L,
+    /// Bound of what the polynomial through `gaps` misses between the points (m).
+    left: L,
+    /// Nodes that stay open.
+    open: u8,
+}
+
+/// Largest excursion of the polynomial through values at the points beyond these values, relative to their range. The
+/// largest possible one is 1/8 for degree 2 and 1/4 for degree 3.
+const EXCURSION: f64 = 0.25;
+
+impl<L: Octet> GapsInStep<L> {
+    /// Reads the gaps of a block. Its interpolation errors must be in `path_moved`.
+    #[inline(always)]
+    fn new(trial: &BladeTrial, rows: &BladeRows, level: &BladeLevel, block: usize) -> Self {
+        let count = level.points() + 1;
+        let mut gaps = [L::zero(); POINTS];
+        gaps[0] = L::load(&trial.start.gaps[block]);
+        let mut pushes = L::zero().less(L::load(&trial.start.multipliers[block]));
+        let (mut low, mut high) = (gaps[0], gaps[0]);
+        let mut steepest = L::load(&trial.start.sigma[block]).abs();
+        for point in 1..count {
+            let lane = (point - 1) * rows.blocks + block;
+            gaps[point] = L::load(&trial.gaps[lane]);
+            pushes |= L::zero().less(L::load(&trial.multipliers[lane]));
+            (low, high) = (low.min(gaps[point]), high.max(gaps[point]));
+            steepest = steepest.max(L::load(&trial.sigma[lane]).abs());
         }
+        let unresolved = L::load(&trial.path_moved[0][block]);
+        let left = sum(&gaps[..count], &level.basis.left_out).abs() * L::splat(NEAR) + unresolved;
+        let (steepness, open) = (L::load(&rows.steepness[block]), !pushes & rows.valid(block));
+        Self { gaps, low, high, steepness, steepest, left, open }
     }
-    if range[0] > 0.0 || range[1] < 1.0 {
-        (low, ends) = (L::splat(f64::INFINITY), [L::zero(); 2]);
-        for (end, theta) in ends.iter_mut().zip(range) {
-            *end = sum(&gaps[..count], &basis.weights_at(theta));
-            low = low.min(*end);
-        }
-        for (gap, point) in gaps[..count].iter().zip(basis.points) {
-            if (range[0]..=range[1]).contains(&point) {
-                low = low.min(*gap);
+
+    /// Returns the nodes whose smallest gap may be below `bar` (m).
+    #[inline(always)]
+    fn may_matter(&self, bar: L) -> u8 {
+        let least = self.low - (self.high - self.low) * L::splat(EXCURSION) - self.left;
+        least.less(bar.max(L::zero()) * (self.steepness + self.steepest)) & self.open
+    }
+
+    /// Selects the nodes that may come closer between the points of the step, and below `bar` (m).
+    #[inline(always)]
+    fn choose(&self, level: &BladeLevel, bar: L, tolerance: f64, range: [f64; 2]) -> u8 {
+        let (basis, count) = (&level.basis, level.points() + 1);
+        let slopes = both(|end| basis.slopes_at(range[end]));
+        let gaps = &self.gaps[..count];
+        let mut within = L::splat(f64::INFINITY);
+        for (place, weights) in basis.between.iter().enumerate() {
+            let theta = (fraction(place, 1) + 0.5) / fraction(PLACES, 1);
+            if (range[0]..=range[1]).contains(&theta) {
+                within = within.min(sum(gaps, weights));
             }
         }
+        let (mut low, mut ends) = (self.low, [gaps[0], gaps[count - 1]]);
+        if range[0] > 0.0 || range[1] < 1.0 {
+            (low, ends) = (L::splat(f64::INFINITY), [L::zero(); 2]);
+            for (end, theta) in ends.iter_mut().zip(range) {
+                *end = sum(gaps, &basis.weights_at(theta));
+                low = low.min(*end);
+            }
+            for (gap, point) in gaps.iter().zip(basis.points) {
+                if (range[0]..=range[1]).contains(&point) {
+                    low = low.min(*gap);
+                }
+            }
+        }
+        let deeper = low - within;
+        let at_end = ends[1].less(ends[0]);
+        let slope = L::select(at_end, sum(gaps, &slopes[1]), sum(gaps, &slopes[0])).abs();
+        let falls = !L::zero().less(deeper) & (self.left * L::splat(FALLING)).less(slope);
+        let comes = L::splat(FOLLOW_FRACTION * tolerance).less(deeper.max(L::zero()) + self.left);
+        let size = (self.steepness * self.steepness + self.steepest * self.steepest).sqrt();
+        let matters = ((low.min(within) - self.left) / size).less(bar);
+        comes & matters & !falls & self.open
     }
-    let deeper = low - within;
-    let at_end = ends[1].less(ends[0]);
-    let slope = L::select(at_end, sum(&gaps[..count], &slopes[1]), sum(&gaps[..count], &slopes[0])).abs();
-    let falls = !L::zero().less(deeper) & (left * L::splat(FALLING)).less(slope);
-    let comes = L::splat(FOLLOW_FRACTION * tolerance).less(deeper.max(L::zero()) + left);
-    let steepness = L::load(&rows.steepness[block]);
-    let size = (steepness * steepness + steepest * steepest).sqrt();
-    let matters = ((low.min(within) - left) / size).less(bar);
-    comes & matters & !falls & !pushes & rows.valid(block)
 }
 
 /// Bounds the interpolation error of the motion of all modes between points at equal distances: returns the largest
@@ -174,13 +210,15 @@ impl OctetKernel for FindInterpolationError<'_> {
     #[inline(always)]
     fn run<L: Octet>(self) -> f64 {
         let Self { trial, rows, length, pushes } = self;
-        let BladeTrial { start, modal_forces, mode_bounds, .. } = trial;
+        let BladeTrial { start, modal_forces, mode_bounds, amplitudes, .. } = trial;
         let mut error = L::zero();
         for (k, largest) in rows.largest.iter().enumerate() {
             let relative = relative_error(L::load(&rows.rates[3][k]) * L::splat(length));
-            let mode_error = amplitude::<L>(rows, start, modal_forces, k, pushes) * relative;
+            let amplitude = amplitude::<L>(rows, start, modal_forces, k, pushes);
+            let (mode_error, largest) = (amplitude * relative, L::load(largest));
             mode_error.store(&mut mode_bounds[k]);
-            error = error + L::load(largest) * mode_error;
+            (largest * amplitude).store(&mut amplitudes[k]);
+            error = error + largest * mode_error;
         }
         error.total()
     }

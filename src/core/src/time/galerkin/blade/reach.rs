@@ -25,9 +25,8 @@ impl OctetKernel for FindReach<'_> {
             let turned = (v + L::load(&rates[k]) * q) * L::load(&per_frequency[k]);
             (q * q + turned * turned).sqrt().store(amplitude);
         }
-        for (magnitudes, reach) in rows.magnitudes.iter().zip(reach) {
-            displace::<L, 1>(magnitudes, rows.blocks, [amplitudes], reach);
-        }
+        let ([closing, around], [closing_reach, around_reach]) = (&rows.magnitudes, reach);
+        displace::<L, 2, 1>([closing, around], rows.blocks, [amplitudes], [closing_reach, around_reach]);
     }
 }
 

@@ -17,7 +17,7 @@ const PASSES: usize = 6;
 const ROUNDING: f64 = 1e-13;
 
 /// Tries a step.
-pub(super) struct Attempt<'a> {
+pub(super) struct Attempt<'a, const W: usize> {
     pub trial: &'a mut BladeTrial,
     pub rows: &'a BladeRows,
     pub level: &'a BladeLevel,
@@ -26,7 +26,7 @@ pub(super) struct Attempt<'a> {
     pub precision: f64,
 }
 
-impl OctetKernel for Attempt<'_> {
+impl<const W: usize> OctetKernel for Attempt<'_, W> {
     type Output = TrialResult;
     #[inline(always)]
     fn run<L: Octet>(mut self) -> TrialResult {
@@ -50,7 +50,18 @@ impl OctetKernel for Attempt<'_> {
     }
 }
 
-impl Attempt<'_> {
+/// Number of blocks of lanes.
+#[inline(always)]
+fn width<const W: usize>(level: &BladeLevel) -> usize {
+    if W > 0 { W } else { level.blocks }
+}
+
+impl<const W: usize> Attempt<'_, W> {
+    #[inline(always)]
+    fn width(&self) -> usize {
+        width::<W>(self.level)
+    }
+
     /// Computes the displacements at the points without forces after the start of the step.
     #[inline(always)]
     fn move_freely<L: Octet, const P: usize>(&mut self) {
@@ -63,9 +74,10 @@ impl Attempt<'_> {
             }
         }
         let modes: [&[Eight]; P] = std::array::from_fn(|p| &modal[p][..]);
-        for along in [0, 1] {
-            displace::<L, P>(&rows.shapes[along], rows.blocks, modes, &mut moved[along][..level.blocks]);
-        }
+        let [closing, around] = moved;
+        let width = width::<W>(level);
+        let (closing, around) = (&mut closing[..width], &mut around[..width]);
+        displace::<L, 2, P>([&rows.shapes[0], &rows.shapes[1]], rows.blocks, modes, [closing, around]);
         held.copy_from_slice(&start.held[1]);
         if level.kind == ForceInterpolation::Constant {
             // The force at the start does not persist into the step.
@@ -74,9 +86,6 @@ impl Attempt<'_> {
         if !start.pushed || level.kind == ForceInterpolation::Constant {
             return;
         }
-        let width = level.blocks;
-        let [closing, around] = moved;
-        let (closing, around) = (&mut closing[..width], &mut around[..width]);
         for node in 0..rows.nodes {
             if start.multipliers[node / 8].0[node % 8] > 0.0 {
                 let [a, b] = both(|along| L::splat(start.forces[along][node / 8].0[node % 8]));
@@ -97,7 +106,7 @@ impl Attempt<'_> {
     fn find_open_gaps<L: Octet>(&mut self) -> bool {
         let mut penetrates = false;
         let Self { trial, rows, faced, level, .. } = &mut *self;
-        for Place { lane, point, block } in level.places(rows) {
+        for Place { lane, point, block } in level.places::<W>(rows) {
             let valid = rows.valid(lane);
             let drive = &faced.drives[point + 1];
             let (per_radius, held) = (L::load(&rows.per_radius[block]), L::load(&trial.held[block]));
@@ -126,7 +135,7 @@ impl Attempt<'_> {
     #[inline(always)]
     fn rest<L: Octet>(&mut self) {
         let Self { trial, rows, level, .. } = self;
-        for Place { lane, block, .. } in level.places(rows) {
+        for Place { lane, block, .. } in level.places::<W>(rows) {
             let held = L::load(&trial.held[block]);
             (L::load(&trial.open[lane]) + L::load(&trial.bend[lane]) * held * held).store(&mut trial.gaps[lane]);
         }
@@ -147,7 +156,7 @@ impl Attempt<'_> {
         if !trial.start.pushed || level.kind == ForceInterpolation::Constant {
             return;
         }
-        for Place { lane, point, block } in level.places(rows) {
+        for Place { lane, point, block } in level.places::<W>(rows) {
             let (now, slope) = (L::load(&trial.start.multipliers[block]), L::load(&trial.start.slopes[block]));
             let closed = L::zero().less(now);
             let expected = (now + slope * L::splat(level.basis.points[point + 1] * level.step)).max(L::zero());
@@ -161,9 +170,9 @@ impl Attempt<'_> {
     #[inline(always)]
     fn list_members<L: Octet>(&mut self) {
         let Self { trial, rows, level, .. } = &mut *self;
-        let width = level.blocks;
+        let width = width::<W>(level);
         trial.members.clear();
-        for Place { lane, point, block } in level.places(rows) {
+        for Place { lane, point, block } in level.places::<W>(rows) {
             let mut mask = trial.active[lane];
             while mask != 0 {
                 let at = mask.trailing_zeros() as usize;
@@ -195,7 +204,7 @@ impl Attempt<'_> {
     /// any.
     #[inline(always)]
     fn add_open<L: Octet>(&mut self) -> bool {
-        let width = self.level.blocks;
+        let width = self.width();
         let BladeTrial { open, closing, members, multipliers, gaps, later, active, .. } = &mut *self.trial;
         if later.iter().all(|mask| *mask == 0) {
             return false;
@@ -215,7 +224,7 @@ impl Attempt<'_> {
     /// Solves the contact problem of the members, and computes F of all lanes.
     #[inline(always)]
     fn solve_members<L: Octet>(&mut self) {
-        let width = self.level.blocks;
+        let width = self.width();
         let BladeTrial { open, closing, members, multipliers, gaps, matrix, .. } = &mut *self.trial;
         let count = members.len();
         let blocks = Eight::blocks(count);
@@ -252,7 +261,7 @@ impl Attempt<'_> {
     /// the curved surface. Returns false if no solution is found.
     #[inline(always)]
     fn solve<L: Octet>(&mut self, factorisations: &mut usize) -> bool {
-        let width = self.level.blocks;
+        let width = self.width();
         let most = 40 + 4 * 8 * width;
         self.trial.curved.fill(Eight::ZERO);
         let (mut pass, mut solutions) = (0, 0);
@@ -271,8 +280,11 @@ impl Attempt<'_> {
             pass += 1;
             if !is_curved {
                 self.finish::<L>();
-                let gaps = &self.trial.gaps[..width];
-                return gaps.iter().all(|block| block.0.iter().all(|gap| gap.is_finite()));
+                let mut finite = 0xff;
+                for gaps in &self.trial.gaps[..width] {
+                    finite &= L::load(gaps).abs().less(L::splat(f64::INFINITY));
+                }
+                return finite == 0xff;
             }
             if pass == PASSES {
                 return false;
@@ -285,14 +297,14 @@ impl Attempt<'_> {
     #[inline(always)]
     fn change_members<L: Octet>(&mut self, solutions: usize) -> bool {
         let mut largest = [L::zero(); 2];
-        for lane in 0..self.level.blocks {
+        for lane in 0..self.width() {
             largest[0] = largest[0].max(L::load(&self.trial.multipliers[lane]).abs());
             let (open, active) = (L::load(&self.trial.open[lane]), self.trial.active[lane]);
             largest[1] = largest[1].max(L::select(active, open.abs(), L::zero()));
         }
-        let [force, gap] = largest.map(|one| one.array().into_iter().fold(0.0_f64, f64::max) * ROUNDING);
+        let [force, gap] = both(|of| largest[of].array().into_iter().fold(0.0_f64, f64::max) * ROUNDING);
         let mut changed = false;
-        for lane in 0..self.level.blocks {
+        for lane in 0..self.width() {
             let valid = self.rows.valid(lane);
             let BladeTrial { multipliers, gaps, active, .. } = &mut *self.trial;
             let pulls = active[lane] & L::load(&multipliers[lane]).less(L::splat(-force));
@@ -315,13 +327,13 @@ impl Attempt<'_> {
     /// than the precision from the assumed contribution, replaces that and returns true.
     #[inline(always)]
     fn find_curvature<L: Octet>(&mut self) -> bool {
-        let (width, precision) = (self.level.blocks, L::splat(self.precision));
+        let (width, precision) = (self.width(), L::splat(self.precision));
         let BladeTrial { around, members, multipliers, gaps, held, bend, curved, open, active, turned, .. } =
             &mut *self.trial;
         let amount = |place: usize| multipliers[members[place] / 8].0[members[place] % 8];
         combine::<L>(None, around, members, amount, &mut turned[..width]);
         let mut over = 0;
-        for Place { lane, block, .. } in self.level.places(self.rows) {
+        for Place { lane, block, .. } in self.level.places::<W>(self.rows) {
             let by = L::load(&turned[lane]) - L::load(&held[block]);
             let change = L::load(&bend[lane]) * by * by - L::load(&curved[lane]);
             let valid = self.rows.valid(lane);
@@ -331,7 +343,7 @@ impl Attempt<'_> {
         if over == 0 {
             return false;
         }
-        for Place { lane, block, .. } in self.level.places(self.rows) {
+        for Place { lane, block, .. } in self.level.places::<W>(self.rows) {
             let by = L::load(&turned[lane]) - L::load(&held[block]);
             let now = L::load(&bend[lane]) * by * by;
             let change = now - L::load(&curved[lane]);
@@ -348,7 +360,7 @@ impl Attempt<'_> {
             clear, sigma, bend, curved, gaps, moved, multipliers, directions, forces, held, turned, ..
         } = &mut *self.trial;
         let [closing, around] = moved;
-        for Place { lane, block, .. } in self.level.places(self.rows) {
+        for Place { lane, block, .. } in self.level.places::<W>(self.rows) {
             let turned = L::load(&turned[lane]);
             let by = turned - L::load(&held[block]);
             let straight = L::load(&gaps[lane]) - L::load(&curved[lane]);

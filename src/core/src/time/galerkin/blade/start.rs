@@ -23,10 +23,8 @@ impl OctetKernel for FindStart<'_> {
         let BladeTrial { start, angles, .. } = trial;
         let [q, v] = &start.modes;
         start.held.iter_mut().for_each(|held| held.fill(Eight::ZERO));
-        start.pushed = false;
-        for node in 0..rows.nodes {
+        for node in 0..if start.pushed { rows.nodes } else { 0 } {
             if start.multipliers[node / 8].0[node % 8] > 0.0 {
-                start.pushed = true;
                 let force = both(|along| L::splat(start.forces[along][node / 8].0[node % 8]));
                 for block in 0..rows.blocks {
                     let moved = |seen: usize| {
@@ -51,12 +49,11 @@ impl OctetKernel for FindStart<'_> {
         let spin = drive.speed;
         let reverses = rows.largest_around * square.sqrt() >= spin.abs() * rows.smallest_radius;
         if reverses {
-            displace::<L, 1>(&rows.shapes[1], rows.blocks, [v], &mut start.friction);
+            displace::<L, 1, 1>([&rows.shapes[1]], rows.blocks, [v], [&mut start.friction]);
         }
         if !known {
-            for along in [0, 1] {
-                displace::<L, 1>(&rows.shapes[along], rows.blocks, [q], &mut start.moved[along]);
-            }
+            let ([closing, around], [closings, arounds]) = (&rows.shapes, &mut start.moved);
+            displace::<L, 2, 1>([closing, around], rows.blocks, [q], [closings, arounds]);
         }
         for block in 0..rows.blocks {
             let per_radius = L::load(&rows.per_radius[block]);

@@ -12,7 +12,7 @@ use super::surface::FacedSurface;
 use crate::geometry::layout::Layout;
 use crate::math::octet::Eight;
 use crate::math::simd::InstructionSet;
-use crate::math::vector::{Vector3, set_vector3_at, vector3_at};
+use crate::math::vector::{set_vector3_at, vector3_at};
 use crate::time::galerkin::basis::MOST;
 use crate::time::galerkin::state::SectorState;
 use crate::time::galerkin::trial::TrialResult;
@@ -124,6 +124,8 @@ pub(crate) struct BladeTrial {
     pub(super) amplitudes: Vec<Eight>,
     /// Closing and circumferential displacements (m), each followed by the velocities (m/s).
     pub(super) path_moved: [Vec<Eight>; 2],
+    /// Rows of the error form (index of their first block) that have an impulse error, and this error (N·s).
+    pub(super) struck: Vec<(usize, f64)>,
     /// Impulse errors along the closing displacement, then along the circumferential one (N·s).
     pub(super) impulses: Vec<Eight>,
     /// True if a contact force acts in the step.
@@ -180,6 +182,7 @@ impl BladeTrial {
             unresolved: None,
             forces_known: false,
             path_moved: [0, 1].map(|_| vec![Eight::ZERO; 2 * nodes]),
+            struck: Vec::with_capacity(2 * rows.nodes),
             impulses: vec![Eight::ZERO; 2 * nodes],
             pushes: false,
             reach: [of_nodes(), of_nodes()],
@@ -196,6 +199,7 @@ impl BladeTrial {
 
     /// Reads the state of a sector at the start of a span.
     pub fn read(&mut self, rows: &BladeRows, state: &SectorState) {
+        self.unresolved = None;
         let start = &mut self.start;
         Eight::spread(state.position.iter().copied(), 0.0, &mut start.modes[0]);
         Eight::spread(state.velocity.iter().copied(), 0.0, &mut start.modes[1]);
@@ -220,20 +224,22 @@ impl BladeTrial {
         };
         flat(&contacts.modes[0], &mut state.position);
         flat(&contacts.modes[1], &mut state.velocity);
+        state.gaps_known = true;
+        let StartContacts { multipliers, sigma, gaps, forces: [closing, around], .. } = contacts;
+        [&mut state.forces, &mut state.normals, &mut state.multipliers].into_iter().for_each(|values| values.fill(0.0));
         for node in 0..rows.nodes {
             let (block, i) = (node / 8, node % 8);
-            let StartContacts { multipliers, sigma, gaps, forces: [closing, around], .. } = contacts;
-            let [multiplier, sigma, gap, closing, around] =
-                [multipliers, sigma, gaps, closing, around].map(|values| values[block].0[i]);
-            let steepness = rows.steepness[block].0[i];
+            let of = |values: &[Eight]| values[block].0[i];
+            let (multiplier, sigma, steepness) = (of(multipliers), of(sigma), of(&rows.steepness));
             let length = (steepness * steepness + sigma * sigma).sqrt();
-            set_vector3_at(&mut state.forces, node, rows.in_space(node, Vector2::new(closing, around)));
-            let normal = rows.in_space(node, Vector2::new(1.0, sigma)) / length;
-            set_vector3_at(&mut state.normals, node, if multiplier > 0.0 { normal } else { Vector3::zeros() });
-            state.multipliers[node] = multiplier * length;
-            state.gaps[node] = gap / length;
+            state.gaps[node] = of(gaps) / length;
+            if multiplier > 0.0 {
+                let force = Vector2::new(of(closing), of(around));
+                set_vector3_at(&mut state.forces, node, rows.in_space(node, force));
+                set_vector3_at(&mut state.normals, node, rows.in_space(node, Vector2::new(1.0, sigma)) / length);
+                state.multipliers[node] = multiplier * length;
+            }
         }
-        state.gaps_known = true;
     }
 
     /// Computes the quantities at the start of a step, including displacements and gaps unless they are known.
@@ -250,7 +256,10 @@ impl BladeTrial {
         precision: f64,
     ) -> TrialResult {
         (self.forces_known, self.unresolved) = (false, None);
-        self.instructions.run_octets(Attempt { trial: self, rows, level, faced, precision })
+        match level.blocks {
+            6 => self.instructions.run_octets(Attempt::<6> { trial: self, rows, level, faced, precision }),
+            _ => self.instructions.run_octets(Attempt::<0> { trial: self, rows, level, faced, precision }),
+        }
     }
 
     /// Computes the modal forces of the tried step.
@@ -278,6 +287,7 @@ impl BladeTrial {
 
     /// Advances the modes over the tried step, or over a step without forces, and returns the damping loss (J).
     pub fn advance(&mut self, level: &BladeLevel, pushes: bool) -> f64 {
+        self.unresolved = None;
         self.instructions.run_octets(Advance { trial: self, level, pushes })
     }
 
