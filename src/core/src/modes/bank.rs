@@ -165,6 +165,8 @@ pub struct ModalBank {
     disk: Option<Disk>,
     scheme: Scheme,
     step: f64,
+    /// True if the damping ratios have changed since the coefficients were computed.
+    is_outdated: bool,
     state: BankState,
     /// Modal loads of the current step.
     modal_load: Vec<f64>,
@@ -239,6 +241,7 @@ impl ModalBank {
             columns: FlexibilityColumns::new(if options.uses_modes { rows } else { 0 }),
             scheme: Scheme::default(),
             step: 0.0,
+            is_outdated: true,
             state: BankState {
                 position: vec![0.0; state_len],
                 increment: vec![0.0; state_len],

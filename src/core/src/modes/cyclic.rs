@@ -119,10 +119,10 @@ impl CyclicModel {
     }
 
     /// Sets one damping ratio for all modes; the first modes of each nodal diameter have their `own`.
-    pub(crate) fn set_damping_ratio(&mut self, damping_ratio: f64, own: &[f64]) {
-        for diameter in &mut self.diameters {
-            fill_ratios(&mut diameter.damping_ratios, damping_ratio, own, 1);
-        }
+    /// Returns whether any has changed.
+    pub(crate) fn set_damping_ratio(&mut self, damping_ratio: f64, own: &[f64]) -> bool {
+        let changes = self.diameters.iter_mut().map(|of| fill_ratios(&mut of.damping_ratios, damping_ratio, own, 1));
+        changes.fold(false, |any, has_changed| any | has_changed)
     }
 
     /// Largest undamped angular frequency (rad/s).

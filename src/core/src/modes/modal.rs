@@ -117,11 +117,15 @@ impl ModalSpin {
 }
 
 /// Sets one ratio for all modes; the first modes have their `own`. Each value is repeated `copies` times in `ratios`.
-pub(crate) fn fill_ratios(ratios: &mut [f64], ratio: f64, own: &[f64], copies: usize) {
-    ratios.fill(ratio);
-    for (ratios, own) in ratios.chunks_mut(copies).zip(own) {
-        ratios.fill(*own);
+/// Returns whether a ratio has changed.
+pub(crate) fn fill_ratios(ratios: &mut [f64], ratio: f64, own: &[f64], copies: usize) -> bool {
+    let mut has_changed = false;
+    for (mode, target) in ratios.iter_mut().enumerate() {
+        let ratio = own.get(mode / copies).copied().unwrap_or(ratio);
+        has_changed |= target.to_bits() != ratio.to_bits();
+        *target = ratio;
     }
+    has_changed
 }
 
 impl<T: Scalar> ModalModel<T> {

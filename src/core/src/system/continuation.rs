@@ -230,13 +230,13 @@ impl System {
         all.then(|| gaps.iter().filter(|gap| gap.is_infinite()).count())
     }
 
-    /// Restores a saved state; coefficients are recomputed from the saved step size.
+    /// Restores a saved state; coefficients are those of the saved step size.
     pub fn restore(&mut self, reader: &mut StateReader) {
         let mut step = 0.0_f64;
         step.restore(reader);
         for structure in &mut self.structures {
             if step > 0.0 {
-                structure.modes.set_step(self.settings.scheme, step);
+                structure.modes.prepare_restore(self.settings.scheme, step);
             }
             structure.restore(reader);
         }

@@ -312,6 +312,44 @@ fn a_thousand_resets_give_identical_bits() {
     }
 }
 
+/// Tables are kept on restore if they are valid. Here they belong to another damping, speed or internal step.
+#[test]
+fn restored_state_replaces_tables_of_other_parameters() {
+    for (name, scene) in scenes() {
+        let length = scene.settings.experiment.communication_step;
+        let mut simulation = started(&scene);
+        if let Some(speed) = simulation.table().find("speed").map(|row| row.reference) {
+            simulation.set_real(speed, 1.02 * simulation.real(speed).unwrap()).unwrap();
+        }
+        run(&mut simulation, 2, length);
+        let state = saved(&simulation);
+        run(&mut simulation, 2, length);
+        let expected = saved(&simulation);
+        let changes = [("damping_ratio", 1.5), ("speed", 0.9)].into_iter();
+        // The last communication step has internal steps of the same length, or shorter ones.
+        for ((variable, factor), last) in changes.flat_map(|change| [1.0, 0.37].map(|last| (change, last))) {
+            let Some(reference) = simulation.table().find(variable).map(|row| row.reference) else { continue };
+            let mut other = Simulation::new(&scene).unwrap();
+            let value = f64::max(factor * other.real(reference).unwrap(), 1e-3);
+            let is_input = variable == "speed";
+            if is_input {
+                other.initialise(0.0).unwrap();
+            }
+            other.set_real(reference, value).unwrap();
+            if !is_input {
+                other.initialise(0.0).unwrap();
+            }
+            run(&mut other, 1, length);
+            go(&mut other, last * length);
+            for _ in 0..2 {
+                other.restore_state(&state).unwrap();
+                run(&mut other, 2, length);
+                assert!(saved(&other) == expected, "{name}, `{variable}`");
+            }
+        }
+    }
+}
+
 /// The search for closest points begins at the saved nodes, not where trials of an earlier span ended.
 #[test]
 fn adaptive_steps_continue_from_states_with_the_same_bits() {

@@ -10,7 +10,7 @@ impl ModalBank {
     pub fn set_step(&mut self, scheme: Scheme, step: f64) {
         // The contact forces of the last step act on a disk with the coefficients for which they were computed.
         self.finish();
-        (self.scheme, self.step) = (scheme, step);
+        (self.scheme, self.step, self.is_outdated) = (scheme, step, false);
         for set in 0..self.sets {
             for mode in 0..self.modes {
                 let (Some(of), index) = (self.oscillator(mode, set), set * self.modes + mode) else { continue };
@@ -25,6 +25,13 @@ impl ModalBank {
             disk.fill(&self.coefficients);
         }
         self.refresh_coupling();
+    }
+
+    /// Sets the step size, like [`ModalBank::set_step`], before a state is restored. Coefficients that are valid are kept.
+    pub(crate) fn prepare_restore(&mut self, scheme: Scheme, step: f64) {
+        if self.is_outdated || self.scheme != scheme || self.step.to_bits() != step.to_bits() {
+            self.set_step(scheme, step);
+        }
     }
 
     pub(super) fn spread_coefficients(&mut self) {
@@ -111,9 +118,9 @@ impl ModalBank {
     /// Sets the modal damping ratio of all modes; the first modes of a sector or nodal diameter get the ratios `own`
     /// (takes effect with the next [`ModalBank::set_step`]).
     pub(crate) fn set_damping_ratio(&mut self, damping_ratio: f64, own: &[f64]) {
-        fill_ratios(&mut self.model.damping_ratios, damping_ratio, own, 1);
+        self.is_outdated |= fill_ratios(&mut self.model.damping_ratios, damping_ratio, own, 1);
         if let Some(disk) = &mut self.disk {
-            disk.model.set_damping_ratio(damping_ratio, own);
+            self.is_outdated |= disk.model.set_damping_ratio(damping_ratio, own);
         }
     }
 

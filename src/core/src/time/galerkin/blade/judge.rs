@@ -8,7 +8,7 @@ use crate::math::octet::{Eight, Octet};
 use crate::time::galerkin::basis::{POINTS, TimeBasis};
 use crate::time::galerkin::trial::{KINK, NEAR, TrialResult};
 
-impl<const W: usize> Attempt<'_, W> {
+impl Attempt<'_> {
     /// Computes the error, and finds contacts that open or close (switches) and near misses.
     #[inline(always)]
     pub(super) fn judge<L: Octet>(&mut self, result: &mut TrialResult) {

@@ -86,10 +86,10 @@ impl BladeLevel {
 
     /// Returns the places of all blocks of lanes, in order.
     #[inline(always)]
-    pub(super) fn places<const W: usize>(&self, rows: &BladeRows) -> impl Iterator<Item = Place> + use<W> {
+    pub(super) fn places(&self, rows: &BladeRows) -> impl Iterator<Item = Place> + use<> {
         let blocks = rows.blocks;
         let (mut point, mut block) = (0, 0);
-        (0..if W > 0 { W } else { self.blocks }).map(move |lane| {
+        (0..self.blocks).map(move |lane| {
             let place = Place { lane, point, block };
             block += 1;
             if block == blocks {

@@ -17,7 +17,7 @@ const PASSES: usize = 6;
 const ROUNDING: f64 = 1e-13;
 
 /// Tries a step.
-pub(super) struct Attempt<'a, const W: usize> {
+pub(super) struct Attempt<'a> {
     pub trial: &'a mut BladeTrial,
     pub rows: &'a BladeRows,
     pub level: &'a BladeLevel,
@@ -26,7 +26,7 @@ pub(super) struct Attempt<'a, const W: usize> {
     pub precision: f64,
 }
 
-impl<const W: usize> OctetKernel for Attempt<'_, W> {
+impl OctetKernel for Attempt<'_> {
     type Output = TrialResult;
     #[inline(always)]
     fn run<L: Octet>(mut self) -> TrialResult {
@@ -50,18 +50,7 @@ impl<const W: usize> OctetKernel for Attempt<'_, W> {
     }
 }
 
-/// Number of blocks of lanes.
-#[inline(always)]
-fn width<const W: usize>(level: &BladeLevel) -> usize {
-    if W > 0 { W } else { level.blocks }
-}
-
-impl<const W: usize> Attempt<'_, W> {
-    #[inline(always)]
-    fn width(&self) -> usize {
-        width::<W>(self.level)
-    }
-
+impl Attempt<'_> {
     /// Computes the displacements at the points without forces after the start of the step.
     #[inline(always)]
     fn move_freely<L: Octet, const P: usize>(&mut self) {
@@ -75,7 +64,7 @@ impl<const W: usize> Attempt<'_, W> {
         }
         let modes: [&[Eight]; P] = std::array::from_fn(|p| &modal[p][..]);
         let [closing, around] = moved;
-        let width = width::<W>(level);
+        let width = level.blocks;
         let (closing, around) = (&mut closing[..width], &mut around[..width]);
         displace::<L, 2, P>([&rows.shapes[0], &rows.shapes[1]], rows.blocks, modes, [closing, around]);
         held.copy_from_slice(&start.held[1]);
@@ -106,7 +95,7 @@ impl<const W: usize> Attempt<'_, W> {
     fn find_open_gaps<L: Octet>(&mut self) -> bool {
         let mut penetrates = false;
         let Self { trial, rows, faced, level, .. } = &mut *self;
-        for Place { lane, point, block } in level.places::<W>(rows) {
+        for Place { lane, point, block } in level.places(rows) {
             let valid = rows.valid(lane);
             let drive = &faced.drives[point + 1];
             let (per_radius, held) = (L::load(&rows.per_radius[block]), L::load(&trial.held[block]));
@@ -135,7 +124,7 @@ impl<const W: usize> Attempt<'_, W> {
     #[inline(always)]
     fn rest<L: Octet>(&mut self) {
         let Self { trial, rows, level, .. } = self;
-        for Place { lane, block, .. } in level.places::<W>(rows) {
+        for Place { lane, block, .. } in level.places(rows) {
             let held = L::load(&trial.held[block]);
             (L::load(&trial.open[lane]) + L::load(&trial.bend[lane]) * held * held).store(&mut trial.gaps[lane]);
         }
@@ -156,7 +145,7 @@ impl<const W: usize> Attempt<'_, W> {
         if !trial.start.pushed || level.kind == ForceInterpolation::Constant {
             return;
         }
-        for Place { lane, point, block } in level.places::<W>(rows) {
+        for Place { lane, point, block } in level.places(rows) {
             let (now, slope) = (L::load(&trial.start.multipliers[block]), L::load(&trial.start.slopes[block]));
             let closed = L::zero().less(now);
             let expected = (now + slope * L::splat(level.basis.points[point + 1] * level.step)).max(L::zero());
@@ -170,9 +159,9 @@ impl<const W: usize> Attempt<'_, W> {
     #[inline(always)]
     fn list_members<L: Octet>(&mut self) {
         let Self { trial, rows, level, .. } = &mut *self;
-        let width = width::<W>(level);
+        let width = level.blocks;
         trial.members.clear();
-        for Place { lane, point, block } in level.places::<W>(rows) {
+        for Place { lane, point, block } in level.places(rows) {
             let mut mask = trial.active[lane];
             while mask != 0 {
                 let at = mask.trailing_zeros() as usize;
@@ -204,7 +193,7 @@ impl<const W: usize> Attempt<'_, W> {
     /// any.
     #[inline(always)]
     fn add_open<L: Octet>(&mut self) -> bool {
-        let width = self.width();
+        let width = self.level.blocks;
         let BladeTrial { open, closing, members, multipliers, gaps, later, active, .. } = &mut *self.trial;
         if later.iter().all(|mask| *mask == 0) {
             return false;
@@ -224,7 +213,7 @@ impl<const W: usize> Attempt<'_, W> {
     /// Solves the contact problem of the members, and computes F of all lanes.
     #[inline(always)]
     fn solve_members<L: Octet>(&mut self) {
-        let width = self.width();
+        let width = self.level.blocks;
         let BladeTrial { open, closing, members, multipliers, gaps, matrix, .. } = &mut *self.trial;
         let count = members.len();
         let blocks = Eight::blocks(count);
@@ -261,7 +250,7 @@ impl<const W: usize> Attempt<'_, W> {
     /// the curved surface. Returns false if no solution is found.
     #[inline(always)]
     fn solve<L: Octet>(&mut self, factorisations: &mut usize) -> bool {
-        let width = self.width();
+        let width = self.level.blocks;
         let most = 40 + 4 * 8 * width;
         self.trial.curved.fill(Eight::ZERO);
         let (mut pass, mut solutions) = (0, 0);
@@ -297,14 +286,14 @@ impl<const W: usize> Attempt<'_, W> {
     #[inline(always)]
     fn change_members<L: Octet>(&mut self, solutions: usize) -> bool {
         let mut largest = [L::zero(); 2];
-        for lane in 0..self.width() {
+        for lane in 0..self.level.blocks {
             largest[0] = largest[0].max(L::load(&self.trial.multipliers[lane]).abs());
             let (open, active) = (L::load(&self.trial.open[lane]), self.trial.active[lane]);
             largest[1] = largest[1].max(L::select(active, open.abs(), L::zero()));
         }
         let [force, gap] = both(|of| largest[of].array().into_iter().fold(0.0_f64, f64::max) * ROUNDING);
         let mut changed = false;
-        for lane in 0..self.width() {
+        for lane in 0..self.level.blocks {
             let valid = self.rows.valid(lane);
             let BladeTrial { multipliers, gaps, active, .. } = &mut *self.trial;
             let pulls = active[lane] & L::load(&multipliers[lane]).less(L::splat(-force));
@@ -327,13 +316,13 @@ impl<const W: usize> Attempt<'_, W> {
     /// than the precision from the assumed contribution, replaces that and returns true.
     #[inline(always)]
     fn find_curvature<L: Octet>(&mut self) -> bool {
-        let (width, precision) = (self.width(), L::splat(self.precision));
+        let (width, precision) = (self.level.blocks, L::splat(self.precision));
         let BladeTrial { around, members, multipliers, gaps, held, bend, curved, open, active, turned, .. } =
             &mut *self.trial;
         let amount = |place: usize| multipliers[members[place] / 8].0[members[place] % 8];
         combine::<L>(None, around, members, amount, &mut turned[..width]);
         let mut over = 0;
-        for Place { lane, block, .. } in self.level.places::<W>(self.rows) {
+        for Place { lane, block, .. } in self.level.places(self.rows) {
             let by = L::load(&turned[lane]) - L::load(&held[block]);
             let change = L::load(&bend[lane]) * by * by - L::load(&curved[lane]);
             let valid = self.rows.valid(lane);
@@ -343,7 +332,7 @@ impl<const W: usize> Attempt<'_, W> {
         if over == 0 {
             return false;
         }
-        for Place { lane, block, .. } in self.level.places::<W>(self.rows) {
+        for Place { lane, block, .. } in self.level.places(self.rows) {
             let by = L::load(&turned[lane]) - L::load(&held[block]);
             let now = L::load(&bend[lane]) * by * by;
             let change = now - L::load(&curved[lane]);
@@ -360,7 +349,7 @@ impl<const W: usize> Attempt<'_, W> {
             clear, sigma, bend, curved, gaps, moved, multipliers, directions, forces, held, turned, ..
         } = &mut *self.trial;
         let [closing, around] = moved;
-        for Place { lane, block, .. } in self.level.places::<W>(self.rows) {
+        for Place { lane, block, .. } in self.level.places(self.rows) {
             let turned = L::load(&turned[lane]);
             let by = turned - L::load(&held[block]);
             let straight = L::load(&gaps[lane]) - L::load(&curved[lane]);

@@ -256,10 +256,7 @@ impl BladeTrial {
         precision: f64,
     ) -> TrialResult {
         (self.forces_known, self.unresolved) = (false, None);
-        match level.blocks {
-            6 => self.instructions.run_octets(Attempt::<6> { trial: self, rows, level, faced, precision }),
-            _ => self.instructions.run_octets(Attempt::<0> { trial: self, rows, level, faced, precision }),
-        }
+        self.instructions.run_octets(Attempt { trial: self, rows, level, faced, precision })
     }
 
     /// Computes the modal forces of the tried step.
