@@ -252,7 +252,6 @@ impl BladeInSpan<'_> {
             let ends = [interval.from, interval.to].map(|time| ((time - begun) / length).clamp(0.0, 1.0));
             self.follow(step, interpolation, ends);
         }
-        self.include_lowest();
     }
 
     /// Records the smallest gaps over an interval with a length (s). They follow from cubics through the gaps and their rates

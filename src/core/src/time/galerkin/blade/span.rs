@@ -33,8 +33,8 @@ pub(crate) struct Blade {
     angles: Vec<NodeAngles>,
     pub(super) trial: BladeTrial,
     pub tally: BladeTally,
-    /// Smallest gaps of the nodes over all sectors so far (m); gaps of the current sector at the start of the span (m);
-    /// and gaps below which the smallest gaps of the current sector are needed (m).
+    /// Smallest gaps of the nodes over all sectors at the start of the span (m); gaps of the current sector then (m); and
+    /// gaps below which the smallest gaps of the current sector are needed (m).
     lowest: Vec<Eight>,
     pub(super) begun: Vec<Eight>,
     pub(super) floors: Vec<Eight>,
@@ -198,15 +198,6 @@ impl<'a> BladeInSpan<'a> {
     pub fn write(&mut self, state: &mut SectorState) {
         let Blade { kinds, trial, .. } = &mut *self.blade;
         BladeTrial::write(&kinds[self.place.kind].rows, &trial.start, state);
-        self.include_lowest();
-    }
-
-    /// Includes the smallest gaps of the sector in those of all sectors.
-    pub(super) fn include_lowest(&mut self) {
-        let Blade { lowest, tally, .. } = &mut *self.blade;
-        for (lowest, own) in lowest.as_mut_slice().iter_mut().zip(&tally.lowest) {
-            lowest.0.iter_mut().zip(own.0).for_each(|(lowest, own)| *lowest = lowest.min(own));
-        }
     }
 
     /// Returns whether a gap of the last trial in this span is not a number.
