@@ -20,9 +20,8 @@ impl BladeInSpan<'_> {
     /// Records the smallest gaps between two fractions of a tried step. If the step does not resolve the motion, only the gaps
     /// at the points are recorded.
     pub(super) fn record_gaps(&mut self, step: SpanStep, kind: ForceInterpolation, is_resolved: bool, ends: [f64; 2]) {
-        let Blade { trial, kinds, tally, floors, .. } = &mut *self.blade;
-        let tables = &kinds[self.place.kind];
-        let (rows, level) = (&tables.rows, tables.level(step.level, kind));
+        let Blade { trial, tally, floors, .. } = &mut *self.blade;
+        let (rows, level) = (&self.tables.rows, self.tables.level(step.level, kind));
         trial.followed.fill(0);
         let found =
             is_resolved && trial.select_followed((rows, level), [&tally.lowest, floors], self.goal.tolerance, ends);
@@ -35,17 +34,16 @@ impl BladeInSpan<'_> {
 
     /// Records the smallest gaps of the followed nodes between two fractions of a step.
     pub(super) fn follow(&mut self, step: SpanStep, kind: ForceInterpolation, ends: [f64; 2]) {
-        let Blade { trial, kinds, tally, floors, .. } = &mut *self.blade;
+        let Blade { trial, tally, floors, .. } = &mut *self.blade;
         let path =
             FollowedPath { place: &self.place, drives: &self.drives, step, kind, tolerance: self.goal.tolerance };
-        path.follow(trial, &mut kinds[self.place.kind], [&mut tally.lowest, floors], ends);
+        path.follow(trial, self.tables, [&mut tally.lowest, floors], ends);
     }
 
     /// Finds the largest penetration between the points of the tried step, of nodes that stay open.
     pub(super) fn find_depth(&mut self, step: SpanStep, kind: ForceInterpolation, result: &mut TrialResult) {
         let tolerance = self.goal.tolerance;
-        let Blade { trial, kinds, depth_limits, .. } = &mut *self.blade;
-        let tables = &mut kinds[self.place.kind];
+        let (tables, Blade { trial, depth_limits, .. }) = (self.tables, &mut *self.blade);
         if trial.pushes() {
             trial.find_modal_forces(&tables.rows, tables.level(step.level, kind));
         }
@@ -97,14 +95,12 @@ impl FollowedPath<'_> {
     fn follow(
         &self,
         trial: &mut BladeTrial,
-        tables: &mut BladeTables,
+        tables: &BladeTables,
         [lowest, floors]: [&mut [Eight]; 2],
         ends: [f64; 2],
     ) {
         let Self { place, step, kind, .. } = *self;
-        tables.prepare(step.level, kind);
         let finest = MAX_HALVINGS.min(HALVINGS - step.level);
-        (0..=finest).for_each(|halvings| tables.prepare(step.level + halvings, ForceInterpolation::Polynomial));
         let halves: [_; MAX_HALVINGS + 1] =
             std::array::from_fn(|k| tables.level(step.level + k.min(finest), ForceInterpolation::Polynomial));
         let level = tables.level(step.level, kind);
