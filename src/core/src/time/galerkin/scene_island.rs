@@ -26,7 +26,7 @@ use crate::system::contact_view::ContactMember;
 use crate::system::work::ContactWork;
 use crate::system::{ContactPair, StepFailure, Structure, System};
 use crate::time::workers::Workers;
-use blade_sectors::{BladeSectors, SectorSpan, SectorsOf};
+use blade_sectors::{BladeSectors, SectorSpan, SpanOfSectors};
 use nalgebra::DMatrix;
 use std::mem::take;
 
@@ -215,12 +215,18 @@ impl SceneIsland {
     ) -> Result<(), StepFailure> {
         let Self { set, island, records, turns, blade: Some(sectors), .. } = self else { return Ok(()) };
         let (structure, pair) = (records[0].structure, records[0].pairs[0].pair);
-        let of = SectorsOf { set: *set, tables: &island.tables[0], structure, pair, goal };
-        sectors.integrate_all(system, of, span, workers);
-        (0..*turns).try_for_each(|sector| {
-            sectors.integrate_one(sector, system, of, span);
-            sectors.enter(sector, system, of, span)
-        })
+        let of = SpanOfSectors { span, set: *set, tables: &island.tables[0], structure, pair, goal };
+        let leaders = span.leaders(*turns);
+        for group in [0..leaders, leaders..*turns] {
+            sectors.integrate_together(group.clone(), system, of, workers);
+            for sector in group {
+                sectors.integrate_one(sector, system, of);
+                sectors.enter(sector, system, of)?;
+                sectors.include_lowest(sector);
+            }
+            sectors.model.use_lowest();
+        }
+        Ok(())
     }
 
     /// Integrates one sector after the other, or all together, over a span.

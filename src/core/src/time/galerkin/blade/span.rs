@@ -32,8 +32,10 @@ pub(crate) struct BladeModel {
     kinds: Vec<BladeTables>,
     /// Angles of the nodes of each sector.
     angles: Vec<NodeAngles>,
-    /// Smallest gaps of the nodes over all sectors at the start of the span (m).
+    /// Smallest gaps of the nodes over all sectors at the start of the span and over the span of some sectors (m): of
+    /// those before the current group of sectors, and of all so far.
     lowest: Vec<Eight>,
+    lowest_so_far: Vec<Eight>,
     /// Largest number of points of a step.
     degree: usize,
 }
@@ -96,7 +98,7 @@ impl BladeModel {
         let kinds: Vec<_> = kinds.iter().map(|tables| BladeTables::new(tables, gap)).collect();
         let lowest = vec![Eight::ZERO; kinds.first()?.rows.blocks];
         let angles = (0..gap.layout.lanes).map(|sector| NodeAngles::new(&gap.layout, sector)).collect();
-        Some(Self { kinds, angles, lowest, degree })
+        Some(Self { kinds, angles, lowest_so_far: lowest.clone(), lowest, degree })
     }
 
     /// Uses tables for spans of this length (s). Does not allocate.
@@ -108,6 +110,19 @@ impl BladeModel {
     pub(crate) fn begin_span(&mut self, gaps: &[f64], lanes: usize, sectors: usize) {
         let smallest = |row: &[f64]| row[..sectors].iter().copied().fold(f64::INFINITY, f64::min);
         Eight::spread(gaps.chunks_exact(lanes).map(smallest), f64::NEG_INFINITY, &mut self.lowest);
+        self.lowest_so_far.copy_from_slice(&self.lowest);
+    }
+
+    /// Includes the smallest gaps of a sector in those of the sectors so far.
+    pub(crate) fn include_lowest(&mut self, tally: &BladeTally) {
+        for (lowest, own) in self.lowest_so_far.iter_mut().zip(&tally.lowest) {
+            lowest.0.iter_mut().zip(own.0).for_each(|(lowest, own)| *lowest = lowest.min(own));
+        }
+    }
+
+    /// Uses the smallest gaps of the sectors so far for further sectors.
+    pub(crate) fn use_lowest(&mut self) {
+        self.lowest.copy_from_slice(&self.lowest_so_far);
     }
 
     /// Returns whether steps can pass internal points in a steady phase. All modes must have a frequency above zero.

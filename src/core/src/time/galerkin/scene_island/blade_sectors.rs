@@ -1,7 +1,8 @@
 //! Sectors of a structure that face one surface of revolution.
 //!
 //! Several threads can share the sectors of a span. The result of a sector depends only on the state at the start of the
-//! span, and results are entered in the order of the sectors, so they do not depend on the number of threads.
+//! span and, in a long span, on the smallest gaps of the first few sectors. Results are entered in the order of the
+//! sectors, so they do not depend on the number of threads.
 
 use super::steady_phase::{real_count, steady_course};
 use crate::contact::ContactParameters;
@@ -19,9 +20,14 @@ use crate::time::galerkin::state::SectorState;
 use crate::time::galerkin::tables::Tables;
 use crate::time::galerkin::trial::Trial;
 use crate::time::workers::Workers;
+use std::iter::Zip;
 use std::mem::{swap, take};
+use std::ops::Range;
 use std::slice::IterMut;
 use std::sync::{Mutex, PoisonError};
+
+/// One of this number of sectors is integrated before the others.
+const PER_LEADER: usize = 9;
 
 /// Tables, scratch memory and results of the sectors of a structure.
 #[derive(Debug, Clone)]
@@ -74,6 +80,15 @@ pub(super) enum SectorSpan<'a> {
 }
 
 impl SectorSpan<'_> {
+    /// Number of sectors that are integrated before the others: their smallest gaps limit those that are searched in the
+    /// others. This saves more time than it costs only if steps end within the span.
+    pub fn leaders(&self, sectors: usize) -> usize {
+        match self {
+            Self::Interval(interval) if interval.to - interval.from > interval.span => sectors / PER_LEADER,
+            _ => 0,
+        }
+    }
+
     /// Length of the span (s).
     fn length(&self) -> f64 {
         match self {
@@ -98,7 +113,7 @@ struct SectorsInSpan<'a> {
 
 /// Sectors that no thread has begun.
 struct Remaining<'a> {
-    results: std::iter::Enumerate<IterMut<'a, SectorResult>>,
+    results: Zip<Range<usize>, IterMut<'a, SectorResult>>,
     open_steps: &'a mut [f64],
     open_step_len: usize,
 }
@@ -113,9 +128,10 @@ impl<'a> Remaining<'a> {
     }
 }
 
-/// Tables of all contact rows, place in the system, and tolerance of the sectors.
+/// Span of the sectors, with the tables of all contact rows, the place in the system, and the tolerance.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct SectorsOf<'a> {
+pub(super) struct SpanOfSectors<'a> {
+    pub span: SectorSpan<'a>,
     pub tables: &'a [Tables],
     /// Indices of the set, the structure and the pair.
     pub set: usize,
@@ -154,15 +170,23 @@ impl BladeSectors {
         self.results.resize(if threads > 1 { sectors } else { 1 }, result);
     }
 
-    /// Integrates all sectors over a span if several threads share them.
-    pub fn integrate_all(&mut self, system: &mut System, of: SectorsOf, span: SectorSpan, workers: &Workers) {
-        if self.results.len() == 1 {
+    /// Integrates some sectors over a span if several threads share them.
+    pub fn integrate_together(
+        &mut self,
+        sectors: Range<usize>,
+        system: &mut System,
+        of: SpanOfSectors,
+        workers: &Workers,
+    ) {
+        if self.results.len() == 1 || sectors.is_empty() {
             return;
         }
         let mut open_steps = take(&mut system.structures[of.structure].step_control.open_steps);
-        if let Some(common) = of.in_span(system, &self.model, span) {
-            let results = self.results.iter_mut().enumerate();
-            let remaining = Remaining { results, open_steps: &mut open_steps, open_step_len: self.open_step_len };
+        if let Some(common) = of.begin(system, &self.model) {
+            let open_step_len = self.open_step_len;
+            let open_steps = &mut open_steps[sectors.start * open_step_len..sectors.end * open_step_len];
+            let results = sectors.clone().zip(&mut self.results[sectors]);
+            let remaining = Remaining { results, open_steps, open_step_len };
             let (remaining, scratch) = (Mutex::new(remaining), Mutex::new(self.scratch.iter_mut()));
             workers.run(&|| {
                 let Some(scratch) = next_of(&scratch, Iterator::next) else { return };
@@ -174,13 +198,13 @@ impl BladeSectors {
         system.structures[of.structure].step_control.open_steps = open_steps;
     }
 
-    /// Integrates one sector over a span, unless [`Self::integrate_all`] has integrated it.
-    pub fn integrate_one(&mut self, sector: usize, system: &mut System, of: SectorsOf, span: SectorSpan) {
-        if self.results.len() > 1 && !matches!(span, SectorSpan::End(_)) {
+    /// Integrates one sector over a span, unless [`Self::integrate_together`] has integrated it.
+    pub fn integrate_one(&mut self, sector: usize, system: &mut System, of: SpanOfSectors) {
+        if self.results.len() > 1 && !matches!(of.span, SectorSpan::End(_)) {
             return;
         }
         let mut open_steps = take(&mut system.structures[of.structure].step_control.open_steps);
-        if let Some(common) = of.in_span(system, &self.model, span) {
+        if let Some(common) = of.begin(system, &self.model) {
             let open_step = &mut open_steps[sector * self.open_step_len..][..self.open_step_len];
             let place = self.result_place(sector);
             common.integrate(sector, open_step, &mut self.scratch[0], &mut self.results[place]);
@@ -192,14 +216,8 @@ impl BladeSectors {
     ///
     /// # Errors
     /// [`StepFailure`]; the state is then undefined.
-    pub fn enter(
-        &self,
-        sector: usize,
-        system: &mut System,
-        of: SectorsOf,
-        span: SectorSpan,
-    ) -> Result<(), StepFailure> {
-        let SectorsOf { set, structure, pair, goal, .. } = of;
+    pub fn enter(&self, sector: usize, system: &mut System, of: SpanOfSectors) -> Result<(), StepFailure> {
+        let SpanOfSectors { span, set, structure, pair, goal, .. } = of;
         let result = &self.results[self.result_place(sector)];
         let System { structures, events, counted, .. } = system;
         let of = &mut structures[structure];
@@ -226,6 +244,12 @@ impl BladeSectors {
         result.outcome.map_err(|_| StepFailure::Unsolved { structure, sector })
     }
 
+    /// Includes the smallest gaps of a sector that has been integrated in those of the sectors so far.
+    pub fn include_lowest(&mut self, sector: usize) {
+        let place = self.result_place(sector);
+        self.model.include_lowest(&self.results[place].tally);
+    }
+
     fn result_place(&self, sector: usize) -> usize {
         if self.results.len() > 1 { sector } else { 0 }
     }
@@ -236,8 +260,8 @@ fn next_of<I, T>(shared: &Mutex<I>, next: impl FnOnce(&mut I) -> Option<T>) -> O
     next(&mut shared.lock().unwrap_or_else(PoisonError::into_inner))
 }
 
-impl<'a> SectorsOf<'a> {
-    fn in_span(&self, system: &'a System, model: &'a BladeModel, span: SectorSpan<'a>) -> Option<SectorsInSpan<'a>> {
+impl<'a> SpanOfSectors<'a> {
+    fn begin(&self, system: &'a System, model: &'a BladeModel) -> Option<SectorsInSpan<'a>> {
         let pair: &ContactPair = &system.pairs[self.pair];
         let GapLaw::Revolution(gap) = pair.gap() else { return None };
         // Sectors before this one may have used a part of the allowed steps.
@@ -250,7 +274,7 @@ impl<'a> SectorsOf<'a> {
             parameters: pair.parts.parameters,
             prescribed: &pair.prescribed,
             goal: StepGoal { most, ..self.goal },
-            span,
+            span: self.span,
         })
     }
 }

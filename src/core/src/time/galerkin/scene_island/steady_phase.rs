@@ -1,7 +1,7 @@
 //! Steps of single sectors in a steady phase, which do not end at internal points.
 
 use super::SceneIsland;
-use super::blade_sectors::{SectorSpan, SectorsOf};
+use super::blade_sectors::{SectorSpan, SpanOfSectors};
 use crate::system::pair::Prescribed;
 use crate::system::{StepFailure, Structure, System};
 use crate::time::SteadyInterval;
@@ -44,7 +44,8 @@ impl SceneIsland {
     pub(crate) fn close_steps(&mut self, system: &mut System, interval: SteadyInterval) -> Result<(), StepFailure> {
         let Self { set, goal, island, records, turns, blade: Some(sectors), .. } = self else { return Ok(()) };
         let (structure, pair) = (records[0].structure, records[0].pairs[0].pair);
-        let of = SectorsOf { set: *set, tables: &island.tables[0], structure, pair, goal: *goal };
+        let (span, tables) = (SectorSpan::End(interval), &island.tables[0][..]);
+        let of = SpanOfSectors { span, set: *set, tables, structure, pair, goal: *goal };
         for sector in 0..*turns {
             let open_steps = &system.structures[structure].step_control.open_steps;
             let open_step = &open_steps[sector * sectors.open_step_len..][..sectors.open_step_len];
@@ -55,8 +56,8 @@ impl SceneIsland {
                 Some(start) => sectors.model.set_span(SpanKind::Bounded, interval.to - start),
                 None => sectors.model.set_span(SpanKind::Steady, interval.span),
             }
-            sectors.integrate_one(sector, system, of, SectorSpan::End(interval));
-            sectors.enter(sector, system, of, SectorSpan::End(interval))?;
+            sectors.integrate_one(sector, system, of);
+            sectors.enter(sector, system, of)?;
         }
         Ok(())
     }
