@@ -4,7 +4,9 @@
 
 pub mod galerkin;
 mod recurrence;
+mod workers;
 
+use std::io;
 use std::ops::{Deref, DerefMut};
 
 use tiprub_cosim::persist::StateReader;
@@ -34,6 +36,14 @@ pub trait Stepper {
     /// Sets the largest number of attempted steps since the start of the run ([`System::steps_tried`]), beyond which no island begins a
     /// step.
     fn allow(&mut self, _most_tried: u64) {}
+
+    /// Uses a number of threads, if the method can share its work: creates or ends threads other than the caller's.
+    ///
+    /// # Errors
+    /// If the system does not create a thread.
+    fn use_threads(&mut self, _threads: usize) -> io::Result<()> {
+        Ok(())
+    }
 
     /// Advances the system by one internal step to the time described by `drives`, one per contact pair.
     ///

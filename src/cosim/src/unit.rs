@@ -47,6 +47,7 @@ pub struct StepProgress {
 /// }
 /// println!("{} s: {} contacts, {}", unit.time(), unit.integer(contacts)?, unit.boolean(touching)?);
 /// assert!((unit.output_derivative(angle, 1)? - 1309.0).abs() < 1e-6);
+/// unit.terminate();
 /// unit.reset();
 /// # Ok::<(), tiprub_cosim::Error>(())
 /// ```
@@ -249,6 +250,9 @@ pub trait CoSimulation: Send {
     /// # Errors
     /// Rejected parameters, with numbers and a remedy. The unit can be initialised again with other parameters.
     fn initialise(&mut self, start_time: f64) -> Result<()>;
+
+    /// Ends the run and the threads of the unit. Values can still be read; no step follows until the unit is initialised again.
+    fn terminate(&mut self) {}
 
     /// Restores the state after creation, with all start values.
     fn reset(&mut self);

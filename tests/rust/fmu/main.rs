@@ -9,3 +9,4 @@ mod panics;
 mod states;
 mod stepping;
 mod thermal;
+mod threads;

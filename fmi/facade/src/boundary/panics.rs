@@ -6,15 +6,21 @@
 use std::any::Any;
 use std::cell::Cell;
 use std::panic::{self, PanicHookInfo};
-use std::sync::Once;
+use std::sync::{Mutex, Once, PoisonError};
 
 /// Place of the last panic of a thread: the end of the file's path, its length, the line. It has no destructor, so that
 /// the library can be unloaded while threads that used it are still running.
 type PanicPlace = ([u8; 48], usize, u32);
 
+/// No panic.
+const NOWHERE: PanicPlace = ([0; 48], 0, 0);
+
 thread_local! {
-    static PLACE: Cell<PanicPlace> = const { Cell::new(([0; 48], 0, 0)) };
+    static PLACE: Cell<PanicPlace> = const { Cell::new(NOWHERE) };
 }
+
+/// Place of the last panic of any thread: threads of a unit pass their panics on to the thread that called the unit.
+static LAST: Mutex<PanicPlace> = Mutex::new(NOWHERE);
 
 static HOOK: Once = Once::new();
 
@@ -29,14 +35,18 @@ fn remember(info: &PanicHookInfo<'_>) {
     let tail = &file[file.len().saturating_sub(48)..];
     let mut bytes = [0; 48];
     bytes[..tail.len()].copy_from_slice(tail);
-    PLACE.set((bytes, tail.len(), location.line()));
+    let place = (bytes, tail.len(), location.line());
+    PLACE.set(place);
+    *LAST.lock().unwrap_or_else(PoisonError::into_inner) = place;
 }
 
 /// Returns the message for the importer's log.
 pub(super) fn describe(payload: &(dyn Any + Send)) -> String {
     let text = payload.downcast_ref::<&str>().copied();
     let text = text.or_else(|| payload.downcast_ref::<String>().map(String::as_str)).unwrap_or("no message");
-    let (bytes, length, line) = PLACE.get();
+    let own = PLACE.replace(NOWHERE);
+    let place = if own == NOWHERE { *LAST.lock().unwrap_or_else(PoisonError::into_inner) } else { own };
+    let (bytes, length, line) = place;
     let file = String::from_utf8_lossy(&bytes[..length]).into_owned();
     format!(
         "internal error: {text} (at {file}:{line}). Free the instance, which is no longer usable, and report this \

@@ -92,6 +92,7 @@ impl Slave {
 
     /// Terminates the instance; values can still be read afterwards.
     pub(crate) fn terminate(&mut self) {
+        self.unit.terminate();
         self.phase = InstancePhase::Terminated { time: self.time() };
     }
 

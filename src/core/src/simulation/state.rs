@@ -14,7 +14,7 @@ use super::{Compiled, Simulation};
 use crate::Result;
 
 const MAGIC: [u8; 8] = *b"tiprubST";
-const VERSION: u64 = 17;
+const VERSION: u64 = 18;
 pub(super) const CHECKSUM_BYTES: usize = 8;
 /// Upper bound on all values of a structure and of its ledger, in any unit; squares and products stay far from overflow.
 const LARGEST: f64 = 1e50;

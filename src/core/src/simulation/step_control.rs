@@ -28,6 +28,29 @@ impl Simulation {
         most
     }
 
+    /// Creates the threads that the parameter `threads` requests, and ends others.
+    ///
+    /// # Errors
+    /// If the system does not create a thread.
+    pub(super) fn use_threads(&mut self) -> Result<()> {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 ≤ value ≤ 64")]
+        let threads = self.state.values.value_of(Quantity::Threads, 0) as usize;
+        self.stepper.use_threads(threads).map_err(|error| {
+            let problem = format!("the system does not create {threads} threads: {error}");
+            Error::invalid(
+                "variable `threads`",
+                problem,
+                "Use fewer threads; 1 needs no other thread than the caller's",
+            )
+        })
+    }
+
+    /// Ends all threads.
+    pub(super) fn end_threads(&mut self) {
+        // Ending threads does not fail.
+        drop(self.stepper.use_threads(1));
+    }
+
     /// Allocates the state to return to, if it may be needed: the number of fixed steps is known beforehand.
     pub(super) fn make_room(&mut self) {
         if self.max_internal_steps() > 0 && self.is_marched() && self.mark.is_empty() {

@@ -198,7 +198,7 @@ impl Simulation {
         if self.tangent.follows {
             twin.restore_from(&self.tangent.start);
         } else {
-            twin.restore_state(&self.tangent.start).map_err(lost)?;
+            twin.restore_checked(&self.tangent.start).map_err(lost)?;
             twin.tangent = StepReplay::default();
         }
         self.tangent.follows = true;

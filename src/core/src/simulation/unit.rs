@@ -97,6 +97,7 @@ impl CoSimulation for Simulation {
         self.diagnostics.warnings.retain(|warning| !settings.is_silenced(warning.topic()));
         self.rest(&parameters);
         self.apply_methods(&parameters);
+        self.use_threads()?;
         self.make_room();
         self.make_room_for_tangent();
         self.state.clock = Clock::at(start_time);
@@ -139,6 +140,11 @@ impl CoSimulation for Simulation {
         self.state.clock = Clock::default();
         self.diagnostics.clear();
         self.tangent.renew();
+        self.end_threads();
+    }
+
+    fn terminate(&mut self) {
+        self.end_threads();
     }
 
     fn time(&self) -> f64 {
@@ -271,7 +277,13 @@ impl CoSimulation for Simulation {
     }
 
     fn restore_state(&mut self, buffer: &[u8]) -> Result<()> {
-        self.restore_checked(buffer)
+        self.restore_checked(buffer)?;
+        if self.is_initialised() {
+            // Without threads the results are the same.
+            return self.use_threads().or(Ok(()));
+        }
+        self.end_threads();
+        Ok(())
     }
 
     fn no_derivatives(&self) -> Option<&'static str> {

@@ -10,6 +10,7 @@ mod guide;
 mod penetration;
 mod steady_phase;
 mod sticking;
+mod threads;
 mod two_numbers;
 
 use counting::allocations_of;

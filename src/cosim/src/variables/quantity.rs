@@ -57,6 +57,8 @@ pub enum Quantity {
     Tolerance,
     /// Largest number of internal steps of a communication step, parameter.
     MaxInternalSteps,
+    /// Number of threads, parameter.
+    Threads,
     /// Solver, parameter.
     SolverChoice,
     /// Interpolation of inputs between communication points, parameter.

@@ -137,7 +137,7 @@ impl TableBuilder {
         self.parameter(quantity, name, None, start, text).range(0.0, DAMPING)
     }
 
-    /// Adds internal step, largest number of steps, scheme and solver.
+    /// Adds internal step, largest number of steps, number of threads, scheme and solver.
     pub fn methods(&mut self, settings: &SceneSettings) {
         let text = "Maximum internal time step; the step in use divides the communication step evenly";
         let step = self.parameter(Quantity::StepMax, "internal_step_max", Some(&TIME), settings.time.step, text);
@@ -152,6 +152,8 @@ impl TableBuilder {
         if settings.bounds_steps() {
             self.max_internal_steps(settings);
         }
+        let text = "Number of threads that share independent blades in adaptive steps; results do not depend on it";
+        self.whole(Quantity::Threads, "threads", 1, text).range(1.0, ranges::THREADS);
         let reason = settings.time.scheme_reason.as_ref();
         let reason = reason.map_or(String::new(), |reason| format!("; the start value is {reason}"));
         self.choice(Quantity::SchemeChoice, "scheme", &SCHEMES, scheme, &format!("Time-stepping scheme{reason}"));

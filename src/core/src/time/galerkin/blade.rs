@@ -32,6 +32,7 @@ mod tally;
 mod tests;
 mod trial;
 
-pub(crate) use span::{Blade, BladeInSpan, BladePlace};
-pub(crate) use stored::stored_len;
+pub(crate) use span::{Blade, BladeInSpan, BladeModel, BladePlace};
+pub(crate) use stored::{stored_len, stored_start};
 pub(crate) use tables::SpanKind;
+pub(crate) use tally::BladeTally;

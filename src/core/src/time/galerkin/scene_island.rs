@@ -1,29 +1,32 @@
 //! An island of a scene: the sectors and carriers that it consists of, their state, and the record of their contacts.
 
+mod blade_sectors;
 mod contacts;
 mod steady_phase;
 
 use super::basis::MOST;
-use super::blade::{Blade, BladeInSpan, BladePlace, SpanKind};
+use super::blade::{BladeModel, SpanKind};
 use super::carrier::{CarrierIntegrator, coordinates};
 use super::compliance::Lanes;
 use super::disk::CoupledDisk;
 use super::flight::FreeFlight;
-use super::island::{Island, IslandSector, StepControl};
+use super::island::{Island, IslandSector};
 use super::obstacle_view::ObstacleView;
 use super::record::{PairRecord, SpanRecord};
-use super::span::{StepGoal, Stopped, integrate};
+use super::span::{StepGoal, Stopped};
 use super::state::SectorState;
 use super::surroundings::{CarriersInStep, Surroundings};
-use super::tables::{HALVINGS, Tables};
+use super::tables::Tables;
+use crate::geometry::PrescribedMotion;
 use crate::geometry::wrench::At;
-use crate::geometry::{GapLaw, PrescribedMotion};
 use crate::math::vector::vector3_at;
 use crate::modes::bank::{Disk, ModalBank};
 use crate::modes::coordinates::ContactModes;
 use crate::system::contact_view::ContactMember;
 use crate::system::work::ContactWork;
 use crate::system::{ContactPair, StepFailure, Structure, System};
+use crate::time::workers::Workers;
+use blade_sectors::{BladeSectors, SectorSpan, SpanOfSectors};
 use nalgebra::DMatrix;
 use std::mem::take;
 
@@ -44,10 +47,8 @@ pub(crate) struct SceneIsland {
     /// Number of sectors that take turns.
     turns: usize,
     goal: StepGoal,
-    /// Steps of sectors that face one surface of revolution.
-    blade: Option<Box<Blade>>,
-    /// Length of an array that stores an open step of a sector; 0 if all steps end at internal points.
-    open_step_len: usize,
+    /// Sectors that face one surface of revolution.
+    blade: Option<Box<BladeSectors>>,
     /// Free flight of each kind of a single sector.
     flights: Vec<FreeFlight>,
 }
@@ -132,25 +133,19 @@ impl SceneIsland {
                 records.push(SpanRecord { sector, ..record.clone() });
             }
         }
-        let blade = match own().next() {
-            Some((_, pair)) if takes_turns && own().nth(1).is_none() => Blade::new(&tables[0], pair.gap(), solver),
+        let model = match own().next() {
+            Some((_, pair)) if takes_turns && own().nth(1).is_none() => BladeModel::new(&tables[0], pair.gap(), solver),
             _ => None,
         };
         let first = &structures[touching[0]];
-        let open_step_len = match &blade {
-            Some(blade) if blade.supports_steady_phase() && !first.step_control.open_steps.is_empty() => {
-                first.open_step_len()
-            }
-            _ => 0,
-        };
+        let blade = model.map(|model| Box::new(BladeSectors::new(model, first, &sectors[0].trial)));
         let precision = if takes_turns { PRECISION } else { CLOSE * PRECISION };
         Self {
             set,
             island: Island::new(tables, sectors, disks, carriers),
             records,
-            blade: blade.map(Box::new),
-            open_step_len,
-            turns: if takes_turns { structures[touching[0]].modes().sectors() } else { 1 },
+            blade,
+            turns: if takes_turns { first.modes().sectors() } else { 1 },
             goal: StepGoal { tolerance, precision: (precision * tolerance).max(rounding), most: u64::MAX },
             flights,
         }
@@ -173,20 +168,65 @@ impl SceneIsland {
         }
     }
 
+    /// Returns the number of threads that can share the sectors.
+    pub(crate) fn most_threads(&self) -> usize {
+        if self.blade.is_some() { self.turns } else { 1 }
+    }
+
+    /// Allocates memory for `threads` threads, or fewer if there are fewer sectors to share.
+    pub(crate) fn use_threads(&mut self, threads: usize) {
+        let threads = threads.min(self.most_threads());
+        if let Some(sectors) = &mut self.blade {
+            sectors.use_threads(threads, self.turns);
+        }
+    }
+
     /// Integrates all sectors over a span (s), at whose end the pairs are.
     ///
     /// # Errors
     /// [`StepFailure`]; the state is then undefined.
-    pub fn integrate(&mut self, system: &mut System, span: f64, most_tried: u64) -> Result<(), StepFailure> {
+    pub fn integrate(
+        &mut self,
+        system: &mut System,
+        span: f64,
+        most_tried: u64,
+        workers: &Workers,
+    ) -> Result<(), StepFailure> {
         system.sets.members(self.set).iter().for_each(|one| system.structures[*one].begin_span());
         self.records.iter_mut().for_each(|record| record.begin_courses(&system.pairs, span));
-        if let Some(blade) = &mut self.blade {
+        if let Some(sectors) = &mut self.blade {
             let structure = &system.structures[self.records[0].structure];
-            blade.set_span(SpanKind::Bounded, span);
-            blade.begin_span(&structure.history.gap.before, structure.lanes(), self.turns);
-            return (0..self.turns).try_for_each(|turn| self.step_blade(turn, system, span, most_tried));
+            sectors.model.set_span(SpanKind::Bounded, span);
+            sectors.model.begin_span(&structure.history.gap.before, structure.lanes(), self.turns);
+            let goal = StepGoal { most: most_tried, ..self.goal };
+            let course = self.records[0].pairs[0].course;
+            return self.integrate_sectors(system, SectorSpan::Bounded(&course, span), goal, workers);
         }
         (0..self.turns).try_for_each(|turn| self.take_turn(turn, system, span, most_tried))
+    }
+
+    /// Integrates all sectors that face a surface of revolution over a span.
+    fn integrate_sectors(
+        &mut self,
+        system: &mut System,
+        span: SectorSpan,
+        goal: StepGoal,
+        workers: &Workers,
+    ) -> Result<(), StepFailure> {
+        let Self { set, island, records, turns, blade: Some(sectors), .. } = self else { return Ok(()) };
+        let (structure, pair) = (records[0].structure, records[0].pairs[0].pair);
+        let of = SpanOfSectors { span, set: *set, tables: &island.tables[0], structure, pair, goal };
+        let leaders = span.leaders(*turns);
+        for group in [0..leaders, leaders..*turns] {
+            sectors.integrate_together(group.clone(), system, of, workers);
+            for sector in group {
+                sectors.integrate_one(sector, system, of);
+                sectors.enter(sector, system, of)?;
+                sectors.include_lowest(sector);
+            }
+            sectors.model.use_lowest();
+        }
+        Ok(())
     }
 
     /// Integrates one sector after the other, or all together, over a span.
@@ -218,41 +258,6 @@ impl SceneIsland {
             }));
         }
         Ok(())
-    }
-
-    /// Integrates one sector that faces a surface of revolution over a span.
-    fn step_blade(&mut self, turn: usize, system: &mut System, span: f64, most_tried: u64) -> Result<(), StepFailure> {
-        self.aim(turn, &system.structures);
-        let System { structures, pairs, events, counted, .. } = system;
-        self.read(structures);
-        let goal = StepGoal { most: most_tried, ..self.goal };
-        let Self { island: Island { sectors, control, .. }, records, blade: Some(blade), set, .. } = &mut *self else {
-            return Ok(());
-        };
-        let (IslandSector { table: [_, kind], state, .. }, record) = (&mut sectors[0], &mut records[0]);
-        let PairRecord { pair, course, .. } = record.pairs[0];
-        let (structure, sector) = (record.structure, record.sector);
-        let GapLaw::Revolution(gap) = pairs[pair].gap() else { return Ok(()) };
-        blade.choose_minima(&structures[structure].needed_minima, sector, |node| record.tallies[node].lowest);
-        let place = BladePlace { kind: *kind, sector, gap, parameters: pairs[pair].parts.parameters, course };
-        let mut steps = BladeInSpan::begin(blade, place, *control, goal, Some(state));
-        let outcome = integrate(&mut steps, &mut counted.effort);
-        steps.write(state);
-        *control = steps.control;
-        let is_lost = steps.is_lost();
-        record.damping = blade.tally.damping;
-        (0..record.tallies.len()).for_each(|node| record.tallies[node].lowest = blade.tally.lowest(node));
-        let of = &structures[structure];
-        events.now.extend((0..of.nodes()).filter_map(|node| {
-            let at = ContactMember { structure, pair, node, sector, index: of.index(node, sector) };
-            blade.tally.event(blade.rows(*kind), at, span)
-        }));
-        blade.tally.work.enter(&mut counted.ledgers[*set]);
-        if blade.tally.implausible || is_lost {
-            return Err(StepFailure::Implausible { structure, sector });
-        }
-        self.write(structures);
-        outcome.map_err(|stopped| stopped.failure(structure, sector))
     }
 
     /// Selects the sector whose turn it is.
@@ -293,12 +298,7 @@ impl SceneIsland {
     /// Reads the step control of the first sector before a span.
     fn read_control(&mut self, structures: &[Structure]) {
         let SpanRecord { structure, sector, .. } = self.records[0];
-        let control = &structures[structure].step_control;
-        self.island.control = StepControl {
-            bank: control.bank[sector],
-            largest: control.largest[sector],
-            level: usize::try_from(control.level[sector]).unwrap_or(HALVINGS).min(HALVINGS),
-        };
+        self.island.control = structures[structure].step_control_of(sector);
     }
 
     /// Writes the state to the structures and returns the work of loads during the span (J).
@@ -307,15 +307,8 @@ impl SceneIsland {
         let Island { sectors, tables, control, disks, carriers, .. } = &mut self.island;
         for (one, record) in sectors.iter_mut().zip(&self.records) {
             let (structure, sector) = (&mut structures[record.structure], record.sector);
-            let lowest = |node: usize| record.tallies[node].lowest;
-            if self.blade.is_some() && !one.state.is_loaded() && !structure.is_loaded(sector) {
-                structure.write_lowest(sector, lowest);
-            } else {
-                structure.write_contacts(sector, &one.state, lowest);
-            }
-            let of = &mut structure.step_control;
-            (of.bank[sector], of.largest[sector]) = (control.bank, control.largest);
-            of.level[sector] = control.level as u64;
+            structure.write_contacts(sector, &one.state, |node| record.tallies[node].lowest);
+            structure.write_step_control(sector, *control);
             if one.disk.is_none() {
                 let (bank, (moved, state)) = (&mut structure.modes, one.displacements(tables));
                 bank.write_sector(sector, &state.position, &state.velocity, &state.forces, moved);
@@ -401,16 +394,6 @@ impl SceneIsland {
         structures[index].step_control.level.fill(0);
         counted.effort.steps += self.turns as u64;
         counted.effort.flights += self.turns as u64;
-    }
-}
-
-impl Stopped {
-    /// Converts the reason why a sector was not integrated to the end.
-    fn failure(self, structure: usize, sector: usize) -> StepFailure {
-        match self {
-            Self::Exhausted => StepFailure::Exhausted,
-            Self::Unsolved => StepFailure::Unsolved { structure, sector },
-        }
     }
 }
 

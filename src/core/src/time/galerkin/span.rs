@@ -117,11 +117,7 @@ impl<S: SpanSteps> StepChoice<'_, S> {
         let (goal, count) = (self.steps.goal(), self.steps.count());
         loop {
             let level = self.steps.control().level;
-            // A shortest step may need two trials.
-            let next = count * if level == HALVINGS { 2 } else { 1 };
-            if effort.tried().saturating_add(next) > goal.most {
-                return Err(Stopped::Exhausted);
-            }
+            self.check_effort(effort)?;
             let (step, end) = (SpanStep::new(level, done), done + units_per_step(level));
             let is_even = end.is_multiple_of(2 * units_per_step(level));
             if self.steps.fly(step) {
@@ -129,7 +125,7 @@ impl<S: SpanSteps> StepChoice<'_, S> {
                 self.steps.control().level -= usize::from(level > 0 && is_even);
                 return Ok(end);
             }
-            let (result, kind) = self.try_step(step, effort);
+            let (result, kind) = self.try_step(step, effort)?;
             if self.is_too_long(step, kind, &result, goal.tolerance) && level < HALVINGS {
                 self.steps.control().level += 1;
                 continue;
@@ -168,16 +164,23 @@ impl<S: SpanSteps> StepChoice<'_, S> {
         largest > 0.0 && self.steps.control().bank + paid > FULL * largest
     }
 
+    /// Checks that one more step may be tried.
+    fn check_effort(&self, effort: &Effort) -> Result<(), Stopped> {
+        let is_allowed = effort.tried().saturating_add(self.steps.count()) <= self.steps.goal().most;
+        if is_allowed { Ok(()) } else { Err(Stopped::Exhausted) }
+    }
+
     /// Tries one step; a shortest step is tried with a constant force if the polynomial is rejected.
-    fn try_step(&mut self, step: SpanStep, effort: &mut Effort) -> (TrialResult, ForceInterpolation) {
+    fn try_step(&mut self, step: SpanStep, effort: &mut Effort) -> Result<(TrialResult, ForceInterpolation), Stopped> {
         let result = self.run_trial(step, ForceInterpolation::Polynomial, effort);
         let affordable = result.solved && !(result.switches && result.switched > self.steps.control().bank);
         if step.level < HALVINGS || affordable {
-            return (result, ForceInterpolation::Polynomial);
+            return Ok((result, ForceInterpolation::Polynomial));
         }
+        self.check_effort(effort)?;
         let result = self.run_trial(step, ForceInterpolation::Constant, effort);
         effort.constant += self.steps.count();
-        (result, ForceInterpolation::Constant)
+        Ok((result, ForceInterpolation::Constant))
     }
 
     fn run_trial(&mut self, step: SpanStep, kind: ForceInterpolation, effort: &mut Effort) -> TrialResult {

@@ -3,7 +3,9 @@
 use super::scene_island::SceneIsland;
 use crate::geometry::PrescribedMotion;
 use crate::system::{SearchStart, StepFailure, Structure, System};
+use crate::time::workers::Workers;
 use crate::time::{SteadyInterval, Stepper};
+use std::io;
 
 /// Tables and scratch memory for adaptive steps of all islands of a system.
 #[derive(Debug, Clone)]
@@ -12,6 +14,8 @@ pub struct Galerkin {
     islands: Vec<SceneIsland>,
     /// Largest number of attempted steps since the start of the run.
     most_tried: u64,
+    /// Threads that share the sectors of an island.
+    workers: Workers,
 }
 
 impl Galerkin {
@@ -24,7 +28,7 @@ impl Galerkin {
         for structure in system.structures.iter_mut().filter(|structure| structure.nodes() > 0) {
             structure.lowest_in_span = vec![f64::INFINITY; structure.gaps().len()];
         }
-        Self { islands, most_tried: u64::MAX }
+        Self { islands, most_tried: u64::MAX, workers: Workers::default() }
     }
 }
 
@@ -37,6 +41,17 @@ impl Stepper for Galerkin {
         self.most_tried = most_tried;
     }
 
+    fn use_threads(&mut self, threads: usize) -> io::Result<()> {
+        let most = self.islands.iter().map(SceneIsland::most_threads).max().unwrap_or(1);
+        let more = threads.min(most).saturating_sub(1);
+        if more != self.workers.count() {
+            self.workers = Workers::default();
+            self.workers = Workers::new(more)?;
+            self.islands.iter_mut().for_each(|island| island.use_threads(more + 1));
+        }
+        Ok(())
+    }
+
     fn step(&mut self, system: &mut System, drives: &[PrescribedMotion]) -> Result<(), StepFailure> {
         let span = system.step_size();
         for (pair, drive) in system.pairs.iter_mut().zip(drives) {
@@ -45,7 +60,8 @@ impl Stepper for Galerkin {
         system.events.shift();
         system.events.now.clear();
         let factorisations = system.counted.effort.factorisations;
-        self.islands.iter_mut().try_for_each(|island| island.integrate(system, span, self.most_tried))?;
+        let Self { islands, most_tried, workers } = self;
+        islands.iter_mut().try_for_each(|island| island.integrate(system, span, *most_tried, workers))?;
         system.counted.factorisations += system.counted.effort.factorisations - factorisations;
         system.check_travel()?;
         system.find_gaps(SearchStart::PreviousStep);
@@ -88,7 +104,8 @@ impl Stepper for Galerkin {
         system.events.shift();
         system.events.now.clear();
         let factorisations = system.counted.effort.factorisations;
-        self.islands.iter_mut().try_for_each(|island| island.integrate_steady_interval(system, interval))?;
+        let Self { islands, workers, .. } = self;
+        islands.iter_mut().try_for_each(|island| island.integrate_steady_interval(system, interval, workers))?;
         system.counted.factorisations += system.counted.effort.factorisations - factorisations;
         system.check_travel()?;
         system.structures.iter_mut().for_each(|structure| {

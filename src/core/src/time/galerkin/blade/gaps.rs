@@ -19,9 +19,8 @@ impl BladeInSpan<'_> {
     /// Records the smallest gaps between two fractions of a tried step. If the step does not resolve the motion, only the gaps
     /// at the points are recorded.
     pub(super) fn record_gaps(&mut self, step: SpanStep, kind: ForceInterpolation, is_resolved: bool, ends: [f64; 2]) {
-        let Blade { trial, kinds, tally, floors, bars, .. } = &mut *self.blade;
-        let tables = &kinds[self.place.kind];
-        let (rows, level) = (&tables.rows, tables.level(step.level, kind));
+        let Blade { trial, tally, floors, bars, .. } = &mut *self.blade;
+        let (rows, level) = (&self.tables.rows, self.tables.level(step.level, kind));
         trial.followed.fill(0);
         find_bars(bars, floors, &tally.lowest);
         let found = is_resolved && trial.select_followed((rows, level), bars, self.goal.tolerance, ends);
@@ -34,10 +33,10 @@ impl BladeInSpan<'_> {
 
     /// Records the smallest gaps between two fractions of a step, of nodes that are followed.
     pub(super) fn follow(&mut self, step: SpanStep, kind: ForceInterpolation, ends: [f64; 2]) {
-        let Blade { trial, kinds, tally, floors, .. } = &mut *self.blade;
+        let Blade { trial, tally, floors, .. } = &mut *self.blade;
         let (tolerance, deep) = (self.goal.tolerance, f64::NEG_INFINITY);
         let path = FollowedPath { place: &self.place, drives: &self.drives, step, kind, tolerance, deep };
-        path.follow(trial, &mut kinds[self.place.kind], [&mut tally.lowest, floors], ends);
+        path.follow(trial, self.tables, [&mut tally.lowest, floors], ends);
     }
 
     /// Finds the smallest gaps between the points of a tried step, of nodes that stay open, and whether they penetrate by more
@@ -45,7 +44,7 @@ impl BladeInSpan<'_> {
     pub(super) fn find_least_gaps(&mut self, step: SpanStep, kind: ForceInterpolation, result: &mut TrialResult) {
         let (tolerance, whole) = (self.goal.tolerance, [0.0, 1.0]);
         let may_be_recorded = self.recorded != RecordScope::WorkOnly && self.ends_within(step);
-        let Blade { trial, kinds, tally, floors, bars, least, .. } = &mut *self.blade;
+        let (tables, Blade { trial, tally, floors, bars, least, .. }) = (self.tables, &mut *self.blade);
         least.fill(Eight([f64::INFINITY; 8]));
         trial.followed.fill(0);
         if !result.solved || !result.resolves_motion(kind, tolerance) {
@@ -58,7 +57,6 @@ impl BladeInSpan<'_> {
             find_bars(bars, floors, &tally.lowest);
         }
         bars.iter_mut().flat_map(|block| &mut block.0).for_each(|bar| *bar = bar.max(bar_for_depth));
-        let tables = &mut kinds[self.place.kind];
         if trial.pushes() {
             trial.find_modal_forces(&tables.rows, tables.level(step.level, kind));
         }
@@ -77,9 +75,8 @@ impl BladeInSpan<'_> {
     /// Records the smallest gaps of the tried step, as found by [`find_least_gaps`](Self::find_least_gaps), and the gaps at its
     /// points.
     pub(super) fn record_least_gaps(&mut self, step: SpanStep, kind: ForceInterpolation) {
-        let Blade { trial, kinds, tally, least, .. } = &mut *self.blade;
-        let tables = &kinds[self.place.kind];
-        let (rows, level) = (&tables.rows, tables.level(step.level, kind));
+        let Blade { trial, tally, least, .. } = &mut *self.blade;
+        let (rows, level) = (&self.tables.rows, self.tables.level(step.level, kind));
         let (instructions, lowest) = (trial.instructions, &mut tally.lowest);
         include(lowest, least);
         instructions.run_octets(RecordPoints { trial, rows, level, lowest, ends: [0.0, 1.0] });
@@ -132,14 +129,12 @@ impl FollowedPath<'_> {
     fn follow(
         &self,
         trial: &mut BladeTrial,
-        tables: &mut BladeTables,
+        tables: &BladeTables,
         [lowest, floors]: [&mut [Eight]; 2],
         ends: [f64; 2],
     ) {
         let Self { place, step, kind, .. } = *self;
-        tables.prepare(step.level, kind);
         let finest = MAX_HALVINGS.min(HALVINGS - step.level);
-        (0..=finest).for_each(|halvings| tables.prepare(step.level + halvings, ForceInterpolation::Polynomial));
         let halves: [_; MAX_HALVINGS + 1] =
             std::array::from_fn(|k| tables.level(step.level + k.min(finest), ForceInterpolation::Polynomial));
         let level = tables.level(step.level, kind);

@@ -9,7 +9,6 @@ use super::gaps::drive_and_rate_at;
 use super::rows::BladeRows;
 use super::span::{Blade, BladeInSpan, RecordScope};
 use super::surface::PointDrive;
-use super::tables::SpanKind;
 use super::tally::Sums;
 use super::trial::BladeTrial;
 use crate::math::octet::Eight;
@@ -154,8 +153,7 @@ impl BladeInSpan<'_> {
             }
             return;
         };
-        self.blade.kinds[self.place.kind].prepare(step.level, kind);
-        let weights = self.blade.kinds[self.place.kind].level(step.level, kind).part(within);
+        let weights = self.tables.level(step.level, kind).part(within);
         self.find_drives(step, kind, &weights);
         self.add(step, kind, &weights, Sums::SpanOnly);
         self.record_gaps(step, kind, open.is_resolved, within);
@@ -166,9 +164,8 @@ impl BladeInSpan<'_> {
         let first = (interval.from / interval.span).floor();
         self.place.course = course(to_count(first));
         let [from, to] = [interval.from, interval.to].map(|time| self.drive_at(time / interval.span - first).0);
-        let (gap, kind) = (self.place.gap, self.place.kind);
-        let Blade { trial, kinds, floors, tally, .. } = &mut *self.blade;
-        let rows = &kinds[kind].rows;
+        let (gap, rows) = (self.place.gap, &self.tables.rows);
+        let Blade { trial, floors, tally, .. } = &mut *self.blade;
         let turns = (to.turned - from.turned).abs() >= std::f64::consts::TAU;
         for node in 0..rows.nodes {
             let of = |blocks: &[Eight]| blocks[node / 8].0[node % 8];
@@ -189,8 +186,7 @@ impl BladeInSpan<'_> {
     /// Returns whether no contact is possible in the steady phase, and the vibration is smaller than the tolerance. The
     /// reach must be known.
     pub(super) fn stays_clear(&self) -> bool {
-        let Blade { trial, kinds, .. } = &*self.blade;
-        let rows = &kinds[self.place.kind].rows;
+        let (rows, trial) = (&self.tables.rows, &self.blade.trial);
         let reach = |along: usize, node: usize| trial.reach[along][node / 8].0[node % 8];
         let is_still = |node: usize| reach(0, node).max(reach(1, node)) <= self.goal.tolerance;
         if !(0..rows.nodes).all(is_still) {
@@ -224,9 +220,7 @@ impl BladeInSpan<'_> {
         drives[0] = drive;
         let faced = self.place.faced_surface(&drives);
         let interpolation = kind.unwrap_or(ForceInterpolation::Polynomial);
-        let blade = &mut *self.blade;
-        blade.kinds[kind_of_sector].prepare(step.level, interpolation);
-        let tables = &blade.kinds[kind_of_sector];
+        let (blade, tables) = (&mut *self.blade, self.tables);
         let place = blade.responses.iter().position(|response| response.matches(kind_of_sector, time));
         let place = place.unwrap_or_else(|| {
             blade.next_response = (blade.next_response + 1) % CACHED_RESPONSES;
@@ -252,15 +246,14 @@ impl BladeInSpan<'_> {
             let ends = [interval.from, interval.to].map(|time| ((time - begun) / length).clamp(0.0, 1.0));
             self.follow(step, interpolation, ends);
         }
-        self.include_lowest();
     }
 
     /// Records the smallest gaps over an interval with a length (s). They follow from cubics through the gaps and their rates
     /// at both ends, if the error is small enough. `shape_error` (m) is the error that the shape of the surface causes.
     /// Returns whether the error is too large for some nodes, which must be followed.
     fn record_cubic_minima(&mut self, length: f64, shape_error: f64) -> bool {
-        let Blade { trial, kinds, tally, floors, begun, .. } = &mut *self.blade;
-        let (rows, tolerance) = (&kinds[self.place.kind].rows, self.goal.tolerance);
+        let Blade { trial, tally, floors, begun, .. } = &mut *self.blade;
+        let (rows, tolerance) = (&self.tables.rows, self.goal.tolerance);
         // No forces act in a flight.
         trial.pushes = false;
         let error = trial.find_interpolation_error(rows, length) + shape_error;
@@ -283,7 +276,8 @@ impl BladeInSpan<'_> {
     }
 
     /// Integrates from the start of the open step to the end of `interval` within it, with steps that end there, and
-    /// writes the state. `course` returns the prescribed motion between two times (s since the start of the steady phase).
+    /// writes the state. Unless this is a
+    /// flight, the tables must be those of a bounded span from [`stored_start`](super::stored::stored_start) on. `course` returns the prescribed motion between two times (s since the start of the steady phase).
     ///
     /// # Errors
     /// [`Stopped`] if a step is not solved.
@@ -312,15 +306,13 @@ impl BladeInSpan<'_> {
             // This step is discarded.
             self.control.bank -= banked;
             let begun = (to_real(self.progress.spans) + step.from) * interval.span;
-            let length = interval.to - begun;
-            if length > NEGLIGIBLE_LENGTH * interval.span {
-                self.blade.set_span(SpanKind::Bounded, length);
+            if interval.to - begun > NEGLIGIBLE_LENGTH * interval.span {
                 self.place.course = course([begun, interval.to]);
                 (self.recorded, self.control.level) = (RecordScope::WorkOnly, 0);
                 integrate(self, effort)?;
             }
         }
-        BladeTrial::write(&self.blade.kinds[self.place.kind].rows, &self.blade.trial.start, state);
+        BladeTrial::write(&self.tables.rows, &self.blade.trial.start, state);
         Ok(())
     }
 

@@ -25,17 +25,27 @@ use crate::time::galerkin::tables::Tables;
 use crate::time::galerkin::trial::{ForceInterpolation, TrialResult};
 use std::mem::{replace, take};
 
-/// Tables of a blade for all kinds of its sectors, its trials, and sums over a span. Allocates only on creation.
+/// Tables of the blades of a structure, which do not change during a span.
 #[derive(Debug, Clone)]
-pub(crate) struct Blade {
-    pub(super) kinds: Vec<BladeTables>,
+pub(crate) struct BladeModel {
+    /// Tables of each kind of sector.
+    kinds: Vec<BladeTables>,
     /// Angles of the nodes of each sector.
     angles: Vec<NodeAngles>,
+    /// Smallest gaps of the nodes over all sectors at the start of the span and over the span of some sectors (m): of
+    /// those before the current group of sectors, and of all so far.
+    lowest: Vec<Eight>,
+    lowest_so_far: Vec<Eight>,
+    /// Largest number of points of a step.
+    degree: usize,
+}
+
+/// Trials of one blade, and sums over a span. Allocates only on creation. Each thread has its own.
+#[derive(Debug, Clone)]
+pub(crate) struct Blade {
     pub(super) trial: BladeTrial,
     pub tally: BladeTally,
-    /// Smallest gaps of the nodes over all sectors so far (m); gaps of the current sector at the start of the span (m);
-    /// and gaps below which the smallest gaps of the current sector are needed (m).
-    lowest: Vec<Eight>,
+    /// Gaps of the sector at the start of the span (m), and gaps below which its smallest gaps are needed (m).
     pub(super) begun: Vec<Eight>,
     pub(super) floors: Vec<Eight>,
     /// Gaps below which the smallest gaps of the tried step are needed (m), and those found; infinite if not needed.
@@ -72,7 +82,7 @@ pub(crate) struct BladePlace<'a> {
     pub course: MotionCourse,
 }
 
-impl Blade {
+impl BladeModel {
     /// Allocates tables for the kinds of sectors of a structure. Returns `None` unless all of its nodes face a surface
     /// of revolution.
     pub fn new(kinds: &[Tables], gap: &GapLaw, solver: Solver) -> Option<Self> {
@@ -88,13 +98,9 @@ impl Blade {
         }
         let degree = degrees().max()?;
         let kinds: Vec<_> = kinds.iter().map(|tables| BladeTables::new(tables, gap)).collect();
-        let rows = &kinds.first()?.rows;
-        let (trial, tally) = (BladeTrial::new(rows, degree), BladeTally::new(rows));
-        let of_nodes = || vec![Eight::ZERO; rows.blocks];
+        let lowest = vec![Eight::ZERO; kinds.first()?.rows.blocks];
         let angles = (0..gap.layout.lanes).map(|sector| NodeAngles::new(&gap.layout, sector)).collect();
-        let responses = ModeResponse::allocate_cache(rows);
-        let [lowest, begun, floors, bars, least] = std::array::from_fn(|_| of_nodes());
-        Some(Self { trial, tally, lowest, begun, floors, bars, least, angles, responses, next_response: 0, kinds })
+        Some(Self { kinds, angles, lowest_so_far: lowest.clone(), lowest, degree })
     }
 
     /// Uses tables for spans of this length (s). Does not allocate.
@@ -106,24 +112,17 @@ impl Blade {
     pub(crate) fn begin_span(&mut self, gaps: &[f64], lanes: usize, sectors: usize) {
         let smallest = |row: &[f64]| row[..sectors].iter().copied().fold(f64::INFINITY, f64::min);
         Eight::spread(gaps.chunks_exact(lanes).map(smallest), f64::NEG_INFINITY, &mut self.lowest);
+        self.lowest_so_far.copy_from_slice(&self.lowest);
     }
 
-    /// Starts a span of a sector with these gaps (m) of its nodes, and finds which smallest gaps are needed.
-    pub(crate) fn choose_minima(&mut self, needed: &NeededMinima, sector: usize, gap: impl Fn(usize) -> f64) {
-        let Self { kinds, tally, lowest, begun, floors, .. } = self;
-        let nodes = kinds[0].rows.nodes;
-        Eight::spread((0..nodes).map(&gap), f64::INFINITY, begun);
-        tally.begin(begun);
-        let own = if needed.all_of(sector) {
-            f64::INFINITY
-        } else if needed.by_sector {
-            (0..nodes).map(gap).fold(f64::INFINITY, f64::min)
-        } else {
-            f64::NEG_INFINITY
-        };
-        for (floor, lowest) in floors.iter_mut().zip(lowest) {
-            *floor = Eight(lowest.0.map(|lowest| lowest.max(own)));
-        }
+    /// Includes the smallest gaps of a sector in those of the sectors so far.
+    pub(crate) fn include_lowest(&mut self, tally: &BladeTally) {
+        include(&mut self.lowest_so_far, &tally.lowest);
+    }
+
+    /// Uses the smallest gaps of the sectors so far for further sectors.
+    pub(crate) fn use_lowest(&mut self) {
+        self.lowest.copy_from_slice(&self.lowest_so_far);
     }
 
     /// Returns whether steps can pass internal points in a steady phase. All modes must have a frequency above zero.
@@ -138,11 +137,47 @@ impl Blade {
     }
 }
 
+impl Blade {
+    /// Allocates memory for trials of a blade.
+    pub fn new(model: &BladeModel) -> Self {
+        let rows = model.rows(0);
+        let of_nodes = || vec![Eight::ZERO; rows.blocks];
+        Self {
+            trial: BladeTrial::new(rows, model.degree),
+            tally: BladeTally::new(rows),
+            begun: of_nodes(),
+            floors: of_nodes(),
+            bars: of_nodes(),
+            least: of_nodes(),
+            responses: ModeResponse::allocate_cache(rows),
+            next_response: 0,
+        }
+    }
+
+    /// Starts a span of a sector with these gaps (m) of its nodes, and finds which smallest gaps are needed.
+    pub(crate) fn choose_minima(&mut self, model: &BladeModel, needed: &NeededMinima, sector: usize, gaps: &[f64]) {
+        let Self { tally, begun, floors, .. } = self;
+        Eight::spread(gaps.iter().copied(), f64::INFINITY, begun);
+        tally.begin(begun);
+        let own = if needed.all_of(sector) {
+            f64::INFINITY
+        } else if needed.by_sector {
+            gaps.iter().copied().fold(f64::INFINITY, f64::min)
+        } else {
+            f64::NEG_INFINITY
+        };
+        for (floor, lowest) in floors.iter_mut().zip(&model.lowest) {
+            *floor = Eight(lowest.0.map(|lowest| lowest.max(own)));
+        }
+    }
+}
+
 /// The reach without contact is found again after this number of spans of a steady phase.
 const REACH_SPANS: u64 = 64;
 
 /// A sector of a blade during a span.
 pub(crate) struct BladeInSpan<'a> {
+    pub(super) tables: &'a BladeTables,
     pub(super) blade: &'a mut Blade,
     pub(super) place: BladePlace<'a>,
     pub control: StepControl,
@@ -168,17 +203,20 @@ pub(crate) struct BladeInSpan<'a> {
 impl<'a> BladeInSpan<'a> {
     /// Begins a span of a sector from a state. Without a state, the caller must recall an open step.
     pub fn begin(
+        model: &'a BladeModel,
         blade: &'a mut Blade,
         place: BladePlace<'a>,
         control: StepControl,
         goal: StepGoal,
         state: Option<&SectorState>,
     ) -> Self {
-        blade.trial.turn_to(&blade.angles[place.sector]);
+        let tables = &model.kinds[place.kind];
+        blade.trial.turn_to(&model.angles[place.sector]);
         if let Some(state) = state {
-            blade.trial.read(&blade.kinds[place.kind].rows, state);
+            blade.trial.read(&tables.rows, state);
         }
         Self {
+            tables,
             blade,
             place,
             control,
@@ -197,16 +235,8 @@ impl<'a> BladeInSpan<'a> {
     }
 
     /// Writes the state at the end of the span.
-    pub fn write(&mut self, state: &mut SectorState) {
-        let Blade { kinds, trial, .. } = &mut *self.blade;
-        BladeTrial::write(&kinds[self.place.kind].rows, &trial.start, state);
-        self.include_lowest();
-    }
-
-    /// Includes the smallest gaps of the sector in those of all sectors.
-    pub(super) fn include_lowest(&mut self) {
-        let Blade { lowest, tally, .. } = &mut *self.blade;
-        include(lowest, &tally.lowest);
+    pub fn write(&self, state: &mut SectorState) {
+        BladeTrial::write(&self.tables.rows, &self.blade.trial.start, state);
     }
 
     /// Returns whether a gap of the last trial in this span is not a number.
@@ -221,7 +251,7 @@ impl<'a> BladeInSpan<'a> {
 
     /// Finds the prescribed motion at the points of a step, and the motion over which the forces there do work.
     pub(super) fn find_drives(&mut self, step: SpanStep, kind: ForceInterpolation, weights: &PartWeights) {
-        let level = self.blade.kinds[self.place.kind].level(step.level, kind);
+        let level = self.tables.level(step.level, kind);
         let count = level.points() + 1;
         let mut moved = [TurningMotion::default(); POINTS];
         for point in 0..count {
@@ -238,13 +268,12 @@ impl<'a> BladeInSpan<'a> {
     /// Adds the tried step, or a part of it, to sums.
     pub(super) fn add(&mut self, step: SpanStep, kind: ForceInterpolation, part: &PartWeights, sums: Sums) {
         if self.blade.trial.pushes() && sums != Sums::WorkOnly {
-            let count = self.blade.kinds[self.place.kind].level(step.level, kind).points() + 1;
+            let count = self.tables.level(step.level, kind).points() + 1;
             self.drives[..count].iter_mut().for_each(|drive| drive.rotor = libm::sincos(drive.rotor_angle));
         }
         let faced = &self.place.faced_surface(&self.drives);
-        let Blade { trial, kinds, tally, .. } = &mut *self.blade;
-        let tables = &kinds[self.place.kind];
-        let (rows, level, motions) = (&tables.rows, tables.level(step.level, kind), &self.motions);
+        let Blade { trial, tally, .. } = &mut *self.blade;
+        let (rows, level, motions) = (&self.tables.rows, self.tables.level(step.level, kind), &self.motions);
         AddStep { tally, trial, rows, level, faced, motions, part, sums }.add();
     }
 
@@ -255,21 +284,18 @@ impl<'a> BladeInSpan<'a> {
 
     fn find_clearance(&mut self, drives: &[PointDrive; POINTS]) -> Clearance {
         let faced = self.place.faced_surface(drives);
-        let Blade { trial, kinds, floors, tally, .. } = &mut *self.blade;
-        trial.find_clearance(&kinds[self.place.kind].rows, &faced, floors, &tally.lowest)
+        let Blade { trial, floors, tally, .. } = &mut *self.blade;
+        trial.find_clearance(&self.tables.rows, &faced, floors, &tally.lowest)
     }
 
     /// Advances the modes to the end of a step. `kind` is `None` for a flight.
     pub(super) fn advance(&mut self, step: SpanStep, kind: Option<ForceInterpolation>) {
-        let Blade { trial, kinds, tally, .. } = &mut *self.blade;
-        let tables = &mut kinds[self.place.kind];
-        let interpolation = kind.unwrap_or(ForceInterpolation::Polynomial);
-        tables.prepare(step.level, interpolation);
-        let level = tables.level(step.level, interpolation);
+        let Blade { trial, tally, .. } = &mut *self.blade;
+        let level = self.tables.level(step.level, kind.unwrap_or(ForceInterpolation::Polynomial));
         let pushes = kind.is_some() && trial.pushes();
         tally.damping += trial.advance(level, pushes);
         if kind.is_some() {
-            trial.begin_next_step(&tables.rows, level);
+            trial.begin_next_step(&self.tables.rows, level);
         }
         self.known = kind.is_some();
         self.reach_known &= !pushes;
@@ -282,7 +308,7 @@ impl<'a> BladeInSpan<'a> {
 
     /// Energy of the sector at the start of the step (J).
     pub(super) fn energy_at_start(&self) -> f64 {
-        self.blade.trial.energy(&self.blade.kinds[self.place.kind].rows)
+        self.blade.trial.energy(&self.tables.rows)
     }
 }
 
@@ -321,7 +347,7 @@ impl SpanSteps for BladeInSpan<'_> {
     }
 
     fn length(&self, level: usize) -> f64 {
-        self.blade.kinds[self.place.kind].length(level)
+        self.tables.length(level)
     }
 
     fn count(&self) -> u64 {
@@ -335,7 +361,7 @@ impl SpanSteps for BladeInSpan<'_> {
         // Vibration decays in long flights.
         let is_due = self.progress.done == 0 && self.progress.spans.is_multiple_of(REACH_SPANS);
         if !self.reach_known || is_due && matches!(self.recorded, RecordScope::Interval(_)) {
-            self.blade.trial.find_reach(&self.blade.kinds[self.place.kind].rows);
+            self.blade.trial.find_reach(&self.tables.rows);
             self.reach_known = true;
         }
         if matches!(self.recorded, RecordScope::Interval(_)) && self.stays_clear() {
@@ -364,39 +390,36 @@ impl SpanSteps for BladeInSpan<'_> {
     }
 
     fn attempt(&mut self, step: SpanStep, kind: ForceInterpolation) -> TrialResult {
-        self.blade.kinds[self.place.kind].prepare(step.level, kind);
-        let whole = self.blade.kinds[self.place.kind].level(step.level, kind).whole;
-        self.find_drives(step, kind, &whole);
+        let BladeTables { rows, .. } = self.tables;
+        let level = self.tables.level(step.level, kind);
+        self.find_drives(step, kind, &level.whole);
         let faced = self.place.faced_surface(&self.drives);
-        let tables = &self.blade.kinds[self.place.kind];
         let trial = &mut self.blade.trial;
-        trial.begin(&tables.rows, self.known, &faced);
+        trial.begin(rows, self.known, &faced);
         self.known = true;
-        let level = tables.level(step.level, kind);
         self.tried = level.blocks;
-        let mut result = trial.attempt(&tables.rows, level, &faced, self.goal.precision);
+        let mut result = trial.attempt(rows, level, &faced, self.goal.precision);
         self.find_least_gaps(step, kind, &mut result);
         result
     }
 
     fn accept(&mut self, step: SpanStep, kind: ForceInterpolation, result: &TrialResult) -> f64 {
-        let (is_open, whole) =
-            (!self.ends_within(step), self.blade.kinds[self.place.kind].level(step.level, kind).whole);
+        let (is_open, level) = (!self.ends_within(step), self.tables.level(step.level, kind));
         let records = !is_open && self.recorded != RecordScope::WorkOnly;
         let before = take(&mut self.blade.tally.work);
-        self.add(step, kind, &whole, if records { Sums::All } else { Sums::WorkOnly });
-        let Blade { trial, kinds, tally, .. } = &mut *self.blade;
-        let tables = &kinds[self.place.kind];
+        self.add(step, kind, &level.whole, if records { Sums::All } else { Sums::WorkOnly });
+        let Blade { trial, tally, .. } = &mut *self.blade;
+        let rows = &self.tables.rows;
         let banked = match kind {
             ForceInterpolation::Constant => {
-                tally.work.dropped += trial.dropped(&tables.rows);
+                tally.work.dropped += trial.dropped(rows);
                 tally.work.dropped + tally.work.closing
             }
             ForceInterpolation::Polynomial if result.switches => -result.switched,
             ForceInterpolation::Polynomial => 0.0,
         };
         if trial.pushes() {
-            trial.find_modal_forces(&tables.rows, tables.level(step.level, kind));
+            trial.find_modal_forces(rows, level);
         } else if is_open {
             trial.modal_forces.iter_mut().for_each(|modal| modal.fill(Eight::ZERO));
         }

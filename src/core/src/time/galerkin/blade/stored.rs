@@ -110,6 +110,14 @@ impl BladeInSpan<'_> {
     }
 }
 
+/// Returns the start of a stored step in spans of length `span` (s since the start of the steady phase); `None` for a
+/// flight and for an array without a step.
+pub(crate) fn stored_start(numbers: &[f64], span: f64) -> Option<f64> {
+    let [spans, done] = [numbers[1], numbers[2]].map(to_count);
+    let is_tried = numbers[0] != 0.0 && ![0.0, UNBOUNDED_FLIGHT].contains(&numbers[4]);
+    is_tried.then(|| (to_real(spans) + SpanStep::new(0, done.min(UNITS_PER_SPAN - 1)).from) * span)
+}
+
 /// Length of an array that stores an open step of a blade with these numbers of nodes and of modes with inertia.
 pub(crate) fn stored_len(nodes: usize, modes: usize) -> usize {
     HEADER_LEN + 8 * ((12 + 7 * MOST) * Eight::blocks(nodes) + (2 + MOST) * Eight::blocks(modes))

@@ -7,17 +7,26 @@ use crate::modes::coordinates::ContactModes;
 use crate::time::galerkin::level::StepTables;
 use crate::time::galerkin::tables::{HALVINGS, Tables, halved};
 use crate::time::galerkin::trial::ForceInterpolation;
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
-/// Tables of one kind of sector.
-#[derive(Debug, Clone)]
+/// Tables of one kind of sector. Several threads can use them, and fill them, at the same time.
+#[derive(Debug)]
 pub(super) struct BladeTables {
     pub rows: BladeRows,
     modes: ContactModes,
-    /// Tables of all contact rows for one length, from which the others are filled.
-    general: StepTables,
     grids: [Grid; 2],
     /// Index of the grid in use.
     in_use: usize,
+    unfilled: Mutex<UnfilledTables>,
+}
+
+/// Memory of the tables that are not filled.
+#[derive(Debug, Clone)]
+struct UnfilledTables {
+    /// Tables of all contact rows for one length, from which the others are filled.
+    general: StepTables,
+    polynomial: Vec<BladeLevel>,
+    constant: Vec<BladeLevel>,
 }
 
 /// Span whose steps the tables describe.
@@ -30,15 +39,13 @@ pub(crate) enum SpanKind {
 }
 
 /// Tables for a span that is halved repeatedly.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 struct Grid {
     /// Length of the span (s).
     span: f64,
-    levels: Vec<BladeLevel>,
+    levels: [OnceLock<BladeLevel>; HALVINGS + 1],
     /// Steps of the shortest length with a constant force.
-    constant: BladeLevel,
-    /// True for filled levels; the last entry belongs to the constant force.
-    filled: [bool; HALVINGS + 2],
+    constant: OnceLock<BladeLevel>,
 }
 
 impl BladeTables {
@@ -47,48 +54,74 @@ impl BladeTables {
         let degree = tables.levels[0].basis.degree;
         let rows = BladeRows::new(tables.shapes(), tables.rows.error_form(), &gap.slopes, &gap.layout);
         let level = |kind| BladeLevel::new(&rows, degree, kind);
-        let grid = Grid {
-            span: 0.0,
-            levels: (0..=HALVINGS).map(|_| level(ForceInterpolation::Polynomial)).collect(),
-            constant: level(ForceInterpolation::Constant),
-            filled: [false; HALVINGS + 2],
-        };
         let modes = tables.shapes().clone();
-        Self { general: StepTables::new(&modes, degree), modes, grids: [grid.clone(), grid], rows, in_use: 0 }
+        let unfilled = UnfilledTables {
+            general: StepTables::new(&modes, degree),
+            polynomial: (0..2 * (HALVINGS + 1)).map(|_| level(ForceInterpolation::Polynomial)).collect(),
+            constant: (0..2).map(|_| level(ForceInterpolation::Constant)).collect(),
+        };
+        Self { rows, modes, grids: Default::default(), in_use: 0, unfilled: Mutex::new(unfilled) }
+    }
+
+    fn unfilled(&self) -> MutexGuard<'_, UnfilledTables> {
+        self.unfilled.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Uses tables for spans of this length (s).
     pub fn set_span(&mut self, kind: SpanKind, span: f64) {
         self.in_use = kind as usize;
-        let grid = &mut self.grids[self.in_use];
-        if grid.span.to_bits() != span.to_bits() {
-            (grid.span, grid.filled) = (span, [false; HALVINGS + 2]);
+        let Grid { span: previous, levels, constant } = &mut self.grids[self.in_use];
+        if previous.to_bits() == span.to_bits() {
+            return;
         }
+        *previous = span;
+        let unfilled = self.unfilled.get_mut().unwrap_or_else(PoisonError::into_inner);
+        unfilled.polynomial.extend(levels.iter_mut().filter_map(OnceLock::take));
+        unfilled.constant.extend(constant.take());
     }
 
-    /// Fills the table of a level unless it is filled. Does not allocate.
-    pub fn prepare(&mut self, level: usize, kind: ForceInterpolation) {
-        let Self { rows, modes, general, grids, in_use } = self;
-        let Grid { span, levels, constant, filled } = &mut grids[*in_use];
-        let (entry, halvings, table) = match kind {
-            ForceInterpolation::Polynomial => (level, level, &mut levels[level]),
-            ForceInterpolation::Constant => (HALVINGS + 1, HALVINGS, constant),
-        };
-        if !filled[entry] {
-            general.set_step(modes, halved(*span, halvings));
-            table.fill(rows, general);
-            filled[entry] = true;
-        }
-    }
-
-    /// Table of a level, which must be filled.
+    /// Returns the table of a level, which is filled when it is first used. Does not allocate.
     pub fn level(&self, level: usize, kind: ForceInterpolation) -> &BladeLevel {
-        let grid = &self.grids[self.in_use];
-        if kind == ForceInterpolation::Constant { &grid.constant } else { &grid.levels[level] }
+        let Grid { levels, constant, .. } = &self.grids[self.in_use];
+        match kind {
+            ForceInterpolation::Polynomial => levels[level].get_or_init(|| self.filled(kind, level)),
+            ForceInterpolation::Constant => constant.get_or_init(|| self.filled(kind, HALVINGS)),
+        }
+    }
+
+    /// Fills a table for the span halved `halvings` times.
+    #[cold]
+    fn filled(&self, kind: ForceInterpolation, halvings: usize) -> BladeLevel {
+        let UnfilledTables { general, polynomial, constant } = &mut *self.unfilled();
+        general.set_step(&self.modes, self.length(halvings));
+        let memory = match kind {
+            ForceInterpolation::Polynomial => polynomial,
+            ForceInterpolation::Constant => constant,
+        };
+        let mut level = memory.pop().unwrap_or_else(|| unreachable!("memory for every level"));
+        level.fill(&self.rows, general);
+        level
     }
 
     /// Length of the steps of a level (s).
     pub fn length(&self, level: usize) -> f64 {
         halved(self.grids[self.in_use].span, level)
+    }
+}
+
+impl Clone for BladeTables {
+    fn clone(&self) -> Self {
+        let Self { rows, modes, grids, in_use, .. } = self;
+        let mut unfilled = self.unfilled().clone();
+        // Later, all tables may be unfilled.
+        unfilled.polynomial.reserve_exact(2 * (HALVINGS + 1));
+        unfilled.constant.reserve_exact(2);
+        Self {
+            rows: rows.clone(),
+            modes: modes.clone(),
+            grids: grids.clone(),
+            in_use: *in_use,
+            unfilled: Mutex::new(unfilled),
+        }
     }
 }

@@ -1,0 +1,346 @@
+//! Sectors of a structure that face one surface of revolution.
+//!
+//! Several threads can share the sectors of a span. The result of a sector depends only on the state at the start of the
+//! span and, in a long span, on the smallest gaps of the first few sectors. Results are entered in the order of the
+//! sectors, so they do not depend on the number of threads.
+
+use super::steady_phase::{real_count, steady_course};
+use crate::contact::ContactParameters;
+use crate::geometry::GapLaw;
+use crate::geometry::revolution::RevolutionGap;
+use crate::system::contact_view::ContactMember;
+use crate::system::pair::Prescribed;
+use crate::system::{ContactPair, Effort, StepFailure, Structure, System};
+use crate::time::SteadyInterval;
+use crate::time::galerkin::blade::{Blade, BladeInSpan, BladeModel, BladePlace, BladeTally};
+use crate::time::galerkin::island::StepControl;
+use crate::time::galerkin::record::MotionCourse;
+use crate::time::galerkin::span::{StepGoal, Stopped, integrate};
+use crate::time::galerkin::state::SectorState;
+use crate::time::galerkin::tables::Tables;
+use crate::time::galerkin::trial::Trial;
+use crate::time::workers::Workers;
+use std::iter::Zip;
+use std::mem::{swap, take};
+use std::ops::Range;
+use std::slice::IterMut;
+use std::sync::{Mutex, PoisonError};
+
+/// One of this number of sectors is integrated before the others.
+const PER_LEADER: usize = 9;
+
+/// Tables, scratch memory and results of the sectors of a structure.
+#[derive(Debug, Clone)]
+pub(super) struct BladeSectors {
+    pub model: BladeModel,
+    /// Length of an array that stores an open step of a sector; 0 if all steps end at internal points.
+    pub open_step_len: usize,
+    /// Scratch memory of each thread.
+    scratch: Vec<Scratch>,
+    /// Results of all sectors, or of one sector after the other if there is one thread.
+    results: Vec<SectorResult>,
+}
+
+/// Scratch memory of a thread.
+#[derive(Debug, Clone)]
+struct Scratch {
+    blade: Blade,
+    /// Finds the displacements of the contact rows.
+    trial: Trial,
+}
+
+/// State of a sector at the end of a span, and its contacts during the span.
+#[derive(Debug, Clone)]
+pub(super) struct SectorResult {
+    /// Kind of the sector among the tables.
+    pub kind: usize,
+    pub state: SectorState,
+    /// Displacements of the contact rows (m).
+    pub displacements: Vec<f64>,
+    pub control: StepControl,
+    pub tally: BladeTally,
+    /// Rates of the gaps at the end of an interval of a steady phase (m/s), and energy at the start of the open step (J).
+    pub gap_rates: Vec<f64>,
+    pub energy: f64,
+    pub effort: Effort,
+    /// True if a gap of the last trial is not a number.
+    pub is_lost: bool,
+    pub outcome: Result<(), Stopped>,
+}
+
+/// A span of the sectors.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum SectorSpan<'a> {
+    /// A span that ends at an internal point, with its prescribed motion and length (s).
+    Bounded(&'a MotionCourse, f64),
+    /// An interval of a steady phase.
+    Interval(SteadyInterval),
+    /// The end of a steady phase.
+    End(SteadyInterval),
+}
+
+impl SectorSpan<'_> {
+    /// Number of sectors that are integrated before the others: their smallest gaps limit those that are searched in the
+    /// others. This saves more time than it costs only if steps end within the span.
+    pub fn leaders(&self, sectors: usize) -> usize {
+        match self {
+            Self::Interval(interval) if interval.to - interval.from > interval.span => sectors / PER_LEADER,
+            _ => 0,
+        }
+    }
+
+    /// Length of the span (s).
+    fn length(&self) -> f64 {
+        match self {
+            Self::Bounded(_, length) => *length,
+            Self::Interval(interval) | Self::End(interval) => interval.to - interval.from,
+        }
+    }
+}
+
+/// What all sectors have in common in a span.
+#[derive(Debug, Clone, Copy)]
+struct SectorsInSpan<'a> {
+    model: &'a BladeModel,
+    tables: &'a [Tables],
+    structure: &'a Structure,
+    gap: &'a RevolutionGap,
+    parameters: ContactParameters,
+    prescribed: &'a Prescribed,
+    goal: StepGoal,
+    span: SectorSpan<'a>,
+}
+
+/// Sectors that no thread has begun.
+struct Remaining<'a> {
+    results: Zip<Range<usize>, IterMut<'a, SectorResult>>,
+    open_steps: &'a mut [f64],
+    open_step_len: usize,
+}
+
+impl<'a> Remaining<'a> {
+    /// Returns the next sector, its result and its open step.
+    fn next(&mut self) -> Option<(usize, &'a mut SectorResult, &'a mut [f64])> {
+        let (sector, result) = self.results.next()?;
+        let (own, rest) = take(&mut self.open_steps).split_at_mut(self.open_step_len);
+        self.open_steps = rest;
+        Some((sector, result, own))
+    }
+}
+
+/// Span of the sectors, with the tables of all contact rows, the place in the system, and the tolerance.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SpanOfSectors<'a> {
+    pub span: SectorSpan<'a>,
+    pub tables: &'a [Tables],
+    /// Indices of the set, the structure and the pair.
+    pub set: usize,
+    pub structure: usize,
+    pub pair: usize,
+    pub goal: StepGoal,
+}
+
+impl BladeSectors {
+    /// Allocates memory for one thread.
+    pub fn new(model: BladeModel, structure: &Structure, trial: &Trial) -> Self {
+        let is_open = model.supports_steady_phase() && !structure.step_control.open_steps.is_empty();
+        let open_step_len = if is_open { structure.open_step_len() } else { 0 };
+        let scratch = Scratch { blade: Blade::new(&model), trial: trial.clone() };
+        let nodes = structure.nodes();
+        let result = SectorResult {
+            kind: 0,
+            state: SectorState::new(structure.modes().model().inertial_modes(), nodes),
+            displacements: vec![0.0; 3 * nodes],
+            control: StepControl::default(),
+            tally: scratch.blade.tally.clone(),
+            gap_rates: vec![0.0; nodes],
+            energy: 0.0,
+            effort: Effort::default(),
+            is_lost: false,
+            outcome: Ok(()),
+        };
+        Self { model, open_step_len, scratch: vec![scratch], results: vec![result] }
+    }
+
+    /// Allocates memory for `threads` threads that share `sectors` sectors.
+    pub fn use_threads(&mut self, threads: usize, sectors: usize) {
+        let (trial, result) = (self.scratch[0].trial.clone(), self.results[0].clone());
+        // A copy of a list has no room for further items.
+        self.scratch.resize_with(threads, || Scratch { blade: Blade::new(&self.model), trial: trial.clone() });
+        self.results.resize(if threads > 1 { sectors } else { 1 }, result);
+    }
+
+    /// Integrates some sectors over a span if several threads share them.
+    pub fn integrate_together(
+        &mut self,
+        sectors: Range<usize>,
+        system: &mut System,
+        of: SpanOfSectors,
+        workers: &Workers,
+    ) {
+        if self.results.len() == 1 || sectors.is_empty() {
+            return;
+        }
+        let mut open_steps = take(&mut system.structures[of.structure].step_control.open_steps);
+        if let Some(common) = of.begin(system, &self.model) {
+            let open_step_len = self.open_step_len;
+            let open_steps = &mut open_steps[sectors.start * open_step_len..sectors.end * open_step_len];
+            let results = sectors.clone().zip(&mut self.results[sectors]);
+            let remaining = Remaining { results, open_steps, open_step_len };
+            let (remaining, scratch) = (Mutex::new(remaining), Mutex::new(self.scratch.iter_mut()));
+            workers.run(&|| {
+                let Some(scratch) = next_of(&scratch, Iterator::next) else { return };
+                while let Some((sector, result, open_step)) = next_of(&remaining, Remaining::next) {
+                    common.integrate(sector, open_step, scratch, result);
+                }
+            });
+        }
+        system.structures[of.structure].step_control.open_steps = open_steps;
+    }
+
+    /// Integrates one sector over a span, unless [`Self::integrate_together`] has integrated it.
+    pub fn integrate_one(&mut self, sector: usize, system: &mut System, of: SpanOfSectors) {
+        if self.results.len() > 1 && !matches!(of.span, SectorSpan::End(_)) {
+            return;
+        }
+        let mut open_steps = take(&mut system.structures[of.structure].step_control.open_steps);
+        if let Some(common) = of.begin(system, &self.model) {
+            let open_step = &mut open_steps[sector * self.open_step_len..][..self.open_step_len];
+            let place = self.result_place(sector);
+            common.integrate(sector, open_step, &mut self.scratch[0], &mut self.results[place]);
+        }
+        system.structures[of.structure].step_control.open_steps = open_steps;
+    }
+
+    /// Enters the result of a sector that has been integrated.
+    ///
+    /// # Errors
+    /// [`StepFailure`]; the state is then undefined.
+    pub fn enter(&self, sector: usize, system: &mut System, of: SpanOfSectors) -> Result<(), StepFailure> {
+        let SpanOfSectors { span, set, structure, pair, goal, .. } = of;
+        let result = &self.results[self.result_place(sector)];
+        let System { structures, events, counted, .. } = system;
+        let of = &mut structures[structure];
+        counted.effort.add(&result.effort);
+        if result.outcome == Err(Stopped::Exhausted) || counted.effort.tried() > goal.most {
+            return Err(StepFailure::Exhausted);
+        }
+        if let SectorSpan::Interval(_) = span {
+            of.step_control.energies[sector] = result.energy;
+            if result.outcome.is_ok() {
+                of.write_gaps(sector, result);
+            }
+        }
+        let rows = self.model.rows(result.kind);
+        events.now.extend((0..of.nodes()).filter_map(|node| {
+            let at = ContactMember { structure, pair, node, sector, index: of.index(node, sector) };
+            result.tally.event(rows, at, span.length())
+        }));
+        result.tally.work.enter(&mut counted.ledgers[set]);
+        if result.tally.implausible || result.is_lost {
+            return Err(StepFailure::Implausible { structure, sector });
+        }
+        of.write_result(sector, result);
+        result.outcome.map_err(|_| StepFailure::Unsolved { structure, sector })
+    }
+
+    /// Includes the smallest gaps of a sector that has been integrated in those of the sectors so far.
+    pub fn include_lowest(&mut self, sector: usize) {
+        let place = self.result_place(sector);
+        self.model.include_lowest(&self.results[place].tally);
+    }
+
+    fn result_place(&self, sector: usize) -> usize {
+        if self.results.len() > 1 { sector } else { 0 }
+    }
+}
+
+/// Returns the next item of a shared iterator.
+fn next_of<I, T>(shared: &Mutex<I>, next: impl FnOnce(&mut I) -> Option<T>) -> Option<T> {
+    next(&mut shared.lock().unwrap_or_else(PoisonError::into_inner))
+}
+
+impl<'a> SpanOfSectors<'a> {
+    fn begin(&self, system: &'a System, model: &'a BladeModel) -> Option<SectorsInSpan<'a>> {
+        let pair: &ContactPair = &system.pairs[self.pair];
+        let GapLaw::Revolution(gap) = pair.gap() else { return None };
+        // Sectors before this one may have used a part of the allowed steps.
+        let most = self.goal.most.saturating_sub(system.steps_tried());
+        Some(SectorsInSpan {
+            model,
+            tables: self.tables,
+            structure: &system.structures[self.structure],
+            gap,
+            parameters: pair.parts.parameters,
+            prescribed: &pair.prescribed,
+            goal: StepGoal { most, ..self.goal },
+            span: self.span,
+        })
+    }
+}
+
+impl SectorsInSpan<'_> {
+    /// Integrates a sector, whose open step is stored in an array.
+    fn integrate(&self, sector: usize, open_step: &mut [f64], scratch: &mut Scratch, result: &mut SectorResult) {
+        let Self { model, structure, .. } = *self;
+        let Scratch { blade, trial } = scratch;
+        let (bank, state) = (structure.modes(), &mut result.state);
+        let (kind, control) = (bank.set_of(sector), structure.step_control_of(sector));
+        (result.kind, result.control) = (kind, control);
+        (result.effort, result.outcome) = (Effort::default(), Ok(()));
+        structure.read_gaps(sector, state);
+        blade.choose_minima(model, &structure.needed_minima, sector, &state.gaps);
+        let (course, has_open_step) = match self.span {
+            SectorSpan::Bounded(course, _) => (*course, false),
+            _ => (MotionCourse::default(), open_step[0] != 0.0),
+        };
+        if !has_open_step {
+            structure.read_contacts(sector, state);
+            bank.read_sector(sector, &mut state.position, &mut state.velocity);
+        }
+        let place = BladePlace { kind, sector, gap: self.gap, parameters: self.parameters, course };
+        let begun = (!has_open_step).then_some(&*state);
+        let mut steps = BladeInSpan::begin(model, blade, place, control, self.goal, begun);
+        match self.span {
+            SectorSpan::Bounded(..) => {
+                result.outcome = integrate(&mut steps, &mut result.effort);
+                result.is_lost = steps.is_lost();
+                steps.write(state);
+                result.control = steps.control;
+            }
+            SectorSpan::Interval(interval) => self.integrate_interval(&mut steps, interval, open_step, result),
+            SectorSpan::End(interval) => self.end(&mut steps, interval, open_step, result),
+        }
+        swap(&mut result.tally, &mut blade.tally);
+        result.displacements.copy_from_slice(trial.displacements(&self.tables[result.kind].rows, &result.state));
+    }
+
+    fn integrate_interval(
+        &self,
+        steps: &mut BladeInSpan,
+        interval: SteadyInterval,
+        open_step: &mut [f64],
+        result: &mut SectorResult,
+    ) {
+        steps.recall(open_step);
+        let course = |spans: u64| steady_course(self.prescribed, real_count(spans) * interval.span, interval.span);
+        result.outcome = steps.integrate_steady_interval(interval, course, &mut result.effort);
+        result.is_lost = steps.is_lost();
+        if result.outcome.is_ok() {
+            steps.write_sample(interval, course, &mut result.state);
+            steps.store(open_step);
+            result.gap_rates.iter_mut().enumerate().for_each(|(node, rate)| *rate = steps.gap_rate(node));
+        }
+        (result.control, result.energy) = (steps.control, steps.energy());
+    }
+
+    /// Ends the open step of a sector.
+    fn end(&self, steps: &mut BladeInSpan, interval: SteadyInterval, open_step: &mut [f64], result: &mut SectorResult) {
+        steps.recall(open_step);
+        open_step.fill(0.0);
+        let course = |[from, to]: [f64; 2]| steady_course(self.prescribed, from, to - from);
+        result.outcome = steps.close(interval, course, &mut result.effort, &mut result.state);
+        result.is_lost = steps.is_lost();
+        result.control = StepControl { level: result.control.level, ..steps.control };
+    }
+}
