@@ -52,6 +52,11 @@ pub struct TimeSettings {
 }
 
 impl TimeSettings {
+    /// Returns the error tolerance of adaptive steps; `None` with fixed steps.
+    pub fn step_tolerance(&self) -> Option<f64> {
+        self.scheme.properties().adaptive.then(|| self.tolerance.unwrap_or(TOLERANCE))
+    }
+
     /// Checks every value against its range.
     pub(super) fn validate(&self) -> Result<()> {
         within("time.max_internal_steps", f64::from(self.max_internal_steps.unwrap_or(0)), 0.0, ranges::STEPS)?;
