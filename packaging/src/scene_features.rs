@@ -2,7 +2,7 @@
 
 use tiprub_core::scene::settings::{
     BodyMotion, CoatingSettings, ContactSettings, CuttingSettings, InputInterpolation, Preset, SceneSettings,
-    StructureSettings, SurfaceSettings, TOLERANCE,
+    StructureSettings, SurfaceSettings,
 };
 use tiprub_core::{Rom, Scene};
 
@@ -23,8 +23,7 @@ pub fn features(scene: &Scene) -> Vec<String> {
     if scheme.properties().quasi_static && !scheme.properties().adaptive {
         found.push(format!("the highest modes are quasi-static: contact nodes have no mass ({})", scheme.name()));
     }
-    if scheme.properties().adaptive {
-        let tolerance = settings.time.tolerance.unwrap_or(TOLERANCE);
+    if let Some(tolerance) = settings.time.step_tolerance() {
         found.push(format!(
             "adaptive steps of every blade, with a tolerance of {tolerance:e} of the clearance; contact nodes have no \
              mass (galerkin)"

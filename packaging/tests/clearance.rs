@@ -38,6 +38,7 @@ fn smallest_clearances_do_not_depend_on_the_communication_step() {
     let rom = reduce_rotor37(&Rotor37Options::default(), &|_| {}).unwrap().rom;
     let mut scene = rotor37_scene_with(rom).unwrap();
     (scene.settings.time.scheme, scene.settings.time.step) = (Scheme::Galerkin, STEP);
+    scene.settings.time.tolerance = Some(1e-3);
     scene.settings.outputs.watched_sectors = vec![1];
     let gap = scene.settings.contacts[0].gap;
     let (long, short) = (minima(&scene, 1), minima(&scene, 16));

@@ -3,7 +3,7 @@
 use std::{path::Path, time::Instant};
 
 use serde_json::{Map, Value, json};
-use tiprub_core::scene::settings::{ContactSettings, SceneSettings, TOLERANCE};
+use tiprub_core::scene::settings::{ContactSettings, SceneSettings};
 use tiprub_core::{Scene, Warning};
 use tiprub_gallery::scene_source;
 use tiprub_shell::{
@@ -22,13 +22,10 @@ use crate::{answer, cli::RunArguments, scene_features};
 
 /// Returns the largest gap or penetration of a closed contact with adaptive steps (m); 0 with fixed steps.
 fn allowed_error(settings: &SceneSettings, set: &[(String, String)]) -> f64 {
-    if !settings.time.scheme.properties().adaptive {
-        return 0.0;
-    }
-    let given = set.iter().find(|(name, _)| name == "tolerance").and_then(|(_, value)| value.parse().ok());
+    let Some(tolerance) = estimate::time_in_use(settings, set).step_tolerance() else { return 0.0 };
     let gap = |contact: &ContactSettings| contact.nominal_gap();
     let smallest = settings.contacts.iter().map(gap).filter(|gap| *gap > 0.0).fold(f64::INFINITY, f64::min);
-    if smallest.is_finite() { given.or(settings.time.tolerance).unwrap_or(TOLERANCE) * smallest } else { 0.0 }
+    if smallest.is_finite() { tolerance * smallest } else { 0.0 }
 }
 
 /// Loads and runs the scene, writes the CSV, and summarises.
@@ -142,10 +139,10 @@ fn where_the_rest_is(json: &Value, warned: bool) -> String {
     text
 }
 
-/// Returns the errors of the run if requested, else those that the ROM of the master carries.
+/// Returns the errors of the run if requested, else those that are known without further runs.
 fn estimated(scene: &Scene, arguments: &RunArguments, schedule: &Schedule, console: &Console) -> Result<Vec<Estimate>> {
     if !arguments.estimate {
-        return Ok(estimate::of_rom(&scene.roms[tiprub_study::master(scene)]));
+        return Ok(estimate::without_runs(scene, &arguments.set));
     }
     let mut scene = scene.clone();
     (scene.settings.experiment.start, scene.settings.experiment.communication_step) = (schedule.start, schedule.step);

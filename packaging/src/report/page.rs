@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use tiprub_core::scene::settings::{SceneSettings, TOLERANCE};
+use tiprub_core::scene::settings::SceneSettings;
 use tiprub_cosim::variables::Quantity;
 use tiprub_figure::{STYLE, escape};
 use tiprub_shell::Result;
@@ -165,8 +165,7 @@ fn run_section(input: &ReportInput<'_>) -> String {
         ("computing time per simulated second", format!("{} s", rounded(stepping / simulated))),
     ];
     let settings = &input.scene.settings;
-    if settings.time.scheme.properties().adaptive {
-        let tolerance = settings.time.tolerance.unwrap_or(TOLERANCE);
+    if let Some(tolerance) = settings.time.step_tolerance() {
         rows.insert(2, ("adaptive steps", format!("tolerance {} of the clearance", scientific(tolerance))));
     } else if let Some(step) = results.last(Quantity::InternalStep) {
         rows.insert(2, ("internal step h", format!("{} s", scientific(step))));

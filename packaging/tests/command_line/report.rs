@@ -15,7 +15,7 @@ use tiprub_shell::{
     native::{self, RunInputs},
     schedule::Schedule,
 };
-use tiprub_study::estimate::Estimate;
+use tiprub_study::estimate::{ErrorSource, Estimate};
 
 #[test]
 fn a_report_is_complete_offline_and_small() {
@@ -32,7 +32,7 @@ fn a_report_is_complete_offline_and_small() {
         facts: &[RomFacts::of(&reduction.rom, None).unwrap()],
         schedule: &schedule,
         native: &run,
-        estimates: &[Estimate { direction: "steps", left: Ok(1.5e-3), found_on: None }],
+        estimates: &[Estimate { direction: "steps", left: Ok(1.5e-3), source: ErrorSource::Run }],
         paper: Some((Simulation::new(&scene).unwrap().table(), &run)),
         imported: &[ImportedSummary { label: "FMI 2.0".into(), stepping: 0.1, agreement }],
         files: &[ReportFile { name: "results.csv".into(), meaning: "results".into(), bytes: 1234 }],

@@ -5,9 +5,12 @@
 //! between them. If they decrease as a power, the remaining error is c₂/(r − 1) with r = c₁/c₂, limited to the ratios that later levels can have. If
 //! they hardly decrease, the error is unknown. Longer steps may be rejected: then shorter ones are tried, and the error is c₁ + c₂/(r − 1).
 
+mod step_bound;
+
 use serde_json::{Value, json};
 use tiprub_core::scene::rom::RubErrors;
 use tiprub_core::{Rom, Scene};
+use tiprub_cosim::shown;
 use tiprub_shell::{Result, console::Console};
 
 use crate::convergence::{
@@ -17,6 +20,9 @@ use crate::convergence::{
     truncate::{Truncation, truncated},
 };
 use crate::error::user_scene::own_division;
+
+pub use step_bound::time_in_use;
+use step_bound::{RUBS, step_bound, with_time_in_use};
 
 /// Smallest ratio of two changes of the displacements from which the error is estimated.
 const SHRINKING: f64 = 1.3;
@@ -33,6 +39,17 @@ const LATER: [(&str, [f64; 2]); 4] = [
 const WORDS: [(&str, &str); 2] =
     [("patches", "patches along the chord"), ("rows", "rows of patches across the thickness")];
 
+/// Runs from which an error is known.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum ErrorSource {
+    /// This run, compared with coarser runs of its scene.
+    Run,
+    /// Rubs of other scenes with the same tolerance: the largest error of these rubs.
+    Rubs,
+    /// The rub with this description, whose errors the ROM carries.
+    Rom(String),
+}
+
 /// Estimated error of one direction.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimate {
@@ -41,16 +58,21 @@ pub struct Estimate {
     /// Error of the displacements (relative L2), or the reason why it is unknown. Impulse and work are too often close to the limit by chance to be
     /// estimated.
     pub left: std::result::Result<f64, String>,
-    /// Name of the scene on which it was determined, if the error comes from the ROM.
-    pub found_on: Option<String>,
+    /// Source of the error.
+    pub source: ErrorSource,
 }
 
 impl Estimate {
     fn unknown(direction: &'static str, why: impl Into<String>) -> Self {
-        Self { direction, left: Err(why.into()), found_on: None }
+        Self { direction, left: Err(why.into()), source: ErrorSource::Run }
     }
 
-    /// Replaces an unknown error by the error that the ROM carries.
+    /// Returns the error of the steps of `scene` as measured in other rubs.
+    fn of_measured_steps(scene: &Scene) -> Self {
+        Self { direction: "steps", left: step_bound(scene), source: ErrorSource::Rubs }
+    }
+
+    /// Replaces an unknown error of the model by the error that the ROM carries.
     fn or_of(self, rom: &Rom) -> Self {
         let Some(errors) = rom.checks.rub_errors.as_ref().filter(|_| self.left.is_err()) else { return self };
         let known = match self.direction {
@@ -61,7 +83,7 @@ impl Estimate {
             _ => None,
         };
         match known {
-            Some(left) => Self { left: Ok(left), found_on: Some(errors.found_on.clone()), ..self },
+            Some(left) => Self { left: Ok(left), source: ErrorSource::Rom(errors.found_on.clone()), ..self },
             None => self,
         }
     }
@@ -82,27 +104,39 @@ impl Estimate {
         };
         let own_first = refined.direction.levels.first().is_some_and(|level| level.own);
         let left = last / (ratio - 1.0) + if own_first { before } else { 0.0 };
-        Self { direction, left: Ok(left), found_on: None }
+        Self { direction, left: Ok(left), source: ErrorSource::Run }
     }
 
     /// Returns the name and the value, or the reason why it is unknown.
     pub fn json(&self) -> (String, Value) {
         let value = match &self.left {
-            Ok(left) => json!({ "displacements": left, "found_on": self.found_on }),
+            Ok(left) => json!({ "displacements": left, "found_on": self.found_on() }),
             Err(why) => json!({ "unknown": why }),
         };
         (self.direction.to_owned(), value)
     }
 
-    fn source_text(&self) -> &'static str {
+    /// Returns the description of the rubs on which the error was found, unless it was this one.
+    fn found_on(&self) -> Option<&str> {
+        match &self.source {
+            ErrorSource::Run => None,
+            ErrorSource::Rubs => Some(RUBS),
+            ErrorSource::Rom(found_on) => Some(found_on),
+        }
+    }
+
+    fn direction_text(&self) -> &'static str {
         WORDS.iter().find(|(name, _)| *name == self.direction).map_or(self.direction, |(_, words)| words)
     }
 
     /// Formats the error: "modes 1.2 %"; "mesh unknown".
     pub fn text(&self) -> String {
-        match self.left {
-            Ok(left) => format!("{} {:.2} %", self.source_text(), 100.0 * left),
-            Err(_) => format!("{} unknown", self.source_text()),
+        match (&self.left, &self.source) {
+            (Ok(left), ErrorSource::Rubs) => {
+                format!("{} up to about {} % ({RUBS})", self.direction_text(), shown(100.0 * left))
+            }
+            (Ok(left), _) => format!("{} {:.2} %", self.direction_text(), 100.0 * left),
+            (Err(_), _) => format!("{} unknown", self.direction_text()),
         }
     }
 }
@@ -129,10 +163,13 @@ pub fn json_of(estimates: &[Estimate]) -> Value {
 /// Returns one line for reports: errors of this run, then those that the ROM carries from another run.
 pub fn errors_text(estimates: &[Estimate]) -> String {
     let list = |of_rom: bool| {
-        let chosen = estimates.iter().filter(|one| one.found_on.is_some() == of_rom);
+        let chosen = estimates.iter().filter(|one| matches!(one.source, ErrorSource::Rom(_)) == of_rom);
         chosen.map(Estimate::text).collect::<Vec<_>>().join(", ")
     };
-    let found_on = estimates.iter().find_map(|one| one.found_on.as_ref());
+    let found_on = estimates.iter().find_map(|one| match &one.source {
+        ErrorSource::Rom(found_on) => Some(found_on),
+        _ => None,
+    });
     let of_rom = found_on.map(|found_on| {
         let found_on = if found_on.is_empty() { "an unnamed rub" } else { found_on };
         format!("from the ROM, for {found_on}: {}", list(true))
@@ -147,10 +184,23 @@ pub fn of_rom(rom: &Rom) -> Vec<Estimate> {
         return Vec::new();
     }
     let steps = Estimate::unknown("steps", "it depends on the run, not on the ROM: use `tiprub run --estimate`");
-    let others = ["modes", "patches", "rows", "mesh"].map(|direction| {
+    std::iter::once(steps).chain(of_model(rom)).collect()
+}
+
+fn of_model(rom: &Rom) -> [Estimate; 4] {
+    ["modes", "patches", "rows", "mesh"].map(|direction| {
         Estimate::unknown(direction, "not stored in the ROM: use `tiprub study convergence --into`").or_of(rom)
-    });
-    [steps].into_iter().chain(others).collect()
+    })
+}
+
+/// Returns the errors of a run that are known without further runs, with replaced start values (name, value as text): those of the steps as measured
+/// in other rubs, and those that the ROM carries; empty if none is known.
+pub fn without_runs(scene: &Scene, settings: &[(String, String)]) -> Vec<Estimate> {
+    let (scene, _) = with_time_in_use(scene, settings);
+    let steps = Estimate::of_measured_steps(&scene);
+    let model = of_model(&scene.roms[crate::master(&scene)]);
+    let all: Vec<Estimate> = std::iter::once(steps).chain(model).collect();
+    if all.iter().any(|estimate| estimate.left.is_ok()) { all } else { Vec::new() }
 }
 
 fn direction(title: &str, unit: &'static str, levels: Vec<RefinementLevel>) -> RefinementDirection {
@@ -258,9 +308,12 @@ pub fn estimates(
             .map(|direction| Estimate::unknown(direction, why.as_str()))
             .into());
     }
+    let (scene, settings) = &with_time_in_use(scene, settings);
     let runner = Runner::new(settings, samples, console);
     let division = own_division(scene);
-    let mut found = vec![of_steps(scene, division, &runner)?];
+    let steps = of_steps(scene, division, &runner)?;
+    let measured = Estimate::of_measured_steps(scene);
+    let mut found = vec![if steps.left.is_err() && measured.left.is_ok() { measured } else { steps }];
     let own =
         [("modes", modes(scene, division)), ("patches", patches(scene, division)), ("rows", rows(scene, division))];
     for (name, direction) in own {
@@ -305,7 +358,7 @@ mod tests {
 
     #[test]
     fn error_line_lists_known_and_unknown_estimates() {
-        let of = |direction, left| Estimate { direction, left: Ok(left), found_on: None };
+        let of = |direction, left| Estimate { direction, left: Ok(left), source: ErrorSource::Run };
         let all = [of("steps", 1.2e-3), Estimate::unknown("mesh", "no other")];
         assert_eq!(errors_text(&all), "estimated error of the displacements: steps 0.12 %, mesh unknown");
     }
@@ -319,7 +372,7 @@ mod tests {
         let found_on = "a light rub".to_owned();
         rom.checks.rub_errors =
             Some(RubErrors { found_on, modes: None, patches: Some(0.02), rows: None, mesh: Some(0.05) });
-        let known = Estimate { direction: "patches", left: Ok(0.01), found_on: None };
+        let known = Estimate { direction: "patches", left: Ok(0.01), source: ErrorSource::Run };
         let all = [Estimate::unknown("modes", "refused"), known.clone(), Estimate::unknown("mesh", "no other")];
         let all = all.map(|estimate| estimate.or_of(&rom));
         assert_eq!(all[1], known, "what the run tells stays");

@@ -4,7 +4,7 @@
 
 use serde_json::json;
 use tiprub_core::scene::method::{Scheme, Solver};
-use tiprub_core::scene::settings::{Meridian, Preset, Shape, SpinSettings, TOLERANCE};
+use tiprub_core::scene::settings::{Meridian, Preset, Shape, SpinSettings};
 use tiprub_core::{CoSimulation, Scene, Simulation};
 use tiprub_figure::plots::{Plot, Series};
 use tiprub_gallery::scene_source;
@@ -107,8 +107,8 @@ pub(crate) fn blades_of(scene: &Scene) -> Result<BladeScene> {
 fn product(scene: &Scene, division: u32, samples: u32) -> tiprub_core::Result<SideBySideRun> {
     let mut scene = scene.clone();
     let (time, interval) = (&mut scene.settings.time, scene.settings.experiment.communication_step);
-    if time.scheme == Scheme::Galerkin {
-        time.tolerance = Some(time.tolerance.unwrap_or(TOLERANCE) / f64::from(division.pow(4)));
+    if let Some(tolerance) = time.step_tolerance() {
+        time.tolerance = Some(tolerance / f64::from(division.pow(4)));
     } else {
         time.step /= f64::from(division);
     }

@@ -24,6 +24,8 @@ const LENGTH: f64 = 7e-3;
 const MOST: usize = 25;
 /// Smallest fraction of a Newton step.
 const SHORTEST: f64 = 0.1;
+/// Tolerance of the steps of the rub.
+const TOLERANCE: f64 = 1e-3;
 /// A step is solved if the shaft is within this fraction of the clearance from the position that its force causes: a
 /// hundredth of the tolerance of the rub, whose forces jump by less than it when its steps change.
 const SOLVED: f64 = 1e-5;
@@ -230,6 +232,7 @@ fn scene(arguments: &StudyCommon, console: &Console) -> Result<Scene> {
     } else {
         scene_source::load("builtin:rotor37", &arguments.cache.cache(), console)?
     };
+    scene.settings.time.tolerance = Some(TOLERANCE);
     scene.settings.structures[0].whirl = true;
     Ok(scene)
 }

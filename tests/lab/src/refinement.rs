@@ -30,6 +30,8 @@ use crate::cli::RefinementArguments;
 /// Depth of the bumps around rotor 37, which intrude by 2·depth − 1 of the gap.
 const LIGHT: f64 = 0.6;
 const HEAVY: f64 = 1.0;
+/// Tolerance of the scenes with adaptive steps: small compared with the other errors.
+const TOLERANCE: f64 = 1e-3;
 /// Friction coefficient of the scenes with friction.
 const FRICTION: f64 = 0.15;
 /// Families of scenes that share a picture.
@@ -71,6 +73,9 @@ fn standards() -> Result<Vec<Standard>> {
     ] {
         let one_row = name.ends_with("one-row");
         let mut settings = scene_source::settings(if one_row { "builtin:rotor37-one-row" } else { "builtin:rotor37" })?;
+        if !one_row {
+            settings.time.tolerance = Some(TOLERANCE);
+        }
         settings.contacts[0].friction = friction;
         settings.surfaces[0].shape = Shape::TwoLobe { depth, width: 0.15, phase: 0.0 };
         let (name, title, family) = (name.into(), title.into(), if one_row { APART } else { FAMILIES[0] });

@@ -111,6 +111,8 @@ type WitnessRun = std::result::Result<RunSummary, String>;
 const DEFAULT: ((Scheme, Solver), u32) = ((Scheme::ModalExact, Solver::Lcp), 8);
 const FINE: ((Scheme, Solver), u32) = ((Scheme::ModalExact, Solver::Lcp), 64);
 const MASSLESS: ((Scheme, Solver), u32) = ((Scheme::MasslessBoundary, Solver::Lcp), 8);
+/// Tolerance of adaptive steps: small compared with the errors of the models.
+const TOLERANCE: f64 = 1e-3;
 /// Adaptive steps as long as the tolerance permits.
 const GALERKIN: ((Scheme, Solver), u32) = ((Scheme::Galerkin, Solver::Lcp), 1);
 const PAPER: ((Scheme, Solver), u32) = ((Scheme::CentralDifference, Solver::Film), 4);
@@ -254,6 +256,7 @@ impl WitnessScene {
         settings.experiment.communication_step = INTERVAL;
         settings.time.step = INTERVAL / f64::from(reduced.division);
         (settings.time.scheme, settings.contacts[0].solver) = reduced.method;
+        settings.time.tolerance = settings.time.scheme.properties().adaptive.then_some(TOLERANCE);
         Ok(Scene { settings, roms: vec![rom] })
     }
 

@@ -179,7 +179,7 @@ fn bodies() -> Vec<Scene> {
     let plates = [(BlockSide::Left, distance), (BlockSide::Right, distance)];
     let faces = lattice::scene(lattice::faces([0.0, 0.045, 0.0]), &plates, true, [0.0, -40.0, 0.0]);
     let mut marched = with(faces, Solver::Lcp, Scheme::Galerkin);
-    marched.settings.time.step = 2e-5;
+    (marched.settings.time.step, marched.settings.time.tolerance) = (2e-5, Some(1e-3));
     let mut stuck = marched.clone();
     sticking(&mut stuck);
     vec![

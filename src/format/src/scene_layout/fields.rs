@@ -539,7 +539,7 @@ pub static FIELDS: &[SceneField] = &[
     field(
         "time.tolerance",
         "number",
-        Some("1e-3"),
+        Some("1e-2"),
         "{}",
         "Displacement error that `galerkin` accepts per step, as a fraction of the smallest clearance; with free \
          masters, as a fraction of one thousandth of the smallest dimension of the body.",

@@ -2,7 +2,6 @@
 
 use tiprub_core::modes::modal::ModalModel;
 use tiprub_core::scene::rom::DisplacementFrame;
-use tiprub_core::scene::settings::TOLERANCE;
 use tiprub_core::{Rom, Scene};
 use tiprub_format::builtin_model;
 use tiprub_gallery::{
@@ -185,10 +184,8 @@ impl<'a> Refiner<'a> {
         let shares = if self.again.quick { &QUICK_STEPS[..] } else { &STEPS[..] };
         let time = &self.scene.settings.time;
         let tolerant = is_adaptive(self.scene);
-        let step = match tolerant {
-            true => time.tolerance.unwrap_or(TOLERANCE),
-            false => divided(self.scene.settings.experiment.communication_step, time.step),
-        };
+        let divided = || divided(self.scene.settings.experiment.communication_step, time.step);
+        let step = time.step_tolerance().unwrap_or_else(divided);
         // Tolerances are a decade apart, because errors follow them in steps.
         let shares = if tolerant { DECADES.get(..shares.len()).unwrap_or(&DECADES) } else { shares };
         let mut divisions: Vec<u32> = shares.iter().map(|share| count(f64::from(self.own) / share)).collect();

@@ -2,7 +2,6 @@
 
 use tiprub_core::Scene;
 use tiprub_core::scene::method::{Scheme, Solver};
-use tiprub_core::scene::settings::TOLERANCE;
 use tiprub_cosim::shown;
 use tiprub_shell::{Failure, Result, console::Console, forecast::WorkPlan, schedule::Schedule};
 
@@ -223,11 +222,8 @@ impl UserScene {
 /// Returns a scene's number of internal steps per communication step, or the inverse of its tolerance.
 pub(crate) fn own_division(scene: &Scene) -> u32 {
     let time = &scene.settings.time;
-    if time.scheme.properties().adaptive {
-        count(1.0 / time.tolerance.unwrap_or(TOLERANCE))
-    } else {
-        divisions(scene.settings.experiment.communication_step, time.step)
-    }
+    let steps = || divisions(scene.settings.experiment.communication_step, time.step);
+    time.step_tolerance().map_or_else(steps, |tolerance| count(1.0 / tolerance))
 }
 
 /// Returns the internal steps per communication step around which fixed steps are tried: the scene's number; for adaptive steps, those of a quarter

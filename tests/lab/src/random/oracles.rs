@@ -276,10 +276,7 @@ impl OracleWatch {
 fn promised(scene: &Scene, gap: f64) -> f64 {
     let coated = scene.settings.contacts.iter().filter_map(|contact| contact.coating.as_ref());
     let thickness = coated.map(|coating| coating.thickness).fold(0.0, f64::max);
-    let tolerance = match scene.settings.time.scheme {
-        Scheme::Galerkin => scene.settings.time.tolerance.unwrap_or(tiprub_core::scene::settings::TOLERANCE),
-        _ => 0.0,
-    };
+    let tolerance = scene.settings.time.step_tolerance().unwrap_or(0.0);
     let film = if solver(scene) == Solver::Film { film_inside(scene) } else { 0.0 };
     thickness + gap * GAP_ROUNDING + loosest_gap(scene, gap) * tolerance + film
 }

@@ -24,6 +24,7 @@ impl Machine {
         let mut scene = bumps(rich_blade(36));
         scene.settings.surfaces[0].ramp_time = 0.0;
         (scene.settings.time.scheme, scene.settings.time.step) = (Scheme::Galerkin, H);
+        scene.settings.time.tolerance = Some(1e-3);
         let mut machine = Self { simulation: Simulation::new(&scene)?, done: 0 };
         machine.open(WIDE[0])?;
         machine.simulation.initialise(0.0)?;

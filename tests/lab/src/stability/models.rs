@@ -158,12 +158,7 @@ pub(crate) fn allowed(scene: &Scene) -> f64 {
     let smallest = contacts.flat_map(|contact| {
         contact.sector_gaps.iter().copied().chain(contact.sector_gaps.is_empty().then_some(contact.gap))
     });
-    if scene.settings.time.scheme == Scheme::Galerkin {
-        scene.settings.time.tolerance.unwrap_or(tiprub_core::scene::settings::TOLERANCE)
-            * smallest.fold(f64::INFINITY, f64::min)
-    } else {
-        0.0
-    }
+    scene.settings.time.step_tolerance().map_or(0.0, |tolerance| tolerance * smallest.fold(f64::INFINITY, f64::min))
 }
 
 /// A contact node on a spring on a mass on a spring, in each direction: six degrees of freedom per sector.

@@ -9,7 +9,7 @@ use crate::scene::ranges;
 use crate::{Result, Rom};
 
 /// Default error tolerance of a step of `galerkin`, as a fraction of the smallest clearance.
-pub const TOLERANCE: f64 = 1e-3;
+pub const TOLERANCE: f64 = 1e-2;
 
 /// Default longest step of `galerkin` (s). The communication step also limits the step.
 pub const ADAPTIVE_STEP: f64 = 8e-5;
@@ -39,7 +39,7 @@ pub struct TimeSettings {
     /// longest step; [`ADAPTIVE_STEP`] if the file does not specify it.
     #[serde(default)]
     pub step: f64,
-    /// Tolerance on the displacement error of a step of `galerkin`, as a fraction of the smallest clearance; 1e-3 if
+    /// Tolerance on the displacement error of a step of `galerkin`, as a fraction of the smallest clearance; 1e-2 if
     /// absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tolerance: Option<f64>,
@@ -52,6 +52,11 @@ pub struct TimeSettings {
 }
 
 impl TimeSettings {
+    /// Returns the error tolerance of adaptive steps; `None` with fixed steps.
+    pub fn step_tolerance(&self) -> Option<f64> {
+        self.scheme.properties().adaptive.then(|| self.tolerance.unwrap_or(TOLERANCE))
+    }
+
     /// Checks every value against its range.
     pub(super) fn validate(&self) -> Result<()> {
         within("time.max_internal_steps", f64::from(self.max_internal_steps.unwrap_or(0)), 0.0, ranges::STEPS)?;
