@@ -1,6 +1,7 @@
 //! An island of a scene: the sectors and carriers that it consists of, their state, and the record of their contacts.
 
 mod contacts;
+mod distant;
 mod steady_phase;
 
 use super::basis::MOST;
@@ -194,6 +195,7 @@ impl SceneIsland {
         self.aim(turn, &system.structures);
         let System { structures, pairs, events, counted, .. } = system;
         self.read(structures);
+        self.choose_active(structures, pairs, span);
         let goal = StepGoal { most: most_tried, ..self.goal };
         let Self { island, records, .. } = &mut *self;
         let mut surroundings = SceneSurroundings { structures, pairs, records };
