@@ -59,12 +59,11 @@ impl Kernel for FindMotions<'_> {
         let nodes = self.moved.chunks_exact(3 * lanes).zip(self.begun.chunks_exact(3 * lanes));
         for (node, (now, before)) in nodes.enumerate() {
             let [a, b, c] = self.normals.each_ref().map(|normals| &normals[node * lanes..][..lanes]);
-            let motions = &mut self.motions[..lanes];
             let change = |row: usize, lane: usize| now[row * lanes + lane] - before[row * lanes + lane];
-            for lane in 0..lanes {
-                let motion = [change(0, lane), change(1, lane), change(2, lane)];
-                let motion = approach(motion, [a[lane], b[lane], c[lane]]);
-                motions[lane] = if motion > motions[lane] { motion } else { motions[lane] };
+            for (lane, largest) in self.motions.iter_mut().enumerate() {
+                let moved = [change(0, lane), change(1, lane), change(2, lane)];
+                let motion = approach(moved, [a[lane], b[lane], c[lane]]);
+                *largest = if motion > *largest { motion } else { *largest };
             }
         }
     }
