@@ -16,6 +16,11 @@ use super::trial::{ForceInterpolation, Trial, TrialResult};
 use crate::scene::method::Solver;
 use crate::system::Effort;
 
+/// Steps of coupled sectors may add this fraction of the largest energy so far to a bank that still holds energy. In most of their steps
+/// some contact opens or closes, so that without this limit all steps would be short. Measured on `builtin:stage` at a tolerance of 1e-3:
+/// half as many trials, with an error of 3e-4 instead of 1e-4.
+const SPARED: f64 = 1e-6;
+
 /// State of step control that persists from span to span.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct StepControl {
@@ -357,6 +362,10 @@ impl<S: Surroundings> SpanSteps for IslandInSpan<'_, S> {
 
     fn count(&self) -> u64 {
         self.island.sectors.len() as u64
+    }
+
+    fn spared(&self) -> f64 {
+        if self.island.is_single() { 0.0 } else { SPARED }
     }
 
     fn fly(&mut self, step: SpanStep) -> bool {
