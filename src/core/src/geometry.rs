@@ -186,6 +186,11 @@ impl GapLaw {
         if let Self::Spline(law) = self { Some(law) } else { None }
     }
 
+    /// Returns the gap function of a smooth ring through data points.
+    pub(crate) fn smooth_ring(&self) -> Option<&SplineGap> {
+        self.spline_law().filter(|law| law.surface.is_smooth_ring())
+    }
+
     /// Returns the surface through data points that the nodes can touch.
     #[inline(always)]
     pub fn spline(&self) -> Option<&SurfaceSpline> {

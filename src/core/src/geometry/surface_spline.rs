@@ -28,6 +28,7 @@ mod patch;
 mod projection;
 
 pub use patch::{Evaluation, Weights};
+pub(crate) use projection::CLOSE;
 pub use projection::Projection;
 
 use tiprub_cosim::persist_fields;

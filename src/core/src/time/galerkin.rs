@@ -16,6 +16,7 @@ pub mod flight;
 pub mod island;
 pub mod kernels;
 pub mod level;
+mod near_gaps;
 mod obstacle_view;
 mod record;
 pub mod response;

@@ -2,8 +2,12 @@
 
 use super::SplineGap;
 use crate::geometry::frame::PolarFrame;
-use crate::geometry::surface_spline::{ClosestPoint, Projection};
+use crate::geometry::surface_spline::{CLOSE, ClosestPoint, Projection};
 use crate::geometry::{Gap, PrescribedMotion, Vector3};
+
+/// Largest error of the closest point (in patches) from which a single evaluation of a surface finds gaps to rounding, and the closest point
+/// to about its square. The next evaluation starts from there.
+const NEARBY: f64 = 1e-3;
 
 /// A search for closest points of many nodes at one instant.
 pub(crate) struct NearSearch<'a> {
@@ -61,7 +65,7 @@ impl<'a> NearSearch<'a> {
         let (x, frame) = self.position(node, index, local);
         let ClosestPoint { patch, s, t } = self.gap.surface.advance(before, self.gap.turned);
         let guess = ClosestPoint { patch, s: s + drift[0], t: t + drift[1] };
-        let found = self.gap.surface.project_close(x, guess)?;
+        let found = self.gap.surface.project_close(x, guess, CLOSE)?;
         *drift = [found.foot.s - s, found.foot.t - t];
         Some(self.near(found, frame))
     }
@@ -72,16 +76,33 @@ impl<'a> NearSearch<'a> {
         let (x, frame) = self.position(node, index, local);
         let start = before.map(|before| self.gap.surface.advance(before, self.gap.turned));
         let guess = start.unwrap_or_else(|| self.gap.surface.locate(x));
+        let found = self.search(x, guess);
+        let (foot, is_near) = (found.foot, start.is_some_and(|start| start.patch == found.foot.patch));
+        let drift = if is_near { [foot.s - guess.s, foot.t - guess.t] } else { [0.0; 2] };
+        (self.near(found, frame), drift)
+    }
+
+    /// Finds the gap of a node displaced by `local` (m) from a place near its closest point, with the normal in the directions of the node.
+    #[inline(always)]
+    pub fn gap(&self, [node, index]: [usize; 2], local: Vector3, guess: ClosestPoint) -> Gap {
+        let (x, frame) = self.position(node, index, local);
+        let found = match self.gap.surface.project_close(x, guess, NEARBY) {
+            Some(found) => found,
+            None => self.search(x, guess),
+        };
+        Gap { normal: frame.local(found.normal), ..found }
+    }
+
+    /// Searches the closest point of a position, with the normal in the directions of the shape: an infinite gap beyond the extension of the
+    /// surface, NaN without closest point.
+    fn search(&self, x: Vector3, guess: ClosestPoint) -> Gap {
         let nowhere = Gap { distance: f64::NAN, normal: -Vector3::x(), foot: guess };
-        let found = match self.gap.surface.project(x, guess) {
+        match self.gap.surface.project(x, guess) {
             Projection::Found { gap, .. } => gap,
             Projection::BeyondEdge { place } => Gap { distance: f64::INFINITY, foot: place, ..nowhere },
             // The caller detects this: the model no longer describes such a state.
             Projection::Lost => nowhere,
-        };
-        let (foot, is_near) = (found.foot, start.is_some_and(|start| start.patch == found.foot.patch));
-        let drift = if is_near { [foot.s - guess.s, foot.t - guess.t] } else { [0.0; 2] };
-        (self.near(found, frame), drift)
+        }
     }
 
     #[inline(always)]

@@ -37,7 +37,7 @@ const STEP_TOLERANCE: f64 = 1e-11;
 /// Rounding of the coordinates of x − S, relative to |x| (and |x − S|).
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
 /// Newton steps up to this (in patches) end at the closest point within about [`STEP_TOLERANCE`], because errors are squared.
-const CLOSE: f64 = 1e-5;
+pub(crate) const CLOSE: f64 = 1e-5;
 /// Largest number of corrections near a good start; one or two are usual.
 const MAX_CORRECTIONS: usize = 6;
 /// Largest number of iterations, far above the need of starts on the opposite side of the casing (about 30).
@@ -111,9 +111,9 @@ impl SurfaceSpline {
     }
 
     /// Finds the closest point to `x` (m) on a smooth surface around an axis, by one Newton step from `guess`. Its end is extrapolated to
-    /// second order instead of evaluated. Returns `None` if the step is too long for that.
+    /// second order instead of evaluated. Returns `None` if the step is longer than `longest` (in patches).
     #[inline(always)]
-    pub(crate) fn project_close(&self, x: Vector3, guess: ClosestPoint) -> Option<Gap> {
+    pub(crate) fn project_close(&self, x: Vector3, guess: ClosestPoint, longest: f64) -> Option<Gap> {
         let foot = FootPoint::seen(x, guess, self.evaluate_bicubic::<true>(guess));
         let metric = foot.metric();
         let (hessian, determinant) = foot.hessian(metric);
@@ -125,7 +125,7 @@ impl SurfaceSpline {
         let ([low, high], place) =
             (self.span(guess.patch[1]), ClosestPoint { s: guess.s + s, t: guess.t + t, ..guess });
         let stays = (0.0..1.0).contains(&place.s) && (low..high).contains(&place.t);
-        if !(stays && s.abs() <= CLOSE && t.abs() <= CLOSE) {
+        if !(stays && s.abs() <= longest && t.abs() <= longest) {
             return None;
         }
         let Evaluation { point, d_s, d_t, d_ss, d_st, d_tt } = foot.evaluation;
@@ -299,11 +299,12 @@ mod tests {
             assert!((gap.distance - expected.distance).abs() < 1e-16, "{gap:?}, {expected:?}");
             let mut near = || 0.7 * random.within(-CLOSE, CLOSE);
             let guess = ClosestPoint { s: expected.foot.s + near(), t: expected.foot.t + near(), ..expected.foot };
-            let closely = surface.project_close(x, guess).unwrap();
+            let closely = surface.project_close(x, guess, CLOSE).unwrap();
             // Coordinates of 0.25 m are rounded to 3e-17 m.
             assert!((closely.distance - expected.distance).abs() < 4e-16, "{closely:?}, {expected:?}");
             assert!((closely.normal - expected.normal).norm() < 1e-11, "{closely:?}, {expected:?}");
-            assert_eq!(surface.project_close(x, ClosestPoint { s: guess.s + 3.0 * CLOSE, ..guess }), None);
+            let beyond = ClosestPoint { s: guess.s + 3.0 * CLOSE, ..guess };
+            assert_eq!(surface.project_close(x, beyond, CLOSE), None);
         }
     }
 }

@@ -1,17 +1,19 @@
 //! A structure that carries surfaces, during the steps of the sectors that touch them.
 
-use super::basis::{POINTS, real};
+use super::basis::{MOST, POINTS, real};
 use super::compliance::Lanes;
 use super::kernels::{Combine, PADDED};
 use super::shared_body::SharedBody;
 use super::surroundings::LaneStep;
 use super::trial::ForceInterpolation;
 use crate::geometry::frame::PolarFrame;
-use crate::math::simd::InstructionSet;
+use crate::geometry::surface_spline::motion::largest_difference;
+use crate::math::simd::{InstructionSet, Kernel};
 use crate::math::vector::Vector3;
 use crate::modes::bank::ModalBank;
 use crate::modes::coordinates::Coordinates;
 use crate::system::carrier::Spot;
+use std::ops::RangeInclusive;
 
 /// Tables, state and scratch memory of a structure that carries surfaces.
 #[derive(Debug, Clone)]
@@ -30,6 +32,10 @@ pub struct CarrierIntegrator {
     /// Displacements of these rows at the points of the step (m), and velocities at its start (m/s).
     moved: [Vec<f64>; POINTS],
     velocity: Vec<f64>,
+    /// Displacements of these rows at the start of the span (m).
+    begun: Vec<f64>,
+    /// No point of a surface moves by more than this times the largest motion of a control point.
+    pub(crate) amplification: f64,
     /// Displacements over which forces at each point of the accepted step do work, Σ_k S_ik u_k (m).
     worked: [Vec<f64>; POINTS],
     /// Weights of the work of forces at each point of the tried step.
@@ -44,8 +50,15 @@ pub struct CarrierIntegrator {
     /// True for lanes on this structure.
     pub touches: Vec<bool>,
     frames: Vec<PolarFrame>,
-    /// Modal forces per unit of λ of one lane.
+    /// Modal displacements per unit of λ of one lane.
     force: Vec<f64>,
+    /// Loads on the rows at the points (N), and rows with loads.
+    loads: [Vec<f64>; POINTS],
+    loaded: Vec<usize>,
+    is_loaded: Vec<bool>,
+    /// Scratch: loads on the loaded rows, and modal forces, padded to whole registers.
+    amounts: [Vec<f64>; MOST],
+    modal: [Vec<f64>; MOST],
 }
 
 impl CarrierIntegrator {
@@ -75,6 +88,8 @@ impl CarrierIntegrator {
             instructions: InstructionSet::detect(),
             moved: std::array::from_fn(|_| vec![0.0; padded]),
             velocity: vec![0.0; padded],
+            begun: vec![0.0; padded],
+            amplification: 1.0,
             worked: std::array::from_fn(|_| vec![0.0; padded]),
             work_weights: [[0.0; POINTS]; POINTS],
             impulses: vec![0.0; modes],
@@ -83,6 +98,11 @@ impl CarrierIntegrator {
             touches: vec![false; lanes.len()],
             frames: vec![PolarFrame::FIXED; lanes.len()],
             force: vec![0.0; stride],
+            loads: std::array::from_fn(|_| vec![0.0; rows]),
+            loaded: Vec::with_capacity(rows),
+            is_loaded: vec![false; rows],
+            amounts: std::array::from_fn(|_| Vec::with_capacity(rows)),
+            modal: std::array::from_fn(|_| vec![0.0; stride]),
             body: if bank.options.loads { body.loaded() } else { body },
         }
     }
@@ -104,13 +124,31 @@ impl CarrierIntegrator {
         }
     }
 
-    /// Finds displacements and velocities of the rows at the start of a step.
+    /// Finds displacements and velocities of the rows at the start of a span.
     pub(crate) fn find_start(&mut self) {
         self.body.settle();
         let Self { by_mode, all, moved: [start, ..], velocity, body, instructions, .. } = self;
         let (table, stride, columns) = (&by_mode[..], start.len(), &all[..]);
         let coefficients = [&body.at[0][..], &body.state.velocity];
         instructions.run(Combine { table, stride, columns, coefficients, sums: [start, velocity] });
+        self.begun.copy_from_slice(&self.moved[0]);
+    }
+
+    /// Largest motion of a surface since the start of the span at the points 1 … `points` of the step (m).
+    pub(crate) fn largest_motion(&self, points: usize) -> f64 {
+        let moved = self.moved[1..=points].iter().map(|moved| largest_difference(moved, &self.begun));
+        self.amplification * moved.fold(0.0, f64::max)
+    }
+
+    /// Advances to the end of an accepted step, whose displacements become those at the start of the next one.
+    pub(crate) fn take(&mut self, level: usize, kind: ForceInterpolation, points: usize) {
+        self.body.take(level, kind);
+        self.body.settle();
+        self.moved.swap(0, points);
+        let Self { by_mode, all, velocity, body, instructions, .. } = self;
+        let (table, stride, columns) = (&by_mode[..], velocity.len(), &all[..]);
+        let coefficients = [&body.state.velocity[..]];
+        instructions.run(Combine { table, stride, columns, coefficients, sums: [velocity] });
     }
 
     /// Velocity of a place at the start of the step (m/s), in the directions of the node.
@@ -146,27 +184,60 @@ impl CarrierIntegrator {
         }
     }
 
-    /// Adds the reaction to a force on a node at a place, at point i.
+    /// Removes all loads.
+    pub(crate) fn clear_loads(&mut self) {
+        for row in self.loaded.drain(..) {
+            self.is_loaded[row] = false;
+            self.loads.iter_mut().for_each(|loads| loads[row] = 0.0);
+        }
+    }
+
+    /// Adds the reaction to a force on a node at a place to the loads at point i.
     pub(crate) fn react(&mut self, spot: Spot, i: usize, force: Vector3) {
-        self.find_force(spot, force);
-        self.body.forces[i].iter_mut().zip(&self.force).for_each(|(sum, force)| *sum -= force);
-    }
-
-    /// Adds an impulse on a node at a place (N·s).
-    pub(crate) fn add_impulse(&mut self, spot: Spot, impulse: Vector3) {
-        self.find_force(spot, impulse);
-        self.impulses.iter_mut().zip(&self.force).for_each(|(sum, force)| *sum += force);
-    }
-
-    /// Computes the modal forces of a force at a place, in the directions of the node.
-    fn find_force(&mut self, spot: Spot, force: Vector3) {
         let ((weights, first), fixed) = (spot.rows(), spot.frame.fixed(force));
-        let rows: [usize; 48] = std::array::from_fn(|i| first[i / 3] + i % 3);
-        let amounts: [f64; 48] = std::array::from_fn(|i| weights.values[i / 3] * fixed[i % 3]);
-        let (stride, count) = (self.force.len(), 3 * weights.len);
-        let (columns, coefficients) = (&rows[..count], [&amounts[..count]]);
-        let sums = [&mut self.force[..]];
-        self.instructions.run(Combine { table: &self.shapes, stride, columns, coefficients, sums });
+        for (first, weight) in first.iter().zip(&weights.values[..weights.len]) {
+            for (component, force) in fixed.iter().enumerate() {
+                let row = first + component;
+                self.loads[i][row] -= weight * force;
+                if !self.is_loaded[row] {
+                    self.is_loaded[row] = true;
+                    self.loaded.push(row);
+                }
+            }
+        }
+    }
+
+    /// Sets the modal forces at some points to those of the loads.
+    pub(crate) fn gather(&mut self, points: RangeInclusive<usize>) {
+        let (first, count) = (*points.start(), points.end() + 1 - points.start());
+        self.gather_loads(first, count);
+        for (forces, modal) in self.body.forces[points].iter_mut().zip(&self.modal) {
+            let modes = forces.len();
+            forces.copy_from_slice(&modal[..modes]);
+        }
+    }
+
+    /// Computes the impulses on the modes from reactions to impulses on the nodes at point 0 (N·s).
+    pub(crate) fn gather_impulses(&mut self) {
+        self.gather_loads(0, 1);
+        let modes = self.impulses.len();
+        self.impulses.copy_from_slice(&self.modal[0][..modes]);
+    }
+
+    /// Computes the modal forces of the loads at `count` points from `first` on.
+    fn gather_loads(&mut self, first: usize, count: usize) {
+        let Self { shapes, loads, loaded, amounts, modal, instructions, .. } = self;
+        for (amounts, loads) in amounts.iter_mut().zip(&loads[first..first + count]) {
+            amounts.clear();
+            amounts.extend(loaded.iter().map(|row| loads[*row]));
+        }
+        let ([a, b, c], [one, two, three]) = (&*amounts, modal);
+        let (table, stride, columns) = (&shapes[..], one.len(), &loaded[..]);
+        match count {
+            1 => instructions.run(Combine { table, stride, columns, coefficients: [a], sums: [one] }),
+            2 => instructions.run(Combine { table, stride, columns, coefficients: [a, b], sums: [one, two] }),
+            _ => instructions.run(Combine { table, stride, columns, coefficients: [a, b, c], sums: [one, two, three] }),
+        }
     }
 
     /// Displacement error caused by the impulses (m).
@@ -200,13 +271,20 @@ impl CarrierIntegrator {
         direction: Vector3,
         carrier_compliance: &mut [f64],
     ) {
+        if !self.touches[lane] {
+            return;
+        }
         let (padded, lanes) = (self.force.len(), step.lanes);
         for i in 1..=lanes.points {
             self.move_modes(step, i, lane, direction);
-            for node in (0..lanes.nodes).filter(|node| self.touches[lanes.at(i, *node)]) {
-                let other = lanes.at(i, node);
-                carrier_compliance[other] += dot_of(&self.along[other * padded..][..padded], &self.force);
-            }
+            let Self { force, along, touches, instructions, .. } = self;
+            let others = i * lanes.nodes - lanes.nodes..i * lanes.nodes;
+            instructions.run(AddAlong {
+                moved: force,
+                along: &along[others.start * padded..others.end * padded],
+                touches: &touches[others.clone()],
+                sums: &mut carrier_compliance[others],
+            });
         }
     }
 
@@ -237,17 +315,36 @@ impl CarrierIntegrator {
         let [x, y, z] = self.seen.each_ref().map(|seen| &seen[lane * padded..][..padded]);
         let (k, _) = lanes.place(lane);
         let [a, b, c] = self.frames[lane].fixed(force).into();
-        let (influence, coordinates) = (&self.body.tables.levels[level].influence, &self.body.coordinates);
-        for (mode, by) in influence.iter().enumerate() {
-            let inert = coordinates.inertia[mode]
-                * if kind == ForceInterpolation::Constant { by.constant } else { by.points[i - 1][k] };
-            let soft = if i == k { coordinates.softness[mode] } else { 0.0 };
-            self.force[mode] = (inert + soft) * (a * x[mode] + b * y[mode] + c * z[mode]);
+        let response = self.body.response(level, kind, i, k);
+        let seen = x.iter().zip(y).zip(z);
+        for ((to, response), ((x, y), z)) in self.force.iter_mut().zip(response).zip(seen) {
+            *to = response * (a * x + b * y + c * z);
+        }
+    }
+}
+
+/// Adds the displacements along the normals of some lanes, whose modal components are `along`, to `sums`.
+struct AddAlong<'a> {
+    /// Displacements of the modes.
+    moved: &'a [f64],
+    along: &'a [f64],
+    /// True for lanes on the structure.
+    touches: &'a [bool],
+    sums: &'a mut [f64],
+}
+
+impl Kernel for AddAlong<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let lanes = self.along.chunks_exact(self.moved.len()).zip(self.touches).zip(self.sums);
+        for ((along, _), sum) in lanes.filter(|((_, touches), _)| **touches) {
+            *sum += dot_of(along, self.moved);
         }
     }
 }
 
 /// Scalar product, summed in eight parts.
+#[inline(always)]
 fn dot_of(a: &[f64], b: &[f64]) -> f64 {
     let mut parts = [0.0; PADDED];
     for (a, b) in a.as_chunks::<PADDED>().0.iter().zip(b.as_chunks::<PADDED>().0) {

@@ -3,6 +3,8 @@
 use super::basis::POINTS;
 use super::shared_body::SharedBody;
 use super::state::SectorState;
+use super::trial::ForceInterpolation;
+use crate::math::simd::{InstructionSet, Kernel};
 use crate::math::vector::{Vector3, strided_vector3};
 use crate::modes::bank::{Disk, ModalBank};
 
@@ -24,6 +26,47 @@ pub struct CoupledDisk {
     pub reach: Vec<f64>,
     /// Error of the judged step (m).
     pub error: f64,
+    /// Displacements (m) and normals at the start of the span, and largest changes of the gaps of each lane by the motion since then (m).
+    begun: Vec<f64>,
+    normals: [Vec<f64>; 3],
+    motions: Vec<f64>,
+    instructions: InstructionSet,
+}
+
+/// Normals turn by less than this in a span (rad), because flanks of a casing are as low as its clearance.
+const TURN: f64 = 0.1;
+
+/// Returns by how much a node that moves by at most `motion` (m) changes its gap at most, from its unit normal at the start.
+#[inline(always)]
+pub(super) fn approach(motion: [f64; 3], normal: [f64; 3]) -> f64 {
+    let ([x, y, z], [a, b, c]) = (motion.map(f64::abs), normal.map(f64::abs));
+    a * x + b * y + c * z + TURN * (x + y + z)
+}
+
+/// Largest changes of the gaps of each lane (m), including the previous ones in `motions`.
+struct FindMotions<'a> {
+    lanes: usize,
+    moved: &'a [f64],
+    begun: &'a [f64],
+    normals: &'a [Vec<f64>; 3],
+    motions: &'a mut [f64],
+}
+
+impl Kernel for FindMotions<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let lanes = self.lanes;
+        let nodes = self.moved.chunks_exact(3 * lanes).zip(self.begun.chunks_exact(3 * lanes));
+        for (node, (now, before)) in nodes.enumerate() {
+            let [a, b, c] = self.normals.each_ref().map(|normals| &normals[node * lanes..][..lanes]);
+            let change = |row: usize, lane: usize| now[row * lanes + lane] - before[row * lanes + lane];
+            for (lane, largest) in self.motions.iter_mut().enumerate() {
+                let moved = [change(0, lane), change(1, lane), change(2, lane)];
+                let motion = approach(moved, [a[lane], b[lane], c[lane]]);
+                *largest = if motion > *largest { motion } else { *largest };
+            }
+        }
+    }
 }
 
 impl CoupledDisk {
@@ -39,6 +82,10 @@ impl CoupledDisk {
             amplitudes: vec![0.0; coordinates.inertia.len()],
             reach: vec![0.0; bank.rows()],
             error: 0.0,
+            begun: vec![0.0; rows],
+            normals: std::array::from_fn(|_| vec![0.0; rows / 3]),
+            motions: vec![0.0; bank.lanes()],
+            instructions: InstructionSet::detect(),
             lanes: bank.lanes(),
             body: SharedBody::new(coordinates, degree),
         }
@@ -62,6 +109,18 @@ impl CoupledDisk {
     /// Finds displacements and velocities of all rows at the start of a step.
     pub(crate) fn find_rows(&mut self, disk: &mut Disk) {
         disk.rows_of(&self.body.at[0], &mut self.moved[0]);
+        self.find_velocity(disk);
+    }
+
+    /// Advances to the end of an accepted step, whose displacements become those at the start of the next one.
+    pub(crate) fn take(&mut self, level: usize, kind: ForceInterpolation, points: usize) {
+        self.body.take(level, kind);
+        self.body.settle();
+        self.moved.swap(0, points);
+    }
+
+    /// Finds velocities of all rows at the start of a step.
+    pub(crate) fn find_velocity(&mut self, disk: &mut Disk) {
         disk.rows_of(&self.body.state.velocity, &mut self.velocity);
     }
 
@@ -81,6 +140,31 @@ impl CoupledDisk {
     /// Displacement of a node of a sector at a point of the step (m).
     pub(crate) fn moved_at(&self, point: usize, node: usize, sector: usize) -> Vector3 {
         strided_vector3(&self.moved[point], 3 * node * self.lanes + sector, self.lanes)
+    }
+
+    /// Begins a span, at whose start the displacements are known.
+    pub(crate) fn begin_span(&mut self) {
+        self.begun.copy_from_slice(&self.moved[0]);
+    }
+
+    /// Sets the normals at the start of the span, `[component][node · lanes + sector]`.
+    pub(crate) fn set_normals(&mut self, normals: &[Vec<f64>; 3]) {
+        self.normals.iter_mut().zip(normals).for_each(|(own, normals)| own.copy_from_slice(normals));
+    }
+
+    /// Finds by how much the motion of the nodes of each sector since the start of the span changes gaps at most, at the points
+    /// 1 … `points` of the step (m).
+    pub(crate) fn find_motions(&mut self, points: usize) {
+        self.motions.fill(0.0);
+        for moved in &self.moved[1..=points] {
+            let Self { lanes, begun, normals, motions, .. } = self;
+            self.instructions.run(FindMotions { lanes: *lanes, moved, begun, normals, motions });
+        }
+    }
+
+    /// Largest motion of a node of a sector that [`CoupledDisk::find_motions`] has found (m).
+    pub(crate) fn motion(&self, sector: usize) -> f64 {
+        self.motions[sector]
     }
 
     /// Finds the largest displacements of the rows of any sector from rest without contact (m).

@@ -29,7 +29,7 @@ pub(crate) struct ObstacleView<'a> {
 
 impl ObstacleView<'_> {
     /// Returns the pair of a node, and its record.
-    fn pair(&self, node: usize) -> Option<(&ContactPair, &PairRecord)> {
+    pub(super) fn pair(&self, node: usize) -> Option<(&ContactPair, &PairRecord)> {
         let own = &self.record.pairs[self.record.pair_of[node]?];
         Some((&self.pairs[own.pair], own))
     }
@@ -122,6 +122,10 @@ impl Obstacle for ObstacleView<'_> {
         node_by_node(self, lanes, moved, gaps, normals);
     }
 
+    fn gaps_at(&mut self, point: usize, lanes: Lanes, moved: &[f64], gaps: &mut [f64], normals: &mut [f64]) {
+        self.find_gaps_at(point, lanes, moved, gaps, normals);
+    }
+
     fn gap_within(&self, node: usize, theta: f64, moved: Vector3) -> Option<f64> {
         let (pair, own) = self.pair(node)?;
         let [from, length] = self.record.step;
@@ -173,8 +177,11 @@ impl Obstacle for ObstacleView<'_> {
         pairs.any(|pair| pair.gap().slides_anywhere() && pair.parts.parameters.friction != 0.0)
     }
 
-    fn prepare_compliance(&mut self, lanes: Lanes, chosen: &[bool], normals: &[f64]) -> bool {
+    fn begin_solution(&mut self) {
         self.record.solutions += 1;
+    }
+
+    fn prepare_compliance(&mut self, lanes: Lanes, chosen: &[bool], normals: &[f64]) -> bool {
         if self.carriers.carriers.is_empty() {
             return false;
         }
@@ -261,7 +268,7 @@ impl Witness for ObstacleView<'_> {
     }
 
     fn guess_start_places(&mut self) {
-        self.record.guess_start_places();
+        self.record.guess_start_places(self.pairs);
     }
 
     fn react(&mut self, node: usize, point: usize, force: Vector3) {
@@ -270,14 +277,16 @@ impl Witness for ObstacleView<'_> {
     }
 
     fn add_impulse(&mut self, node: usize, point: usize, impulse: Vector3) {
-        self.with_carrier_mut(node, point, |carrier, spot| carrier.add_impulse(spot, impulse));
+        self.with_carrier_mut(node, point, |carrier, spot| carrier.react(spot, 0, impulse));
     }
 
     fn record_step(&mut self, step: &AcceptedStep) {
         self.record.work.dropped += step.dropped;
-        self.weigh_motions(step);
-        let points = step.trial.points();
-        for node in 0..step.trial.nodes() {
+        let (points, nodes) = (step.trial.points(), 0..step.trial.nodes());
+        if nodes.clone().any(|node| (0..=points).any(|point| step.trial.multiplier(point, node) > 0.0)) {
+            self.weigh_motions(step);
+        }
+        for node in nodes {
             let Some(pair) = self.record.pair_of[node] else { continue };
             self.record.tallies[node].lowest = self.lowest(step.trial, &step.level.basis, node);
             let comes = (1..=points).find(|i| step.trial.multiplier(*i, node) > 0.0);

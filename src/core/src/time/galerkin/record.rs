@@ -4,6 +4,7 @@ use crate::geometry::revolution::Instants;
 use crate::geometry::surface_spline::ClosestPoint;
 use crate::geometry::wrench::{MotionIncrement, Wrench};
 use crate::geometry::{PrescribedMotion, Vector3};
+use crate::math::simd::InstructionSet;
 use crate::math::vector::{ZERO, length};
 use crate::system::ShapeGrowth;
 use crate::system::carrier::Spot;
@@ -257,6 +258,9 @@ pub(crate) struct SpanRecord {
     pub slips: [Vec<Option<Vector3>>; POINTS],
     pub solutions: usize,
     pub instants: Instants,
+    pub instructions: InstructionSet,
+    /// Scratch: upper bounds of the change of the gaps of each lane over the span by all motion but that of the nodes (m).
+    pub changes: Vec<f64>,
     /// Pair to whose surface all nodes at all points are entered in `instants`.
     pub lanes_of: Option<usize>,
     /// True if a contact exceeds the limits of small displacements.
@@ -285,6 +289,8 @@ impl SpanRecord {
             acted: std::array::from_fn(|_| vec![ClosestPoint::default(); nodes]),
             slips: std::array::from_fn(|_| vec![None; nodes]),
             solutions: 0,
+            instructions: InstructionSet::detect(),
+            changes: vec![0.0; of.lanes()],
             instants: Instants::new(Lanes { points: MOST, nodes }.width()),
             lanes_of: None,
             implausible: false,
@@ -337,10 +343,20 @@ impl SpanRecord {
         }
     }
 
-    /// Uses the places at the start of the step as initial guess.
-    pub(crate) fn guess_start_places(&mut self) {
+    /// Uses the places at the start of the step as initial guess, carried along by the rotation of the rotor.
+    pub(crate) fn guess_start_places(&mut self, pairs: &[ContactPair]) {
         let [first, rest @ ..] = &mut self.places;
-        rest.iter_mut().for_each(|places| places.copy_from_slice(first));
+        for own in &self.pairs {
+            let pair = &pairs[own.pair];
+            let ring = pair.gap().smooth_ring();
+            for (places, (_, motion)) in rest.iter_mut().zip(&own.drives[1..]) {
+                let motion = motion.less(&own.drives[0].1);
+                let turns = (motion.turn - motion.shape_rotation) / std::f64::consts::TAU;
+                for node in pair.nodes() {
+                    places[*node] = ring.map_or(first[*node], |law| law.surface.advance(first[*node], turns));
+                }
+            }
+        }
     }
 
     /// Starts the span of a sector, with the places and gaps (m) of its nodes at their indices. The search for closest
@@ -352,7 +368,8 @@ impl SpanRecord {
             self.places[0][node] = place_of(index);
             self.tallies[node] = NodeTally { lowest: gap_of(index), ..NodeTally::NOTHING };
         }
-        self.guess_start_places();
+        let [first, rest @ ..] = &mut self.places;
+        rest.iter_mut().for_each(|places| places.copy_from_slice(first));
         (self.work, self.damping) = (ContactWork::default(), 0.0);
         (self.implausible, self.behind_edge) = (false, None);
     }

@@ -161,6 +161,19 @@ impl ContactRows {
         self.add_up(&self.magnitudes, [&sums.coefficients[0]], [one]);
     }
 
+    /// Bounds the displacements of the rows from their current positions over a time `span` (s) without forces: by the velocities of the slow
+    /// modes (m/s) times `span`, plus a rest (m). The first set of `velocities` is used.
+    pub(crate) fn travel(&self, span: f64, state: &SectorState, velocities: &mut Sums<2>, rest: &mut Sums<1>) {
+        let ([slow, _], [bounds]) = (&mut velocities.coefficients, &mut rest.coefficients);
+        let modes = self.rates.iter().zip(state.position.iter().zip(&state.velocity));
+        for ((slow, bound), (rates, (q, v))) in slow.iter_mut().zip(bounds).zip(modes) {
+            [*slow, *bound] = travel(*rates, [*q, *v], span);
+        }
+        let ([one, _], [two]) = (&mut velocities.rows, &mut rest.rows);
+        self.add_up(&self.by_mode, [&velocities.coefficients[0]], [one]);
+        self.add_up(&self.magnitudes, [&rest.coefficients[0]], [two]);
+    }
+
     /// Velocities of the rows at the end of a step without forces (m/s).
     pub(crate) fn end_velocities(&self, level: &StepTables, state: &SectorState, sums: &mut Sums<1>) {
         let [a, b, ..] = &level.modes.end[1];
@@ -180,11 +193,58 @@ impl ContactRows {
     }
 }
 
+/// Bounds the displacement of a mode with the decay rate ξω (1/s) and 1/ω_d (s) over a time `span` (s), from its displacement q and velocity
+/// v: by a velocity times `span`, plus a rest. The motion of a slow mode is a straight line and a parabola; a fast mode of amplitude A moves
+/// by at most 2 A.
+fn travel([rate, per_frequency]: [f64; 2], [q, v]: [f64; 2], span: f64) -> [f64; 2] {
+    if !per_frequency.is_finite() {
+        return [v, 0.0];
+    }
+    let turned = (v + rate * q) * per_frequency;
+    let amplitude = (q * q + turned * turned).sqrt();
+    // |q| ≤ A and |q̇| ≤ A ω, so |q̈| ≤ A ω (ω + 2ξω).
+    let frequency = 1.0 / per_frequency + rate;
+    let parabola = 0.5 * frequency * (frequency + 2.0 * rate) * span * span;
+    if parabola < 2.0 { [v, parabola * amplitude] } else { [0.0, 2.0 * amplitude] }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::time::galerkin::advance::Advance;
     use tiprub_test_models::SeededRandom;
+
+    /// Free vibration stays within the bound of its travel over any time up to the span.
+    #[test]
+    fn travel_is_bounded_over_the_span() {
+        let mut random = SeededRandom(8);
+        for case in 0..200 {
+            let ratio = random.of(&[0.0, 0.02, 0.3, 0.7]);
+            let count = 1 + random.below(4);
+            let frequencies: Vec<f64> = (0..count).map(|_| random.scale(1e3, 1e6)).collect();
+            let (damping_ratios, shapes) = (vec![ratio; count], random.matrix(3, count));
+            let modes = ContactModes { frequencies, damping_ratios, shapes, residual: DMatrix::zeros(3, 3) };
+            let (rows, mut level) = (ContactRows::new(&modes), StepTables::new(&modes, 1));
+            level.set_step(&modes, 1e-7);
+            let mut state = SectorState::new(count, 1);
+            state.position.iter_mut().for_each(|q| *q = random.signed());
+            state.velocity.iter_mut().for_each(|v| *v = 3e4 * random.signed());
+            let (mut start, mut now, mut rest) = (Sums::new(count, 1), Sums::new(count, 1), Sums::new(count, 1));
+            rows.now(&state, &mut start);
+            let (from, mut advance) = (start.vector3(0, 0, 1), Advance::new(count, 1));
+            rows.travel(2e-5, &state, &mut now, &mut rest);
+            let bound = 2e-5 * now.vector3(0, 0, 1).abs() + rest.vector3(0, 0, 1);
+            for _ in 0..200 {
+                advance.freely(&level, &mut state);
+                rows.now(&state, &mut now);
+                let moved = (now.vector3(0, 0, 1) - from).abs();
+                assert!(
+                    (0..3).all(|row| moved[row] <= bound[row] * (1.0 + 1e-9)),
+                    "case {case}: {moved} beyond {bound}"
+                );
+            }
+        }
+    }
 
     /// Decaying vibration stays within the largest displacement; undamped vibration attains it.
     #[test]

@@ -2,6 +2,7 @@
 
 mod blade_sectors;
 mod contacts;
+mod distant;
 mod steady_phase;
 
 use super::basis::MOST;
@@ -234,6 +235,7 @@ impl SceneIsland {
         self.aim(turn, &system.structures);
         let System { structures, pairs, events, counted, .. } = system;
         self.read(structures);
+        self.choose_active(structures, pairs, span);
         let goal = StepGoal { most: most_tried, ..self.goal };
         let Self { island, records, .. } = &mut *self;
         let mut surroundings = SceneSurroundings { structures, pairs, records };

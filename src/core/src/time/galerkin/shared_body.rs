@@ -2,10 +2,12 @@
 
 use super::advance::Advance;
 use super::basis::{MOST, POINTS, TimeBasis};
+use super::level::Influence;
 use super::span::SpanStep;
 use super::state::SectorState;
-use super::tables::Tables;
+use super::tables::{HALVINGS, Tables};
 use super::trial::ForceInterpolation;
+use crate::math::simd::{InstructionSet, Kernel};
 use crate::modes::coordinates::Coordinates;
 use nalgebra::DMatrix;
 
@@ -35,6 +37,60 @@ pub struct SharedBody {
     pub loss: f64,
     /// Work of loads since it was last collected (J).
     pub load_work: f64,
+    /// Displacements of all modes per modal force, for each level.
+    responses: Vec<BodyResponse>,
+    instructions: InstructionSet,
+}
+
+/// Displacements of all modes per modal force in a step of a level.
+#[derive(Debug, Clone, PartialEq)]
+struct BodyResponse {
+    /// `[i - 1][k]`: at point i, for a force at point k; empty for points that the step does not have.
+    points: [[Vec<f64>; POINTS]; MOST],
+    /// At the end, for a constant force.
+    constant: Vec<f64>,
+}
+
+impl BodyResponse {
+    fn new(modes: usize, degree: usize) -> Self {
+        let length = |i: usize, k: usize| if i < degree && k <= degree { modes } else { 0 };
+        let points = std::array::from_fn(|i| std::array::from_fn(|k| vec![0.0; length(i, k)]));
+        Self { points, constant: vec![0.0; modes] }
+    }
+
+    fn fill(&mut self, influence: &[Influence], coordinates: &Coordinates) {
+        let Coordinates { inertia, softness, .. } = coordinates;
+        for (i, points) in self.points.iter_mut().enumerate() {
+            for (k, points) in points.iter_mut().enumerate() {
+                for (mode, point) in points.iter_mut().enumerate() {
+                    let soft = if k == i + 1 { softness[mode] } else { 0.0 };
+                    *point = inertia[mode] * influence[mode].points[i][k] + soft;
+                }
+            }
+        }
+        for (mode, constant) in self.constant.iter_mut().enumerate() {
+            *constant = inertia[mode] * influence[mode].constant + softness[mode];
+        }
+    }
+}
+
+/// `to` = `free` + Σ response · force for some points.
+struct Push<'a> {
+    free: &'a [f64],
+    terms: &'a [[&'a [f64]; 2]],
+    to: &'a mut [f64],
+}
+
+impl Kernel for Push<'_> {
+    #[inline(always)]
+    fn run(self) {
+        self.to.copy_from_slice(self.free);
+        for [response, force] in self.terms {
+            for (to, (response, force)) in self.to.iter_mut().zip(response.iter().zip(*force)) {
+                *to += response * force;
+            }
+        }
+    }
 }
 
 impl SharedBody {
@@ -56,6 +112,8 @@ impl SharedBody {
             loads_at: std::array::from_fn(|_| Vec::new()),
             loss: 0.0,
             load_work: 0.0,
+            responses: (0..=HALVINGS).map(|_| BodyResponse::new(count, degree)).collect(),
+            instructions: InstructionSet::detect(),
         }
     }
 
@@ -71,6 +129,17 @@ impl SharedBody {
     /// Fills the tables for spans of length `span` (s).
     pub fn set_span(&mut self, span: f64) {
         self.tables.set_span(span);
+        for (response, level) in self.responses.iter_mut().zip(&self.tables.levels) {
+            response.fill(&level.influence, &self.coordinates);
+        }
+    }
+
+    /// Returns the displacements of the modes at point i per modal force at point k.
+    pub(crate) fn response(&self, level: usize, kind: ForceInterpolation, i: usize, k: usize) -> &[f64] {
+        match kind {
+            ForceInterpolation::Constant => &self.responses[level].constant,
+            ForceInterpolation::Polynomial => &self.responses[level].points[i - 1][k],
+        }
     }
 
     /// Sets the state of modes without inertia to zero.
@@ -132,15 +201,16 @@ impl SharedBody {
 
     /// Computes the coordinates at the points under the forces there.
     pub fn push(&mut self, level: usize, kind: ForceInterpolation) {
-        let Self { coordinates, tables, forces, free, at, .. } = self;
-        let table = &tables.levels[level];
-        let points = kind.points(&table.basis);
+        let Self { tables, forces, free, at, responses, instructions, .. } = self;
+        let points = kind.points(&tables.levels[level].basis);
         for i in 1..=points {
-            let (target, free) = (&mut at[i], &free[i - 1]);
-            for (mode, target) in target.iter_mut().enumerate() {
-                let pushed = table.influence[mode].displacement(kind, i, points, |k| forces[k][mode]);
-                *target =
-                    free[mode] + coordinates.inertia[mode] * pushed + coordinates.softness[mode] * forces[i][mode];
+            let (free, to, BodyResponse { points: rows, constant }) = (&free[i - 1], &mut at[i], &responses[level]);
+            match kind {
+                ForceInterpolation::Constant => instructions.run(Push { free, terms: &[[constant, &forces[1]]], to }),
+                ForceInterpolation::Polynomial => {
+                    let terms: [[&[f64]; 2]; POINTS] = std::array::from_fn(|k| [&rows[i - 1][k][..], &forces[k]]);
+                    instructions.run(Push { free, terms: &terms[..=points], to });
+                }
             }
         }
     }

@@ -77,6 +77,11 @@ pub trait SpanSteps {
     /// Returns the number of sectors.
     fn count(&self) -> u64;
 
+    /// Fraction of the largest energy so far that a step may add to a bank that still holds energy.
+    fn spared(&self) -> f64 {
+        0.0
+    }
+
     /// Takes the step without a trial if no contact is possible during the step, and returns whether it did.
     fn fly(&mut self, step: SpanStep) -> bool;
 
@@ -155,7 +160,14 @@ impl<S: SpanSteps> StepChoice<'_, S> {
         result.misses(tolerance)
             || (result.near && self.steps.length(step.level) > SHORTEST_LOOK)
             || (result.switches && result.switched > bank)
-            || (result.switched < 0.0 && (step.level < SAVED && bank > 0.0 || self.overflows_bank(-result.switched)))
+            || (result.switched < 0.0 && self.adds_too_much(step, -result.switched))
+    }
+
+    /// Returns whether a step adds too much energy (J) to the bank: more than is spared while it still holds energy, or more than its limit.
+    fn adds_too_much(&mut self, step: SpanStep, paid: f64) -> bool {
+        let (spared, holds) = (self.steps.spared(), self.steps.control().bank > 0.0);
+        let is_spared = spared > 0.0 && paid <= spared * self.steps.largest_energy();
+        (step.level < SAVED && holds && !is_spared) || self.overflows_bank(paid)
     }
 
     /// Returns whether the bank would exceed its limit if `paid` (J) were added. Without any energy so far there is no limit.

@@ -66,9 +66,13 @@ pub struct Trial {
     /// Displacements and gaps of all lanes per λ of each lane.
     columns: Vec<f64>,
     closing: Vec<f64>,
-    /// Compliance of the obstacle, and whether it is elastic.
-    carrier_compliance: Vec<f64>,
+    /// True if the obstacle is elastic.
     carrier_yields: bool,
+    /// Gaps of all lanes per λ of each lane by the obstacle, the lanes for which it was prepared in this trial, and whether that was for the
+    /// current solution.
+    carrier_columns: Vec<f64>,
+    carrier_known: Vec<bool>,
+    carrier_is_fresh: bool,
     law: Law,
     instructions: InstructionSet,
     /// Unknowns of the problem: lanes.
@@ -130,8 +134,10 @@ impl Trial {
             forces: three(),
             columns: vec![0.0; lanes.len() * 3 * lanes.width()],
             closing: vec![0.0; lanes.len() * lanes.width()],
-            carrier_compliance: width(),
             carrier_yields: false,
+            carrier_columns: vec![0.0; lanes.len() * lanes.width()],
+            carrier_known: vec![false; lanes.len()],
+            carrier_is_fresh: false,
             law: Law::new(solver, None, contacts),
             instructions: InstructionSet::detect(),
             members: Vec::with_capacity(lanes.len()),
@@ -207,6 +213,7 @@ impl Trial {
     ) {
         let compliance = level.compliance_of(kind);
         self.free_motion.is_known = false;
+        self.carrier_known.fill(false);
         self.work_weights = std::array::from_fn(|i| kind.work_weights(&level.basis, i));
         self.durations = std::array::from_fn(|i| level.step * kind.weight(&level.basis, i));
         self.lanes = compliance.lanes();
@@ -304,7 +311,8 @@ impl Trial {
         for lane in 0..lanes.len() {
             self.chosen[lane] = self.gaps[lane] <= 0.0 || self.multipliers[lane] > 0.0 || self.without[lane] < 0.0;
         }
-        self.carrier_yields = obstacle.prepare_compliance(lanes, &self.chosen, &self.normals[..3 * width]);
+        obstacle.begin_solution();
+        self.prepare_carriers(obstacle);
         for lane in 0..lanes.len() {
             if self.chosen[lane] {
                 self.choose(lane, compliance, obstacle);
@@ -349,27 +357,6 @@ impl Trial {
         self.solved_normals[..stride].copy_from_slice(&self.normals[..stride]);
     }
 
-    /// Finds the displacements at the points by the modes with inertia.
-    ///
-    /// The total displacements are unsuitable: without mass, nodes follow the force back and forth, much faster than they slide.
-    fn find_inert(&mut self, residual: &DMatrix<f64>) {
-        for point in 0..=self.lanes.points {
-            for node in 0..self.lanes.nodes {
-                let (force, moved) = (self.force(point, node), self.displacement(point, node));
-                set_vector3_at(&mut self.withdrawn, node, -force);
-                set_vector3_at(&mut self.inert[point], node, moved);
-            }
-            let y = &mut self.inert[point];
-            self.instructions.run(AddProduct { matrix: residual, x: &self.withdrawn, y });
-        }
-    }
-
-    /// Returns the sliding distance over which a force on a node at a point does work (m).
-    fn sliding_distance(&self, point: usize, node: usize) -> Vector3 {
-        let terms = self.work_weights[point].iter().zip(&self.inert);
-        terms.map(|(weight, inert)| *weight * vector3_at(inert, node)).sum()
-    }
-
     /// Makes a lane an unknown, with the direction and the effect of its force.
     fn choose(&mut self, lane: usize, compliance: &LaneCompliance, obstacle: &mut impl Obstacle) {
         let (lanes, width) = (self.lanes, self.lanes.width());
@@ -400,13 +387,16 @@ impl Trial {
             closing: &mut self.closing[lane * width..][..width],
         });
         if self.carrier_yields {
-            obstacle.add_normal_compliance(lane, direction, &mut self.carrier_compliance[..width]);
+            let column = &mut self.carrier_columns[lane * width..][..width];
+            if !self.carrier_known[lane] {
+                column.fill(0.0);
+            } else if self.carrier_is_fresh {
+                obstacle.add_normal_compliance(lane, direction, column);
+            }
             let closing = &mut self.closing[lane * width..][..width];
             let now = self.multipliers[lane];
-            for ((carrier_compliance, closing), without) in
-                self.carrier_compliance.iter().zip(closing).zip(&mut self.without)
-            {
-                (*closing, *without) = (*closing + carrier_compliance, *without - now * carrier_compliance);
+            for ((column, closing), without) in column.iter().zip(closing).zip(&mut self.without) {
+                (*closing, *without) = (*closing + column, *without - now * column);
             }
         }
     }

@@ -12,6 +12,9 @@ const PASSES_OF_ONE: usize = 6;
 /// Largest number of gap evaluations in one trial of several sectors whose motions are coupled.
 const PASSES: usize = 16;
 
+/// Bodies are assumed to move between the points of a step by at most this multiple of their largest motion at the points.
+const BETWEEN: f64 = 2.0;
+
 /// Gaps of an island at the points of a step.
 pub(super) struct IslandGaps {
     /// Smallest gap (m).
@@ -32,17 +35,15 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
             carrier.work_weights = std::array::from_fn(|i| kind.work_weights(basis, i));
         }
         let is_single = self.island.is_single();
-        for index in self.indices() {
+        self.begin_surfaces(step, kind);
+        for place in self.places() {
+            let index = self.index(place);
             self.island.sectors[index].far = false;
             let SectorInStep { mut surfaces, tables, disk, trial, state, .. } = self.sector(index, step, kind);
             let level = &tables.levels[step.level];
-            surfaces.begin_step(step.from, step.length, level, kind);
             let rows = disk.is_none().then_some(&tables.rows);
-            if let Some(rows) = rows.filter(|_| !is_single || !state.gaps_known) {
+            if let Some(rows) = rows.filter(|_| trial.sticks() && !is_single || !state.gaps_known) {
                 trial.find_start(rows, state);
-            }
-            if !is_single {
-                surfaces.guess_start_places();
             }
             trial.begin(level, kind, rows, state);
             trial.find_start_gaps(state, |node, moved| surfaces.gap(node, 0, moved).distance);
@@ -53,15 +54,32 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         }
     }
 
+    /// Sets the prescribed motion at the points, and initial guesses of the closest points. Surfaces follow the motion of the first sector.
+    fn begin_surfaces(&mut self, step: SpanStep, kind: ForceInterpolation) {
+        let is_single = self.island.is_single();
+        for index in 0..self.island.sectors.len() {
+            let is_active = self.island.sectors[index].allowance.is_none();
+            let SectorInStep { mut surfaces, tables, .. } = self.sector(index, step, kind);
+            if is_active || surfaces.sector() == 0 {
+                surfaces.begin_step(step.from, step.length, &tables.levels[step.level], kind);
+                if !is_single {
+                    surfaces.guess_start_places();
+                }
+            }
+        }
+        if !self.island.carriers.is_empty() && self.active().any(|one| !one.state.gaps_known) {
+            self.surroundings.bend(&self.island.carriers, 0);
+        }
+    }
+
     /// Applies the forces at some points of the step to the surface carriers.
     fn react(&mut self, points: std::ops::RangeInclusive<usize>, step: SpanStep, kind: ForceInterpolation) {
         if self.island.carriers.is_empty() {
             return;
         }
-        for carrier in &mut self.island.carriers {
-            points.clone().for_each(|point| carrier.body.forces[point].fill(0.0));
-        }
-        for index in self.indices() {
+        self.island.carriers.iter_mut().for_each(CarrierIntegrator::clear_loads);
+        for place in self.places() {
+            let index = self.index(place);
             if self.island.sectors[index].far {
                 continue;
             }
@@ -72,16 +90,17 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
                 }
             }
         }
+        self.island.carriers.iter_mut().for_each(|carrier| carrier.gather(points.clone()));
     }
 
     /// Computes the motion of all shared bodies under the current forces.
     pub(super) fn move_bodies(&mut self, step: SpanStep, kind: ForceInterpolation, points: usize) {
-        let Island { disks, sectors, .. } = &mut *self.island;
+        let Island { disks, sectors, active, .. } = &mut *self.island;
         for (number, disk) in disks.iter_mut().enumerate() {
             let Some(bank) = self.surroundings.disk(disk.structure) else { continue };
             let of_disk = |one: &IslandSector| one.disk.filter(|(disk, _)| *disk == number).map(|(_, lane)| lane);
             for point in 1..=points {
-                let own = sectors.iter().filter_map(|one| Some((one, of_disk(one)?)));
+                let own = active.iter().map(|index| &sectors[*index]).filter_map(|one| Some((one, of_disk(one)?)));
                 let pushing = own.flat_map(|(one, lane)| {
                     let nodes = (0..one.trial.nodes()).filter(|node| one.trial.multiplier(point, *node) != 0.0);
                     nodes.map(move |node| (lane, node, one.trial.force(point, node)))
@@ -90,7 +109,8 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
             }
             disk.body.push(step.level, kind);
             disk.find_rows_at(bank, points);
-            for one in sectors.iter_mut() {
+            for index in active.iter() {
+                let one = &mut sectors[*index];
                 if let Some(lane) = of_disk(one) {
                     one.trial.carry(|point, node| disk.moved_at(point, node, lane));
                 }
@@ -114,29 +134,34 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         points: usize,
         far: bool,
     ) -> IslandGaps {
-        let all = self.indices();
         if self.island.carriers.is_empty() {
-            for index in all {
+            for place in self.places() {
+                let index = self.index(place);
                 if self.island.sectors[index].far == far {
                     let SectorInStep { mut surfaces, trial, .. } = self.sector(index, step, kind);
                     trial.find_gaps(&mut surfaces);
                 }
             }
         } else {
-            let chosen = self.island.sectors.iter_mut().filter(|one| one.far == far);
-            chosen.for_each(|one| one.trial.move_rows());
+            for place in self.places() {
+                let one = &mut self.island.sectors[self.island.active[place]];
+                if one.far == far {
+                    one.trial.move_rows();
+                }
+            }
             for point in 1..=points {
                 self.surroundings.bend(&self.island.carriers, point);
-                for index in all.clone() {
+                for place in self.places() {
+                    let index = self.index(place);
                     if self.island.sectors[index].far == far {
                         let SectorInStep { mut surfaces, trial, .. } = self.sector(index, step, kind);
-                        trial.find_gaps_at(point, |node, moved| surfaces.gap(node, point, moved));
+                        trial.find_gaps_at(point, &mut surfaces);
                     }
                 }
             }
         }
         let mut found = IslandGaps { lowest: f64::INFINITY, largest: 0.0, rests: true };
-        for one in self.island.sectors.iter().filter(|one| one.far == far) {
+        for one in self.active().filter(|one| one.far == far) {
             let (lowest, largest) = one.trial.extremes();
             let is_lost = lowest.is_nan() || found.lowest.is_nan();
             found.lowest = if is_lost { f64::NAN } else { found.lowest.min(lowest) };
@@ -148,20 +173,21 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
 
     /// Marks the sectors that are far; `lowest` is the lowest gap (m).
     fn separate_far_sectors(&mut self, lowest: f64) {
-        for one in &mut self.island.sectors {
+        for place in self.places() {
+            let one = &mut self.island.sectors[self.island.active[place]];
             one.far = one.trial.rests() && one.trial.extremes().0 > -lowest;
         }
     }
 
     /// Rechecks the far sectors. Returns whether one of them touches, and marks that sector as near.
     fn recheck_far_sectors(&mut self, step: SpanStep, kind: ForceInterpolation, points: usize) -> bool {
-        if !self.island.sectors.iter().any(|one| one.far) {
+        if !self.active().any(|one| one.far) {
             return false;
         }
         let IslandGaps { lowest, .. } = self.find_gaps(step, kind, points, true);
-        for one in self.island.sectors.iter_mut().filter(|one| one.far) {
-            let lowest = one.trial.extremes().0;
-            one.far = lowest >= 0.0;
+        for place in self.places() {
+            let one = &mut self.island.sectors[self.island.active[place]];
+            one.far &= one.trial.extremes().0 >= 0.0;
         }
         // The next evaluation of the near sectors reports NaN gaps.
         lowest.is_nan() || lowest < 0.0
@@ -169,12 +195,14 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
 
     /// Stores the first sector for which `holds` is true as the cause of the failure.
     fn blame(&mut self, holds: impl Fn(&IslandSector) -> bool, is_lost: bool) {
-        self.island.failed = self.island.sectors.iter().position(holds).map(|index| (index, is_lost));
+        let failed = self.island.active.iter().find(|index| holds(&self.island.sectors[**index]));
+        self.island.failed = failed.map(|index| (*index, is_lost));
     }
 
     /// Finds forces that remove penetration, sector by sector. Returns false if a contact problem has no solution.
     fn solve(&mut self, step: SpanStep, kind: ForceInterpolation, result: &mut TrialResult) -> bool {
-        for index in self.indices() {
+        for place in self.places() {
+            let index = self.index(place);
             let IslandSector { far, trial, .. } = &self.island.sectors[index];
             if *far || (trial.extremes().0 >= 0.0 && trial.rests()) {
                 continue;
@@ -194,11 +222,47 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         true
     }
 
-    /// Tries a step.
+    /// Tries a step, until no surface has moved so far that another sector may touch.
     pub(super) fn attempt_step(&mut self, step: SpanStep, kind: ForceInterpolation) -> TrialResult {
         if let Some(result) = self.attempt_steady(step, kind) {
             return result;
         }
+        loop {
+            let result = self.attempt_active(step, kind);
+            if !result.solved || !self.activate_sectors(self.island.points(step, kind)) {
+                return result;
+            }
+        }
+    }
+
+    /// Activates the sectors that may touch because bodies have moved so far. Returns whether there are any.
+    fn activate_sectors(&mut self, points: usize) -> bool {
+        if self.island.active.len() == self.island.sectors.len() {
+            return false;
+        }
+        let motions = self.island.carriers.iter().map(|carrier| carrier.largest_motion(points));
+        let of_surfaces = motions.fold(0.0, f64::max);
+        self.island.disks.iter_mut().for_each(|disk| disk.find_motions(points));
+        let Island { disks, sectors, active, .. } = &mut *self.island;
+        let before = active.len();
+        for (index, one) in sectors.iter_mut().enumerate() {
+            let motion = of_surfaces + one.disk.map_or(0.0, |(disk, lane)| disks[disk].motion(lane));
+            if one.allowance.is_some_and(|allowance| allowance <= BETWEEN * motion) {
+                one.allowance = None;
+                one.trial.forget();
+                one.state.gaps_known = false;
+                if let Some((disk, lane)) = one.disk {
+                    one.trial.start_at(|row| disks[disk].row_at_start(row, lane));
+                }
+                active.push(index);
+            }
+        }
+        active.sort_unstable();
+        active.len() > before
+    }
+
+    /// Tries a step of the active sectors.
+    fn attempt_active(&mut self, step: SpanStep, kind: ForceInterpolation) -> TrialResult {
         self.prepare(step, kind);
         let (points, precision) = (self.island.points(step, kind), self.goal.precision);
         let passes = if self.island.is_single() { PASSES_OF_ONE } else { PASSES };
@@ -250,10 +314,11 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
 
     /// Finds error, switches and near misses of all sectors.
     fn judge(&mut self, step: SpanStep, points: usize, result: &mut TrialResult) {
-        self.island.carriers.iter_mut().for_each(|carrier| carrier.impulses.fill(0.0));
+        self.island.carriers.iter_mut().for_each(CarrierIntegrator::clear_loads);
         self.island.disks.iter_mut().for_each(|disk| disk.error = 0.0);
         let is_single = self.island.is_single();
-        for index in self.indices() {
+        for place in self.places() {
+            let index = self.index(place);
             self.island.sectors[index].far = false;
             let SectorInStep { mut surfaces, tables, disk, trial, state, .. } =
                 self.sector(index, step, ForceInterpolation::Polynomial);
@@ -277,7 +342,8 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
                 }
             }
         }
-        if self.island.sectors.iter().any(|one| one.trial.has_depth()) {
+        self.island.carriers.iter_mut().for_each(CarrierIntegrator::gather_impulses);
+        if self.active().any(|one| one.trial.has_depth()) {
             result.depth = self.depth(step, points);
         }
         let errors = self.island.carriers.iter().map(CarrierIntegrator::error);
@@ -289,7 +355,8 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
     fn depth(&mut self, step: SpanStep, points: usize) -> f64 {
         let (mut deepest, is_single) = (0.0_f64, self.island.is_single());
         self.surroundings.bend(&self.island.carriers, 0);
-        for index in self.indices() {
+        for place in self.places() {
+            let index = self.index(place);
             let SectorInStep { mut surfaces, tables, disk, trial, state, .. } =
                 self.sector(index, step, ForceInterpolation::Polynomial);
             if disk.is_none() {

@@ -1,7 +1,6 @@
 //! Trials of sectors that step together because they move each other or touch a common surface.
 
-use super::Trial;
-use crate::geometry::Gap;
+use super::{Obstacle, Trial};
 use crate::math::vector::{Vector3, vector3_at};
 use crate::time::galerkin::state::SectorState;
 
@@ -33,12 +32,19 @@ impl Trial {
     }
 
     /// Finds gaps (m) and normals at point 1 … s, for the current displacements of the nodes (m).
-    pub(crate) fn find_gaps_at(&mut self, point: usize, mut gap: impl FnMut(usize, Vector3) -> Gap) {
-        for node in 0..self.nodes() {
-            let lane = self.lanes.at(point, node);
-            let gap = gap(node, self.lanes.vector3(&self.moved, lane));
-            self.gaps[lane] = gap.distance;
-            self.lanes.set(&mut self.normals, lane, gap.normal);
+    pub(crate) fn find_gaps_at(&mut self, point: usize, obstacle: &mut impl Obstacle) {
+        let Self { lanes, moved, gaps, normals, .. } = self;
+        obstacle.gaps_at(point, *lanes, moved, gaps, normals);
+    }
+
+    /// Prepares the compliance of the obstacle at the chosen lanes, unless it is known from an earlier solution of this trial. Later gaps
+    /// are evaluated with the motion of the obstacle, so that its compliance needs not be exact.
+    pub(super) fn prepare_carriers(&mut self, obstacle: &mut impl Obstacle) {
+        let (lanes, stride) = (self.lanes, 3 * self.lanes.width());
+        self.carrier_is_fresh = (0..lanes.len()).any(|lane| self.chosen[lane] && !self.carrier_known[lane]);
+        if self.carrier_is_fresh {
+            self.carrier_known.copy_from_slice(&self.chosen);
+            self.carrier_yields = obstacle.prepare_compliance(lanes, &self.chosen, &self.normals[..stride]);
         }
     }
 

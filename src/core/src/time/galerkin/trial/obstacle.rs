@@ -19,6 +19,16 @@ pub trait Obstacle {
         node_by_node(self, lanes, moved, gaps, normals);
     }
 
+    /// Finds gaps (m) and normals at one point, on surfaces that are bent as there; arrays of [`Lanes`].
+    fn gaps_at(&mut self, point: usize, lanes: Lanes, moved: &[f64], gaps: &mut [f64], normals: &mut [f64]) {
+        for node in 0..lanes.nodes {
+            let lane = lanes.at(point, node);
+            let gap = self.gap(node, point, lanes.vector3(moved, lane));
+            gaps[lane] = gap.distance;
+            lanes.set(normals, lane, gap.normal);
+        }
+    }
+
     /// Gap (m) of a node displaced by `moved` (m) at the fraction `theta` of the step; `None` if it is known at the points only.
     fn gap_within(&self, _node: usize, _theta: f64, _moved: Vector3) -> Option<f64> {
         None
@@ -40,6 +50,9 @@ pub trait Obstacle {
 
     /// Angle on the surface (rad, fixed frame) of a node displaced by `moved` (m); 0 on surfaces without an axis.
     fn angle(&self, node: usize, point: usize, moved: Vector3) -> f64;
+
+    /// Called before a contact problem is solved.
+    fn begin_solution(&mut self) {}
 
     /// Prepares the compliance of the obstacle at the chosen lanes with these normals. Returns false if the obstacle is rigid.
     fn prepare_compliance(&mut self, _lanes: Lanes, _chosen: &[bool], _normals: &[f64]) -> bool {

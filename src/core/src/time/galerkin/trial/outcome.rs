@@ -17,6 +17,18 @@ impl Trial {
         reach
     }
 
+    /// Returns upper bounds of the displacement of each row from its current position over a time `span` (s), without contact (m).
+    pub(crate) fn travel(&mut self, rows: &ContactRows, state: &SectorState, span: f64) -> &[f64] {
+        let ((rest, reach), now) = (&mut self.reach, &mut self.now);
+        rows.travel(span, state, now, rest);
+        let nodes = self.lanes.nodes;
+        for node in 0..nodes {
+            let straight = span * now.vector3(0, node, nodes).abs();
+            set_vector3_at(reach, node, straight + rest.vector3(0, node, nodes));
+        }
+        reach
+    }
+
     /// Number of points at which forces are unknown: s, or 1 if the force is constant.
     pub fn points(&self) -> usize {
         self.lanes.points

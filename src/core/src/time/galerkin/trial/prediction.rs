@@ -1,10 +1,12 @@
 //! A lane of a trial as its contact law sees it.
 
-use super::Obstacle;
+use super::{Obstacle, Trial};
 use crate::contact::{ContactParameters, ContactPrediction};
 use crate::geometry::Sliding;
-use crate::math::vector::Vector3;
+use crate::math::vector::{Vector3, set_vector3_at, vector3_at};
 use crate::time::galerkin::compliance::Lanes;
+use crate::time::galerkin::kernels::AddProduct;
+use nalgebra::DMatrix;
 
 /// A contact node at a point of the step, before its force is known.
 pub(super) struct LanePrediction<'a, O> {
@@ -83,5 +85,28 @@ impl<O: Obstacle> ContactPrediction for LanePrediction<'_, O> {
     }
     fn angle(&self) -> f64 {
         self.obstacle.angle(self.node, self.point, self.moved)
+    }
+}
+
+impl Trial {
+    /// Finds the displacements at the points by the modes with inertia.
+    ///
+    /// The total displacements are unsuitable: without mass, nodes follow the force back and forth, much faster than they slide.
+    pub(super) fn find_inert(&mut self, residual: &DMatrix<f64>) {
+        for point in 0..=self.lanes.points {
+            for node in 0..self.lanes.nodes {
+                let (force, moved) = (self.force(point, node), self.displacement(point, node));
+                set_vector3_at(&mut self.withdrawn, node, -force);
+                set_vector3_at(&mut self.inert[point], node, moved);
+            }
+            let y = &mut self.inert[point];
+            self.instructions.run(AddProduct { matrix: residual, x: &self.withdrawn, y });
+        }
+    }
+
+    /// Returns the sliding distance over which a force on a node at a point does work (m).
+    pub(super) fn sliding_distance(&self, point: usize, node: usize) -> Vector3 {
+        let terms = self.work_weights[point].iter().zip(&self.inert);
+        terms.map(|(weight, inert)| *weight * vector3_at(inert, node)).sum()
     }
 }

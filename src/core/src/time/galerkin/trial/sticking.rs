@@ -87,6 +87,7 @@ impl Trial {
             self.without[lane] = self.gaps[lane] - pushed;
             self.chosen[lane] = self.gaps[lane] <= 0.0 || self.multipliers[lane] > 0.0 || self.without[lane] < 0.0;
         }
+        obstacle.begin_solution();
         self.carrier_yields = obstacle.prepare_compliance(lanes, &self.chosen, &self.normals[..3 * lanes.width()]);
         self.find_carrier_motion(own, obstacle);
         for lane in 0..lanes.len() {

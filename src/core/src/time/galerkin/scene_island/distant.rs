@@ -1,0 +1,87 @@
+//! Sectors that certainly stay open over a span, whose gaps need no evaluation.
+//!
+//! As with fixed steps (`system/nearness.rs`): a gap changes by no more than its node and its surface move. The motion of a surface, and of
+//! coupled sectors, by the contact forces of the span is not known before. It is compared with the allowance of each sector in every step.
+
+use super::SceneIsland;
+use crate::geometry::spline::SplineGap;
+use crate::math::vector::vector3_at;
+use crate::system::{ContactPair, Structure};
+use crate::time::galerkin::disk::approach;
+use std::ops::Range;
+
+/// Factor on the prescribed motion over the span, which need not be monotonic.
+const PRESCRIBED: f64 = 2.0;
+
+impl SceneIsland {
+    /// Selects the sectors that may touch or have a smallest gap that outputs need in a span (s). The others are open, and stay so while
+    /// the surfaces move by less than their allowance.
+    pub(super) fn choose_active(&mut self, structures: &[Structure], pairs: &[ContactPair], span: f64) {
+        if !self.island.carriers.is_empty() {
+            self.island.sectors.iter_mut().for_each(|one| one.allowance = Some(f64::INFINITY));
+            for disk in &mut self.island.disks {
+                disk.set_normals(&structures[disk.structure].history.geometry.before.normal);
+            }
+            for index in 0..self.records.len() {
+                if self.records[index].sector == 0 {
+                    let sectors = index..index + structures[self.records[index].structure].modes().sectors();
+                    self.find_allowances(sectors, structures, pairs, span);
+                }
+            }
+        }
+        let active = self.island.sectors.iter().enumerate().filter(|(_, one)| one.allowance.is_none());
+        self.island.active.clear();
+        self.island.active.extend(active.map(|(index, _)| index));
+    }
+
+    /// Finds the allowances of all sectors of a structure.
+    fn find_allowances(&mut self, sectors: Range<usize>, structures: &[Structure], pairs: &[ContactPair], span: f64) {
+        let first = sectors.start;
+        let structure = &structures[self.records[first].structure];
+        for number in 0..self.records[first].pairs.len() {
+            let pair = &pairs[self.records[first].pairs[number].pair];
+            let ring = pair.gap().smooth_ring().filter(|_| !structure.needed_minima.by_sector).zip(pair.carrier());
+            if let Some((gap, carrier)) = ring {
+                let rows = &structures[carrier.structure].modes().displacement()[carrier.first_row..];
+                let rows = &rows[..3 * gap.surface.control_points().len()];
+                let (drive, motion) = (pair.drive_now(), &pair.prescribed.motion.now);
+                gap.gap_changes(drive, motion, [rows, rows], &mut self.records[first].changes);
+                let mut carriers = self.island.carriers.iter_mut();
+                if let Some(one) = carriers.find(|one| one.structure == carrier.structure) {
+                    one.amplification = one.amplification.max(gap.surface.amplification());
+                }
+            }
+            for index in sectors.clone() {
+                let change = self.records[first].changes[self.records[index].sector];
+                let allowance = ring.and_then(|(gap, _)| self.allowance(index, structure, gap, span));
+                let allowance = allowance.map(|allowance| allowance - PRESCRIBED * change).filter(|left| *left > 0.0);
+                let own = &mut self.island.sectors[index].allowance;
+                *own = own.zip(allowance).map(|(own, allowance)| own.min(allowance));
+            }
+        }
+    }
+
+    /// Returns by how much the surface that the nodes of a sector face, and the nodes of coupled sectors, may move in the span so that the
+    /// nodes stay open (m), with larger gaps than another sector has; `None` if they may touch without such motion.
+    fn allowance(&mut self, index: usize, structure: &Structure, gap: &SplineGap, span: f64) -> Option<f64> {
+        let (sector, lanes, gaps) = (self.records[index].sector, structure.lanes(), &structure.history.gap.before);
+        if structure.needed_minima.all_of(sector) || self.island.sectors[index].state.is_loaded() {
+            return None;
+        }
+        let travel = self.island.travel(index, span);
+        let normals = &structure.history.geometry.before.normal;
+        let normal = |node: usize| normals.each_ref().map(|normals| normals[node * lanes + sector]);
+        let mut smallest = f64::INFINITY;
+        for node in &gap.nodes {
+            let row = &gaps[node * lanes..(node + 1) * lanes];
+            let others = row.iter().copied().fold(f64::INFINITY, f64::min).max(0.0);
+            let own = travel.map_or(0.0, |travel| approach(vector3_at(travel, *node).into(), normal(*node)));
+            let free = row[sector] - others - own;
+            if !(free > 0.0 && free.is_finite()) {
+                return None;
+            }
+            smallest = smallest.min(free);
+        }
+        Some(smallest)
+    }
+}
