@@ -27,6 +27,7 @@ impl BladeInSpan<'_> {
             return;
         }
         let Some(OpenStep { step, kind, is_resolved, work, energy, banked }) = self.open else { return };
+        self.clear_unknown(step, kind);
         let flag = |is: bool| f64::from(u8::from(is));
         let SpanProgress { spans, done, effort } = self.progress;
         let code = match kind {
@@ -56,6 +57,22 @@ impl BladeInSpan<'_> {
             .chain([banked]);
         head.iter_mut().zip(values).for_each(|(to, value)| *to = value);
         self.blade.trial.for_each_stored_block(kind.is_some(), arrays, |block, numbers| *numbers = block.0);
+    }
+
+    /// Clears values that the open step does not have, so that a saved state does not depend on earlier trials.
+    fn clear_unknown(&mut self, step: SpanStep, kind: Option<ForceInterpolation>) {
+        let BladeTrial { reach, moved, sigma, gaps, multipliers, forces, pushes, .. } = &mut self.blade.trial;
+        if !self.reach_known {
+            reach.iter_mut().for_each(|reach| reach.fill(Eight::ZERO));
+        }
+        if !*pushes {
+            forces.iter_mut().for_each(|forces| forces.fill(Eight::ZERO));
+        }
+        if let Some(kind) = kind {
+            let used = self.tables.level(step.level, kind).blocks;
+            let lanes = [sigma, gaps, multipliers].into_iter().chain(moved).chain(forces);
+            lanes.for_each(|lanes| lanes[used..].fill(Eight::ZERO));
+        }
     }
 
     /// Reads the open step from an array. Returns false if the array contains none.
