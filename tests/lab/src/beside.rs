@@ -29,9 +29,9 @@ const LONGEST: f64 = 5e-7;
 const MARGIN: f64 = 4.0;
 
 /// Result of one of the two programs.
-struct SideBySideRun {
+pub(crate) struct SideBySideRun {
     /// Displacements of all contact rows and blades at the communication points (m), sample by sample.
-    displacements: Vec<f64>,
+    pub(crate) displacements: Vec<f64>,
     /// Sum of λ over all contacts, per communication step (N·s).
     impulses: Vec<f64>,
 }
@@ -135,7 +135,7 @@ fn impulse(simulation: &Simulation) -> f64 {
 }
 
 /// Runs the witness over as many steps, each at most `longest` (s).
-fn witness(
+pub(crate) fn witness(
     scene: &BladeScene,
     interval: f64,
     longest: f64,
@@ -159,7 +159,7 @@ fn witness(
 }
 
 /// Returns the relative distance of two sequences (L2).
-fn apart(a: &[f64], b: &[f64]) -> f64 {
+pub(crate) fn apart(a: &[f64], b: &[f64]) -> f64 {
     let square = |values: &mut dyn Iterator<Item = f64>| values.map(|value| value * value).sum::<f64>();
     let size = square(&mut b.iter().copied());
     if size == 0.0 { 0.0 } else { (square(&mut a.iter().zip(b).map(|(a, b)| a - b)) / size).sqrt() }

@@ -14,7 +14,7 @@ use tiprub_study as study;
 use tiprub_study::arguments::{Speeds, StudyCommon, positive, speeds};
 
 use crate::{
-    bases, beside, conjugacy, convergence, coupling, cube, error, estimates, inputs, modes, penetration, random,
+    bases, bench, beside, conjugacy, convergence, coupling, cube, error, estimates, inputs, modes, penetration, random,
     refinement, scatter, stability, stage, wear, witness,
 };
 
@@ -89,6 +89,8 @@ pub enum LabCommand {
     Stress(StudyCommon),
     /// Penetration of contact nodes between the points of adaptive steps, from sampled displacements.
     Penetration(StudyCommon),
+    /// Processor time and error of rubs by tolerance and communication step, beside methods with fixed steps.
+    Bench(StudyCommon),
     /// One blade in a coated casing whose radius decreases: wear lobes compared with blade vibrations per revolution.
     Wear(StudyCommon),
 }
@@ -307,6 +309,7 @@ impl LabCli {
             LabCommand::Witness(common) => ("witness", common),
             LabCommand::Stress(common) => ("stress", common),
             LabCommand::Penetration(common) => ("penetration", common),
+            LabCommand::Bench(common) => ("bench", common),
             LabCommand::Wear(common) => ("wear", common),
         };
         let directory = commands::study::directory(name, common);
@@ -339,6 +342,7 @@ impl LabCli {
             LabCommand::Witness(common) => witness::study(common, console),
             LabCommand::Stress(common) => witness::stress(common, console),
             LabCommand::Penetration(common) => penetration::study(common, console),
+            LabCommand::Bench(common) => bench::study(common, console),
             LabCommand::Wear(common) => wear::study(common, console),
             LabCommand::Stability(_) | LabCommand::Random(_) => unreachable!("`run` has answered it"),
         }

@@ -245,6 +245,22 @@ fn quick_penetration_study_finds_no_missed_contact() {
     assert!(rows.iter().all(|row| row["touching"].as_u64() > Some(100)), "{rows:#?}");
 }
 
+#[test]
+fn quick_bench_gives_times_and_errors() {
+    let root = tempfile::tempdir().unwrap();
+    let json = study(root.path(), "bench", &[]);
+    let rows = json["results"].as_array().unwrap();
+    assert_eq!(rows.len(), 4 * 3 + 3 + 1, "tolerances by communication steps, fixed steps, the independent solver");
+    for row in rows {
+        assert!(row["rejected"].is_null() && row["seconds_per_second"].as_f64() > Some(0.0), "{row:#}");
+        assert!(row["error"].as_f64().is_some_and(|error| error > 0.0 && error < 0.5), "{row:#}");
+    }
+    let errors: Vec<f64> = rows.iter().map(|row| row["error"].as_f64().unwrap()).collect();
+    assert!(errors[9] < 0.1 * errors[0], "a smaller tolerance gives a smaller error: {errors:?}");
+    let table = fs::read_to_string(root.path().join("out/bench.md")).unwrap();
+    assert!(table.contains("| ms per revolution |") && table.contains("| central-difference + film |"), "{table}");
+}
+
 /// The errors occur before any reduction, and no directory is created.
 #[test]
 fn rejects_unsupported_studies_before_running() {
@@ -272,6 +288,7 @@ fn rejects_unsupported_studies_before_running() {
         "bases",
         "scatter",
         "penetration",
+        "bench",
         "wear",
     ] {
         let reported = refuse(&[name, "--quick", "--out", "file/out"], 1);

@@ -1,0 +1,270 @@
+//! Speed of rubs by tolerance and communication step, with baselines measured in the same run and the error beside each
+//! time.
+
+use serde_json::{Value, json};
+use tiprub_core::scene::method::{Scheme, Solver};
+use tiprub_core::scene::settings::Shape;
+use tiprub_core::{CoSimulation, Scene, Simulation};
+use tiprub_figure::table::Table;
+use tiprub_gallery::scene_source;
+use tiprub_shell::{Failure, Result, console::Console};
+use tiprub_study::{
+    Statement, Study,
+    arguments::StudyCommon,
+    error::{clock, scene::SceneRun, summary::rate},
+    machine,
+};
+
+use crate::{
+    beside::{self, apart, blades_of},
+    stability::models,
+};
+
+/// Depths of the bumps: as built in, and a heavy rub.
+const DEPTHS: [(&str, f64); 2] = [("light", 0.6), ("heavy", 1.2)];
+const TOLERANCES: [f64; 4] = [1e-1, 1e-2, 1e-3, 1e-4];
+/// Communication steps (s), shortest first.
+const INTERVALS: [f64; 3] = [1e-5, 1e-4, 1e-3];
+/// Communication step of the baselines (s).
+const BASE_INTERVAL: f64 = 1e-4;
+/// Tolerance of the run that errors of adaptive steps are relative to.
+const FINEST: f64 = 1e-6;
+/// Duration of a run (ms): full study, quick study.
+const DURATION: [u32; 2] = [10, 2];
+/// Methods with fixed steps: the paper's first.
+const FIXED: [(Scheme, Solver); 3] =
+    [(Scheme::PAPER, Solver::Film), (Scheme::ModalExact, Solver::Lcp), (Scheme::MasslessBoundary, Solver::Lcp)];
+/// Longest fixed step that is tried (s), and maximum number of times that it is halved.
+const LONGEST: f64 = 1e-6;
+const MOST_HALVINGS: i32 = 6;
+/// Step of the independent solver (s).
+const INDEPENDENT_STEP: f64 = 5e-7;
+/// Number of runs, the fastest of which counts.
+const REPETITIONS: usize = 3;
+
+/// Displacements of all contact nodes at the end of every millisecond, one after the other (m), and the processor time
+/// of the steps (s).
+struct TimedRub {
+    displacements: Vec<f64>,
+    seconds: f64,
+}
+
+/// One row of the table.
+struct BenchRow {
+    rub: &'static str,
+    method: String,
+    setting: String,
+    interval: f64,
+    /// Processor time per simulated second (s/s), and relative error of the displacements.
+    found: std::result::Result<[f64; 2], String>,
+    /// Duration of a revolution (s).
+    revolution: f64,
+}
+
+/// Runs `milliseconds` of the scene with communication steps of `interval` (s).
+fn timed(scene: &Scene, interval: f64, milliseconds: u32) -> tiprub_core::Result<TimedRub> {
+    let mut scene = scene.clone();
+    scene.settings.experiment.communication_step = interval;
+    let mut simulation = Simulation::new(&scene)?;
+    simulation.initialise(0.0)?;
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most a hundred")]
+    let steps = (1e-3 / interval).round() as u32;
+    let mut found = TimedRub { displacements: Vec::new(), seconds: 0.0 };
+    for step in 0..milliseconds * steps {
+        let before = clock::now();
+        simulation.do_step(f64::from(step) * interval, interval)?;
+        found.seconds += (clock::now() - before).as_secs_f64();
+        if (step + 1).is_multiple_of(steps) {
+            let bank = simulation.system().bank();
+            let rows = bank.displacement().chunks_exact(bank.lanes());
+            found.displacements.extend(rows.flat_map(|row| &row[..scene.roms[0].sectors]));
+        }
+    }
+    Ok(found)
+}
+
+/// Returns the fastest of several runs.
+fn fastest(scene: &Scene, interval: f64, size: BenchSize) -> tiprub_core::Result<TimedRub> {
+    let mut best = timed(scene, interval, size.milliseconds)?;
+    for _ in 1..size.repetitions {
+        best.seconds = best.seconds.min(timed(scene, interval, size.milliseconds)?.seconds);
+    }
+    Ok(best)
+}
+
+#[derive(Debug, Clone, Copy)]
+struct BenchSize {
+    milliseconds: u32,
+    repetitions: usize,
+}
+
+impl BenchSize {
+    fn new(quick: bool) -> Self {
+        Self { milliseconds: DURATION[usize::from(quick)], repetitions: if quick { 1 } else { REPETITIONS } }
+    }
+
+    fn rate(self, seconds: f64) -> f64 {
+        seconds / (1e-3 * f64::from(self.milliseconds))
+    }
+}
+
+/// A rub with its name.
+struct Rub {
+    name: &'static str,
+    scene: Scene,
+    size: BenchSize,
+}
+
+impl Rub {
+    fn row(
+        &self,
+        method: &str,
+        setting: String,
+        interval: f64,
+        found: std::result::Result<[f64; 2], String>,
+    ) -> BenchRow {
+        let revolution = std::f64::consts::TAU / self.scene.settings.structures[0].speed.abs();
+        BenchRow { rub: self.name, method: method.to_owned(), setting, interval, found, revolution }
+    }
+
+    fn with_tolerance(&self, tolerance: f64) -> Scene {
+        let mut scene = SceneRun::changed(&self.scene, (Scheme::ADAPTIVE, Solver::Lcp), 8e-5, 0.0);
+        scene.settings.time.tolerance = Some(tolerance);
+        scene
+    }
+
+    /// Returns the rows of adaptive steps.
+    fn adaptive(&self) -> tiprub_core::Result<Vec<BenchRow>> {
+        let finest = timed(&self.with_tolerance(FINEST), BASE_INTERVAL, self.size.milliseconds)?;
+        let mut rows = Vec::new();
+        for tolerance in TOLERANCES {
+            let scene = self.with_tolerance(tolerance);
+            for interval in INTERVALS {
+                let run = fastest(&scene, interval, self.size)?;
+                let found = [self.size.rate(run.seconds), apart(&run.displacements, &finest.displacements)];
+                rows.push(self.row("adaptive steps", format!("tolerance {tolerance:.0e}"), interval, Ok(found)));
+            }
+        }
+        Ok(rows)
+    }
+
+    /// Returns the row of a method with the longest fixed step that the scene accepts.
+    fn fixed(&self, method: (Scheme, Solver)) -> BenchRow {
+        let with = |step: f64| SceneRun::changed(&self.scene, method, step, 0.0);
+        let name = format!("{} + {}", method.0.name(), method.1.name());
+        let mut why = String::new();
+        for halvings in 0..=MOST_HALVINGS {
+            let step = LONGEST * 0.5_f64.powi(halvings);
+            let setting = format!("h = {:.4} µs", 1e6 * step);
+            let runs = fastest(&with(step), BASE_INTERVAL, self.size)
+                .and_then(|run| Ok([run, timed(&with(0.25 * step), BASE_INTERVAL, self.size.milliseconds)?]));
+            match runs {
+                Ok([run, finer]) => {
+                    let error = apart(&run.displacements, &finer.displacements);
+                    return self.row(&name, setting, BASE_INTERVAL, Ok([self.size.rate(run.seconds), error]));
+                }
+                Err(problem) => why = problem.to_string(),
+            }
+        }
+        self.row(&name, "no step was accepted".into(), BASE_INTERVAL, Err(why))
+    }
+
+    /// Returns the row of the independent solver with dense matrices.
+    fn independent(&self) -> BenchRow {
+        let run = |step: f64| -> std::result::Result<TimedRub, String> {
+            let blades = blades_of(&self.scene).map_err(|failure| failure.to_string())?;
+            let before = clock::now();
+            let found = beside::witness(&blades, 1e-3, step, self.size.milliseconds)?;
+            Ok(TimedRub { displacements: found.displacements, seconds: (clock::now() - before).as_secs_f64() })
+        };
+        let found = run(INDEPENDENT_STEP).and_then(|own| {
+            let finer = run(0.5 * INDEPENDENT_STEP)?;
+            Ok([self.size.rate(own.seconds), apart(&own.displacements, &finer.displacements)])
+        });
+        let setting = format!("h = {:.1} µs", 1e6 * INDEPENDENT_STEP);
+        self.row("Moreau-Jean, independent and dense", setting, 1e-3, found)
+    }
+
+    fn rows(&self) -> Result<Vec<BenchRow>> {
+        let mut rows =
+            self.adaptive().map_err(|error| Failure::from_core(format!("lab bench, {} rub", self.name), error))?;
+        rows.extend(FIXED.map(|method| self.fixed(method)));
+        rows.push(self.independent());
+        Ok(rows)
+    }
+}
+
+fn rubs(common: &StudyCommon, console: &Console) -> Result<Vec<Rub>> {
+    let size = BenchSize::new(common.quick);
+    if common.quick {
+        return Ok(vec![Rub { name: "small", scene: models::bumps(models::blade(12)), size }]);
+    }
+    let scene = scene_source::load("builtin:rotor37", &common.cache.cache(), console)?;
+    let with = |(name, bumps): (&'static str, f64)| {
+        let mut scene = scene.clone();
+        if let Shape::TwoLobe { depth, .. } = &mut scene.settings.surfaces[0].shape {
+            *depth = bumps;
+        }
+        Rub { name, scene, size }
+    };
+    Ok(DEPTHS.map(with).into())
+}
+
+impl BenchRow {
+    fn cells(&self) -> Vec<String> {
+        let [revolution, second, error] = match &self.found {
+            Ok([rate_of, error]) => [rate(1e3 * rate_of * self.revolution), rate(*rate_of), format!("{error:.1e}")],
+            Err(_) => ["rejected"; 3].map(String::from),
+        };
+        let interval = format!("{:.0}", 1e6 * self.interval);
+        vec![self.rub.into(), self.method.clone(), self.setting.clone(), interval, revolution, second, error]
+    }
+
+    fn json(&self) -> Value {
+        let [seconds, error] = self.found.as_ref().map_or([None; 2], |found| found.map(Some));
+        json!({
+            "rub": self.rub, "method": self.method, "setting": self.setting, "communication_step": self.interval,
+            "seconds_per_second": seconds, "error": error, "rejected": self.found.as_ref().err(),
+        })
+    }
+}
+
+/// Runs the benchmark.
+///
+/// # Errors
+/// If a run with adaptive steps fails.
+pub(crate) fn study(common: &StudyCommon, console: &Console) -> Result<Study> {
+    let rubs = rubs(common, console)?;
+    let task = console.task("Timing rubs", Some(rubs.len() as u64));
+    let mut rows = Vec::new();
+    for (done, rub) in (1..).zip(&rubs) {
+        rows.extend(rub.rows()?);
+        task.at(done);
+    }
+    drop(task);
+    let columns = ["rub", "method", "setting", "H (µs)", "ms per revolution", "time (s/s)", "error"];
+    let mut table = Table::new("Processor time and error of rubs", columns);
+    table.rows = rows.iter().map(BenchRow::cells).collect();
+    let worst = (rows.iter().filter(|row| row.method == "adaptive steps")).filter_map(|row| {
+        let tolerance: f64 = row.setting.strip_prefix("tolerance ")?.parse().ok()?;
+        Some(row.found.as_ref().ok()?[1] / tolerance)
+    });
+    let worst = worst.fold(0.0, f64::max);
+    Ok(Study {
+        name: "bench",
+        title: "Speed of rubs".into(),
+        summary: "Processor times of the steps, the fastest of several runs. Errors are relative L2 errors of the displacements at \
+                  every millisecond: of adaptive steps against a tolerance of 1e-6, of fixed steps against the same method with \
+                  a quarter of the step, of the independent solver against half of its step."
+            .into(),
+        facts: machine::facts(),
+        statements: vec![Statement::tested(
+            "Adaptive steps cause a smaller error than the tolerance",
+            worst < 1.0,
+            format!("at most {worst:.2} of the tolerance"),
+        )],
+        figures: Vec::new(),
+        results: rows.iter().map(BenchRow::json).collect(),
+        files: vec![("bench.md".into(), "table of the results".into(), table.to_markdown().into_bytes())],
+    })
+}
