@@ -1,4 +1,4 @@
-//! Threads that share the blades of a rotor: results, also after a saved state is restored, and errors do not depend on their number.
+//! Threads that share the blades of a rotor: results, saved states and errors do not depend on their number.
 
 use super::scene;
 use tiprub_core::scene::method::Scheme;
@@ -7,6 +7,9 @@ use tiprub_core::{CoSimulation, Scene, Simulation};
 use tiprub_test_models::{bits, go, real, reference, rich_blade, saved, set};
 
 const BLADES: usize = 11;
+/// Largest number of bytes that the number of threads itself changes in a saved state: two in its value now and at the
+/// previous communication point, and the checksum.
+const OWN_BYTES: usize = 12;
 
 fn rub() -> Scene {
     let mut scene = scene(Scheme::Galerkin, 4e-5, 1e-3);
@@ -35,11 +38,11 @@ fn started_with(scene: &Scene, threads: i32) -> Simulation {
     simulation
 }
 
-/// Returns the values after every communication step. Inputs rest, change and rest again.
+/// Returns the values after every communication step, and saved states. Inputs rest, change and rest again.
 /// Meanwhile the run continues from a state that was saved before.
-fn run(scene: &Scene, threads: i32) -> Vec<Vec<u64>> {
+fn run(scene: &Scene, threads: i32) -> (Vec<Vec<u64>>, Vec<Vec<u8>>) {
     let mut simulation = started_with(scene, threads);
-    let mut values = Vec::new();
+    let (mut values, mut states) = (Vec::new(), Vec::new());
     for n in 0..160 {
         let length = match n {
             0..60 => 1e-5,
@@ -53,20 +56,27 @@ fn run(scene: &Scene, threads: i32) -> Vec<Vec<u64>> {
             let state = saved(&simulation);
             go(&mut simulation, 1.7e-5);
             simulation.restore_state(&state).unwrap();
+            states.push(state);
         }
         go(&mut simulation, length);
         values.push(bits(&simulation));
     }
     assert!(simulation.system().ledger().friction_loss.value() > 0.0, "no contact");
-    values
+    states.push(saved(&simulation));
+    (values, states)
 }
 
 #[test]
 fn results_do_not_depend_on_the_number_of_threads() {
     for scene in [rub(), heavy(), mistuned()] {
-        let values = run(&scene, 1);
+        let (values, states) = run(&scene, 1);
         for threads in [2, 4, 64] {
-            assert!(run(&scene, threads) == values, "{threads} threads");
+            let (found, saved) = run(&scene, threads);
+            assert!(found == values, "{threads} threads: outputs");
+            for (found, expected) in saved.iter().zip(&states) {
+                let differ = found.iter().zip(expected).filter(|(found, expected)| found != expected).count();
+                assert!(found.len() == expected.len() && differ <= OWN_BYTES, "{threads} threads: {differ} bytes");
+            }
         }
     }
 }
