@@ -63,6 +63,7 @@ pub fn rigid() -> Scene {
     rom.extras.stress = Some(WatchedPoints { map: stress, points });
     let mut scene = models::bumps(rom);
     let settings = &mut scene.settings;
+    settings.time.tolerance = Some(1e-3);
     settings.structures[0].speed = 1800.0;
     settings.surfaces[0].shape = Shape::TwoLobe { depth: 1.2, width: 0.15, phase: 0.0 };
     settings.surfaces[0].ramp_time = 1e-4;

@@ -33,8 +33,8 @@ impl Simulation {
     /// # Errors
     /// If the system does not create a thread.
     pub(super) fn use_threads(&mut self) -> Result<()> {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 ≤ value ≤ 64")]
-        let threads = self.state.values.value_of(Quantity::Threads, 0) as usize;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 ≤ value ≤ 64")]
+        let threads = self.state.values.value_of(Quantity::Threads, 0).max(1.0) as usize;
         self.stepper.use_threads(threads).map_err(|error| {
             let problem = format!("the system does not create {threads} threads: {error}");
             Error::invalid(

@@ -79,6 +79,11 @@ impl SceneSettings {
         self.time.tolerance.is_some() || self.time.scheme.properties().adaptive
     }
 
+    /// Returns whether threads may share the blades: adaptive steps on rigid surfaces.
+    pub(crate) fn shares_blades(&self) -> bool {
+        self.takes_a_tolerance() && self.surfaces.iter().all(|surface| surface.structure.is_none())
+    }
+
     /// Returns the scheme of this validated scene if its file gives none, and the reason in words.
     ///
     /// It is `galerkin` (adaptive steps) on rigid surfaces wherever no rule of [`rules`](super::rules) excludes it. It is `modal-exact`

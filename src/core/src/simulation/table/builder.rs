@@ -152,8 +152,10 @@ impl TableBuilder {
         if settings.bounds_steps() {
             self.max_internal_steps(settings);
         }
-        let text = "Number of threads that share independent blades in adaptive steps; results do not depend on it";
-        self.whole(Quantity::Threads, "threads", 1, text).range(1.0, ranges::THREADS);
+        if settings.shares_blades() {
+            let text = "Number of threads that share independent blades in adaptive steps; results do not depend on it";
+            self.whole(Quantity::Threads, "threads", 1, text).range(1.0, ranges::THREADS);
+        }
         let reason = settings.time.scheme_reason.as_ref();
         let reason = reason.map_or(String::new(), |reason| format!("; the start value is {reason}"));
         self.choice(Quantity::SchemeChoice, "scheme", &SCHEMES, scheme, &format!("Time-stepping scheme{reason}"));

@@ -203,7 +203,9 @@ impl BladeTrial {
         let start = &mut self.start;
         Eight::spread(state.position.iter().copied(), 0.0, &mut start.modes[0]);
         Eight::spread(state.velocity.iter().copied(), 0.0, &mut start.modes[1]);
-        start.slopes.fill(Eight::ZERO);
+        let StartContacts { forces: [closing, around], multipliers, slopes, sigma, .. } = start;
+        // Entries without a node are part of saved states, so they must not depend on earlier trials.
+        [closing, around, multipliers, slopes, sigma].into_iter().for_each(|blocks| blocks.fill(Eight::ZERO));
         start.pushed = false;
         for node in 0..rows.nodes {
             let force = rows.in_plane(vector3_at(&state.forces, node));
