@@ -132,17 +132,21 @@ fn page_describes_grid_heat_and_spin() {
 }
 
 #[test]
-fn default_has_at_most_51_scalars_and_the_time() {
-    let count = |outputs: OutputSettings| {
+fn default_has_at_most_50_scalars_with_fixed_steps() {
+    let count_with = |tolerance: Option<f64>, outputs: OutputSettings| {
         let mut scene = scene::rigid();
         // The ROM has no watched points, which would add four outputs each.
         scene.roms[0].extras.watched = None;
         scene.settings.surfaces[0].moving = false;
-        scene.settings.outputs = outputs;
-        Simulation::new(&scene).unwrap().table().references()
+        (scene.settings.outputs, scene.settings.time.tolerance) = (outputs, tolerance);
+        // The time is not counted.
+        Simulation::new(&scene).unwrap().table().references() - 1
     };
+    let adaptive = count_with(Some(1e-3), OutputSettings::default());
+    assert!(adaptive <= 57, "{adaptive} scalars");
+    let count = |outputs: OutputSettings| count_with(None, outputs);
     let least = count(OutputSettings::default());
-    assert!(least <= 51 + 1, "{least} scalars");
+    assert!(least <= 50, "{least} scalars");
     let more = |change: fn(&mut OutputSettings)| {
         let mut outputs = OutputSettings::default();
         change(&mut outputs);
