@@ -37,10 +37,10 @@ pub trait Stepper {
     /// step.
     fn allow(&mut self, _most_tried: u64) {}
 
-    /// Uses a number of threads, if the method can share its work: creates or ends threads other than the caller's.
+    /// Uses this number of threads, including the caller's, if the method can share its work. Creates or ends the other threads.
     ///
     /// # Errors
-    /// If the system does not create a thread.
+    /// If the system cannot create a thread.
     fn use_threads(&mut self, _threads: usize) -> io::Result<()> {
         Ok(())
     }

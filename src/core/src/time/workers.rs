@@ -1,7 +1,7 @@
 //! Threads that share the sectors of a step.
 //!
-//! The threads are created at initialisation. Between two jobs they first watch for the next one for a short while, and
-//! then wait without using the processor. They end when the [`Workers`] are dropped.
+//! The threads are created at initialisation. Between two jobs they poll for the next one for a short time, and then
+//! wait without using the processor. They end when the [`Workers`] are dropped.
 
 use std::any::Any;
 use std::io;
@@ -10,8 +10,8 @@ use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 
-/// Number of times that a thread looks for a change before it waits without using the processor.
-const LOOKS: u32 = 2000;
+/// Number of times that a thread polls before it waits without using the processor.
+const SPINS: u32 = 2000;
 
 /// A job that each thread runs once.
 type Job<'a> = &'a (dyn Fn() + Sync);
@@ -50,11 +50,11 @@ struct State {
 }
 
 impl Workers {
-    /// Creates `count` threads in addition to the caller, and waits until they run, because a thread allocates memory when
-    /// it starts.
+    /// Creates `count` threads in addition to the caller, and waits until they run. A thread allocates memory when it starts,
+    /// which must not happen during a step.
     ///
     /// # Errors
-    /// If the system does not create a thread; those that exist already end.
+    /// If the system cannot create a thread. The threads that were created end.
     pub(crate) fn new(count: usize) -> io::Result<Self> {
         let mut workers = Self::default();
         for _ in 0..count {
@@ -132,7 +132,7 @@ impl Shared {
     /// them.
     fn close(&self) -> Option<Box<dyn Any + Send>> {
         self.lock().job = None;
-        look_for(|| self.active.load(Ordering::Acquire) == 0);
+        spin_until(|| self.active.load(Ordering::Acquire) == 0);
         let mut state = self.lock();
         while self.active.load(Ordering::Acquire) > 0 {
             state = self.is_idle.wait(state).unwrap_or_else(PoisonError::into_inner);
@@ -161,7 +161,7 @@ impl Shared {
     /// Waits for a job after the first `seen` ones and begins it; `None` if the threads must end.
     fn next_job(&self, seen: &mut u64) -> Option<Job<'static>> {
         loop {
-            look_for(|| self.jobs.load(Ordering::Acquire) != *seen);
+            spin_until(|| self.jobs.load(Ordering::Acquire) != *seen);
             let mut state = self.lock();
             while self.jobs.load(Ordering::Acquire) == *seen && !state.ends {
                 state.waiting += 1;
@@ -186,9 +186,9 @@ impl std::fmt::Debug for Shared {
     }
 }
 
-/// Looks for a change for a short while.
-fn look_for(has_changed: impl Fn() -> bool) {
-    for _ in 0..LOOKS {
+/// Polls until a condition holds, but only for a short time.
+fn spin_until(has_changed: impl Fn() -> bool) {
+    for _ in 0..SPINS {
         if has_changed() {
             return;
         }
