@@ -251,7 +251,7 @@ pub trait CoSimulation: Send {
     /// Rejected parameters, with numbers and a remedy. The unit can be initialised again with other parameters.
     fn initialise(&mut self, start_time: f64) -> Result<()>;
 
-    /// Ends the run and the threads of the unit. Values can still be read; no step follows until the unit is initialised again.
+    /// Ends the run and the threads of the unit. Values can still be read. Reset and initialise the unit before further steps.
     fn terminate(&mut self) {}
 
     /// Restores the state after creation, with all start values.

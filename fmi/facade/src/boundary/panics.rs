@@ -12,15 +12,16 @@ use std::sync::{Mutex, Once, PoisonError};
 /// the library can be unloaded while threads that used it are still running.
 type PanicPlace = ([u8; 48], usize, u32);
 
-/// No panic.
-const NOWHERE: PanicPlace = ([0; 48], 0, 0);
+/// Value without a panic.
+const NO_PLACE: PanicPlace = ([0; 48], 0, 0);
 
 thread_local! {
-    static PLACE: Cell<PanicPlace> = const { Cell::new(NOWHERE) };
+    static PLACE: Cell<PanicPlace> = const { Cell::new(NO_PLACE) };
 }
 
-/// Place of the last panic of any thread: threads of a unit pass their panics on to the thread that called the unit.
-static LAST: Mutex<PanicPlace> = Mutex::new(NOWHERE);
+/// Place of the last panic of any thread. Threads of a unit pass their panics to the thread that called the unit, which has no place of
+/// its own.
+static LAST: Mutex<PanicPlace> = Mutex::new(NO_PLACE);
 
 static HOOK: Once = Once::new();
 
@@ -44,8 +45,8 @@ fn remember(info: &PanicHookInfo<'_>) {
 pub(super) fn describe(payload: &(dyn Any + Send)) -> String {
     let text = payload.downcast_ref::<&str>().copied();
     let text = text.or_else(|| payload.downcast_ref::<String>().map(String::as_str)).unwrap_or("no message");
-    let own = PLACE.replace(NOWHERE);
-    let place = if own == NOWHERE { *LAST.lock().unwrap_or_else(PoisonError::into_inner) } else { own };
+    let own = PLACE.replace(NO_PLACE);
+    let place = if own == NO_PLACE { *LAST.lock().unwrap_or_else(PoisonError::into_inner) } else { own };
     let (bytes, length, line) = place;
     let file = String::from_utf8_lossy(&bytes[..length]).into_owned();
     format!(

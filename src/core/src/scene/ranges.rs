@@ -35,7 +35,7 @@ pub const LOBES: f64 = 1e6;
 pub const LONGEST_STEP: f64 = 1.0;
 /// Largest number of internal steps of one communication step.
 pub const STEPS: f64 = 1e9;
-/// Largest number of threads.
+/// Largest number of threads of a unit.
 pub const THREADS: f64 = 64.0;
 /// Smallest and largest error of a step, as a fraction of the clearance: below, it is mostly rounding.
 pub const TOLERANCE: [f64; 2] = [1e-9, 0.1];

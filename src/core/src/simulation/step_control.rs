@@ -31,17 +31,13 @@ impl Simulation {
     /// Creates the threads that the parameter `threads` requests, and ends others.
     ///
     /// # Errors
-    /// If the system does not create a thread.
+    /// If the system cannot create a thread.
     pub(super) fn use_threads(&mut self) -> Result<()> {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 ≤ value ≤ 64")]
         let threads = self.state.values.value_of(Quantity::Threads, 0).max(1.0) as usize;
         self.stepper.use_threads(threads).map_err(|error| {
-            let problem = format!("the system does not create {threads} threads: {error}");
-            Error::invalid(
-                "variable `threads`",
-                problem,
-                "Use fewer threads; 1 needs no other thread than the caller's",
-            )
+            let problem = format!("the system cannot create {threads} threads: {error}");
+            Error::invalid("variable `threads`", problem, "Use fewer threads; 1 creates none")
         })
     }
 

@@ -279,7 +279,7 @@ impl CoSimulation for Simulation {
     fn restore_state(&mut self, buffer: &[u8]) -> Result<()> {
         self.restore_checked(buffer)?;
         if self.is_initialised() {
-            // Without threads the results are the same.
+            // Results do not depend on threads, so the run continues without them.
             return self.use_threads().or(Ok(()));
         }
         self.end_threads();
