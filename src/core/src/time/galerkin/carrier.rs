@@ -34,7 +34,7 @@ pub struct CarrierIntegrator {
     velocity: Vec<f64>,
     /// Displacements of these rows at the start of the span (m).
     begun: Vec<f64>,
-    /// No point of a surface moves by more than this times the largest motion of a control point.
+    /// Bound of the largest motion of a point of a surface, divided by the largest motion of a control point.
     pub(crate) amplification: f64,
     /// Displacements over which forces at each point of the accepted step do work, Σ_k S_ik u_k (m).
     worked: [Vec<f64>; POINTS],
@@ -52,7 +52,7 @@ pub struct CarrierIntegrator {
     frames: Vec<PolarFrame>,
     /// Modal displacements per unit of λ of one lane.
     force: Vec<f64>,
-    /// Loads on the rows at the points (N), and rows with loads.
+    /// Loads on the rows at the points (N), indices of the rows with loads, and true for each of these rows.
     loads: [Vec<f64>; POINTS],
     loaded: Vec<usize>,
     is_loaded: Vec<bool>,
@@ -140,7 +140,7 @@ impl CarrierIntegrator {
         self.amplification * moved.fold(0.0, f64::max)
     }
 
-    /// Advances to the end of an accepted step, whose displacements become those at the start of the next one.
+    /// Advances to the end of an accepted step. Displacements at its end become those at the start of the next step.
     pub(crate) fn take(&mut self, level: usize, kind: ForceInterpolation, points: usize) {
         self.body.take(level, kind);
         self.body.settle();
@@ -207,7 +207,7 @@ impl CarrierIntegrator {
         }
     }
 
-    /// Sets the modal forces at some points to those of the loads.
+    /// Computes the modal forces at some points from the loads.
     pub(crate) fn gather(&mut self, points: RangeInclusive<usize>) {
         let (first, count) = (*points.start(), points.end() + 1 - points.start());
         self.gather_loads(first, count);
@@ -217,7 +217,7 @@ impl CarrierIntegrator {
         }
     }
 
-    /// Computes the impulses on the modes from reactions to impulses on the nodes at point 0 (N·s).
+    /// Computes the modal impulses (N·s) from the loads at point 0, which contain the reactions to impulses on the nodes.
     pub(crate) fn gather_impulses(&mut self) {
         self.gather_loads(0, 1);
         let modes = self.impulses.len();

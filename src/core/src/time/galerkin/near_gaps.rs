@@ -1,4 +1,4 @@
-//! Gaps of the nodes of a sector to a smooth ring, each from a place near its closest point.
+//! Gaps of the nodes of a sector to a smooth ring, from initial guesses of the closest points.
 
 use super::compliance::Lanes;
 use super::obstacle_view::ObstacleView;
@@ -21,7 +21,7 @@ struct NearGaps<'a> {
     point: usize,
     /// Displacements (m).
     moved: &'a [f64],
-    /// Places near the closest points, which replace them.
+    /// Initial guesses of the closest points, which the results replace.
     places: &'a mut [ClosestPoint],
     gaps: &'a mut [f64],
     normals: &'a mut [f64],

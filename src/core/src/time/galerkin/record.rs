@@ -259,7 +259,7 @@ pub(crate) struct SpanRecord {
     pub solutions: usize,
     pub instants: Instants,
     pub instructions: InstructionSet,
-    /// Scratch: upper bounds of the change of the gaps of each lane over the span by all motion but that of the nodes (m).
+    /// Scratch: bounds of the change of the gaps of each sector over the span (m), without the motion of the nodes.
     pub changes: Vec<f64>,
     /// Pair to whose surface all nodes at all points are entered in `instants`.
     pub lanes_of: Option<usize>,
@@ -343,7 +343,7 @@ impl SpanRecord {
         }
     }
 
-    /// Uses the places at the start of the step as initial guess, carried along by the rotation of the rotor.
+    /// Uses the places at the start of the step, advanced by the rotation of the rotor, as initial guesses.
     pub(crate) fn guess_start_places(&mut self, pairs: &[ContactPair]) {
         let [first, rest @ ..] = &mut self.places;
         for own in &self.pairs {

@@ -161,8 +161,8 @@ impl ContactRows {
         self.add_up(&self.magnitudes, [&sums.coefficients[0]], [one]);
     }
 
-    /// Bounds the displacements of the rows from their current positions over a time `span` (s) without forces: by the velocities of the slow
-    /// modes (m/s) times `span`, plus a rest (m). The first set of `velocities` is used.
+    /// Bounds the displacements of the rows from their current positions over a time `span` (s) without forces. The bound is `span` times the
+    /// magnitude of the first set of `velocities` (slow modes, m/s), plus `rest` (m).
     pub(crate) fn travel(&self, span: f64, state: &SectorState, velocities: &mut Sums<2>, rest: &mut Sums<1>) {
         let ([slow, _], [bounds]) = (&mut velocities.coefficients, &mut rest.coefficients);
         let modes = self.rates.iter().zip(state.position.iter().zip(&state.velocity));
@@ -194,8 +194,8 @@ impl ContactRows {
 }
 
 /// Bounds the displacement of a mode with the decay rate ξω (1/s) and 1/ω_d (s) over a time `span` (s), from its displacement q and velocity
-/// v: by a velocity times `span`, plus a rest. The motion of a slow mode is a straight line and a parabola; a fast mode of amplitude A moves
-/// by at most 2 A.
+/// v. Returns a velocity and a rest: the bound is `span` times the magnitude of the velocity, plus the rest. For a slow mode, the rest bounds
+/// the acceleration term ½ q̈ t². A fast mode of amplitude A moves by at most 2 A.
 fn travel([rate, per_frequency]: [f64; 2], [q, v]: [f64; 2], span: f64) -> [f64; 2] {
     if !per_frequency.is_finite() {
         return [v, 0.0];

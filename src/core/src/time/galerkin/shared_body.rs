@@ -47,7 +47,7 @@ pub struct SharedBody {
 struct BodyResponse {
     /// `[i - 1][k]`: at point i, for a force at point k; empty for points that the step does not have.
     points: [[Vec<f64>; POINTS]; MOST],
-    /// At the end, for a constant force.
+    /// Displacement at the end of the step, for a constant force.
     constant: Vec<f64>,
 }
 
@@ -74,7 +74,7 @@ impl BodyResponse {
     }
 }
 
-/// `to` = `free` + Σ response · force for some points.
+/// Computes `to` = `free` + Σ response · force, where `terms` lists pairs of response and force.
 struct Push<'a> {
     free: &'a [f64],
     terms: &'a [[&'a [f64]; 2]],

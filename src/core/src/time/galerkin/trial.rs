@@ -68,8 +68,8 @@ pub struct Trial {
     closing: Vec<f64>,
     /// True if the obstacle is elastic.
     carrier_yields: bool,
-    /// Gaps of all lanes per λ of each lane by the obstacle, the lanes for which it was prepared in this trial, and whether that was for the
-    /// current solution.
+    /// Change of the gaps of all lanes per λ of each lane by the compliance of the obstacle, true for the lanes whose compliance is known in
+    /// this trial, and true if it was prepared for the current solution.
     carrier_columns: Vec<f64>,
     carrier_known: Vec<bool>,
     carrier_is_fresh: bool,

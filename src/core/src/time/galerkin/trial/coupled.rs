@@ -38,7 +38,7 @@ impl Trial {
     }
 
     /// Prepares the compliance of the obstacle at the chosen lanes, unless it is known from an earlier solution of this trial. Later gaps
-    /// are evaluated with the motion of the obstacle, so that its compliance needs not be exact.
+    /// are evaluated with the motion of the obstacle, so its compliance need not be exact.
     pub(super) fn prepare_carriers(&mut self, obstacle: &mut impl Obstacle) {
         let (lanes, stride) = (self.lanes, 3 * self.lanes.width());
         self.carrier_is_fresh = (0..lanes.len()).any(|lane| self.chosen[lane] && !self.carrier_known[lane]);

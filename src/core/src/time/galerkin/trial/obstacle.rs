@@ -19,7 +19,7 @@ pub trait Obstacle {
         node_by_node(self, lanes, moved, gaps, normals);
     }
 
-    /// Finds gaps (m) and normals at one point, on surfaces that are bent as there; arrays of [`Lanes`].
+    /// Finds gaps (m) and normals at one point. Surfaces must have their shape at this point. The arrays have the layout of [`Lanes`].
     fn gaps_at(&mut self, point: usize, lanes: Lanes, moved: &[f64], gaps: &mut [f64], normals: &mut [f64]) {
         for node in 0..lanes.nodes {
             let lane = lanes.at(point, node);
@@ -51,7 +51,7 @@ pub trait Obstacle {
     /// Angle on the surface (rad, fixed frame) of a node displaced by `moved` (m); 0 on surfaces without an axis.
     fn angle(&self, node: usize, point: usize, moved: Vector3) -> f64;
 
-    /// Called before a contact problem is solved.
+    /// Begins the solution of a contact problem.
     fn begin_solution(&mut self) {}
 
     /// Prepares the compliance of the obstacle at the chosen lanes with these normals. Returns false if the obstacle is rigid.
