@@ -16,10 +16,10 @@ use super::trial::{ForceInterpolation, Trial, TrialResult};
 use crate::scene::method::Solver;
 use crate::system::Effort;
 
-/// Steps of coupled sectors may add this fraction of the largest energy so far to a bank that still holds energy. In most of their steps
-/// some contact opens or closes, so that without this limit all steps would be short. Measured on `builtin:stage` at a tolerance of 1e-3:
-/// half as many trials, with an error of 3e-4 instead of 1e-4.
-const SPARED: f64 = 1e-6;
+/// Fraction of the largest energy so far that a step of coupled sectors may add to a bank that still holds energy. Some contact opens or
+/// closes in most of these steps, so all steps would be short without this allowance. On `builtin:stage` with a tolerance of 1e-3 it halves
+/// the number of trials, and the error is 3e-4 instead of 1e-4.
+const BANK_ALLOWANCE: f64 = 1e-6;
 
 /// State of step control that persists from span to span.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -66,7 +66,7 @@ pub struct IslandSector {
     pub state: SectorState,
     pub(super) trial: Trial,
     advance: Advance,
-    /// Motion of its nodes and its surfaces (m) under which the sector stays open in the current span; `None` for active sectors.
+    /// Motion of the nodes and surfaces (m) up to which the sector stays open in the current span; `None` for active sectors.
     pub(crate) allowance: Option<f64>,
     /// True if no force acts on the sector and its gaps are wider than the depth of other sectors' penetration, because other
     /// sectors move it by less in a step.
@@ -204,11 +204,12 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         integrate(self, effort)
     }
 
-    /// Number of active sectors, and the index of one of them.
+    /// Positions in the list of active sectors.
     fn places(&self) -> std::ops::Range<usize> {
         0..self.island.active.len()
     }
 
+    /// Returns the index of the active sector at a position in the list.
     fn index(&self, place: usize) -> usize {
         self.island.active[place]
     }
@@ -364,8 +365,8 @@ impl<S: Surroundings> SpanSteps for IslandInSpan<'_, S> {
         self.island.sectors.len() as u64
     }
 
-    fn spared(&self) -> f64 {
-        if self.island.is_single() { 0.0 } else { SPARED }
+    fn bank_allowance(&self) -> f64 {
+        if self.island.is_single() { 0.0 } else { BANK_ALLOWANCE }
     }
 
     fn fly(&mut self, step: SpanStep) -> bool {

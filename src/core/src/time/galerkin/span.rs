@@ -78,7 +78,7 @@ pub trait SpanSteps {
     fn count(&self) -> u64;
 
     /// Fraction of the largest energy so far that a step may add to a bank that still holds energy.
-    fn spared(&self) -> f64 {
+    fn bank_allowance(&self) -> f64 {
         0.0
     }
 
@@ -163,11 +163,11 @@ impl<S: SpanSteps> StepChoice<'_, S> {
             || (result.switched < 0.0 && self.adds_too_much(step, -result.switched))
     }
 
-    /// Returns whether a step adds too much energy (J) to the bank: more than is spared while it still holds energy, or more than its limit.
+    /// Returns whether a step adds too much energy (J) to the bank: more than the allowance while it still holds energy, or more than its limit.
     fn adds_too_much(&mut self, step: SpanStep, paid: f64) -> bool {
-        let (spared, holds) = (self.steps.spared(), self.steps.control().bank > 0.0);
-        let is_spared = spared > 0.0 && paid <= spared * self.steps.largest_energy();
-        (step.level < SAVED && holds && !is_spared) || self.overflows_bank(paid)
+        let (allowance, holds) = (self.steps.bank_allowance(), self.steps.control().bank > 0.0);
+        let is_negligible = allowance > 0.0 && paid <= allowance * self.steps.largest_energy();
+        (step.level < SAVED && holds && !is_negligible) || self.overflows_bank(paid)
     }
 
     /// Returns whether the bank would exceed its limit if `paid` (J) were added. Without any energy so far there is no limit.
