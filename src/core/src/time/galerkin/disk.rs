@@ -26,24 +26,25 @@ pub struct CoupledDisk {
     pub reach: Vec<f64>,
     /// Error of the judged step (m).
     pub error: f64,
-    /// Displacements (m) and normals at the start of the span, and largest changes of the gaps of each lane by the motion since then (m).
+    /// Displacements (m) and unit normals at the start of the span, and bound of the change of the gaps of each sector since then (m).
     begun: Vec<f64>,
     normals: [Vec<f64>; 3],
     motions: Vec<f64>,
     instructions: InstructionSet,
 }
 
-/// Normals turn by less than this in a span (rad), because flanks of a casing are as low as its clearance.
-const TURN: f64 = 0.1;
+/// Assumed largest rotation of a normal in a span (rad). Bumps of a casing are about as high as its clearance, so its flanks are flat.
+const NORMAL_ROTATION: f64 = 0.1;
 
-/// Returns by how much a node that moves by at most `motion` (m) changes its gap at most, from its unit normal at the start.
+/// Bounds the change of the gap (m) of a node whose displacement components change by up to `motion` (m). `normal` is the unit normal
+/// at the start of the span.
 #[inline(always)]
-pub(super) fn approach(motion: [f64; 3], normal: [f64; 3]) -> f64 {
+pub(super) fn largest_gap_change(motion: [f64; 3], normal: [f64; 3]) -> f64 {
     let ([x, y, z], [a, b, c]) = (motion.map(f64::abs), normal.map(f64::abs));
-    a * x + b * y + c * z + TURN * (x + y + z)
+    a * x + b * y + c * z + NORMAL_ROTATION * (x + y + z)
 }
 
-/// Largest changes of the gaps of each lane (m), including the previous ones in `motions`.
+/// Bounds the changes of the gaps of each sector (m), and keeps larger values in `motions`.
 struct FindMotions<'a> {
     lanes: usize,
     moved: &'a [f64],
@@ -62,7 +63,7 @@ impl Kernel for FindMotions<'_> {
             let change = |row: usize, lane: usize| now[row * lanes + lane] - before[row * lanes + lane];
             for (lane, largest) in self.motions.iter_mut().enumerate() {
                 let moved = [change(0, lane), change(1, lane), change(2, lane)];
-                let motion = approach(moved, [a[lane], b[lane], c[lane]]);
+                let motion = largest_gap_change(moved, [a[lane], b[lane], c[lane]]);
                 *largest = if motion > *largest { motion } else { *largest };
             }
         }
@@ -142,7 +143,7 @@ impl CoupledDisk {
         strided_vector3(&self.moved[point], 3 * node * self.lanes + sector, self.lanes)
     }
 
-    /// Begins a span, at whose start the displacements are known.
+    /// Begins a span. The displacements at its start must be known.
     pub(crate) fn begin_span(&mut self) {
         self.begun.copy_from_slice(&self.moved[0]);
     }
@@ -152,8 +153,8 @@ impl CoupledDisk {
         self.normals.iter_mut().zip(normals).for_each(|(own, normals)| own.copy_from_slice(normals));
     }
 
-    /// Finds by how much the motion of the nodes of each sector since the start of the span changes gaps at most, at the points
-    /// 1 … `points` of the step (m).
+    /// Bounds the changes of the gaps of each sector (m) by the motion of its nodes since the start of the span, at the points
+    /// 1 … `points` of the step.
     pub(crate) fn find_motions(&mut self, points: usize) {
         self.motions.fill(0.0);
         for moved in &self.moved[1..=points] {
@@ -162,7 +163,7 @@ impl CoupledDisk {
         }
     }
 
-    /// Largest motion of a node of a sector that [`CoupledDisk::find_motions`] has found (m).
+    /// Returns the bound of a sector from [`CoupledDisk::find_motions`] (m).
     pub(crate) fn motion(&self, sector: usize) -> f64 {
         self.motions[sector]
     }

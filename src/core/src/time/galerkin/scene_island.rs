@@ -2,7 +2,7 @@
 
 mod blade_sectors;
 mod contacts;
-mod distant;
+mod open_sectors;
 mod steady_phase;
 
 use super::basis::MOST;
@@ -170,13 +170,13 @@ impl SceneIsland {
     }
 
     /// Returns the number of threads that can share the sectors.
-    pub(crate) fn most_threads(&self) -> usize {
+    pub(crate) fn max_threads(&self) -> usize {
         if self.blade.is_some() { self.turns } else { 1 }
     }
 
     /// Allocates memory for `threads` threads, or fewer if there are fewer sectors to share.
     pub(crate) fn use_threads(&mut self, threads: usize) {
-        let threads = threads.min(self.most_threads());
+        let threads = threads.min(self.max_threads());
         if let Some(sectors) = &mut self.blade {
             sectors.use_threads(threads, self.turns);
         }
@@ -217,15 +217,15 @@ impl SceneIsland {
         let Self { set, island, records, turns, blade: Some(sectors), .. } = self else { return Ok(()) };
         let (structure, pair) = (records[0].structure, records[0].pairs[0].pair);
         let of = SpanOfSectors { span, set: *set, tables: &island.tables[0], structure, pair, goal };
-        let leaders = span.leaders(*turns);
-        for group in [0..leaders, leaders..*turns] {
+        let first = span.first_sectors(*turns);
+        for group in [0..first, first..*turns] {
             sectors.integrate_together(group.clone(), system, of, workers);
             for sector in group {
                 sectors.integrate_one(sector, system, of);
                 sectors.enter(sector, system, of)?;
                 sectors.include_lowest(sector);
             }
-            sectors.model.use_lowest();
+            sectors.model.begin_group();
         }
         Ok(())
     }

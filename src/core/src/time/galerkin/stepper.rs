@@ -42,7 +42,7 @@ impl Stepper for Galerkin {
     }
 
     fn use_threads(&mut self, threads: usize) -> io::Result<()> {
-        let most = self.islands.iter().map(SceneIsland::most_threads).max().unwrap_or(1);
+        let most = self.islands.iter().map(SceneIsland::max_threads).max().unwrap_or(1);
         let more = threads.min(most).saturating_sub(1);
         if more != self.workers.count() {
             self.workers = Workers::default();

@@ -41,8 +41,8 @@ impl OctetKernel for FindModalForces<'_> {
     #[inline(always)]
     fn run<L: Octet>(self) {
         let Self { trial, rows, level } = self;
-        let BladeTrial { start, multipliers, forces, modal_forces, pushing, .. } = trial;
-        pushing.clear();
+        let BladeTrial { start, multipliers, forces, modal_forces, loaded_rows, .. } = trial;
+        loaded_rows.clear();
         let is_constant = level.kind == ForceInterpolation::Constant;
         for block in 0..rows.blocks {
             let mut any = if is_constant { 0 } else { L::zero().less(L::load(&start.multipliers[block])) };
@@ -71,27 +71,27 @@ impl OctetKernel for FindModalForces<'_> {
                     let i = nodes.trailing_zeros() as usize;
                     nodes &= nodes - 1;
                     let first = (along * rows.nodes + 8 * block + i) * rows.mode_blocks;
-                    pushing.push((first, std::array::from_fn(|term| terms[term].0[i])));
+                    loaded_rows.push((first, std::array::from_fn(|term| terms[term].0[i])));
                 }
             }
         }
         match level.basis.degree {
-            2 => add_forces::<L, 2>(rows, pushing, modal_forces),
-            _ => add_forces::<L, MOST>(rows, pushing, modal_forces),
+            2 => project_forces::<L, 2>(rows, loaded_rows, modal_forces),
+            _ => project_forces::<L, MOST>(rows, loaded_rows, modal_forces),
         }
     }
 }
 
-/// Computes the polynomials of the modal forces from those of the nodal forces.
+/// Projects the polynomials of the nodal forces onto the modes: Σ over loaded rows of shape times force, for each power of θ.
 #[inline(always)]
-fn add_forces<L: Octet, const TERMS: usize>(
+fn project_forces<L: Octet, const TERMS: usize>(
     rows: &BladeRows,
-    pushing: &[(usize, [f64; MOST])],
+    loaded_rows: &[(usize, [f64; MOST])],
     modal_forces: &mut [Vec<Eight>; MOST],
 ) {
     for k in 0..rows.mode_blocks {
         let mut sums = [L::zero(); TERMS];
-        for (first, terms) in pushing {
+        for (first, terms) in loaded_rows {
             let shape = L::load(&rows.by_row[first + k]);
             for term in 0..TERMS {
                 sums[term] = sums[term] + shape * L::splat(terms[term]);

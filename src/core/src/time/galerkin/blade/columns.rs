@@ -15,7 +15,7 @@ pub(super) fn values_at_points<L: Octet>(start: &[Eight], lanes: &[Eight], block
 }
 
 /// `sums[d][p]` = Σ over modes of the shapes along direction d times `modes[p]`, for `B` blocks of nodes from `block`. Several
-/// directions are summed in one loop, so that additions do not wait for each other.
+/// directions are summed in one loop, because independent additions overlap in the processor.
 #[inline(always)]
 pub(super) fn add_modes<L: Octet, const D: usize, const P: usize, const B: usize>(
     shapes: [&[Eight]; D],
@@ -49,7 +49,7 @@ pub(super) fn add_modes<L: Octet, const D: usize, const P: usize, const B: usize
     sums
 }
 
-/// Adds the displacements of one mode, whose shapes are at `place`.
+/// Adds the displacements of one mode, whose shapes start at the index `place`.
 #[inline(always)]
 fn add_mode<L: Octet, const D: usize, const P: usize, const B: usize>(
     sums: &mut [[[L; B]; P]; D],

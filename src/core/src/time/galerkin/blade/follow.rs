@@ -70,8 +70,8 @@ pub(super) struct Follow<'a, D> {
     pub lowest: &'a mut [Eight],
     /// Gaps below which the smallest gaps are needed (m).
     pub floors: &'a [Eight],
-    /// Where a gap at an end of a part is below this (m), the cubic alone cannot show that the smallest gap is not needed.
-    pub deep: f64,
+    /// If a gap at an end of a part is below this limit (m), its minimum is always evaluated.
+    pub refine_below: f64,
     /// Largest displacement error of a step (m).
     pub tolerance: f64,
     /// True if forces act in the step.
@@ -155,7 +155,7 @@ impl<D: Fn(f64) -> (PointDrive, DriveRate)> Follow<'_, D> {
         let is_accurate = is_last || error <= MINIMUM_FRACTION * self.tolerance;
         let [begin, end] = part.span();
         let [from, to] = self.ends.map(|fraction| L::splat((fraction - begin) / (end - begin)));
-        let Self { trial, rows, lowest, floors, tolerance, deep, .. } = &mut *self;
+        let Self { trial, rows, lowest, floors, tolerance, refine_below, .. } = &mut *self;
         for block in 0..rows.blocks {
             let followed = trial.followed[block];
             if followed == 0 {
@@ -165,9 +165,9 @@ impl<D: Fn(f64) -> (PointDrive, DriveRate)> Follow<'_, D> {
             let [first, last] = [before, after].map(|point| L::load(&point.gaps[block]));
             let inner = [first + L::load(&before.rates[block]) * third, last - L::load(&after.rates[block]) * third];
             let known = L::load(&lowest[block]);
-            let bar = (L::load(&floors[block]) - L::splat(FOLLOW_FRACTION * *tolerance)).min(known);
+            let threshold = (L::load(&floors[block]) - L::splat(FOLLOW_FRACTION * *tolerance)).min(known);
             let ends = first.min(last);
-            let dips = find_dips(ends, inner[0].min(inner[1]), error, bar) | ends.less(L::splat(*deep));
+            let dips = find_dips(ends, inner[0].min(inner[1]), error, threshold) | ends.less(L::splat(*refine_below));
             let dips = dips & followed;
             if dips == 0 {
                 continue;
@@ -361,8 +361,8 @@ impl OctetKernel for CubicMinima<'_> {
             let inner =
                 [first + L::load(&trial.rates_before[block]) * third, last - L::load(&trial.rates[block]) * third];
             let (ends, between) = (first.min(last), inner[0].min(inner[1]));
-            let bar = L::load(&floors[block]).min(L::load(&lowest[block]));
-            let dips = find_dips(ends, between, error, bar) & rows.valid(block);
+            let threshold = L::load(&floors[block]).min(L::load(&lowest[block]));
+            let dips = find_dips(ends, between, error, threshold) & rows.valid(block);
             trial.followed[block] = 0;
             if dips != 0 {
                 let value = cubic_minimum([first, inner[0], inner[1], last]).1.min(ends);
@@ -379,13 +379,13 @@ impl OctetKernel for CubicMinima<'_> {
     }
 }
 
-/// Returns the nodes whose gap may be smaller between two times than at both times, and smaller than `bar`. `ends` contains
+/// Returns the nodes whose gap may be smaller between two times than at both times, and smaller than `threshold`. `ends` contains
 /// the smaller of the gaps at both times, and `between` the smaller of the two inner Bézier coefficients of each cubic.
 #[inline(always)]
-fn find_dips<L: Octet>(ends: L, between: L, error: f64, bar: L) -> u8 {
+fn find_dips<L: Octet>(ends: L, between: L, error: f64, threshold: L) -> u8 {
     // At θ, the error is at most 16θ²(1 − θ)² times the largest error, and the inner coefficients have the weight 3θ(1 − θ).
     let near_ends = ends + L::splat(error * (4.0 / 3.0));
-    between.less(near_ends) & (between.min(ends) - L::splat(error)).less(bar)
+    between.less(near_ends) & (between.min(ends) - L::splat(error)).less(threshold)
 }
 
 /// Returns the place and value of the minimum of a cubic with these Bézier coefficients. The value is infinite if there is no

@@ -19,11 +19,11 @@ impl BladeInSpan<'_> {
     /// Records the smallest gaps between two fractions of a tried step. If the step does not resolve the motion, only the gaps
     /// at the points are recorded.
     pub(super) fn record_gaps(&mut self, step: SpanStep, kind: ForceInterpolation, is_resolved: bool, ends: [f64; 2]) {
-        let Blade { trial, tally, floors, bars, .. } = &mut *self.blade;
+        let Blade { trial, tally, floors, thresholds, .. } = &mut *self.blade;
         let (rows, level) = (&self.tables.rows, self.tables.level(step.level, kind));
         trial.followed.fill(0);
-        find_bars(bars, floors, &tally.lowest);
-        let found = is_resolved && trial.select_followed((rows, level), bars, self.goal.tolerance, ends);
+        find_thresholds(thresholds, floors, &tally.lowest);
+        let found = is_resolved && trial.select_followed((rows, level), thresholds, self.goal.tolerance, ends);
         let instructions = trial.instructions;
         instructions.run_octets(RecordPoints { trial, rows, level, lowest: &mut tally.lowest, ends });
         if found {
@@ -31,65 +31,66 @@ impl BladeInSpan<'_> {
         }
     }
 
-    /// Records the smallest gaps between two fractions of a step, of nodes that are followed.
+    /// Records the smallest gaps of the followed nodes between two fractions of a step.
     pub(super) fn follow(&mut self, step: SpanStep, kind: ForceInterpolation, ends: [f64; 2]) {
         let Blade { trial, tally, floors, .. } = &mut *self.blade;
-        let (tolerance, deep) = (self.goal.tolerance, f64::NEG_INFINITY);
-        let path = FollowedPath { place: &self.place, drives: &self.drives, step, kind, tolerance, deep };
+        let (tolerance, refine_below) = (self.goal.tolerance, f64::NEG_INFINITY);
+        let path = FollowedPath { place: &self.place, drives: &self.drives, step, kind, tolerance, refine_below };
         path.follow(trial, self.tables, [&mut tally.lowest, floors], ends);
     }
 
-    /// Finds the smallest gaps between the points of a tried step, of nodes that stay open, and whether they penetrate by more
-    /// than the tolerance. Other smallest gaps are only found if they may be recorded.
-    pub(super) fn find_least_gaps(&mut self, step: SpanStep, kind: ForceInterpolation, result: &mut TrialResult) {
+    /// Finds the smallest gaps between the points of a tried step for nodes that stay open. Writes the largest penetration to
+    /// `result` if it exceeds the tolerance. Gaps above that limit are found only if the step may be recorded.
+    pub(super) fn find_step_minima(&mut self, step: SpanStep, kind: ForceInterpolation, result: &mut TrialResult) {
         let (tolerance, whole) = (self.goal.tolerance, [0.0, 1.0]);
         let may_be_recorded = self.recorded != RecordScope::WorkOnly && self.ends_within(step);
-        let (tables, Blade { trial, tally, floors, bars, least, .. }) = (self.tables, &mut *self.blade);
-        least.fill(Eight([f64::INFINITY; 8]));
+        let (tables, Blade { trial, tally, floors, thresholds, step_minima, .. }) = (self.tables, &mut *self.blade);
+        step_minima.fill(Eight([f64::INFINITY; 8]));
         trial.followed.fill(0);
         if !result.solved || !result.resolves_motion(kind, tolerance) {
             return;
         }
-        // Gaps that are only recorded must not change which gaps below minus the tolerance are found.
-        let bar_for_depth = (MINIMUM_FRACTION + FOLLOW_FRACTION - 1.0) * tolerance;
-        bars.fill(Eight([f64::NEG_INFINITY; 8]));
+        // Recording must not change the penetrations that are found.
+        let depth_threshold = (MINIMUM_FRACTION + FOLLOW_FRACTION - 1.0) * tolerance;
+        thresholds.fill(Eight([f64::NEG_INFINITY; 8]));
         if may_be_recorded {
-            find_bars(bars, floors, &tally.lowest);
+            find_thresholds(thresholds, floors, &tally.lowest);
         }
-        bars.iter_mut().flat_map(|block| &mut block.0).for_each(|bar| *bar = bar.max(bar_for_depth));
+        let limits = thresholds.iter_mut().flat_map(|block| &mut block.0);
+        limits.for_each(|threshold| *threshold = threshold.max(depth_threshold));
         if trial.pushes() {
             trial.find_modal_forces(&tables.rows, tables.level(step.level, kind));
         }
         let level = tables.level(step.level, kind);
-        if trial.select_followed((&tables.rows, level), bars, tolerance, whole) {
-            let deep = bar_for_depth - FOLLOW_FRACTION * tolerance;
-            let path = FollowedPath { place: &self.place, drives: &self.drives, step, kind, tolerance, deep };
-            path.follow(trial, tables, [least, bars], whole);
-            let lowest = least.iter().flat_map(|block| block.0).fold(f64::INFINITY, f64::min);
+        if trial.select_followed((&tables.rows, level), thresholds, tolerance, whole) {
+            let refine_below = depth_threshold - FOLLOW_FRACTION * tolerance;
+            let path = FollowedPath { place: &self.place, drives: &self.drives, step, kind, tolerance, refine_below };
+            path.follow(trial, tables, [step_minima, thresholds], whole);
+            let lowest = step_minima.iter().flat_map(|block| block.0).fold(f64::INFINITY, f64::min);
             if lowest < -tolerance && step.level < HALVINGS {
                 result.depth = result.depth.max(-lowest);
             }
         }
     }
 
-    /// Records the smallest gaps of the tried step, as found by [`find_least_gaps`](Self::find_least_gaps), and the gaps at its
+    /// Records the smallest gaps of the tried step, as found by [`find_step_minima`](Self::find_step_minima), and the gaps at its
     /// points.
-    pub(super) fn record_least_gaps(&mut self, step: SpanStep, kind: ForceInterpolation) {
-        let Blade { trial, tally, least, .. } = &mut *self.blade;
+    pub(super) fn record_step_minima(&mut self, step: SpanStep, kind: ForceInterpolation) {
+        let Blade { trial, tally, step_minima, .. } = &mut *self.blade;
         let (rows, level) = (&self.tables.rows, self.tables.level(step.level, kind));
         let (instructions, lowest) = (trial.instructions, &mut tally.lowest);
-        include(lowest, least);
+        include(lowest, step_minima);
         instructions.run_octets(RecordPoints { trial, rows, level, lowest, ends: [0.0, 1.0] });
     }
 }
 
-/// Finds the gaps below which smallest gaps are needed: those below the floor and below the smallest gap so far (m).
-fn find_bars(bars: &mut [Eight], floors: &[Eight], lowest: &[Eight]) {
-    bars.copy_from_slice(floors);
-    include(bars, lowest);
+/// Writes the gaps below which smallest gaps are needed (m): the floor or, if smaller, the smallest gap so far.
+fn find_thresholds(thresholds: &mut [Eight], floors: &[Eight], lowest: &[Eight]) {
+    thresholds.copy_from_slice(floors);
+    include(thresholds, lowest);
 }
 
-/// Replaces numbers by smaller ones.
+/// Replaces each number by the other one if that is smaller.
 pub(super) fn include(numbers: &mut [Eight], others: &[Eight]) {
     for (number, other) in numbers.iter_mut().zip(others) {
         number.0.iter_mut().zip(other.0).for_each(|(number, other)| *number = number.min(other));
@@ -120,8 +121,8 @@ struct FollowedPath<'a> {
     kind: ForceInterpolation,
     /// Largest displacement error of a step (m).
     tolerance: f64,
-    /// See [`Follow::deep`].
-    deep: f64,
+    /// See [`Follow::refine_below`].
+    refine_below: f64,
 }
 
 impl FollowedPath<'_> {
@@ -150,7 +151,7 @@ impl FollowedPath<'_> {
             shape_errors: place.shape_errors([step.from, step.from + step.length]),
             lowest,
             floors,
-            deep: self.deep,
+            refine_below: self.refine_below,
             tolerance: self.tolerance,
             pushes,
             ends,

@@ -68,23 +68,23 @@ impl Attempt<'_> {
     /// Displacement error that the impulse errors cause (m).
     #[inline(always)]
     fn error<L: Octet>(&mut self) -> f64 {
-        let (rows, BladeTrial { impulses, struck, .. }) = (self.rows, &mut *self.trial);
+        let (rows, BladeTrial { impulses, error_rows, .. }) = (self.rows, &mut *self.trial);
         let width = 2 * rows.blocks;
-        struck.clear();
+        error_rows.clear();
         for (along, node) in (0..2).flat_map(|along| (0..rows.nodes).map(move |node| (along, node))) {
             let impulse = impulses[along * rows.blocks + node / 8].0[node % 8];
             if impulse != 0.0 {
-                struck.push(((along * rows.nodes + node) * width, impulse));
+                error_rows.push(((along * rows.nodes + node) * width, impulse));
             }
         }
         let mut terms = L::zero();
         let mut first = 0;
         while first + 3 <= width {
-            terms = terms + weigh::<L, 3>(&rows.error_form[first..], struck, &impulses[first..]);
+            terms = terms + quadratic_form::<L, 3>(&rows.error_form[first..], error_rows, &impulses[first..]);
             first += 3;
         }
         while first < width {
-            terms = terms + weigh::<L, 1>(&rows.error_form[first..], struck, &impulses[first..]);
+            terms = terms + quadratic_form::<L, 1>(&rows.error_form[first..], error_rows, &impulses[first..]);
             first += 1;
         }
         let square = terms.total();
@@ -92,11 +92,12 @@ impl Attempt<'_> {
     }
 }
 
-/// Contribution of the first `B` blocks of impulse errors to the error form, of which the `struck` rows have an error.
+/// Returns the part of the quadratic form of the impulse errors that the first `B` blocks of columns contribute. `form` starts at
+/// the first of these columns. `error_rows` lists the rows with an error, as in [`BladeTrial`].
 #[inline(always)]
-fn weigh<L: Octet, const B: usize>(form: &[Eight], struck: &[(usize, f64)], impulses: &[Eight]) -> L {
+fn quadratic_form<L: Octet, const B: usize>(form: &[Eight], error_rows: &[(usize, f64)], impulses: &[Eight]) -> L {
     let mut sums = [L::zero(); B];
-    for (row, impulse) in struck {
+    for (row, impulse) in error_rows {
         let (entries, impulse) = (&form[*row..][..B], L::splat(*impulse));
         for b in 0..B {
             sums[b] = sums[b] + L::load(&entries[b]) * impulse;

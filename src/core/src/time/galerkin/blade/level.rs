@@ -22,7 +22,7 @@ pub(crate) struct PartWeights {
     pub ends: [f64; 2],
 }
 
-/// Place of a block of lanes: point of the step (0 for the first after its start) and block of nodes.
+/// Indices of a block of lanes, of its point (0 for the first one after the start of the step), and of its block of nodes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Place {
     pub lane: usize,

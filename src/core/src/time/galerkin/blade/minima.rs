@@ -35,7 +35,7 @@ pub(super) struct SelectFollowed<'a> {
     pub rows: &'a BladeRows,
     pub level: &'a BladeLevel,
     /// Gaps below which the smallest gaps are needed (m).
-    pub bars: &'a [Eight],
+    pub thresholds: &'a [Eight],
     /// Largest displacement error of a step (m), and largest error of the motion between the points (m).
     pub tolerance: f64,
     pub unresolved: f64,
@@ -47,14 +47,14 @@ impl OctetKernel for SelectFollowed<'_> {
     type Output = bool;
     #[inline(always)]
     fn run<L: Octet>(self) -> bool {
-        let Self { trial, rows, level, bars, tolerance, unresolved, ends } = self;
+        let Self { trial, rows, level, thresholds, tolerance, unresolved, ends } = self;
         // A coarse test with one bound for all nodes excludes most steps.
         let bounds = &mut trial.path_moved[0];
         bounds[..rows.blocks].fill(Eight([unresolved; 8]));
         let mut candidates = 0;
         for block in 0..rows.blocks {
             trial.followed[block] = 0;
-            candidates |= GapsInStep::<L>::new(trial, rows, level, block).may_matter(L::load(&bars[block]));
+            candidates |= BlockGaps::<L>::new(trial, rows, level, block).may_be_below(L::load(&thresholds[block]));
         }
         if candidates == 0 {
             return false;
@@ -62,11 +62,11 @@ impl OctetKernel for SelectFollowed<'_> {
         displace::<L, 1, 1>([&rows.magnitudes[0]], rows.blocks, [&trial.mode_bounds], [&mut trial.path_moved[0]]);
         let mut found = 0;
         for block in 0..rows.blocks {
-            let gaps = GapsInStep::<L>::new(trial, rows, level, block);
-            let bar = L::load(&bars[block]);
-            let candidates = gaps.may_matter(bar);
+            let gaps = BlockGaps::<L>::new(trial, rows, level, block);
+            let threshold = L::load(&thresholds[block]);
+            let candidates = gaps.may_be_below(threshold);
             if candidates != 0 {
-                trial.followed[block] = candidates & gaps.choose(level, bar, tolerance, ends);
+                trial.followed[block] = candidates & gaps.select_nodes(level, threshold, tolerance, ends);
                 found |= trial.followed[block];
             }
         }
@@ -108,26 +108,26 @@ impl OctetKernel for RecordPoints<'_> {
     }
 }
 
-/// Gaps of a block of nodes at the start and the points of a step.
-struct GapsInStep<L> {
+/// Gaps of a block of eight nodes at the start and at the points of a step.
+struct BlockGaps<L> {
     /// F (m), and its smallest and largest value.
     gaps: [L; POINTS],
     low: L,
     high: L,
-    /// M and the largest |σ|.
+    /// Steepness M of the surface and the largest |σ|.
     steepness: L,
     steepest: L,
-    /// Bound of what the polynomial through `gaps` misses between the points (m).
-    left: L,
+    /// Bound of the interpolation error of the polynomial through `gaps` between the points (m).
+    error_bound: L,
     /// Nodes that stay open.
     open: u8,
 }
 
-/// Largest excursion of the polynomial through values at the points beyond these values, relative to their range. The
-/// largest possible one is 1/8 for degree 2 and 1/4 for degree 3.
+/// Bound of the overshoot of the polynomial through values at the points, as a fraction of the range of these values. The
+/// overshoot is at most 1/8 for degree 2 and 1/4 for degree 3.
 const EXCURSION: f64 = 0.25;
 
-impl<L: Octet> GapsInStep<L> {
+impl<L: Octet> BlockGaps<L> {
     /// Reads the gaps of a block. Its interpolation errors must be in `path_moved`.
     #[inline(always)]
     fn new(trial: &BladeTrial, rows: &BladeRows, level: &BladeLevel, block: usize) -> Self {
@@ -145,21 +145,21 @@ impl<L: Octet> GapsInStep<L> {
             steepest = steepest.max(L::load(&trial.sigma[lane]).abs());
         }
         let unresolved = L::load(&trial.path_moved[0][block]);
-        let left = sum(&gaps[..count], &level.basis.left_out).abs() * L::splat(NEAR) + unresolved;
+        let error_bound = sum(&gaps[..count], &level.basis.left_out).abs() * L::splat(NEAR) + unresolved;
         let (steepness, open) = (L::load(&rows.steepness[block]), !pushes & rows.valid(block));
-        Self { gaps, low, high, steepness, steepest, left, open }
+        Self { gaps, low, high, steepness, steepest, error_bound, open }
     }
 
-    /// Returns the nodes whose smallest gap may be below `bar` (m).
+    /// Returns the nodes whose smallest gap may be below `threshold` (m).
     #[inline(always)]
-    fn may_matter(&self, bar: L) -> u8 {
-        let least = self.low - (self.high - self.low) * L::splat(EXCURSION) - self.left;
-        least.less(bar.max(L::zero()) * (self.steepness + self.steepest)) & self.open
+    fn may_be_below(&self, threshold: L) -> u8 {
+        let lower_bound = self.low - (self.high - self.low) * L::splat(EXCURSION) - self.error_bound;
+        lower_bound.less(threshold.max(L::zero()) * (self.steepness + self.steepest)) & self.open
     }
 
-    /// Selects the nodes that may come closer between the points of the step, and below `bar` (m).
+    /// Selects the nodes that may come closer between the points of the step, and below `threshold` (m).
     #[inline(always)]
-    fn choose(&self, level: &BladeLevel, bar: L, tolerance: f64, range: [f64; 2]) -> u8 {
+    fn select_nodes(&self, level: &BladeLevel, threshold: L, tolerance: f64, range: [f64; 2]) -> u8 {
         let (basis, count) = (&level.basis, level.points() + 1);
         let slopes = both(|end| basis.slopes_at(range[end]));
         let gaps = &self.gaps[..count];
@@ -186,10 +186,10 @@ impl<L: Octet> GapsInStep<L> {
         let deeper = low - within;
         let at_end = ends[1].less(ends[0]);
         let slope = L::select(at_end, sum(gaps, &slopes[1]), sum(gaps, &slopes[0])).abs();
-        let falls = !L::zero().less(deeper) & (self.left * L::splat(FALLING)).less(slope);
-        let comes = L::splat(FOLLOW_FRACTION * tolerance).less(deeper.max(L::zero()) + self.left);
+        let falls = !L::zero().less(deeper) & (self.error_bound * L::splat(FALLING)).less(slope);
+        let comes = L::splat(FOLLOW_FRACTION * tolerance).less(deeper.max(L::zero()) + self.error_bound);
         let size = (self.steepness * self.steepness + self.steepest * self.steepest).sqrt();
-        let matters = ((low.min(within) - self.left) / size).less(bar);
+        let matters = ((low.min(within) - self.error_bound) / size).less(threshold);
         comes & matters & !falls & self.open
     }
 }

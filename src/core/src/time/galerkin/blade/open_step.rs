@@ -276,8 +276,9 @@ impl BladeInSpan<'_> {
     }
 
     /// Integrates from the start of the open step to the end of `interval` within it, with steps that end there, and
-    /// writes the state. Unless this is a
-    /// flight, the tables must be those of a bounded span from [`stored_start`](super::stored::stored_start) on. `course` returns the prescribed motion between two times (s since the start of the steady phase).
+    /// writes the state. `course` returns the prescribed motion between two times (s since the start of the steady
+    /// phase). Unless the open step is a flight, the tables must be those of a bounded span that begins at
+    /// [`stored_start`](super::stored::stored_start).
     ///
     /// # Errors
     /// [`Stopped`] if a step is not solved.

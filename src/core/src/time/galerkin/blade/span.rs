@@ -32,15 +32,15 @@ pub(crate) struct BladeModel {
     kinds: Vec<BladeTables>,
     /// Angles of the nodes of each sector.
     angles: Vec<NodeAngles>,
-    /// Smallest gaps of the nodes over all sectors at the start of the span and over the span of some sectors (m): of
-    /// those before the current group of sectors, and of all so far.
+    /// Smallest gap of each node (m), over all sectors at the start of the span and over the span in integrated sectors.
+    /// `lowest` includes the sectors of earlier groups, and `lowest_of_all` all integrated sectors.
     lowest: Vec<Eight>,
-    lowest_so_far: Vec<Eight>,
+    lowest_of_all: Vec<Eight>,
     /// Largest number of points of a step.
     degree: usize,
 }
 
-/// Trials of one blade, and sums over a span. Allocates only on creation. Each thread has its own.
+/// Trials of one blade, and sums over a span. Allocates only on creation. Each thread has a separate instance.
 #[derive(Debug, Clone)]
 pub(crate) struct Blade {
     pub(super) trial: BladeTrial,
@@ -48,9 +48,9 @@ pub(crate) struct Blade {
     /// Gaps of the sector at the start of the span (m), and gaps below which its smallest gaps are needed (m).
     pub(super) begun: Vec<Eight>,
     pub(super) floors: Vec<Eight>,
-    /// Gaps below which the smallest gaps of the tried step are needed (m), and those found; infinite if not needed.
-    pub(super) bars: Vec<Eight>,
-    pub(super) least: Vec<Eight>,
+    /// Gaps below which the smallest gaps of the tried step are needed (m), and the smallest gaps found (m; infinite if none).
+    pub(super) thresholds: Vec<Eight>,
+    pub(super) step_minima: Vec<Eight>,
     /// Cached responses of the modes, and the index of the last one computed.
     pub(super) responses: Vec<ModeResponse>,
     pub(super) next_response: usize,
@@ -100,7 +100,7 @@ impl BladeModel {
         let kinds: Vec<_> = kinds.iter().map(|tables| BladeTables::new(tables, gap)).collect();
         let lowest = vec![Eight::ZERO; kinds.first()?.rows.blocks];
         let angles = (0..gap.layout.lanes).map(|sector| NodeAngles::new(&gap.layout, sector)).collect();
-        Some(Self { kinds, angles, lowest_so_far: lowest.clone(), lowest, degree })
+        Some(Self { kinds, angles, lowest_of_all: lowest.clone(), lowest, degree })
     }
 
     /// Uses tables for spans of this length (s). Does not allocate.
@@ -112,17 +112,17 @@ impl BladeModel {
     pub(crate) fn begin_span(&mut self, gaps: &[f64], lanes: usize, sectors: usize) {
         let smallest = |row: &[f64]| row[..sectors].iter().copied().fold(f64::INFINITY, f64::min);
         Eight::spread(gaps.chunks_exact(lanes).map(smallest), f64::NEG_INFINITY, &mut self.lowest);
-        self.lowest_so_far.copy_from_slice(&self.lowest);
+        self.lowest_of_all.copy_from_slice(&self.lowest);
     }
 
-    /// Includes the smallest gaps of a sector in those of the sectors so far.
+    /// Includes the smallest gaps of an integrated sector.
     pub(crate) fn include_lowest(&mut self, tally: &BladeTally) {
-        include(&mut self.lowest_so_far, &tally.lowest);
+        include(&mut self.lowest_of_all, &tally.lowest);
     }
 
-    /// Uses the smallest gaps of the sectors so far for further sectors.
-    pub(crate) fn use_lowest(&mut self) {
-        self.lowest.copy_from_slice(&self.lowest_so_far);
+    /// Starts a group of sectors, whose search uses the smallest gaps of all sectors integrated before.
+    pub(crate) fn begin_group(&mut self) {
+        self.lowest.copy_from_slice(&self.lowest_of_all);
     }
 
     /// Returns whether steps can pass internal points in a steady phase. All modes must have a frequency above zero.
@@ -147,8 +147,8 @@ impl Blade {
             tally: BladeTally::new(rows),
             begun: of_nodes(),
             floors: of_nodes(),
-            bars: of_nodes(),
-            least: of_nodes(),
+            thresholds: of_nodes(),
+            step_minima: of_nodes(),
             responses: ModeResponse::allocate_cache(rows),
             next_response: 0,
         }
@@ -399,7 +399,7 @@ impl SpanSteps for BladeInSpan<'_> {
         self.known = true;
         self.tried = level.blocks;
         let mut result = trial.attempt(rows, level, &faced, self.goal.precision);
-        self.find_least_gaps(step, kind, &mut result);
+        self.find_step_minima(step, kind, &mut result);
         result
     }
 
@@ -432,7 +432,7 @@ impl SpanSteps for BladeInSpan<'_> {
         }
         tally.work.add(&work);
         if records {
-            self.record_least_gaps(step, kind);
+            self.record_step_minima(step, kind);
         }
         self.advance(step, Some(kind));
         banked

@@ -59,7 +59,7 @@ impl BladeInSpan<'_> {
         self.blade.trial.for_each_stored_block(kind.is_some(), arrays, |block, numbers| *numbers = block.0);
     }
 
-    /// Clears values that the open step does not have, so that a saved state does not depend on earlier trials.
+    /// Clears values that do not belong to the open step, so that a saved state does not depend on earlier trials.
     fn clear_unknown(&mut self, step: SpanStep, kind: Option<ForceInterpolation>) {
         let BladeTrial { reach, moved, sigma, gaps, multipliers, forces, pushes, .. } = &mut self.blade.trial;
         if !self.reach_known {

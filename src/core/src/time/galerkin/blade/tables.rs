@@ -9,7 +9,7 @@ use crate::time::galerkin::tables::{HALVINGS, Tables, halved};
 use crate::time::galerkin::trial::ForceInterpolation;
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
-/// Tables of one kind of sector. Several threads can use them, and fill them, at the same time.
+/// Tables of one kind of sector. Several threads can read and fill them concurrently.
 #[derive(Debug)]
 pub(super) struct BladeTables {
     pub rows: BladeRows,
@@ -20,7 +20,7 @@ pub(super) struct BladeTables {
     unfilled: Mutex<UnfilledTables>,
 }
 
-/// Memory of the tables that are not filled.
+/// Memory for tables that are not filled.
 #[derive(Debug, Clone)]
 struct UnfilledTables {
     /// Tables of all contact rows for one length, from which the others are filled.
@@ -80,7 +80,7 @@ impl BladeTables {
         unfilled.constant.extend(constant.take());
     }
 
-    /// Returns the table of a level, which is filled when it is first used. Does not allocate.
+    /// Returns the table of a level, and fills it at its first use. Does not allocate.
     pub fn level(&self, level: usize, kind: ForceInterpolation) -> &BladeLevel {
         let Grid { levels, constant, .. } = &self.grids[self.in_use];
         match kind {
@@ -113,7 +113,7 @@ impl Clone for BladeTables {
     fn clone(&self) -> Self {
         let Self { rows, modes, grids, in_use, .. } = self;
         let mut unfilled = self.unfilled().clone();
-        // Later, all tables may be unfilled.
+        // `set_span` returns the memory of all filled tables to these lists.
         unfilled.polynomial.reserve_exact(2 * (HALVINGS + 1));
         unfilled.constant.reserve_exact(2);
         Self {

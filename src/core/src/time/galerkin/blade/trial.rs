@@ -75,9 +75,9 @@ pub(crate) struct BladeTrial {
     pub(super) angles: Vec<Eight>,
     /// Sines and cosines of these angles.
     pub(super) directions_of_nodes: [Vec<Eight>; 2],
-    /// Nodes with a force in the tried step: first block of the row of their shapes along the closing or the circumferential
-    /// displacement, and coefficients of θᵃ of the force along it (N).
-    pub(super) pushing: Vec<(usize, [f64; MOST])>,
+    /// Contact rows with a force in the tried step: index of the first block of their mode shapes, and coefficients of θᵃ of the
+    /// force (N).
+    pub(super) loaded_rows: Vec<(usize, [f64; MOST])>,
     /// Coefficients of θᵃ of the modal forces.
     pub(super) modal_forces: [Vec<Eight>; MOST],
     /// Modal displacements at the points.
@@ -124,8 +124,8 @@ pub(crate) struct BladeTrial {
     pub(super) amplitudes: Vec<Eight>,
     /// Closing and circumferential displacements (m), each followed by the velocities (m/s).
     pub(super) path_moved: [Vec<Eight>; 2],
-    /// Rows of the error form (index of their first block) that have an impulse error, and this error (N·s).
-    pub(super) struck: Vec<(usize, f64)>,
+    /// Rows with an impulse error: index of the first block of the row in the error form, and the error (N·s).
+    pub(super) error_rows: Vec<(usize, f64)>,
     /// Impulse errors along the closing displacement, then along the circumferential one (N·s).
     pub(super) impulses: Vec<Eight>,
     /// True if a contact force acts in the step.
@@ -153,7 +153,7 @@ impl BladeTrial {
             rates_before: of_nodes(),
             angles: of_nodes(),
             directions_of_nodes: [of_nodes(), of_nodes()],
-            pushing: Vec::with_capacity(2 * rows.nodes),
+            loaded_rows: Vec::with_capacity(2 * rows.nodes),
             modal_forces: std::array::from_fn(|_| of_modes()),
             modal: std::array::from_fn(|_| of_modes()),
             moved: [of_lanes(), of_lanes()],
@@ -182,7 +182,7 @@ impl BladeTrial {
             unresolved: None,
             forces_known: false,
             path_moved: [0, 1].map(|_| vec![Eight::ZERO; 2 * nodes]),
-            struck: Vec::with_capacity(2 * rows.nodes),
+            error_rows: Vec::with_capacity(2 * rows.nodes),
             impulses: vec![Eight::ZERO; 2 * nodes],
             pushes: false,
             reach: [of_nodes(), of_nodes()],
@@ -269,19 +269,19 @@ impl BladeTrial {
     }
 
     /// Selects the nodes that may come closer between the points of the tried step than at the points. They count if they
-    /// come closer by more than a fraction of `tolerance` (m), and if their smallest gap may be below `bars` (m). Returns
+    /// come closer by more than a fraction of `tolerance` (m), and if their smallest gap may be below `thresholds` (m). Returns
     /// whether there are such nodes.
     pub(super) fn select_followed(
         &mut self,
         (rows, level): (&BladeRows, &BladeLevel),
-        bars: &[Eight],
+        thresholds: &[Eight],
         tolerance: f64,
         ends: [f64; 2],
     ) -> bool {
         let unresolved = self.unresolved.unwrap_or_else(|| self.find_interpolation_error(rows, level.step));
         self.unresolved = Some(unresolved);
         let instructions = self.instructions;
-        instructions.run_octets(SelectFollowed { trial: self, rows, level, bars, tolerance, unresolved, ends })
+        instructions.run_octets(SelectFollowed { trial: self, rows, level, thresholds, tolerance, unresolved, ends })
     }
 
     /// Advances the modes over the tried step, or over a step without forces, and returns the damping loss (J).

@@ -12,8 +12,8 @@ const PASSES_OF_ONE: usize = 6;
 /// Largest number of gap evaluations in one trial of several sectors whose motions are coupled.
 const PASSES: usize = 16;
 
-/// Bodies are assumed to move between the points of a step by at most this multiple of their largest motion at the points.
-const BETWEEN: f64 = 2.0;
+/// Assumed largest motion of bodies between the points of a step, divided by their largest motion at the points.
+const BETWEEN_POINTS_FACTOR: f64 = 2.0;
 
 /// Gaps of an island at the points of a step.
 pub(super) struct IslandGaps {
@@ -222,7 +222,7 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         true
     }
 
-    /// Tries a step, until no surface has moved so far that another sector may touch.
+    /// Tries a step. Repeats it with more active sectors while bodies move so far that further sectors may touch.
     pub(super) fn attempt_step(&mut self, step: SpanStep, kind: ForceInterpolation) -> TrialResult {
         if let Some(result) = self.attempt_steady(step, kind) {
             return result;
@@ -235,7 +235,7 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         }
     }
 
-    /// Activates the sectors that may touch because bodies have moved so far. Returns whether there are any.
+    /// Activates the sectors that may touch because bodies moved further than their allowance. Returns whether there are any.
     fn activate_sectors(&mut self, points: usize) -> bool {
         if self.island.active.len() == self.island.sectors.len() {
             return false;
@@ -247,7 +247,7 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         let before = active.len();
         for (index, one) in sectors.iter_mut().enumerate() {
             let motion = of_surfaces + one.disk.map_or(0.0, |(disk, lane)| disks[disk].motion(lane));
-            if one.allowance.is_some_and(|allowance| allowance <= BETWEEN * motion) {
+            if one.allowance.is_some_and(|allowance| allowance <= BETWEEN_POINTS_FACTOR * motion) {
                 one.allowance = None;
                 one.trial.forget();
                 one.state.gaps_known = false;

@@ -26,8 +26,8 @@ use std::ops::Range;
 use std::slice::IterMut;
 use std::sync::{Mutex, PoisonError};
 
-/// One of this number of sectors is integrated before the others.
-const PER_LEADER: usize = 9;
+/// Number of sectors per sector that is integrated before the others.
+const SECTORS_PER_FIRST_SECTOR: usize = 9;
 
 /// Tables, scratch memory and results of the sectors of a structure.
 #[derive(Debug, Clone)]
@@ -37,7 +37,7 @@ pub(super) struct BladeSectors {
     pub open_step_len: usize,
     /// Scratch memory of each thread.
     scratch: Vec<Scratch>,
-    /// Results of all sectors, or of one sector after the other if there is one thread.
+    /// One result per sector; with one thread, a single result that the sectors use in turn.
     results: Vec<SectorResult>,
 }
 
@@ -80,11 +80,13 @@ pub(super) enum SectorSpan<'a> {
 }
 
 impl SectorSpan<'_> {
-    /// Number of sectors that are integrated before the others: their smallest gaps limit those that are searched in the
-    /// others. This saves more time than it costs only if steps end within the span.
-    pub fn leaders(&self, sectors: usize) -> usize {
+    /// Returns the number of sectors that are integrated before the others, because their smallest gaps limit the search in the
+    /// others. This saves time only if steps end within the span, so it is 0 for other spans.
+    pub fn first_sectors(&self, sectors: usize) -> usize {
         match self {
-            Self::Interval(interval) if interval.to - interval.from > interval.span => sectors / PER_LEADER,
+            Self::Interval(interval) if interval.to - interval.from > interval.span => {
+                sectors / SECTORS_PER_FIRST_SECTOR
+            }
             _ => 0,
         }
     }
@@ -98,7 +100,7 @@ impl SectorSpan<'_> {
     }
 }
 
-/// What all sectors have in common in a span.
+/// Data that all sectors share in a span.
 #[derive(Debug, Clone, Copy)]
 struct SectorsInSpan<'a> {
     model: &'a BladeModel,
@@ -111,7 +113,7 @@ struct SectorsInSpan<'a> {
     span: SectorSpan<'a>,
 }
 
-/// Sectors that no thread has begun.
+/// Sectors that no thread has started.
 struct Remaining<'a> {
     results: Zip<Range<usize>, IterMut<'a, SectorResult>>,
     open_steps: &'a mut [f64],
@@ -165,7 +167,7 @@ impl BladeSectors {
     /// Allocates memory for `threads` threads that share `sectors` sectors.
     pub fn use_threads(&mut self, threads: usize, sectors: usize) {
         let (trial, result) = (self.scratch[0].trial.clone(), self.results[0].clone());
-        // A copy of a list has no room for further items.
+        // A cloned `Vec` has no spare capacity, so each thread allocates a new `Blade`.
         self.scratch.resize_with(threads, || Scratch { blade: Blade::new(&self.model), trial: trial.clone() });
         self.results.resize(if threads > 1 { sectors } else { 1 }, result);
     }
@@ -189,8 +191,8 @@ impl BladeSectors {
             let remaining = Remaining { results, open_steps, open_step_len };
             let (remaining, scratch) = (Mutex::new(remaining), Mutex::new(self.scratch.iter_mut()));
             workers.run(&|| {
-                let Some(scratch) = next_of(&scratch, Iterator::next) else { return };
-                while let Some((sector, result, open_step)) = next_of(&remaining, Remaining::next) {
+                let Some(scratch) = take_next(&scratch, Iterator::next) else { return };
+                while let Some((sector, result, open_step)) = take_next(&remaining, Remaining::next) {
                     common.integrate(sector, open_step, scratch, result);
                 }
             });
@@ -244,7 +246,7 @@ impl BladeSectors {
         result.outcome.map_err(|_| StepFailure::Unsolved { structure, sector })
     }
 
-    /// Includes the smallest gaps of a sector that has been integrated in those of the sectors so far.
+    /// Includes the smallest gaps of an integrated sector in those of all integrated sectors.
     pub fn include_lowest(&mut self, sector: usize) {
         let place = self.result_place(sector);
         self.model.include_lowest(&self.results[place].tally);
@@ -255,8 +257,8 @@ impl BladeSectors {
     }
 }
 
-/// Returns the next item of a shared iterator.
-fn next_of<I, T>(shared: &Mutex<I>, next: impl FnOnce(&mut I) -> Option<T>) -> Option<T> {
+/// Takes the next item from a shared iterator.
+fn take_next<I, T>(shared: &Mutex<I>, next: impl FnOnce(&mut I) -> Option<T>) -> Option<T> {
     next(&mut shared.lock().unwrap_or_else(PoisonError::into_inner))
 }
 

@@ -72,6 +72,7 @@ impl Structure {
             set_strided_vector3(&mut self.step_control.slopes, first, lanes, vector3_at(&state.slopes, node));
         }
     }
+
     /// Writes the gaps at the end of an interval of a steady phase.
     pub(super) fn write_gaps(&mut self, sector: usize, result: &SectorResult) {
         let step = self.modes().step();

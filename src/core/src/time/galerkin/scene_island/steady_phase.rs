@@ -37,7 +37,7 @@ impl SceneIsland {
         self.integrate_sectors(system, SectorSpan::Interval(interval), self.goal, workers)
     }
 
-    /// Ends the open steps of all sectors at the end of an interval, one sector after the other: each needs its own tables.
+    /// Ends the open steps of all sectors at the end of an interval, one sector after the other, because each needs different tables.
     ///
     /// # Errors
     /// [`StepFailure`]; the state is then undefined.

@@ -1,21 +1,22 @@
-//! Sectors that certainly stay open over a span, whose gaps need no evaluation.
+//! Sectors that stay open over a span, whose gaps need no evaluation.
 //!
-//! As with fixed steps (`system/nearness.rs`): a gap changes by no more than its node and its surface move. The motion of a surface, and of
-//! coupled sectors, by the contact forces of the span is not known before. It is compared with the allowance of each sector in every step.
+//! As with fixed steps (`system/nearness.rs`), a gap changes by no more than the motion of its node and of its surface. The contact forces of
+//! the span also move surfaces and coupled sectors. This motion is unknown at the start of the span, so every step compares it with the
+//! allowance of each sector.
 
 use super::SceneIsland;
 use crate::geometry::spline::SplineGap;
 use crate::math::vector::vector3_at;
 use crate::system::{ContactPair, Structure};
-use crate::time::galerkin::disk::approach;
+use crate::time::galerkin::disk::largest_gap_change;
 use std::ops::Range;
 
-/// Factor on the prescribed motion over the span, which need not be monotonic.
-const PRESCRIBED: f64 = 2.0;
+/// Factor on the prescribed motion over the span, because the motion may be larger within the span than at its end.
+const PRESCRIBED_MOTION_FACTOR: f64 = 2.0;
 
 impl SceneIsland {
-    /// Selects the sectors that may touch or have a smallest gap that outputs need in a span (s). The others are open, and stay so while
-    /// the surfaces move by less than their allowance.
+    /// Selects the sectors that may touch in a span (s), or whose smallest gap an output may need. The others stay open while bodies move by
+    /// less than their allowance.
     pub(super) fn choose_active(&mut self, structures: &[Structure], pairs: &[ContactPair], span: f64) {
         if !self.island.carriers.is_empty() {
             self.island.sectors.iter_mut().for_each(|one| one.allowance = Some(f64::INFINITY));
@@ -54,15 +55,16 @@ impl SceneIsland {
             for index in sectors.clone() {
                 let change = self.records[first].changes[self.records[index].sector];
                 let allowance = ring.and_then(|(gap, _)| self.allowance(index, structure, gap, span));
-                let allowance = allowance.map(|allowance| allowance - PRESCRIBED * change).filter(|left| *left > 0.0);
+                let allowance =
+                    allowance.map(|allowance| allowance - PRESCRIBED_MOTION_FACTOR * change).filter(|left| *left > 0.0);
                 let own = &mut self.island.sectors[index].allowance;
                 *own = own.zip(allowance).map(|(own, allowance)| own.min(allowance));
             }
         }
     }
 
-    /// Returns by how much the surface that the nodes of a sector face, and the nodes of coupled sectors, may move in the span so that the
-    /// nodes stay open (m), with larger gaps than another sector has; `None` if they may touch without such motion.
+    /// Returns the allowance of a sector (m): the motion of its surface, and of its nodes if it is coupled, up to which its gaps stay open and
+    /// larger than those of another sector. `None` if a gap may become smaller without such motion.
     fn allowance(&mut self, index: usize, structure: &Structure, gap: &SplineGap, span: f64) -> Option<f64> {
         let (sector, lanes, gaps) = (self.records[index].sector, structure.lanes(), &structure.history.gap.before);
         if structure.needed_minima.all_of(sector) || self.island.sectors[index].state.is_loaded() {
@@ -75,7 +77,7 @@ impl SceneIsland {
         for node in &gap.nodes {
             let row = &gaps[node * lanes..(node + 1) * lanes];
             let others = row.iter().copied().fold(f64::INFINITY, f64::min).max(0.0);
-            let own = travel.map_or(0.0, |travel| approach(vector3_at(travel, *node).into(), normal(*node)));
+            let own = travel.map_or(0.0, |travel| largest_gap_change(vector3_at(travel, *node).into(), normal(*node)));
             let free = row[sector] - others - own;
             if !(free > 0.0 && free.is_finite()) {
                 return None;
