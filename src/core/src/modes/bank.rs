@@ -166,7 +166,7 @@ pub struct ModalBank {
     scheme: Scheme,
     step: f64,
     /// True if the damping ratios have changed since the coefficients were computed.
-    is_outdated: bool,
+    coefficients_outdated: bool,
     state: BankState,
     /// Modal loads of the current step.
     modal_load: Vec<f64>,
@@ -241,7 +241,7 @@ impl ModalBank {
             columns: FlexibilityColumns::new(if options.uses_modes { rows } else { 0 }),
             scheme: Scheme::default(),
             step: 0.0,
-            is_outdated: true,
+            coefficients_outdated: true,
             state: BankState {
                 position: vec![0.0; state_len],
                 increment: vec![0.0; state_len],
@@ -414,7 +414,7 @@ impl Persist for ModalBank {
             disk.state.restore(reader);
         }
         let BankState { speed, temperature, .. } = self.state;
-        let has_changed = self.coupling.as_ref().is_some_and(|coupling| !coupling.is_at(speed, temperature));
+        let has_changed = self.coupling.as_ref().is_some_and(|coupling| !coupling.matches(speed, temperature));
         if has_changed && self.step > 0.0 {
             self.refresh_coupling();
         }

@@ -5,8 +5,8 @@ use crate::geometry::frame::PolarFrame;
 use crate::geometry::surface_spline::{CLOSE, ClosestPoint, Projection};
 use crate::geometry::{Gap, PrescribedMotion, Vector3};
 
-/// Largest error of the closest point (in patches) from which a single evaluation of a surface finds gaps to rounding, and the closest point
-/// to about its square. The next evaluation starts from there.
+/// Largest error of the initial guess of a closest point (in patches) for which one evaluation of the surface is sufficient: gaps are then
+/// accurate to rounding, and the error of the closest point is about squared. The next evaluation starts there.
 const NEARBY: f64 = 1e-3;
 
 /// A search for closest points of many nodes at one instant.
@@ -93,8 +93,8 @@ impl<'a> NearSearch<'a> {
         Gap { normal: frame.local(found.normal), ..found }
     }
 
-    /// Searches the closest point of a position, with the normal in the directions of the shape: an infinite gap beyond the extension of the
-    /// surface, NaN without closest point.
+    /// Searches the closest point to a position. The normal has the directions of the shape. The gap is infinite beyond the extension of the
+    /// surface, and NaN if there is no closest point.
     fn search(&self, x: Vector3, guess: ClosestPoint) -> Gap {
         let nowhere = Gap { distance: f64::NAN, normal: -Vector3::x(), foot: guess };
         match self.gap.surface.project(x, guess) {

@@ -10,7 +10,7 @@ impl ModalBank {
     pub fn set_step(&mut self, scheme: Scheme, step: f64) {
         // The contact forces of the last step act on a disk with the coefficients for which they were computed.
         self.finish();
-        (self.scheme, self.step, self.is_outdated) = (scheme, step, false);
+        (self.scheme, self.step, self.coefficients_outdated) = (scheme, step, false);
         for set in 0..self.sets {
             for mode in 0..self.modes {
                 let (Some(of), index) = (self.oscillator(mode, set), set * self.modes + mode) else { continue };
@@ -27,9 +27,9 @@ impl ModalBank {
         self.refresh_coupling();
     }
 
-    /// Sets the step size, like [`ModalBank::set_step`], before a state is restored. Coefficients that are valid are kept.
+    /// Sets the step size, like [`ModalBank::set_step`], before a state is restored. Keeps valid coefficients.
     pub(crate) fn prepare_restore(&mut self, scheme: Scheme, step: f64) {
-        if self.is_outdated || self.scheme != scheme || self.step.to_bits() != step.to_bits() {
+        if self.coefficients_outdated || self.scheme != scheme || self.step.to_bits() != step.to_bits() {
             self.set_step(scheme, step);
         }
     }
@@ -103,7 +103,7 @@ impl ModalBank {
     /// energy (J), which is work of the shaft and of heat.
     pub fn set_speed(&mut self, speed: f64, temperature: f64) -> f64 {
         let Some(coupling) = &self.coupling else { return 0.0 };
-        if coupling.is_at(speed, temperature) {
+        if coupling.matches(speed, temperature) {
             return 0.0;
         }
         let before = self.energies();
@@ -118,9 +118,9 @@ impl ModalBank {
     /// Sets the modal damping ratio of all modes; the first modes of a sector or nodal diameter get the ratios `own`
     /// (takes effect with the next [`ModalBank::set_step`]).
     pub(crate) fn set_damping_ratio(&mut self, damping_ratio: f64, own: &[f64]) {
-        self.is_outdated |= fill_ratios(&mut self.model.damping_ratios, damping_ratio, own, 1);
+        self.coefficients_outdated |= fill_ratios(&mut self.model.damping_ratios, damping_ratio, own, 1);
         if let Some(disk) = &mut self.disk {
-            self.is_outdated |= disk.model.set_damping_ratio(damping_ratio, own);
+            self.coefficients_outdated |= disk.model.set_damping_ratio(damping_ratio, own);
         }
     }
 

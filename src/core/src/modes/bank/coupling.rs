@@ -87,8 +87,8 @@ impl Coupling {
         if self.spin.softening.is_some() { self.temperature - self.spin.reference_temperature } else { 0.0 }
     }
 
-    /// Returns whether the coupling is that of a speed (rad/s) and a temperature (K), to the bit.
-    pub(super) fn is_at(&self, speed: f64, temperature: f64) -> bool {
+    /// Returns whether the coupling was computed for exactly this speed (rad/s) and temperature (K).
+    pub(super) fn matches(&self, speed: f64, temperature: f64) -> bool {
         self.speed.to_bits() == speed.to_bits() && self.temperature.to_bits() == temperature.to_bits()
     }
 
