@@ -1,4 +1,4 @@
-//! Allocations of all threads of a process, which therefore runs a single test.
+//! Steps do not allocate in any thread. The allocator counts for the whole process, so this program contains a single test.
 
 use std::alloc::{GlobalAlloc, Layout, System as SystemAllocator};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};

@@ -39,7 +39,7 @@ fn started_with(scene: &Scene, threads: i32) -> Simulation {
 }
 
 /// Returns the values after every communication step, and saved states. Inputs rest, change and rest again.
-/// Meanwhile the run continues from a state that was saved before.
+/// Several times, the run continues from a state that was saved before.
 fn run(scene: &Scene, threads: i32) -> (Vec<Vec<u64>>, Vec<Vec<u8>>) {
     let mut simulation = started_with(scene, threads);
     let (mut values, mut states) = (Vec::new(), Vec::new());
@@ -123,7 +123,7 @@ fn discarded_steps_do_not_depend_on_the_number_of_threads() {
     }
 }
 
-/// A copy has no threads of its own, and its derivatives neither.
+/// Neither a copy nor the computation of derivatives uses further threads.
 #[test]
 fn copies_and_derivatives_do_not_depend_on_the_number_of_threads() {
     let values = |threads: i32| {

@@ -312,7 +312,7 @@ fn a_thousand_resets_give_identical_bits() {
     }
 }
 
-/// Tables are kept on restore if they are valid. Here they belong to another damping, speed or internal step.
+/// Restoring keeps valid tables. In this test they belong to another damping ratio, speed or internal step.
 #[test]
 fn restored_state_replaces_tables_of_other_parameters() {
     for (name, scene) in scenes() {
