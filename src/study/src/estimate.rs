@@ -39,12 +39,12 @@ const LATER: [(&str, [f64; 2]); 4] = [
 const WORDS: [(&str, &str); 2] =
     [("patches", "patches along the chord"), ("rows", "rows of patches across the thickness")];
 
-/// Runs from which an error is known.
+/// Source of an estimated error.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum ErrorSource {
     /// This run, compared with coarser runs of its scene.
     Run,
-    /// Rubs of other scenes with the same tolerance: the largest error of these rubs.
+    /// Rubs of other scenes with the same tolerance; the error is the largest of these rubs.
     Rubs,
     /// The rub with this description, whose errors the ROM carries.
     Rom(String),
@@ -193,8 +193,8 @@ fn of_model(rom: &Rom) -> [Estimate; 4] {
     })
 }
 
-/// Returns the errors of a run that are known without further runs, with replaced start values (name, value as text): those of the steps as measured
-/// in other rubs, and those that the ROM carries; empty if none is known.
+/// Returns the errors of a run that are known without further runs: the error of the steps as measured in other rubs, and the errors that the ROM
+/// contains. `settings` are replaced start values (name, value as text). The list is empty if no error is known.
 pub fn without_runs(scene: &Scene, settings: &[(String, String)]) -> Vec<Estimate> {
     let (scene, _) = with_time_in_use(scene, settings);
     let steps = Estimate::of_measured_steps(&scene);

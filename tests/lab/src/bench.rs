@@ -1,5 +1,4 @@
-//! Speed of rubs by tolerance and communication step, with baselines measured in the same run and the error beside each
-//! time.
+//! Run time and error of rubs by tolerance and communication step, with baselines measured in the same run.
 
 use serde_json::{Value, json};
 use tiprub_core::scene::method::{Scheme, Solver};
@@ -27,7 +26,7 @@ const TOLERANCES: [f64; 4] = [1e-1, 1e-2, 1e-3, 1e-4];
 const INTERVALS: [f64; 3] = [1e-5, 1e-4, 1e-3];
 /// Communication step of the baselines (s).
 const BASE_INTERVAL: f64 = 1e-4;
-/// Tolerance of the run that errors of adaptive steps are relative to.
+/// Tolerance of the reference run for errors of adaptive steps.
 const FINEST: f64 = 1e-6;
 /// Duration of a run (ms): full study, quick study.
 const DURATION: [u32; 2] = [10, 2];
@@ -36,10 +35,10 @@ const FIXED: [(Scheme, Solver); 3] =
     [(Scheme::PAPER, Solver::Film), (Scheme::ModalExact, Solver::Lcp), (Scheme::MasslessBoundary, Solver::Lcp)];
 /// Longest fixed step that is tried (s), and maximum number of times that it is halved.
 const LONGEST: f64 = 1e-6;
-const MOST_HALVINGS: i32 = 6;
+const MAX_HALVINGS: i32 = 6;
 /// Step of the independent solver (s).
 const INDEPENDENT_STEP: f64 = 5e-7;
-/// Number of runs, the fastest of which counts.
+/// Number of repetitions; the fastest one counts.
 const REPETITIONS: usize = 3;
 
 /// Displacements of all contact nodes at the end of every millisecond, one after the other (m), and the processor time
@@ -153,7 +152,7 @@ impl Rub {
         let with = |step: f64| SceneRun::changed(&self.scene, method, step, 0.0);
         let name = format!("{} + {}", method.0.name(), method.1.name());
         let mut why = String::new();
-        for halvings in 0..=MOST_HALVINGS {
+        for halvings in 0..=MAX_HALVINGS {
             let step = LONGEST * 0.5_f64.powi(halvings);
             let setting = format!("h = {:.4} µs", 1e6 * step);
             let runs = fastest(&with(step), BASE_INTERVAL, self.size)

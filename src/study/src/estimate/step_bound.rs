@@ -1,4 +1,4 @@
-//! Errors of adaptive steps as measured in other rubs, which are known without a second run.
+//! Errors of adaptive steps as measured in other rubs. They need no second run.
 
 use tiprub_core::Scene;
 use tiprub_core::scene::method::{Scheme, Solver};
@@ -10,7 +10,7 @@ use tiprub_core::scene::settings::{BodyMotion, SceneSettings, TimeSettings};
 ///
 /// Source: rotor 37 as built in, communication steps of 80 µs, against a tolerance of 1e-6; `lab bench` repeats the light and the heavy rub.
 const ERROR_PER_TOLERANCE: f64 = 1.0;
-/// Smallest tolerance for which this relation was found. Errors with smaller tolerances are smaller than this value, but decrease more slowly.
+/// Smallest tolerance for which this relation was measured. With smaller tolerances, errors are below this value, but decrease more slowly.
 const SMALLEST: f64 = 1e-4;
 /// Description of the rubs.
 pub(super) const RUBS: &str = "rubs of rotor 37, three revolutions";

@@ -13,8 +13,8 @@ const STEADY: f64 = 0.02;
 const MOST_DYNAMIC: f64 = 10.0;
 /// Fraction of the squared amplitudes on engine orders that counts as nearly all of the response.
 const NEARLY_ALL: f64 = 0.99;
-/// Largest penetration, as a fraction of the clearance, unless adaptive steps have a larger tolerance.
-const DEEPEST: f64 = 1e-3;
+/// Largest accepted penetration as a fraction of the clearance, unless adaptive steps have a larger tolerance.
+const MAX_PENETRATION: f64 = 1e-3;
 /// Largest residual of a closed ledger, relative to the exchanged energy.
 const LEDGER: f64 = 1e-9;
 
@@ -70,9 +70,11 @@ fn contact(map: &Map) -> Vec<Statement> {
     );
     let contact = &map.setup.scene.settings.contacts[0];
     let gap = contact.sector_gaps.iter().copied().reduce(f64::min).unwrap_or(contact.gap);
-    let allowed =
-        time_in_use(&map.setup.scene.settings, &map.setup.settings).step_tolerance().unwrap_or(0.0).max(DEEPEST);
-    let expected = match allowed > DEEPEST {
+    let allowed = time_in_use(&map.setup.scene.settings, &map.setup.settings)
+        .step_tolerance()
+        .unwrap_or(0.0)
+        .max(MAX_PENETRATION);
+    let expected = match allowed > MAX_PENETRATION {
         true => "No node penetrates by more than the tolerance of the adaptive steps",
         false => "No node penetrates by more than a thousandth of the clearance",
     };
