@@ -17,7 +17,7 @@
 //!
 //! Invariants, stated as absences: no unsafe code outside `boundary` (except the `no_mangle` attributes of the
 //! façades), no global mutable state (except the silent panic hook of this library's copy of the standard library, and the
-//! place of its last panic), no threads, no output, no panic across the ABI, no value returned by a call that did not succeed.
+//! place of its last panic), no threads of its own, no output, no panic across the ABI, no value returned by a call that did not succeed.
 #![warn(unreachable_pub)]
 #![deny(unsafe_op_in_unsafe_fn)]
 

@@ -1,7 +1,7 @@
 //! Contact stepping of reduced-order models: everything that runs inside `doStep`.
 //!
-//! Floor 0. The crate takes and returns plain data: no files, no threads, no clock, no printing, and no allocation between
-//! [`Simulation::initialise`] and the end of the run. SI units everywhere (m, kg, s, N, rad).
+//! Floor 0. The crate takes and returns plain data: no files, no clock and no printing. A step allocates nothing. Threads
+//! exist only if the parameter `threads` is above 1: they are created at initialisation or when a state is restored. SI units everywhere (m, kg, s, N, rad).
 //!
 //! A [`Scene`] (settings and a [`Rom`]) is compiled once into a [`Simulation`]. The simulation owns the [`VariableTable`], from which all
 //! texts and calls for importers are derived, and steps the contact problem from one communication point to the next.

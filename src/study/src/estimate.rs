@@ -196,8 +196,11 @@ fn of_model(rom: &Rom) -> [Estimate; 4] {
 /// Returns the errors of a run that are known without further runs: the error of the steps as measured in other rubs, and the errors that the ROM
 /// contains. `settings` are replaced start values (name, value as text). The list is empty if no error is known.
 pub fn without_runs(scene: &Scene, settings: &[(String, String)]) -> Vec<Estimate> {
-    let (scene, _) = with_time_in_use(scene, settings);
-    let steps = Estimate::of_measured_steps(&scene);
+    let (scene, others) = with_time_in_use(scene, settings);
+    let mut steps = Estimate::of_measured_steps(&scene);
+    if others.iter().any(|(name, _)| name.ends_with("solver")) {
+        steps.left = Err("it has not been measured for start values of the solver: use `tiprub run --estimate`".into());
+    }
     let model = of_model(&scene.roms[crate::master(&scene)]);
     let all: Vec<Estimate> = std::iter::once(steps).chain(model).collect();
     if all.iter().any(|estimate| estimate.left.is_ok()) { all } else { Vec::new() }
