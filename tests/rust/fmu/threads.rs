@@ -77,13 +77,13 @@ impl Status for fmi3::Step {
 
 #[test]
 fn threads_exist_only_while_an_instance_runs_with_them() {
-    let number = 4;
+    let (number, long) = (4_i32, 4_i64);
     test_version!(fmi2, Fmi2TestSlave, |api: &tiprub_fmi_host::api::Fmi2Api, handle, threads: u32| {
         // SAFETY: the instance is alive; arrays of one element.
         assert_eq!(unsafe { (api.fmi2SetInteger)(handle, &raw const threads, 1, &raw const number) }, OK);
     });
     test_version!(fmi3, Fmi3TestSlave, |api: &tiprub_fmi_host::api::Fmi3Api, handle, threads: u32| {
         // SAFETY: the instance is alive; arrays of one element.
-        assert_eq!(unsafe { (api.fmi3SetInt32)(handle, &raw const threads, 1, &raw const number, 1) }, OK);
+        assert_eq!(unsafe { (api.fmi3SetInt64)(handle, &raw const threads, 1, &raw const long, 1) }, OK);
     });
 }
