@@ -125,7 +125,7 @@ fn discarded_steps_do_not_depend_on_the_number_of_threads() {
 
 /// Neither a copy nor the computation of derivatives uses further threads.
 #[test]
-fn copies_and_derivatives_do_not_depend_on_the_number_of_threads() {
+fn copies_and_derivatives_do_not_depend_on_threads() {
     let values = |threads: i32| {
         let mut simulation = Simulation::new(rub()).unwrap();
         simulation.set_integer(reference(&simulation, "threads"), threads).unwrap();

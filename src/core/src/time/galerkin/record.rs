@@ -73,23 +73,26 @@ impl MotionCourse {
         (drive, motion)
     }
 
-    /// Motion from the start of the span to its fraction `theta`.
-    fn motion(&self, theta: f64) -> MotionIncrement {
-        let motion = self.parts[0].over(theta).since(&self.parts[1].over(theta * theta));
-        MotionIncrement { shape_factor: self.growth.at(theta) - self.before.shape_factor, ..motion }
-    }
-
-    /// Prescribed motion at the fraction `theta` of the span.
+    /// Prescribed motion at the fraction `theta` of the span, and the motion since its start.
     pub fn at(&self, theta: f64) -> (PrescribedMotion, MotionIncrement) {
-        let motion = self.motion(theta);
+        let (turning, TurningMotion { turn, opening, shape_factor, shape_rotation }) = self.turning_at(theta);
         let ([linear, quadratic], before) = (&self.parts, &self.before);
+        let square = theta * theta;
+        let motion = MotionIncrement {
+            step: theta * linear.step + square * quadratic.step,
+            turn,
+            shaft: theta * linear.shaft + square * quadratic.shaft,
+            opening,
+            shape_factor,
+            shape_rotation,
+        };
         let drive = PrescribedMotion {
-            rotor_angle: before.rotor_angle + motion.turn,
-            speed: (linear.turn + 2.0 * theta * quadratic.turn) / linear.step,
-            gap_offset: before.gap_offset + before.radius_change + motion.opening,
+            rotor_angle: turning.rotor_angle,
+            speed: turning.speed,
+            gap_offset: turning.opening,
             radius_change: 0.0,
-            shape_factor: before.shape_factor + motion.shape_factor,
-            shape_rotation: before.shape_rotation + motion.shape_rotation,
+            shape_factor: turning.shape_factor,
+            shape_rotation: turning.shape_rotation,
             shaft: before.shaft + motion.shaft,
             shaft_velocity: (linear.shaft + 2.0 * theta * quadratic.shaft) / linear.step,
         };
