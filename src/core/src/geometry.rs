@@ -364,8 +364,7 @@ impl GapLaw {
         if let Self::Open(law) = self {
             return law.largest;
         }
-        let radii = self.layout().map(|layout| layout.radii.iter());
-        radii.map_or(f64::INFINITY, |radii| SMALL * radii.fold(f64::INFINITY, |low: f64, radius| low.min(*radius)))
+        self.layout().map_or(f64::INFINITY, Layout::largest_displacement)
     }
 
     /// Returns whether small displacements and a casing seen from inside can describe a contact: not deeper than a tenth of the radius, on

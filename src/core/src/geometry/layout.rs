@@ -3,6 +3,7 @@
 use super::frame::PolarFrame;
 use super::{PrescribedMotion, Vector3};
 use crate::math::real;
+use crate::scene::ranges::SMALL;
 use crate::{Error, Result, Rom};
 
 /// Contact nodes of equally spaced sectors; arrays that differ by sector are `[node · lanes + lane]`.
@@ -61,6 +62,11 @@ impl Layout {
             axial: places.iter().map(|place| place[2]).collect(),
             clearances: padded,
         })
+    }
+
+    /// Largest displacement (m) that counts as small: a tenth of the smallest radius.
+    pub(crate) fn largest_displacement(&self) -> f64 {
+        SMALL * self.radii.iter().fold(f64::INFINITY, |low: f64, radius| low.min(*radius))
     }
 
     /// Number of contact nodes per sector.

@@ -8,10 +8,9 @@ use super::clock::{Communication, SimulationPhase, same_step};
 use super::drive::Input;
 use crate::contact::coating::Coating;
 use crate::limits::finding::Subject;
+use crate::system::small::CURVED_SHARE;
 use crate::{Error, Result, Warning};
 
-/// A run is warned of once u_θ²/2r is this fraction of the clearance.
-const CURVED_SHARE: f64 = 0.05;
 impl Simulation {
     pub(super) fn begin(&mut self, current_time: f64, step_size: f64, partial: bool) -> Result<()> {
         let limit = self.state.values[self.compiled.references.step_max];

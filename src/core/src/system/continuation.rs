@@ -65,13 +65,20 @@ impl System {
     /// Instantaneous kinetic and strain energy of all structures (J), ½q̇ᵀMq̇ and ½qᵀKq, between steps only. `each` is called
     /// with the energies of every set.
     pub(crate) fn energies_now(&mut self, mut each: impl FnMut(usize, (f64, f64))) -> (f64, f64) {
-        let step = self.step_size();
-        self.find_lasting(step, step);
+        let is_steady = self.steady_phase.active;
+        if !is_steady {
+            let step = self.step_size();
+            self.find_lasting(step, step);
+        }
         let Self { sets, structures, .. } = self;
         sum_of((0..sets.count()).map(|set| {
             let own = sum_of(sets.members(set).iter().map(|member| {
-                let Structure { modes, history, .. } = &mut structures[*member];
-                modes.energies_now(&history.passing.lasting)
+                let Structure { modes, history, step_control, .. } = &mut structures[*member];
+                if is_steady && !step_control.energies_now.is_empty() {
+                    sum_of(step_control.energies_now.as_chunks().0.iter().map(|[kinetic, strain]| (*kinetic, *strain)))
+                } else {
+                    modes.energies_now(&history.passing.lasting)
+                }
             }));
             each(set, own);
             own

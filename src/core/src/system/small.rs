@@ -5,6 +5,8 @@ use crate::geometry::GapLaw;
 
 /// Clearances below this fraction of the radius belong to a press fit, in which errors of this size do not matter.
 pub(crate) const LEAST_CLEARANCE: f64 = 1e-4;
+/// A run is warned of once u_θ²/2r is this fraction of the clearance.
+pub(crate) const CURVED_SHARE: f64 = 0.05;
 
 /// Error of linear kinematics at a node that moves far around the axis.
 #[derive(Debug, Clone, Copy, PartialEq)]

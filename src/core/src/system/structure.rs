@@ -38,6 +38,8 @@ pub struct Structure {
     pub(crate) lowest_in_span: Vec<f64>,
     /// Selection of the smallest gaps that outputs need.
     pub(crate) needed_minima: NeededMinima,
+    /// Sectors whose state is read at communication points; empty if this holds for every sector.
+    read_sectors: Vec<bool>,
     /// Bounds of gaps that are not evaluated in every step.
     pub(crate) nearness: Nearness,
 }
@@ -58,6 +60,11 @@ impl NeededMinima {
     pub fn all_of(&self, sector: usize) -> bool {
         self.of_sectors.get(sector).copied().unwrap_or(true)
     }
+
+    /// Returns whether an output depends on the gaps of a sector even if they are larger than those of other sectors.
+    pub fn depends_on(&self, sector: usize) -> bool {
+        self.by_sector || self.all_of(sector)
+    }
 }
 
 /// State of adaptive steps for all sectors.
@@ -77,11 +84,13 @@ pub struct StepControl {
     pub open_steps: Vec<f64>,
     /// Energies at the starts of the open steps (J).
     pub energies: Vec<f64>,
+    /// Kinetic and strain energy of each sector at the last communication point of a steady phase (J).
+    pub energies_now: Vec<f64>,
 }
 
 // Everything that determines the future, except the step size; it is restored after the step size has been set.
 persist_fields!(Structure { history, modes, delayed, step_control, pulling, nearness, .. });
-persist_fields!(StepControl { bank, largest, level, slopes, normals, open_steps, energies });
+persist_fields!(StepControl { bank, largest, level, slopes, normals, open_steps, energies, energies_now });
 
 impl StepControl {
     fn new(sectors: usize, contacts: usize) -> Self {
@@ -93,6 +102,7 @@ impl StepControl {
             normals: vec![0.0; 3 * contacts],
             open_steps: Vec::new(),
             energies: vec![0.0; sectors],
+            energies_now: Vec::new(),
         }
     }
 }
@@ -127,6 +137,7 @@ impl Structure {
             step_control: StepControl::new(if touches { modes.sectors() } else { 0 }, contacts),
             lowest_in_span: Vec::new(),
             needed_minima: NeededMinima::default(),
+            read_sectors: Vec::new(),
             nearness: Nearness::default(),
             pair_of,
             lanes: modes.lanes(),
@@ -201,6 +212,16 @@ impl Structure {
         self.needed_minima = NeededMinima { of_sectors, by_sector };
     }
 
+    /// Makes the state of the sectors `watched` (1-based) known at communication points, but not that of the others.
+    pub(crate) fn read_only(&mut self, watched: &[usize]) {
+        self.read_sectors = (1..=self.modes.sectors()).map(|sector| watched.contains(&sector)).collect();
+    }
+
+    /// Returns whether the state of a sector is read at communication points.
+    pub(crate) fn needs_state(&self, sector: usize) -> bool {
+        self.read_sectors.get(sector).copied().unwrap_or(true)
+    }
+
     /// Smallest gaps within the last step (m), as far as the scheme evaluates them, `[node · lanes + lane]`.
     pub(crate) fn lowest_gaps(&self) -> &[f64] {
         if self.lowest_in_span.is_empty() { &self.history.gap.now } else { &self.lowest_in_span }
@@ -265,6 +286,7 @@ impl Structure {
         self.step_control.slopes.fill(0.0);
         self.step_control.normals.fill(0.0);
         self.step_control.open_steps.fill(0.0);
+        self.step_control.energies_now.fill(0.0);
     }
 
     /// Uses gaps and predictions at the start as those of the previous steps.

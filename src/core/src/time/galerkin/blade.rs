@@ -19,6 +19,7 @@ mod judge;
 mod level;
 mod minima;
 mod open_step;
+mod quiet;
 mod reach;
 mod rows;
 mod solve;
@@ -33,6 +34,7 @@ mod tests;
 mod trial;
 
 pub(crate) use span::{Blade, BladeInSpan, BladeModel, BladePlace};
-pub(crate) use stored::{stored_len, stored_start};
+pub(crate) use quiet::QuietSector;
+pub(crate) use stored::{StoredStep, mark_unsampled, stored_len, stored_start};
 pub(crate) use tables::SpanKind;
 pub(crate) use tally::BladeTally;

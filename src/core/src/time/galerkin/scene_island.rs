@@ -198,7 +198,7 @@ impl SceneIsland {
         if let Some(sectors) = &mut self.blade {
             let structure = &system.structures[self.records[0].structure];
             sectors.model.set_span(SpanKind::Bounded, span);
-            sectors.model.begin_span(&structure.history.gap.before, structure.lanes(), self.turns);
+            sectors.model.begin_span(&structure.history.gap.before, structure.lanes(), self.turns, |_| true);
             let goal = StepGoal { most: most_tried, ..self.goal };
             let course = self.records[0].pairs[0].course;
             return self.integrate_sectors(system, SectorSpan::Bounded(&course, span), goal, workers);

@@ -29,6 +29,14 @@ impl ModeResponse {
         self.key == (kind, time.to_bits())
     }
 
+    /// q and q̇ of eight modes without forces, from those at the start of the step and ω².
+    #[inline(always)]
+    pub fn free<L: Octet>(&self, block: usize, [q, v]: [L; 2], square: L) -> [L; 2] {
+        let [a, b] = both(|term| L::load(&self.terms[term][block]));
+        let c = L::load(&self.terms[2][block]);
+        [a * q + b * v, c * v - square * b * q]
+    }
+
     /// Computes the response of a kind of sectors after a time (s).
     pub fn compute(&mut self, rows: &BladeRows, kind: usize, time: f64) {
         self.key = (kind, time.to_bits());

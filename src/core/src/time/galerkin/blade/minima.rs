@@ -109,7 +109,7 @@ impl OctetKernel for RecordPoints<'_> {
 }
 
 /// Gaps of a block of eight nodes at the start and at the points of a step.
-struct BlockGaps<L> {
+pub(super) struct BlockGaps<L> {
     /// F (m), and its smallest and largest value.
     gaps: [L; POINTS],
     low: L,
@@ -130,7 +130,7 @@ const EXCURSION: f64 = 0.25;
 impl<L: Octet> BlockGaps<L> {
     /// Reads the gaps of a block. Its interpolation errors must be in `path_moved`.
     #[inline(always)]
-    fn new(trial: &BladeTrial, rows: &BladeRows, level: &BladeLevel, block: usize) -> Self {
+    pub fn new(trial: &BladeTrial, rows: &BladeRows, level: &BladeLevel, block: usize) -> Self {
         let count = level.points() + 1;
         let mut gaps = [L::zero(); POINTS];
         gaps[0] = L::load(&trial.start.gaps[block]);
@@ -153,8 +153,21 @@ impl<L: Octet> BlockGaps<L> {
     /// Returns the nodes whose smallest gap may be below `threshold` (m).
     #[inline(always)]
     fn may_be_below(&self, threshold: L) -> u8 {
-        let lower_bound = self.low - (self.high - self.low) * L::splat(EXCURSION) - self.error_bound;
-        lower_bound.less(threshold.max(L::zero()) * (self.steepness + self.steepest)) & self.open
+        self.smallest().less(threshold.max(L::zero()) * (self.steepness + self.steepest)) & self.open
+    }
+
+    /// Bounds the gaps of the nodes from below (m); −∞ for nodes that may touch.
+    #[inline(always)]
+    pub fn lower_bound(&self) -> L {
+        let smallest = self.smallest();
+        let positive = L::zero().less(smallest) & self.open;
+        L::select(positive, smallest / (self.steepness + self.steepest), L::splat(f64::NEG_INFINITY))
+    }
+
+    /// Bounds F from below (m).
+    #[inline(always)]
+    fn smallest(&self) -> L {
+        self.low - (self.high - self.low) * L::splat(EXCURSION) - self.error_bound
     }
 
     /// Selects the nodes that may come closer between the points of the step, and below `threshold` (m).

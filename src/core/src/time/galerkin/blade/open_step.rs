@@ -5,7 +5,7 @@
 
 use super::dense::{DenseOutput, ModeResponse};
 use super::follow::CubicMinima;
-use super::gaps::drive_and_rate_at;
+use super::gaps::{drive_and_rate_at, include};
 use super::rows::BladeRows;
 use super::span::{Blade, BladeInSpan, RecordScope};
 use super::surface::PointDrive;
@@ -72,6 +72,12 @@ impl BladeInSpan<'_> {
                 .for_each(|blocks| blocks.fill(Eight::ZERO));
         }
         self.blade.trial.pushes = false;
+        let BladeTrial { least, flight_bounds, .. } = &mut self.blade.trial;
+        if step.length == f64::INFINITY {
+            least.fill(Eight([f64::NEG_INFINITY; 8]));
+        } else {
+            least.copy_from_slice(flight_bounds);
+        }
         self.open = Some(OpenStep { step, kind: None, is_resolved: true, work, energy, banked: 0.0 });
     }
 
@@ -197,54 +203,81 @@ impl BladeInSpan<'_> {
         drive.factor >= 0.0 && (0..rows.nodes).all(|node| left > reach(0, node))
     }
 
-    /// Writes the state at the end of an interval of the steady phase, which the open step contains.
-    pub(crate) fn write_sample(
-        &mut self,
-        interval: SteadyInterval,
-        course: impl Fn(u64) -> MotionCourse,
-        state: &mut SectorState,
-    ) {
-        let Some(OpenStep { step, kind, .. }) = self.open else { return };
-        let (kind_of_sector, begun) = (self.place.kind, to_real(self.progress.spans) * interval.span);
-        let time = ((interval.to - begun) - step.from * interval.span).max(0.0);
-        let last = if self.open.is_some_and(|open| open.is_unbounded()) {
-            to_count((interval.to / interval.span).floor())
-        } else {
-            self.progress.spans
-        };
+    /// Evaluates the open step at a time (s since the start of the steady phase) for spans of length `span` (s). `course`
+    /// returns the prescribed motion over a span, by its number. Returns the time as a fraction of the last span.
+    fn sample(&mut self, time: f64, span: f64, course: impl Fn(u64) -> MotionCourse) -> f64 {
+        let Some(OpenStep { step, kind, .. }) = self.open else { return 0.0 };
+        let elapsed = self.time_in_step(time, span);
+        let is_unbounded = self.open.is_some_and(|open| open.is_unbounded());
+        let last = if is_unbounded { to_count((time / span).floor()) } else { self.progress.spans };
         self.place.course = course(last);
         let mut drives = [PointDrive::default(); POINTS];
-        let theta = (interval.to - to_real(last) * interval.span) / interval.span;
-        let (drive, rate) = drive_and_rate_at(&self.place, theta, interval.span);
-        let shape_errors = self.place.shape_errors([theta - (interval.to - interval.from) / interval.span, theta]);
+        let theta = (time - to_real(last) * span) / span;
+        let (drive, rate) = drive_and_rate_at(&self.place, theta, span);
         drives[0] = drive;
         let faced = self.place.faced_surface(&drives);
         let interpolation = kind.unwrap_or(ForceInterpolation::Polynomial);
         let (blade, tables) = (&mut *self.blade, self.tables);
-        let place = blade.responses.iter().position(|response| response.matches(kind_of_sector, time));
-        let place = place.unwrap_or_else(|| {
-            blade.next_response = (blade.next_response + 1) % CACHED_RESPONSES;
-            blade.responses[blade.next_response].compute(&tables.rows, kind_of_sector, time);
-            blade.next_response
-        });
+        let place = blade.find_response(&tables.rows, self.place.kind, elapsed);
         let (instructions, pushes) = (blade.trial.instructions, kind.is_some() && blade.trial.pushes());
-        let length = interval.to - interval.from;
         instructions.run_octets(DenseOutput {
             trial: &mut blade.trial,
             rows: &tables.rows,
             level: tables.level(step.level, interpolation),
             response: &blade.responses[place],
-            time,
+            time: elapsed,
             faced: &faced,
             rate,
             pushes,
         });
-        BladeTrial::write(&tables.rows, &blade.trial.sample, state);
-        if self.is_in_recalled_flight && self.record_cubic_minima(length, shape_errors.iter().sum()) {
-            let begun = begun + step.from * interval.span;
+        theta
+    }
+
+    /// Time since the start of the open step (s) at a time (s since the start of the steady phase).
+    pub(super) fn time_in_step(&self, time: f64, span: f64) -> f64 {
+        let from = self.open.map_or(0.0, |open| open.step.from);
+        ((time - to_real(self.progress.spans) * span) - from * span).max(0.0)
+    }
+
+    /// Finds the gaps at the start of an interval of the steady phase, which the recalled open step contains.
+    pub(crate) fn sample_start(&mut self, interval: SteadyInterval, course: impl Fn(u64) -> MotionCourse) {
+        self.sample(interval.from, interval.span, course);
+        let Blade { trial, begun, tally, .. } = &mut *self.blade;
+        for (block, begun) in begun.iter_mut().enumerate() {
+            for (i, gap) in begun.0.iter_mut().enumerate().take(self.tables.rows.nodes.saturating_sub(8 * block)) {
+                let (sigma, steepness) = (trial.sample.sigma[block].0[i], self.tables.rows.steepness[block].0[i]);
+                *gap = trial.sample.gaps[block].0[i] / (steepness * steepness + sigma * sigma).sqrt();
+            }
+        }
+        trial.rates_before.copy_from_slice(&trial.rates);
+        include(&mut tally.lowest, begun);
+    }
+
+    /// Finds the gaps at the end of an interval of the steady phase, which the open step contains, and writes them to a state:
+    /// together with modes and contacts if `whole`.
+    pub(crate) fn write_sample(
+        &mut self,
+        interval: SteadyInterval,
+        course: impl Fn(u64) -> MotionCourse,
+        whole: bool,
+        state: &mut SectorState,
+    ) {
+        let theta = self.sample(interval.to, interval.span, course);
+        let (rows, sample) = (&self.tables.rows, &self.blade.trial.sample);
+        if whole {
+            BladeTrial::write(rows, sample, state);
+        } else {
+            BladeTrial::write_gaps(rows, sample, state);
+        }
+        let is_needed = self.is_in_recalled_flight && !self.is_quiet();
+        let Some(OpenStep { step, kind, .. }) = self.open.filter(|_| is_needed) else { return };
+        let (length, shape_ends) = (interval.to - interval.from, [theta - (interval.to - interval.from) / interval.span, theta]);
+        let shape_error = self.place.shape_errors(shape_ends).iter().sum();
+        if self.record_cubic_minima(length, shape_error) {
+            let begun = (to_real(self.progress.spans) * interval.span) + step.from * interval.span;
             let length = step.length * interval.span;
             let ends = [interval.from, interval.to].map(|time| ((time - begun) / length).clamp(0.0, 1.0));
-            self.follow(step, interpolation, ends);
+            self.follow(step, kind.unwrap_or(ForceInterpolation::Polynomial), ends);
         }
     }
 
@@ -271,7 +304,7 @@ impl BladeInSpan<'_> {
     }
 
     /// Returns whether forces act in the open step.
-    fn pushes(&self) -> bool {
+    pub(super) fn pushes(&self) -> bool {
         self.open.is_some_and(|open| open.kind.is_some()) && self.blade.trial.pushes
     }
 
@@ -295,6 +328,7 @@ impl BladeInSpan<'_> {
             self.write_sample(
                 interval,
                 |spans| course([to_real(spans) * interval.span, to_real(spans + 1) * interval.span]),
+                true,
                 state,
             );
             effort.add(&self.progress.effort);
@@ -338,6 +372,18 @@ pub(super) fn to_real(value: u64) -> f64 {
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "conversion saturates, and NaN becomes 0")]
 pub(super) fn to_count(value: f64) -> u64 {
     value as u64
+}
+
+impl Blade {
+    /// Finds the response of the modes of a kind of sectors after a time (s). Returns its place among the cached responses.
+    pub(super) fn find_response(&mut self, rows: &BladeRows, kind: usize, time: f64) -> usize {
+        let place = self.responses.iter().position(|response| response.matches(kind, time));
+        place.unwrap_or_else(|| {
+            self.next_response = (self.next_response + 1) % CACHED_RESPONSES;
+            self.responses[self.next_response].compute(rows, kind, time);
+            self.next_response
+        })
+    }
 }
 
 impl ModeResponse {

@@ -80,6 +80,7 @@ impl OctetKernel for FindClearance<'_> {
             }
             // The gap is F/N with N ≥ M; on a flank below 45° N ≤ √2 M.
             let smallest = left / (L::load(&rows.steepness[block]) * L::splat(std::f64::consts::SQRT_2));
+            L::select(valid, smallest, L::zero()).store(&mut trial.flight_bounds[block]);
             let of_block = smallest.less(L::load(&floors[block]).min(L::load(&lowest[block]))) & valid;
             trial.followed[block] = of_block;
             needed |= of_block;

@@ -108,9 +108,19 @@ impl BladeModel {
         self.kinds.iter_mut().for_each(|tables| tables.set_span(kind, span));
     }
 
-    /// Starts a span of all sectors, with gaps (m) of all nodes in rows of `lanes` lanes.
-    pub(crate) fn begin_span(&mut self, gaps: &[f64], lanes: usize, sectors: usize) {
-        let smallest = |row: &[f64]| row[..sectors].iter().copied().fold(f64::INFINITY, f64::min);
+    /// Starts a span of all sectors, with gaps (m) of all nodes in rows of `lanes` lanes. `is_known` returns whether the gaps of
+    /// a sector are known; unknown gaps are larger than the smallest known ones.
+    pub(crate) fn begin_span(
+        &mut self,
+        gaps: &[f64],
+        lanes: usize,
+        sectors: usize,
+        is_known: impl Fn(usize) -> bool,
+    ) {
+        let smallest = |row: &[f64]| {
+            let known = row[..sectors].iter().enumerate().filter(|(sector, _)| is_known(*sector));
+            known.map(|(_, gap)| *gap).fold(f64::INFINITY, f64::min)
+        };
         Eight::spread(gaps.chunks_exact(lanes).map(smallest), f64::NEG_INFINITY, &mut self.lowest);
         self.lowest_of_all.copy_from_slice(&self.lowest);
     }
@@ -129,6 +139,11 @@ impl BladeModel {
     pub(crate) fn supports_steady_phase(&self) -> bool {
         let mut modes = self.kinds.iter().flat_map(|tables| &tables.rows.rates[1]).flat_map(|block| block.0);
         modes.all(f64::is_finite)
+    }
+
+    /// See [`plausible_energy`](super::quiet::plausible_energy) (J).
+    pub(super) fn plausible_energy(&self, kind: usize) -> f64 {
+        self.kinds[kind].plausible_energy
     }
 
     /// Rows of the sectors of a kind.
@@ -232,6 +247,11 @@ impl<'a> BladeInSpan<'a> {
             has_changed: true,
             is_in_recalled_flight: false,
         }
+    }
+
+    /// Lane of the sector.
+    pub fn sector(&self) -> usize {
+        self.place.sector
     }
 
     /// Writes the state at the end of the span.
@@ -426,6 +446,7 @@ impl SpanSteps for BladeInSpan<'_> {
         let is_resolved = result.resolves_motion(kind, self.goal.tolerance);
         let work = replace(&mut tally.work, before);
         if is_open {
+            self.find_least(step, kind, is_resolved);
             let energy = self.energy_at_start();
             self.open = Some(OpenStep { step, kind: Some(kind), is_resolved, work, energy, banked });
             return banked;

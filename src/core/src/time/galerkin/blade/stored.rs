@@ -6,20 +6,26 @@ use super::trial::BladeTrial;
 use crate::math::octet::Eight;
 use crate::system::Effort;
 use crate::system::work::ContactWork;
+use crate::time::SteadyInterval;
 use crate::time::galerkin::basis::MOST;
 use crate::time::galerkin::span::{SpanStep, UNITS_PER_SPAN};
 use crate::time::galerkin::tables::HALVINGS;
 use crate::time::galerkin::trial::ForceInterpolation;
+use std::iter::once;
 
 /// Length of the header of a stored step, before its arrays.
 const HEADER_LEN: usize = 28;
 /// Code of a flight without an end.
 const UNBOUNDED_FLIGHT: f64 = 3.0;
+/// Index of the number that is 1 if the gaps at the last communication point are not known, otherwise 0.
+const UNSAMPLED: usize = 27;
 
 impl BladeInSpan<'_> {
     /// Stores the rates of the gaps and, if it has changed, the open step in an array with a length of [`stored_len`].
-    pub fn store(&mut self, numbers: &mut [f64]) {
+    /// `sampled` is false if the gaps at the end of the interval are not known.
+    pub fn store(&mut self, numbers: &mut [f64], sampled: bool) {
         let (head, arrays) = numbers.split_at_mut(HEADER_LEN);
+        head[UNSAMPLED] = f64::from(u8::from(!sampled));
         let (rates, arrays) = arrays.split_at_mut(8 * self.blade.trial.rates.len());
         let blocks = self.blade.trial.rates.iter().zip(rates.as_chunks_mut().0);
         blocks.for_each(|(block, numbers)| *numbers = block.0);
@@ -127,6 +133,55 @@ impl BladeInSpan<'_> {
     }
 }
 
+/// An open step that is stored in an array.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct StoredStep<'a>(&'a [f64]);
+
+impl<'a> StoredStep<'a> {
+    /// Reads an array; `None` if it contains no step.
+    pub fn new(numbers: &'a [f64]) -> Option<Self> {
+        (numbers[0] != 0.0).then_some(Self(numbers))
+    }
+
+    /// Returns whether the gaps of the sector at the last communication point are known.
+    pub fn is_sampled(self) -> bool {
+        self.0[UNSAMPLED] == 0.0
+    }
+
+    /// Returns whether forces act in the step, or the step has no end.
+    pub(super) fn is_special(self) -> bool {
+        self.0[8] != 0.0 || self.0[4] == UNBOUNDED_FLIGHT
+    }
+
+    /// Kinetic and strain energy at the start of the step (J).
+    pub(super) fn energy(self) -> f64 {
+        self.0[10]
+    }
+
+    /// Returns the time from the start of the step to the end of an interval of the steady phase (s); `None` if the step ends
+    /// within the interval.
+    pub(super) fn time_until(self, interval: SteadyInterval) -> Option<f64> {
+        let [spans, done, level] = [1, 2, 3].map(|index| to_count(self.0[index]));
+        let step = SpanStep::new(usize::try_from(level).unwrap_or(0).min(HALVINGS), done.min(UNITS_PER_SPAN - 1));
+        let time = interval.to - to_real(spans) * interval.span;
+        let contains = step.from + step.length > time / interval.span;
+        contains.then(|| (time - step.from * interval.span).max(0.0))
+    }
+
+    /// Lower bounds of the gaps (m), q and q̇ at the start of the step, in blocks of nodes and of modes.
+    pub(super) fn arrays(self, nodes: usize, modes: usize) -> [&'a [[f64; 8]]; 3] {
+        let blocks = &self.0[HEADER_LEN..].as_chunks().0[nodes..];
+        let (least, blocks) = blocks.split_at(nodes);
+        let (q, blocks) = blocks.split_at(modes);
+        [least, q, &blocks[..modes]]
+    }
+}
+
+/// Notes in an array that the gaps of the sector at the last communication point are not known.
+pub(crate) fn mark_unsampled(numbers: &mut [f64]) {
+    numbers[UNSAMPLED] = 1.0;
+}
+
 /// Returns the start of a stored step in spans of length `span` (s since the start of the steady phase); `None` for a
 /// flight and for an array without a step.
 pub(crate) fn stored_start(numbers: &[f64], span: f64) -> Option<f64> {
@@ -137,16 +192,17 @@ pub(crate) fn stored_start(numbers: &[f64], span: f64) -> Option<f64> {
 
 /// Length of an array that stores an open step of a blade with these numbers of nodes and of modes with inertia.
 pub(crate) fn stored_len(nodes: usize, modes: usize) -> usize {
-    HEADER_LEN + 8 * ((12 + 7 * MOST) * Eight::blocks(nodes) + (2 + MOST) * Eight::blocks(modes))
+    HEADER_LEN + 8 * ((13 + 7 * MOST) * Eight::blocks(nodes) + (2 + MOST) * Eight::blocks(modes))
 }
 
 impl BladeTrial {
     /// Calls a function with each block of an open step and its place in an array. A flight without a trial has no values at
     /// the points of a step.
     fn for_each_stored_block(&mut self, is_tried: bool, numbers: &mut [f64], of: impl Fn(&mut Eight, &mut [f64; 8])) {
-        let Self { start, moved, sigma, gaps, multipliers, forces, modal_forces, reach, .. } = self;
+        let Self { start, moved, sigma, gaps, multipliers, forces, modal_forces, reach, least, .. } = self;
         let contacts = [&mut start.multipliers, &mut start.slopes, &mut start.gaps, &mut start.sigma];
-        let all = start.modes.iter_mut().chain(&mut start.forces).chain(&mut start.moved).chain(contacts).chain(reach);
+        let first = once(least).chain(&mut start.modes);
+        let all = first.chain(&mut start.forces).chain(&mut start.moved).chain(contacts).chain(reach);
         let lanes =
             [sigma, gaps, multipliers, &mut start.friction].into_iter().chain(moved).chain(forces).chain(modal_forces);
         let mut rest = numbers.as_chunks_mut().0;

@@ -1,6 +1,7 @@
 //! Tables of one kind of sector for steps of all lengths, filled when a length is first used.
 
 use super::level::BladeLevel;
+use super::quiet::plausible_energy;
 use super::rows::BladeRows;
 use crate::geometry::revolution::RevolutionGap;
 use crate::modes::coordinates::ContactModes;
@@ -13,6 +14,8 @@ use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 #[derive(Debug)]
 pub(super) struct BladeTables {
     pub rows: BladeRows,
+    /// See [`plausible_energy`] (J).
+    pub plausible_energy: f64,
     modes: ContactModes,
     grids: [Grid; 2],
     /// Index of the grid in use.
@@ -60,7 +63,8 @@ impl BladeTables {
             polynomial: (0..2 * (HALVINGS + 1)).map(|_| level(ForceInterpolation::Polynomial)).collect(),
             constant: (0..2).map(|_| level(ForceInterpolation::Constant)).collect(),
         };
-        Self { rows, modes, grids: Default::default(), in_use: 0, unfilled: Mutex::new(unfilled) }
+        let plausible_energy = plausible_energy(&modes, &gap.layout);
+        Self { rows, plausible_energy, modes, grids: Default::default(), in_use: 0, unfilled: Mutex::new(unfilled) }
     }
 
     fn unfilled(&self) -> MutexGuard<'_, UnfilledTables> {
@@ -117,6 +121,7 @@ impl Clone for BladeTables {
         unfilled.polynomial.reserve_exact(2 * (HALVINGS + 1));
         unfilled.constant.reserve_exact(2);
         Self {
+            plausible_energy: self.plausible_energy,
             rows: rows.clone(),
             modes: modes.clone(),
             grids: grids.clone(),

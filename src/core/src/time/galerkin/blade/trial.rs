@@ -136,6 +136,9 @@ pub(crate) struct BladeTrial {
     pub(super) unresolved: Option<f64>,
     /// Largest closing and circumferential displacements at any time without contact (m).
     pub(super) reach: [Vec<Eight>; 2],
+    /// Lower bounds of the gaps in the open step (m), and in the flight that was examined last.
+    pub(super) least: Vec<Eight>,
+    pub(super) flight_bounds: Vec<Eight>,
     pub(super) instructions: InstructionSet,
 }
 
@@ -186,6 +189,8 @@ impl BladeTrial {
             impulses: vec![Eight::ZERO; 2 * nodes],
             pushes: false,
             reach: [of_nodes(), of_nodes()],
+            least: of_nodes(),
+            flight_bounds: of_nodes(),
             instructions: InstructionSet::detect(),
         }
     }
@@ -241,6 +246,15 @@ impl BladeTrial {
                 set_vector3_at(&mut state.normals, node, rows.in_space(node, Vector2::new(1.0, sigma)) / length);
                 state.multipliers[node] = multiplier * length;
             }
+        }
+    }
+
+    /// Writes the gaps to a state.
+    pub(super) fn write_gaps(rows: &BladeRows, contacts: &StartContacts, state: &mut SectorState) {
+        for (node, gap) in state.gaps.iter_mut().enumerate() {
+            let of = |values: &[Eight]| values[node / 8].0[node % 8];
+            let (sigma, steepness) = (of(&contacts.sigma), of(&rows.steepness));
+            *gap = of(&contacts.gaps) / (steepness * steepness + sigma * sigma).sqrt();
         }
     }
 

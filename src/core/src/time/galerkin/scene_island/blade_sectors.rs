@@ -12,7 +12,9 @@ use crate::system::contact_view::ContactMember;
 use crate::system::pair::Prescribed;
 use crate::system::{ContactPair, Effort, StepFailure, Structure, System};
 use crate::time::SteadyInterval;
-use crate::time::galerkin::blade::{Blade, BladeInSpan, BladeModel, BladePlace, BladeTally};
+use crate::time::galerkin::blade::{
+    Blade, BladeInSpan, BladeModel, BladePlace, BladeTally, QuietSector, StoredStep, mark_unsampled,
+};
 use crate::time::galerkin::island::StepControl;
 use crate::time::galerkin::record::MotionCourse;
 use crate::time::galerkin::span::{StepGoal, Stopped, integrate};
@@ -62,10 +64,26 @@ pub(super) struct SectorResult {
     /// Rates of the gaps at the end of an interval of a steady phase (m/s), and energy at the start of the open step (J).
     pub gap_rates: Vec<f64>,
     pub energy: f64,
+    /// What is known at the end of the span.
+    pub sampled: Sampled,
+    /// Kinetic and strain energy at the end of an interval of a steady phase (J), if no forces act in the open step.
+    pub energies: Option<[f64; 2]>,
     pub effort: Effort,
     /// True if a gap of the last trial is not a number.
     pub is_lost: bool,
     pub outcome: Result<(), Stopped>,
+}
+
+/// What is known of a sector at the end of a span. At the end of an interval of a steady phase, only what outputs or the
+/// next interval need is evaluated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Sampled {
+    /// Nothing but the energies.
+    Energies,
+    /// The gaps.
+    Gaps,
+    /// Gaps, modes, displacements and contact forces.
+    State,
 }
 
 /// A span of the sectors.
@@ -157,6 +175,8 @@ impl BladeSectors {
             tally: scratch.blade.tally.clone(),
             gap_rates: vec![0.0; nodes],
             energy: 0.0,
+            sampled: Sampled::State,
+            energies: None,
             effort: Effort::default(),
             is_lost: false,
             outcome: Ok(()),
@@ -227,7 +247,8 @@ impl BladeSectors {
         if result.outcome == Err(Stopped::Exhausted) || counted.effort.tried() > goal.most {
             return Err(StepFailure::Exhausted);
         }
-        if let SectorSpan::Interval(_) = span {
+        let is_interval = matches!(span, SectorSpan::Interval(_));
+        if is_interval {
             of.step_control.energies[sector] = result.energy;
             if result.outcome.is_ok() {
                 of.write_gaps(sector, result);
@@ -243,6 +264,10 @@ impl BladeSectors {
             return Err(StepFailure::Implausible { structure, sector });
         }
         of.write_result(sector, result);
+        if is_interval {
+            let energies = result.energies.unwrap_or_else(|| of.modes.energies_of(sector));
+            of.step_control.energies_now[2 * sector..][..2].copy_from_slice(&energies);
+        }
         result.outcome.map_err(|_| StepFailure::Unsolved { structure, sector })
     }
 
@@ -290,8 +315,22 @@ impl SectorsInSpan<'_> {
         let (kind, control) = (bank.set_of(sector), structure.step_control_of(sector));
         (result.kind, result.control) = (kind, control);
         (result.effort, result.outcome) = (Effort::default(), Ok(()));
+        (result.sampled, result.energies, result.is_lost) = (Sampled::State, None, false);
         structure.read_gaps(sector, state);
+        let stored = StoredStep::new(open_step).filter(|_| matches!(self.span, SectorSpan::Interval(_)));
+        if stored.is_some_and(|step| !step.is_sampled()) {
+            state.gaps.fill(f64::INFINITY);
+        }
         blade.choose_minima(model, &structure.needed_minima, sector, &state.gaps);
+        if let (SectorSpan::Interval(interval), Some(step)) = (self.span, stored)
+            && !structure.needs_state(sector)
+            && let Some(QuietSector { energies, at_start }) = blade.quiet_energies(model, kind, step, interval)
+        {
+            (result.sampled, result.energies, result.energy) = (Sampled::Energies, Some(energies), at_start);
+            mark_unsampled(open_step);
+            swap(&mut result.tally, &mut blade.tally);
+            return;
+        }
         let (course, has_open_step) = match self.span {
             SectorSpan::Bounded(course, _) => (*course, false),
             _ => (MotionCourse::default(), open_step[0] != 0.0),
@@ -314,7 +353,9 @@ impl SectorsInSpan<'_> {
             SectorSpan::End(interval) => self.end(&mut steps, interval, open_step, result),
         }
         swap(&mut result.tally, &mut blade.tally);
-        result.displacements.copy_from_slice(trial.displacements(&self.tables[result.kind].rows, &result.state));
+        if result.sampled == Sampled::State {
+            result.displacements.copy_from_slice(trial.displacements(&self.tables[result.kind].rows, &result.state));
+        }
     }
 
     fn integrate_interval(
@@ -324,16 +365,32 @@ impl SectorsInSpan<'_> {
         open_step: &mut [f64],
         result: &mut SectorResult,
     ) {
-        steps.recall(open_step);
+        let (structure, sector) = (self.structure, steps.sector());
+        let was_sampled = StoredStep::new(open_step).is_none_or(StoredStep::is_sampled);
         let course = |spans: u64| steady_course(self.prescribed, real_count(spans) * interval.span, interval.span);
+        if steps.recall(open_step) && !was_sampled && !steps.is_quiet() {
+            steps.sample_start(interval, course);
+        }
         result.outcome = steps.integrate_steady_interval(interval, course, &mut result.effort);
         result.is_lost = steps.is_lost();
-        if result.outcome.is_ok() {
-            steps.write_sample(interval, course, &mut result.state);
-            steps.store(open_step);
+        (result.control, result.energy) = (steps.control, steps.energy());
+        if result.outcome.is_err() {
+            return;
+        }
+        let needs_gaps = structure.needed_minima.depends_on(sector) || !steps.is_quiet();
+        result.energies = steps.energies_without_forces(interval);
+        let is_plausible = result.energies.is_some_and(|energies| steps.is_plausible(energies));
+        let needs_state = structure.needs_state(sector) || structure.is_loaded(sector) || !is_plausible;
+        result.sampled = match (needs_state, needs_gaps) {
+            (true, _) => Sampled::State,
+            (false, true) => Sampled::Gaps,
+            (false, false) => Sampled::Energies,
+        };
+        if result.sampled != Sampled::Energies {
+            steps.write_sample(interval, course, needs_state, &mut result.state);
             result.gap_rates.iter_mut().enumerate().for_each(|(node, rate)| *rate = steps.gap_rate(node));
         }
-        (result.control, result.energy) = (steps.control, steps.energy());
+        steps.store(open_step, needs_gaps);
     }
 
     /// Ends the open step of a sector.

@@ -1,6 +1,6 @@
 //! Contacts of a sector, as read and written by the steps of an island.
 
-use super::blade_sectors::SectorResult;
+use super::blade_sectors::{Sampled, SectorResult};
 use crate::math::vector::{set_strided_vector3, set_vector3_at, vector3_at};
 use crate::system::Structure;
 use crate::time::galerkin::island::StepControl;
@@ -47,7 +47,7 @@ impl Structure {
     }
 
     /// Returns whether a contact of a sector pushes.
-    fn is_loaded(&self, sector: usize) -> bool {
+    pub(super) fn is_loaded(&self, sector: usize) -> bool {
         (0..self.nodes()).any(|node| self.history.multiplier[self.index(node, sector)] != 0.0)
     }
 
@@ -73,8 +73,15 @@ impl Structure {
         }
     }
 
-    /// Writes the gaps at the end of an interval of a steady phase.
+    /// Writes the gaps at the end of an interval of a steady phase; unknown gaps are infinite.
     pub(super) fn write_gaps(&mut self, sector: usize, result: &SectorResult) {
+        if result.sampled == Sampled::Energies {
+            for node in 0..self.nodes() {
+                let index = self.index(node, sector);
+                (self.history.gap.now[index], self.history.gap.before[index]) = (f64::INFINITY, f64::INFINITY);
+            }
+            return;
+        }
         let step = self.modes().step();
         for (node, (gap, rate)) in result.state.gaps.iter().zip(&result.gap_rates).enumerate() {
             let index = self.index(node, sector);
@@ -84,14 +91,17 @@ impl Structure {
 
     /// Writes the state of a sector that faces a surface of revolution after a span.
     pub(super) fn write_result(&mut self, sector: usize, result: &SectorResult) {
-        let SectorResult { state, tally, control, displacements, .. } = result;
-        if state.is_loaded() || self.is_loaded(sector) {
+        let SectorResult { state, tally, control, displacements, sampled, .. } = result;
+        let is_known = *sampled == Sampled::State;
+        if is_known && (state.is_loaded() || self.is_loaded(sector)) {
             self.write_contacts(sector, state, |node| tally.lowest(node));
         } else {
             self.write_lowest(sector, |node| tally.lowest(node));
         }
         self.write_step_control(sector, *control);
-        self.modes.write_sector(sector, &state.position, &state.velocity, &state.forces, displacements);
+        if is_known {
+            self.modes.write_sector(sector, &state.position, &state.velocity, &state.forces, displacements);
+        }
         self.modes.lose(sector, tally.damping);
     }
 }

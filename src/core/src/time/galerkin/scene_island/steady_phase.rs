@@ -5,7 +5,7 @@ use super::blade_sectors::{SectorSpan, SpanOfSectors};
 use crate::system::pair::Prescribed;
 use crate::system::{StepFailure, Structure, System};
 use crate::time::SteadyInterval;
-use crate::time::galerkin::blade::{SpanKind, stored_len, stored_start};
+use crate::time::galerkin::blade::{SpanKind, StoredStep, stored_len, stored_start};
 use crate::time::galerkin::record::MotionCourse;
 use crate::time::workers::Workers;
 
@@ -32,7 +32,10 @@ impl SceneIsland {
             // Copies padding lanes, which no sector writes.
             structure.history.gap.now.copy_from_slice(&structure.history.gap.before);
             sectors.model.set_span(SpanKind::Steady, interval.span);
-            sectors.model.begin_span(&structure.history.gap.before, structure.lanes(), self.turns);
+            let (open_steps, len) = (&structure.step_control.open_steps, sectors.open_step_len);
+            let is_known =
+                |sector: usize| StoredStep::new(&open_steps[sector * len..]).is_none_or(StoredStep::is_sampled);
+            sectors.model.begin_span(&structure.history.gap.before, structure.lanes(), self.turns, is_known);
         }
         self.integrate_sectors(system, SectorSpan::Interval(interval), self.goal, workers)
     }
@@ -85,6 +88,7 @@ impl Structure {
     pub(crate) fn allocate_open_steps(&mut self) {
         if self.nodes() > 0 && self.bank().is_some() {
             self.step_control.open_steps = vec![0.0; self.modes().sectors() * self.open_step_len()];
+            self.step_control.energies_now = vec![0.0; 2 * self.modes().sectors()];
         }
     }
 }

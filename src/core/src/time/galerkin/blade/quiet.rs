@@ -1,0 +1,162 @@
+//! Sectors whose gaps no output needs.
+//!
+//! The gaps in an open step without forces have lower bounds. While these bounds are above the smallest gaps of other
+//! sectors, no output needs the gaps of the sector, and its state is evaluated only for its energy.
+
+use super::columns::displace;
+use super::dense::ModeResponse;
+use super::level::BladeLevel;
+use super::minima::BlockGaps;
+use super::rows::BladeRows;
+use super::span::{Blade, BladeInSpan, BladeModel};
+use super::stored::StoredStep;
+use super::trial::BladeTrial;
+use crate::geometry::layout::Layout;
+use crate::math::octet::{Eight, Octet, OctetKernel, both};
+use crate::modes::coordinates::ContactModes;
+use crate::system::small::{CURVED_SHARE, LEAST_CLEARANCE};
+use crate::time::SteadyInterval;
+use crate::time::galerkin::span::SpanStep;
+use crate::time::galerkin::trial::ForceInterpolation;
+
+impl Blade {
+    /// Returns whether no gap in a step with these lower bounds (m) can be a smallest gap that an output needs.
+    pub(super) fn is_above<'a>(&self, least: impl Iterator<Item = &'a [f64; 8]>) -> bool {
+        let needed = self.floors.iter().zip(&self.tally.lowest);
+        let above = |(least, (floors, lowest)): (&[f64; 8], (&Eight, &Eight))| {
+            least.iter().zip(floors.0).zip(lowest.0).all(|((least, floor), lowest)| *least >= floor.min(lowest))
+        };
+        least.zip(needed).all(above)
+    }
+
+    /// Finds the kinetic and strain energy (J) of a sector at the end of an interval if the sector is quiet: no forces act in
+    /// its stored step, which contains the interval, and no output needs a gap of it. The needed smallest gaps must be chosen.
+    pub fn quiet_energies(
+        &mut self,
+        model: &BladeModel,
+        kind: usize,
+        step: StoredStep,
+        interval: SteadyInterval,
+    ) -> Option<QuietSector> {
+        let rows = model.rows(kind);
+        let time = step.time_until(interval).filter(|_| !step.is_special())?;
+        let [least, q, v] = step.arrays(rows.blocks, rows.mode_blocks);
+        if !self.is_above(least.iter()) {
+            return None;
+        }
+        let start = &mut self.trial.start.modes;
+        for (modes, stored) in start.iter_mut().zip([q, v]) {
+            modes.iter_mut().zip(stored).for_each(|(block, stored)| block.0 = *stored);
+        }
+        let energies = self.find_energies(rows, kind, time);
+        (energies.iter().sum::<f64>() <= model.plausible_energy(kind)).then_some(QuietSector { energies, at_start: step.energy() })
+    }
+
+    /// Kinetic and strain energy (J) at a time (s) in the open step, in which no forces act.
+    pub(super) fn find_energies(&mut self, rows: &BladeRows, kind: usize, time: f64) -> [f64; 2] {
+        let place = self.find_response(rows, kind, time);
+        let (trial, response) = (&self.trial, &self.responses[place]);
+        trial.instructions.run_octets(FindEnergies { modes: &trial.start.modes, rows, response })
+    }
+}
+
+impl BladeInSpan<'_> {
+    /// Finds lower bounds of the gaps in the tried step, which is accepted and stays open.
+    pub(super) fn find_least(&mut self, step: SpanStep, kind: ForceInterpolation, is_resolved: bool) {
+        let (rows, level, trial) = (&self.tables.rows, self.tables.level(step.level, kind), &mut self.blade.trial);
+        if trial.pushes || !is_resolved || trial.unresolved.is_none() {
+            trial.least.fill(Eight([f64::NEG_INFINITY; 8]));
+            return;
+        }
+        let instructions = trial.instructions;
+        instructions.run_octets(FindLeast { trial, rows, level });
+    }
+
+    /// Returns whether no gap in the open step can be a smallest gap that an output needs.
+    pub fn is_quiet(&self) -> bool {
+        !self.pushes() && self.blade.is_above(self.blade.trial.least.iter().map(|block| &block.0))
+    }
+
+    /// Returns whether vibration with these kinetic and strain energies (J) without forces certainly causes only small
+    /// displacements.
+    pub fn is_plausible(&self, energies: [f64; 2]) -> bool {
+        energies.iter().sum::<f64>() <= self.tables.plausible_energy
+    }
+
+    /// Kinetic and strain energy at the end of an interval of the steady phase (J), if no forces act in the open step.
+    pub fn energies_without_forces(&mut self, interval: SteadyInterval) -> Option<[f64; 2]> {
+        let time = self.time_in_step(interval.to, interval.span);
+        (!self.pushes()).then(|| self.blade.find_energies(&self.tables.rows, self.place.kind, time))
+    }
+}
+
+/// A sector whose gaps no output needs.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct QuietSector {
+    /// Kinetic and strain energy at the end of the interval (J).
+    pub energies: [f64; 2],
+    /// Energy at the start of the open step (J).
+    pub at_start: f64,
+}
+
+/// Returns the largest energy (J) of vibration without forces that certainly causes only small displacements: less than the
+/// [limit](Layout::largest_displacement) in every direction, and too small a displacement around the axis for a warning.
+pub(super) fn plausible_energy(modes: &ContactModes, layout: &Layout) -> f64 {
+    let gap = layout.clearances.iter().fold(f64::INFINITY, |low: f64, clearance| low.min(*clearance));
+    let most = |row: usize| {
+        // A displacement u of this row takes at least the energy ½u²/g.
+        let shapes = modes.shapes.row(row);
+        let flexibility: f64 = shapes.iter().zip(&modes.frequencies).map(|(shape, w)| (shape / w) * (shape / w)).sum();
+        let per_radius = layout.per_radius[row / 3];
+        let curved = (2.0 * CURVED_SHARE * gap.max(LEAST_CLEARANCE / per_radius) / per_radius).sqrt();
+        let limit = layout.largest_displacement().min(if row % 3 == 1 { curved } else { f64::INFINITY });
+        0.5 * limit * limit / flexibility
+    };
+    // Rounding must not matter.
+    0.99 * (0..modes.rows()).map(most).fold(f64::INFINITY, f64::min)
+}
+
+/// See [`Blade::find_energies`].
+struct FindEnergies<'a> {
+    /// q and q̇ at the start of the step.
+    modes: &'a [Vec<Eight>; 2],
+    rows: &'a BladeRows,
+    response: &'a ModeResponse,
+}
+
+impl OctetKernel for FindEnergies<'_> {
+    type Output = [f64; 2];
+    #[inline(always)]
+    fn run<L: Octet>(self) -> [f64; 2] {
+        let Self { modes, rows, response } = self;
+        let mut sums = [L::zero(); 2];
+        for k in 0..rows.mode_blocks {
+            let [q, v] = both(|of| L::load(&modes[of][k]));
+            let square = L::load(&rows.rates[2][k]);
+            let [position, velocity] = response.free::<L>(k, [q, v], square);
+            sums = [sums[0] + velocity * velocity, sums[1] + position * position * square];
+        }
+        sums.map(|sum| 0.5 * sum.total())
+    }
+}
+
+/// Finds lower bounds of the gaps (m) of all nodes in the tried step, in which no forces act. The interpolation errors of
+/// the modes must be known.
+pub(super) struct FindLeast<'a> {
+    pub trial: &'a mut BladeTrial,
+    pub rows: &'a BladeRows,
+    pub level: &'a BladeLevel,
+}
+
+impl OctetKernel for FindLeast<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<L: Octet>(self) {
+        let Self { trial, rows, level } = self;
+        displace::<L, 1, 1>([&rows.magnitudes[0]], rows.blocks, [&trial.mode_bounds], [&mut trial.path_moved[0]]);
+        for block in 0..rows.blocks {
+            let bound = BlockGaps::<L>::new(trial, rows, level, block).lower_bound();
+            L::select(rows.valid(block), bound, L::zero()).store(&mut trial.least[block]);
+        }
+    }
+}
