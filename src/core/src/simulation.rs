@@ -124,7 +124,7 @@ impl Simulation {
 
     /// Leaves out the state of sectors on which no output depends, which saves time at communication points. Values of
     /// variables stay the same. [`Simulation::system`] and [`Simulation::watched_displacements`] then return older values or
-    /// infinite gaps for sectors that are not watched. The choice is not part of a saved state.
+    /// the gap [`NO_CLEARANCE`](tiprub_cosim::variables::NO_CLEARANCE) for sectors that are not watched. The choice is not part of a saved state.
     ///
     /// # Examples
     /// ```

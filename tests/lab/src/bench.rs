@@ -1,5 +1,7 @@
 //! Run time and error of rubs by tolerance and communication step, with baselines measured in the same run.
 
+mod features;
+
 use serde_json::{Value, json};
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::settings::Shape;
@@ -60,11 +62,21 @@ struct BenchRow {
     revolution: f64,
 }
 
-/// Runs `milliseconds` of the scene with communication steps of `interval` (s).
-fn timed(scene: &Scene, interval: f64, milliseconds: u32) -> tiprub_core::Result<TimedRub> {
+/// Returns the displacements of all contact nodes at the current time (m).
+fn displacements_of<'a>(simulation: &'a Simulation, scene: &'a Scene) -> impl Iterator<Item = f64> + 'a {
+    let bank = simulation.system().bank();
+    bank.displacement().chunks_exact(bank.lanes()).flat_map(|row| &row[..scene.roms[0].sectors]).copied()
+}
+
+/// Runs `milliseconds` of the scene with communication steps of `interval` (s). If not `whole`, as in an FMU, only the state
+/// that outputs need is evaluated, and there are no displacements.
+fn timed(scene: &Scene, interval: f64, milliseconds: u32, whole: bool) -> tiprub_core::Result<TimedRub> {
     let mut scene = scene.clone();
     scene.settings.experiment.communication_step = interval;
     let mut simulation = Simulation::new(&scene)?;
+    if !whole {
+        simulation.read_only_variables();
+    }
     simulation.initialise(0.0)?;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most a hundred")]
     let steps = (1e-3 / interval).round() as u32;
@@ -73,20 +85,19 @@ fn timed(scene: &Scene, interval: f64, milliseconds: u32) -> tiprub_core::Result
         let before = clock::now();
         simulation.do_step(f64::from(step) * interval, interval)?;
         found.seconds += (clock::now() - before).as_secs_f64();
-        if (step + 1).is_multiple_of(steps) {
-            let bank = simulation.system().bank();
-            let rows = bank.displacement().chunks_exact(bank.lanes());
-            found.displacements.extend(rows.flat_map(|row| &row[..scene.roms[0].sectors]));
+        if whole && (step + 1).is_multiple_of(steps) {
+            found.displacements.extend(displacements_of(&simulation, &scene));
         }
     }
     Ok(found)
 }
 
-/// Returns the fastest of several runs.
+/// Returns the displacements, and the time of the fastest of several runs.
 fn fastest(scene: &Scene, interval: f64, size: BenchSize) -> tiprub_core::Result<TimedRub> {
-    let mut best = timed(scene, interval, size.milliseconds)?;
-    for _ in 1..size.repetitions {
-        best.seconds = best.seconds.min(timed(scene, interval, size.milliseconds)?.seconds);
+    let mut best = timed(scene, interval, size.milliseconds, true)?;
+    best.seconds = f64::INFINITY;
+    for _ in 0..size.repetitions {
+        best.seconds = best.seconds.min(timed(scene, interval, size.milliseconds, false)?.seconds);
     }
     Ok(best)
 }
@@ -134,7 +145,7 @@ impl Rub {
 
     /// Returns the rows of adaptive steps.
     fn adaptive(&self) -> tiprub_core::Result<Vec<BenchRow>> {
-        let finest = timed(&self.with_tolerance(FINEST), BASE_INTERVAL, self.size.milliseconds)?;
+        let finest = timed(&self.with_tolerance(FINEST), BASE_INTERVAL, self.size.milliseconds, true)?;
         let mut rows = Vec::new();
         for tolerance in TOLERANCES {
             let scene = self.with_tolerance(tolerance);
@@ -156,7 +167,7 @@ impl Rub {
             let step = LONGEST * 0.5_f64.powi(halvings);
             let setting = format!("h = {:.4} µs", 1e6 * step);
             let runs = fastest(&with(step), BASE_INTERVAL, self.size)
-                .and_then(|run| Ok([run, timed(&with(0.25 * step), BASE_INTERVAL, self.size.milliseconds)?]));
+                .and_then(|run| Ok([run, timed(&with(0.25 * step), BASE_INTERVAL, self.size.milliseconds, true)?]));
             match runs {
                 Ok([run, finer]) => {
                     let error = apart(&run.displacements, &finer.displacements);
@@ -234,12 +245,13 @@ impl BenchRow {
 /// If a run with adaptive steps fails.
 pub(crate) fn study(common: &StudyCommon, console: &Console) -> Result<Study> {
     let rubs = rubs(common, console)?;
-    let task = console.task("Timing rubs", Some(rubs.len() as u64));
+    let task = console.task("Timing rubs", Some((rubs.len() + features::COUNT) as u64));
     let mut rows = Vec::new();
     for (done, rub) in (1..).zip(&rubs) {
         rows.extend(rub.rows()?);
         task.at(done);
     }
+    let (by_feature, of_features) = features::compare(&rubs[0], &|done| task.at((rubs.len() + done) as u64))?;
     drop(task);
     let columns = ["rub", "method", "setting", "H (µs)", "ms per revolution", "time (s/s)", "error"];
     let mut table = Table::new("Processor time and error of rubs", columns);
@@ -263,7 +275,10 @@ pub(crate) fn study(common: &StudyCommon, console: &Console) -> Result<Study> {
             format!("at most {worst:.2} of the tolerance"),
         )],
         figures: Vec::new(),
-        results: rows.iter().map(BenchRow::json).collect(),
-        files: vec![("bench.md".into(), "table of the results".into(), table.to_markdown().into_bytes())],
+        results: rows.iter().map(BenchRow::json).chain(of_features).collect(),
+        files: vec![
+            ("bench.md".into(), "table of the results".into(), table.to_markdown().into_bytes()),
+            ("features.md".into(), "table of the features".into(), by_feature.to_markdown().into_bytes()),
+        ],
     })
 }

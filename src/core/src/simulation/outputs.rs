@@ -343,7 +343,7 @@ impl Simulation {
     /// Value of one row of an observation matrix (per unit of each mode) at the displacements of a sector.
     fn observed(&self, body: usize, shapes: &DMatrix<f64>, row: usize, sector: usize) -> f64 {
         let modes = self.system.structures()[body].modes();
-        shapes.row(row).iter().enumerate().map(|(mode, shape)| shape * modes.modal_state(mode, sector).0).sum()
+        modes.weigh_positions(sector, |mode| shapes[(row, mode)])
     }
 
     pub(super) fn derivative_of(&self, variable: &Variable, element: usize, reference: u32) -> f64 {

@@ -1,6 +1,7 @@
 //! One structure: its modes, its contact nodes and their history, and the forces on surfaces that it carries.
 
 use tiprub_cosim::persist_fields;
+use tiprub_cosim::variables::NO_CLEARANCE;
 
 use crate::geometry::{Geometry, Vector3};
 use crate::math::vector::{set_strided_vector3, strided_vector3, vector3_at};
@@ -15,6 +16,9 @@ use crate::system::pulling::Pulling;
 /// Penetrations below this count as zero (m): the squares of the resulting values leave the range of double precision, and such
 /// small modes are set to rest.
 const LEAST_PENETRATION: f64 = 1e-150;
+
+/// Gap that is not known because no output needs it (m). Saved states contain finite numbers only.
+pub(crate) const UNKNOWN_GAP: f64 = NO_CLEARANCE;
 
 /// A structure of a scene. Rows of its modes are three per contact node, or three per control point of the surfaces it carries.
 #[derive(Debug, Clone)]

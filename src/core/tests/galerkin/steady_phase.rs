@@ -3,9 +3,9 @@
 
 use super::{apart, print_row, scene};
 use tiprub_core::scene::method::Scheme;
-use tiprub_core::scene::settings::Shape;
+use tiprub_core::scene::settings::{OutputSettings, Shape};
 use tiprub_core::{CoSimulation, Scene, Simulation};
-use tiprub_test_models::{SeededRandom, bits, element, go, real, saved, set, started};
+use tiprub_test_models::{SeededRandom, bits, bumps, element, go, real, rich_blade, saved, set, started};
 
 /// A communication step whose multiples are exact binary numbers (s).
 const TICK: f64 = 1.0 / 131_072.0;
@@ -122,6 +122,54 @@ fn saved_states_continue_with_equal_bits_within_an_open_step() {
         assert_eq!(bits(&simulation), bits(&other));
     }
     assert!(saved(&other) == saved(&simulation));
+}
+
+/// Callers that read only variables do not get the state of sectors on which no output depends.
+#[test]
+fn variables_do_not_depend_on_states_that_are_left_out() {
+    const SECTORS: usize = 12;
+    let only_variables = |scene: &Scene| {
+        let mut simulation = Simulation::new(scene).unwrap();
+        simulation.read_only_variables();
+        simulation.initialise(0.0).unwrap();
+        simulation
+    };
+    let left_out = |simulation: &Simulation| {
+        let structure = &simulation.system().structures()[0];
+        (0..SECTORS).map(|sector| u32::from(structure.gap(0, sector) >= 1e9)).sum::<u32>()
+    };
+    for (tolerance, step, count, least) in
+        [(1e-2, 1e-6, 2000, 0.4), (1e-2, 1.3e-5, 500, 0.3), (1e-4, 1.3e-5, 300, 0.1), (1e-3, 1.7e-4, 40, 0.05)]
+    {
+        let mut scene = bumps(rich_blade(SECTORS));
+        scene.settings.time = rub(tolerance).settings.time;
+        scene.settings.outputs =
+            OutputSettings { watched_sectors: vec![2], energies: true, ..OutputSettings::default() };
+        let [mut all, mut few, mut restored] = [started(&scene), only_variables(&scene), started(&scene)];
+        let mut omitted = 0;
+        for n in 0..count {
+            if n % 300 == 299 {
+                for simulation in [&mut all, &mut few, &mut restored] {
+                    set(simulation, "speed", 1200.0 + f64::from(n));
+                }
+            }
+            if n % 7 == 3 {
+                restored.restore_state(&saved(&few)).unwrap();
+            }
+            [&mut all, &mut few, &mut restored].into_iter().for_each(|simulation| go(simulation, step));
+            assert_eq!(bits(&all), bits(&few), "tolerance {tolerance:e}, step {step:e}, {n}");
+            assert!(n < 4 || bits(&all) == bits(&restored), "restored, {step:e}, {n}");
+            omitted += left_out(&few);
+            assert_eq!(left_out(&all), 0);
+        }
+        let share = f64::from(omitted) / f64::from(count * 12);
+        print_row!(
+            "tolerance {tolerance:.0e}, H = {step:.1e} s: state left out in {:.0} % of all cases",
+            100.0 * share
+        );
+        assert!(share > least, "{share}");
+        assert_eq!(all.system().effort(), few.system().effort());
+    }
 }
 
 #[test]

@@ -65,7 +65,8 @@ impl ModalBank {
 
     /// Kinetic and strain energy of an uncoupled sector (J), for a scheme that stores velocities.
     pub(crate) fn energies_of(&self, sector: usize) -> [f64; 2] {
-        let (velocities, coefficients) = (&self.velocities[self.set_of(sector) * self.modes..], self.coefficients(sector));
+        let (velocities, coefficients) =
+            (&self.velocities[self.set_of(sector) * self.modes..], self.coefficients(sector));
         let (mut kinetic, mut strain) = (0.0, 0.0);
         self.each_part(sector, |mode, _, position, increment| {
             let velocity = velocities[mode].of(position, increment, 0.0);

@@ -33,8 +33,8 @@ mod tally;
 mod tests;
 mod trial;
 
-pub(crate) use span::{Blade, BladeInSpan, BladeModel, BladePlace};
 pub(crate) use quiet::QuietSector;
+pub(crate) use span::{Blade, BladeInSpan, BladeModel, BladePlace};
 pub(crate) use stored::{StoredStep, mark_unsampled, stored_len, stored_start};
 pub(crate) use tables::SpanKind;
 pub(crate) use tally::BladeTally;

@@ -9,6 +9,7 @@ use super::level::BladeLevel;
 use super::rows::BladeRows;
 use super::trial::{BladeTrial, StartContacts};
 use crate::math::octet::{Eight, Octet, OctetKernel, both};
+use crate::system::structure::UNKNOWN_GAP;
 use crate::time::galerkin::basis::{PLACES, POINTS};
 use crate::time::galerkin::trial::{FALLING, NEAR};
 
@@ -156,12 +157,12 @@ impl<L: Octet> BlockGaps<L> {
         self.smallest().less(threshold.max(L::zero()) * (self.steepness + self.steepest)) & self.open
     }
 
-    /// Bounds the gaps of the nodes from below (m); −∞ for nodes that may touch.
+    /// Bounds the gaps of the nodes from below (m); `-UNKNOWN_GAP` for nodes that may touch.
     #[inline(always)]
     pub fn lower_bound(&self) -> L {
         let smallest = self.smallest();
         let positive = L::zero().less(smallest) & self.open;
-        L::select(positive, smallest / (self.steepness + self.steepest), L::splat(f64::NEG_INFINITY))
+        L::select(positive, smallest / (self.steepness + self.steepest), L::splat(-UNKNOWN_GAP))
     }
 
     /// Bounds F from below (m).

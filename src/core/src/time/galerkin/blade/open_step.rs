@@ -6,6 +6,7 @@
 use super::dense::{DenseOutput, ModeResponse};
 use super::follow::CubicMinima;
 use super::gaps::{drive_and_rate_at, include};
+use super::quiet::NO_BOUND;
 use super::rows::BladeRows;
 use super::span::{Blade, BladeInSpan, RecordScope};
 use super::surface::PointDrive;
@@ -74,7 +75,7 @@ impl BladeInSpan<'_> {
         self.blade.trial.pushes = false;
         let BladeTrial { least, flight_bounds, .. } = &mut self.blade.trial;
         if step.length == f64::INFINITY {
-            least.fill(Eight([f64::NEG_INFINITY; 8]));
+            least.fill(NO_BOUND);
         } else {
             least.copy_from_slice(flight_bounds);
         }
@@ -271,7 +272,8 @@ impl BladeInSpan<'_> {
         }
         let is_needed = self.is_in_recalled_flight && !self.is_quiet();
         let Some(OpenStep { step, kind, .. }) = self.open.filter(|_| is_needed) else { return };
-        let (length, shape_ends) = (interval.to - interval.from, [theta - (interval.to - interval.from) / interval.span, theta]);
+        let (length, shape_ends) =
+            (interval.to - interval.from, [theta - (interval.to - interval.from) / interval.span, theta]);
         let shape_error = self.place.shape_errors(shape_ends).iter().sum();
         if self.record_cubic_minima(length, shape_error) {
             let begun = (to_real(self.progress.spans) * interval.span) + step.from * interval.span;

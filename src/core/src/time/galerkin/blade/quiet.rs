@@ -15,9 +15,13 @@ use crate::geometry::layout::Layout;
 use crate::math::octet::{Eight, Octet, OctetKernel, both};
 use crate::modes::coordinates::ContactModes;
 use crate::system::small::{CURVED_SHARE, LEAST_CLEARANCE};
+use crate::system::structure::UNKNOWN_GAP;
 use crate::time::SteadyInterval;
 use crate::time::galerkin::span::SpanStep;
 use crate::time::galerkin::trial::ForceInterpolation;
+
+/// Lower bounds of the gaps in a step in which contact is possible (m). Saved states contain finite numbers only.
+pub(super) const NO_BOUND: Eight = Eight([-UNKNOWN_GAP; 8]);
 
 impl Blade {
     /// Returns whether no gap in a step with these lower bounds (m) can be a smallest gap that an output needs.
@@ -49,7 +53,8 @@ impl Blade {
             modes.iter_mut().zip(stored).for_each(|(block, stored)| block.0 = *stored);
         }
         let energies = self.find_energies(rows, kind, time);
-        (energies.iter().sum::<f64>() <= model.plausible_energy(kind)).then_some(QuietSector { energies, at_start: step.energy() })
+        (energies.iter().sum::<f64>() <= model.plausible_energy(kind))
+            .then_some(QuietSector { energies, at_start: step.energy() })
     }
 
     /// Kinetic and strain energy (J) at a time (s) in the open step, in which no forces act.
@@ -65,7 +70,7 @@ impl BladeInSpan<'_> {
     pub(super) fn find_least(&mut self, step: SpanStep, kind: ForceInterpolation, is_resolved: bool) {
         let (rows, level, trial) = (&self.tables.rows, self.tables.level(step.level, kind), &mut self.blade.trial);
         if trial.pushes || !is_resolved || trial.unresolved.is_none() {
-            trial.least.fill(Eight([f64::NEG_INFINITY; 8]));
+            trial.least.fill(NO_BOUND);
             return;
         }
         let instructions = trial.instructions;

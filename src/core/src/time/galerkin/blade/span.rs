@@ -110,13 +110,7 @@ impl BladeModel {
 
     /// Starts a span of all sectors, with gaps (m) of all nodes in rows of `lanes` lanes. `is_known` returns whether the gaps of
     /// a sector are known; unknown gaps are larger than the smallest known ones.
-    pub(crate) fn begin_span(
-        &mut self,
-        gaps: &[f64],
-        lanes: usize,
-        sectors: usize,
-        is_known: impl Fn(usize) -> bool,
-    ) {
+    pub(crate) fn begin_span(&mut self, gaps: &[f64], lanes: usize, sectors: usize, is_known: impl Fn(usize) -> bool) {
         let smallest = |row: &[f64]| {
             let known = row[..sectors].iter().enumerate().filter(|(sector, _)| is_known(*sector));
             known.map(|(_, gap)| *gap).fold(f64::INFINITY, f64::min)

@@ -39,6 +39,8 @@ pub(crate) struct BladeTally {
     pub damping: f64,
     /// True if a contact exceeds the limits of small displacements.
     pub implausible: bool,
+    /// True if a contact force acts in the span.
+    pub touched: bool,
 }
 
 /// Largest depth of a plausible contact, as a fraction of the radius.
@@ -61,6 +63,7 @@ impl BladeTally {
             work: ContactWork::default(),
             damping: 0.0,
             implausible: false,
+            touched: false,
         }
     }
 
@@ -71,7 +74,8 @@ impl BladeTally {
         let sums = sums.chain(force).chain(fixed_force).chain(moment).chain(point);
         sums.for_each(|sums| sums.fill(Eight::ZERO));
         self.lowest.copy_from_slice(lowest);
-        (self.work, self.damping, self.implausible) = (ContactWork::default(), 0.0, false);
+        (self.work, self.damping) = (ContactWork::default(), 0.0);
+        (self.implausible, self.touched) = (false, false);
     }
 
     /// Smallest gap of a node (m).
@@ -185,6 +189,7 @@ impl AddStep<'_> {
         if any == 0 {
             return;
         }
+        tally.touched |= *sums != Sums::WorkOnly;
         let forces = both(|along| values_at_points::<L>(&start.forces[along], &trial.forces[along], block, count));
         let moved = both(|along| values_at_points::<L>(&start.moved[along], &trial.moved[along], block, count));
         let radius = L::splat(1.0) / L::load(&rows.per_radius[block]);

@@ -10,6 +10,7 @@ use crate::geometry::GapLaw;
 use crate::geometry::revolution::RevolutionGap;
 use crate::system::contact_view::ContactMember;
 use crate::system::pair::Prescribed;
+use crate::system::structure::UNKNOWN_GAP;
 use crate::system::{ContactPair, Effort, StepFailure, Structure, System};
 use crate::time::SteadyInterval;
 use crate::time::galerkin::blade::{
@@ -255,7 +256,8 @@ impl BladeSectors {
             }
         }
         let rows = self.model.rows(result.kind);
-        events.now.extend((0..of.nodes()).filter_map(|node| {
+        let touching_nodes = if result.tally.touched { of.nodes() } else { 0 };
+        events.now.extend((0..touching_nodes).filter_map(|node| {
             let at = ContactMember { structure, pair, node, sector, index: of.index(node, sector) };
             result.tally.event(rows, at, span.length())
         }));
@@ -319,7 +321,7 @@ impl SectorsInSpan<'_> {
         structure.read_gaps(sector, state);
         let stored = StoredStep::new(open_step).filter(|_| matches!(self.span, SectorSpan::Interval(_)));
         if stored.is_some_and(|step| !step.is_sampled()) {
-            state.gaps.fill(f64::INFINITY);
+            state.gaps.fill(UNKNOWN_GAP);
         }
         blade.choose_minima(model, &structure.needed_minima, sector, &state.gaps);
         if let (SectorSpan::Interval(interval), Some(step)) = (self.span, stored)

@@ -2,7 +2,7 @@
 
 use super::blade_sectors::{Sampled, SectorResult};
 use crate::math::vector::{set_strided_vector3, set_vector3_at, vector3_at};
-use crate::system::Structure;
+use crate::system::structure::{Structure, UNKNOWN_GAP};
 use crate::time::galerkin::island::StepControl;
 use crate::time::galerkin::state::SectorState;
 use crate::time::galerkin::tables::HALVINGS;
@@ -73,12 +73,12 @@ impl Structure {
         }
     }
 
-    /// Writes the gaps at the end of an interval of a steady phase; unknown gaps are infinite.
+    /// Writes the gaps at the end of an interval of a steady phase; see [`UNKNOWN_GAP`].
     pub(super) fn write_gaps(&mut self, sector: usize, result: &SectorResult) {
         if result.sampled == Sampled::Energies {
             for node in 0..self.nodes() {
                 let index = self.index(node, sector);
-                (self.history.gap.now[index], self.history.gap.before[index]) = (f64::INFINITY, f64::INFINITY);
+                (self.history.gap.now[index], self.history.gap.before[index]) = (UNKNOWN_GAP, UNKNOWN_GAP);
             }
             return;
         }
