@@ -391,7 +391,7 @@ fn find_dips<L: Octet>(ends: L, between: L, error: f64, threshold: L) -> u8 {
 /// Returns the place and value of the minimum of a cubic with these Bézier coefficients. The value is infinite if there is no
 /// minimum within 0 < θ < 1.
 #[inline(always)]
-fn cubic_minimum<L: Octet>([first, second, third, last]: [L; 4]) -> (L, L) {
+pub(super) fn cubic_minimum<L: Octet>([first, second, third, last]: [L; 4]) -> (L, L) {
     let (slope, change) = ((second - first) * L::splat(3.0), (third - second) * L::splat(3.0));
     let (square, cube) = (change - slope, (last - first) - change);
     // The slope b + 2cθ + 3dθ² rises through zero at θ = −b/(√(c² − 3bd) + c).

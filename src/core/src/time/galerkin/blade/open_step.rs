@@ -146,9 +146,7 @@ impl BladeInSpan<'_> {
             return;
         }
         let Some(kind) = kind else {
-            let mut drives = [PointDrive::default(); POINTS];
-            drives.iter_mut().zip(ends).for_each(|(drive, theta)| *drive = self.drive_at(theta).0);
-            if self.needs_gaps(&drives) {
+            if self.needs_gaps() {
                 self.follow(step, ForceInterpolation::Polynomial, within);
             }
             return;

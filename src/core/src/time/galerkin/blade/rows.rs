@@ -45,6 +45,8 @@ pub(crate) struct BladeRows {
     pub largest_around: f64,
     /// Smallest radius (m).
     pub smallest_radius: f64,
+    /// True if every mode has a frequency above zero.
+    pub all_vibrate: bool,
     /// Direction of the closing displacement of each node.
     directions: Vec<Vector3>,
 }
@@ -92,6 +94,7 @@ impl BladeRows {
             by_row: vec![Eight::ZERO; 2 * nodes * Eight::blocks(count)],
             per_radius: of_nodes(&|node| per_radius[node]),
             largest_around: 0.0,
+            all_vibrate: modes.frequencies.iter().all(|frequency| *frequency > 0.0),
             smallest_radius: per_radius.iter().fold(f64::INFINITY, |least, value| least.min(1.0 / value)),
             directions,
         };

@@ -4,7 +4,6 @@ use super::dense::ModeResponse;
 use super::gaps::include;
 use super::level::PartWeights;
 use super::open_step::{OpenStep, SpanProgress};
-use super::reach::Clearance;
 use super::rows::BladeRows;
 use super::surface::{FacedSurface, PointDrive};
 use super::tables::{BladeTables, SpanKind};
@@ -19,7 +18,7 @@ use crate::system::structure::NeededMinima;
 use crate::time::galerkin::basis::POINTS;
 use crate::time::galerkin::island::StepControl;
 use crate::time::galerkin::record::{MotionCourse, TurningMotion};
-use crate::time::galerkin::span::{SpanStep, SpanSteps, StepGoal};
+use crate::time::galerkin::span::{Flight, SHORTEST_LOOK, SpanStep, SpanSteps, StepGoal};
 use crate::time::galerkin::state::SectorState;
 use crate::time::galerkin::tables::Tables;
 use crate::time::galerkin::trial::{ForceInterpolation, TrialResult};
@@ -277,15 +276,17 @@ impl<'a> BladeInSpan<'a> {
         AddStep { tally, trial, rows, level, faced, motions, part, sums }.add();
     }
 
-    /// Bounds the gaps of a flight between the first two drives. Returns whether some are needed; these nodes are followed.
-    pub(super) fn needs_gaps(&mut self, drives: &[PointDrive; POINTS]) -> bool {
-        self.find_clearance(drives) != Clearance::Wide
-    }
-
-    fn find_clearance(&mut self, drives: &[PointDrive; POINTS]) -> Clearance {
-        let faced = self.place.faced_surface(drives);
-        let Blade { trial, floors, tally, .. } = &mut *self.blade;
-        trial.find_clearance(&self.tables.rows, &faced, floors, &tally.lowest)
+    /// Returns whether the reach shows that no node can touch in a step, and bounds the gaps.
+    fn is_clear(&mut self, step: SpanStep) -> bool {
+        if !self.place.course.only_turns() {
+            return false;
+        }
+        let mut drives = [PointDrive::default(); POINTS];
+        for (drive, theta) in drives.iter_mut().zip([step.from, step.from + step.length]) {
+            *drive = drive_at(&self.place, theta).0;
+        }
+        let faced = self.place.faced_surface(&drives);
+        self.blade.trial.find_clearance(&self.tables.rows, &faced)
     }
 
     /// Advances the modes to the end of a step. `kind` is `None` for a flight.
@@ -354,9 +355,9 @@ impl SpanSteps for BladeInSpan<'_> {
         1
     }
 
-    fn fly(&mut self, step: SpanStep) -> bool {
-        if self.blade.trial.is_pushed() || !self.place.course.only_turns() {
-            return false;
+    fn fly(&mut self, step: SpanStep) -> Flight {
+        if self.blade.trial.is_pushed() || !self.tables.rows.all_vibrate {
+            return Flight::NeedsTrial;
         }
         // Vibration decays in long flights.
         let is_due = self.progress.done == 0 && self.progress.spans.is_multiple_of(REACH_SPANS);
@@ -364,29 +365,25 @@ impl SpanSteps for BladeInSpan<'_> {
             self.blade.trial.find_reach(&self.tables.rows);
             self.reach_known = true;
         }
-        if matches!(self.recorded, RecordScope::Interval(_)) && self.stays_clear() {
+        if matches!(self.recorded, RecordScope::Interval(_)) && self.place.course.only_turns() && self.stays_clear() {
             self.open_flight(SpanStep { length: f64::INFINITY, ..step });
-            return true;
+            return Flight::Taken;
         }
-        let mut drives = [PointDrive::default(); POINTS];
-        for (drive, theta) in drives.iter_mut().zip([step.from, step.from + step.length]) {
-            *drive = drive_at(&self.place, theta).0;
+        // Near a surface, the reach is too large.
+        if !(step.level == 0 && self.is_clear(step) || self.glides(step)) {
+            let is_short = self.length(step.level) <= SHORTEST_LOOK;
+            return if is_short { Flight::NeedsTrial } else { Flight::TooLong };
         }
-        let clearance = self.find_clearance(&drives);
-        if clearance == Clearance::Unknown {
-            return false;
-        }
+        self.blade.trial.pushes = false;
         if !self.ends_within(step) {
             self.open_flight(step);
-        } else if clearance == Clearance::Needed && self.recorded != RecordScope::WorkOnly {
-            let result = self.attempt(step, ForceInterpolation::Polynomial);
-            self.accept(step, ForceInterpolation::Polynomial, &result);
-            // The state must not depend on the scope of recording.
-            self.known &= self.recorded == RecordScope::All;
-        } else {
-            self.advance(step, None);
+            return Flight::Taken;
         }
-        true
+        if self.recorded != RecordScope::WorkOnly && self.needs_gaps() {
+            self.follow(step, ForceInterpolation::Polynomial, [0.0, 1.0]);
+        }
+        self.advance(step, None);
+        Flight::Taken
     }
 
     fn attempt(&mut self, step: SpanStep, kind: ForceInterpolation) -> TrialResult {
