@@ -3,7 +3,7 @@
 //! Without contact, the amplitude of each mode is constant, apart from the damping. It bounds the distance of a slow mode
 //! from the cubic through its values and rates at both ends of a step. A fast mode is bounded by its amplitude alone.
 
-use super::columns::displace;
+use super::columns::{displace, displace_nodes};
 use super::follow::cubic_minimum;
 use super::gaps::drive_and_rate_at;
 use super::level::BladeLevel;
@@ -11,7 +11,7 @@ use super::rows::BladeRows;
 use super::span::{Blade, BladeInSpan};
 use super::surface::{DriveRate, PointDrive};
 use super::trial::BladeTrial;
-use crate::math::octet::{Octet, OctetKernel, both};
+use crate::math::octet::{Eight, Octet, OctetKernel, both};
 use crate::scene::shape::CompiledShape;
 use crate::time::galerkin::span::SpanStep;
 use crate::time::galerkin::trial::ForceInterpolation;
@@ -25,6 +25,10 @@ impl BladeInSpan<'_> {
         let level = tables.level(step.level, ForceInterpolation::Polynomial);
         let span = level.step / step.length;
         let trial = &mut self.blade.trial;
+        if step.from == 0.0 {
+            // The prescribed motion at the end of the previous span differs by rounding.
+            trial.glide_ends[0].forget();
+        }
         trial.instructions.run_octets(Glide {
             rows: &tables.rows,
             level,
@@ -53,6 +57,30 @@ impl BladeInSpan<'_> {
     }
 }
 
+/// Gaps F of a blade without contact at an end of a step, from the slow modes of the step.
+#[derive(Debug, Clone)]
+pub(super) struct GlideEnd {
+    /// Number of halvings of the span to which the slow modes belong; `None` if the gaps are unknown.
+    halvings: Option<usize>,
+    /// F (m), its rate (m/s), and the magnitude of the slope of the surface (m/rad).
+    gaps: Vec<Eight>,
+    rates: Vec<Eight>,
+    slopes: Vec<Eight>,
+}
+
+impl GlideEnd {
+    /// Allocates for a number of blocks of nodes.
+    pub fn new(nodes: usize) -> Self {
+        let [gaps, rates, slopes] = [0, 1, 2].map(|_| vec![Eight::ZERO; nodes]);
+        Self { halvings: None, gaps, rates, slopes }
+    }
+
+    /// Marks the gaps as unknown.
+    pub fn forget(&mut self) {
+        self.halvings = None;
+    }
+}
+
 /// Bounds the gaps of all nodes over a step without contact. Returns whether they stay above zero.
 struct Glide<'a> {
     trial: &'a mut BladeTrial,
@@ -72,36 +100,40 @@ impl OctetKernel for Glide<'_> {
     #[inline(always)]
     fn run<L: Octet>(mut self) -> bool {
         self.find_errors::<L>();
-        self.advance_slow_modes::<L>();
-        let Self { trial, rows, level, halvings, surface, drives, shape_error } = self;
-        let third = L::splat(level.step / 3.0);
-        let [(first, first_rate), (last, last_rate)] = drives;
+        if self.trial.glide_ends[0].halvings != Some(self.halvings) {
+            self.find_gaps::<L>(0);
+        }
+        let [(first, _), (last, _)] = self.drives;
         let turn = 0.5 * (last.turned - first.turned).abs();
-        let curvature = L::splat(surface.largest_curvature());
+        let curvature = L::splat(self.surface.largest_curvature());
         let largest_factor = L::splat(first.factor.abs().max(last.factor.abs()));
+        let (rows, third) = (self.rows, L::splat(self.level.step / 3.0));
+        for block in 0..rows.blocks {
+            let error = L::load(&self.trial.cubic_errors[self.halvings][block]);
+            let valid = rows.valid(block);
+            if error.less(L::load(&self.trial.glide_ends[0].gaps[block])) & valid != valid {
+                return false;
+            }
+        }
+        self.find_gaps::<L>(1);
+        let Self { trial, halvings, shape_error, .. } = self;
         for block in 0..rows.blocks {
             let per_radius = L::load(&rows.per_radius[block]);
             let around = L::load(&trial.reach[1][block]) * per_radius;
-            let [mut slopes, mut gaps, mut rates] = [[L::zero(); 2]; 3];
-            for (end, (drive, rate)) in [(first, first_rate), (last, last_rate)].into_iter().enumerate() {
-                let [shape, slope, _] =
-                    surface.evaluate_octet::<L>(L::load(&trial.angles[block]) + L::splat(drive.turned));
-                let of = |place: usize| L::load(&trial.path_moved[end][place * rows.blocks + block]);
-                gaps[end] = L::splat(drive.clearance) + shape * L::splat(drive.factor) + of(0);
-                let opening = L::splat(rate.clearance) + shape * L::splat(rate.factor) + of(1);
-                rates[end] = opening + slope * L::splat(drive.factor * rate.turned);
-                slopes[end] = slope.abs();
-            }
+            let ends = &trial.glide_ends;
+            let [gaps, rates] =
+                [both(|end| L::load(&ends[end].gaps[block])), both(|end| L::load(&ends[end].rates[block]))];
+            let slopes = both(|end| L::load(&ends[end].slopes[block]));
             // The circumferential displacement turns a node by at most `around`.
             let steepest = slopes[0].max(slopes[1]) + curvature * (L::splat(turn) + around);
             let steepest = steepest * largest_factor;
             let error = L::load(&trial.cubic_errors[halvings][block]) + L::splat(shape_error) + steepest * around;
             let inner = [gaps[0] + rates[0] * third, gaps[1] - rates[1] * third];
-            let ends = gaps[0].min(gaps[1]);
-            let mut least = inner[0].min(inner[1]).min(ends);
+            let lower = gaps[0].min(gaps[1]);
+            let mut least = inner[0].min(inner[1]).min(lower);
             let valid = rows.valid(block);
             if error.less(least) & valid != valid {
-                least = cubic_minimum([gaps[0], inner[0], inner[1], gaps[1]]).1.min(ends);
+                least = cubic_minimum([gaps[0], inner[0], inner[1], gaps[1]]).1.min(lower);
                 if error.less(least) & valid != valid {
                     return false;
                 }
@@ -132,24 +164,34 @@ impl Glide<'_> {
         displace::<L, 1, 1>([&rows.magnitudes[0]], rows.blocks, [mode_bounds], [&mut cubic_errors[*halvings]]);
     }
 
-    /// Finds the closing displacements that the slow modes cause at both ends of the step, and their rates.
+    /// Finds F and its rates that the slow modes cause at one end of the step.
     #[inline(always)]
-    fn advance_slow_modes<L: Octet>(&mut self) {
-        let Self { trial, rows, level, .. } = self;
-        let BladeTrial { start, path, path_moved, .. } = &mut **trial;
-        let [first, last, ..] = &mut path[..] else { return };
+    fn find_gaps<L: Octet>(&mut self, end: usize) {
+        let Self { trial, rows, level, halvings, surface, drives, .. } = self;
+        let BladeTrial { start, path, path_moved: [moved, _], glide_ends, angles, .. } = &mut **trial;
+        let modes = &mut path[0].modes;
         for k in 0..level.slow_blocks {
             let [q, v] = both(|of| L::select(level.slow[k], L::load(&start.modes[of][k]), L::zero()));
             for of in [0, 1] {
-                let [a, b] = both(|term| L::load(&level.end[of][term][k]));
-                [q, v][of].store(&mut first.modes[of][k]);
-                (a * q + b * v).store(&mut last.modes[of][k]);
+                let mut mode = [q, v][of];
+                if end == 1 {
+                    mode = L::load(&level.end[of][0][k]) * q + L::load(&level.end[of][1][k]) * v;
+                }
+                mode.store(&mut modes[of][k]);
             }
         }
-        let shapes = &rows.shapes[0];
-        let shapes = &shapes[..shapes.len().min(8 * level.slow_blocks * rows.blocks)];
-        for (point, moved) in [first, last].into_iter().zip(path_moved) {
-            displace::<L, 1, 2>([shapes], rows.blocks, [&point.modes[0], &point.modes[1]], [moved]);
+        displace_nodes::<L, 1, 2>(rows, [0], level.slow_blocks, [&modes[0], &modes[1]], [&mut moved[..]]);
+        let ((drive, rate), target) = (&drives[end], &mut glide_ends[end]);
+        for block in 0..rows.blocks {
+            let angle = L::load(&angles[block]) + L::splat(drive.turned);
+            let [shape, slope, _] = surface.evaluate_octet::<L>(angle);
+            let [closing, closing_rate] = both(|of| L::load(&moved[of * rows.blocks + block]));
+            let gap = L::splat(drive.clearance) + shape * L::splat(drive.factor) + closing;
+            let opening = L::splat(rate.clearance) + shape * L::splat(rate.factor) + closing_rate;
+            gap.store(&mut target.gaps[block]);
+            (opening + slope * L::splat(drive.factor * rate.turned)).store(&mut target.rates[block]);
+            slope.abs().store(&mut target.slopes[block]);
         }
+        target.halvings = Some(*halvings);
     }
 }

@@ -10,8 +10,8 @@ use nalgebra::{DMatrix, Vector2};
 /// Data of a blade that do not depend on the step length.
 #[derive(Debug, Clone)]
 pub(crate) struct BladeRows {
-    /// ξω, 1/ω_d, ω² and ω of each mode.
-    pub rates: [Vec<Eight>; 4],
+    /// ξω, 1/ω_d, ω², ω and 1/ω² of each mode. The last is 0 if ω is 0.
+    pub rates: [Vec<Eight>; 5],
     /// Magnitudes of `shapes`.
     pub magnitudes: [Vec<Eight>; 2],
     /// Largest magnitude over the nodes of the closing displacement of each mode.
@@ -75,6 +75,7 @@ impl BladeRows {
                 of_modes(&|w, ratio| 1.0 / (w * (1.0 - ratio * ratio).sqrt())),
                 of_modes(&|w, _| w * w),
                 of_modes(&|w, _| w),
+                of_modes(&|w, _| if w > 0.0 { 1.0 / (w * w) } else { 0.0 }),
             ],
             magnitudes: [Vec::new(), Vec::new()],
             largest: vec![Eight::ZERO; Eight::blocks(count)],

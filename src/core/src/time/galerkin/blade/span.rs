@@ -2,6 +2,7 @@
 
 use super::dense::ModeResponse;
 use super::gaps::include;
+use super::glide::GlideEnd;
 use super::level::PartWeights;
 use super::open_step::{OpenStep, SpanProgress};
 use super::rows::BladeRows;
@@ -22,7 +23,7 @@ use crate::time::galerkin::span::{Flight, SHORTEST_LOOK, SpanStep, SpanSteps, St
 use crate::time::galerkin::state::SectorState;
 use crate::time::galerkin::tables::Tables;
 use crate::time::galerkin::trial::{ForceInterpolation, TrialResult};
-use std::mem::{replace, take};
+use std::mem::{replace, swap, take};
 
 /// Tables of the blades of a structure, which do not change during a span.
 #[derive(Debug, Clone)]
@@ -211,6 +212,7 @@ impl<'a> BladeInSpan<'a> {
     ) -> Self {
         let tables = &model.kinds[place.kind];
         blade.trial.turn_to(&model.angles[place.sector]);
+        blade.trial.glide_ends.iter_mut().for_each(GlideEnd::forget);
         if let Some(state) = state {
             blade.trial.read(&tables.rows, state);
         }
@@ -285,8 +287,12 @@ impl<'a> BladeInSpan<'a> {
         for (drive, theta) in drives.iter_mut().zip([step.from, step.from + step.length]) {
             *drive = drive_at(&self.place, theta).0;
         }
-        let faced = self.place.faced_surface(&drives);
-        self.blade.trial.find_clearance(&self.tables.rows, &faced)
+        let (faced, trial) = (self.place.faced_surface(&drives), &mut self.blade.trial);
+        let is_clear = trial.find_clearance(&self.tables.rows, &faced);
+        if is_clear {
+            trial.glide_ends.iter_mut().for_each(GlideEnd::forget);
+        }
+        is_clear
     }
 
     /// Advances the modes to the end of a step. `kind` is `None` for a flight.
@@ -297,6 +303,12 @@ impl<'a> BladeInSpan<'a> {
         tally.damping += trial.advance(level, pushes);
         if kind.is_some() {
             trial.begin_next_step(&self.tables.rows, level);
+        }
+        let [start, end] = &mut trial.glide_ends;
+        swap(start, end);
+        end.forget();
+        if kind.is_some() {
+            start.forget();
         }
         self.known = kind.is_some();
         self.reach_known &= !pushes;

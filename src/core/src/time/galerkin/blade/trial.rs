@@ -2,6 +2,7 @@
 
 use super::accept::{Advance, BeginNextStep, FindModalForces};
 use super::follow::{PathPoint, STORED_TIMES};
+use super::glide::GlideEnd;
 use super::level::BladeLevel;
 use super::minima::SelectFollowed;
 use super::reach::{Energy, FindClearance, FindReach};
@@ -145,6 +146,8 @@ pub(crate) struct BladeTrial {
     pub(super) cubic_errors_known: u16,
     /// Lower bounds of the gaps over a step without a trial (m).
     pub(super) gap_bounds: Vec<Eight>,
+    /// Gaps at the start and the end of the last step without a trial.
+    pub(super) glide_ends: [GlideEnd; 2],
     pub(super) instructions: InstructionSet,
 }
 
@@ -199,6 +202,7 @@ impl BladeTrial {
             cubic_errors: vec![of_nodes(); HALVINGS + 1],
             cubic_errors_known: 0,
             gap_bounds: of_nodes(),
+            glide_ends: [GlideEnd::new(nodes), GlideEnd::new(nodes)],
             instructions: InstructionSet::detect(),
         }
     }
