@@ -28,6 +28,9 @@ pub struct TimeBasis {
     pub left_out: [f64; POINTS],
     /// `[place][i]`: L_i at positions between the points.
     pub between: [[f64; POINTS]; PLACES],
+    /// Weights of the values at the points in the two inner Bézier coefficients of the polynomial as a cubic. The
+    /// polynomial is nowhere below the smallest of these and of its values at both ends.
+    pub inner: [[f64; POINTS]; 2],
 }
 
 impl TimeBasis {
@@ -63,6 +66,10 @@ impl TimeBasis {
             projection: projection(degree, &monomials),
             left_out: left_out(degree, &points),
             between: [[0.0; POINTS]; PLACES],
+            inner: [
+                monomials.map(|row| row[0] + row[1] / 3.0),
+                monomials.map(|row| row[0] + (2.0 * row[1] + row[2]) / 3.0),
+            ],
         };
         for i in 0..count {
             basis.weights[i] = (0..count).map(|a| monomials[i][a] / real(a + 1)).sum();

@@ -15,6 +15,7 @@ mod columns;
 mod dense;
 mod follow;
 mod gaps;
+mod glide;
 mod judge;
 mod level;
 mod minima;

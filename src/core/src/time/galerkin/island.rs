@@ -8,7 +8,7 @@ use super::carrier::CarrierIntegrator;
 use super::compliance::Lanes;
 use super::disk::CoupledDisk;
 use super::shared_body::SharedBody;
-use super::span::{SpanStep, SpanSteps, StepGoal, Stopped, integrate};
+use super::span::{Flight, SpanStep, SpanSteps, StepGoal, Stopped, integrate};
 use super::state::SectorState;
 use super::surroundings::{AcceptedStep, CarriersInStep, LaneStep, Surroundings, Witness};
 use super::tables::Tables;
@@ -369,10 +369,10 @@ impl<S: Surroundings> SpanSteps for IslandInSpan<'_, S> {
         if self.island.is_single() { 0.0 } else { BANK_ALLOWANCE }
     }
 
-    fn fly(&mut self, step: SpanStep) -> bool {
+    fn fly(&mut self, step: SpanStep) -> Flight {
         let pushed = |one: &IslandSector| one.state.multipliers.iter().any(|value| *value != 0.0);
         if !self.island.carriers.is_empty() || self.island.sectors.iter().any(pushed) {
-            return false;
+            return Flight::NeedsTrial;
         }
         for disk in &mut self.island.disks {
             if let Some(bank) = self.surroundings.disk(disk.structure) {
@@ -383,7 +383,7 @@ impl<S: Surroundings> SpanSteps for IslandInSpan<'_, S> {
             let index = self.index(place);
             let (surfaces, reach) = self.reach(index, step);
             if !surfaces.is_clear(step.from, step.length, reach) {
-                return false;
+                return Flight::NeedsTrial;
             }
         }
         self.follow_flight(step);
@@ -399,7 +399,7 @@ impl<S: Surroundings> SpanSteps for IslandInSpan<'_, S> {
         }
         self.island.disks.iter_mut().for_each(|disk| disk.body.fly(step.level));
         self.find_start();
-        true
+        Flight::Taken
     }
 
     fn attempt(&mut self, step: SpanStep, kind: ForceInterpolation) -> TrialResult {

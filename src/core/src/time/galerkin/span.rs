@@ -12,7 +12,7 @@ const SAVED: usize = 3;
 /// The bank is full at this fraction of the largest energy so far; steps that would add to a full bank are halved down to the shortest.
 const FULL: f64 = 0.01;
 /// Shortest step that is halved because a node comes near between the points (s).
-const SHORTEST_LOOK: f64 = 2.5e-6;
+pub(crate) const SHORTEST_LOOK: f64 = 2.5e-6;
 
 /// A step within a span: its level, and its start and length as fractions of the span.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,6 +60,17 @@ pub enum Stopped {
     Exhausted,
 }
 
+/// Outcome of the attempt to take a step without a trial.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Flight {
+    /// No contact is possible during the step, and it has been taken.
+    Taken,
+    /// A contact may be possible; a shorter step shows whether it is.
+    TooLong,
+    /// The step needs a trial.
+    NeedsTrial,
+}
+
 /// Steps within a span, of an island or of a blade.
 pub trait SpanSteps {
     /// Tolerance and limits.
@@ -82,8 +93,8 @@ pub trait SpanSteps {
         0.0
     }
 
-    /// Takes the step without a trial if no contact is possible during the step, and returns whether it did.
-    fn fly(&mut self, step: SpanStep) -> bool;
+    /// Takes the step without a trial if no contact is possible during the step.
+    fn fly(&mut self, step: SpanStep) -> Flight;
 
     /// Tries a step.
     fn attempt(&mut self, step: SpanStep, kind: ForceInterpolation) -> TrialResult;
@@ -125,10 +136,18 @@ impl<S: SpanSteps> StepChoice<'_, S> {
             self.check_effort(effort)?;
             let (step, end) = (SpanStep::new(level, done), done + units_per_step(level));
             let is_even = end.is_multiple_of(2 * units_per_step(level));
-            if self.steps.fly(step) {
-                (effort.steps, effort.flights) = (effort.steps + count, effort.flights + count);
-                self.steps.control().level -= usize::from(level > 0 && is_even);
-                return Ok(end);
+            match self.steps.fly(step) {
+                Flight::Taken => {
+                    (effort.steps, effort.flights) = (effort.steps + count, effort.flights + count);
+                    self.steps.control().level -= usize::from(level > 0 && is_even);
+                    return Ok(end);
+                }
+                Flight::TooLong => {
+                    effort.trials += count;
+                    self.steps.control().level += 1;
+                    continue;
+                }
+                Flight::NeedsTrial => {}
             }
             let (result, kind) = self.try_step(step, effort)?;
             if self.is_too_long(step, kind, &result, goal.tolerance) && level < HALVINGS {

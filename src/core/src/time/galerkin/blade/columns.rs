@@ -1,7 +1,11 @@
 //! Linear combinations of columns and Gaussian elimination, in blocks of eight numbers.
 
+use super::rows::BladeRows;
 use crate::math::octet::{Eight, Octet};
 use crate::time::galerkin::basis::POINTS;
+
+/// Largest number of nodes in the last block that are summed one by one.
+const FEW_NODES: usize = 2;
 
 /// Returns the values of a block of nodes at the start of a step and at its points: `count` values in total.
 #[inline(always)]
@@ -86,6 +90,67 @@ pub(super) fn displace<L: Octet, const D: usize, const P: usize>(
     while block < blocks {
         put::<L, D, P, 1>(&add_modes(shapes, blocks, block, modes), blocks, block, &mut lanes);
         block += 1;
+    }
+}
+
+/// Like [`displace`] for the first `mode_blocks` blocks of modes, along the directions `along`. If only a few nodes are in
+/// the last block, each of them is summed over blocks of modes instead.
+#[inline(always)]
+pub(super) fn displace_nodes<L: Octet, const D: usize, const P: usize>(
+    rows: &BladeRows,
+    along: [usize; D],
+    mode_blocks: usize,
+    modes: [&[Eight]; P],
+    mut lanes: [&mut [Eight]; D],
+) {
+    let (blocks, left) = (rows.blocks, rows.nodes % 8);
+    let is_short = blocks > 1 && (1..=FEW_NODES).contains(&left);
+    let whole = if is_short { blocks - 1 } else { blocks };
+    let mut shapes = [&rows.shapes[0][..]; D];
+    for d in 0..D {
+        let of_direction = &rows.shapes[along[d]];
+        shapes[d] = &of_direction[..of_direction.len().min(8 * mode_blocks * blocks)];
+    }
+    let mut block = 0;
+    while block + 3 <= whole {
+        put::<L, D, P, 3>(&add_modes(shapes, blocks, block, modes), blocks, block, &mut lanes);
+        block += 3;
+    }
+    while block + 2 <= whole {
+        put::<L, D, P, 2>(&add_modes(shapes, blocks, block, modes), blocks, block, &mut lanes);
+        block += 2;
+    }
+    while block < whole {
+        put::<L, D, P, 1>(&add_modes(shapes, blocks, block, modes), blocks, block, &mut lanes);
+        block += 1;
+    }
+    if !is_short {
+        return;
+    }
+    for d in 0..D {
+        for p in 0..P {
+            lanes[d][p * blocks + whole] = Eight::ZERO;
+        }
+    }
+    for node in 8 * whole..rows.nodes {
+        let mut of_node = [&rows.by_row[..0]; D];
+        for d in 0..D {
+            of_node[d] = &rows.by_row[(along[d] * rows.nodes + node) * rows.mode_blocks..][..mode_blocks];
+        }
+        let mut sums = [[L::zero(); P]; D];
+        for k in 0..mode_blocks {
+            for d in 0..D {
+                let shape = L::load(&of_node[d][k]);
+                for p in 0..P {
+                    sums[d][p] = sums[d][p] + shape * L::load(&modes[p][k]);
+                }
+            }
+        }
+        for d in 0..D {
+            for p in 0..P {
+                lanes[d][p * blocks + whole].0[node % 8] = sums[d][p].total();
+            }
+        }
     }
 }
 

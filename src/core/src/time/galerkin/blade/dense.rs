@@ -1,7 +1,8 @@
 //! State of a blade at any time within an accepted step (dense output).
 
-use super::columns::displace;
+use super::columns::displace_nodes;
 use super::level::BladeLevel;
+use super::minima::steady_motion;
 use super::rows::BladeRows;
 use super::surface::{DriveRate, FacedSurface};
 use super::trial::{BladeTrial, StartContacts};
@@ -83,9 +84,9 @@ impl OctetKernel for DenseOutput<'_> {
             sample.forces.iter_mut().for_each(|forces| forces.fill(Eight::ZERO));
         }
         sample.slopes.copy_from_slice(&start.slopes);
-        let ([closing, around], [closing_moved, around_moved]) = (&self.rows.shapes, path_moved);
-        let (blocks, modes) = (self.rows.blocks, [&sample.modes[0][..], &sample.modes[1]]);
-        displace::<L, 2, 2>([closing, around], blocks, modes, [closing_moved, around_moved]);
+        let ([closing_moved, around_moved], blocks) = (path_moved, self.rows.blocks);
+        let modes = [&sample.modes[0][..], &sample.modes[1]];
+        displace_nodes::<L, 2, 2>(self.rows, [0, 1], self.rows.mode_blocks, modes, [closing_moved, around_moved]);
         for (along, moved) in [&*closing_moved, &*around_moved].into_iter().enumerate() {
             sample.moved[along].copy_from_slice(&moved[..blocks]);
             sample.held[along].copy_from_slice(&moved[blocks..]);
@@ -108,20 +109,14 @@ impl DenseOutput<'_> {
     fn find_modes<L: Octet>(&mut self) {
         let Self { trial, rows, level, response, time, pushes, .. } = self;
         let BladeTrial { start, sample, modal_forces, .. } = &mut **trial;
-        let per_step = 1.0 / level.step;
         for k in 0..rows.mode_blocks {
             let [a, b] = both(|term| L::load(&response.terms[term][k]));
             let c = L::load(&response.terms[2][k]);
             let [q, v] = both(|of| L::load(&start.modes[of][k]));
-            let (square, twice_rate) = (L::load(&rows.rates[2][k]), L::load(&rows.rates[0][k]) * L::splat(2.0));
+            let square = L::load(&rows.rates[2][k]);
             let mut steady = [L::zero(); 3];
             if *pushes {
-                let per_square = L::splat(1.0) / square.max(L::splat(f64::MIN_POSITIVE));
-                let [one, two] = both(|term| L::load(&modal_forces[term][k]));
-                let three = L::load(&modal_forces[2][k]);
-                steady[2] = three * L::splat(per_step * per_step) * per_square;
-                steady[1] = (two * L::splat(per_step) - L::splat(2.0) * twice_rate * steady[2]) * per_square;
-                steady[0] = (one - twice_rate * steady[1] - L::splat(2.0) * steady[2]) * per_square;
+                steady = steady_motion::<L>(rows, modal_forces, k, level.step);
             }
             let (left, rate) = (q - steady[0], v - steady[1]);
             let time = L::splat(*time);

@@ -1,6 +1,6 @@
 //! Smallest gaps within a step, from cubics through the exact gaps and their rates at two times.
 
-use super::columns::{add_modes, displace, put};
+use super::columns::{add_modes, displace_nodes, put, sum, values_at_points};
 use super::level::BladeLevel;
 use super::minima::{FOLLOW_FRACTION, MAX_HALVINGS, MINIMUM_FRACTION, amplitude, fraction, relative_error};
 use super::rows::BladeRows;
@@ -127,8 +127,9 @@ impl<D: Fn(f64) -> (PointDrive, DriveRate)> Follow<'_, D> {
     #[inline(always)]
     fn find_amplitudes<L: Octet>(&mut self) {
         let BladeTrial { start, modal_forces, amplitudes, .. } = &mut *self.trial;
+        let forced_step = self.pushes.then_some(self.level.step);
         for (k, (target, largest)) in amplitudes.iter_mut().zip(&self.rows.largest).enumerate() {
-            (L::load(largest) * amplitude::<L>(self.rows, start, modal_forces, k, self.pushes)).store(target);
+            (L::load(largest) * amplitude::<L>(self.rows, start, modal_forces, k, forced_step)).store(target);
         }
     }
 
@@ -227,7 +228,7 @@ impl<D: Fn(f64) -> (PointDrive, DriveRate)> Follow<'_, D> {
         let (shapes, both_modes) = ([&closing[..], around], [&modes[0][..], &modes[1]]);
         let mut moved = [&mut closing_moved[..], around_moved];
         if count > 1 {
-            displace::<L, 2, 2>(shapes, rows.blocks, both_modes, moved);
+            displace_nodes::<L, 2, 2>(rows, [0, 1], rows.mode_blocks, both_modes, moved);
             return;
         }
         for block in 0..rows.blocks {
@@ -263,29 +264,40 @@ impl<D: Fn(f64) -> (PointDrive, DriveRate)> Follow<'_, D> {
     #[inline(always)]
     fn add_quasi_static<L: Octet>(&mut self, theta: f64) {
         let Self { trial, rows, level, .. } = self;
-        let BladeTrial { start, path_moved, forces, multipliers, .. } = &mut **trial;
+        let BladeTrial { start, path_moved, forces, multipliers, followed, .. } = &mut **trial;
         let (weights, slopes) = (level.basis.weights_at(theta), level.basis.slopes_at(theta));
-        for (along, node) in (0..2).flat_map(|along| (0..rows.nodes).map(move |node| (along, node))) {
-            let (block, i) = (node / 8, node % 8);
-            let first = start.forces[along][block].0[i];
-            let (mut force, mut change) = (weights[0] * first, slopes[0] * first);
-            let mut acts = start.multipliers[block].0[i] > 0.0;
-            for point in 1..=level.points() {
-                let lane = (point - 1) * rows.blocks + block;
-                force += weights[point] * forces[along][lane].0[i];
-                change += slopes[point] * forces[along][lane].0[i];
-                acts |= multipliers[lane].0[i] > 0.0;
+        let (count, blocks, per_second) = (level.points() + 1, rows.blocks, 1.0 / level.step);
+        for source in 0..blocks {
+            let mut acting = 0;
+            for multiplier in values_at_points::<L>(&start.multipliers, multipliers, source, count) {
+                acting |= L::zero().less(multiplier);
             }
-            if !acts {
+            if acting == 0 {
                 continue;
             }
-            for (seen, moved) in path_moved.iter_mut().enumerate() {
-                let column = &rows.flexibility[along][seen][node * rows.blocks..][..rows.blocks];
-                let (positions, velocities) = moved.split_at_mut(rows.blocks);
-                for (moved, amount) in [(positions, force), (velocities, change / level.step)] {
-                    for (moved, flexibility) in moved.iter_mut().zip(column) {
-                        (L::load(moved) + L::load(flexibility) * L::splat(amount)).store(moved);
+            // Forces and their rates along both directions.
+            let mut of_forces = [[[0.0; 8]; 2]; 2];
+            for along in [0, 1] {
+                let values = values_at_points::<L>(&start.forces[along], &forces[along], source, count);
+                of_forces[along][0] = sum(&values[..count], &weights).array();
+                of_forces[along][1] = (sum(&values[..count], &slopes) * L::splat(per_second)).array();
+            }
+            for target in (0..blocks).filter(|target| followed[*target] != 0) {
+                for (seen, moved) in path_moved.iter_mut().enumerate() {
+                    let [mut position, mut velocity] = both(|of| L::load(&moved[of * blocks + target]));
+                    let mut nodes = acting;
+                    while nodes != 0 {
+                        let i = nodes.trailing_zeros() as usize;
+                        nodes &= nodes - 1;
+                        for along in [0, 1] {
+                            let flexibility = &rows.flexibility[along][seen][(8 * source + i) * blocks + target];
+                            let flexibility = L::load(flexibility);
+                            position = position + flexibility * L::splat(of_forces[along][0][i]);
+                            velocity = velocity + flexibility * L::splat(of_forces[along][1][i]);
+                        }
                     }
+                    position.store(&mut moved[target]);
+                    velocity.store(&mut moved[blocks + target]);
                 }
             }
         }
@@ -391,7 +403,7 @@ fn find_dips<L: Octet>(ends: L, between: L, error: f64, threshold: L) -> u8 {
 /// Returns the place and value of the minimum of a cubic with these Bézier coefficients. The value is infinite if there is no
 /// minimum within 0 < θ < 1.
 #[inline(always)]
-fn cubic_minimum<L: Octet>([first, second, third, last]: [L; 4]) -> (L, L) {
+pub(super) fn cubic_minimum<L: Octet>([first, second, third, last]: [L; 4]) -> (L, L) {
     let (slope, change) = ((second - first) * L::splat(3.0), (third - second) * L::splat(3.0));
     let (square, cube) = (change - slope, (last - first) - change);
     // The slope b + 2cθ + 3dθ² rises through zero at θ = −b/(√(c² − 3bd) + c).

@@ -4,7 +4,7 @@
 use super::columns::{sum, values_at_points};
 use super::solve::Attempt;
 use super::trial::BladeTrial;
-use crate::math::octet::{Eight, Octet};
+use crate::math::octet::{Eight, Octet, both};
 use crate::time::galerkin::basis::{POINTS, TimeBasis};
 use crate::time::galerkin::trial::{KINK, NEAR, TrialResult};
 
@@ -16,6 +16,7 @@ impl Attempt<'_> {
         let count = basis.count();
         let mut switched = L::zero();
         self.trial.impulses.fill(Eight::ZERO);
+        self.trial.error_rows.clear();
         for block in 0..blocks {
             let valid = self.rows.valid(block);
             let trial = &mut *self.trial;
@@ -48,7 +49,14 @@ impl Attempt<'_> {
                     let signed = if along == 0 { L::zero() - most } else { most };
                     impulse = L::select(mixed, signed, left);
                 }
-                L::select(any, impulse, L::zero()).store(&mut trial.impulses[along * blocks + block]);
+                let impulses = &mut trial.impulses[along * blocks + block];
+                L::select(any, impulse, L::zero()).store(impulses);
+                let mut nodes = any;
+                while nodes != 0 {
+                    let i = nodes.trailing_zeros() as usize;
+                    nodes &= nodes - 1;
+                    trial.error_rows.push(((along * self.rows.nodes + 8 * block + i) * 2 * blocks, impulses.0[i]));
+                }
             }
             if mixed != 0 {
                 result.switches = true;
@@ -70,13 +78,6 @@ impl Attempt<'_> {
     fn error<L: Octet>(&mut self) -> f64 {
         let (rows, BladeTrial { impulses, error_rows, .. }) = (self.rows, &mut *self.trial);
         let width = 2 * rows.blocks;
-        error_rows.clear();
-        for (along, node) in (0..2).flat_map(|along| (0..rows.nodes).map(move |node| (along, node))) {
-            let impulse = impulses[along * rows.blocks + node / 8].0[node % 8];
-            if impulse != 0.0 {
-                error_rows.push(((along * rows.nodes + node) * width, impulse));
-            }
-        }
         let mut terms = L::zero();
         let mut first = 0;
         while first + 3 <= width {
@@ -115,15 +116,12 @@ fn quadratic_form<L: Octet, const B: usize>(form: &[Eight], error_rows: &[(usize
 #[inline(always)]
 fn comes_near<L: Octet>(basis: &TimeBasis, gaps: &[L; POINTS], nodes: u8) -> (bool, f64) {
     let gaps = &gaps[..basis.count()];
-    let (mut low, mut high) = (gaps[0], gaps[0]);
-    for gap in &gaps[1..] {
-        (low, high) = (low.min(*gap), high.max(*gap));
-    }
-    let candidates = low.less(L::splat(0.5 + NEAR) * (high - low)) & nodes;
+    let left = sum(gaps, &basis.left_out).abs() * L::splat(NEAR);
+    let inner = both(|of| sum(gaps, &basis.inner[of]));
+    let candidates = gaps[0].min(gaps[basis.degree]).min(inner[0].min(inner[1])).less(left) & nodes;
     if candidates == 0 {
         return (false, 0.0);
     }
-    let left = sum(gaps, &basis.left_out).abs() * L::splat(NEAR);
     let mut lowest = L::splat(f64::INFINITY);
     for place in &basis.between {
         lowest = lowest.min(sum(gaps, place));

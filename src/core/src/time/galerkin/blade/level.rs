@@ -48,6 +48,11 @@ pub(crate) struct BladeLevel {
     pub loss: Vec<Eight>,
     /// True if at least one mode is damped.
     pub damped: bool,
+    /// Masks of the modes that a cubic follows over the step, and number of blocks of modes that contain them all.
+    pub slow: Vec<u8>,
+    pub slow_blocks: usize,
+    /// Largest distance of each mode from its cubic, or from zero if the mode is not slow, relative to its amplitude.
+    pub relative_errors: Vec<Eight>,
     /// Interpolation of the forces.
     pub kind: ForceInterpolation,
     /// Displacements of all lanes per unit force on each lane (point · nodes + node). For each of the two directions of
@@ -77,6 +82,9 @@ impl BladeLevel {
             end: [0, 1].map(|_| std::array::from_fn(|_| of_modes())),
             loss: vec![Eight::ZERO; TERMS * (TERMS + 1) / 2 * rows.mode_blocks],
             damped: false,
+            slow: vec![0; rows.mode_blocks],
+            slow_blocks: 0,
+            relative_errors: of_modes(),
             kind,
             basis,
             columns: vec![Eight::ZERO; points * rows.nodes * column],
@@ -120,6 +128,15 @@ impl BladeLevel {
         for (to, (row, term)) in self.loss.chunks_exact_mut(blocks.max(1)).zip(pairs) {
             let twice = if row == term { 1.0 } else { 2.0 };
             Eight::spread(tables.modes.loss[row][term].iter().map(|value| twice * value), 0.0, to);
+        }
+        self.slow_blocks = 0;
+        let frequencies = self.slow.iter_mut().zip(&mut self.relative_errors).zip(&rows.rates[3]);
+        for (block, ((slow, errors), frequencies)) in frequencies.enumerate() {
+            *errors = Eight(frequencies.0.map(|frequency| cubic_error(frequency * tables.step).min(1.0)));
+            *slow = (0..8).fold(0, |mask, i| mask | u8::from(errors.0[i] < 1.0) << i);
+            if *slow != 0 {
+                self.slow_blocks = block + 1;
+            }
         }
         let compliance = tables.compliance_of(self.kind);
         let (lanes, stride) = (compliance.lanes(), compliance.stride());
@@ -196,6 +213,12 @@ impl BladeLevel {
         let columns = &self.start_columns[4 * node * self.blocks..][..4 * self.blocks];
         quarters(columns, self.blocks)
     }
+}
+
+/// Bounds the distance of a mode from the cubic through its values and rates at two times, relative to its amplitude.
+/// `x` is the frequency of the mode times the time between them.
+fn cubic_error(x: f64) -> f64 {
+    x * x * x * x / 384.0
 }
 
 #[inline(always)]

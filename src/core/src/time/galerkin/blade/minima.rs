@@ -10,7 +10,7 @@ use super::rows::BladeRows;
 use super::trial::{BladeTrial, StartContacts};
 use crate::math::octet::{Eight, Octet, OctetKernel, both};
 use crate::system::structure::UNKNOWN_GAP;
-use crate::time::galerkin::basis::{PLACES, POINTS};
+use crate::time::galerkin::basis::{MOST, PLACES, POINTS};
 use crate::time::galerkin::trial::{FALLING, NEAR};
 
 /// Largest number of halvings of a step into parts.
@@ -21,11 +21,12 @@ pub(super) const FOLLOW_FRACTION: f64 = 0.1;
 pub(super) const MINIMUM_FRACTION: f64 = 0.3;
 
 impl BladeTrial {
-    /// Bounds the interpolation error (m) of all modes between points at a distance `length` (s).
+    /// Bounds the interpolation error (m) of all modes between points at a distance `length` (s). If forces act, this is
+    /// the length of the step.
     pub(super) fn find_interpolation_error(&mut self, rows: &BladeRows, length: f64) -> f64 {
-        let pushes = self.pushes;
+        let forced_step = self.pushes.then_some(length);
         self.unresolved = None;
-        self.instructions.run_octets(FindInterpolationError { trial: self, rows, length, pushes })
+        self.instructions.run_octets(FindInterpolationError { trial: self, rows, length, forced_step })
     }
 }
 
@@ -111,10 +112,10 @@ impl OctetKernel for RecordPoints<'_> {
 
 /// Gaps of a block of eight nodes at the start and at the points of a step.
 pub(super) struct BlockGaps<L> {
-    /// F (m), and its smallest and largest value.
+    /// F (m), its smallest value, and a lower bound of the polynomial through all values.
     gaps: [L; POINTS],
     low: L,
-    high: L,
+    least: L,
     /// Steepness M of the surface and the largest |σ|.
     steepness: L,
     steepest: L,
@@ -124,10 +125,6 @@ pub(super) struct BlockGaps<L> {
     open: u8,
 }
 
-/// Bound of the overshoot of the polynomial through values at the points, as a fraction of the range of these values. The
-/// overshoot is at most 1/8 for degree 2 and 1/4 for degree 3.
-const EXCURSION: f64 = 0.25;
-
 impl<L: Octet> BlockGaps<L> {
     /// Reads the gaps of a block. Its interpolation errors must be in `path_moved`.
     #[inline(always)]
@@ -136,39 +133,38 @@ impl<L: Octet> BlockGaps<L> {
         let mut gaps = [L::zero(); POINTS];
         gaps[0] = L::load(&trial.start.gaps[block]);
         let mut pushes = L::zero().less(L::load(&trial.start.multipliers[block]));
-        let (mut low, mut high) = (gaps[0], gaps[0]);
+        let mut low = gaps[0];
         let mut steepest = L::load(&trial.start.sigma[block]).abs();
         for point in 1..count {
             let lane = (point - 1) * rows.blocks + block;
             gaps[point] = L::load(&trial.gaps[lane]);
             pushes |= L::zero().less(L::load(&trial.multipliers[lane]));
-            (low, high) = (low.min(gaps[point]), high.max(gaps[point]));
+            low = low.min(gaps[point]);
             steepest = steepest.max(L::load(&trial.sigma[lane]).abs());
         }
         let unresolved = L::load(&trial.path_moved[0][block]);
         let error_bound = sum(&gaps[..count], &level.basis.left_out).abs() * L::splat(NEAR) + unresolved;
+        let inner = both(|of| sum(&gaps[..count], &level.basis.inner[of]));
+        let least = inner[0].min(inner[1]).min(low);
         let (steepness, open) = (L::load(&rows.steepness[block]), !pushes & rows.valid(block));
-        Self { gaps, low, high, steepness, steepest, error_bound, open }
+        Self { gaps, low, least, steepness, steepest, error_bound, open }
     }
 
     /// Returns the nodes whose smallest gap may be below `threshold` (m).
     #[inline(always)]
     fn may_be_below(&self, threshold: L) -> u8 {
-        self.smallest().less(threshold.max(L::zero()) * (self.steepness + self.steepest)) & self.open
+        // The gap is F/N with M ≤ N ≤ M + |σ|.
+        let is_negative = threshold.less(L::zero());
+        let size = L::select(is_negative, self.steepness, self.steepness + self.steepest);
+        (self.least - self.error_bound).less(threshold * size) & self.open
     }
 
     /// Bounds the gaps of the nodes from below (m); `-UNKNOWN_GAP` for nodes that may touch.
     #[inline(always)]
     pub fn lower_bound(&self) -> L {
-        let smallest = self.smallest();
-        let positive = L::zero().less(smallest) & self.open;
-        L::select(positive, smallest / (self.steepness + self.steepest), L::splat(-UNKNOWN_GAP))
-    }
-
-    /// Bounds F from below (m).
-    #[inline(always)]
-    fn smallest(&self) -> L {
-        self.low - (self.high - self.low) * L::splat(EXCURSION) - self.error_bound
+        let smallest = self.least - self.error_bound;
+        let is_positive = L::zero().less(smallest) & self.open;
+        L::select(is_positive, smallest / (self.steepness + self.steepest), L::splat(-UNKNOWN_GAP))
     }
 
     /// Selects the nodes that may come closer between the points of the step, and below `threshold` (m).
@@ -215,20 +211,20 @@ pub(super) struct FindInterpolationError<'a> {
     pub rows: &'a BladeRows,
     /// Distance of the points (s).
     pub length: f64,
-    /// True if forces act in the step.
-    pub pushes: bool,
+    /// Length of the step (s) if forces act in it.
+    pub forced_step: Option<f64>,
 }
 
 impl OctetKernel for FindInterpolationError<'_> {
     type Output = f64;
     #[inline(always)]
     fn run<L: Octet>(self) -> f64 {
-        let Self { trial, rows, length, pushes } = self;
+        let Self { trial, rows, length, forced_step } = self;
         let BladeTrial { start, modal_forces, mode_bounds, amplitudes, .. } = trial;
         let mut error = L::zero();
         for (k, largest) in rows.largest.iter().enumerate() {
             let relative = relative_error(L::load(&rows.rates[3][k]) * L::splat(length));
-            let amplitude = amplitude::<L>(rows, start, modal_forces, k, pushes);
+            let amplitude = amplitude::<L>(rows, start, modal_forces, k, forced_step);
             let (mode_error, largest) = (amplitude * relative, L::load(largest));
             mode_error.store(&mut mode_bounds[k]);
             (largest * amplitude).store(&mut amplitudes[k]);
@@ -238,28 +234,42 @@ impl OctetKernel for FindInterpolationError<'_> {
     }
 }
 
-/// Bounds the amplitudes of eight modes in a step.
+/// Steady motion of eight modes under the modal forces of a step of length `step` (s), as coefficients of powers of the time
+/// since its start.
+#[inline(always)]
+pub(super) fn steady_motion<L: Octet>(
+    rows: &BladeRows,
+    modal_forces: &[Vec<Eight>],
+    block: usize,
+    step: f64,
+) -> [L; MOST] {
+    let (per_step, twice_rate) = (1.0 / step, L::load(&rows.rates[0][block]) * L::splat(2.0));
+    let per_square = L::load(&rows.rates[4][block]);
+    let [one, two] = both(|term| L::load(&modal_forces[term][block]));
+    let square = L::load(&modal_forces[2][block]) * L::splat(per_step * per_step) * per_square;
+    let linear = (two * L::splat(per_step) - L::splat(2.0) * twice_rate * square) * per_square;
+    [(one - twice_rate * linear - L::splat(2.0) * square) * per_square, linear, square]
+}
+
+/// Bounds the amplitudes with which eight modes vibrate about their steady motion in a step.
 #[inline(always)]
 pub(super) fn amplitude<L: Octet>(
     rows: &BladeRows,
     start: &StartContacts,
     modal_forces: &[Vec<Eight>],
     block: usize,
-    pushes: bool,
+    forced_step: Option<f64>,
 ) -> L {
     let [rates, per_frequency, ..] = &rows.rates;
-    let [q, v] = both(|of| L::load(&start.modes[of][block]));
-    let per_frequency = L::load(&per_frequency[block]);
-    let turned = (v + L::load(&rates[block]) * q) * per_frequency;
-    let amplitude = (q * q + turned * turned).sqrt();
-    if !pushes {
-        return amplitude;
+    let [mut q, mut v] = both(|of| L::load(&start.modes[of][block]));
+    if let Some(step) = forced_step {
+        let [position, velocity, _] = steady_motion::<L>(rows, modal_forces, block, step);
+        (q, v) = (q - position, v - velocity);
     }
-    let mut force = L::zero();
-    for term in modal_forces {
-        force = force + L::load(&term[block]).abs();
-    }
-    amplitude + force * per_frequency * per_frequency * L::splat(2.0)
+    let turned = ((v + L::load(&rates[block]) * q) * L::load(&per_frequency[block])).abs();
+    let position = q.abs();
+    // At most 8 % above the root of the sum of squares, without a root.
+    position.max(turned) + L::splat(std::f64::consts::SQRT_2 - 1.0) * position.min(turned)
 }
 
 /// Bounds the error of the cubic between two times, relative to the amplitude of a mode. `x` is the frequency of the mode

@@ -73,11 +73,8 @@ impl BladeInSpan<'_> {
                 .for_each(|blocks| blocks.fill(Eight::ZERO));
         }
         self.blade.trial.pushes = false;
-        let BladeTrial { least, flight_bounds, .. } = &mut self.blade.trial;
         if step.length == f64::INFINITY {
-            least.fill(NO_BOUND);
-        } else {
-            least.copy_from_slice(flight_bounds);
+            self.blade.trial.gap_bounds.fill(NO_BOUND);
         }
         self.open = Some(OpenStep { step, kind: None, is_resolved: true, work, energy, banked: 0.0 });
     }
@@ -153,9 +150,7 @@ impl BladeInSpan<'_> {
             return;
         }
         let Some(kind) = kind else {
-            let mut drives = [PointDrive::default(); POINTS];
-            drives.iter_mut().zip(ends).for_each(|(drive, theta)| *drive = self.drive_at(theta).0);
-            if self.needs_gaps(&drives) {
+            if self.needs_gaps() {
                 self.follow(step, ForceInterpolation::Polynomial, within);
             }
             return;

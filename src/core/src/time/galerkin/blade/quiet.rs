@@ -70,7 +70,7 @@ impl BladeInSpan<'_> {
     pub(super) fn find_least(&mut self, step: SpanStep, kind: ForceInterpolation, is_resolved: bool) {
         let (rows, level, trial) = (&self.tables.rows, self.tables.level(step.level, kind), &mut self.blade.trial);
         if trial.pushes || !is_resolved || trial.unresolved.is_none() {
-            trial.least.fill(NO_BOUND);
+            trial.gap_bounds.fill(NO_BOUND);
             return;
         }
         let instructions = trial.instructions;
@@ -79,7 +79,7 @@ impl BladeInSpan<'_> {
 
     /// Returns whether no gap in the open step can be a smallest gap that an output needs.
     pub fn is_quiet(&self) -> bool {
-        !self.pushes() && self.blade.is_above(self.blade.trial.least.iter().map(|block| &block.0))
+        !self.pushes() && self.blade.is_above(self.blade.trial.gap_bounds.iter().map(|block| &block.0))
     }
 
     /// Returns whether vibration with these kinetic and strain energies (J) without forces certainly causes only small
@@ -161,7 +161,7 @@ impl OctetKernel for FindLeast<'_> {
         displace::<L, 1, 1>([&rows.magnitudes[0]], rows.blocks, [&trial.mode_bounds], [&mut trial.path_moved[0]]);
         for block in 0..rows.blocks {
             let bound = BlockGaps::<L>::new(trial, rows, level, block).lower_bound();
-            L::select(rows.valid(block), bound, L::zero()).store(&mut trial.least[block]);
+            L::select(rows.valid(block), bound, L::zero()).store(&mut trial.gap_bounds[block]);
         }
     }
 }

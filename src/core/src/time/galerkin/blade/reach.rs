@@ -4,7 +4,7 @@ use super::columns::displace;
 use super::rows::BladeRows;
 use super::surface::FacedSurface;
 use super::trial::BladeTrial;
-use crate::math::octet::{Eight, Octet, OctetKernel};
+use crate::math::octet::{Octet, OctetKernel};
 
 /// See [`BladeTrial::find_reach`].
 pub(super) struct FindReach<'a> {
@@ -17,28 +17,16 @@ impl OctetKernel for FindReach<'_> {
     #[inline(always)]
     fn run<L: Octet>(self) {
         let Self { trial, rows } = self;
-        let BladeTrial { start, modal, reach, .. } = trial;
+        let BladeTrial { start, free_amplitudes, reach, .. } = trial;
         let ([q, v], [rates, per_frequency, ..]) = (&start.modes, &rows.rates);
-        let amplitudes = &mut modal[0];
-        for (k, amplitude) in amplitudes.iter_mut().enumerate() {
+        for (k, amplitude) in free_amplitudes.iter_mut().enumerate() {
             let (q, v) = (L::load(&q[k]), L::load(&v[k]));
             let turned = (v + L::load(&rates[k]) * q) * L::load(&per_frequency[k]);
             (q * q + turned * turned).sqrt().store(amplitude);
         }
         let ([closing, around], [closing_reach, around_reach]) = (&rows.magnitudes, reach);
-        displace::<L, 2, 1>([closing, around], rows.blocks, [amplitudes], [closing_reach, around_reach]);
+        displace::<L, 2, 1>([closing, around], rows.blocks, [free_amplitudes], [closing_reach, around_reach]);
     }
-}
-
-/// Bound on the gaps of all nodes over a step or a part of it without contact.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Clearance {
-    /// A node may touch.
-    Unknown,
-    /// No node can touch, but a gap may become smaller than the smallest gap recorded so far, which an output needs.
-    Needed,
-    /// No node can touch, and no output needs a gap of this step.
-    Wide,
 }
 
 /// See [`BladeTrial::find_clearance`].
@@ -46,21 +34,18 @@ pub(super) struct FindClearance<'a> {
     pub trial: &'a mut BladeTrial,
     pub rows: &'a BladeRows,
     pub faced: &'a FacedSurface<'a>,
-    pub floors: &'a [Eight],
-    pub lowest: &'a [Eight],
 }
 
 impl OctetKernel for FindClearance<'_> {
-    type Output = Clearance;
+    type Output = bool;
     #[inline(always)]
-    fn run<L: Octet>(self) -> Clearance {
-        let Self { trial, rows, faced, floors, lowest } = self;
+    fn run<L: Octet>(self) -> bool {
+        let Self { trial, rows, faced } = self;
         let [start, end, ..] = &faced.drives;
         if start.factor < 0.0 {
-            return Clearance::Unknown;
+            return false;
         }
         let bumpiness = faced.surface.bumpiness();
-        let mut needed = 0;
         for block in 0..rows.blocks {
             let around = L::load(&trial.reach[1][block]) * L::load(&rows.per_radius[block]);
             let angles = L::load(&trial.angles[block]);
@@ -76,16 +61,13 @@ impl OctetKernel for FindClearance<'_> {
             let left = L::splat(start.clearance) + shape * L::splat(start.factor) - L::load(&trial.reach[0][block]);
             let valid = rows.valid(block);
             if L::zero().less(left) & valid != valid {
-                return Clearance::Unknown;
+                return false;
             }
             // The gap is F/N with N ≥ M; on a flank below 45° N ≤ √2 M.
             let smallest = left / (L::load(&rows.steepness[block]) * L::splat(std::f64::consts::SQRT_2));
-            L::select(valid, smallest, L::zero()).store(&mut trial.flight_bounds[block]);
-            let of_block = smallest.less(L::load(&floors[block]).min(L::load(&lowest[block]))) & valid;
-            trial.followed[block] = of_block;
-            needed |= of_block;
+            L::select(valid, smallest, L::zero()).store(&mut trial.gap_bounds[block]);
         }
-        if needed == 0 { Clearance::Wide } else { Clearance::Needed }
+        true
     }
 }
 

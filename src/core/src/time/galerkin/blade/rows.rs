@@ -10,8 +10,8 @@ use nalgebra::{DMatrix, Vector2};
 /// Data of a blade that do not depend on the step length.
 #[derive(Debug, Clone)]
 pub(crate) struct BladeRows {
-    /// ξω, 1/ω_d, ω² and ω of each mode.
-    pub rates: [Vec<Eight>; 4],
+    /// ξω, 1/ω_d, ω², ω and 1/ω² of each mode. The last is 0 if ω is 0.
+    pub rates: [Vec<Eight>; 5],
     /// Magnitudes of `shapes`.
     pub magnitudes: [Vec<Eight>; 2],
     /// Largest magnitude over the nodes of the closing displacement of each mode.
@@ -45,6 +45,8 @@ pub(crate) struct BladeRows {
     pub largest_around: f64,
     /// Smallest radius (m).
     pub smallest_radius: f64,
+    /// True if every mode has a frequency above zero.
+    pub all_vibrate: bool,
     /// Direction of the closing displacement of each node.
     directions: Vec<Vector3>,
 }
@@ -73,6 +75,7 @@ impl BladeRows {
                 of_modes(&|w, ratio| 1.0 / (w * (1.0 - ratio * ratio).sqrt())),
                 of_modes(&|w, _| w * w),
                 of_modes(&|w, _| w),
+                of_modes(&|w, _| if w > 0.0 { 1.0 / (w * w) } else { 0.0 }),
             ],
             magnitudes: [Vec::new(), Vec::new()],
             largest: vec![Eight::ZERO; Eight::blocks(count)],
@@ -92,6 +95,7 @@ impl BladeRows {
             by_row: vec![Eight::ZERO; 2 * nodes * Eight::blocks(count)],
             per_radius: of_nodes(&|node| per_radius[node]),
             largest_around: 0.0,
+            all_vibrate: modes.frequencies.iter().all(|frequency| *frequency > 0.0),
             smallest_radius: per_radius.iter().fold(f64::INFINITY, |least, value| least.min(1.0 / value)),
             directions,
         };

@@ -1,10 +1,10 @@
 //! The contact problem of a step of a blade: forces that keep all nodes from penetrating at all points.
 
-use super::columns::{combine, displace, eliminate, eliminate_any};
+use super::columns::{combine, displace_nodes, eliminate, eliminate_any};
 use super::level::{BladeLevel, Place};
 use super::rows::BladeRows;
 use super::surface::FacedSurface;
-use super::trial::BladeTrial;
+use super::trial::{BladeTrial, StartContacts};
 use crate::math::octet::{Eight, Octet, OctetKernel, both};
 use crate::time::galerkin::trial::{ForceInterpolation, TrialResult};
 
@@ -15,6 +15,41 @@ const JOINT_CHANGES: usize = 8;
 const PASSES: usize = 6;
 /// Forces and gaps of the wrong sign within this fraction of the largest count as rounding.
 const ROUNDING: f64 = 1e-13;
+
+/// Adds the displacements under the forces at the start of the step.
+#[inline(always)]
+fn add_pushed<L: Octet, const P: usize>(
+    blocks: usize,
+    start: &StartContacts,
+    level: &BladeLevel,
+    [closing, around]: [&mut [Eight]; 2],
+) {
+    for first in (0..blocks * P).step_by(P) {
+        let mut sums = [both(|_| L::zero()); P];
+        for p in 0..P {
+            sums[p] = [L::load(&closing[first + p]), L::load(&around[first + p])];
+        }
+        for (block, multipliers) in start.multipliers.iter().enumerate() {
+            let mut nodes = L::zero().less(L::load(multipliers));
+            while nodes != 0 {
+                let i = nodes.trailing_zeros() as usize;
+                nodes &= nodes - 1;
+                let [a, b] = both(|along| L::splat(start.forces[along][block].0[i]));
+                let columns = level.start_column(8 * block + i);
+                let columns = [0, 1, 2, 3].map(|of| &columns[of][first..][..P]);
+                for p in 0..P {
+                    let [aa, ab] = both(|seen| L::load(&columns[seen][p]));
+                    let [ba, bb] = both(|seen| L::load(&columns[2 + seen][p]));
+                    sums[p] = [sums[p][0] + (a * aa + b * ba), sums[p][1] + (a * ab + b * bb)];
+                }
+            }
+        }
+        for p in 0..P {
+            sums[p][0].store(&mut closing[first + p]);
+            sums[p][1].store(&mut around[first + p]);
+        }
+    }
+}
 
 /// Tries a step.
 pub(super) struct Attempt<'a> {
@@ -66,7 +101,7 @@ impl Attempt<'_> {
         let [closing, around] = moved;
         let width = level.blocks;
         let (closing, around) = (&mut closing[..width], &mut around[..width]);
-        displace::<L, 2, P>([&rows.shapes[0], &rows.shapes[1]], rows.blocks, modes, [closing, around]);
+        displace_nodes::<L, 2, P>(rows, [0, 1], rows.mode_blocks, modes, [closing, around]);
         held.copy_from_slice(&start.held[1]);
         if level.kind == ForceInterpolation::Constant {
             // The force at the start does not persist into the step.
@@ -75,18 +110,7 @@ impl Attempt<'_> {
         if !start.pushed || level.kind == ForceInterpolation::Constant {
             return;
         }
-        for node in 0..rows.nodes {
-            if start.multipliers[node / 8].0[node % 8] > 0.0 {
-                let [a, b] = both(|along| L::splat(start.forces[along][node / 8].0[node % 8]));
-                let columns = level.start_column(node);
-                for block in 0..width {
-                    let ([aa, ab], [ba, bb]) =
-                        (both(|i| L::load(&columns[i][block])), both(|i| L::load(&columns[2 + i][block])));
-                    (L::load(&closing[block]) + (a * aa + b * ba)).store(&mut closing[block]);
-                    (L::load(&around[block]) + (a * ab + b * bb)).store(&mut around[block]);
-                }
-            }
-        }
+        add_pushed::<L, P>(rows.blocks, start, level, [closing, around]);
     }
 
     /// Computes F of all lanes without forces, linearised about the place of their nodes, and the directions of the

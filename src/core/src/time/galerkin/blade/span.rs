@@ -2,9 +2,9 @@
 
 use super::dense::ModeResponse;
 use super::gaps::include;
+use super::glide::GlideEnd;
 use super::level::PartWeights;
 use super::open_step::{OpenStep, SpanProgress};
-use super::reach::Clearance;
 use super::rows::BladeRows;
 use super::surface::{FacedSurface, PointDrive};
 use super::tables::{BladeTables, SpanKind};
@@ -19,11 +19,11 @@ use crate::system::structure::NeededMinima;
 use crate::time::galerkin::basis::POINTS;
 use crate::time::galerkin::island::StepControl;
 use crate::time::galerkin::record::{MotionCourse, TurningMotion};
-use crate::time::galerkin::span::{SpanStep, SpanSteps, StepGoal};
+use crate::time::galerkin::span::{Flight, SHORTEST_LOOK, SpanStep, SpanSteps, StepGoal};
 use crate::time::galerkin::state::SectorState;
 use crate::time::galerkin::tables::Tables;
 use crate::time::galerkin::trial::{ForceInterpolation, TrialResult};
-use std::mem::{replace, take};
+use std::mem::{replace, swap, take};
 
 /// Tables of the blades of a structure, which do not change during a span.
 #[derive(Debug, Clone)]
@@ -221,6 +221,7 @@ impl<'a> BladeInSpan<'a> {
     ) -> Self {
         let tables = &model.kinds[place.kind];
         blade.trial.turn_to(&model.angles[place.sector]);
+        blade.trial.glide_ends.iter_mut().for_each(GlideEnd::forget);
         if let Some(state) = state {
             blade.trial.read(&tables.rows, state);
         }
@@ -291,15 +292,21 @@ impl<'a> BladeInSpan<'a> {
         AddStep { tally, trial, rows, level, faced, motions, part, sums }.add();
     }
 
-    /// Bounds the gaps of a flight between the first two drives. Returns whether some are needed; these nodes are followed.
-    pub(super) fn needs_gaps(&mut self, drives: &[PointDrive; POINTS]) -> bool {
-        self.find_clearance(drives) != Clearance::Wide
-    }
-
-    fn find_clearance(&mut self, drives: &[PointDrive; POINTS]) -> Clearance {
-        let faced = self.place.faced_surface(drives);
-        let Blade { trial, floors, tally, .. } = &mut *self.blade;
-        trial.find_clearance(&self.tables.rows, &faced, floors, &tally.lowest)
+    /// Returns whether the reach shows that no node can touch in a step, and bounds the gaps.
+    fn is_clear(&mut self, step: SpanStep) -> bool {
+        if !self.place.course.only_turns() {
+            return false;
+        }
+        let mut drives = [PointDrive::default(); POINTS];
+        for (drive, theta) in drives.iter_mut().zip([step.from, step.from + step.length]) {
+            *drive = drive_at(&self.place, theta).0;
+        }
+        let (faced, trial) = (self.place.faced_surface(&drives), &mut self.blade.trial);
+        let is_clear = trial.find_clearance(&self.tables.rows, &faced);
+        if is_clear {
+            trial.glide_ends.iter_mut().for_each(GlideEnd::forget);
+        }
+        is_clear
     }
 
     /// Advances the modes to the end of a step. `kind` is `None` for a flight.
@@ -310,6 +317,12 @@ impl<'a> BladeInSpan<'a> {
         tally.damping += trial.advance(level, pushes);
         if kind.is_some() {
             trial.begin_next_step(&self.tables.rows, level);
+        }
+        let [start, end] = &mut trial.glide_ends;
+        swap(start, end);
+        end.forget();
+        if kind.is_some() {
+            start.forget();
         }
         self.known = kind.is_some();
         self.reach_known &= !pushes;
@@ -368,9 +381,9 @@ impl SpanSteps for BladeInSpan<'_> {
         1
     }
 
-    fn fly(&mut self, step: SpanStep) -> bool {
-        if self.blade.trial.is_pushed() || !self.place.course.only_turns() {
-            return false;
+    fn fly(&mut self, step: SpanStep) -> Flight {
+        if self.blade.trial.is_pushed() || !self.tables.rows.all_vibrate {
+            return Flight::NeedsTrial;
         }
         // Vibration decays in long flights.
         let is_due = self.progress.done == 0 && self.progress.spans.is_multiple_of(REACH_SPANS);
@@ -378,29 +391,25 @@ impl SpanSteps for BladeInSpan<'_> {
             self.blade.trial.find_reach(&self.tables.rows);
             self.reach_known = true;
         }
-        if matches!(self.recorded, RecordScope::Interval(_)) && self.stays_clear() {
+        if matches!(self.recorded, RecordScope::Interval(_)) && self.place.course.only_turns() && self.stays_clear() {
             self.open_flight(SpanStep { length: f64::INFINITY, ..step });
-            return true;
+            return Flight::Taken;
         }
-        let mut drives = [PointDrive::default(); POINTS];
-        for (drive, theta) in drives.iter_mut().zip([step.from, step.from + step.length]) {
-            *drive = drive_at(&self.place, theta).0;
+        // Near a surface, the reach is too large.
+        if !(step.level == 0 && self.is_clear(step) || self.glides(step)) {
+            let is_short = self.length(step.level) <= SHORTEST_LOOK;
+            return if is_short { Flight::NeedsTrial } else { Flight::TooLong };
         }
-        let clearance = self.find_clearance(&drives);
-        if clearance == Clearance::Unknown {
-            return false;
-        }
+        self.blade.trial.pushes = false;
         if !self.ends_within(step) {
             self.open_flight(step);
-        } else if clearance == Clearance::Needed && self.recorded != RecordScope::WorkOnly {
-            let result = self.attempt(step, ForceInterpolation::Polynomial);
-            self.accept(step, ForceInterpolation::Polynomial, &result);
-            // The state must not depend on the scope of recording.
-            self.known &= self.recorded == RecordScope::All;
-        } else {
-            self.advance(step, None);
+            return Flight::Taken;
         }
-        true
+        if self.recorded != RecordScope::WorkOnly && self.needs_gaps() {
+            self.follow(step, ForceInterpolation::Polynomial, [0.0, 1.0]);
+        }
+        self.advance(step, None);
+        Flight::Taken
     }
 
     fn attempt(&mut self, step: SpanStep, kind: ForceInterpolation) -> TrialResult {

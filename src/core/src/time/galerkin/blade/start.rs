@@ -1,10 +1,10 @@
 //! Displacements, gaps and sliding at the start of a step.
 
-use super::columns::displace;
+use super::columns::{displace, displace_nodes};
 use super::rows::BladeRows;
 use super::surface::FacedSurface;
 use super::trial::BladeTrial;
-use crate::math::octet::{Eight, Octet, OctetKernel, both};
+use crate::math::octet::{Octet, OctetKernel, both};
 
 /// Finds displacements, F and σ at the start of a step, and the direction of sliding.
 pub(super) struct FindStart<'a> {
@@ -22,22 +22,23 @@ impl OctetKernel for FindStart<'_> {
         let Self { known, trial, rows, faced } = self;
         let BladeTrial { start, angles, .. } = trial;
         let [q, v] = &start.modes;
-        start.held.iter_mut().for_each(|held| held.fill(Eight::ZERO));
-        for node in 0..if start.pushed { rows.nodes } else { 0 } {
-            if start.multipliers[node / 8].0[node % 8] > 0.0 {
-                let force = both(|along| L::splat(start.forces[along][node / 8].0[node % 8]));
-                for block in 0..rows.blocks {
-                    let moved = |seen: usize| {
-                        let [a, b] = both(|along| {
-                            L::load(&rows.flexibility[along][seen][node * rows.blocks + block]) * force[along]
-                        });
-                        a + b
-                    };
-                    for (seen, held) in start.held.iter_mut().enumerate() {
-                        (L::load(&held[block]) + moved(seen)).store(&mut held[block]);
+        for target in 0..rows.blocks {
+            let mut held = both(|_| L::zero());
+            for (block, multipliers) in start.multipliers.iter().enumerate() {
+                let mut nodes = if start.pushed { L::zero().less(L::load(multipliers)) } else { 0 };
+                while nodes != 0 {
+                    let i = nodes.trailing_zeros() as usize;
+                    nodes &= nodes - 1;
+                    let force = both(|along| L::splat(start.forces[along][block].0[i]));
+                    for seen in [0, 1] {
+                        let place = (8 * block + i) * rows.blocks + target;
+                        let [a, b] = both(|along| L::load(&rows.flexibility[along][seen][place]) * force[along]);
+                        held[seen] = held[seen] + (a + b);
                     }
                 }
             }
+            held[0].store(&mut start.held[0][target]);
+            held[1].store(&mut start.held[1][target]);
         }
         let drive = &faced.drives[0];
         // Nodes that vibrate more slowly than the rotor turns cannot reverse.
@@ -52,8 +53,8 @@ impl OctetKernel for FindStart<'_> {
             displace::<L, 1, 1>([&rows.shapes[1]], rows.blocks, [v], [&mut start.friction]);
         }
         if !known {
-            let ([closing, around], [closings, arounds]) = (&rows.shapes, &mut start.moved);
-            displace::<L, 2, 1>([closing, around], rows.blocks, [q], [closings, arounds]);
+            let [closings, arounds] = &mut start.moved;
+            displace_nodes::<L, 2, 1>(rows, [0, 1], rows.mode_blocks, [q], [closings, arounds]);
         }
         for block in 0..rows.blocks {
             let per_radius = L::load(&rows.per_radius[block]);

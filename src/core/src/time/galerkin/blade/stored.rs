@@ -67,9 +67,11 @@ impl BladeInSpan<'_> {
 
     /// Clears values that do not belong to the open step, so that a saved state does not depend on earlier trials.
     fn clear_unknown(&mut self, step: SpanStep, kind: Option<ForceInterpolation>) {
-        let BladeTrial { reach, moved, sigma, gaps, multipliers, forces, pushes, .. } = &mut self.blade.trial;
+        let BladeTrial { reach, free_amplitudes, moved, sigma, gaps, multipliers, forces, pushes, .. } =
+            &mut self.blade.trial;
         if !self.reach_known {
             reach.iter_mut().for_each(|reach| reach.fill(Eight::ZERO));
+            free_amplitudes.fill(Eight::ZERO);
         }
         if !*pushes {
             forces.iter_mut().for_each(|forces| forces.fill(Eight::ZERO));
@@ -108,7 +110,7 @@ impl BladeInSpan<'_> {
         (self.known, self.reach_known) = (is(6), is(7));
         let trial = &mut self.blade.trial;
         (trial.pushes, trial.start.pushed) = (is(8), is(9));
-        (trial.forces_known, trial.unresolved) = (true, None);
+        (trial.forces_known, trial.unresolved, trial.cubic_errors_known) = (true, None, 0);
         let work = ContactWork {
             shaft: numbers[11],
             casing: numbers[12],
@@ -192,16 +194,16 @@ pub(crate) fn stored_start(numbers: &[f64], span: f64) -> Option<f64> {
 
 /// Length of an array that stores an open step of a blade with these numbers of nodes and of modes with inertia.
 pub(crate) fn stored_len(nodes: usize, modes: usize) -> usize {
-    HEADER_LEN + 8 * ((13 + 7 * MOST) * Eight::blocks(nodes) + (2 + MOST) * Eight::blocks(modes))
+    HEADER_LEN + 8 * ((13 + 7 * MOST) * Eight::blocks(nodes) + (3 + MOST) * Eight::blocks(modes))
 }
 
 impl BladeTrial {
     /// Calls a function with each block of an open step and its place in an array. A flight without a trial has no values at
     /// the points of a step.
     fn for_each_stored_block(&mut self, is_tried: bool, numbers: &mut [f64], of: impl Fn(&mut Eight, &mut [f64; 8])) {
-        let Self { start, moved, sigma, gaps, multipliers, forces, modal_forces, reach, least, .. } = self;
+        let Self { start, moved, sigma, gaps, multipliers, forces, modal_forces, reach, .. } = self;
         let contacts = [&mut start.multipliers, &mut start.slopes, &mut start.gaps, &mut start.sigma];
-        let first = once(least).chain(&mut start.modes);
+        let first = once(&mut self.gap_bounds).chain(&mut start.modes).chain(once(&mut self.free_amplitudes));
         let all = first.chain(&mut start.forces).chain(&mut start.moved).chain(contacts).chain(reach);
         let lanes =
             [sigma, gaps, multipliers, &mut start.friction].into_iter().chain(moved).chain(forces).chain(modal_forces);

@@ -2,9 +2,10 @@
 
 use super::accept::{Advance, BeginNextStep, FindModalForces};
 use super::follow::{PathPoint, STORED_TIMES};
+use super::glide::GlideEnd;
 use super::level::BladeLevel;
 use super::minima::SelectFollowed;
-use super::reach::{Clearance, Energy, FindClearance, FindReach};
+use super::reach::{Energy, FindClearance, FindReach};
 use super::rows::BladeRows;
 use super::solve::Attempt;
 use super::start::FindStart;
@@ -15,6 +16,7 @@ use crate::math::simd::InstructionSet;
 use crate::math::vector::{set_vector3_at, vector3_at};
 use crate::time::galerkin::basis::MOST;
 use crate::time::galerkin::state::SectorState;
+use crate::time::galerkin::tables::HALVINGS;
 use crate::time::galerkin::trial::TrialResult;
 use nalgebra::Vector2;
 use std::mem::replace;
@@ -136,9 +138,16 @@ pub(crate) struct BladeTrial {
     pub(super) unresolved: Option<f64>,
     /// Largest closing and circumferential displacements at any time without contact (m).
     pub(super) reach: [Vec<Eight>; 2],
-    /// Lower bounds of the gaps in the open step (m), and in the flight that was examined last.
-    pub(super) least: Vec<Eight>,
-    pub(super) flight_bounds: Vec<Eight>,
+    /// Amplitudes of the modes without contact.
+    pub(super) free_amplitudes: Vec<Eight>,
+    /// For the steps of each level, bounds on the distance of the closing displacements without contact from the cubics
+    /// of the slow modes (m), and mask of the levels whose bounds are known.
+    pub(super) cubic_errors: Vec<Vec<Eight>>,
+    pub(super) cubic_errors_known: u16,
+    /// Lower bounds of the gaps over the last step without a trial, or over an open step (m).
+    pub(super) gap_bounds: Vec<Eight>,
+    /// Gaps at the start and the end of the last step without a trial.
+    pub(super) glide_ends: [GlideEnd; 2],
     pub(super) instructions: InstructionSet,
 }
 
@@ -189,8 +198,11 @@ impl BladeTrial {
             impulses: vec![Eight::ZERO; 2 * nodes],
             pushes: false,
             reach: [of_nodes(), of_nodes()],
-            least: of_nodes(),
-            flight_bounds: of_nodes(),
+            free_amplitudes: of_modes(),
+            cubic_errors: vec![of_nodes(); HALVINGS + 1],
+            cubic_errors_known: 0,
+            gap_bounds: of_nodes(),
+            glide_ends: [GlideEnd::new(nodes), GlideEnd::new(nodes)],
             instructions: InstructionSet::detect(),
         }
     }
@@ -311,20 +323,14 @@ impl BladeTrial {
 
     /// Finds the largest closing and circumferential displacement of each node (m) at any time without contact.
     pub(crate) fn find_reach(&mut self, rows: &BladeRows) {
+        self.cubic_errors_known = 0;
         self.instructions.run_octets(FindReach { trial: self, rows });
     }
 
     /// Bounds the gaps while the rotor turns past the resting surface, from the angle of the first drive to that of the
-    /// second. A smallest gap is needed if it is below `floors` and below `lowest`, the smallest gap so far (m); the
-    /// followed nodes are then those whose smallest gaps are needed.
-    pub(crate) fn find_clearance(
-        &mut self,
-        rows: &BladeRows,
-        faced: &FacedSurface,
-        floors: &[Eight],
-        lowest: &[Eight],
-    ) -> Clearance {
-        self.instructions.run_octets(FindClearance { trial: self, rows, faced, floors, lowest })
+    /// second. Returns whether no node can touch.
+    pub(crate) fn find_clearance(&mut self, rows: &BladeRows, faced: &FacedSurface) -> bool {
+        self.instructions.run_octets(FindClearance { trial: self, rows, faced })
     }
 
     /// Kinetic and strain energy at the start of the step (J).
