@@ -93,7 +93,7 @@ impl BladeModel {
         if law.sticks || !law.complementary || !law.constant_friction || degrees().any(|degree| degree == 1) {
             return None;
         }
-        if gap.nodes.len() != kinds[0].nodes() || gap.shaft_moves {
+        if gap.nodes.len() != kinds[0].nodes() {
             return None;
         }
         let degree = degrees().max()?;
@@ -262,6 +262,9 @@ impl<'a> BladeInSpan<'a> {
         for (motion, weights) in self.motions.iter_mut().zip(&weights.work).take(count) {
             *motion = TurningMotion::default();
             moved[..count].iter().zip(weights).for_each(|(to, weight)| motion.add(*weight, &moved[0], to));
+            if self.place.course.is_off_centre() {
+                motion.shaft = moved[..count].iter().zip(weights).map(|(to, weight)| *weight * to.shaft).sum();
+            }
         }
     }
 
@@ -270,6 +273,7 @@ impl<'a> BladeInSpan<'a> {
         if self.blade.trial.pushes() && sums != Sums::WorkOnly {
             let count = self.tables.level(step.level, kind).points() + 1;
             self.drives[..count].iter_mut().for_each(|drive| drive.rotor = libm::sincos(drive.rotor_angle));
+            self.blade.trial.find_across(&self.tables.rows, self.tables.level(step.level, kind));
         }
         let faced = &self.place.faced_surface(&self.drives);
         let Blade { trial, tally, .. } = &mut *self.blade;
@@ -277,15 +281,17 @@ impl<'a> BladeInSpan<'a> {
         AddStep { tally, trial, rows, level, faced, motions, part, sums }.add();
     }
 
-    /// Bounds the gaps of a flight between the first two drives. Returns whether some are needed; these nodes are followed.
-    pub(super) fn needs_gaps(&mut self, drives: &[PointDrive; POINTS]) -> bool {
-        self.find_clearance(drives) != Clearance::Wide
+    /// Bounds the gaps of a flight between two fractions of the span. Returns whether some are needed; these nodes are followed.
+    pub(super) fn needs_gaps(&mut self, ends: [f64; 2]) -> bool {
+        self.find_clearance(ends) != Clearance::Wide
     }
 
-    fn find_clearance(&mut self, drives: &[PointDrive; POINTS]) -> Clearance {
-        let faced = self.place.faced_surface(drives);
+    fn find_clearance(&mut self, ends: [f64; 2]) -> Clearance {
+        let mut drives = [PointDrive::default(); POINTS];
+        drives.iter_mut().zip(ends).for_each(|(drive, theta)| *drive = self.drive_at(theta).0);
+        let (faced, shaft) = (self.place.faced_surface(&drives), self.place.course.shaft_bounds(ends));
         let Blade { trial, floors, tally, .. } = &mut *self.blade;
-        trial.find_clearance(&self.tables.rows, &faced, floors, &tally.lowest)
+        trial.find_clearance(&self.tables.rows, &faced, &shaft, floors, &tally.lowest)
     }
 
     /// Advances the modes to the end of a step. `kind` is `None` for a flight.
@@ -314,12 +320,23 @@ impl<'a> BladeInSpan<'a> {
 
 impl<'a> BladePlace<'a> {
     pub(super) fn faced_surface(&self, drives: &[PointDrive; POINTS]) -> FacedSurface<'a> {
-        FacedSurface { surface: &self.gap.surface, drives: *drives, friction: self.parameters.friction }
+        let is_off_centre = self.course.is_off_centre();
+        FacedSurface { surface: &self.gap.surface, drives: *drives, friction: self.parameters.friction, is_off_centre }
     }
 }
 
 /// Prescribed motion of a sector at the fraction `theta` of a span, and the motion since the start of the span.
 pub(super) fn drive_at(place: &BladePlace, theta: f64) -> (PointDrive, TurningMotion) {
+    let (point, motion) = centred_drive_at(place, theta);
+    if !place.course.is_off_centre() {
+        return (point, motion);
+    }
+    let [shaft, velocity, moved] = place.course.shaft_at(theta);
+    (point.with_shaft(shaft, velocity), TurningMotion { shaft: moved, ..motion })
+}
+
+/// Returns the prescribed motion without that of the shaft.
+pub(super) fn centred_drive_at(place: &BladePlace, theta: f64) -> (PointDrive, TurningMotion) {
     let (drive, motion) = place.course.turning_at(theta);
     let point = PointDrive {
         turned: drive.rotor_angle - drive.shape_rotation,
@@ -328,6 +345,7 @@ pub(super) fn drive_at(place: &BladePlace, theta: f64) -> (PointDrive, TurningMo
         speed: drive.speed,
         rotor_angle: drive.rotor_angle,
         rotor: (0.0, 1.0),
+        ..PointDrive::default()
     };
     (point, motion)
 }
@@ -355,7 +373,7 @@ impl SpanSteps for BladeInSpan<'_> {
     }
 
     fn fly(&mut self, step: SpanStep) -> bool {
-        if self.blade.trial.is_pushed() || !self.place.course.only_turns() {
+        if self.blade.trial.is_pushed() || !self.place.course.is_casing_at_rest() {
             return false;
         }
         // Vibration decays in long flights.
@@ -368,11 +386,7 @@ impl SpanSteps for BladeInSpan<'_> {
             self.open_flight(SpanStep { length: f64::INFINITY, ..step });
             return true;
         }
-        let mut drives = [PointDrive::default(); POINTS];
-        for (drive, theta) in drives.iter_mut().zip([step.from, step.from + step.length]) {
-            *drive = drive_at(&self.place, theta).0;
-        }
-        let clearance = self.find_clearance(&drives);
+        let clearance = self.find_clearance([step.from, step.from + step.length]);
         if clearance == Clearance::Unknown {
             return false;
         }

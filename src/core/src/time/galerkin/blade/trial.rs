@@ -1,6 +1,7 @@
 //! Scratch memory and results of trials of a blade.
 
 use super::accept::{Advance, BeginNextStep, FindModalForces};
+use super::across::FindAcross;
 use super::follow::{PathPoint, STORED_TIMES};
 use super::level::BladeLevel;
 use super::minima::SelectFollowed;
@@ -14,6 +15,7 @@ use crate::math::octet::Eight;
 use crate::math::simd::InstructionSet;
 use crate::math::vector::{set_vector3_at, vector3_at};
 use crate::time::galerkin::basis::MOST;
+use crate::time::galerkin::record::ShaftBounds;
 use crate::time::galerkin::state::SectorState;
 use crate::time::galerkin::trial::TrialResult;
 use nalgebra::Vector2;
@@ -110,6 +112,8 @@ pub(crate) struct BladeTrial {
     pub(super) active: Vec<u8>,
     pub(super) prepared: Vec<u8>,
     pub(super) later: Vec<u8>,
+    /// Displacements normal to `moved`, at the start of the step and at the points (m); zero unless the shaft can move.
+    pub(super) across: Vec<Eight>,
     /// F, λ' and forces.
     pub(super) gaps: Vec<Eight>,
     pub(super) multipliers: Vec<Eight>,
@@ -172,6 +176,7 @@ impl BladeTrial {
             active: vec![0; lanes],
             prepared: vec![0; lanes],
             later: vec![0; lanes],
+            across: vec![Eight::ZERO; nodes + lanes],
             gaps: of_lanes(),
             multipliers: of_lanes(),
             forces: [of_lanes(), of_lanes()],
@@ -268,6 +273,13 @@ impl BladeTrial {
         }
     }
 
+    /// Finds the displacements normal to the closing and the circumferential displacement, if the shaft can move.
+    pub(super) fn find_across(&mut self, rows: &BladeRows, level: &BladeLevel) {
+        if !rows.across.is_empty() {
+            self.instructions.run_octets(FindAcross { trial: self, rows, level });
+        }
+    }
+
     /// Selects the nodes that may come closer between the points of the tried step than at the points. They count if they
     /// come closer by more than a fraction of `tolerance` (m), and if their smallest gap may be below `thresholds` (m). Returns
     /// whether there are such nodes.
@@ -301,16 +313,17 @@ impl BladeTrial {
     }
 
     /// Bounds the gaps while the rotor turns past the resting surface, from the angle of the first drive to that of the
-    /// second. A smallest gap is needed if it is below `floors` and below `lowest`, the smallest gap so far (m); the
+    /// second, and the shaft moves within `shaft`. A smallest gap is needed if it is below `floors` and below `lowest`, the smallest gap so far (m); the
     /// followed nodes are then those whose smallest gaps are needed.
     pub(crate) fn find_clearance(
         &mut self,
         rows: &BladeRows,
         faced: &FacedSurface,
+        shaft: &ShaftBounds,
         floors: &[Eight],
         lowest: &[Eight],
     ) -> Clearance {
-        self.instructions.run_octets(FindClearance { trial: self, rows, faced, floors, lowest })
+        self.instructions.run_octets(FindClearance { trial: self, rows, faced, shaft, floors, lowest })
     }
 
     /// Kinetic and strain energy at the start of the step (J).
