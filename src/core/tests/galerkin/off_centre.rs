@@ -4,7 +4,7 @@
 use super::{H, SECTORS, scene};
 use tiprub_core::scene::method::Scheme;
 use tiprub_core::scene::settings::Shape;
-use tiprub_core::{CoSimulation, Scene, Simulation};
+use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{element, go, real, set, started};
 
 /// Exact binary fraction of a second.
@@ -52,14 +52,14 @@ fn work_on_the_shaft_is_force_times_motion() {
         let residual = ledger.residual(kinetic + strain).abs() / ledger.scale();
         assert!(residual < 1e-12, "{tolerance:e}: {residual:e}");
         let largest = ledger.whirl_work.value().abs();
-        assert!(largest > 1e-2 * ledger.friction_loss.value(), "{largest:e}");
+        assert!(largest > 1.0, "{largest:e} J");
         for (force, work) in by_force.into_iter().zip([&ledger.whirl_work, &ledger.shift_work]) {
             let error = (force - work.value()).abs() / largest;
             assert!(error < 1e-10, "{tolerance:e}: {force:e} {:e}", work.value());
         }
         curvature.push(ledger.curvature_work.value().abs() / ledger.scale());
     }
-    println!("curvature work / energy turnover: {curvature:.1e?}");
+    println!("curvature work / energy turnover: {curvature:?}");
     assert!(curvature[0] < 1e-3 && curvature[1] < 1e-5, "{curvature:?}");
 }
 
@@ -106,6 +106,8 @@ fn resting_eccentric_shaft_gives_the_same_bits_for_every_communication_step() {
     let run = |ticks: &[u32], tolerance: f64| {
         let mut simulation = started(&rub(tolerance));
         shift(&mut simulation, [1.4e-4, -1.1e-4, 3e-5]);
+        // The shaft moves in the first step, and has rested for a whole step after the second.
+        go(&mut simulation, TICK);
         go(&mut simulation, TICK);
         let (mut reached, mut lengths) = (0, ticks.iter().cycle());
         while reached < 512 {
@@ -127,7 +129,7 @@ fn resting_eccentric_shaft_gives_the_same_bits_for_every_communication_step() {
     }
 }
 
-/// The largest clearance that a flight records is that of a round casing about an eccentric shaft.
+/// The smallest clearance of flights is that of an eccentric rotor in a round casing.
 #[test]
 fn flights_about_a_moving_shaft_find_the_smallest_clearance() {
     let mut scene = rub(1e-3);
