@@ -1,6 +1,7 @@
 //! Smallest clearances and largest forces of communication steps: those within internal steps, not only at their end
 //! points.
 
+use super::off_centre::{shift, whirl};
 use super::{H, SECTORS, run, scene};
 use tiprub_core::scene::method::Scheme;
 use tiprub_core::scene::settings::Shape;
@@ -37,7 +38,7 @@ fn apart(found: &[(Vec<f64>, f64)], others: &[(Vec<f64>, f64)]) -> (f64, f64) {
 /// A change of the scene, and the inputs that the importer sets before a communication step.
 type ExtremesCase = (&'static str, fn(&mut Scene), fn(&mut Simulation, u32));
 
-const CASES: [ExtremesCase; 6] = [
+const CASES: [ExtremesCase; 10] = [
     ("rub", |_| (), |_, _| ()),
     // Blades touch at first, then they swing freely past lobes that come close.
     (
@@ -61,7 +62,23 @@ const CASES: [ExtremesCase; 6] = [
         |scene| scene.settings.surfaces[0].shape = Shape::Lobes { amplitude: 3e-4, order: 9, phase: 0.05 },
         wide,
     ),
+    ("rub about an eccentric shaft", whirl, |simulation, _| shift(simulation, [1.4e-4, -0.8e-4, 0.0])),
+    ("rub about a shaft that moves", whirl, orbit),
+    ("at rest about an eccentric shaft", round, |simulation, _| shift(simulation, [2.6e-4, -1.4e-4, 0.0])),
+    ("at rest about a shaft that moves", round, orbit),
 ];
+
+/// A round casing about a rotor with inputs for the displacement of its shaft.
+fn round(scene: &mut Scene) {
+    whirl(scene);
+    scene.settings.surfaces[0].shape = Shape::Circular {};
+}
+
+/// Moves the shaft centre along chords, and along the axis.
+fn orbit(simulation: &mut Simulation, n: u32) {
+    let (sine, cosine) = (f64::from(n) * 0.9).sin_cos();
+    shift(simulation, [2.2e-4 * cosine - 0.5e-4, 2.2e-4 * sine, 1e-4 * sine]);
+}
 
 fn wide(simulation: &mut Simulation, _: u32) {
     set(simulation, "casing_radius_change", 2e-4);
@@ -94,11 +111,15 @@ fn smallest_gaps_agree_with_samples() {
     const TICK: f64 = 1.0 / 4_194_304.0;
     let lobes = Shape::Lobes { amplitude: 4.3e-4, order: 3, phase: -1.084 };
     let edge = Shape::TwoLobe { depth: -1.34, width: 0.229, phase: -0.102 };
-    for (shape, speed, ramp_time) in [(lobes, 175.0, 1e-4), (edge, 609.0, 2e-3)] {
+    let round = Shape::Circular {};
+    for (shape, speed, ramp_time, radius) in
+        [(lobes, 175.0, 1e-4, 0.0), (edge, 609.0, 2e-3, 0.0), (round, 609.0, 2e-3, 1.9e-4)]
+    {
         let mut scene = scene(Scheme::Galerkin, 8e-5, 1e-5);
         scene.settings.surfaces[0].shape = shape;
         scene.settings.surfaces[0].ramp_time = ramp_time;
         scene.settings.structures[0].speed = speed;
+        scene.settings.structures[0].whirl = radius > 0.0;
         let (mut simulation, mut sampled) = (started(&scene), started(&scene));
         let places = || (0..3).flat_map(|node| (0..SECTORS).map(move |sector| (node, sector)));
         let gaps = |simulation: &Simulation| -> Vec<f64> {
@@ -106,9 +127,25 @@ fn smallest_gaps_agree_with_samples() {
         };
         for window in 0..128 {
             let mut lowest = gaps(&sampled);
-            for _ in 0..64 {
+            // The shaft moves along chords.
+            let place = |window: u32| {
+                let (sine, cosine) = (0.05 * f64::from(window)).sin_cos();
+                [radius * (1.0 - cosine), radius * sine]
+            };
+            let move_to = |simulation: &mut Simulation, share: f64| {
+                let ([x, y], [next_x, next_y]) = (place(window), place(window + 1));
+                set(simulation, "whirl_x", x + share * (next_x - x));
+                set(simulation, "whirl_y", y + share * (next_y - y));
+            };
+            for tick in 1..=64 {
+                if radius > 0.0 {
+                    move_to(&mut sampled, f64::from(tick) / 64.0);
+                }
                 go(&mut sampled, TICK);
                 lowest.iter_mut().zip(gaps(&sampled)).for_each(|(lowest, gap)| *lowest = lowest.min(gap));
+            }
+            if radius > 0.0 {
+                move_to(&mut simulation, 1.0);
             }
             go(&mut simulation, 64.0 * TICK);
             for ((node, sector), lowest) in places().zip(lowest) {

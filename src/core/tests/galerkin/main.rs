@@ -7,6 +7,7 @@ mod counting;
 mod extremes;
 #[path = "../../../../tests/guide.rs"]
 mod guide;
+mod off_centre;
 mod penetration;
 mod steady_phase;
 mod sticking;

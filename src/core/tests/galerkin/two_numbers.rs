@@ -1,6 +1,7 @@
-//! Compares steps of blades with two numbers per node with the general steps, which use three. Inputs for a whirl that
-//! stays zero select the general steps for the same motion.
+//! Compares steps of blades with two numbers per node with the general steps, which use three. A second surface with the same
+//! shape, which some of the nodes face, selects the general steps for the same motion.
 
+use super::off_centre::{shift, whirl};
 use super::{H, SECTORS, allocations_of, apart, scene};
 use tiprub_core::scene::method::Scheme;
 use tiprub_core::scene::settings::{Meridian, Shape};
@@ -12,7 +13,7 @@ const STEPS: u32 = 80;
 /// A change of the scene, and the inputs that the importer sets before a communication step.
 type Case = (&'static str, fn(&mut Scene), fn(&mut Simulation, u32));
 
-const CASES: [Case; 8] = [
+const CASES: [Case; 14] = [
     ("two lobes", |_| (), |_, _| ()),
     ("without friction", |scene| scene.settings.contacts[0].friction = 0.0, |_, _| ()),
     (
@@ -24,7 +25,7 @@ const CASES: [Case; 8] = [
     (
         "lobes, and a casing that moves",
         |scene| scene.settings.surfaces[0].shape = Shape::Lobes { amplitude: 4.2e-4, order: 3, phase: 0.4 },
-        |simulation, n| set(simulation, "casing_radius_change", 2e-5 * (f64::from(n) * 0.3).sin()),
+        |simulation, n| put(simulation, "casing_radius_change", 2e-5 * (f64::from(n) * 0.3).sin()),
     ),
     (
         "table",
@@ -38,7 +39,7 @@ const CASES: [Case; 8] = [
         "round, closing",
         |scene| scene.settings.surfaces[0].shape = Shape::Circular {},
         |simulation, n| {
-            set(simulation, "casing_radius_change", -3.9e-4 * (f64::from(n) * 0.05).min(1.0));
+            put(simulation, "casing_radius_change", -3.9e-4 * (f64::from(n) * 0.05).min(1.0));
         },
     ),
     (
@@ -46,7 +47,83 @@ const CASES: [Case; 8] = [
         |scene| scene.settings.contacts[0].friction = 0.02,
         |simulation, n| set(simulation, "speed", if n % 2 == 0 { 30.0 } else { -30.0 }),
     ),
+    ("shaft in the middle", whirl, |_, _| ()),
+    ("eccentric shaft", whirl, |simulation, _| shift(simulation, [1.5e-4, -0.8e-4, 0.0])),
+    (
+        "eccentric shaft in a round casing, meridian",
+        |scene| {
+            whirl(scene);
+            scene.settings.surfaces[0].shape = Shape::Circular {};
+            scene.settings.contacts[0].meridian = Meridian::Contour;
+        },
+        |simulation, n| shift(simulation, [4.2e-4 * (f64::from(n) * 0.05).min(1.0), 1e-4, 0.0]),
+    ),
+    (
+        "whirl, shift, and a casing that moves",
+        |scene| {
+            whirl(scene);
+            scene.settings.contacts[0].meridian = Meridian::Contour;
+        },
+        |simulation, n| {
+            orbit(simulation, n);
+            let time = f64::from(n) * 0.1;
+            put(simulation, "casing_radius_change", 2e-5 * time.sin());
+            put(simulation, "casing_shape_rotation", 0.05 * time);
+        },
+    ),
+    (
+        "whirl between lobes, accelerating",
+        |scene| {
+            whirl(scene);
+            scene.settings.surfaces[0].shape = Shape::Lobes { amplitude: 3.6e-4, order: 3, phase: 0.4 };
+        },
+        |simulation, n| {
+            orbit(simulation, n);
+            set(simulation, "speed", 1300.0 + 10.0 * f64::from(n));
+        },
+    ),
+    (
+        "whirl that reverses slow tips",
+        |scene| {
+            whirl(scene);
+            scene.settings.contacts[0].friction = 0.02;
+        },
+        |simulation, n| {
+            orbit(simulation, n);
+            set(simulation, "speed", -12.0);
+        },
+    ),
 ];
+
+/// Moves the shaft centre along a circle, by a chord in each communication step, and along the axis.
+fn orbit(simulation: &mut Simulation, n: u32) {
+    let (sine, cosine) = (f64::from(n) * 0.06).sin_cos();
+    shift(simulation, [1.6e-4 * (cosine - 1.0), 1.6e-4 * sine, 5e-5 * sine]);
+}
+
+/// Makes one node face a surface of its own, with the same shape.
+fn split(scene: &mut Scene) {
+    for (index, node) in scene.roms[0].contact_nodes.iter_mut().enumerate() {
+        node.name = if index == 0 { "first".into() } else { format!("other_{index}") };
+    }
+    let settings = &mut scene.settings;
+    let mut surface = settings.surfaces[0].clone();
+    surface.name = "second".into();
+    settings.surfaces.push(surface);
+    let mut contact = settings.contacts[0].clone();
+    (contact.nodes, contact.slave) = (Some("first".into()), "second".into());
+    settings.contacts[0].nodes = Some("other".into());
+    settings.contacts.push(contact);
+}
+
+/// Sets an input of each surface.
+fn put(simulation: &mut Simulation, name: &str, value: f64) {
+    let own = ["", "casing.", "second."].map(|prefix| format!("{prefix}{name}"));
+    let known = own.iter().filter_map(|name| Some(simulation.table().find(name)?.reference));
+    let known: Vec<_> = known.collect();
+    assert!(!known.is_empty(), "{name}");
+    known.into_iter().for_each(|reference| simulation.set_real(reference, value).unwrap());
+}
 
 /// Values of a run.
 struct Values {
@@ -76,7 +153,12 @@ fn values(scene: &Scene, drive: fn(&mut Simulation, u32)) -> Values {
             forces.extend((0..3).map(|node| element(&simulation, &format!("blade[{sector}].normal_force"), node)));
         }
         let ledger = simulation.system().ledger();
-        forces.extend([&ledger.friction_loss, &ledger.curvature_work].map(|work| 1e3 * work.value()));
+        let works = [&ledger.friction_loss, &ledger.curvature_work, &ledger.casing_work, &ledger.shift_work];
+        forces.extend(works.map(|work| 1e3 * work.value()));
+        forces.push(1e3 * ledger.whirl_work.value());
+        if scene.settings.structures[0].whirl {
+            forces.extend(["moment_x", "moment_y"].map(|name| 10.0 * real(&simulation, name)));
+        }
     }
     let ledger = simulation.system().ledger();
     let (kinetic, strain) = simulation.system().energies();
@@ -92,7 +174,7 @@ fn two_numbers_per_node_give_the_same_steps_as_three() {
             let mut plane = scene(Scheme::Galerkin, H, tolerance);
             change(&mut plane);
             let mut space = plane.clone();
-            space.settings.structures[0].whirl = true;
+            split(&mut space);
             let [two, three] = [plane, space].map(|scene| values(&scene, drive));
             let moved = apart(&two.displacements, &three.displacements);
             let force = apart(&two.forces, &three.forces);
@@ -107,18 +189,22 @@ fn two_numbers_per_node_give_the_same_steps_as_three() {
 #[test]
 fn mistuned_sectors_may_differ_in_degree() {
     let bending = [850.0, 2300.0, 3100.0, 5200.0, 9000.0, 15_000.0, 24_000.0, 40_000.0];
-    let frequencies: Vec<f64> = bending.into_iter().chain([45_000.0, 50_000.0, 55_000.0]).collect();
+    let local = [45_000.0, 50_000.0, 55_000.0, 47_000.0, 52_000.0, 57_000.0];
+    let frequencies: Vec<f64> = bending.into_iter().chain(local).collect();
     let shape = |row: usize, mode: usize| match mode.checked_sub(bending.len()) {
-        None => [1.0, 4.0, 1.6][row] * (1.3 * mode as f64 + 2.1 * row as f64).cos(),
+        None => [1.0, 4.0, 1.6][row % 3] * (1.3 * mode as f64 + 2.1 * (row % 3) as f64 + 0.1 * row as f64).cos(),
         Some(local) if local == row => 14.0,
         Some(_) => (mode as f64 + 1.9 * row as f64).sin(),
     };
-    let rom = modal("blade", &frequencies, shape, vec![node("tip", [RADIUS, 0.0, 0.0], -0.2)]);
-    let displacements = |whirl: bool, factor: f64| {
+    let nodes = [0.0, 0.02].map(|place| node(format!("tip_{place}"), [RADIUS, place, place], -0.2));
+    let rom = modal("blade", &frequencies, shape, nodes.into());
+    let displacements = |general: bool, factor: f64| {
         let mut scene = scene(Scheme::Galerkin, H, 1e-2);
         scene.roms[0] = Rom { sectors: SECTORS, damping_ratio: 0.005, ..rom.clone() };
         scene.settings.structures[0].frequency_factors = vec![1.0, factor, 1.02, factor];
-        scene.settings.structures[0].whirl = whirl;
+        if general {
+            split(&mut scene);
+        }
         let mut simulation = started(&scene);
         let mut found = Vec::new();
         for _ in 0..60 {
@@ -156,18 +242,29 @@ fn blade_of_many_nodes(nodes: u32) -> Rom {
 
 #[test]
 fn steps_of_many_nodes_allocate_only_warnings() {
-    for whirl in [false, true] {
+    for (general, moves) in [(false, false), (true, false), (false, true)] {
         let mut scene = scene(Scheme::Galerkin, H, 1e-3);
         scene.roms[0] = blade_of_many_nodes(18);
-        scene.settings.structures[0].whirl = whirl;
+        if general {
+            split(&mut scene);
+        }
+        if moves {
+            whirl(&mut scene);
+        }
         let mut simulation = started(&scene);
         let mut contacts = 0;
         for step in 0..50 {
+            if moves {
+                orbit(&mut simulation, step);
+            }
             let allocations = allocations_of(|| go(&mut simulation, H));
             let warnings = simulation.take_notes();
-            assert!(allocations == 0 || !warnings.is_empty(), "step {step}, whirl {whirl}: {allocations} allocations");
+            assert!(
+                allocations == 0 || !warnings.is_empty(),
+                "step {step}, general {general}, {moves}: {allocations} allocations"
+            );
             contacts += simulation.system().events().len();
         }
-        assert!(contacts > 0, "whirl {whirl}");
+        assert!(contacts > 0, "general {general}");
     }
 }

@@ -1,5 +1,5 @@
-//! Steps of one blade on a surface of revolution whose shaft stays in the middle. Every displacement and every force of
-//! a node has two components instead of three.
+//! Steps of one blade on a surface of revolution. Every displacement and every force of a node has two components instead
+//! of three.
 //!
 //! With F = r_c − r − u_r + m u_z ([`revolution`](crate::geometry::revolution)) and N = |∇F|, the gap is F/N and the
 //! normal force is λ' ∇F with the scaled multiplier λ' = λ/N. The complementarity condition and the work keep their
@@ -9,8 +9,11 @@
 //! b = u_θ. Contact forces lie in the plane of the two. With friction, the components of a force along a and b are
 //! λ' (1 + µσ/M) and λ' (σ − µM), with σ = s'/r and M = √(1 + m²). The coefficient µ is negative if the node slides
 //! towards negative b.
+//!
+//! This is the law about a shaft in the middle. [`off_centre`] extends it to any other shaft.
 
 mod accept;
+mod across;
 mod columns;
 mod dense;
 mod follow;
@@ -19,6 +22,7 @@ mod glide;
 mod judge;
 mod level;
 mod minima;
+mod off_centre;
 mod open_step;
 mod quiet;
 mod reach;

@@ -23,6 +23,21 @@ pub(crate) struct MotionCourse {
     /// Linear and quadratic part of the motion over the whole span.
     parts: [MotionIncrement; 2],
     growth: ShapeGrowth,
+    /// True if the shaft centre leaves the axis of the casing, or its axial position, at some time.
+    is_off_centre: bool,
+}
+
+/// Bounds of the motion of the shaft over a step.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct ShaftBounds {
+    /// Distance of the shaft centre from the axis (m).
+    pub offset: f64,
+    /// Deviation of the displacement along a direction that turns with the rotor from its chord over the step (m).
+    pub excursion: f64,
+    /// Fourth derivative of this displacement (m), where the time is a fraction of the step.
+    pub fourth: f64,
+    /// Change of the direction in which the axis of the casing sees a node at a radius of 1 m, relative to the rotor (m).
+    pub swing: f64,
 }
 
 impl MotionCourse {
@@ -38,7 +53,52 @@ impl MotionCourse {
         let whole = MotionIncrement::between(before, end, span);
         let linear = half.over(4.0).less(&whole);
         let quadratic = whole.over(2.0).less(&half.over(4.0));
-        Self { before: *before, parts: [linear, quadratic], growth }
+        let is_off_centre = [before.shaft, linear.shaft, quadratic.shaft] != [ZERO; 3];
+        Self { before: *before, parts: [linear, quadratic], growth, is_off_centre }
+    }
+
+    /// Returns whether the shaft centre leaves the axis of the casing, or its axial position, at some time.
+    pub(crate) fn is_off_centre(&self) -> bool {
+        self.is_off_centre
+    }
+
+    /// Returns whether the casing rests.
+    pub(crate) fn is_casing_at_rest(&self) -> bool {
+        self.parts.iter().all(MotionIncrement::is_casing_at_rest)
+    }
+
+    /// Displacement of the shaft centre (m) and its velocity (m/s) at the fraction `theta` of the span, and its motion since the
+    /// start of the span (m).
+    pub(crate) fn shaft_at(&self, theta: f64) -> [Vector3; 3] {
+        let ([linear, quadratic], before) = (&self.parts, &self.before);
+        let moved = theta * linear.shaft + theta * theta * quadratic.shaft;
+        let velocity = (linear.shaft + 2.0 * theta * quadratic.shaft) / linear.step;
+        [before.shaft + moved, velocity, moved]
+    }
+
+    /// Bounds the motion of the shaft between two fractions of the span.
+    pub(crate) fn shaft_bounds(&self, ends: [f64; 2]) -> ShaftBounds {
+        if !self.is_off_centre {
+            return ShaftBounds::default();
+        }
+        let ([linear, quadratic], part) = (&self.parts, ends[1] - ends[0]);
+        let across = |shaft: &Vector3| libm::hypot(shaft[0], shaft[1]);
+        let most = ends[0].abs().max(ends[1].abs());
+        let rates =
+            |linear: f64, quadratic: f64| [(linear + 2.0 * most * quadratic) * part, 2.0 * quadratic * part * part];
+        let [turn, acceleration] = rates(linear.turn.abs(), quadratic.turn.abs());
+        let [moved, bend] = rates(length(linear.shaft), length(quadratic.shaft));
+        let [from, to] = ends.map(|theta| across(&self.shaft_at(theta)[0]));
+        let offset = from.max(to) + 0.125 * bend;
+        let square = turn * turn;
+        ShaftBounds {
+            offset,
+            excursion: 0.125 * (bend + 2.0 * moved * turn + offset * (square + acceleration)),
+            fourth: offset * (square * square + 6.0 * square * acceleration + 3.0 * acceleration * acceleration)
+                + 4.0 * moved * turn * (square + 3.0 * acceleration)
+                + 6.0 * bend * (square + acceleration),
+            swing: offset * turn + moved,
+        }
     }
 
     /// Growth of the shape over the span.
@@ -51,8 +111,7 @@ impl MotionCourse {
         self.parts.iter().all(|part| part.is_casing_at_rest() && part.shaft == Vector3::zeros())
     }
 
-    /// Prescribed motion at the fraction `theta` of the span, and the motion since its start, of a rotor whose shaft does not
-    /// move.
+    /// Prescribed motion at the fraction `theta` of the span, and the motion since its start, without the motion of the shaft.
     #[inline]
     pub(crate) fn turning_at(&self, theta: f64) -> (TurningDrive, TurningMotion) {
         let ([linear, quadratic], before) = (&self.parts, &self.before);
@@ -62,6 +121,7 @@ impl MotionCourse {
             opening: combine(linear.opening, quadratic.opening),
             shape_factor: self.growth.at(theta) - before.shape_factor,
             shape_rotation: combine(linear.shape_rotation, quadratic.shape_rotation),
+            shaft: ZERO,
         };
         let drive = TurningDrive {
             rotor_angle: before.rotor_angle + motion.turn,
@@ -75,7 +135,7 @@ impl MotionCourse {
 
     /// Prescribed motion at the fraction `theta` of the span, and the motion since its start.
     pub fn at(&self, theta: f64) -> (PrescribedMotion, MotionIncrement) {
-        let (turning, TurningMotion { turn, opening, shape_factor, shape_rotation }) = self.turning_at(theta);
+        let (turning, TurningMotion { turn, opening, shape_factor, shape_rotation, .. }) = self.turning_at(theta);
         let ([linear, quadratic], before) = (&self.parts, &self.before);
         let square = theta * theta;
         let motion = MotionIncrement {
@@ -100,7 +160,7 @@ impl MotionCourse {
     }
 }
 
-/// Prescribed motion of a rotor whose shaft does not move.
+/// Prescribed motion of a rotor and its casing without the motion of the shaft.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct TurningDrive {
     /// Angle (rad) and speed (rad/s) of the rotor.
@@ -113,7 +173,7 @@ pub(crate) struct TurningDrive {
     pub shape_rotation: f64,
 }
 
-/// Change of the prescribed motion of a rotor whose shaft does not move.
+/// Change of the prescribed motion.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct TurningMotion {
     /// Rotation of the rotor (rad).
@@ -123,10 +183,12 @@ pub(crate) struct TurningMotion {
     /// Change of the factor on the shape of the surface, and rotation of the shape (rad).
     pub shape_factor: f64,
     pub shape_rotation: f64,
+    /// Motion of the shaft centre along fixed x, y and z (m).
+    pub shaft: Vector3,
 }
 
 impl TurningMotion {
-    /// Adds `weight` times the motion from `from` to `to`.
+    /// Adds `weight` times the motion from `from` to `to`, without that of the shaft.
     pub fn add(&mut self, weight: f64, from: &Self, to: &Self) {
         self.turn += weight * (to.turn - from.turn);
         self.opening += weight * (to.opening - from.opening);

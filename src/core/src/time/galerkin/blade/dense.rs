@@ -3,6 +3,7 @@
 use super::columns::displace_nodes;
 use super::level::BladeLevel;
 use super::minima::steady_motion;
+use super::off_centre::{OffCentre, directions_of};
 use super::rows::BladeRows;
 use super::surface::{DriveRate, FacedSurface};
 use super::trial::{BladeTrial, StartContacts};
@@ -167,21 +168,29 @@ impl DenseOutput<'_> {
     /// Where a force acts, F is the smallest of these values, and σ follows from the direction of the force.
     #[inline(always)]
     fn find_gaps<L: Octet>(&mut self, weights: &[f64; POINTS]) {
-        let Self { trial, rows, level, faced, pushes, .. } = self;
-        let BladeTrial { start, sample, multipliers, gaps, angles, rates, .. } = &mut **trial;
+        let Self { trial, rows, level, faced, rate: of_drive, pushes, .. } = self;
+        let BladeTrial { start, sample, multipliers, gaps, angles, directions_of_nodes, rates, .. } = &mut **trial;
         let drive = &faced.drives[0];
-        let (speed, factor_rate) = (L::splat(self.rate.turned), L::splat(self.rate.factor));
+        let (speed, factor_rate) = (L::splat(of_drive.turned), L::splat(of_drive.factor));
         let slopes = level.basis.slopes_at(self.time / level.step).map(|slope| slope / level.step);
         for block in 0..rows.blocks {
             let per_radius = L::load(&rows.per_radius[block]);
             let [closing, around] = both(|along| L::load(&sample.moved[along][block]));
-            let at = L::load(&angles[block]) + L::splat(drive.turned) + around * per_radius;
-            let [shape, slope, _] = faced.surface.evaluate_octet::<L>(at);
-            let factor = L::splat(drive.factor);
-            let (mut sigma, steepness) = (slope * factor * per_radius, L::load(&rows.steepness[block]));
-            let mut gap = L::splat(drive.clearance) + shape * factor + closing;
             let [closing_rate, around_rate] = both(|along| L::load(&sample.held[along][block]));
-            let mut rate = closing_rate + shape * factor_rate + slope * factor * (speed + around_rate * per_radius);
+            let steepness = L::load(&rows.steepness[block]);
+            let (clear, mut sigma, mut rate) = if faced.is_off_centre {
+                let place = (L::load(&angles[block]), directions_of(directions_of_nodes, block));
+                let seen = OffCentre::new(faced.surface, drive, (rows, block), place, [closing, around]);
+                let slope = L::load(&rows.slopes[block]);
+                (seen.clear, seen.sigma, seen.rate(drive, of_drive, slope, [closing_rate, around_rate]))
+            } else {
+                let at = L::load(&angles[block]) + L::splat(drive.turned) + around * per_radius;
+                let [shape, slope, _] = faced.surface.evaluate_octet::<L>(at);
+                let factor = L::splat(drive.factor);
+                let rate = closing_rate + shape * factor_rate + slope * factor * (speed + around_rate * per_radius);
+                (L::splat(drive.clearance) + shape * factor, slope * factor * per_radius, rate)
+            };
+            let mut gap = clear + closing;
             if *pushes {
                 let first = L::load(&start.gaps[block]);
                 let mut touches = L::zero().less(L::load(&start.multipliers[block]));

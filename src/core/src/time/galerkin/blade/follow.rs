@@ -3,6 +3,7 @@
 use super::columns::{add_modes, displace_nodes, put, sum, values_at_points};
 use super::level::BladeLevel;
 use super::minima::{FOLLOW_FRACTION, MAX_HALVINGS, MINIMUM_FRACTION, amplitude, fraction, relative_error};
+use super::off_centre::{OffCentre, directions_of};
 use super::rows::BladeRows;
 use super::surface::{DriveRate, FacedSurface, PointDrive};
 use super::trial::BladeTrial;
@@ -194,19 +195,28 @@ impl<D: Fn(f64) -> (PointDrive, DriveRate)> Follow<'_, D> {
         let (drive, rate) = (self.drive_at)(theta);
         let Self { trial, rows, faced, ends, .. } = self;
         let is_recorded = ends[0] <= theta && theta <= ends[1];
-        let BladeTrial { path, path_moved, angles, followed, .. } = &mut **trial;
+        let BladeTrial { path, path_moved, angles, directions_of_nodes, followed, .. } = &mut **trial;
         for block in (0..rows.blocks).filter(|block| followed[*block] != 0) {
             let per_radius = L::load(&rows.per_radius[block]);
             let [closing, around] = both(|along| L::load(&path_moved[along][block]));
             let [closing_rate, around_rate] = both(|along| L::load(&path_moved[along][rows.blocks + block]));
-            let at = L::load(&angles[block]) + L::splat(drive.turned) + around * per_radius;
-            let [shape, slope, _] = faced.surface.evaluate_octet::<L>(at);
-            let factor = L::splat(drive.factor);
-            let (sigma, steepness) = (slope * factor * per_radius, L::load(&rows.steepness[block]));
+            let (clear, sigma, rate) = if faced.is_off_centre {
+                let place = (L::load(&angles[block]), directions_of(directions_of_nodes, block));
+                let seen = OffCentre::new(faced.surface, &drive, (rows, block), place, [closing, around]);
+                let slope = L::load(&rows.slopes[block]);
+                (seen.clear, seen.sigma, seen.rate(&drive, &rate, slope, [closing_rate, around_rate]))
+            } else {
+                let at = L::load(&angles[block]) + L::splat(drive.turned) + around * per_radius;
+                let [shape, slope, _] = faced.surface.evaluate_octet::<L>(at);
+                let factor = L::splat(drive.factor);
+                let opening = L::splat(rate.clearance) + shape * L::splat(rate.factor) + closing_rate;
+                let rate = opening + slope * factor * (L::splat(rate.turned) + around_rate * per_radius);
+                (L::splat(drive.clearance) + shape * factor, slope * factor * per_radius, rate)
+            };
+            let steepness = L::load(&rows.steepness[block]);
             let size = (steepness * steepness + sigma * sigma).sqrt();
-            let gap = (L::splat(drive.clearance) + shape * factor + closing) / size;
-            let opening = L::splat(rate.clearance) + shape * L::splat(rate.factor) + closing_rate;
-            let change = (opening + slope * factor * (L::splat(rate.turned) + around_rate * per_radius)) / size;
+            let gap = (clear + closing) / size;
+            let change = rate / size;
             gap.store(&mut path[stored].gaps[block]);
             change.store(&mut path[stored].rates[block]);
             if is_recorded {

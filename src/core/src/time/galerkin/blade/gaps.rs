@@ -2,7 +2,7 @@
 
 use super::follow::Follow;
 use super::minima::{FOLLOW_FRACTION, MAX_HALVINGS, MINIMUM_FRACTION, RecordPoints};
-use super::span::{Blade, BladeInSpan, BladePlace, RecordScope, drive_at};
+use super::span::{Blade, BladeInSpan, BladePlace, RecordScope, centred_drive_at, drive_at};
 use super::surface::{DriveRate, PointDrive};
 use super::tables::BladeTables;
 use super::trial::BladeTrial;
@@ -11,6 +11,9 @@ use crate::time::galerkin::basis::POINTS;
 use crate::time::galerkin::span::SpanStep;
 use crate::time::galerkin::tables::HALVINGS;
 use crate::time::galerkin::trial::{ForceInterpolation, TrialResult};
+
+/// Factor on bounds for an eccentric shaft, because the eccentricity also acts at twice the angle of the rotor, by a smaller amount.
+const SAFETY: f64 = 2.0;
 
 /// Rates of the prescribed motion are differences over this fraction of a span.
 const RATE_FRACTION: f64 = 1.0 / 64.0;
@@ -102,14 +105,20 @@ impl BladePlace<'_> {
     /// the parts that are proportional to the length of the interval, its square, and its cube or higher powers.
     pub(super) fn shape_errors(&self, ends: [f64; 2]) -> [f64; 3] {
         let [from, to] = ends.map(|end| drive_at(self, end).0);
-        let (surface, turn) = (&self.gap.surface, (to.turned - from.turned).abs());
+        let (surface, mut turn) = (&self.gap.surface, (to.turned - from.turned).abs());
+        let mut eccentric = 0.0;
+        if self.course.is_off_centre() {
+            let (shaft, per_radius) = (self.course.shaft_bounds(ends), &self.gap.layout.per_radius);
+            turn += SAFETY * shaft.swing * per_radius.iter().fold(0.0, |most, value| value.max(most));
+            eccentric = SAFETY * shaft.fourth / 384.0;
+        }
         let factor = from.factor.abs().max(to.factor.abs());
         let [square, higher] = self.course.growth().cubic_errors(ends).map(|error| error * surface.largest_change());
         // The third derivative of a spline jumps by up to 4 times its curvature per spacing of its knots. The fourth
         // derivative of a bump exp(−x²) is 6 times its curvature.
         let bend =
             surface.largest_curvature() * factor * turn * turn * (turn / surface.angular_scale()).min(1.0) / 48.0;
-        [surface.largest_kink() * factor * turn / 8.0, square, higher + bend]
+        [surface.largest_kink() * factor * turn / 8.0, square, higher + bend + eccentric]
     }
 }
 
@@ -161,7 +170,7 @@ impl FollowedPath<'_> {
 
 /// Returns the prescribed motion of a sector and its rates at the fraction `theta` of a span with this length (s).
 pub(super) fn drive_and_rate_at(place: &BladePlace, theta: f64, span: f64) -> (PointDrive, DriveRate) {
-    let [now, before] = [theta, theta - RATE_FRACTION].map(|theta| drive_at(place, theta).0);
+    let (now, before) = (drive_at(place, theta).0, centred_drive_at(place, theta - RATE_FRACTION).0);
     let rate = now.rate_since(&before, RATE_FRACTION * span);
     (now, DriveRate { factor: place.course.growth().rate_at(theta) / span, ..rate })
 }

@@ -60,6 +60,9 @@ pub(crate) struct BladeLevel {
     pub columns: Vec<Eight>,
     /// Displacements of all lanes per unit force on each node at the start of the step, in the same order.
     pub start_columns: Vec<Eight>,
+    /// Displacements of all lanes normal to these two directions, per unit force on each node at the start of the step, then on each
+    /// lane, along the two directions of the force. Empty unless the shaft can move.
+    across: Vec<Eight>,
 }
 
 impl BladeLevel {
@@ -89,6 +92,7 @@ impl BladeLevel {
             basis,
             columns: vec![Eight::ZERO; points * rows.nodes * column],
             start_columns: vec![Eight::ZERO; rows.nodes * column],
+            across: vec![Eight::ZERO; if rows.across.is_empty() { 0 } else { (points + 1) * rows.nodes * 2 * blocks }],
         }
     }
 
@@ -150,6 +154,11 @@ impl BladeLevel {
                     let direction = rows.along(along, node);
                     let moved: Vector3 =
                         (0..3).map(|c| direction[c] * lanes.vector3(columns[c], lanes.at(at, other))).sum();
+                    if !self.across.is_empty() {
+                        let column = (2 * (from * rows.nodes + node) + along) * self.blocks;
+                        self.across[column + (at - 1) * rows.blocks + other / 8].0[other % 8] =
+                            rows.normal_to_plane(other).dot(&moved);
+                    }
                     for seen in [0, 1] {
                         let column = ((node * 2 + along) * 2 + seen) * self.blocks;
                         let target = match from {
@@ -205,6 +214,14 @@ impl BladeLevel {
     pub fn column(&self, lane: usize) -> [&[Eight]; 4] {
         let columns = &self.columns[4 * lane * self.blocks..][..4 * self.blocks];
         quarters(columns, self.blocks)
+    }
+
+    /// Displacements of all lanes normal to the closing and the circumferential displacement, per unit force along each of these on a
+    /// node at the start of the step (`from` 0) or at a point.
+    #[inline(always)]
+    pub(super) fn across(&self, from: usize, node: usize, nodes: usize) -> [&[Eight]; 2] {
+        let columns = &self.across[2 * (from * nodes + node) * self.blocks..][..2 * self.blocks];
+        columns.split_at(self.blocks).into()
     }
 
     /// Displacements of all lanes per unit force on a node at the start of the step, in the order of [`Self::column`].

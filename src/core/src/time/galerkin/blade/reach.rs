@@ -1,10 +1,12 @@
 //! Largest displacements of the nodes of a blade without contact, and the energy of the blade.
 
 use super::columns::displace;
+use super::off_centre::Directions;
 use super::rows::BladeRows;
-use super::surface::FacedSurface;
+use super::surface::{FacedSurface, PointDrive};
 use super::trial::BladeTrial;
-use crate::math::octet::{Octet, OctetKernel};
+use crate::math::octet::{Octet, OctetKernel, both};
+use crate::time::galerkin::record::ShaftBounds;
 
 /// See [`BladeTrial::find_reach`].
 pub(super) struct FindReach<'a> {
@@ -34,20 +36,28 @@ pub(super) struct FindClearance<'a> {
     pub trial: &'a mut BladeTrial,
     pub rows: &'a BladeRows,
     pub faced: &'a FacedSurface<'a>,
+    pub shaft: &'a ShaftBounds,
 }
 
 impl OctetKernel for FindClearance<'_> {
     type Output = bool;
     #[inline(always)]
     fn run<L: Octet>(self) -> bool {
-        let Self { trial, rows, faced } = self;
+        let Self { trial, rows, faced, shaft } = self;
         let [start, end, ..] = &faced.drives;
         if start.factor < 0.0 {
             return false;
         }
         let bumpiness = faced.surface.bumpiness();
         for block in 0..rows.blocks {
-            let around = L::load(&trial.reach[1][block]) * L::load(&rows.per_radius[block]);
+            let mut around = L::load(&trial.reach[1][block]) * L::load(&rows.per_radius[block]);
+            let mut closed = L::load(&trial.reach[0][block]);
+            if faced.is_off_centre {
+                let angles = both(|of| L::load(&trial.directions_of_nodes[of][block]));
+                closed = closed + closed_by_shaft(rows, block, angles, [start, end], shaft, around);
+                // The axis of the casing sees the node at another angle than the shaft does.
+                around = around + L::splat(SAFETY * shaft.offset) * L::load(&rows.per_radius[block]);
+            }
             let angles = L::load(&trial.angles[block]);
             let from = angles + L::splat(start.turned.min(end.turned)) - around;
             let to = angles + L::splat(start.turned.max(end.turned)) + around;
@@ -58,7 +68,7 @@ impl OctetKernel for FindClearance<'_> {
                 Some(curvature) => low.min(high) - width * width * L::splat(0.125 * curvature),
                 None => L::zero(),
             };
-            let left = L::splat(start.clearance) + shape * L::splat(start.factor) - L::load(&trial.reach[0][block]);
+            let left = L::splat(start.clearance) + shape * L::splat(start.factor) - closed;
             let valid = rows.valid(block);
             if L::zero().less(left) & valid != valid {
                 return false;
@@ -69,6 +79,32 @@ impl OctetKernel for FindClearance<'_> {
         }
         true
     }
+}
+
+/// Factor on bounds of small terms that grow with the square of the shaft's offset relative to the radius, which is at most a
+/// tenth.
+const SAFETY: f64 = 1.25;
+
+/// Bounds the part of the clearance (m) that an eccentric shaft closes between two drives, at nodes that move by up to `around`
+/// (rad).
+#[inline(always)]
+fn closed_by_shaft<L: Octet>(
+    rows: &BladeRows,
+    block: usize,
+    angles: [L; 2],
+    drives: [&PointDrive; 2],
+    shaft: &ShaftBounds,
+    around: L,
+) -> L {
+    let frame = Directions::new(angles, (0.0, 1.0), L::zero());
+    let [outwards, _] = frame.local(&drives[0].shaft);
+    let [outwards_later, _] = frame.local(&drives[1].shaft);
+    let (slope, per_radius) = (L::load(&rows.slopes[block]), L::load(&rows.per_radius[block]));
+    let along = both(|end| slope * L::splat(drives[end].shaft[2]));
+    // ρ − r − u_r is at most e_r + e²/(2a).
+    let bend = L::splat(SAFETY * shaft.offset * shaft.offset) * per_radius;
+    let most = outwards.max(outwards_later) + L::splat(shaft.excursion) + L::splat(shaft.offset) * around;
+    most + bend - along[0].min(along[1])
 }
 
 /// See [`BladeTrial::energy`].

@@ -1,6 +1,6 @@
 //! Mode shapes of a blade along the closing and the circumferential displacement, in blocks of eight nodes.
 
-use crate::geometry::layout::Layout;
+use crate::geometry::RevolutionGap;
 use crate::math::octet::Eight;
 use crate::math::vector::{Vector3, vector3_at};
 use crate::modes::coordinates::ContactModes;
@@ -47,13 +47,18 @@ pub(crate) struct BladeRows {
     pub smallest_radius: f64,
     /// True if every mode has a frequency above zero.
     pub all_vibrate: bool,
+    /// Shapes mode by mode along the direction (m, 0, 1)/M normal to the other two, and the displacements along it of all nodes per
+    /// unit force on each node along the two directions. Only moments on a moving shaft need them; empty otherwise.
+    pub across: Vec<Eight>,
+    pub across_flexibility: [Vec<Eight>; 2],
     /// Direction of the closing displacement of each node.
     directions: Vec<Vector3>,
 }
 
 impl BladeRows {
-    /// Arranges the rows of modes by direction, for nodes with these meridional slopes and radii (m).
-    pub fn new(modes: &ContactModes, error_form: &DMatrix<f64>, slopes: &[f64], layout: &Layout) -> Self {
+    /// Arranges the rows of modes by direction, for nodes that face this surface.
+    pub fn new(modes: &ContactModes, error_form: &DMatrix<f64>, gap: &RevolutionGap) -> Self {
+        let RevolutionGap { slopes, layout, .. } = gap;
         let per_radius = &layout.per_radius;
         let (nodes, count) = (slopes.len(), modes.len());
         let blocks = Eight::blocks(nodes);
@@ -97,8 +102,13 @@ impl BladeRows {
             largest_around: 0.0,
             all_vibrate: modes.frequencies.iter().all(|frequency| *frequency > 0.0),
             smallest_radius: per_radius.iter().fold(f64::INFINITY, |least, value| least.min(1.0 / value)),
+            across: Vec::new(),
+            across_flexibility: [Vec::new(), Vec::new()],
             directions,
         };
+        if gap.shaft_moves {
+            rows.find_across(modes);
+        }
         for (mode, shape) in modes.shapes.column_iter().enumerate() {
             for along in [0, 1] {
                 let values = (0..nodes).map(|node| rows.along(along, node).dot(&vector3_at(shape.as_slice(), node)));
@@ -141,6 +151,34 @@ impl BladeRows {
             rows.largest_around = rows.largest_around.max(square.sqrt());
         }
         rows
+    }
+
+    /// Finds shapes and flexibility along the third direction.
+    fn find_across(&mut self, modes: &ContactModes) {
+        let (nodes, blocks) = (self.nodes, self.blocks);
+        let mut across = vec![Eight::ZERO; blocks * modes.len()];
+        for (shape, target) in modes.shapes.column_iter().zip(across.chunks_exact_mut(blocks)) {
+            let moved = |node: usize| self.normal_to_plane(node).dot(&vector3_at(shape.as_slice(), node));
+            Eight::spread((0..nodes).map(moved), 0.0, target);
+        }
+        self.across = across;
+        self.across_flexibility = [0, 1].map(|along| {
+            let mut target = vec![Eight::ZERO; blocks * nodes];
+            for (node, target) in target.chunks_exact_mut(blocks).enumerate() {
+                let moved = |other: usize| {
+                    let block = modes.residual.fixed_view::<3, 3>(3 * other, 3 * node);
+                    self.normal_to_plane(other).dot(&(block * self.along(along, node)))
+                };
+                Eight::spread((0..nodes).map(moved), 0.0, target);
+            }
+            target
+        });
+    }
+
+    /// Unit direction normal to the closing and the circumferential displacement of a node.
+    pub fn normal_to_plane(&self, node: usize) -> Vector3 {
+        let slope = self.directions[node][2];
+        Vector3::new(slope, 0.0, 1.0) / (1.0 + slope * slope).sqrt()
     }
 
     /// Mask of the entries of a block of nodes or lanes that belong to a node.

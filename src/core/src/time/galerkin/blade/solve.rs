@@ -2,6 +2,7 @@
 
 use super::columns::{combine, displace_nodes, eliminate, eliminate_any};
 use super::level::{BladeLevel, Place};
+use super::off_centre::{OffCentre, directions_of};
 use super::rows::BladeRows;
 use super::surface::FacedSurface;
 use super::trial::{BladeTrial, StartContacts};
@@ -124,15 +125,22 @@ impl Attempt<'_> {
             let drive = &faced.drives[point + 1];
             let (per_radius, held) = (L::load(&rows.per_radius[block]), L::load(&trial.held[block]));
             let (closing, around) = (L::load(&trial.moved[0][lane]), L::load(&trial.moved[1][lane]));
-            let at = L::load(&trial.angles[block]) + L::splat(drive.turned) + (around + held) * per_radius;
-            let [shape, slope, curvature] = faced.surface.evaluate_octet::<L>(at);
-            let factor = L::splat(drive.factor);
-            let sigma = slope * factor * per_radius;
-            let clear = L::splat(drive.clearance) + shape * factor;
+            let angles = L::load(&trial.angles[block]);
+            let (sigma, clear, bend) = if faced.is_off_centre {
+                let place = (angles, directions_of(&trial.directions_of_nodes, block));
+                let seen = OffCentre::new(faced.surface, drive, (rows, block), place, [closing, around + held]);
+                (seen.sigma, seen.clear, seen.bend)
+            } else {
+                let at = angles + L::splat(drive.turned) + (around + held) * per_radius;
+                let [shape, slope, curvature] = faced.surface.evaluate_octet::<L>(at);
+                let factor = L::splat(drive.factor);
+                let bend = curvature * factor * per_radius * per_radius * L::splat(0.5);
+                (slope * factor * per_radius, L::splat(drive.clearance) + shape * factor, bend)
+            };
             let open = clear + closing - sigma * held;
             sigma.store(&mut trial.sigma[lane]);
             clear.store(&mut trial.clear[lane]);
-            (curvature * factor * per_radius * per_radius * L::splat(0.5)).store(&mut trial.bend[lane]);
+            bend.store(&mut trial.bend[lane]);
             open.store(&mut trial.open[lane]);
             let friction = L::load(&trial.start.friction[block]);
             (L::splat(1.0) + friction * sigma * L::load(&rows.per_steepness[block]))

@@ -93,7 +93,7 @@ impl BladeModel {
         if law.sticks || !law.complementary || !law.constant_friction || degrees().any(|degree| degree == 1) {
             return None;
         }
-        if gap.nodes.len() != kinds[0].nodes() || gap.shaft_moves {
+        if gap.nodes.len() != kinds[0].nodes() {
             return None;
         }
         let degree = degrees().max()?;
@@ -277,6 +277,9 @@ impl<'a> BladeInSpan<'a> {
         for (motion, weights) in self.motions.iter_mut().zip(&weights.work).take(count) {
             *motion = TurningMotion::default();
             moved[..count].iter().zip(weights).for_each(|(to, weight)| motion.add(*weight, &moved[0], to));
+            if self.place.course.is_off_centre() {
+                motion.shaft = moved[..count].iter().zip(weights).map(|(to, weight)| *weight * to.shaft).sum();
+            }
         }
     }
 
@@ -285,6 +288,7 @@ impl<'a> BladeInSpan<'a> {
         if self.blade.trial.pushes() && sums != Sums::WorkOnly {
             let count = self.tables.level(step.level, kind).points() + 1;
             self.drives[..count].iter_mut().for_each(|drive| drive.rotor = libm::sincos(drive.rotor_angle));
+            self.blade.trial.find_across(&self.tables.rows, self.tables.level(step.level, kind));
         }
         let faced = &self.place.faced_surface(&self.drives);
         let Blade { trial, tally, .. } = &mut *self.blade;
@@ -294,15 +298,15 @@ impl<'a> BladeInSpan<'a> {
 
     /// Returns whether the reach shows that no node can touch in a step, and bounds the gaps.
     fn is_clear(&mut self, step: SpanStep) -> bool {
-        if !self.place.course.only_turns() {
+        if !self.place.course.is_casing_at_rest() {
             return false;
         }
+        let ends = [step.from, step.from + step.length];
         let mut drives = [PointDrive::default(); POINTS];
-        for (drive, theta) in drives.iter_mut().zip([step.from, step.from + step.length]) {
-            *drive = drive_at(&self.place, theta).0;
-        }
-        let (faced, trial) = (self.place.faced_surface(&drives), &mut self.blade.trial);
-        let is_clear = trial.find_clearance(&self.tables.rows, &faced);
+        drives.iter_mut().zip(ends).for_each(|(drive, theta)| *drive = self.drive_at(theta).0);
+        let (faced, shaft) = (self.place.faced_surface(&drives), self.place.course.shaft_bounds(ends));
+        let trial = &mut self.blade.trial;
+        let is_clear = trial.find_clearance(&self.tables.rows, &faced, &shaft);
         if is_clear {
             trial.glide_ends.iter_mut().for_each(GlideEnd::forget);
         }
@@ -341,12 +345,23 @@ impl<'a> BladeInSpan<'a> {
 
 impl<'a> BladePlace<'a> {
     pub(super) fn faced_surface(&self, drives: &[PointDrive; POINTS]) -> FacedSurface<'a> {
-        FacedSurface { surface: &self.gap.surface, drives: *drives, friction: self.parameters.friction }
+        let is_off_centre = self.course.is_off_centre();
+        FacedSurface { surface: &self.gap.surface, drives: *drives, friction: self.parameters.friction, is_off_centre }
     }
 }
 
 /// Prescribed motion of a sector at the fraction `theta` of a span, and the motion since the start of the span.
 pub(super) fn drive_at(place: &BladePlace, theta: f64) -> (PointDrive, TurningMotion) {
+    let (point, motion) = centred_drive_at(place, theta);
+    if !place.course.is_off_centre() {
+        return (point, motion);
+    }
+    let [shaft, velocity, moved] = place.course.shaft_at(theta);
+    (point.with_shaft(shaft, velocity), TurningMotion { shaft: moved, ..motion })
+}
+
+/// Returns the prescribed motion without that of the shaft.
+pub(super) fn centred_drive_at(place: &BladePlace, theta: f64) -> (PointDrive, TurningMotion) {
     let (drive, motion) = place.course.turning_at(theta);
     let point = PointDrive {
         turned: drive.rotor_angle - drive.shape_rotation,
@@ -355,6 +370,7 @@ pub(super) fn drive_at(place: &BladePlace, theta: f64) -> (PointDrive, TurningMo
         speed: drive.speed,
         rotor_angle: drive.rotor_angle,
         rotor: (0.0, 1.0),
+        ..PointDrive::default()
     };
     (point, motion)
 }
@@ -395,9 +411,11 @@ impl SpanSteps for BladeInSpan<'_> {
             self.open_flight(SpanStep { length: f64::INFINITY, ..step });
             return Flight::Taken;
         }
-        // Near a surface, the reach is too large.
-        if !(step.level == 0 && self.is_clear(step) || self.glides(step)) {
-            let is_short = self.length(step.level) <= SHORTEST_LOOK;
+        // Near a surface, the reach is too large. The cubics of the slow modes hold for a shaft in the middle only.
+        let is_off_centre = self.place.course.is_off_centre();
+        let is_clear = (step.level == 0 || is_off_centre) && self.is_clear(step);
+        if !is_clear && (is_off_centre || !self.glides(step)) {
+            let is_short = is_off_centre || self.length(step.level) <= SHORTEST_LOOK;
             return if is_short { Flight::NeedsTrial } else { Flight::TooLong };
         }
         self.blade.trial.pushes = false;

@@ -1,10 +1,15 @@
 //! Displacements, gaps and sliding at the start of a step.
 
 use super::columns::{displace, displace_nodes};
+use super::off_centre::{Directions, OffCentre, directions_of};
 use super::rows::BladeRows;
 use super::surface::FacedSurface;
 use super::trial::BladeTrial;
 use crate::math::octet::{Octet, OctetKernel, both};
+use crate::math::vector::length;
+
+/// Factor on the speed of the shaft, because displacements of the nodes change the speed at which they slide.
+const SAFETY: f64 = 1.25;
 
 /// Finds displacements, F and σ at the start of a step, and the direction of sliding.
 pub(super) struct FindStart<'a> {
@@ -20,7 +25,7 @@ impl OctetKernel for FindStart<'_> {
     #[inline(always)]
     fn run<L: Octet>(self) {
         let Self { known, trial, rows, faced } = self;
-        let BladeTrial { start, angles, .. } = trial;
+        let BladeTrial { start, angles, directions_of_nodes, .. } = trial;
         let [q, v] = &start.modes;
         for target in 0..rows.blocks {
             let mut held = both(|_| L::zero());
@@ -48,7 +53,11 @@ impl OctetKernel for FindStart<'_> {
         }
         let square = square.total();
         let spin = drive.speed;
-        let reverses = rows.largest_around * square.sqrt() >= spin.abs() * rows.smallest_radius;
+        let mut fastest = rows.largest_around * square.sqrt();
+        if faced.is_off_centre {
+            fastest += SAFETY * length(drive.shaft_velocity);
+        }
+        let reverses = fastest >= spin.abs() * rows.smallest_radius;
         if reverses {
             displace::<L, 1, 1>([&rows.shapes[1]], rows.blocks, [v], [&mut start.friction]);
         }
@@ -58,8 +67,12 @@ impl OctetKernel for FindStart<'_> {
         }
         for block in 0..rows.blocks {
             let per_radius = L::load(&rows.per_radius[block]);
-            let speed =
+            let mut speed =
                 L::splat(spin) / per_radius + if reverses { L::load(&start.friction[block]) } else { L::zero() };
+            if faced.is_off_centre && reverses {
+                let frame = Directions::new(directions_of(directions_of_nodes, block), (0.0, 1.0), L::zero());
+                speed = speed + frame.local(&drive.shaft_velocity)[1];
+            }
             let (forwards, backwards) = (L::zero().less(speed), speed.less(L::zero()));
             let friction = L::select(forwards, L::splat(faced.friction), L::zero());
             L::select(backwards, L::splat(-faced.friction), friction).store(&mut start.friction[block]);
@@ -70,13 +83,19 @@ impl OctetKernel for FindStart<'_> {
                 both(|along| L::load(&start.moved[along][block]) + L::load(&start.held[along][block]));
             closing.store(&mut start.moved[0][block]);
             around.store(&mut start.moved[1][block]);
-            let at = L::load(&angles[block]) + L::splat(drive.turned) + around * per_radius;
-            let [shape, slope, _] = faced.surface.evaluate_octet::<L>(at);
-            let factor = L::splat(drive.factor);
-            (L::splat(drive.clearance) + shape * factor + closing).store(&mut start.gaps[block]);
+            let (clear, sigma) = if faced.is_off_centre {
+                let place = (L::load(&angles[block]), directions_of(directions_of_nodes, block));
+                let seen = OffCentre::new(faced.surface, drive, (rows, block), place, [closing, around]);
+                (seen.clear, seen.sigma)
+            } else {
+                let at = L::load(&angles[block]) + L::splat(drive.turned) + around * per_radius;
+                let [shape, slope, _] = faced.surface.evaluate_octet::<L>(at);
+                let factor = L::splat(drive.factor);
+                (L::splat(drive.clearance) + shape * factor, slope * factor * per_radius)
+            };
+            (clear + closing).store(&mut start.gaps[block]);
             // A node in contact keeps the σ with which its force was computed.
             let pushes = L::zero().less(L::load(&start.multipliers[block]));
-            let sigma = slope * factor * per_radius;
             L::select(pushes, L::load(&start.sigma[block]), sigma).store(&mut start.sigma[block]);
         }
     }

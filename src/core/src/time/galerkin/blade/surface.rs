@@ -1,5 +1,7 @@
 //! Shape of the surface at the angles of eight nodes.
 
+use super::off_centre::in_rotor;
+use crate::geometry::Vector3;
 use crate::math::octet::{Eight, Octet};
 use crate::scene::shape::CompiledShape;
 use crate::time::galerkin::basis::POINTS;
@@ -17,6 +19,9 @@ pub(crate) struct PointDrive {
     pub speed: f64,
     pub rotor_angle: f64,
     pub rotor: (f64, f64),
+    /// Displacement (m) and velocity (m/s) of the shaft centre along the axes x, y and z of the turning rotor.
+    pub shaft: Vector3,
+    pub shaft_velocity: Vector3,
 }
 
 /// Rates of the prescribed motion.
@@ -31,6 +36,18 @@ pub(super) struct DriveRate {
 }
 
 impl PointDrive {
+    /// Displacement of the shaft centre along fixed x, y and z (m).
+    #[inline(always)]
+    pub fn shaft_in_space(&self) -> Vector3 {
+        in_rotor((-self.rotor.0, self.rotor.1), self.shaft)
+    }
+
+    /// Adds the displacement (m) and the velocity (m/s) of the shaft centre along fixed directions.
+    pub fn with_shaft(self, shaft: Vector3, velocity: Vector3) -> Self {
+        let rotor = libm::sincos(self.rotor_angle);
+        Self { rotor, shaft: in_rotor(rotor, shaft), shaft_velocity: in_rotor(rotor, velocity), ..self }
+    }
+
     /// Returns the mean rates of the motion from `before` to `self` within a time (s).
     pub fn rate_since(&self, before: &Self, time: f64) -> DriveRate {
         let per_second = 1.0 / time;
@@ -42,7 +59,7 @@ impl PointDrive {
     }
 }
 
-/// Surface of revolution that all nodes of a blade face. The rotor turns past the surface but does not whirl.
+/// Surface of revolution that all nodes of a blade face.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FacedSurface<'a> {
     /// Shape of the surface.
@@ -51,6 +68,8 @@ pub(crate) struct FacedSurface<'a> {
     pub drives: [PointDrive; POINTS],
     /// Friction coefficient.
     pub friction: f64,
+    /// True if the shaft centre may be away from the middle.
+    pub is_off_centre: bool,
 }
 
 impl CompiledShape {

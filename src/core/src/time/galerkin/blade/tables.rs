@@ -55,7 +55,7 @@ impl BladeTables {
     /// Allocates tables for the modes of the tables of all contact rows.
     pub fn new(tables: &Tables, gap: &RevolutionGap) -> Self {
         let degree = tables.levels[0].basis.degree;
-        let rows = BladeRows::new(tables.shapes(), tables.rows.error_form(), &gap.slopes, &gap.layout);
+        let rows = BladeRows::new(tables.shapes(), tables.rows.error_form(), gap);
         let level = |kind| BladeLevel::new(&rows, degree, kind);
         let modes = tables.shapes().clone();
         let unfilled = UnfilledTables {

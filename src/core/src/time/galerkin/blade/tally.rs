@@ -2,6 +2,7 @@
 
 use super::columns::values_at_points;
 use super::level::{BladeLevel, PartWeights};
+use super::off_centre::{Directions, OffCentre, directions_of, in_rotor};
 use super::rows::BladeRows;
 use super::surface::FacedSurface;
 use super::trial::BladeTrial;
@@ -129,32 +130,6 @@ pub(super) struct AddStep<'a> {
     pub sums: Sums,
 }
 
-/// Sines and cosines of the angles of nodes, in blocks of eight: angle addition for the rotor angle, and a power series
-/// for the small angle of the circumferential displacement.
-struct Directions<L> {
-    sine: L,
-    cosine: L,
-}
-
-impl<L: Octet> Directions<L> {
-    /// Directions at angles (sine, cosine), turned by a rotor angle (sine, cosine) and a small angle.
-    #[inline(always)]
-    fn new([sine, cosine]: [L; 2], rotor: (f64, f64), small: L) -> Self {
-        let (s, c) = (L::splat(rotor.0), L::splat(rotor.1));
-        let (sine, cosine) = (sine * c + cosine * s, cosine * c - sine * s);
-        let square = small * small;
-        let small_sine = small * (L::splat(1.0) - square * (L::splat(1.0 / 6.0) - square * L::splat(1.0 / 120.0)));
-        let small_cosine = L::splat(1.0) - square * (L::splat(0.5) - square * L::splat(1.0 / 24.0));
-        Self { sine: sine * small_cosine + cosine * small_sine, cosine: cosine * small_cosine - sine * small_sine }
-    }
-
-    /// Fixed components of a vector with these radial and tangential components.
-    #[inline(always)]
-    fn fixed(&self, radial: L, tangential: L) -> [L; 2] {
-        [radial * self.cosine - tangential * self.sine, radial * self.sine + tangential * self.cosine]
-    }
-}
-
 impl OctetKernel for AddStep<'_> {
     type Output = ();
     #[inline(always)]
@@ -195,8 +170,8 @@ impl AddStep<'_> {
         let radius = L::splat(1.0) / L::load(&rows.per_radius[block]);
         let per_radius = L::load(&rows.per_radius[block]);
         let slope = L::load(&rows.slopes[block]);
-        let angles = both(|of| L::load(&trial.directions_of_nodes[of][block]));
-        let mut work = [L::zero(); 4];
+        let angles = directions_of::<L>(&trial.directions_of_nodes, block);
+        let (mut work, mut by_shaft) = ([L::zero(); 4], [L::zero(); 2]);
         let mut heat_of_nodes = L::zero();
         let mut normals = [L::zero(); POINTS];
         let weights_of = |i: usize, values: &[L; POINTS]| {
@@ -225,17 +200,39 @@ impl AddStep<'_> {
             let motion = &motions[i];
             let spin = radius * L::splat(motion.turn);
             let over = [weights_of(i, &moved[0]), weights_of(i, &moved[1])];
-            let heat = L::zero() - (friction[0] * over[0] + friction[1] * (over[1] + spin));
+            let mut heat = L::zero() - (friction[0] * over[0] + friction[1] * (over[1] + spin));
+            let drive = &faced.drives[i];
+            let off_centre = faced.is_off_centre.then(|| {
+                let place = (L::load(&trial.angles[block]), angles);
+                OffCentre::new(faced.surface, drive, (rows, block), place, [moved[0][i], moved[1][i]])
+            });
+            let across = L::load(&trial.across[i * rows.blocks + block]) * L::load(&rows.per_steepness[block]);
+            let radial_move = slope * across - moved[0][i] / (steepness * steepness);
+            let axial_move = slope * moved[0][i] / (steepness * steepness) + across;
+            if let Some(off_centre) = &off_centre {
+                let shaft = in_rotor(drive.rotor, motion.shaft);
+                let axial = slope * L::splat(shaft[2]);
+                let [closed, turned] = off_centre.seen(slope, L::splat(1.0) + radial_move * per_radius, &shaft);
+                heat = heat - (friction[0] * closed + friction[1] * turned);
+                by_shaft[0] = by_shaft[0] - (closing * (closed - axial) + around * turned);
+                by_shaft[1] = by_shaft[1] - closing * axial;
+            }
             heat_of_nodes = heat_of_nodes + heat;
             work[0] = work[0] - around * spin;
             work[1] = work[1] + closing * over[0] + around * over[1];
             work[2] = work[2] - multiplier * weights_of(i, &gaps);
             if !motion.is_casing_at_rest() {
-                let at = L::load(&trial.angles[block]) + L::splat(faced.drives[i].turned) + moved[1][i] * per_radius;
-                let [shape, slope, _] = faced.surface.evaluate_octet::<L>(at);
-                let turned = slope * L::splat(faced.drives[i].factor * motion.shape_rotation);
+                let at = L::load(&trial.angles[block]) + L::splat(drive.turned) + moved[1][i] * per_radius;
+                let [shape, slope, scale] = match &off_centre {
+                    Some(seen) => [seen.shape, seen.slope, seen.scale],
+                    None => {
+                        let [shape, slope, _] = faced.surface.evaluate_octet::<L>(at);
+                        [shape, slope, L::splat(1.0)]
+                    }
+                };
+                let turned = slope * L::splat(drive.factor * motion.shape_rotation);
                 let opened = L::splat(motion.opening) + shape * L::splat(motion.shape_factor) - turned;
-                work[3] = work[3] - multiplier * opened;
+                work[3] = work[3] - multiplier * opened * scale;
             }
             if *sums == Sums::WorkOnly {
                 continue;
@@ -245,24 +242,23 @@ impl AddStep<'_> {
             add(&mut tally.tangential[block], duration * tangential);
             add(&mut tally.force[0][block], duration * closing);
             add(&mut tally.force[1][block], duration * around);
-            let radial_move = L::zero() - moved[0][i] / (steepness * steepness);
-            let axial_move = slope * moved[0][i] / (steepness * steepness);
-            let frame = Directions::new(angles, faced.drives[i].rotor, moved[1][i] * per_radius);
+            let frame = Directions::new(angles, drive.rotor, moved[1][i] * per_radius);
             let (arm, height) = (radius + radial_move, L::load(&rows.axial[block]) + axial_move);
             let (radial, tangent, axial) =
                 (L::zero() - closing, around / (L::splat(1.0) + radial_move * per_radius), slope * closing);
             let in_plane = frame.fixed(radial, tangent);
             let place = frame.fixed(arm, L::zero());
+            let centre = drive.shaft_in_space();
             // Cross product of (arm, 0, height) and (radial, tangential, axial) in the directions of the node.
             let moment = frame.fixed(L::zero() - height * tangent, height * radial - arm * axial);
             for c in [0, 1] {
                 add(&mut tally.fixed_force[c][block], duration * in_plane[c]);
                 add(&mut tally.moment[c][block], duration * moment[c]);
-                add(&mut tally.point[c][block], duration * normal * place[c]);
+                add(&mut tally.point[c][block], duration * normal * (place[c] + L::splat(centre[c])));
             }
             add(&mut tally.fixed_force[2][block], duration * axial);
             add(&mut tally.moment[2][block], duration * radius * around);
-            add(&mut tally.point[2][block], duration * normal * height);
+            add(&mut tally.point[2][block], duration * normal * (height + L::splat(centre[2])));
             if level.basis.points[i] <= part.ends[1] {
                 let deep = (gaps[i] / size).less(radius * L::splat(-SMALL)) | L::splat(1.0).less(sigma.abs());
                 tally.implausible |= deep & L::zero().less(multiplier) != 0;
@@ -277,13 +273,16 @@ impl AddStep<'_> {
             return;
         }
         let [shaft, exact, closing, casing] = [work[0].total(), work[1].total(), work[2].total(), work[3].total()];
+        let [whirl, shift] = if faced.is_off_centre { both(|of| by_shaft[of].total()) } else { [0.0; 2] };
         let work = ContactWork {
             shaft,
+            whirl,
+            shift,
             exact,
             closing,
             casing,
             heat: heat_of_nodes.total(),
-            turnover: shaft.abs() + casing.abs(),
+            turnover: shaft.abs() + whirl.abs() + shift.abs() + casing.abs(),
             moved: exact.abs(),
             ..ContactWork::default()
         };

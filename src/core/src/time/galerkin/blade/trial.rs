@@ -1,6 +1,7 @@
 //! Scratch memory and results of trials of a blade.
 
 use super::accept::{Advance, BeginNextStep, FindModalForces};
+use super::across::FindAcross;
 use super::follow::{PathPoint, STORED_TIMES};
 use super::glide::GlideEnd;
 use super::level::BladeLevel;
@@ -15,6 +16,7 @@ use crate::math::octet::Eight;
 use crate::math::simd::InstructionSet;
 use crate::math::vector::{set_vector3_at, vector3_at};
 use crate::time::galerkin::basis::MOST;
+use crate::time::galerkin::record::ShaftBounds;
 use crate::time::galerkin::state::SectorState;
 use crate::time::galerkin::tables::HALVINGS;
 use crate::time::galerkin::trial::TrialResult;
@@ -112,6 +114,8 @@ pub(crate) struct BladeTrial {
     pub(super) active: Vec<u8>,
     pub(super) prepared: Vec<u8>,
     pub(super) later: Vec<u8>,
+    /// Displacements normal to `moved`, at the start of the step and at the points (m); zero unless the shaft can move.
+    pub(super) across: Vec<Eight>,
     /// F, λ' and forces.
     pub(super) gaps: Vec<Eight>,
     pub(super) multipliers: Vec<Eight>,
@@ -184,6 +188,7 @@ impl BladeTrial {
             active: vec![0; lanes],
             prepared: vec![0; lanes],
             later: vec![0; lanes],
+            across: vec![Eight::ZERO; nodes + lanes],
             gaps: of_lanes(),
             multipliers: of_lanes(),
             forces: [of_lanes(), of_lanes()],
@@ -294,6 +299,13 @@ impl BladeTrial {
         }
     }
 
+    /// Finds the displacements normal to the closing and the circumferential displacement, if the shaft can move.
+    pub(super) fn find_across(&mut self, rows: &BladeRows, level: &BladeLevel) {
+        if !rows.across.is_empty() {
+            self.instructions.run_octets(FindAcross { trial: self, rows, level });
+        }
+    }
+
     /// Selects the nodes that may come closer between the points of the tried step than at the points. They count if they
     /// come closer by more than a fraction of `tolerance` (m), and if their smallest gap may be below `thresholds` (m). Returns
     /// whether there are such nodes.
@@ -328,9 +340,9 @@ impl BladeTrial {
     }
 
     /// Bounds the gaps while the rotor turns past the resting surface, from the angle of the first drive to that of the
-    /// second. Returns whether no node can touch.
-    pub(crate) fn find_clearance(&mut self, rows: &BladeRows, faced: &FacedSurface) -> bool {
-        self.instructions.run_octets(FindClearance { trial: self, rows, faced })
+    /// second, and the shaft moves within `shaft`. Returns whether no node can touch.
+    pub(crate) fn find_clearance(&mut self, rows: &BladeRows, faced: &FacedSurface, shaft: &ShaftBounds) -> bool {
+        self.instructions.run_octets(FindClearance { trial: self, rows, faced, shaft })
     }
 
     /// Kinetic and strain energy at the start of the step (J).
