@@ -70,8 +70,12 @@ pub struct Disk {
     pub(super) state: DiskState,
     /// Displacements caused by the modal loads, per mode of nodal diameter 0.
     load_response: Vec<f64>,
-    /// Scratch: spectrum of displacements.
+    /// Scratch: spectrum of displacements, and of those at another point of a step.
     spectrum: Vec<Complexes>,
+    other_spectrum: Vec<Complexes>,
+    /// Scratch: spectrum and contact nodes of forces at another point of a step.
+    other_force: Vec<Complexes>,
+    other_nodes: Vec<bool>,
     /// Requested forces: (sector, node, force).
     asked: Vec<(usize, usize, Vector3)>,
     /// Spectrum and contact nodes of the requested forces.
@@ -112,6 +116,9 @@ impl Disk {
             },
             load_response: vec![0.0; model.diameters[0].len()],
             spectrum: vec![NOTHING; blocks * rows],
+            other_spectrum: vec![NOTHING; blocks * rows],
+            other_force: vec![NOTHING; blocks * rows],
+            other_nodes: vec![false; rows / 3],
             asked: Vec::with_capacity(sectors * rows / 3),
             asked_force: vec![NOTHING; blocks * rows],
             asked_nodes: vec![false; rows / 3],

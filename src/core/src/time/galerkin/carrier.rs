@@ -15,6 +15,10 @@ use crate::modes::coordinates::Coordinates;
 use crate::system::carrier::Spot;
 use std::ops::RangeInclusive;
 
+/// Number of sectors whose forces are coupled through the structure in a contact solution. Each has a block of lanes; the lanes of further
+/// sectors share block `BLOCKS`.
+pub(crate) const BLOCKS: usize = 32;
+
 /// Tables, state and scratch memory of a structure that carries surfaces.
 #[derive(Debug, Clone)]
 pub struct CarrierIntegrator {
@@ -44,12 +48,18 @@ pub struct CarrierIntegrator {
     error_form: Vec<f64>,
     /// Errors of impulses on the modes in the tried step.
     pub impulses: Vec<f64>,
-    /// Modal components of each lane in fixed directions and along its normal, and its directions.
+    /// Modal components of each lane of the current sector in fixed directions, and its directions.
     seen: [Vec<f64>; 3],
-    along: Vec<f64>,
-    /// True for lanes on this structure.
-    pub touches: Vec<bool>,
     frames: Vec<PolarFrame>,
+    /// Modal components along the normals and along the forces of the lanes of each block, and true for lanes on this structure.
+    along: Vec<f64>,
+    acting: Vec<f64>,
+    touches: Vec<bool>,
+    /// Lanes of a block.
+    lanes: usize,
+    /// Changes of the modal forces at points 1 … s since the gaps were evaluated, as acting on the nodes, and displacements they cause.
+    changes: [Vec<f64>; MOST],
+    shifts: [Vec<f64>; MOST],
     /// Modal displacements per unit of λ of one lane.
     force: Vec<f64>,
     /// Loads on the rows at the points (N), indices of the rows with loads, and true for each of these rows.
@@ -94,9 +104,13 @@ impl CarrierIntegrator {
             work_weights: [[0.0; POINTS]; POINTS],
             impulses: vec![0.0; modes],
             seen: std::array::from_fn(|_| vec![0.0; lanes.len() * stride]),
-            along: vec![0.0; lanes.len() * stride],
-            touches: vec![false; lanes.len()],
             frames: vec![PolarFrame::FIXED; lanes.len()],
+            along: vec![0.0; (BLOCKS + 1) * lanes.len() * stride],
+            acting: vec![0.0; (BLOCKS + 1) * lanes.len() * stride],
+            touches: vec![false; (BLOCKS + 1) * lanes.len()],
+            lanes: lanes.len(),
+            changes: std::array::from_fn(|_| vec![0.0; stride]),
+            shifts: std::array::from_fn(|_| vec![0.0; stride]),
             force: vec![0.0; stride],
             loads: std::array::from_fn(|_| vec![0.0; rows]),
             loaded: Vec::with_capacity(rows),
@@ -245,10 +259,15 @@ impl CarrierIntegrator {
         self.impulses.iter().zip(&self.error_form).map(|(impulse, form)| impulse * impulse * form).sum::<f64>().sqrt()
     }
 
+    /// Removes all lanes of a block.
+    pub(crate) fn clear_lanes(&mut self, block: usize) {
+        self.touches[block * self.lanes..][..self.lanes].fill(false);
+    }
+
     /// Assigns a lane of the current sector to a place, with this normal.
-    pub(crate) fn set_lane(&mut self, lane: usize, spot: Spot, normal: Vector3) {
-        let padded = self.force.len();
-        (self.touches[lane], self.frames[lane]) = (true, spot.frame);
+    pub(crate) fn set_lane(&mut self, block: usize, lane: usize, spot: Spot, normal: Vector3) {
+        let (padded, place) = (self.force.len(), block * self.lanes + lane);
+        (self.touches[place], self.frames[lane]) = (true, spot.frame);
         let (weights, first) = spot.rows();
         let window = lane * padded..(lane + 1) * padded;
         let Self { seen, shapes, along, instructions, .. } = self;
@@ -259,7 +278,7 @@ impl CarrierIntegrator {
             instructions.run(Combine { table: shapes, stride: padded, columns, coefficients, sums });
         }
         let seen = seen.each_ref().map(|seen| &seen[window.clone()]);
-        spot.components(normal, seen, &mut along[window.clone()]);
+        spot.components(normal, seen, &mut along[place * padded..][..padded]);
     }
 
     /// Adds the displacement at all lanes (m, along their normals) per λ of one lane, whose force per λ is `direction`, to
@@ -271,21 +290,71 @@ impl CarrierIntegrator {
         direction: Vector3,
         carrier_compliance: &mut [f64],
     ) {
-        if !self.touches[lane] {
+        let (padded, lanes, first) = (self.force.len(), step.lanes, step.block * self.lanes);
+        if !self.touches[first + lane] {
             return;
         }
-        let (padded, lanes) = (self.force.len(), step.lanes);
+        self.find_acting(first, lane, direction);
+        let (k, _) = lanes.place(lane);
         for i in 1..=lanes.points {
-            self.move_modes(step, i, lane, direction);
-            let Self { force, along, touches, instructions, .. } = self;
+            let Self { force, along, acting, touches, instructions, body, .. } = self;
+            let response = body.response(step.level, step.kind, i, k);
+            for ((to, response), acting) in force.iter_mut().zip(response).zip(&acting[(first + lane) * padded..]) {
+                *to = response * acting;
+            }
             let others = i * lanes.nodes - lanes.nodes..i * lanes.nodes;
+            let places = first + others.start..first + others.end;
             instructions.run(AddAlong {
                 moved: force,
-                along: &along[others.start * padded..others.end * padded],
-                touches: &touches[others.clone()],
+                along: &along[places.start * padded..places.end * padded],
+                touches: &touches[places],
                 sums: &mut carrier_compliance[others],
             });
         }
+    }
+
+    /// Finds the modal components along the force per λ of a lane.
+    fn find_acting(&mut self, first: usize, lane: usize, direction: Vector3) {
+        let padded = self.force.len();
+        let [x, y, z] = self.seen.each_ref().map(|seen| &seen[lane * padded..][..padded]);
+        let [a, b, c] = self.frames[lane].fixed(direction).into();
+        let seen = x.iter().zip(y).zip(z);
+        for (to, ((x, y), z)) in self.acting[(first + lane) * padded..][..padded].iter_mut().zip(seen) {
+            *to = a * x + b * y + c * z;
+        }
+    }
+
+    /// Forgets all changes of forces.
+    pub(crate) fn clear_changes(&mut self) {
+        self.changes.iter_mut().chain(&mut self.shifts).for_each(|values| values.fill(0.0));
+    }
+
+    /// Adds a change of λ of a lane since the gaps were evaluated (N).
+    pub(crate) fn change(&mut self, step: LaneStep, lane: usize, change: f64) {
+        let (padded, place) = (self.force.len(), step.block * self.lanes + lane);
+        if self.touches[place] {
+            let sums = &mut self.changes[step.lanes.place(lane).0 - 1];
+            let acting = &self.acting[place * padded..][..padded];
+            self.instructions.run(AddMultiple { acting, change, sums });
+        }
+    }
+
+    /// Finds the displacements of the modes caused by all changes of forces.
+    pub(crate) fn spread_changes(&mut self, step: LaneStep) {
+        let Self { changes, shifts, body, .. } = self;
+        for (point, shift) in shifts[..step.lanes.points].iter_mut().enumerate() {
+            body.displace(step.level, step.kind, point + 1, &changes[..step.lanes.points], shift);
+        }
+    }
+
+    /// Change of the gap of a lane caused by all changes of forces (m).
+    pub(crate) fn shift(&self, step: LaneStep, lane: usize) -> f64 {
+        let (padded, place) = (self.force.len(), step.block * self.lanes + lane);
+        let shifts = &self.shifts[step.lanes.place(lane).0 - 1];
+        let mut sums = [0.0];
+        let (along, touches) = (&self.along[place * padded..][..padded], &self.touches[place..=place]);
+        self.instructions.run(AddAlong { moved: shifts, along, touches, sums: &mut sums });
+        sums[0]
     }
 
     /// Adds the displacement in the directions of each lane under a `force` on one lane at the end of the step (N), if the end is
@@ -297,9 +366,9 @@ impl CarrierIntegrator {
         force: Vector3,
         carrier_compliance: &mut [f64],
     ) {
-        let (padded, lanes) = (self.force.len(), step.lanes);
+        let (padded, lanes, first) = (self.force.len(), step.lanes, step.block * self.lanes);
         self.move_modes(step, 1, lane, force);
-        for other in (0..lanes.nodes).filter(|node| self.touches[*node]) {
+        for other in (0..lanes.nodes).filter(|node| self.touches[first + node]) {
             let fixed = self.seen.each_ref().map(|seen| dot_of(&seen[other * padded..][..padded], &self.force));
             lanes.set(carrier_compliance, other, self.frames[other].local(fixed.into()));
         }
@@ -307,8 +376,8 @@ impl CarrierIntegrator {
 
     /// Returns the motion of the modes at point i under a force on a lane, in the directions of the lane.
     fn move_modes(&mut self, step: LaneStep, i: usize, lane: usize, force: Vector3) {
-        let LaneStep { level, kind, lanes } = step;
-        if !self.touches[lane] {
+        let LaneStep { level, kind, lanes, block } = step;
+        if !self.touches[block * self.lanes + lane] {
             return self.force.fill(0.0);
         }
         let padded = self.force.len();
@@ -339,6 +408,22 @@ impl Kernel for AddAlong<'_> {
         let lanes = self.along.chunks_exact(self.moved.len()).zip(self.touches).zip(self.sums);
         for ((along, _), sum) in lanes.filter(|((_, touches), _)| **touches) {
             *sum += dot_of(along, self.moved);
+        }
+    }
+}
+
+/// Adds a multiple of the modal components of a force to `sums`.
+struct AddMultiple<'a> {
+    acting: &'a [f64],
+    change: f64,
+    sums: &'a mut [f64],
+}
+
+impl Kernel for AddMultiple<'_> {
+    #[inline(always)]
+    fn run(self) {
+        for (sum, acting) in self.sums.iter_mut().zip(self.acting) {
+            *sum += self.change * acting;
         }
     }
 }

@@ -127,8 +127,13 @@ impl CoupledDisk {
 
     /// Finds displacements of all rows at the points 1 … `points` of the step.
     pub(crate) fn find_rows_at(&mut self, disk: &mut Disk, points: usize) {
-        for point in 1..=points {
-            disk.rows_of(&self.body.at[point], &mut self.moved[point]);
+        let ([_, a, b, c], [_, one, two, three]) = (&self.body.at, &mut self.moved);
+        if points == 1 {
+            return disk.rows_of(a, one);
+        }
+        disk.rows_of_two([a, b], [one, two]);
+        if points == 3 {
+            disk.rows_of(c, three);
         }
     }
 

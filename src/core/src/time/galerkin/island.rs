@@ -4,7 +4,7 @@
 mod attempt;
 
 use super::advance::Advance;
-use super::carrier::CarrierIntegrator;
+use super::carrier::{BLOCKS, CarrierIntegrator};
 use super::compliance::Lanes;
 use super::disk::CoupledDisk;
 use super::shared_body::SharedBody;
@@ -68,8 +68,10 @@ pub struct IslandSector {
     advance: Advance,
     /// Motion of the nodes and surfaces (m) up to which the sector stays open in the current span; `None` for active sectors.
     pub(crate) allowance: Option<f64>,
-    /// True if no force acts on the sector and its gaps are wider than the depth of other sectors' penetration, because other
-    /// sectors move it by less in a step.
+    /// Block of the lanes of the sector on surface carriers in the current trial; `None` before the first contact problem.
+    block: Option<usize>,
+    /// True if no force acts on the sector and its gaps are so wide that they are evaluated only after the contact problems of the other
+    /// sectors.
     far: bool,
 }
 
@@ -86,6 +88,7 @@ impl IslandSector {
             trial: if own.steady.is_empty() { trial } else { trial.steady() },
             advance: Advance::new(modes, nodes),
             allowance: None,
+            block: None,
             far: false,
         }
     }
@@ -222,8 +225,9 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
     /// Returns a sector with its surfaces in a step.
     fn sector(&mut self, index: usize, step: SpanStep, kind: ForceInterpolation) -> SectorInStep<'_, S::Surfaces<'_>> {
         let Island { sectors, carriers, tables, disks, .. } = &mut *self.island;
-        let IslandSector { table, disk, trial, state, advance, .. } = &mut sectors[index];
-        let step = LaneStep { level: step.level, kind, lanes: Lanes { points: 0, nodes: 0 } };
+        let IslandSector { table, disk, trial, state, advance, block, .. } = &mut sectors[index];
+        let (lanes, block) = (Lanes { points: trial.points(), nodes: trial.nodes() }, block.unwrap_or(BLOCKS));
+        let step = LaneStep { level: step.level, kind, lanes, block };
         let carriers = CarriersInStep { carriers, step };
         SectorInStep {
             surfaces: self.surroundings.surfaces(index, carriers),
@@ -282,7 +286,9 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         let points = self.island.points(step, kind);
         self.prepare(step, kind);
         self.move_bodies(step, kind, points);
-        self.find_gaps(step, kind, points, false);
+        for far in [false, true] {
+            self.find_gaps(step, kind, points, far);
+        }
         self.find_minima(step, kind, true);
         for place in self.places() {
             let index = self.index(place);

@@ -1,7 +1,7 @@
 //! One sector and its surfaces over a span: gaps at any time, and a record of the contacts.
 
 use super::basis::{TimeBasis, real};
-use super::carrier::CarrierIntegrator;
+use super::carrier::{BLOCKS, CarrierIntegrator};
 use super::compliance::Lanes;
 use super::level::StepTables;
 use super::record::{FORCE_ROUNDING, PairRecord, SpanRecord, SurfacePlace};
@@ -185,12 +185,12 @@ impl Obstacle for ObstacleView<'_> {
         if self.carriers.carriers.is_empty() {
             return false;
         }
-        self.carriers.step.lanes = lanes;
-        self.carriers.carriers.iter_mut().for_each(|carrier| carrier.touches.fill(false));
+        let block = self.carriers.step.block;
+        self.carriers.carriers.iter_mut().for_each(|carrier| carrier.clear_lanes(block));
         for lane in (0..lanes.len()).filter(|lane| chosen[*lane]) {
             let (point, node) = lanes.place(lane);
             let normal = lanes.vector3(normals, lane);
-            self.with_carrier_mut(node, point, |carrier, spot| carrier.set_lane(lane, spot, normal));
+            self.with_carrier_mut(node, point, |carrier, spot| carrier.set_lane(block, lane, spot, normal));
         }
         true
     }
@@ -207,6 +207,26 @@ impl Obstacle for ObstacleView<'_> {
         if let Some((carrier, step)) = self.carrier(lane) {
             carrier.add_compliance(step, lane, force, carrier_compliance);
         }
+    }
+
+    fn is_coupled(&self) -> bool {
+        self.carriers.step.block < BLOCKS
+    }
+
+    fn change(&mut self, lane: usize, change: f64) {
+        if let Some((carrier, step)) = self.carrier(lane) {
+            carrier.change(step, lane, change);
+        }
+    }
+
+    fn spread_changes(&mut self) {
+        let CarriersInStep { carriers, step } = &mut self.carriers;
+        carriers.iter_mut().for_each(|carrier| carrier.spread_changes(*step));
+    }
+
+    fn shift(&self, lane: usize) -> f64 {
+        let CarriersInStep { carriers, step } = &self.carriers;
+        carriers.iter().map(|carrier| carrier.shift(*step, lane)).sum()
     }
 
     fn parameters(&self, node: usize) -> &ContactParameters {
@@ -325,6 +345,11 @@ impl ObstacleView<'_> {
     /// A surface of revolution and the displacements are not polynomials of time, so gaps are evaluated. Gaps to other surfaces
     /// are a polynomial.
     fn lowest_near(&self, trial: &Trial, basis: &TimeBasis, node: usize, theta: f64) -> f64 {
+        let of_spline = |(pair, _): (&ContactPair, &PairRecord)| pair.gap().spline().is_some();
+        if !self.carriers.carriers.is_empty() && self.pair(node).is_some_and(of_spline) {
+            // The gap is a polynomial, with its minimum at `theta`.
+            return trial.gap_within(basis, node, theta);
+        }
         let mut lowest = f64::INFINITY;
         let mut look = |theta: f64| {
             let moved = trial.displacement_within(basis, node, theta);

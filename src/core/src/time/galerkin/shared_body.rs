@@ -93,6 +93,22 @@ impl Kernel for Push<'_> {
     }
 }
 
+/// Adds response · force to `to`.
+struct AddResponse<'a> {
+    response: &'a [f64],
+    force: &'a [f64],
+    to: &'a mut [f64],
+}
+
+impl Kernel for AddResponse<'_> {
+    #[inline(always)]
+    fn run(self) {
+        for (to, (response, force)) in self.to.iter_mut().zip(self.response.iter().zip(self.force)) {
+            *to += response * force;
+        }
+    }
+}
+
 impl SharedBody {
     /// Creates a body with polynomials of degree `degree`; call [`SharedBody::set_span`] before the first step.
     pub fn new(coordinates: Coordinates, degree: usize) -> Self {
@@ -212,6 +228,22 @@ impl SharedBody {
                     instructions.run(Push { free, terms: &terms[..=points], to });
                 }
             }
+        }
+    }
+
+    /// Computes the displacements of the modes at point i under `forces` on the modes at the points 1, 2, … alone, after padding 0.
+    pub(crate) fn displace(
+        &self,
+        level: usize,
+        kind: ForceInterpolation,
+        i: usize,
+        forces: &[Vec<f64>],
+        to: &mut [f64],
+    ) {
+        to.fill(0.0);
+        for (k, force) in forces.iter().enumerate() {
+            let response = self.response(level, kind, i, k + 1);
+            self.instructions.run(AddResponse { response, force, to: &mut *to });
         }
     }
 

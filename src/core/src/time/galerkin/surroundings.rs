@@ -75,6 +75,8 @@ pub struct LaneStep {
     pub kind: ForceInterpolation,
     /// Lanes of the current contact problem.
     pub lanes: Lanes,
+    /// Block of the lanes of the sector on surface carriers.
+    pub block: usize,
 }
 
 /// Surfaces that the sectors of an island may touch.

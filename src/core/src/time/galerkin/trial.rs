@@ -73,6 +73,11 @@ pub struct Trial {
     carrier_columns: Vec<f64>,
     carrier_known: Vec<bool>,
     carrier_is_fresh: bool,
+    /// Multipliers at the evaluated gaps and after the last solution (N), and changes of the gaps since their evaluation by the forces of
+    /// other sectors (m).
+    evaluated: Vec<f64>,
+    applied: Vec<f64>,
+    shifts: Vec<f64>,
     law: Law,
     instructions: InstructionSet,
     /// Unknowns of the problem: lanes.
@@ -138,6 +143,9 @@ impl Trial {
             carrier_columns: vec![0.0; lanes.len() * lanes.width()],
             carrier_known: vec![false; lanes.len()],
             carrier_is_fresh: false,
+            evaluated: width(),
+            applied: width(),
+            shifts: width(),
             law: Law::new(solver, None, contacts),
             instructions: InstructionSet::detect(),
             members: Vec::with_capacity(lanes.len()),
@@ -318,6 +326,19 @@ impl Trial {
                 self.choose(lane, compliance, obstacle);
             }
         }
+        self.begin_exchange();
+        self.find_shifts(obstacle);
+        self.find_forces(compliance, obstacle, verdict)
+    }
+
+    /// Finds the forces of the current problem, and then also those of contacts that these forces make penetrate.
+    pub(super) fn find_forces(
+        &mut self,
+        compliance: &LaneCompliance,
+        obstacle: &mut impl Obstacle,
+        verdict: &mut TrialResult,
+    ) -> bool {
+        let width = self.lanes.width();
         loop {
             self.pose(obstacle);
             let outcome = self.law.solve();
@@ -348,6 +369,7 @@ impl Trial {
             let forces = self.forces[row..][..width].iter_mut();
             forces.zip(directions).for_each(|(force, (direction, value))| *force = direction * value);
         }
+        self.give_changes(obstacle);
         true
     }
 

@@ -1,6 +1,6 @@
 //! Coordinates of a disk as a plain array, in the order of the state of its modes; entries without a mode stay 0.
 
-use super::pass::Combination;
+use super::pass::{Combination, TwoCombinations, TwoModalForces};
 use super::{Disk, LANES, complexes};
 use crate::math::vector::Vector3;
 use crate::modes::coordinates::Coordinates;
@@ -56,6 +56,40 @@ impl Disk {
             spectrum: &mut self.spectrum,
         });
         self.synthesise(values);
+    }
+
+    /// Computes displacements of the contact rows of all sectors for two sets of coordinates, as [`Disk::rows_of`].
+    pub(crate) fn rows_of_two(&mut self, coordinates: [&[f64]; 2], values: [&mut [f64]; 2]) {
+        self.instruction_set.run(TwoCombinations {
+            columns: self.modes,
+            rows: self.rows,
+            matrix: &self.shapes,
+            values: coordinates.map(complexes),
+            spectra: [&mut self.spectrum, &mut self.other_spectrum],
+        });
+        for values in values {
+            self.synthesise(values);
+            std::mem::swap(&mut self.spectrum, &mut self.other_spectrum);
+        }
+    }
+
+    /// Computes the forces on all coordinates for two sets of contact forces, as [`Disk::modal_forces`].
+    pub(crate) fn modal_forces_of_two(
+        &mut self,
+        [first, second]: [impl Iterator<Item = (usize, usize, Vector3)>; 2],
+        to: [&mut [f64]; 2],
+    ) {
+        self.gather(first);
+        std::mem::swap(&mut self.asked_force, &mut self.other_force);
+        std::mem::swap(&mut self.asked_nodes, &mut self.other_nodes);
+        self.gather(second);
+        self.asked_nodes.iter_mut().zip(&self.other_nodes).for_each(|(asked, other)| *asked |= other);
+        if !self.asked_nodes.contains(&true) {
+            return to.into_iter().for_each(|to| to.fill(0.0));
+        }
+        let Self { modes, rows, shapes, asked_force, other_force, asked_nodes: touched, .. } = self;
+        let forces = [&other_force[..], &asked_force[..]];
+        self.instruction_set.run(TwoModalForces { modes: *modes, rows: *rows, shapes, forces, touched, to });
     }
 
     /// Computes the forces on all coordinates that contact forces (sector, node, N) cause.
@@ -134,6 +168,27 @@ mod tests {
             disk.modal_forces(all.into_iter(), &mut modal);
             let other: f64 = modal.iter().zip(&at).map(|(p, q)| p * q).sum();
             assert!((work - other).abs() < 1e-11 * (1.0 + work.abs()), "{sectors}: {work} {other}");
+            // Two sets at once give the same as one after the other, also if one of them has no forces.
+            let turned: Vec<f64> = at.iter().map(|value| -3.0 * value).collect();
+            let (mut one, mut two, mut alone) = (values.clone(), values.clone(), values.clone());
+            disk.rows_of_two([&at, &turned], [&mut one, &mut two]);
+            assert_eq!(one, values);
+            disk.rows_of(&turned, &mut alone);
+            assert_eq!(two, alone);
+            let some = |share: usize| (0..sectors).step_by(share).map(|s| (s, s % (rows / 3), force(s, 1)));
+            for shares in [[1, 2], [2, 1], [sectors + 1, 1]] {
+                let mut both = [modal.clone(), modal.clone()];
+                let [first, second] = &mut both;
+                disk.modal_forces_of_two(shares.map(some), [first, second]);
+                for (share, both) in shares.into_iter().zip(&both) {
+                    disk.modal_forces(some(share), &mut modal);
+                    assert_eq!(*both, modal, "{sectors}, every {share}. sector");
+                }
+            }
+            let mut both = [modal.clone(), modal.clone()];
+            let [first, second] = &mut both;
+            disk.modal_forces_of_two([some(1).take(0), some(1).take(0)], [first, second]);
+            assert!(both.iter().flatten().all(|value| *value == 0.0));
         }
     }
 }

@@ -175,6 +175,57 @@ impl Kernel for Combination<'_> {
     }
 }
 
+/// Spectra of rows for two sets of amplitudes, U = Σ Ψ q, so that the shapes are loaded once.
+pub(super) struct TwoCombinations<'a> {
+    pub columns: usize,
+    pub rows: usize,
+    /// `[block][column][row]`.
+    pub matrix: &'a [Complexes],
+    /// `[block][column]` of each set.
+    pub values: [&'a [Complexes]; 2],
+    pub spectra: [&'a mut [Complexes]; 2],
+}
+
+impl Kernel for TwoCombinations<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { columns, rows, matrix, values: [one, two], spectra: [first, second] } = self;
+        let values = one.chunks_exact(columns).zip(two.chunks_exact(columns));
+        let spectra = first.chunks_exact_mut(rows).zip(second.chunks_exact_mut(rows));
+        for ((matrix, values), (first, second)) in matrix.chunks_exact(columns * rows).zip(values).zip(spectra) {
+            let mut row = 0;
+            while row < rows {
+                let spectra = [&mut *first, &mut *second];
+                row += match rows - row {
+                    6.. => combine_two::<6>(matrix, values, row, spectra),
+                    _ => combine_two::<3>(matrix, values, row, spectra),
+                };
+            }
+        }
+    }
+}
+
+/// Combines the columns of `ROWS` rows from `first` on for two sets. Returns `ROWS`.
+#[inline(always)]
+fn combine_two<const ROWS: usize>(
+    matrix: &[Complexes],
+    values: (&[Complexes], &[Complexes]),
+    first: usize,
+    spectra: [&mut [Complexes]; 2],
+) -> usize {
+    let mut sums = [[[[0.0; LANES]; 2]; ROWS]; 2];
+    let [one, two] = &mut sums;
+    let columns = matrix.chunks_exact(spectra[0].len()).zip(values.0.iter().zip(values.1));
+    for (entries, (a, b)) in columns {
+        add_rows(one, &entries[first..], a);
+        add_rows(two, &entries[first..], b);
+    }
+    for (spectrum, sums) in spectra.into_iter().zip(&sums) {
+        spectrum[first..][..ROWS].copy_from_slice(sums);
+    }
+    ROWS
+}
+
 /// Combines the columns of the rows from `row` on, for one block, in groups of rows that fit the registers.
 #[inline(always)]
 fn combine(
@@ -269,6 +320,34 @@ impl Kernel for ModalForces<'_> {
             let force = &self.force[place / self.modes * self.rows..][..self.rows];
             let shapes = &self.shapes[place * self.rows..][..self.rows];
             to.copy_from_slice(modal_force(self.touched, shapes, force).as_flattened());
+        }
+    }
+}
+
+/// Modal forces of two spectra of contact forces on all modes, so that the shapes are loaded once.
+pub(super) struct TwoModalForces<'a> {
+    pub modes: usize,
+    pub rows: usize,
+    /// `[block][mode][row]`.
+    pub shapes: &'a [Complexes],
+    /// `[block][row]` of each set.
+    pub forces: [&'a [Complexes]; 2],
+    /// Contact nodes with forces of either set.
+    pub touched: &'a [bool],
+    /// `[block][mode][part][lane]` of each set.
+    pub to: [&'a mut [f64]; 2],
+}
+
+impl Kernel for TwoModalForces<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { modes, rows, shapes, forces, touched, to: [one, two] } = self;
+        let targets = one.chunks_exact_mut(2 * LANES).zip(two.chunks_exact_mut(2 * LANES));
+        for (place, (one, two)) in targets.enumerate() {
+            let [first, second] = forces.map(|force| &force[place / modes * rows..][..rows]);
+            let shapes = &shapes[place * rows..][..rows];
+            one.copy_from_slice(modal_force(touched, shapes, first).as_flattened());
+            two.copy_from_slice(modal_force(touched, shapes, second).as_flattened());
         }
     }
 }

@@ -2,7 +2,7 @@
 //! step.
 
 use super::{Island, IslandInSpan, IslandSector, SectorInStep};
-use crate::time::galerkin::carrier::CarrierIntegrator;
+use crate::time::galerkin::carrier::{BLOCKS, CarrierIntegrator};
 use crate::time::galerkin::span::SpanStep;
 use crate::time::galerkin::surroundings::{Surroundings, Witness};
 use crate::time::galerkin::trial::{ForceInterpolation, Obstacle, TrialResult};
@@ -11,6 +11,14 @@ use crate::time::galerkin::trial::{ForceInterpolation, Obstacle, TrialResult};
 const PASSES_OF_ONE: usize = 6;
 /// Largest number of gap evaluations in one trial of several sectors whose motions are coupled.
 const PASSES: usize = 16;
+
+/// Largest number of exchanges of forces between sectors on elastic surfaces after a contact solution, and fraction of the largest gap of a
+/// closed contact to which their gaps agree then. The normals at the next evaluation differ by about as much.
+const EXCHANGES: usize = 12;
+const EXCHANGED: f64 = 1e-5;
+
+/// Sectors whose gaps at the start of a step exceed this many tolerances are evaluated only after the contact problems of the others.
+const FAR: f64 = 20.0;
 
 /// Assumed largest motion of bodies between the points of a step, divided by their largest motion at the points.
 const BETWEEN_POINTS_FACTOR: f64 = 2.0;
@@ -34,24 +42,33 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
             carrier.body.begin(step, kind);
             carrier.work_weights = std::array::from_fn(|i| kind.work_weights(basis, i));
         }
-        let is_single = self.island.is_single();
         self.begin_surfaces(step, kind);
         for place in self.places() {
-            let index = self.index(place);
-            self.island.sectors[index].far = false;
-            let SectorInStep { mut surfaces, tables, disk, trial, state, .. } = self.sector(index, step, kind);
-            let level = &tables.levels[step.level];
-            let rows = disk.is_none().then_some(&tables.rows);
-            if let Some(rows) = rows.filter(|_| trial.sticks() && !is_single || !state.gaps_known) {
-                trial.find_start(rows, state);
-            }
-            trial.begin(level, kind, rows, state);
-            trial.find_start_gaps(state, |node, moved| surfaces.gap(node, 0, moved).distance);
+            self.begin_trial(self.index(place), step, kind);
         }
         if self.island.fresh {
             // Earlier forces are applied at the places of the nodes at the start of the span.
             self.react(0..=0, step, kind);
         }
+    }
+
+    /// Starts the trial of a sector.
+    fn begin_trial(&mut self, index: usize, step: SpanStep, kind: ForceInterpolation) {
+        let is_single = self.island.is_single();
+        let one = &mut self.island.sectors[index];
+        one.block = None;
+        let SectorInStep { mut surfaces, tables, disk, trial, state, .. } = self.sector(index, step, kind);
+        let level = &tables.levels[step.level];
+        let rows = disk.is_none().then_some(&tables.rows);
+        if let Some(rows) = rows.filter(|_| trial.sticks() && !is_single || !state.gaps_known) {
+            trial.find_start(rows, state);
+        }
+        trial.begin(level, kind, rows, state);
+        trial.find_start_gaps(state, |node, moved| surfaces.gap(node, 0, moved).distance);
+        drop(surfaces);
+        let distance = FAR * self.goal.tolerance;
+        let one = &mut self.island.sectors[index];
+        one.far = !is_single && one.trial.rests() && one.trial.lowest_at_start() > distance;
     }
 
     /// Sets the prescribed motion at the points, and initial guesses of the closest points. Surfaces follow the motion of the first sector.
@@ -99,13 +116,20 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         for (number, disk) in disks.iter_mut().enumerate() {
             let Some(bank) = self.surroundings.disk(disk.structure) else { continue };
             let of_disk = |one: &IslandSector| one.disk.filter(|(disk, _)| *disk == number).map(|(_, lane)| lane);
-            for point in 1..=points {
+            let pushing = |point: usize| {
                 let own = active.iter().map(|index| &sectors[*index]).filter_map(|one| Some((one, of_disk(one)?)));
-                let pushing = own.flat_map(|(one, lane)| {
-                    let nodes = (0..one.trial.nodes()).filter(|node| one.trial.multiplier(point, *node) != 0.0);
+                own.flat_map(move |(one, lane)| {
+                    let nodes = (0..one.trial.nodes()).filter(move |node| one.trial.multiplier(point, *node) != 0.0);
                     nodes.map(move |node| (lane, node, one.trial.force(point, node)))
-                });
-                bank.modal_forces(pushing, &mut disk.body.forces[point]);
+                })
+            };
+            let [_, one, two, three] = &mut disk.body.forces;
+            match points {
+                1 => bank.modal_forces(pushing(1), one),
+                _ => bank.modal_forces_of_two([pushing(1), pushing(2)], [one, two]),
+            }
+            if points == 3 {
+                bank.modal_forces(pushing(3), three);
             }
             disk.body.push(step.level, kind);
             disk.find_rows_at(bank, points);
@@ -175,7 +199,7 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
     fn separate_far_sectors(&mut self, lowest: f64) {
         for place in self.places() {
             let one = &mut self.island.sectors[self.island.active[place]];
-            one.far = one.trial.rests() && one.trial.extremes().0 > -lowest;
+            one.far |= one.trial.rests() && one.trial.extremes().0 > -lowest;
         }
     }
 
@@ -199,13 +223,22 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         self.island.failed = failed.map(|index| (*index, is_lost));
     }
 
-    /// Finds forces that remove penetration, sector by sector. Returns false if a contact problem has no solution.
-    fn solve(&mut self, step: SpanStep, kind: ForceInterpolation, result: &mut TrialResult) -> bool {
+    /// Finds forces that remove penetration, sector by sector. Each sector sees the motion of elastic surfaces by the new forces of the
+    /// others, until their gaps agree to `precision` (m). Returns false if a contact problem has no solution.
+    fn solve(&mut self, step: SpanStep, kind: ForceInterpolation, precision: f64, result: &mut TrialResult) -> bool {
+        self.island.carriers.iter_mut().for_each(CarrierIntegrator::clear_changes);
+        let mut blocks = BLOCKS.min(self.island.sectors.iter().filter(|one| one.block.is_some()).count());
+        let mut solved = 0;
         for place in self.places() {
             let index = self.index(place);
-            let IslandSector { far, trial, .. } = &self.island.sectors[index];
+            let IslandSector { far, trial, block, .. } = &mut self.island.sectors[index];
             if *far || (trial.extremes().0 >= 0.0 && trial.rests()) {
                 continue;
+            }
+            solved += 1;
+            if block.is_none() {
+                *block = Some(blocks);
+                blocks = BLOCKS.min(blocks + 1);
             }
             let SectorInStep { mut surfaces, tables, disk, trial, state, .. } = self.sector(index, step, kind);
             if disk.is_none() {
@@ -219,24 +252,53 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
                 return false;
             }
         }
+        let is_coupled = solved > 1 && !self.island.carriers.is_empty();
+        !is_coupled || self.exchange_forces(step, kind, precision, result)
+    }
+
+    /// Solves the contact problems of the sectors again with the new forces of the others.
+    fn exchange_forces(
+        &mut self,
+        step: SpanStep,
+        kind: ForceInterpolation,
+        precision: f64,
+        result: &mut TrialResult,
+    ) -> bool {
+        for _ in 0..EXCHANGES {
+            let mut changed = false;
+            for place in self.places() {
+                let index = self.index(place);
+                let IslandSector { far, trial, .. } = &self.island.sectors[index];
+                if *far || trial.sticks() || (trial.extremes().0 >= 0.0 && trial.rests()) {
+                    continue;
+                }
+                let SectorInStep { mut surfaces, tables, trial, .. } = self.sector(index, step, kind);
+                let compliance = tables.levels[step.level].compliance_of(kind);
+                let [solved, own] = trial.solve_again(compliance, &mut surfaces, precision, result);
+                drop(surfaces);
+                if !solved {
+                    self.island.failed = Some((index, false));
+                    return false;
+                }
+                changed |= own;
+            }
+            if !changed {
+                break;
+            }
+        }
         true
     }
 
-    /// Tries a step. Repeats it with more active sectors while bodies move so far that further sectors may touch.
+    /// Tries a step, with more active sectors if bodies move so far that further sectors may touch.
     pub(super) fn attempt_step(&mut self, step: SpanStep, kind: ForceInterpolation) -> TrialResult {
         if let Some(result) = self.attempt_steady(step, kind) {
             return result;
         }
-        loop {
-            let result = self.attempt_active(step, kind);
-            if !result.solved || !self.activate_sectors(self.island.points(step, kind)) {
-                return result;
-            }
-        }
+        self.attempt_active(step, kind)
     }
 
-    /// Activates the sectors that may touch because bodies moved further than their allowance. Returns whether there are any.
-    fn activate_sectors(&mut self, points: usize) -> bool {
+    /// Activates the sectors that may touch because bodies moved further than their allowance. Returns whether one of them touches.
+    fn activate_sectors(&mut self, step: SpanStep, kind: ForceInterpolation, points: usize) -> bool {
         if self.island.active.len() == self.island.sectors.len() {
             return false;
         }
@@ -257,8 +319,26 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
                 active.push(index);
             }
         }
-        active.sort_unstable();
-        active.len() > before
+        if active.len() == before {
+            return false;
+        }
+        self.surroundings.bend(&self.island.carriers, 0);
+        for place in before..self.island.active.len() {
+            let index = self.index(place);
+            let SectorInStep { mut surfaces, tables, .. } = self.sector(index, step, kind);
+            surfaces.begin_step(step.from, step.length, &tables.levels[step.level], kind);
+            surfaces.guess_start_places();
+            drop(surfaces);
+            self.begin_trial(index, step, kind);
+            let Island { disks, sectors, .. } = &mut *self.island;
+            let one = &mut sectors[index];
+            one.far = true;
+            if let Some((disk, lane)) = one.disk {
+                one.trial.carry(|point, node| disks[disk].moved_at(point, node, lane));
+            }
+        }
+        self.island.active.sort_unstable();
+        self.recheck_far_sectors(step, kind, points)
     }
 
     /// Tries a step of the active sectors.
@@ -277,6 +357,7 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
             // No contact is active or needed, or the solution also holds for the curved gaps.
             if ((rests && lowest >= 0.0) || (pass > 0 && lowest >= -precision && largest <= precision))
                 && !self.recheck_far_sectors(step, kind, points)
+                && !self.activate_sectors(step, kind, points)
             {
                 result.solved = true;
                 break;
@@ -288,7 +369,8 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
                 self.blame(|one| one.trial.extremes().0 <= lowest || one.trial.extremes().1 >= largest, false);
                 return result;
             }
-            if !self.solve(step, kind, &mut result) {
+            let exchanged = EXCHANGED * largest.max(-lowest);
+            if !self.solve(step, kind, exchanged.max(EXCHANGED * precision), &mut result) {
                 return result;
             }
         }

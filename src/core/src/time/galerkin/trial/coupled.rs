@@ -1,7 +1,8 @@
 //! Trials of sectors that step together because they move each other or touch a common surface.
 
-use super::{Obstacle, Trial};
+use super::{Obstacle, Trial, TrialResult};
 use crate::math::vector::{Vector3, vector3_at};
+use crate::time::galerkin::compliance::LaneCompliance;
 use crate::time::galerkin::state::SectorState;
 
 impl Trial {
@@ -20,6 +21,11 @@ impl Trial {
                 self.start_contacts.gaps[node] = gap(node, vector3_at(&self.start, node));
             }
         }
+    }
+
+    /// Smallest gap at the start (m).
+    pub(crate) fn lowest_at_start(&self) -> f64 {
+        self.start_contacts.gaps.iter().copied().fold(f64::INFINITY, f64::min)
     }
 
     /// Sets the displacements without forces so that the total displacement (m) of a node at point 1 … s equals that of the
@@ -46,6 +52,64 @@ impl Trial {
             self.carrier_known.copy_from_slice(&self.chosen);
             self.carrier_yields = obstacle.prepare_compliance(lanes, &self.chosen, &self.normals[..stride]);
         }
+    }
+
+    /// Begins the exchange of forces with other sectors on the obstacle, at the gaps that were last evaluated.
+    pub(super) fn begin_exchange(&mut self) {
+        let count = self.lanes.len();
+        self.evaluated[..count].copy_from_slice(&self.multipliers[..count]);
+        self.applied[..count].copy_from_slice(&self.multipliers[..count]);
+        self.shifts.fill(0.0);
+    }
+
+    /// Includes the motion of the obstacle by changes of the forces of other sectors in the gaps without forces. Returns the largest change
+    /// of a gap (m).
+    pub(super) fn find_shifts(&mut self, obstacle: &impl Obstacle) -> f64 {
+        let (width, mut largest) = (self.lanes.width(), 0.0_f64);
+        if !self.carrier_yields || !obstacle.is_coupled() {
+            return largest;
+        }
+        for lane in (0..self.lanes.len()).filter(|lane| self.carrier_known[*lane]) {
+            // Own forces are part of the problem.
+            let own = self.members.iter().map(|member| {
+                self.carrier_columns[member * width + lane] * (self.applied[*member] - self.evaluated[*member])
+            });
+            let shift = obstacle.shift(lane) - own.sum::<f64>();
+            let change = shift - std::mem::replace(&mut self.shifts[lane], shift);
+            self.without[lane] += change;
+            largest = largest.max(change.abs());
+        }
+        largest
+    }
+
+    /// Gives the changes of the forces since the last solution to the obstacle.
+    pub(super) fn give_changes(&mut self, obstacle: &mut impl Obstacle) {
+        if !self.carrier_yields || !obstacle.is_coupled() {
+            return;
+        }
+        for lane in (0..self.lanes.len()).filter(|lane| self.carrier_known[*lane]) {
+            let now = self.multipliers[lane];
+            let change = now - std::mem::replace(&mut self.applied[lane], now);
+            if change != 0.0 {
+                obstacle.change(lane, change);
+            }
+        }
+        obstacle.spread_changes();
+    }
+
+    /// Solves the contact problem again if forces of other sectors have changed a gap by more than `precision` (m). Returns whether there is
+    /// a solution, and whether the forces have changed.
+    pub(crate) fn solve_again(
+        &mut self,
+        compliance: &LaneCompliance,
+        obstacle: &mut impl Obstacle,
+        precision: f64,
+        verdict: &mut TrialResult,
+    ) -> [bool; 2] {
+        if self.find_shifts(obstacle) <= precision {
+            return [true, false];
+        }
+        [self.find_forces(compliance, obstacle, verdict), true]
     }
 
     /// Impulse error on the rows of a node (N·s); valid after the step has been judged.

@@ -63,6 +63,22 @@ pub trait Obstacle {
     /// force per λ is `direction`. Valid only after [`Obstacle::prepare_compliance`] has returned true.
     fn add_normal_compliance(&mut self, _lane: usize, _direction: Vector3, _given: &mut [f64]) {}
 
+    /// Returns whether the lanes of the sector are known to the obstacle while other sectors are solved.
+    fn is_coupled(&self) -> bool {
+        false
+    }
+
+    /// Adds a change of λ (N) of a lane since the gaps were evaluated. The compliance at this lane must have been prepared.
+    fn change(&mut self, _lane: usize, _change: f64) {}
+
+    /// Finds the motion of the obstacle by all changes of forces, of all sectors.
+    fn spread_changes(&mut self) {}
+
+    /// Change of the gap of a lane by this motion (m).
+    fn shift(&self, _lane: usize) -> f64 {
+        0.0
+    }
+
     /// Adds the displacement of the obstacle in all three directions of each lane, under a `force` on one lane (N).
     fn add_compliance(&mut self, _lane: usize, _force: Vector3, _given: &mut [f64]) {}
 
