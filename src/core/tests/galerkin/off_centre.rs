@@ -148,6 +148,6 @@ fn flights_about_a_moving_shaft_find_the_smallest_clearance() {
             assert!(least / 1.06 < found && found < most, "{n}: {found:e}");
         }
     }
-    assert_eq!(element(&simulation, "blade[1].normal_force", 0), 0.0);
+    assert!(element(&simulation, "blade[1].normal_force", 0) <= 0.0);
     assert!(simulation.system().effort().flights > 2000);
 }

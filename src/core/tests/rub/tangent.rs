@@ -240,6 +240,13 @@ fn derivatives_do_not_change_the_simulation() {
     scenes.push(("modal-exact, elastic casing", rotor(flexible)));
     for (name, scene) in scenes {
         let (mut plain, mut asked) = (models::started(&scene), switched_on(&scene));
+        // With a limit, steps end at communication points, as they do with derivatives.
+        if name.contains("galerkin") {
+            let limit = plain.table().find("max_internal_steps").unwrap().reference;
+            for simulation in [&mut plain, &mut asked] {
+                simulation.set_integer(limit, 1_000_000).unwrap();
+            }
+        }
         let (inputs, outputs) = (references(&plain, Causality::Input), references(&plain, Causality::Output));
         let seed = vec![1e-3; inputs.len()];
         let mut first = vec![0.0; outputs.len()];

@@ -2,7 +2,7 @@
 //!
 //! With the shaft centre at (e_r, e_t, e_z) in the directions of a node, the gap is F/|∇F| with F and ∇F as in
 //! [`revolution`](crate::geometry::revolution). The closing displacement a now changes F by α a with α = (κ + m²)/M² and
-//! κ = cos δ + s′ sin δ/ρ. Steps use F/α, whose change per closing displacement is 1, with σ = F′/α; the contact problem, the gap
+//! κ = cos δ + s′ sin δ/ρ. Steps use F/α, whose change per closing displacement is 1, with σ = (∂F/∂u_θ)/α; the contact problem, the gap
 //! F/|∇F| and the directions of the forces then keep their form, and λ' is α times larger.
 //!
 //! u_r is taken as −a/M². This is exact for a slope m = 0. Otherwise it neglects a displacement w normal to the plane of a and u_θ, which
