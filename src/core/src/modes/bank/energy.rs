@@ -63,19 +63,6 @@ impl ModalBank {
         (kinetic, strain)
     }
 
-    /// Kinetic and strain energy of an uncoupled sector (J), for a scheme that stores velocities.
-    pub(crate) fn energies_of(&self, sector: usize) -> [f64; 2] {
-        let (velocities, coefficients) =
-            (&self.velocities[self.set_of(sector) * self.modes..], self.coefficients(sector));
-        let (mut kinetic, mut strain) = (0.0, 0.0);
-        self.each_part(sector, |mode, _, position, increment| {
-            let velocity = velocities[mode].of(position, increment, 0.0);
-            kinetic += 0.5 * velocity * velocity;
-            strain += coefficients[mode].spring * (position * position);
-        });
-        [kinetic, strain]
-    }
-
     /// Damping loss since the last call (J).
     pub(crate) fn collect_loss(&mut self) -> f64 {
         self.finish();

@@ -253,6 +253,17 @@ impl BladeInSpan<'_> {
         include(&mut tally.lowest, begun);
     }
 
+    /// Writes the whole state at the end of an interval of the steady phase, which the open step contains.
+    pub(crate) fn write_whole_sample(
+        &mut self,
+        interval: SteadyInterval,
+        course: impl Fn(u64) -> MotionCourse,
+        state: &mut SectorState,
+    ) {
+        self.sample(interval.to, interval.span, course);
+        BladeTrial::write(&self.tables.rows, &self.blade.trial.sample, state);
+    }
+
     /// Finds the gaps at the end of an interval of the steady phase, which the open step contains, and writes them to a state:
     /// together with modes and contacts if `whole`.
     pub(crate) fn write_sample(

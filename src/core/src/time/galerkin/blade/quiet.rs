@@ -82,16 +82,20 @@ impl BladeInSpan<'_> {
         !self.pushes() && self.blade.is_above(self.blade.trial.gap_bounds.iter().map(|block| &block.0))
     }
 
-    /// Returns whether vibration with these kinetic and strain energies (J) without forces certainly causes only small
-    /// displacements.
+    /// Returns whether displacements with these kinetic and strain energies (J) are certainly small.
     pub fn is_plausible(&self, energies: [f64; 2]) -> bool {
         energies.iter().sum::<f64>() <= self.tables.plausible_energy
     }
 
-    /// Kinetic and strain energy at the end of an interval of the steady phase (J), if no forces act in the open step.
-    pub fn energies_without_forces(&mut self, interval: SteadyInterval) -> Option<[f64; 2]> {
-        let time = self.time_in_step(interval.to, interval.span);
-        (!self.pushes()).then(|| self.blade.find_energies(&self.tables.rows, self.place.kind, time))
+    /// Kinetic and strain energy at the end of an interval of the steady phase (J). If forces act in the open step, it must have
+    /// been sampled there.
+    pub fn energies_at_end(&mut self, interval: SteadyInterval) -> [f64; 2] {
+        let (rows, time) = (&self.tables.rows, self.time_in_step(interval.to, interval.span));
+        if self.pushes() {
+            let trial = &self.blade.trial;
+            return trial.instructions.run_octets(FindSampledEnergies { trial, rows });
+        }
+        self.blade.find_energies(rows, self.place.kind, time)
     }
 }
 
@@ -104,14 +108,15 @@ pub(crate) struct QuietSector {
     pub at_start: f64,
 }
 
-/// Returns the largest energy (J) of vibration without forces that certainly causes only small displacements: less than the
+/// Returns the largest kinetic and strain energy (J) that certainly belongs to small displacements: less than the
 /// [limit](Layout::largest_displacement) in every direction, and too small a displacement around the axis for a warning.
 pub(super) fn plausible_energy(modes: &ContactModes, layout: &Layout) -> f64 {
     let gap = layout.clearances.iter().fold(f64::INFINITY, |low: f64, clearance| low.min(*clearance));
     let most = |row: usize| {
         // A displacement u of this row takes at least the energy ½u²/g.
         let shapes = modes.shapes.row(row);
-        let flexibility: f64 = shapes.iter().zip(&modes.frequencies).map(|(shape, w)| (shape / w) * (shape / w)).sum();
+        let of_modes: f64 = shapes.iter().zip(&modes.frequencies).map(|(shape, w)| (shape / w) * (shape / w)).sum();
+        let flexibility = of_modes + modes.residual[(row, row)];
         let per_radius = layout.per_radius[row / 3];
         let curved = (2.0 * CURVED_SHARE * gap.max(LEAST_CLEARANCE / per_radius) / per_radius).sqrt();
         let limit = layout.largest_displacement().min(if row % 3 == 1 { curved } else { f64::INFINITY });
@@ -140,6 +145,33 @@ impl OctetKernel for FindEnergies<'_> {
             let square = L::load(&rows.rates[2][k]);
             let [position, velocity] = response.free::<L>(k, [q, v], square);
             sums = [sums[0] + velocity * velocity, sums[1] + position * position * square];
+        }
+        sums.map(|sum| 0.5 * sum.total())
+    }
+}
+
+/// Finds the kinetic and strain energy (J) of the sampled modes, including those without inertia.
+struct FindSampledEnergies<'a> {
+    trial: &'a BladeTrial,
+    rows: &'a BladeRows,
+}
+
+impl OctetKernel for FindSampledEnergies<'_> {
+    type Output = [f64; 2];
+    #[inline(always)]
+    fn run<L: Octet>(self) -> [f64; 2] {
+        let Self { trial: BladeTrial { sample, path_moved, .. }, rows } = self;
+        let mut sums = [L::zero(); 2];
+        for k in 0..rows.mode_blocks {
+            let [q, v] = both(|of| L::load(&sample.modes[of][k]));
+            sums = [sums[0] + v * v, sums[1] + q * q * L::load(&rows.rates[2][k])];
+        }
+        for along in [0, 1] {
+            for block in 0..rows.blocks {
+                // The forces move the nodes beyond the modes with inertia.
+                let held = L::load(&sample.moved[along][block]) - L::load(&path_moved[along][block]);
+                sums[1] = sums[1] + L::load(&sample.forces[along][block]) * held;
+            }
         }
         sums.map(|sum| 0.5 * sum.total())
     }

@@ -67,8 +67,8 @@ pub(super) struct SectorResult {
     pub energy: f64,
     /// What is known at the end of the span.
     pub sampled: Sampled,
-    /// Kinetic and strain energy at the end of an interval of a steady phase (J), if no forces act in the open step.
-    pub energies: Option<[f64; 2]>,
+    /// Kinetic and strain energy at the end of an interval of a steady phase (J).
+    pub energies: [f64; 2],
     pub effort: Effort,
     /// True if a gap of the last trial is not a number.
     pub is_lost: bool,
@@ -177,7 +177,7 @@ impl BladeSectors {
             gap_rates: vec![0.0; nodes],
             energy: 0.0,
             sampled: Sampled::State,
-            energies: None,
+            energies: [0.0; 2],
             effort: Effort::default(),
             is_lost: false,
             outcome: Ok(()),
@@ -267,8 +267,7 @@ impl BladeSectors {
         }
         of.write_result(sector, result);
         if is_interval {
-            let energies = result.energies.unwrap_or_else(|| of.modes.energies_of(sector));
-            of.step_control.energies_now[2 * sector..][..2].copy_from_slice(&energies);
+            of.step_control.energies_now[2 * sector..][..2].copy_from_slice(&result.energies);
         }
         result.outcome.map_err(|_| StepFailure::Unsolved { structure, sector })
     }
@@ -317,7 +316,7 @@ impl SectorsInSpan<'_> {
         let (kind, control) = (bank.set_of(sector), structure.step_control_of(sector));
         (result.kind, result.control) = (kind, control);
         (result.effort, result.outcome) = (Effort::default(), Ok(()));
-        (result.sampled, result.energies, result.is_lost) = (Sampled::State, None, false);
+        (result.sampled, result.is_lost) = (Sampled::State, false);
         structure.read_gaps(sector, state);
         let stored = StoredStep::new(open_step).filter(|_| matches!(self.span, SectorSpan::Interval(_)));
         if stored.is_some_and(|step| !step.is_sampled()) {
@@ -328,7 +327,7 @@ impl SectorsInSpan<'_> {
             && !structure.needs_state(sector)
             && let Some(QuietSector { energies, at_start }) = blade.quiet_energies(model, kind, step, interval)
         {
-            (result.sampled, result.energies, result.energy) = (Sampled::Energies, Some(energies), at_start);
+            (result.sampled, result.energies, result.energy) = (Sampled::Energies, energies, at_start);
             mark_unsampled(open_step);
             swap(&mut result.tally, &mut blade.tally);
             return;
@@ -380,17 +379,21 @@ impl SectorsInSpan<'_> {
             return;
         }
         let needs_gaps = structure.needed_minima.depends_on(sector) || !steps.is_quiet();
-        result.energies = steps.energies_without_forces(interval);
-        let is_plausible = result.energies.is_some_and(|energies| steps.is_plausible(energies));
-        let needs_state = structure.needs_state(sector) || structure.is_loaded(sector) || !is_plausible;
+        let needs_state = structure.needs_state(sector);
+        if needs_gaps || needs_state {
+            steps.write_sample(interval, course, needs_state, &mut result.state);
+            result.gap_rates.iter_mut().enumerate().for_each(|(node, rate)| *rate = steps.gap_rate(node));
+        }
+        result.energies = steps.energies_at_end(interval);
         result.sampled = match (needs_state, needs_gaps) {
             (true, _) => Sampled::State,
             (false, true) => Sampled::Gaps,
             (false, false) => Sampled::Energies,
         };
-        if result.sampled != Sampled::Energies {
-            steps.write_sample(interval, course, needs_state, &mut result.state);
-            result.gap_rates.iter_mut().enumerate().for_each(|(node, rate)| *rate = steps.gap_rate(node));
+        if !needs_state && !steps.is_plausible(result.energies) {
+            // The displacements are checked after the interval.
+            steps.write_whole_sample(interval, course, &mut result.state);
+            result.sampled = Sampled::State;
         }
         steps.store(open_step, needs_gaps);
     }

@@ -47,7 +47,7 @@ impl Structure {
     }
 
     /// Returns whether a contact of a sector pushes.
-    pub(super) fn is_loaded(&self, sector: usize) -> bool {
+    fn is_loaded(&self, sector: usize) -> bool {
         (0..self.nodes()).any(|node| self.history.multiplier[self.index(node, sector)] != 0.0)
     }
 
