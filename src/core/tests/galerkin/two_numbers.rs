@@ -44,7 +44,7 @@ const CASES: [Case; 14] = [
     ),
     (
         "tips that vibrate faster than they slide",
-        |scene| scene.settings.contacts[0].friction = 0.02,
+        |scene| scene.settings.contacts[0].friction = 0.01,
         |simulation, n| set(simulation, "speed", if n % 2 == 0 { 30.0 } else { -30.0 }),
     ),
     ("shaft in the middle", whirl, |_, _| ()),
