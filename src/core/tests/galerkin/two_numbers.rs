@@ -44,8 +44,8 @@ const CASES: [Case; 14] = [
     ),
     (
         "tips that vibrate faster than they slide",
-        |scene| scene.settings.contacts[0].friction = 0.01,
-        |simulation, n| set(simulation, "speed", if n % 2 == 0 { 30.0 } else { -30.0 }),
+        |scene| scene.settings.contacts[0].friction = 0.02,
+        |simulation, n| set(simulation, "speed", if n % 2 == 0 { 40.0 } else { -40.0 }),
     ),
     ("shaft in the middle", whirl, |_, _| ()),
     ("eccentric shaft", whirl, |simulation, _| shift(simulation, [1.5e-4, -0.8e-4, 0.0])),
@@ -168,9 +168,11 @@ fn values(scene: &Scene, drive: fn(&mut Simulation, u32)) -> Values {
 }
 
 #[test]
-fn two_numbers_per_node_give_the_same_steps_as_three() {
+fn two_numbers_per_node_agree_with_three() {
     for (name, change, drive) in CASES {
-        for tolerance in [1e-2, 1e-4] {
+        // Coarse steps do not resolve when tips stop sliding.
+        let coarse = if name.contains("faster than they slide") { 1e-3 } else { 1e-2 };
+        for tolerance in [coarse, 1e-4] {
             let mut plane = scene(Scheme::Galerkin, H, tolerance);
             change(&mut plane);
             let mut space = plane.clone();
