@@ -18,12 +18,15 @@ const TOLERANCES: [f64; 2] = [1e-2, 1e-3];
 /// Eccentricity of the shaft relative to the clearance.
 const ECCENTRICITY: f64 = 0.05;
 
+/// Value of an input at a communication step, by its number, relative to the unit of the input.
+type Course = fn(f64) -> f64;
+
 /// A feature of a scene, and how its inputs move.
 struct Feature {
     name: &'static str,
     change: fn(&mut Scene),
-    /// Inputs before each communication step, from its number: name, and change relative to the unit of the third number.
-    inputs: &'static [(&'static str, fn(f64) -> f64)],
+    /// Names of inputs, and their values before each communication step.
+    inputs: &'static [(&'static str, Course)],
 }
 
 /// Number of features.
