@@ -14,7 +14,7 @@ fn load(resources: &Path) -> Result<Loaded, Diagnostic> {
     let unit = move || -> Result<Box<dyn CoSimulation>> {
         let mut simulation = Simulation::new(scene)?;
         simulation.use_checks(&checks);
-        simulation.read_only_variables();
+        simulation.skip_unneeded_states();
         Ok(Box::new(simulation))
     };
     Ok(Loaded {

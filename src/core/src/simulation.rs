@@ -122,24 +122,25 @@ impl Simulation {
         Ok(simulation)
     }
 
-    /// Leaves out the state of sectors on which no output depends, which saves time at communication points. Values of
-    /// variables stay the same. [`Simulation::system`] and [`Simulation::watched_displacements`] then return older values or
-    /// the gap [`NO_CLEARANCE`](tiprub_cosim::variables::NO_CLEARANCE) for sectors that are not watched. The choice is not part of a saved state.
+    /// Skips the evaluation of sectors on which no output depends, which saves time at communication points. The values of
+    /// variables do not change. For sectors that are not watched, [`Simulation::system`] and
+    /// [`Simulation::watched_displacements`] then return old values, or the gap
+    /// [`NO_CLEARANCE`](tiprub_cosim::variables::NO_CLEARANCE). A saved state does not contain this setting.
     ///
     /// # Examples
     /// ```
     /// # use tiprub_core::{CoSimulation, Simulation};
     /// # let scene = tiprub_test_models::rub(2);
     /// let mut simulation = Simulation::new(&scene)?;
-    /// simulation.read_only_variables();
+    /// simulation.skip_unneeded_states();
     /// simulation.initialise(0.0)?;
     /// simulation.do_step(0.0, 1e-4)?;
     /// # Ok::<(), tiprub_core::Error>(())
     /// ```
-    pub fn read_only_variables(&mut self) {
+    pub fn skip_unneeded_states(&mut self) {
         let outputs = &self.compiled.scene.settings.outputs;
         if outputs.nodal_diameters.is_none() {
-            self.system.structures.iter_mut().for_each(|one| one.read_only(&outputs.watched_sectors));
+            self.system.structures.iter_mut().for_each(|one| one.require_states_of(&outputs.watched_sectors));
         }
     }
 

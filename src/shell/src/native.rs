@@ -51,7 +51,7 @@ pub fn run(scene: &Scene, schedule: &Schedule, given: RunInputs<'_>, progress: &
     scene.settings.experiment.communication_step = schedule.time(1) - schedule.time(0);
     let mut simulation = Simulation::new(&scene).map_err(in_scene)?;
     simulation.use_checks(given.checks);
-    simulation.read_only_variables();
+    simulation.skip_unneeded_states();
     for (variable, value) in given.settings {
         if given.history.is_some_and(|history| history.holds(variable)) {
             let problem = "the file given with --inputs also has a column for this variable";

@@ -68,14 +68,14 @@ fn displacements_of<'a>(simulation: &'a Simulation, scene: &'a Scene) -> impl It
     bank.displacement().chunks_exact(bank.lanes()).flat_map(|row| &row[..scene.roms[0].sectors]).copied()
 }
 
-/// Runs `milliseconds` of the scene with communication steps of `interval` (s). If not `whole`, as in an FMU, only the state
-/// that outputs need is evaluated, and there are no displacements.
+/// Runs `milliseconds` of the scene with communication steps of `interval` (s). If `whole` is false, only the states that
+/// outputs need are evaluated, as in an FMU, and no displacements are returned.
 fn timed(scene: &Scene, interval: f64, milliseconds: u32, whole: bool) -> tiprub_core::Result<TimedRub> {
     let mut scene = scene.clone();
     scene.settings.experiment.communication_step = interval;
     let mut simulation = Simulation::new(&scene)?;
     if !whole {
-        simulation.read_only_variables();
+        simulation.skip_unneeded_states();
     }
     simulation.initialise(0.0)?;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most a hundred")]
@@ -92,7 +92,7 @@ fn timed(scene: &Scene, interval: f64, milliseconds: u32, whole: bool) -> tiprub
     Ok(found)
 }
 
-/// Returns the displacements, and the time of the fastest of several runs.
+/// Returns the displacements of a run, and the shortest time of several runs.
 fn fastest(scene: &Scene, interval: f64, size: BenchSize) -> tiprub_core::Result<TimedRub> {
     let mut best = timed(scene, interval, size.milliseconds, true)?;
     best.seconds = f64::INFINITY;

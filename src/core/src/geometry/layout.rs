@@ -64,7 +64,7 @@ impl Layout {
         })
     }
 
-    /// Largest displacement (m) that counts as small: a tenth of the smallest radius.
+    /// Returns the largest displacement (m) that counts as small: a tenth of the smallest radius.
     pub(crate) fn largest_displacement(&self) -> f64 {
         SMALL * self.radii.iter().fold(f64::INFINITY, |low: f64, radius| low.min(*radius))
     }

@@ -5,7 +5,7 @@ use crate::geometry::GapLaw;
 
 /// Clearances below this fraction of the radius belong to a press fit, in which errors of this size do not matter.
 pub(crate) const LEAST_CLEARANCE: f64 = 1e-4;
-/// A run is warned of once u_θ²/2r is this fraction of the clearance.
+/// A warning is reported if u_θ²/2r reaches this fraction of the clearance.
 pub(crate) const CURVED_SHARE: f64 = 0.05;
 
 /// Error of linear kinematics at a node that moves far around the axis.
@@ -69,7 +69,7 @@ impl System {
         let limit = pair.gap().largest_displacement();
         let displacements = modes.displacement();
         let is_beyond = |displacement: &f64| displacement.abs() > limit;
-        // Without an early exit, the compiler uses SIMD instructions.
+        // The compiler vectorises this loop because it has no early exit.
         if !displacements.iter().fold(false, |any, displacement| any | is_beyond(displacement)) {
             return Ok(());
         }

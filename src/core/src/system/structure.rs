@@ -17,7 +17,7 @@ use crate::system::pulling::Pulling;
 /// small modes are set to rest.
 const LEAST_PENETRATION: f64 = 1e-150;
 
-/// Gap that is not known because no output needs it (m). Saved states contain finite numbers only.
+/// Value of a gap that is unknown because no output needs it (m). It is finite because saved states contain finite numbers only.
 pub(crate) const UNKNOWN_GAP: f64 = NO_CLEARANCE;
 
 /// A structure of a scene. Rows of its modes are three per contact node, or three per control point of the surfaces it carries.
@@ -42,7 +42,7 @@ pub struct Structure {
     pub(crate) lowest_in_span: Vec<f64>,
     /// Selection of the smallest gaps that outputs need.
     pub(crate) needed_minima: NeededMinima,
-    /// Sectors whose state is read at communication points; empty if this holds for every sector.
+    /// True for sectors whose state is read at communication points; empty if the state of every sector is read.
     read_sectors: Vec<bool>,
     /// Bounds of gaps that are not evaluated in every step.
     pub(crate) nearness: Nearness,
@@ -65,7 +65,7 @@ impl NeededMinima {
         self.of_sectors.get(sector).copied().unwrap_or(true)
     }
 
-    /// Returns whether an output depends on the gaps of a sector even if they are larger than those of other sectors.
+    /// Returns whether an output depends on the gaps of a sector even if other sectors have smaller gaps.
     pub fn depends_on(&self, sector: usize) -> bool {
         self.by_sector || self.all_of(sector)
     }
@@ -88,7 +88,7 @@ pub struct StepControl {
     pub open_steps: Vec<f64>,
     /// Energies at the starts of the open steps (J).
     pub energies: Vec<f64>,
-    /// Kinetic and strain energy of each sector at the last communication point of a steady phase (J).
+    /// Kinetic and strain energies of each sector at the last communication point of a steady phase (J).
     pub energies_now: Vec<f64>,
 }
 
@@ -216,8 +216,8 @@ impl Structure {
         self.needed_minima = NeededMinima { of_sectors, by_sector };
     }
 
-    /// Makes the state of the sectors `watched` (1-based) known at communication points, but not that of the others.
-    pub(crate) fn read_only(&mut self, watched: &[usize]) {
+    /// Requires the state of only the sectors `watched` (1-based) at communication points.
+    pub(crate) fn require_states_of(&mut self, watched: &[usize]) {
         self.read_sectors = (1..=self.modes.sectors()).map(|sector| watched.contains(&sector)).collect();
     }
 

@@ -62,13 +62,13 @@ const CASES: [ExtremesCase; 10] = [
         |scene| scene.settings.surfaces[0].shape = Shape::Lobes { amplitude: 3e-4, order: 9, phase: 0.05 },
         wide,
     ),
-    ("rub about an eccentric shaft", whirl, |simulation, _| shift(simulation, [1.4e-4, -0.8e-4, 0.0])),
-    ("rub about a shaft that moves", whirl, orbit),
-    ("at rest about an eccentric shaft", round, |simulation, _| shift(simulation, [2.6e-4, -1.4e-4, 0.0])),
-    ("at rest about a shaft that moves", round, orbit),
+    ("rub with an eccentric shaft", whirl, |simulation, _| shift(simulation, [1.4e-4, -0.8e-4, 0.0])),
+    ("rub with a moving shaft", whirl, orbit),
+    ("at rest with an eccentric shaft", round, |simulation, _| shift(simulation, [2.6e-4, -1.4e-4, 0.0])),
+    ("at rest with a moving shaft", round, orbit),
 ];
 
-/// A round casing about a rotor with inputs for the displacement of its shaft.
+/// Uses a round casing, and adds inputs for the displacement of the shaft.
 fn round(scene: &mut Scene) {
     whirl(scene);
     scene.settings.surfaces[0].shape = Shape::Circular {};

@@ -1,5 +1,4 @@
-//! Blades on a shaft that is not in the middle of a rigid casing: work on the shaft, symmetry, and independence of the
-//! communication step.
+//! Blades on an off-centre shaft in a rigid casing: work on the shaft, symmetry, and independence of the communication step.
 
 use super::{H, SECTORS, scene};
 use tiprub_core::scene::method::Scheme;
@@ -29,8 +28,8 @@ pub fn shift(simulation: &mut Simulation, place: [f64; 3]) {
     }
 }
 
-/// Mean forces times the motion of the shaft are the works in the ledger. Works of all inputs and losses explain the energy of the
-/// blades up to curvature work, which vanishes with the tolerance.
+/// The works in the ledger equal the mean forces times the motion of the shaft. The energy balance closes to rounding, and its
+/// curvature work vanishes with the tolerance.
 #[test]
 fn work_on_the_shaft_is_force_times_motion() {
     let mut curvature = Vec::new();
@@ -63,9 +62,9 @@ fn work_on_the_shaft_is_force_times_motion() {
     assert!(curvature[0] < 1e-3 && curvature[1] < 1e-5, "{curvature:?}");
 }
 
-/// If the displacement of the shaft turns by the pitch of the sectors, each sector moves like the one before it.
+/// If the displacement of the shaft is rotated by the pitch of the sectors, each sector moves like the previous sector.
 #[test]
-fn turned_eccentricity_permutes_the_sectors() {
+fn rotated_eccentricity_permutes_the_sectors() {
     let run = |turns: i32, moves: bool| {
         let mut scene = rub(1e-3);
         scene.settings.surfaces[0].shape = Shape::Circular {};
@@ -100,13 +99,13 @@ fn turned_eccentricity_permutes_the_sectors() {
     }
 }
 
-/// While the shaft rests, steps do not end at communication points, wherever the shaft is.
+/// While the shaft rests, steps do not end at communication points, also if the shaft is off-centre.
 #[test]
 fn resting_eccentric_shaft_gives_the_same_bits_for_every_communication_step() {
     let run = |ticks: &[u32], tolerance: f64| {
         let mut simulation = started(&rub(tolerance));
         shift(&mut simulation, [1.4e-4, -1.1e-4, 3e-5]);
-        // The shaft moves in the first step, and has rested for a whole step after the second.
+        // The shaft moves in the first step and rests during the second step.
         go(&mut simulation, TICK);
         go(&mut simulation, TICK);
         let (mut reached, mut lengths) = (0, ticks.iter().cycle());
@@ -129,9 +128,9 @@ fn resting_eccentric_shaft_gives_the_same_bits_for_every_communication_step() {
     }
 }
 
-/// The smallest clearance of flights is that of an eccentric rotor in a round casing.
+/// Flights report the smallest clearance of an eccentric rotor in a round casing.
 #[test]
-fn flights_about_a_moving_shaft_find_the_smallest_clearance() {
+fn flights_with_a_moving_shaft_find_the_smallest_clearance() {
     let mut scene = rub(1e-3);
     scene.settings.surfaces[0].shape = Shape::Circular {};
     let mut simulation = started(&scene);
@@ -141,7 +140,7 @@ fn flights_about_a_moving_shaft_find_the_smallest_clearance() {
         let share = (f64::from(n) * 0.1).min(1.0);
         shift(&mut simulation, [share * size * angle.cos(), share * size * angle.sin(), 0.0]);
         go(&mut simulation, 1e-3);
-        // The rotor turns by more than a pitch, so some node passes the narrowest place.
+        // The rotor turns by more than a pitch, so a node passes the smallest clearance.
         let found = real(&simulation, "clearance_minimum");
         if n > 12 {
             let [least, most] = [clearance - size, clearance - size * 0.4_f64.cos()];

@@ -19,7 +19,7 @@ fn detects_every_contact_between_points() {
         scene.roms[0] = ringing_blade(SECTORS, seed);
         scene.settings.surfaces[0].shape = Shape::TwoLobe { depth: 1.2, width: 0.15, phase: 0.0 };
         scene.settings.contacts[0].friction = 0.0;
-        // Every other blade belongs to an eccentric rotor.
+        // Blades with an even seed belong to an eccentric rotor.
         let eccentricity = if seed % 2 == 0 { 1.5e-4 } else { 0.0 };
         scene.settings.structures[0].whirl = eccentricity != 0.0;
         let mut simulation = started(&scene);

@@ -1,5 +1,5 @@
-//! Compares steps of blades with two numbers per node with the general steps, which use three. A second surface with the same
-//! shape, which some of the nodes face, selects the general steps for the same motion.
+//! Compares steps of blades with two numbers per node with the general steps, which use three. To select the general steps for
+//! the same motion, one node faces a second surface with the same shape.
 
 use super::off_centre::{shift, whirl};
 use super::{H, SECTORS, allocations_of, apart, scene};
@@ -47,7 +47,7 @@ const CASES: [Case; 14] = [
         |scene| scene.settings.contacts[0].friction = 0.02,
         |simulation, n| set(simulation, "speed", if n % 2 == 0 { 40.0 } else { -40.0 }),
     ),
-    ("shaft in the middle", whirl, |_, _| ()),
+    ("centred shaft", whirl, |_, _| ()),
     ("eccentric shaft", whirl, |simulation, _| shift(simulation, [1.5e-4, -0.8e-4, 0.0])),
     (
         "eccentric shaft in a round casing, meridian",
@@ -95,13 +95,13 @@ const CASES: [Case; 14] = [
     ),
 ];
 
-/// Moves the shaft centre along a circle, by a chord in each communication step, and along the axis.
+/// Moves the shaft centre along the chords of a circle, one chord per communication step, and along the axis.
 fn orbit(simulation: &mut Simulation, n: u32) {
     let (sine, cosine) = (f64::from(n) * 0.06).sin_cos();
     shift(simulation, [1.6e-4 * (cosine - 1.0), 1.6e-4 * sine, 5e-5 * sine]);
 }
 
-/// Makes one node face a surface of its own, with the same shape.
+/// Lets the first node face a separate surface with the same shape.
 fn split(scene: &mut Scene) {
     for (index, node) in scene.roms[0].contact_nodes.iter_mut().enumerate() {
         node.name = if index == 0 { "first".into() } else { format!("other_{index}") };
@@ -170,7 +170,7 @@ fn values(scene: &Scene, drive: fn(&mut Simulation, u32)) -> Values {
 #[test]
 fn two_numbers_per_node_agree_with_three() {
     for (name, change, drive) in CASES {
-        // Coarse steps do not resolve when tips stop sliding.
+        // Coarse steps do not resolve the times at which tips stop sliding.
         let coarse = if name.contains("faster than they slide") { 1e-3 } else { 1e-2 };
         for tolerance in [coarse, 1e-4] {
             let mut plane = scene(Scheme::Galerkin, H, tolerance);

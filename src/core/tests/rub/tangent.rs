@@ -240,7 +240,7 @@ fn derivatives_do_not_change_the_simulation() {
     scenes.push(("modal-exact, elastic casing", rotor(flexible)));
     for (name, scene) in scenes {
         let (mut plain, mut asked) = (models::started(&scene), switched_on(&scene));
-        // With a limit, steps end at communication points, as they do with derivatives.
+        // A limit on internal steps makes steps end at communication points, as derivatives do.
         if name.contains("galerkin") {
             let limit = plain.table().find("max_internal_steps").unwrap().reference;
             for simulation in [&mut plain, &mut asked] {

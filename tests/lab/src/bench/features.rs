@@ -1,4 +1,4 @@
-//! Run time of the light rub with one more feature, relative to the rub without it.
+//! Run time of the light rub with one additional feature, relative to the run time without it.
 
 use serde_json::{Value, json};
 use tiprub_core::scene::method::Solver;
@@ -13,26 +13,26 @@ use crate::beside::apart;
 
 /// Communication step (s).
 const INTERVAL: f64 = 1e-4;
-/// Tolerance of the timed runs, and of the runs that give their errors.
+/// Tolerance of the timed runs, and of the reference runs that determine their errors.
 const TOLERANCES: [f64; 2] = [1e-2, 1e-3];
 /// Eccentricity of the shaft relative to the clearance.
 const ECCENTRICITY: f64 = 0.05;
 
-/// Value of an input at a communication step, by its number, relative to the unit of the input.
-type Course = fn(f64) -> f64;
+/// Value of an input relative to its unit, as a function of the number of the communication step.
+type InputCourse = fn(f64) -> f64;
 
-/// A feature of a scene, and how its inputs move.
+/// A feature of a scene, and the motion of its inputs.
 struct Feature {
     name: &'static str,
     change: fn(&mut Scene),
-    /// Names of inputs, and their values before each communication step.
-    inputs: &'static [(&'static str, Course)],
+    /// Inputs that are set before each communication step.
+    inputs: &'static [(&'static str, InputCourse)],
 }
 
 /// Number of features.
 pub(super) const COUNT: usize = 7;
 
-/// Nothing is added or moved in the first row, with which the others are compared.
+/// The first row adds no feature; the other rows are compared with it.
 const FEATURES: [Feature; COUNT] = [
     Feature { name: "none", change: |_| {}, inputs: &[] },
     Feature { name: "mistuned blades", change: mistune, inputs: &[] },
@@ -76,7 +76,8 @@ struct FeatureRow {
 }
 
 impl Feature {
-    /// Runs a scene; returns the time of the steps (s), the displacements at every millisecond (m), and the attempted steps.
+    /// Runs a scene. Returns the time of the steps (s), the displacements at every millisecond (m) and the number of attempted
+    /// steps. If `whole` is false, only the states that outputs need are evaluated, and no displacements are returned.
     fn run(
         &self,
         scene: &Scene,
@@ -90,7 +91,7 @@ impl Feature {
         scene.settings.experiment.communication_step = INTERVAL;
         let mut simulation = Simulation::new(&scene)?;
         if !whole {
-            simulation.read_only_variables();
+            simulation.skip_unneeded_states();
         }
         simulation.initialise(0.0)?;
         let unit = |name: &str| match name {

@@ -70,10 +70,10 @@ pub struct Disk {
     pub(super) state: DiskState,
     /// Displacements caused by the modal loads, per mode of nodal diameter 0.
     load_response: Vec<f64>,
-    /// Scratch: spectrum of displacements, and of those at another point of a step.
+    /// Scratch: spectra of displacements at one point and at another point of a step.
     spectrum: Vec<Complexes>,
     other_spectrum: Vec<Complexes>,
-    /// Scratch: spectrum and contact nodes of forces at another point of a step.
+    /// Scratch: spectrum and contact nodes of the forces at another point of a step.
     other_force: Vec<Complexes>,
     other_nodes: Vec<bool>,
     /// Requested forces: (sector, node, force).

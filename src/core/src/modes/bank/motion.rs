@@ -14,9 +14,9 @@ impl ModalBank {
         self.amplitudes_at(self.index(mode, group), mode, group)
     }
 
-    /// Sum of the modal positions of a sector, or of the real parts of a nodal diameter, times a weight of each mode.
+    /// Returns the weighted sum of the modal positions of a sector, or of their real parts for a nodal diameter.
     pub(crate) fn weigh_positions(&self, group: usize, weight: impl Fn(usize) -> f64) -> f64 {
-        // −0 is the empty sum, as in the standard library.
+        // The empty sum is −0, as in the standard library.
         let mut sum = -0.0;
         self.each_part(group, |mode, part, position, _| {
             if part == 0 {
@@ -169,7 +169,7 @@ impl ModalBank {
 
     /// Returns whether every modal coordinate is finite.
     pub fn is_finite(&self) -> bool {
-        // Without an early exit, the compiler uses SIMD instructions.
+        // The compiler vectorises this loop because it has no early exit.
         let all_finite = |values: &[f64]| values.iter().fold(true, |all, value| all & value.is_finite());
         all_finite(&self.state.position)
             && all_finite(&self.state.increment)

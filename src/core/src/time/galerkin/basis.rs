@@ -28,8 +28,8 @@ pub struct TimeBasis {
     pub left_out: [f64; POINTS],
     /// `[place][i]`: L_i at positions between the points.
     pub between: [[f64; POINTS]; PLACES],
-    /// Weights of the values at the points in the two inner Bézier coefficients of the polynomial as a cubic. The
-    /// polynomial is nowhere below the smallest of these and of its values at both ends.
+    /// Weights of the values at the points in the two inner Bézier coefficients of the polynomial, written as a cubic. Its
+    /// values at both ends are the other two coefficients, and the smallest coefficient is a lower bound of the polynomial.
     pub inner: [[f64; POINTS]; 2],
 }
 

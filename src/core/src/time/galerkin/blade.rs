@@ -10,23 +10,23 @@
 //! λ' (1 + µσ/M) and λ' (σ − µM), with σ = s'/r and M = √(1 + m²). The coefficient µ is negative if the node slides
 //! towards negative b.
 //!
-//! This is the law about a shaft in the middle. [`off_centre`] extends it to any other shaft.
+//! These equations are for a centred shaft. [`off_centre`] extends them to an off-centre shaft.
 
 mod accept;
-mod across;
 mod columns;
+mod contact_free;
 mod dense;
 mod follow;
 mod gaps;
-mod glide;
 mod judge;
 mod level;
+mod meridional;
 mod minima;
 mod off_centre;
 mod open_step;
-mod quiet;
 mod reach;
 mod rows;
+mod skipped;
 mod solve;
 mod span;
 mod start;
@@ -38,7 +38,7 @@ mod tally;
 mod tests;
 mod trial;
 
-pub(crate) use quiet::QuietSector;
+pub(crate) use skipped::SkippedSector;
 pub(crate) use span::{Blade, BladeInSpan, BladeModel, BladePlace};
 pub(crate) use stored::{StoredStep, mark_unsampled, stored_len, stored_start};
 pub(crate) use tables::SpanKind;

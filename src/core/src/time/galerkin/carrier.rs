@@ -15,8 +15,8 @@ use crate::modes::coordinates::Coordinates;
 use crate::system::carrier::Spot;
 use std::ops::RangeInclusive;
 
-/// Number of sectors whose forces are coupled through the structure in a contact solution. Each has a block of lanes; the lanes of further
-/// sectors share block `BLOCKS`.
+/// Largest number of sectors that exchange forces through the structure within a contact solution. Each of them has a block of lanes.
+/// All other sectors share block `BLOCKS`.
 pub(crate) const BLOCKS: usize = 32;
 
 /// Tables, state and scratch memory of a structure that carries surfaces.
@@ -48,16 +48,16 @@ pub struct CarrierIntegrator {
     error_form: Vec<f64>,
     /// Errors of impulses on the modes in the tried step.
     pub impulses: Vec<f64>,
-    /// Modal components of each lane of the current sector in fixed directions, and its directions.
+    /// Modal components of each lane of the current sector in fixed directions, and directions of the lanes.
     seen: [Vec<f64>; 3],
     frames: Vec<PolarFrame>,
-    /// Modal components along the normals and along the forces of the lanes of each block, and true for lanes on this structure.
+    /// Modal components along the normals and along the forces of the lanes of all blocks, and true for lanes on this structure.
     along: Vec<f64>,
     acting: Vec<f64>,
     touches: Vec<bool>,
-    /// Lanes of a block.
+    /// Number of lanes of a block.
     lanes: usize,
-    /// Changes of the modal forces at points 1 … s since the gaps were evaluated, as acting on the nodes, and displacements they cause.
+    /// Changes of the modal forces at the points 1 … s since the gaps were evaluated, and the modal displacements that they cause.
     changes: [Vec<f64>; MOST],
     shifts: [Vec<f64>; MOST],
     /// Modal displacements per unit of λ of one lane.
@@ -313,7 +313,7 @@ impl CarrierIntegrator {
         }
     }
 
-    /// Finds the modal components along the force per λ of a lane.
+    /// Finds the modal components along the force of a lane per λ.
     fn find_acting(&mut self, first: usize, lane: usize, direction: Vector3) {
         let padded = self.force.len();
         let [x, y, z] = self.seen.each_ref().map(|seen| &seen[lane * padded..][..padded]);
@@ -324,13 +324,13 @@ impl CarrierIntegrator {
         }
     }
 
-    /// Forgets all changes of forces.
-    pub(crate) fn clear_changes(&mut self) {
+    /// Sets all changes of forces to zero.
+    pub(crate) fn clear_force_changes(&mut self) {
         self.changes.iter_mut().chain(&mut self.shifts).for_each(|values| values.fill(0.0));
     }
 
-    /// Adds a change of λ of a lane since the gaps were evaluated (N).
-    pub(crate) fn change(&mut self, step: LaneStep, lane: usize, change: f64) {
+    /// Adds a change of λ of a lane since the last evaluation of the gaps (N).
+    pub(crate) fn add_force_change(&mut self, step: LaneStep, lane: usize, change: f64) {
         let (padded, place) = (self.force.len(), step.block * self.lanes + lane);
         if self.touches[place] {
             let sums = &mut self.changes[step.lanes.place(lane).0 - 1];
@@ -339,16 +339,16 @@ impl CarrierIntegrator {
         }
     }
 
-    /// Finds the displacements of the modes caused by all changes of forces.
-    pub(crate) fn spread_changes(&mut self, step: LaneStep) {
+    /// Finds the modal displacements caused by all changes of forces.
+    pub(crate) fn apply_force_changes(&mut self, step: LaneStep) {
         let Self { changes, shifts, body, .. } = self;
         for (point, shift) in shifts[..step.lanes.points].iter_mut().enumerate() {
             body.displace(step.level, step.kind, point + 1, &changes[..step.lanes.points], shift);
         }
     }
 
-    /// Change of the gap of a lane caused by all changes of forces (m).
-    pub(crate) fn shift(&self, step: LaneStep, lane: usize) -> f64 {
+    /// Returns the change of the gap of a lane caused by all changes of forces (m).
+    pub(crate) fn gap_change(&self, step: LaneStep, lane: usize) -> f64 {
         let (padded, place) = (self.force.len(), step.block * self.lanes + lane);
         let shifts = &self.shifts[step.lanes.place(lane).0 - 1];
         let mut sums = [0.0];

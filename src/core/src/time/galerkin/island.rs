@@ -68,10 +68,10 @@ pub struct IslandSector {
     advance: Advance,
     /// Motion of the nodes and surfaces (m) up to which the sector stays open in the current span; `None` for active sectors.
     pub(crate) allowance: Option<f64>,
-    /// Block of the lanes of the sector on surface carriers in the current trial; `None` before the first contact problem.
+    /// Block of lanes of the sector on surface carriers in the current trial; `None` before its first contact problem.
     block: Option<usize>,
     /// True if no force acts on the sector and its gaps are so wide that they are evaluated only after the contact problems of the other
-    /// sectors.
+    /// sectors are solved.
     far: bool,
 }
 
@@ -405,7 +405,7 @@ impl<S: Surroundings> SpanSteps for IslandInSpan<'_, S> {
         }
         self.island.disks.iter_mut().for_each(|disk| disk.body.fly(step.level));
         self.find_start();
-        Flight::Taken
+        Flight::Accepted
     }
 
     fn attempt(&mut self, step: SpanStep, kind: ForceInterpolation) -> TrialResult {

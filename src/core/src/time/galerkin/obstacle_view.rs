@@ -213,20 +213,20 @@ impl Obstacle for ObstacleView<'_> {
         self.carriers.step.block < BLOCKS
     }
 
-    fn change(&mut self, lane: usize, change: f64) {
+    fn add_force_change(&mut self, lane: usize, change: f64) {
         if let Some((carrier, step)) = self.carrier(lane) {
-            carrier.change(step, lane, change);
+            carrier.add_force_change(step, lane, change);
         }
     }
 
-    fn spread_changes(&mut self) {
+    fn apply_force_changes(&mut self) {
         let CarriersInStep { carriers, step } = &mut self.carriers;
-        carriers.iter_mut().for_each(|carrier| carrier.spread_changes(*step));
+        carriers.iter_mut().for_each(|carrier| carrier.apply_force_changes(*step));
     }
 
-    fn shift(&self, lane: usize) -> f64 {
+    fn gap_change(&self, lane: usize) -> f64 {
         let CarriersInStep { carriers, step } = &self.carriers;
-        carriers.iter().map(|carrier| carrier.shift(*step, lane)).sum()
+        carriers.iter().map(|carrier| carrier.gap_change(*step, lane)).sum()
     }
 
     fn parameters(&self, node: usize) -> &ContactParameters {
@@ -347,7 +347,7 @@ impl ObstacleView<'_> {
     fn lowest_near(&self, trial: &Trial, basis: &TimeBasis, node: usize, theta: f64) -> f64 {
         let of_spline = |(pair, _): (&ContactPair, &PairRecord)| pair.gap().spline().is_some();
         if !self.carriers.carriers.is_empty() && self.pair(node).is_some_and(of_spline) {
-            // The gap is a polynomial, with its minimum at `theta`.
+            // The gap is a polynomial whose minimum is at `theta`.
             return trial.gap_within(basis, node, theta);
         }
         let mut lowest = f64::INFINITY;

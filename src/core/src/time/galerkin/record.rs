@@ -23,20 +23,20 @@ pub(crate) struct MotionCourse {
     /// Linear and quadratic part of the motion over the whole span.
     parts: [MotionIncrement; 2],
     growth: ShapeGrowth,
-    /// True if the shaft centre leaves the axis of the casing, or its axial position, at some time.
+    /// True if the shaft is displaced from the centre, or axially, at any time of the span.
     is_off_centre: bool,
 }
 
-/// Bounds of the motion of the shaft over a step.
+/// Bounds on the motion of the shaft over a step.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct ShaftBounds {
-    /// Distance of the shaft centre from the axis (m).
+    /// Distance of the shaft centre from the axis of the casing (m).
     pub offset: f64,
-    /// Deviation of the displacement along a direction that turns with the rotor from its chord over the step (m).
-    pub excursion: f64,
-    /// Fourth derivative of this displacement (m), where the time is a fraction of the step.
-    pub fourth: f64,
-    /// Change of the direction in which the axis of the casing sees a node at a radius of 1 m, relative to the rotor (m).
+    /// Deviation of the displacement, along a direction that turns with the rotor, from linear motion over the step (m).
+    pub chord_deviation: f64,
+    /// Fourth derivative of this displacement with respect to time as a fraction of the step (m).
+    pub fourth_derivative: f64,
+    /// Change of the angle of a node about the axis of the casing, relative to the rotor, times the radius of the node (m).
     pub swing: f64,
 }
 
@@ -57,7 +57,7 @@ impl MotionCourse {
         Self { before: *before, parts: [linear, quadratic], growth, is_off_centre }
     }
 
-    /// Returns whether the shaft centre leaves the axis of the casing, or its axial position, at some time.
+    /// Returns whether the shaft is displaced from the centre, or axially, at any time of the span.
     pub(crate) fn is_off_centre(&self) -> bool {
         self.is_off_centre
     }
@@ -67,8 +67,8 @@ impl MotionCourse {
         self.parts.iter().all(MotionIncrement::is_casing_at_rest)
     }
 
-    /// Displacement of the shaft centre (m) and its velocity (m/s) at the fraction `theta` of the span, and its motion since the
-    /// start of the span (m).
+    /// Returns the displacement (m) and the velocity (m/s) of the shaft centre at the fraction `theta` of the span, and its motion
+    /// since the start of the span (m).
     pub(crate) fn shaft_at(&self, theta: f64) -> [Vector3; 3] {
         let ([linear, quadratic], before) = (&self.parts, &self.before);
         let moved = theta * linear.shaft + theta * theta * quadratic.shaft;
@@ -93,8 +93,9 @@ impl MotionCourse {
         let square = turn * turn;
         ShaftBounds {
             offset,
-            excursion: 0.125 * (bend + 2.0 * moved * turn + offset * (square + acceleration)),
-            fourth: offset * (square * square + 6.0 * square * acceleration + 3.0 * acceleration * acceleration)
+            chord_deviation: 0.125 * (bend + 2.0 * moved * turn + offset * (square + acceleration)),
+            fourth_derivative: offset
+                * (square * square + 6.0 * square * acceleration + 3.0 * acceleration * acceleration)
                 + 4.0 * moved * turn * (square + 3.0 * acceleration)
                 + 6.0 * bend * (square + acceleration),
             swing: offset * turn + moved,
@@ -111,7 +112,7 @@ impl MotionCourse {
         self.parts.iter().all(|part| part.is_casing_at_rest() && part.shaft == Vector3::zeros())
     }
 
-    /// Prescribed motion at the fraction `theta` of the span, and the motion since its start, without the motion of the shaft.
+    /// Returns the prescribed motion at the fraction `theta` of the span, and the motion since its start, both without the shaft.
     #[inline]
     pub(crate) fn turning_at(&self, theta: f64) -> (TurningDrive, TurningMotion) {
         let ([linear, quadratic], before) = (&self.parts, &self.before);
@@ -160,7 +161,7 @@ impl MotionCourse {
     }
 }
 
-/// Prescribed motion of a rotor and its casing without the motion of the shaft.
+/// Prescribed motion of a rotor and its casing, without the displacement of the shaft.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct TurningDrive {
     /// Angle (rad) and speed (rad/s) of the rotor.
@@ -173,7 +174,7 @@ pub(crate) struct TurningDrive {
     pub shape_rotation: f64,
 }
 
-/// Change of the prescribed motion.
+/// Change of the prescribed motion of a rotor and its casing.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct TurningMotion {
     /// Rotation of the rotor (rad).
@@ -188,7 +189,7 @@ pub(crate) struct TurningMotion {
 }
 
 impl TurningMotion {
-    /// Adds `weight` times the motion from `from` to `to`, without that of the shaft.
+    /// Adds `weight` times the motion from `from` to `to`, without the motion of the shaft.
     pub fn add(&mut self, weight: f64, from: &Self, to: &Self) {
         self.turn += weight * (to.turn - from.turn);
         self.opening += weight * (to.opening - from.opening);

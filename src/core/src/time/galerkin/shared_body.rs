@@ -231,7 +231,7 @@ impl SharedBody {
         }
     }
 
-    /// Computes the displacements of the modes at point i under `forces` on the modes at the points 1, 2, … alone, after padding 0.
+    /// Computes the modal displacements at point i caused only by the modal `forces` at the points 1, 2, …; padding is 0.
     pub(crate) fn displace(
         &self,
         level: usize,

@@ -60,12 +60,12 @@ pub enum Stopped {
     Exhausted,
 }
 
-/// Outcome of the attempt to take a step without a trial.
+/// Outcome of an attempt to take a step without a trial.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Flight {
-    /// No contact is possible during the step, and it has been taken.
-    Taken,
-    /// A contact may be possible; a shorter step shows whether it is.
+    /// No contact is possible during the step, and the step has been accepted.
+    Accepted,
+    /// Contact may be possible; a shorter step gives tighter bounds.
     TooLong,
     /// The step needs a trial.
     NeedsTrial,
@@ -137,7 +137,7 @@ impl<S: SpanSteps> StepChoice<'_, S> {
             let (step, end) = (SpanStep::new(level, done), done + units_per_step(level));
             let is_even = end.is_multiple_of(2 * units_per_step(level));
             match self.steps.fly(step) {
-                Flight::Taken => {
+                Flight::Accepted => {
                     (effort.steps, effort.flights) = (effort.steps + count, effort.flights + count);
                     self.steps.control().level -= usize::from(level > 0 && is_even);
                     return Ok(end);

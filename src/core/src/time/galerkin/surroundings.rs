@@ -75,7 +75,7 @@ pub struct LaneStep {
     pub kind: ForceInterpolation,
     /// Lanes of the current contact problem.
     pub lanes: Lanes,
-    /// Block of the lanes of the sector on surface carriers.
+    /// Block of lanes of the sector on surface carriers.
     pub block: usize,
 }
 

@@ -73,8 +73,8 @@ pub struct Trial {
     carrier_columns: Vec<f64>,
     carrier_known: Vec<bool>,
     carrier_is_fresh: bool,
-    /// Multipliers at the evaluated gaps and after the last solution (N), and changes of the gaps since their evaluation by the forces of
-    /// other sectors (m).
+    /// Multipliers at the last evaluation of the gaps and after the last solution (N), and changes of the gaps since this evaluation that
+    /// forces of other sectors cause (m).
     evaluated: Vec<f64>,
     applied: Vec<f64>,
     shifts: Vec<f64>,
@@ -331,7 +331,7 @@ impl Trial {
         self.find_forces(compliance, obstacle, verdict)
     }
 
-    /// Finds the forces of the current problem, and then also those of contacts that these forces make penetrate.
+    /// Finds the forces of the current contact problem. Adds contacts that penetrate under these forces, and repeats this until none does.
     pub(super) fn find_forces(
         &mut self,
         compliance: &LaneCompliance,
@@ -369,7 +369,7 @@ impl Trial {
             let forces = self.forces[row..][..width].iter_mut();
             forces.zip(directions).for_each(|(force, (direction, value))| *force = direction * value);
         }
-        self.give_changes(obstacle);
+        self.apply_force_changes(obstacle);
         true
     }
 

@@ -58,7 +58,7 @@ impl Disk {
         self.synthesise(values);
     }
 
-    /// Computes displacements of the contact rows of all sectors for two sets of coordinates, as [`Disk::rows_of`].
+    /// Computes the displacements of the contact rows of all sectors for two sets of coordinates; see [`Disk::rows_of`].
     pub(crate) fn rows_of_two(&mut self, coordinates: [&[f64]; 2], values: [&mut [f64]; 2]) {
         self.instruction_set.run(TwoCombinations {
             columns: self.modes,
@@ -73,7 +73,7 @@ impl Disk {
         }
     }
 
-    /// Computes the forces on all coordinates for two sets of contact forces, as [`Disk::modal_forces`].
+    /// Computes the forces on all coordinates for two sets of contact forces; see [`Disk::modal_forces`].
     pub(crate) fn modal_forces_of_two(
         &mut self,
         [first, second]: [impl Iterator<Item = (usize, usize, Vector3)>; 2],
@@ -168,7 +168,7 @@ mod tests {
             disk.modal_forces(all.into_iter(), &mut modal);
             let other: f64 = modal.iter().zip(&at).map(|(p, q)| p * q).sum();
             assert!((work - other).abs() < 1e-11 * (1.0 + work.abs()), "{sectors}: {work} {other}");
-            // Two sets at once give the same as one after the other, also if one of them has no forces.
+            // Two sets together give the same results as each set alone, also if one of them has no forces.
             let turned: Vec<f64> = at.iter().map(|value| -3.0 * value).collect();
             let (mut one, mut two, mut alone) = (values.clone(), values.clone(), values.clone());
             disk.rows_of_two([&at, &turned], [&mut one, &mut two]);

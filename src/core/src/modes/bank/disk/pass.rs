@@ -175,7 +175,7 @@ impl Kernel for Combination<'_> {
     }
 }
 
-/// Spectra of rows for two sets of amplitudes, U = Σ Ψ q, so that the shapes are loaded once.
+/// Spectra of rows for two sets of amplitudes, U = Σ Ψ q. The shapes are loaded only once.
 pub(super) struct TwoCombinations<'a> {
     pub columns: usize,
     pub rows: usize,
@@ -205,7 +205,7 @@ impl Kernel for TwoCombinations<'_> {
     }
 }
 
-/// Combines the columns of `ROWS` rows from `first` on for two sets. Returns `ROWS`.
+/// Combines the columns of `ROWS` rows from row `first` on, for two sets of amplitudes. Returns `ROWS`.
 #[inline(always)]
 fn combine_two<const ROWS: usize>(
     matrix: &[Complexes],
@@ -324,7 +324,7 @@ impl Kernel for ModalForces<'_> {
     }
 }
 
-/// Modal forces of two spectra of contact forces on all modes, so that the shapes are loaded once.
+/// Modal forces of two spectra of contact forces on all modes. The shapes are loaded only once.
 pub(super) struct TwoModalForces<'a> {
     pub modes: usize,
     pub rows: usize,
@@ -332,7 +332,7 @@ pub(super) struct TwoModalForces<'a> {
     pub shapes: &'a [Complexes],
     /// `[block][row]` of each set.
     pub forces: [&'a [Complexes]; 2],
-    /// Contact nodes with forces of either set.
+    /// True for contact nodes with a force of either set.
     pub touched: &'a [bool],
     /// `[block][mode][part][lane]` of each set.
     pub to: [&'a mut [f64]; 2],

@@ -4,7 +4,7 @@ use super::rows::BladeRows;
 use crate::math::octet::{Eight, Octet};
 use crate::time::galerkin::basis::POINTS;
 
-/// Largest number of nodes in the last block that are summed one by one.
+/// Largest number of nodes in the last block that are summed node by node.
 const FEW_NODES: usize = 2;
 
 /// Returns the values of a block of nodes at the start of a step and at its points: `count` values in total.
@@ -93,8 +93,8 @@ pub(super) fn displace<L: Octet, const D: usize, const P: usize>(
     }
 }
 
-/// Like [`displace`] for the first `mode_blocks` blocks of modes, along the directions `along`. If only a few nodes are in
-/// the last block, each of them is summed over blocks of modes instead.
+/// Like [`displace`], but along the directions `along` and for the first `mode_blocks` blocks of modes only. If the last block
+/// contains only a few nodes, each of these nodes is summed over blocks of modes.
 #[inline(always)]
 pub(super) fn displace_nodes<L: Octet, const D: usize, const P: usize>(
     rows: &BladeRows,

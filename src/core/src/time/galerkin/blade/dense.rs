@@ -3,7 +3,7 @@
 use super::columns::displace_nodes;
 use super::level::BladeLevel;
 use super::minima::steady_motion;
-use super::off_centre::{OffCentre, directions_of};
+use super::off_centre::{OffCentreGaps, directions_of};
 use super::rows::BladeRows;
 use super::surface::{DriveRate, FacedSurface};
 use super::trial::{BladeTrial, StartContacts};
@@ -31,7 +31,7 @@ impl ModeResponse {
         self.key == (kind, time.to_bits())
     }
 
-    /// q and q̇ of eight modes without forces, from those at the start of the step and ω².
+    /// Returns q and q̇ of eight modes without forces, from their values at the start of the step and ω².
     #[inline(always)]
     pub fn free<L: Octet>(&self, block: usize, [q, v]: [L; 2], square: L) -> [L; 2] {
         let [a, b] = both(|term| L::load(&self.terms[term][block]));
@@ -180,7 +180,7 @@ impl DenseOutput<'_> {
             let steepness = L::load(&rows.steepness[block]);
             let (clear, mut sigma, mut rate) = if faced.is_off_centre {
                 let place = (L::load(&angles[block]), directions_of(directions_of_nodes, block));
-                let seen = OffCentre::new(faced.surface, drive, (rows, block), place, [closing, around]);
+                let seen = OffCentreGaps::new(faced.surface, drive, (rows, block), place, [closing, around]);
                 let slope = L::load(&rows.slopes[block]);
                 (seen.clear, seen.sigma, seen.rate(drive, of_drive, slope, [closing_rate, around_rate]))
             } else {

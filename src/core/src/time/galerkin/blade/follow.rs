@@ -3,7 +3,7 @@
 use super::columns::{add_modes, displace_nodes, put, sum, values_at_points};
 use super::level::BladeLevel;
 use super::minima::{FOLLOW_FRACTION, MAX_HALVINGS, MINIMUM_FRACTION, amplitude, fraction, relative_error};
-use super::off_centre::{OffCentre, directions_of};
+use super::off_centre::{OffCentreGaps, directions_of};
 use super::rows::BladeRows;
 use super::surface::{DriveRate, FacedSurface, PointDrive};
 use super::trial::BladeTrial;
@@ -202,7 +202,7 @@ impl<D: Fn(f64) -> (PointDrive, DriveRate)> Follow<'_, D> {
             let [closing_rate, around_rate] = both(|along| L::load(&path_moved[along][rows.blocks + block]));
             let (clear, sigma, rate) = if faced.is_off_centre {
                 let place = (L::load(&angles[block]), directions_of(directions_of_nodes, block));
-                let seen = OffCentre::new(faced.surface, &drive, (rows, block), place, [closing, around]);
+                let seen = OffCentreGaps::new(faced.surface, &drive, (rows, block), place, [closing, around]);
                 let slope = L::load(&rows.slopes[block]);
                 (seen.clear, seen.sigma, seen.rate(&drive, &rate, slope, [closing_rate, around_rate]))
             } else {
@@ -285,7 +285,7 @@ impl<D: Fn(f64) -> (PointDrive, DriveRate)> Follow<'_, D> {
             if acting == 0 {
                 continue;
             }
-            // Forces and their rates along both directions.
+            // Forces (N) and their rates (N/s) along both directions.
             let mut of_forces = [[[0.0; 8]; 2]; 2];
             for along in [0, 1] {
                 let values = values_at_points::<L>(&start.forces[along], &forces[along], source, count);

@@ -12,7 +12,7 @@ use crate::time::galerkin::span::SpanStep;
 use crate::time::galerkin::tables::HALVINGS;
 use crate::time::galerkin::trial::{ForceInterpolation, TrialResult};
 
-/// Factor on bounds for an eccentric shaft, because the eccentricity also acts at twice the angle of the rotor, by a smaller amount.
+/// Safety factor of bounds for an off-centre shaft. It covers the smaller effect of the eccentricity at twice the rotor angle.
 const SAFETY: f64 = 2.0;
 
 /// Rates of the prescribed motion are differences over this fraction of a span.
@@ -110,7 +110,7 @@ impl BladePlace<'_> {
         if self.course.is_off_centre() {
             let (shaft, per_radius) = (self.course.shaft_bounds(ends), &self.gap.layout.per_radius);
             turn += SAFETY * shaft.swing * per_radius.iter().fold(0.0, |most, value| value.max(most));
-            eccentric = SAFETY * shaft.fourth / 384.0;
+            eccentric = SAFETY * shaft.fourth_derivative / 384.0;
         }
         let factor = from.factor.abs().max(to.factor.abs());
         let [square, higher] = self.course.growth().cubic_errors(ends).map(|error| error * surface.largest_change());

@@ -48,10 +48,10 @@ pub(crate) struct BladeLevel {
     pub loss: Vec<Eight>,
     /// True if at least one mode is damped.
     pub damped: bool,
-    /// Masks of the modes that a cubic follows over the step, and number of blocks of modes that contain them all.
+    /// Masks of the slow modes, which a cubic approximates over the step, and number of blocks that contain all of them.
     pub slow: Vec<u8>,
     pub slow_blocks: usize,
-    /// Largest distance of each mode from its cubic, or from zero if the mode is not slow, relative to its amplitude.
+    /// Largest distance of each slow mode from its cubic, or of each fast mode from zero, relative to its amplitude.
     pub relative_errors: Vec<Eight>,
     /// Interpolation of the forces.
     pub kind: ForceInterpolation,
@@ -60,9 +60,9 @@ pub(crate) struct BladeLevel {
     pub columns: Vec<Eight>,
     /// Displacements of all lanes per unit force on each node at the start of the step, in the same order.
     pub start_columns: Vec<Eight>,
-    /// Displacements of all lanes normal to these two directions, per unit force on each node at the start of the step, then on each
-    /// lane, along the two directions of the force. Empty unless the shaft can move.
-    across: Vec<Eight>,
+    /// Meridional displacements of all lanes per unit force on each node at the start of the step, then on each lane, along the
+    /// closing and the circumferential direction. Empty unless the shaft can move.
+    meridional: Vec<Eight>,
 }
 
 impl BladeLevel {
@@ -92,7 +92,10 @@ impl BladeLevel {
             basis,
             columns: vec![Eight::ZERO; points * rows.nodes * column],
             start_columns: vec![Eight::ZERO; rows.nodes * column],
-            across: vec![Eight::ZERO; if rows.across.is_empty() { 0 } else { (points + 1) * rows.nodes * 2 * blocks }],
+            meridional: vec![
+                Eight::ZERO;
+                if rows.meridional.is_empty() { 0 } else { (points + 1) * rows.nodes * 2 * blocks }
+            ],
         }
     }
 
@@ -154,10 +157,10 @@ impl BladeLevel {
                     let direction = rows.along(along, node);
                     let moved: Vector3 =
                         (0..3).map(|c| direction[c] * lanes.vector3(columns[c], lanes.at(at, other))).sum();
-                    if !self.across.is_empty() {
+                    if !self.meridional.is_empty() {
                         let column = (2 * (from * rows.nodes + node) + along) * self.blocks;
-                        self.across[column + (at - 1) * rows.blocks + other / 8].0[other % 8] =
-                            rows.normal_to_plane(other).dot(&moved);
+                        self.meridional[column + (at - 1) * rows.blocks + other / 8].0[other % 8] =
+                            rows.meridional_direction(other).dot(&moved);
                     }
                     for seen in [0, 1] {
                         let column = ((node * 2 + along) * 2 + seen) * self.blocks;
@@ -216,11 +219,11 @@ impl BladeLevel {
         quarters(columns, self.blocks)
     }
 
-    /// Displacements of all lanes normal to the closing and the circumferential displacement, per unit force along each of these on a
-    /// node at the start of the step (`from` 0) or at a point.
+    /// Returns the meridional displacements of all lanes per unit force on a node, along the closing and the circumferential
+    /// direction. The force acts at the start of the step (`from` = 0) or at a point.
     #[inline(always)]
-    pub(super) fn across(&self, from: usize, node: usize, nodes: usize) -> [&[Eight]; 2] {
-        let columns = &self.across[2 * (from * nodes + node) * self.blocks..][..2 * self.blocks];
+    pub(super) fn meridional(&self, from: usize, node: usize, nodes: usize) -> [&[Eight]; 2] {
+        let columns = &self.meridional[2 * (from * nodes + node) * self.blocks..][..2 * self.blocks];
         columns.split_at(self.blocks).into()
     }
 

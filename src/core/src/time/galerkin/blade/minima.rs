@@ -21,8 +21,8 @@ pub(super) const FOLLOW_FRACTION: f64 = 0.1;
 pub(super) const MINIMUM_FRACTION: f64 = 0.3;
 
 impl BladeTrial {
-    /// Bounds the interpolation error (m) of all modes between points at a distance `length` (s). If forces act, this is
-    /// the length of the step.
+    /// Bounds the interpolation error (m) of all modes between points at a distance `length` (s). If forces act, `length` must
+    /// be the length of the step.
     pub(super) fn find_interpolation_error(&mut self, rows: &BladeRows, length: f64) -> f64 {
         let forced_step = self.pushes.then_some(length);
         self.unresolved = None;
@@ -159,7 +159,7 @@ impl<L: Octet> BlockGaps<L> {
         (self.least - self.error_bound).less(threshold * size) & self.open
     }
 
-    /// Bounds the gaps of the nodes from below (m); `-UNKNOWN_GAP` for nodes that may touch.
+    /// Returns lower bounds of the gaps of the nodes (m); `-UNKNOWN_GAP` for nodes that may touch.
     #[inline(always)]
     pub fn lower_bound(&self) -> L {
         let smallest = self.least - self.error_bound;
@@ -234,8 +234,8 @@ impl OctetKernel for FindInterpolationError<'_> {
     }
 }
 
-/// Steady motion of eight modes under the modal forces of a step of length `step` (s), as coefficients of powers of the time
-/// since its start.
+/// Returns the steady motion of eight modes under the modal forces of a step of length `step` (s), as coefficients of powers
+/// of the time since its start.
 #[inline(always)]
 pub(super) fn steady_motion<L: Octet>(
     rows: &BladeRows,
@@ -268,7 +268,7 @@ pub(super) fn amplitude<L: Octet>(
     }
     let turned = ((v + L::load(&rates[block]) * q) * L::load(&per_frequency[block])).abs();
     let position = q.abs();
-    // At most 8 % above the root of the sum of squares, without a root.
+    // At most 8 % above √(position² + turned²), but without a square root.
     position.max(turned) + L::splat(std::f64::consts::SQRT_2 - 1.0) * position.min(turned)
 }
 

@@ -1,12 +1,12 @@
-//! Gaps of eight nodes about a shaft that is not in the middle of the casing.
+//! Gaps of eight nodes for an off-centre shaft.
 //!
 //! With the shaft centre at (e_r, e_t, e_z) in the directions of a node, the gap is F/|∇F| with F and ∇F as in
-//! [`revolution`](crate::geometry::revolution). The closing displacement a now changes F by α a with α = (κ + m²)/M² and
-//! κ = cos δ + s′ sin δ/ρ. Steps use F/α, whose change per closing displacement is 1, with σ = (∂F/∂u_θ)/α; the contact problem, the gap
+//! [`revolution`](crate::geometry::revolution). A closing displacement a changes F by α a with α = (κ + m²)/M² and
+//! κ = cos δ + s′ sin δ/ρ. Steps use F/α, whose derivative with respect to a is 1, and σ = (∂F/∂u_θ)/α. The contact problem, the gap
 //! F/|∇F| and the directions of the forces then keep their form, and λ' is α times larger.
 //!
-//! u_r is taken as −a/M². This is exact for a slope m = 0. Otherwise it neglects a displacement w normal to the plane of a and u_θ, which
-//! changes the gap by m (1 − κ) w: by about 1e-5 w if the eccentricity is as large as the clearance.
+//! u_r is approximated by −a/M². This is exact for a slope m = 0. Otherwise, it neglects the meridional displacement w, which changes the
+//! gap by m (1 − κ) w. This is about 1e-5 w if the eccentricity equals the clearance.
 
 use super::rows::BladeRows;
 use super::surface::{DriveRate, PointDrive};
@@ -14,7 +14,7 @@ use crate::geometry::Vector3;
 use crate::math::octet::{Eight, Octet, both};
 use crate::scene::shape::CompiledShape;
 
-/// Converts a vector in fixed directions to the directions of a rotor whose angle has this sine and cosine.
+/// Returns the components of a vector along the axes of a rotor, from its fixed components and the sine and cosine of the rotor angle.
 pub(super) fn in_rotor((sine, cosine): (f64, f64), fixed: Vector3) -> Vector3 {
     Vector3::new(fixed[0] * cosine + fixed[1] * sine, fixed[1] * cosine - fixed[0] * sine, fixed[2])
 }
@@ -28,7 +28,7 @@ pub(super) struct Directions<L> {
 }
 
 impl<L: Octet> Directions<L> {
-    /// Directions at angles (sine, cosine), turned by a rotor angle (sine, cosine) and a small angle.
+    /// Creates the directions at angles (sine, cosine), turned by a rotor angle (sine, cosine) and a small angle.
     #[inline(always)]
     pub fn new([sine, cosine]: [L; 2], rotor: (f64, f64), small: L) -> Self {
         let (s, c) = (L::splat(rotor.0), L::splat(rotor.1));
@@ -39,13 +39,13 @@ impl<L: Octet> Directions<L> {
         Self { sine: sine * small_cosine + cosine * small_sine, cosine: cosine * small_cosine - sine * small_sine }
     }
 
-    /// Fixed components of a vector with these radial and tangential components.
+    /// Returns the fixed components of a vector with these radial and tangential components.
     #[inline(always)]
     pub fn fixed(&self, radial: L, tangential: L) -> [L; 2] {
         [radial * self.cosine - tangential * self.sine, radial * self.sine + tangential * self.cosine]
     }
 
-    /// Radial and tangential component of a vector that is the same for all nodes.
+    /// Returns the radial and tangential components of a vector that is the same for all nodes.
     #[inline(always)]
     pub fn local(&self, vector: &Vector3) -> [L; 2] {
         let (x, y) = (L::splat(vector[0]), L::splat(vector[1]));
@@ -53,29 +53,29 @@ impl<L: Octet> Directions<L> {
     }
 }
 
-/// Eight nodes and the surface that they face, about a shaft that is not in the middle.
-pub(super) struct OffCentre<L> {
+/// Gaps of eight nodes and their derivatives, for an off-centre shaft.
+pub(super) struct OffCentreGaps<L> {
     /// F/α without the closing displacement (m), and σ.
     pub clear: L,
     pub sigma: L,
-    /// Coefficient of a squared circumferential displacement in F/α (1/m).
+    /// Coefficient of the squared circumferential displacement in F/α (1/m).
     pub bend: L,
     /// 1/α.
     pub scale: L,
     /// Shape of the surface (m) and its slope (m/rad), without the factor.
     pub shape: L,
     pub slope: L,
-    /// Directions of the nodes in the rotor.
+    /// Directions of the nodes relative to the rotor.
     frame: Directions<L>,
-    /// Change of F per displacement of the shaft: inwards, and around.
+    /// Change of F per inward and per circumferential displacement of the shaft.
     by_shaft: [L; 2],
-    /// Change of F per angle of the rotor (m/rad), without the change of the angle at which the shape is seen.
+    /// Change of F per rotor angle (m/rad), minus the slope of the shape.
     turning: L,
 }
 
-impl<L: Octet> OffCentre<L> {
-    /// Finds gaps of a block of nodes with these angles in the rotor (rad), the sines and cosines of these angles, and the closing
-    /// and the circumferential displacement (m).
+impl<L: Octet> OffCentreGaps<L> {
+    /// Finds the gaps of a block of nodes from their angles in the rotor (rad) with sines and cosines, and from their closing and
+    /// circumferential displacements (m).
     #[inline(always)]
     pub fn new(
         surface: &CompiledShape,
@@ -108,7 +108,7 @@ impl<L: Octet> OffCentre<L> {
         let shifted = outwards + sideways * sideways / (distance + arm) - slope * L::splat(drive.shaft[2]);
         let open = L::splat(drive.clearance) + shape * factor - shifted + closing;
         let around_arc = stretch * by_shaft[1];
-        // d(φ + δ)/dφ, and the same minus 1.
+        // d(φ + δ)/dφ and dδ/dφ.
         let seen = radius * per_distance * cosine;
         let less = L::zero() - (arm * outwards + sideways * sideways) * per_distance * per_distance;
         let second = curvature * factor * seen * seen
@@ -127,7 +127,7 @@ impl<L: Octet> OffCentre<L> {
         }
     }
 
-    /// Returns the rate of F/α (m/s) from the rates of the closing and of the circumferential displacement (m/s).
+    /// Returns the rate of F/α (m/s) from the rates of the closing and circumferential displacements (m/s).
     #[inline(always)]
     pub fn rate(&self, drive: &PointDrive, rate: &DriveRate, slope: L, [closing, around]: [L; 2]) -> L {
         let [outwards, sideways] = self.frame.local(&drive.shaft_velocity);
@@ -139,8 +139,8 @@ impl<L: Octet> OffCentre<L> {
         closing + self.scale * (of_casing + of_shaft + self.turning * L::splat(drive.speed)) + self.sigma * around
     }
 
-    /// Components of a displacement or a velocity of the shaft, along the axes of the rotor, that are conjugate to the forces along
-    /// the closing and the circumferential displacement; `stretch` is (r + u_r)/r.
+    /// Returns the components of a shaft displacement or velocity that are conjugate to the closing and circumferential forces.
+    /// `shaft` is given along the axes of the rotor, and `stretch` is (r + u_r)/r.
     #[inline(always)]
     pub fn seen(&self, slope: L, stretch: L, shaft: &Vector3) -> [L; 2] {
         let [outwards, sideways] = self.frame.local(shaft);
@@ -148,7 +148,7 @@ impl<L: Octet> OffCentre<L> {
     }
 }
 
-/// arctan t for |t| ≤ 0.2 (truncation below 1e-16 of t).
+/// Returns arctan t for |t| ≤ 0.2. The truncation error is below 1e-16 t.
 #[inline(always)]
 fn small_arc_tangent<L: Octet>(t: L) -> L {
     let square = t * t;

@@ -6,8 +6,8 @@
 use super::dense::{DenseOutput, ModeResponse};
 use super::follow::CubicMinima;
 use super::gaps::{drive_and_rate_at, include};
-use super::quiet::NO_BOUND;
 use super::rows::BladeRows;
+use super::skipped::NO_BOUND;
 use super::span::{Blade, BladeInSpan, RecordScope};
 use super::surface::PointDrive;
 use super::tally::Sums;
@@ -204,7 +204,7 @@ impl BladeInSpan<'_> {
     }
 
     /// Evaluates the open step at a time (s since the start of the steady phase) for spans of length `span` (s). `course`
-    /// returns the prescribed motion over a span, by its number. Returns the time as a fraction of the last span.
+    /// returns the prescribed motion over the span with a given number. Returns the time as a fraction of the last span.
     fn sample(&mut self, time: f64, span: f64, course: impl Fn(u64) -> MotionCourse) -> f64 {
         let Some(OpenStep { step, kind, .. }) = self.open else { return 0.0 };
         let elapsed = self.time_in_step(time, span);
@@ -233,13 +233,13 @@ impl BladeInSpan<'_> {
         theta
     }
 
-    /// Time since the start of the open step (s) at a time (s since the start of the steady phase).
+    /// Converts a time since the start of the steady phase to a time since the start of the open step (s).
     pub(super) fn time_in_step(&self, time: f64, span: f64) -> f64 {
         let from = self.open.map_or(0.0, |open| open.step.from);
         ((time - to_real(self.progress.spans) * span) - from * span).max(0.0)
     }
 
-    /// Finds the gaps at the start of an interval of the steady phase, which the recalled open step contains.
+    /// Finds the gaps at the start of an interval of the steady phase. The recalled open step must contain this time.
     pub(crate) fn sample_start(&mut self, interval: SteadyInterval, course: impl Fn(u64) -> MotionCourse) {
         self.sample(interval.from, interval.span, course);
         let Blade { trial, begun, tally, .. } = &mut *self.blade;
@@ -253,7 +253,7 @@ impl BladeInSpan<'_> {
         include(&mut tally.lowest, begun);
     }
 
-    /// Writes the whole state at the end of an interval of the steady phase, which the open step contains.
+    /// Writes the whole state at the end of an interval of the steady phase. The open step must contain this time.
     pub(crate) fn write_whole_sample(
         &mut self,
         interval: SteadyInterval,
@@ -264,8 +264,8 @@ impl BladeInSpan<'_> {
         BladeTrial::write(&self.tables.rows, &self.blade.trial.sample, state);
     }
 
-    /// Finds the gaps at the end of an interval of the steady phase, which the open step contains, and writes them to a state:
-    /// together with modes and contacts if `whole`.
+    /// Writes the gaps at the end of an interval of the steady phase to `state`, and also modes and contacts if `whole` is
+    /// true. The open step must contain this time.
     pub(crate) fn write_sample(
         &mut self,
         interval: SteadyInterval,
@@ -280,7 +280,7 @@ impl BladeInSpan<'_> {
         } else {
             BladeTrial::write_gaps(rows, sample, state);
         }
-        let is_needed = self.is_in_recalled_flight && !self.is_quiet();
+        let is_needed = self.is_in_recalled_flight && !self.gaps_are_unneeded();
         let Some(OpenStep { step, kind, .. }) = self.open.filter(|_| is_needed) else { return };
         let (length, shape_ends) =
             (interval.to - interval.from, [theta - (interval.to - interval.from) / interval.span, theta]);
@@ -387,7 +387,7 @@ pub(super) fn to_count(value: f64) -> u64 {
 }
 
 impl Blade {
-    /// Finds the response of the modes of a kind of sectors after a time (s). Returns its place among the cached responses.
+    /// Finds the response of the modes of a kind of sectors after a time (s). Returns its index among the cached responses.
     pub(super) fn find_response(&mut self, rows: &BladeRows, kind: usize, time: f64) -> usize {
         let place = self.responses.iter().position(|response| response.matches(kind, time));
         place.unwrap_or_else(|| {

@@ -55,7 +55,7 @@ impl OctetKernel for FindClearance<'_> {
             if faced.is_off_centre {
                 let angles = both(|of| L::load(&trial.directions_of_nodes[of][block]));
                 closed = closed + closed_by_shaft(rows, block, angles, [start, end], shaft, around);
-                // The axis of the casing sees the node at another angle than the shaft does.
+                // The angle of the node about the axis of the casing differs from its angle about the shaft.
                 around = around + L::splat(SAFETY * shaft.offset) * L::load(&rows.per_radius[block]);
             }
             let angles = L::load(&trial.angles[block]);
@@ -81,12 +81,11 @@ impl OctetKernel for FindClearance<'_> {
     }
 }
 
-/// Factor on bounds of small terms that grow with the square of the shaft's offset relative to the radius, which is at most a
-/// tenth.
+/// Safety factor for terms of higher order in the ratio of the shaft offset to the radius, which is at most 0.1.
 const SAFETY: f64 = 1.25;
 
-/// Bounds the part of the clearance (m) that an eccentric shaft closes between two drives, at nodes that move by up to `around`
-/// (rad).
+/// Bounds the reduction of the clearance (m) by an off-centre shaft between two drives, for nodes whose circumferential
+/// displacement is at most `around` (rad).
 #[inline(always)]
 fn closed_by_shaft<L: Octet>(
     rows: &BladeRows,
@@ -103,7 +102,7 @@ fn closed_by_shaft<L: Octet>(
     let along = both(|end| slope * L::splat(drives[end].shaft[2]));
     // ρ − r − u_r is at most e_r + e²/(2a).
     let bend = L::splat(SAFETY * shaft.offset * shaft.offset) * per_radius;
-    let most = outwards.max(outwards_later) + L::splat(shaft.excursion) + L::splat(shaft.offset) * around;
+    let most = outwards.max(outwards_later) + L::splat(shaft.chord_deviation) + L::splat(shaft.offset) * around;
     most + bend - along[0].min(along[1])
 }
 

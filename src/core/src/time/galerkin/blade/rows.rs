@@ -47,10 +47,11 @@ pub(crate) struct BladeRows {
     pub smallest_radius: f64,
     /// True if every mode has a frequency above zero.
     pub all_vibrate: bool,
-    /// Shapes mode by mode along the direction (m, 0, 1)/M normal to the other two, and the displacements along it of all nodes per
-    /// unit force on each node along the two directions. Only moments on a moving shaft need them; empty otherwise.
-    pub across: Vec<Eight>,
-    pub across_flexibility: [Vec<Eight>; 2],
+    /// Mode shapes along the meridional direction (m, 0, 1)/M, mode by mode, and meridional displacements of all nodes per unit
+    /// force on each node along the closing and the circumferential direction. Empty unless the shaft can move, because only
+    /// moments on a moving shaft depend on them.
+    pub meridional: Vec<Eight>,
+    pub meridional_flexibility: [Vec<Eight>; 2],
     /// Direction of the closing displacement of each node.
     directions: Vec<Vector3>,
 }
@@ -102,12 +103,12 @@ impl BladeRows {
             largest_around: 0.0,
             all_vibrate: modes.frequencies.iter().all(|frequency| *frequency > 0.0),
             smallest_radius: per_radius.iter().fold(f64::INFINITY, |least, value| least.min(1.0 / value)),
-            across: Vec::new(),
-            across_flexibility: [Vec::new(), Vec::new()],
+            meridional: Vec::new(),
+            meridional_flexibility: [Vec::new(), Vec::new()],
             directions,
         };
         if gap.shaft_moves {
-            rows.find_across(modes);
+            rows.find_meridional(modes);
         }
         for (mode, shape) in modes.shapes.column_iter().enumerate() {
             for along in [0, 1] {
@@ -153,21 +154,21 @@ impl BladeRows {
         rows
     }
 
-    /// Finds shapes and flexibility along the third direction.
-    fn find_across(&mut self, modes: &ContactModes) {
+    /// Finds mode shapes and flexibility along the meridional direction.
+    fn find_meridional(&mut self, modes: &ContactModes) {
         let (nodes, blocks) = (self.nodes, self.blocks);
-        let mut across = vec![Eight::ZERO; blocks * modes.len()];
-        for (shape, target) in modes.shapes.column_iter().zip(across.chunks_exact_mut(blocks)) {
-            let moved = |node: usize| self.normal_to_plane(node).dot(&vector3_at(shape.as_slice(), node));
+        let mut meridional = vec![Eight::ZERO; blocks * modes.len()];
+        for (shape, target) in modes.shapes.column_iter().zip(meridional.chunks_exact_mut(blocks)) {
+            let moved = |node: usize| self.meridional_direction(node).dot(&vector3_at(shape.as_slice(), node));
             Eight::spread((0..nodes).map(moved), 0.0, target);
         }
-        self.across = across;
-        self.across_flexibility = [0, 1].map(|along| {
+        self.meridional = meridional;
+        self.meridional_flexibility = [0, 1].map(|along| {
             let mut target = vec![Eight::ZERO; blocks * nodes];
             for (node, target) in target.chunks_exact_mut(blocks).enumerate() {
                 let moved = |other: usize| {
                     let block = modes.residual.fixed_view::<3, 3>(3 * other, 3 * node);
-                    self.normal_to_plane(other).dot(&(block * self.along(along, node)))
+                    self.meridional_direction(other).dot(&(block * self.along(along, node)))
                 };
                 Eight::spread((0..nodes).map(moved), 0.0, target);
             }
@@ -175,8 +176,8 @@ impl BladeRows {
         });
     }
 
-    /// Unit direction normal to the closing and the circumferential displacement of a node.
-    pub fn normal_to_plane(&self, node: usize) -> Vector3 {
+    /// Returns the unit vector along the meridian at a node, normal to the closing and the circumferential direction.
+    pub fn meridional_direction(&self, node: usize) -> Vector3 {
         let slope = self.directions[node][2];
         Vector3::new(slope, 0.0, 1.0) / (1.0 + slope * slope).sqrt()
     }

@@ -2,7 +2,7 @@
 
 use super::columns::{combine, displace_nodes, eliminate, eliminate_any};
 use super::level::{BladeLevel, Place};
-use super::off_centre::{OffCentre, directions_of};
+use super::off_centre::{OffCentreGaps, directions_of};
 use super::rows::BladeRows;
 use super::surface::FacedSurface;
 use super::trial::{BladeTrial, StartContacts};
@@ -17,7 +17,7 @@ const PASSES: usize = 6;
 /// Forces and gaps of the wrong sign within this fraction of the largest count as rounding.
 const ROUNDING: f64 = 1e-13;
 
-/// Adds the displacements under the forces at the start of the step.
+/// Adds the displacements caused by the forces at the start of the step.
 #[inline(always)]
 fn add_pushed<L: Octet, const P: usize>(
     blocks: usize,
@@ -128,7 +128,7 @@ impl Attempt<'_> {
             let angles = L::load(&trial.angles[block]);
             let (sigma, clear, bend) = if faced.is_off_centre {
                 let place = (angles, directions_of(&trial.directions_of_nodes, block));
-                let seen = OffCentre::new(faced.surface, drive, (rows, block), place, [closing, around + held]);
+                let seen = OffCentreGaps::new(faced.surface, drive, (rows, block), place, [closing, around + held]);
                 (seen.sigma, seen.clear, seen.bend)
             } else {
                 let at = angles + L::splat(drive.turned) + (around + held) * per_radius;

@@ -1,8 +1,8 @@
 //! Integration of a blade over a span.
 
+use super::contact_free::SlowModeGaps;
 use super::dense::ModeResponse;
 use super::gaps::include;
-use super::glide::GlideEnd;
 use super::level::PartWeights;
 use super::open_step::{OpenStep, SpanProgress};
 use super::rows::BladeRows;
@@ -21,7 +21,7 @@ use crate::time::galerkin::island::StepControl;
 use crate::time::galerkin::record::{MotionCourse, TurningMotion};
 use crate::time::galerkin::span::{Flight, SHORTEST_LOOK, SpanStep, SpanSteps, StepGoal};
 use crate::time::galerkin::state::SectorState;
-use crate::time::galerkin::tables::Tables;
+use crate::time::galerkin::tables::{HALVINGS, Tables};
 use crate::time::galerkin::trial::{ForceInterpolation, TrialResult};
 use std::mem::{replace, swap, take};
 
@@ -109,7 +109,7 @@ impl BladeModel {
     }
 
     /// Starts a span of all sectors, with gaps (m) of all nodes in rows of `lanes` lanes. `is_known` returns whether the gaps of
-    /// a sector are known; unknown gaps are larger than the smallest known ones.
+    /// a sector are known. Unknown gaps are larger than the smallest known gaps.
     pub(crate) fn begin_span(&mut self, gaps: &[f64], lanes: usize, sectors: usize, is_known: impl Fn(usize) -> bool) {
         let smallest = |row: &[f64]| {
             let known = row[..sectors].iter().enumerate().filter(|(sector, _)| is_known(*sector));
@@ -135,7 +135,7 @@ impl BladeModel {
         modes.all(f64::is_finite)
     }
 
-    /// See [`plausible_energy`](super::quiet::plausible_energy) (J).
+    /// Returns the largest energy (J) of certainly small displacements; see [`plausible_energy`](super::skipped::plausible_energy).
     pub(super) fn plausible_energy(&self, kind: usize) -> f64 {
         self.kinds[kind].plausible_energy
     }
@@ -221,7 +221,7 @@ impl<'a> BladeInSpan<'a> {
     ) -> Self {
         let tables = &model.kinds[place.kind];
         blade.trial.turn_to(&model.angles[place.sector]);
-        blade.trial.glide_ends.iter_mut().for_each(GlideEnd::forget);
+        blade.trial.slow_mode_gaps.iter_mut().for_each(SlowModeGaps::forget);
         if let Some(state) = state {
             blade.trial.read(&tables.rows, state);
         }
@@ -244,7 +244,7 @@ impl<'a> BladeInSpan<'a> {
         }
     }
 
-    /// Lane of the sector.
+    /// Returns the lane of the sector.
     pub fn sector(&self) -> usize {
         self.place.sector
     }
@@ -288,7 +288,7 @@ impl<'a> BladeInSpan<'a> {
         if self.blade.trial.pushes() && sums != Sums::WorkOnly {
             let count = self.tables.level(step.level, kind).points() + 1;
             self.drives[..count].iter_mut().for_each(|drive| drive.rotor = libm::sincos(drive.rotor_angle));
-            self.blade.trial.find_across(&self.tables.rows, self.tables.level(step.level, kind));
+            self.blade.trial.find_meridional(&self.tables.rows, self.tables.level(step.level, kind));
         }
         let faced = &self.place.faced_surface(&self.drives);
         let Blade { trial, tally, .. } = &mut *self.blade;
@@ -296,7 +296,7 @@ impl<'a> BladeInSpan<'a> {
         AddStep { tally, trial, rows, level, faced, motions, part, sums }.add();
     }
 
-    /// Returns whether the reach shows that no node can touch in a step, and bounds the gaps.
+    /// Bounds the gaps in a step by the reach, and returns whether all of them stay above zero.
     fn is_clear(&mut self, step: SpanStep) -> bool {
         if !self.place.course.is_casing_at_rest() {
             return false;
@@ -308,7 +308,7 @@ impl<'a> BladeInSpan<'a> {
         let trial = &mut self.blade.trial;
         let is_clear = trial.find_clearance(&self.tables.rows, &faced, &shaft);
         if is_clear {
-            trial.glide_ends.iter_mut().for_each(GlideEnd::forget);
+            trial.slow_mode_gaps.iter_mut().for_each(SlowModeGaps::forget);
         }
         is_clear
     }
@@ -322,7 +322,7 @@ impl<'a> BladeInSpan<'a> {
         if kind.is_some() {
             trial.begin_next_step(&self.tables.rows, level);
         }
-        let [start, end] = &mut trial.glide_ends;
+        let [start, end] = &mut trial.slow_mode_gaps;
         swap(start, end);
         end.forget();
         if kind.is_some() {
@@ -360,7 +360,7 @@ pub(super) fn drive_at(place: &BladePlace, theta: f64) -> (PointDrive, TurningMo
     (point.with_shaft(shaft, velocity), TurningMotion { shaft: moved, ..motion })
 }
 
-/// Returns the prescribed motion without that of the shaft.
+/// Returns the prescribed motion without the displacement of the shaft.
 pub(super) fn centred_drive_at(place: &BladePlace, theta: f64) -> (PointDrive, TurningMotion) {
     let (drive, motion) = place.course.turning_at(theta);
     let point = PointDrive {
@@ -409,25 +409,25 @@ impl SpanSteps for BladeInSpan<'_> {
         }
         if matches!(self.recorded, RecordScope::Interval(_)) && self.place.course.only_turns() && self.stays_clear() {
             self.open_flight(SpanStep { length: f64::INFINITY, ..step });
-            return Flight::Taken;
+            return Flight::Accepted;
         }
-        // Near a surface, the reach is too large. The cubics of the slow modes hold for a shaft in the middle only.
+        // Near a surface, the bounds by the reach are too coarse. The cubics of the slow modes require a centred shaft.
         let is_off_centre = self.place.course.is_off_centre();
         let is_clear = (step.level == 0 || is_off_centre) && self.is_clear(step);
-        if !is_clear && (is_off_centre || !self.glides(step)) {
-            let is_short = is_off_centre || self.length(step.level) <= SHORTEST_LOOK;
-            return if is_short { Flight::NeedsTrial } else { Flight::TooLong };
+        if !is_clear && (is_off_centre || !self.cubics_stay_open(step)) {
+            let is_shortest = step.level == HALVINGS || self.length(step.level) <= SHORTEST_LOOK;
+            return if is_off_centre || is_shortest { Flight::NeedsTrial } else { Flight::TooLong };
         }
         self.blade.trial.pushes = false;
         if !self.ends_within(step) {
             self.open_flight(step);
-            return Flight::Taken;
+            return Flight::Accepted;
         }
         if self.recorded != RecordScope::WorkOnly && self.needs_gaps() {
             self.follow(step, ForceInterpolation::Polynomial, [0.0, 1.0]);
         }
         self.advance(step, None);
-        Flight::Taken
+        Flight::Accepted
     }
 
     fn attempt(&mut self, step: SpanStep, kind: ForceInterpolation) -> TrialResult {
@@ -467,7 +467,7 @@ impl SpanSteps for BladeInSpan<'_> {
         let is_resolved = result.resolves_motion(kind, self.goal.tolerance);
         let work = replace(&mut tally.work, before);
         if is_open {
-            self.find_least(step, kind, is_resolved);
+            self.find_gap_bounds(step, kind, is_resolved);
             let energy = self.energy_at_start();
             self.open = Some(OpenStep { step, kind: Some(kind), is_resolved, work, energy, banked });
             return banked;

@@ -1,14 +1,14 @@
 //! Displacements, gaps and sliding at the start of a step.
 
 use super::columns::{displace, displace_nodes};
-use super::off_centre::{Directions, OffCentre, directions_of};
+use super::off_centre::{Directions, OffCentreGaps, directions_of};
 use super::rows::BladeRows;
 use super::surface::FacedSurface;
 use super::trial::BladeTrial;
 use crate::math::octet::{Octet, OctetKernel, both};
 use crate::math::vector::length;
 
-/// Factor on the speed of the shaft, because displacements of the nodes change the speed at which they slide.
+/// Safety factor of the shaft speed, because displacements of the nodes change their sliding speed.
 const SAFETY: f64 = 1.25;
 
 /// Finds displacements, F and σ at the start of a step, and the direction of sliding.
@@ -85,7 +85,7 @@ impl OctetKernel for FindStart<'_> {
             around.store(&mut start.moved[1][block]);
             let (clear, sigma) = if faced.is_off_centre {
                 let place = (L::load(&angles[block]), directions_of(directions_of_nodes, block));
-                let seen = OffCentre::new(faced.surface, drive, (rows, block), place, [closing, around]);
+                let seen = OffCentreGaps::new(faced.surface, drive, (rows, block), place, [closing, around]);
                 (seen.clear, seen.sigma)
             } else {
                 let at = L::load(&angles[block]) + L::splat(drive.turned) + around * per_radius;

@@ -17,12 +17,12 @@ use std::iter::once;
 const HEADER_LEN: usize = 28;
 /// Code of a flight without an end.
 const UNBOUNDED_FLIGHT: f64 = 3.0;
-/// Index of the number that is 1 if the gaps at the last communication point are not known, otherwise 0.
+/// Index of the number that is 1 if the gaps at the last communication point are unknown, and otherwise 0.
 const UNSAMPLED: usize = 27;
 
 impl BladeInSpan<'_> {
     /// Stores the rates of the gaps and, if it has changed, the open step in an array with a length of [`stored_len`].
-    /// `sampled` is false if the gaps at the end of the interval are not known.
+    /// `sampled` is false if the gaps at the end of the interval are unknown.
     pub fn store(&mut self, numbers: &mut [f64], sampled: bool) {
         let (head, arrays) = numbers.split_at_mut(HEADER_LEN);
         head[UNSAMPLED] = f64::from(u8::from(!sampled));
@@ -140,7 +140,7 @@ impl BladeInSpan<'_> {
 pub(crate) struct StoredStep<'a>(&'a [f64]);
 
 impl<'a> StoredStep<'a> {
-    /// Reads an array; `None` if it contains no step.
+    /// Reads an array. Returns `None` if it contains no step.
     pub fn new(numbers: &'a [f64]) -> Option<Self> {
         (numbers[0] != 0.0).then_some(Self(numbers))
     }
@@ -155,7 +155,7 @@ impl<'a> StoredStep<'a> {
         self.0[8] != 0.0 || self.0[4] == UNBOUNDED_FLIGHT
     }
 
-    /// Kinetic and strain energy at the start of the step (J).
+    /// Returns the energy at the start of the step (J).
     pub(super) fn energy(self) -> f64 {
         self.0[10]
     }
@@ -170,7 +170,7 @@ impl<'a> StoredStep<'a> {
         contains.then(|| (time - step.from * interval.span).max(0.0))
     }
 
-    /// Lower bounds of the gaps (m), q and q̇ at the start of the step, in blocks of nodes and of modes.
+    /// Returns lower bounds of the gaps (m) in blocks of nodes, and q and q̇ at the start of the step in blocks of modes.
     pub(super) fn arrays(self, nodes: usize, modes: usize) -> [&'a [[f64; 8]]; 3] {
         let blocks = &self.0[HEADER_LEN..].as_chunks().0[nodes..];
         let (least, blocks) = blocks.split_at(nodes);
@@ -179,7 +179,7 @@ impl<'a> StoredStep<'a> {
     }
 }
 
-/// Notes in an array that the gaps of the sector at the last communication point are not known.
+/// Marks the gaps at the last communication point as unknown in an array.
 pub(crate) fn mark_unsampled(numbers: &mut [f64]) {
     numbers[UNSAMPLED] = 1.0;
 }

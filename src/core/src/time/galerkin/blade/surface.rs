@@ -36,13 +36,13 @@ pub(super) struct DriveRate {
 }
 
 impl PointDrive {
-    /// Displacement of the shaft centre along fixed x, y and z (m).
+    /// Returns the displacement of the shaft centre along fixed x, y and z (m).
     #[inline(always)]
     pub fn shaft_in_space(&self) -> Vector3 {
         in_rotor((-self.rotor.0, self.rotor.1), self.shaft)
     }
 
-    /// Adds the displacement (m) and the velocity (m/s) of the shaft centre along fixed directions.
+    /// Adds the displacement (m) and the velocity (m/s) of the shaft centre, given along fixed axes.
     pub fn with_shaft(self, shaft: Vector3, velocity: Vector3) -> Self {
         let rotor = libm::sincos(self.rotor_angle);
         Self { rotor, shaft: in_rotor(rotor, shaft), shaft_velocity: in_rotor(rotor, velocity), ..self }
@@ -68,7 +68,7 @@ pub(crate) struct FacedSurface<'a> {
     pub drives: [PointDrive; POINTS],
     /// Friction coefficient.
     pub friction: f64,
-    /// True if the shaft centre may be away from the middle.
+    /// True if the shaft may be off-centre.
     pub is_off_centre: bool,
 }
 

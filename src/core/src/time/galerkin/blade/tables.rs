@@ -1,8 +1,8 @@
 //! Tables of one kind of sector for steps of all lengths, filled when a length is first used.
 
 use super::level::BladeLevel;
-use super::quiet::plausible_energy;
 use super::rows::BladeRows;
+use super::skipped::plausible_energy;
 use crate::geometry::revolution::RevolutionGap;
 use crate::modes::coordinates::ContactModes;
 use crate::time::galerkin::level::StepTables;
@@ -14,7 +14,7 @@ use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 #[derive(Debug)]
 pub(super) struct BladeTables {
     pub rows: BladeRows,
-    /// See [`plausible_energy`] (J).
+    /// Largest energy (J) of certainly small displacements; see [`plausible_energy`].
     pub plausible_energy: f64,
     modes: ContactModes,
     grids: [Grid; 2],

@@ -2,7 +2,7 @@
 
 use super::columns::values_at_points;
 use super::level::{BladeLevel, PartWeights};
-use super::off_centre::{Directions, OffCentre, directions_of, in_rotor};
+use super::off_centre::{Directions, OffCentreGaps, directions_of, in_rotor};
 use super::rows::BladeRows;
 use super::surface::FacedSurface;
 use super::trial::BladeTrial;
@@ -40,7 +40,7 @@ pub(crate) struct BladeTally {
     pub damping: f64,
     /// True if a contact exceeds the limits of small displacements.
     pub implausible: bool,
-    /// True if a contact force acts in the span.
+    /// True if a contact force acts during the span.
     pub touched: bool,
 }
 
@@ -204,11 +204,11 @@ impl AddStep<'_> {
             let drive = &faced.drives[i];
             let off_centre = faced.is_off_centre.then(|| {
                 let place = (L::load(&trial.angles[block]), angles);
-                OffCentre::new(faced.surface, drive, (rows, block), place, [moved[0][i], moved[1][i]])
+                OffCentreGaps::new(faced.surface, drive, (rows, block), place, [moved[0][i], moved[1][i]])
             });
-            let across = L::load(&trial.across[i * rows.blocks + block]) * L::load(&rows.per_steepness[block]);
-            let radial_move = slope * across - moved[0][i] / (steepness * steepness);
-            let axial_move = slope * moved[0][i] / (steepness * steepness) + across;
+            let meridional = L::load(&trial.meridional[i * rows.blocks + block]) * L::load(&rows.per_steepness[block]);
+            let radial_move = slope * meridional - moved[0][i] / (steepness * steepness);
+            let axial_move = slope * moved[0][i] / (steepness * steepness) + meridional;
             if let Some(off_centre) = &off_centre {
                 let shaft = in_rotor(drive.rotor, motion.shaft);
                 let axial = slope * L::splat(shaft[2]);

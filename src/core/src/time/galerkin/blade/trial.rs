@@ -1,10 +1,10 @@
 //! Scratch memory and results of trials of a blade.
 
 use super::accept::{Advance, BeginNextStep, FindModalForces};
-use super::across::FindAcross;
+use super::contact_free::SlowModeGaps;
 use super::follow::{PathPoint, STORED_TIMES};
-use super::glide::GlideEnd;
 use super::level::BladeLevel;
+use super::meridional::FindMeridional;
 use super::minima::SelectFollowed;
 use super::reach::{Energy, FindClearance, FindReach};
 use super::rows::BladeRows;
@@ -114,8 +114,8 @@ pub(crate) struct BladeTrial {
     pub(super) active: Vec<u8>,
     pub(super) prepared: Vec<u8>,
     pub(super) later: Vec<u8>,
-    /// Displacements normal to `moved`, at the start of the step and at the points (m); zero unless the shaft can move.
-    pub(super) across: Vec<Eight>,
+    /// Meridional displacements at the start of the step and at the points (m); zero unless the shaft can move.
+    pub(super) meridional: Vec<Eight>,
     /// F, λ' and forces.
     pub(super) gaps: Vec<Eight>,
     pub(super) multipliers: Vec<Eight>,
@@ -142,16 +142,16 @@ pub(crate) struct BladeTrial {
     pub(super) unresolved: Option<f64>,
     /// Largest closing and circumferential displacements at any time without contact (m).
     pub(super) reach: [Vec<Eight>; 2],
-    /// Amplitudes of the modes without contact.
+    /// Amplitudes of the modes while no contact acts.
     pub(super) free_amplitudes: Vec<Eight>,
-    /// For the steps of each level, bounds on the distance of the closing displacements without contact from the cubics
-    /// of the slow modes (m), and mask of the levels whose bounds are known.
+    /// Bounds on the distance of the closing displacements without contact from the cubics of the slow modes (m) per level of
+    /// steps, and mask of the levels whose bounds are known.
     pub(super) cubic_errors: Vec<Vec<Eight>>,
     pub(super) cubic_errors_known: u16,
     /// Lower bounds of the gaps over the last step without a trial, or over an open step (m).
     pub(super) gap_bounds: Vec<Eight>,
-    /// Gaps at the start and the end of the last step without a trial.
-    pub(super) glide_ends: [GlideEnd; 2],
+    /// Gaps at the start and at the end of the last step without a trial.
+    pub(super) slow_mode_gaps: [SlowModeGaps; 2],
     pub(super) instructions: InstructionSet,
 }
 
@@ -188,7 +188,7 @@ impl BladeTrial {
             active: vec![0; lanes],
             prepared: vec![0; lanes],
             later: vec![0; lanes],
-            across: vec![Eight::ZERO; nodes + lanes],
+            meridional: vec![Eight::ZERO; nodes + lanes],
             gaps: of_lanes(),
             multipliers: of_lanes(),
             forces: [of_lanes(), of_lanes()],
@@ -207,7 +207,7 @@ impl BladeTrial {
             cubic_errors: vec![of_nodes(); HALVINGS + 1],
             cubic_errors_known: 0,
             gap_bounds: of_nodes(),
-            glide_ends: [GlideEnd::new(nodes), GlideEnd::new(nodes)],
+            slow_mode_gaps: [SlowModeGaps::new(nodes), SlowModeGaps::new(nodes)],
             instructions: InstructionSet::detect(),
         }
     }
@@ -299,10 +299,10 @@ impl BladeTrial {
         }
     }
 
-    /// Finds the displacements normal to the closing and the circumferential displacement, if the shaft can move.
-    pub(super) fn find_across(&mut self, rows: &BladeRows, level: &BladeLevel) {
-        if !rows.across.is_empty() {
-            self.instructions.run_octets(FindAcross { trial: self, rows, level });
+    /// Finds the meridional displacements if the shaft can move.
+    pub(super) fn find_meridional(&mut self, rows: &BladeRows, level: &BladeLevel) {
+        if !rows.meridional.is_empty() {
+            self.instructions.run_octets(FindMeridional { trial: self, rows, level });
         }
     }
 
@@ -340,7 +340,7 @@ impl BladeTrial {
     }
 
     /// Bounds the gaps while the rotor turns past the resting surface, from the angle of the first drive to that of the
-    /// second, and the shaft moves within `shaft`. Returns whether no node can touch.
+    /// second, and the shaft moves within the bounds `shaft`. Returns whether all gaps stay above zero.
     pub(crate) fn find_clearance(&mut self, rows: &BladeRows, faced: &FacedSurface, shaft: &ShaftBounds) -> bool {
         self.instructions.run_octets(FindClearance { trial: self, rows, faced, shaft })
     }

@@ -12,12 +12,13 @@ const PASSES_OF_ONE: usize = 6;
 /// Largest number of gap evaluations in one trial of several sectors whose motions are coupled.
 const PASSES: usize = 16;
 
-/// Largest number of exchanges of forces between sectors on elastic surfaces after a contact solution, and fraction of the largest gap of a
-/// closed contact to which their gaps agree then. The normals at the next evaluation differ by about as much.
-const EXCHANGES: usize = 12;
-const EXCHANGED: f64 = 1e-5;
+/// Largest number of exchanges of forces between sectors on elastic surfaces per contact solution, and precision of the gaps after these
+/// exchanges, relative to the largest gap of a closed contact. The change of the normals until the next evaluation causes similar errors.
+const MAX_EXCHANGES: usize = 12;
+const EXCHANGE_PRECISION: f64 = 1e-5;
 
-/// Sectors whose gaps at the start of a step exceed this many tolerances are evaluated only after the contact problems of the others.
+/// Sectors whose gaps at the start of a step exceed this many tolerances are evaluated only after the contact problems of the other sectors are
+/// solved.
 const FAR: f64 = 20.0;
 
 /// Assumed largest motion of bodies between the points of a step, divided by their largest motion at the points.
@@ -223,10 +224,10 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         self.island.failed = failed.map(|index| (*index, is_lost));
     }
 
-    /// Finds forces that remove penetration, sector by sector. Each sector sees the motion of elastic surfaces by the new forces of the
-    /// others, until their gaps agree to `precision` (m). Returns false if a contact problem has no solution.
+    /// Finds forces that remove penetration, sector by sector. Sectors on elastic surfaces then exchange their new forces until their gaps
+    /// agree to `precision` (m). Returns false if a contact problem has no solution.
     fn solve(&mut self, step: SpanStep, kind: ForceInterpolation, precision: f64, result: &mut TrialResult) -> bool {
-        self.island.carriers.iter_mut().for_each(CarrierIntegrator::clear_changes);
+        self.island.carriers.iter_mut().for_each(CarrierIntegrator::clear_force_changes);
         let mut blocks = BLOCKS.min(self.island.sectors.iter().filter(|one| one.block.is_some()).count());
         let mut solved = 0;
         for place in self.places() {
@@ -256,7 +257,7 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         !is_coupled || self.exchange_forces(step, kind, precision, result)
     }
 
-    /// Solves the contact problems of the sectors again with the new forces of the others.
+    /// Solves the contact problems again with the new forces of the other sectors. Returns false if one of them has no solution.
     fn exchange_forces(
         &mut self,
         step: SpanStep,
@@ -264,7 +265,7 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         precision: f64,
         result: &mut TrialResult,
     ) -> bool {
-        for _ in 0..EXCHANGES {
+        for _ in 0..MAX_EXCHANGES {
             let mut changed = false;
             for place in self.places() {
                 let index = self.index(place);
@@ -289,7 +290,7 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         true
     }
 
-    /// Tries a step, with more active sectors if bodies move so far that further sectors may touch.
+    /// Tries a step. Activates further sectors if bodies move so far that these sectors may touch.
     pub(super) fn attempt_step(&mut self, step: SpanStep, kind: ForceInterpolation) -> TrialResult {
         if let Some(result) = self.attempt_steady(step, kind) {
             return result;
@@ -297,7 +298,7 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         self.attempt_active(step, kind)
     }
 
-    /// Activates the sectors that may touch because bodies moved further than their allowance. Returns whether one of them touches.
+    /// Activates the sectors that may touch because bodies move further than their allowance. Returns whether one of them touches.
     fn activate_sectors(&mut self, step: SpanStep, kind: ForceInterpolation, points: usize) -> bool {
         if self.island.active.len() == self.island.sectors.len() {
             return false;
@@ -369,8 +370,8 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
                 self.blame(|one| one.trial.extremes().0 <= lowest || one.trial.extremes().1 >= largest, false);
                 return result;
             }
-            let exchanged = EXCHANGED * largest.max(-lowest);
-            if !self.solve(step, kind, exchanged.max(EXCHANGED * precision), &mut result) {
+            let exchanged = EXCHANGE_PRECISION * largest.max(-lowest);
+            if !self.solve(step, kind, exchanged.max(EXCHANGE_PRECISION * precision), &mut result) {
                 return result;
             }
         }

@@ -14,7 +14,7 @@ use crate::system::structure::UNKNOWN_GAP;
 use crate::system::{ContactPair, Effort, StepFailure, Structure, System};
 use crate::time::SteadyInterval;
 use crate::time::galerkin::blade::{
-    Blade, BladeInSpan, BladeModel, BladePlace, BladeTally, QuietSector, StoredStep, mark_unsampled,
+    Blade, BladeInSpan, BladeModel, BladePlace, BladeTally, SkippedSector, StoredStep, mark_unsampled,
 };
 use crate::time::galerkin::island::StepControl;
 use crate::time::galerkin::record::MotionCourse;
@@ -65,7 +65,7 @@ pub(super) struct SectorResult {
     /// Rates of the gaps at the end of an interval of a steady phase (m/s), and energy at the start of the open step (J).
     pub gap_rates: Vec<f64>,
     pub energy: f64,
-    /// What is known at the end of the span.
+    /// Results that are known at the end of the span.
     pub sampled: Sampled,
     /// Kinetic and strain energy at the end of an interval of a steady phase (J).
     pub energies: [f64; 2],
@@ -75,13 +75,13 @@ pub(super) struct SectorResult {
     pub outcome: Result<(), Stopped>,
 }
 
-/// What is known of a sector at the end of a span. At the end of an interval of a steady phase, only what outputs or the
-/// next interval need is evaluated.
+/// Results of a sector that are known at the end of a span. At the end of an interval of a steady phase, only the results
+/// that outputs or the next interval need are evaluated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Sampled {
-    /// Nothing but the energies.
+    /// Only the energies.
     Energies,
-    /// The gaps.
+    /// The gaps and the energies.
     Gaps,
     /// Gaps, modes, displacements and contact forces.
     State,
@@ -325,7 +325,7 @@ impl SectorsInSpan<'_> {
         blade.choose_minima(model, &structure.needed_minima, sector, &state.gaps);
         if let (SectorSpan::Interval(interval), Some(step)) = (self.span, stored)
             && !structure.needs_state(sector)
-            && let Some(QuietSector { energies, at_start }) = blade.quiet_energies(model, kind, step, interval)
+            && let Some(SkippedSector { energies, at_start }) = blade.energies_if_skippable(model, kind, step, interval)
         {
             (result.sampled, result.energies, result.energy) = (Sampled::Energies, energies, at_start);
             mark_unsampled(open_step);
@@ -369,7 +369,7 @@ impl SectorsInSpan<'_> {
         let (structure, sector) = (self.structure, steps.sector());
         let was_sampled = StoredStep::new(open_step).is_none_or(StoredStep::is_sampled);
         let course = |spans: u64| steady_course(self.prescribed, real_count(spans) * interval.span, interval.span);
-        if steps.recall(open_step) && !was_sampled && !steps.is_quiet() {
+        if steps.recall(open_step) && !was_sampled && !steps.gaps_are_unneeded() {
             steps.sample_start(interval, course);
         }
         result.outcome = steps.integrate_steady_interval(interval, course, &mut result.effort);
@@ -378,7 +378,7 @@ impl SectorsInSpan<'_> {
         if result.outcome.is_err() {
             return;
         }
-        let needs_gaps = structure.needed_minima.depends_on(sector) || !steps.is_quiet();
+        let needs_gaps = structure.needed_minima.depends_on(sector) || !steps.gaps_are_unneeded();
         let needs_state = structure.needs_state(sector);
         if needs_gaps || needs_state {
             steps.write_sample(interval, course, needs_state, &mut result.state);

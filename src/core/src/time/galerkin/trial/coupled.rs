@@ -23,7 +23,7 @@ impl Trial {
         }
     }
 
-    /// Smallest gap at the start (m).
+    /// Returns the smallest gap at the start (m).
     pub(crate) fn lowest_at_start(&self) -> f64 {
         self.start_contacts.gaps.iter().copied().fold(f64::INFINITY, f64::min)
     }
@@ -54,7 +54,7 @@ impl Trial {
         }
     }
 
-    /// Begins the exchange of forces with other sectors on the obstacle, at the gaps that were last evaluated.
+    /// Begins the exchange of forces with other sectors on the obstacle, starting from the last evaluated gaps.
     pub(super) fn begin_exchange(&mut self) {
         let count = self.lanes.len();
         self.evaluated[..count].copy_from_slice(&self.multipliers[..count]);
@@ -62,19 +62,19 @@ impl Trial {
         self.shifts.fill(0.0);
     }
 
-    /// Includes the motion of the obstacle by changes of the forces of other sectors in the gaps without forces. Returns the largest change
-    /// of a gap (m).
+    /// Adds the motion of the obstacle under the changed forces of other sectors to the gaps without forces. Returns the largest change of
+    /// a gap (m).
     pub(super) fn find_shifts(&mut self, obstacle: &impl Obstacle) -> f64 {
         let (width, mut largest) = (self.lanes.width(), 0.0_f64);
         if !self.carrier_yields || !obstacle.is_coupled() {
             return largest;
         }
         for lane in (0..self.lanes.len()).filter(|lane| self.carrier_known[*lane]) {
-            // Own forces are part of the problem.
+            // The contact problem already includes the forces of this sector.
             let own = self.members.iter().map(|member| {
                 self.carrier_columns[member * width + lane] * (self.applied[*member] - self.evaluated[*member])
             });
-            let shift = obstacle.shift(lane) - own.sum::<f64>();
+            let shift = obstacle.gap_change(lane) - own.sum::<f64>();
             let change = shift - std::mem::replace(&mut self.shifts[lane], shift);
             self.without[lane] += change;
             largest = largest.max(change.abs());
@@ -82,8 +82,8 @@ impl Trial {
         largest
     }
 
-    /// Gives the changes of the forces since the last solution to the obstacle.
-    pub(super) fn give_changes(&mut self, obstacle: &mut impl Obstacle) {
+    /// Applies the changes of the forces since the last solution to the obstacle.
+    pub(super) fn apply_force_changes(&mut self, obstacle: &mut impl Obstacle) {
         if !self.carrier_yields || !obstacle.is_coupled() {
             return;
         }
@@ -91,14 +91,14 @@ impl Trial {
             let now = self.multipliers[lane];
             let change = now - std::mem::replace(&mut self.applied[lane], now);
             if change != 0.0 {
-                obstacle.change(lane, change);
+                obstacle.add_force_change(lane, change);
             }
         }
-        obstacle.spread_changes();
+        obstacle.apply_force_changes();
     }
 
     /// Solves the contact problem again if forces of other sectors have changed a gap by more than `precision` (m). Returns whether there is
-    /// a solution, and whether the forces have changed.
+    /// a solution, and whether the problem was solved again.
     pub(crate) fn solve_again(
         &mut self,
         compliance: &LaneCompliance,

@@ -63,19 +63,19 @@ pub trait Obstacle {
     /// force per λ is `direction`. Valid only after [`Obstacle::prepare_compliance`] has returned true.
     fn add_normal_compliance(&mut self, _lane: usize, _direction: Vector3, _given: &mut [f64]) {}
 
-    /// Returns whether the lanes of the sector are known to the obstacle while other sectors are solved.
+    /// Returns whether the sector exchanges forces with other sectors on the obstacle.
     fn is_coupled(&self) -> bool {
         false
     }
 
-    /// Adds a change of λ (N) of a lane since the gaps were evaluated. The compliance at this lane must have been prepared.
-    fn change(&mut self, _lane: usize, _change: f64) {}
+    /// Adds a change of λ (N) of a lane since the last evaluation of the gaps. The compliance at this lane must have been prepared.
+    fn add_force_change(&mut self, _lane: usize, _change: f64) {}
 
-    /// Finds the motion of the obstacle by all changes of forces, of all sectors.
-    fn spread_changes(&mut self) {}
+    /// Finds the motion of the obstacle caused by all changes of the forces of all sectors.
+    fn apply_force_changes(&mut self) {}
 
-    /// Change of the gap of a lane by this motion (m).
-    fn shift(&self, _lane: usize) -> f64 {
+    /// Returns the change of the gap of a lane caused by this motion (m).
+    fn gap_change(&self, _lane: usize) -> f64 {
         0.0
     }
 

@@ -1,7 +1,7 @@
-//! Steps without contact, from cubics through the motion of the slow modes.
+//! Steps without a trial, for which cubics through the motion of the slow modes show that no contact is possible.
 //!
-//! Without contact, the amplitude of each mode is constant, apart from the damping. It bounds the distance of a slow mode
-//! from the cubic through its values and rates at both ends of a step. A fast mode is bounded by its amplitude alone.
+//! Without contact, the amplitude of each mode is constant, apart from damping. For a slow mode, it bounds the distance
+//! from the cubic through the values and rates at both ends of a step. For a fast mode, it bounds the displacement.
 
 use super::columns::{displace, displace_nodes};
 use super::follow::cubic_minimum;
@@ -17,9 +17,9 @@ use crate::time::galerkin::span::SpanStep;
 use crate::time::galerkin::trial::ForceInterpolation;
 
 impl BladeInSpan<'_> {
-    /// Returns whether no node can touch in a step that starts without contact, and bounds the gaps. The reach must be
-    /// known.
-    pub(super) fn glides(&mut self, step: SpanStep) -> bool {
+    /// Bounds the gaps in a step that starts without contact, and returns whether all of them stay above zero. The reach
+    /// must be known.
+    pub(super) fn cubics_stay_open(&mut self, step: SpanStep) -> bool {
         let (tables, place) = (self.tables, &self.place);
         let ends = [step.from, step.from + step.length];
         let level = tables.level(step.level, ForceInterpolation::Polynomial);
@@ -27,9 +27,9 @@ impl BladeInSpan<'_> {
         let trial = &mut self.blade.trial;
         if step.from == 0.0 {
             // The prescribed motion at the end of the previous span differs by rounding.
-            trial.glide_ends[0].forget();
+            trial.slow_mode_gaps[0].forget();
         }
-        trial.instructions.run_octets(Glide {
+        trial.instructions.run_octets(BoundContactFreeStep {
             rows: &tables.rows,
             level,
             halvings: step.level,
@@ -40,8 +40,8 @@ impl BladeInSpan<'_> {
         })
     }
 
-    /// Returns whether the smallest gap of a node in the current step without a trial may be needed. Such nodes are
-    /// followed.
+    /// Selects the nodes to follow: those whose smallest gap in the current step without a trial may be needed. Returns
+    /// whether there are any.
     pub(super) fn needs_gaps(&mut self) -> bool {
         let Blade { trial, floors, tally, .. } = &mut *self.blade;
         let mut any = 0;
@@ -57,9 +57,9 @@ impl BladeInSpan<'_> {
     }
 }
 
-/// Gaps F of a blade without contact at an end of a step, from the slow modes of the step.
+/// F of a blade without contact at one end of a step, caused by the slow modes of the step.
 #[derive(Debug, Clone)]
-pub(super) struct GlideEnd {
+pub(super) struct SlowModeGaps {
     /// Number of halvings of the span to which the slow modes belong; `None` if the gaps are unknown.
     halvings: Option<usize>,
     /// F (m), its rate (m/s), and the magnitude of the slope of the surface (m/rad).
@@ -68,7 +68,7 @@ pub(super) struct GlideEnd {
     slopes: Vec<Eight>,
 }
 
-impl GlideEnd {
+impl SlowModeGaps {
     /// Allocates for a number of blocks of nodes.
     pub fn new(nodes: usize) -> Self {
         let [gaps, rates, slopes] = [0, 1, 2].map(|_| vec![Eight::ZERO; nodes]);
@@ -81,8 +81,8 @@ impl GlideEnd {
     }
 }
 
-/// Bounds the gaps of all nodes over a step without contact. Returns whether they stay above zero.
-struct Glide<'a> {
+/// Bounds the gaps of all nodes over a step without contact. Returns whether all of them stay above zero.
+struct BoundContactFreeStep<'a> {
     trial: &'a mut BladeTrial,
     rows: &'a BladeRows,
     level: &'a BladeLevel,
@@ -95,12 +95,12 @@ struct Glide<'a> {
     shape_error: f64,
 }
 
-impl OctetKernel for Glide<'_> {
+impl OctetKernel for BoundContactFreeStep<'_> {
     type Output = bool;
     #[inline(always)]
     fn run<L: Octet>(mut self) -> bool {
         self.find_errors::<L>();
-        if self.trial.glide_ends[0].halvings != Some(self.halvings) {
+        if self.trial.slow_mode_gaps[0].halvings != Some(self.halvings) {
             self.find_gaps::<L>(0);
         }
         let [(first, _), (last, _)] = self.drives;
@@ -111,7 +111,7 @@ impl OctetKernel for Glide<'_> {
         for block in 0..rows.blocks {
             let error = L::load(&self.trial.cubic_errors[self.halvings][block]);
             let valid = rows.valid(block);
-            if error.less(L::load(&self.trial.glide_ends[0].gaps[block])) & valid != valid {
+            if error.less(L::load(&self.trial.slow_mode_gaps[0].gaps[block])) & valid != valid {
                 return false;
             }
         }
@@ -120,7 +120,7 @@ impl OctetKernel for Glide<'_> {
         for block in 0..rows.blocks {
             let per_radius = L::load(&rows.per_radius[block]);
             let around = L::load(&trial.reach[1][block]) * per_radius;
-            let ends = &trial.glide_ends;
+            let ends = &trial.slow_mode_gaps;
             let [gaps, rates] =
                 [both(|end| L::load(&ends[end].gaps[block])), both(|end| L::load(&ends[end].rates[block]))];
             let slopes = both(|end| L::load(&ends[end].slopes[block]));
@@ -146,9 +146,9 @@ impl OctetKernel for Glide<'_> {
     }
 }
 
-impl Glide<'_> {
-    /// Bounds the distance of the closing displacements from their cubics, unless it is known from an earlier step of the
-    /// same length.
+impl BoundContactFreeStep<'_> {
+    /// Bounds the distance of the closing displacements from their cubics, unless the bound is known from an earlier step of
+    /// the same length.
     #[inline(always)]
     fn find_errors<L: Octet>(&mut self) {
         let Self { trial, rows, level, halvings, .. } = self;
@@ -164,11 +164,11 @@ impl Glide<'_> {
         displace::<L, 1, 1>([&rows.magnitudes[0]], rows.blocks, [mode_bounds], [&mut cubic_errors[*halvings]]);
     }
 
-    /// Finds F and its rates that the slow modes cause at one end of the step.
+    /// Finds F and its rate, as caused by the slow modes, at one end of the step.
     #[inline(always)]
     fn find_gaps<L: Octet>(&mut self, end: usize) {
         let Self { trial, rows, level, halvings, surface, drives, .. } = self;
-        let BladeTrial { start, path, path_moved: [moved, _], glide_ends, angles, .. } = &mut **trial;
+        let BladeTrial { start, path, path_moved: [moved, _], slow_mode_gaps, angles, .. } = &mut **trial;
         let modes = &mut path[0].modes;
         for k in 0..level.slow_blocks {
             let [q, v] = both(|of| L::select(level.slow[k], L::load(&start.modes[of][k]), L::zero()));
@@ -181,7 +181,7 @@ impl Glide<'_> {
             }
         }
         displace_nodes::<L, 1, 2>(rows, [0], level.slow_blocks, [&modes[0], &modes[1]], [&mut moved[..]]);
-        let ((drive, rate), target) = (&drives[end], &mut glide_ends[end]);
+        let ((drive, rate), target) = (&drives[end], &mut slow_mode_gaps[end]);
         for block in 0..rows.blocks {
             let angle = L::load(&angles[block]) + L::splat(drive.turned);
             let [shape, slope, _] = surface.evaluate_octet::<L>(angle);

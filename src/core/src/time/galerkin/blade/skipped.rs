@@ -1,7 +1,7 @@
-//! Sectors whose gaps no output needs.
+//! Sectors whose gaps no output needs, so that their states are not evaluated.
 //!
 //! The gaps in an open step without forces have lower bounds. While these bounds are above the smallest gaps of other
-//! sectors, no output needs the gaps of the sector, and its state is evaluated only for its energy.
+//! sectors, no output needs the gaps of the sector, and only its energies are computed.
 
 use super::columns::displace;
 use super::dense::ModeResponse;
@@ -20,12 +20,13 @@ use crate::time::SteadyInterval;
 use crate::time::galerkin::span::SpanStep;
 use crate::time::galerkin::trial::ForceInterpolation;
 
-/// Lower bounds of the gaps in a step in which contact is possible (m). Saved states contain finite numbers only.
+/// Lower bounds of the gaps in a step in which contact is possible (m). They are finite because saved states contain finite
+/// numbers only.
 pub(super) const NO_BOUND: Eight = Eight([-UNKNOWN_GAP; 8]);
 
 impl Blade {
-    /// Returns whether no gap in a step with these lower bounds (m) can be a smallest gap that an output needs.
-    pub(super) fn is_above<'a>(&self, least: impl Iterator<Item = &'a [f64; 8]>) -> bool {
+    /// Returns whether these lower bounds of the gaps in a step (m) exceed all smallest gaps that outputs need.
+    pub(super) fn exceeds_needed_minima<'a>(&self, least: impl Iterator<Item = &'a [f64; 8]>) -> bool {
         let needed = self.floors.iter().zip(&self.tally.lowest);
         let above = |(least, (floors, lowest)): (&[f64; 8], (&Eight, &Eight))| {
             least.iter().zip(floors.0).zip(lowest.0).all(|((least, floor), lowest)| *least >= floor.min(lowest))
@@ -33,19 +34,20 @@ impl Blade {
         least.zip(needed).all(above)
     }
 
-    /// Finds the kinetic and strain energy (J) of a sector at the end of an interval if the sector is quiet: no forces act in
-    /// its stored step, which contains the interval, and no output needs a gap of it. The needed smallest gaps must be chosen.
-    pub fn quiet_energies(
+    /// Finds the energies of a sector at the end of an interval if its state is not needed: the stored step contains the
+    /// interval, no forces act in it, no output needs its gaps, and its displacements are certainly small. Otherwise returns
+    /// `None`. The smallest gaps that outputs need must have been chosen.
+    pub fn energies_if_skippable(
         &mut self,
         model: &BladeModel,
         kind: usize,
         step: StoredStep,
         interval: SteadyInterval,
-    ) -> Option<QuietSector> {
+    ) -> Option<SkippedSector> {
         let rows = model.rows(kind);
         let time = step.time_until(interval).filter(|_| !step.is_special())?;
         let [least, q, v] = step.arrays(rows.blocks, rows.mode_blocks);
-        if !self.is_above(least.iter()) {
+        if !self.exceeds_needed_minima(least.iter()) {
             return None;
         }
         let start = &mut self.trial.start.modes;
@@ -54,10 +56,10 @@ impl Blade {
         }
         let energies = self.find_energies(rows, kind, time);
         (energies.iter().sum::<f64>() <= model.plausible_energy(kind))
-            .then_some(QuietSector { energies, at_start: step.energy() })
+            .then_some(SkippedSector { energies, at_start: step.energy() })
     }
 
-    /// Kinetic and strain energy (J) at a time (s) in the open step, in which no forces act.
+    /// Returns the kinetic and strain energy (J) at a time (s) after the start of the open step, in which no forces act.
     pub(super) fn find_energies(&mut self, rows: &BladeRows, kind: usize, time: f64) -> [f64; 2] {
         let place = self.find_response(rows, kind, time);
         let (trial, response) = (&self.trial, &self.responses[place]);
@@ -66,20 +68,20 @@ impl Blade {
 }
 
 impl BladeInSpan<'_> {
-    /// Finds lower bounds of the gaps in the tried step, which is accepted and stays open.
-    pub(super) fn find_least(&mut self, step: SpanStep, kind: ForceInterpolation, is_resolved: bool) {
+    /// Finds lower bounds of the gaps in the tried step, which has been accepted and stays open.
+    pub(super) fn find_gap_bounds(&mut self, step: SpanStep, kind: ForceInterpolation, is_resolved: bool) {
         let (rows, level, trial) = (&self.tables.rows, self.tables.level(step.level, kind), &mut self.blade.trial);
         if trial.pushes || !is_resolved || trial.unresolved.is_none() {
             trial.gap_bounds.fill(NO_BOUND);
             return;
         }
         let instructions = trial.instructions;
-        instructions.run_octets(FindLeast { trial, rows, level });
+        instructions.run_octets(FindGapBounds { trial, rows, level });
     }
 
-    /// Returns whether no gap in the open step can be a smallest gap that an output needs.
-    pub fn is_quiet(&self) -> bool {
-        !self.pushes() && self.blade.is_above(self.blade.trial.gap_bounds.iter().map(|block| &block.0))
+    /// Returns whether no output needs the smallest gaps of the open step.
+    pub fn gaps_are_unneeded(&self) -> bool {
+        !self.pushes() && self.blade.exceeds_needed_minima(self.blade.trial.gap_bounds.iter().map(|block| &block.0))
     }
 
     /// Returns whether displacements with these kinetic and strain energies (J) are certainly small.
@@ -87,8 +89,8 @@ impl BladeInSpan<'_> {
         energies.iter().sum::<f64>() <= self.tables.plausible_energy
     }
 
-    /// Kinetic and strain energy at the end of an interval of the steady phase (J). If forces act in the open step, it must have
-    /// been sampled there.
+    /// Returns the kinetic and strain energy (J) at the end of an interval of the steady phase. If forces act in the open step, it
+    /// must have been sampled at this time.
     pub fn energies_at_end(&mut self, interval: SteadyInterval) -> [f64; 2] {
         let (rows, time) = (&self.tables.rows, self.time_in_step(interval.to, interval.span));
         if self.pushes() {
@@ -99,21 +101,21 @@ impl BladeInSpan<'_> {
     }
 }
 
-/// A sector whose gaps no output needs.
+/// Energies of a sector whose state is skipped.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct QuietSector {
+pub(crate) struct SkippedSector {
     /// Kinetic and strain energy at the end of the interval (J).
     pub energies: [f64; 2],
     /// Energy at the start of the open step (J).
     pub at_start: f64,
 }
 
-/// Returns the largest kinetic and strain energy (J) that certainly belongs to small displacements: less than the
-/// [limit](Layout::largest_displacement) in every direction, and too small a displacement around the axis for a warning.
+/// Returns the largest sum of kinetic and strain energy (J) for which displacements are certainly small: below the
+/// [limit](Layout::largest_displacement) in every direction, and too small around the axis to cause a warning.
 pub(super) fn plausible_energy(modes: &ContactModes, layout: &Layout) -> f64 {
     let gap = layout.clearances.iter().fold(f64::INFINITY, |low: f64, clearance| low.min(*clearance));
     let most = |row: usize| {
-        // A displacement u of this row takes at least the energy ½u²/g.
+        // A displacement u of a row with flexibility g needs at least the energy ½u²/g.
         let shapes = modes.shapes.row(row);
         let of_modes: f64 = shapes.iter().zip(&modes.frequencies).map(|(shape, w)| (shape / w) * (shape / w)).sum();
         let flexibility = of_modes + modes.residual[(row, row)];
@@ -122,7 +124,7 @@ pub(super) fn plausible_energy(modes: &ContactModes, layout: &Layout) -> f64 {
         let limit = layout.largest_displacement().min(if row % 3 == 1 { curved } else { f64::INFINITY });
         0.5 * limit * limit / flexibility
     };
-    // Rounding must not matter.
+    // The margin covers rounding.
     0.99 * (0..modes.rows()).map(most).fold(f64::INFINITY, f64::min)
 }
 
@@ -168,7 +170,7 @@ impl OctetKernel for FindSampledEnergies<'_> {
         }
         for along in [0, 1] {
             for block in 0..rows.blocks {
-                // The forces move the nodes beyond the modes with inertia.
+                // Displacements under the forces that modes with inertia do not contain.
                 let held = L::load(&sample.moved[along][block]) - L::load(&path_moved[along][block]);
                 sums[1] = sums[1] + L::load(&sample.forces[along][block]) * held;
             }
@@ -179,13 +181,13 @@ impl OctetKernel for FindSampledEnergies<'_> {
 
 /// Finds lower bounds of the gaps (m) of all nodes in the tried step, in which no forces act. The interpolation errors of
 /// the modes must be known.
-pub(super) struct FindLeast<'a> {
+pub(super) struct FindGapBounds<'a> {
     pub trial: &'a mut BladeTrial,
     pub rows: &'a BladeRows,
     pub level: &'a BladeLevel,
 }
 
-impl OctetKernel for FindLeast<'_> {
+impl OctetKernel for FindGapBounds<'_> {
     type Output = ();
     #[inline(always)]
     fn run<L: Octet>(self) {

@@ -1,6 +1,6 @@
-//! Displacements normal to the closing and the circumferential displacement.
+//! Displacements along the meridian of the surface, which are normal to the closing and the circumferential displacement.
 //!
-//! They do no work, but they move the point of action of a contact force, which affects the moments on a moving shaft.
+//! They do no work, but they shift the point of action of a contact force, which affects the moments on a moving shaft.
 
 use super::columns::displace;
 use super::level::BladeLevel;
@@ -9,14 +9,14 @@ use super::trial::BladeTrial;
 use crate::math::octet::{Eight, Octet, OctetKernel, both};
 use crate::time::galerkin::trial::ForceInterpolation;
 
-/// Finds these displacements at the start of a step and at its points.
-pub(super) struct FindAcross<'a> {
+/// Finds the meridional displacements at the start of a step and at its points.
+pub(super) struct FindMeridional<'a> {
     pub trial: &'a mut BladeTrial,
     pub rows: &'a BladeRows,
     pub level: &'a BladeLevel,
 }
 
-impl OctetKernel for FindAcross<'_> {
+impl OctetKernel for FindMeridional<'_> {
     type Output = ();
     #[inline(always)]
     fn run<L: Octet>(mut self) {
@@ -26,35 +26,35 @@ impl OctetKernel for FindAcross<'_> {
             _ => self.move_freely::<L, 3>(),
         }
         let Self { trial, rows, level } = self;
-        let BladeTrial { start, across, multipliers, forces, .. } = trial;
-        let (at_start, lanes) = across.split_at_mut(rows.blocks);
+        let BladeTrial { start, meridional, multipliers, forces, .. } = trial;
+        let (at_start, lanes) = meridional.split_at_mut(rows.blocks);
         let lanes = &mut lanes[..level.blocks];
         for node in 0..rows.nodes {
             let (block, i) = (node / 8, node % 8);
             if start.multipliers[block].0[i] > 0.0 {
                 let force = both(|along| start.forces[along][block].0[i]);
-                let columns = both(|along| &rows.across_flexibility[along][node * rows.blocks..][..rows.blocks]);
+                let columns = both(|along| &rows.meridional_flexibility[along][node * rows.blocks..][..rows.blocks]);
                 add::<L>(at_start, columns, force);
                 if level.kind == ForceInterpolation::Polynomial {
-                    add::<L>(lanes, level.across(0, node, rows.nodes), force);
+                    add::<L>(lanes, level.meridional(0, node, rows.nodes), force);
                 }
             }
             for point in 0..level.points() {
                 let lane = point * rows.blocks + block;
                 if multipliers[lane].0[i] > 0.0 {
                     let force = both(|along| forces[along][lane].0[i]);
-                    add::<L>(lanes, level.across(point + 1, node, rows.nodes), force);
+                    add::<L>(lanes, level.meridional(point + 1, node, rows.nodes), force);
                 }
             }
         }
     }
 }
 
-impl FindAcross<'_> {
+impl FindMeridional<'_> {
     /// Finds the displacements without forces in the step.
     #[inline(always)]
     fn move_freely<L: Octet, const P: usize>(&mut self) {
-        let Self { trial: BladeTrial { start, modal, across, .. }, rows, level } = self;
+        let Self { trial: BladeTrial { start, modal, meridional, .. }, rows, level } = self;
         let [q, v] = &start.modes;
         for (modal, [a, b]) in modal.iter_mut().zip(&level.free).take(P) {
             for (block, modal) in modal.iter_mut().enumerate() {
@@ -62,10 +62,10 @@ impl FindAcross<'_> {
                 terms.store(modal);
             }
         }
-        let (at_start, lanes) = across.split_at_mut(rows.blocks);
+        let (at_start, lanes) = meridional.split_at_mut(rows.blocks);
         let modes: [&[Eight]; P] = std::array::from_fn(|p| &modal[p][..]);
-        displace::<L, 1, 1>([&rows.across], rows.blocks, [q], [at_start]);
-        displace::<L, 1, P>([&rows.across], rows.blocks, modes, [lanes]);
+        displace::<L, 1, 1>([&rows.meridional], rows.blocks, [q], [at_start]);
+        displace::<L, 1, P>([&rows.meridional], rows.blocks, modes, [lanes]);
     }
 }
 
