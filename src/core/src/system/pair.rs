@@ -238,6 +238,19 @@ impl ShapeGrowth {
         change * Self::share(elapsed, length) + (factors[0] + theta * change) * share_rate
     }
 
+    /// Bounds the first three derivatives of the factor between two fractions of the span, per interval.
+    pub fn largest_derivatives(&self, ends: [f64; 2]) -> [f64; 3] {
+        let Self { factors, elapsed, length } = *self;
+        let part = ends[1] - ends[0];
+        let change = ((factors[1] - factors[0]) * part).abs();
+        if elapsed[0] + ends[0] * (elapsed[1] - elapsed[0]) >= length {
+            return [change, 0.0, 0.0];
+        }
+        let turn = std::f64::consts::PI * (part * (elapsed[1] - elapsed[0]) / length).abs();
+        let half = 0.5 * factors[0].abs().max(factors[1].abs());
+        [change + half * turn, (change + half * turn) * turn, (1.5 * change + half * turn) * turn * turn]
+    }
+
     /// Bounds the error of the cubic through the factor and its rate at two fractions of the span: the part that is
     /// proportional to the squared length of the interval, and the part that is proportional to its fourth power.
     pub fn cubic_errors(&self, ends: [f64; 2]) -> [f64; 2] {

@@ -118,7 +118,15 @@ impl BladePlace<'_> {
         // derivative of a bump exp(−x²) is 6 times its curvature.
         let bend =
             surface.largest_curvature() * factor * turn * turn * (turn / surface.angular_scale()).min(1.0) / 48.0;
-        [surface.largest_kink() * factor * turn / 8.0, square, higher + bend + eccentric]
+        // The other terms of the fourth derivative of a factor times the shape, which is seen at a changing angle. The slope
+        // is at most √(2 A c) for changes up to A and a curvature c.
+        let [first, second, third] = self.course.growth().largest_derivatives(ends);
+        let curvature = surface.largest_curvature() * turn * turn;
+        let slope = (2.0 * surface.largest_change() * curvature).sqrt();
+        let mixed = 16.0 * first * curvature * (turn / surface.angular_scale()).min(1.0)
+            + 6.0 * second * curvature
+            + 4.0 * third * slope;
+        [surface.largest_kink() * factor * turn / 8.0, square, higher + bend + eccentric + mixed / 384.0]
     }
 }
 

@@ -102,7 +102,9 @@ fn closed_by_shaft<L: Octet>(
     let along = both(|end| slope * L::splat(drives[end].shaft[2]));
     // ρ − r − u_r is at most e_r + e²/(2a).
     let bend = L::splat(SAFETY * shaft.offset * shaft.offset) * per_radius;
-    let most = outwards.max(outwards_later) + L::splat(shaft.chord_deviation) + L::splat(shaft.offset) * around;
+    // The axial displacement deviates from its chord too.
+    let chord_deviation = L::splat(shaft.chord_deviation) * L::load(&rows.steepness[block]);
+    let most = outwards.max(outwards_later) + chord_deviation + L::splat(shaft.offset) * around;
     most + bend - along[0].min(along[1])
 }
 

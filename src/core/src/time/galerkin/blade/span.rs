@@ -285,7 +285,7 @@ impl<'a> BladeInSpan<'a> {
 
     /// Adds the tried step, or a part of it, to sums.
     pub(super) fn add(&mut self, step: SpanStep, kind: ForceInterpolation, part: &PartWeights, sums: Sums) {
-        if self.blade.trial.pushes() && sums != Sums::WorkOnly {
+        if self.blade.trial.pushes() && (sums != Sums::WorkOnly || self.place.course.is_off_centre()) {
             let count = self.tables.level(step.level, kind).points() + 1;
             self.drives[..count].iter_mut().for_each(|drive| drive.rotor = libm::sincos(drive.rotor_angle));
             self.blade.trial.find_meridional(&self.tables.rows, self.tables.level(step.level, kind));
@@ -418,7 +418,8 @@ impl SpanSteps for BladeInSpan<'_> {
             let is_shortest = step.level == HALVINGS || self.length(step.level) <= SHORTEST_LOOK;
             return if is_off_centre || is_shortest { Flight::NeedsTrial } else { Flight::TooLong };
         }
-        self.blade.trial.pushes = false;
+        // Results of a rejected trial do not belong to this step.
+        (self.blade.trial.pushes, self.blade.trial.unresolved) = (false, None);
         if !self.ends_within(step) {
             self.open_flight(step);
             return Flight::Accepted;

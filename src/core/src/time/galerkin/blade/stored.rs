@@ -28,7 +28,8 @@ impl BladeInSpan<'_> {
         head[UNSAMPLED] = f64::from(u8::from(!sampled));
         let (rates, arrays) = arrays.split_at_mut(8 * self.blade.trial.rates.len());
         let blocks = self.blade.trial.rates.iter().zip(rates.as_chunks_mut().0);
-        blocks.for_each(|(block, numbers)| *numbers = block.0);
+        // Unknown rates must not be part of a saved state.
+        blocks.for_each(|(block, numbers)| *numbers = if sampled { block.0 } else { [0.0; 8] });
         if !self.has_changed {
             return;
         }

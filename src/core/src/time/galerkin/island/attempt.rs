@@ -44,6 +44,8 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
             carrier.work_weights = std::array::from_fn(|i| kind.work_weights(basis, i));
         }
         self.begin_surfaces(step, kind);
+        // Inactive sectors keep no block, because active ones could get the same.
+        self.island.sectors.iter_mut().for_each(|one| one.block = None);
         for place in self.places() {
             self.begin_trial(self.index(place), step, kind);
         }

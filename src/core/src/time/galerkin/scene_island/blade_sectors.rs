@@ -382,7 +382,6 @@ impl SectorsInSpan<'_> {
         let needs_state = structure.needs_state(sector);
         if needs_gaps || needs_state {
             steps.write_sample(interval, course, needs_state, &mut result.state);
-            result.gap_rates.iter_mut().enumerate().for_each(|(node, rate)| *rate = steps.gap_rate(node));
         }
         result.energies = steps.energies_at_end(interval);
         result.sampled = match (needs_state, needs_gaps) {
@@ -395,6 +394,7 @@ impl SectorsInSpan<'_> {
             steps.write_whole_sample(interval, course, &mut result.state);
             result.sampled = Sampled::State;
         }
+        result.gap_rates.iter_mut().enumerate().for_each(|(node, rate)| *rate = steps.gap_rate(node));
         steps.store(open_step, needs_gaps);
     }
 
