@@ -250,7 +250,11 @@ fn quick_bench_gives_times_and_errors() {
     let root = tempfile::tempdir().unwrap();
     let json = study(root.path(), "bench", &[]);
     let rows = json["results"].as_array().unwrap();
-    assert_eq!(rows.len(), 4 * 3 + 3 + 1 + 7, "tolerances by communication steps, fixed steps, the independent solver, features");
+    assert_eq!(
+        rows.len(),
+        4 * 3 + 3 + 1 + 7,
+        "tolerances by communication steps, fixed steps, the independent solver, features"
+    );
     for row in rows {
         assert!(row["rejected"].is_null() && row["seconds_per_second"].as_f64() > Some(0.0), "{row:#}");
         assert!(row["error"].as_f64().is_some_and(|error| error > 0.0 && error < 0.5), "{row:#}");

@@ -169,20 +169,6 @@ fn skipped_states_do_not_affect_variables() {
     }
 }
 
-/// The shortest step is a fixed fraction of the longest one, so it can be long itself.
-#[test]
-fn long_steps_near_contact_are_halved_to_the_shortest_step() {
-    let mut scene = rub(1e-2);
-    scene.settings.surfaces[0].shape = Shape::Circular {};
-    (scene.settings.structures[0].speed, scene.settings.contacts[0].friction) = (100.0, 0.0);
-    scene.settings.time.step = 2e-2;
-    let mut simulation = started(&scene);
-    set(&mut simulation, "casing_radius_change", -4.1e-4);
-    (0..4).for_each(|_| go(&mut simulation, 2e-2));
-    let effort = simulation.system().effort();
-    assert!(effort.trials > 0 && real(&simulation, "clearance_minimum") < 1e-6, "{effort:?}");
-}
-
 #[test]
 fn setting_the_same_value_again_changes_nothing() {
     let run = |sets: bool| {
