@@ -114,19 +114,22 @@ impl BladePlace<'_> {
         }
         let factor = from.factor.abs().max(to.factor.abs());
         let [square, higher] = self.course.growth().cubic_errors(ends).map(|error| error * surface.largest_change());
+        // The slope is at most √(2 A c) for changes up to A and a curvature c.
+        let [first, second, third] = self.course.growth().largest_derivatives(ends);
+        let (part, curvature) = (turn / surface.angular_scale(), surface.largest_curvature() * turn * turn);
+        let slope = (2.0 * surface.largest_change() * curvature).sqrt();
+        let kink = surface.largest_kink() * factor * turn / 8.0;
+        if part >= 1.0 {
+            // A cubic differs from a function by at most 1/32 of the largest second derivative.
+            let bend = factor * curvature + 2.0 * first * slope + second * surface.largest_change();
+            return [kink, square, bend / 32.0 + eccentric];
+        }
         // The third derivative of a spline jumps by up to 4 times its curvature per spacing of its knots. The fourth
         // derivative of a bump exp(−x²) is 6 times its curvature.
-        let bend =
-            surface.largest_curvature() * factor * turn * turn * (turn / surface.angular_scale()).min(1.0) / 48.0;
-        // The other terms of the fourth derivative of a factor times the shape, which is seen at a changing angle. The slope
-        // is at most √(2 A c) for changes up to A and a curvature c.
-        let [first, second, third] = self.course.growth().largest_derivatives(ends);
-        let curvature = surface.largest_curvature() * turn * turn;
-        let slope = (2.0 * surface.largest_change() * curvature).sqrt();
-        let mixed = 16.0 * first * curvature * (turn / surface.angular_scale()).min(1.0)
-            + 6.0 * second * curvature
-            + 4.0 * third * slope;
-        [surface.largest_kink() * factor * turn / 8.0, square, higher + bend + eccentric + mixed / 384.0]
+        let bend = surface.largest_curvature() * factor * turn * turn * part / 48.0;
+        // The other terms of the fourth derivative of a factor times the shape, which is seen at a changing angle.
+        let mixed = 16.0 * first * curvature * part + 6.0 * second * curvature + 4.0 * third * slope;
+        [kink, square, higher + bend + eccentric + mixed / 384.0]
     }
 }
 
