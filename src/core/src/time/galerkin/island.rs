@@ -304,7 +304,8 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
             let index = self.index(place);
             let SectorInStep { surfaces, tables, disk, trial, state, advance } = self.sector(index, step, kind);
             let level = tables.of_points(step.level, kind, trial.points());
-            if !trial.find_minima(&level.basis, is_resolved, tolerance) {
+            let is_needed = |node: usize, bound: f64| surfaces.needs_minimum(node, bound);
+            if !trial.find_minima(&level.basis, is_resolved, tolerance, is_needed) {
                 continue;
             }
             if disk.is_none() {

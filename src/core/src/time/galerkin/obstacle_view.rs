@@ -271,6 +271,10 @@ impl Witness for ObstacleView<'_> {
         self.any_node(from, length, |at, gap, end| gap.approach(at, end, vector3_at(reach, at.node)) > tolerance)
     }
 
+    fn needs_minimum(&self, node: usize, bound: f64) -> bool {
+        bound < self.record.needed_below[node].min(self.record.tallies[node].lowest)
+    }
+
     fn record_gaps(&mut self, level: &StepTables, trial: &Trial) {
         for node in 0..trial.nodes() {
             if self.record.pair_of[node].is_some() {

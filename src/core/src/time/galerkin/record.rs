@@ -11,6 +11,7 @@ use crate::system::carrier::Spot;
 use crate::system::contact_view::ContactMember;
 use crate::system::pair::ContactPair;
 use crate::system::work::{ContactWork, WorkingForce};
+use crate::system::structure::NeededMinima;
 use crate::system::{ContactEvent, StepFailure, Structure};
 use crate::time::galerkin::basis::{MOST, POINTS};
 use crate::time::galerkin::compliance::Lanes;
@@ -313,6 +314,10 @@ pub(crate) struct SpanRecord {
     pub work: ContactWork,
     /// Damping loss over the span (J).
     pub damping: f64,
+    /// Gap of each node below which its smallest gap over the span is needed (m).
+    pub needed_below: Vec<f64>,
+    /// Smallest gap of each node (m), over all sectors at the start of the span and over the span in the sectors before this one.
+    pub lowest_of_all: Vec<f64>,
     /// Start and length of the tried step, as fractions of the span.
     pub step: [f64; 2],
     /// Gaps within free flight are searched if they may be smaller than at its ends by more than this (m).
@@ -351,6 +356,8 @@ impl SpanRecord {
             tallies: vec![NodeTally::NOTHING; nodes],
             work: ContactWork::default(),
             damping: 0.0,
+            needed_below: vec![f64::INFINITY; nodes],
+            lowest_of_all: vec![f64::INFINITY; nodes],
             places: std::array::from_fn(|_| vec![ClosestPoint::default(); nodes]),
             acted: std::array::from_fn(|_| vec![ClosestPoint::default(); nodes]),
             slips: std::array::from_fn(|_| vec![None; nodes]),
@@ -422,6 +429,35 @@ impl SpanRecord {
                     places[*node] = ring.map_or(first[*node], |law| law.surface.advance(first[*node], turns));
                 }
             }
+        }
+    }
+
+    /// Starts a span in which all sectors of the structure take turns.
+    pub(crate) fn begin_turns(&mut self, of: &Structure) {
+        let (gaps, sectors) = (&of.history.gap.before, of.modes().sectors());
+        for (lowest, gaps) in self.lowest_of_all.iter_mut().zip(gaps.chunks_exact(self.lanes)) {
+            *lowest = gaps[..sectors].iter().copied().fold(f64::INFINITY, f64::min);
+        }
+    }
+
+    /// Finds which smallest gaps of the sector outputs need in its turn.
+    pub(crate) fn choose_minima(&mut self, needed: &NeededMinima) {
+        let own = if needed.all_of(self.sector) {
+            f64::INFINITY
+        } else if needed.by_sector {
+            self.tallies.iter().map(|tally| tally.lowest).fold(f64::INFINITY, f64::min)
+        } else {
+            f64::NEG_INFINITY
+        };
+        for (below, lowest) in self.needed_below.iter_mut().zip(&self.lowest_of_all) {
+            *below = lowest.max(own);
+        }
+    }
+
+    /// Ends the turn of the sector.
+    pub(crate) fn end_turn(&mut self) {
+        for (lowest, tally) in self.lowest_of_all.iter_mut().zip(&self.tallies) {
+            *lowest = lowest.min(tally.lowest);
         }
     }
 

@@ -203,6 +203,10 @@ impl SceneIsland {
             let course = self.records[0].pairs[0].course;
             return self.integrate_sectors(system, SectorSpan::Bounded(&course, span), goal, workers);
         }
+        if self.is_single() {
+            let record = &mut self.records[0];
+            record.begin_turns(&system.structures[record.structure]);
+        }
         (0..self.turns).try_for_each(|turn| self.take_turn(turn, system, span, most_tried))
     }
 
@@ -235,12 +239,19 @@ impl SceneIsland {
         self.aim(turn, &system.structures);
         let System { structures, pairs, events, counted, .. } = system;
         self.read(structures);
+        if self.is_single() {
+            let record = &mut self.records[0];
+            record.choose_minima(&structures[record.structure].needed_minima);
+        }
         self.choose_active(structures, pairs, span);
         let goal = StepGoal { most: most_tried, ..self.goal };
         let Self { island, records, .. } = &mut *self;
         let mut surroundings = SceneSurroundings { structures, pairs, records };
         let outcome = island.begin(&mut surroundings, goal).integrate(&mut counted.effort);
         let load_work = self.write(structures);
+        if self.is_single() {
+            self.records[0].end_turn();
+        }
         self.records.iter().try_for_each(SpanRecord::check)?;
         outcome.map_err(|stopped| self.failure(stopped))?;
         let ledger = &mut counted.ledgers[self.set];

@@ -34,6 +34,11 @@ pub trait Witness: Obstacle {
         false
     }
 
+    /// Returns whether the smallest gap of a node within the step is needed if it may be as small as `bound` (m).
+    fn needs_minimum(&self, _node: usize, _bound: f64) -> bool {
+        true
+    }
+
     /// Called before the tried step is accepted, with gaps and displacements at its points.
     fn record_gaps(&mut self, _level: &StepTables, _trial: &Trial) {}
 

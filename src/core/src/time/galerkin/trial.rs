@@ -1,6 +1,7 @@
 //! Trial of one step of one sector: contact forces and gaps at the points, and the quality of the step.
 
 mod coupled;
+mod fast_sliding;
 mod judgement;
 mod minima;
 mod obstacle;
@@ -109,6 +110,10 @@ pub struct Trial {
     /// Data for steps of a higher degree; and slopes of the polynomials through the points at the end of the step (1/s).
     steady: Option<Box<Steady>>,
     end_slopes: [f64; POINTS],
+    /// True if contacts that could stick slide fast in the tried step; and the directions of their slip at every lane, while the
+    /// contact problem of such a step is solved.
+    slides_fast: bool,
+    slip_directions: Vec<Vector3>,
 }
 
 impl Trial {
@@ -167,6 +172,8 @@ impl Trial {
             per_step: 0.0,
             steady: None,
             end_slopes: [0.0; POINTS],
+            slides_fast: false,
+            slip_directions: Vec::new(),
         }
     }
 
@@ -220,7 +227,7 @@ impl Trial {
         state: &SectorState,
     ) {
         let compliance = level.compliance_of(kind);
-        self.free_motion.is_known = false;
+        (self.free_motion.is_known, self.slides_fast) = (false, false);
         self.carrier_known.fill(false);
         self.work_weights = std::array::from_fn(|i| kind.work_weights(&level.basis, i));
         self.durations = std::array::from_fn(|i| level.step * kind.weight(&level.basis, i));
@@ -301,10 +308,10 @@ impl Trial {
         verdict: &mut TrialResult,
     ) -> bool {
         self.keep_normals();
-        if self.sticking.is_some() {
+        if self.may_stick() {
             return self.solve_sticking(compliance, obstacle, verdict);
         }
-        if obstacle.turns() {
+        if obstacle.turns() && !self.slides_fast {
             self.find_inert(residual);
         }
         let (lanes, width) = (self.lanes, self.lanes.width());
@@ -383,15 +390,20 @@ impl Trial {
     fn choose(&mut self, lane: usize, compliance: &LaneCompliance, obstacle: &mut impl Obstacle) {
         let (lanes, width) = (self.lanes, self.lanes.width());
         let (point, node) = lanes.place(lane);
-        let sliding = SlidingState {
-            moved: lanes.vector3(&self.moved, lane),
-            velocity: vector3_at(&self.velocities, node),
-            sliding_distance: self.sliding_distance(point, node),
-            duration: self.durations[point],
-            normal: lanes.vector3(&self.normals, lane),
+        let sliding = if obstacle.parameters(node).friction == 0.0 {
+            Sliding::default()
+        } else if let Some(direction) = self.slip_directions.get(lane) {
+            Sliding { direction: *direction, ..Sliding::default() }
+        } else {
+            let sliding = SlidingState {
+                moved: lanes.vector3(&self.moved, lane),
+                velocity: vector3_at(&self.velocities, node),
+                sliding_distance: self.sliding_distance(point, node),
+                duration: self.durations[point],
+                normal: lanes.vector3(&self.normals, lane),
+            };
+            obstacle.sliding(node, point, &sliding)
         };
-        let has_friction = obstacle.parameters(node).friction > 0.0;
-        let sliding = if has_friction { obstacle.sliding(node, point, &sliding) } else { Sliding::default() };
         let Self { without, multipliers, normals, moved, .. } = &*self;
         let values = LaneValues { lanes, without, multipliers, normals, moved };
         let prediction = LanePrediction { sliding, ..values.prediction(lane, obstacle) };

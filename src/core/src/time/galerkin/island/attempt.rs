@@ -383,8 +383,8 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         result
     }
 
-    /// Tries a step of a higher degree, if there are tables for it. Returns the result if no sticking contact changes
-    /// its status within the step.
+    /// Tries a step of a higher degree, if there are tables for it. Returns the result if all contacts slide fast, or if no
+    /// contact changes its status within the step.
     fn attempt_steady(&mut self, step: SpanStep, kind: ForceInterpolation) -> Option<TrialResult> {
         if kind == ForceInterpolation::Constant || !self.island.is_single() {
             return None;
@@ -393,6 +393,10 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         let SectorInStep { mut surfaces, tables, trial, state, .. } = self.sector(0, step, kind);
         let level = tables.steady.get(step.level)?;
         surfaces.begin_step(step.from, step.length, level, kind);
+        let fast = trial.run_fast_sliding(level, &tables.rows, state, &mut surfaces, precision);
+        if fast.solved {
+            return Some(fast);
+        }
         let result = trial.run_steady(level, &tables.rows, state, &mut surfaces, precision);
         result.solved.then_some(result)
     }

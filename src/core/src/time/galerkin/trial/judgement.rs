@@ -102,7 +102,7 @@ impl Trial {
         self.impulses.fill(0.0);
         (verdict.switches, verdict.switched, verdict.near, verdict.error) = (false, 0.0, false, 0.0);
         self.depths.fill(0.0);
-        let mut pushed = false;
+        let (mut pushed, may_stick) = (false, self.may_stick());
         for node in 0..self.nodes() {
             let pushes = |point: usize| self.multiplier(point, node) > 0.0;
             let (any, all) = ((0..count).any(pushes), (0..count).all(pushes));
@@ -120,9 +120,9 @@ impl Trial {
             for component in 0..3 {
                 let force = |point: usize| forces[point][component];
                 let left = (0..count).map(|point| basis.left_out[point] * force(point)).sum::<f64>() * level.step;
-                self.impulses[3 * node + component] = if self.sticking.is_some() && basis.degree > 1 {
+                self.impulses[3 * node + component] = if may_stick && basis.degree > 1 {
                     left / level.share
-                } else if self.sticking.is_some() {
+                } else if may_stick {
                     // Errors of closed contacts accumulate over all steps of a span.
                     let bend = if all { BEND / level.share } else { OPENING };
                     bend * level.step * self.bend(node, component)
@@ -141,7 +141,7 @@ impl Trial {
             }
         }
         let mut turn = 0.0;
-        if self.sticking.is_some() {
+        if may_stick {
             if basis.degree == 1 {
                 turn = self.find_turn(rows.residual(), level.step, obstacle);
             }

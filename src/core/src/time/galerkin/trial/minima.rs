@@ -51,11 +51,18 @@ impl Minima {
 
 impl Trial {
     /// Finds nodes that may come closer between the points of a step than at them, by more than a fraction of `tolerance` (m).
-    /// Returns whether there are any.
+    /// Returns whether there are any. `is_needed` returns whether the smallest gap of a node is needed if it may be as
+    /// small as a bound (m).
     ///
     /// Finds none if `is_resolved` is false: the polynomials of a step with a constant force, or of a step that misses the tolerance, do not
     /// describe the motion between its points.
-    pub(crate) fn find_minima(&mut self, basis: &TimeBasis, is_resolved: bool, tolerance: f64) -> bool {
+    pub(crate) fn find_minima(
+        &mut self,
+        basis: &TimeBasis,
+        is_resolved: bool,
+        tolerance: f64,
+        is_needed: impl Fn(usize, f64) -> bool,
+    ) -> bool {
         self.minima.at.fill(f64::NAN);
         self.minima.parts = 0;
         let mut found = false;
@@ -74,7 +81,8 @@ impl Trial {
             let lowest = gaps[..basis.count()].iter().copied().fold(f64::INFINITY, f64::min);
             let deeper = minimum.map_or(0.0, |theta| lowest - evaluate(&cubic, theta));
             let falls = minimum.is_none() && slope.abs() > left * FALLING;
-            if !falls && deeper + left > SHARE * tolerance {
+            let may_matter = !falls && deeper + left > SHARE * tolerance;
+            if may_matter && is_needed(node, lowest - deeper - left) {
                 self.minima.at[node] = minimum.unwrap_or(lower);
                 found = true;
             }

@@ -5,8 +5,10 @@
 //! sliding has not reversed, and open nodes stay open. Otherwise a step of degree 1 finds the change.
 
 use super::{Trial, TrialResult};
+use crate::contact::Law;
 use crate::contact::de_saxce::Eliminate;
 use crate::math::vector::{Vector3, length, tangential, tangents, vector3_at};
+use crate::scene::method::Solver;
 use crate::time::galerkin::basis::{POINTS, TimeBasis};
 use crate::time::galerkin::compliance::LaneCompliance;
 use crate::time::galerkin::level::StepTables;
@@ -37,7 +39,9 @@ enum ContactStatus {
 pub(super) struct Steady {
     status: Vec<ContactStatus>,
     /// Direction of the slip at every lane.
-    directions: Vec<Vector3>,
+    pub(super) directions: Vec<Vector3>,
+    /// Law of contacts that slide fast.
+    pub(super) sliding_law: Law,
     matrix: Vec<f64>,
     right: Vec<f64>,
 }
@@ -48,6 +52,7 @@ impl Steady {
         Self {
             status: vec![ContactStatus::Open; nodes],
             directions: vec![Vector3::zeros(); lanes],
+            sliding_law: Law::new(Solver::Lcp, None, lanes),
             matrix: vec![0.0; 9 * lanes * lanes],
             right: vec![0.0; 3 * lanes],
         }

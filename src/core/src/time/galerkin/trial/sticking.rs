@@ -268,6 +268,11 @@ impl Trial {
         self.sticking.is_some()
     }
 
+    /// Returns whether contacts may stick in the tried step.
+    pub(super) fn may_stick(&self) -> bool {
+        self.sticking.is_some() && !self.slides_fast
+    }
+
     /// Returns the largest distance (m) that nodes may have slid back and forth within a step. Where sliding reverses, nodes
     /// stick for a while; the result is four times the distance because of the duration of sticking.
     pub(crate) fn find_turn(&mut self, residual: &DMatrix<f64>, step: f64, obstacle: &impl Obstacle) -> f64 {
