@@ -7,16 +7,19 @@
 use super::steady::Steady;
 use super::{ForceInterpolation, Obstacle, Trial, TrialResult};
 use crate::math::vector::{Vector3, length, tangential};
-use crate::time::galerkin::basis::{POINTS, TimeBasis};
+use crate::time::galerkin::basis::POINTS;
 use crate::time::galerkin::level::StepTables;
 use crate::time::galerkin::rows::ContactRows;
 use crate::time::galerkin::state::SectorState;
 use std::mem::{swap, take};
 
 /// Largest number of evaluations of gaps and slips.
-const PASSES: usize = 8;
-/// Accuracy of the directions of friction. They cause an error of the forces of µ times this fraction.
-const TURNED: f64 = 1e-6;
+const PASSES: usize = 16;
+/// Number of evaluations that find the direction of friction at each point. In very short steps, the flexibility of the nodes
+/// affects these directions so much that they do not converge; further evaluations find one direction for the whole step.
+const POINTWISE_PASSES: usize = 4;
+/// Number of evaluations after which directions change by half of the change that they require.
+const FULL_PASSES: usize = 8;
 /// Smallest component of the slip velocity along the mean slip, at any point and as a fraction of the mean slip velocity.
 const SLOWEST: f64 = 0.5;
 
@@ -67,10 +70,10 @@ impl Trial {
             if self.rests() && lowest >= 0.0 {
                 return true;
             }
-            let Some(turned) = self.find_fast_directions(&mut own.directions, &level.basis, obstacle) else {
+            let Some(moved) = self.find_fast_directions(&mut own.directions, level, pass, obstacle) else {
                 return false;
             };
-            if pass > 0 && lowest >= -precision && largest <= precision && turned <= TURNED {
+            if pass > 0 && lowest >= -precision && largest <= precision && moved <= precision {
                 return true;
             }
             self.slip_directions = take(&mut own.directions);
@@ -83,17 +86,23 @@ impl Trial {
         false
     }
 
-    /// Finds the directions of the slip of all nodes at all points, and returns by how much those of touching nodes have turned.
-    /// Returns `None` if a touching node may stick.
+    /// Finds the directions of the slip of all nodes at all points. Returns by how much their changes may move touching nodes (m),
+    /// or `None` if a touching node may stick.
     fn find_fast_directions(
         &self,
         directions: &mut [Vector3],
-        basis: &TimeBasis,
+        level: &StepTables,
+        pass: usize,
         obstacle: &impl Obstacle,
     ) -> Option<f64> {
-        let (lanes, last) = (self.lanes, basis.degree);
-        let mut turned = 0.0_f64;
-        for node in (0..lanes.nodes).filter(|node| obstacle.parameters(*node).friction > 0.0) {
+        let (lanes, basis, last) = (self.lanes, &level.basis, level.basis.degree);
+        let relaxation = if pass < FULL_PASSES { 1.0 } else { 0.5 };
+        let mut largest = 0.0_f64;
+        for node in 0..lanes.nodes {
+            let friction = obstacle.parameters(node).friction;
+            if friction == 0.0 {
+                continue;
+            }
             let touches = (0..=last).any(|point| self.multiplier(point, node) > 0.0)
                 || (1..=last).any(|point| self.gap(point, node) < 0.0);
             let mut places = [Vector3::zeros(); POINTS];
@@ -107,15 +116,21 @@ impl Trial {
                 if point == 0 {
                     continue;
                 }
+                let lane = lanes.at(point, node);
+                let slip = if pass < POINTWISE_PASSES { slip } else { places[last] };
+                let before = directions[lane];
                 let along = tangential(slip, self.normal(point, node));
-                let (size, lane) = (length(along), lanes.at(point, node));
-                let direction = if size > 0.0 { along / size } else { Vector3::zeros() };
+                let along = along / length(along).max(f64::MIN_POSITIVE);
+                let along = if relaxation < 1.0 { before + relaxation * (along - before) } else { along };
+                directions[lane] = along / length(along).max(f64::MIN_POSITIVE);
                 if touches {
-                    turned = turned.max((direction - directions[lane]).amax());
+                    let flexibility = level.compliance.of_lane(lane);
+                    let flexibility = (0..3).map(|c| lanes.vector3(flexibility[c], lane)[c]).fold(0.0, f64::max);
+                    let turned = length(directions[lane] - before) / relaxation;
+                    largest = largest.max(friction * self.multiplier(point, node) * turned * flexibility);
                 }
-                directions[lane] = direction;
             }
         }
-        Some(turned)
+        Some(largest)
     }
 }
