@@ -1,8 +1,8 @@
 //! Steps of a higher degree in which contacts that could stick slide fast. They may open and close within the step.
 //!
-//! Where the slip along a surface hardly changes its velocity during the step, no contact sticks, and friction opposes a
-//! known direction. The contact problem then has one unknown per lane, as without sticking. The directions are those of
-//! the slip under the solution, found by iteration.
+//! If nodes vibrate much more slowly than prescribed motion makes them slide, no contact sticks, and the contact problem has
+//! one unknown per lane, as without sticking. Friction opposes the slip under the solution, whose direction is found by
+//! iteration.
 
 use super::steady::Steady;
 use super::{ForceInterpolation, Obstacle, Trial, TrialResult};
@@ -20,8 +20,8 @@ const PASSES: usize = 16;
 const POINTWISE_PASSES: usize = 4;
 /// Number of evaluations after which directions change by half of the change that they require.
 const FULL_PASSES: usize = 8;
-/// Smallest component of the slip velocity along the mean slip, at any point and as a fraction of the mean slip velocity.
-const SLOWEST: f64 = 0.5;
+/// Largest vibration velocity at which contacts slide fast, as a fraction of the sliding velocity by prescribed motion.
+const LARGEST_VIBRATION: f64 = 0.1;
 
 impl Trial {
     /// Tries a step in which all contacts slide fast. It counts as unsolved if one may stick.
@@ -107,10 +107,12 @@ impl Trial {
                 || (1..=last).any(|point| self.gap(point, node) < 0.0);
             let mut places = [Vector3::zeros(); POINTS];
             (1..=last).for_each(|point| places[point] = self.slip(node, point, obstacle));
-            let mean = tangential(places[last], self.normal(last, node));
+            let normal = self.normal(last, node);
+            let drift = tangential(obstacle.drift(node, last, self.displacement(last, node)), normal);
             for point in 0..=last {
                 let slip: Vector3 = (0..=last).map(|k| basis.work[point][k] * places[k]).sum();
-                if touches && slip.dot(&mean) <= SLOWEST * basis.weights[point] * mean.norm_squared() {
+                let vibration = tangential(slip, normal) - basis.weights[point] * drift;
+                if touches && length(vibration) > LARGEST_VIBRATION * basis.weights[point] * length(drift) {
                     return None;
                 }
                 if point == 0 {

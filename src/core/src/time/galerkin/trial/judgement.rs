@@ -21,6 +21,9 @@ const BEND: f64 = 0.5;
 /// 0.5, 10 and 30 its errors at tolerances from 1e-2 to 1e-5 are up to 305, 10 and 2.4 times the tolerance, with 17 and 26 % more
 /// trials.
 const OPENING: f64 = 30.0;
+/// Weight of the error of steps in which contacts that could stick slide fast, because it determines when they stick. Measured as
+/// [`OPENING`].
+const FAST: f64 = 3.0;
 /// A step is shortened if the gap of a node between the points may be below this multiple of the interpolation error.
 pub(crate) const NEAR: f64 = 4.0;
 /// Ratio of slope to interpolation error above which a gap with a monotonic polynomial is smallest at an end of the
@@ -103,6 +106,7 @@ impl Trial {
         (verdict.switches, verdict.switched, verdict.near, verdict.error) = (false, 0.0, false, 0.0);
         self.depths.fill(0.0);
         let (mut pushed, may_stick) = (false, self.may_stick());
+        let weight = if self.slides_fast { FAST } else { 1.0 };
         for node in 0..self.nodes() {
             let pushes = |point: usize| self.multiplier(point, node) > 0.0;
             let (any, all) = ((0..count).any(pushes), (0..count).all(pushes));
@@ -127,9 +131,9 @@ impl Trial {
                     let bend = if all { BEND / level.share } else { OPENING };
                     bend * level.step * self.bend(node, component)
                 } else if all {
-                    left
+                    weight * left
                 } else {
-                    left.abs().max(KINK * level.step * kink(basis, force))
+                    weight * left.abs().max(KINK * level.step * kink(basis, force))
                 };
             }
             if !all {
