@@ -5,6 +5,7 @@ use super::{Island, IslandInSpan, IslandSector, SectorInStep};
 use crate::time::galerkin::carrier::{BLOCKS, CarrierIntegrator};
 use crate::time::galerkin::span::SpanStep;
 use crate::time::galerkin::surroundings::{Surroundings, Witness};
+use crate::time::galerkin::tables::HALVINGS;
 use crate::time::galerkin::trial::{ForceInterpolation, Obstacle, TrialResult};
 
 /// Largest number of gap evaluations in one trial of a single sector. The last one is exact except for curvature.
@@ -393,9 +394,11 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         let SectorInStep { mut surfaces, tables, trial, state, .. } = self.sector(0, step, kind);
         let level = tables.steady.get(step.level)?;
         surfaces.begin_step(step.from, step.length, level, kind);
-        let fast = trial.run_fast_sliding(level, &tables.rows, state, &mut surfaces, precision);
-        if fast.solved {
-            return Some(fast);
+        if step.level < HALVINGS {
+            let fast = trial.run_fast_sliding(level, &tables.rows, state, &mut surfaces, precision);
+            if fast.solved {
+                return Some(fast);
+            }
         }
         let result = trial.run_steady(level, &tables.rows, state, &mut surfaces, precision);
         result.solved.then_some(result)

@@ -23,7 +23,7 @@ const BEND: f64 = 0.5;
 const OPENING: f64 = 30.0;
 /// Weight of the error of steps in which contacts that could stick slide fast, because it determines when they stick. Measured as
 /// [`OPENING`].
-const FAST: f64 = 3.0;
+const FAST: f64 = 8.0;
 /// A step is shortened if the gap of a node between the points may be below this multiple of the interpolation error.
 pub(crate) const NEAR: f64 = 4.0;
 /// Ratio of slope to interpolation error above which a gap with a monotonic polynomial is smallest at an end of the
