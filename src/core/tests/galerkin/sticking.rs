@@ -55,7 +55,7 @@ fn sticking_of_coupled_sectors_matches_one_structure() {
             let [together, alone] = [disk.cyclic(), disk.whole()].map(|rom| of(rom, tolerance));
             let (parted, error) = (apart(&together, &alone), apart(&together, &exact));
             println!("{speed} rad/s, tolerance {tolerance:e}: {error:.1e}, from one structure {parted:.1e}");
-            assert!(parted < tolerance, "{speed} rad/s, {tolerance:e}: {parted:e}");
+            assert!(parted < 2.0 * tolerance, "{speed} rad/s, {tolerance:e}: {parted:e}");
             assert!(error < 2.0 * tolerance, "{speed} rad/s, {tolerance:e}: {error:e}");
         }
     }
