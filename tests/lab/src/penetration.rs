@@ -32,7 +32,7 @@ const SECTORS: usize = 4;
 /// a polynomial, so it differs.
 const ROUNDING: f64 = 1e-11;
 const AGREEING: f64 = 0.9;
-/// Largest penetration of open nodes, as a fraction of the tolerance. The error of the search is at most 0.3 of the
+/// Largest penetration, as a fraction of the tolerance. The error of the search is at most 0.3 of the
 /// tolerance.
 const ALLOWED: f64 = 1.3;
 
@@ -215,6 +215,11 @@ pub(crate) fn study(common: &StudyCommon, console: &Console) -> Result<Study> {
             open < ALLOWED,
             format!("at most {open:.3} of the tolerance"),
         ),
+        Statement::tested(
+            "Nodes that touch in a step penetrate by no more than 1.3 of the tolerance at any sample",
+            touching < ALLOWED,
+            format!("at most {touching:.3} of the tolerance"),
+        ),
         Statement::tested("Blades touch in every rub", touched == found.len(), format!("{touched} of {}", found.len())),
         Statement::tested(
             "The gaps of open nodes agree with those of the product to rounding, except in steps in which they also touch",
@@ -236,7 +241,7 @@ pub(crate) fn study(common: &StudyCommon, console: &Console) -> Result<Study> {
         title: "Penetration between the points of steps".into(),
         summary: format!(
             "All gaps of {} rubs with adaptive steps, every {:.1} µs: the deepest penetration as a fraction of the \
-             tolerance. Nodes that touch in the step penetrate by at most {touching:.2} of the tolerance.",
+             tolerance.",
             found.len(),
             1e6 * interval
         ),

@@ -1,7 +1,7 @@
 //! Smallest gaps of the nodes within a tried step.
 
 use super::follow::Follow;
-use super::minima::{FOLLOW_FRACTION, MAX_HALVINGS, MINIMUM_FRACTION, RecordPoints};
+use super::minima::{FOLLOW_FRACTION, MAX_HALVINGS, MINIMUM_FRACTION, RecordPoints, Search};
 use super::span::{Blade, BladeInSpan, BladePlace, RecordScope, centred_drive_at, drive_at};
 use super::surface::{DriveRate, PointDrive};
 use super::tables::BladeTables;
@@ -26,7 +26,8 @@ impl BladeInSpan<'_> {
         let (rows, level) = (&self.tables.rows, self.tables.level(step.level, kind));
         trial.followed.fill(0);
         find_thresholds(thresholds, floors, &tally.lowest);
-        let found = is_resolved && trial.select_followed((rows, level), thresholds, self.goal.tolerance, ends);
+        let found =
+            is_resolved && trial.select_followed((rows, level), thresholds, self.goal.tolerance, (Search::Open, ends));
         let instructions = trial.instructions;
         instructions.run_octets(RecordPoints { trial, rows, level, lowest: &mut tally.lowest, ends });
         if found {
@@ -42,8 +43,8 @@ impl BladeInSpan<'_> {
         path.follow(trial, self.tables, [&mut tally.lowest, floors], ends);
     }
 
-    /// Finds the smallest gaps between the points of a tried step for nodes that stay open. Writes the largest penetration to
-    /// `result` if it exceeds the tolerance. Gaps above that limit are found only if the step may be recorded.
+    /// Finds the smallest gaps between the points of a tried step. Writes the largest penetration to `result` if it exceeds the
+    /// tolerance. Gaps above that limit are found only if the step may be recorded.
     pub(super) fn find_step_minima(&mut self, step: SpanStep, kind: ForceInterpolation, result: &mut TrialResult) {
         let (tolerance, whole) = (self.goal.tolerance, [0.0, 1.0]);
         let may_be_recorded = self.recorded != RecordScope::WorkOnly && self.ends_within(step);
@@ -65,11 +66,14 @@ impl BladeInSpan<'_> {
             trial.find_modal_forces(&tables.rows, tables.level(step.level, kind));
         }
         let level = tables.level(step.level, kind);
-        if trial.select_followed((&tables.rows, level), thresholds, tolerance, whole) {
+        trial.limit_closed((&tables.rows, level), thresholds, depth_threshold, tolerance);
+        if trial.select_followed((&tables.rows, level), thresholds, tolerance, (Search::All, whole)) {
             let refine_below = depth_threshold - FOLLOW_FRACTION * tolerance;
             let path = FollowedPath { place: &self.place, drives: &self.drives, step, kind, tolerance, refine_below };
             path.follow(trial, tables, [step_minima, thresholds], whole);
             let lowest = step_minima.iter().flat_map(|block| block.0).fold(f64::INFINITY, f64::min);
+            // The recorded gaps of nodes in contact are those at the points.
+            trial.forget_closed((&tables.rows, level), step_minima);
             if lowest < -tolerance && step.level < HALVINGS {
                 result.depth = result.depth.max(-lowest);
             }

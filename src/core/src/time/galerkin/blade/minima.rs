@@ -43,20 +43,32 @@ pub(super) struct SelectFollowed<'a> {
     pub unresolved: f64,
     /// Ends of the part of the step that is searched, as fractions of the step.
     pub ends: [f64; 2],
+    /// Nodes that are searched.
+    pub search: Search,
+}
+
+/// Nodes whose smallest gap within a step is searched.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Search {
+    /// Nodes that stay open.
+    Open,
+    /// All nodes.
+    All,
 }
 
 impl OctetKernel for SelectFollowed<'_> {
     type Output = bool;
     #[inline(always)]
     fn run<L: Octet>(self) -> bool {
-        let Self { trial, rows, level, thresholds, tolerance, unresolved, ends } = self;
+        let Self { trial, rows, level, thresholds, tolerance, unresolved, ends, search } = self;
         // A coarse test with one bound for all nodes excludes most steps.
         let bounds = &mut trial.path_moved[0];
         bounds[..rows.blocks].fill(Eight([unresolved; 8]));
         let mut candidates = 0;
         for block in 0..rows.blocks {
             trial.followed[block] = 0;
-            candidates |= BlockGaps::<L>::new(trial, rows, level, block).may_be_below(L::load(&thresholds[block]));
+            let gaps = BlockGaps::<L>::new(trial, rows, level, block).searched(search, rows, block);
+            candidates |= gaps.may_be_below(L::load(&thresholds[block]));
         }
         if candidates == 0 {
             return false;
@@ -64,7 +76,7 @@ impl OctetKernel for SelectFollowed<'_> {
         displace::<L, 1, 1>([&rows.magnitudes[0]], rows.blocks, [&trial.mode_bounds], [&mut trial.path_moved[0]]);
         let mut found = 0;
         for block in 0..rows.blocks {
-            let gaps = BlockGaps::<L>::new(trial, rows, level, block);
+            let gaps = BlockGaps::<L>::new(trial, rows, level, block).searched(search, rows, block);
             let threshold = L::load(&thresholds[block]);
             let candidates = gaps.may_be_below(threshold);
             if candidates != 0 {
@@ -148,6 +160,13 @@ impl<L: Octet> BlockGaps<L> {
         let least = inner[0].min(inner[1]).min(low);
         let (steepness, open) = (L::load(&rows.steepness[block]), !pushes & rows.valid(block));
         Self { gaps, low, least, steepness, steepest, error_bound, open }
+    }
+
+    /// Replaces the nodes that stay open by those that are searched.
+    #[inline(always)]
+    fn searched(self, search: Search, rows: &BladeRows, block: usize) -> Self {
+        let open = if search == Search::All { rows.valid(block) } else { self.open };
+        Self { open, ..self }
     }
 
     /// Returns the nodes whose smallest gap may be below `threshold` (m).

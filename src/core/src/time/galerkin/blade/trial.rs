@@ -5,7 +5,7 @@ use super::contact_free::SlowModeGaps;
 use super::follow::{PathPoint, STORED_TIMES};
 use super::level::BladeLevel;
 use super::meridional::FindMeridional;
-use super::minima::SelectFollowed;
+use super::minima::{Search, SelectFollowed};
 use super::reach::{Energy, FindClearance, FindReach};
 use super::rows::BladeRows;
 use super::solve::Attempt;
@@ -306,6 +306,45 @@ impl BladeTrial {
         }
     }
 
+    /// Returns the nodes of a block that are in contact at the start of the tried step or at a point.
+    fn closed(&self, rows: &BladeRows, level: &BladeLevel, block: usize) -> u8 {
+        let points = (0..level.points()).map(|point| &self.multipliers[point * rows.blocks + block]);
+        let positive = |block: &Eight| (0..8).fold(0, |mask, i| mask | u8::from(block.0[i] > 0.0) << i);
+        std::iter::once(&self.start.multipliers[block]).chain(points).fold(0, |mask, block| mask | positive(block))
+    }
+
+    /// Sets the thresholds (m) of nodes in contact to `limit`. Nodes that are deeper than `tolerance` at the start, because
+    /// an input has moved the surface, are not searched.
+    pub(super) fn limit_closed(
+        &self,
+        (rows, level): (&BladeRows, &BladeLevel),
+        thresholds: &mut [Eight],
+        limit: f64,
+        tolerance: f64,
+    ) {
+        for (block, thresholds) in thresholds.iter_mut().enumerate() {
+            let closed = self.closed(rows, level, block);
+            for (i, threshold) in thresholds.0.iter_mut().enumerate().filter(|(i, _)| closed >> i & 1 == 1) {
+                let is_deep = self.start.gaps[block].0[i] < -tolerance;
+                *threshold = if is_deep { f64::NEG_INFINITY } else { limit };
+            }
+        }
+    }
+
+    /// Removes the nodes in contact from the followed nodes, and sets their smallest gaps (m) to infinity.
+    pub(super) fn forget_closed(&mut self, (rows, level): (&BladeRows, &BladeLevel), lowest: &mut [Eight]) {
+        for (block, lowest) in lowest.iter_mut().enumerate() {
+            let closed = self.closed(rows, level, block);
+            self.followed[block] &= !closed;
+            lowest
+                .0
+                .iter_mut()
+                .enumerate()
+                .filter(|(i, _)| closed >> i & 1 == 1)
+                .for_each(|(_, gap)| *gap = f64::INFINITY);
+        }
+    }
+
     /// Selects the nodes that may come closer between the points of the tried step than at the points. They count if they
     /// come closer by more than a fraction of `tolerance` (m), and if their smallest gap may be below `thresholds` (m). Returns
     /// whether there are such nodes.
@@ -314,12 +353,21 @@ impl BladeTrial {
         (rows, level): (&BladeRows, &BladeLevel),
         thresholds: &[Eight],
         tolerance: f64,
-        ends: [f64; 2],
+        (search, ends): (Search, [f64; 2]),
     ) -> bool {
         let unresolved = self.unresolved.unwrap_or_else(|| self.find_interpolation_error(rows, level.step));
         self.unresolved = Some(unresolved);
         let instructions = self.instructions;
-        instructions.run_octets(SelectFollowed { trial: self, rows, level, thresholds, tolerance, unresolved, ends })
+        instructions.run_octets(SelectFollowed {
+            trial: self,
+            rows,
+            level,
+            thresholds,
+            tolerance,
+            unresolved,
+            ends,
+            search,
+        })
     }
 
     /// Advances the modes over the tried step, or over a step without forces, and returns the damping loss (J).

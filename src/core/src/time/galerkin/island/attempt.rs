@@ -394,11 +394,11 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         let SectorInStep { mut surfaces, tables, trial, state, .. } = self.sector(0, step, kind);
         let level = tables.steady.get(step.level)?;
         surfaces.begin_step(step.from, step.length, level, kind);
-        if step.level < HALVINGS {
-            let fast = trial.run_fast_sliding(level, &tables.rows, state, &mut surfaces, precision);
-            if fast.solved {
-                return Some(fast);
-            }
+        let fast = trial.run_fast_sliding(level, &tables.rows, state, &mut surfaces, precision);
+        // A shortest step that needs energy is tried with degree 1 before it is tried with a constant force.
+        let needs_energy = fast.switches && fast.switched > 0.0;
+        if fast.solved && (step.level < HALVINGS || !needs_energy) {
+            return Some(fast);
         }
         let result = trial.run_steady(level, &tables.rows, state, &mut surfaces, precision);
         result.solved.then_some(result)
