@@ -22,7 +22,7 @@ use tiprub_study::{
 const INTERVAL: f64 = 1e-4;
 /// Tolerance, the default of scenes.
 const TOLERANCE: f64 = 1e-2;
-/// Number of repetitions of a full study; the fastest one counts.
+/// Number of repetitions; the fastest one counts.
 const REPETITIONS: usize = 3;
 /// Clearance of blades that do not touch, relative to that of the others.
 const AWAY: f64 = 4.0;
@@ -54,7 +54,6 @@ struct ScalingSize {
     base: RotorSize,
     variations: [Variation; 4],
     milliseconds: u32,
-    repetitions: usize,
 }
 
 const fn variations(
@@ -95,21 +94,14 @@ const fn variations(
 const FULL: ScalingSize = ScalingSize {
     mesh: MeshCounts { chord: 24, thickness: 2, span: 40 },
     base: RotorSize { sectors: 36, modes: 80, patches: 9, touching: None },
-    variations: variations(
-        &[12, 20, 36, 64, 112],
-        &[10, 20, 40, 80, 160],
-        &[3, 5, 9, 17, 33],
-        &[0, 2, 4, 9, 18, 36],
-    ),
+    variations: variations(&[12, 20, 36, 64, 112], &[10, 20, 40, 80, 160], &[3, 5, 9, 17, 33], &[0, 2, 4, 9, 18, 36]),
     milliseconds: 10,
-    repetitions: REPETITIONS,
 };
 const QUICK: ScalingSize = ScalingSize {
     mesh: MeshCounts { chord: 8, thickness: 1, span: 5 },
     base: RotorSize { sectors: 12, modes: 12, patches: 3, touching: None },
     variations: variations(&[6, 12, 24], &[8, 16, 32], &[3, 5, 9], &[0, 3, 6, 12]),
     milliseconds: 4,
-    repetitions: 1,
 };
 
 /// Result of one size.
@@ -154,7 +146,7 @@ impl ScalingSize {
 
     fn point(&self, scene: &Scene, value: usize) -> tiprub_core::Result<ScalingPoint> {
         let mut point = ScalingPoint { value, seconds: f64::INFINITY, trials: 0 };
-        for _ in 0..self.repetitions {
+        for _ in 0..REPETITIONS {
             let mut simulation = Simulation::new(scene)?;
             simulation.skip_unneeded_states();
             simulation.initialise(0.0)?;
@@ -218,8 +210,7 @@ impl<'a> ScalingCurve<'a> {
         let [first, last] = [self.points[0], self.points[self.points.len() - 1]];
         let fitted = self.points.iter().find(|point| point.value > 0).map_or(0, |point| point.value);
         let exponent = |fit: Option<PowerFit>| fit.map_or("unknown".to_owned(), |fit| format!("{:.2}", fit.exponent));
-        let deviation =
-            self.time.map_or("unknown".to_owned(), |fit| format!("{:.0} %", 100.0 * fit.deviation));
+        let deviation = self.time.map_or("unknown".to_owned(), |fit| format!("{:.0} %", 100.0 * fit.deviation));
         vec![
             self.variation.name.to_owned(),
             format!("{fitted} to {}", last.value),
@@ -272,8 +263,14 @@ pub(crate) fn study(common: &StudyCommon, console: &Console) -> Result<Study> {
 }
 
 fn report(size: &ScalingSize, curves: &[ScalingCurve]) -> Study {
-    let columns =
-        ["varied number", "range of the fit", "time (s/s)", "exponent", "largest deviation", "exponent of attempted steps"];
+    let columns = [
+        "varied number",
+        "range of the fit",
+        "time (s/s)",
+        "exponent",
+        "largest deviation",
+        "exponent of attempted steps",
+    ];
     let mut table = Table::new("Exponents of the stepping time", columns);
     table.rows = curves.iter().map(ScalingCurve::cells).collect();
     let mut all = Table::new("Stepping time by size", ["varied number", "value", "time (s/s)", "attempted steps"]);
@@ -284,8 +281,7 @@ fn report(size: &ScalingSize, curves: &[ScalingCurve]) -> Study {
         }));
     }
     let of_blades: Vec<&ScalingCurve> = curves.iter().filter(|curve| curve.variation.is_of_blades).collect();
-    let exponents: Vec<f64> =
-        of_blades.iter().map(|curve| curve.trials.map_or(f64::NAN, |fit| fit.exponent)).collect();
+    let exponents: Vec<f64> = of_blades.iter().map(|curve| curve.trials.map_or(f64::NAN, |fit| fit.exponent)).collect();
     let RotorSize { sectors, modes, patches, .. } = size.base;
     Study {
         name: "scaling",

@@ -164,8 +164,7 @@ impl Rub {
             }
             Ok(rows)
         };
-        rows().unwrap_or_else(|failure| {
-            vec![self.row(&library.name, setting(), INTERVALS[0], Err(failure.to_string()))]
-        })
+        rows()
+            .unwrap_or_else(|failure| vec![self.row(&library.name, setting(), INTERVALS[0], Err(failure.to_string()))])
     }
 }

@@ -122,8 +122,7 @@ impl RubVariant {
 /// # Errors
 /// A run that fails.
 pub(super) fn compare(rub: &Rub, quick: bool) -> Result<(Table, Vec<Value>, Statement)> {
-    let chosen: Vec<&RubVariant> =
-        if quick { vec![&VARIANTS[0], &VARIANTS[8]] } else { VARIANTS.iter().collect() };
+    let chosen: Vec<&RubVariant> = if quick { vec![&VARIANTS[0], &VARIANTS[8]] } else { VARIANTS.iter().collect() };
     let run = |variant: &&RubVariant| {
         variant.errors(rub, quick).map_err(|error| Failure::from_core(format!("lab bench, {}", variant.name), error))
     };
@@ -142,8 +141,8 @@ pub(super) fn compare(rub: &Rub, quick: bool) -> Result<(Table, Vec<Value>, Stat
         worst <= 1.0,
         format!("at most {worst:.2} of the printed error"),
     );
-    let data = found.iter().map(|one| {
-        json!({ "variant": one.name, "tolerances": TOLERANCES, "errors": one.errors, "printed": one.printed })
-    });
+    let data = found.iter().map(
+        |one| json!({ "variant": one.name, "tolerances": TOLERANCES, "errors": one.errors, "printed": one.printed }),
+    );
     Ok((table, data.collect(), statement))
 }
