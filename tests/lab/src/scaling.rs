@@ -193,6 +193,8 @@ struct ScalingCurve<'a> {
     points: Vec<ScalingPoint>,
     time: Option<PowerFit>,
     trials: Option<PowerFit>,
+    /// Fit of the times of the last two points only.
+    last_times: Option<PowerFit>,
 }
 
 impl<'a> ScalingCurve<'a> {
@@ -200,12 +202,13 @@ impl<'a> ScalingCurve<'a> {
     fn new(variation: &'a Variation, points: Vec<ScalingPoint>) -> Self {
         let none = points.first().filter(|point| point.value == 0).copied();
         let rest = &points[usize::from(none.is_some())..];
-        let fit = |of: &dyn Fn(&ScalingPoint) -> f64| {
+        let fit = |points: &[ScalingPoint], of: &dyn Fn(&ScalingPoint) -> f64| {
             let least = none.as_ref().map_or(0.0, of);
-            PowerFit::new(&rest.iter().map(|point| (point.value as f64, of(point) - least)).collect::<Vec<_>>())
+            PowerFit::new(&points.iter().map(|point| (point.value as f64, of(point) - least)).collect::<Vec<_>>())
         };
-        let (time, trials) = (fit(&|point| point.seconds), fit(&|point| point.trials as f64));
-        Self { variation, points, time, trials }
+        let (time, trials) = (fit(rest, &|point| point.seconds), fit(rest, &|point| point.trials as f64));
+        let last_times = fit(&rest[rest.len().saturating_sub(2)..], &|point| point.seconds);
+        Self { variation, points, time, trials, last_times }
     }
 
     fn cells(&self) -> Vec<String> {
@@ -219,6 +222,7 @@ impl<'a> ScalingCurve<'a> {
             format!("{} to {}", rate(first.seconds), rate(last.seconds)),
             exponent(self.time),
             deviation,
+            exponent(self.last_times),
             exponent(self.trials),
         ]
     }
@@ -227,6 +231,7 @@ impl<'a> ScalingCurve<'a> {
         json!({
             "varied": self.variation.name,
             "exponent": self.time.map(|fit| fit.exponent), "deviation": self.time.map(|fit| fit.deviation),
+            "exponent_of_last_two": self.last_times.map(|fit| fit.exponent),
             "exponent_of_trials": self.trials.map(|fit| fit.exponent),
             "points": self.points.iter().map(|point| json!({
                 "value": point.value, "seconds_per_second": point.seconds, "trials": point.trials,
@@ -271,6 +276,7 @@ fn report(size: &ScalingSize, curves: &[ScalingCurve]) -> Study {
         "time (s/s)",
         "exponent",
         "largest deviation",
+        "exponent of the last two values",
         "exponent of attempted steps",
     ];
     let mut table = Table::new("Exponents of the stepping time", columns);
