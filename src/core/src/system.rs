@@ -30,7 +30,7 @@ use crate::modes::modal::ModalModel;
 use crate::scene::method::{Scheme, Solver};
 use crate::system::history::Two;
 pub(crate) use contact_view::Bodies;
-pub use effort::Effort;
+pub use effort::{Effort, EvaluatedBlocks};
 pub use event::ContactEvent;
 pub use failure::StepFailure;
 use group::Reach;
@@ -116,6 +116,7 @@ pub struct System {
     pub(crate) settings: SystemSettings,
     pub(crate) events: Two<Vec<ContactEvent>>,
     pub(crate) counted: RunTotals,
+    pub(crate) evaluated: EvaluatedBlocks,
     pub(crate) steady_phase: SteadyPhase,
     /// Energy of each set before a change of the step size (J).
     mechanical: Vec<f64>,
@@ -161,6 +162,7 @@ impl System {
             settings,
             events: Two { now: room(), before: room() },
             counted: RunTotals::new(vec![Ledger::default(); sets.count()]),
+            evaluated: EvaluatedBlocks::default(),
             steady_phase: SteadyPhase::default(),
             mechanical: vec![0.0; sets.count()],
             sets,
@@ -244,6 +246,11 @@ impl System {
     /// Returns the work of adaptive steps, summed over all sectors.
     pub fn effort(&self) -> &Effort {
         &self.counted.effort
+    }
+
+    /// Returns the evaluated blocks of nodes, summed over all sectors.
+    pub fn evaluated_blocks(&self) -> &EvaluatedBlocks {
+        &self.evaluated
     }
 
     /// Number of attempted steps, including accepted ones.
@@ -344,6 +351,7 @@ impl System {
         }
         let initial = |set| Ledger { initial: self.mechanical_energy(set), ..Ledger::default() };
         self.counted = RunTotals::new((0..self.sets.count()).map(initial).collect());
+        self.evaluated = EvaluatedBlocks::default();
     }
 
     /// Kinetic plus strain energy of a set (J), in the form that the scheme conserves.

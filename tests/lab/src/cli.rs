@@ -15,7 +15,7 @@ use tiprub_study::arguments::{Speeds, StudyCommon, positive, speeds};
 
 use crate::{
     bases, bench, beside, conjugacy, convergence, coupling, cube, error, estimates, inputs, modes, penetration, random,
-    refinement, scatter, stability, stage, wear, witness,
+    refinement, scaling, scatter, stability, stage, wear, witness,
 };
 
 /// Evidence for tiprub: studies of the built-in models and of standard problems.
@@ -90,7 +90,9 @@ pub enum LabCommand {
     /// Penetration of contact nodes between the points of adaptive steps, from sampled displacements.
     Penetration(StudyCommon),
     /// Processor time and error of rubs by tolerance and communication step, beside methods with fixed steps.
-    Bench(StudyCommon),
+    Bench(BenchArguments),
+    /// Growth of the stepping time with the numbers of sectors, modes, patches and touching blades: fitted exponents.
+    Scaling(StudyCommon),
     /// One blade in a coated casing whose radius decreases: wear lobes compared with blade vibrations per revolution.
     Wear(StudyCommon),
 }
@@ -112,6 +114,21 @@ pub struct LabCubeArguments {
     /// Run only the cube with contact patches: takes a minute.
     #[arg(long)]
     pub patches_only: bool,
+    /// Options of all studies.
+    #[command(flatten)]
+    pub common: StudyCommon,
+}
+
+/// Arguments of `lab bench`.
+#[derive(Debug, Args)]
+pub struct BenchArguments {
+    /// Also time the FMU library of another release, in the same run as the library of these sources: a library, or an
+    /// FMU that contains one; may be repeated. Both run the scenes of this study.
+    #[arg(long, value_name = "FILE")]
+    pub library: Vec<PathBuf>,
+    /// Python interpreter with NumPy, which runs the paper's method for comparison.
+    #[arg(long, value_name = "FILE", default_value = "python3")]
+    pub python: PathBuf,
     /// Options of all studies.
     #[command(flatten)]
     pub common: StudyCommon,
@@ -309,7 +326,8 @@ impl LabCli {
             LabCommand::Witness(common) => ("witness", common),
             LabCommand::Stress(common) => ("stress", common),
             LabCommand::Penetration(common) => ("penetration", common),
-            LabCommand::Bench(common) => ("bench", common),
+            LabCommand::Bench(arguments) => ("bench", &arguments.common),
+            LabCommand::Scaling(common) => ("scaling", common),
             LabCommand::Wear(common) => ("wear", common),
         };
         let directory = commands::study::directory(name, common);
@@ -342,7 +360,8 @@ impl LabCli {
             LabCommand::Witness(common) => witness::study(common, console),
             LabCommand::Stress(common) => witness::stress(common, console),
             LabCommand::Penetration(common) => penetration::study(common, console),
-            LabCommand::Bench(common) => bench::study(common, console),
+            LabCommand::Bench(arguments) => bench::study(arguments, console),
+            LabCommand::Scaling(common) => scaling::study(common, console),
             LabCommand::Wear(common) => wear::study(common, console),
             LabCommand::Stability(_) | LabCommand::Random(_) => unreachable!("`run` has answered it"),
         }
@@ -372,6 +391,8 @@ mod tests {
             ("convergence --threads 2", false),
             ("stage scene.toml", false),
             ("beside scene.toml --quick", true),
+            ("bench --library old.so --library old.fmu --python python3", true),
+            ("scaling --library old.so", false),
         ] {
             assert_eq!(LabCli::try_parse_from(["lab"].into_iter().chain(line.split(' '))).is_ok(), right, "{line}");
         }

@@ -5,7 +5,7 @@
 //! - `stability`: stiff and extreme cases, each in a separate process, with a verdict;
 //! - `random`: random valid scenes, small and violent, with the properties that each must have;
 //! - `cube`, `stage`, `convergence`, `modes`: comparison of the built-in models with the paper's figures;
-//! - `bench`: time and error of rubs, with baselines;
+//! - `bench`: time and error of rubs, with baselines; `scaling`: growth of the time with the size of a rub;
 //! - `beside`: any scene of blades compared with an independent stepper;
 //! - `witness`: reduced blades against full finite elements; `bases`: reduction bases of a blade;
 //! - `scatter`: adaptive steps on random rubs and sectors;
@@ -30,6 +30,7 @@ mod modes;
 mod penetration;
 mod random;
 mod refinement;
+mod scaling;
 mod scatter;
 mod stability;
 mod stage;

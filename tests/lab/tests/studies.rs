@@ -3,7 +3,12 @@
 #[path = "../../guide.rs"]
 mod guide;
 
-use std::{collections::BTreeSet, fs, path::Path, process::Command};
+use std::{
+    collections::BTreeSet,
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+};
 
 use serde_json::Value;
 
@@ -245,24 +250,88 @@ fn quick_penetration_study_finds_no_missed_contact() {
     assert!(rows.iter().all(|row| row["touching"].as_u64() > Some(100)), "{rows:#?}");
 }
 
+/// Python of the tests, which has NumPy if `tests/run.sh` has created its environment; otherwise that of the system.
+fn python() -> PathBuf {
+    let own = tiprub_tests::root().join("target/tests-venv/bin/python");
+    if own.is_file() { own } else { "python3".into() }
+}
+
 #[test]
 fn quick_bench_gives_times_and_errors() {
     let root = tempfile::tempdir().unwrap();
-    let json = study(root.path(), "bench", &[]);
+    let library = std::env::var_os("TIPRUB_LIBRARY").map_or_else(tiprub_tests::shared, PathBuf::from);
+    let python = python();
+    let options = ["--library", library.to_str().unwrap(), "--python", python.to_str().unwrap()];
+    let json = study(root.path(), "bench", &options);
+    only_no(&json, &[]);
     let rows = json["results"].as_array().unwrap();
+    let (timed, variants) = rows.split_at(rows.len() - 2);
     assert_eq!(
-        rows.len(),
-        4 * 3 + 3 + 1 + 7,
-        "tolerances by communication steps, fixed steps, the independent solver, features"
+        timed.len(),
+        4 * 3 + 2 * 3 + 3 + 2 + 1 + 7,
+        "tolerances by communication steps, libraries, the paper's method, fixed steps, the independent solver, features"
     );
-    for row in rows {
+    let named = |row: &Value, method: &str| row["method"].as_str().is_some_and(|name| name.contains(method));
+    let of = |method: &'static str| timed.iter().filter(move |row| named(row, method));
+    let with_numpy = Command::new(&python).args(["-c", "import numpy"]).output().is_ok_and(|run| run.status.success());
+    if !with_numpy {
+        let why = of("NumPy").next().unwrap()["rejected"].as_str().unwrap();
+        assert!(why.contains("skipped") && why.contains("Install NumPy"), "{why}");
+    }
+    for row in timed.iter().filter(|row| with_numpy || !named(row, "NumPy")) {
         assert!(row["rejected"].is_null() && row["seconds_per_second"].as_f64() > Some(0.0), "{row:#}");
         assert!(row["error"].as_f64().is_some_and(|error| error > 0.0 && error < 0.5), "{row:#}");
     }
-    let errors: Vec<f64> = rows.iter().map(|row| row["error"].as_f64().unwrap()).collect();
+    let errors: Vec<f64> = of("adaptive").map(|row| row["error"].as_f64().unwrap()).collect();
     assert!(errors[9] < 0.1 * errors[0], "a smaller tolerance gives a smaller error: {errors:?}");
-    let table = fs::read_to_string(root.path().join("out/bench.md")).unwrap();
+    for row in of("library") {
+        let off = row["error"].as_f64().unwrap() / errors[3] - 1.0;
+        assert!(off.abs() < 1e-9, "a library and the core give the same displacements: {row:#}");
+    }
+    let dense: Vec<f64> = of("dense matrices").filter_map(|row| row["error"].as_f64()).collect();
+    assert!(dense.iter().all(|error| (error / dense[0] - 1.0).abs() < 1e-6), "Rust and NumPy: {dense:?}");
+    for variant in variants {
+        let errors: Vec<f64> = variant["errors"].as_array().unwrap().iter().map(|one| one.as_f64().unwrap()).collect();
+        assert!(errors[3] > 0.0 && errors[3] < 0.1 * errors[0], "{variant:#}");
+    }
+    let read = |name: &str| fs::read_to_string(root.path().join("out").join(name)).unwrap();
+    let table = read("bench.md");
     assert!(table.contains("| ms per revolution |") && table.contains("| central-difference + film |"), "{table}");
+    assert_eq!(read("tolerances.md").lines().count(), 2 + 2 + 2);
+    assert_eq!(read("features.md").lines().count(), 2 + 2 + 7);
+}
+
+#[test]
+fn bench_rejects_files_without_a_library() {
+    let root = tempfile::tempdir().unwrap();
+    let file = root.path().join("old.so");
+    fs::write(&file, "text").unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_lab"));
+    command.current_dir(root.path()).args(["bench", "--quick", "--library", "old.so"]);
+    let reported = String::from_utf8(command.output().unwrap().stderr).unwrap();
+    assert!(reported.contains("old.so: is not a complete shared library"), "{reported}");
+}
+
+#[test]
+fn quick_scaling_study_fits_every_variation() {
+    let root = tempfile::tempdir().unwrap();
+    let json = study(root.path(), "scaling", &[]);
+    only_no(&json, &[]);
+    let curves = json["results"].as_array().unwrap();
+    let names: Vec<&str> = curves.iter().map(|curve| curve["varied"].as_str().unwrap()).collect();
+    assert_eq!(names, ["sectors", "modes per blade", "patches per blade", "touching blades"]);
+    for curve in curves {
+        // Differences of times can vanish on a busy machine; numbers of steps are the same in every run.
+        assert!(curve["varied"] == "touching blades" || curve["exponent"].as_f64().is_some(), "{curve:#}");
+        assert!((0.0..1.2).contains(&curve["exponent_of_trials"].as_f64().unwrap()), "{curve:#}");
+        let points = curve["points"].as_array().unwrap();
+        assert!(points.len() >= 3 && points.iter().all(|point| point["trials"].as_u64() > Some(0)), "{curve:#}");
+    }
+    let read = |name: &str| fs::read_to_string(root.path().join("out").join(name)).unwrap();
+    assert_eq!(read("scaling.md").lines().count(), 2 + 2 + 4);
+    assert_eq!(read("points.md").lines().count(), 2 + 2 + 3 + 3 + 3 + 4);
+    let (_, progress) = lab(root.path(), env!("CARGO_TARGET_TMPDIR"), &["scaling", "--quick", "--out", "out"]);
+    assert!(progress.contains("point 13 of 13: 12 touching blades"), "{progress}");
 }
 
 /// The errors occur before any reduction, and no directory is created.
@@ -293,6 +362,7 @@ fn rejects_unsupported_studies_before_running() {
         "scatter",
         "penetration",
         "bench",
+        "scaling",
         "wear",
     ] {
         let reported = refuse(&[name, "--quick", "--out", "file/out"], 1);

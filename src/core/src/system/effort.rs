@@ -21,6 +21,31 @@ pub struct Effort {
     pub factorisations: u64,
 }
 
+/// Work of the steps of blades on surfaces of revolution: evaluated blocks of eight nodes since the start. It depends on
+/// the communication step and on the outputs, so it is not part of a saved state.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct EvaluatedBlocks {
+    /// Number of blocks of eight gaps that were evaluated.
+    pub gaps: u64,
+    /// Number of blocks of eight displacements or velocities, along one direction, that were computed from the modes.
+    pub displacements: u64,
+}
+
+impl EvaluatedBlocks {
+    /// Counts an evaluation: of `gaps` blocks of gaps, and `displacements` blocks of displacements for each of them.
+    #[inline(always)]
+    pub(crate) fn count(&mut self, gaps: usize, displacements: usize) {
+        self.gaps += gaps as u64;
+        self.displacements += (gaps * displacements) as u64;
+    }
+
+    /// Adds the work of further steps.
+    pub(crate) fn add(&mut self, other: &Self) {
+        self.gaps += other.gaps;
+        self.displacements += other.displacements;
+    }
+}
+
 persist_fields!(Effort { steps, flights, trials, unsolved, constant, missed, factorisations });
 
 impl Effort {

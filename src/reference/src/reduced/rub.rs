@@ -36,13 +36,13 @@ pub struct BumpedCasing {
 
 /// Contact state of a point of a tip at the casing; directions are radial, tangential, axial.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Touch {
+pub struct Touch {
     /// Gap (m).
-    pub(crate) gap: f64,
+    pub gap: f64,
     /// Gradient of the gap with respect to displacements.
-    pub(crate) normal: [f64; 3],
+    pub normal: [f64; 3],
     /// Force per unit multiplier, friction included.
-    pub(crate) force: [f64; 3],
+    pub force: [f64; 3],
     /// Rate of the gap due to rotation and growth (m/s).
     pub(crate) rate: f64,
 }
@@ -65,7 +65,7 @@ impl BumpedCasing {
     }
 
     /// Evaluates a point of the tip displaced by `moved` (m), at a time (s).
-    pub(crate) fn meets(&self, tip: &RubTip, time: f64, [radial, tangential, axial]: [f64; 3]) -> Touch {
+    pub fn meets(&self, tip: &RubTip, time: f64, [radial, tangential, axial]: [f64; 3]) -> Touch {
         let [shape, slope, growth] = self.shape(tip.angle + self.speed * time + tangential / tip.radius, time);
         let gradient = [-1.0, slope / tip.radius, tip.slope];
         let length = gradient.iter().map(|g| g * g).sum::<f64>().sqrt();
@@ -126,6 +126,11 @@ impl BladeScene {
             own.iter_mut().for_each(|frequency| *frequency *= factor);
         }
         Some(Self { load: vec![0.0; modes.len()], rows, modes, blades })
+    }
+
+    /// Returns the matrices and the surroundings.
+    pub fn blades(&self) -> &Blades {
+        &self.blades
     }
 
     fn each(&self) -> usize {

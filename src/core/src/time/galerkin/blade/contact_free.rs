@@ -168,7 +168,7 @@ impl BoundContactFreeStep<'_> {
     #[inline(always)]
     fn find_gaps<L: Octet>(&mut self, end: usize) {
         let Self { trial, rows, level, halvings, surface, drives, .. } = self;
-        let BladeTrial { start, path, path_moved: [moved, _], slow_mode_gaps, angles, .. } = &mut **trial;
+        let BladeTrial { start, path, path_moved: [moved, _], slow_mode_gaps, angles, evaluated, .. } = &mut **trial;
         let modes = &mut path[0].modes;
         for k in 0..level.slow_blocks {
             let [q, v] = both(|of| L::select(level.slow[k], L::load(&start.modes[of][k]), L::zero()));
@@ -181,6 +181,7 @@ impl BoundContactFreeStep<'_> {
             }
         }
         displace_nodes::<L, 1, 2>(rows, [0], level.slow_blocks, [&modes[0], &modes[1]], [&mut moved[..]]);
+        evaluated.count(rows.blocks, 2);
         let ((drive, rate), target) = (&drives[end], &mut slow_mode_gaps[end]);
         for block in 0..rows.blocks {
             let angle = L::load(&angles[block]) + L::splat(drive.turned);

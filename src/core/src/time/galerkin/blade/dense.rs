@@ -79,7 +79,8 @@ impl OctetKernel for DenseOutput<'_> {
     #[inline(always)]
     fn run<L: Octet>(mut self) {
         self.find_modes::<L>();
-        let BladeTrial { start, sample, path_moved, .. } = &mut *self.trial;
+        let BladeTrial { start, sample, path_moved, evaluated, .. } = &mut *self.trial;
+        evaluated.count(self.rows.blocks, 4);
         if !self.pushes {
             sample.multipliers.fill(Eight::ZERO);
             sample.forces.iter_mut().for_each(|forces| forces.fill(Eight::ZERO));

@@ -195,7 +195,8 @@ impl<D: Fn(f64) -> (PointDrive, DriveRate)> Follow<'_, D> {
         let (drive, rate) = (self.drive_at)(theta);
         let Self { trial, rows, faced, ends, .. } = self;
         let is_recorded = ends[0] <= theta && theta <= ends[1];
-        let BladeTrial { path, path_moved, angles, directions_of_nodes, followed, .. } = &mut **trial;
+        let BladeTrial { path, path_moved, angles, directions_of_nodes, followed, evaluated, .. } = &mut **trial;
+        evaluated.count(followed.iter().filter(|followed| **followed != 0).count(), 4);
         for block in (0..rows.blocks).filter(|block| followed[*block] != 0) {
             let per_radius = L::load(&rows.per_radius[block]);
             let [closing, around] = both(|along| L::load(&path_moved[along][block]));

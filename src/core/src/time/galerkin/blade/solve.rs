@@ -90,7 +90,7 @@ impl Attempt<'_> {
     /// Computes the displacements at the points without forces after the start of the step.
     #[inline(always)]
     fn move_freely<L: Octet, const P: usize>(&mut self) {
-        let Self { trial: BladeTrial { start, modal, moved, held, .. }, rows, level, .. } = self;
+        let Self { trial: BladeTrial { start, modal, moved, held, evaluated, .. }, rows, level, .. } = self;
         let [q, v] = &start.modes;
         for (modal, [a, b]) in modal.iter_mut().zip(&level.free).take(P) {
             for (block, modal) in modal.iter_mut().enumerate() {
@@ -103,6 +103,7 @@ impl Attempt<'_> {
         let width = level.blocks;
         let (closing, around) = (&mut closing[..width], &mut around[..width]);
         displace_nodes::<L, 2, P>(rows, [0, 1], rows.mode_blocks, modes, [closing, around]);
+        evaluated.count(width, 2);
         held.copy_from_slice(&start.held[1]);
         if level.kind == ForceInterpolation::Constant {
             // The force at the start does not persist into the step.

@@ -15,6 +15,7 @@ use crate::geometry::GapLaw;
 use crate::geometry::revolution::RevolutionGap;
 use crate::math::octet::Eight;
 use crate::scene::method::Solver;
+use crate::system::EvaluatedBlocks;
 use crate::system::structure::NeededMinima;
 use crate::time::galerkin::basis::POINTS;
 use crate::time::galerkin::island::StepControl;
@@ -161,6 +162,11 @@ impl Blade {
             responses: ModeResponse::allocate_cache(rows),
             next_response: 0,
         }
+    }
+
+    /// Returns the blocks evaluated since the last call.
+    pub(crate) fn take_evaluated(&mut self) -> EvaluatedBlocks {
+        take(&mut self.trial.evaluated)
     }
 
     /// Starts a span of a sector with these gaps (m) of its nodes, and finds which smallest gaps are needed.

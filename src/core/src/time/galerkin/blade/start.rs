@@ -25,7 +25,7 @@ impl OctetKernel for FindStart<'_> {
     #[inline(always)]
     fn run<L: Octet>(self) {
         let Self { known, trial, rows, faced } = self;
-        let BladeTrial { start, angles, directions_of_nodes, .. } = trial;
+        let BladeTrial { start, angles, directions_of_nodes, evaluated, .. } = trial;
         let [q, v] = &start.modes;
         for target in 0..rows.blocks {
             let mut held = both(|_| L::zero());
@@ -64,6 +64,7 @@ impl OctetKernel for FindStart<'_> {
         if !known {
             let [closings, arounds] = &mut start.moved;
             displace_nodes::<L, 2, 1>(rows, [0, 1], rows.mode_blocks, [q], [closings, arounds]);
+            evaluated.count(rows.blocks, 2);
         }
         for block in 0..rows.blocks {
             let per_radius = L::load(&rows.per_radius[block]);

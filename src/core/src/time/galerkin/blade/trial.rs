@@ -15,6 +15,7 @@ use crate::geometry::layout::Layout;
 use crate::math::octet::Eight;
 use crate::math::simd::InstructionSet;
 use crate::math::vector::{set_vector3_at, vector3_at};
+use crate::system::EvaluatedBlocks;
 use crate::time::galerkin::basis::MOST;
 use crate::time::galerkin::record::ShaftBounds;
 use crate::time::galerkin::state::SectorState;
@@ -153,6 +154,8 @@ pub(crate) struct BladeTrial {
     /// Gaps at the start and at the end of the last step without a trial.
     pub(super) slow_mode_gaps: [SlowModeGaps; 2],
     pub(super) instructions: InstructionSet,
+    /// Blocks of nodes evaluated since the counts were last taken.
+    pub(super) evaluated: EvaluatedBlocks,
 }
 
 impl BladeTrial {
@@ -209,6 +212,7 @@ impl BladeTrial {
             gap_bounds: of_nodes(),
             slow_mode_gaps: [SlowModeGaps::new(nodes), SlowModeGaps::new(nodes)],
             instructions: InstructionSet::detect(),
+            evaluated: EvaluatedBlocks::default(),
         }
     }
 

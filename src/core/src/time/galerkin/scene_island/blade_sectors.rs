@@ -11,7 +11,7 @@ use crate::geometry::revolution::RevolutionGap;
 use crate::system::contact_view::ContactMember;
 use crate::system::pair::Prescribed;
 use crate::system::structure::UNKNOWN_GAP;
-use crate::system::{ContactPair, Effort, StepFailure, Structure, System};
+use crate::system::{ContactPair, Effort, EvaluatedBlocks, StepFailure, Structure, System};
 use crate::time::SteadyInterval;
 use crate::time::galerkin::blade::{
     Blade, BladeInSpan, BladeModel, BladePlace, BladeTally, SkippedSector, StoredStep, mark_unsampled,
@@ -70,6 +70,7 @@ pub(super) struct SectorResult {
     /// Kinetic and strain energy at the end of an interval of a steady phase (J).
     pub energies: [f64; 2],
     pub effort: Effort,
+    pub evaluated: EvaluatedBlocks,
     /// True if a gap of the last trial is not a number.
     pub is_lost: bool,
     pub outcome: Result<(), Stopped>,
@@ -179,6 +180,7 @@ impl BladeSectors {
             sampled: Sampled::State,
             energies: [0.0; 2],
             effort: Effort::default(),
+            evaluated: EvaluatedBlocks::default(),
             is_lost: false,
             outcome: Ok(()),
         };
@@ -242,9 +244,10 @@ impl BladeSectors {
     pub fn enter(&self, sector: usize, system: &mut System, of: SpanOfSectors) -> Result<(), StepFailure> {
         let SpanOfSectors { span, set, structure, pair, goal, .. } = of;
         let result = &self.results[self.result_place(sector)];
-        let System { structures, events, counted, .. } = system;
+        let System { structures, events, counted, evaluated, .. } = system;
         let of = &mut structures[structure];
         counted.effort.add(&result.effort);
+        evaluated.add(&result.evaluated);
         if result.outcome == Err(Stopped::Exhausted) || counted.effort.tried() > goal.most {
             return Err(StepFailure::Exhausted);
         }
@@ -316,6 +319,7 @@ impl SectorsInSpan<'_> {
         let (kind, control) = (bank.set_of(sector), structure.step_control_of(sector));
         (result.kind, result.control) = (kind, control);
         (result.effort, result.outcome) = (Effort::default(), Ok(()));
+        result.evaluated = EvaluatedBlocks::default();
         (result.sampled, result.is_lost) = (Sampled::State, false);
         structure.read_gaps(sector, state);
         let stored = StoredStep::new(open_step).filter(|_| matches!(self.span, SectorSpan::Interval(_)));
@@ -354,6 +358,7 @@ impl SectorsInSpan<'_> {
             SectorSpan::End(interval) => self.end(&mut steps, interval, open_step, result),
         }
         swap(&mut result.tally, &mut blade.tally);
+        result.evaluated = blade.take_evaluated();
         if result.sampled == Sampled::State {
             result.displacements.copy_from_slice(trial.displacements(&self.tables[result.kind].rows, &result.state));
         }
