@@ -3,7 +3,7 @@
 
 use super::{Island, IslandInSpan, IslandSector, SectorInStep};
 use crate::time::galerkin::carrier::{BLOCKS, CarrierIntegrator};
-use crate::time::galerkin::span::SpanStep;
+use crate::time::galerkin::span::{SpanStep, StepGoal};
 use crate::time::galerkin::surroundings::{Surroundings, Witness};
 use crate::time::galerkin::tables::HALVINGS;
 use crate::time::galerkin::trial::{ForceInterpolation, Obstacle, TrialResult};
@@ -390,14 +390,14 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         if kind == ForceInterpolation::Constant || !self.island.is_single() {
             return None;
         }
-        let precision = self.goal.precision;
+        let StepGoal { precision, tolerance, .. } = self.goal;
         let SectorInStep { mut surfaces, tables, trial, state, .. } = self.sector(0, step, kind);
         let level = tables.steady.get(step.level)?;
         surfaces.begin_step(step.from, step.length, level, kind);
         let fast = trial.run_fast_sliding(level, &tables.rows, state, &mut surfaces, precision);
-        // A shortest step that needs energy is tried with degree 1 before it is tried with a constant force.
+        // A shortest step that misses the tolerance or needs energy is also tried with degree 1.
         let needs_energy = fast.switches && fast.switched > 0.0;
-        if fast.solved && (step.level < HALVINGS || !needs_energy) {
+        if fast.solved && (step.level < HALVINGS || !needs_energy && !fast.misses(tolerance)) {
             return Some(fast);
         }
         let result = trial.run_steady(level, &tables.rows, state, &mut surfaces, precision);
