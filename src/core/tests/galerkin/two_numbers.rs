@@ -182,8 +182,8 @@ fn two_numbers_per_node_agree_with_three() {
             let force = apart(&two.forces, &three.forces);
             println!("{name}, {tolerance:e}: {moved:.1e} {force:.1e}, trials {} {}", two.trials, three.trials);
             assert!(three.forces.iter().any(|force| *force != 0.0), "{name}: no contact");
-            // Only steps with two numbers per node bound the penetration of nodes in contact.
-            assert!(moved < 0.3 * tolerance && force < 2.0 * tolerance, "{name}, {tolerance:e}: {moved:e} {force:e}");
+            // The steps differ, because only steps with two numbers per node bound the penetration of nodes in contact.
+            assert!(moved < 2.0 * tolerance && force < 2.0 * tolerance, "{name}, {tolerance:e}: {moved:e} {force:e}");
         }
     }
 }
