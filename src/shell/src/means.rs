@@ -24,9 +24,9 @@ pub fn means(run: &NativeRun) -> Vec<NamedValue> {
         NamedValue { name: "mean_total_normal_force".to_owned(), value: impulse / length }
     });
     let outputs = scalars(run, |span, _| span == Span::Mean);
-    let mean = |(name, column): (&String, usize)| NamedValue {
-        name: with_prefix("mean_", name),
-        value: integral(recording, column) / length,
+    let mean = |(name, column): (&String, usize)| {
+        let values: Vec<f64> = (0..recording.rows()).map(|row| recording.row(row)[column]).collect();
+        NamedValue { name: with_prefix("mean_", name), value: integral(recording, &values) / length }
     };
     force.into_iter().chain(outputs.map(mean)).collect()
 }
@@ -48,10 +48,9 @@ pub fn json(values: &[NamedValue]) -> Value {
     values.iter().map(|entry| (entry.name.clone(), json!(entry.value))).collect::<serde_json::Map<_, _>>().into()
 }
 
-/// Integrates a column of means over each communication step.
-pub fn integral(recording: &Recording, column: usize) -> f64 {
-    let steps = recording.times.windows(2).zip(1..);
-    steps.map(|(ends, row)| (ends[1] - ends[0]) * recording.row(row)[column]).sum()
+/// Integrates an output that is a mean over each communication step over the run. The value at the start has no step.
+pub fn integral(recording: &Recording, values: &[f64]) -> f64 {
+    recording.times.windows(2).zip(values.iter().skip(1)).map(|(ends, mean)| (ends[1] - ends[0]) * mean).sum()
 }
 
 /// Returns names and columns of the scalar outputs that `is_wanted` selects by their span and by whether they are energies.

@@ -37,6 +37,11 @@ use crate::{
 
 /// Number of runs whose scenes are tried for the check of names, until one is accepted.
 const MOST_TRIED: usize = 8;
+/// Number of results of slow checks that are kept.
+const MOST_CHECKS: usize = 256;
+/// Parts of the names of parameters on which slow checks depend.
+const CHECKED_PARAMETERS: [&str; 7] =
+    ["friction", "damping", "internal_step", "scheme", "solver", "tolerance", "velocity"];
 /// Key of the digest of all rows in the file of histories.
 const ROWS_FACT: &str = "tiprub.rows";
 
@@ -118,8 +123,11 @@ pub struct SweepOutcome {
 /// # Errors
 /// A variable does not exist, a reduction has wrong arguments, or a file cannot be written. Rejected and failed runs are rows, not errors.
 pub fn run(request: &SweepRequest) -> Result<SweepOutcome> {
-    let mut part = PartRun::prepare(request)?;
-    part.run_pending()?;
+    let (mut part, created) = PartRun::prepare(request)?;
+    if !part.pending.is_empty() {
+        part.check_names().inspect_err(|_| remove(&created))?;
+        part.run_pending()?;
+    }
     part.complete()
 }
 
@@ -139,18 +147,20 @@ pub struct SweepSize {
 /// # Errors
 /// The errors of [`run`].
 pub fn check(request: &SweepRequest) -> Result<SweepSize> {
-    let files = SweepFiles::new(request.output);
-    let journals = [files.journal, files.history_journal];
-    let created: Vec<PathBuf> = journals.into_iter().filter(|path| !path.exists()).collect();
-    let mut part = PartRun::prepare(request)?;
+    let (mut part, created) = PartRun::prepare(request)?;
     let checked = part.check_names();
+    remove(&created);
+    checked?;
+    let (runs, pending) = (part.digests.len(), part.pending.len());
+    Ok(SweepSize { plan_runs: request.plan.design.runs(), runs, pending })
+}
+
+/// Removes journals without rows.
+fn remove(created: &[PathBuf]) {
     for path in created {
         // The journal of histories exists only if the plan requests them.
         let _ = std::fs::remove_file(path);
     }
-    checked?;
-    let (runs, pending) = (part.digests.len(), part.pending.len());
-    Ok(SweepSize { plan_runs: request.plan.design.runs(), runs, pending })
 }
 
 /// Part with its journals.
@@ -172,8 +182,8 @@ struct PartRun<'a> {
 }
 
 impl<'a> PartRun<'a> {
-    /// Opens the journals, and finds the runs without a row.
-    fn prepare(request: &'a SweepRequest<'a>) -> Result<Self> {
+    /// Opens the journals, and finds the runs without a row. Also returns the journals that did not exist.
+    fn prepare(request: &'a SweepRequest<'a>) -> Result<(Self, Vec<PathBuf>)> {
         let SweepRequest { plan, output, .. } = *request;
         let files = SweepFiles::new(output);
         let mut store = RomStore::new(request.sources, plan.directory(), request.cache, &files.models);
@@ -186,13 +196,15 @@ impl<'a> PartRun<'a> {
         if output.exists() {
             rows.extend(result_file::read(output)?.into_iter().map(|row| (row.digest.clone(), row)));
         }
+        let journals = [&files.journal, &files.history_journal];
+        let created = journals.into_iter().filter(|path| !path.exists()).cloned().collect();
         let (journal, found) = Journal::open(&files.journal)?;
         rows.extend(found.into_iter().map(|row| (row.digest.clone(), row)));
         let histories = plan.histories.as_ref().map(|_| HistoryJournal::open(&files.history_journal)).transpose()?;
         let mut part =
             Self { request, files, first, digests, rows, pending: Vec::new(), resumed: 0, journal, histories, store };
         part.find_pending();
-        Ok(part)
+        Ok((part, created))
     }
 
     fn find_pending(&mut self) {
@@ -278,15 +290,11 @@ impl<'a> PartRun<'a> {
 
     /// Does the pending runs, and appends each row to the journal.
     fn run_pending(&mut self) -> Result<()> {
-        if self.pending.is_empty() {
-            return Ok(());
-        }
         let SweepRequest { stop, console, threads, .. } = *self.request;
         if self.resumed > 0 {
             let (done, all) = (self.resumed, self.digests.len());
             console.print_progress(format_args!("{done} of {all} runs are already finished"));
         }
-        self.check_names()?;
         for run in self.pending.clone() {
             if stop.load(Ordering::Relaxed) {
                 return Ok(());
@@ -304,7 +312,7 @@ impl<'a> PartRun<'a> {
             digests: &self.digests,
             store: &self.store,
             scene: Mutex::new(None),
-            checks: Mutex::new(Arc::new(Vec::new())),
+            checks: Mutex::default(),
         };
         let mut is_announced = false;
         let finished = |_, (row, history): (Row, Option<History>)| {
@@ -392,6 +400,13 @@ impl<'a> PartRun<'a> {
     }
 }
 
+/// Returns a key for results of slow checks. A result has its own key in the simulation, so a coarse key here never changes a row.
+fn checks_key(scene: &str, settings: &[(String, String)]) -> String {
+    let matters = |name: &str| CHECKED_PARAMETERS.iter().any(|part| name.contains(part));
+    let settings = settings.iter().filter(|(name, _)| matters(name));
+    settings.fold(scene.to_owned(), |key, (name, value)| format!("{key}\n{name}={value}"))
+}
+
 /// Does single runs, on any thread.
 struct Worker<'a> {
     request: &'a SweepRequest<'a>,
@@ -400,8 +415,8 @@ struct Worker<'a> {
     store: &'a RomStore<'a>,
     /// Last scene with its digest; runs that differ in start values only share it.
     scene: Mutex<Option<(String, Arc<Scene>)>>,
-    /// Results of slow checks of the last run.
-    checks: Mutex<Arc<Vec<u8>>>,
+    /// Results of slow checks, by the scene and the start values on which they may depend.
+    checks: Mutex<HashMap<String, Arc<Vec<u8>>>>,
 }
 
 impl Worker<'_> {
@@ -431,14 +446,17 @@ impl Worker<'_> {
         let case = Case::new(plan, run).map_err(refused)?;
         let scene = self.scene(&case, &digest.scene).map_err(refused)?;
         let schedule = plan.schedule(&scene.settings).map_err(refused)?;
-        let checks = self.checks.lock().map(|checks| checks.clone()).unwrap_or_default();
+        let key = checks_key(&digest.scene, &case.settings);
+        let known = self.checks.lock().ok().and_then(|checks| checks.get(&key).cloned());
+        let checks = known.unwrap_or_else(|| Arc::new(self.request.cache.checks(&scene)));
         let given = RunInputs { settings: &case.settings, checks: &checks, ..RunInputs::default() };
         let started = StartedRun::new(&scene, &schedule, given).map_err(refused)?;
         let results = started.finish(&|_| {}).map_err(|failure| (Status::Failed, failure))?;
-        if let Ok(mut checks) = self.checks.lock()
-            && !results.checks.is_empty()
-        {
-            *checks = Arc::new(results.checks.clone());
+        if let Ok(mut checks) = self.checks.lock() {
+            if checks.len() >= MOST_CHECKS {
+                checks.clear();
+            }
+            checks.entry(key).or_insert_with(|| Arc::new(results.checks.clone()));
         }
         Ok((results, schedule))
     }
@@ -453,5 +471,22 @@ impl Worker<'_> {
             *last = Some((digest.to_owned(), scene.clone()));
         }
         Ok(scene)
+    }
+}
+
+#[cfg(test)]
+mod unit_tests {
+    use super::*;
+
+    #[test]
+    fn runs_that_differ_in_speed_share_slow_checks() {
+        let key = |settings: &[(&str, &str)]| {
+            let pairs = settings.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned()));
+            checks_key("scene", &pairs.collect::<Vec<_>>())
+        };
+        let base = key(&[("speed", "1"), ("friction_coefficient", "0.1")]);
+        assert_eq!(key(&[("speed", "2"), ("friction_coefficient", "0.1"), ("gap_offset", "1e-5")]), base);
+        assert_ne!(key(&[("speed", "1"), ("friction_coefficient", "0.2")]), base);
+        assert_ne!(key(&[("speed", "1"), ("friction_coefficient", "0.1"), ("solver", "film")]), base);
     }
 }

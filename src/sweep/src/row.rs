@@ -143,14 +143,15 @@ impl Row {
     }
 }
 
+/// Begins the option of `tiprub run` for a start value, which messages name.
+const SETTING: &str = "--set ";
+
 /// Returns the reason of a failure, without places in the changed scene and without options of `tiprub run`.
 fn reason(failure: &Failure) -> String {
     let mut failure = failure.clone();
-    let is_changed = failure.diagnostic.place.as_deref().is_some_and(|place| place.starts_with(CHANGED_SCENE));
-    if is_changed {
-        failure.diagnostic.place = None;
-    }
-    if let Some(variable) = failure.diagnostic.what.strip_prefix("--set ").map(str::to_owned) {
+    let is_hidden = |place: &str| place.starts_with(CHANGED_SCENE) || place.starts_with(SETTING);
+    failure.diagnostic.place = failure.diagnostic.place.filter(|place| !is_hidden(place));
+    if let Some(variable) = failure.diagnostic.what.strip_prefix(SETTING).map(str::to_owned) {
         failure.diagnostic.what = variable;
     }
     failure.to_string()
@@ -174,6 +175,8 @@ mod tests {
         let failure = Failure::new("contact[1].gap", "is negative", "Give 0 or more");
         let placed = failure.clone().at(format!("{CHANGED_SCENE}:12:3"));
         assert_eq!(reason(&placed), reason(&failure));
+        let ranged = Failure::new("variable `speed`", "9 is out of range", "Give less").at("--set speed=9");
+        assert_eq!(reason(&ranged), "variable `speed`: 9 is out of range. Give less.");
         assert!(reason(&failure.at("blade.rom.safetensors")).starts_with("blade.rom.safetensors: contact[1].gap"));
     }
 }

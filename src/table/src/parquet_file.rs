@@ -9,7 +9,7 @@ use parquet::{
     errors::ParquetError,
     file::{
         metadata::KeyValue,
-        properties::WriterProperties,
+        properties::{EnabledStatistics, WriterProperties},
         reader::{FileReader, SerializedFileReader},
         writer::SerializedFileWriter,
     },
@@ -83,6 +83,8 @@ impl<'a> ParquetWriter<'a> {
         let facts = facts.iter().map(|(key, value)| KeyValue::new((*key).to_owned(), value.clone())).collect();
         let properties = WriterProperties::builder()
             .set_compression(Compression::SNAPPY)
+            .set_statistics_enabled(EnabledStatistics::Chunk)
+            .set_offset_index_disabled(true)
             .set_created_by(concat!("tiprub ", env!("CARGO_PKG_VERSION")).to_owned())
             .set_key_value_metadata(Some(facts))
             .build();
