@@ -35,6 +35,13 @@ fn project() -> Project {
     project
 }
 
+/// Project whose runs are long enough to be killed in the middle of the sweep, also on a busy machine.
+fn slow_project() -> Project {
+    let project = Project::new();
+    fs::write(project.path("plan.toml"), PLAN.replace("stop = 3.0", "stop = 12.0")).unwrap();
+    project
+}
+
 /// Runs a sweep and returns its answer.
 fn swept(project: &Project, arguments: &[&str]) -> Value {
     let all = [&["sweep", "plan.toml", "--json", "--quiet"], arguments].concat();
@@ -76,7 +83,7 @@ fn wait_for_rows(project: &Project, journal: &str, rows: usize) {
 /// The program is killed twice in the middle, and continues each time.
 #[test]
 fn killed_sweep_resumes_and_gives_the_same_rows() {
-    let project = project();
+    let project = slow_project();
     let answer = swept(&project, &["-o", "undisturbed.parquet"]);
     let numbers = ["plan_runs", "runs", "finished", "refused", "failed", "finished_before"];
     assert_eq!(numbers.map(|name| answer[name].as_u64().unwrap()), [24, 24, 18, 6, 0, 0]);
@@ -172,7 +179,7 @@ fn row_equals_the_single_run() {
 #[test]
 #[cfg(unix)]
 fn interrupted_sweep_reports_how_to_continue() {
-    let project = project();
+    let project = slow_project();
     let child = command(&project, &["sweep", "plan.toml", "--threads", "1"]).spawn().unwrap();
     wait_for_rows(&project, "plan.parquet.journal", 2);
     let number = child.id().to_string();

@@ -427,7 +427,7 @@ impl Worker<'_> {
         let work = catch_unwind(AssertUnwindSafe(|| self.results(run, digest)));
         let result = work.unwrap_or_else(|_| {
             let remedy = "Report it to the developers, with the plan and the messages on the terminal";
-            Err((Status::Failed, Failure::new("tiprub", "an internal error stopped the run", remedy)))
+            Err(Box::new((Status::Failed, Failure::new("tiprub", "an internal error stopped the run", remedy))))
         });
         let seconds = clock.elapsed().as_secs_f64();
         match result {
@@ -436,12 +436,12 @@ impl Worker<'_> {
                 let history = request.map(|request| History::of(&results.recording, request));
                 (Row::finished(&digest.run, &results, &schedule, seconds), history)
             }
-            Err((status, failure)) => (Row::without_results(&digest.run, status, &failure, seconds), None),
+            Err(end) => (Row::without_results(&digest.run, end.0, &end.1, seconds), None),
         }
     }
 
-    fn results(&self, run: usize, digest: &CaseDigest) -> Result<(NativeRun, Schedule), (Status, Failure)> {
-        let refused = |failure| (Status::Refused, failure);
+    fn results(&self, run: usize, digest: &CaseDigest) -> Result<(NativeRun, Schedule), Box<(Status, Failure)>> {
+        let refused = |failure| Box::new((Status::Refused, failure));
         let plan = self.request.plan;
         let case = Case::new(plan, run).map_err(refused)?;
         let scene = self.scene(&case, &digest.scene).map_err(refused)?;
@@ -451,7 +451,7 @@ impl Worker<'_> {
         let checks = known.unwrap_or_else(|| Arc::new(self.request.cache.checks(&scene)));
         let given = RunInputs { settings: &case.settings, checks: &checks, ..RunInputs::default() };
         let started = StartedRun::new(&scene, &schedule, given).map_err(refused)?;
-        let results = started.finish(&|_| {}).map_err(|failure| (Status::Failed, failure))?;
+        let results = started.finish(&|_| {}).map_err(|failure| Box::new((Status::Failed, failure)))?;
         if let Ok(mut checks) = self.checks.lock() {
             if checks.len() >= MOST_CHECKS {
                 checks.clear();

@@ -308,11 +308,11 @@ fn rom_rules(entries: &BTreeMap<String, RomEntry>, scene: &toml::Table) -> Resul
     entries.iter().map(rule).collect()
 }
 
+/// Names of variables with their entries in the plan; a column of a table may have none.
+type NamedEntries<'a> = Vec<(String, Option<&'a VariableEntry>)>;
+
 /// Returns the variables with their fields and labels, and a column of values for each.
-fn columns<'a>(
-    file: &'a PlanFile,
-    directory: &Path,
-) -> Result<(Vec<(String, Option<&'a VariableEntry>)>, Vec<Column>)> {
+fn columns<'a>(file: &'a PlanFile, directory: &Path) -> Result<(NamedEntries<'a>, Vec<Column>)> {
     if file.design == DesignKind::Table {
         return table_columns(file, directory);
     }
@@ -335,10 +335,7 @@ fn columns<'a>(
 }
 
 /// Returns the columns of a table of values.
-fn table_columns<'a>(
-    file: &'a PlanFile,
-    directory: &Path,
-) -> Result<(Vec<(String, Option<&'a VariableEntry>)>, Vec<Column>)> {
+fn table_columns<'a>(file: &'a PlanFile, directory: &Path) -> Result<(NamedEntries<'a>, Vec<Column>)> {
     let path = file.table.as_ref().ok_or_else(|| {
         Failure::new("table", "missing: the design is a table", "Name a CSV or Parquet file: table = \"runs.csv\"")
     })?;
@@ -379,7 +376,7 @@ impl RangeEntry {
     fn cells(&self) -> Result<Vec<Cell>> {
         let Self { from, to, count, spacing } = *self;
         let wrong = |problem: &str, remedy: &str| Err(Failure::new("values", problem, remedy));
-        if !(from.is_finite() && to.is_finite()) || !(2..=MOST_RUNS).contains(&count) {
+        if !(from.is_finite() && to.is_finite() && (2..=MOST_RUNS).contains(&count)) {
             return wrong("the range is not usable", "Give finite ends and a count of 2 or more");
         }
         if spacing == Spacing::Logarithmic && !(from > 0.0 && to > 0.0) {
@@ -438,11 +435,7 @@ fn flatten(table: &toml::Table, prefix: &str, found: &mut Vec<(String, String)>)
 }
 
 /// Returns the variables with the places of their values.
-fn targets(
-    file: &PlanFile,
-    variables: Vec<(String, Option<&VariableEntry>)>,
-    roms: &[RomRule],
-) -> Result<Vec<PlanVariable>> {
+fn targets(file: &PlanFile, variables: NamedEntries, roms: &[RomRule]) -> Result<Vec<PlanVariable>> {
     let names: Vec<&str> = variables.iter().map(|(name, _)| name.as_str()).collect();
     let mut in_roms = Vec::new();
     for rule in roms {
