@@ -134,7 +134,7 @@ mod tests {
     fn column_has_the_narrowest_common_type() {
         let column = |cells: &[Cell]| Column::new("a", cells.iter().cloned().map(Some).collect());
         let (whole, real) = (Cell::Integer(2), Cell::Real(0.5));
-        assert_eq!(column(&[whole.clone()]).kind, ColumnType::Integer);
+        assert_eq!(column(std::slice::from_ref(&whole)).kind, ColumnType::Integer);
         assert_eq!(column(&[whole.clone(), real.clone()]).cells, [Some(Cell::Real(2.0)), Some(real)]);
         let mixed = column(&[whole, Cell::Boolean(true)]);
         assert_eq!(mixed.cells, [Some(Cell::Text("2".into())), Some(Cell::Text("true".into()))]);
