@@ -138,7 +138,9 @@ impl<'a> RomStore<'a> {
             RomOrigin::File(path) => scene_source::read_rom(path),
             RomOrigin::Reduction(arguments) => {
                 let reduce = || self.sources.reduce(arguments, &self.directory, console);
-                self.reduced.get(&format!("{CACHED_NAME}-{}", &digest[..12]), &digest, console, &reduce)
+                // The messages of this cache refer to options of built-in models.
+                let quiet = Console::new(true, false);
+                self.reduced.get(&format!("{CACHED_NAME}-{}", &digest[..12]), &digest, &quiet, &reduce)
             }
         };
         self.roms.insert(origin.clone(), StoredRom { digest, loaded: Some(rom.map(Arc::new)) });

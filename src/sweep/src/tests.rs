@@ -255,6 +255,26 @@ fn refusals_and_failures_are_rows_with_reasons() {
     assert_eq!(outcome.reasons.iter().map(|(.., count)| count).sum::<usize>(), 5);
 }
 
+/// The second run needs more internal steps than it may take.
+#[test]
+fn failed_step_is_a_row_and_other_runs_continue() {
+    let bench = Bench::new();
+    // Adaptive steps need more modes than contact directions.
+    let stiffness = DMatrix::from_fn(6, 6, |row, column| if row == column { 1e5 * (1.0 + row as f64) } else { 0.0 });
+    let contact_map =
+        DMatrix::from_fn(3, 6, |row, column| if column % 3 == row { 1.0 / (1.0 + column as f64) } else { 0.0 });
+    let rom = Rom { mass: DMatrix::identity(6, 6) * 0.1, stiffness, contact_map, ..rom(1e5) };
+    fs::write(bench.path("small.rom.safetensors"), tiprub_format::write_rom(&rom)).unwrap();
+    let plan = "scene = \"scene.toml\"\n[[variable]]\nname = \"method\"\nfield = \"time.scheme\"\nvalues = [\"galerkin\"]\n\
+                [[variable]]\nname = \"most\"\nfield = \"time.max_internal_steps\"\nvalues = [0, 1, 100000]";
+    let outcome = bench.run(plan, "a.parquet");
+    assert_eq!((outcome.finished, outcome.refused, outcome.failed), (2, 0, 1), "{outcome:?}");
+    let table = bench.table("a.parquet");
+    assert_eq!(texts(&table, "status"), ["finished", "failed", "finished"]);
+    assert!(texts(&table, "reason")[1].contains("internal steps"), "{:?}", texts(&table, "reason"));
+    assert!(texts(&table, "most_contacts")[1].is_empty() && texts(&table, "missed_steps")[0] == "0");
+}
+
 #[test]
 fn equal_runs_are_computed_once() {
     let bench = Bench::new();
