@@ -3,6 +3,7 @@
 use serde_json::{Value, json};
 use tiprub_shell::{
     extremes::{Extreme, extremes, six_digits},
+    means::integral,
     recording::Recording,
 };
 
@@ -69,11 +70,6 @@ fn heat(recording: &Recording) -> AnswerLine {
         None => (None, "no contact in the scene has friction"),
     };
     AnswerLine { name: "heat", value, meaning: meaning.to_owned() }
-}
-
-/// Integrates a mean over each communication step.
-fn integral(recording: &Recording, means: &[f64]) -> f64 {
-    recording.times.windows(2).zip(&means[1..]).map(|(ends, mean)| (ends[1] - ends[0]) * mean).sum()
 }
 
 fn torque(recording: &Recording) -> AnswerLine {

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use tiprub_study::arguments::{CacheArguments, MapArguments, SceneOptions, StabilityArguments, assignment, positive};
+use tiprub_sweep::part::Part;
 
 use crate::{
     library::PlatformChoice,
@@ -17,7 +18,7 @@ use crate::{
 #[command(
     name = "tiprub",
     version,
-    about = "Blade-tip/casing contact (rub) as an FMU: reduce, package, run, inspect, study, demo",
+    about = "Blade-tip/casing contact (rub) as an FMU: reduce, package, run, sweep, inspect, study, demo",
     long_about = "Simulates the contact of a bladed disk (a reduced-order model) with a rigid or flexible casing, \
                   and packages it as an FMU for any FMI 2.0 or FMI 3.0 importer.\n\n\
                   All quantities are in SI units (m, kg, s, N, rad).",
@@ -83,6 +84,12 @@ pub enum Command {
                             Column names are the FMI 2.0 variable names; numbers are written with all significant \
                             digits.")]
     Run(RunArguments),
+    /// Run a plan: many runs of a scene with other start values, scene fields or ROMs, one row of results per run.
+    #[command(after_help = "Examples:\n  tiprub sweep plan.toml\n  tiprub sweep plan.toml --check\n  \
+                            tiprub sweep plan.toml --part 17/1000 -o results/part-0017.parquet\n\n\
+                            The guide page docs/sweeps.md explains plans and results. If a sweep is interrupted or \
+                            killed, run the same command again: finished runs are not repeated.")]
+    Sweep(SweepArguments),
     /// Inspect and validate an FMU, ROM or scene file.
     #[command(
         after_help = "Examples:\n  tiprub inspect rotor37_fmi2.fmu\n  tiprub inspect rotor37.rom.safetensors\n  \
@@ -165,6 +172,9 @@ pub struct RunArguments {
     /// Write all outputs to a CSV file; `-` is stdout.
     #[arg(long, value_name = "FILE")]
     pub csv: Option<PathBuf>,
+    /// Write all outputs to a Parquet file, in columns of real numbers.
+    #[arg(long, value_name = "FILE")]
+    pub parquet: Option<PathBuf>,
     /// Stop time (s), instead of the scene's.
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
     pub stop: Option<f64>,
@@ -190,6 +200,44 @@ pub struct RunArguments {
     /// Where built-in models are kept.
     #[command(flatten)]
     pub cache: CacheArguments,
+}
+
+/// Arguments of `tiprub sweep`.
+#[derive(Debug, Args)]
+pub struct SweepArguments {
+    /// Plan of the sweep (TOML).
+    #[arg(value_name = "PLAN")]
+    pub plan: PathBuf,
+    /// Run only this part of the plan, so that several machines can share it. Every run is in exactly one part.
+    #[arg(long, value_name = "NUMBER/COUNT")]
+    pub part: Option<Part>,
+    /// Parquet file for the results [default: the name of the plan, with the part if there are several, in the current
+    /// directory].
+    #[arg(long, short, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// Number of runs at the same time; each run uses one thread [default: one per processor].
+    #[arg(long, value_name = "N")]
+    pub threads: Option<std::num::NonZero<usize>>,
+    /// Check the plan up to its first run, and print the number of runs; run nothing.
+    #[arg(long)]
+    pub check: bool,
+    /// Where built-in models are kept.
+    #[command(flatten)]
+    pub cache: CacheArguments,
+}
+
+impl SweepArguments {
+    /// Returns the part to run.
+    pub fn part(&self) -> Part {
+        self.part.unwrap_or(Part::WHOLE)
+    }
+
+    /// Returns the file for the results.
+    pub fn output(&self) -> PathBuf {
+        let stem = self.plan.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let named = || PathBuf::from(format!("{stem}{}.parquet", self.part().file_suffix()));
+        self.output.clone().unwrap_or_else(named)
+    }
 }
 
 /// Arguments of `tiprub inspect`.

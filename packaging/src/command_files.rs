@@ -8,6 +8,8 @@ use tiprub_shell::{
     places::{Identity, NamedFile, apart, identity, outputs},
 };
 
+use tiprub_sweep::{engine::SweepFiles, plan};
+
 use crate::{
     cli::{Command, LibraryArguments, PackageArguments, StudyCommand},
     commands::{demo, package::targets, study::directory},
@@ -29,7 +31,8 @@ pub fn check(command: &Command) -> Result<()> {
             let csv = arguments.csv.clone().filter(|path| path != Path::new("-"));
             let inputs = NamedFile::option("--inputs", &arguments.inputs);
             let read: Vec<NamedFile> = scene(&arguments.scene).into_iter().chain(inputs).collect();
-            outputs(&read, &Vec::from_iter(NamedFile::option("--csv", &csv)))
+            let parquet = NamedFile::option("--parquet", &arguments.parquet);
+            outputs(&read, &Vec::from_iter(NamedFile::option("--csv", &csv).into_iter().chain(parquet)))
         }
         Command::Reduce(arguments) => outputs(&arguments.model.files(), &written(arguments.model.written())),
         Command::Demo(arguments) => {
@@ -55,6 +58,14 @@ pub fn check(command: &Command) -> Result<()> {
             let targets = targets(arguments.fmi, &arguments.output, &arguments.name())?;
             let read: Vec<NamedFile> = arguments.files().into_iter().chain(libraries(&arguments.libraries)?).collect();
             outputs(&read, &fmus(&targets))
+        }
+        Command::Sweep(arguments) => {
+            let plan = NamedFile::new("PLAN", &arguments.plan);
+            let named =
+                plan::input_files(&arguments.plan).into_iter().map(|path| NamedFile::new("a file of PLAN", path));
+            let read: Vec<NamedFile> = [plan].into_iter().chain(named).collect();
+            let SweepFiles { rows, histories, .. } = SweepFiles::new(&arguments.output());
+            outputs(&read, &[NamedFile::new("--output", rows), NamedFile::new("--output", histories)])
         }
         Command::Inspect(_) => Ok(()),
     }

@@ -132,7 +132,7 @@ pub fn parsed<C: Parser>(asked: &Console) -> C {
 }
 
 /// Splits an error of clap into place, problem and remedy; `None` for help, which is no failure.
-fn failure(error: &clap::Error, program: &str) -> Option<Failure> {
+pub(crate) fn failure(error: &clap::Error, program: &str) -> Option<Failure> {
     if error.exit_code() == 0 {
         return None;
     }

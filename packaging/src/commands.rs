@@ -6,6 +6,7 @@ pub mod package;
 pub mod reduce;
 pub mod run;
 pub mod study;
+pub mod sweep;
 pub mod thermal;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -32,6 +33,7 @@ pub fn run(command: &Command, console: &Console) -> Result<CommandOutcome> {
             Command::Run(arguments) => run::run(arguments, console),
             Command::Inspect(arguments) => inspect::run(arguments, console),
             Command::Study(arguments) => study::run(arguments, console),
+            Command::Sweep(arguments) => sweep::run(arguments, console),
         }
     })
 }

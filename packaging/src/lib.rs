@@ -1,4 +1,4 @@
-//! The `tiprub` command line as a library: reduce, package, run, demo, inspect.
+//! The `tiprub` command line as a library: reduce, package, run, sweep, demo, inspect.
 //!
 //! It connects the lower layers. [`commands`] has one module per command; the other modules are shared by them.
 //!
@@ -10,6 +10,7 @@
 //! - [`scene_features`], [`rom_facts`]: properties and limits of a scene or a ROM;
 //! - [`user_mesh`], [`cube_models`], [`mod@reduced`]: models that are read, checked, reduced and described;
 //! - [`fmu`], [`thermal_fmu`], [`library`]: content of an FMU, and the source of its shared library;
+//! - [`sweep_sources`]: scenes and models of a sweep;
 //! - [`report`]: the HTML report of the demo.
 
 pub mod answer;
@@ -29,6 +30,7 @@ pub mod report;
 pub mod rom_facts;
 pub mod scene_features;
 pub mod shared_arguments;
+pub mod sweep_sources;
 pub mod thermal_arguments;
 pub mod thermal_fmu;
 pub mod user_mesh;

@@ -10,13 +10,17 @@ use std::{collections::BTreeSet, fs, path::Path, process::Command};
 
 use guide::{blocks, holds, missing, numbers, pages, print_row};
 
-/// Returns the output of `tiprub ...`, line by line. The command may use the scene file of the page "First scene".
+/// Returns the output of `tiprub ...`, line by line. The command may use the scene file of the page "First scene", and the plan of the page "Sweeps".
 fn run(command: &str) -> Vec<String> {
     let root = tempfile::tempdir().unwrap();
     let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/first-scene.md");
     let page = fs::read_to_string(page).unwrap();
     let scene = page.split("```toml\n").nth(1).unwrap().split("```").next().unwrap();
     fs::write(root.path().join("my_scene.toml"), scene).unwrap();
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/sweeps.md");
+    let page = fs::read_to_string(page).unwrap();
+    let plan = page.split("```toml\n").nth(1).unwrap().split("```").next().unwrap();
+    fs::write(root.path().join("plan.toml"), plan).unwrap();
     run_in(root.path(), command)
 }
 

@@ -28,7 +28,7 @@ fn free_of(package: &str, unwanted: &[&str]) {
 
 #[test]
 fn crate_dependencies_respect_the_layers() {
-    let offline = ["faer", "rayon", "quick-xml", "zip", "clap", "plotters", "indicatif", "libloading"];
+    let offline = ["faer", "rayon", "quick-xml", "zip", "clap", "plotters", "indicatif", "libloading", "parquet"];
     let floors = ["tiprub-model", "tiprub-reference", "tiprub-model-description", "tiprub"];
     let files = ["tiprub-format", "tiprub-fmi", "tiprub-fmi-facade", "toml", "safetensors", "serde_json"];
     let simulations = ["tiprub-core", "tiprub-thermal", "nalgebra"];
@@ -47,6 +47,8 @@ fn crate_dependencies_respect_the_layers() {
     free_of("tiprub-fmi-host", &["tiprub-fmi", "tiprub-model", "tiprub-gallery", "tiprub-figure", "clap", "faer"]);
     free_of("tiprub-figure", &["tiprub-gallery", "tiprub-study", "tiprub-fmi-host", "clap"]);
     free_of("tiprub-gallery", &["tiprub-figure", "tiprub-study", "tiprub-fmi-host", "clap", "plotters"]);
+    free_of("tiprub-table", &["tiprub-model", "tiprub-gallery", "tiprub-fmi-host", "clap", "plotters", "arrow-array"]);
+    free_of("tiprub-sweep", &["tiprub-figure", "tiprub-study", "tiprub-fmi-host", "clap", "plotters", "zip", "tiprub"]);
     let evidence = ["tiprub-reference", "tiprub-lab", "tiprub-fmi"];
     free_of("tiprub-study", &[&evidence[..], &["tiprub", "tiprub-fmi-host", "zip", "libloading"]].concat());
     free_of("tiprub", &evidence);

@@ -22,6 +22,7 @@ fn read() -> Vec<(&'static str, &'static str, String)> {
         ("thermal", "library", "thermal --name written --fmi 2 --library {}".into()),
         ("run", "scene", "run {}".into()),
         ("run", "inputs", "run builtin:rotor37 --inputs {}".into()),
+        ("sweep", "plan", "sweep {}".into()),
         ("inspect", "file", "inspect {}".into()),
         ("study map", "scene", "study map {}".into()),
         ("study stability", "scene", "study stability {}".into()),
@@ -56,8 +57,12 @@ fn matrices() -> [(&'static str, &'static str); 4] {
 /// `None` if the argument names the file itself.
 fn written() -> Vec<(String, &'static str, &'static str, Option<String>)> {
     let fmu = Some("written_fmi2.fmu".to_owned());
-    let mut all =
-        vec![("run".into(), "csv", "--csv {}", None), ("study convergence".into(), "into", "--into {}", None)];
+    let mut all = vec![
+        ("run".into(), "csv", "--csv {}", None),
+        ("run".into(), "parquet", "--parquet {}", None),
+        ("sweep".into(), "output", "--output {}", None),
+        ("study convergence".into(), "into", "--into {}", None),
+    ];
     for command in ["package", "thermal"] {
         all.extend([None, fmu.clone()].map(|name| (command.into(), "output", "--output {}", name)));
     }

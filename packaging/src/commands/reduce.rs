@@ -3,6 +3,7 @@
 use std::{fmt::Write as _, path::Path, time::Instant};
 
 use serde_json::{Value, json};
+use tiprub_core::Rom;
 use tiprub_core::limits::plausibility::Slip;
 use tiprub_cosim::warning::{self, Warning};
 use tiprub_gallery::{builtin, reduction};
@@ -68,6 +69,16 @@ pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<CommandOutc
     let paths: Vec<&Path> = files.iter().map(|(path, _)| path.as_path()).collect();
     let (text, json) = (text(&reduced, &facts, &paths), json(&reduced, &facts, written, output, &warnings));
     Ok(CommandOutcome { text, json, ..CommandOutcome::default() })
+}
+
+/// Reduces and checks a model without writing files.
+///
+/// # Errors
+/// The errors of [`run`], except those of files that are written.
+pub(crate) fn rom(model: &ModelToReduce, console: &Console) -> Result<Rom> {
+    let reduced = reduced(model, console)?;
+    check_slips(&reduced, &RomFacts::of(&reduced.rom, None)?, model.written().accept_implausible)?;
+    Ok(reduced.rom)
 }
 
 /// Rejects a model with implausible values, unless it `is_meant`: its slips are warnings then.

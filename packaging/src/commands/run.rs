@@ -11,12 +11,14 @@ use tiprub_shell::{
     console::{CommandOutcome, Console, shown_path, warnings_json},
     extremes::{Extreme, extremes},
     history::InputHistory,
-    native::{self, RunInputs},
+    means,
+    native::{self, ParameterValue, RunInputs, UsedParameter},
     recording::shortest,
     schedule::Schedule,
 };
 
 use tiprub_study::estimate::{self, Estimate};
+use tiprub_table::recording_file;
 
 use crate::{answer, cli::RunArguments, scene_features};
 
@@ -28,7 +30,7 @@ fn allowed_error(settings: &SceneSettings, set: &[(String, String)]) -> f64 {
     if smallest.is_finite() { tolerance * smallest } else { 0.0 }
 }
 
-/// Loads and runs the scene, writes the CSV, and summarises.
+/// Loads and runs the scene, writes the CSV and the Parquet file, and summarises.
 ///
 /// # Errors
 /// The scene or an option is wrong, the simulation is rejected or diverges, or a file cannot be written.
@@ -58,6 +60,11 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<CommandOutcome
     }
     if let Some(path) = arguments.csv.as_deref().filter(|_| !to_stdout) {
         run.recording.write_csv(path)?;
+    }
+    if let Some(path) = arguments.parquet.as_deref() {
+        let facts =
+            [("tiprub.release", env!("CARGO_PKG_VERSION").to_owned()), ("tiprub.scene", scene.settings.name.clone())];
+        recording_file::write(path, &run.recording, &facts)?;
     }
     let stepping = run.stepping.as_secs_f64();
     let simulated = schedule.stop - schedule.start;
@@ -98,7 +105,11 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<CommandOutcome
         "warning_details": warning_details,
         "answer": answer::json(&answer),
         "csv": arguments.csv.as_deref().map(shown_path),
+        "parquet": arguments.parquet.as_deref().map(shown_path),
+        "parameters": parameters_json(&run.parameters),
         "extremes": Extreme::json(&extremes),
+        "means": means::json(&means::means(&run)),
+        "totals": means::json(&means::totals(&run)),
         "last": last,
     });
     let rest = if arguments.all {
@@ -118,6 +129,18 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<CommandOutcome
     Ok(CommandOutcome { text, warnings: run.warnings, rest, json })
 }
 
+/// Returns the inputs and parameters at the start of a run as a JSON object.
+fn parameters_json(parameters: &[UsedParameter]) -> Value {
+    let value = |parameter: &UsedParameter| match &parameter.value {
+        ParameterValue::Real(value) => json!(value),
+        ParameterValue::Reals(values) => json!(values),
+        ParameterValue::Integer(value) => json!(value),
+        ParameterValue::Boolean(value) => json!(value),
+        ParameterValue::Text(value) => json!(value),
+    };
+    parameters.iter().map(|parameter| (parameter.name.clone(), value(parameter))).collect::<Map<_, _>>().into()
+}
+
 /// Returns the last lines, which say where the rest of the results is.
 fn where_the_rest_is(json: &Value, warned: bool) -> String {
     let number = |name: &str| json[name].as_f64().unwrap_or(f64::NAN);
@@ -131,7 +154,7 @@ fn where_the_rest_is(json: &Value, warned: bool) -> String {
         number("stepping_seconds"),
         number("real_time_factor"),
         json["scheme"].as_str().unwrap_or_default(),
-        json["csv"].as_str().unwrap_or("--csv FILE"),
+        json["csv"].as_str().or(json["parquet"].as_str()).unwrap_or("--csv FILE or --parquet FILE"),
     );
     if warned {
         text.push_str("\nfor the meaning of a warning: docs/warnings.md; to suppress it: --silence ID");
@@ -195,7 +218,7 @@ fn summary(json: &Value, extremes: &[Extreme], warnings: &[Warning]) -> String {
         let whole = |warning: &Warning| format!("  [{}] {warning}\n", warning.topic().id());
         text.extend(warnings.iter().map(whole));
     }
-    if let Some(path) = json["csv"].as_str() {
+    for path in [&json["csv"], &json["parquet"]].into_iter().filter_map(Value::as_str) {
         text.push_str(&format!("\nwritten: {path}"));
     }
     text

@@ -11,6 +11,7 @@ mod project;
 mod reduce;
 mod report;
 mod run;
+mod sweep;
 mod usage;
 mod user_meshes;
 mod warnings;

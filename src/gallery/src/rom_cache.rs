@@ -45,7 +45,7 @@ impl RomCache {
     }
 
     /// Returns a cache in this directory.
-    pub(crate) fn at(directory: impl Into<PathBuf>) -> Self {
+    pub fn at(directory: impl Into<PathBuf>) -> Self {
         Self { directory: Some(directory.into()) }
     }
 
@@ -130,6 +130,12 @@ impl RomCache {
     }
 }
 
+/// Returns a digest of everything that determines a model that this program reduces: its name, its options, the sources of the reduction, the release
+/// and the kind of processor.
+pub fn model_digest(name: &str, options: &dyn Debug) -> String {
+    key(name, options)
+}
+
 /// Returns the key: everything that determines a model. The debug form of options is complete, and its numbers read back to the same bits.
 fn key(name: &str, options: &dyn Debug) -> String {
     let versions = [LAYOUT, env!("CARGO_PKG_VERSION"), env!("TIPRUB_MODEL_SOURCES"), std::env::consts::ARCH];
@@ -139,6 +145,11 @@ fn key(name: &str, options: &dyn Debug) -> String {
         hash.update(item);
     }
     hexadecimal(hash)
+}
+
+/// Returns the SHA-256 of bytes as hexadecimal digits.
+pub fn content_digest(bytes: &[u8]) -> String {
+    digest(bytes)
 }
 
 fn hexadecimal(hash: Sha256) -> String {

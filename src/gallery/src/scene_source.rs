@@ -3,6 +3,7 @@
 use std::{
     cell::RefCell,
     ffi::OsStr,
+    fs,
     path::{Path, PathBuf},
 };
 
@@ -75,13 +76,43 @@ pub fn files(argument: &str) -> Vec<PathBuf> {
     [path.to_path_buf()].into_iter().chain(roms.map(|structure| beside(&structure.rom))).collect()
 }
 
+/// Text of a scene with the place of its files.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SceneText {
+    /// Name for messages: the path, or the name of a built-in scene.
+    pub name: String,
+    /// The scene (TOML).
+    pub text: String,
+    /// Directory to which paths of ROM files are relative.
+    pub directory: PathBuf,
+}
+
+/// Reads the text of a scene, without its models.
+///
+/// # Errors
+/// The file cannot be read or is not a scene.
+pub fn text(argument: impl AsRef<OsStr>) -> Result<SceneText> {
+    match source(argument.as_ref())? {
+        SceneSource::Embedded(name, text) => {
+            Ok(SceneText { name: name.to_owned(), text: text.to_owned(), directory: PathBuf::new() })
+        }
+        SceneSource::File(path) => {
+            // Checks the text and the size of the file.
+            tiprub_format::load_settings(path)?;
+            let text = fs::read_to_string(path).map_err(|error| Failure::file(path, "cannot be read", &error))?;
+            let directory = path.parent().unwrap_or(Path::new("")).to_owned();
+            Ok(SceneText { name: path.display().to_string(), text, directory })
+        }
+    }
+}
+
 /// Adds the place of `time.step` in the scene file to a failure whose remedy names this key.
 pub fn located(argument: impl AsRef<OsStr>, mut failure: Failure) -> Failure {
     const KEY: &str = "time.step";
     let place = || {
         let (name, text) = match source(argument.as_ref()).ok()? {
             SceneSource::Embedded(name, text) => (name.to_owned(), text.to_owned()),
-            SceneSource::File(path) => (path.display().to_string(), std::fs::read_to_string(path).ok()?),
+            SceneSource::File(path) => (path.display().to_string(), fs::read_to_string(path).ok()?),
         };
         let (line, column) = tiprub_format::position_of(&text, KEY)?;
         Some(format!("{name}:{line}:{column}"))
@@ -187,7 +218,6 @@ pub fn read_rom(path: &Path) -> Result<Rom> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::fs;
 
     #[test]
     fn embedded_scene_is_valid_and_equals_its_file_form() {

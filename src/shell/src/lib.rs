@@ -2,8 +2,8 @@
 //!
 //! - [`failure`], [`console`]: errors as text and JSON; the terminal and progress;
 //! - [`output_file`], [`places`]: files that are written completely or not at all, and the check that no output is an input;
-//! - [`schedule`], [`history`], [`native`], [`recording`], [`extremes`]: communication points, inputs, the run without FMI, its table of
-//!   results;
+//! - [`schedule`], [`history`], [`native`], [`recording`], [`extremes`], [`means`]: communication points, inputs, the run without FMI, its
+//!   table of results, and their summary;
 //! - [`forecast`]: progress of long work and its remaining time;
 //! - [`sweep`]: independent runs in parallel.
 
@@ -12,6 +12,7 @@ pub mod extremes;
 pub mod failure;
 pub mod forecast;
 pub mod history;
+pub mod means;
 pub mod native;
 pub mod output_file;
 pub mod places;

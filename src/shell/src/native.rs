@@ -4,15 +4,24 @@ use std::time::{Duration, Instant};
 
 use tiprub_core::system::Effort;
 use tiprub_core::{CoSimulation, Scene, Simulation, VariableTable, Warning};
-use tiprub_cosim::variables::{Causality, DataType, Value, Variable};
+use tiprub_cosim::variables::{Causality, DataType, Span, Value, Variable};
 
-use crate::{Failure, Result, history::InputHistory, recording::Recording, schedule::Schedule};
+use crate::{
+    Failure, Result,
+    history::{Driver, InputHistory},
+    recording::Recording,
+    schedule::Schedule,
+};
 
 /// Results of a native run.
 #[derive(Debug, Clone)]
 pub struct NativeRun {
     /// All outputs at all communication points.
     pub recording: Recording,
+    /// Facts about the columns of the recording, in their order.
+    pub columns: Vec<OutputColumn>,
+    /// Inputs and parameters at the start, in the order of the table.
+    pub parameters: Vec<UsedParameter>,
     /// Time spent stepping (not in initialisation or recording).
     pub stepping: Duration,
     /// Longest duration of one communication step.
@@ -25,6 +34,41 @@ pub struct NativeRun {
     pub warnings: Vec<Warning>,
     /// Results of slow checks, for [`RunInputs::checks`] of the next run.
     pub checks: Vec<u8>,
+}
+
+/// Facts about one column of the recording of a native run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct OutputColumn {
+    /// Relation of its values to the communication step.
+    pub span: Span,
+    /// True if the output is an energy (J).
+    pub is_energy: bool,
+    /// True if the column is one element of an array.
+    pub is_element: bool,
+}
+
+/// Value of an input or a parameter with which a run starts.
+#[derive(Debug, Clone, PartialEq)]
+pub struct UsedParameter {
+    /// Name, without the index of an element.
+    pub name: String,
+    /// Value.
+    pub value: ParameterValue,
+}
+
+/// Value of an input or a parameter (SI units).
+#[derive(Debug, Clone, PartialEq)]
+pub enum ParameterValue {
+    /// Real number.
+    Real(f64),
+    /// Elements of an array of real numbers.
+    Reals(Vec<f64>),
+    /// Whole number.
+    Integer(i32),
+    /// Truth value.
+    Boolean(bool),
+    /// Text, or the name of an item of an enumeration.
+    Text(String),
 }
 
 /// Inputs of a run besides its scene.
@@ -44,59 +88,136 @@ pub struct RunInputs<'a> {
 /// # Errors
 /// Settings are unknown or wrong, the scene is rejected, or a step fails; the failure then contains the warnings so far.
 pub fn run(scene: &Scene, schedule: &Schedule, given: RunInputs<'_>, progress: &dyn Fn(usize)) -> Result<NativeRun> {
-    let name = scene.settings.name.clone();
-    let in_scene = |error: tiprub_core::Error| Failure::from_core(format!("scene `{name}`"), error);
-    // Checks and warnings apply to the step that is used.
+    StartedRun::new(scene, schedule, given)?.finish(progress)
+}
+
+/// Run that is initialised and has not taken a step yet.
+pub struct StartedRun<'a> {
+    simulation: Simulation,
+    schedule: Schedule,
+    driver: Option<Driver<'a>>,
+    scene_name: String,
+    outputs: Outputs,
+    parameters: Vec<UsedParameter>,
+    checks: Vec<u8>,
+    warnings: Vec<Warning>,
+    recording: Recording,
+}
+
+impl<'a> StartedRun<'a> {
+    /// Initialises `scene` with replaced start values and inputs over time.
+    ///
+    /// # Errors
+    /// Settings are unknown or wrong, the scene is rejected, or the results would not fit into memory.
+    pub fn new(scene: &Scene, schedule: &Schedule, given: RunInputs<'a>) -> Result<Self> {
+        let scene_name = scene.settings.name.clone();
+        let in_scene = |error: tiprub_core::Error| in_scene(&scene_name, error);
+        let mut simulation = compiled(scene, schedule)?;
+        simulation.use_checks(given.checks);
+        simulation.skip_unneeded_states();
+        for (variable, value) in given.settings {
+            if given.history.is_some_and(|history| history.holds(variable)) {
+                let problem = "the file given with --inputs also has a column for this variable";
+                let remedy = "Set the variable with either --set or --inputs";
+                return Err(Failure::usage(format!("--set {variable}"), problem, remedy));
+            }
+            set(&mut simulation, variable, value)?;
+        }
+        let driver = given.history.map(|history| history.drive(&simulation)).transpose()?;
+        if let Some(driver) = &driver {
+            driver.start(&mut simulation, schedule.start)?;
+        }
+        simulation.initialise(schedule.start).map_err(in_scene)?;
+        let checks = simulation.checks();
+        // Warnings of the start; those of the run are reported as its notes.
+        let mut warnings = [simulation.warnings(), &schedule.warnings()].concat();
+        warnings.extend(given.history.map(|history| history.warnings(schedule.step)).unwrap_or_default());
+        warnings.retain(|warning| !scene.settings.is_silenced(warning.topic()));
+        let parameters = used_parameters(&simulation).map_err(in_scene)?;
+        let outputs = Outputs::of(simulation.table());
+        let recording = Recording::with_columns(outputs.names.clone(), schedule.count + 1)?;
+        let schedule = *schedule;
+        Ok(Self { simulation, schedule, driver, scene_name, outputs, parameters, checks, warnings, recording })
+    }
+
+    /// Takes all steps.
+    ///
+    /// # Errors
+    /// A step fails; the failure contains the warnings so far.
+    pub fn finish(self, progress: &dyn Fn(usize)) -> Result<NativeRun> {
+        let Self { mut simulation, schedule, driver, scene_name, outputs, mut warnings, mut recording, .. } = self;
+        let in_scene = |error: tiprub_core::Error| in_scene(&scene_name, error);
+        let (mut stepping, mut slowest) = (Duration::ZERO, Duration::ZERO);
+        for index in 0..=schedule.count {
+            let time = schedule.time(index);
+            recording.times.push(time);
+            outputs.read(&simulation, &mut recording.values).map_err(in_scene)?;
+            progress(index);
+            if index < schedule.count {
+                let next = schedule.time(index + 1);
+                if let Some(driver) = &driver {
+                    driver.step(&mut simulation, [time, next])?;
+                }
+                let clock = Instant::now();
+                if let Err(error) = simulation.do_step(time, next - time) {
+                    warnings.extend(simulation.take_notes());
+                    return Err(in_scene(error).with_warnings(warnings));
+                }
+                let taken = clock.elapsed();
+                (stepping, slowest) = (stepping + taken, slowest.max(taken));
+            }
+        }
+        warnings.extend(simulation.take_notes());
+        let system = simulation.system();
+        let effort = (system.settings().scheme.properties().adaptive).then(|| *system.effort());
+        let internal_steps = system.effort().steps;
+        let (columns, parameters, checks) = (outputs.columns, self.parameters, self.checks);
+        Ok(NativeRun { recording, columns, parameters, stepping, slowest, internal_steps, effort, warnings, checks })
+    }
+}
+
+fn in_scene(name: &str, error: tiprub_core::Error) -> Failure {
+    Failure::from_core(format!("scene `{name}`"), error)
+}
+
+/// Compiles a scene for a schedule: checks and warnings apply to the communication step that is used.
+///
+/// # Errors
+/// The scene is rejected.
+pub fn compiled(scene: &Scene, schedule: &Schedule) -> Result<Simulation> {
+    let step = schedule.time(1) - schedule.time(0);
+    let compile = |scene: &Scene| Simulation::new(scene).map_err(|error| in_scene(&scene.settings.name, error));
+    if scene.settings.experiment.communication_step.to_bits() == step.to_bits() {
+        return compile(scene);
+    }
     let mut scene = scene.clone();
-    scene.settings.experiment.communication_step = schedule.time(1) - schedule.time(0);
-    let mut simulation = Simulation::new(&scene).map_err(in_scene)?;
-    simulation.use_checks(given.checks);
-    simulation.skip_unneeded_states();
-    for (variable, value) in given.settings {
-        if given.history.is_some_and(|history| history.holds(variable)) {
-            let problem = "the file given with --inputs also has a column for this variable";
-            let remedy = "Set the variable with either --set or --inputs";
-            return Err(Failure::usage(format!("--set {variable}"), problem, remedy));
-        }
-        set(&mut simulation, variable, value)?;
-    }
-    let driver = given.history.map(|history| history.drive(&simulation)).transpose()?;
-    if let Some(driver) = &driver {
-        driver.start(&mut simulation, schedule.start)?;
-    }
-    simulation.initialise(schedule.start).map_err(in_scene)?;
-    let checks = simulation.checks();
-    // Warnings of the start; those of the run are reported as its notes.
-    let mut warnings = [simulation.warnings(), &schedule.warnings()].concat();
-    warnings.extend(given.history.map(|history| history.warnings(schedule.step)).unwrap_or_default());
-    warnings.retain(|warning| !scene.settings.is_silenced(warning.topic()));
-    let outputs = Outputs::of(simulation.table());
-    let mut recording = Recording::with_columns(outputs.names.clone(), schedule.count + 1)?;
-    let (mut stepping, mut slowest) = (Duration::ZERO, Duration::ZERO);
-    for index in 0..=schedule.count {
-        let time = schedule.time(index);
-        recording.times.push(time);
-        outputs.read(&simulation, &mut recording.values).map_err(in_scene)?;
-        progress(index);
-        if index < schedule.count {
-            let next = schedule.time(index + 1);
-            if let Some(driver) = &driver {
-                driver.step(&mut simulation, [time, next])?;
+    scene.settings.experiment.communication_step = step;
+    compile(&scene)
+}
+
+/// Returns the current values of all inputs and parameters.
+fn used_parameters(simulation: &Simulation) -> tiprub_core::Result<Vec<UsedParameter>> {
+    let read = |variable: &Variable| {
+        let first = variable.reference;
+        let value = match variable.kind {
+            DataType::Real if variable.dimension.is_some() => {
+                let elements = (first..).take(variable.len());
+                ParameterValue::Reals(elements.map(|element| simulation.real(element)).collect::<Result<_, _>>()?)
             }
-            let clock = Instant::now();
-            if let Err(error) = simulation.do_step(time, next - time) {
-                warnings.extend(simulation.take_notes());
-                return Err(in_scene(error).with_warnings(warnings));
+            DataType::Real => ParameterValue::Real(simulation.real(first)?),
+            DataType::Boolean => ParameterValue::Boolean(simulation.boolean(first)?),
+            DataType::Integer => ParameterValue::Integer(simulation.integer(first)?),
+            DataType::Enumeration(enumeration) => {
+                let number = simulation.integer(first)?;
+                let item = usize::try_from(number - 1).ok().and_then(|index| enumeration.items.get(index));
+                item.map_or(ParameterValue::Integer(number), |(item, _)| ParameterValue::Text((*item).to_owned()))
             }
-            let taken = clock.elapsed();
-            (stepping, slowest) = (stepping + taken, slowest.max(taken));
-        }
-    }
-    warnings.extend(simulation.take_notes());
-    let system = simulation.system();
-    let effort = (system.settings().scheme.properties().adaptive).then(|| *system.effort());
-    let internal_steps = system.effort().steps;
-    Ok(NativeRun { recording, stepping, slowest, internal_steps, effort, warnings, checks })
+            DataType::String => return Ok(None),
+        };
+        Ok(Some(UsedParameter { name: variable.name.clone(), value }))
+    };
+    let settable = simulation.table().variables().iter().filter(|variable| variable.is_settable());
+    settable.filter_map(|variable| read(variable).transpose()).collect()
 }
 
 /// Returns the current values of all numeric outputs, in the order of the table.
@@ -110,6 +231,7 @@ pub fn numeric_outputs(simulation: &Simulation) -> Vec<f64> {
 /// Numeric outputs of a table, element by element.
 struct Outputs {
     names: Vec<String>,
+    columns: Vec<OutputColumn>,
     elements: Vec<(DataType, u32)>,
 }
 
@@ -117,10 +239,16 @@ impl Outputs {
     fn of(table: &VariableTable) -> Self {
         let is_numeric_output =
             |variable: &&Variable| variable.causality == Causality::Output && variable.kind != DataType::String;
-        let mut outputs = Self { names: Vec::new(), elements: Vec::new() };
+        let mut outputs = Self { names: Vec::new(), columns: Vec::new(), elements: Vec::new() };
         for variable in table.variables().iter().filter(is_numeric_output) {
+            let column = OutputColumn {
+                span: variable.span,
+                is_energy: variable.unit.is_some_and(|unit| unit.name == "J"),
+                is_element: variable.dimension.is_some(),
+            };
             for (index, reference) in (0..variable.len()).zip(variable.reference..) {
                 outputs.names.push(variable.element_name(index));
+                outputs.columns.push(column);
                 outputs.elements.push((variable.kind, reference));
             }
         }
@@ -196,6 +324,39 @@ fn example(kind: &str) -> &'static str {
     if kind == "f64" { ", for example 1.5e-3" } else { "" }
 }
 
+/// Checks that a variable or an element of this name has a start value.
+///
+/// # Errors
+/// There is no such variable, with similar names; or the variable is an output.
+pub fn check_settable(table: &VariableTable, name: &str) -> Result<()> {
+    let (.., reference) = locate(table, name)?;
+    let owner = |variable: &&Variable| (variable.reference..).take(variable.len()).any(|other| other == reference);
+    if table.variables().iter().find(owner).is_some_and(Variable::is_settable) {
+        return Ok(());
+    }
+    let remedy = "Set inputs and parameters only; docs/variables.md lists them";
+    Err(Failure::usage(format!("--set {name}"), "it is computed and cannot be set", remedy))
+}
+
+/// Returns the names of the columns of the recording that an output stands for: itself, or all elements of an array.
+///
+/// # Errors
+/// There is no such output, with similar names.
+pub fn output_columns(table: &VariableTable, name: &str) -> Result<Vec<String>> {
+    let Outputs { names, .. } = Outputs::of(table);
+    if names.iter().any(|column| column == name) {
+        return Ok(vec![name.to_owned()]);
+    }
+    let is_element = |column: &&String| column.strip_prefix(name).is_some_and(|rest| rest.starts_with('['));
+    let elements: Vec<String> = names.iter().filter(is_element).cloned().collect();
+    if elements.is_empty() {
+        let candidates: Vec<&str> = names.iter().map(String::as_str).collect();
+        let remedy = similar(name, &candidates, "outputs");
+        return Err(Failure::usage(format!("output `{name}`"), "no such output", remedy));
+    }
+    Ok(elements)
+}
+
 /// Returns type, dimension and first value reference of a variable or of one of its elements.
 fn locate(table: &VariableTable, name: &str) -> Result<(DataType, Option<usize>, u32)> {
     if let Some(variable) = table.find(name) {
@@ -221,15 +382,20 @@ fn locate(table: &VariableTable, name: &str) -> Result<(DataType, Option<usize>,
 const MOST_LISTED: usize = 60;
 
 pub(crate) fn suggestion(name: &str, candidates: &[&str]) -> String {
+    similar(name, candidates, "inputs and parameters")
+}
+
+/// Returns the remedy for an unknown name: the similar name, or all candidates, whose `kind` is given.
+pub fn similar(name: &str, candidates: &[&str], kind: &str) -> String {
     let scored = candidates.iter().map(|candidate| (strsim::jaro_winkler(name, candidate), *candidate));
     match scored.max_by(|a, b| a.0.total_cmp(&b.0)) {
         Some((score, candidate)) if score > 0.8 => format!("Did you mean `{candidate}`?"),
         _ if candidates.len() > MOST_LISTED => format!(
-            "Available inputs and parameters: {}, and {} more; use `tiprub inspect` to list those of an FMU",
+            "Available {kind}: {}, and {} more; use `tiprub inspect` to list those of an FMU",
             candidates[..MOST_LISTED].join(", "),
             candidates.len() - MOST_LISTED
         ),
-        _ => format!("Available inputs and parameters: {}", candidates.join(", ")),
+        _ => format!("Available {kind}: {}", candidates.join(", ")),
     }
 }
 

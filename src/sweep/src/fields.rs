@@ -1,0 +1,154 @@
+//! Values of the keys of a scene file, named by paths such as `contact[1].gap`.
+
+use tiprub_format::FIELDS;
+use tiprub_shell::{Failure, Result, native::similar};
+use toml::{Table, Value};
+
+/// One name of a path, with the index (from 1) or the name of an entry in brackets.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Step<'a> {
+    key: &'a str,
+    entry: Option<&'a str>,
+}
+
+/// Splits a path at its points.
+fn steps(path: &str) -> Result<Vec<Step<'_>>> {
+    let parsed: Option<Vec<Step<'_>>> = path.split('.').map(parsed_step).collect();
+    parsed.ok_or_else(|| {
+        let remedy = "Give a path such as contact[1].gap or structure[blade].speed";
+        Failure::new(format!("field `{path}`"), "is not the path of a key", remedy)
+    })
+}
+
+fn parsed_step(part: &str) -> Option<Step<'_>> {
+    let (key, entry) = match part.split_once('[') {
+        Some((key, rest)) => (key, Some(rest.strip_suffix(']')?)),
+        None => (part, None),
+    };
+    (!key.is_empty() && entry != Some("")).then_some(Step { key, entry })
+}
+
+/// Sets the value at a path of a scene. Tables that are missing are created.
+///
+/// # Errors
+/// The scene file has no such key, with similar keys; or the scene has no such entry.
+pub fn set(scene: &mut Table, path: &str, value: Value) -> Result<()> {
+    let steps = steps(path)?;
+    check_key(path, &steps)?;
+    let (last, tables) = steps.split_last().expect("a path has at least one step");
+    let mut table = scene;
+    for step in tables {
+        let below = table.entry(step.key).or_insert_with(|| Value::Table(Table::new()));
+        table = match (entry(path, step, below)?, step.key) {
+            (Value::Table(table), _) => table,
+            (_, key) => return Err(Failure::new(format!("field `{path}`"), format!("`{key}` is not a table"), "")),
+        };
+    }
+    match last.entry {
+        None => {
+            table.insert(last.key.to_owned(), value);
+        }
+        Some(_) => {
+            let problem = format!("the scene has no list `{}`", last.key);
+            let missing = || Failure::new(format!("field `{path}`"), problem, "Set the whole list, without brackets");
+            *entry(path, last, table.get_mut(last.key).ok_or_else(missing)?)? = value;
+        }
+    }
+    Ok(())
+}
+
+/// Checks that scene files have such a key.
+fn check_key(path: &str, steps: &[Step]) -> Result<()> {
+    let name = steps.iter().map(|step| step.key).collect::<Vec<_>>().join(".");
+    if FIELDS.iter().any(|field| field.path == name) {
+        return Ok(());
+    }
+    let known: Vec<&str> = FIELDS.iter().map(|field| field.path).collect();
+    let remedy = similar(&name, &known, "keys of scene files");
+    Err(Failure::usage(format!("field `{path}`"), "scene files have no such key", remedy))
+}
+
+/// Returns the entry of a repeated table or a list, or the value itself.
+fn entry<'a>(path: &str, step: &Step, value: &'a mut Value) -> Result<&'a mut Value> {
+    let Value::Array(entries) = value else {
+        return match step.entry {
+            None => Ok(value),
+            Some(_) => Err(Failure::usage(
+                format!("field `{path}`"),
+                format!("`{}` is not repeated in the scene", step.key),
+                format!("Write `{}` without brackets", step.key),
+            )),
+        };
+    };
+    let named = |entry: &Value| entry.get("name").and_then(Value::as_str).map(str::to_owned);
+    let position = match step.entry {
+        None if entries.len() == 1 => Some(0),
+        None => None,
+        Some(text) => match text.parse::<usize>() {
+            Ok(number) => number.checked_sub(1).filter(|index| *index < entries.len()),
+            Err(_) => entries.iter().position(|entry| named(entry).as_deref() == Some(text)),
+        },
+    };
+    let count = entries.len();
+    let names: Vec<String> = entries.iter().filter_map(named).collect();
+    position.and_then(|index| entries.get_mut(index)).ok_or_else(|| {
+        let names = if names.is_empty() { String::new() } else { format!(" or a name of {}", names.join(", ")) };
+        Failure::usage(
+            format!("field `{path}`"),
+            format!("the scene has {count} entries `{}`, and none is selected", step.key),
+            format!("Write `{}[...]` with a number from 1 to {count}{names}", step.key),
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SCENE: &str = "name = \"a\"\n[[structure]]\nname = \"front\"\nspeed = 1.0\n[[structure]]\nname = \"rear\"\n\
+                         [[contact]]\nmaster = \"front\"\nsector_gaps = [1.0, 2.0]\n";
+
+    fn changed(path: &str, value: Value) -> Result<Table> {
+        let mut scene: Table = toml::from_str(SCENE).unwrap();
+        set(&mut scene, path, value)?;
+        Ok(scene)
+    }
+
+    #[test]
+    fn values_are_set_by_number_and_by_name() {
+        for (path, found) in [
+            ("structure[2].speed", "/structure/1/speed"),
+            ("structure[rear].speed", "/structure/1/speed"),
+            ("contact.gap", "/contact/0/gap"),
+            ("contact[1].sector_gaps[2]", "/contact/0/sector_gaps/1"),
+            ("time.tolerance", "/time/tolerance"),
+            ("structure[front].spin.growth", "/structure/0/spin/growth"),
+        ] {
+            let scene = changed(path, Value::Float(0.25)).unwrap_or_else(|failure| panic!("{path}: {failure}"));
+            let mut value = &Value::Table(scene);
+            for key in found.split('/').skip(1) {
+                value = match key.parse::<usize>() {
+                    Ok(index) => &value[index],
+                    Err(_) => &value[key],
+                };
+            }
+            assert_eq!(value.as_float(), Some(0.25), "{path}");
+        }
+    }
+
+    #[test]
+    fn unknown_keys_and_entries_are_explained() {
+        for (path, words) in [
+            ("contact[1].gapp", "Did you mean `contact.gap`?"),
+            ("structure.speed", "a number from 1 to 2 or a name of front, rear"),
+            ("structure[3].speed", "number from 1 to 2"),
+            ("structure[middle].speed", "front, rear"),
+            ("time[1].step", "without brackets"),
+            ("contact[1.gap", "Give a path"),
+            ("contact..gap", "Give a path"),
+        ] {
+            let failure = changed(path, Value::Boolean(true)).unwrap_err();
+            assert!(failure.to_string().contains(words), "{path}: {failure}");
+        }
+    }
+}

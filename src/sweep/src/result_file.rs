@@ -1,0 +1,66 @@
+//! The Parquet file of a part: one row per run.
+
+use std::path::Path;
+
+use tiprub_shell::{Failure, Result};
+use tiprub_table::{Cell, Column, ColumnType, Table, parquet_file};
+
+use crate::{
+    plan::Plan,
+    row::{DIGEST, FIRST_COLUMNS, LAST_COLUMNS, RESERVED_NAMES, RUN, Row, STATUS},
+};
+
+/// Returns the table of runs (from 1) and their rows.
+pub fn table(plan: &Plan, rows: &[(usize, &Row)]) -> Table {
+    let number = |run: usize| Some(Cell::Integer(i64::try_from(run).unwrap_or(i64::MAX)));
+    let runs = rows.iter().map(|(run, _)| number(*run)).collect();
+    let mut columns = vec![Column { name: RUN.to_owned(), kind: ColumnType::Integer, cells: runs }];
+    for (index, variable) in plan.variables.iter().enumerate() {
+        let cells = rows
+            .iter()
+            .map(|(run, _)| plan.design.value(run - 1, index).clone().converted(plan.design.kind(index)).ok())
+            .collect();
+        columns.push(Column { name: variable.name.clone(), kind: plan.design.kind(index), cells });
+    }
+    let mut others: Vec<&str> = Vec::new();
+    for (name, _) in rows.iter().flat_map(|(_, row)| &row.cells) {
+        let is_variable = plan.variables.iter().any(|variable| variable.name == *name);
+        if !is_variable && !RESERVED_NAMES.contains(&name.as_str()) && !others.contains(&name.as_str()) {
+            others.push(name);
+        }
+    }
+    let others = others.into_iter().map(|name| {
+        let cells = rows.iter().filter_map(|(_, row)| row.cell(name));
+        (name, ColumnType::common(cells))
+    });
+    let all = FIRST_COLUMNS.into_iter().chain(others).chain(LAST_COLUMNS);
+    columns.extend(all.map(|(name, kind)| {
+        let cell = |row: &Row| match name {
+            DIGEST => Some(Cell::Text(row.digest.clone())),
+            _ => row.cell(name).cloned().and_then(|cell| cell.converted(kind).ok()),
+        };
+        Column { name: name.to_owned(), kind, cells: rows.iter().map(|(_, row)| cell(row)).collect() }
+    }));
+    Table { columns }
+}
+
+/// Reads the rows of a file that a sweep wrote before.
+///
+/// # Errors
+/// The file cannot be read, or is not the result of a sweep.
+pub fn read(path: &Path) -> Result<Vec<Row>> {
+    let other = || {
+        let remedy = "Give another file with --output, or remove this one";
+        Failure::new(path.display(), "exists and is not the result of a sweep", remedy)
+    };
+    let Table { columns } = parquet_file::read(path).map_err(|_| other())?;
+    let position = |name: &str| columns.iter().position(|column| column.name == name);
+    let (Some(first), Some(digest)) = (position(STATUS), position(DIGEST)) else { return Err(other()) };
+    let rows = columns[digest].cells.iter().enumerate().filter_map(|(row, cell)| {
+        let Some(Cell::Text(digest)) = cell else { return None };
+        let results = columns[first..].iter().filter(|column| column.name != DIGEST);
+        let cells = results.filter_map(|column| Some((column.name.clone(), column.cells[row].clone()?)));
+        Some(Row { digest: digest.clone(), cells: cells.collect() })
+    });
+    Ok(rows.collect())
+}
