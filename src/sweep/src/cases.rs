@@ -17,7 +17,7 @@ pub(crate) const CHANGED_SCENE: &str = "the scene of this run";
 /// Version of the digest and of the results of a row.
 const ROW_VERSION: &str = "1";
 
-/// What one run computes.
+/// Scene, values and outputs of one run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Case {
     /// Scene with the values of the run (TOML).

@@ -6,7 +6,7 @@ use tiprub_table::{Cell, Column, ColumnType};
 /// Largest number of runs of a plan.
 pub const MOST_RUNS: usize = 10_000_000;
 
-/// How the values of the variables are combined to runs.
+/// Rule that combines the values of the variables into runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Combination {
     /// Every value of a variable with every value of the others; the last variable changes fastest.

@@ -55,7 +55,7 @@ pub const RESERVED_NAMES: [&str; 19] = {
     names
 };
 
-/// How a run ended.
+/// Outcome of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Status {
     /// All steps were taken.
