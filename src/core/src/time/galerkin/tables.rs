@@ -8,7 +8,7 @@ use super::trial::ForceInterpolation;
 use crate::modes::coordinates::ContactModes;
 
 /// Largest number of halvings of the span.
-pub const HALVINGS: usize = 10;
+pub const HALVINGS: usize = 12;
 
 /// Tables of one kind of sector for a span that is halved repeatedly. All levels have the same degree.
 #[derive(Debug, Clone)]
