@@ -105,6 +105,10 @@ impl Trial {
             }
             let touches = (0..=last).any(|point| self.multiplier(point, node) > 0.0)
                 || (1..=last).any(|point| self.gap(point, node) < 0.0);
+            // Later passes need the directions of the touching nodes only.
+            if pass > 0 && !touches {
+                continue;
+            }
             let mut places = [Vector3::zeros(); POINTS];
             (1..=last).for_each(|point| places[point] = self.slip(node, point, obstacle));
             let normal = self.normal(last, node);
