@@ -28,7 +28,6 @@ mod patch;
 mod projection;
 
 pub use patch::{Evaluation, Weights};
-pub(crate) use projection::CLOSE;
 pub use projection::Projection;
 
 use tiprub_cosim::persist_fields;

@@ -2,7 +2,7 @@
 
 use super::SplineGap;
 use crate::geometry::frame::PolarFrame;
-use crate::geometry::surface_spline::{CLOSE, ClosestPoint, Projection};
+use crate::geometry::surface_spline::{ClosestPoint, Projection};
 use crate::geometry::{Gap, PrescribedMotion, Vector3};
 
 /// Largest error of the initial guess of a closest point (in patches) for which one evaluation of the surface is sufficient: gaps are then
@@ -65,7 +65,7 @@ impl<'a> NearSearch<'a> {
         let (x, frame) = self.position(node, index, local);
         let ClosestPoint { patch, s, t } = self.gap.surface.advance(before, self.gap.turned);
         let guess = ClosestPoint { patch, s: s + drift[0], t: t + drift[1] };
-        let found = self.gap.surface.project_close(x, guess, CLOSE)?;
+        let found = self.gap.surface.project_close(x, guess, NEARBY)?;
         *drift = [found.foot.s - s, found.foot.t - t];
         Some(self.near(found, frame))
     }

@@ -36,8 +36,6 @@ pub enum Projection {
 const STEP_TOLERANCE: f64 = 1e-11;
 /// Rounding of the coordinates of x − S, relative to |x| (and |x − S|).
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
-/// Newton steps up to this (in patches) end at the closest point within about [`STEP_TOLERANCE`], because errors are squared.
-pub(crate) const CLOSE: f64 = 1e-5;
 /// Largest number of corrections near a good start; one or two are usual.
 const MAX_CORRECTIONS: usize = 6;
 /// Largest number of iterations, far above the need of starts on the opposite side of the casing (about 30).
@@ -274,6 +272,9 @@ mod tests {
     use super::*;
     use crate::scene::settings::Closure;
     use tiprub_test_models::SeededRandom;
+
+    /// Newton steps up to this (in patches) end at the closest point within about [`STEP_TOLERANCE`], because errors are squared.
+    const CLOSE: f64 = 1e-5;
 
     /// Nodes of a run start from their places of the previous step: the short search ends at the same place as the long one.
     #[test]
