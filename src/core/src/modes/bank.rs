@@ -176,10 +176,9 @@ pub struct ModalBank {
     modal_force: Vec<f64>,
     /// Scratch: change of the modal coordinates of the current sector.
     correction: Vec<f64>,
-    /// Scratch: rows of one sector with contact forces.
-    touched_rows: Vec<usize>,
-    /// Scratch: displacements of the rows of one sector.
+    /// Scratch: displacements of the rows of one sector by contact forces, and all displacements of its rows.
     moved: Vec<f64>,
+    row_values: Vec<f64>,
     /// Scratch: modal coordinates and increments of one sector.
     gathered: [Vec<f64>; 2],
 }
@@ -259,8 +258,8 @@ impl ModalBank {
             increment_before: vec![0.0; state_len],
             modal_force: vec![0.0; modes * parts],
             correction: vec![0.0; modes],
-            touched_rows: Vec::with_capacity(rows),
             moved: vec![0.0; rows],
+            row_values: vec![0.0; rows],
             gathered: [vec![0.0; modes], vec![0.0; modes]],
             coupling,
             excitation,

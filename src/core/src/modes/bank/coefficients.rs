@@ -136,17 +136,21 @@ impl ModalBank {
     /// Collects the modal forces on one group that persist over the step: contact forces (`forces[row · lanes + sector]`, N;
     /// none for an empty slice), modal loads and spin.
     pub(super) fn gather_forces(&mut self, group: usize, forces: &[f64]) {
-        let of_row = |row: usize| forces.get(row * self.lanes + group).copied().unwrap_or(0.0);
-        let has_forces = |row: &usize| self.disk.is_none() && of_row(*row) != 0.0;
-        self.touched_rows.clear();
-        self.touched_rows.extend((0..self.rows).filter(has_forces));
+        let (modes, lanes) = (self.modes, self.lanes);
+        self.modal_force.fill(0.0);
+        if self.disk.is_none() {
+            let of_sector = forces.chunks_exact(lanes).map(|row| row[group]);
+            for (shapes, force) in
+                self.contact_rows.chunks_exact(modes).zip(of_sector).filter(|(_, force)| *force != 0.0)
+            {
+                self.modal_force.iter_mut().zip(shapes).for_each(|(sum, shape)| *sum += shape * force);
+            }
+        }
         let load = if group < self.loaded_groups() { &self.state.modal_load_before[..] } else { &[] };
-        for mode in 0..self.modes {
-            let shapes = &self.contact_modes[mode * self.rows..][..self.rows];
-            let rows = self.touched_rows.iter();
+        for mode in 0..modes {
             let mut force = match &self.disk {
                 Some(disk) => disk.asked_modal_force(mode, group),
-                None => [rows.fold(0.0, |sum, row| sum + shapes[*row] * of_row(*row)), 0.0],
+                None => [self.modal_force[mode], 0.0],
             };
             force[0] += load.get(mode).copied().unwrap_or(0.0);
             if let Some(excitation) = &self.excitation {

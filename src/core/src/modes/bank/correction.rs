@@ -1,7 +1,7 @@
 //! Forces that act on some sectors after the prediction: contact forces, delayed forces, modal loads.
 
 use super::ModalBank;
-use super::predict::{Accumulate, ModalForce};
+use super::predict::{Accumulate, AddModes, ModalForce};
 use crate::modes::schemes::ModeCoefficients;
 
 impl ModalBank {
@@ -55,11 +55,13 @@ impl ModalBank {
             self.instruction_set.run(Accumulate { sums, matrix, values: &self.correction });
             return;
         }
-        for (shapes, correction) in self.contact_modes.chunks_exact(self.rows.max(1)).zip(&self.correction) {
-            for (row, shape) in shapes.iter().enumerate() {
-                self.state.displacement[row * lanes + sector] += shape * correction;
-            }
-        }
+        let mut moved = std::mem::take(&mut self.row_values);
+        let rows = || self.state.displacement.chunks_exact(lanes);
+        moved.iter_mut().zip(rows()).for_each(|(moved, row)| *moved = row[sector]);
+        self.instruction_set.run(AddModes { sums: &mut moved, matrix: &self.contact_modes, values: &self.correction });
+        let rows = self.state.displacement.chunks_exact_mut(lanes);
+        rows.zip(&moved).for_each(|(row, moved)| row[sector] = *moved);
+        self.row_values = moved;
     }
 
     /// Writes φᵀf of one sector, for the force on its rows (N), to the scratch array `modal_force`.

@@ -235,7 +235,23 @@ fn add_rows<const WIDTH: usize, const ROWS: usize>(sums: &mut [[f64; WIDTH]; ROW
     }
 }
 
-/// `sums` + Σ matrix[mode] · values[mode], with `sums.len()` entries per mode.
+/// `sums` + Σ matrix[mode] · values[mode], with `sums.len()` entries per mode, added mode by mode.
+pub(super) struct AddModes<'a> {
+    pub sums: &'a mut [f64],
+    pub matrix: &'a [f64],
+    pub values: &'a [f64],
+}
+
+impl Kernel for AddModes<'_> {
+    #[inline(always)]
+    fn run(self) {
+        for (value, shapes) in self.values.iter().zip(self.matrix.chunks_exact(self.sums.len().max(1))) {
+            self.sums.iter_mut().zip(shapes).for_each(|(sum, shape)| *sum += shape * value);
+        }
+    }
+}
+
+/// `sums` + Σ matrix[mode] · values[mode], with `sums.len()` entries per mode, added four modes at a time.
 pub(crate) struct Accumulate<'a> {
     pub sums: &'a mut [f64],
     pub matrix: &'a [f64],
