@@ -246,7 +246,7 @@ fn quick_penetration_study_finds_no_missed_contact() {
     let json = study(root.path(), "penetration", &[]);
     only_no(&json, &[]);
     let rows = json["results"].as_array().unwrap();
-    assert_eq!(rows.len(), 6);
+    assert_eq!(rows.len(), 7);
     assert!(rows.iter().all(|row| row["touching"].as_u64() > Some(100)), "{rows:#?}");
 }
 

@@ -99,7 +99,7 @@ impl Simulation {
         let left = LEFT * shortest(step);
         if parameters.scheme.properties().adaptive && parameters.tolerance < left {
             let problem = format!(
-                "the tolerance {} cannot be reached: galerkin steps are at least {} s long, a thousandth of the \
+                "the tolerance {} cannot be reached: galerkin steps are at least {} s long, 1/4096 of the \
                  longest step, which causes errors of about {left:.0e} where contacts open and close",
                 shown(parameters.tolerance),
                 shown(shortest(step)),
@@ -116,7 +116,7 @@ impl Simulation {
             return;
         }
         let problem = format!(
-            "up to t = {} s, {} of {} steps have missed the tolerance of {}: the shortest steps of {} s, a thousandth \
+            "up to t = {} s, {} of {} steps have missed the tolerance of {}: the shortest steps of {} s, 1/4096 \
              of the longest, were accepted anyway",
             shown_time(time),
             effort.missed,

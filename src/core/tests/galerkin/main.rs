@@ -423,7 +423,7 @@ fn missed_tolerance_is_counted_and_warned_of_once() {
         "{effort:?} {notes:?}"
     );
     assert!(
-        ["missed the tolerance of 1e-9", "7.8125e-8 s", "time.step", "larger tolerance"]
+        ["missed the tolerance of 1e-9", "1.953125e-8 s", "time.step", "larger tolerance"]
             .iter()
             .all(|words| notes[0].contains(words)),
         "{}",

@@ -172,7 +172,7 @@ fn two_numbers_per_node_agree_with_three() {
     for (name, change, drive) in CASES {
         // Coarse steps do not resolve the times at which tips stop sliding.
         let coarse = if name.contains("faster than they slide") { 1e-3 } else { 1e-2 };
-        for tolerance in [coarse, 1e-4] {
+        for tolerance in [coarse, 1e-4, 1e-6] {
             let mut plane = scene(Scheme::Galerkin, H, tolerance);
             change(&mut plane);
             let mut space = plane.clone();
@@ -183,7 +183,8 @@ fn two_numbers_per_node_agree_with_three() {
             println!("{name}, {tolerance:e}: {moved:.1e} {force:.1e}, trials {} {}", two.trials, three.trials);
             assert!(three.forces.iter().any(|force| *force != 0.0), "{name}: no contact");
             // The steps differ, because only steps with two numbers per node bound the penetration of nodes in contact.
-            assert!(moved < 2.0 * tolerance && force < 2.0 * tolerance, "{name}, {tolerance:e}: {moved:e} {force:e}");
+            let limit = (2.0 * tolerance).max(1e-5);
+            assert!(moved < limit && force < limit, "{name}, {tolerance:e}: {moved:e} {force:e}");
         }
     }
 }
