@@ -5,8 +5,8 @@ use crate::geometry::frame::PolarFrame;
 use crate::geometry::surface_spline::{ClosestPoint, Projection};
 use crate::geometry::{Gap, PrescribedMotion, Vector3};
 
-/// Largest error of the initial guess of a closest point (in patches) for which one evaluation of the surface is sufficient: gaps are then
-/// accurate to rounding, and the error of the closest point is about squared. The next evaluation starts there.
+/// Largest error of the initial guess of a closest point (in patches) for which one evaluation of the surface is sufficient. On a casing with
+/// 24 columns, errors of gaps are then below 1e-13 m, and the error of the closest point is about squared. The next evaluation starts there.
 const NEARBY: f64 = 1e-3;
 
 /// A search for closest points of many nodes at one instant.
