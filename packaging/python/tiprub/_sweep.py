@@ -96,8 +96,7 @@ def sweep(
         digits = len(str(wanted))
         parts = [f"{number}/{wanted}" for number in range(1, wanted + 1)]
         files = [str(directory / f"{file.stem}-{number:0{digits}}-of-{wanted}.parquet") for number in range(1, wanted + 1)]
-        if pilot is not None:
-            os.replace(directory / _PILOT, files[0])
+        _adopt_pilot(directory, files[0])
         answers = _gather(distributed, cluster, files, parts, task, file.stem, quiet)
     report = _sums(answers)
     if pilot is not None:
@@ -106,9 +105,6 @@ def sweep(
     _move(directory, histories)
     report.update(plan=str(file), output=str(directory), tasks=wanted, seconds=time.monotonic() - clock)
     return Report(report, directory)
-
-
-_PILOT = "pilot.parquet"
 
 
 def _package(name: str) -> Any:
@@ -162,12 +158,21 @@ def _pilot(cluster: Any, task: dict[str, str], directory: Path, runs: int, threa
     shared = max(1, runs // (TASKS_PER_THREAD * max(1, threads)))
     if shared <= PILOT_RUNS:
         return shared, None
-    output = str(directory / _PILOT)
+    output = str(directory / "pilot.parquet")
     future = cluster.submit(run_part, output, f"1/{runs // PILOT_RUNS}", **task, pure=False)
     answer = _answer(future)
     # The first run may have made the slow checks at the start, which the others share.
     seconds = sorted(parquet.ParquetFile(output).read(["seconds"])["seconds"].to_pylist())[PILOT_RUNS // 2]
     return min(shared, max(1, math.ceil(TASK_SECONDS / max(seconds, 1e-6)))), answer
+
+
+def _adopt_pilot(directory: Path, first: str) -> None:
+    """Make the runs that were measured, or begun, rows of the first part. Rows that the part already has are the same."""
+    for end in (".parquet", ".parquet.journal", ".histories.parquet", ".parquet.histories-journal"):
+        found, target = directory / f"pilot{end}", Path(first.removesuffix(".parquet") + end)
+        if found.exists() and not target.exists() and end != ".histories.parquet":
+            os.replace(found, target)
+        found.unlink(missing_ok=True)
 
 
 def run_part(output: str, part: str, plan: str, digest: str) -> Union[dict[str, Any], Error]:
