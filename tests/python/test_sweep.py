@@ -230,10 +230,13 @@ def samples(page, language):
 
 @pytest.fixture
 def engines(plan, monkeypatch):
-    """The plan, with the program on PATH, as the scripts of the guide expect it."""
+    """The plan, with the program on PATH and the digest in the environment, as the scripts of the guide expect it."""
     (plan.parent / "bin").mkdir()
     (plan.parent / "bin" / "tiprub").symlink_to(PROGRAM)
     monkeypatch.setenv("PATH", os.pathsep.join([str(plan.parent / "bin"), str(Path(sys.executable).parent), os.environ["PATH"]]))
+    command = samples("clusters.md", "bash")[0] + 'printf %s "$DIGEST"'
+    monkeypatch.setenv("DIGEST", subprocess.run(["bash", "-ec", command], check=True, capture_output=True, text=True).stdout)
+    assert len(os.environ["DIGEST"]) == 64
     return plan
 
 
@@ -250,16 +253,14 @@ def same_rows(found, plan):
 @pytest.mark.skipif(os.name == "nt", reason="no bash there")
 def test_slurm_script_runs_a_part(engines):
     """Slurm is not here: the body of the script runs once for every element of the array."""
-    script, submission = samples("clusters.md", "bash")[:2]
-    Path("sweep.slurm").write_text(script.replace("PARTS=1000", "PARTS=4"))
-    digest = submission.split("sbatch")[0]
+    Path("sweep.slurm").write_text(samples("clusters.md", "bash")[1].replace("PARTS=1000", "PARTS=4"))
     for number in range(1, 5):
         environment = {**os.environ, "SLURM_ARRAY_TASK_ID": str(number)}
-        subprocess.run(["bash", "-ec", f"{digest}\nbash sweep.slurm"], env=environment, check=True, capture_output=True)
+        subprocess.run(["bash", "sweep.slurm"], env=environment, check=True, capture_output=True)
     same_rows(joined(Path("results")), engines)
     # A node with another scene does nothing.
     Path("scene.toml").write_text(Path("scene.toml").read_text() + "\n")
-    environment = {**os.environ, "SLURM_ARRAY_TASK_ID": "1", "DIGEST": "0" * 64}
+    environment = {**os.environ, "SLURM_ARRAY_TASK_ID": "1"}
     answer = subprocess.run(["bash", "sweep.slurm"], env=environment, capture_output=True, text=True)
     assert answer.returncode == 1 and "differs" in answer.stderr
 
@@ -268,9 +269,10 @@ def test_slurm_script_runs_a_part(engines):
 def test_snakefile_runs_all_parts(engines):
     (snakefile,) = samples("clusters.md", "python snakemake")
     Path("Snakefile").write_text(snakefile.replace("PARTS = 1000", "PARTS = 4"))
-    subprocess.run(["snakemake", "--cores", "2"], check=True, capture_output=True)
+    command = ["snakemake", "--cores", "2", "--config", f"digest={os.environ['DIGEST']}"]
+    subprocess.run(command, check=True, capture_output=True)
     same_rows(joined(Path("results")), engines)
-    again = subprocess.run(["snakemake", "--cores", "2"], check=True, capture_output=True, text=True)
+    again = subprocess.run(command, check=True, capture_output=True, text=True)
     assert "Nothing to be done" in again.stdout + again.stderr
 
 
@@ -280,13 +282,14 @@ def test_hyperqueue_script_runs_all_parts(engines):
     script = samples("clusters.md", "bash")[2]
     Path("sweep.sh").write_text(script.replace("PARTS=1000", "PARTS=4"))
     code = """
+import os
 from hyperqueue import Job, LocalCluster
 from hyperqueue.cluster import WorkerConfig
 with LocalCluster(worker_config=WorkerConfig(cores=2)) as cluster:
     client, job = cluster.client(), Job()
     job.program(["true"])  # has the number 0
     for _ in range(4):
-        job.program(["bash", "sweep.sh"], cwd=".")
+        job.program(["bash", "sweep.sh"], cwd=".", env={"DIGEST": os.environ["DIGEST"]})
     assert client.wait_for_jobs([client.submit(job)])
 """
     subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
