@@ -196,7 +196,7 @@ def _answer(future: Any) -> dict[str, Any]:
         answer = future.result()
     except Exception as error:
         problem = f"a task failed: {type(error).__name__}: {error}"
-        raise Error("dask", problem, "Install the same release of tiprub on all workers, and see the logs of the workers") from None
+        raise Error("dask", problem, "Install the same release of tiprub on the scheduler and all workers, and see their logs") from None
     if isinstance(answer, Error):
         raise answer
     return answer
