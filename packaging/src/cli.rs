@@ -221,6 +221,10 @@ pub struct SweepArguments {
     /// Check the plan up to its first run, and print the number of runs; run nothing.
     #[arg(long)]
     pub check: bool,
+    /// Run nothing unless the program, the plan, and all files that it names have this digest. `--check` prints the digest, so that
+    /// the machines that share a sweep can compare it.
+    #[arg(long, value_name = "SHA256", conflicts_with = "check")]
+    pub digest: Option<String>,
     /// Where built-in models are kept.
     #[command(flatten)]
     pub cache: CacheArguments,

@@ -20,8 +20,9 @@ import pandas
 from ._program import Error, Report, as_html, assignments, call, kind_of, options, place, program
 from ._rom import rom
 from ._scene import BUILTIN, Scene, scene_file
+from ._sweep import sweep
 
-__all__ = ["Error", "Report", "Result", "Scene", "demo", "inspect", "package", "program", "reduce", "rom", "run", "study"]
+__all__ = ["Error", "Report", "Result", "Scene", "demo", "inspect", "package", "program", "reduce", "rom", "run", "study", "sweep"]
 try:
     __version__ = _metadata.version("tiprub")
 except _metadata.PackageNotFoundError:

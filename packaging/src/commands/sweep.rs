@@ -16,6 +16,7 @@ use tiprub_shell::{
 use tiprub_sweep::{
     engine::{self, SweepFiles, SweepOutcome, SweepRequest},
     plan::Plan,
+    plan_digest::plan_digest,
 };
 
 use crate::{cli::SweepArguments, sweep_sources::ProgramSources};
@@ -32,6 +33,16 @@ const MOST_REASONS: usize = 5;
 pub fn run(arguments: &SweepArguments, console: &Console) -> Result<CommandOutcome> {
     let sources = ProgramSources::default();
     let plan = Plan::load(&arguments.plan, &sources)?;
+    let digest = || {
+        let program = std::env::current_exe()
+            .map_err(|error| Failure::new("tiprub", format!("its executable cannot be found: {error}"), ""))?;
+        plan_digest(&plan, &program, &sources)
+    };
+    if arguments.digest.is_some() && arguments.digest != Some(digest()?) {
+        let problem = "the program, the plan, or a file that it names differs from those of the digest";
+        let remedy = "Install the same release and give the same files on all machines";
+        return Err(Failure::new(plan.path.display(), problem, remedy));
+    }
     let (output, cache, stop) = (arguments.output(), arguments.cache.cache(), stop_flag()?);
     let request = SweepRequest {
         plan: &plan,
@@ -44,7 +55,7 @@ pub fn run(arguments: &SweepArguments, console: &Console) -> Result<CommandOutco
         console,
     };
     if arguments.check {
-        return check(&request);
+        return check(&request, &digest()?);
     }
     let clock = Instant::now();
     let outcome = engine::run(&request)?;
@@ -79,11 +90,11 @@ pub fn run(arguments: &SweepArguments, console: &Console) -> Result<CommandOutco
 }
 
 /// Checks the plan without running it.
-fn check(request: &SweepRequest) -> Result<CommandOutcome> {
+fn check(request: &SweepRequest, digest: &str) -> Result<CommandOutcome> {
     let size = engine::check(request)?;
     let done = size.runs - size.pending;
     let text = format!(
-        "the plan has {} runs; part {} has {}, of which {done} need no work",
+        "the plan has {} runs; part {} has {}, of which {done} need no work\ndigest: {digest}",
         size.plan_runs, request.part, size.runs
     );
     let json = json!({
@@ -91,6 +102,7 @@ fn check(request: &SweepRequest) -> Result<CommandOutcome> {
         "part": request.part.to_string(),
         "runs": size.runs,
         "pending": size.pending,
+        "digest": digest,
         "output": shown_path(request.output),
     });
     Ok(CommandOutcome { text, json, ..CommandOutcome::default() })

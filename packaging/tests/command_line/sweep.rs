@@ -230,3 +230,32 @@ fn unknown_names_end_the_sweep_before_any_run() {
     let error = project.fail(&["sweep", "plan.toml", "-o", "scene.toml"], 2);
     assert!(error.contains("same file as a file of PLAN"), "{error}");
 }
+
+#[test]
+fn digest_covers_the_files_of_a_plan() {
+    let project = project();
+    let digest = || swept(&project, &["--check"])["digest"].as_str().unwrap().to_owned();
+    let first = digest();
+    assert_eq!(digest(), first);
+    for name in ["plan.toml", "scene.toml", "small.rom.safetensors"] {
+        let before = fs::read(project.path(name)).unwrap();
+        fs::write(project.path(name), [&before[..], b"\n"].concat()).unwrap();
+        assert_ne!(digest(), first, "{name}");
+        let error = project.fail(&["sweep", "plan.toml", "--digest", &first], 1);
+        assert!(error.contains("differs from those of the digest"), "{name}: {error}");
+        assert!(!project.files().iter().any(|name| name.contains("parquet")), "nothing was run");
+        fs::write(project.path(name), before).unwrap();
+    }
+    // A model of a run other than the first.
+    fs::copy(project.path("small.rom.safetensors"), project.path("b.rom.safetensors")).unwrap();
+    fs::copy(project.path("small.rom.safetensors"), project.path("a.rom.safetensors")).unwrap();
+    let models =
+        "\n[[variable]]\nname = \"model\"\nvalues = [\"a\", \"b\"]\n[rom.rotor]\nfile = \"{model}.rom.safetensors\"\n";
+    fs::write(project.path("plan.toml"), format!("{PLAN}{models}")).unwrap();
+    let first = digest();
+    fs::write(project.path("b.rom.safetensors"), "other").unwrap();
+    assert_ne!(digest(), first);
+    fs::write(project.path("plan.toml"), PLAN).unwrap();
+    let first = digest();
+    assert_eq!(swept(&project, &["--digest", &first, "--part", "1/24"])["finished"], 1);
+}

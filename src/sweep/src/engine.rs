@@ -448,11 +448,15 @@ impl Worker<'_> {
         let schedule = plan.schedule(&scene.settings).map_err(refused)?;
         let key = checks_key(&digest.scene, &case.settings);
         let known = self.checks.lock().ok().and_then(|checks| checks.get(&key).cloned());
-        let checks = known.unwrap_or_else(|| Arc::new(self.request.cache.checks(&scene)));
-        let given = RunInputs { settings: &case.settings, checks: &checks, ..RunInputs::default() };
+        let known = known.unwrap_or_else(|| Arc::new(self.request.cache.checks(&scene)));
+        let given = RunInputs { settings: &case.settings, checks: &known, ..RunInputs::default() };
         let started = StartedRun::new(&scene, &schedule, given).map_err(refused)?;
         let results = started.finish(&|_| {}).map_err(|failure| Box::new((Status::Failed, failure)))?;
         if let Ok(mut checks) = self.checks.lock() {
+            // For the other parts on this machine.
+            if checks.is_empty() && *known != results.checks {
+                self.request.cache.keep_checks(&scene, &results.checks);
+            }
             if checks.len() >= MOST_CHECKS {
                 checks.clear();
             }

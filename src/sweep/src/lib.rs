@@ -8,7 +8,8 @@
 //! - [`cases`]: scene, models, start values and digest of one run;
 //! - [`models`]: ROMs of a sweep, each read or reduced once;
 //! - [`row`]: results of one run; [`result_file`]: the Parquet files;
-//! - [`histories`]: outputs over time.
+//! - [`histories`]: outputs over time;
+//! - [`plan_digest`]: comparison of the files of several machines.
 #![warn(unreachable_pub)]
 #![forbid(unsafe_code)]
 
@@ -21,6 +22,7 @@ pub mod journal;
 pub mod models;
 pub mod part;
 pub mod plan;
+pub mod plan_digest;
 pub mod result_file;
 pub mod row;
 #[cfg(test)]

@@ -1,0 +1,248 @@
+"""Sweeps on a cluster of dask.distributed."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import logging
+import math
+import os
+import re
+import sys
+import time
+from pathlib import Path
+from typing import Any, Iterator, Optional, Sequence, Union
+
+from ._program import Error, Report, call, place
+
+#: Computing time of a task (s), unless the caller gives the number of its runs.
+TASK_SECONDS = 10.0
+#: Number of tasks per thread of the cluster that are made in any case, so that the threads finish at about the same time.
+TASKS_PER_THREAD = 4
+#: Number of runs that are measured to choose the number of runs of a task.
+PILOT_RUNS = 3
+#: Problem of a part that another process is working on, and the time (s) between two attempts to start it.
+LOCKED, RETRY_SECONDS = "another process is working on this part", 0.5
+#: Time (s) between two lines of progress.
+PROGRESS_SECONDS = 5.0
+#: Part that contains the last run of every plan and few others.
+LAST_PART = "1000000/1000000"
+
+
+def sweep(
+    plan: Union[str, "os.PathLike[str]"],
+    client: Any = None,
+    output: Union[None, str, "os.PathLike[str]"] = None,
+    *,
+    runs_per_task: Optional[int] = None,
+    quiet: bool = False,
+) -> Report:
+    """Run the plan of a sweep on a cluster of dask.distributed.
+
+    Every task runs a part of the plan with `tiprub sweep --part` and writes one Parquet file. A task whose worker was killed is repeated
+    on another worker, and continues with the runs that have no row yet. Call the function again to continue after the driver was killed.
+    It requires `pip install 'tiprub[dask]'`.
+
+    Parameters
+    ----------
+    plan : path
+        Plan (TOML). All workers need it and the files that it names under the same path.
+    client : distributed.Client, distributed cluster or str
+        Client, cluster, or address of a scheduler. By default, a LocalCluster with one thread per processor.
+    output : path
+        Directory for the results, by default the name of the plan without `.toml`, in the current directory. All workers must share it.
+    runs_per_task : int
+        Runs of a task. By default, a few runs are measured, and a task takes about ten seconds or a quarter of a thread's work.
+    quiet : bool
+        Suppress progress on stderr.
+
+    Returns
+    -------
+    Report
+        Numbers of `runs`, `finished`, `refused` and `failed` runs, `finished_before`, `tasks`, `reasons`, `seconds`. Its `path` is the
+        directory, a Parquet data set: `pandas.read_parquet(report)`. Outputs over time are in the directory `NAME-histories` beside it.
+
+    Raises
+    ------
+    Error
+        The plan is wrong, a worker has another program or other files, or a file cannot be written. Rejected and failed runs are rows.
+    """
+    distributed, parquet = _package("distributed"), _package("pyarrow.parquet")
+    if runs_per_task is not None and (not isinstance(runs_per_task, int) or isinstance(runs_per_task, bool) or runs_per_task < 1):
+        raise Error("keyword `runs_per_task`", f"{runs_per_task!r} is not a number of runs", "Give 1 or more", 2)
+    clock = time.monotonic()
+    file = Path(place("plan", plan)).absolute()
+    directory = Path(place("keyword `output`", output) if output is not None else file.stem).absolute()
+    histories = directory.with_name(f"{directory.name}-histories")
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        # The program looks for them beside the rows.
+        _move(histories, directory)
+    except OSError as error:
+        raise Error(str(directory), f"cannot be written: {error}", "Give another directory with `output`") from None
+    check = call(["sweep", "--check", f"--part={LAST_PART}", f"--output={directory / 'check.parquet'}"], [str(file)], quiet=True)
+    task = {"plan": str(file), "digest": check["digest"]}
+    with _connected(distributed, client) as cluster:
+        threads = sum(cluster.nthreads().values())
+        count = _known_parts(directory, file.stem)
+        if count is None and runs_per_task is None:
+            runs_per_task, pilot = _pilot(cluster, task, directory, check["plan_runs"], threads, parquet)
+        else:
+            pilot = None
+        wanted = count if runs_per_task is None else math.ceil(check["plan_runs"] / runs_per_task)
+        if count not in (None, wanted):
+            problem = f"contains {count} parts of this plan, but these runs per task give {wanted}"
+            raise Error(str(directory), problem, "Leave out `runs_per_task`, or give another directory with `output`", 2)
+        digits = len(str(wanted))
+        parts = [f"{number}/{wanted}" for number in range(1, wanted + 1)]
+        files = [str(directory / f"{file.stem}-{number:0{digits}}-of-{wanted}.parquet") for number in range(1, wanted + 1)]
+        _adopt_pilot(directory, files[0])
+        answers = _gather(distributed, cluster, files, parts, task, file.stem, quiet)
+    report = _sums(answers)
+    if pilot is not None:
+        report["finished_before"] -= pilot["runs"] - pilot["finished_before"]
+    _equal_columns(files, parquet)
+    _move(directory, histories)
+    report.update(plan=str(file), output=str(directory), tasks=wanted, seconds=time.monotonic() - clock)
+    return Report(report, directory)
+
+
+def _package(name: str) -> Any:
+    """Import a package of the extra `dask`."""
+    try:
+        return importlib.import_module(name)
+    except ImportError as error:
+        raise Error("tiprub.sweep", f"needs a package that is missing: {error}", "Install the extra: pip install 'tiprub[dask]'") from None
+
+
+def _move(source: Path, target: Path) -> None:
+    """Move the files of outputs over time."""
+    found = list(source.glob("*.histories.parquet"))
+    if found:
+        target.mkdir(exist_ok=True)
+    for file in found:
+        os.replace(file, target / file.name)
+    if found and not any(source.iterdir()):
+        source.rmdir()
+
+
+@contextlib.contextmanager
+def _connected(distributed: Any, client: Any) -> Iterator[Any]:
+    """Return a client of the cluster; one that is created here is closed at the end."""
+    if isinstance(client, distributed.Client):
+        yield client
+        return
+    # The work takes place in processes of the program, so threads suffice for the workers.
+    local = {"processes": False, "dashboard_address": None, "silence_logs": logging.CRITICAL} if client is None else {}
+    try:
+        own = distributed.Client(client, **local)
+    except (OSError, TypeError, ValueError) as error:
+        remedy = "Give a distributed.Client, a cluster, or the address of a scheduler"
+        raise Error("keyword `client`", f"there is no connection to {client!r}: {error}", remedy) from None
+    with own:
+        yield own
+
+
+def _known_parts(directory: Path, stem: str) -> Optional[int]:
+    """Return the number of parts of the results in a directory; None if there are none."""
+    name = re.compile(re.escape(stem) + r"-\d+-of-(\d+)\.parquet(\.journal)?")
+    counts = {int(match[1]) for match in map(name.fullmatch, os.listdir(directory)) if match}
+    if len(counts) > 1:
+        problem = f"contains results of this plan in {' and in '.join(map(str, sorted(counts)))} parts"
+        raise Error(str(directory), problem, "Remove one of them, or give another directory with `output`", 2)
+    return min(counts, default=None)
+
+
+def _pilot(cluster: Any, task: dict[str, str], directory: Path, runs: int, threads: int, parquet: Any) -> tuple[int, Optional[dict[str, Any]]]:
+    """Choose the number of runs of a task. Also returns the answer for the runs that were measured, which are in a file of their own."""
+    shared = max(1, runs // (TASKS_PER_THREAD * max(1, threads)))
+    if shared <= PILOT_RUNS:
+        return shared, None
+    output = str(directory / "pilot.parquet")
+    future = cluster.submit(run_part, output, f"1/{runs // PILOT_RUNS}", **task, pure=False)
+    answer = _answer(future)
+    # The first run may have made the slow checks at the start, which the others share.
+    seconds = sorted(parquet.ParquetFile(output).read(["seconds"])["seconds"].to_pylist())[PILOT_RUNS // 2]
+    return min(shared, max(1, math.ceil(TASK_SECONDS / max(seconds, 1e-6)))), answer
+
+
+def _adopt_pilot(directory: Path, first: str) -> None:
+    """Make the runs that were measured, or begun, rows of the first part. Rows that the part already has are the same."""
+    for end in (".parquet", ".parquet.journal", ".histories.parquet", ".parquet.histories-journal"):
+        found, target = directory / f"pilot{end}", Path(first.removesuffix(".parquet") + end)
+        if found.exists() and not target.exists() and end != ".histories.parquet":
+            os.replace(found, target)
+        found.unlink(missing_ok=True)
+
+
+def run_part(output: str, part: str, plan: str, digest: str) -> Union[dict[str, Any], Error]:
+    """Run a part of a plan on a worker. Returns an error instead of raising it: Dask would also print it."""
+    if not Path(output).parent.is_dir():
+        return Error(str(Path(output).parent), "does not exist on a worker", "Give a directory with `output` that all workers share")
+    words = ["sweep", "--threads=1", f"--part={part}", f"--digest={digest}", f"--output={output}"]
+    while True:
+        try:
+            return call(words, [plan], quiet=True)
+        except Error as error:
+            # The program of a worker that was killed completes its part.
+            if error.problem != LOCKED:
+                return error
+        time.sleep(RETRY_SECONDS)
+
+
+def _answer(future: Any) -> dict[str, Any]:
+    """Return the answer of a task."""
+    try:
+        answer = future.result()
+    except Exception as error:
+        problem = f"a task failed: {type(error).__name__}: {error}"
+        raise Error("dask", problem, "Install the same release of tiprub on the scheduler and all workers, and see their logs") from None
+    if isinstance(answer, Error):
+        raise answer
+    return answer
+
+
+def _gather(
+    distributed: Any, cluster: Any, files: Sequence[str], parts: Sequence[str], task: dict[str, str], title: str, quiet: bool
+) -> list[dict[str, Any]]:
+    """Run all parts and return their answers. After an error, no other task begins."""
+    futures, answers, shown = [], [], time.monotonic()
+    try:
+        futures = cluster.map(run_part, files, parts, **task, pure=False)
+        for future in distributed.as_completed(futures):
+            answers.append(_answer(future))
+            future.release()
+            if not quiet and time.monotonic() - shown >= PROGRESS_SECONDS and sys.stderr is not None:
+                shown = time.monotonic()
+                print(f"{title}: {len(answers)} of {len(files)} tasks are finished", file=sys.stderr)
+        return answers
+    finally:
+        if len(answers) < len(futures):
+            cluster.cancel(futures)
+
+
+def _sums(answers: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Combine the answers of all parts."""
+    sums: dict[str, Any] = {key: sum(answer[key] for answer in answers) for key in ("runs", "finished", "refused", "failed", "finished_before")}
+    reasons: dict[str, dict[str, Any]] = {}
+    for found in sorted((one for answer in answers for one in answer["reasons"]), key=lambda one: one["first_run"]):
+        reasons.setdefault(found["reason"], {**found, "runs": 0})["runs"] += found["runs"]
+    return {**sums, "reasons": list(reasons.values())}
+
+
+def _equal_columns(files: Sequence[str], parquet: Any) -> None:
+    """Give all files the same columns: parts whose runs were all refused lack some."""
+    arrow = _package("pyarrow")
+    try:
+        schemas = [parquet.read_schema(file) for file in files]
+        common = arrow.unify_schemas([schema.remove_metadata() for schema in schemas], promote_options="permissive")
+        for file, schema in zip(files, schemas):
+            if not schema.equals(common):
+                table = parquet.ParquetFile(file).read()
+                columns = [table[field.name].cast(field.type) if field.name in schema.names else arrow.nulls(len(table), field.type)
+                           for field in common]
+                whole = arrow.Table.from_arrays(columns, schema=common.with_metadata(schema.metadata))
+                parquet.write_table(whole, f"{file}.new")
+                os.replace(f"{file}.new", file)
+    except OSError as error:
+        raise Error("tiprub.sweep", f"results cannot be read: {error}", "Give a directory with `output` that all workers share") from None

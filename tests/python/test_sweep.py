@@ -1,0 +1,317 @@
+"""Sweeps on a cluster: `tiprub.sweep`, and the scripts of the guide for other engines."""
+
+import os
+import signal
+import stat
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import distributed
+import pandas
+import pytest
+
+from conftest import ROOT
+from test_module import BLADE, MAP, MASS, POSITIONS, SCENE, STIFFNESS, module, refused
+
+PROGRAM = os.environ["TIPRUB"]
+PACKAGE = str(ROOT / "packaging" / "python")
+#: Columns that differ between equal runs.
+TIMES = ["seconds", "stepping_seconds"]
+#: 40 runs, the last 20 of which are refused.
+PLAN = """
+scene = "scene.toml"
+stop = {stop}
+[[variable]]
+name = "friction_coefficient"
+values = [0.05, 3.0]
+[[variable]]
+name = "speed"
+values = {{ from = 400, to = 500, count = 20 }}
+"""
+
+
+@pytest.fixture
+def plan(tmp_path, monkeypatch):
+    """The plan, with its scene and ROM, in the current directory."""
+    monkeypatch.chdir(tmp_path)
+    module.rom("blade.rom.safetensors", MASS, STIFFNESS, MAP, POSITIONS, **BLADE)
+    Path("scene.toml").write_text(module._scene.toml(SCENE))
+    return written(tmp_path / "plan.toml", 2e-3)
+
+
+def written(path, stop):
+    path.write_text(PLAN.format(stop=stop))
+    return path
+
+
+def whole(plan):
+    """Results of the program without a cluster, without computing times."""
+    file = plan.with_suffix(".whole.parquet")
+    subprocess.run([PROGRAM, "--quiet", "sweep", plan, "-o", file], check=True, capture_output=True)
+    return pandas.read_parquet(file).drop(columns=TIMES)
+
+
+def journaled(directory):
+    """Computing times of the runs in journals and files of parts, by digest."""
+    seconds = {}
+    for journal in directory.glob("*.journal"):
+        for line in journal.read_text().split("\n")[1:-1]:
+            cells = line.split("\t")
+            seconds[cells[0]] = float(cells[cells.index("seconds") + 1][1:])
+    for file in directory.glob("*.parquet"):
+        table = pandas.read_parquet(file)
+        seconds.update(zip(table["digest"], table["seconds"]))
+    return seconds
+
+
+def wait_for_rows(directory, count, process=None):
+    """Wait until so many runs are finished and a part is in progress."""
+    deadline = time.monotonic() + 120
+    while not (len(list(directory.glob("*.journal"))) > 0 and len(journaled(directory)) >= count):
+        assert time.monotonic() < deadline and (process is None or process.poll() is None)
+        time.sleep(0.01)
+
+
+def kept_rows(known, report):
+    """Check that rows that were finished before were not run again."""
+    table = pandas.read_parquet(report)
+    again = dict(zip(table["digest"], table["seconds"]))
+    assert known and all(again[digest] == seconds for digest, seconds in known.items())
+
+
+def test_cluster_gives_the_table_of_the_program(plan, capfd):
+    report = module.sweep(plan, quiet=True, runs_per_task=6)
+    assert capfd.readouterr() == ("", "")
+    assert report.path == plan.with_suffix("") and (report["runs"], report["tasks"], report["finished_before"]) == (40, 7, 0)
+    assert (report["finished"], report["refused"], report["failed"]) == (20, 20, 0)
+    assert [(one["first_run"], one["runs"]) for one in report["reasons"]] == [(21, 20)] and "friction" in report["reasons"][0]["reason"]
+    expected = whole(plan)
+    results = pandas.read_parquet(report)
+    assert results.drop(columns=TIMES).equals(expected)
+    # The last parts contain only refused runs, and have the same columns as the others.
+    assert len(list(report.path.iterdir())) == 7
+
+    import duckdb
+    import polars
+    assert polars.read_parquet(report.path)["digest"].to_list() == list(expected["digest"])
+    forces = duckdb.sql(f"select largest_total_normal_force from '{report.path}/*.parquet' order by run").fetchall()
+    assert [force for (force,) in forces if force is not None] == list(expected["largest_total_normal_force"].dropna())
+
+    again = module.sweep(plan, quiet=True)
+    assert (again["finished_before"], again["tasks"]) == (40, 7) and pandas.read_parquet(again).equals(results)
+    # The plan becomes longer, and then has fewer runs than parts.
+    text = plan.read_text()
+    for changes, runs in ((("3.0]", "3.0, 4.0]"), 60), (("20 }", "2 }"), 4)):
+        plan.write_text(text.replace(*changes))
+        report = module.sweep(plan, quiet=True)
+        assert (report["runs"], report["tasks"]) == (runs, 7) and len(pandas.read_parquet(report)) == runs
+
+
+def test_number_of_runs_of_a_task_is_measured(plan, monkeypatch):
+    monkeypatch.setenv("TIPRUB_CACHE", str(plan.parent / "cache"))
+    with distributed.Client(processes=False, n_workers=1, threads_per_worker=2, dashboard_address=None) as client:
+        report = module.sweep(plan, client, "measured", quiet=True)
+    # A quarter of the work of a thread.
+    assert (report["runs"], report["tasks"], report["finished_before"]) == (40, 8, 0)
+    assert list((plan.parent / "cache").glob("scene-*.checks")), "the next part starts with the slow checks of this one"
+    assert pandas.read_parquet(report).drop(columns=TIMES).equals(whole(plan))
+
+
+def test_histories_are_a_data_set_of_their_own(plan):
+    plan.write_text(plan.read_text() + '[histories]\noutputs = ["torque"]\nevery = 10\n')
+    for before in (0, 40):
+        report = module.sweep(plan, quiet=True, runs_per_task=10)
+        assert not list(report.path.glob("*histories*"))
+        assert report["finished_before"] == before and len(pandas.read_parquet(report)) == 40
+        histories = pandas.read_parquet(plan.with_name("plan-histories"))
+        assert sorted(set(histories["run"])) == list(range(1, 21)) and list(histories.columns) == ["run", "time", "torque"]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no such signals there")
+def test_killed_worker_loses_no_run(plan):
+    written(plan, 0.1)
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=50) as cluster:
+        with distributed.Client(cluster) as client:
+            first, _ = client.run(os.getpid).values()
+            directory = plan.with_suffix("")
+            known = {}
+
+            def kill():
+                wait_for_rows(directory, 3)
+                os.kill(first, signal.SIGKILL)
+                known.update(journaled(directory))
+
+            with distributed.worker.ThreadPoolExecutor(1) as pool:
+                killing = pool.submit(kill)
+                report = module.sweep(plan, client, runs_per_task=10, quiet=True)
+                killing.result()
+            assert first not in client.run(os.getpid).values()
+    assert (report["runs"], report["finished"], report["refused"]) == (40, 20, 20)
+    kept_rows(known, report)
+    assert pandas.read_parquet(report).drop(columns=TIMES).equals(whole(plan))
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no such signals there")
+def test_killed_driver_continues(plan):
+    written(plan, 0.1)
+    code = f"import sys; sys.path.insert(0, {PACKAGE!r}); import tiprub; tiprub.sweep('plan.toml', runs_per_task=4)"
+    with subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.DEVNULL) as driver:
+        wait_for_rows(plan.with_suffix(""), 6, driver)
+        driver.kill()
+    known = journaled(plan.with_suffix(""))
+    assert len(known) < 40, "there is work left"
+    report = module.sweep(plan, quiet=True)
+    assert (report["runs"], report["tasks"], report["finished"]) == (40, 10, 20) and report["finished_before"] >= len(known)
+    kept_rows(known, report)
+    assert pandas.read_parquet(report).drop(columns=TIMES).equals(whole(plan))
+
+
+def test_workers_reject_other_programs_and_files(plan, capfd, tmp_path):
+    other = tmp_path / "other"
+    other.write_bytes(Path(PROGRAM).read_bytes() + b"\n")
+    other.chmod(other.stat().st_mode | stat.S_IEXEC)
+    with distributed.Client(n_workers=1, threads_per_worker=1, dashboard_address=None, silence_logs=50) as client:
+        client.run(use_program, str(other))
+        error = refused(module.sweep, plan, client, runs_per_task=10)
+        assert error.what == str(plan) and "differs" in error.problem and "same release" in error.remedy
+        client.run(use_program, PROGRAM)
+        assert not list(plan.with_suffix("").iterdir()), "nothing was run"
+        gone = refused(lambda: client.submit(raised, client.submit(module._sweep.run_part, "/none/a", "1/1", "plan.toml", "")).result())
+        assert "does not exist" in gone.problem
+    for name in ("plan.toml", "scene.toml", "blade.rom.safetensors"):
+        digest = module.call(["sweep", "--check"], [str(plan)], quiet=True)["digest"]
+        before = Path(name).read_bytes()
+        Path(name).write_bytes(before + b" ")
+        answer = module._sweep.run_part(str(tmp_path / "a.parquet"), "1/4", str(plan), digest)
+        assert isinstance(answer, module.Error) and "differs" in answer.problem, name
+        Path(name).write_bytes(before)
+        assert module._sweep.run_part(str(tmp_path / "a.parquet"), "1/4", str(plan), digest)["runs"] == 10
+    assert capfd.readouterr().err == ""
+
+
+def use_program(path):
+    os.environ["TIPRUB"] = path
+
+
+def raised(error):
+    raise error
+
+
+def test_errors_are_reported_once_and_print_nothing(plan, capfd, monkeypatch):
+    assert "none.toml" in refused(module.sweep, "none.toml").what
+    plan.write_text(plan.read_text().replace('"speed"', '"sped"'))
+    assert "speed" in refused(module.sweep, plan).remedy
+    written(plan, 2e-3)
+    for wrong in (0, 1.5, True, "all"):
+        assert refused(module.sweep, plan, runs_per_task=wrong).what == "keyword `runs_per_task`"
+    for wrong in ("nonsense", 3):
+        assert refused(module.sweep, plan, wrong).what == "keyword `client`"
+    module.sweep(plan, runs_per_task=10)
+    error = refused(module.sweep, plan, runs_per_task=20)
+    assert error.exit_code == 2 and "4 parts" in error.problem
+    assert refused(module.sweep, plan, output="scene.toml").what.endswith("scene.toml")
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    assert "pip install 'tiprub[dask]'" in refused(module.sweep, plan).remedy
+    assert capfd.readouterr() == ("", "")
+
+
+def test_dask_is_imported_only_for_sweeps():
+    code = f"import sys; sys.path.insert(0, {PACKAGE!r}); import tiprub; print({{'dask', 'distributed', 'pyarrow'}} & set(sys.modules))"
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "distributed" not in answer.stdout and "dask" not in answer.stdout
+
+
+def samples(page, language):
+    """Samples of a page of the guide in this language."""
+    return [part.split("```")[0] for part in (ROOT / "docs" / page).read_text().split(f"```{language}\n")[1:]]
+
+
+@pytest.fixture
+def engines(plan, monkeypatch):
+    """The plan, with the program on PATH and the digest in the environment, as the scripts of the guide expect it."""
+    (plan.parent / "bin").mkdir()
+    (plan.parent / "bin" / "tiprub").symlink_to(PROGRAM)
+    monkeypatch.setenv("PATH", os.pathsep.join([str(plan.parent / "bin"), str(Path(sys.executable).parent), os.environ["PATH"]]))
+    command = samples("clusters.md", "bash")[0] + 'printf %s "$DIGEST"'
+    monkeypatch.setenv("DIGEST", subprocess.run(["bash", "-ec", command], check=True, capture_output=True, text=True).stdout)
+    assert len(os.environ["DIGEST"]) == 64
+    return plan
+
+
+def joined(directory):
+    return pandas.concat(map(pandas.read_parquet, sorted(directory.glob("*.parquet"))), ignore_index=True)
+
+
+def same_rows(found, plan):
+    """Parts without a finished run lack columns."""
+    expected = whole(plan)
+    assert found.reindex(columns=expected.columns).sort_values("run", ignore_index=True).equals(expected)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no bash there")
+def test_slurm_script_runs_a_part(engines):
+    """Slurm is not here: the body of the script runs once for every element of the array."""
+    Path("sweep.slurm").write_text(samples("clusters.md", "bash")[1].replace("PARTS=1000", "PARTS=4"))
+    for number in range(1, 5):
+        environment = {**os.environ, "SLURM_ARRAY_TASK_ID": str(number)}
+        subprocess.run(["bash", "sweep.slurm"], env=environment, check=True, capture_output=True)
+    same_rows(joined(Path("results")), engines)
+    # A node with another scene does nothing.
+    Path("scene.toml").write_text(Path("scene.toml").read_text() + "\n")
+    environment = {**os.environ, "SLURM_ARRAY_TASK_ID": "1"}
+    answer = subprocess.run(["bash", "sweep.slurm"], env=environment, capture_output=True, text=True)
+    assert answer.returncode == 1 and "differs" in answer.stderr
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no bash there")
+def test_snakefile_runs_all_parts(engines):
+    (snakefile,) = samples("clusters.md", "python snakemake")
+    Path("Snakefile").write_text(snakefile.replace("PARTS = 1000", "PARTS = 4"))
+    command = ["snakemake", "--cores", "2", "--config", f"digest={os.environ['DIGEST']}"]
+    subprocess.run(command, check=True, capture_output=True)
+    same_rows(joined(Path("results")), engines)
+    again = subprocess.run(command, check=True, capture_output=True, text=True)
+    assert "Nothing to be done" in again.stdout + again.stderr
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no bash there")
+def test_hyperqueue_script_runs_all_parts(engines):
+    """The program `hq` is not on PyPI, but its server, its workers and their variables are."""
+    script = samples("clusters.md", "bash")[2]
+    Path("sweep.sh").write_text(script.replace("PARTS=1000", "PARTS=4"))
+    code = """
+import os
+from hyperqueue import Job, LocalCluster
+from hyperqueue.cluster import WorkerConfig
+with LocalCluster(worker_config=WorkerConfig(cores=2)) as cluster:
+    client, job = cluster.client(), Job()
+    job.program(["true"])  # has the number 0
+    for _ in range(4):
+        job.program(["bash", "sweep.sh"], cwd=".", env={"DIGEST": os.environ["DIGEST"]})
+    assert client.wait_for_jobs([client.submit(job)])
+"""
+    subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+    same_rows(joined(Path("results")), engines)
+
+
+def test_empty_tasks_cost_little(tmp_path):
+    answer = subprocess.run([sys.executable, ROOT / "examples" / "clusters" / "empty_tasks.py", "--tasks", "1000"],
+                            capture_output=True, text=True, check=True)
+    assert "1000 tasks" in answer.stdout
+
+
+def test_designs_of_experiments_of_the_guide(tmp_path, monkeypatch):
+    """The samples of the guide, with an eighth of the runs."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setitem(sys.modules, "tiprub", module)
+    space = {}
+    for sample in samples("sweeps.md", "python"):
+        exec(sample.replace("256", "32"), space)  # noqa: S102
+    space["salib"] = space["indices"]["ST"]
+    ranks, salib, openturns = (dict(zip(space["bounds"], space[name])) for name in ("ranks", "salib", "total_indices"))
+    for found in (salib, openturns):
+        assert found["gap_offset"] > found["friction_coefficient"] > 0.1 > found["damping_ratio"]
+    assert ranks["gap_offset"] < ranks["friction_coefficient"] < -0.3 < ranks["damping_ratio"]
+    assert len(pandas.read_parquet("salib")) == 32 * 6
