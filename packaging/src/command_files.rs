@@ -129,7 +129,7 @@ fn keep_inputs(inputs: &[NamedFile], (option, out): (&str, &Path), extensions: &
     let files: Vec<Identity> = files.filter_map(|path| identity(&path)).collect();
     for input in inputs {
         if identity(&input.path).is_some_and(|place| files.contains(&place)) {
-            let problem = format!("contains {} {}, which may be overwritten", input.role, input.path.display());
+            let problem = format!("contains {} {}, which this command may overwrite", input.role, input.path.display());
             return Err(Failure::usage(format!("{option} {}", out.display()), problem, "Give another directory"));
         }
     }

@@ -138,6 +138,11 @@ fn text(reduced: &ReducedModel, facts: &RomFacts, paths: &[&Path]) -> String {
     for path in paths {
         let _ = write!(text, "\n  written: {}", path.display());
     }
+    if reduced.shapes.is_none() {
+        text.push_str(
+            "\n  no shape file, because the model has no mesh of one material: `tiprub run --vtk` shows its contact nodes only",
+        );
+    }
     for check in &reduced.spin_checks {
         let worst =
             check.frequency_deviation().into_iter().fold(0.0, |worst: f64, deviation| worst.max(deviation.abs()));

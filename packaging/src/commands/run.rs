@@ -1,6 +1,6 @@
 //! `tiprub run`: runs a scene without FMI, with one row of results per communication point.
 
-use std::{collections::HashSet, path::Path, time::Instant};
+use std::{path::Path, time::Instant};
 
 use serde_json::{Map, Value, json};
 use tiprub_core::scene::settings::{ContactSettings, SceneSettings};
@@ -13,7 +13,7 @@ use tiprub_shell::{
     extremes::{Extreme, extremes},
     history::InputHistory,
     means,
-    native::{self, ParameterValue, RunInputs, StartedRun, UsedParameter},
+    native::{self, ObservedScene, ParameterValue, RunInputs, StartedRun, UsedParameter},
     recording::shortest,
     schedule::Schedule,
 };
@@ -46,12 +46,12 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<CommandOutcome
     let schedule = Schedule::new(&scene.settings.experiment, arguments.stop, arguments.step)?;
     let history = arguments.inputs.as_deref().map(InputHistory::read).transpose()?;
     let known = cache.checks(&scene);
-    let (mut fields, recorded) = fields(arguments, &scene, &schedule, &cache, console)?.unzip();
+    let (mut fields, observed) = fields(arguments, &scene, &schedule, &cache, console)?.unzip();
     let clock = Instant::now();
     let run = {
         let task = console.task(&format!("Running {}", scene.settings.name), Some(schedule.count as u64));
         let (settings, history) = (&arguments.set[..], history.as_ref());
-        let given = RunInputs { settings, history, checks: &known, recorded: recorded.as_ref() };
+        let given = RunInputs { settings, history, checks: &known, observed: observed.as_ref() };
         let progress = |done| task.at(done as u64);
         let run = match &mut fields {
             None => native::run(&scene, &schedule, given, &progress),
@@ -168,14 +168,14 @@ impl RequestedFields {
     }
 }
 
-/// Prepares fields over time and the names of the outputs to record, if fields are requested.
+/// Prepares fields over time, if they are requested.
 fn fields(
     arguments: &RunArguments,
     scene: &Scene,
     schedule: &Schedule,
     cache: &RomCache,
     console: &Console,
-) -> Result<Option<(RequestedFields, HashSet<String>)>> {
+) -> Result<Option<(RequestedFields, ObservedScene)>> {
     let Some(options) = arguments.fields() else { return Ok(None) };
     let extended = options.scene(scene)?;
     let directory = Path::new(&arguments.scene).parent().unwrap_or(Path::new(""));
@@ -190,6 +190,7 @@ fn fields(
             }
         }
     });
+    let observed = ObservedScene::new(scene, schedule)?;
     let series = FieldSeries::new(options, &extended, shapes.collect::<Result<_>>()?, *schedule)?;
     let alone = series.without_surface().into_iter().map(|name| {
         format!(
@@ -198,7 +199,7 @@ fn fields(
         )
     });
     console.warn_texts(&alone.collect::<Vec<_>>());
-    Ok(Some((RequestedFields { scene: extended, series }, native::column_names(scene, schedule)?)))
+    Ok(Some((RequestedFields { scene: extended, series }, observed)))
 }
 
 /// Returns the inputs and parameters at the start of a run as a JSON object.

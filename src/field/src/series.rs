@@ -187,6 +187,12 @@ impl FieldSeries {
         for contact in 0..scene.settings.contacts.len() {
             parts.extend(ring_part(contact, scene)?);
         }
+        // Names of structures and surfaces may coincide with those of other parts.
+        for index in 0..parts.len() {
+            while parts[..index].iter().any(|other| other.name == parts[index].name) {
+                parts[index].name.push_str("_2");
+            }
+        }
         Ok(Self { options, parts, structures, schedule, reached: 0, next_index: 1, bytes: 0, files: 0 })
     }
 
@@ -481,8 +487,7 @@ fn surface_fields(structure: &Structure, moved: &Moved) -> Result<PartFields> {
 }
 
 /// Fields of contact nodes: name of the output, and of the field.
-const CONTACT_FIELDS: [(&str, &str); 4] = [
-    ("clearance", "clearance"),
+const CONTACT_FIELDS: [(&str, &str); 3] = [
     ("normal_force", "normal_force"),
     ("tangential_force", "tangential_force"),
     ("normal_pressure", "contact_pressure"),
@@ -501,11 +506,13 @@ fn of_sectors(structure: &Structure, simulation: &Simulation, name: &str) -> Opt
 fn contact_fields(structure: &Structure, moved: &Moved, simulation: &Simulation) -> Result<PartFields> {
     let nodes: Vec<Vector> = structure.rom.contact_nodes.iter().map(|node| structure.position(node)).collect();
     let mut point_fields = vec![displacement(&moved.contact)?];
-    if matches!(structure.role, Role::Rotor | Role::Free) {
+    if let Some(gaps) = structure.clearances(simulation) {
+        let shown = |gap: f64| if gap >= NO_CLEARANCE { f32::NAN } else { single(gap) };
+        let gaps: Vec<f32> = gaps.into_iter().map(shown).collect();
+        point_fields.push(EncodedArray::reals("clearance", 1, &gaps)?);
         for (output, field) in CONTACT_FIELDS {
             let Some(values) = of_sectors(structure, simulation, output) else { continue };
-            let shown = |value: f64| if value >= NO_CLEARANCE { f32::NAN } else { single(value) };
-            point_fields.push(EncodedArray::reals(field, 1, &values.into_iter().map(shown).collect::<Vec<_>>())?);
+            point_fields.push(EncodedArray::reals(field, 1, &values.into_iter().map(single).collect::<Vec<_>>())?);
         }
     }
     Ok(PartFields { points: placed(structure, moved.motion, &nodes), point_fields, cell_fields: Vec::new() })

@@ -3,10 +3,12 @@
 use std::f64::consts::TAU;
 
 use nalgebra::{Complex, DMatrix};
+use tiprub_core::geometry::Geometry;
 use tiprub_core::modes::bank::ModalBank;
 use tiprub_core::scene::rom::{ContactNode, DisplacementFrame};
 use tiprub_core::scene::settings::{BodyMotion, SceneSettings};
 use tiprub_core::{CoSimulation, Rom, Scene, Simulation};
+use tiprub_cosim::variables::NO_CLEARANCE;
 use tiprub_model::SurfaceShapes;
 
 /// Vector (x, y, z).
@@ -220,6 +222,27 @@ impl Structure {
             }
         };
         shapes.into_iter().enumerate().map(structure).collect()
+    }
+
+    /// Returns the current gaps of the contact nodes of the chosen sectors (m), sector by sector, node by node: at least
+    /// [`NO_CLEARANCE`] for nodes without a surface to touch. They do not depend on the gaps that the steps evaluate.
+    pub(crate) fn clearances(&self, simulation: &Simulation) -> Option<Vec<f64>> {
+        let index = self.index.filter(|_| matches!(self.role, Role::Rotor | Role::Free))?;
+        let system = simulation.system();
+        let own = &system.structures()[index];
+        let mut gaps = vec![NO_CLEARANCE; own.gaps().len()];
+        for pair in system.pairs().iter().filter(|pair| pair.structure() == index) {
+            let mut law = pair.gap().clone();
+            let points = law.spline().map_or(0, |surface| surface.control_points().len());
+            let moved = pair.carrier().map_or(&[][..], |carrier| {
+                &system.structures()[carrier.structure].modes().displacement()[carrier.first_row..][..3 * points]
+            });
+            let mut geometry = Geometry::new(gaps.len(), points > 0);
+            law.evaluate(pair.drive_now(), own.modes().displacement(), moved, None, &mut geometry, &mut gaps);
+        }
+        let nodes = 0..self.rom.contact_nodes.len();
+        let of_sector = |sector: &usize| nodes.clone().map(|node| gaps[own.index(node, *sector)]).collect::<Vec<_>>();
+        Some(self.sectors.iter().flat_map(of_sector).collect())
     }
 
     /// Returns the current displacements.

@@ -54,11 +54,15 @@ pub(crate) struct Surface {
 impl Surface {
     /// Finds the surface of a mesh, without faces all of whose corners are in one of the sets `omitted`.
     pub(crate) fn new(mesh: &Mesh, omitted: &[BTreeSet<usize>]) -> Self {
+        Self::with_at_most(mesh, omitted, MAX_POINTS)
+    }
+
+    fn with_at_most(mesh: &Mesh, omitted: &[BTreeSet<usize>], points: usize) -> Self {
         let mut faces = surface_quads(mesh);
         faces.retain(|face| !omitted.iter().any(|set| face.iter().all(|node| set.contains(node))));
         let used: BTreeSet<usize> = faces.iter().flatten().copied().collect();
         let nodes: Vec<usize> = used.into_iter().collect();
-        let representative = thinned(mesh, &nodes, MAX_POINTS);
+        let representative = thinned(mesh, &nodes, points);
         let kept: BTreeSet<usize> = representative.values().copied().collect();
         let kept: Vec<usize> = kept.into_iter().collect();
         let index: BTreeMap<usize, u32> = kept.iter().copied().zip(0..).collect();
@@ -163,5 +167,62 @@ fn thinned(mesh: &Mesh, nodes: &[usize], most: usize) -> BTreeMap<usize, usize> 
             return nodes.iter().map(|node| (*node, nearest[&cell(*node)])).collect();
         }
         size *= COARSER;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::element::ElementKind;
+    use crate::mesh::Element;
+
+    /// Returns a plate of 20 × 20 × 1 bricks of 1 m.
+    fn plate() -> Mesh {
+        let (count, at) = (20, |i: usize, j: usize, k: usize| (i * 21 + j) * 2 + k);
+        let mut mesh = Mesh::default();
+        for i in 0..=count {
+            for j in 0..=count {
+                mesh.nodes.extend([0.0, 1.0].map(|z| [i as f64, j as f64, z]));
+            }
+        }
+        for i in 0..count {
+            for j in 0..count {
+                let layer = |k| [at(i, j, k), at(i + 1, j, k), at(i + 1, j + 1, k), at(i, j + 1, k)];
+                mesh.elements.push(Element { kind: ElementKind::Hex8, nodes: [layer(0), layer(1)].concat() });
+            }
+        }
+        mesh
+    }
+
+    #[test]
+    fn thinned_surface_has_few_points_that_are_nodes() {
+        let mesh = plate();
+        let whole = Surface::new(&mesh, &[]);
+        assert_eq!((whole.nodes.len(), whole.ends.len()), (mesh.nodes.len(), 2 * 400 + 80));
+        let few = Surface::with_at_most(&mesh, &[], 200);
+        assert!((100..=200).contains(&few.nodes.len()), "{}", few.nodes.len());
+        let mut start = 0;
+        for end in few.ends.iter().map(|end| *end as usize) {
+            let corners: BTreeSet<u32> = few.corners[start..end].iter().copied().collect();
+            assert!(corners.len() == end - start && (3..=4).contains(&corners.len()), "{corners:?}");
+            start = end;
+        }
+        assert_eq!(start, few.corners.len());
+        for (node, position) in few.nodes.iter().zip(&few.positions) {
+            assert_eq!(mesh.nodes[*node].map(f64::to_bits), position.map(f64::to_bits));
+        }
+        for axis in [0, 1] {
+            let values = few.positions.iter().map(|place| place[axis]);
+            let [low, high] = values.fold([f64::MAX, f64::MIN], |[low, high], x| [low.min(x), high.max(x)]);
+            assert!(low <= 2.0 && high >= 18.0, "{low} {high}");
+        }
+    }
+
+    #[test]
+    fn omitted_faces_leave_their_shared_points() {
+        let mesh = plate();
+        let rim: BTreeSet<usize> = (0..mesh.nodes.len()).filter(|node| mesh.nodes[*node][0] == 0.0).collect();
+        let open = Surface::new(&mesh, &[rim]);
+        assert_eq!((open.nodes.len(), open.ends.len()), (mesh.nodes.len(), 2 * 400 + 60));
     }
 }

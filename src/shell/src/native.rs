@@ -82,9 +82,28 @@ pub struct RunInputs<'a> {
     /// Results of slow checks of an earlier run. They have no effect if they belong to another scene or other
     /// parameters.
     pub checks: &'a [u8],
-    /// Outputs to record; all if absent. The state of every sector is then known at communication points, for an
-    /// observer.
-    pub recorded: Option<&'a HashSet<String>>,
+    /// Scene whose results the run has, if an observer needs more outputs than this scene has.
+    pub observed: Option<&'a ObservedScene>,
+}
+
+/// Scene that is run with more outputs, for an observer. The state of every sector is then known at communication points.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ObservedScene {
+    /// Columns of its recording.
+    columns: HashSet<String>,
+    /// Its watched sectors (1-based).
+    watched_sectors: Vec<usize>,
+}
+
+impl ObservedScene {
+    /// Creates the description of a scene.
+    ///
+    /// # Errors
+    /// The scene is rejected.
+    pub fn new(scene: &Scene, schedule: &Schedule) -> Result<Self> {
+        let columns = Outputs::of(compiled(scene, schedule)?.table()).names.into_iter().collect();
+        Ok(Self { columns, watched_sectors: scene.settings.outputs.watched_sectors.clone() })
+    }
 }
 
 /// Function that is called at every communication point with its index and the simulation.
@@ -121,8 +140,9 @@ impl<'a> StartedRun<'a> {
         let in_scene = |error: tiprub_core::Error| in_scene(&scene_name, error);
         let mut simulation = compiled(scene, schedule)?;
         simulation.use_checks(given.checks);
-        if given.recorded.is_none() {
-            simulation.skip_unneeded_states();
+        match given.observed {
+            Some(observed) => simulation.search_minima_of(&observed.watched_sectors),
+            None => simulation.skip_unneeded_states(),
         }
         for (variable, value) in given.settings {
             if given.history.is_some_and(|history| history.holds(variable)) {
@@ -144,8 +164,8 @@ impl<'a> StartedRun<'a> {
         warnings.retain(|warning| !scene.settings.is_silenced(warning.topic()));
         let parameters = used_parameters(&simulation).map_err(in_scene)?;
         let mut outputs = Outputs::of(simulation.table());
-        if let Some(recorded) = given.recorded {
-            outputs.keep(recorded);
+        if let Some(observed) = given.observed {
+            outputs.keep(&observed.columns);
         }
         let recording = Recording::with_columns(outputs.names.clone(), schedule.count + 1)?;
         let schedule = *schedule;
@@ -242,14 +262,6 @@ fn used_parameters(simulation: &Simulation) -> tiprub_core::Result<Vec<UsedParam
     };
     let settable = simulation.table().variables().iter().filter(|variable| variable.is_settable());
     settable.filter_map(|variable| read(variable).transpose()).collect()
-}
-
-/// Returns the names of the columns of the recording of a scene.
-///
-/// # Errors
-/// The scene is rejected.
-pub fn column_names(scene: &Scene, schedule: &Schedule) -> Result<HashSet<String>> {
-    Ok(Outputs::of(compiled(scene, schedule)?.table()).names.into_iter().collect())
 }
 
 /// Returns the current values of all numeric outputs, in the order of the table.
