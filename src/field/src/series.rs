@@ -179,7 +179,8 @@ impl FieldSeries {
                 parts.push(surface_part(index, structure, shapes)?);
             }
             parts.push(contact_part(index, structure, scene)?);
-            if let Some(stress) = structure.rom.extras.stress.as_ref().filter(|_| structure.role == Role::Rotor) {
+            let has_stress = scene.settings.outputs.stress && structure.role == Role::Rotor;
+            if let Some(stress) = structure.rom.extras.stress.as_ref().filter(|_| has_stress) {
                 let cells = repeated(&points_alone(stress.points.len()), stress.points.len(), structure.sectors.len());
                 parts.push(part(format!("{}_stress", structure.name), structure, cells, Source::Stress(index))?);
             }
@@ -209,10 +210,7 @@ impl FieldSeries {
             let fields = match &part.source {
                 Source::Surface(own) => surface_fields(&self.structures[*own], &moved[*own])?,
                 Source::Contact(own) => contact_fields(&self.structures[*own], &moved[*own], simulation)?,
-                Source::Stress(own) => match stress_fields(&self.structures[*own], &moved[*own], simulation)? {
-                    Some(fields) => fields,
-                    None => continue,
-                },
+                Source::Stress(own) => stress_fields(&self.structures[*own], &moved[*own], simulation)?,
                 Source::Ring(ring) => ring_fields(ring, simulation)?,
             };
             let cell_fields = [&part.cell_fields[..], &fields.cell_fields].concat();
@@ -267,15 +265,10 @@ impl FieldSeries {
         let head = "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\" byte_order=\"LittleEndian\">\n\
                     <Collection>\n";
         file.write_all(head.as_bytes()).map_err(failure)?;
-        let stress = |part: &Part| matches!(part.source, Source::Stress(_));
         for index in (0..self.reached).filter(|index| self.options.includes(*index, self.schedule.count)) {
             let time = self.schedule.time(index);
             for (number, part) in self.parts.iter().enumerate() {
                 let name = file_name(&part.name, index);
-                // Only a scene that reports stress has files of it.
-                if stress(part) && !self.options.directory.join(&name).is_file() {
-                    continue;
-                }
                 let own = &part.name;
                 writeln!(
                     file,
@@ -518,17 +511,17 @@ fn contact_fields(structure: &Structure, moved: &Moved, simulation: &Simulation)
     Ok(PartFields { points: placed(structure, moved.motion, &nodes), point_fields, cell_fields: Vec::new() })
 }
 
-/// Returns the stress at the stress points; `None` if the scene does not report it.
-fn stress_fields(structure: &Structure, moved: &Moved, simulation: &Simulation) -> Result<Option<PartFields>> {
-    let Some(values) = of_sectors(structure, simulation, "von_mises_stress") else { return Ok(None) };
+/// Returns the stress at the stress points of a scene that reports it.
+fn stress_fields(structure: &Structure, moved: &Moved, simulation: &Simulation) -> Result<PartFields> {
+    let values = of_sectors(structure, simulation, "von_mises_stress").unwrap_or_default();
     let places = structure.rom.extras.stress.as_ref().map_or(&[][..], |stress| &stress.points);
     let points: Vec<Vector> = places.iter().map(|place| structure.position(place)).collect();
     let values: Vec<f32> = values.into_iter().map(single).collect();
-    Ok(Some(PartFields {
+    Ok(PartFields {
         points: placed(structure, moved.motion, &points),
         point_fields: vec![EncodedArray::reals("von_mises_stress", 1, &values)?],
         cell_fields: Vec::new(),
-    }))
+    })
 }
 
 fn ring_fields(ring: &Ring, simulation: &Simulation) -> Result<PartFields> {

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use flate2::read::ZlibDecoder;
 use tiprub_core::scene::method::{Scheme, Solver};
-use tiprub_core::scene::rom::DisplacementFrame;
+use tiprub_core::scene::rom::{DisplacementFrame, WatchedPoints};
 use tiprub_core::scene::settings::{CoatingSettings, OutputSettings};
 use tiprub_core::{Rom, Scene};
 use tiprub_field::{FieldOptions, FieldSeries, shape_file};
@@ -343,4 +343,17 @@ fn rejects_wrong_sectors_and_directories() {
     options(root.path(), &[], true).check_directory().unwrap();
     let failure = options(&root.path().join("notes.txt"), &[], true).check_directory().unwrap_err();
     assert!(failure.to_string().contains("is a file, not a directory"), "{failure}");
+}
+
+#[test]
+fn stress_is_shown_where_the_rom_has_it() {
+    let mut scene = rub();
+    let node = scene.roms[0].contact_nodes[0].clone();
+    let map = nalgebra::DMatrix::from_fn(6, scene.roms[0].order(), |i, j| 1e12 * (1.0 + (i + 2 * j) as f64));
+    scene.roms[0].extras.stress = Some(WatchedPoints { map, points: vec![node] });
+    let bench = Bench::run(&scene, &[1, 4], 100);
+    let expected = [1, 4].map(|sector| bench.output(&format!("blade[{sector}].von_mises_stress[1]"), 100));
+    assert_close(&bench.array("rotor_stress", 100, "von_mises_stress"), &expected, "stress");
+    assert!(expected.iter().all(|stress| *stress > 0.0), "{expected:?}");
+    assert_eq!(bench.array("rotor_stress", 100, "sector"), [1.0, 4.0]);
 }

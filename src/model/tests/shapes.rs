@@ -105,13 +105,12 @@ fn modes_of_a_blade_move_its_surface_like_the_full_model() {
 
 #[test]
 fn modes_of_casings_and_free_bodies_move_their_surfaces_like_the_full_model() {
-    // Double modes of a ring have no defined direction: the support at one end keeps all of them, and mode 0 to 0 is empty.
+    // The two modes of a double frequency of a ring have no defined direction, so that their space is compared.
     let casing = reduce_ring(&coarse(RingSupport::Low), &silent).unwrap();
     let shapes = casing.shapes.as_ref().unwrap();
     let nodes = nodes(casing.mesh.as_ref().unwrap(), shapes);
     let modes = ModalModel::at_speed(&casing.rom, 0.0, 0.0).unwrap().shapes.map(|value| Complex::new(value, 0.0));
     let moved = moved(&shapes.diameters[0], &modes);
-    // The first two modes span the space of the first two full ones.
     let full = DMatrix::from_fn(3 * nodes.len(), 2, |row, k| casing.modes[k].shape[nodes[row / 3]][row % 3]);
     let own = moved.columns(0, 2).map(|value| value.re);
     let turn = (full.transpose() * &full).try_inverse().unwrap() * full.transpose() * &own;
