@@ -107,8 +107,12 @@ fn scene(argument: &str) -> Vec<NamedFile> {
 /// Returns the output files that `reduce` was given.
 fn written(arguments: &OutputArguments) -> Vec<NamedFile> {
     let shapes = arguments.output.as_deref().and_then(|output| arguments.shapes(output));
-    let options =
-        [("--output", &arguments.output), ("--inp", &arguments.inp), ("--vtk", &arguments.vtk), ("shapes", &shapes)];
+    let options = [
+        ("--output", &arguments.output),
+        ("--inp", &arguments.inp),
+        ("--vtk", &arguments.vtk),
+        ("the shape file", &shapes),
+    ];
     options.into_iter().filter_map(|(role, path)| NamedFile::option(role, path)).collect()
 }
 

@@ -45,7 +45,7 @@ pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<CommandOutc
         ("--output", Some(output)),
         ("--inp", written.inp.as_ref()),
         ("--vtk", written.vtk.as_ref()),
-        ("shapes", shapes.as_ref()),
+        ("the shape file", shapes.as_ref()),
     ];
     let names: Vec<NamedFile> =
         targets.into_iter().filter_map(|(role, path)| Some(NamedFile::new(role, path?))).collect();

@@ -48,7 +48,7 @@ pub(crate) struct DisplacementMap<'a, T> {
     diameters: Vec<[&'a [T]; 2]>,
 }
 
-impl<'a, T: Copy + Into<f64>> DisplacementMap<'a, T> {
+impl<T: Copy + Into<f64>> DisplacementMap<'_, T> {
     /// Computes the displacements of sectors (0-based) of `count` sectors, in the directions of the first sector.
     ///
     /// Coupled sectors move by u_s = Σ w_n Re(C_n z_n e^(i n 2π s/N)), see [`tiprub_core::scene::rom::Harmonic`].

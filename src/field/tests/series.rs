@@ -45,6 +45,7 @@ fn array(path: &Path, name: &str) -> Vec<f64> {
 }
 
 /// Returns a surface whose points are the contact nodes, so that its displacements are known.
+#[expect(clippy::cast_possible_truncation, reason = "shapes have single precision")]
 fn contact_surface(rom: &Rom) -> SurfaceShapes {
     let place = |node: &tiprub_core::scene::rom::ContactNode| match rom.frame {
         DisplacementFrame::Cartesian => node.position,

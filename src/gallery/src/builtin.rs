@@ -90,7 +90,7 @@ pub fn shapes(name: &str, rom: &Rom, cache: &RomCache, console: &Console) -> Opt
 /// Built-in model with its options; not yet reduced.
 enum BuiltinModel {
     Rotor37(Rotor37Options),
-    Disk(DiskModel),
+    Disk(Box<DiskModel>),
     Casing(CasingOptions),
     StageCasing(StageCasingOptions),
     Cube(CubeOptions),
@@ -104,7 +104,7 @@ impl BuiltinModel {
         }
         Some(match name {
             CASING37 => Self::Casing(CasingOptions::default()),
-            STAGE | STAGE_NODES | STAGE_NODES_COARSE => Self::Disk(DiskModel::named(name)),
+            STAGE | STAGE_NODES | STAGE_NODES_COARSE => Self::Disk(Box::new(DiskModel::named(name))),
             STAGE_CASING | STAGE_CASING_COARSE => Self::StageCasing(stage_casing(name == STAGE_CASING_COARSE)),
             CUBE => Self::Cube(CubeOptions::default()),
             _ => Self::CubeRing(RingOptions::new(RINGS.iter().find(|(ring, _)| *ring == name)?.1)),
@@ -115,7 +115,7 @@ impl BuiltinModel {
     fn options(&self) -> &dyn Debug {
         match self {
             Self::Rotor37(options) => options,
-            Self::Disk(model) => model,
+            Self::Disk(model) => model.as_ref(),
             Self::Casing(options) => options,
             Self::StageCasing(options) => options,
             Self::Cube(options) => options,

@@ -62,6 +62,33 @@ fn check(reduction: &Reduction, first: usize, count: usize, allowed: f64) {
     }
 }
 
+/// Checks the displacements of contact nodes that are points of the surface against the contact map of the ROM.
+fn check_contact(reduction: &Reduction) {
+    let (rom, shapes) = (&reduction.rom, reduction.shapes.as_ref().unwrap());
+    let (rows, mut compared) = (3 * shapes.points.len(), 0);
+    for (index, node) in rom.contact_nodes.iter().enumerate() {
+        let angle = if rom.frame == DisplacementFrame::Cylindrical { node.position[1] } else { 0.0 };
+        let (sine, cosine) = angle.sin_cos();
+        let place = match rom.frame {
+            DisplacementFrame::Cylindrical => [node.position[0] * cosine, node.position[0] * sine, node.position[2]],
+            DisplacementFrame::Cartesian => node.position,
+        };
+        let near = |point: &[f64; 3]| (0..3).all(|axis| (point[axis] - place[axis]).abs() < 1e-9);
+        let Some(point) = shapes.points.iter().position(near) else { continue };
+        compared += 1;
+        for k in 0..rom.order() {
+            let own = [0, 1, 2].map(|axis| f64::from(shapes.diameters[0].real[k * rows + 3 * point + axis]));
+            let found = [cosine * own[0] + sine * own[1], cosine * own[1] - sine * own[0], own[2]];
+            let size = rom.contact_map.column(k).amax();
+            for (component, found) in found.into_iter().enumerate() {
+                let expected = rom.contact_map[(3 * index + component, k)];
+                assert!((found - expected).abs() <= 2e-7 * size, "{}: {index} {k}: {found} {expected}", rom.name);
+            }
+        }
+    }
+    assert!(2 * compared > rom.contact_nodes.len(), "{}: {compared}", rom.name);
+}
+
 #[test]
 fn modes_of_a_blade_move_its_surface_like_the_full_model() {
     for (frame, kind) in [
@@ -115,10 +142,14 @@ fn modes_of_casings_and_free_bodies_move_their_surfaces_like_the_full_model() {
     let own = moved.columns(0, 2).map(|value| value.re);
     let turn = (full.transpose() * &full).try_inverse().unwrap() * full.transpose() * &own;
     let far = (&full * turn - &own).norm() / own.norm();
-    assert!(far < 1e-3, "{far}");
-    let cube = reduce_cube(&CubeOptions { modes: Some(40), ..CubeOptions::default() }, &silent).unwrap();
-    check(&cube, 6, 7, 1e-2);
-    check(&reduce_cube_ring(&RingOptions::new(RingSide::Left), &silent).unwrap(), 0, 3, 1e-3);
+    // The coarse reduction changes the modes by some thousandths, so the contact nodes are compared as well: without an error.
+    assert!(far < 5e-3, "{far}");
+    check_contact(&casing);
+    // The modes of a cube have no defined direction either.
+    check_contact(&reduce_cube(&CubeOptions { modes: Some(40), ..CubeOptions::default() }, &silent).unwrap());
+    let ring = reduce_cube_ring(&RingOptions::new(RingSide::Left), &silent).unwrap();
+    check_contact(&ring);
+    check(&ring, 0, 3, 1e-3);
 }
 
 #[test]
