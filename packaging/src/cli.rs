@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use tiprub_field::FieldOptions;
 use tiprub_study::arguments::{CacheArguments, MapArguments, SceneOptions, StabilityArguments, assignment, positive};
 use tiprub_sweep::part::Part;
 
@@ -175,6 +176,19 @@ pub struct RunArguments {
     /// Write all outputs to a Parquet file, in columns of real numbers.
     #[arg(long, value_name = "FILE")]
     pub parquet: Option<PathBuf>,
+    /// Write surfaces, displacements, clearance, contact pressure, wear and stress over time for ParaView: one file per
+    /// part and time (.vtu), listed in DIR/fields.pvd.
+    #[arg(long, value_name = "DIR")]
+    pub vtk: Option<PathBuf>,
+    /// Sectors for --vtk, separated by commas [default: all].
+    #[arg(long, value_name = "N,N,...", value_delimiter = ',', requires = "vtk")]
+    pub vtk_sectors: Vec<usize>,
+    /// Write the files of --vtk at every K-th communication point, and at the last one.
+    #[arg(long, value_name = "K", default_value = "1", requires = "vtk")]
+    pub vtk_every: std::num::NonZero<usize>,
+    /// Accept a directory for --vtk that is not empty, and replace its files.
+    #[arg(long, requires = "vtk")]
+    pub force: bool,
     /// Stop time (s), instead of the scene's.
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
     pub stop: Option<f64>,
@@ -200,6 +214,18 @@ pub struct RunArguments {
     /// Where built-in models are kept.
     #[command(flatten)]
     pub cache: CacheArguments,
+}
+
+impl RunArguments {
+    /// Returns the choices for fields over time, if they are requested.
+    pub fn fields(&self) -> Option<FieldOptions> {
+        Some(FieldOptions {
+            directory: self.vtk.clone()?,
+            sectors: self.vtk_sectors.clone(),
+            every: self.vtk_every.get(),
+            force: self.force,
+        })
+    }
 }
 
 /// Arguments of `tiprub sweep`.

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use tiprub_field::series;
 use tiprub_gallery::scene_source;
 use tiprub_shell::{
     Failure, Result, output_file,
@@ -32,7 +33,11 @@ pub fn check(command: &Command) -> Result<()> {
             let inputs = NamedFile::option("--inputs", &arguments.inputs);
             let read: Vec<NamedFile> = scene(&arguments.scene).into_iter().chain(inputs).collect();
             let parquet = NamedFile::option("--parquet", &arguments.parquet);
-            outputs(&read, &Vec::from_iter(NamedFile::option("--csv", &csv).into_iter().chain(parquet)))
+            let written = Vec::from_iter(NamedFile::option("--csv", &csv).into_iter().chain(parquet));
+            outputs(&read, &written)?;
+            let Some(fields) = arguments.fields() else { return Ok(()) };
+            keep_inputs(&read, ("--vtk", &fields.directory), &series::FILES)?;
+            fields.check_directory()
         }
         Command::Reduce(arguments) => outputs(&arguments.model.files(), &written(arguments.model.written())),
         Command::Demo(arguments) => {
@@ -101,23 +106,35 @@ fn scene(argument: &str) -> Vec<NamedFile> {
 
 /// Returns the output files that `reduce` was given.
 fn written(arguments: &OutputArguments) -> Vec<NamedFile> {
-    let options = [("--output", &arguments.output), ("--inp", &arguments.inp), ("--vtk", &arguments.vtk)];
+    let shapes = arguments.output.as_deref().and_then(|output| arguments.shapes(output));
+    let options = [
+        ("--output", &arguments.output),
+        ("--inp", &arguments.inp),
+        ("--vtk", &arguments.vtk),
+        ("the shape file", &shapes),
+    ];
     options.into_iter().filter_map(|(role, path)| NamedFile::option(role, path)).collect()
 }
 
 /// Checks a study, which names its files itself in one directory: no input may be there with one of the extensions of these files.
 fn study(argument: &str, out: &Path, more: Vec<NamedFile>) -> Result<()> {
+    let read: Vec<NamedFile> = scene(argument).into_iter().chain(more).collect();
+    keep_inputs(&read, ("--out", out), &STUDY_FILES)
+}
+
+/// Checks a command that names its files itself in the directory of an option: no input may be there with one of these extensions.
+fn keep_inputs(inputs: &[NamedFile], (option, out): (&str, &Path), extensions: &[&str]) -> Result<()> {
     let replaced = |path: &PathBuf| {
         let kind = path.extension().and_then(|kind| kind.to_str()).unwrap_or_default().to_ascii_lowercase();
-        STUDY_FILES.contains(&kind.as_str())
+        extensions.contains(&kind.as_str())
     };
     // If the directory does not exist, there are no files.
     let files = out.read_dir().into_iter().flatten().flatten().map(|entry| entry.path()).filter(replaced);
     let files: Vec<Identity> = files.filter_map(|path| identity(&path)).collect();
-    for input in scene(argument).into_iter().chain(more) {
+    for input in inputs {
         if identity(&input.path).is_some_and(|place| files.contains(&place)) {
-            let problem = format!("contains {} {}, which the study may overwrite", input.role, input.path.display());
-            return Err(Failure::usage(format!("--out {}", out.display()), problem, "Give another directory"));
+            let problem = format!("contains {} {}, which this command may overwrite", input.role, input.path.display());
+            return Err(Failure::usage(format!("{option} {}", out.display()), problem, "Give another directory"));
         }
     }
     Ok(())

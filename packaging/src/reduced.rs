@@ -4,7 +4,7 @@ use serde_json::Value;
 use tiprub_core::Rom;
 use tiprub_core::limits::plausibility::Slip;
 use tiprub_model::{
-    Material, Mesh, Reduction,
+    Material, Mesh, Reduction, SurfaceShapes,
     cyclic::CyclicReduction,
     inp::{CyclicSymmetry, calculix_cyclic_input, calculix_input},
     spin::SpinCheck,
@@ -42,6 +42,8 @@ pub struct ReducedModel {
     pub faces: Option<[String; 2]>,
     /// Mode shapes for pictures.
     pub fields: Vec<NodalField>,
+    /// Surface with its displacements per reduced coordinate; `None` without a mesh.
+    pub shapes: Option<SurfaceShapes>,
     /// Description of the file that was read, as text and as JSON.
     pub read: (String, Value),
     /// Warnings.
@@ -58,6 +60,7 @@ impl ReducedModel {
         };
         Self {
             fields: reduction.modes.iter().zip(1..).map(field).collect(),
+            shapes: reduction.shapes,
             rom: reduction.rom,
             mesh: reduction.mesh.zip(reduction.material),
             nodes: reduction.nodes,
@@ -89,6 +92,7 @@ impl ReducedModel {
         });
         Self {
             fields: fields.collect(),
+            shapes: reduction.shapes,
             rom: reduction.rom,
             mesh,
             nodes,

@@ -1,8 +1,9 @@
 //! Options that several kinds of `tiprub reduce` share.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use tiprub_field::shape_file;
 use tiprub_model::{Material, reduce::ReductionKind};
 
 /// Output options of every reduction.
@@ -24,6 +25,19 @@ pub struct OutputArguments {
     /// Also write the mesh, sets and mode shapes for ParaView (.vtu).
     #[arg(long, value_name = "FILE")]
     pub vtk: Option<PathBuf>,
+    /// Do not write the shape file beside the ROM (NAME.shapes.safetensors), from which `tiprub run --vtk` draws the
+    /// surface of the model.
+    #[arg(long)]
+    pub no_shapes: bool,
+}
+
+impl OutputArguments {
+    /// Returns the shape file beside this ROM; `None` if it is not requested, or if the ROM is written to a device or a
+    /// pipe.
+    pub fn shapes(&self, rom: &Path) -> Option<PathBuf> {
+        let is_stream = rom.exists() && !rom.is_file();
+        (!self.no_shapes && !is_stream).then(|| shape_file::beside(rom))
+    }
 }
 
 /// Which modes a reduction keeps.

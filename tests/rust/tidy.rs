@@ -46,6 +46,8 @@ fn crate_dependencies_respect_the_layers() {
     free_of("tiprub-shell", &[&above_shell[..], &["tiprub-model", "faer", "clap", "plotters", "zip"]].concat());
     free_of("tiprub-fmi-host", &["tiprub-fmi", "tiprub-model", "tiprub-gallery", "tiprub-figure", "clap", "faer"]);
     free_of("tiprub-figure", &["tiprub-gallery", "tiprub-study", "tiprub-fmi-host", "clap"]);
+    let above_field = ["tiprub-gallery", "tiprub-study", "tiprub-figure", "tiprub-fmi-host", "tiprub"];
+    free_of("tiprub-field", &[&above_field[..], &["tiprub-table", "clap", "plotters", "zip"]].concat());
     free_of("tiprub-gallery", &["tiprub-figure", "tiprub-study", "tiprub-fmi-host", "clap", "plotters"]);
     free_of("tiprub-table", &["tiprub-model", "tiprub-gallery", "tiprub-fmi-host", "clap", "plotters", "arrow-array"]);
     free_of("tiprub-sweep", &["tiprub-figure", "tiprub-study", "tiprub-fmi-host", "clap", "plotters", "zip", "tiprub"]);

@@ -60,6 +60,7 @@ fn written() -> Vec<(String, &'static str, &'static str, Option<String>)> {
     let mut all = vec![
         ("run".into(), "csv", "--csv {}", None),
         ("run".into(), "parquet", "--parquet {}", None),
+        ("run".into(), "vtk", "--vtk {} --force", Some("x.vtu".into())),
         ("sweep".into(), "output", "--output {}", None),
         ("study convergence".into(), "into", "--into {}", None),
     ];
@@ -134,7 +135,7 @@ fn no_command_overwrites_its_inputs() {
             let line = line.replace("{}", &link.display().to_string()).replace("SCENE", &scene.display().to_string());
             let line = format!("{line} {}", words.replace("{}", &target.display().to_string()));
             let failure = answer(&line).expect_err(&line);
-            let is_named = ["is the same file as", "the study may overwrite"];
+            let is_named = ["is the same file as", "this command may overwrite"];
             assert!(failure.usage && is_named.iter().any(|words| failure.problem.contains(words)), "{line}: {failure}");
             pairs += 1;
         }

@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 use tiprub_core::Rom;
 use tiprub_core::limits::plausibility::Slip;
 use tiprub_cosim::warning::{self, Warning};
+use tiprub_field::shape_file;
 use tiprub_gallery::{builtin, reduction};
 use tiprub_model::{
     Rotor37Options,
@@ -39,7 +40,13 @@ pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<CommandOutc
     let written = arguments.model.written();
     let output =
         &written.output.clone().unwrap_or_else(|| format!("{}.rom.safetensors", arguments.model.name()).into());
-    let targets = [("--output", Some(output)), ("--inp", written.inp.as_ref()), ("--vtk", written.vtk.as_ref())];
+    let shapes = &written.shapes(output);
+    let targets = [
+        ("--output", Some(output)),
+        ("--inp", written.inp.as_ref()),
+        ("--vtk", written.vtk.as_ref()),
+        ("the shape file", shapes.as_ref()),
+    ];
     let names: Vec<NamedFile> =
         targets.into_iter().filter_map(|(role, path)| Some(NamedFile::new(role, path?))).collect();
     places::apart(&arguments.model.files(), &names)?;
@@ -56,6 +63,9 @@ pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<CommandOutc
     if let Some(path) = &written.vtk {
         files.push((path, reduced.vtk()?));
     }
+    if let Some((path, own)) = shapes.as_ref().zip(reduced.shapes.as_ref()) {
+        files.push((path, shape_file::write(own, &reduced.rom)));
+    }
     for (path, bytes) in &files {
         output_file::write(path, bytes)?;
     }
@@ -67,7 +77,10 @@ pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<CommandOutc
     warnings.extend(spin_warning(&reduced.spin_checks));
     console.warn_texts(&warnings);
     let paths: Vec<&Path> = files.iter().map(|(path, _)| path.as_path()).collect();
-    let (text, json) = (text(&reduced, &facts, &paths), json(&reduced, &facts, written, output, &warnings));
+    let has_shapes = reduced.shapes.is_some();
+    let shapes = shapes.as_deref().filter(|_| has_shapes);
+    let (text, json) =
+        (text(&reduced, &facts, &paths), json(&reduced, &facts, written, [Some(output), shapes], &warnings));
     Ok(CommandOutcome { text, json, ..CommandOutcome::default() })
 }
 
@@ -125,6 +138,11 @@ fn text(reduced: &ReducedModel, facts: &RomFacts, paths: &[&Path]) -> String {
     for path in paths {
         let _ = write!(text, "\n  written: {}", path.display());
     }
+    if reduced.shapes.is_none() {
+        text.push_str(
+            "\n  no shape file, because the model has no mesh of one material: `tiprub run --vtk` shows its contact nodes only",
+        );
+    }
     for check in &reduced.spin_checks {
         let worst =
             check.frequency_deviation().into_iter().fold(0.0, |worst: f64, deviation| worst.max(deviation.abs()));
@@ -144,7 +162,7 @@ fn json(
     reduced: &ReducedModel,
     facts: &RomFacts,
     written: &OutputArguments,
-    output: &Path,
+    [output, shapes]: [Option<&Path>; 2],
     warnings: &[String],
 ) -> Value {
     json!({
@@ -165,7 +183,8 @@ fn json(
         "seconds": reduced.seconds,
         "warnings": warnings,
         "files": {
-            "rom": shown_path(output),
+            "rom": output.map(shown_path),
+            "shapes": shapes.map(shown_path),
             "inp": written.inp.as_deref().map(shown_path),
             "vtk": written.vtk.as_deref().map(shown_path),
         },

@@ -5,14 +5,15 @@ use std::{path::Path, time::Instant};
 use serde_json::{Map, Value, json};
 use tiprub_core::scene::settings::{ContactSettings, SceneSettings};
 use tiprub_core::{Scene, Warning};
-use tiprub_gallery::scene_source;
+use tiprub_field::{FieldSeries, shape_file};
+use tiprub_gallery::{builtin, rom_cache::RomCache, scene_source};
 use tiprub_shell::{
     Failure, Result,
     console::{CommandOutcome, Console, shown_path, warnings_json},
     extremes::{Extreme, extremes},
     history::InputHistory,
     means,
-    native::{self, ParameterValue, RunInputs, UsedParameter},
+    native::{self, ObservedScene, ParameterValue, RunInputs, StartedRun, UsedParameter},
     recording::shortest,
     schedule::Schedule,
 };
@@ -45,11 +46,21 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<CommandOutcome
     let schedule = Schedule::new(&scene.settings.experiment, arguments.stop, arguments.step)?;
     let history = arguments.inputs.as_deref().map(InputHistory::read).transpose()?;
     let known = cache.checks(&scene);
+    let (mut fields, observed) = fields(arguments, &scene, &schedule, &cache, console)?.unzip();
     let clock = Instant::now();
     let run = {
         let task = console.task(&format!("Running {}", scene.settings.name), Some(schedule.count as u64));
-        let given = RunInputs { settings: &arguments.set, history: history.as_ref(), checks: &known };
-        let run = native::run(&scene, &schedule, given, &|done| task.at(done as u64));
+        let (settings, history) = (&arguments.set[..], history.as_ref());
+        let given = RunInputs { settings, history, checks: &known, observed: observed.as_ref() };
+        let progress = |done| task.at(done as u64);
+        let run = match &mut fields {
+            None => native::run(&scene, &schedule, given, &progress),
+            Some(RequestedFields { scene, series }) => StartedRun::new(scene, &schedule, given)
+                .and_then(|run| run.finish_observed(&progress, &mut |index, simulation| series.add(index, simulation)))
+                // If the run fails, its files up to then can be used.
+                .and_then(|run| series.finish().map(|()| run))
+                .inspect_err(|_| drop(series.finish())),
+        };
         // The message refers to the step in the file, unless the command line sets another one.
         let is_set = arguments.step.is_some() || arguments.set.iter().any(|(name, _)| name == "internal_step_max");
         run.map_err(|failure| if is_set { failure } else { scene_source::located(&arguments.scene, failure) })?
@@ -106,6 +117,7 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<CommandOutcome
         "answer": answer::json(&answer),
         "csv": arguments.csv.as_deref().map(shown_path),
         "parquet": arguments.parquet.as_deref().map(shown_path),
+        "vtk": fields.as_ref().map(RequestedFields::json),
         "parameters": parameters_json(&run.parameters),
         "extremes": Extreme::json(&extremes),
         "means": means::json(&means::means(&run)),
@@ -114,19 +126,80 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<CommandOutcome
     });
     let rest = if arguments.all {
         let outputs = outputs(&run.recording.names, run.recording.row(rows - 1));
-        format!("\n{outputs}\n{}", summary(&json, &extremes, &run.warnings) + &lines(&estimates))
+        let fields = fields.as_ref().map_or(String::new(), RequestedFields::text);
+        format!("\n{outputs}\n{}{fields}", summary(&json, &extremes, &run.warnings) + &lines(&estimates))
     } else {
         let reported =
             if estimates.is_empty() { String::new() } else { format!("\n{}", estimate::errors_text(&estimates)) };
+        let fields = fields.as_ref().map_or(String::new(), RequestedFields::text);
         let hint =
             if arguments.estimate { "" } else { "\nto estimate the errors of this run with coarser runs: --estimate" };
-        format!("{}{reported}{hint}", where_the_rest_is(&json, !run.warnings.is_empty()))
+        format!("{}{fields}{reported}{hint}", where_the_rest_is(&json, !run.warnings.is_empty()))
     };
     let (text, rest) = if to_stdout { (run.recording.to_csv(), String::new()) } else { (answer::text(&answer), rest) };
     if !estimates.is_empty() {
         json["estimated_errors"] = Value::Object(estimates.iter().map(Estimate::json).collect());
     }
     Ok(CommandOutcome { text, warnings: run.warnings, rest, json })
+}
+
+/// Fields over time.
+struct RequestedFields {
+    /// Scene whose outputs include the fields.
+    scene: Scene,
+    series: FieldSeries,
+}
+
+impl RequestedFields {
+    fn json(&self) -> Value {
+        let (files, bytes) = self.series.written();
+        json!({
+            "index": shown_path(&self.series.index_path()),
+            "files": files,
+            "bytes": bytes,
+            "without_surface": self.series.without_surface(),
+        })
+    }
+
+    fn text(&self) -> String {
+        let (files, bytes) = self.series.written();
+        let megabytes = 1e-6 * bytes as f64;
+        format!("\nwritten: {} ({files} files, {megabytes:.1} MB)", self.series.index_path().display())
+    }
+}
+
+/// Prepares fields over time, if they are requested.
+fn fields(
+    arguments: &RunArguments,
+    scene: &Scene,
+    schedule: &Schedule,
+    cache: &RomCache,
+    console: &Console,
+) -> Result<Option<(RequestedFields, ObservedScene)>> {
+    let Some(options) = arguments.fields() else { return Ok(None) };
+    let extended = options.scene(scene)?;
+    let directory = Path::new(&arguments.scene).parent().unwrap_or(Path::new(""));
+    let shapes = scene.settings.structures.iter().zip(&scene.roms).map(|(structure, rom)| {
+        match tiprub_format::builtin_model(structure) {
+            Some(name) => builtin::shapes(name, rom, cache, console).transpose(),
+            None => {
+                let path = directory.join(&structure.rom);
+                let beside = shape_file::beside(&path);
+                let files = shape_file::in_directory(path.parent().unwrap_or(Path::new("")), Some(&beside));
+                shape_file::find(rom, files)
+            }
+        }
+    });
+    let observed = ObservedScene::new(scene, schedule)?;
+    let series = FieldSeries::new(options, &extended, shapes.collect::<Result<_>>()?, *schedule)?;
+    let alone = series.without_surface().into_iter().map(|name| {
+        format!(
+            "{name} is shown by its contact nodes only: no shape file belongs to its ROM. `tiprub reduce` writes one \
+             beside the ROM of a mesh with one material"
+        )
+    });
+    console.warn_texts(&alone.collect::<Vec<_>>());
+    Ok(Some((RequestedFields { scene: extended, series }, observed)))
 }
 
 /// Returns the inputs and parameters at the start of a run as a JSON object.

@@ -133,7 +133,7 @@ fn rejects_outputs_that_coincide_with_other_files() {
         assert!(message.contains("is the same file as"), "{message}");
     }
     let message = project.fail(&["study", "map", "out/scene.json", "--out", "out"], 2);
-    assert!(message.contains("which the study may overwrite"), "{message}");
+    assert!(message.contains("which this command may overwrite"), "{message}");
     assert_eq!(fs::read_to_string(project.path("scene.toml")).unwrap(), SCENE);
     assert_eq!(fs::read_to_string(project.path("speed.csv")).unwrap(), inputs);
     assert_eq!(project.files().len(), before.len() + 1);

@@ -1,5 +1,6 @@
 //! User models through the program: reduce, package, run, and messages about wrong models.
 
+mod fields;
 mod sets;
 mod tips;
 

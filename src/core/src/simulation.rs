@@ -144,6 +144,25 @@ impl Simulation {
         }
     }
 
+    /// Searches the smallest gaps within spans for these sectors (1-based) only, although the scene may watch more: the
+    /// steps then have the bits of a scene that watches these sectors. The clearances of other watched sectors may be
+    /// too large.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::{CoSimulation, Simulation};
+    /// # let scene = tiprub_test_models::rub(2);
+    /// let mut simulation = Simulation::new(&scene)?;
+    /// simulation.search_minima_of(&[1]);
+    /// simulation.initialise(0.0)?;
+    /// simulation.do_step(0.0, 1e-4)?;
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
+    pub fn search_minima_of(&mut self, sectors: &[usize]) {
+        let by_sector = self.compiled.scene.settings.outputs.all_sectors;
+        self.system.structures.iter_mut().for_each(|one| one.need_minima(sectors, by_sector));
+    }
+
     /// Returns the stepped system, for studies that need more than the outputs.
     ///
     /// # Examples

@@ -1,25 +1,24 @@
 //! Built-in models, by their name after `builtin:` in a scene; reduced on first use.
 
+use std::fmt::Debug;
+
 use tiprub_core::Rom;
+use tiprub_field::shape_file;
 use tiprub_model::{
-    CasingOptions, Mesh, Rotor37Options,
+    CasingOptions, Mesh, Rotor37Options, SurfaceShapes,
     casing::CASING37,
     cube::{CubeOptions, RingOptions, RingSide},
     cyclic::{CyclicReduction, ModeSelection, reduce_cyclic},
     reduce::ReductionKind,
     rotor37::{DESIGN_SPEED, MeshCounts, TipContact, blade_mesh},
-    stage::{
-        SectorCounts, SectorOptions, StageOptions,
-        casing::{StageCasingOptions, reduce_stage_casing},
-        sector_mesh, stage_model,
-    },
+    stage::{SectorCounts, SectorOptions, StageOptions, casing::StageCasingOptions, sector_mesh, stage_model},
 };
 use tiprub_shell::{Result, console::Console};
 
 use crate::{
     known,
     reduction::{self, with_progress},
-    rom_cache::RomCache,
+    rom_cache::{CachedModel, RomCache},
 };
 
 /// Rotor 37, recommended: nine patches along the chord in two rows at the sides of the tip.
@@ -67,37 +66,81 @@ pub(crate) const NAMES: [&str; 13] = [
 
 /// Returns the model of this name; `None` if there is no such model.
 pub fn rom(name: &str, cache: &RomCache, console: &Console) -> Option<Result<Rom>> {
-    if let Some(options) = rotor37(name) {
-        let reduced = cache.get(name, &options, console, &|| Ok(reduction::rotor37(&options, console)?.rom));
-        return Some(reduced.map(|rom| known::with_known_errors(&options, rom)));
+    let model = BuiltinModel::named(name)?;
+    let rom = cache.get_model(name, model.options(), console, &|| model.reduce(console));
+    Some(rom.map(|rom| model.with_known_errors(rom)))
+}
+
+/// Returns the surface of the model of this name, whose ROM is given: from the cache, or from a new reduction. `None` if
+/// there is no such model, or if the ROM is not that of this model.
+pub fn shapes(name: &str, rom: &Rom, cache: &RomCache, console: &Console) -> Option<Result<SurfaceShapes>> {
+    let model = BuiltinModel::named(name)?;
+    if let Some(shapes) = cache.shapes(name, rom) {
+        return Some(Ok(shapes));
     }
-    let disk = || {
-        let model = DiskModel::named(name);
-        let rom = cache.get(name, &model, console, &|| Ok(model.reduce(console)?.0.rom))?;
-        Ok(known::with_known_errors(&model.options, rom))
+    let reduced = match model.reduce(console) {
+        Ok(reduced) => reduced,
+        Err(failure) => return Some(Err(failure)),
     };
-    Some(match name {
-        CASING37 => {
-            let options = CasingOptions::default();
-            cache.get(name, &options, console, &|| Ok(reduction::casing(&options, console)?.rom))
+    let shapes = reduced.shapes.filter(|_| shape_file::rom_digest(&reduced.rom) == shape_file::rom_digest(rom))?;
+    cache.keep_shapes(name, rom, &shapes, console);
+    Some(Ok(shapes))
+}
+
+/// Built-in model with its options; not yet reduced.
+enum BuiltinModel {
+    Rotor37(Rotor37Options),
+    Disk(Box<DiskModel>),
+    Casing(CasingOptions),
+    StageCasing(StageCasingOptions),
+    Cube(CubeOptions),
+    CubeRing(RingOptions),
+}
+
+impl BuiltinModel {
+    fn named(name: &str) -> Option<Self> {
+        if let Some(options) = rotor37(name) {
+            return Some(Self::Rotor37(options));
         }
-        STAGE | STAGE_NODES | STAGE_NODES_COARSE => disk(),
-        STAGE_CASING | STAGE_CASING_COARSE => {
-            let options = stage_casing(name == STAGE_CASING_COARSE);
-            let title = "Reducing the casing of the stage";
-            let reduce = || with_progress(title, console, &|listener| reduce_stage_casing(&options, listener));
-            cache.get(name, &options, console, &|| Ok(reduce()?.rom))
+        Some(match name {
+            CASING37 => Self::Casing(CasingOptions::default()),
+            STAGE | STAGE_NODES | STAGE_NODES_COARSE => Self::Disk(Box::new(DiskModel::named(name))),
+            STAGE_CASING | STAGE_CASING_COARSE => Self::StageCasing(stage_casing(name == STAGE_CASING_COARSE)),
+            CUBE => Self::Cube(CubeOptions::default()),
+            _ => Self::CubeRing(RingOptions::new(RINGS.iter().find(|(ring, _)| *ring == name)?.1)),
+        })
+    }
+
+    /// Returns the options, which determine the model.
+    fn options(&self) -> &dyn Debug {
+        match self {
+            Self::Rotor37(options) => options,
+            Self::Disk(model) => model.as_ref(),
+            Self::Casing(options) => options,
+            Self::StageCasing(options) => options,
+            Self::Cube(options) => options,
+            Self::CubeRing(options) => options,
         }
-        CUBE => {
-            let options = CubeOptions::default();
-            cache.get(name, &options, console, &|| Ok(reduction::cube(&options, console)?.rom))
+    }
+
+    fn reduce(&self, console: &Console) -> Result<CachedModel> {
+        Ok(match self {
+            Self::Rotor37(options) => reduction::rotor37(options, console)?.into(),
+            Self::Disk(model) => model.reduce(console)?.0.into(),
+            Self::Casing(options) => reduction::casing(options, console)?.into(),
+            Self::StageCasing(options) => reduction::stage_casing(options, console)?.into(),
+            Self::Cube(options) => reduction::cube(options, console)?.into(),
+            Self::CubeRing(options) => reduction::cube_ring(options, console)?.into(),
+        })
+    }
+
+    fn with_known_errors(&self, rom: Rom) -> Rom {
+        match self {
+            Self::Rotor37(options) => known::with_known_errors(options, rom),
+            Self::Disk(model) => known::with_known_errors(&model.options, rom),
+            _ => rom,
         }
-        _ => {
-            let (_, side) = RINGS.iter().find(|(ring, _)| *ring == name)?;
-            let options = RingOptions::new(*side);
-            cache.get(name, &options, console, &|| Ok(reduction::cube_ring(&options, console)?.rom))
-        }
-    })
+    }
 }
 
 /// Returns the options of the built-in blade with this name; `None` if there is no such blade.

@@ -15,6 +15,8 @@ use std::{
 use etcetera::BaseStrategy;
 use sha2::{Digest, Sha256};
 use tiprub_core::{Rom, Scene};
+use tiprub_field::shape_file;
+use tiprub_model::{Reduction, SurfaceShapes, cyclic::CyclicReduction};
 use tiprub_shell::{Result, console::Console, output_file};
 
 /// Version of the layout of cached files.
@@ -27,10 +29,39 @@ const VARIABLE: &str = "TIPRUB_CACHE";
 const LARGEST: u64 = tiprub_format::LARGEST_ROM + (1 << 10);
 /// Number of versions of one model that are cached: several options and releases may be in use side by side.
 const MAX_VERSIONS: usize = 4;
+/// Number of surfaces of one model that are cached.
+const MAX_SHAPE_FILES: usize = 2;
 /// Prefix and suffix of the names of files with results of checks, and the maximum number of these files.
 const CHECKS_PREFIX: &str = "scene";
 const CHECKS_SUFFIX: &str = ".checks";
 const MAX_CHECK_FILES: usize = 16;
+
+/// Model to cache.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CachedModel {
+    /// Reduced-order model.
+    pub rom: Rom,
+    /// Surface with its displacements per reduced coordinate, if it is to be cached.
+    pub shapes: Option<SurfaceShapes>,
+}
+
+impl From<Rom> for CachedModel {
+    fn from(rom: Rom) -> Self {
+        Self { rom, shapes: None }
+    }
+}
+
+impl From<Reduction> for CachedModel {
+    fn from(Reduction { rom, shapes, .. }: Reduction) -> Self {
+        Self { rom, shapes }
+    }
+}
+
+impl From<CyclicReduction> for CachedModel {
+    fn from(CyclicReduction { rom, shapes, .. }: CyclicReduction) -> Self {
+        Self { rom, shapes }
+    }
+}
 
 /// Cache directory, if there is one.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -77,7 +108,21 @@ impl RomCache {
         console: &Console,
         make: &dyn Fn() -> Result<Rom>,
     ) -> Result<Rom> {
-        let Some(directory) = &self.directory else { return make() };
+        self.get_model(name, options, console, &|| make().map(CachedModel::from))
+    }
+
+    /// Returns a model as [`RomCache::get`] does; caches its surface, too.
+    ///
+    /// # Errors
+    /// The errors of `make`.
+    pub(crate) fn get_model(
+        &self,
+        name: &str,
+        options: &dyn Debug,
+        console: &Console,
+        make: &dyn Fn() -> Result<CachedModel>,
+    ) -> Result<Rom> {
+        let Some(directory) = &self.directory else { return Ok(make()?.rom) };
         let key = key(name, options);
         let path = directory.join(format!("{name}-{}.rom", &key[..32]));
         match read(&path, &key) {
@@ -93,13 +138,37 @@ impl RomCache {
             }
             Err(None) => {}
         }
-        let rom = make()?;
+        let CachedModel { rom, shapes } = make()?;
+        if let Some(shapes) = &shapes {
+            self.keep_shapes(name, &rom, shapes, console);
+        }
         let kept = output_file::only_a_file(&path).and_then(|()| output_file::write(&path, content(&rom, &key)));
         if let Err(failure) = kept {
             console.print_progress(format_args!("Model {name} is not cached: {failure}"));
         }
         prune(directory, name, ".rom", MAX_VERSIONS);
         Ok(rom)
+    }
+
+    /// Returns the cached surface of the model `name` with this ROM; `None` if there is none, or if it is damaged.
+    pub fn shapes(&self, name: &str, rom: &Rom) -> Option<SurfaceShapes> {
+        shape_file::read(&self.shapes_path(name, rom)?, rom).ok()
+    }
+
+    /// Caches the surface of a model. If the file cannot be written, the work continues without it.
+    pub(crate) fn keep_shapes(&self, name: &str, rom: &Rom, shapes: &SurfaceShapes, console: &Console) {
+        let (Some(directory), Some(path)) = (&self.directory, self.shapes_path(name, rom)) else { return };
+        let kept =
+            output_file::only_a_file(&path).and_then(|()| output_file::write(&path, shape_file::write(shapes, rom)));
+        if let Err(failure) = kept {
+            console.print_progress(format_args!("The surface of model {name} is not cached: {failure}"));
+        }
+        prune(directory, name, shape_file::SUFFIX, MAX_SHAPE_FILES);
+    }
+
+    fn shapes_path(&self, name: &str, rom: &Rom) -> Option<PathBuf> {
+        let digest = shape_file::rom_digest(rom);
+        Some(self.directory.as_ref()?.join(format!("{name}-{}{}", &digest[..32], shape_file::SUFFIX)))
     }
 
     /// Returns the results of slow checks of the last run of a scene, for

@@ -17,6 +17,7 @@ use nalgebra::Complex;
 use tiprub_core::Rom;
 
 use crate::reduce::ReductionKind;
+use crate::shapes::SurfaceShapes;
 
 pub use boundary::PairingReport;
 pub use disk::{WholeDisk, whole_disk};
@@ -111,4 +112,7 @@ pub struct CyclicReduction {
     pub largest_angular_frequency: f64,
     /// Notes about the choice of modes.
     pub notes: Vec<String>,
+    /// Surface of the mesh of a sector, without its faces to other sectors, with its displacements per reduced
+    /// coordinate; `None` without a mesh.
+    pub shapes: Option<SurfaceShapes>,
 }

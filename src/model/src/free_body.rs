@@ -17,6 +17,7 @@ use crate::reduce::{
     ContactPoint, HeldContact, Reduction, ReductionKind, check_nodes, compare, description, full_modes, interface,
     responses,
 };
+use crate::shapes::Surface;
 
 /// Number of rigid-body motions.
 const RIGID: usize = 6;
@@ -95,8 +96,11 @@ pub(crate) fn reduce_free_body(
         extras: RomExtras::default(),
     };
     let fixed_interface_frequencies = reduced.fixed_interface_frequencies;
+    let surface = model.mesh.as_ref().map(|(mesh, _)| Surface::new(mesh, &[]));
+    let shapes = surface.map(|surface| surface.real(&free, &reduced.transformation, Some(&modes.shapes)));
     let model = (model.nodes.len(), model.mesh);
-    Ok(Reduction { fixed_interface_frequencies, ..Reduction::new(rom, &full.modes, &free, &modes.squares, model)? })
+    let reduction = Reduction::new(rom, &full.modes, &free, &modes.squares, model)?;
+    Ok(Reduction { fixed_interface_frequencies, shapes, ..reduction })
 }
 
 fn contact_node(point: &ContactPoint, position: [f64; 3]) -> ContactNode {

@@ -17,6 +17,7 @@ use crate::eigen::EigenModes;
 use crate::fe_model::FeModel;
 use crate::progress::{Listener, ReductionStage, report};
 use crate::reduce::{FullModes, Reduction, compare, description, full_modes};
+use crate::shapes::Surface;
 use crate::sparse::{SparseMatrix, principal_pair};
 use crate::{Error, Result};
 
@@ -130,9 +131,12 @@ pub(crate) fn reduce_panel(
             ..RomExtras::default()
         },
     };
+    let surface = model.mesh.as_ref().map(|(mesh, _)| Surface::new(mesh, &[]));
+    let shapes = surface.map(|surface| surface.real(&free, &reduced.transformation, None));
     let model = (model.nodes.len(), model.mesh);
     let mut reduction = Reduction::new(rom, &full.modes, &free, &basis.eigenvalues, model)?;
     reduction.modes.truncate(options.checked_modes);
+    reduction.shapes = shapes;
     Ok(reduction)
 }
 

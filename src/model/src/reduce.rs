@@ -19,6 +19,7 @@ use crate::free_interface::free_interface;
 use crate::material::Material;
 use crate::mesh::Mesh;
 use crate::progress::{Listener, ReductionStage, report, silent};
+use crate::shapes::{Surface, SurfaceShapes};
 use crate::sparse::{Factor, SparseMatrix, principal_pair, tall_product};
 use crate::spin::{
     ReducedSpin, Resting, Rotating, SPARE_MODES, SpinCheck, SpinningStates, centrifugal_load, reduced_spin,
@@ -108,6 +109,8 @@ pub struct Reduction {
     pub fixed_interface_frequencies: Vec<f64>,
     /// Accuracy of the spin arrays at half the largest speed and at the largest; empty if they were not requested.
     pub spin_checks: Vec<SpinCheck>,
+    /// Surface of the mesh with its displacements per reduced coordinate; `None` without a mesh.
+    pub shapes: Option<SurfaceShapes>,
 }
 
 /// Reduces a mesh to its contact nodes and fixed-interface modes.
@@ -285,8 +288,10 @@ pub fn reduce_model(
         }
     }
     let fixed_interface_frequencies = craig_bampton.fixed_interface_frequencies;
+    let surface = model.mesh.as_ref().map(|(mesh, _)| Surface::new(mesh, &[]));
+    let shapes = surface.map(|surface| surface.real(&free, &craig_bampton.transformation, None));
     let reduction = Reduction::new(rom, &full.modes, &free, &squares, (model.nodes.len(), model.mesh))?;
-    Ok(Reduction { spin_checks, fixed_interface_frequencies, ..reduction })
+    Ok(Reduction { spin_checks, fixed_interface_frequencies, shapes, ..reduction })
 }
 
 fn check_speed(speed: f64) -> Result<()> {

@@ -1,5 +1,6 @@
 //! Runs a scene without FMI, with the core, communication points and outputs of the FMU.
 
+use std::collections::HashSet;
 use std::time::{Duration, Instant};
 
 use tiprub_core::system::Effort;
@@ -81,7 +82,32 @@ pub struct RunInputs<'a> {
     /// Results of slow checks of an earlier run. They have no effect if they belong to another scene or other
     /// parameters.
     pub checks: &'a [u8],
+    /// Scene whose results the run has, if an observer needs more outputs than this scene has.
+    pub observed: Option<&'a ObservedScene>,
 }
+
+/// Scene that is run with more outputs, for an observer. The state of every sector is then known at communication points.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ObservedScene {
+    /// Columns of its recording.
+    columns: HashSet<String>,
+    /// Its watched sectors (1-based).
+    watched_sectors: Vec<usize>,
+}
+
+impl ObservedScene {
+    /// Creates the description of a scene.
+    ///
+    /// # Errors
+    /// The scene is rejected.
+    pub fn new(scene: &Scene, schedule: &Schedule) -> Result<Self> {
+        let columns = Outputs::of(compiled(scene, schedule)?.table()).names.into_iter().collect();
+        Ok(Self { columns, watched_sectors: scene.settings.outputs.watched_sectors.clone() })
+    }
+}
+
+/// Function that is called at every communication point with its index and the simulation.
+pub type Observer<'a> = dyn FnMut(usize, &Simulation) -> Result<()> + 'a;
 
 /// Runs `scene` over the schedule with replaced start values and inputs over time.
 ///
@@ -114,7 +140,10 @@ impl<'a> StartedRun<'a> {
         let in_scene = |error: tiprub_core::Error| in_scene(&scene_name, error);
         let mut simulation = compiled(scene, schedule)?;
         simulation.use_checks(given.checks);
-        simulation.skip_unneeded_states();
+        match given.observed {
+            Some(observed) => simulation.search_minima_of(&observed.watched_sectors),
+            None => simulation.skip_unneeded_states(),
+        }
         for (variable, value) in given.settings {
             if given.history.is_some_and(|history| history.holds(variable)) {
                 let problem = "the file given with --inputs also has a column for this variable";
@@ -134,7 +163,10 @@ impl<'a> StartedRun<'a> {
         warnings.extend(given.history.map(|history| history.warnings(schedule.step)).unwrap_or_default());
         warnings.retain(|warning| !scene.settings.is_silenced(warning.topic()));
         let parameters = used_parameters(&simulation).map_err(in_scene)?;
-        let outputs = Outputs::of(simulation.table());
+        let mut outputs = Outputs::of(simulation.table());
+        if let Some(observed) = given.observed {
+            outputs.keep(&observed.columns);
+        }
         let recording = Recording::with_columns(outputs.names.clone(), schedule.count + 1)?;
         let schedule = *schedule;
         Ok(Self { simulation, schedule, driver, scene_name, outputs, parameters, checks, warnings, recording })
@@ -145,6 +177,14 @@ impl<'a> StartedRun<'a> {
     /// # Errors
     /// A step fails; the failure contains the warnings so far.
     pub fn finish(self, progress: &dyn Fn(usize)) -> Result<NativeRun> {
+        self.finish_observed(progress, &mut |_, _| Ok(()))
+    }
+
+    /// Takes all steps, and calls an observer at every communication point.
+    ///
+    /// # Errors
+    /// A step or the observer fails; the failure contains the warnings so far.
+    pub fn finish_observed(self, progress: &dyn Fn(usize), observer: &mut Observer<'_>) -> Result<NativeRun> {
         let Self { mut simulation, schedule, driver, scene_name, outputs, mut warnings, mut recording, .. } = self;
         let in_scene = |error: tiprub_core::Error| in_scene(&scene_name, error);
         let (mut stepping, mut slowest) = (Duration::ZERO, Duration::ZERO);
@@ -152,6 +192,10 @@ impl<'a> StartedRun<'a> {
             let time = schedule.time(index);
             recording.times.push(time);
             outputs.read(&simulation, &mut recording.values).map_err(in_scene)?;
+            if let Err(failure) = observer(index, &simulation) {
+                warnings.extend(simulation.take_notes());
+                return Err(failure.with_warnings(warnings));
+            }
             progress(index);
             if index < schedule.count {
                 let next = schedule.time(index + 1);
@@ -253,6 +297,17 @@ impl Outputs {
             }
         }
         outputs
+    }
+
+    /// Keeps the elements with these names.
+    fn keep(&mut self, names: &HashSet<String>) {
+        let kept: Vec<bool> = self.names.iter().map(|name| names.contains(name)).collect();
+        let mut next = kept.iter().copied();
+        self.names.retain(|_| next.next().unwrap_or(false));
+        next = kept.iter().copied();
+        self.columns.retain(|_| next.next().unwrap_or(false));
+        next = kept.iter().copied();
+        self.elements.retain(|_| next.next().unwrap_or(false));
     }
 
     fn read(&self, simulation: &Simulation, values: &mut Vec<f64>) -> tiprub_core::Result<()> {

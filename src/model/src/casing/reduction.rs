@@ -22,6 +22,7 @@ use crate::mesh::Mesh;
 use crate::patches::PatchCoordinates;
 use crate::progress::{Listener, ReductionStage, report};
 use crate::reduce::{ContactPoint, Reduction, check_nodes, compare, element_names, full_modes};
+use crate::shapes::Surface;
 use crate::sparse::{principal_pair, tall_product};
 use crate::thermal::patch_loads;
 use crate::{Error, Result};
@@ -154,9 +155,11 @@ pub fn reduce_casing(
             ..RomExtras::default()
         },
     };
+    let shapes = Some(Surface::new(&mesh, &[]).real(&free, &reduced.transformation, Some(&modes.shapes)));
     let model = (mesh.nodes.len(), Some((mesh, material.clone())));
     let fixed_interface_frequencies = reduced.fixed_interface_frequencies;
-    Ok(Reduction { fixed_interface_frequencies, ..Reduction::new(rom, &full.modes, &free, &modes.squares, model)? })
+    let reduction = Reduction::new(rom, &full.modes, &free, &modes.squares, model)?;
+    Ok(Reduction { fixed_interface_frequencies, shapes, ..reduction })
 }
 
 /// Returns the error for a grid whose points depend on each other.

@@ -38,6 +38,8 @@ pub(super) struct Component {
     /// F̂.
     defect: Mat<c64>,
     kind: ReductionKind,
+    /// T; empty once it has been taken.
+    pub transformation: Mat<c64>,
 }
 
 /// Modes of one nodal diameter that are kept in a reduction.
@@ -48,6 +50,8 @@ pub(super) struct ComponentModes {
     pub stiffness: Mat<c64>,
     /// Ω² with the contact held.
     pub squares: Vec<f64>,
+    /// Reduced coordinates in terms of the computed ones, unless they are the first of these.
+    pub turn: Option<Mat<c64>>,
 }
 
 /// Quality of the lowest modes of a reduced nodal diameter.
@@ -124,7 +128,8 @@ impl Component {
         let outside = full.solve(mass_transformation.as_ref()) - &transformation * &inner;
         let defect = hermitian((outside.adjoint() * full.shifted(outside.as_ref())).as_ref());
         let squares = basis.squares;
-        Ok(Self { real: at_rest.real, contact, squares, mass, stiffness, shift, inner, defect, kind })
+        let real = at_rest.real;
+        Ok(Self { real, contact, squares, mass, stiffness, shift, inner, defect, kind, transformation })
     }
 
     /// Returns the reduced model with the first `modes` modes.
@@ -136,7 +141,7 @@ impl Component {
         let mut mass = self.mass.get(..size, ..size).to_owned();
         let mut stiffness = self.stiffness.get(..size, ..size).to_owned();
         if self.kind == ReductionKind::FixedInterface || modes == 0 {
-            return Ok(ComponentModes { mass, stiffness, squares: self.squares[..modes].to_vec() });
+            return Ok(ComponentModes { mass, stiffness, squares: self.squares[..modes].to_vec(), turn: None });
         }
         // The contact-free parts of free-interface modes are expressed in their own modes.
         let (squares, own) =
@@ -149,7 +154,7 @@ impl Component {
             .iter()
             .enumerate()
             .for_each(|(k, &square)| stiffness[(contact + k, contact + k)] = c64::new(square, 0.0));
-        Ok(ComponentModes { mass, stiffness, squares })
+        Ok(ComponentModes { mass, stiffness, squares, turn: Some(turn) })
     }
 
     /// Returns the lowest `count` modes of the reduced model with the first `modes` fixed-interface modes, and their

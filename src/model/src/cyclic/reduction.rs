@@ -13,6 +13,7 @@ use super::{CyclicBoundary, CyclicOptions, CyclicReduction, ModeSelection, Nodal
 use super::{families, lanczos, parallel, quality};
 use crate::progress::{Listener, ReductionStage, report};
 use crate::reduce::{ContactPoint, ReductionKind, check_nodes, interface, responses};
+use crate::shapes::{DiameterShapes, Surface};
 use crate::{Error, FeModel, Result};
 
 /// Result of one nodal diameter, computed in parallel.
@@ -20,6 +21,8 @@ struct DiameterReduction {
     component: Component,
     full_squares: Vec<f64>,
     shapes: Vec<Vec<[Complex<f64>; 3]>>,
+    /// Displacements of the surface per computed coordinate, 3·points × coordinates; `None` without a mesh.
+    moved: Option<Mat<c64>>,
 }
 
 /// Reduces one sector of a disk to its contact nodes or patches and modes, for every nodal diameter.
@@ -52,13 +55,16 @@ pub fn reduce_cyclic(
     // As in `reduce`: a millionth of the order of the highest ω² lies among the lowest elastic ones.
     let shift = -1e-6 * sector.stiffness.trace() / sector.mass.trace();
     let shifted = if clamped.is_empty() { Some(Condensed::new(&sector, shift, listener)?) } else { None };
+    let faces = [0, 1].map(|side| boundary.pairs.iter().map(|pair| pair[side]).collect());
+    let surface = model.mesh.as_ref().map(|(mesh, _)| Surface::new(mesh, &faces));
     let diameters = boundary.largest_nodal_diameter() + 1;
     let found = parallel::for_each(diameters, 2, (ReductionStage::FixedInterfaceModes, listener), |number, step| {
-        find(&at_rest, shifted.as_ref(), (number, boundary.sectors, model.nodes.len()), options, step)
+        let sizes = (number, boundary.sectors, model.nodes.len());
+        find((&at_rest, shifted.as_ref()), surface.as_ref(), sizes, options, step)
     })?;
     report(listener, ReductionStage::FullModes, 1, 1);
     report(listener, ReductionStage::Checks, 0, 1);
-    let result = assembled((model, clamped.len(), contact, boundary), &sector, found, options)?;
+    let result = assembled((model, clamped.len(), contact, boundary), (&sector, surface), found, options)?;
     report(listener, ReductionStage::Checks, 1, 1);
     Ok(result)
 }
@@ -82,8 +88,8 @@ fn check_options(contact: &[ContactPoint], options: &CyclicOptions) -> Result<()
 
 /// Computes everything about one nodal diameter that needs the full model.
 fn find(
-    at_rest: &Condensed<'_>,
-    shifted: Option<&Condensed<'_>>,
+    (at_rest, shifted): (&Condensed<'_>, Option<&Condensed<'_>>),
+    surface: Option<&Surface>,
     (number, sectors, nodes): (usize, usize, usize),
     options: &CyclicOptions,
     step: &dyn Fn(),
@@ -103,7 +109,7 @@ fn find(
         (ReductionKind::FreeInterface, RequestedModes::UpTo(_)) => component::modes(full, parts.order(), wanted)?,
     };
     step();
-    let component = match (options.kind, wanted) {
+    let mut component = match (options.kind, wanted) {
         (ReductionKind::FixedInterface, _) => Component::fixed_interface(&held, full, wanted)?,
         (ReductionKind::FreeInterface, RequestedModes::Count(count)) => {
             Component::free_interface(&held, full, &modes.lowest(count))?
@@ -112,8 +118,10 @@ fn find(
     };
     modes = modes.lowest(checked);
     let shapes = node_shapes(full, modes.shapes.as_ref(), nodes);
+    let transformation = core::mem::replace(&mut component.transformation, Mat::zeros(0, 0));
+    let moved = surface.map(|surface| surface.moved(&node_shapes(full, transformation.as_ref(), nodes)));
     step();
-    Ok(DiameterReduction { component, full_squares: modes.eigenvalues, shapes })
+    Ok(DiameterReduction { component, full_squares: modes.eigenvalues, shapes, moved })
 }
 
 /// Returns the displacements (x, y, z) of every node of the model; zero for clamped nodes.
@@ -143,7 +151,7 @@ fn node_shapes(operator: &CyclicPencil<'_>, shapes: MatRef<'_, c64>, nodes: usiz
 
 fn assembled(
     (model, clamped, contact, boundary): (&FeModel, usize, &[ContactPoint], &CyclicBoundary),
-    sector: &Sector,
+    (sector, surface): (&Sector, Option<Surface>),
     found: Vec<DiameterReduction>,
     options: &CyclicOptions,
 ) -> Result<CyclicReduction> {
@@ -154,6 +162,7 @@ fn assembled(
     let convergence = quality::convergence(&components, &full, boundary.sectors)?;
     let mut harmonics = Vec::with_capacity(found.len());
     let mut nodal_diameters = Vec::with_capacity(found.len());
+    let mut moved = Vec::with_capacity(found.len());
     let mut largest = 0.0_f64;
     for (number, (one, &count)) in found.iter().zip(&choice.counts).enumerate() {
         let order = one.component.contact + count;
@@ -162,6 +171,11 @@ fn assembled(
         let kept = one.component.kept(count)?;
         nodal_diameters.push(nodal_diameter(number, one, &kept, &quality));
         harmonics.push(harmonic(&one.component, &kept));
+        moved.extend(one.moved.as_ref().map(|own| {
+            let own = own.get(.., ..order);
+            let own = kept.turn.as_ref().map_or_else(|| own.to_owned(), |turn| own * turn);
+            DiameterShapes::new(&own, one.component.real)
+        }));
     }
     for (diameter, one) in nodal_diameters.iter_mut().zip(found) {
         diameter.shapes = one.shapes;
@@ -197,6 +211,7 @@ fn assembled(
     };
     rom.validate()?;
     Ok(CyclicReduction {
+        shapes: surface.map(|surface| surface.with(moved)),
         rom,
         nodal_diameters,
         convergence,

@@ -117,6 +117,7 @@ impl Reduction {
             reduced_angular_frequencies: squares.iter().map(|square| square.max(0.0).sqrt()).collect(),
             fixed_interface_frequencies: Vec::new(),
             spin_checks: Vec::new(),
+            shapes: None,
         })
     }
 }

@@ -1,0 +1,228 @@
+//! Surface of a model with the displacement of each of its points per reduced coordinate, for pictures.
+//!
+//! Only the corner nodes of the faces are kept, which draws a quadratic face as a plane one. A surface with more than
+//! [`MAX_POINTS`] points is thinned: all nodes in one cell of a regular grid are represented by the node nearest to
+//! the middle of the cell. Every point remains a node, so its displacement is that of the model.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use faer::{Mat, c64};
+use nalgebra::{Complex, DMatrix};
+
+use crate::mesh::{Mesh, surface_quads};
+
+/// Largest number of points of a surface.
+pub const MAX_POINTS: usize = 20_000;
+/// Factor on the size of the cells until a surface has few enough points.
+const COARSER: f64 = 1.1;
+
+/// Surface of one sector or one structure, and its displacements.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SurfaceShapes {
+    /// Undeformed positions (x, y, z) of the points (m).
+    pub points: Vec<[f64; 3]>,
+    /// Point indices (from 0) of the corners of all triangles and quadrilaterals, one after the other.
+    pub corners: Vec<u32>,
+    /// End of each face in `corners`.
+    pub ends: Vec<u32>,
+    /// Displacements of nodal diameter 0 and, for coupled sectors, of all others, ascending.
+    pub diameters: Vec<DiameterShapes>,
+}
+
+/// Displacements of the points of a surface per reduced coordinate of one nodal diameter of a
+/// [ROM](tiprub_core::Rom).
+#[derive(Debug, Clone, PartialEq)]
+pub struct DiameterShapes {
+    /// Number of reduced coordinates.
+    pub order: usize,
+    /// Real parts of the displacements along x, y, z (m per unit coordinate), `[coordinate][point][axis]`.
+    pub real: Vec<f32>,
+    /// Imaginary parts in the same order; empty if all are zero.
+    pub imaginary: Vec<f32>,
+}
+
+/// Surface of a mesh.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Surface {
+    /// Nodes of the mesh that are points of the surface.
+    nodes: Vec<usize>,
+    positions: Vec<[f64; 3]>,
+    corners: Vec<u32>,
+    ends: Vec<u32>,
+}
+
+impl Surface {
+    /// Finds the surface of a mesh, without faces all of whose corners are in one of the sets `omitted`.
+    pub(crate) fn new(mesh: &Mesh, omitted: &[BTreeSet<usize>]) -> Self {
+        Self::with_at_most(mesh, omitted, MAX_POINTS)
+    }
+
+    fn with_at_most(mesh: &Mesh, omitted: &[BTreeSet<usize>], points: usize) -> Self {
+        let mut faces = surface_quads(mesh);
+        faces.retain(|face| !omitted.iter().any(|set| face.iter().all(|node| set.contains(node))));
+        let used: BTreeSet<usize> = faces.iter().flatten().copied().collect();
+        let nodes: Vec<usize> = used.into_iter().collect();
+        let representative = thinned(mesh, &nodes, points);
+        let kept: BTreeSet<usize> = representative.values().copied().collect();
+        let kept: Vec<usize> = kept.into_iter().collect();
+        let index: BTreeMap<usize, u32> = kept.iter().copied().zip(0..).collect();
+        let (mut corners, mut ends) = (Vec::new(), Vec::new());
+        let mut end = 0;
+        for face in faces {
+            let mut around: Vec<u32> = face.iter().map(|node| index[&representative[node]]).collect();
+            around.dedup();
+            if around.len() > 1 && around.first() == around.last() {
+                around.pop();
+            }
+            let distinct: BTreeSet<u32> = around.iter().copied().collect();
+            if distinct.len() < 3 || distinct.len() != around.len() {
+                continue;
+            }
+            end += if around.len() == 3 { 3 } else { 4 };
+            corners.extend(around);
+            ends.push(end);
+        }
+        Self { positions: kept.iter().map(|node| mesh.nodes[*node]).collect(), nodes: kept, corners, ends }
+    }
+
+    /// Creates the shapes from the displacements of the free dofs (3·node + component, ascending) per coordinate, `free
+    /// dofs` × `coordinates`, or per coordinate of `turn`, `coordinates` × reduced coordinates.
+    pub(crate) fn real(self, free: &[usize], transformation: &Mat<f64>, turn: Option<&DMatrix<f64>>) -> SurfaceShapes {
+        let dofs = self.nodes.iter().flat_map(|node| (0..3).map(move |axis| 3 * node + axis));
+        let rows: Vec<Option<usize>> = dofs.map(|dof| free.binary_search(&dof).ok()).collect();
+        let own = Mat::from_fn(rows.len(), transformation.ncols(), |i, k| {
+            rows[i].map_or(0.0, |row| transformation[(row, k)])
+        });
+        let own = match turn {
+            None => own,
+            Some(turn) => own * Mat::from_fn(turn.nrows(), turn.ncols(), |i, k| turn[(i, k)]),
+        };
+        let real = own.col_iter().flat_map(|column| column.iter().map(|value| single(*value)));
+        let shapes = DiameterShapes { order: own.ncols(), real: real.collect(), imaginary: Vec::new() };
+        self.with(vec![shapes])
+    }
+
+    /// Returns the displacements of the points from those of all nodes of the mesh for each coordinate, 3·points ×
+    /// coordinates.
+    pub(crate) fn moved(&self, shapes: &[Vec<[Complex<f64>; 3]>]) -> Mat<c64> {
+        Mat::from_fn(3 * self.nodes.len(), shapes.len(), |row, k| {
+            let value = shapes[k][self.nodes[row / 3]][row % 3];
+            c64::new(value.re, value.im)
+        })
+    }
+
+    /// Adds the displacements of every nodal diameter.
+    pub(crate) fn with(self, diameters: Vec<DiameterShapes>) -> SurfaceShapes {
+        SurfaceShapes { points: self.positions, corners: self.corners, ends: self.ends, diameters }
+    }
+}
+
+impl DiameterShapes {
+    /// Creates the shapes from the displacements, 3·points × coordinates.
+    pub(crate) fn new(moved: &Mat<c64>, is_real: bool) -> Self {
+        let part = |pick: fn(&c64) -> f64| -> Vec<f32> {
+            moved.col_iter().flat_map(|column| column.iter().map(|value| single(pick(value)))).collect()
+        };
+        let imaginary = if is_real { Vec::new() } else { part(|value| value.im) };
+        Self { order: moved.ncols(), real: part(|value| value.re), imaginary }
+    }
+}
+
+/// Rounds to single precision.
+#[expect(clippy::cast_possible_truncation, reason = "rounding is intended")]
+fn single(value: f64) -> f32 {
+    value as f32
+}
+
+/// Returns the representative of each of these nodes; there are at most `most` representatives.
+fn thinned(mesh: &Mesh, nodes: &[usize], most: usize) -> BTreeMap<usize, usize> {
+    if nodes.len() <= most {
+        return nodes.iter().map(|node| (*node, *node)).collect();
+    }
+    let extent = |axis: usize| {
+        let values = nodes.iter().map(|node| mesh.nodes[*node][axis]);
+        values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
+    };
+    let extents = [0, 1, 2].map(extent);
+    let largest = extents.iter().map(|[low, high]| high - low).fold(0.0, f64::max);
+    // Coarser than the points of a surface would be if they were evenly spread over the largest two extents.
+    let mut size = largest / (most as f64).sqrt();
+    loop {
+        #[expect(clippy::cast_possible_truncation, reason = "there are at most as many cells as √`most`")]
+        let cell = |node: usize| [0, 1, 2].map(|axis| ((mesh.nodes[node][axis] - extents[axis][0]) / size) as i64);
+        let distance = |node: usize| {
+            let cell = cell(node);
+            let off =
+                [0, 1, 2].map(|axis| mesh.nodes[node][axis] - extents[axis][0] - (cell[axis] as f64 + 0.5) * size);
+            off.iter().map(|x| x * x).sum::<f64>()
+        };
+        let mut nearest: BTreeMap<[i64; 3], usize> = BTreeMap::new();
+        for &node in nodes {
+            let chosen = nearest.entry(cell(node)).or_insert(node);
+            if distance(node) < distance(*chosen) {
+                *chosen = node;
+            }
+        }
+        if nearest.len() <= most {
+            return nodes.iter().map(|node| (*node, nearest[&cell(*node)])).collect();
+        }
+        size *= COARSER;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::element::ElementKind;
+    use crate::mesh::Element;
+
+    /// Returns a plate of 20 × 20 × 1 bricks of 1 m.
+    fn plate() -> Mesh {
+        let (count, at) = (20, |i: usize, j: usize, k: usize| (i * 21 + j) * 2 + k);
+        let mut mesh = Mesh::default();
+        for i in 0..=count {
+            for j in 0..=count {
+                mesh.nodes.extend([0.0, 1.0].map(|z| [i as f64, j as f64, z]));
+            }
+        }
+        for i in 0..count {
+            for j in 0..count {
+                let layer = |k| [at(i, j, k), at(i + 1, j, k), at(i + 1, j + 1, k), at(i, j + 1, k)];
+                mesh.elements.push(Element { kind: ElementKind::Hex8, nodes: [layer(0), layer(1)].concat() });
+            }
+        }
+        mesh
+    }
+
+    #[test]
+    fn thinned_surface_has_few_points_that_are_nodes() {
+        let mesh = plate();
+        let whole = Surface::new(&mesh, &[]);
+        assert_eq!((whole.nodes.len(), whole.ends.len()), (mesh.nodes.len(), 2 * 400 + 80));
+        let few = Surface::with_at_most(&mesh, &[], 200);
+        assert!((100..=200).contains(&few.nodes.len()), "{}", few.nodes.len());
+        let mut start = 0;
+        for end in few.ends.iter().map(|end| *end as usize) {
+            let corners: BTreeSet<u32> = few.corners[start..end].iter().copied().collect();
+            assert!(corners.len() == end - start && (3..=4).contains(&corners.len()), "{corners:?}");
+            start = end;
+        }
+        assert_eq!(start, few.corners.len());
+        for (node, position) in few.nodes.iter().zip(&few.positions) {
+            assert_eq!(mesh.nodes[*node].map(f64::to_bits), position.map(f64::to_bits));
+        }
+        for axis in [0, 1] {
+            let values = few.positions.iter().map(|place| place[axis]);
+            let [low, high] = values.fold([f64::MAX, f64::MIN], |[low, high], x| [low.min(x), high.max(x)]);
+            assert!(low <= 2.0 && high >= 18.0, "{low} {high}");
+        }
+    }
+
+    #[test]
+    fn omitted_faces_leave_their_shared_points() {
+        let mesh = plate();
+        let rim: BTreeSet<usize> = (0..mesh.nodes.len()).filter(|node| mesh.nodes[*node][0] == 0.0).collect();
+        let open = Surface::new(&mesh, &[rim]);
+        assert_eq!((open.nodes.len(), open.ends.len()), (mesh.nodes.len(), 2 * 400 + 60));
+    }
+}
