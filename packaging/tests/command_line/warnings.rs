@@ -162,7 +162,7 @@ fn run_time_warnings_appear_once() {
     rom.contact_map = DMatrix::from_fn(3, 6, |i, j| f64::from(u8::from(3 + i == j)));
     fs::write(&path, tiprub_format::write_rom(&rom)).unwrap();
     let scene = SCENE
-        .replace("step = 1e-4", "scheme = \"galerkin\"\ntolerance = 1e-9\nstep = 8e-5")
+        .replace("step = 1e-4", "scheme = \"galerkin\"\ntolerance = 1e-9\nstep = 8e-4")
         .replace("amplitude = 2e-3", "amplitude = 1.1e-3");
     fs::write(project.path("scene.toml"), scene).unwrap();
     let output = project.run(&["run", "scene.toml", "--json", "--quiet"]);
