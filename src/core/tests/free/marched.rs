@@ -300,7 +300,9 @@ fn sticking_friction_only_dissipates_energy() {
                 }
                 let energy = real(&simulation, "kinetic_energy") + real(&simulation, "strain_energy");
                 assert!(energy < (1.0 + 1e-9) * start, "{energy} J of {start} J");
-                assert!(real(&simulation, "energy_residual_relative").abs() < 1e-12);
+                // Rounding of the ledger, which grows with the number of steps.
+                let rounding = 1e-13 + 2.5e-16 * simulation.system().effort().steps as f64;
+                assert!(real(&simulation, "energy_residual_relative").abs() < rounding);
             }
             let heat = simulation.system().ledger().friction_loss.value();
             assert!(heat > 1e-3 * start, "{heat} J");
