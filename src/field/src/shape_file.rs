@@ -24,7 +24,7 @@ use tiprub_core::scene::rom::DisplacementFrame;
 use tiprub_model::{SurfaceShapes, shapes::DiameterShapes};
 use tiprub_shell::{Failure, Result};
 
-/// End of the name of a ROM file, and of the shape file beside it.
+/// Extensions of a ROM file and of the shape file beside it.
 const ROM_SUFFIX: &str = ".rom.safetensors";
 /// End of the names of shape files.
 pub const SUFFIX: &str = ".shapes.safetensors";

@@ -107,9 +107,9 @@ fn sum<T: Copy + Into<f64>>(map: &[T], factors: impl ExactSizeIterator<Item = f6
 /// Reduced coordinates of a structure at one instant.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Coordinates {
-    /// Of each chosen sector.
+    /// Amplitudes of each chosen sector.
     Uncoupled(Vec<Vec<f64>>),
-    /// Of each nodal diameter.
+    /// Amplitudes of each nodal diameter.
     Coupled(Vec<Vec<Complex<f64>>>),
 }
 

@@ -131,7 +131,7 @@ fn modes_of_a_blade_move_its_surface_like_the_full_model() {
 }
 
 #[test]
-fn modes_of_casings_and_free_bodies_move_their_surfaces_like_the_full_model() {
+fn casings_and_free_bodies_move_like_the_full_model() {
     // The two modes of a double frequency of a ring have no defined direction, so that their space is compared.
     let casing = reduce_ring(&coarse(RingSupport::Low), &silent).unwrap();
     let shapes = casing.shapes.as_ref().unwrap();
@@ -153,7 +153,7 @@ fn modes_of_casings_and_free_bodies_move_their_surfaces_like_the_full_model() {
 }
 
 #[test]
-fn modes_of_coupled_sectors_move_their_surface_like_the_full_model() {
+fn coupled_sectors_move_like_the_full_model() {
     let sectors = 7;
     let mesh = sector(ElementKind::Hex20, sectors, COARSE);
     let (contact, faces) = (tips(&mesh, 2), boundary(&mesh, sectors));

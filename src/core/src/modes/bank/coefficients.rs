@@ -136,18 +136,11 @@ impl ModalBank {
     /// Collects the modal forces on one group that persist over the step: contact forces (`forces[row · lanes + sector]`, N;
     /// none for an empty slice), modal loads and spin.
     pub(super) fn gather_forces(&mut self, group: usize, forces: &[f64]) {
-        let (modes, lanes) = (self.modes, self.lanes);
-        self.modal_force.fill(0.0);
         if self.disk.is_none() {
-            let of_sector = forces.chunks_exact(lanes).map(|row| row[group]);
-            for (shapes, force) in
-                self.contact_rows.chunks_exact(modes).zip(of_sector).filter(|(_, force)| *force != 0.0)
-            {
-                self.modal_force.iter_mut().zip(shapes).for_each(|(sum, shape)| *sum += shape * force);
-            }
+            self.project_sector(group, forces);
         }
         let load = if group < self.loaded_groups() { &self.state.modal_load_before[..] } else { &[] };
-        for mode in 0..modes {
+        for mode in 0..self.modes {
             let mut force = match &self.disk {
                 Some(disk) => disk.asked_modal_force(mode, group),
                 None => [self.modal_force[mode], 0.0],

@@ -1,7 +1,7 @@
 //! Forces that act on some sectors after the prediction: contact forces, delayed forces, modal loads.
 
 use super::ModalBank;
-use super::predict::{Accumulate, AddModes, ModalForce};
+use super::predict::{Accumulate, AddColumns};
 use crate::modes::schemes::ModeCoefficients;
 
 impl ModalBank {
@@ -58,7 +58,11 @@ impl ModalBank {
         let mut moved = std::mem::take(&mut self.row_values);
         let rows = || self.state.displacement.chunks_exact(lanes);
         moved.iter_mut().zip(rows()).for_each(|(moved, row)| *moved = row[sector]);
-        self.instruction_set.run(AddModes { sums: &mut moved, matrix: &self.contact_modes, values: &self.correction });
+        self.instruction_set.run(AddColumns {
+            sums: &mut moved,
+            matrix: &self.contact_modes,
+            values: &self.correction,
+        });
         let rows = self.state.displacement.chunks_exact_mut(lanes);
         rows.zip(&moved).for_each(|(row, moved)| row[sector] = *moved);
         self.row_values = moved;
@@ -66,8 +70,9 @@ impl ModalBank {
 
     /// Writes φᵀf of one sector, for the force on its rows (N), to the scratch array `modal_force`.
     fn project(&mut self, force: &[f64]) {
-        let (modal_force, contact_rows) = (&mut self.modal_force, &self.contact_rows);
-        self.instruction_set.run(ModalForce { modal_force, contact_rows, force });
+        self.modal_force.fill(0.0);
+        let (sums, matrix) = (&mut self.modal_force, &self.contact_rows);
+        self.instruction_set.run(AddColumns { sums, matrix, values: force });
     }
 
     /// Corrects one sector for the contact `force` on its rows (N), eq. 11 of the paper.
@@ -118,21 +123,31 @@ impl ModalBank {
         self.move_rows(sector);
     }
 
+    /// Writes φᵀf of one sector to the scratch array `modal_force`, for the forces on all rows (`forces[row · lanes + sector]`, N; none
+    /// for an empty slice). Returns whether a force differs from 0.
+    pub(super) fn project_sector(&mut self, sector: usize, forces: &[f64]) -> bool {
+        let mut force = std::mem::take(&mut self.moved);
+        force.fill(0.0);
+        force.iter_mut().zip(forces.chunks_exact(self.lanes)).for_each(|(force, row)| *force = row[sector]);
+        let acts = force.iter().any(|force| *force != 0.0);
+        if acts {
+            self.project(&force);
+        } else {
+            self.modal_force.fill(0.0);
+        }
+        self.moved = force;
+        acts
+    }
+
     /// Applies contact forces of the previous step (`forces[row · lanes + sector]`, N) after the prediction (massless-boundary).
     pub(crate) fn act_delayed(&mut self, forces: &[f64]) {
-        let (lanes, mut force) = (self.lanes, std::mem::take(&mut self.moved));
         for sector in 0..self.sectors {
-            for (row, force) in force.iter_mut().enumerate() {
-                *force = forces[row * lanes + sector];
-            }
-            if force.iter().any(|force| *force != 0.0) {
-                self.project(&force);
+            if self.project_sector(sector, forces) {
                 let modal_force = std::mem::take(&mut self.modal_force);
                 self.act_delayed_modal(sector, &modal_force);
                 self.modal_force = modal_force;
             }
         }
-        self.moved = force;
     }
 
     /// Applies modal forces of the previous step to one sector after the prediction.

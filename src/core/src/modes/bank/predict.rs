@@ -55,25 +55,6 @@ impl ModalBank {
     }
 }
 
-/// φᵀf of all modes for the forces on the contact rows of one sector.
-pub(super) struct ModalForce<'a> {
-    pub modal_force: &'a mut [f64],
-    pub contact_rows: &'a [f64],
-    pub force: &'a [f64],
-}
-
-impl Kernel for ModalForce<'_> {
-    #[inline(always)]
-    fn run(self) {
-        self.modal_force.fill(0.0);
-        for (shapes, force) in self.contact_rows.chunks_exact(self.modal_force.len()).zip(self.force) {
-            for (sum, shape) in self.modal_force.iter_mut().zip(shapes) {
-                *sum += shape * force;
-            }
-        }
-    }
-}
-
 /// The fused pass over all chunks. `increment_before` holds d, `state.increment` receives d⁺. `LOSS`: sum the damping loss.
 /// `SPECIAL`: coefficients per lane (mistuning) and modal loads.
 pub(super) struct Predict<'a, const WIDTH: usize, const LOSS: bool, const SPECIAL: bool>(pub &'a mut ModalBank);
@@ -235,18 +216,18 @@ fn add_rows<const WIDTH: usize, const ROWS: usize>(sums: &mut [[f64; WIDTH]; ROW
     }
 }
 
-/// `sums` + Σ matrix[mode] · values[mode], with `sums.len()` entries per mode, added mode by mode.
-pub(super) struct AddModes<'a> {
+/// `sums` + Σ matrix[i] · values[i], with `sums.len()` entries per value, added value by value.
+pub(super) struct AddColumns<'a> {
     pub sums: &'a mut [f64],
     pub matrix: &'a [f64],
     pub values: &'a [f64],
 }
 
-impl Kernel for AddModes<'_> {
+impl Kernel for AddColumns<'_> {
     #[inline(always)]
     fn run(self) {
-        for (value, shapes) in self.values.iter().zip(self.matrix.chunks_exact(self.sums.len().max(1))) {
-            self.sums.iter_mut().zip(shapes).for_each(|(sum, shape)| *sum += shape * value);
+        for (value, column) in self.values.iter().zip(self.matrix.chunks_exact(self.sums.len().max(1))) {
+            self.sums.iter_mut().zip(column).for_each(|(sum, entry)| *sum += entry * value);
         }
     }
 }
