@@ -172,9 +172,10 @@ fn two_numbers_per_node_agree_with_three() {
     for (name, change, drive) in CASES {
         // Coarse steps do not resolve the times at which tips stop sliding.
         let coarse = if name.contains("faster than they slide") { 1e-3 } else { 1e-2 };
-        for tolerance in [coarse, 1e-4, 1e-6] {
+        for tolerance in [coarse, 1e-4, 1e-7] {
             let mut plane = scene(Scheme::Galerkin, H, tolerance);
             change(&mut plane);
+            let plane_is_centred = !plane.settings.structures[0].whirl;
             let mut space = plane.clone();
             split(&mut space);
             let [two, three] = [plane, space].map(|scene| values(&scene, drive));
@@ -183,7 +184,8 @@ fn two_numbers_per_node_agree_with_three() {
             println!("{name}, {tolerance:e}: {moved:.1e} {force:.1e}, trials {} {}", two.trials, three.trials);
             assert!(three.forces.iter().any(|force| *force != 0.0), "{name}: no contact");
             // The steps differ, because only steps with two numbers per node bound the penetration of nodes in contact.
-            let limit = (2.0 * tolerance).max(1e-5);
+            // With an off-centre shaft, they approach motions that differ by up to 7e-6.
+            let limit = (2.0 * tolerance).max(if plane_is_centred { 1e-6 } else { 1e-5 });
             assert!(moved < limit && force < limit, "{name}, {tolerance:e}: {moved:e} {force:e}");
         }
     }
