@@ -13,7 +13,7 @@ use tiprub_sweep::{engine::SweepFiles, plan};
 
 use crate::{
     cli::{Command, LibraryArguments, PackageArguments, StudyCommand},
-    commands::{demo, package::targets, study::directory},
+    commands::{demo, package::targets},
     fmu::FmiVersion,
     library,
     shared_arguments::OutputArguments,
@@ -47,16 +47,14 @@ pub fn check(command: &Command) -> Result<()> {
             output_file::try_directory(&arguments.out)
         }
         Command::Study(arguments) => match &arguments.study {
-            StudyCommand::Map(own) => study(&own.scene, &directory("map", &own.common), Vec::new()),
+            StudyCommand::Map(own) => study(&own.scene, &own.common.directory("map"), Vec::new()),
             StudyCommand::Convergence(own) => {
                 let read = scene(&own.study.scene).into_iter().chain(own.from.files()).collect::<Vec<_>>();
                 outputs(&read, &Vec::from_iter(NamedFile::option("--into", &own.study.into)))?;
-                study(&own.study.scene, &directory("convergence", &own.study.common), own.from.files())
+                study(&own.study.scene, &own.study.common.directory("convergence"), own.from.files())
             }
-            StudyCommand::Stability(own) => study(&own.scene, &directory("stability", &own.common), Vec::new()),
-            StudyCommand::Error(own) => {
-                study(&own.study.scene, &directory("error", &own.study.common), own.from.files())
-            }
+            StudyCommand::Stability(own) => study(&own.scene, &own.common.directory("stability"), Vec::new()),
+            StudyCommand::Error(own) => study(&own.study.scene, &own.study.common.directory("error"), own.from.files()),
         },
         Command::Package(arguments) => package(arguments),
         Command::Thermal(arguments) => {

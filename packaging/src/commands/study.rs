@@ -1,6 +1,6 @@
 //! `tiprub study`: answers a question about a scene with pictures and numbers.
 
-use std::path::PathBuf;
+use serde_json::json;
 
 use tiprub_shell::{
     Result,
@@ -8,11 +8,11 @@ use tiprub_shell::{
     output_file,
 };
 use tiprub_study::{
-    Study,
-    arguments::StudyCommon,
+    StudyOutcome,
     convergence::{self, EstimatedRom, refine::RomSource},
     error, estimate, map, output, stability,
 };
+use tiprub_sweep::tasks::{FinishedPart, TaskJournals};
 
 use crate::{
     cli::{StudyArguments, StudyCommand},
@@ -26,29 +26,36 @@ use crate::{
 /// # Errors
 /// A run fails, or files cannot be written.
 pub fn run(arguments: &StudyArguments, console: &Console) -> Result<CommandOutcome> {
-    type Work<'a> = Box<dyn Fn(&Console) -> Result<Study> + 'a>;
+    type Work<'a> = Box<dyn Fn(&Console) -> Result<StudyOutcome> + 'a>;
     let (name, common, work): (_, _, Work) = match &arguments.study {
         StudyCommand::Map(own) => ("map", &own.common, Box::new(|console| map::study(own, console))),
         StudyCommand::Error(own) => {
             let given = own.from.is_given()?;
             let of = move |console: &Console| {
                 let source = BladeSource::of(&own.from);
-                error::study(&own.study, given.then_some(&source as &dyn RomSource), console)
+                error::study(&own.study, given.then_some(&source as &dyn RomSource), console).map(StudyOutcome::from)
             };
             ("error", &own.study.common, Box::new(of))
         }
         StudyCommand::Convergence(own) => return convergence(own, console),
         StudyCommand::Stability(own) => ("stability", &own.common, Box::new(|console| stability::study(own, console))),
     };
-    let directory = directory(name, common);
+    let directory = common.directory(name);
     output_file::try_directory(&directory)?;
-    output::write(&work(console)?, &directory)
+    match work(console)? {
+        StudyOutcome::Finished(study, journals) => {
+            let outcome = output::write(&study, &directory)?;
+            journals.map_or(Ok(()), TaskJournals::remove)?;
+            Ok(outcome)
+        }
+        StudyOutcome::Part(part) => Ok(of_part(&part)),
+    }
 }
 
 /// Runs the convergence study, which may also write a ROM.
 fn convergence(own: &ConvergenceCommand, console: &Console) -> Result<CommandOutcome> {
     let given = own.from.is_given()?;
-    let directory = directory("convergence", &own.study.common);
+    let directory = own.study.common.directory("convergence");
     output_file::try_directory(&directory)?;
     if let Some(path) = &own.study.into {
         check_target(path, own.study.force)?;
@@ -76,7 +83,13 @@ fn convergence(own: &ConvergenceCommand, console: &Console) -> Result<CommandOut
     Ok(outcome)
 }
 
-/// Returns the directory for all files.
-pub fn directory(name: &str, common: &StudyCommon) -> PathBuf {
-    common.out.clone().unwrap_or_else(|| PathBuf::from(format!("study-{name}")))
+/// Summarises a part of a study.
+fn of_part(FinishedPart { part, tasks, all, journal }: &FinishedPart) -> CommandOutcome {
+    let text = format!(
+        "part {part}: {tasks} of {all} runs are finished, their results are in {}
+         When all parts are finished, run the command without --part in the same place to make the study",
+        journal.display()
+    );
+    let json = json!({ "part": part.to_string(), "runs": tasks, "all_runs": all, "journal": shown_path(journal) });
+    CommandOutcome { text, json, ..CommandOutcome::default() }
 }

@@ -1,6 +1,12 @@
 //! `tiprub study` in its quick forms, and the cache of built-in models behind it.
 
-use std::{fs, path::Path, process::Command};
+use std::{
+    fs,
+    path::Path,
+    process::{Command, Stdio},
+    thread,
+    time::{Duration, Instant},
+};
 
 use serde_json::{Value, json};
 
@@ -75,6 +81,80 @@ fn quick_interaction_map_shows_the_leaning_branch() {
         assert!(force[1].to_bits() == row[7].to_bits() && force[1] > 1.0, "{row:?} {force:?}");
         assert!((0.01..0.5).contains(&row[6]), "{row:?}");
     }
+}
+
+/// Arguments of a small map.
+const MAP: [&str; 11] = [
+    "study",
+    "map",
+    "builtin:rotor37-paper",
+    "--speeds",
+    "1300:1500:8",
+    "--revolutions",
+    "4",
+    "--transient",
+    "3",
+    "--json",
+    "--quiet",
+];
+
+/// Kills a study when its journal has at least two results, and returns their number.
+#[track_caller]
+fn killed_after_two(directory: &Path, journal: &Path, arguments: &[&str]) -> usize {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_tiprub"));
+    command.current_dir(directory).env("TIPRUB_CACHE", env!("CARGO_TARGET_TMPDIR")).args(arguments);
+    let mut child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let results = || fs::read_to_string(journal).map_or(0, |text| text.lines().count().saturating_sub(1));
+    let begun = Instant::now();
+    while results() < 2 {
+        assert!(begun.elapsed() < Duration::from_secs(60) && child.try_wait().unwrap().is_none());
+        thread::sleep(Duration::from_millis(2));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    results()
+}
+
+#[test]
+fn killed_stability_study_continues() {
+    let root = tempfile::tempdir().unwrap();
+    let study = ["study", "stability", "builtin:rotor37-paper", "--quick", "--threads", "1", "--out"];
+    let cache = env!("CARGO_TARGET_TMPDIR");
+    tiprub(root.path(), cache, &[&study[..], &["whole"]].concat());
+    let journal = root.path().join("killed/stability.journal");
+    let kept = killed_after_two(root.path(), &journal, &[&study[..], &["killed"]].concat());
+    let (_, messages) = tiprub(root.path(), cache, &[&study[..], &["killed"]].concat());
+    assert!(messages.contains(&format!("{kept} of")) && messages.contains("are already finished"), "{messages}");
+    let page = |out: &str| fs::read_to_string(root.path().join(out).join("index.html")).unwrap();
+    assert!(page("killed") == page("whole") && !journal.exists());
+}
+
+/// A map that is killed continues, and parts of a map join: both give the same numbers as one undisturbed run.
+#[test]
+fn killed_map_continues_and_parts_join() {
+    let root = tempfile::tempdir().unwrap();
+    let cache = env!("CARGO_TARGET_TMPDIR");
+    let map = |more: &[&str]| -> Value {
+        let (stdout, _) = tiprub(root.path(), cache, &[&MAP[..], more].concat());
+        serde_json::from_str(&stdout).unwrap()
+    };
+    let numbers = |out: &str| fs::read(root.path().join(out).join("map.csv")).unwrap();
+    map(&["--out", "whole"]);
+    let journal = root.path().join("killed/map.journal");
+    let kept = killed_after_two(root.path(), &journal, &[&MAP[..], &["--out", "killed", "--threads", "1"]].concat());
+    assert!((2..8).contains(&kept), "{kept}");
+    let (_, messages) = tiprub(root.path(), cache, &[&MAP[..10], &["--out", "killed"]].concat());
+    assert!(messages.contains(&format!("{kept} of 8 runs are already finished")), "{messages}");
+    assert!(numbers("killed") == numbers("whole") && !journal.exists());
+    for part in ["1/3", "3/3"] {
+        let answer = map(&["--out", "parts", "--part", part]);
+        assert_eq!((answer["part"].as_str(), answer["all_runs"].as_u64()), (Some(part), Some(8)));
+        assert!(!root.path().join("parts/index.html").exists());
+    }
+    map(&["--out", "parts"]);
+    assert_eq!(numbers("parts"), numbers("whole"));
+    let files: Vec<_> = fs::read_dir(root.path().join("parts")).unwrap().map(|entry| entry.unwrap().path()).collect();
+    assert!(!files.iter().any(|path| path.extension().is_some_and(|kind| kind == "journal")), "{files:?}");
 }
 
 /// Reports the cheapest setting for a scene, and two schemes that agree.

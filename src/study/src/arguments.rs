@@ -7,6 +7,7 @@ use tiprub_core::Scene;
 use tiprub_cosim::warning::Topic;
 use tiprub_gallery::{rom_cache::RomCache, scene_source};
 use tiprub_shell::console::Console;
+use tiprub_sweep::part::Part;
 
 /// Options of all studies.
 #[derive(Debug, Args)]
@@ -23,6 +24,13 @@ pub struct StudyCommon {
     /// Cache of built-in models.
     #[command(flatten)]
     pub cache: CacheArguments,
+}
+
+impl StudyCommon {
+    /// Returns the directory for all files of the study `name`.
+    pub fn directory(&self, name: &str) -> PathBuf {
+        self.out.clone().unwrap_or_else(|| PathBuf::from(format!("study-{name}")))
+    }
 }
 
 /// Arguments of `tiprub study map`.
@@ -46,6 +54,11 @@ pub struct MapArguments {
     /// 400].
     #[arg(long, value_name = "N", value_parser = transient)]
     pub transient: Option<usize>,
+    /// Run only this part of the angular velocities, so that several machines can share them, and store the results in the
+    /// output directory. The same command without --part reads the results of all parts there, runs what is missing, and
+    /// makes the map.
+    #[arg(long, value_name = "K/N")]
+    pub part: Option<Part>,
     /// Start value of an input or parameter, such as friction_coefficient=0 or gap_offset=1e-5; may be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment, allow_hyphen_values = true)]
     pub set: Vec<(String, String)>,

@@ -2,7 +2,8 @@
 //!
 //! A study is a function that returns a [`Study`]: facts, figures with the numbers behind them, and statements with their results. [`output`] writes
 //! every study in the same form: one HTML page that opens offline, an SVG and a CSV per figure, and `results.json`. Independent runs go through
-//! `tiprub_shell::sweep`.
+//! `tiprub_shell::sweep`; maps and stability studies store their results in journals (`tiprub_sweep::tasks`), so that they continue if they were
+//! interrupted.
 
 pub mod arguments;
 pub mod convergence;
@@ -18,6 +19,7 @@ use tiprub_core::Scene;
 use tiprub_core::scene::settings::SceneSettings;
 use tiprub_figure::{plots::Plot, waterfall::Waterfall};
 use tiprub_shell::{Failure, Result, recording::shortest};
+use tiprub_sweep::tasks::{FinishedPart, TaskJournals};
 
 /// Returns the index of the structure whose tips have the contact nodes.
 pub fn master(scene: &Scene) -> usize {
@@ -84,6 +86,21 @@ pub struct Study {
     pub results: Value,
     /// Further files to write: name, meaning, bytes.
     pub files: Vec<(String, String, Vec<u8>)>,
+}
+
+/// Outcome of a study.
+#[derive(Debug)]
+pub enum StudyOutcome {
+    /// The study is finished. The journals of its runs are removed when its files have been written.
+    Finished(Box<Study>, Option<TaskJournals>),
+    /// Only a part of its runs was requested.
+    Part(FinishedPart),
+}
+
+impl From<Study> for StudyOutcome {
+    fn from(study: Study) -> Self {
+        Self::Finished(Box::new(study), None)
+    }
 }
 
 /// Expectation of a study with its result.

@@ -13,6 +13,7 @@ mod statements;
 use findings::{Coincidence, MapPeak};
 use prediction::{Crossing, FrequencyPrediction};
 use serde_json::json;
+use std::cell::Cell;
 use tiprub_core::Scene;
 use tiprub_core::scene::settings::SpinSettings;
 use tiprub_gallery::scene_source;
@@ -22,8 +23,12 @@ use tiprub_shell::{
     forecast::{Forecast, WorkPlan},
     sweep,
 };
+use tiprub_sweep::{
+    part::Part,
+    tasks::{TaskJournals, TaskResults},
+};
 
-use super::{Statement, Study};
+use super::{Statement, Study, StudyOutcome};
 use crate::arguments::{MapArguments, Speeds};
 use crate::one_rotor_and_friction;
 pub use run::{MapSetup, SpeedResponse, SpeedRun};
@@ -35,6 +40,8 @@ const RANGE: [f64; 2] = [0.8, 1.2 * LEAN];
 /// Ratio of the highest speed of the map to a crossing up to a fifth above the middle, which is the largest shift of resonance observed for rotor
 /// 37; the middle itself has more room.
 const LEAN: f64 = 1.25;
+/// Name of the study, for files.
+const NAME: &str = "map";
 const COUNT: usize = 141;
 const QUICK_COUNT: usize = 8;
 /// Revolutions of the window; the bin width is the speed divided by this number.
@@ -76,8 +83,8 @@ struct Map {
 /// Runs the study: simulates all speeds, transforms the responses, draws and compares.
 ///
 /// # Errors
-/// The scene cannot be loaded, or is rejected at every speed.
-pub fn study(arguments: &MapArguments, console: &Console) -> Result<Study> {
+/// The scene cannot be loaded, or is rejected at every speed; a journal in the output directory cannot be used.
+pub fn study(arguments: &MapArguments, console: &Console) -> Result<StudyOutcome> {
     let name = arguments.scene.as_str();
     // Checked before any model is reduced.
     let settings = scene_source::settings(name)?;
@@ -92,18 +99,29 @@ pub fn study(arguments: &MapArguments, console: &Console) -> Result<Study> {
         settings: arguments.set.clone(),
     };
     let threads = arguments.threads.map_or_else(sweep::processors, std::num::NonZero::get);
-    let (study, warnings) = {
+    let (map, speeds) = Map::prepare(scene, &request)?;
+    let part = arguments.part.unwrap_or(Part::WHOLE);
+    let mut journals = TaskJournals::open(&arguments.common.directory(NAME), NAME, part, &map.setup.digests())?;
+    let runs = {
         // The rate is unknown before the first run has finished.
         let forecast = Forecast::new(console, "Running the interaction map", WorkPlan::new(0.0));
-        let found = of_scene(scene, &request, threads, |done, all, steps| match done {
-            0 => forecast.plan(0, steps),
-            _ => forecast.done(0, steps / all as f64),
-        })?;
+        let (count, steps) = (part.runs(speeds.len()).len(), map.internal_steps(&speeds) / speeds.len() as f64);
+        let is_planned = Cell::new(false);
+        let progress = |done: usize| match is_planned.replace(true) {
+            false => forecast.plan(0, steps * (count - done) as f64),
+            true => forecast.done(0, steps),
+        };
+        let runs = journals.run("speed", &speeds, threads, |speed| map.setup.run(*speed), console, progress)?;
         forecast.finish();
-        found
+        runs
     };
+    let runs = match runs {
+        TaskResults::All(runs) => runs,
+        TaskResults::Part(part) => return Ok(StudyOutcome::Part(part)),
+    };
+    let (study, warnings) = map.finish(runs, request.quick)?;
     console.warn_texts(&warnings);
-    Ok(study)
+    Ok(StudyOutcome::Finished(Box::new(study), Some(journals)))
 }
 
 /// Request of a map; `None` selects the default of the study.
@@ -121,38 +139,29 @@ pub struct MapRequest {
     pub settings: Vec<(String, String)>,
 }
 
-/// Runs the study of a scene; also returns the warnings of its runs. `progress` receives the number of finished runs, starting with 0, the number of
-/// all runs and the internal steps of all.
-///
-/// # Errors
-/// The errors of [`study`].
-pub fn of_scene(
-    scene: Scene,
-    request: &MapRequest,
-    threads: usize,
-    progress: impl Fn(usize, usize, f64),
-) -> Result<(Study, Vec<String>)> {
-    let (mut map, speeds) = Map::prepare(scene, request)?;
-    let steps = map.internal_steps(&speeds);
-    let report_progress = |done| progress(done, speeds.len(), steps);
-    report_progress(0);
-    map.runs = sweep::sweep(&speeds, threads, |speed| map.setup.run(*speed), report_progress)?;
-    if let (true, Some(Err(refusal))) =
-        (map.answered().next().is_none(), map.runs.first().map(|run| run.outcome.as_ref().map(|_| ())))
-    {
-        return Err(Failure::new(
-            "study map",
-            format!("all angular velocities were rejected; reason for the first: {refusal}"),
-            "",
-        ));
-    }
-    map.peaks = findings::peaks(&map.runs);
-    map.coincidences = findings::coincidences(&map.runs, &map.prediction, &map.crossings, map.setup.revolutions);
-    let warnings = map.warnings();
-    Ok((map.report(request.quick)?, warnings))
-}
-
 impl Map {
+    /// Evaluates the runs, and returns the study with the warnings of the runs.
+    ///
+    /// # Errors
+    /// All runs were rejected, or a figure cannot be drawn.
+    fn finish(mut self, runs: Vec<SpeedRun>, quick: bool) -> Result<(Study, Vec<String>)> {
+        self.runs = runs;
+        if let (true, Some(Err(refusal))) =
+            (self.answered().next().is_none(), self.runs.first().map(|run| run.outcome.as_ref().map(|_| ())))
+        {
+            return Err(Failure::new(
+                "study map",
+                format!("all angular velocities were rejected; reason for the first: {refusal}"),
+                "",
+            ));
+        }
+        self.peaks = findings::peaks(&self.runs);
+        self.coincidences =
+            findings::coincidences(&self.runs, &self.prediction, &self.crossings, self.setup.revolutions);
+        let warnings = self.warnings();
+        Ok((self.report(quick)?, warnings))
+    }
+
     /// Prepares the map, and returns the speeds to run.
     fn prepare(scene: Scene, request: &MapRequest) -> Result<(Self, Vec<f64>)> {
         if request.settings.iter().any(|(name, _)| name == "speed") {
@@ -228,7 +237,7 @@ impl Map {
         let refusals: Vec<_> =
             self.runs.iter().filter_map(|run| Some((run.speed, run.outcome.as_ref().err()?))).collect();
         Ok(Study {
-            name: "map",
+            name: NAME,
             title: "Interaction map".into(),
             summary: format!(
                 "Amplitudes of the blade tips of the scene `{}` over angular velocity and frequency, from {} runs, and \

@@ -11,6 +11,9 @@ pub mod scene;
 pub mod seek;
 pub mod structure;
 
+use serde::{Serialize, de::DeserializeOwned};
+use std::{cell::Cell, fmt::Debug};
+
 use grid::StabilityGrid;
 use scene::{OperatingPoint, SceneStart, ScreeningResult, StabilityScene};
 use structure::{KnownContact, Rates, SingleStructure};
@@ -24,8 +27,12 @@ use tiprub_shell::{
     forecast::{Forecast, WorkPlan},
     sweep,
 };
+use tiprub_sweep::{
+    part::Part,
+    tasks::{TaskJournals, TaskResults, scene_digest},
+};
 
-use super::{Study, master};
+use super::{StudyOutcome, master};
 use crate::{arguments::StabilityArguments, error::user_scene::refuse_compared, one_rotor_and_friction};
 
 /// Friction that makes the coefficient a parameter of a scene; every answer replaces it.
@@ -100,8 +107,8 @@ pub struct StabilityResult {
 /// Runs the study of a scene.
 ///
 /// # Errors
-/// The scene cannot be read, is rejected for all values, or start values are wrong.
-pub fn study(arguments: &StabilityArguments, console: &Console) -> Result<Study> {
+/// The scene cannot be read, is rejected for all values, or start values are wrong; a journal in the output directory cannot be used.
+pub fn study(arguments: &StabilityArguments, console: &Console) -> Result<StudyOutcome> {
     refuse_compared(&arguments.set)?;
     let scene = arguments.common.options.load(&arguments.scene, &arguments.common.cache.cache(), console)?;
     one_rotor_and_friction(&scene.settings)?;
@@ -119,19 +126,49 @@ pub fn study(arguments: &StabilityArguments, console: &Console) -> Result<Study>
     ledger.plan(LIMITS, limits::ANSWERS as f64);
     ledger.plan(GRID, (first.places().len() * first.steps.len()) as f64);
     let forecast = Forecast::new(console, &format!("Checking {}", scene.settings.name), ledger);
-    let limits = limits::of(&asked, &own, threads, arguments.common.quick, &forecast)?;
+    let shared = [scene_digest(&scene), format!("{:?} {own:?} {}", arguments.set, arguments.common.quick)];
+    let mut journals = TaskJournals::open(&arguments.common.directory(NAME), NAME, Part::WHOLE, &shared)?;
+    let mut work = StoredWork { threads, journals: &mut journals, console, forecast: &forecast };
+    let limits = limits::of(&asked, &own, arguments.common.quick, &mut work)?;
     let usable = limits.iter().find(|usable| usable.method == own.method).and_then(limits::Usable::step);
     let grid = StabilityGrid::new(arguments, &own, coupled, usable)?;
     let structures = structures(&scene, &own, &grid)?;
     let no_rates = structures.as_ref().err().copied();
     let structures = structures.unwrap_or_default();
-    let points = points(&asked, &own, &grid, &structures, threads, &forecast)?;
+    let points = points(&asked, &own, &grid, &structures, &mut work)?;
     forecast.finish();
     let found =
         StabilityResult { name: arguments.scene.clone(), own, grid, points, limits, no_rates, scene: scene.clone() };
-    page::study(&found)
+    Ok(StudyOutcome::Finished(Box::new(page::study(&found)?), Some(journals)))
 }
 
+/// Tasks that run on several threads, with results in journals.
+pub(super) struct StoredWork<'a> {
+    threads: usize,
+    journals: &'a mut TaskJournals,
+    console: &'a Console,
+    forecast: &'a Forecast,
+}
+
+impl StoredWork<'_> {
+    /// Does tasks of a kind, each with this share of the planned work of the forecast.
+    fn run<T: Debug + Sync, R: Serialize + DeserializeOwned + Send>(
+        &mut self,
+        (kind, name, share): (usize, &str, f64),
+        items: &[T],
+        work: impl Fn(&T) -> Result<R> + Sync,
+    ) -> Result<Vec<R>> {
+        let before = Cell::new(0);
+        let progress = |done: usize| self.forecast.done(kind, share * (done - before.replace(done)) as f64);
+        match self.journals.run(name, items, self.threads, work, self.console, progress)? {
+            TaskResults::All(results) => Ok(results),
+            TaskResults::Part(part) => Err(Failure::new("study stability", format!("has no parts: {part:?}"), "")),
+        }
+    }
+}
+
+/// Name of the study, for files.
+const NAME: &str = "stability";
 /// Kinds of work in a forecast.
 pub(super) const LIMITS: usize = 0;
 const GRID: usize = 1;
@@ -188,17 +225,17 @@ fn points(
     own: &SceneStart,
     grid: &StabilityGrid,
     structures: &[SingleStructure],
-    threads: usize,
-    forecast: &Forecast,
+    work: &mut StoredWork,
 ) -> Result<Vec<StabilityPoint>> {
     let places = grid.places();
-    let of_step = |step: &f64| {
-        let answers = asked.at(own.method, *step, &places);
+    let kind = (GRID, &*format!("grid {places:?}"), places.len() as f64);
+    let answers = work.run(kind, &grid.steps, |step| Ok(asked.at(own.method, *step, &places)))?;
+    let of_step = |(step, answers): &(f64, Vec<ScreeningResult>)| {
         let rates = |index: usize, place: &OperatingPoint| {
             let structure = structures.get(index / grid.frictions.len())?;
             rates(structure, own.method.0, *step, *place)
         };
-        let points = places.iter().zip(answers).enumerate();
+        let points = places.iter().zip(answers.clone()).enumerate();
         Ok(points
             .map(|(index, (place, answer))| StabilityPoint {
                 place: *place,
@@ -208,8 +245,8 @@ fn points(
             })
             .collect::<Vec<_>>())
     };
-    let progress = |_| forecast.done(GRID, places.len() as f64);
-    let found = sweep::sweep(&grid.steps, threads, of_step, progress)?;
+    let answered: Vec<_> = grid.steps.iter().copied().zip(answers).collect();
+    let found = sweep::sweep(&answered, work.threads, of_step, |_| {})?;
     let found = found.concat();
     if found.is_empty() { Err(Failure::new("stability", "the grid of the study is empty", "")) } else { Ok(found) }
 }

@@ -106,7 +106,7 @@ fn filled(plan: &Plan, run: usize, pattern: &str) -> String {
 }
 
 /// Returns the SHA-256 of texts with their lengths, as hexadecimal digits.
-fn digest_of<'a>(items: impl Iterator<Item = &'a str>) -> String {
+pub(crate) fn digest_of<'a>(items: impl Iterator<Item = &'a str>) -> String {
     let mut hash = Sha256::new();
     for item in items {
         hash.update((item.len() as u64).to_le_bytes());

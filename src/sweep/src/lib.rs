@@ -10,6 +10,8 @@
 //! - [`row`]: results of one run; [`result_file`]: the Parquet files;
 //! - [`histories`]: outputs over time;
 //! - [`plan_digest`]: comparison of the files of several machines.
+//!
+//! Studies store the results of their [`tasks`] in journals of the same kind.
 #![warn(unreachable_pub)]
 #![forbid(unsafe_code)]
 
@@ -25,5 +27,6 @@ pub mod plan;
 pub mod plan_digest;
 pub mod result_file;
 pub mod row;
+pub mod tasks;
 #[cfg(test)]
 mod tests;

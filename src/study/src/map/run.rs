@@ -2,12 +2,14 @@
 
 use std::time::{Duration, Instant};
 
+use serde::{Deserialize, Serialize};
 use tiprub_core::scene::method::Scheme;
 use tiprub_core::system::System;
 use tiprub_core::{CoSimulation, Scene, Simulation};
 use tiprub_cosim::shown;
 use tiprub_cosim::variables::Quantity;
 use tiprub_shell::{Failure, Result, native};
+use tiprub_sweep::tasks::scene_digest;
 
 use super::{
     spectrum::{Analyser, Decimator},
@@ -44,7 +46,7 @@ pub struct MapSetup {
 }
 
 /// Result of one speed.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct SpeedRun {
     /// Angular velocity (rad/s).
     pub speed: f64,
@@ -54,7 +56,7 @@ pub struct SpeedRun {
 
 /// Response in the window at one speed. The two ends of a blade tip are given, leading edge first; for a structure with one contact node they are
 /// equal.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct SpeedResponse {
     /// Distance of the bins (Hz).
     pub resolution: f64,
@@ -111,6 +113,12 @@ impl WindowTally {
 }
 
 impl MapSetup {
+    /// Returns everything that determines the results of a run, except for its speed.
+    pub fn digests(&self) -> Vec<String> {
+        let Self { scene, settings, samples, transient, revolutions, top } = self;
+        vec![scene_digest(scene), format!("{settings:?} {samples} {transient} {revolutions} {top:?}")]
+    }
+
     /// Creates a simulation with its start values, not yet initialised, that rotates with `speed` (rad/s) in the sense of the scene.
     ///
     /// # Errors

@@ -2,9 +2,10 @@
 
 use tiprub_core::modes::{cyclic::CyclicModel, modal::ModalModel};
 use tiprub_core::scene::method::{Scheme, Solver};
-use tiprub_shell::{Result, forecast::Forecast, sweep};
+use tiprub_shell::Result;
 
 use super::{
+    StoredWork,
     scene::{Method, OperatingPoint, SceneStart, ScreeningResult, StabilityScene},
     seek::{Sought, TRIED, seek},
 };
@@ -65,13 +66,7 @@ fn highest(asked: &StabilityScene) -> f64 {
 ///
 /// # Errors
 /// A thread fails.
-pub fn of(
-    asked: &StabilityScene,
-    own: &SceneStart,
-    threads: usize,
-    quick: bool,
-    forecast: &Forecast,
-) -> Result<Vec<Usable>> {
+pub(super) fn of(asked: &StabilityScene, own: &SceneStart, quick: bool, work: &mut StoredWork) -> Result<Vec<Usable>> {
     let place = [OperatingPoint { friction: own.friction, speed: own.speed }];
     let highest = highest(asked);
     let range = TRIED.map(|product| product / highest);
@@ -82,29 +77,30 @@ pub fn of(
             |solver: Solver, step: f64| -> ScreeningResult { asked.at((*scheme, solver), step, &place).remove(0) };
         let known = Some(scheme.properties().stable_below / highest).filter(|step| step.is_finite());
         let sought = |solver: Solver, range: [f64; 2]| seek(range, known, |step| ask(solver, step).map(drop));
-        let mut found: Vec<Usable> = Vec::new();
+        let mut found: Vec<Sought<String>> = Vec::new();
         for solver in Solver::ALL {
             let like = found.iter().find(|other| alike(other, &|step| ask(solver, step)));
             let sought = match like {
-                Some(other) => other.sought.clone(),
+                Some(other) => other.clone(),
                 None => match sought(solver, range) {
                     // The scene's own step is already rejected: the limit lies below.
                     Sought::None(_) if quick => sought(solver, TRIED.map(|product| product / highest)),
                     found => found,
                 },
             };
-            found.push(Usable { method: (*scheme, solver), sought });
+            found.push(sought);
         }
         Ok(found)
     };
     let share = ANSWERS as f64 / Scheme::RECURRENCES.len() as f64;
-    let progress = |_| forecast.done(super::LIMITS, share);
-    Ok(sweep::sweep(&Scheme::RECURRENCES, threads, of_scheme, progress)?.concat())
+    let found = work.run((super::LIMITS, "limits", share), &Scheme::RECURRENCES, of_scheme)?;
+    let methods = Scheme::RECURRENCES.iter().flat_map(|scheme| Solver::ALL.map(|solver| (*scheme, solver)));
+    Ok(methods.zip(found.concat()).map(|(method, sought)| Usable { method, sought }).collect())
 }
 
 /// Returns whether another solver gives the same answers just below and just above a limit, with the same reason.
-fn alike(other: &Usable, ask: &dyn Fn(f64) -> ScreeningResult) -> bool {
-    let Sought::Below(step, why) = &other.sought else { return false };
+fn alike(other: &Sought<String>, ask: &dyn Fn(f64) -> ScreeningResult) -> bool {
+    let Sought::Below(step, why) = other else { return false };
     // Twice the width of the last interval.
     ask(step * (1.0 - 1e-6)).is_ok() && ask(step * 1.02).is_err_and(|refusal| same_reason(&refusal, why))
 }

@@ -1,12 +1,14 @@
 //! Searches for the largest step up to which all tried steps are accepted.
 
+use serde::{Deserialize, Serialize};
+
 /// Range of tried steps, times the highest angular frequency: from steps that resolve every mode well to far beyond.
 pub const TRIED: [f64; 2] = [0.1, 1e3];
 /// Number of halvings of the interval between an accepted and a rejected step.
 const HALVINGS: u32 = 7;
 
 /// Result of a search.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Sought<E> {
     /// All steps are accepted, up to the largest tried (s).
     All(f64),
