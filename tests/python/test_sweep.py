@@ -191,6 +191,24 @@ def test_workers_reject_other_programs_and_files(plan, capfd, tmp_path):
     assert capfd.readouterr().err == ""
 
 
+def test_worker_without_the_module_is_an_error(plan, tmp_path):
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    options = dict(n_workers=0, processes=False, protocol="tcp://", dashboard_address=None)
+    with distributed.LocalCluster(**options) as cluster, distributed.Client(cluster) as client:
+        words = ["-m", "distributed.cli.dask_worker", cluster.scheduler_address, "--no-nanny", "--no-dashboard"]
+        place = tmp_path / "elsewhere"
+        place.mkdir()
+        with subprocess.Popen([sys.executable, *words], env=environment, cwd=place, stderr=subprocess.DEVNULL) as worker:
+            try:
+                client.wait_for_workers(1, timeout=60)
+                with pytest.raises(module.Error) as error:
+                    module.sweep(plan, client, quiet=True)
+                assert "cannot import the module" in error.value.problem
+            finally:
+                worker.terminate()
+    assert not list(plan.with_suffix("").glob("*"))
+
+
 def use_program(path):
     os.environ["TIPRUB"] = path
 
@@ -300,6 +318,12 @@ def test_empty_tasks_cost_little(tmp_path):
     answer = subprocess.run([sys.executable, ROOT / "examples" / "clusters" / "empty_tasks.py", "--tasks", "1000"],
                             capture_output=True, text=True, check=True)
     assert "1000 tasks" in answer.stdout
+
+
+def test_ways_to_run_a_sweep_are_measured():
+    script = [sys.executable, ROOT / "examples" / "clusters" / "many_runs.py", "--speeds", "3", "--offsets", "2"]
+    answer = subprocess.run(script, env={**os.environ, "PYTHONPATH": PACKAGE}, capture_output=True, text=True, check=True)
+    assert answer.stdout.startswith("6 runs, equal tables") and answer.stdout.count("times as fast") == 4
 
 
 def test_designs_of_experiments_of_the_guide(tmp_path, monkeypatch):

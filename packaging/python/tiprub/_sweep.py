@@ -25,6 +25,8 @@ PILOT_RUNS = 3
 LOCKED, RETRY_SECONDS = "another process is working on this part", 0.5
 #: Time (s) between two lines of progress.
 PROGRESS_SECONDS = 5.0
+#: Expression that is true if this module can be imported.
+HAS_MODULE = "__import__('importlib.util').util.find_spec('tiprub') is not None"
 #: Part that contains the last run of every plan and few others.
 LAST_PART = "1000000/1000000"
 
@@ -83,6 +85,7 @@ def sweep(
     check = call(["sweep", "--check", f"--part={LAST_PART}", f"--output={directory / 'check.parquet'}"], [str(file)], quiet=True)
     task = {"plan": str(file), "digest": check["digest"]}
     with _connected(distributed, client) as cluster:
+        _check_workers(cluster)
         threads = sum(cluster.nthreads().values())
         count = _known_parts(directory, file.stem)
         if count is None and runs_per_task is None:
@@ -141,6 +144,17 @@ def _connected(distributed: Any, client: Any) -> Iterator[Any]:
         raise Error("keyword `client`", f"there is no connection to {client!r}: {error}", remedy) from None
     with own:
         yield own
+
+
+def _check_workers(cluster: Any) -> None:
+    """Check that the scheduler and the workers that exist can import this module. Without it, tasks would wait forever."""
+    # A function of this module could not be sent to them.
+    places = {"the scheduler": cluster.run_on_scheduler(eval, HAS_MODULE), **cluster.run(eval, HAS_MODULE, on_error="return")}
+    lacking = [name for name, has_module in places.items() if has_module is not True]
+    if lacking:
+        more = f" and {len(lacking) - 1} more" if len(lacking) > 1 else ""
+        problem = f"{lacking[0]}{more} cannot import the module `tiprub`"
+        raise Error("dask", problem, "Install the same release of tiprub on the scheduler and all workers")
 
 
 def _known_parts(directory: Path, stem: str) -> Optional[int]:
