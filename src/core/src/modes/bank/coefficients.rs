@@ -22,7 +22,7 @@ impl ModalBank {
             self.spread_coefficients();
         }
         if let Some(disk) = &mut self.disk {
-            disk.fill(&self.coefficients);
+            disk.fill(&self.coefficients, scheme);
         }
         self.refresh_coupling();
     }

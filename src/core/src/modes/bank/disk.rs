@@ -15,6 +15,7 @@ use crate::math::simd::InstructionSet;
 use crate::math::vector::{Vector3, strided_vector3};
 use crate::modes::cyclic::CyclicModel;
 use crate::modes::schemes::ModeCoefficients;
+use crate::scene::method::Scheme;
 use fourier::{Fourier, Synthesis};
 use pass::{Combination, Complexes, Gather, LaneCoefficients, ModalForces, Pass, modal_force};
 
@@ -58,6 +59,8 @@ pub struct Disk {
     rows: usize,
     /// Largest number of modes of a nodal diameter.
     modes: usize,
+    /// Number of modes of each block of nodal diameters that have inertia, and thus can differ from 0 after the prediction.
+    moving: Vec<usize>,
     /// Ψ, `[block][mode][row]`.
     shapes: Vec<Complexes>,
     /// `[block][mode]`.
@@ -128,6 +131,7 @@ impl Disk {
             fourier,
             rows,
             modes,
+            moving: vec![modes; blocks],
             shapes,
         }
     }
@@ -137,9 +141,12 @@ impl Disk {
         &self.model
     }
 
-    /// Computes the flexibility from the coefficients of all modes, `[n][mode]`.
-    pub(super) fn fill(&mut self, coefficients: &[ModeCoefficients]) {
+    /// Computes the flexibility from the coefficients of all modes under a scheme, `[n][mode]`.
+    pub(super) fn fill(&mut self, coefficients: &[ModeCoefficients], scheme: Scheme) {
         let (modes, rows) = (self.modes, self.rows);
+        for (moving, diameters) in self.moving.iter_mut().zip(self.model.diameters.chunks(LANES)) {
+            *moving = diameters.iter().map(|diameter| diameter.dynamic_modes(scheme)).max().unwrap_or(0);
+        }
         for (n, coefficients) in coefficients.chunks_exact(modes).enumerate() {
             for (lanes, k) in self.coefficients[n / LANES * modes..].iter_mut().zip(coefficients) {
                 lanes.set(n % LANES, k);
@@ -337,6 +344,7 @@ impl ModalBank {
         let [increment, older] = increments.map(|values| complexes_mut(values));
         disk.instruction_set.run(Pass::<APPLY, DELAYED, LOSS, ADVANCE> {
             modes: disk.modes,
+            moving: &disk.moving,
             rows: disk.rows,
             touched: &disk.state.touched,
             coefficients: &disk.coefficients,

@@ -40,6 +40,8 @@ impl LaneCoefficients {
 /// step (massless-boundary). `LOSS`: add the damping loss of the previous step. `ADVANCE`: predict and recover.
 pub(super) struct Pass<'a, const APPLY: bool, const DELAYED: bool, const LOSS: bool, const ADVANCE: bool> {
     pub modes: usize,
+    /// Number of modes of each block that can differ from 0 after the prediction; the first ones.
+    pub moving: &'a [usize],
     pub rows: usize,
     /// Contact nodes on which the forces act.
     pub touched: &'a [bool],
@@ -83,6 +85,7 @@ impl<const APPLY: bool, const DELAYED: bool, const LOSS: bool, const ADVANCE: bo
         let force = &self.force[block * rows..][..rows];
         // Loads rotate with the disk, so they act on nodal diameter 0 only.
         let loaded = block == 0 && !self.modal_load.is_empty();
+        let moving = if loaded { modes } else { self.moving[block] };
         let mut lost = [0.0; LANES];
         let mut sums = [[[0.0; LANES]; 2]; ROWS];
         let states = self.position[block * modes..][..modes]
@@ -134,7 +137,7 @@ impl<const APPLY: bool, const DELAYED: bool, const LOSS: bool, const ADVANCE: bo
             if APPLY || ADVANCE {
                 *position = q;
             }
-            if ADVANCE {
+            if ADVANCE && mode < moving {
                 add_rows(&mut sums, shapes, &q);
             }
         }
@@ -145,7 +148,7 @@ impl<const APPLY: bool, const DELAYED: bool, const LOSS: bool, const ADVANCE: bo
         }
         if ADVANCE {
             self.spectrum[block * rows..][..ROWS].copy_from_slice(&sums);
-            let (shapes, position) = (&self.shapes[block * modes * rows..], &self.position[block * modes..][..modes]);
+            let (shapes, position) = (&self.shapes[block * modes * rows..], &self.position[block * modes..][..moving]);
             combine(shapes, position, None, ROWS, &mut self.spectrum[block * rows..][..rows]);
         }
     }
