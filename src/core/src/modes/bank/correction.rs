@@ -50,19 +50,20 @@ impl ModalBank {
     /// Adds the displacement of the contact rows by `correction`.
     pub(super) fn move_rows(&mut self, sector: usize) {
         let lanes = self.lanes;
+        // Quasi-static modes, which come last, do not respond to delayed forces.
+        let last = self.correction.iter().rposition(|value| *value != 0.0).map_or(0, |last| last + 1);
+        // Whole groups of four modes give the same sums as all modes.
+        let values = &self.correction[..last.next_multiple_of(4).min(self.modes)];
+        let matrix = &self.contact_modes[..values.len() * self.rows];
         if lanes == 1 {
-            let (sums, matrix) = (&mut self.state.displacement, &self.contact_modes);
-            self.instruction_set.run(Accumulate { sums, matrix, values: &self.correction });
+            let sums = &mut self.state.displacement;
+            self.instruction_set.run(Accumulate { sums, matrix, values });
             return;
         }
         let mut moved = std::mem::take(&mut self.row_values);
         let rows = || self.state.displacement.chunks_exact(lanes);
         moved.iter_mut().zip(rows()).for_each(|(moved, row)| *moved = row[sector]);
-        self.instruction_set.run(AddColumns {
-            sums: &mut moved,
-            matrix: &self.contact_modes,
-            values: &self.correction,
-        });
+        self.instruction_set.run(AddColumns { sums: &mut moved, matrix, values });
         let rows = self.state.displacement.chunks_exact_mut(lanes);
         rows.zip(&moved).for_each(|(row, moved)| row[sector] = *moved);
         self.row_values = moved;
