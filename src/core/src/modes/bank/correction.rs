@@ -1,7 +1,7 @@
 //! Forces that act on some sectors after the prediction: contact forces, delayed forces, modal loads.
 
 use super::ModalBank;
-use super::predict::{Accumulate, AddColumns};
+use super::predict::{Accumulate, AddColumns, used_len};
 use crate::modes::schemes::ModeCoefficients;
 
 impl ModalBank {
@@ -51,9 +51,9 @@ impl ModalBank {
     pub(super) fn move_rows(&mut self, sector: usize) {
         let lanes = self.lanes;
         // Quasi-static modes, which come last, do not respond to delayed forces.
-        let last = self.correction.iter().rposition(|value| *value != 0.0).map_or(0, |last| last + 1);
+        let used = used_len(&self.correction);
         // Whole groups of four modes give the same sums as all modes.
-        let values = &self.correction[..last.next_multiple_of(4).min(self.modes)];
+        let values = &self.correction[..used.next_multiple_of(4).min(self.modes)];
         let matrix = &self.contact_modes[..values.len() * self.rows];
         if lanes == 1 {
             let sums = &mut self.state.displacement;

@@ -64,8 +64,9 @@ impl<const WIDTH: usize, const LOSS: bool, const SPECIAL: bool> Kernel for Predi
     fn run(self) {
         let bank = self.0;
         let (modes, rows) = (bank.model.len(), bank.rows);
-        // Without loads, the prediction of a quasi-static mode is exactly 0, so its rows need no sums.
-        let moving = if SPECIAL { modes } else { bank.model.dynamic_modes(bank.scheme) };
+        // The prediction of a quasi-static mode without a load is exactly 0, so its rows need no sums.
+        let loaded = used_len(&bank.modal_load);
+        let moving = bank.model.dynamic_modes(bank.scheme).max(loaded).min(modes);
         let lanes = bank.chunks * WIDTH;
         let block = modes * WIDTH;
         for chunk in 0..bank.chunks {
@@ -110,6 +111,11 @@ impl<const WIDTH: usize, const LOSS: bool, const SPECIAL: bool> Kernel for Predi
             }
         }
     }
+}
+
+/// Returns the number of values up to the last one that is not 0.
+pub(super) fn used_len(values: &[f64]) -> usize {
+    values.iter().rposition(|value| *value != 0.0).map_or(0, |last| last + 1)
 }
 
 /// A single structure with more contact rows than this recovers them mode by mode.

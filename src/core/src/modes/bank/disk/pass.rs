@@ -8,6 +8,7 @@ use super::fourier::Fourier;
 use crate::math::simd::Kernel;
 use crate::math::vector::Vector3;
 use crate::modes::bank::LANES;
+use crate::modes::bank::predict::used_len;
 use crate::modes::schemes::ModeCoefficients;
 
 /// One complex value per lane: real and imaginary parts.
@@ -85,7 +86,7 @@ impl<const APPLY: bool, const DELAYED: bool, const LOSS: bool, const ADVANCE: bo
         let force = &self.force[block * rows..][..rows];
         // Loads rotate with the disk, so they act on nodal diameter 0 only.
         let loaded = block == 0 && !self.modal_load.is_empty();
-        let moving = if loaded { modes } else { self.moving[block] };
+        let moving = self.moving[block].max(if loaded { used_len(self.modal_load) } else { 0 });
         let mut lost = [0.0; LANES];
         let mut sums = [[[0.0; LANES]; 2]; ROWS];
         let states = self.position[block * modes..][..modes]
