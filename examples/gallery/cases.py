@@ -17,13 +17,14 @@ from scipy.signal import butter, hilbert, sosfiltfilt
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 # The Python module, and the code of the other examples.
-sys.path[1:1] = [str(ROOT / "packaging" / "python"), str(HERE.parent / "shaft"), str(HERE.parent / "thermal")]
+sys.path[1:1] = [str(ROOT / "packaging" / "python"), str(HERE.parent / "thermal"), str(HERE.parent / "shaft")]
 
 import drawing  # noqa: E402
 import tiprub  # noqa: E402
 from coupling import CouplingError  # noqa: E402
 from cycle_jump import Plan, cycle_jump  # noqa: E402
 from drawing import BLUE, DARK, GREEN, GREY, ORANGE, bar, panels, scale, view  # noqa: E402
+from figures import power  # noqa: E402
 from pair import Casing, Rub  # noqa: E402
 from scenario import CLEARANCE, Shafts, package, silence  # noqa: E402
 from studies import Way, coupled, place_of  # noqa: E402
@@ -167,12 +168,9 @@ def thermal(work, stop=4.0, tolerance=0.5):
         journey = cycle_jump(Rub(one, share=0.5), received, Plan(REVOLUTION / 10, 10, tolerance), stop)
         supplied = received.supplied()
     times, values = numpy.array(journey.times), numpy.array(journey.values)
-    lengths = numpy.diff([0.0, *times])
-    heat = numpy.concatenate([[0.0], numpy.cumsum(numpy.array(journey.fluxes).sum(axis=1) * lengths)])
-    edges = numpy.linspace(0.0, times[-1], 41)
-    power = numpy.diff(numpy.interp(edges, [0.0, *times], heat)) / numpy.diff(edges)
+    middles, heat = power(journey, 0.1)
     figure, left, right = panels(1.0, 1.15)
-    left.stairs(power / 1e3, edges, color=ORANGE, fill=True, alpha=0.8)
+    left.bar(middles, heat / 1e3, width=0.1, color=ORANGE, alpha=0.8)
     left.set(xlabel="time (s)", ylabel="heat into the casing (kW)", ylim=(0.0, None))
     angles = numpy.linspace(0.0, 360.0, values.shape[1] + 1)
     for time, colour in ((0.25, BLUE), (1.0, GREEN), (stop, ORANGE)):
@@ -181,8 +179,8 @@ def thermal(work, stop=4.0, tolerance=0.5):
     right.legend(loc="center", handlelength=1.0)
     work.save(figure)
     return {
-        "start": power[0] / 1e3,
-        "end": power[-1] / 1e3,
+        "start": heat[0] / 1e3,
+        "end": heat[-1] / 1e3,
         "hottest": values[-1].max(),
         "coldest": values[-1].min(),
         "mean": values[-1].mean(),
@@ -236,37 +234,45 @@ def whirl(work, unbalance=3e-3, at=1e-3, step=5e-5, stop=0.06):
     }
 
 
-def flutter(work):
-    work.reduce("blade", "blade", MODELS / "blade_hex20.inp", clamp_set="ROOT", sectors=36, units="mm-t-s", material="steel", contact_nodes=2)
-    result = work.run()
-    warning = next(text for text in result.warnings if "grows at" in text)
-    rate, frequency = (float(number) for number in re.search(r"grows at (\S+) 1/s at (\S+) kHz", warning).groups())
+def vibration(result):
+    """Amplitude (µm) of the vibration of blade 1 at 20 to 40 kHz over time, and its growth rate (1/s) and frequency (kHz) from 5.5 to 7 ms."""
     time = result.index.to_numpy()
     band = butter(4, [20e3, 40e3], "band", fs=1.0 / (time[1] - time[0]), output="sos")
     motion = hilbert(sosfiltfilt(band, result["blade[1].tip_tangential_displacement[1]"]))
     size, window = 1e6 * numpy.abs(motion), (time > 5.5e-3) & (time < 7.0e-3)
-    measured, level = numpy.polyfit(time[window], numpy.log(size[window]), 1)
-    turns = numpy.polyfit(time[window], numpy.unwrap(numpy.angle(motion[window])), 1)[0] / (2.0 * math.pi)
-    forces = family(result, "blade[1].normal_force")
+    rate = numpy.polyfit(time[window], numpy.log(size[window]), 1)[0]
+    angle = numpy.unwrap(numpy.angle(motion[window]))
+    return pandas.Series(size, 1e3 * time), rate, numpy.polyfit(time[window], angle, 1)[0] / (2e3 * math.pi)
+
+
+def flutter(work):
+    work.reduce("blade", "blade", MODELS / "blade_hex20.inp", clamp_set="ROOT", sectors=36, units="mm-t-s", material="steel", contact_nodes=2)
+    result = work.run()
+    warning = next(text for text in result.warnings if "grows at" in text)
+    predicted, frequency = (float(number) for number in re.search(r"grows at (\S+) 1/s at (\S+) kHz", warning).groups())
+    size, measured, found = vibration(result)
+    adaptive = re.sub("(?m)^time = .*", 'time = { scheme = "galerkin", tolerance = 1e-3 }', work.scene.read_text(encoding="utf-8"))
+    adaptive = tiprub.run(adaptive, directory=work.place, quiet=True)
+    forces = family(result, "blade[1].normal_force") / 1e3
     figure, left, right = panels(1.0, 1.15)
     for node, colour in enumerate((BLUE, ORANGE)):
-        left.plot(1e3 * time, forces[:, node] / 1e3, color=colour, linewidth=1.0, label=f"node {node + 1}")
-    left.set(xlabel="time (ms)", ylabel="normal force (kN)", ylim=(0.0, 1.3 * forces.max() / 1e3), xlim=(4.0, 7.2))
+        left.plot(size.index, forces[:, node], color=colour, linewidth=1.0, label=f"node {node + 1}")
+    left.set(xlabel="time (ms)", ylabel="normal force (kN)", ylim=(0.0, 1.3 * forces.max()), xlim=(4.0, 7.2))
     left.legend(loc="upper left", ncols=2)
-    shown = (time > 4.6e-3) & (time < 7.1e-3)
-    right.semilogy(1e3 * time[shown], size[shown], color=BLUE, label=f"measured, {measured:.0f} 1/s")
-    line = numpy.exp(level + rate * time[window] + (measured - rate) * time[window].mean())
-    right.semilogy(1e3 * time[window], 1.8 * line, color=ORANGE, linestyle="dashed", label=f"predicted, {rate:.0f} 1/s")
-    right.set(xlabel="time (ms)", ylabel="vibration at 29 kHz (µm)", ylim=(None, 20.0 * size[shown].max()))
+    shown, growing = size.loc[4.6:7.1], size.loc[5.5:7.0]
+    right.semilogy(shown, color=BLUE, label=f"measured, {measured:.0f} 1/s")
+    line = 1.8 * growing.iloc[0] * numpy.exp(1e-3 * predicted * (growing.index - growing.index[0]))
+    right.semilogy(growing.index, line, color=ORANGE, linestyle="dashed", label=f"predicted, {predicted:.0f} 1/s")
+    right.set(xlabel="time (ms)", ylabel="vibration at 29 kHz (µm)", ylim=(None, 20.0 * shown.max()))
     right.legend(loc="upper left", handlelength=1.0)
     work.save(figure)
     return {
-        "predicted": rate,
+        "predicted": predicted,
         "measured": measured,
         "frequency": frequency,
-        "found": turns / 1e3,
-        "times": size[window][-1] / size[window][0],
-        "warning": warning.split(":")[0],
+        "found": found,
+        "times": growing.iloc[-1] / growing.iloc[0],
+        "adaptive": vibration(adaptive)[1],
     }
 
 
@@ -424,8 +430,9 @@ def interaction_map(work, count=41):
         axis.annotate(f"{order}Ω", (inside[-1], order * inside[-1] / (2.0 * math.pi)), ha="right", va="bottom", color=GREEN)
     axis.axhline(crossing["predicted frequency (Hz)"], color=BLUE, linewidth=1.0)
     axis.annotate("mode 1", (1765.0, crossing["predicted frequency (Hz)"] - 10.0), va="top", color=BLUE)
-    axis.plot(crossing["predicted speed (rad/s)"], crossing["predicted frequency (Hz)"], "o", color=BLUE, markerfacecolor="none", markersize=10, markeredgewidth=2.0, label="crossing of 4Ω and mode 1")
-    axis.plot(peaks["speed (rad/s)"], peaks["frequency (Hz)"], "s", color=BLUE, markerfacecolor="none", markersize=10, markeredgewidth=2.0, label="largest response")
+    hollow = {"color": BLUE, "markerfacecolor": "none", "markersize": 10, "markeredgewidth": 2.0}
+    axis.plot(crossing["predicted speed (rad/s)"], crossing["predicted frequency (Hz)"], "o", **hollow, label="crossing of 4Ω and mode 1")
+    axis.plot(peaks["speed (rad/s)"], peaks["frequency (Hz)"], "s", **hollow, label="largest response")
     axis.set(xlabel="speed (rad/s)", ylabel="frequency (Hz)", ylim=(0.0, 2000.0), xlim=(speeds[0], speeds[-1]))
     axis.grid(False)
     axis.legend(loc="lower right", facecolor="white", framealpha=0.85, frameon=True, edgecolor="none")
