@@ -30,7 +30,7 @@ QUICK = {
         """,
     ),
     "heat": (
-        {"revolutions": 3, "seconds": 0.12, "library": LIBRARY, "thermal_library": THERMAL},
+        {"revolutions": 3, "seconds": 0.1, "library": LIBRARY, "thermal_library": THERMAL},
         """
         assert abs(lost) < 1e-9 * course.supplied and course.supplied > 10.0
         assert course.temperatures[-1].max() > 10.0 * abs(course.temperatures[-1].min())
