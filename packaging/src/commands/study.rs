@@ -86,7 +86,7 @@ fn convergence(own: &ConvergenceCommand, console: &Console) -> Result<CommandOut
 /// Summarises a part of a study.
 fn of_part(FinishedPart { part, tasks, all, journal }: &FinishedPart) -> CommandOutcome {
     let text = format!(
-        "part {part}: {tasks} of {all} runs are finished, their results are in {}
+        "part {part}: {tasks} of {all} runs are finished, their results are in {}\n\
          When all parts are finished, run the command without --part in the same place to make the study",
         journal.display()
     );

@@ -151,6 +151,17 @@ fn killed_map_continues_and_parts_join() {
         assert_eq!((answer["part"].as_str(), answer["all_runs"].as_u64()), (Some(part), Some(8)));
         assert!(!root.path().join("parts/index.html").exists());
     }
+    // Other options do not use the results of the parts, and do not remove them.
+    let mut other = Command::new(env!("CARGO_BIN_EXE_tiprub"));
+    other.current_dir(root.path()).env("TIPRUB_CACHE", cache).args(MAP).args([
+        "--out",
+        "parts",
+        "--set",
+        "gap_offset=1e-5",
+    ]);
+    let refused = other.output().unwrap();
+    assert_eq!(refused.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&refused.stdout).contains("other options"), "{refused:?}");
     map(&["--out", "parts"]);
     assert_eq!(numbers("parts"), numbers("whole"));
     let files: Vec<_> = fs::read_dir(root.path().join("parts")).unwrap().map(|entry| entry.unwrap().path()).collect();

@@ -3,7 +3,10 @@
 use serde_json::{Value, json};
 use tiprub_cosim::variables::Span;
 
-use crate::{native::NativeRun, recording::Recording};
+use crate::{
+    native::{NativeRun, OutputColumn},
+    recording::Recording,
+};
 
 /// Mean or total of an output over a run.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,6 +46,18 @@ pub fn totals(run: &NativeRun) -> Vec<NamedValue> {
     outputs.map(total).collect()
 }
 
+/// Returns the names of all means and totals of a run with these outputs.
+pub fn names(names: &[String], columns: &[OutputColumn]) -> Vec<String> {
+    let of = |is_wanted: &dyn Fn(&OutputColumn) -> bool| -> Vec<&String> {
+        let scalars = names.iter().zip(columns).filter(|(_, facts)| !facts.is_element && is_wanted(facts));
+        scalars.map(|(name, _)| name).collect()
+    };
+    let force = names.iter().any(|name| name == "normal_impulse").then(|| "mean_total_normal_force".to_owned());
+    let means = of(&|facts| facts.span == Span::Mean).into_iter().map(|name| with_prefix("mean_", name));
+    let totals = of(&|facts| facts.span == Span::Total || facts.is_energy).into_iter().cloned();
+    force.into_iter().chain(means).chain(totals).collect()
+}
+
 /// Returns named values as a JSON object.
 pub fn json(values: &[NamedValue]) -> Value {
     values.iter().map(|entry| (entry.name.clone(), json!(entry.value))).collect::<serde_json::Map<_, _>>().into()
@@ -72,7 +87,6 @@ fn with_prefix(prefix: &str, name: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::native::OutputColumn;
     use std::time::Duration;
 
     fn run() -> NativeRun {
@@ -115,6 +129,9 @@ mod tests {
         let expected = expected.map(|(name, value)| NamedValue { name: name.to_owned(), value });
         assert_eq!(found, expected);
         assert_eq!(json(&found)["front.mean_torque"], json!(-4.0));
+        let run = run();
+        let all = found.into_iter().chain(totals(&run)).map(|entry| entry.name);
+        assert_eq!(names(&run.recording.names, &run.columns), all.collect::<Vec<_>>());
     }
 
     #[test]

@@ -10,6 +10,7 @@ use tiprub_cosim::variables::{Causality, DataType, Span, Value, Variable};
 use crate::{
     Failure, Result,
     history::{Driver, InputHistory},
+    means,
     recording::Recording,
     schedule::Schedule,
 };
@@ -391,6 +392,12 @@ pub fn check_settable(table: &VariableTable, name: &str) -> Result<()> {
     }
     let remedy = "Set inputs and parameters only; docs/variables.md lists them";
     Err(Failure::usage(format!("--set {name}"), "it is computed and cannot be set", remedy))
+}
+
+/// Returns the names of all means and totals of a run.
+pub fn result_names(table: &VariableTable) -> Vec<String> {
+    let Outputs { names, columns, .. } = Outputs::of(table);
+    means::names(&names, &columns)
 }
 
 /// Returns the names of the columns of the recording that an output stands for: itself, or all elements of an array.

@@ -31,7 +31,7 @@ use crate::{
     models::{RomStore, SweepSources},
     part::Part,
     plan::{Plan, VariableTarget},
-    result_file,
+    result_file::{self, ROWS_FACT},
     row::{Row, Status},
 };
 
@@ -42,8 +42,6 @@ const MOST_CHECKS: usize = 256;
 /// Parts of the names of parameters on which slow checks depend.
 const CHECKED_PARAMETERS: [&str; 7] =
     ["friction", "damping", "internal_step", "scheme", "solver", "tolerance", "velocity"];
-/// Key of the digest of all rows in the file of histories.
-const ROWS_FACT: &str = "tiprub.rows";
 
 /// Request of a part of a sweep.
 pub struct SweepRequest<'a> {
@@ -89,7 +87,10 @@ impl SweepFiles {
         };
         Self {
             rows: output.to_owned(),
-            histories: output.with_extension("histories.parquet"),
+            histories: match output.extension() {
+                Some(kind) if kind == "parquet" => output.with_extension("histories.parquet"),
+                _ => beside("histories.parquet"),
+            },
             journal: beside("journal"),
             history_journal: beside("histories-journal"),
             models: beside("models"),
@@ -155,6 +156,16 @@ pub fn check(request: &SweepRequest) -> Result<SweepSize> {
     Ok(SweepSize { plan_runs: request.plan.design.runs(), runs, pending })
 }
 
+/// Checks that a file of outputs over time, if it exists, is one that a sweep wrote.
+fn check_histories(path: &Path) -> Result<()> {
+    let has_fact = || parquet_file::facts(path).is_ok_and(|facts| facts.iter().any(|(key, _)| key == ROWS_FACT));
+    if !path.exists() || has_fact() {
+        return Ok(());
+    }
+    let remedy = "Give another file with --output, or remove this one";
+    Err(Failure::new(path.display(), "exists and does not contain the outputs over time of a sweep", remedy))
+}
+
 /// Removes journals without rows.
 fn remove(created: &[PathBuf]) {
     for path in created {
@@ -179,6 +190,8 @@ struct PartRun<'a> {
     journal: Journal,
     histories: Option<HistoryJournal>,
     store: RomStore<'a>,
+    /// Names of the means and totals of a run, if a scene of the plan is accepted.
+    results: Vec<String>,
 }
 
 impl<'a> PartRun<'a> {
@@ -200,9 +213,23 @@ impl<'a> PartRun<'a> {
         let created = journals.into_iter().filter(|path| !path.exists()).cloned().collect();
         let (journal, found) = Journal::open(&files.journal)?;
         rows.extend(found.into_iter().map(|row| (row.digest.clone(), row)));
+        if plan.histories.is_some() {
+            check_histories(&files.histories)?;
+        }
         let histories = plan.histories.as_ref().map(|_| HistoryJournal::open(&files.history_journal)).transpose()?;
-        let mut part =
-            Self { request, files, first, digests, rows, pending: Vec::new(), resumed: 0, journal, histories, store };
+        let mut part = Self {
+            request,
+            files,
+            first,
+            digests,
+            rows,
+            pending: Vec::new(),
+            resumed: 0,
+            journal,
+            histories,
+            store,
+            results: Vec::new(),
+        };
         part.find_pending();
         Ok((part, created))
     }
@@ -275,14 +302,18 @@ impl<'a> PartRun<'a> {
                 native::output_columns(table, output).map_err(in_plan)?;
             }
             let outputs = table.variables().iter().filter(|variable| variable.causality == Causality::Output);
+            let results = native::result_names(table);
             let clash = outputs
                 .map(|output| &output.name)
+                .chain(&results)
                 .find(|name| plan.variables.iter().any(|variable| variable.name == **name));
             if let Some(name) = clash {
                 let remedy = "Give the variable another name";
-                let failure = Failure::new(format!("variable `{name}`"), "has the name of an output", remedy);
+                let failure =
+                    Failure::new(format!("variable `{name}`"), "has the name of an output or a result", remedy);
                 return Err(in_plan(failure));
             }
+            self.results = results;
             return Ok(());
         }
         Ok(())
@@ -346,15 +377,14 @@ impl<'a> PartRun<'a> {
         let rows: Vec<(usize, &Row)> =
             numbers.zip(self.digests.iter().filter_map(|digest| self.rows.get(&digest.run))).collect();
         let has_new_histories = !self.has_complete_histories();
+        let table = result_file::table(self.request.plan, &rows, &self.results);
         if let Some(mut journal) = self.histories.take() {
             if has_new_histories {
                 histories::write(&self.files.histories, &mut journal, &rows, &facts)?;
             }
-            let table = result_file::table(self.request.plan, &rows);
             parquet_file::write(&self.files.rows, &table, &facts)?;
             journal.remove()?;
         } else {
-            let table = result_file::table(self.request.plan, &rows);
             parquet_file::write(&self.files.rows, &table, &facts)?;
         }
         self.journal.remove()?;
@@ -379,10 +409,11 @@ impl<'a> PartRun<'a> {
             numbers.zip(&self.digests).filter_map(known)
         };
         let count = |status| rows().filter(|(_, row)| row.has_status(status)).count();
-        let mut reasons: Vec<(String, usize, usize)> = Vec::new();
+        let (mut reasons, mut places) = (Vec::<(String, usize, usize)>::new(), HashMap::new());
         for (run, row) in rows() {
             let Some(reason) = row.cell("reason").map(ToString::to_string) else { continue };
-            match reasons.iter_mut().find(|(other, ..)| *other == reason) {
+            let place = *places.entry(reason.clone()).or_insert(reasons.len());
+            match reasons.get_mut(place) {
                 Some((.., count)) => *count += 1,
                 None => reasons.push((reason, run, 1)),
             }

@@ -57,6 +57,45 @@ pub fn set(scene: &mut Table, path: &str, value: Value) -> Result<()> {
     Ok(())
 }
 
+/// Returns the path of a key of the scene, with the number (from 1) of every entry of a list.
+///
+/// # Errors
+/// The scene has no such entry.
+pub(crate) fn place(scene: &Table, path: &str) -> Result<String> {
+    let (mut scene, mut place) = (Value::Table(scene.clone()), String::new());
+    let mut table = &mut scene;
+    for step in steps(path)? {
+        let missing = || Failure::new(format!("field `{path}`"), "is not in the scene", "");
+        let below = table.get_mut(step.key).ok_or_else(missing)?;
+        let separator = if place.is_empty() { "" } else { "." };
+        place.push_str(&format!("{separator}{}", step.key));
+        let Value::Array(entries) = &*below else {
+            table = below;
+            continue;
+        };
+        let selected = step.entry.is_some() || entries.len() == 1 && entries[0].is_table();
+        if !selected {
+            return Ok(place);
+        }
+        let position = position(entries, step.entry).unwrap_or_default();
+        place.push_str(&format!("[{}]", position + 1));
+        table = entry(path, &step, below)?;
+    }
+    Ok(place)
+}
+
+/// Returns the index of the entry of a list that is selected by a number (from 1), by a name, or as the only one.
+fn position(entries: &[Value], selected: Option<&str>) -> Option<usize> {
+    let named = |entry: &Value| entry.get("name").and_then(Value::as_str).map(str::to_owned);
+    match selected {
+        None => (entries.len() == 1).then_some(0),
+        Some(text) => match text.parse::<usize>() {
+            Ok(number) => number.checked_sub(1).filter(|index| *index < entries.len()),
+            Err(_) => entries.iter().position(|entry| named(entry).as_deref() == Some(text)),
+        },
+    }
+}
+
 /// Checks that scene files have such a key.
 fn check_key(path: &str, steps: &[Step]) -> Result<()> {
     let name = steps.iter().map(|step| step.key).collect::<Vec<_>>().join(".");
@@ -81,14 +120,7 @@ fn entry<'a>(path: &str, step: &Step, value: &'a mut Value) -> Result<&'a mut Va
         };
     };
     let named = |entry: &Value| entry.get("name").and_then(Value::as_str).map(str::to_owned);
-    let position = match step.entry {
-        None if entries.len() == 1 => Some(0),
-        None => None,
-        Some(text) => match text.parse::<usize>() {
-            Ok(number) => number.checked_sub(1).filter(|index| *index < entries.len()),
-            Err(_) => entries.iter().position(|entry| named(entry).as_deref() == Some(text)),
-        },
-    };
+    let position = position(entries, step.entry);
     let count = entries.len();
     let names: Vec<String> = entries.iter().filter_map(named).collect();
     position.and_then(|index| entries.get_mut(index)).ok_or_else(|| {
@@ -133,6 +165,21 @@ mod tests {
                 };
             }
             assert_eq!(value.as_float(), Some(0.25), "{path}");
+        }
+    }
+
+    #[test]
+    fn two_paths_of_one_key_have_the_same_place() {
+        let scene: Table = toml::from_str(SCENE).unwrap();
+        for (path, place) in [
+            ("structure[2].name", "structure[2].name"),
+            ("structure[rear].name", "structure[2].name"),
+            ("contact.master", "contact[1].master"),
+            ("contact[1].sector_gaps", "contact[1].sector_gaps"),
+            ("contact[1].sector_gaps[2]", "contact[1].sector_gaps[2]"),
+            ("name", "name"),
+        ] {
+            assert_eq!(super::place(&scene, path).unwrap(), place, "{path}");
         }
     }
 

@@ -225,12 +225,22 @@ impl Plan {
         Schedule::new(&experiment, None, None)
     }
 
-    /// Checks that the scene has all fields, with the values of the first run.
+    /// Checks that the scene has all fields, with the values of the first run, and that no two variables set the same key.
     fn check_fields(&self) -> Result<()> {
         let mut document = self.document.clone();
+        let mut places: Vec<(String, &str)> = Vec::new();
+        for rule in &self.roms {
+            places.push((format!("structure[{}].rom", rule.structure + 1), "[rom]"));
+        }
         for (variable, value) in self.values(0) {
             if let VariableTarget::Field(path) = &variable.target {
                 fields::set(&mut document, path, field_value(value))?;
+                let place = fields::place(&document, path)?;
+                if let Some((_, other)) = places.iter().find(|(known, _)| *known == place) {
+                    let problem = format!("sets the key `{place}`, which `{other}` sets, too");
+                    return Err(Failure::new(format!("variable `{}`", variable.name), problem, "Remove one of them"));
+                }
+                places.push((place, &variable.name));
             }
         }
         Ok(())

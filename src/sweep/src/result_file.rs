@@ -10,8 +10,11 @@ use crate::{
     row::{DIGEST, FIRST_COLUMNS, LAST_COLUMNS, RESERVED_NAMES, RUN, Row, STATUS},
 };
 
-/// Returns the table of runs (from 1) and their rows.
-pub fn table(plan: &Plan, rows: &[(usize, &Row)]) -> Table {
+/// Key of the digest of all rows in the files of a sweep.
+pub(crate) const ROWS_FACT: &str = "tiprub.rows";
+
+/// Returns the table of runs (from 1) and their rows, with columns for all `results`, even if no run has finished.
+pub fn table(plan: &Plan, rows: &[(usize, &Row)], results: &[String]) -> Table {
     let number = |run: usize| Some(Cell::Integer(i64::try_from(run).unwrap_or(i64::MAX)));
     let runs = rows.iter().map(|(run, _)| number(*run)).collect();
     let mut columns = vec![Column { name: RUN.to_owned(), kind: ColumnType::Integer, cells: runs }];
@@ -23,15 +26,16 @@ pub fn table(plan: &Plan, rows: &[(usize, &Row)]) -> Table {
         columns.push(Column { name: variable.name.clone(), kind: plan.design.kind(index), cells });
     }
     let mut others: Vec<&str> = Vec::new();
-    for (name, _) in rows.iter().flat_map(|(_, row)| &row.cells) {
+    for name in results.iter().chain(rows.iter().flat_map(|(_, row)| row.cells.iter().map(|(name, _)| name))) {
         let is_variable = plan.variables.iter().any(|variable| variable.name == *name);
         if !is_variable && !RESERVED_NAMES.contains(&name.as_str()) && !others.contains(&name.as_str()) {
             others.push(name);
         }
     }
     let others = others.into_iter().map(|name| {
-        let cells = rows.iter().filter_map(|(_, row)| row.cell(name));
-        (name, ColumnType::common(cells))
+        let mut cells = rows.iter().filter_map(|(_, row)| row.cell(name)).peekable();
+        let is_known = cells.peek().is_some();
+        (name, if is_known { ColumnType::common(cells) } else { ColumnType::Real })
     });
     let all = FIRST_COLUMNS.into_iter().chain(others).chain(LAST_COLUMNS);
     columns.extend(all.map(|(name, kind)| {
@@ -53,6 +57,10 @@ pub fn read(path: &Path) -> Result<Vec<Row>> {
         let remedy = "Give another file with --output, or remove this one";
         Failure::new(path.display(), "exists and is not the result of a sweep", remedy)
     };
+    let facts = parquet_file::facts(path).map_err(|_| other())?;
+    if !facts.iter().any(|(key, _)| key == ROWS_FACT) {
+        return Err(other());
+    }
     let Table { columns } = parquet_file::read(path).map_err(|_| other())?;
     let position = |name: &str| columns.iter().position(|column| column.name == name);
     let (Some(first), Some(digest)) = (position(STATUS), position(DIGEST)) else { return Err(other()) };

@@ -18,8 +18,9 @@ use tiprub_table::Cell;
 
 use crate::{cases::digest_of, journal::Journal, part::Part, row::Row};
 
-/// Name of the only value in a row.
+/// Names of the values in a row: the result, and the digest of everything that determines the results of all tasks.
 const RESULT: &str = "result";
+const SHARED: &str = "shared";
 /// End of the names of journals.
 const SUFFIX: &str = ".journal";
 
@@ -66,16 +67,30 @@ impl TaskJournals {
     /// contains everything that determines the results of all tasks.
     ///
     /// # Errors
-    /// A file cannot be read or written, is not a journal, or another process has it open.
+    /// A file cannot be read or written, is not a journal, belongs to a study with other options, or another process has it open.
     pub fn open(directory: &Path, name: &str, part: Part, shared: &[String]) -> Result<Self> {
         let path = directory.join(format!("{name}{}{SUFFIX}", part.file_suffix()));
-        let (journal, mut rows) = Journal::open(&path)?;
+        let shared = digest_of([name, LIBRARY_RELEASE].into_iter().chain(shared.iter().map(String::as_str)));
+        let open = |path: &Path| {
+            let (journal, rows) = Journal::open(path)?;
+            let own = |row: &Row| matches!(row.cell(SHARED), Some(Cell::Text(digest)) if *digest == shared);
+            if rows.iter().all(own) {
+                return Ok((journal, rows));
+            }
+            let problem = format!(
+                "contains {} results of the study with another scene, other options or another release",
+                rows.len()
+            );
+            let remedy = "Repeat the command with those, give another directory with --out, or remove the file";
+            Err(Failure::new(path.display(), problem, remedy))
+        };
+        let (journal, mut rows) = open(&path)?;
         let mut others = Vec::new();
         if part == Part::WHOLE {
             for other in file_names(directory)? {
                 let suffix = other.strip_prefix(name).and_then(|rest| rest.strip_suffix(SUFFIX));
                 if suffix.is_some_and(|suffix| suffix.starts_with('-')) {
-                    let (journal, found) = Journal::open(&directory.join(other))?;
+                    let (journal, found) = open(&directory.join(other))?;
                     others.push(journal);
                     rows.extend(found);
                 }
@@ -86,7 +101,6 @@ impl TaskJournals {
             _ => None,
         };
         let known = rows.into_iter().filter_map(result).collect();
-        let shared = digest_of([name, LIBRARY_RELEASE].into_iter().chain(shared.iter().map(String::as_str)));
         Ok(Self { journal, others, known, part, shared, path })
     }
 
@@ -128,7 +142,8 @@ impl TaskJournals {
             };
             let json = serde_json::to_string(&result).unwrap_or_default();
             if serde_json::from_str::<R>(&json).is_ok() {
-                let cells = vec![(RESULT.to_owned(), Cell::Text(json))];
+                let cells =
+                    vec![(SHARED.to_owned(), Cell::Text(self.shared.clone())), (RESULT.to_owned(), Cell::Text(json))];
                 self.journal.append(&Row { digest: digests[task].clone(), cells })?;
             }
             results[task] = Some(result);
@@ -216,9 +231,11 @@ mod tests {
         tried.retain(|item| *item > 0.0);
         tried.sort_by(f64::total_cmp);
         assert_eq!(tried, items);
-        // Another scene shares no result.
-        let (results, third) = squares(root.path(), Part::WHOLE, "another scene", &items);
-        assert_eq!((all(results), third), (expected, items));
+        // The results of another scene are not mixed with these, and not lost.
+        let other = TaskJournals::open(root.path(), "map", Part::WHOLE, &["another scene".to_owned()]).unwrap_err();
+        assert!(other.problem.contains("20 results"), "{other}");
+        let (results, third) = squares(root.path(), Part::WHOLE, "scene", &items);
+        assert_eq!((all(results), third), (expected, Vec::new()));
     }
 
     #[test]
@@ -235,7 +252,7 @@ mod tests {
         let (results, tried) = squares(root.path(), Part::WHOLE, "scene", &items);
         assert_eq!(all(results), items.iter().map(|item| item * item).collect::<Vec<_>>());
         assert_eq!(tried, [3.0, 4.0, 5.0]);
-        let journals = TaskJournals::open(root.path(), "map", Part::WHOLE, &[]).unwrap();
+        let journals = TaskJournals::open(root.path(), "map", Part::WHOLE, &["scene".to_owned()]).unwrap();
         assert_eq!(journals.others.len(), 2);
         journals.remove().unwrap();
         assert_eq!(fs::read_dir(root.path()).unwrap().count(), 0);

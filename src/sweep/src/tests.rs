@@ -418,3 +418,62 @@ fn stopped_sweep_keeps_its_rows() {
     assert_eq!((size.plan_runs, size.runs, size.pending), (6, 6, 6));
     assert!(engine::run(&request(&running, &output)).unwrap().is_complete);
 }
+
+/// A part without a finished run has the same columns as the others.
+#[test]
+fn refused_part_has_all_columns() {
+    let bench = Bench::new();
+    let plan = "scene = \"scene.toml\"\n[[variable]]\nname = \"friction_coefficient\"\nvalues = [-1.0, 0.1]";
+    for number in [1, 2] {
+        bench.try_part(plan, &format!("{number}.parquet"), Part::new(number, 2).unwrap(), 1).unwrap();
+    }
+    let [refused, finished] = ["1.parquet", "2.parquet"].map(|name| bench.table(name));
+    assert_eq!(
+        (texts(&refused, "status"), texts(&finished, "status")),
+        (vec!["refused".into()], vec!["finished".into()])
+    );
+    let facts =
+        |table: &Table| -> Vec<_> { table.columns.iter().map(|column| (column.name.clone(), column.kind)).collect() };
+    assert_eq!(facts(&refused), facts(&finished));
+    assert_eq!(texts(&refused, "friction_loss"), [""]);
+}
+
+#[test]
+fn names_and_keys_that_clash_are_rejected() {
+    let bench = Bench::new();
+    let gap =
+        |name: &str, field: &str| format!("[[variable]]\nname = \"{name}\"\nfield = \"{field}\"\nvalues = [5e-4]\n");
+    let scene = "scene = \"scene.toml\"\n";
+    for (text, words) in [
+        (gap("mean_torque", "contact[1].gap"), "name of an output or a result"),
+        (gap("friction_loss", "contact[1].gap"), "name of an output or a result"),
+        (gap("a", "contact[1].gap") + &gap("b", "contact.gap"), "`contact[1].gap`, which `a` sets, too"),
+        (
+            "[[variable]]\nname = \"a\"\nfield = \"structure[rotor].rom\"\nvalues = [\"b.rom.safetensors\"]\n\
+             [rom.rotor]\nfile = \"small.rom.safetensors\"\n"
+                .to_owned(),
+            "which `[rom]` sets, too",
+        ),
+    ] {
+        let failure = bench.try_part(&format!("{scene}{text}"), "a.parquet", Part::WHOLE, 1).unwrap_err();
+        assert!(failure.usage && failure.to_string().contains(words), "{failure}");
+    }
+}
+
+/// Files of users with the same columns as results, and files of outputs over time of other sweeps, are never replaced.
+#[test]
+fn foreign_files_are_kept() {
+    let bench = Bench::new();
+    let cells = |name: &str| tiprub_table::Column::new(name, vec![Some(Cell::Text("mine".into()))]);
+    let mine = Table { columns: vec![cells("status"), cells("digest")] };
+    parquet_file::write(&bench.path("mine.parquet"), &mine, &[]).unwrap();
+    let failure = bench.try_part(GRID, "mine.parquet", Part::WHOLE, 1).unwrap_err();
+    assert!(failure.problem.contains("not the result of a sweep"), "{failure}");
+    fs::write(bench.path("a.histories.parquet"), "mine").unwrap();
+    let plan = format!("{GRID}[histories]\noutputs = [\"torque\"]\n");
+    let failure = bench.try_part(&plan, "a.parquet", Part::WHOLE, 1).unwrap_err();
+    assert!(failure.what.contains("a.histories.parquet"), "{failure}");
+    assert_eq!(fs::read_to_string(bench.path("a.histories.parquet")).unwrap(), "mine");
+    let [two, three] = ["part.2", "part.3"].map(|name| SweepFiles::new(&bench.path(name)).histories);
+    assert_ne!(two, three);
+}

@@ -22,6 +22,9 @@ pub fn read(path: &Path) -> Result<Table> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes);
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(bytes);
     let names = reader.headers().map_err(|error| wrong(error.to_string(), "Save the file as UTF-8"))?.clone();
+    if names.is_empty() {
+        return Err(wrong("is empty".to_owned(), "Give the names of the columns in the first line"));
+    }
     for (index, name) in names.iter().enumerate() {
         if name.is_empty() {
             return Err(wrong(format!("column {} has no name", index + 1), "Give the names in the first line"));
@@ -65,7 +68,9 @@ mod tests {
         let expected = [ColumnType::Real, ColumnType::Integer, ColumnType::Text, ColumnType::Boolean];
         assert_eq!(kinds, ["speed", "modes", "scheme", "on"].into_iter().zip(expected).collect::<Vec<_>>());
         assert_eq!(table.column("scheme").unwrap().cells[1], None);
-        for (text, problem) in [("a,a\n1,2\n", "two columns"), ("a,\n1,2\n", "has no name"), ("a,b\n1\n", "fields")] {
+        for (text, problem) in
+            [("", "is empty"), ("a,a\n1,2\n", "two columns"), ("a,\n1,2\n", "has no name"), ("a,b\n1\n", "fields")]
+        {
             std::fs::write(&path, text).unwrap();
             let failure = read(&path).unwrap_err();
             assert!(failure.problem.contains(problem) && failure.what.contains("a.csv"), "{failure}");

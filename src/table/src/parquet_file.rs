@@ -3,7 +3,7 @@
 use std::{io::BufWriter, path::Path, sync::Arc};
 
 use parquet::{
-    basic::{Compression, LogicalType, Repetition, Type as PhysicalType},
+    basic::{Compression, ConvertedType, LogicalType, Repetition, Type as PhysicalType},
     column::{reader::ColumnReader, writer::ColumnWriter},
     data_type::ByteArray,
     errors::ParquetError,
@@ -201,7 +201,7 @@ pub fn write(target: &Path, table: &Table, facts: &[(&str, String)]) -> Result<(
 /// The file cannot be opened, is damaged, or has a column of a type that has no [`ColumnType`].
 pub fn read(path: &Path) -> Result<Table> {
     let file = tiprub_format::open_file(path).map_err(|error| Failure::file(path, "cannot be opened", &error))?;
-    let remedy = "Write the file again without nested columns, with Snappy compression";
+    let remedy = "Write the file again with columns of whole numbers, doubles, text, true and false, and with Snappy compression";
     let failed = |error: ParquetError| Failure::new(path.display(), format!("cannot be read: {error}"), remedy);
     let file = SerializedFileReader::new(file).map_err(failed)?;
     let schema = file.metadata().file_metadata().schema_descr_ptr();
@@ -222,6 +222,19 @@ pub fn read(path: &Path) -> Result<Table> {
     Ok(Table { columns })
 }
 
+/// Types of whole numbers.
+const INTEGERS: [ConvertedType; 9] = [
+    ConvertedType::NONE,
+    ConvertedType::INT_8,
+    ConvertedType::INT_16,
+    ConvertedType::INT_32,
+    ConvertedType::INT_64,
+    ConvertedType::UINT_8,
+    ConvertedType::UINT_16,
+    ConvertedType::UINT_32,
+    ConvertedType::UINT_64,
+];
+
 /// Returns the facts that a file stores as keys and values.
 ///
 /// # Errors
@@ -240,12 +253,20 @@ fn column_type(descriptor: &ColumnDescriptor) -> parquet::errors::Result<ColumnT
     if descriptor.max_rep_level() > 0 || descriptor.path().parts().len() > 1 {
         return Err(ParquetError::General(format!("column `{name}` is nested")));
     }
-    match descriptor.physical_type() {
-        PhysicalType::BOOLEAN => Ok(ColumnType::Boolean),
-        PhysicalType::INT32 | PhysicalType::INT64 => Ok(ColumnType::Integer),
-        PhysicalType::FLOAT | PhysicalType::DOUBLE => Ok(ColumnType::Real),
-        PhysicalType::BYTE_ARRAY => Ok(ColumnType::Text),
-        other => Err(ParquetError::General(format!("column `{name}` has the unsupported type {other}"))),
+    let annotated = descriptor.converted_type();
+    match (descriptor.physical_type(), annotated) {
+        // The annotation gives such numbers another meaning, for example that of a scaled number or a time.
+        (PhysicalType::INT32 | PhysicalType::INT64, other) if !INTEGERS.contains(&other) => {
+            Err(ParquetError::General(format!("column `{name}` has the unsupported type {other}")))
+        }
+        (PhysicalType::BYTE_ARRAY, ConvertedType::DECIMAL) => {
+            Err(ParquetError::General(format!("column `{name}` has the unsupported type {annotated}")))
+        }
+        (PhysicalType::BOOLEAN, _) => Ok(ColumnType::Boolean),
+        (PhysicalType::INT32 | PhysicalType::INT64, _) => Ok(ColumnType::Integer),
+        (PhysicalType::FLOAT | PhysicalType::DOUBLE, _) => Ok(ColumnType::Real),
+        (PhysicalType::BYTE_ARRAY, _) => Ok(ColumnType::Text),
+        (other, _) => Err(ParquetError::General(format!("column `{name}` has the unsupported type {other}"))),
     }
 }
 
@@ -365,6 +386,33 @@ mod tests {
         let failure = read(&path).unwrap_err();
         assert!(failure.problem.starts_with("cannot be read: ") && failure.what.contains("a.parquet"), "{failure}");
         assert!(read(&root.path().join("none")).is_err());
+    }
+
+    /// Scaled numbers and times must not be read as the whole numbers that represent them.
+    #[test]
+    fn annotated_numbers_are_rejected() {
+        use parquet::{data_type::Int32Type, schema::parser::parse_message_type};
+        let root = tempfile::tempdir().unwrap();
+        let path = root.path().join("a.parquet");
+        for (annotation, is_number) in [("", true), (" (INT_16)", true), (" (DECIMAL(4,1))", false), (" (DATE)", false)]
+        {
+            let schema = parse_message_type(&format!("message schema {{ required int32 a{annotation}; }}")).unwrap();
+            let properties = Arc::new(WriterProperties::default());
+            let file = std::fs::File::create(&path).unwrap();
+            let mut file = SerializedFileWriter::new(file, Arc::new(schema), properties).unwrap();
+            let mut group = file.next_row_group().unwrap();
+            let mut column = group.next_column().unwrap().unwrap();
+            column.typed::<Int32Type>().write_batch(&[1605], None, None).unwrap();
+            column.close().unwrap();
+            group.close().unwrap();
+            file.close().unwrap();
+            match read(&path) {
+                Ok(table) => {
+                    assert!(is_number && table.columns[0].cells == [Some(Cell::Integer(1605))], "{annotation}")
+                }
+                Err(failure) => assert!(!is_number && failure.problem.contains("column `a`"), "{failure}"),
+            }
+        }
     }
 
     #[test]

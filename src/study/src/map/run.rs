@@ -116,6 +116,8 @@ impl MapSetup {
     /// Returns everything that determines the results of a run, except for its speed.
     pub fn digests(&self) -> Vec<String> {
         let Self { scene, settings, samples, transient, revolutions, top } = self;
+        let mut settings = settings.clone();
+        settings.sort();
         vec![scene_digest(scene), format!("{settings:?} {samples} {transient} {revolutions} {top:?}")]
     }
 
