@@ -33,7 +33,8 @@ pub fn check(command: &Command) -> Result<()> {
             let inputs = NamedFile::option("--inputs", &arguments.inputs);
             let read: Vec<NamedFile> = scene(&arguments.scene).into_iter().chain(inputs).collect();
             let parquet = NamedFile::option("--parquet", &arguments.parquet);
-            let written = Vec::from_iter(NamedFile::option("--csv", &csv).into_iter().chain(parquet));
+            let report = NamedFile::option("--report", &arguments.report);
+            let written = Vec::from_iter(NamedFile::option("--csv", &csv).into_iter().chain(parquet).chain(report));
             outputs(&read, &written)?;
             let Some(fields) = arguments.fields() else { return Ok(()) };
             keep_inputs(&read, ("--vtk", &fields.directory), &series::FILES)?;

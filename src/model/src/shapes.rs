@@ -62,26 +62,7 @@ impl Surface {
         faces.retain(|face| !omitted.iter().any(|set| face.iter().all(|node| set.contains(node))));
         let used: BTreeSet<usize> = faces.iter().flatten().copied().collect();
         let nodes: Vec<usize> = used.into_iter().collect();
-        let representative = thinned(mesh, &nodes, points);
-        let kept: BTreeSet<usize> = representative.values().copied().collect();
-        let kept: Vec<usize> = kept.into_iter().collect();
-        let index: BTreeMap<usize, u32> = kept.iter().copied().zip(0..).collect();
-        let (mut corners, mut ends) = (Vec::new(), Vec::new());
-        let mut end = 0;
-        for face in faces {
-            let mut around: Vec<u32> = face.iter().map(|node| index[&representative[node]]).collect();
-            around.dedup();
-            if around.len() > 1 && around.first() == around.last() {
-                around.pop();
-            }
-            let distinct: BTreeSet<u32> = around.iter().copied().collect();
-            if distinct.len() < 3 || distinct.len() != around.len() {
-                continue;
-            }
-            end += if around.len() == 3 { 3 } else { 4 };
-            corners.extend(around);
-            ends.push(end);
-        }
+        let Merged { kept, corners, ends } = merged(faces.into_iter(), &thinned(&mesh.nodes, &nodes, points));
         Self { positions: kept.iter().map(|node| mesh.nodes[*node]).collect(), nodes: kept, corners, ends }
     }
 
@@ -128,6 +109,69 @@ impl DiameterShapes {
     }
 }
 
+impl SurfaceShapes {
+    /// Returns the surface with at most `most` of its points; itself if it has no more.
+    #[must_use]
+    pub fn thinned(self, most: usize) -> Self {
+        if self.points.len() <= most {
+            return self;
+        }
+        let all: Vec<usize> = (0..self.points.len()).collect();
+        let Merged { kept, corners, ends } = merged(self.faces(), &thinned(&self.points, &all, most));
+        let pick = |values: &[f32]| -> Vec<f32> {
+            let coordinates = values.chunks_exact(3 * self.points.len());
+            coordinates.flat_map(|own| kept.iter().flat_map(move |point| own[3 * point..][..3].iter().copied())).collect()
+        };
+        let diameters = self.diameters.iter().map(|own| DiameterShapes {
+            order: own.order,
+            real: pick(&own.real),
+            imaginary: pick(&own.imaginary),
+        });
+        let points = kept.iter().map(|point| self.points[*point]).collect();
+        Self { points, corners, ends, diameters: diameters.collect() }
+    }
+
+    /// Returns the corners of each face.
+    pub fn faces(&self) -> impl Iterator<Item = Vec<usize>> {
+        let starts = core::iter::once(0).chain(self.ends.iter().copied());
+        let ranges = starts.zip(&self.ends).map(|(start, end)| start as usize..*end as usize);
+        ranges.map(|range| self.corners[range].iter().map(|corner| *corner as usize).collect())
+    }
+}
+
+/// Faces over fewer points.
+struct Merged {
+    /// Points that remain, ascending.
+    kept: Vec<usize>,
+    /// Corners and ends as in [`SurfaceShapes`], over the points that remain.
+    corners: Vec<u32>,
+    ends: Vec<u32>,
+}
+
+/// Replaces the corners of faces by their representatives; faces that collapse are omitted.
+fn merged(faces: impl Iterator<Item = Vec<usize>>, representative: &BTreeMap<usize, usize>) -> Merged {
+    let kept: BTreeSet<usize> = representative.values().copied().collect();
+    let kept: Vec<usize> = kept.into_iter().collect();
+    let index: BTreeMap<usize, u32> = kept.iter().copied().zip(0..).collect();
+    let (mut corners, mut ends) = (Vec::new(), Vec::new());
+    let mut end = 0;
+    for face in faces {
+        let mut around: Vec<u32> = face.iter().map(|node| index[&representative[node]]).collect();
+        around.dedup();
+        if around.len() > 1 && around.first() == around.last() {
+            around.pop();
+        }
+        let distinct: BTreeSet<u32> = around.iter().copied().collect();
+        if distinct.len() < 3 || distinct.len() != around.len() {
+            continue;
+        }
+        end += if around.len() == 3 { 3 } else { 4 };
+        corners.extend(around);
+        ends.push(end);
+    }
+    Merged { kept, corners, ends }
+}
+
 /// Rounds to single precision.
 #[expect(clippy::cast_possible_truncation, reason = "rounding is intended")]
 fn single(value: f64) -> f32 {
@@ -135,12 +179,12 @@ fn single(value: f64) -> f32 {
 }
 
 /// Returns the representative of each of these nodes; there are at most `most` representatives.
-fn thinned(mesh: &Mesh, nodes: &[usize], most: usize) -> BTreeMap<usize, usize> {
+fn thinned(positions: &[[f64; 3]], nodes: &[usize], most: usize) -> BTreeMap<usize, usize> {
     if nodes.len() <= most {
         return nodes.iter().map(|node| (*node, *node)).collect();
     }
     let extent = |axis: usize| {
-        let values = nodes.iter().map(|node| mesh.nodes[*node][axis]);
+        let values = nodes.iter().map(|node| positions[*node][axis]);
         values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
     };
     let extents = [0, 1, 2].map(extent);
@@ -149,11 +193,11 @@ fn thinned(mesh: &Mesh, nodes: &[usize], most: usize) -> BTreeMap<usize, usize> 
     let mut size = largest / (most as f64).sqrt();
     loop {
         #[expect(clippy::cast_possible_truncation, reason = "there are at most as many cells as √`most`")]
-        let cell = |node: usize| [0, 1, 2].map(|axis| ((mesh.nodes[node][axis] - extents[axis][0]) / size) as i64);
+        let cell = |node: usize| [0, 1, 2].map(|axis| ((positions[node][axis] - extents[axis][0]) / size) as i64);
         let distance = |node: usize| {
             let cell = cell(node);
             let off =
-                [0, 1, 2].map(|axis| mesh.nodes[node][axis] - extents[axis][0] - (cell[axis] as f64 + 0.5) * size);
+                [0, 1, 2].map(|axis| positions[node][axis] - extents[axis][0] - (cell[axis] as f64 + 0.5) * size);
             off.iter().map(|x| x * x).sum::<f64>()
         };
         let mut nearest: BTreeMap<[i64; 3], usize> = BTreeMap::new();
@@ -216,6 +260,25 @@ mod tests {
             let [low, high] = values.fold([f64::MAX, f64::MIN], |[low, high], x| [low.min(x), high.max(x)]);
             assert!(low <= 2.0 && high >= 18.0, "{low} {high}");
         }
+    }
+
+    #[test]
+    fn thinned_shapes_keep_the_displacements_of_their_points() {
+        let surface = Surface::new(&plate(), &[]);
+        let place = |point: &[f64; 3]| point.map(single);
+        let real: Vec<f32> = surface.positions.iter().flat_map(place).collect();
+        let twice: Vec<f32> = real.iter().map(|value| 2.0 * value).collect();
+        let shapes = DiameterShapes { order: 2, real: [real.clone(), twice].concat(), imaginary: real };
+        let all = surface.with(vec![shapes]);
+        assert_eq!(all.clone().thinned(all.points.len()), all);
+        let few = all.clone().thinned(300);
+        assert!((150..=300).contains(&few.points.len()) && few.ends.len() < all.ends.len());
+        let positions: Vec<f32> = few.points.iter().flat_map(place).collect();
+        let [own] = &few.diameters[..] else { panic!("one nodal diameter") };
+        let doubled: Vec<f32> = positions.iter().map(|value| 2.0 * value).collect();
+        assert!(own.real == [positions.clone(), doubled].concat() && own.imaginary == positions);
+        assert!(few.faces().flatten().all(|corner| corner < few.points.len()));
+        assert_eq!(few.faces().count(), few.ends.len());
     }
 
     #[test]
