@@ -1,6 +1,6 @@
 """Open a page in Chromium (Qt WebEngine) without a screen, run JavaScript in it, and print the results as JSON.
 
-    python browser.py PAGE WIDTH HEIGHT light|dark [--shot FILE] EXPRESSION...
+    python browser.py PAGE WIDTH HEIGHT light|dark EXPRESSION... [--shot FILE]
 
 The page counts as loaded when `ready` is true in it. Each expression is a function body that may return a value; between two
 expressions the page can draw. Exit code 77: no browser can run here; the last line on stderr is the reason.
@@ -15,12 +15,14 @@ os.environ["QT_LOGGING_RULES"] = "*=false"
 # Software rendering, also for WebGL; the sandbox needs privileges that containers do not have.
 os.environ["QTWEBENGINE_DISABLE_SANDBOX"] = "1"
 os.environ["QTWEBENGINE_CHROMIUM_FLAGS"] = "--use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader --ignore-gpu-blocklist --log-level=3"
+# Blink's numbers for dark and light.
+os.environ["QTWEBENGINE_CHROMIUM_FLAGS"] += f" --blink-settings=preferredColorScheme={0 if 'dark' in sys.argv[4:5] else 1}"
 READY = "document.readyState === 'complete' && (!document.getElementById('viewer') || document.getElementById('viewer').dataset.ready === 'true' || !document.querySelector('.note').hidden)"
 UNAVAILABLE = 77
 PATIENCE = 60_000
 
 try:
-    from PySide6.QtCore import Qt, QTimer, QUrl
+    from PySide6.QtCore import QTimer, QUrl
     from PySide6.QtWebEngineCore import QWebEnginePage
     from PySide6.QtWebEngineWidgets import QWebEngineView
     from PySide6.QtWidgets import QApplication
@@ -91,9 +93,8 @@ def main():
         at = arguments.index("--shot")
         shot = arguments[at + 1]
         del arguments[at : at + 2]
-    path, width, height, scheme, *expressions = arguments
+    path, width, height, _, *expressions = arguments
     application = QApplication([sys.argv[0]])
-    application.styleHints().setColorScheme(Qt.ColorScheme.Dark if scheme == "dark" else Qt.ColorScheme.Light)
     session = Session(application, path, int(width), int(height), shot, expressions)
     application.exec()
     # Chromium's threads need not end in order.

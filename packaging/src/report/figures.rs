@@ -19,17 +19,18 @@ use tiprub_study::map::prediction::FrequencyPrediction;
 use tiprub_study::response::{Spectrogram, Spectrum};
 
 use super::input::ReportInput;
+use super::numbers::rounded;
 
 /// Largest number of contact nodes that are drawn as lines instead of a map.
 const MAX_LINES: usize = 4;
-/// The response is shown up to a frequency below which this fraction of its energy lies, and to a factor above it.
-const SHOWN_ENERGY: f64 = 0.995;
-const ABOVE: f64 = 1.4;
+/// The response is shown up to a factor above its highest peak with this fraction of the largest amplitude.
+const SHOWN_PEAK: f64 = 0.1;
+const ABOVE: f64 = 1.2;
 /// Number of modes that are shown at least, and largest number of lines of modes.
 const MIN_MODES: usize = 2;
 const MAX_MODES: usize = 60;
 /// Largest number of engine orders.
-const MAX_ORDERS: usize = 60;
+const MAX_ORDERS: usize = 36;
 /// Decades of the spectrogram.
 const DECADES: f64 = 3.0;
 
@@ -135,8 +136,7 @@ fn clearances(input: &ReportInput<'_>) -> Result<Vec<Captioned>> {
         figures.push(Captioned {
             body: map.to_html(),
             caption: format!(
-                "Smallest clearance{turn} at each place around the casing over time: dark cells are tips that touch. Rising \
-                 stripes are single blades that turn past."
+                "Smallest clearance{turn} at each place around the casing over time. Dark cells: a tip touches."
             ),
         });
     }
@@ -253,7 +253,10 @@ fn vibration(input: &ReportInput<'_>, history: Option<(&HitBlade, &TipHistory)>)
     let nyquist = 0.5 / spacing;
     let modes = prediction.as_ref().map(|own| own.modes(0, 0.0)).unwrap_or_default();
     let needed = modes.get(MIN_MODES - 1).or(modes.last()).copied().unwrap_or(0.0);
-    let top = (ABOVE * spectrum.frequency_below(SHOWN_ENERGY)).max(1.15 * needed).clamp(4.0 * spectrum.resolution, nyquist);
+    let peaks = spectrum.peaks();
+    let largest = peaks.iter().map(|peak| peak.1).fold(0.0, f64::max);
+    let highest = peaks.iter().filter(|peak| peak.1 >= SHOWN_PEAK * largest).map(|peak| peak.0).fold(0.0, f64::max);
+    let top = (ABOVE * highest).max(1.15 * needed).clamp(4.0 * spectrum.resolution, nyquist);
     let mut figures = Vec::new();
     let speed = Results::new(input.table, &input.native.recording).last(Quantity::Speed).or_else(|| master_speed(input));
     if let (Some(prediction), Some(speed)) = (&prediction, speed.filter(|speed| *speed != 0.0)) {
@@ -310,7 +313,7 @@ fn campbell(prediction: &FrequencyPrediction, speed: f64, top: f64, spectrum: &S
     let strongest = peaks.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1));
     let strongest = strongest.map_or(String::new(), |(found, amplitude)| {
         let order = found * std::f64::consts::TAU / speed;
-        format!(" The largest amplitude, {amplitude:.3} µm, is at {found:.0} Hz ({order:.2} times the speed).")
+        format!(" The largest amplitude, {} µm, is at {found:.0} Hz ({order:.2} times the speed).", rounded(amplitude))
     });
     let campbell = Campbell {
         speed,

@@ -27,12 +27,13 @@ pub fn render(input: &ReportInput<'_>) -> Result<String> {
     );
     let _ = write!(
         page,
-        "<header><h1>{title}</h1><p>{}</p>{}{}</header>\n",
+        "<div class=\"top\"><header><h1>{title}</h1><p>{}</p>{}{}</header>\n",
         escape(&settings.description),
         summary.words(input, blade.as_ref()),
         summary.cards()
     );
     page.push_str(&viewer::section(input, blade.as_ref())?);
+    page.push_str("</div>\n");
     for (title, html) in figures::sections(input, blade.as_ref())? {
         let _ = writeln!(page, "<section><h2>{title}</h2>{html}</section>");
     }

@@ -84,10 +84,10 @@ function start(buffer) {
   const rotors = bodies.filter(own => own.role === "rotor");
   rotors.forEach(own => { if (own.triangles && own.inner > 0.25 * own.outer) bodies.push(drum(own)); });
   if (!Number.isFinite(low)) low = 0;
-  const totals = times.map((_, f) => bodies.reduce((sum, own) => { for (let i = f * own.size; i < (f + 1) * own.size; i++) sum += own.forces[i]; return sum; }, 0));
+  const totals = header.totals;
 
   const moving = Math.max(1e-12, ...bodies.map(own => own.largest)), extent = Math.max(1e-9, ...bodies.map(own => own.height));
-  const usual = Math.max(1, 0.1 * extent / moving);
+  const usual = Math.max(1, 0.2 * extent / moving);
   const is_round = walls.length > 0;
   const hit = header.hit, hit_body = hit && bodies[hit.body];
   const state = { at: 0, scale: is_round ? usual : Math.min(usual, 1 + usual / 4), playing: false, yaw: 0, pitch: 0, near: 1, view: "all", turn: false, pace: 1 };
@@ -160,11 +160,16 @@ function start(buffer) {
     reach = Math.max(reach, outer);
     return { rank: 0, points: places.length / 3, sectors: 1, nodes: 0, size: 0, forces: [], weights: [], largest: 0, height: 0, outer, cylindrical: true, texture: texture(),
       basis: texture(), light: texture(), now: new Float32Array(1), lit: new Float32Array(1), motion: null, triangle_count: corners.length, walled: null, gap: 0,
-      triangles: vertices(new Float32Array(places), new Float32Array(places.length / 3 * 2), new Uint16Array(corners)), ...extra };
+      triangles: vertices(new Float32Array(places), new Float32Array(places.length / 3 * 2), new Uint16Array(corners)),
+      lines: extra.rims ? vertices(new Float32Array(places), new Float32Array(places.length / 3 * 2), new Uint16Array(rims(rows.length))) : null, line_count: 4 * ANGLES, ...extra };
   }
+  // Lines along the first and the last row.
+  function rims(count) { return [0, (count - 1) * ANGLES].flatMap(row => Array.from({ length: ANGLES }, (_, i) => [row + i, row + (i + 1) % ANGLES]).flat()); }
   function shell(own) {
     const few = own.rows.length > 9 ? own.rows.filter((_, i) => i % Math.ceil(own.rows.length / 9) === 0 || i === own.rows.length - 1) : own.rows;
-    return revolved(few, { role: "casing", walled: walls.indexOf(own), gap: own.gap });
+    // The drawn shell is wider than the contact, so that its shape is visible.
+    const [first, last] = [few[0], few[few.length - 1]], more = Math.max(0.25 * (last[1] - first[1]), 0.02 * first[0]);
+    return revolved([[first[0], first[1] - more], ...few, [last[0], last[1] + more]], { role: "casing", rims: true, walled: walls.indexOf(own), gap: own.gap });
   }
   function drum(own) {
     const [from, to] = own.z, inner = own.inner * 0.999;
@@ -207,7 +212,7 @@ function start(buffer) {
     let across = [Math.cos(axes), Math.sin(axes), 0], up = [-Math.sin(axes), Math.cos(axes), 0], target = [0, 0, 0], size = reach;
     if (state.view === "blade") {
       [across, up] = [[Math.sin(axes), -Math.cos(axes), 0], across];
-      target = sum([mix(hit_body.inner, hit_body.outer, 0.62), up]); size = 0.85 * hit_body.height;
+      target = sum([mix(hit_body.inner, hit_body.outer, 0.6), up], [0.5 * (hit_body.z[0] + hit_body.z[1]), [0, 0, 1]]); size = 0.8 * hit_body.height;
     } else { target = [0, 0, middle_z]; if (hit_body && hit_body.role === "free") target = sum([1, target], [1, hit_body.moved.slice(1)]); }
     const [sy, cy, sp, cp] = [Math.sin(state.yaw), Math.cos(state.yaw), Math.sin(state.pitch), Math.cos(state.pitch)];
     const away = sum([cp * cy, [0, 0, 1]], [cp * sy, across], [sp, up]);
@@ -237,11 +242,11 @@ function start(buffer) {
     ["weights", "basis", "forces", "wall"].forEach((name, at) => gl.uniform1i(uniform[name], at));
     const solid = own => own.role !== "casing" || !is_round;
     pass(bodies.filter(solid), 1);
-    const dot_size = ratio * (state.view === "blade" ? 34 : 22);
+    const dot_size = ratio * (state.view === "blade" ? 30 : 17);
     gl.enable(gl.BLEND); gl.depthMask(false);
     // Far side of the shell, then the near side.
     gl.enable(gl.CULL_FACE);
-    for (const side of [gl.FRONT, gl.BACK]) { gl.cullFace(side); pass(bodies.filter(own => !solid(own)), state.view === "blade" ? 0.1 : 0.16); }
+    for (const side of [gl.FRONT, gl.BACK]) { gl.cullFace(side); pass(bodies.filter(own => !solid(own)), state.view === "blade" ? 0.12 : 0.2); }
     gl.disable(gl.CULL_FACE);
     for (const own of bodies.filter(own => own.dots && (own.size || !own.triangles))) {
       use(own); gl.uniform1i(uniform.first, own.surface); gl.uniform1i(uniform.mode, 1); gl.uniform1f(uniform.dot_size, own.size ? dot_size : 0.5 * dot_size); gl.uniform1f(uniform.resting, own.triangles ? 0 : 0.9);

@@ -71,14 +71,19 @@ impl Campbell {
             let _ = write!(svg, r#"<path class="rule" d="M{:.1} {bottom}v5"/>"#, x(speed));
             text(&mut svg, [x(speed), bottom + 6.0 + font], "middle", &tick(speed));
         }
+        let mut labels: Vec<[f64; 2]> = Vec::new();
         for (order, is_excited) in &self.orders {
             let hertz = *order as f64 * last / std::f64::consts::TAU;
             let share = if hertz > self.top { self.top / hertz } else { 1.0 };
             let class = if *is_excited { "order excited" } else { "order" };
             let (to_x, to_y) = (x(share * last), y(share * hertz));
             let _ = write!(svg, r#"<path class="{class}" d="M{left} {bottom}L{to_x:.1} {to_y:.1}"/>"#);
-            if *is_excited {
-                text(&mut svg, [to_x - 4.0, to_y + font], "end", &order.to_string());
+            // Labels of close lines would overlap.
+            let place = [to_x - 4.0, to_y + font];
+            let is_free = labels.iter().all(|other| (other[0] - place[0]).hypot(other[1] - place[1]) > 1.8 * font);
+            if *is_excited && is_free {
+                labels.push(place);
+                text(&mut svg, place, "end", &order.to_string());
             }
         }
         for mode in &self.modes {

@@ -11,7 +11,7 @@ use crate::{
 const LEVELS: usize = 9;
 /// Heights in the picture (SVG units): of a row, of the space above the rows, and of the axis below them.
 const ROW: f64 = 14.0;
-const ABOVE: f64 = 4.0;
+const ABOVE: f64 = 9.0;
 const BELOW: f64 = 46.0;
 const RIGHT: f64 = 16.0;
 /// Height of all rows if they have a scale instead of names, and the largest height of rows with names.
@@ -93,7 +93,7 @@ impl GridMap {
         let values = self.values.iter().flatten().copied().filter(|value| value.is_finite());
         let [low, high] = values.fold([0.0_f64, 0.0_f64], |[low, high], value| [low.min(value), high.max(value)]);
         if let Some(decades) = self.decades {
-            let high = if high > 0.0 { high } else { 1.0 };
+            let high = if high > 0.0 { round_step(high) } else { 1.0 };
             return [high * 10_f64.powf(-decades), high];
         }
         if high <= 0.0 {
@@ -164,11 +164,16 @@ impl GridMap {
                 let _ = write!(svg, r#"<g transform="translate({} {middle}) rotate(-90)">"#, 1.1 * font);
                 text(&mut svg, [0.0, 0.0], "middle", label);
                 svg.push_str("</g>");
+                let mut last = f64::INFINITY;
                 for (value, words) in marks.iter().filter(|(value, _)| (*low..=*high_value).contains(value)) {
                     let _ = write!(svg, r#"<path class="mark" d="M{left} {:.1}H{}"/>"#, y(*value), width - RIGHT);
-                    let _ = write!(svg, r#"<g class="mark">"#);
-                    text(&mut svg, [width - RIGHT - 3.0, y(*value) - 3.0], "end", words);
-                    svg.push_str("</g>");
+                    // Labels of close lines would overlap.
+                    if (last - y(*value)).abs() > 1.2 * font {
+                        last = y(*value);
+                        svg.push_str(r#"<g class="mark">"#);
+                        text(&mut svg, [width - RIGHT - 3.0, last - 3.0], "end", words);
+                        svg.push_str("</g>");
+                    }
                 }
             }
         }
@@ -198,12 +203,13 @@ impl GridMap {
         for (index, values) in self.values.iter().enumerate() {
             let level = |bin: usize| Some(self.of_bin(values, bin, bins)).filter(|value| value.is_finite());
             let levels: Vec<Option<usize>> = (0..bins).map(|bin| level(bin).map(|value| self.level(value, range))).collect();
-            let y = ABOVE + row * index as f64;
+            // Rounded edges, so that neighbours leave no gap.
+            let [y, below] = [index, index + 1].map(|index| ABOVE + row * index as f64);
             let mut from = 0;
             for run in levels.chunk_by(|a, b| a == b) {
                 if let Some(level) = run[0] {
-                    let (x, wide) = (left + cell * from as f64, cell * run.len() as f64);
-                    let _ = write!(paths[level], "M{x:.1} {y:.1}h{wide:.1}v{:.1}h-{wide:.1}z", row - line);
+                    let [x, end] = [from, from + run.len()].map(|bin| left + cell * bin as f64);
+                    let _ = write!(paths[level], "M{x:.1} {y:.1}H{end:.1}V{:.1}H{x:.1}z", below - line);
                 }
                 from += run.len();
             }

@@ -62,7 +62,7 @@ impl Surface {
         faces.retain(|face| !omitted.iter().any(|set| face.iter().all(|node| set.contains(node))));
         let used: BTreeSet<usize> = faces.iter().flatten().copied().collect();
         let nodes: Vec<usize> = used.into_iter().collect();
-        let Merged { kept, corners, ends } = merged(faces.into_iter(), &thinned(&mesh.nodes, &nodes, points));
+        let Merged { kept, corners, ends } = merged(faces.into_iter(), &thinned(&mesh.nodes, &nodes, points, &|_| 0));
         Self { positions: kept.iter().map(|node| mesh.nodes[*node]).collect(), nodes: kept, corners, ends }
     }
 
@@ -110,14 +110,16 @@ impl DiameterShapes {
 }
 
 impl SurfaceShapes {
-    /// Returns the surface with at most `most` of its points; itself if it has no more.
+    /// Returns the surface with at most `most` of its points; itself if it has no more. Points of the two sides of a thin
+    /// structure do not represent each other.
     #[must_use]
     pub fn thinned(self, most: usize) -> Self {
         if self.points.len() <= most {
             return self;
         }
         let all: Vec<usize> = (0..self.points.len()).collect();
-        let Merged { kept, corners, ends } = merged(self.faces(), &thinned(&self.points, &all, most));
+        let sides = self.sides();
+        let Merged { kept, corners, ends } = merged(self.faces(), &thinned(&self.points, &all, most, &|point| sides[point]));
         let pick = |values: &[f32]| -> Vec<f32> {
             let coordinates = values.chunks_exact(3 * self.points.len());
             coordinates.flat_map(|own| kept.iter().flat_map(move |point| own[3 * point..][..3].iter().copied())).collect()
@@ -129,6 +131,28 @@ impl SurfaceShapes {
         });
         let points = kept.iter().map(|point| self.points[*point]).collect();
         Self { points, corners, ends, diameters: diameters.collect() }
+    }
+
+    /// Returns the direction of the normal of each point: the number of its largest component, and its sign.
+    fn sides(&self) -> Vec<u8> {
+        let mut normals = vec![[0.0; 3]; self.points.len()];
+        for face in self.faces() {
+            let [a, b, c] = [0, 1, 2].map(|corner: usize| self.points[face[corner]]);
+            let [u, v] = [b, c].map(|end| [0, 1, 2].map(|axis| end[axis] - a[axis]));
+            let normal = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+            for corner in face {
+                normals[corner].iter_mut().zip(normal).for_each(|(sum, value)| *sum += value);
+            }
+        }
+        let side = |normal: &[f64; 3]| {
+            let axis = (0..3_u8).max_by(|a, b| {
+                let [a, b] = [a, b].map(|axis| normal[usize::from(*axis)].abs());
+                a.total_cmp(&b)
+            });
+            let axis = axis.unwrap_or(0);
+            2 * axis + u8::from(normal[usize::from(axis)] < 0.0)
+        };
+        normals.iter().map(side).collect()
     }
 
     /// Returns the corners of each face.
@@ -178,8 +202,8 @@ fn single(value: f64) -> f32 {
     value as f32
 }
 
-/// Returns the representative of each of these nodes; there are at most `most` representatives.
-fn thinned(positions: &[[f64; 3]], nodes: &[usize], most: usize) -> BTreeMap<usize, usize> {
+/// Returns the representative of each of these nodes, which is on the same `side`; there are at most `most` representatives.
+fn thinned(positions: &[[f64; 3]], nodes: &[usize], most: usize, side: &dyn Fn(usize) -> u8) -> BTreeMap<usize, usize> {
     if nodes.len() <= most {
         return nodes.iter().map(|node| (*node, *node)).collect();
     }
@@ -200,15 +224,15 @@ fn thinned(positions: &[[f64; 3]], nodes: &[usize], most: usize) -> BTreeMap<usi
                 [0, 1, 2].map(|axis| positions[node][axis] - extents[axis][0] - (cell[axis] as f64 + 0.5) * size);
             off.iter().map(|x| x * x).sum::<f64>()
         };
-        let mut nearest: BTreeMap<[i64; 3], usize> = BTreeMap::new();
+        let mut nearest: BTreeMap<([i64; 3], u8), usize> = BTreeMap::new();
         for &node in nodes {
-            let chosen = nearest.entry(cell(node)).or_insert(node);
+            let chosen = nearest.entry((cell(node), side(node))).or_insert(node);
             if distance(node) < distance(*chosen) {
                 *chosen = node;
             }
         }
         if nearest.len() <= most {
-            return nodes.iter().map(|node| (*node, nearest[&cell(*node)])).collect();
+            return nodes.iter().map(|node| (*node, nearest[&(cell(*node), side(*node))])).collect();
         }
         size *= COARSER;
     }
@@ -273,6 +297,10 @@ mod tests {
         assert_eq!(all.clone().thinned(all.points.len()), all);
         let few = all.clone().thinned(300);
         assert!((150..=300).contains(&few.points.len()) && few.ends.len() < all.ends.len());
+        // Both sides of the plate, which is thinner than the cells, remain.
+        let thick = |point: &&[f64; 3]| point[2] > 0.5;
+        let above = few.points.iter().filter(thick).count();
+        assert!(above > 50 && few.points.len() - above > 50, "{above} of {}", few.points.len());
         let positions: Vec<f32> = few.points.iter().flat_map(place).collect();
         let [own] = &few.diameters[..] else { panic!("one nodal diameter") };
         let doubled: Vec<f32> = positions.iter().map(|value| 2.0 * value).collect();

@@ -61,17 +61,6 @@ impl Spectrum {
         found.sort_by(|a, b| a.0.total_cmp(&b.0));
         found
     }
-
-    /// Returns the frequency (Hz) below which this fraction of the squared amplitudes lies.
-    pub fn frequency_below(&self, fraction: f64) -> f64 {
-        let total: f64 = self.amplitudes.iter().map(|value| value * value).sum();
-        let mut sum = 0.0;
-        let reached = self.amplitudes.iter().position(|value| {
-            sum += value * value;
-            sum >= fraction * total
-        });
-        reached.unwrap_or(0) as f64 * self.resolution
-    }
 }
 
 impl Spectrogram {
@@ -121,8 +110,6 @@ mod tests {
         for wanted in [500.0, 1500.0] {
             assert!(peaks.iter().any(|(hertz, _)| (hertz - wanted).abs() < 15.0), "{wanted}: {peaks:?}");
         }
-        let [low, high] = [0.5, 0.99].map(|fraction| spectrum.frequency_below(fraction));
-        assert!((480.0..530.0).contains(&low) && (1490.0..1600.0).contains(&high), "{low} {high}");
     }
 
     #[test]

@@ -32,6 +32,9 @@ pub(super) struct BodyFrame {
     pub(super) motion: RigidMotion,
     /// Normal force per contact node, mean over a communication step (N), sector by sector.
     pub(super) forces: Vec<f32>,
+    /// Sum of these forces of each sector, and of the structure (N).
+    pub(super) sector_forces: Vec<f32>,
+    pub(super) total: f32,
     /// Smallest clearance of each sector (m); infinite without a surface to touch.
     pub(super) clearances: Vec<f32>,
 }
@@ -177,7 +180,7 @@ impl Capture {
             motion.angle = variable(simulation, &format!("{}rotor_angle", structure.prefix));
         }
         let references = self.forces[own].iter().flat_map(|(first, count)| (*first..).take(*count));
-        let forces = references.map(|reference| simulation.real(reference).map_or(0.0, single));
+        let forces: Vec<f32> = references.map(|reference| simulation.real(reference).map_or(0.0, single)).collect();
         let nodes = structure.rom.contact_nodes.len().max(1);
         let gaps = structure.clearances(simulation).unwrap_or_default();
         let smallest = |gaps: &[f64]| {
@@ -185,7 +188,9 @@ impl Capture {
             single(near.fold(f64::INFINITY, f64::min))
         };
         let clearances = gaps.chunks(nodes).map(smallest).collect();
-        BodyFrame { amplitudes: Vec::new(), motion, forces: forces.collect(), clearances }
+        let sector_forces: Vec<f32> = forces.chunks(nodes).map(|own| own.iter().sum()).collect();
+        let total = sector_forces.iter().sum();
+        BodyFrame { amplitudes: Vec::new(), motion, forces, sector_forces, total, clearances }
     }
 
     fn note_angles(&mut self, bodies: &[BodyFrame]) {
@@ -262,7 +267,7 @@ pub(super) fn angle_bin(motion: RigidMotion, sector: usize, sectors: usize, coun
 
 impl Frame {
     fn bytes(&self) -> usize {
-        let body = |own: &BodyFrame| 4 * (own.amplitudes.len() + own.forces.len() + own.clearances.len()) + 128;
+        let body = |own: &BodyFrame| 4 * (own.amplitudes.len() + own.forces.len() + own.sector_forces.len() + own.clearances.len()) + 128;
         let ring = |own: &RingFrame| 4 * own.wear.len() + size_of::<RingFrame>();
         self.bodies.iter().map(body).sum::<usize>() + self.rings.iter().map(ring).sum::<usize>()
     }
@@ -271,13 +276,11 @@ impl Frame {
 impl BodyFrame {
     /// Adds the contacts of another point.
     fn merge(&mut self, other: &Self) {
-        self.forces.iter_mut().zip(&other.forces).for_each(|(own, other)| *own = own.max(*other));
+        let largest = |own: &mut [f32], other: &[f32]| own.iter_mut().zip(other).for_each(|(own, other)| *own = own.max(*other));
+        largest(&mut self.forces, &other.forces);
+        largest(&mut self.sector_forces, &other.sector_forces);
+        self.total = self.total.max(other.total);
         self.clearances.iter_mut().zip(&other.clearances).for_each(|(own, other)| *own = own.min(*other));
-    }
-
-    /// Total normal force (N).
-    pub(super) fn total(&self) -> f64 {
-        self.forces.iter().map(|force| f64::from(*force)).sum()
     }
 }
 

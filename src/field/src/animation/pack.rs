@@ -82,10 +82,13 @@ impl Capture {
         let (chosen, is_cut) = self.chosen_frames();
         let frames: Vec<&Frame> = chosen.iter().map(|index| &self.frames[*index]).collect();
         // Contacts of frames between the chosen ones belong to the next of them.
+        let from = |place: usize| if place == 0 { chosen[0] } else { chosen[place - 1] + 1 };
+        let total = |frame: &Frame| frame.bodies.iter().map(|body| f64::from(body.total)).sum::<f64>();
+        let totals = (0..frames.len()).map(|place| self.frames[from(place)..=chosen[place]].iter().map(total).fold(0.0, f64::max));
+        let totals: Vec<f64> = totals.collect();
         let force = |own: usize, place: usize| -> Vec<f64> {
-            let from = if place == 0 { chosen[0] } else { chosen[place - 1] + 1 };
             let mut largest = vec![0.0_f64; self.frames[chosen[place]].bodies[own].forces.len()];
-            for frame in &self.frames[from..=chosen[place]] {
+            for frame in &self.frames[from(place)..=chosen[place]] {
                 largest.iter_mut().zip(&frame.bodies[own].forces).for_each(|(most, force)| *most = most.max(f64::from(*force)));
             }
             largest
@@ -105,7 +108,7 @@ impl Capture {
         let times: Vec<f64> = frames.iter().map(|frame| frame.time).collect();
         Ok(Animation {
             interval: [times.first().copied().unwrap_or(0.0), times.last().copied().unwrap_or(0.0)],
-            header: json!({ "times": times, "angles": ANGLES, "bodies": bodies, "walls": walls }),
+            header: json!({ "times": times, "totals": totals, "angles": ANGLES, "bodies": bodies, "walls": walls }),
             data: base64::engine::general_purpose::STANDARD.encode(bytes),
             is_cut,
             deviation,
@@ -115,7 +118,7 @@ impl Capture {
     /// Returns the indices of the frames to show, and whether contact also occurs outside them.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "numbers of frames")]
     fn chosen_frames(&self) -> (Vec<usize>, bool) {
-        let total = |frame: &Frame| frame.bodies.iter().map(super::capture::BodyFrame::total).sum::<f64>();
+        let total = |frame: &Frame| frame.bodies.iter().map(|body| f64::from(body.total)).sum::<f64>();
         let totals: Vec<f64> = self.frames.iter().map(total).collect();
         let last = self.frames.len().saturating_sub(1);
         let touches = |index: &usize| totals[*index] > 0.0;

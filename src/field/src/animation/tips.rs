@@ -104,8 +104,7 @@ impl Capture {
             for (place, sector) in own.sectors.iter().enumerate() {
                 for frame in &self.frames {
                     let body = &frame.bodies[structure];
-                    let forces = body.forces.chunks(own.rom.contact_nodes.len().max(1)).nth(place).unwrap_or_default();
-                    let force = forces.iter().map(|force| f64::from(*force)).sum::<f64>();
+                    let force = body.sector_forces.get(place).map_or(0.0, |force| f64::from(*force));
                     let clearance = body.clearances.get(place).map_or(f64::INFINITY, |gap| f64::from(*gap));
                     let rank = if force > 0.0 { force } else { -clearance };
                     if found.as_ref().is_none_or(|(most, _)| rank > *most) {
