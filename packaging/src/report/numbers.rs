@@ -33,7 +33,7 @@ pub(super) fn scientific(value: f64) -> String {
     }
 }
 
-/// Formats a value with three significant digits and a prefix of its unit.
+/// Formats a value with three significant digits and a prefix of its unit, without a line break between them.
 pub(super) fn with_prefix(value: f64, unit: &str) -> String {
     const PREFIXES: [(f64, &str); 7] =
         [(1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n")];
@@ -41,7 +41,7 @@ pub(super) fn with_prefix(value: f64, unit: &str) -> String {
     // 999.6 is shown as 1.00 of the next prefix.
     let found = PREFIXES.into_iter().find(|(factor, _)| magnitude >= 0.9995 * factor);
     let (factor, prefix) = found.filter(|_| magnitude > 0.0).unwrap_or((1.0, ""));
-    format!("{} {prefix}{unit}", rounded(value / factor))
+    format!("{}\u{a0}{prefix}{unit}", rounded(value / factor))
 }
 
 #[cfg(test)]
@@ -59,6 +59,7 @@ mod tests {
     #[test]
     fn units_have_prefixes() {
         let texts = [20588.1, 999.7, 0.00042, 1.5e-6, -210.296, 0.0].map(|value| with_prefix(value, "N"));
-        assert_eq!(texts, ["20.6 kN", "1.00 kN", "420 µN", "1.50 µN", "-210 N", "0 N"]);
+        let plain = texts.map(|text| text.replace('\u{a0}', " "));
+        assert_eq!(plain, ["20.6 kN", "1.00 kN", "420 µN", "1.50 µN", "-210 N", "0 N"]);
     }
 }

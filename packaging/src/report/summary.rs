@@ -146,7 +146,7 @@ impl Summary {
         if let Some((heat, _)) = self.heat {
             let _ = write!(text, " Friction turns {} into heat", with_prefix(heat, "J"));
             if let Some(torque) = self.torque.filter(|torque| *torque != 0.0) {
-                let _ = write!(text, ", and the contact torque is {} on average", with_prefix(torque, "N m"));
+                let _ = write!(text, ", and the contact torque is {} on average", with_prefix(torque, "N\u{a0}m"));
             }
             text.push('.');
         }

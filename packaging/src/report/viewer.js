@@ -74,8 +74,9 @@ void main() {
 function start(buffer) {
   const program = link();
   const uniform = new Proxy({}, { get: (known, name) => known[name] ??= gl.getUniformLocation(program, name) });
-  const i16 = ([place, unit], count) => Float32Array.from(new Int16Array(buffer, place, count), v => v * unit);
-  const u16 = (place, count) => new Uint16Array(buffer, place, count);
+  // Low bytes come before high bytes.
+  const u16 = (place, count) => { const [low, high] = [0, count].map(more => new Uint8Array(buffer, place + more, count)); return Uint16Array.from(low, (byte, i) => byte | high[i] << 8); };
+  const i16 = ([place, unit], count) => Float32Array.from(new Int16Array(u16(place, count).buffer), v => v * unit);
   const times = header.times, frames = times.length, ANGLES = header.angles;
   const walls = header.walls.map(own => ({ ...own, change: i16(own.change, ANGLES * frames), now: new Float32Array(ANGLES), texture: texture() }));
   let reach = 0, low = Infinity, hardest = 0;
@@ -92,7 +93,7 @@ function start(buffer) {
   const hit = header.hit, hit_body = hit && bodies[hit.body];
   const state = { at: 0, scale: is_round ? usual : Math.min(usual, 1 + usual / 4), playing: false, yaw: 0, pitch: 0, near: 1, view: "all", turn: false, pace: 1 };
   const limits = [1, Math.max(100, 10 * usual)];
-  const first_view = () => Object.assign(state, state.view === "all" ? { yaw: 0.6, pitch: 0.32, near: 1 } : { yaw: 0.75, pitch: 0.35, near: 1 });
+  const first_view = () => Object.assign(state, state.view === "all" ? { yaw: 0.5, pitch: 0.3, near: 1 } : { yaw: 0.75, pitch: 0.35, near: 1 });
   first_view();
 
   function texture() {
@@ -116,7 +117,8 @@ function start(buffer) {
   }
   function body(own, index) {
     const points = own.points, places = i16(own.place, 3 * points), surface = points - own.nodes;
-    const basis = i16(own.basis, 3 * points * own.rank), rows = Math.max(1, Math.ceil(points * own.rank / 1024));
+    const basis = new Float32Array(3 * points * own.rank), rows = Math.max(1, Math.ceil(points * own.rank / 1024));
+    own.basis.forEach((one, k) => basis.set(i16(one, 3 * points), 3 * points * k));
     const padded = new Float32Array(3 * 1024 * rows); padded.set(basis);
     const weights = own.weights.map(one => i16(one, frames * own.sectors));
     const size = own.forces[2] ? own.sectors * own.nodes : 0, forces = i16(own.forces, frames * size);
@@ -212,11 +214,11 @@ function start(buffer) {
     let across = [Math.cos(axes), Math.sin(axes), 0], up = [-Math.sin(axes), Math.cos(axes), 0], target = [0, 0, 0], size = reach;
     if (state.view === "blade") {
       [across, up] = [[Math.sin(axes), -Math.cos(axes), 0], across];
-      target = sum([mix(hit_body.inner, hit_body.outer, 0.6), up], [0.5 * (hit_body.z[0] + hit_body.z[1]), [0, 0, 1]]); size = 0.8 * hit_body.height;
+      target = sum([mix(hit_body.inner, hit_body.outer, 0.6), up], [0.5 * (hit_body.z[0] + hit_body.z[1]), [0, 0, 1]]); size = 0.62 * hit_body.height;
     } else { target = [0, 0, middle_z]; if (hit_body && hit_body.role === "free") target = sum([1, target], [1, hit_body.moved.slice(1)]); }
     const [sy, cy, sp, cp] = [Math.sin(state.yaw), Math.cos(state.yaw), Math.sin(state.pitch), Math.cos(state.pitch)];
     const away = sum([cp * cy, [0, 0, 1]], [cp * sy, across], [sp, up]);
-    const aspect = canvas.width / canvas.height, view = 0.5, distance = 1.12 * size / Math.tan(view / 2) / Math.min(1, aspect) / state.near;
+    const aspect = canvas.width / canvas.height, view = 0.5, distance = 1.04 * size / Math.tan(view / 2) / Math.min(1, aspect) / state.near;
     const eye = sum([1, target], [distance, away]), right = unit(cross(up, away)), high = cross(away, right);
     const f = 1 / Math.tan(view / 2), near = 0.05 * distance, far = distance + 4 * reach;
     const columns = [0, 1, 2].map(axis => [f / aspect * right[axis], f * high[axis], (near + far) / (near - far) * away[axis], -away[axis]]);

@@ -6,6 +6,10 @@ use nalgebra::{DMatrix, SymmetricEigen};
 const EXTRA: usize = 8;
 /// Number of times that the search is repeated with its result.
 const REPEATS: usize = 2;
+/// One field of so many takes part in the search.
+const SPARSE: u32 = 3;
+/// Number of fields up to which all take part.
+const FEW: usize = 500;
 /// Directions shorter than this fraction of the longest are rounding.
 const ROUNDING: f64 = 1e-6;
 
@@ -21,24 +25,29 @@ pub(crate) struct Basis {
 }
 
 impl Basis {
-    /// Finds the best basis of at most `rank` vectors: randomised subspace iteration with fixed numbers (Halko, Martinsson,
+    /// Finds the best basis of at most `rank` vectors, or of so few that the deviation is below `enough`: randomised subspace iteration with fixed numbers (Halko, Martinsson,
     /// Tropp 2011), then the eigenvectors of the small matrix C Cᵀ. All fields have one length.
-    pub(crate) fn new(fields: &[Vec<f32>], rank: usize) -> Self {
+    pub(crate) fn new(fields: &[Vec<f32>], rank: usize, enough: f64) -> Self {
         let length = fields.first().map_or(0, Vec::len);
         let count = (rank + EXTRA).min(fields.len()).min(length);
         let mut directions = vec![vec![0.0_f32; length]; count];
+        // A linear congruential generator; its high bits decide.
         let mut number = 1_u32;
-        for field in fields {
+        let mut next = || {
+            number = number.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            number >> 16
+        };
+        let sparse: Vec<&Vec<f32>> =
+            fields.iter().filter(|_| fields.len() <= FEW || next().is_multiple_of(SPARSE)).collect();
+        for field in &sparse {
             for direction in &mut directions {
-                // A linear congruential generator; its highest bit decides the sign.
-                number = number.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-                add(direction, if number >> 31 == 0 { 1.0 } else { -1.0 }, field);
+                add(direction, if next() & 0x8000 == 0 { 1.0 } else { -1.0 }, field);
             }
         }
         orthonormalise(&mut directions);
         for _ in 0..REPEATS {
             let mut next = vec![vec![0.0_f32; length]; directions.len()];
-            for field in fields {
+            for field in &sparse {
                 for (next, direction) in next.iter_mut().zip(&directions) {
                     add(next, single(dot(direction, field)), field);
                 }
@@ -50,42 +59,47 @@ impl Basis {
             fields.iter().map(|field| directions.iter().map(|own| dot(own, field)).collect()).collect();
         let (vectors, turn) = turned(&directions, &found, rank);
         let coefficients: Vec<Vec<f32>> = found.iter().map(|own| turn.iter().map(|t| single(sum(t, own))).collect()).collect();
-        let mut deviation = Deviation::default();
-        fields.iter().zip(&coefficients).for_each(|(field, own)| deviation.note(field.clone(), &vectors, own));
-        Self { vectors, coefficients, deviation: deviation.fraction() }
+        let deviations = deviations(fields, &vectors, &coefficients);
+        let needed = deviations.iter().position(|deviation| *deviation <= enough).unwrap_or(vectors.len());
+        let mut basis = Self { vectors, coefficients, deviation: deviations[needed] };
+        basis.vectors.truncate(needed);
+        basis.coefficients.iter_mut().for_each(|own| own.truncate(needed));
+        basis
     }
 
     /// Describes other fields with the vectors of this basis.
     pub(crate) fn extended(self, fields: impl Iterator<Item = Vec<f32>>) -> Self {
-        let (mut coefficients, mut deviation) = (Vec::new(), Deviation::default());
-        for field in fields {
-            let own = self.vectors.iter().map(|vector| single(dot(vector, &field))).collect();
-            deviation.note(field, &self.vectors, &own);
+        let (mut coefficients, mut largest, mut deviation) = (Vec::new(), 0.0_f32, 0.0_f32);
+        for mut field in fields {
+            let own: Vec<f32> = self.vectors.iter().map(|vector| single(dot(vector, &field))).collect();
+            largest = largest.max(most(&field));
+            self.vectors.iter().zip(&own).for_each(|(vector, weight)| add(&mut field, -weight, vector));
+            deviation = deviation.max(most(&field));
             coefficients.push(own);
         }
-        Self { vectors: self.vectors, coefficients, deviation: deviation.fraction() }
+        let deviation = if largest > 0.0 { f64::from(deviation / largest) } else { 0.0 };
+        Self { vectors: self.vectors, coefficients, deviation }
     }
 }
 
-/// Largest value and largest deviation so far.
-#[derive(Default)]
-struct Deviation {
-    largest: f32,
-    deviation: f32,
+/// Returns the deviation for each number of vectors, from none to all, as in [`Basis::deviation`].
+fn deviations(fields: &[Vec<f32>], vectors: &[Vec<f32>], coefficients: &[Vec<f32>]) -> Vec<f64> {
+    let mut largest = vec![0.0_f32; vectors.len() + 1];
+    for (field, own) in fields.iter().zip(coefficients) {
+        let mut rest = field.clone();
+        largest[0] = largest[0].max(most(&rest));
+        for (number, (vector, weight)) in vectors.iter().zip(own).enumerate() {
+            add(&mut rest, -weight, vector);
+            largest[number + 1] = largest[number + 1].max(most(&rest));
+        }
+    }
+    let whole = largest[0];
+    largest.iter().map(|own| if whole > 0.0 { f64::from(own / whole) } else { 0.0 }).collect()
 }
 
-impl Deviation {
-    fn note(&mut self, field: Vec<f32>, vectors: &[Vec<f32>], coefficients: &Vec<f32>) {
-        let most = |values: &[f32]| values.iter().fold(0.0_f32, |most, value| most.max(value.abs()));
-        self.largest = self.largest.max(most(&field));
-        let mut rest = field;
-        vectors.iter().zip(coefficients).for_each(|(vector, weight)| add(&mut rest, -weight, vector));
-        self.deviation = self.deviation.max(most(&rest));
-    }
-
-    fn fraction(&self) -> f64 {
-        if self.largest > 0.0 { f64::from(self.deviation / self.largest) } else { 0.0 }
-    }
+/// Returns the largest magnitude.
+fn most(values: &[f32]) -> f32 {
+    values.iter().fold(0.0_f32, |most, value| most.max(value.abs()))
 }
 
 /// Returns at most `rank` vectors in the order of their contribution, and their components along `directions`.
@@ -170,7 +184,7 @@ mod tests {
 
     #[test]
     fn finds_all_shapes_of_low_rank_fields() {
-        let basis = Basis::new(&fields(), 12);
+        let basis = Basis::new(&fields(), 12, 0.0);
         assert_eq!(basis.vectors.len(), 3);
         assert!(basis.deviation < 2e-6, "{}", basis.deviation);
         for (i, a) in basis.vectors.iter().enumerate() {
@@ -182,16 +196,20 @@ mod tests {
 
     #[test]
     fn reports_the_deviation_of_a_truncated_basis() {
-        let basis = Basis::new(&fields(), 2);
+        let basis = Basis::new(&fields(), 2, 0.0);
         assert!(basis.vectors.len() == 2 && (1e-5..1e-2).contains(&basis.deviation), "{}", basis.deviation);
-        let one = Basis::new(&fields(), 1);
+        let enough = Basis::new(&fields(), 12, 0.01);
+        assert!(enough.vectors.len() == 2 && enough.coefficients[0].len() == 2 && enough.deviation == basis.deviation);
+        let kept = basis.clone().extended(fields().into_iter());
+        assert!((kept.deviation / basis.deviation - 1.0).abs() < 1e-2 && kept.coefficients.len() == 40);
+        let one = Basis::new(&fields(), 1, 0.0);
         assert!(one.deviation > 0.05, "{}", one.deviation);
     }
 
     #[test]
     fn accepts_fields_at_rest() {
-        let basis = Basis::new(&vec![vec![0.0; 12]; 5], 4);
+        let basis = Basis::new(&vec![vec![0.0; 12]; 5], 4, 0.0);
         assert!(basis.vectors.is_empty() && basis.coefficients == vec![Vec::<f32>::new(); 5] && basis.deviation == 0.0);
-        assert!(Basis::new(&[], 4).vectors.is_empty());
+        assert!(Basis::new(&[], 4, 0.0).vectors.is_empty());
     }
 }

@@ -14,8 +14,9 @@ use super::{ANGLES, MAX_TIMES};
 use crate::cells::{contact_cells, points_alone};
 use crate::structure::{Role, Structure};
 
-/// Largest rank of the displacements of one structure.
-const MAX_RANK: usize = 12;
+/// Largest rank of the displacements of one structure, and the deviation at which a lower rank suffices.
+const MAX_RANK: usize = 28;
+const DEVIATION: f64 = 0.01;
 /// Largest number of displacement values of one structure in memory.
 const MAX_VALUES: usize = 25_000_000;
 /// Times per period of the slowest mode that moves much.
@@ -26,6 +27,9 @@ const BEFORE_PEAK: f64 = 0.4;
 const LIGHT: f64 = 0.12;
 /// Index of a point that no contact lights.
 const NO_NODE: u16 = u16::MAX;
+/// Steps of the largest contribution to displacements, and of the smallest.
+const STEPS: f64 = 4000.0;
+const MIN_STEPS: f64 = 30.0;
 /// Largest value of an `i16` that is used, and of a force.
 const FULL: f64 = 32_767.0;
 
@@ -56,20 +60,30 @@ impl Packer {
         self.0.len()
     }
 
-    fn whole(&mut self, values: impl Iterator<Item = u16>) -> usize {
+    /// Adds numbers: first their low bytes, then their high bytes, which compresses better.
+    fn words(&mut self, values: &[[u8; 2]]) -> usize {
         let start = self.start();
-        self.0.extend(values.flat_map(u16::to_le_bytes));
+        self.0.extend(values.iter().map(|word| word[0]));
+        self.0.extend(values.iter().map(|word| word[1]));
         start
     }
 
+    fn whole(&mut self, values: impl Iterator<Item = u16>) -> usize {
+        self.words(&values.map(u16::to_le_bytes).collect::<Vec<_>>())
+    }
+
     /// Adds values as fractions of the largest; returns the offset and the value of one unit.
-    #[expect(clippy::cast_possible_truncation, reason = "scaled to the range of the type")]
     fn scaled(&mut self, values: &[f64]) -> (usize, f64) {
+        self.stepped(values, FULL)
+    }
+
+    /// Adds values in `steps` steps from 0 to the largest; returns the offset and the value of one unit.
+    #[expect(clippy::cast_possible_truncation, reason = "scaled to the range of the type")]
+    fn stepped(&mut self, values: &[f64], steps: f64) -> (usize, f64) {
         let largest = values.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
-        let unit = if largest > 0.0 { largest / FULL } else { 1.0 };
-        let start = self.start();
-        self.0.extend(values.iter().flat_map(|value| ((value / unit).round() as i16).to_le_bytes()));
-        (start, unit)
+        let unit = if largest > 0.0 { largest / steps } else { 1.0 };
+        let words: Vec<[u8; 2]> = values.iter().map(|value| ((value / unit).round() as i16).to_le_bytes()).collect();
+        (self.words(&words), unit)
     }
 }
 
@@ -163,10 +177,22 @@ impl Capture {
         let points: Vec<[f64; 3]> = surface.iter().chain(&nodes).copied().collect();
         let basis = self.basis(own, structure, frames, points.len());
         let rank = basis.vectors.len();
-        let vectors: Vec<f64> = basis.vectors.iter().flatten().map(|value| f64::from(*value)).collect();
-        // Each coefficient has a range of its own.
-        let series = (0..rank).map(|k| basis.coefficients.iter().map(|own| f64::from(own[k])).collect::<Vec<_>>());
-        let coefficients: Vec<(usize, f64)> = series.map(|series| packer.scaled(&series)).collect();
+        // Vectors of small contribution need fewer steps, and their bytes compress better.
+        let largest = |values: &mut dyn Iterator<Item = f32>| values.fold(0.0_f32, |most, value| most.max(value.abs()));
+        let contribution = |k: usize| {
+            let weight = largest(&mut basis.coefficients.iter().map(|own| own[k]));
+            f64::from(weight) * f64::from(largest(&mut basis.vectors[k].iter().copied()))
+        };
+        let contributions: Vec<f64> = (0..rank).map(contribution).collect();
+        let most = contributions.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+        let (mut coefficients, mut vectors) = (Vec::new(), Vec::new());
+        for (k, own) in contributions.iter().enumerate() {
+            let steps = (STEPS * own / most).clamp(MIN_STEPS, FULL).round();
+            let series: Vec<f64> = basis.coefficients.iter().map(|own| f64::from(own[k])).collect();
+            coefficients.push(packer.stepped(&series, steps));
+            let vector: Vec<f64> = basis.vectors[k].iter().map(|value| f64::from(*value)).collect();
+            vectors.push(packer.stepped(&vector, steps));
+        }
         let (place, unit) = packer.scaled(&points.iter().flatten().copied().collect::<Vec<_>>());
         let (triangles, lines) = (triangles(structure), lines(structure));
         let short = |index: usize| u16::try_from(index).unwrap_or(NO_NODE);
@@ -178,7 +204,6 @@ impl Capture {
                 [motion.angle, motion.shift[0], motion.shift[1], motion.shift[2]]
             })
             .collect();
-        let (basis_place, basis_unit) = packer.scaled(&vectors);
         let (force_place, force_unit) = packer.scaled(forces);
         let ring = self.rings.iter().position(|ring| ring.carrier == Some(own));
         let value = json!({
@@ -197,7 +222,7 @@ impl Capture {
             "wall": ring,
             "motion": motion,
             "place": [place, unit],
-            "basis": [basis_place, basis_unit],
+            "basis": vectors,
             "weights": coefficients,
             "triangles": [packer.whole(triangles.iter().map(|index| short(*index))), triangles.len()],
             "lines": [packer.whole(lines.iter().map(|index| short(index + surface.len()))), lines.len()],
@@ -229,10 +254,10 @@ impl Capture {
             surface.into_iter().zip(contact).map(of_sector).collect()
         };
         if every == 1 {
-            return Basis::new(&frames.iter().flat_map(field).collect::<Vec<_>>(), MAX_RANK);
+            return Basis::new(&frames.iter().flat_map(field).collect::<Vec<_>>(), MAX_RANK, DEVIATION);
         }
         let shown = frames.iter().step_by(every).flat_map(field).collect::<Vec<_>>();
-        let found = Basis::new(&shown, MAX_RANK);
+        let found = Basis::new(&shown, MAX_RANK, DEVIATION);
         drop(shown);
         found.extended(frames.iter().flat_map(field))
     }

@@ -46,7 +46,8 @@ impl Film {
     /// Reads numbers at `[offset, unit]`.
     fn numbers(&self, place: &Value, count: usize) -> Vec<f64> {
         let start = usize::try_from(place[0].as_u64().unwrap()).unwrap();
-        let words = self.bytes[start..][..2 * count].as_chunks().0.iter().map(|word| i16::from_le_bytes(*word));
+        let (low, high) = self.bytes[start..][..2 * count].split_at(count);
+        let words = low.iter().zip(high).map(|(low, high)| i16::from_le_bytes([*low, *high]));
         words.map(|word| f64::from(word) * place[1].as_f64().unwrap()).collect()
     }
 
@@ -68,12 +69,12 @@ impl Film {
     fn displacement(&self, body: &Value, time: usize, sector: usize, node: usize) -> [f64; 3] {
         let size = |name: &str| usize::try_from(body[name].as_u64().unwrap()).unwrap();
         let (rank, points, sectors, nodes) = (size("rank"), size("points"), size("sectors"), size("nodes"));
-        let basis = self.numbers(&body["basis"], 3 * points * rank);
         let mut sum = [0.0; 3];
         for k in 0..rank {
             let weight = self.numbers(&body["weights"][k], sectors * self.times().len())[time * sectors + sector];
+            let vector = self.numbers(&body["basis"][k], 3 * points);
             for (axis, sum) in sum.iter_mut().enumerate() {
-                *sum += weight * basis[3 * (k * points + points - nodes + node) + axis];
+                *sum += weight * vector[3 * (points - nodes + node) + axis];
             }
         }
         sum
