@@ -24,7 +24,7 @@ use super::numbers::rounded;
 /// Largest number of contact nodes that are drawn as lines instead of a map.
 const MAX_LINES: usize = 4;
 /// The response is shown up to a factor above its highest peak with this fraction of the largest amplitude.
-const SHOWN_PEAK: f64 = 0.1;
+const SHOWN_PEAK: f64 = 0.18;
 const ABOVE: f64 = 1.2;
 /// Number of modes that are shown at least, and largest number of lines of modes.
 const MIN_MODES: usize = 2;
@@ -136,7 +136,7 @@ fn clearances(input: &ReportInput<'_>) -> Result<Vec<Captioned>> {
         figures.push(Captioned {
             body: map.to_html(),
             caption: format!(
-                "Smallest clearance{turn} at each place around the casing over time. Dark cells: a tip touches."
+                "Smallest clearance{turn} at each place around the casing over time. Where the colour is strongest, a tip touches."
             ),
         });
     }

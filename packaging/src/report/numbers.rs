@@ -41,7 +41,7 @@ pub(super) fn with_prefix(value: f64, unit: &str) -> String {
     // 999.6 is shown as 1.00 of the next prefix.
     let found = PREFIXES.into_iter().find(|(factor, _)| magnitude >= 0.9995 * factor);
     let (factor, prefix) = found.filter(|_| magnitude > 0.0).unwrap_or((1.0, ""));
-    format!("{}\u{a0}{prefix}{unit}", rounded(value / factor))
+    format!("{}\u{a0}{prefix}{unit}", rounded(value / factor).replace('-', "−"))
 }
 
 #[cfg(test)]
@@ -60,6 +60,6 @@ mod tests {
     fn units_have_prefixes() {
         let texts = [20588.1, 999.7, 0.00042, 1.5e-6, -210.296, 0.0].map(|value| with_prefix(value, "N"));
         let plain = texts.map(|text| text.replace('\u{a0}', " "));
-        assert_eq!(plain, ["20.6 kN", "1.00 kN", "420 µN", "1.50 µN", "-210 N", "0 N"]);
+        assert_eq!(plain, ["20.6 kN", "1.00 kN", "420 µN", "1.50 µN", "−210 N", "0 N"]);
     }
 }

@@ -10,7 +10,7 @@ use tiprub_shell::extremes;
 use super::input::ReportInput;
 use super::numbers::{rounded, with_prefix};
 
-/// Vibration whose largest energy changes by less than this factor neither grows nor decays.
+/// Vibration whose largest energy changes by less than this factor is steady.
 const STEADY: f64 = 1.1;
 
 /// Times of contact.
@@ -95,13 +95,7 @@ impl Summary {
         };
         let grows = match self.growth {
             Some(growth) => {
-                let word = if growth > STEADY {
-                    "yes"
-                } else if growth < 1.0 / STEADY {
-                    "no, it decays"
-                } else {
-                    "no, steady"
-                };
+                let word = if growth > STEADY { "yes" } else { "no" };
                 let note = "largest vibration energy of the last third of the run over that of the middle third";
                 (format!("{word}, ×{}", rounded(growth)), note.to_owned())
             }
@@ -154,9 +148,9 @@ impl Summary {
             let _ = write!(text, " The coating is worn by up to {}.", with_prefix(depth, "m"));
         }
         match self.growth {
-            Some(growth) if growth > STEADY => text.push_str(" Vibration still grows at the end of the run."),
-            Some(growth) if growth < 1.0 / STEADY => text.push_str(" Vibration decays towards the end of the run."),
-            Some(_) => text.push_str(" Vibration neither grows nor decays."),
+            Some(growth) if growth > STEADY => text.push_str(" Vibration is stronger in the last third of the run than in the middle third."),
+            Some(growth) if growth < 1.0 / STEADY => text.push_str(" Vibration is weaker in the last third of the run than in the middle third."),
+            Some(_) => text.push_str(" Vibration is as strong in the last third of the run as in the middle third."),
             None => {}
         }
         format!("<p class=\"answer\">{text}</p>")
