@@ -109,8 +109,7 @@ pub fn run(arguments: &DemoArguments, console: &Console) -> Result<CommandOutcom
     let estimates = watch.measure("estimating errors", || estimate::estimates(&scene, &[], schedule.count, console))?;
     let capture = watch.measure("run for the report", || observe(&scene, &reduction, &schedule, console))?;
     let facts = scene.roms.iter().map(|rom| RomFacts::of(rom, None)).collect::<Result<Vec<_>>>()?;
-    let demo =
-        Demo { estimates, capture, directory, scene, schedule, facts, native, imported, durations: watch.0 };
+    let demo = Demo { estimates, capture, directory, scene, schedule, facts, native, imported, durations: watch.0 };
     demo.write_report()?;
     demo.outcome()
 }

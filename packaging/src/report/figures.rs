@@ -114,7 +114,11 @@ fn clearances(input: &ReportInput<'_>) -> Result<Vec<Captioned>> {
         };
         let rest = at_rest(input, &own.name, own.smallest.len())?;
         let curves = rest.into_iter().chain([smallest]).collect();
-        let turn = if input.capture.angle_clearances().len() > 1 { format!(" of {}", escape(&own.name)) } else { String::new() };
+        let turn = if input.capture.angle_clearances().len() > 1 {
+            format!(" of {}", escape(&own.name))
+        } else {
+            String::new()
+        };
         figures.push(Captioned {
             body: Polar { label: "clearance (µm)".into(), curves }.to_html(),
             caption: format!(
@@ -186,9 +190,11 @@ fn forces(input: &ReportInput<'_>, results: &Results<'_>, blade: Option<&HitBlad
     if let Some(impulses) = input.native.recording.column("normal_impulse") {
         let times = &input.native.recording.times;
         let steps = times.windows(2).zip(impulses.iter().skip(1));
-        let points: Vec<(f64, f64)> = steps.map(|(ends, impulse)| (1e3 * ends[1], impulse / (ends[1] - ends[0]))).collect();
+        let points: Vec<(f64, f64)> =
+            steps.map(|(ends, impulse)| (1e3 * ends[1], impulse / (ends[1] - ends[0]))).collect();
         if impulses.iter().any(|impulse| *impulse != 0.0) {
-            let plot = Plot { height: 220, ..Plot::new("time (ms)", "normal force (N)", vec![Series::line("force", points)]) };
+            let plot =
+                Plot { height: 220, ..Plot::new("time (ms)", "normal force (N)", vec![Series::line("force", points)]) };
             figures.push(Captioned {
                 body: plot.to_html()?,
                 caption: "Total normal force of all contacts, mean over each communication step.".into(),
@@ -202,7 +208,8 @@ fn forces(input: &ReportInput<'_>, results: &Results<'_>, blade: Option<&HitBlad
         let body = if rows.is_empty() {
             String::new()
         } else if rows.len() <= MAX_LINES {
-            let points = |values: &Vec<f64>| times.iter().zip(values).map(|(time, value)| (1e3 * time, *value)).collect();
+            let points =
+                |values: &Vec<f64>| times.iter().zip(values).map(|(time, value)| (1e3 * time, *value)).collect();
             let series = rows.iter().map(|(node, values)| Series::line(readable(node), points(values))).collect();
             Plot::new("time (ms)", "normal force (N)", series).to_html()?
         } else {
@@ -258,7 +265,8 @@ fn vibration(input: &ReportInput<'_>, history: Option<(&HitBlade, &TipHistory)>)
     let highest = peaks.iter().filter(|peak| peak.1 >= SHOWN_PEAK * largest).map(|peak| peak.0).fold(0.0, f64::max);
     let top = (ABOVE * highest).max(1.15 * needed).clamp(4.0 * spectrum.resolution, nyquist);
     let mut figures = Vec::new();
-    let speed = Results::new(input.table, &input.native.recording).last(Quantity::Speed).or_else(|| master_speed(input));
+    let speed =
+        Results::new(input.table, &input.native.recording).last(Quantity::Speed).or_else(|| master_speed(input));
     if let (Some(prediction), Some(speed)) = (&prediction, speed.filter(|speed| *speed != 0.0)) {
         figures.push(campbell(prediction, speed.abs(), top, &spectrum, &what));
     }
@@ -305,10 +313,12 @@ fn campbell(prediction: &FrequencyPrediction, speed: f64, top: f64, spectrum: &S
     let grid: Vec<f64> = (0..=12).map(|index| last * f64::from(index) / 12.0).collect();
     let columns: Vec<Vec<f64>> = grid.iter().map(|speed| prediction.lines(*speed)).collect();
     let lines = (0..columns[0].len()).filter(|mode| (0.0..top).contains(&columns[0][*mode]) && columns[0][*mode] > 0.0);
-    let modes = lines.take(MAX_MODES).map(|mode| grid.iter().zip(&columns).map(|(x, column)| (*x, column[mode])).collect());
+    let modes =
+        lines.take(MAX_MODES).map(|mode| grid.iter().zip(&columns).map(|(x, column)| (*x, column[mode])).collect());
     let hertz = |order: usize| order as f64 * speed / std::f64::consts::TAU;
     let orders = (1..=MAX_ORDERS).take_while(|order| hertz(*order) <= top);
-    let response: Vec<(f64, f64)> = spectrum.amplitudes.iter().enumerate().map(|(bin, value)| (bin as f64 * spectrum.resolution, *value)).collect();
+    let response: Vec<(f64, f64)> =
+        spectrum.amplitudes.iter().enumerate().map(|(bin, value)| (bin as f64 * spectrum.resolution, *value)).collect();
     let peaks: Vec<(f64, f64)> = spectrum.peaks().into_iter().filter(|peak| peak.0 <= top).collect();
     let strongest = peaks.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1));
     let strongest = strongest.map_or(String::new(), |(found, amplitude)| {
@@ -344,7 +354,10 @@ fn energies(results: &Results<'_>) -> Result<Vec<Captioned>> {
     ];
     let exchanged = [("external work", Quantity::ExternalWork), ("friction heat", Quantity::FrictionLoss)];
     for (list, caption) in [
-        (&vibration[..], "Vibration energy of all structures, and the energy dissipated by damping and impacts since the start."),
+        (
+            &vibration[..],
+            "Vibration energy of all structures, and the energy dissipated by damping and impacts since the start.",
+        ),
         (
             &exchanged[..],
             "External work of the drive and the casing, and friction heat, since the start. The difference is the vibration \
@@ -352,8 +365,7 @@ fn energies(results: &Results<'_>) -> Result<Vec<Captioned>> {
         ),
     ] {
         let series = list.iter().filter_map(|(label, quantity)| results.series(label, *quantity));
-        let series: Vec<Series> =
-            series.filter(|series| series.points.iter().any(|point| point.1 != 0.0)).collect();
+        let series: Vec<Series> = series.filter(|series| series.points.iter().any(|point| point.1 != 0.0)).collect();
         if !series.is_empty() {
             let plot = Plot { height: 220, ..Plot::new("time (ms)", "energy (J)", series) };
             figures.push(Captioned { body: plot.to_html()?, caption: caption.into() });

@@ -8,7 +8,9 @@ pub(super) fn rounded(value: f64) -> String {
     if !(1e-3..1e6).contains(&value.abs()) {
         return scientific(value);
     }
-    let (mut digits, mut magnitude) = (2_usize, value.abs());
+    // 0.9997 has the digits of 1.
+    let three = format!("{value:.2e}").parse().unwrap_or(value);
+    let (mut digits, mut magnitude) = (2_usize, f64::abs(three));
     while magnitude >= 10.0 && digits > 0 {
         magnitude /= 10.0;
         digits -= 1;

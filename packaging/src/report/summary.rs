@@ -124,7 +124,15 @@ impl Summary {
             with_prefix(self.length, "s")
         );
         if let Some(blade) = blade.filter(|blade| blade.force > 0.0 && blade.sectors > 1) {
-            let rotor = if input.scene.settings.structures.iter().filter(|own| own.motion == BodyMotion::Rotating).count() > 1 {
+            let rotor = if input
+                .scene
+                .settings
+                .structures
+                .iter()
+                .filter(|own| own.motion == BodyMotion::Rotating)
+                .count()
+                > 1
+            {
                 format!(" of {}", escape(&blade.name))
             } else {
                 String::new()
@@ -148,8 +156,12 @@ impl Summary {
             let _ = write!(text, " The coating is worn by up to {}.", with_prefix(depth, "m"));
         }
         match self.growth {
-            Some(growth) if growth > STEADY => text.push_str(" Vibration is stronger in the last third of the run than in the middle third."),
-            Some(growth) if growth < 1.0 / STEADY => text.push_str(" Vibration is weaker in the last third of the run than in the middle third."),
+            Some(growth) if growth > STEADY => {
+                text.push_str(" Vibration is stronger in the last third of the run than in the middle third.")
+            }
+            Some(growth) if growth < 1.0 / STEADY => {
+                text.push_str(" Vibration is weaker in the last third of the run than in the middle third.")
+            }
             Some(_) => text.push_str(" Vibration is as strong in the last third of the run as in the middle third."),
             None => {}
         }
@@ -164,7 +176,7 @@ fn contact_time(recording: &tiprub_shell::recording::Recording) -> Option<Contac
     let touching: Vec<(f64, f64)> =
         steps.filter(|(_, impulse)| **impulse != 0.0).map(|(ends, _)| (ends[0], ends[1] - ends[0])).collect();
     let first = touching.first().map_or(0.0, |step| step.0);
-    Some(ContactTime { first, total: touching.iter().map(|step| step.1).sum() })
+    Some(ContactTime { first, total: touching.iter().fold(0.0, |sum, step| sum + step.1) })
 }
 
 #[cfg(test)]

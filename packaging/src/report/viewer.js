@@ -130,7 +130,7 @@ function start(buffer) {
     const outer = radii.reduce((a, b) => Math.max(a, b), 0), inner = radii.reduce((a, b) => Math.min(a, b), outer);
     reach = Math.max(reach, Math.hypot(outer, ...[Math.max(...z.map(Math.abs))].map(v => own.role === "free" ? v : 0)));
     const result = { ...own, index, size, forces, weights, outer, inner, z: [Math.min(...z), Math.max(...z)], texture: texture(), basis: texture(), light: texture(),
-      height: own.sectors > 1 ? outer - inner : 0.25 * outer, now: new Float32Array(Math.max(1, own.sectors * own.rank)), lit: new Float32Array(Math.max(1, size)),
+      height: own.sectors > 1 ? Math.max(outer - inner, 0.15 * outer) : 0.25 * outer, now: new Float32Array(Math.max(1, own.sectors * own.rank)), lit: new Float32Array(Math.max(1, size)),
       lines: own.lines[1] ? vertices(places, lights, u16(...own.lines)) : null, line_count: own.lines[1],
       triangles: own.triangles[1] ? vertices(places, lights, u16(...own.triangles)) : null, triangle_count: own.triangles[1],
       dots: own.nodes ? vertices(places.slice(3 * surface), lights.slice(2 * surface).map((v, i) => i % 2 ? 1 : i / 2), null) : null, surface,
@@ -283,8 +283,8 @@ function start(buffer) {
   function report({ time, total }) {
     const exact = `${(1e3 * time).toFixed(3)} ms`;
     find(".now").textContent = `t = ${exact}\n${total > 0 ? "contact force " + prefix(total, "N") : "no contact"}`;
-    find(".time output").textContent = exact; find(".scale output").textContent = `×${Number(state.scale.toPrecision(3))}`;
-    slider("time").setAttribute("aria-valuetext", exact); slider("scale").setAttribute("aria-valuetext", find(".scale output").textContent);
+    find(".time .value").textContent = exact; find(".scale .value").textContent = `×${Number(state.scale.toPrecision(3))}`;
+    slider("time").setAttribute("aria-valuetext", exact); slider("scale").setAttribute("aria-valuetext", find(".scale .value").textContent);
   }
   let asked = false, last = 0;
   const ask = () => { if (!asked) { asked = true; requestAnimationFrame(step); } };

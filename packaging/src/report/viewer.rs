@@ -20,7 +20,8 @@ const PROGRAM: &str = include_str!("viewer.js");
 pub(super) fn section(input: &ReportInput<'_>, blade: Option<&HitBlade>) -> Result<String> {
     let animation = input.capture.animation()?;
     let mut header = animation.header;
-    header["hit"] = json!(blade.map(|blade| json!({ "body": blade.structure, "sector": blade.sector, "time": blade.time })));
+    header["hit"] =
+        json!(blade.map(|blade| json!({ "body": blade.structure, "sector": blade.sector, "time": blade.time })));
     // A closing tag in a name would end the script.
     let header = header.to_string().replace('<', "\\u003c");
     let [start, stop] = animation.interval;
@@ -41,15 +42,19 @@ pub(super) fn section(input: &ReportInput<'_>, blade: Option<&HitBlade>) -> Resu
     let _ = write!(
         html,
         "<div class=\"controls\"><button type=\"button\" class=\"play\">Play</button>\
-         <label class=\"time\"><span>Time <output></output></span><svg class=\"strip\" preserveAspectRatio=\"none\" \
+         <label class=\"time\"><span>Time <b class=\"value\"></b></span><svg class=\"strip\" preserveAspectRatio=\"none\" \
          viewBox=\"0 0 1000 24\" aria-hidden=\"true\"><path/></svg>\
          <input type=\"range\" name=\"time\" min=\"0\" max=\"2000\" step=\"1\" value=\"0\"></label>\
-         <label class=\"scale\"><span>Exaggeration <output></output></span>\
+         <label class=\"scale\"><span>Exaggeration <b class=\"value\"></b></span>\
          <input type=\"range\" name=\"scale\" min=\"0\" max=\"1000\" step=\"1\" value=\"500\"></label>\
          <label class=\"pace\"><span>Pace</span><select name=\"pace\"><option value=\"0.25\">¼</option><option value=\"0.5\">½</option>\
          <option value=\"1\" selected>1</option><option value=\"2\">2</option></select></label>{views}</div>\n"
     );
-    let _ = write!(html, "<div class=\"explain\">{}</div>\n", explanation(input, [start, stop], animation.is_cut, animation.deviation));
+    let _ = write!(
+        html,
+        "<div class=\"explain\">{}</div>\n",
+        explanation(input, [start, stop], animation.is_cut, animation.deviation)
+    );
     let _ = write!(
         html,
         "<script type=\"application/json\" id=\"run-header\">{header}</script>\n\
@@ -63,7 +68,9 @@ pub(super) fn section(input: &ReportInput<'_>, blade: Option<&HitBlade>) -> Resu
 /// Explains what is exaggerated and what is missing.
 fn explanation(input: &ReportInput<'_>, [start, stop]: [f64; 2], is_cut: bool, deviation: f64) -> String {
     let whole = stop - start >= 0.999 * (input.schedule.stop - input.schedule.start);
-    let interval = if whole { "The animation shows the whole run".to_owned() } else {
+    let interval = if whole {
+        "The animation shows the whole run".to_owned()
+    } else {
         format!("The animation shows {} to {}", with_prefix(start, "s"), with_prefix(stop, "s"))
     };
     let cut = if is_cut { ", with the largest force; contact also occurs at other times" } else { "" };
@@ -71,8 +78,8 @@ fn explanation(input: &ReportInput<'_>, [start, stop]: [f64; 2], is_cut: bool, d
     if input.capture.has_rings() {
         text.push_str(
             " Displacements, the gap between tips and casing and the shape of the casing are exaggerated by the same factor, so \
-             that tips meet the casing in the picture exactly when they do in the run. Sizes of blades and casing, and the rotation, \
-             are true. A grey drum replaces the disk if the model has none.",
+             that contact nodes meet the casing in the picture when they do in the run. Sizes of blades and casing, and the \
+             rotation, are true. A grey drum replaces the disk if the model has none.",
         );
     } else {
         text.push_str(
@@ -85,7 +92,8 @@ fn explanation(input: &ReportInput<'_>, [start, stop]: [f64; 2], is_cut: bool, d
          interval.",
     );
     if deviation > 0.0 {
-        let _ = write!(text, " The drawn displacements deviate from the run by at most {} %.", rounded(100.0 * deviation));
+        let _ =
+            write!(text, " The drawn displacements deviate from the run by at most {} %.", rounded(100.0 * deviation));
     }
     let alone: Vec<String> = input.capture.without_surface().into_iter().map(escape).collect();
     if !alone.is_empty() {

@@ -18,6 +18,6 @@ pub const MAX_TIMES: usize = 121;
 /// Number of equal angles at which the radius of a casing is stored.
 pub const ANGLES: usize = 180;
 /// Largest number of points of a surface with several sectors, and of a surface with one.
-const MAX_POINTS: [usize; 2] = [2400, 2600];
+const MAX_POINTS: [usize; 2] = [2400, 5000];
 /// Largest memory for the frames of a run (bytes).
 const MAX_BYTES: usize = 96 << 20;

@@ -94,8 +94,7 @@ pub fn observed_scene(scene: &Scene, sectors: &[usize]) -> Result<Scene> {
     let added: Vec<usize> = chosen.filter(|sector| !outputs.watched_sectors.contains(sector)).collect();
     outputs.watched_sectors.extend(added);
     outputs.wear |= contacts().any(|contact| contact.coating.is_some());
-    let rotors =
-        || masters.iter().filter(|(own, rom)| own.motion != BodyMotion::Free && rom.extras.stress.is_some());
+    let rotors = || masters.iter().filter(|(own, rom)| own.motion != BodyMotion::Free && rom.extras.stress.is_some());
     let is_complete = rotors().all(|(own, rom)| {
         (!own.thermal || rom.extras.stress_thermal.is_some())
             && (!own.spin.growth || rom.extras.stress_centrifugal.is_some())

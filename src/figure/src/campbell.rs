@@ -64,7 +64,8 @@ impl Campbell {
             r#"<svg xmlns="http://www.w3.org/2000/svg" class="map" viewBox="0 0 {width} {height}" font-family="sans-serif" font-size="{font}">"#
         );
         for hertz in round_values([0.0, self.top], 7.0) {
-            let _ = write!(svg, r#"<path class="grid" d="M{left} {0:.1}H{right:.1}M{start:.1} {0:.1}H{end}"/>"#, y(hertz));
+            let _ =
+                write!(svg, r#"<path class="grid" d="M{left} {0:.1}H{right:.1}M{start:.1} {0:.1}H{end}"/>"#, y(hertz));
             text(&mut svg, [left - 7.0, y(hertz) + 0.36 * font], "end", &tick(hertz));
         }
         for speed in round_values([0.0, last], size.ticks) {

@@ -202,7 +202,8 @@ impl GridMap {
         let mut paths = vec![String::new(); LEVELS];
         for (index, values) in self.values.iter().enumerate() {
             let level = |bin: usize| Some(self.of_bin(values, bin, bins)).filter(|value| value.is_finite());
-            let levels: Vec<Option<usize>> = (0..bins).map(|bin| level(bin).map(|value| self.level(value, range))).collect();
+            let levels: Vec<Option<usize>> =
+                (0..bins).map(|bin| level(bin).map(|value| self.level(value, range))).collect();
             // Rounded edges, so that neighbours leave no gap.
             let [y, below] = [index, index + 1].map(|index| ABOVE + row * index as f64);
             let mut from = 0;

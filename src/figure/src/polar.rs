@@ -132,7 +132,8 @@ mod tests {
         let svg = polar(vec![0.0, 400.0, 0.0, 400.0]).to_svg();
         let curve = svg.split("class=\"s1\" d=\"").nth(1).unwrap().split('"').next().unwrap();
         let radius = |point: &str| {
-            let [x, y]: [f64; 2] = point.split(' ').map(|n| n.parse().unwrap()).collect::<Vec<f64>>().try_into().unwrap();
+            let [x, y]: [f64; 2] =
+                point.split(' ').map(|n| n.parse().unwrap()).collect::<Vec<f64>>().try_into().unwrap();
             (x - 0.5 * SIZE).hypot(y - 0.5 * SIZE)
         };
         let radii: Vec<f64> = curve[1..].split('L').map(radius).collect();

@@ -16,6 +16,11 @@ pub const MAX_POINTS: usize = 20_000;
 /// Factor on the size of the cells until a surface has few enough points.
 const COARSER: f64 = 1.1;
 
+/// Smallest inner radius of a ring, as a fraction of its outer radius.
+const THICKEST_RING: f64 = 0.5;
+/// Factor by which the first cells of a thinned surface are finer than evenly spread points.
+const FINEST: f64 = 6.0;
+
 /// Surface of one sector or one structure, and its displacements.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SurfaceShapes {
@@ -62,7 +67,8 @@ impl Surface {
         faces.retain(|face| !omitted.iter().any(|set| face.iter().all(|node| set.contains(node))));
         let used: BTreeSet<usize> = faces.iter().flatten().copied().collect();
         let nodes: Vec<usize> = used.into_iter().collect();
-        let Merged { kept, corners, ends } = merged(faces.into_iter(), &thinned(&mesh.nodes, &nodes, points, &|_| 0));
+        let Merged { kept, corners, ends } =
+            merged(faces.into_iter(), &thinned(&mesh.nodes, &nodes, points, 1.0, &|_| 0));
         Self { positions: kept.iter().map(|node| mesh.nodes[*node]).collect(), nodes: kept, corners, ends }
     }
 
@@ -118,11 +124,14 @@ impl SurfaceShapes {
             return self;
         }
         let all: Vec<usize> = (0..self.points.len()).collect();
-        let sides = self.sides();
-        let Merged { kept, corners, ends } = merged(self.faces(), &thinned(&self.points, &all, most, &|point| sides[point]));
+        let (sides, positions) = (self.sides(), self.cell_positions());
+        let Merged { kept, corners, ends } =
+            merged(self.faces(), &thinned(&positions, &all, most, FINEST, &|point| sides[point]));
         let pick = |values: &[f32]| -> Vec<f32> {
             let coordinates = values.chunks_exact(3 * self.points.len());
-            coordinates.flat_map(|own| kept.iter().flat_map(move |point| own[3 * point..][..3].iter().copied())).collect()
+            coordinates
+                .flat_map(|own| kept.iter().flat_map(move |point| own[3 * point..][..3].iter().copied()))
+                .collect()
         };
         let diameters = self.diameters.iter().map(|own| DiameterShapes {
             order: own.order,
@@ -131,6 +140,17 @@ impl SurfaceShapes {
         });
         let points = kept.iter().map(|point| self.points[*point]).collect();
         Self { points, corners, ends, diameters: diameters.collect() }
+    }
+
+    /// Returns the positions whose cells are thinned: of a ring around the z axis, radius, arc and z, so that its cross-section is
+    /// the same everywhere; else x, y, z.
+    fn cell_positions(&self) -> Vec<[f64; 3]> {
+        let radii = self.points.iter().map(|[x, y, _]| x.hypot(*y));
+        let [low, high] = radii.fold([f64::INFINITY, 0.0], |[low, high], r: f64| [low.min(r), high.max(r)]);
+        if low < THICKEST_RING * high {
+            return self.points.clone();
+        }
+        self.points.iter().map(|[x, y, z]| [x.hypot(*y), high * y.atan2(*x), *z]).collect()
     }
 
     /// Returns the direction of the normal of each point: the number of its largest component, and its sign.
@@ -202,8 +222,15 @@ fn single(value: f64) -> f32 {
     value as f32
 }
 
-/// Returns the representative of each of these nodes, which is on the same `side`; there are at most `most` representatives.
-fn thinned(positions: &[[f64; 3]], nodes: &[usize], most: usize, side: &dyn Fn(usize) -> u8) -> BTreeMap<usize, usize> {
+/// Returns the representative of each of these nodes, which is on the same `side`; there are at most `most` representatives. The
+/// first cells are finer by the factor `fineness` than evenly spread points would be.
+fn thinned(
+    positions: &[[f64; 3]],
+    nodes: &[usize],
+    most: usize,
+    fineness: f64,
+    side: &dyn Fn(usize) -> u8,
+) -> BTreeMap<usize, usize> {
     if nodes.len() <= most {
         return nodes.iter().map(|node| (*node, *node)).collect();
     }
@@ -214,14 +241,13 @@ fn thinned(positions: &[[f64; 3]], nodes: &[usize], most: usize, side: &dyn Fn(u
     let extents = [0, 1, 2].map(extent);
     let largest = extents.iter().map(|[low, high]| high - low).fold(0.0, f64::max);
     // Coarser than the points of a surface would be if they were evenly spread over the largest two extents.
-    let mut size = largest / (most as f64).sqrt();
+    let mut size = largest / (most as f64).sqrt() / fineness;
     loop {
-        #[expect(clippy::cast_possible_truncation, reason = "there are at most as many cells as √`most`")]
+        #[expect(clippy::cast_possible_truncation, reason = "there are few cells")]
         let cell = |node: usize| [0, 1, 2].map(|axis| ((positions[node][axis] - extents[axis][0]) / size) as i64);
         let distance = |node: usize| {
             let cell = cell(node);
-            let off =
-                [0, 1, 2].map(|axis| positions[node][axis] - extents[axis][0] - (cell[axis] as f64 + 0.5) * size);
+            let off = [0, 1, 2].map(|axis| positions[node][axis] - extents[axis][0] - (cell[axis] as f64 + 0.5) * size);
             off.iter().map(|x| x * x).sum::<f64>()
         };
         let mut nearest: BTreeMap<([i64; 3], u8), usize> = BTreeMap::new();
@@ -307,6 +333,33 @@ mod tests {
         assert!(own.real == [positions.clone(), doubled].concat() && own.imaginary == positions);
         assert!(few.faces().flatten().all(|corner| corner < few.points.len()));
         assert_eq!(few.faces().count(), few.ends.len());
+    }
+
+    #[test]
+    fn thinned_ring_has_the_same_cross_section_everywhere() {
+        let [around, along] = [120_u32, 12_u32];
+        let place = |k: u32, i: u32| {
+            let angle = std::f64::consts::TAU * f64::from(i) / f64::from(around);
+            let radius = 1.0 + 0.02 * f64::from(k % 2);
+            [radius * angle.cos(), radius * angle.sin(), 0.02 * f64::from(k)]
+        };
+        let face = |k: u32, i: u32| {
+            let next = (i + 1) % around;
+            [k * around + i, k * around + next, (k + 1) * around + next, (k + 1) * around + i]
+        };
+        let corners: Vec<u32> = (0..along - 1).flat_map(|k| (0..around).flat_map(move |i| face(k, i))).collect();
+        let ring = SurfaceShapes {
+            points: (0..along).flat_map(|k| (0..around).map(move |i| place(k, i))).collect(),
+            ends: (1..=(along - 1) * around).map(|face| 4 * face).collect(),
+            corners,
+            diameters: Vec::new(),
+        };
+        #[expect(clippy::cast_possible_truncation, reason = "micrometres")]
+        let rounded = |value: f64| (1e6 * value).round() as i64;
+        let few = ring.thinned(500);
+        assert!((150..=500).contains(&few.points.len()), "{}", few.points.len());
+        let rows: BTreeSet<[i64; 2]> = few.points.iter().map(|[x, y, z]| [x.hypot(*y), *z].map(rounded)).collect();
+        assert!(rows.len() <= 12 && few.points.len() / rows.len() >= 20, "{} of {}", rows.len(), few.points.len());
     }
 
     #[test]

@@ -58,7 +58,8 @@ impl Basis {
         let found: Vec<Vec<f64>> =
             fields.iter().map(|field| directions.iter().map(|own| dot(own, field)).collect()).collect();
         let (vectors, turn) = turned(&directions, &found, rank);
-        let coefficients: Vec<Vec<f32>> = found.iter().map(|own| turn.iter().map(|t| single(sum(t, own))).collect()).collect();
+        let coefficients: Vec<Vec<f32>> =
+            found.iter().map(|own| turn.iter().map(|t| single(sum(t, own))).collect()).collect();
         let deviations = deviations(fields, &vectors, &coefficients);
         let needed = deviations.iter().position(|deviation| *deviation <= enough).unwrap_or(vectors.len());
         let mut basis = Self { vectors, coefficients, deviation: deviations[needed] };
@@ -199,7 +200,8 @@ mod tests {
         let basis = Basis::new(&fields(), 2, 0.0);
         assert!(basis.vectors.len() == 2 && (1e-5..1e-2).contains(&basis.deviation), "{}", basis.deviation);
         let enough = Basis::new(&fields(), 12, 0.01);
-        assert!(enough.vectors.len() == 2 && enough.coefficients[0].len() == 2 && enough.deviation == basis.deviation);
+        assert!(enough.vectors.len() == 2 && enough.coefficients[0].len() == 2);
+        assert!((enough.deviation / basis.deviation - 1.0).abs() < 1e-2, "{} {}", enough.deviation, basis.deviation);
         let kept = basis.clone().extended(fields().into_iter());
         assert!((kept.deviation / basis.deviation - 1.0).abs() < 1e-2 && kept.coefficients.len() == 40);
         let one = Basis::new(&fields(), 1, 0.0);

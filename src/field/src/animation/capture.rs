@@ -79,7 +79,8 @@ impl Capture {
         };
         let shapes = shapes.into_iter().zip(&scene.roms).map(thin).collect();
         let structures = Structure::of_scene(scene, shapes, &[]);
-        let rings = (0..scene.settings.contacts.len()).filter_map(|contact| Ring::of_contact(contact, scene).transpose());
+        let rings =
+            (0..scene.settings.contacts.len()).filter_map(|contact| Ring::of_contact(contact, scene).transpose());
         let by_angle = structures.iter().map(|own| match own.role {
             Role::Rotor => vec![f32::INFINITY; ANGLES],
             _ => Vec::new(),
@@ -157,7 +158,8 @@ impl Capture {
 
     /// Reads the mode shapes, and finds the variables with the forces.
     fn start(&mut self, simulation: &Simulation) {
-        self.shapes = self.structures.iter().map(|own| Some(ModalShapes::of(own.bank(simulation)?).into_owned())).collect();
+        self.shapes =
+            self.structures.iter().map(|own| Some(ModalShapes::of(own.bank(simulation)?).into_owned())).collect();
         let variables = |own: &Structure| -> Vec<(u32, usize)> {
             let found = |name: String| simulation.table().find(&name).map(|found| (found.reference, found.len()));
             let names = own.sectors.iter().map(|sector| own.sector_variable(*sector, "normal_force"));
@@ -267,7 +269,9 @@ pub(super) fn angle_bin(motion: RigidMotion, sector: usize, sectors: usize, coun
 
 impl Frame {
     fn bytes(&self) -> usize {
-        let body = |own: &BodyFrame| 4 * (own.amplitudes.len() + own.forces.len() + own.sector_forces.len() + own.clearances.len()) + 128;
+        let body = |own: &BodyFrame| {
+            4 * (own.amplitudes.len() + own.forces.len() + own.sector_forces.len() + own.clearances.len()) + 128
+        };
         let ring = |own: &RingFrame| 4 * own.wear.len() + size_of::<RingFrame>();
         self.bodies.iter().map(body).sum::<usize>() + self.rings.iter().map(ring).sum::<usize>()
     }
@@ -276,7 +280,8 @@ impl Frame {
 impl BodyFrame {
     /// Adds the contacts of another point.
     fn merge(&mut self, other: &Self) {
-        let largest = |own: &mut [f32], other: &[f32]| own.iter_mut().zip(other).for_each(|(own, other)| *own = own.max(*other));
+        let largest =
+            |own: &mut [f32], other: &[f32]| own.iter_mut().zip(other).for_each(|(own, other)| *own = own.max(*other));
         largest(&mut self.forces, &other.forces);
         largest(&mut self.sector_forces, &other.sector_forces);
         self.total = self.total.max(other.total);

@@ -98,12 +98,16 @@ impl Capture {
         // Contacts of frames between the chosen ones belong to the next of them.
         let from = |place: usize| if place == 0 { chosen[0] } else { chosen[place - 1] + 1 };
         let total = |frame: &Frame| frame.bodies.iter().map(|body| f64::from(body.total)).sum::<f64>();
-        let totals = (0..frames.len()).map(|place| self.frames[from(place)..=chosen[place]].iter().map(total).fold(0.0, f64::max));
+        let totals = (0..frames.len())
+            .map(|place| self.frames[from(place)..=chosen[place]].iter().map(total).fold(0.0, f64::max));
         let totals: Vec<f64> = totals.collect();
         let force = |own: usize, place: usize| -> Vec<f64> {
             let mut largest = vec![0.0_f64; self.frames[chosen[place]].bodies[own].forces.len()];
             for frame in &self.frames[from(place)..=chosen[place]] {
-                largest.iter_mut().zip(&frame.bodies[own].forces).for_each(|(most, force)| *most = most.max(f64::from(*force)));
+                largest
+                    .iter_mut()
+                    .zip(&frame.bodies[own].forces)
+                    .for_each(|(most, force)| *most = most.max(f64::from(*force)));
             }
             largest
         };
@@ -217,7 +221,6 @@ impl Capture {
             "sectors": structure.rom.sectors,
             "points": points.len(),
             "nodes": nodes.len(),
-            "names": structure.rom.contact_nodes.iter().map(|node| &node.name).collect::<Vec<_>>(),
             "rank": rank,
             "wall": ring,
             "motion": motion,
@@ -278,7 +281,9 @@ impl Capture {
 /// Returns the corners of the triangles of a surface.
 fn triangles(structure: &Structure) -> Vec<usize> {
     let faces = structure.shapes.iter().flat_map(|shapes| shapes.faces());
-    faces.flat_map(|face| (1..face.len() - 1).flat_map(move |k| [face[0], face[k], face[k + 1]]).collect::<Vec<_>>()).collect()
+    faces
+        .flat_map(|face| (1..face.len() - 1).flat_map(move |k| [face[0], face[k], face[k + 1]]).collect::<Vec<_>>())
+        .collect()
 }
 
 /// Returns the ends of lines between the contact nodes of a structure without a surface.

@@ -123,7 +123,8 @@ impl Capture {
     pub fn node_forces(&self, blade: &HitBlade) -> Vec<(String, Vec<f64>)> {
         let nodes = &self.structures[blade.structure].rom.contact_nodes;
         let first = blade.sector * nodes.len();
-        let is_known = self.frames.iter().all(|frame| frame.bodies[blade.structure].forces.len() >= first + nodes.len());
+        let is_known =
+            self.frames.iter().all(|frame| frame.bodies[blade.structure].forces.len() >= first + nodes.len());
         let series = |node: usize| -> Vec<f64> {
             self.frames.iter().map(|frame| f64::from(frame.bodies[blade.structure].forces[first + node])).collect()
         };
@@ -142,7 +143,11 @@ impl Capture {
         let (real, imaginary) = (parts(|value| value.re), parts(|value| value.im));
         let is_coupled = matches!(self.shapes[blade.structure], Some(ModalShapes::Coupled(_)));
         let map = DisplacementMap {
-            diameters: real.iter().zip(&imaginary).map(|(re, im)| [&re[..], if is_coupled { &im[..] } else { &[] }]).collect(),
+            diameters: real
+                .iter()
+                .zip(&imaginary)
+                .map(|(re, im)| [&re[..], if is_coupled { &im[..] } else { &[] }])
+                .collect(),
         };
         let moved = |frame: &Frame| -> Option<[f64; 3]> {
             let amplitudes: Vec<f64> =

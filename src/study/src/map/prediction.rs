@@ -1,9 +1,9 @@
 //! Resonances predicted by linear theory: engine orders of the casing and natural frequencies in the rotating frame.
 
 use realfft::RealFftPlanner;
-use tiprub_core::{Scene, Simulation};
 use tiprub_core::modes::{cyclic::CyclicModel, modal::ModalModel};
 use tiprub_core::scene::shape::CompiledShape;
+use tiprub_core::{Scene, Simulation};
 use tiprub_shell::{Failure, Result, native};
 
 use super::start::{MapStart, master};
