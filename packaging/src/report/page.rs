@@ -25,9 +25,9 @@ pub fn render(input: &ReportInput<'_>) -> Result<String> {
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
          <title>{title} - tiprub report</title>\n<style>\n{STYLE}{OWN_STYLE}</style>\n</head>\n<body>\n<main class=\"report\">\n"
     );
-    let _ = write!(
+    let _ = writeln!(
         page,
-        "<div class=\"top\"><header><h1>{title}</h1><p>{}</p>{}{}</header>\n",
+        "<div class=\"top\"><header><h1>{title}</h1><p>{}</p>{}{}</header>",
         escape(&settings.description),
         summary.words(input, blade.as_ref()),
         summary.cards()

@@ -39,7 +39,7 @@ pub(super) fn section(input: &ReportInput<'_>, blade: Option<&HitBlade>) -> Resu
             blade.sector + 1
         )
     });
-    let _ = write!(
+    let _ = writeln!(
         html,
         "<div class=\"controls\"><button type=\"button\" class=\"play\">Play</button>\
          <label class=\"time\"><span>Time <b class=\"value\"></b></span><svg class=\"strip\" preserveAspectRatio=\"none\" \
@@ -48,11 +48,11 @@ pub(super) fn section(input: &ReportInput<'_>, blade: Option<&HitBlade>) -> Resu
          <label class=\"scale\"><span>Exaggeration <b class=\"value\"></b></span>\
          <input type=\"range\" name=\"scale\" min=\"0\" max=\"1000\" step=\"1\" value=\"500\"></label>\
          <label class=\"pace\"><span>Pace</span><select name=\"pace\"><option value=\"0.25\">¼</option><option value=\"0.5\">½</option>\
-         <option value=\"1\" selected>1</option><option value=\"2\">2</option></select></label>{views}</div>\n"
+         <option value=\"1\" selected>1</option><option value=\"2\">2</option></select></label>{views}</div>"
     );
-    let _ = write!(
+    let _ = writeln!(
         html,
-        "<div class=\"explain\">{}</div>\n",
+        "<div class=\"explain\">{}</div>",
         explanation(input, [start, stop], animation.is_cut, animation.deviation)
     );
     let _ = write!(

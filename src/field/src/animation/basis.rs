@@ -5,9 +5,9 @@ use nalgebra::{DMatrix, SymmetricEigen};
 /// Number of vectors of the search beyond the largest rank.
 const EXTRA: usize = 8;
 /// Number of times that the search is repeated with its result.
-const REPEATS: usize = 2;
+const REPEATS: usize = 1;
 /// One field of so many takes part in the search.
-const SPARSE: u32 = 3;
+const SPARSE: u32 = 5;
 /// Number of fields up to which all take part.
 const FEW: usize = 500;
 /// Directions shorter than this fraction of the longest are rounding.
@@ -149,15 +149,16 @@ fn add(sum: &mut [f32], factor: f32, values: &[f32]) {
     sum.iter_mut().zip(values).for_each(|(sum, value)| *sum += factor * value);
 }
 
-/// Eight sums, which the compiler turns into vector instructions.
+/// Sixteen sums, which the compiler turns into vector instructions.
 fn dot(a: &[f32], b: &[f32]) -> f64 {
-    let (heads_a, rest_a) = a.as_chunks::<8>();
-    let (heads_b, rest_b) = b.as_chunks::<8>();
-    let mut sums = [0.0_f64; 8];
+    let (heads_a, rest_a) = a.as_chunks::<16>();
+    let (heads_b, rest_b) = b.as_chunks::<16>();
+    let mut sums = [0.0_f32; 16];
     for (a, b) in heads_a.iter().zip(heads_b) {
-        sums.iter_mut().zip(a.iter().zip(b)).for_each(|(sum, (a, b))| *sum += f64::from(*a) * f64::from(*b));
+        sums.iter_mut().zip(a.iter().zip(b)).for_each(|(sum, (a, b))| *sum += a * b);
     }
-    sums.iter().sum::<f64>() + rest_a.iter().zip(rest_b).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum::<f64>()
+    let rest = rest_a.iter().zip(rest_b).map(|(a, b)| f64::from(a * b));
+    sums.iter().map(|sum| f64::from(*sum)).sum::<f64>() + rest.sum::<f64>()
 }
 
 fn sum(a: &[f64], b: &[f64]) -> f64 {
