@@ -25,11 +25,11 @@ pub(super) fn section(input: &ReportInput<'_>, blade: Option<&HitBlade>) -> Resu
     // A closing tag in a name would end the script.
     let header = header.to_string().replace('<', "\\u003c");
     let [start, stop] = animation.interval;
-    let mut html = format!(
+    let mut html = String::from(
         "<section class=\"viewer\" id=\"viewer\" aria-label=\"Animation of the contact\">\n<div class=\"stage\">\
          <canvas tabindex=\"0\" role=\"img\" aria-label=\"Three-dimensional picture of the run. Arrow keys turn it, plus and minus \
          zoom.\"></canvas><output class=\"now\"></output><p class=\"note\" hidden></p><div class=\"key\" aria-hidden=\"true\">\
-         <span><i class=\"cool\"></i>displacement <b></b></span><span><i class=\"hot\"></i>contact force <b></b></span></div></div>\n"
+         <span><i class=\"cool\"></i>displacement <b></b></span><span><i class=\"hot\"></i>contact force <b></b></span></div></div>\n",
     );
     let views = blade.filter(|blade| blade.sectors > 1).map_or(String::new(), |blade| {
         format!(
