@@ -1,11 +1,13 @@
 //! Main results of a run in five lines: force, heat, torque, clearance, growth.
 
 use serde_json::{Value, json};
+use tiprub_core::scene::settings::{ContactSettings, SceneSettings};
 use tiprub_shell::{
     extremes::{Extreme, extremes, six_digits},
     means::integral,
     recording::Recording,
 };
+use tiprub_study::estimate;
 
 /// One line of the main results.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,6 +18,19 @@ pub struct AnswerLine {
     pub value: Option<(f64, &'static str)>,
     /// Meaning of the value, or the reason why there is none.
     pub meaning: String,
+}
+
+/// Returns the five lines of a run of a scene with replaced start values.
+pub fn of_scene(recording: &Recording, settings: &SceneSettings, set: &[(String, String)]) -> [AnswerLine; 5] {
+    lines(recording, allowed_error(settings, set))
+}
+
+/// Returns the largest gap or penetration of a closed contact with adaptive steps (m); 0 with fixed steps.
+fn allowed_error(settings: &SceneSettings, set: &[(String, String)]) -> f64 {
+    let Some(tolerance) = estimate::time_in_use(settings, set).step_tolerance() else { return 0.0 };
+    let gap = |contact: &ContactSettings| contact.nominal_gap();
+    let smallest = settings.contacts.iter().map(gap).filter(|gap| *gap > 0.0).fold(f64::INFINITY, f64::min);
+    if smallest.is_finite() { tolerance * smallest } else { 0.0 }
 }
 
 /// Returns the five lines of a run whose steps may leave closed contact open or penetrating by up to `tolerance` (m).

@@ -60,6 +60,7 @@ fn written() -> Vec<(String, &'static str, &'static str, Option<String>)> {
     let mut all = vec![
         ("run".into(), "csv", "--csv {}", None),
         ("run".into(), "parquet", "--parquet {}", None),
+        ("run".into(), "report", "--report {}", None),
         ("run".into(), "vtk", "--vtk {} --force", Some("x.vtu".into())),
         ("sweep".into(), "output", "--output {}", None),
         ("study convergence".into(), "into", "--into {}", None),

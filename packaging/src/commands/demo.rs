@@ -7,6 +7,7 @@ use std::{
 
 use serde_json::json;
 use tiprub_core::{CoSimulation, Scene, Simulation};
+use tiprub_field::animation::Capture;
 use tiprub_fmi_host::{ImportedRun, UnpackedFmu};
 use tiprub_gallery::{
     reduction,
@@ -24,9 +25,11 @@ use tiprub_shell::{
 use tiprub_study::estimate::{self, Estimate};
 
 use crate::{
+    answer,
     cli::DemoArguments,
     fmu::{FmiVersion, FmuPackage},
     library::{self, LibraryBuild, LibraryUnit},
+    observers::Observers,
     report::{
         input::{ImportedSummary, ReportFile, ReportInput},
         page,
@@ -47,8 +50,8 @@ pub const FILES: [&str; 6] = [ROM_FILE, SCENE_FILE, REPORT_FILE, CSV_FILE, "roto
 const LARGEST_SCENE: u64 = 1 << 20;
 
 /// Note about the error study, which the demo does not run.
-const STUDY: &str = "The report shows the error against run time of every method. To measure it on this machine (takes \
-                     minutes), run\n  tiprub study error builtin:rotor37 --quick\n";
+const STUDY: &str = "To measure the error against run time of every method on this machine (takes minutes), run\n  \
+                     tiprub study error builtin:rotor37 --quick\n";
 
 /// Remedy if the directory contains a scene that was changed.
 const KEEP: &str = "Choose another directory with --out, or move your file elsewhere";
@@ -104,10 +107,9 @@ pub fn run(arguments: &DemoArguments, console: &Console) -> Result<CommandOutcom
         imported.push(ImportedSummary { label, stepping: run.stepping.as_secs_f64(), agreement });
     }
     let estimates = watch.measure("estimating errors", || estimate::estimates(&scene, &[], schedule.count, console))?;
-    let paper = watch.measure("the paper's model and method", || Paper::run(&schedule, console))?;
+    let capture = watch.measure("run for the report", || observe(&scene, &reduction, &schedule, console))?;
     let facts = scene.roms.iter().map(|rom| RomFacts::of(rom, None)).collect::<Result<Vec<_>>>()?;
-    let demo =
-        Demo { estimates, paper, directory, scene, schedule, reduction, facts, native, imported, durations: watch.0 };
+    let demo = Demo { estimates, capture, directory, scene, schedule, facts, native, imported, durations: watch.0 };
     demo.write_report()?;
     demo.outcome()
 }
@@ -143,6 +145,19 @@ fn write_inputs(directory: &Path, reduction: &Reduction, scene_text: &str) -> Re
     scene_source::load(&scene, &RomCache::off(), &Console::new(true, false))
 }
 
+/// Repeats the native run with an observer, which costs computing time.
+fn observe(scene: &Scene, reduction: &Reduction, schedule: &Schedule, console: &Console) -> Result<Capture> {
+    let shapes = || Ok(vec![reduction.shapes.clone()]);
+    let observers = Observers::new(scene, schedule, (None, true), shapes, console)?;
+    let task = console.task("Native run for the report", Some(schedule.count as u64));
+    let run = |mut observers: Observers| -> Result<Option<Capture>> {
+        observers.run(schedule, RunInputs::default(), &|done| task.at(done as u64))?;
+        Ok(observers.capture)
+    };
+    let missing = || Failure::new("report", "the run was not observed", "Report this to the developers");
+    observers.map(run).transpose()?.flatten().ok_or_else(missing)
+}
+
 fn fmu_path(directory: &Path, version: FmiVersion) -> PathBuf {
     directory.join(format!("rotor37_fmi{}.fmu", version.digit()))
 }
@@ -159,45 +174,28 @@ struct Demo<'a> {
     directory: &'a Path,
     scene: Scene,
     schedule: Schedule,
-    reduction: Reduction,
     facts: Vec<RomFacts>,
     native: NativeRun,
     imported: Vec<ImportedSummary>,
     estimates: Vec<Estimate>,
-    paper: Paper,
+    capture: Capture,
     durations: Vec<(String, f64)>,
-}
-
-/// Built-in scene with the paper's model and method, run in the same way as the scene of the demo.
-struct Paper {
-    scene: Scene,
-    run: NativeRun,
-}
-
-impl Paper {
-    fn run(schedule: &Schedule, console: &Console) -> Result<Self> {
-        let scene = scene_source::load("builtin:rotor37-paper", &RomCache::off(), console)?;
-        let task = console.task("Native run of the paper's model and method", Some(schedule.count as u64));
-        let run = native::run(&scene, schedule, RunInputs::default(), &|done| task.at(done as u64))?;
-        Ok(Self { scene, run })
-    }
 }
 
 impl Demo<'_> {
     fn write_report(&self) -> Result<()> {
         let simulation = Simulation::new(&self.scene).map_err(|error| Failure::from_core(SCENE_FILE, error))?;
-        let paper =
-            Simulation::new(&self.paper.scene).map_err(|error| Failure::from_core("the paper's scene", error))?;
         let html = page::render(&ReportInput {
-            estimates: &self.estimates,
-            paper: Some((paper.table(), &self.paper.run)),
             scene: &self.scene,
             table: simulation.table(),
-            reduction: Some(&self.reduction),
-            facts: &self.facts,
+            settings: &[],
             schedule: &self.schedule,
             native: &self.native,
+            capture: &self.capture,
+            answer: &answer::of_scene(&self.native.recording, &self.scene.settings, &[]),
+            facts: &self.facts,
             imported: &self.imported,
+            estimates: &self.estimates,
             files: &self.files(),
             durations: &self.durations,
         })?;

@@ -1,19 +1,19 @@
 //! `tiprub run`: runs a scene without FMI, with one row of results per communication point.
 
-use std::{path::Path, time::Instant};
+use std::{fmt::Write as _, path::Path, time::Instant};
 
 use serde_json::{Map, Value, json};
-use tiprub_core::scene::settings::{ContactSettings, SceneSettings};
-use tiprub_core::{Scene, Warning};
-use tiprub_field::{FieldSeries, shape_file};
-use tiprub_gallery::{builtin, rom_cache::RomCache, scene_source};
+use tiprub_core::{CoSimulation, Scene, Warning};
+use tiprub_field::FieldSeries;
+use tiprub_gallery::scene_source;
 use tiprub_shell::{
     Failure, Result,
     console::{CommandOutcome, Console, shown_path, warnings_json},
     extremes::{Extreme, extremes},
     history::InputHistory,
     means,
-    native::{self, ObservedScene, ParameterValue, RunInputs, StartedRun, UsedParameter},
+    native::{self, ParameterValue, RunInputs, UsedParameter},
+    output_file,
     recording::shortest,
     schedule::Schedule,
 };
@@ -21,15 +21,13 @@ use tiprub_shell::{
 use tiprub_study::estimate::{self, Estimate};
 use tiprub_table::recording_file;
 
-use crate::{answer, cli::RunArguments, scene_features};
-
-/// Returns the largest gap or penetration of a closed contact with adaptive steps (m); 0 with fixed steps.
-fn allowed_error(settings: &SceneSettings, set: &[(String, String)]) -> f64 {
-    let Some(tolerance) = estimate::time_in_use(settings, set).step_tolerance() else { return 0.0 };
-    let gap = |contact: &ContactSettings| contact.nominal_gap();
-    let smallest = settings.contacts.iter().map(gap).filter(|gap| *gap > 0.0).fold(f64::INFINITY, f64::min);
-    if smallest.is_finite() { tolerance * smallest } else { 0.0 }
-}
+use crate::{
+    answer,
+    observers::{Observers, surfaces},
+    report::{input::ReportInput, page},
+    run_arguments::RunArguments,
+    scene_features,
+};
 
 /// Loads and runs the scene, writes the CSV and the Parquet file, and summarises.
 ///
@@ -46,20 +44,18 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<CommandOutcome
     let schedule = Schedule::new(&scene.settings.experiment, arguments.stop, arguments.step)?;
     let history = arguments.inputs.as_deref().map(InputHistory::read).transpose()?;
     let known = cache.checks(&scene);
-    let (mut fields, observed) = fields(arguments, &scene, &schedule, &cache, console)?.unzip();
+    let requested = (arguments.fields(), arguments.report.is_some());
+    let surfaces = || surfaces(&scene, &arguments.scene, &cache, console);
+    let mut observers = Observers::new(&scene, &schedule, requested, surfaces, console)?;
     let clock = Instant::now();
     let run = {
         let task = console.task(&format!("Running {}", scene.settings.name), Some(schedule.count as u64));
         let (settings, history) = (&arguments.set[..], history.as_ref());
-        let given = RunInputs { settings, history, checks: &known, observed: observed.as_ref() };
+        let given = RunInputs { settings, history, checks: &known, observed: None };
         let progress = |done| task.at(done as u64);
-        let run = match &mut fields {
+        let run = match &mut observers {
             None => native::run(&scene, &schedule, given, &progress),
-            Some(RequestedFields { scene, series }) => StartedRun::new(scene, &schedule, given)
-                .and_then(|run| run.finish_observed(&progress, &mut |index, simulation| series.add(index, simulation)))
-                // If the run fails, its files up to then can be used.
-                .and_then(|run| series.finish().map(|()| run))
-                .inspect_err(|_| drop(series.finish())),
+            Some(observers) => observers.run(&schedule, given, &progress),
         };
         // The message refers to the step in the file, unless the command line sets another one.
         let is_set = arguments.step.is_some() || arguments.set.iter().any(|(name, _)| name == "internal_step_max");
@@ -91,9 +87,32 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<CommandOutcome
     // A parameter on the command line replaces that of the scene.
     let is_set = arguments.set.iter().any(|(name, _)| name == "scheme");
     let scheme = if is_set { "set on the command line".to_owned() } else { scene_features::scheme(&scene.settings) };
-    let answer = answer::lines(&run.recording, allowed_error(&scene.settings, &arguments.set));
+    let answer = answer::of_scene(&run.recording, &scene.settings, &arguments.set);
     let [warnings, warning_details] = warnings_json(&run.warnings);
     let estimates = estimated(&scene, arguments, &schedule, console)?;
+    let fields = observers.as_ref().and_then(|observers| observers.fields.as_ref());
+    let capture = observers.as_ref().and_then(|observers| observers.capture.as_ref());
+    let report = match arguments.report.as_deref().zip(capture) {
+        None => None,
+        Some((path, capture)) => {
+            let html = page::render(&ReportInput {
+                scene: &scene,
+                table: native::compiled(&scene, &schedule)?.table(),
+                settings: &arguments.set,
+                schedule: &schedule,
+                native: &run,
+                capture,
+                answer: &answer,
+                facts: &[],
+                imported: &[],
+                estimates: &estimates,
+                files: &[],
+                durations: &[],
+            })?;
+            output_file::write(path, &html)?;
+            Some((path, html.len()))
+        }
+    };
     let mut json = json!({
         "model": scene.settings.name,
         "scheme": scheme,
@@ -117,7 +136,8 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<CommandOutcome
         "answer": answer::json(&answer),
         "csv": arguments.csv.as_deref().map(shown_path),
         "parquet": arguments.parquet.as_deref().map(shown_path),
-        "vtk": fields.as_ref().map(RequestedFields::json),
+        "vtk": fields.map(fields_json),
+        "report": report.map(|(path, _)| shown_path(path)),
         "parameters": parameters_json(&run.parameters),
         "extremes": Extreme::json(&extremes),
         "means": means::json(&means::means(&run)),
@@ -126,12 +146,12 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<CommandOutcome
     });
     let rest = if arguments.all {
         let outputs = outputs(&run.recording.names, run.recording.row(rows - 1));
-        let fields = fields.as_ref().map_or(String::new(), RequestedFields::text);
+        let fields = written(fields, report);
         format!("\n{outputs}\n{}{fields}", summary(&json, &extremes, &run.warnings) + &lines(&estimates))
     } else {
         let reported =
             if estimates.is_empty() { String::new() } else { format!("\n{}", estimate::errors_text(&estimates)) };
-        let fields = fields.as_ref().map_or(String::new(), RequestedFields::text);
+        let fields = written(fields, report);
         let hint =
             if arguments.estimate { "" } else { "\nto estimate the errors of this run with coarser runs: --estimate" };
         format!("{}{fields}{reported}{hint}", where_the_rest_is(&json, !run.warnings.is_empty()))
@@ -143,63 +163,29 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<CommandOutcome
     Ok(CommandOutcome { text, warnings: run.warnings, rest, json })
 }
 
-/// Fields over time.
-struct RequestedFields {
-    /// Scene whose outputs include the fields.
-    scene: Scene,
-    series: FieldSeries,
+/// Describes the files of fields over time.
+fn fields_json(fields: &FieldSeries) -> Value {
+    let (files, bytes) = fields.written();
+    json!({
+        "index": shown_path(&fields.index_path()),
+        "files": files,
+        "bytes": bytes,
+        "without_surface": fields.without_surface(),
+    })
 }
 
-impl RequestedFields {
-    fn json(&self) -> Value {
-        let (files, bytes) = self.series.written();
-        json!({
-            "index": shown_path(&self.series.index_path()),
-            "files": files,
-            "bytes": bytes,
-            "without_surface": self.series.without_surface(),
-        })
-    }
-
-    fn text(&self) -> String {
-        let (files, bytes) = self.series.written();
+/// Returns lines about the files of fields over time and the report.
+fn written(fields: Option<&FieldSeries>, report: Option<(&Path, usize)>) -> String {
+    let mut text = String::new();
+    if let Some(fields) = fields {
+        let (files, bytes) = fields.written();
         let megabytes = 1e-6 * bytes as f64;
-        format!("\nwritten: {} ({files} files, {megabytes:.1} MB)", self.series.index_path().display())
+        let _ = write!(text, "\nwritten: {} ({files} files, {megabytes:.1} MB)", fields.index_path().display());
     }
-}
-
-/// Prepares fields over time, if they are requested.
-fn fields(
-    arguments: &RunArguments,
-    scene: &Scene,
-    schedule: &Schedule,
-    cache: &RomCache,
-    console: &Console,
-) -> Result<Option<(RequestedFields, ObservedScene)>> {
-    let Some(options) = arguments.fields() else { return Ok(None) };
-    let extended = options.scene(scene)?;
-    let directory = Path::new(&arguments.scene).parent().unwrap_or(Path::new(""));
-    let shapes = scene.settings.structures.iter().zip(&scene.roms).map(|(structure, rom)| {
-        match tiprub_format::builtin_model(structure) {
-            Some(name) => builtin::shapes(name, rom, cache, console).transpose(),
-            None => {
-                let path = directory.join(&structure.rom);
-                let beside = shape_file::beside(&path);
-                let files = shape_file::in_directory(path.parent().unwrap_or(Path::new("")), Some(&beside));
-                shape_file::find(rom, files)
-            }
-        }
-    });
-    let observed = ObservedScene::new(scene, schedule)?;
-    let series = FieldSeries::new(options, &extended, shapes.collect::<Result<_>>()?, *schedule)?;
-    let alone = series.without_surface().into_iter().map(|name| {
-        format!(
-            "{name} is shown by its contact nodes only: no shape file belongs to its ROM. `tiprub reduce` writes one \
-             beside the ROM of a mesh with one material"
-        )
-    });
-    console.warn_texts(&alone.collect::<Vec<_>>());
-    Ok(Some((RequestedFields { scene: extended, series }, observed)))
+    if let Some((path, bytes)) = report {
+        let _ = write!(text, "\nwritten: {} ({:.2} MB), open it in a browser", path.display(), 1e-6 * bytes as f64);
+    }
+    text
 }
 
 /// Returns the inputs and parameters at the start of a run as a JSON object.

@@ -1,11 +1,11 @@
 //! Data for the report.
 
 use tiprub_core::{Scene, VariableTable};
-use tiprub_model::Reduction;
+use tiprub_field::animation::Capture;
 use tiprub_shell::{native::NativeRun, recording::RecordingDifference, schedule::Schedule};
 use tiprub_study::estimate::Estimate;
 
-use crate::rom_facts::RomFacts;
+use crate::{answer::AnswerLine, rom_facts::RomFacts};
 
 /// Results of an imported run for the report.
 #[derive(Debug, Clone)]
@@ -35,20 +35,22 @@ pub struct ReportInput<'a> {
     pub scene: &'a Scene,
     /// Variables of the run.
     pub table: &'a VariableTable,
-    /// Full model and modes, if they are available.
-    pub reduction: Option<&'a Reduction>,
-    /// Facts of the ROMs.
-    pub facts: &'a [RomFacts],
+    /// Start values from the command line (name, value).
+    pub settings: &'a [(String, String)],
     /// Communication points.
     pub schedule: &'a Schedule,
     /// The native run.
     pub native: &'a NativeRun,
+    /// Motion and contacts of the run.
+    pub capture: &'a Capture,
+    /// Main results of the run.
+    pub answer: &'a [AnswerLine],
+    /// Facts of the ROMs; may be empty.
+    pub facts: &'a [RomFacts],
     /// Runs through the C interfaces of FMI.
     pub imported: &'a [ImportedSummary],
     /// Estimated errors of steps, modes, patches and mesh; empty if not requested.
     pub estimates: &'a [Estimate],
-    /// Run of the same rub with the paper's model and method, and its variables.
-    pub paper: Option<(&'a VariableTable, &'a NativeRun)>,
     /// Files beside the report.
     pub files: &'a [ReportFile],
     /// Wall times of the parts of the work (name, s).

@@ -1,71 +1,125 @@
-//! Report of a run: complete, offline, small.
+//! Report of a run: complete, offline, small, without effect on the results.
 
-use tiprub_core::{CoSimulation, Simulation};
-use tiprub_gallery::{reduction, scene_source::rotor37_scene_with};
-use tiprub_model::{Rotor37Options, rotor37::MeshCounts};
-use tiprub_packaging::{
-    report::{
-        input::{ImportedSummary, ReportFile, ReportInput},
-        page::render,
-    },
-    rom_facts::RomFacts,
-};
-use tiprub_shell::{
-    console::Console,
-    native::{self, RunInputs},
-    schedule::Schedule,
-};
-use tiprub_study::estimate::{ErrorSource, Estimate};
+use std::fs;
+
+use serde_json::Value;
+
+use crate::project::{Project, SCENE};
+
+/// Elements without an end.
+const VOID: [&str; 4] = ["meta", "input", "br", "!DOCTYPE"];
+
+/// Checks that all elements of a page are closed in their order; text of scripts and styles is skipped.
+#[track_caller]
+fn assert_well_formed(html: &str) {
+    let (mut open, mut rest) = (Vec::new(), html);
+    while let Some(start) = rest.find('<') {
+        rest = &rest[start + 1..];
+        let end = rest.find('>').expect("a tag ends");
+        let (tag, after) = (&rest[..end], &rest[end + 1..]);
+        rest = after;
+        let name = |tag: &str| tag.split([' ', '\n', '/']).next().unwrap_or_default().to_owned();
+        if let Some(closed) = tag.strip_prefix('/') {
+            assert_eq!(open.pop().as_deref(), Some(closed), "{}", &after[..after.len().min(80)]);
+        } else if !tag.ends_with('/') && !VOID.contains(&name(tag).as_str()) {
+            open.push(name(tag));
+        }
+        if let Some(raw) = open.last().filter(|name| ["script", "style"].contains(&name.as_str())) {
+            rest = &rest[rest.find(&format!("</{raw}>")).expect("it is closed")..];
+        }
+    }
+    assert!(open.is_empty(), "{open:?}");
+}
+
+/// Checks what every report has; returns it.
+#[track_caller]
+fn read(project: &Project, name: &str) -> String {
+    let html = fs::read_to_string(project.path(name)).unwrap();
+    assert_well_formed(&html);
+    assert!(html.len() < 1_200_000, "{} bytes", html.len());
+    let outside = html.replace("http://www.w3.org/2000/svg", "");
+    assert!(!outside.contains("http") && !outside.contains(" src=") && !outside.contains("url("), "opens offline");
+    assert!(!outside.contains("@import") && !outside.contains("fetch("));
+    assert!(!html.contains(">NaN") && !html.contains(">inf") && !html.contains("NaN "), "no number is missing");
+    assert_eq!(html.matches("<figure").count(), html.matches("<figcaption").count());
+    for title in ["How hard?", "How long?", "How hot?", "How much wear?", "Does it grow?", "The run", "Scene"] {
+        assert!(html.contains(title), "{title}");
+    }
+    html
+}
+
+/// Returns the header of the animation.
+fn header(html: &str) -> Value {
+    let text = html.split("id=\"run-header\">").nth(1).unwrap().split("</script>").next().unwrap();
+    serde_json::from_str(text).unwrap()
+}
 
 #[test]
-fn a_report_is_complete_offline_and_small() {
-    let options = Rotor37Options { mesh: MeshCounts { chord: 4, thickness: 1, span: 4 }, ..Rotor37Options::paper() };
-    let reduction = reduction::rotor37(&options, &Console::new(true, false)).unwrap();
-    let scene = rotor37_scene_with(reduction.rom.clone()).unwrap();
-    let schedule = Schedule::new(&scene.settings.experiment, Some(0.004), Some(2e-6)).unwrap();
-    let run = native::run(&scene, &schedule, RunInputs::default(), &|_| {}).unwrap();
-    let agreement = run.recording.compare(&run.recording).unwrap();
-    let html = render(&ReportInput {
-        scene: &scene,
-        table: Simulation::new(&scene).unwrap().table(),
-        reduction: Some(&reduction),
-        facts: &[RomFacts::of(&reduction.rom, None).unwrap()],
-        schedule: &schedule,
-        native: &run,
-        estimates: &[Estimate { direction: "steps", left: Ok(1.5e-3), source: ErrorSource::Run }],
-        paper: Some((Simulation::new(&scene).unwrap().table(), &run)),
-        imported: &[ImportedSummary { label: "FMI 2.0".into(), stepping: 0.1, agreement }],
-        files: &[ReportFile { name: "results.csv".into(), meaning: "results".into(), bytes: 1234 }],
-        durations: &[("native run".into(), 0.5)],
-    })
-    .unwrap();
+fn report_is_complete_and_does_not_change_the_results() {
+    let project = Project::new();
+    let energies = format!("{SCENE}[outputs]\nenergies = true\n");
+    fs::write(project.path("scene.toml"), energies).unwrap();
+    project.succeed(&["run", "scene.toml", "--csv", "alone.csv", "--step", "2e-4"]);
+    let run = ["run", "scene.toml", "--csv", "observed.csv", "--step", "2e-4", "--report", "out/run.html"];
+    let printed = project.succeed(&run);
+    assert!(printed.contains("written: out/run.html (0.") && printed.contains("open it in a browser"), "{printed}");
+    let [alone, observed] = ["alone.csv", "observed.csv"].map(|name| fs::read(project.path(name)).unwrap());
+    assert!(alone == observed, "a report does not change the results");
+    let html = read(&project, "out/run.html");
     for wanted in [
-        "mode 4:",
-        "estimated error of the displacements: steps 0.15 %",
-        "Comparison with the paper's model and method",
-        "clearance (µm)",
-        "normal force (N)",
-        "friction force (N)",
-        "nodes in contact",
+        "The blades touch the casing for the first time after",
+        "is hit hardest",
+        "the casing has no coating",
+        "Where do the tips touch?",
+        "Campbell diagram",
+        "Spectrogram",
         "energy (J)",
-        "|residual|",
-        "leading edge",
-        "eq. 12",
-        "eq. 13",
-        "all internal steps accepted below",
-        "bit for bit",
-        "href=\"results.csv\"",
-        "tiprub study error builtin:rotor37",
-        "computing time per simulated second",
-        "class=\"narrow\"",
+        "rotor is shown by contact nodes only",
+        "All settings, defaults included",
     ] {
         assert!(html.contains(wanted), "{wanted}");
     }
-    assert!(html.len() < 2_000_000, "{} bytes", html.len());
-    let outside = html.replace("http://www.w3.org/2000/svg", "");
-    assert!(!outside.contains("http") && !outside.contains("src=") && !outside.contains("url("), "opens offline");
-    assert!(!html.contains("NaN") && !html.contains(">inf"), "no number is missing");
-    assert!(!html.contains("-0.00000") && !html.contains("real-time factor"));
-    assert_eq!(html.matches("<svg").count(), html.matches("</svg>").count());
-    assert_eq!(html.matches("<figure").count(), html.matches("<figcaption").count());
+    let header = header(&html);
+    assert_eq!(header["bodies"][0]["sectors"], 4);
+    assert_eq!(header["bodies"][0]["triangles"][1], 0);
+    let times = header["times"].as_array().unwrap();
+    assert!((20..=121).contains(&times.len()), "{}", times.len());
+    assert_eq!(header["totals"].as_array().unwrap().len(), times.len());
+    assert!(header["totals"].as_array().unwrap().iter().any(|force| force.as_f64().unwrap() > 0.0));
+    // The same run gives the same bytes, apart from the measured times.
+    project.succeed(&["run", "scene.toml", "--step", "2e-4", "--report", "again.html"]);
+    let data = |html: &str| html.split("id=\"run-data\">").nth(1).unwrap().split('<').next().unwrap().to_owned();
+    assert_eq!(data(&html), data(&read(&project, "again.html")));
+}
+
+#[test]
+fn report_without_contact_says_so() {
+    let project = Project::new();
+    fs::write(project.path("scene.toml"), SCENE.replace("amplitude = 2e-3", "amplitude = 2e-5")).unwrap();
+    let printed = project.succeed(&["--json", "run", "scene.toml", "--report", "free.html"]);
+    let result: Value = serde_json::from_str(&printed).unwrap();
+    assert_eq!(result["report"], "free.html");
+    let html = read(&project, "free.html");
+    assert!(html.contains("No blade touches the casing in") && html.contains("no contact occurred"));
+    assert!(!html.contains("is hit hardest"));
+}
+
+#[test]
+fn names_are_escaped_in_page_and_script() {
+    let project = Project::new();
+    let scene = SCENE.replace("name = \"small\"", "name = \"small\"\ndescription = \"a </script><b> & c\"");
+    fs::write(project.path("scene.toml"), scene).unwrap();
+    project.succeed(&["run", "scene.toml", "--report", "run.html"]);
+    let html = read(&project, "run.html");
+    assert!(html.contains("a &lt;/script&gt;&lt;b&gt; &amp; c") && html.matches("</script>").count() == 3);
+}
+
+#[test]
+fn rejects_a_report_that_cannot_be_written() {
+    let project = Project::new();
+    for (file, problem) in [("scene.toml", "is the same file as SCENE"), (".", "")] {
+        let failure = project.fail(&["run", "scene.toml", "--report", file], if file == "." { 1 } else { 2 });
+        assert!(failure.contains("--report") || failure.contains(problem), "{failure}");
+    }
+    assert_eq!(fs::read_to_string(project.path("scene.toml")).unwrap(), SCENE);
 }

@@ -25,7 +25,9 @@ fn columns(csv: &str) -> (Vec<String>, Vec<Vec<f64>>) {
 /// Returns the JSON object of a run of a built-in scene, which must succeed with contact.
 #[track_caller]
 fn run_builtin(project: &TempDir, name: &str) -> (serde_json::Value, Vec<String>, Vec<Vec<f64>>) {
-    let json = succeed(project, &["run", name, "--csv", "out.csv", "--json", "--quiet"]);
+    let json = succeed(project, &["run", name, "--csv", "out.csv", "--report", "out.html", "--json", "--quiet"]);
+    let report = fs::read_to_string(project.path().join("out.html")).unwrap();
+    assert!(report.len() < 1_250_000 && report.contains("is hit hardest"), "{name}: {} bytes", report.len());
     let summary: serde_json::Value = serde_json::from_str(&json).unwrap();
     // Closed contact flutters, which is reported once; there are no other warnings.
     let warnings = summary["warnings"].as_array().unwrap();

@@ -5,13 +5,14 @@
 
 use std::{f64::consts::TAU, fs, io::Write, path::PathBuf};
 
-use tiprub_core::scene::settings::{BodyMotion, ContactSettings, SurfaceSettings};
-use tiprub_core::scene::shape::CompiledShape;
-use tiprub_core::{Rom, Scene, Simulation};
+use tiprub_core::scene::settings::BodyMotion;
+use tiprub_core::{Scene, Simulation};
 use tiprub_cosim::variables::NO_CLEARANCE;
 use tiprub_model::SurfaceShapes;
 use tiprub_shell::{Failure, Result, output_file, schedule::Schedule};
 
+use crate::cells::{Cells, contact_cells, groups, points_alone, repeated};
+use crate::ring::Ring;
 use crate::structure::{Moved, RigidMotion, Role, Structure, Vector, elements};
 use crate::vtu::{self, Content, EncodedArray, EncodedCells, cell};
 
@@ -19,13 +20,6 @@ use crate::vtu::{self, Content, EncodedArray, EncodedCells, cell};
 pub const INDEX: &str = "fields.pvd";
 /// Extensions of all files.
 pub const FILES: [&str; 2] = ["pvd", "vtu"];
-/// Points around and along the rigid surface of a contact without a coating.
-const RING: [usize; 2] = [360, 8];
-/// Contact nodes within this fraction of their radius along the axis have no axial extent; a surface then extends by
-/// this fraction of the radius to both sides.
-const FLAT: f64 = 1e-6;
-const HALF_STRIP: f64 = 0.05;
-
 /// Choices for the files.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FieldOptions {
@@ -58,48 +52,55 @@ impl FieldOptions {
         output_file::try_directory(path)
     }
 
-    /// Returns the scene with the outputs from which the fields are read: all chosen sectors are watched, and wear and
-    /// stress are reported as far as the scene has them. Its results are those of the scene.
+    /// Returns the scene with the outputs from which the fields are read, see [`observed_scene`].
     ///
     /// # Errors
     /// A chosen sector that no structure has, or that is given twice.
     pub fn scene(&self, scene: &Scene) -> Result<Scene> {
-        let mut extended = scene.clone();
-        let settings = &scene.settings;
-        let contacts = || settings.contacts.iter();
-        let is_master = |name: &String| contacts().any(|contact| contact.master == *name);
-        let structures = settings.structures.iter().zip(&scene.roms).filter(|(own, _)| is_master(&own.name));
-        let masters: Vec<_> = structures.collect();
-        let most = masters.iter().map(|(_, rom)| rom.sectors).max().unwrap_or(1);
-        for (place, sector) in self.sectors.iter().enumerate() {
-            if !(1..=most).contains(sector) {
-                let problem = format!("there is no sector {sector}");
-                return Err(Failure::usage("--vtk-sectors", problem, format!("Give sectors from 1 to {most}")));
-            }
-            if self.sectors[..place].contains(sector) {
-                let problem = format!("sector {sector} is given twice");
-                return Err(Failure::usage("--vtk-sectors", problem, "Give each sector once"));
-            }
-        }
-        let outputs = &mut extended.settings.outputs;
-        let chosen = (1..=most).filter(|sector| self.sectors.is_empty() || self.sectors.contains(sector));
-        let added: Vec<usize> = chosen.filter(|sector| !outputs.watched_sectors.contains(sector)).collect();
-        outputs.watched_sectors.extend(added);
-        outputs.wear |= contacts().any(|contact| contact.coating.is_some());
-        let rotors =
-            || masters.iter().filter(|(own, rom)| own.motion != BodyMotion::Free && rom.extras.stress.is_some());
-        let is_complete = rotors().all(|(own, rom)| {
-            (!own.thermal || rom.extras.stress_thermal.is_some())
-                && (!own.spin.growth || rom.extras.stress_centrifugal.is_some())
-        });
-        outputs.stress |= is_complete && rotors().next().is_some();
-        Ok(extended)
+        observed_scene(scene, &self.sectors)
     }
 
     /// Returns whether communication point `index` of `count` steps belongs to the series.
     fn includes(&self, index: usize, count: usize) -> bool {
         index.is_multiple_of(self.every) || index == count
     }
+}
+
+/// Returns the scene with the outputs that an observer reads: the chosen sectors (1-based; all if there are none) are watched, and
+/// wear and stress are reported as far as the scene has them. Its results are those of the scene.
+///
+/// # Errors
+/// A chosen sector that no structure has, or that is given twice.
+pub fn observed_scene(scene: &Scene, sectors: &[usize]) -> Result<Scene> {
+    let mut extended = scene.clone();
+    let settings = &scene.settings;
+    let contacts = || settings.contacts.iter();
+    let is_master = |name: &String| contacts().any(|contact| contact.master == *name);
+    let structures = settings.structures.iter().zip(&scene.roms).filter(|(own, _)| is_master(&own.name));
+    let masters: Vec<_> = structures.collect();
+    let most = masters.iter().map(|(_, rom)| rom.sectors).max().unwrap_or(1);
+    for (place, sector) in sectors.iter().enumerate() {
+        if !(1..=most).contains(sector) {
+            let problem = format!("there is no sector {sector}");
+            return Err(Failure::usage("--vtk-sectors", problem, format!("Give sectors from 1 to {most}")));
+        }
+        if sectors[..place].contains(sector) {
+            let problem = format!("sector {sector} is given twice");
+            return Err(Failure::usage("--vtk-sectors", problem, "Give each sector once"));
+        }
+    }
+    let outputs = &mut extended.settings.outputs;
+    let chosen = (1..=most).filter(|sector| sectors.is_empty() || sectors.contains(sector));
+    let added: Vec<usize> = chosen.filter(|sector| !outputs.watched_sectors.contains(sector)).collect();
+    outputs.watched_sectors.extend(added);
+    outputs.wear |= contacts().any(|contact| contact.coating.is_some());
+    let rotors = || masters.iter().filter(|(own, rom)| own.motion != BodyMotion::Free && rom.extras.stress.is_some());
+    let is_complete = rotors().all(|(own, rom)| {
+        (!own.thermal || rom.extras.stress_thermal.is_some())
+            && (!own.spin.growth || rom.extras.stress_centrifugal.is_some())
+    });
+    outputs.stress |= is_complete && rotors().next().is_some();
+    Ok(extended)
 }
 
 /// Files of a run, written while it runs.
@@ -136,20 +137,6 @@ enum Source {
     Stress(usize),
     /// Rigid or coated surface of a contact.
     Ring(Box<Ring>),
-}
-
-/// Surface of revolution of a contact.
-struct Ring {
-    /// Index of the contact.
-    contact: usize,
-    shape: CompiledShape,
-    /// Radius and axial position of each ring of points (m).
-    rows: Vec<[f64; 2]>,
-    around: usize,
-    /// True if the surface moves only as prescribed.
-    is_rigid: bool,
-    /// Name of the output with the wear of each cell; `None` without a coating.
-    wear: Option<String>,
 }
 
 /// Points and fields of a part at one time.
@@ -287,22 +274,6 @@ fn file_name(part: &str, index: usize) -> String {
     format!("{part}_{index:06}.vtu")
 }
 
-/// Cells by their corners and types.
-type Cells = Vec<(Vec<usize>, u8)>;
-
-fn points_alone(count: usize) -> Cells {
-    (0..count).map(|point| (vec![point], cell::VERTEX)).collect()
-}
-
-/// Repeats the cells for each sector of `points` points.
-fn repeated(cells: &Cells, points: usize, sectors: usize) -> Cells {
-    let of_sector = |sector: usize| {
-        let moved = move |corners: &[usize]| corners.iter().map(|corner| sector * points + corner).collect();
-        cells.iter().map(move |(corners, kind)| (moved(corners), *kind))
-    };
-    (0..sectors).flat_map(of_sector).collect()
-}
-
 fn encoded(cells: &Cells) -> Result<EncodedCells> {
     let whole = |value: usize| {
         let remedy = "Choose fewer sectors with --vtk-sectors";
@@ -349,103 +320,20 @@ fn contact_part(index: usize, structure: &Structure, scene: &Scene) -> Result<Pa
     part(format!("{}_contact", structure.name), structure, cells, Source::Contact(index))
 }
 
-/// Returns the contact nodes of each contact of a structure.
-fn groups(structure: &Structure, contacts: &[ContactSettings]) -> Vec<Vec<usize>> {
-    let nodes = &structure.rom.contact_nodes;
-    let own = contacts.iter().filter(|contact| contact.master == structure.name);
-    let group = |contact: &ContactSettings| {
-        let start = contact.nodes.as_deref().unwrap_or_default();
-        (0..nodes.len()).filter(|node| nodes[*node].name.starts_with(start)).collect()
-    };
-    own.map(group).collect()
-}
-
-/// Returns the cells between contact nodes: faces of a grid, faces between rows of patches, or lines along the chord.
-fn contact_cells(rom: &Rom, groups: Vec<Vec<usize>>) -> Cells {
-    let count = rom.contact_nodes.len();
-    let faces = |around: usize, along: usize, closed: bool| -> Cells {
-        let steps = if closed { around } else { around - 1 };
-        let face = |k: usize, i: usize| {
-            let next = (i + 1) % around;
-            vec![k * around + i, k * around + next, (k + 1) * around + next, (k + 1) * around + i]
-        };
-        (0..along - 1).flat_map(|k| (0..steps).map(move |i| (face(k, i), cell::QUAD))).collect()
-    };
-    if let Some(grid) = rom.extras.grid {
-        return faces(grid.around, grid.along, grid.closed);
-    }
-    if let Some(rows) = rom.extras.rows.filter(|rows| *rows > 1 && count / rows > 1 && groups.len() == 1) {
-        return faces(count / rows, rows, false);
-    }
-    let is_line = |group: &Vec<usize>| group.len() > 1 && rom.extras.rows.is_none_or(|rows| rows == 1);
-    if rom.frame == tiprub_core::scene::rom::DisplacementFrame::Cylindrical
-        && groups.iter().all(is_line)
-        && !groups.is_empty()
-    {
-        return groups.into_iter().map(|group| (group, cell::POLY_LINE)).collect();
-    }
-    points_alone(count)
-}
-
 /// Returns a surface of revolution: one without a structure, or with a coating.
 fn ring_part(contact: usize, scene: &Scene) -> Result<Option<Part>> {
-    let settings = &scene.settings;
-    let own = &settings.contacts[contact];
-    let Some(surface) = settings.surfaces.iter().find(|surface| surface.name == own.slave) else { return Ok(None) };
-    let master = settings.structures.iter().zip(&scene.roms).find(|(structure, _)| structure.name == own.master);
-    let Some((_, rom)) = master.filter(|(structure, _)| structure.motion != BodyMotion::Free) else { return Ok(None) };
-    let is_rigid = surface.structure.is_none() || surface.rigid;
-    if !is_rigid && own.coating.is_none() {
+    let Some(ring) = Ring::of_contact(contact, scene)?.filter(|ring| ring.carrier.is_none() || ring.wear.is_some())
+    else {
         return Ok(None);
-    }
-    let [around, along] = own.coating.map_or(RING, |coating| [coating.cells_around, coating.cells_along]);
-    let Some(rows) = contour(rom, own, along) else { return Ok(None) };
-    let shape = CompiledShape::new(&surface.shape, own.nominal_gap())
-        .map_err(|error| Failure::from_core(&surface.name, error))?;
+    };
+    let (around, along) = (ring.around, ring.rows.len() - 1);
     let face = |k: usize, i: usize| {
         let next = (i + 1) % around;
         (vec![k * around + i, k * around + next, (k + 1) * around + next, (k + 1) * around + i], cell::QUAD)
     };
     let cells: Cells = (0..along).flat_map(|k| (0..around).map(move |i| face(k, i))).collect();
-    let wear = own.coating.map(|_| wear_name(settings.contacts.len(), surface));
-    let name = surface_name(settings.contacts.len(), surface, contact);
-    let ring = Ring { contact, shape, rows, around, is_rigid, wear };
-    let source = Source::Ring(Box::new(ring));
-    Ok(Some(Part { name, cells: encoded(&cells)?, cell_fields: Vec::new(), source }))
-}
-
-fn surface_name(contacts: usize, surface: &SurfaceSettings, contact: usize) -> String {
-    if contacts > 1 { format!("{}_surface_{}", surface.name, contact + 1) } else { format!("{}_surface", surface.name) }
-}
-
-/// Returns the name of the output with the wear of each cell.
-fn wear_name(contacts: usize, surface: &SurfaceSettings) -> String {
-    if contacts > 1 { format!("{}.wear_depth", surface.name) } else { "wear_depth".to_owned() }
-}
-
-/// Returns radius and axial position (m) of `along` + 1 rings of points on the round surface of a contact: between its
-/// first and its last contact node, at the distance of the nominal gap. `None` without contact nodes.
-fn contour(rom: &Rom, contact: &ContactSettings, along: usize) -> Option<Vec<[f64; 2]>> {
-    let start = contact.nodes.as_deref().unwrap_or_default();
-    let nodes = rom.contact_nodes.iter().filter(|node| node.name.starts_with(start));
-    let mut places: Vec<[f64; 2]> = nodes.map(|node| [node.position[2], node.position[0]]).collect();
-    places.sort_by(|a, b| a[0].total_cmp(&b[0]));
-    let (first, last) = (places.first()?, places.last()?);
-    let half = if last[0] - first[0] > FLAT * first[1] { 0.0 } else { HALF_STRIP * first[1] };
-    let [low, high] = [first[0] - half, last[0] + half];
-    let radius = |z: f64| {
-        let above = places.partition_point(|place| place[0] <= z);
-        if above == 0 || above == places.len() {
-            return places[above.saturating_sub(1)][1];
-        }
-        let ([from, a], [to, b]) = (places[above - 1], places[above]);
-        a + (b - a) * (z - from) / (to - from)
-    };
-    let ring = |k: usize| {
-        let z = low + (high - low) * k as f64 / along as f64;
-        [radius(z) + contact.nominal_gap(), z]
-    };
-    Some((0..=along).map(ring).collect())
+    let name = ring.name.clone();
+    Ok(Some(Part { name, cells: encoded(&cells)?, cell_fields: Vec::new(), source: Source::Ring(Box::new(ring)) }))
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "rounding is intended")]
@@ -488,11 +376,7 @@ const CONTACT_FIELDS: [(&str, &str); 3] = [
 
 /// Returns the values of an output of all chosen sectors, sector by sector; `None` if the scene does not have it.
 fn of_sectors(structure: &Structure, simulation: &Simulation, name: &str) -> Option<Vec<f64>> {
-    let name = |sector: &usize| match structure.role {
-        Role::Free => format!("{}{name}", structure.prefix),
-        _ => format!("{}blade[{}].{name}", structure.prefix, sector + 1),
-    };
-    let values = structure.sectors.iter().map(|sector| elements(simulation, &name(sector)));
+    let values = structure.sectors.iter().map(|sector| elements(simulation, &structure.sector_variable(*sector, name)));
     values.collect::<Option<Vec<_>>>().map(|values| values.concat())
 }
 
@@ -534,15 +418,12 @@ fn ring_fields(ring: &Ring, simulation: &Simulation) -> Result<PartFields> {
         })
     });
     let mut fields = PartFields { points: flat(points), ..PartFields::default() };
-    if ring.is_rigid {
-        let outwards: Vec<Vector> = (0..ring.around)
-            .map(|i| {
-                let ((sine, cosine), angle) = (direction(i), TAU * i as f64 / ring.around as f64);
-                let shape = drive.shape_factor * ring.shape.evaluate(angle - drive.shape_rotation).0;
-                let change = shape + drive.radius_change + drive.gap_offset;
-                [change * cosine, change * sine, 0.0]
-            })
-            .collect();
+    if ring.carrier.is_none() {
+        let change = |(i, change): (usize, f64)| {
+            let (sine, cosine) = direction(i);
+            [change * cosine, change * sine, 0.0]
+        };
+        let outwards: Vec<Vector> = ring.radius_changes(drive, ring.around).enumerate().map(change).collect();
         let moved = ring.rows.iter().flat_map(|_| outwards.iter().copied());
         fields.point_fields.push(EncodedArray::reals("displacement", 3, &flat(moved))?);
     }

@@ -1,10 +1,10 @@
 //! Geometry and displacements of one structure of a scene.
 
-use std::f64::consts::TAU;
+use std::{borrow::Cow, f64::consts::TAU};
 
 use nalgebra::{Complex, DMatrix};
 use tiprub_core::geometry::Geometry;
-use tiprub_core::modes::bank::ModalBank;
+use tiprub_core::modes::{bank::ModalBank, modal::ModalModel};
 use tiprub_core::scene::rom::{ContactNode, DisplacementFrame};
 use tiprub_core::scene::settings::{BodyMotion, SceneSettings};
 use tiprub_core::{CoSimulation, Rom, Scene, Simulation};
@@ -45,7 +45,7 @@ impl RigidMotion {
 
 /// Displacements per reduced coordinate, `[coordinate][row]`, of each nodal diameter.
 pub(crate) struct DisplacementMap<'a, T> {
-    diameters: Vec<[&'a [T]; 2]>,
+    pub(crate) diameters: Vec<[&'a [T]; 2]>,
 }
 
 impl<T: Copy + Into<f64>> DisplacementMap<'_, T> {
@@ -113,24 +113,65 @@ pub(crate) enum Coordinates {
     Coupled(Vec<Vec<Complex<f64>>>),
 }
 
-impl Coordinates {
-    /// Reads the coordinates of sectors (0-based).
-    fn read(bank: &ModalBank, sectors: &[usize]) -> Self {
-        if let Some(disk) = bank.disk() {
-            let own = disk.model().diameters.iter().enumerate().map(|(n, diameter)| {
-                let amplitudes = (0..diameter.len()).map(|mode| {
-                    let [re, im] = bank.amplitudes(mode, n)[0];
-                    Complex::new(re, im)
-                });
-                times(&diameter.shapes, &amplitudes.collect::<Vec<_>>())
-            });
-            return Self::Coupled(own.collect());
+/// Mass-normalised mode shapes of a structure in reduced coordinates.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum ModalShapes<'a> {
+    /// Of one sector.
+    Uncoupled(Cow<'a, DMatrix<f64>>),
+    /// Of each nodal diameter.
+    Coupled(Vec<Cow<'a, DMatrix<Complex<f64>>>>),
+}
+
+impl<'a> ModalShapes<'a> {
+    /// Returns the shapes of a bank.
+    pub(crate) fn of(bank: &'a ModalBank) -> Self {
+        match bank.disk() {
+            None => Self::Uncoupled(Cow::Borrowed(&bank.model().shapes)),
+            Some(disk) => Self::Coupled(disk.model().diameters.iter().map(|own| Cow::Borrowed(&own.shapes)).collect()),
         }
-        let own = |sector: &usize| {
-            let amplitudes = (0..bank.modes()).map(|mode| bank.amplitudes(mode, *sector)[0][0]);
-            times(&bank.model().shapes, &amplitudes.collect::<Vec<_>>())
-        };
-        Self::Uncoupled(sectors.iter().map(own).collect())
+    }
+
+    /// Returns the shapes for use after the run.
+    pub(crate) fn into_owned(self) -> ModalShapes<'static> {
+        match self {
+            Self::Uncoupled(shapes) => ModalShapes::Uncoupled(Cow::Owned(shapes.into_owned())),
+            Self::Coupled(shapes) => {
+                ModalShapes::Coupled(shapes.into_iter().map(|own| Cow::Owned(own.into_owned())).collect())
+            }
+        }
+    }
+
+    /// Reads the modal amplitudes of sectors (0-based): sector by sector, or real and imaginary parts of all nodal diameters.
+    pub(crate) fn amplitudes(&self, bank: &ModalBank, sectors: &[usize]) -> Vec<f64> {
+        match self {
+            Self::Uncoupled(shapes) => {
+                let modes = 0..shapes.ncols();
+                let own = |sector: &usize| modes.clone().map(|mode| bank.amplitudes(mode, *sector)[0][0]).collect();
+                sectors.iter().flat_map(|sector| -> Vec<f64> { own(sector) }).collect()
+            }
+            Self::Coupled(shapes) => {
+                let modes = shapes.iter().enumerate().flat_map(|(n, own)| (0..own.ncols()).map(move |mode| (n, mode)));
+                modes.flat_map(|(n, mode)| bank.amplitudes(mode, n)[0]).collect()
+            }
+        }
+    }
+
+    /// Returns the reduced coordinates from the modal amplitudes.
+    pub(crate) fn coordinates(&self, amplitudes: &[f64]) -> Coordinates {
+        match self {
+            Self::Uncoupled(shapes) => {
+                let sectors = amplitudes.chunks_exact(shapes.ncols().max(1));
+                Coordinates::Uncoupled(sectors.map(|own| times(shapes, own)).collect())
+            }
+            Self::Coupled(shapes) => {
+                let mut rest = amplitudes.as_chunks::<2>().0.iter().map(|[re, im]| Complex::new(*re, *im));
+                let own = |shapes: &Cow<'_, DMatrix<Complex<f64>>>| {
+                    let own: Vec<Complex<f64>> = rest.by_ref().take(shapes.ncols()).collect();
+                    times(shapes, &own)
+                };
+                Coordinates::Coupled(shapes.iter().map(own).collect())
+            }
+        }
     }
 }
 
@@ -245,8 +286,28 @@ impl Structure {
         Some(self.sectors.iter().flat_map(of_sector).collect())
     }
 
-    /// Returns the current displacements.
-    pub(crate) fn moved(&self, simulation: &Simulation) -> Moved {
+    /// Returns the period (s) of the slowest elastic mode of the undamped structure; `None` if it cannot be determined.
+    pub(crate) fn slowest_period(&self) -> Option<f64> {
+        let model = ModalModel::from_rom(&self.rom, self.rom.damping_ratio).ok()?;
+        let slowest = model.frequencies.into_iter().find(|frequency| *frequency > 0.0)?;
+        Some(TAU / slowest)
+    }
+
+    /// Returns the name of an output of a sector (0-based).
+    pub(crate) fn sector_variable(&self, sector: usize, name: &str) -> String {
+        match self.role {
+            Role::Free => format!("{}{name}", self.prefix),
+            _ => format!("{}blade[{}].{name}", self.prefix, sector + 1),
+        }
+    }
+
+    /// Returns the modes of the structure; `None` if it is rigid.
+    pub(crate) fn bank<'s>(&self, simulation: &'s Simulation) -> Option<&'s ModalBank> {
+        Some(simulation.system().structures()[self.index?].modes())
+    }
+
+    /// Returns the current rigid motion, without that of the sectors.
+    pub(crate) fn rigid_motion(&self, simulation: &Simulation) -> RigidMotion {
         let mut motion = RigidMotion::default();
         let value = |name: &str| variable(simulation, &format!("{}{name}", self.prefix));
         match self.role {
@@ -257,24 +318,35 @@ impl Structure {
             Role::Free => motion.shift = ["displacement_x", "displacement_y", "displacement_z"].map(value),
             Role::Carrier | Role::Rigid => {}
         }
+        motion
+    }
+
+    /// Returns the displacements of contact nodes and surface from the reduced coordinates, sector by sector, in the
+    /// directions of the first sector. Those of contact nodes have the directions of the ROM.
+    pub(crate) fn sector_displacements(&self, coordinates: Option<&Coordinates>) -> [Vec<Vec<f64>>; 2] {
         let count = self.rom.sectors;
-        let at_rest = |rows: usize| vec![vec![0.0; rows]; self.sectors.len()];
-        let (contact, surface) = match self.index.map(|index| simulation.system().structures()[index].modes()) {
-            None => {
-                let points = self.shapes.as_ref().map(|shapes| at_rest(3 * shapes.points.len()));
-                (at_rest(3 * self.rom.contact_nodes.len()), points.unwrap_or_default())
-            }
-            Some(bank) => {
-                let coordinates = Coordinates::read(bank, &self.sectors);
-                let maps = self.contact_maps.iter().map(|map| map.each_ref().map(Vec::as_slice)).collect();
-                let contact = DisplacementMap { diameters: maps }.displacements(&coordinates, &self.sectors, count);
-                let surface = self.shapes.as_ref().map(|shapes| {
-                    let maps = shapes.diameters.iter().map(|own| [&own.real[..], &own.imaginary[..]]).collect();
-                    DisplacementMap { diameters: maps }.displacements(&coordinates, &self.sectors, count)
-                });
-                (contact, surface.unwrap_or_default())
-            }
+        let points = self.shapes.as_ref().map(|shapes| shapes.points.len());
+        let Some(coordinates) = coordinates else {
+            let at_rest = |points: usize| vec![vec![0.0; 3 * points]; self.sectors.len()];
+            return [at_rest(self.rom.contact_nodes.len()), points.map_or_else(Vec::new, at_rest)];
         };
+        let maps = self.contact_maps.iter().map(|map| map.each_ref().map(Vec::as_slice)).collect();
+        let contact = DisplacementMap { diameters: maps }.displacements(coordinates, &self.sectors, count);
+        let surface = self.shapes.as_ref().map(|shapes| {
+            let maps = shapes.diameters.iter().map(|own| [&own.real[..], &own.imaginary[..]]).collect();
+            DisplacementMap { diameters: maps }.displacements(coordinates, &self.sectors, count)
+        });
+        [contact, surface.unwrap_or_default()]
+    }
+
+    /// Returns the current displacements.
+    pub(crate) fn moved(&self, simulation: &Simulation) -> Moved {
+        let (motion, count) = (self.rigid_motion(simulation), self.rom.sectors);
+        let coordinates = self.bank(simulation).map(|bank| {
+            let shapes = ModalShapes::of(bank);
+            shapes.coordinates(&shapes.amplitudes(bank, &self.sectors))
+        });
+        let [contact, surface] = self.sector_displacements(coordinates.as_ref());
         let turned = |values: Vec<Vec<f64>>, is_of_contact: bool| {
             let of_sector = |(values, sector): (Vec<f64>, &usize)| {
                 let vectors = values.as_chunks::<3>().0.iter().copied();
@@ -292,7 +364,7 @@ impl Structure {
     }
 
     /// Converts the displacement of a contact node to x, y, z of the first sector.
-    fn cartesian(&self, node: usize, [a, b, c]: Vector) -> Vector {
+    pub(crate) fn cartesian(&self, node: usize, [a, b, c]: Vector) -> Vector {
         match self.rom.frame {
             DisplacementFrame::Cartesian => [a, b, c],
             DisplacementFrame::Cylindrical => {

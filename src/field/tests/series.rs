@@ -17,6 +17,9 @@ use tiprub_shell::recording::Recording;
 use tiprub_shell::schedule::Schedule;
 use tiprub_test_models::disk::TestDisk;
 
+#[path = "series/animation.rs"]
+mod animation;
+
 /// Returns the values of an array of a file, after checking the layout of its blocks.
 fn array(path: &Path, name: &str) -> Vec<f64> {
     let bytes = std::fs::read(path).unwrap();

@@ -1,12 +1,14 @@
-//! Drawing of line plots, waterfall diagrams, maps of cells, pictures of meshes and tables, and the style of their pages.
+//! Drawing of line plots, waterfall, Campbell and polar diagrams, maps of cells and values, pictures of meshes and tables, and the style of their pages.
 
 pub(crate) mod axis;
+pub mod campbell;
 pub mod cells;
 pub(crate) mod decimate;
+pub mod grid_map;
 pub mod picture;
 pub mod plots;
+pub mod polar;
 pub mod table;
-pub mod time_map;
 pub mod waterfall;
 
 /// Style sheet of the pages.

@@ -16,6 +16,11 @@ pub const MAX_POINTS: usize = 20_000;
 /// Factor on the size of the cells until a surface has few enough points.
 const COARSER: f64 = 1.1;
 
+/// Smallest inner radius of a ring, as a fraction of its outer radius.
+const THICKEST_RING: f64 = 0.5;
+/// Factor by which the first cells of a thinned surface are finer than evenly spread points.
+const FINEST: f64 = 6.0;
+
 /// Surface of one sector or one structure, and its displacements.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SurfaceShapes {
@@ -62,26 +67,8 @@ impl Surface {
         faces.retain(|face| !omitted.iter().any(|set| face.iter().all(|node| set.contains(node))));
         let used: BTreeSet<usize> = faces.iter().flatten().copied().collect();
         let nodes: Vec<usize> = used.into_iter().collect();
-        let representative = thinned(mesh, &nodes, points);
-        let kept: BTreeSet<usize> = representative.values().copied().collect();
-        let kept: Vec<usize> = kept.into_iter().collect();
-        let index: BTreeMap<usize, u32> = kept.iter().copied().zip(0..).collect();
-        let (mut corners, mut ends) = (Vec::new(), Vec::new());
-        let mut end = 0;
-        for face in faces {
-            let mut around: Vec<u32> = face.iter().map(|node| index[&representative[node]]).collect();
-            around.dedup();
-            if around.len() > 1 && around.first() == around.last() {
-                around.pop();
-            }
-            let distinct: BTreeSet<u32> = around.iter().copied().collect();
-            if distinct.len() < 3 || distinct.len() != around.len() {
-                continue;
-            }
-            end += if around.len() == 3 { 3 } else { 4 };
-            corners.extend(around);
-            ends.push(end);
-        }
+        let Merged { kept, corners, ends } =
+            merged(faces.into_iter(), &thinned(&mesh.nodes, &nodes, points, 1.0, &|_| 0));
         Self { positions: kept.iter().map(|node| mesh.nodes[*node]).collect(), nodes: kept, corners, ends }
     }
 
@@ -128,43 +115,150 @@ impl DiameterShapes {
     }
 }
 
+impl SurfaceShapes {
+    /// Returns the surface with at most `most` of its points; itself if it has no more. Points of the two sides of a thin
+    /// structure do not represent each other.
+    #[must_use]
+    pub fn thinned(self, most: usize) -> Self {
+        if self.points.len() <= most {
+            return self;
+        }
+        let all: Vec<usize> = (0..self.points.len()).collect();
+        let (sides, positions) = (self.sides(), self.cell_positions());
+        let Merged { kept, corners, ends } =
+            merged(self.faces(), &thinned(&positions, &all, most, FINEST, &|point| sides[point]));
+        let pick = |values: &[f32]| -> Vec<f32> {
+            let coordinates = values.chunks_exact(3 * self.points.len());
+            coordinates
+                .flat_map(|own| kept.iter().flat_map(move |point| own[3 * point..][..3].iter().copied()))
+                .collect()
+        };
+        let diameters = self.diameters.iter().map(|own| DiameterShapes {
+            order: own.order,
+            real: pick(&own.real),
+            imaginary: pick(&own.imaginary),
+        });
+        let points = kept.iter().map(|point| self.points[*point]).collect();
+        Self { points, corners, ends, diameters: diameters.collect() }
+    }
+
+    /// Returns the positions whose cells are thinned: of a ring around the z axis, radius, arc and z, so that its cross-section is
+    /// the same everywhere; else x, y, z.
+    fn cell_positions(&self) -> Vec<[f64; 3]> {
+        let radii = self.points.iter().map(|[x, y, _]| x.hypot(*y));
+        let [low, high] = radii.fold([f64::INFINITY, 0.0], |[low, high], r: f64| [low.min(r), high.max(r)]);
+        if low < THICKEST_RING * high {
+            return self.points.clone();
+        }
+        self.points.iter().map(|[x, y, z]| [x.hypot(*y), high * y.atan2(*x), *z]).collect()
+    }
+
+    /// Returns the direction of the normal of each point: the number of its largest component, and its sign.
+    fn sides(&self) -> Vec<u8> {
+        let mut normals = vec![[0.0; 3]; self.points.len()];
+        for face in self.faces() {
+            let [a, b, c] = [0, 1, 2].map(|corner: usize| self.points[face[corner]]);
+            let [u, v] = [b, c].map(|end| [0, 1, 2].map(|axis| end[axis] - a[axis]));
+            let normal = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+            for corner in face {
+                normals[corner].iter_mut().zip(normal).for_each(|(sum, value)| *sum += value);
+            }
+        }
+        let side = |normal: &[f64; 3]| {
+            let axis = (0..3_u8).max_by(|a, b| {
+                let [a, b] = [a, b].map(|axis| normal[usize::from(*axis)].abs());
+                a.total_cmp(&b)
+            });
+            let axis = axis.unwrap_or(0);
+            2 * axis + u8::from(normal[usize::from(axis)] < 0.0)
+        };
+        normals.iter().map(side).collect()
+    }
+
+    /// Returns the corners of each face.
+    pub fn faces(&self) -> impl Iterator<Item = Vec<usize>> {
+        let starts = core::iter::once(0).chain(self.ends.iter().copied());
+        let ranges = starts.zip(&self.ends).map(|(start, end)| start as usize..*end as usize);
+        ranges.map(|range| self.corners[range].iter().map(|corner| *corner as usize).collect())
+    }
+}
+
+/// Faces over fewer points.
+struct Merged {
+    /// Points that remain, ascending.
+    kept: Vec<usize>,
+    /// Corners and ends as in [`SurfaceShapes`], over the points that remain.
+    corners: Vec<u32>,
+    ends: Vec<u32>,
+}
+
+/// Replaces the corners of faces by their representatives; faces that collapse are omitted.
+fn merged(faces: impl Iterator<Item = Vec<usize>>, representative: &BTreeMap<usize, usize>) -> Merged {
+    let kept: BTreeSet<usize> = representative.values().copied().collect();
+    let kept: Vec<usize> = kept.into_iter().collect();
+    let index: BTreeMap<usize, u32> = kept.iter().copied().zip(0..).collect();
+    let (mut corners, mut ends) = (Vec::new(), Vec::new());
+    let mut end = 0;
+    for face in faces {
+        let mut around: Vec<u32> = face.iter().map(|node| index[&representative[node]]).collect();
+        around.dedup();
+        if around.len() > 1 && around.first() == around.last() {
+            around.pop();
+        }
+        let distinct: BTreeSet<u32> = around.iter().copied().collect();
+        if distinct.len() < 3 || distinct.len() != around.len() {
+            continue;
+        }
+        end += if around.len() == 3 { 3 } else { 4 };
+        corners.extend(around);
+        ends.push(end);
+    }
+    Merged { kept, corners, ends }
+}
+
 /// Rounds to single precision.
 #[expect(clippy::cast_possible_truncation, reason = "rounding is intended")]
 fn single(value: f64) -> f32 {
     value as f32
 }
 
-/// Returns the representative of each of these nodes; there are at most `most` representatives.
-fn thinned(mesh: &Mesh, nodes: &[usize], most: usize) -> BTreeMap<usize, usize> {
+/// Returns the representative of each of these nodes, which is on the same `side`; there are at most `most` representatives. The
+/// first cells are finer by the factor `fineness` than evenly spread points would be.
+fn thinned(
+    positions: &[[f64; 3]],
+    nodes: &[usize],
+    most: usize,
+    fineness: f64,
+    side: &dyn Fn(usize) -> u8,
+) -> BTreeMap<usize, usize> {
     if nodes.len() <= most {
         return nodes.iter().map(|node| (*node, *node)).collect();
     }
     let extent = |axis: usize| {
-        let values = nodes.iter().map(|node| mesh.nodes[*node][axis]);
+        let values = nodes.iter().map(|node| positions[*node][axis]);
         values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
     };
     let extents = [0, 1, 2].map(extent);
     let largest = extents.iter().map(|[low, high]| high - low).fold(0.0, f64::max);
     // Coarser than the points of a surface would be if they were evenly spread over the largest two extents.
-    let mut size = largest / (most as f64).sqrt();
+    let mut size = largest / (most as f64).sqrt() / fineness;
     loop {
-        #[expect(clippy::cast_possible_truncation, reason = "there are at most as many cells as √`most`")]
-        let cell = |node: usize| [0, 1, 2].map(|axis| ((mesh.nodes[node][axis] - extents[axis][0]) / size) as i64);
+        #[expect(clippy::cast_possible_truncation, reason = "there are few cells")]
+        let cell = |node: usize| [0, 1, 2].map(|axis| ((positions[node][axis] - extents[axis][0]) / size) as i64);
         let distance = |node: usize| {
             let cell = cell(node);
-            let off =
-                [0, 1, 2].map(|axis| mesh.nodes[node][axis] - extents[axis][0] - (cell[axis] as f64 + 0.5) * size);
+            let off = [0, 1, 2].map(|axis| positions[node][axis] - extents[axis][0] - (cell[axis] as f64 + 0.5) * size);
             off.iter().map(|x| x * x).sum::<f64>()
         };
-        let mut nearest: BTreeMap<[i64; 3], usize> = BTreeMap::new();
+        let mut nearest: BTreeMap<([i64; 3], u8), usize> = BTreeMap::new();
         for &node in nodes {
-            let chosen = nearest.entry(cell(node)).or_insert(node);
+            let chosen = nearest.entry((cell(node), side(node))).or_insert(node);
             if distance(node) < distance(*chosen) {
                 *chosen = node;
             }
         }
         if nearest.len() <= most {
-            return nodes.iter().map(|node| (*node, nearest[&cell(*node)])).collect();
+            return nodes.iter().map(|node| (*node, nearest[&(cell(*node), side(*node))])).collect();
         }
         size *= COARSER;
     }
@@ -216,6 +310,56 @@ mod tests {
             let [low, high] = values.fold([f64::MAX, f64::MIN], |[low, high], x| [low.min(x), high.max(x)]);
             assert!(low <= 2.0 && high >= 18.0, "{low} {high}");
         }
+    }
+
+    #[test]
+    fn thinned_shapes_keep_the_displacements_of_their_points() {
+        let surface = Surface::new(&plate(), &[]);
+        let place = |point: &[f64; 3]| point.map(single);
+        let real: Vec<f32> = surface.positions.iter().flat_map(place).collect();
+        let twice: Vec<f32> = real.iter().map(|value| 2.0 * value).collect();
+        let shapes = DiameterShapes { order: 2, real: [real.clone(), twice].concat(), imaginary: real };
+        let all = surface.with(vec![shapes]);
+        assert_eq!(all.clone().thinned(all.points.len()), all);
+        let few = all.clone().thinned(300);
+        assert!((150..=300).contains(&few.points.len()) && few.ends.len() < all.ends.len());
+        // Both sides of the plate, which is thinner than the cells, remain.
+        let thick = |point: &&[f64; 3]| point[2] > 0.5;
+        let above = few.points.iter().filter(thick).count();
+        assert!(above > 50 && few.points.len() - above > 50, "{above} of {}", few.points.len());
+        let positions: Vec<f32> = few.points.iter().flat_map(place).collect();
+        let [own] = &few.diameters[..] else { panic!("one nodal diameter") };
+        let doubled: Vec<f32> = positions.iter().map(|value| 2.0 * value).collect();
+        assert!(own.real == [positions.clone(), doubled].concat() && own.imaginary == positions);
+        assert!(few.faces().flatten().all(|corner| corner < few.points.len()));
+        assert_eq!(few.faces().count(), few.ends.len());
+    }
+
+    #[test]
+    fn thinned_ring_has_the_same_cross_section_everywhere() {
+        let [around, along] = [120_u32, 12_u32];
+        let place = |k: u32, i: u32| {
+            let angle = std::f64::consts::TAU * f64::from(i) / f64::from(around);
+            let radius = 1.0 + 0.02 * f64::from(k % 2);
+            [radius * angle.cos(), radius * angle.sin(), 0.02 * f64::from(k)]
+        };
+        let face = |k: u32, i: u32| {
+            let next = (i + 1) % around;
+            [k * around + i, k * around + next, (k + 1) * around + next, (k + 1) * around + i]
+        };
+        let corners: Vec<u32> = (0..along - 1).flat_map(|k| (0..around).flat_map(move |i| face(k, i))).collect();
+        let ring = SurfaceShapes {
+            points: (0..along).flat_map(|k| (0..around).map(move |i| place(k, i))).collect(),
+            ends: (1..=(along - 1) * around).map(|face| 4 * face).collect(),
+            corners,
+            diameters: Vec::new(),
+        };
+        #[expect(clippy::cast_possible_truncation, reason = "micrometres")]
+        let rounded = |value: f64| (1e6 * value).round() as i64;
+        let few = ring.thinned(500);
+        assert!((150..=500).contains(&few.points.len()), "{}", few.points.len());
+        let rows: BTreeSet<[i64; 2]> = few.points.iter().map(|[x, y, z]| [x.hypot(*y), *z].map(rounded)).collect();
+        assert!(rows.len() <= 12 && few.points.len() / rows.len() >= 20, "{} of {}", rows.len(), few.points.len());
     }
 
     #[test]

@@ -12,6 +12,7 @@ pub mod estimate;
 pub mod machine;
 pub mod map;
 pub mod output;
+pub mod response;
 pub mod stability;
 
 use serde_json::{Value, json};

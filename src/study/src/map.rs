@@ -6,7 +6,7 @@ mod findings;
 mod picture;
 pub mod prediction;
 mod run;
-mod spectrum;
+pub(crate) mod spectrum;
 mod start;
 mod statements;
 

@@ -1,10 +1,10 @@
 //! Resonances predicted by linear theory: engine orders of the casing and natural frequencies in the rotating frame.
 
 use realfft::RealFftPlanner;
-use tiprub_core::Scene;
 use tiprub_core::modes::{cyclic::CyclicModel, modal::ModalModel};
 use tiprub_core::scene::shape::CompiledShape;
-use tiprub_shell::{Failure, Result};
+use tiprub_core::{Scene, Simulation};
+use tiprub_shell::{Failure, Result, native};
 
 use super::start::{MapStart, master};
 
@@ -80,6 +80,16 @@ impl FrequencyPrediction {
             frequencies.push(vec![hertz(&model.frequencies)]);
         }
         Ok(Self { speeds, frequencies, sectors: rom.sectors, base_order: base_order(scene, start)?, stiffening })
+    }
+
+    /// Predicts frequencies of the first master of a scene with replaced start values.
+    ///
+    /// # Errors
+    /// The first master does not rotate, a start value is wrong, or the errors of [`FrequencyPrediction::new`].
+    pub fn with_settings(scene: &Scene, settings: &[(String, String)], fastest: f64) -> Result<Self> {
+        let mut simulation = Simulation::new(scene).map_err(|error| Failure::from_core(&scene.settings.name, error))?;
+        settings.iter().try_for_each(|(name, value)| native::set(&mut simulation, name, value))?;
+        Self::new(scene, &MapStart::of(scene, &simulation)?, fastest)
     }
 
     /// Returns the natural frequencies that an engine order can excite at a speed (rad/s), in Hz.

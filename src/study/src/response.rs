@@ -1,0 +1,135 @@
+//! Vibration of a run over frequency: spectrum, peaks, and spectrum over time.
+
+use tiprub_shell::Result;
+
+use crate::map::spectrum::{Analyser, peaks};
+
+/// Smallest number of samples of a spectrum.
+const MIN_SAMPLES: usize = 64;
+/// Number of windows, without overlap, in a run; and number of times of a spectrogram.
+const WINDOWS: usize = 4;
+const TIMES: usize = 120;
+/// Peaks below this fraction of the largest are not listed, and the largest number of peaks.
+const MIN_PEAK: f64 = 0.03;
+const MAX_PEAKS: usize = 8;
+
+/// Amplitudes of a signal over frequency.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Spectrum {
+    /// Distance of the frequencies (Hz).
+    pub resolution: f64,
+    /// Amplitudes from frequency 0, in the unit of the signal.
+    pub amplitudes: Vec<f64>,
+}
+
+/// Amplitudes of a signal over frequency and time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Spectrogram {
+    /// Distance of the frequencies (Hz).
+    pub resolution: f64,
+    /// First and last time: middles of the windows (s).
+    pub times: [f64; 2],
+    /// Length of a window (s).
+    pub window: f64,
+    /// Amplitudes `[time][frequency]`, in the unit of the signal.
+    pub amplitudes: Vec<Vec<f64>>,
+}
+
+impl Spectrum {
+    /// Transforms samples with one spacing (s), with a Hann window. `None` if there are too few.
+    ///
+    /// # Errors
+    /// The transform fails (not observed).
+    pub fn of(samples: &[f64], spacing: f64) -> Result<Option<Self>> {
+        if samples.len() < MIN_SAMPLES {
+            return Ok(None);
+        }
+        let squares = Analyser::new(samples.len(), samples.len()).squares(samples.iter().copied())?;
+        let amplitudes = squares.into_iter().map(f64::sqrt).collect();
+        Ok(Some(Self { resolution: 1.0 / (samples.len() as f64 * spacing), amplitudes }))
+    }
+
+    /// Returns the largest peaks (Hz, amplitude), by frequency.
+    pub fn peaks(&self) -> Vec<(f64, f64)> {
+        let most = self.amplitudes.iter().copied().fold(0.0, f64::max);
+        let mut found: Vec<(f64, f64)> = peaks(&self.amplitudes, MIN_PEAK * most)
+            .iter()
+            .map(|peak| (peak.bin * self.resolution, peak.amplitude))
+            .collect();
+        found.sort_by(|a, b| b.1.total_cmp(&a.1));
+        found.truncate(MAX_PEAKS);
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        found
+    }
+}
+
+impl Spectrogram {
+    /// Transforms overlapping parts of samples with one spacing (s). `None` if there are too few.
+    ///
+    /// # Errors
+    /// The transform fails (not observed).
+    pub fn of(samples: &[f64], start: f64, spacing: f64) -> Result<Option<Self>> {
+        let length = (samples.len() / WINDOWS).max(MIN_SAMPLES);
+        if samples.len() < 2 * MIN_SAMPLES {
+            return Ok(None);
+        }
+        let analyser = Analyser::new(length, length);
+        let last = samples.len() - length;
+        let count = TIMES.min(last + 1);
+        let amplitudes = (0..count).map(|column| {
+            let from = last * column / (count - 1).max(1);
+            let squares = analyser.squares(samples[from..from + length].iter().copied())?;
+            Ok(squares.into_iter().map(f64::sqrt).collect())
+        });
+        let window = length as f64 * spacing;
+        Ok(Some(Self {
+            resolution: 1.0 / window,
+            times: [start + 0.5 * window, start + 0.5 * window + last as f64 * spacing],
+            window,
+            amplitudes: amplitudes.collect::<Result<_>>()?,
+        }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Returns a sine of 500 Hz that becomes one of 1500 Hz with half the amplitude, 1000 samples of 0.1 ms.
+    fn changing() -> Vec<f64> {
+        let sine = |hertz: f64, time: f64| (std::f64::consts::TAU * hertz * time).sin();
+        let value = |time: f64| if time < 0.05 { 2.0 * sine(500.0, time) } else { sine(1500.0, time) };
+        (0..1000).map(|sample| value(1e-4 * f64::from(sample))).collect()
+    }
+
+    #[test]
+    fn spectrum_contains_both_frequencies() {
+        let spectrum = Spectrum::of(&changing(), 1e-4).unwrap().unwrap();
+        assert!((spectrum.resolution - 10.0).abs() < 1e-9);
+        let peaks = spectrum.peaks();
+        for wanted in [500.0, 1500.0] {
+            assert!(peaks.iter().any(|(hertz, _)| (hertz - wanted).abs() < 15.0), "{wanted}: {peaks:?}");
+        }
+    }
+
+    #[test]
+    fn spectrogram_follows_the_change() {
+        let found = Spectrogram::of(&changing(), 0.2, 1e-4).unwrap().unwrap();
+        let largest = |column: &Vec<f64>| {
+            let most = (0..column.len()).max_by(|a, b| column[*a].total_cmp(&column[*b])).unwrap();
+            (most as f64 * found.resolution, column[most])
+        };
+        let (first, last) = (largest(&found.amplitudes[0]), largest(found.amplitudes.last().unwrap()));
+        assert!((first.0 - 500.0).abs() < 41.0 && (first.1 - 2.0).abs() < 0.4, "{first:?}");
+        assert!((last.0 - 1500.0).abs() < 41.0 && (last.1 - 1.0).abs() < 0.2, "{last:?}");
+        assert!((found.times[0] - 0.2125).abs() < 1e-9 && (found.times[1] - 0.2875).abs() < 1e-9);
+        assert_eq!(found.amplitudes.len(), TIMES);
+    }
+
+    #[test]
+    fn short_signals_have_no_spectrum() {
+        assert_eq!(Spectrum::of(&[1.0; 63], 1e-4).unwrap(), None);
+        assert_eq!(Spectrogram::of(&[1.0; 127], 0.0, 1e-4).unwrap(), None);
+        assert_eq!(Spectrum::of(&[1.0; 64], 1e-4).unwrap().unwrap().peaks(), []);
+    }
+}
