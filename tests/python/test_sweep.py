@@ -2,10 +2,12 @@
 
 import os
 import signal
+import socket
 import stat
 import subprocess
 import sys
 import time
+import warnings
 from pathlib import Path
 
 import distributed
@@ -127,6 +129,18 @@ def test_histories_are_a_data_set_of_their_own(plan):
         assert report["finished_before"] == before and len(pandas.read_parquet(report)) == 40
         histories = pandas.read_parquet(plan.with_name("plan-histories"))
         assert sorted(set(histories["run"])) == list(range(1, 21)) and list(histories.columns) == ["run", "time", "torque"]
+
+
+def test_own_cluster_warns_of_no_port_in_use(plan):
+    with socket.socket() as other, warnings.catch_warnings():
+        other.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            other.bind(("", 8787))
+            other.listen()
+        except OSError:
+            pass  # Another program uses the port.
+        warnings.simplefilter("error", UserWarning)
+        assert module.sweep(plan, quiet=True, runs_per_task=40)["finished"] == 20
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no such signals there")

@@ -136,7 +136,11 @@ def _connected(distributed: Any, client: Any) -> Iterator[Any]:
         yield client
         return
     # The work takes place in processes of the program, so threads suffice for the workers.
-    local = {"processes": False, "dashboard_address": None, "silence_logs": logging.CRITICAL} if client is None else {}
+    local: dict[str, Any] = {}
+    if client is None:
+        # Without an address, Dask would open port 8787, and warn if it is in use.
+        address = {"dashboard_address": "127.0.0.1:0", "scheduler_kwargs": {"dashboard": False}}
+        local = {"processes": False, "silence_logs": logging.CRITICAL, **address}
     try:
         own = distributed.Client(client, **local)
     except (OSError, TypeError, ValueError) as error:
