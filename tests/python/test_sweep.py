@@ -6,10 +6,12 @@ import socket
 import stat
 import subprocess
 import sys
+import threading
 import time
 import warnings
 from pathlib import Path
 
+import dask
 import distributed
 import pandas
 import pytest
@@ -131,6 +133,28 @@ def test_histories_are_a_data_set_of_their_own(plan):
         assert sorted(set(histories["run"])) == list(range(1, 21)) and list(histories.columns) == ["run", "time", "torque"]
 
 
+def test_wait_for_workers_is_reported(plan, capfd, monkeypatch):
+    monkeypatch.setattr(module._sweep, "WORKER_SECONDS", 0.3)
+    for quiet in (False, True):
+        options = dict(n_workers=0, processes=False, dashboard_address=":0", silence_logs=50)
+        with distributed.LocalCluster(**options) as cluster, distributed.Client(cluster) as client:
+            later = threading.Timer(1.0, cluster.scale, [1])
+            later.start()
+            report = module.sweep(plan, client, output=f"results-{quiet}", quiet=quiet, runs_per_task=20)
+            later.join()
+        assert report["finished"] == 20
+        assert ("plan: waiting for workers" in capfd.readouterr().err) == (not quiet)
+
+
+def test_lost_scheduler_is_an_error(plan):
+    with dask.config.set({"distributed.comm.timeouts.connect": "1s"}):
+        with distributed.LocalCluster(n_workers=0, processes=False, protocol="tcp://", dashboard_address=":0", silence_logs=50) as cluster:
+            client = distributed.Client(cluster.scheduler_address)
+        with client:
+            error = refused(module.sweep, plan, client)
+    assert error.what == "keyword `client`"
+
+
 def test_own_cluster_warns_of_no_port_in_use(plan):
     with socket.socket() as other, warnings.catch_warnings():
         other.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -238,7 +262,10 @@ def test_errors_are_reported_once_and_print_nothing(plan, capfd, monkeypatch):
     written(plan, 2e-3)
     for wrong in (0, 1.5, True, "all"):
         assert refused(module.sweep, plan, runs_per_task=wrong).what == "keyword `runs_per_task`"
-    for wrong in ("nonsense", 3):
+    options = dict(n_workers=0, processes=False, dashboard_address=":0", silence_logs=50)
+    with distributed.LocalCluster(**options) as closed_cluster, distributed.Client(closed_cluster) as closed:
+        pass
+    for wrong in ("nonsense", 3, closed, closed_cluster):
         assert refused(module.sweep, plan, wrong).what == "keyword `client`"
     module.sweep(plan, runs_per_task=10)
     error = refused(module.sweep, plan, runs_per_task=20)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import importlib
 import logging
 import math
 import os
 import re
+import socket
 import sys
 import time
 from pathlib import Path
@@ -25,6 +27,8 @@ PILOT_RUNS = 3
 LOCKED, RETRY_SECONDS = "another process is working on this part", 0.5
 #: Time (s) between two lines of progress.
 PROGRESS_SECONDS = 5.0
+#: Time (s) that a cluster without workers has to start one, before a line reports it.
+WORKER_SECONDS = 3.0
 #: Expression that is true if this module can be imported.
 HAS_MODULE = "__import__('importlib.util').util.find_spec('tiprub') is not None"
 #: Part that contains the last run of every plan and few others.
@@ -85,7 +89,7 @@ def sweep(
     check = call(["sweep", "--check", f"--part={LAST_PART}", f"--output={directory / 'check.parquet'}"], [str(file)], quiet=True)
     task = {"plan": str(file), "digest": check["digest"]}
     with _connected(distributed, client) as cluster:
-        _check_workers(cluster)
+        _check_workers(cluster, file.stem, quiet)
         threads = sum(cluster.nthreads().values())
         count = _known_parts(directory, file.stem)
         if count is None and runs_per_task is None:
@@ -132,7 +136,10 @@ def _move(source: Path, target: Path) -> None:
 @contextlib.contextmanager
 def _connected(distributed: Any, client: Any) -> Iterator[Any]:
     """Return a client of the cluster; one that is created here is closed at the end."""
+    remedy = "Give an open distributed.Client, a cluster, or the address of a scheduler"
     if isinstance(client, distributed.Client):
+        if client.status not in ("running", "connecting"):
+            raise Error("keyword `client`", f"{client!r} is {client.status}", remedy)
         yield client
         return
     # The work takes place in processes of the program, so threads suffice for the workers.
@@ -143,22 +150,35 @@ def _connected(distributed: Any, client: Any) -> Iterator[Any]:
         local = {"processes": False, "silence_logs": logging.CRITICAL, **address}
     try:
         own = distributed.Client(client, **local)
-    except (OSError, TypeError, ValueError) as error:
-        remedy = "Give a distributed.Client, a cluster, or the address of a scheduler"
+    except (OSError, RuntimeError, TypeError, ValueError) as error:
         raise Error("keyword `client`", f"there is no connection to {client!r}: {error}", remedy) from None
     with own:
         yield own
 
 
-def _check_workers(cluster: Any) -> None:
+def _check_workers(cluster: Any, title: str, quiet: bool) -> None:
     """Check that the scheduler and the workers that exist can import this module. Without it, tasks would wait forever."""
-    # A function of this module could not be sent to them.
-    places = {"the scheduler": cluster.run_on_scheduler(eval, HAS_MODULE), **cluster.run(eval, HAS_MODULE, on_error="return")}
+    try:
+        # A function of this module could not be sent to them.
+        places = {"scheduler": cluster.run_on_scheduler(eval, HAS_MODULE)}
+        try:
+            cluster.wait_for_workers(1, timeout=WORKER_SECONDS)
+        except asyncio.TimeoutError:
+            # This is no error: an adaptive cluster starts workers only for tasks.
+            _print_progress(f"{title}: waiting for workers", quiet)
+        places.update(cluster.run(eval, HAS_MODULE, on_error="return"))
+    except OSError as error:
+        raise Error("keyword `client`", f"the scheduler of {cluster!r} does not answer: {error}", "Start it again") from None
     lacking = [name for name, has_module in places.items() if has_module is not True]
     if lacking:
         more = f" and {len(lacking) - 1} more" if len(lacking) > 1 else ""
-        problem = f"{lacking[0]}{more} cannot import the module `tiprub`"
-        raise Error("dask", problem, "Install the same release of tiprub on the scheduler and all workers")
+        remedy = "Install the same release of tiprub on the scheduler and all workers"
+        raise Error(f"Dask, {lacking[0]}{more}", "cannot import the module `tiprub`", remedy)
+
+
+def _print_progress(line: str, quiet: bool) -> None:
+    if not quiet and sys.stderr is not None:
+        print(line, file=sys.stderr)
 
 
 def _known_parts(directory: Path, stem: str) -> Optional[int]:
@@ -178,7 +198,7 @@ def _pilot(cluster: Any, task: dict[str, str], directory: Path, runs: int, threa
         return shared, None
     output = str(directory / "pilot.parquet")
     future = cluster.submit(run_part, output, f"1/{runs // PILOT_RUNS}", **task, pure=False)
-    answer = _answer(future)
+    answer = _answer(future, output)
     # The first run may have made the slow checks at the start, which the others share.
     seconds = sorted(parquet.ParquetFile(output).read(["seconds"])["seconds"].to_pylist())[PILOT_RUNS // 2]
     return min(shared, max(1, math.ceil(TASK_SECONDS / max(seconds, 1e-6)))), answer
@@ -196,7 +216,8 @@ def _adopt_pilot(directory: Path, first: str) -> None:
 def run_part(output: str, part: str, plan: str, digest: str) -> Union[dict[str, Any], Error]:
     """Run a part of a plan on a worker. Returns an error instead of raising it: Dask would also print it."""
     if not Path(output).parent.is_dir():
-        return Error(str(Path(output).parent), "does not exist on a worker", "Give a directory with `output` that all workers share")
+        problem = f"does not exist on the worker {socket.gethostname()}"
+        return Error(str(Path(output).parent), problem, "Give a directory with `output` that all workers share")
     words = ["sweep", "--threads=1", f"--part={part}", f"--digest={digest}", f"--output={output}"]
     while True:
         try:
@@ -208,13 +229,13 @@ def run_part(output: str, part: str, plan: str, digest: str) -> Union[dict[str, 
         time.sleep(RETRY_SECONDS)
 
 
-def _answer(future: Any) -> dict[str, Any]:
-    """Return the answer of a task."""
+def _answer(future: Any, output: str) -> dict[str, Any]:
+    """Return the answer of a task that writes `output`."""
     try:
         answer = future.result()
     except Exception as error:
         problem = f"a task failed: {type(error).__name__}: {error}"
-        raise Error("dask", problem, "Install the same release of tiprub on the scheduler and all workers, and see their logs") from None
+        raise Error(output, problem, "Install the same release of tiprub on the scheduler and all workers, and see their logs") from None
     if isinstance(answer, Error):
         raise answer
     return answer
@@ -227,12 +248,13 @@ def _gather(
     futures, answers, shown = [], [], time.monotonic()
     try:
         futures = cluster.map(run_part, files, parts, **task, pure=False)
+        outputs = dict(zip(futures, files))
         for future in distributed.as_completed(futures):
-            answers.append(_answer(future))
+            answers.append(_answer(future, outputs[future]))
             future.release()
-            if not quiet and time.monotonic() - shown >= PROGRESS_SECONDS and sys.stderr is not None:
+            if time.monotonic() - shown >= PROGRESS_SECONDS:
                 shown = time.monotonic()
-                print(f"{title}: {len(answers)} of {len(files)} tasks are finished", file=sys.stderr)
+                _print_progress(f"{title}: {len(answers)} of {len(files)} tasks are finished", quiet)
         return answers
     finally:
         if len(answers) < len(futures):
