@@ -133,6 +133,17 @@ def test_histories_are_a_data_set_of_their_own(plan):
         assert sorted(set(histories["run"])) == list(range(1, 21)) and list(histories.columns) == ["run", "time", "torque"]
 
 
+def test_parts_without_finished_runs_have_all_columns(plan):
+    text = plan.read_text().replace("[0.05, 3.0]", "[3.0, 0.05]")
+    plan.write_text(text + '[histories]\noutputs = ["torque"]\nevery = 10\n')
+    for before in (0, 40):
+        report = module.sweep(plan, quiet=True, runs_per_task=10)
+        assert report["finished_before"] == before and (report["refused"], report["finished"]) == (20, 20)
+        histories = pandas.read_parquet(plan.with_name("plan-histories"))
+        assert sorted(set(histories["run"])) == list(range(21, 41)) and list(histories.columns) == ["run", "time", "torque"]
+        assert histories["torque"].notna().all() and pandas.read_parquet(report)["largest_total_normal_force"].notna().sum() == 20
+
+
 def test_wait_for_workers_is_reported(plan, capfd, monkeypatch):
     monkeypatch.setattr(module._sweep, "WORKER_SECONDS", 0.3)
     for quiet in (False, True):

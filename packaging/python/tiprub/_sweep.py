@@ -109,6 +109,7 @@ def sweep(
     if pilot is not None:
         report["finished_before"] -= pilot["runs"] - pilot["finished_before"]
     _equal_columns(files, parquet)
+    _equal_columns(sorted(directory.glob("*.histories.parquet")), parquet)
     _move(directory, histories)
     report.update(plan=str(file), output=str(directory), tasks=wanted, seconds=time.monotonic() - clock)
     return Report(report, directory)
@@ -270,12 +271,13 @@ def _sums(answers: Sequence[dict[str, Any]]) -> dict[str, Any]:
     return {**sums, "reasons": list(reasons.values())}
 
 
-def _equal_columns(files: Sequence[str], parquet: Any) -> None:
+def _equal_columns(files: Sequence[Union[str, Path]], parquet: Any) -> None:
     """Give all files the same columns: parts whose runs were all refused lack some."""
     arrow = _package("pyarrow")
     try:
         schemas = [parquet.read_schema(file) for file in files]
-        common = arrow.unify_schemas([schema.remove_metadata() for schema in schemas], promote_options="permissive")
+        plain = [schema.remove_metadata() for schema in schemas]
+        common = arrow.unify_schemas(plain, promote_options="permissive") if plain else None
         for file, schema in zip(files, schemas):
             if not schema.equals(common):
                 table = parquet.ParquetFile(file).read()
@@ -284,5 +286,5 @@ def _equal_columns(files: Sequence[str], parquet: Any) -> None:
                 whole = arrow.Table.from_arrays(columns, schema=common.with_metadata(schema.metadata))
                 parquet.write_table(whole, f"{file}.new")
                 os.replace(f"{file}.new", file)
-    except OSError as error:
-        raise Error("tiprub.sweep", f"results cannot be read: {error}", "Give a directory with `output` that all workers share") from None
+    except (OSError, ValueError) as error:
+        raise Error(str(Path(files[0]).parent), f"results cannot be read: {error}", "Give a directory with `output` that all workers share") from None
