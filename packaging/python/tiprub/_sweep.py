@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import glob
 import importlib
 import logging
 import math
 import os
 import re
+import shutil
 import socket
 import sys
+import tempfile
 import time
 from pathlib import Path
 from typing import Any, Iterator, Optional, Sequence, Union
@@ -56,7 +59,8 @@ def sweep(
     client : distributed.Client, distributed cluster or str
         Client, cluster, or address of a scheduler. By default, a LocalCluster with one thread per processor.
     output : path
-        Directory for the results, by default the name of the plan without `.toml`, in the current directory. All workers must share it.
+        Directory for the results of this plan alone, shared by all workers. By default, it has the name of the plan without `.toml`, and is
+        in the current directory even if the plan is in another one.
     runs_per_task : int
         Runs of a task. By default, a few runs are measured, and a task takes about ten seconds or a quarter of a thread's work.
     quiet : bool
@@ -76,41 +80,42 @@ def sweep(
     distributed, parquet = _package("distributed"), _package("pyarrow.parquet")
     if runs_per_task is not None and (not isinstance(runs_per_task, int) or isinstance(runs_per_task, bool) or runs_per_task < 1):
         raise Error("keyword `runs_per_task`", f"{runs_per_task!r} is not a number of runs", "Give 1 or more", 2)
+    for what, path in (("plan", plan), ("keyword `output`", output)):
+        if path is not None and not place(what, path):
+            raise Error(what, "is an empty path", "Give the path of a file (`plan`) or directory (`output`)", 2)
     clock = time.monotonic()
     file = Path(place("plan", plan)).absolute()
     directory = Path(place("keyword `output`", output) if output is not None else file.stem).absolute()
     histories = directory.with_name(f"{directory.name}-histories")
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-        # The program looks for them beside the rows.
-        _move(histories, directory)
-    except OSError as error:
-        raise Error(str(directory), f"cannot be written: {error}", "Give another directory with `output`") from None
-    check = call(["sweep", "--check", f"--part={LAST_PART}", f"--output={directory / 'check.parquet'}"], [str(file)], quiet=True)
+    # The check writes a journal and reduced models beside its output.
+    with tempfile.TemporaryDirectory() as elsewhere:
+        check = call(["sweep", "--check", f"--part={LAST_PART}", f"--output={Path(elsewhere) / 'check.parquet'}"], [str(file)], quiet=True)
     task = {"plan": str(file), "digest": check["digest"]}
-    with _connected(distributed, client) as cluster:
+    with _connected(distributed, client) as cluster, _created(directory):
+        count = _known_parts(directory, histories, file.stem)
         _check_workers(cluster, file.stem, quiet)
         threads = sum(cluster.nthreads().values())
-        count = _known_parts(directory, file.stem)
         if count is None and runs_per_task is None:
             runs_per_task, pilot = _pilot(cluster, task, directory, check["plan_runs"], threads, parquet)
         else:
             pilot = None
         wanted = count if runs_per_task is None else math.ceil(check["plan_runs"] / runs_per_task)
         if count not in (None, wanted):
-            problem = f"contains {count} parts of this plan, but these runs per task give {wanted}"
+            problem = f"contains, with `{histories.name}`, results of this plan in {count} parts, but these runs per task give {wanted}"
             raise Error(str(directory), problem, "Leave out `runs_per_task`, or give another directory with `output`", 2)
         digits = len(str(wanted))
         parts = [f"{number}/{wanted}" for number in range(1, wanted + 1)]
         files = [str(directory / f"{file.stem}-{number:0{digits}}-of-{wanted}.parquet") for number in range(1, wanted + 1)]
         _adopt_pilot(directory, files[0])
+        # The program looks for them beside the rows.
+        _move(histories, directory, file.stem)
         answers = _gather(distributed, cluster, files, parts, task, file.stem, quiet)
     report = _sums(answers)
     if pilot is not None:
         report["finished_before"] -= pilot["runs"] - pilot["finished_before"]
     _equal_columns(files, parquet)
-    _equal_columns(sorted(directory.glob("*.histories.parquet")), parquet)
-    _move(directory, histories)
+    _equal_columns(_history_files(directory, file.stem), parquet)
+    _move(directory, histories, file.stem)
     report.update(plan=str(file), output=str(directory), tasks=wanted, seconds=time.monotonic() - clock)
     return Report(report, directory)
 
@@ -123,13 +128,37 @@ def _package(name: str) -> Any:
         raise Error("tiprub.sweep", f"needs a package that is missing: {error}", "Install the extra: pip install 'tiprub[dask]'") from None
 
 
-def _move(source: Path, target: Path) -> None:
+@contextlib.contextmanager
+def _created(directory: Path) -> Iterator[None]:
+    """Create a directory. At the end, remove the directories that are new and empty."""
+    try:
+        new = [path for path in (directory, *directory.parents) if not path.exists()]
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise Error(str(directory), f"cannot be written: {error}", "Give another directory with `output`") from None
+    try:
+        yield
+    finally:
+        with contextlib.suppress(OSError):
+            for path in new:
+                path.rmdir()
+
+
+def _history_files(directory: Path, stem: str) -> list[Path]:
+    """Return the files of outputs over time of a plan in a directory."""
+    return sorted(directory.glob(f"{glob.escape(stem)}-[0-9]*-of-*.histories.parquet"))
+
+
+def _move(source: Path, target: Path, stem: str) -> None:
     """Move the files of outputs over time."""
-    found = list(source.glob("*.histories.parquet"))
-    if found:
-        target.mkdir(exist_ok=True)
-    for file in found:
-        os.replace(file, target / file.name)
+    found = _history_files(source, stem)
+    try:
+        if found:
+            target.mkdir(exist_ok=True)
+        for file in found:
+            os.replace(file, target / file.name)
+    except OSError as error:
+        raise Error(str(target), f"cannot be written: {error}", "Give another directory with `output`") from None
     if found and not any(source.iterdir()):
         source.rmdir()
 
@@ -182,14 +211,30 @@ def _print_progress(line: str, quiet: bool) -> None:
         print(line, file=sys.stderr)
 
 
-def _known_parts(directory: Path, stem: str) -> Optional[int]:
-    """Return the number of parts of the results in a directory; None if there are none."""
-    name = re.compile(re.escape(stem) + r"-\d+-of-(\d+)\.parquet(\.journal)?")
-    counts = {int(match[1]) for match in map(name.fullmatch, os.listdir(directory)) if match}
+def _known_parts(directory: Path, histories: Path, stem: str) -> Optional[int]:
+    """Return the number of parts of the results in two directories; None if there are none. Other results in the first one are an error."""
+    # Left by the check of an earlier release.
+    for path in list(directory.glob("check.parquet.*")):
+        _remove(path)
+    own = re.compile(rf"(pilot|{re.escape(stem)}-\d+-of-(\d+))(\.histories)?\.parquet(\..+)?")
+    for path in directory.rglob("*.parquet*"):
+        name = path.relative_to(directory)
+        # Readers of Parquet skip names with these first letters.
+        is_hidden = any(part.startswith((".", "_")) for part in name.parts)
+        if not is_hidden and not own.fullmatch(str(name)):
+            problem = f"contains `{name}`, which is not a part of the plan `{stem}`"
+            raise Error(str(directory), problem, "Give each plan a directory of its own with `output`", 2)
+    names = (path.name for parent in (directory, histories) for path in parent.glob("*.parquet*"))
+    counts = {int(match[2]) for match in map(own.fullmatch, names) if match and match[2]}
     if len(counts) > 1:
-        problem = f"contains results of this plan in {' and in '.join(map(str, sorted(counts)))} parts"
+        problem = f"contains, with `{histories.name}`, results of this plan in {' and in '.join(map(str, sorted(counts)))} parts"
         raise Error(str(directory), problem, "Remove one of them, or give another directory with `output`", 2)
     return min(counts, default=None)
+
+
+def _remove(path: Path) -> None:
+    """Remove a file or directory, if it exists."""
+    shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
 
 
 def _pilot(cluster: Any, task: dict[str, str], directory: Path, runs: int, threads: int, parquet: Any) -> tuple[int, Optional[dict[str, Any]]]:
@@ -207,11 +252,11 @@ def _pilot(cluster: Any, task: dict[str, str], directory: Path, runs: int, threa
 
 def _adopt_pilot(directory: Path, first: str) -> None:
     """Make the runs that were measured, or begun, rows of the first part. Rows that the part already has are the same."""
-    for end in (".parquet", ".parquet.journal", ".histories.parquet", ".parquet.histories-journal"):
+    for end in (".parquet", ".parquet.journal", ".histories.parquet", ".parquet.histories-journal", ".parquet.models"):
         found, target = directory / f"pilot{end}", Path(first.removesuffix(".parquet") + end)
         if found.exists() and not target.exists() and end != ".histories.parquet":
             os.replace(found, target)
-        found.unlink(missing_ok=True)
+        _remove(found)
 
 
 def run_part(output: str, part: str, plan: str, digest: str) -> Union[dict[str, Any], Error]:
