@@ -118,6 +118,9 @@ def test_number_of_runs_of_a_task_is_measured(plan, monkeypatch):
     monkeypatch.setenv("TIPRUB_CACHE", str(plan.parent / "cache"))
     with distributed.Client(processes=False, n_workers=1, threads_per_worker=2, dashboard_address=None) as client:
         report = module.sweep(plan, client, "measured", quiet=True)
+        with_histories = plan.with_name("with_histories.toml")
+        with_histories.write_text(plan.read_text() + '[histories]\noutputs = ["torque"]\n')
+        assert module.sweep(with_histories, client, quiet=True)["finished_before"] == 0
     # A quarter of the work of a thread.
     assert (report["runs"], report["tasks"], report["finished_before"]) == (40, 8, 0)
     assert list((plan.parent / "cache").glob("scene-*.checks")), "the next part starts with the slow checks of this one"
