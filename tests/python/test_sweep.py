@@ -2,12 +2,17 @@
 
 import os
 import signal
+import socket
 import stat
 import subprocess
 import sys
+import tempfile
+import threading
 import time
+import warnings
 from pathlib import Path
 
+import dask
 import distributed
 import pandas
 import pytest
@@ -113,6 +118,9 @@ def test_number_of_runs_of_a_task_is_measured(plan, monkeypatch):
     monkeypatch.setenv("TIPRUB_CACHE", str(plan.parent / "cache"))
     with distributed.Client(processes=False, n_workers=1, threads_per_worker=2, dashboard_address=None) as client:
         report = module.sweep(plan, client, "measured", quiet=True)
+        with_histories = plan.with_name("with_histories.toml")
+        with_histories.write_text(plan.read_text() + '[histories]\noutputs = ["torque"]\n')
+        assert module.sweep(with_histories, client, quiet=True)["finished_before"] == 0
     # A quarter of the work of a thread.
     assert (report["runs"], report["tasks"], report["finished_before"]) == (40, 8, 0)
     assert list((plan.parent / "cache").glob("scene-*.checks")), "the next part starts with the slow checks of this one"
@@ -127,6 +135,111 @@ def test_histories_are_a_data_set_of_their_own(plan):
         assert report["finished_before"] == before and len(pandas.read_parquet(report)) == 40
         histories = pandas.read_parquet(plan.with_name("plan-histories"))
         assert sorted(set(histories["run"])) == list(range(1, 21)) and list(histories.columns) == ["run", "time", "torque"]
+
+
+def test_parts_without_finished_runs_have_all_columns(plan):
+    text = plan.read_text().replace("[0.05, 3.0]", "[3.0, 0.05]")
+    plan.write_text(text + '[histories]\noutputs = ["torque"]\nevery = 10\n')
+    for before in (0, 40):
+        report = module.sweep(plan, quiet=True, runs_per_task=10)
+        assert report["finished_before"] == before and (report["refused"], report["finished"]) == (20, 20)
+        histories = pandas.read_parquet(plan.with_name("plan-histories"))
+        assert sorted(set(histories["run"])) == list(range(21, 41)) and list(histories.columns) == ["run", "time", "torque"]
+        assert histories["torque"].notna().all() and pandas.read_parquet(report)["largest_total_normal_force"].notna().sum() == 20
+
+
+def test_directory_contains_one_plan(plan):
+    report = module.sweep(plan, output="results", runs_per_task=20, quiet=True)
+    other = written(plan.with_name("other.toml"), 1e-3)
+    # Readers of Parquet also read the directories in a directory.
+    for directory in (report.path, report.path.parent):
+        error = refused(module.sweep, other, output=directory, runs_per_task=20)
+        assert (error.what, error.exit_code) == (str(directory), 2) and "plan-1-of-2.parquet" in error.problem
+    assert len(pandas.read_parquet(report)) == 40 and len(list(report.path.iterdir())) == 2
+    # Another plan was interrupted.
+    interrupted = plan.with_name("interrupted")
+    interrupted.mkdir()
+    (interrupted / "plan-1-of-2.parquet.journal").touch()
+    assert "plan-1-of-2.parquet.journal" in refused(module.sweep, other, output=interrupted).problem
+    assert module.sweep(plan, output=interrupted, quiet=True)["tasks"] == 2
+
+
+def test_histories_of_other_parts_are_not_mixed(plan):
+    plan.write_text(plan.read_text() + '[histories]\noutputs = ["torque"]\nevery = 10\n')
+    report = module.sweep(plan, quiet=True, runs_per_task=20)
+    for file in report.path.iterdir():
+        file.unlink()
+    error = refused(module.sweep, plan, runs_per_task=10)
+    assert "`plan-histories`" in error.problem and "2 parts" in error.problem
+    assert module.sweep(plan, quiet=True)["finished_before"] == 0
+
+
+def test_check_leaves_no_files(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("plan.toml").write_text("""
+        scene = "builtin:rotor37-one-row"
+        stop = 1e-4
+        rom.rotor.reduce = "rotor37 --contact-nodes 3"
+        [[variable]]
+        name = "speed"
+        values = [1600, 1700]
+    """)
+    # Files of an earlier release, and of runs that were measured and then killed.
+    for name in ("check", "pilot"):
+        models = tmp_path / "plan" / f"{name}.parquet.models"
+        models.mkdir(parents=True)
+        (models / "model-0.rom").touch()
+    (tmp_path / "plan" / "check.parquet.journal").touch()
+    report = module.sweep("plan.toml", quiet=True, runs_per_task=2)
+    assert [file.name for file in report.path.iterdir()] == ["plan-1-of-1.parquet"]
+    assert list(pandas.read_parquet(report)["status"]) == ["finished"] * 2
+
+    def interrupted(words, *_, **__):
+        (output,) = (word.removeprefix("--output=") for word in words if word.startswith("--output="))
+        Path(f"{output}.journal").touch()
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(module._sweep, "call", interrupted)
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(temporary))
+    with pytest.raises(KeyboardInterrupt):
+        module.sweep("plan.toml", output=report)
+    assert not list(temporary.iterdir()) and len(list(report.path.iterdir())) == 1
+
+
+def test_wait_for_workers_is_reported(plan, capfd, monkeypatch):
+    monkeypatch.setattr(module._sweep, "WORKER_SECONDS", 0.3)
+    for quiet in (False, True):
+        options = dict(n_workers=0, processes=False, dashboard_address=":0", silence_logs=50)
+        with distributed.LocalCluster(**options) as cluster, distributed.Client(cluster) as client:
+            later = threading.Timer(1.0, cluster.scale, [1])
+            later.start()
+            report = module.sweep(plan, client, output=f"results-{quiet}", quiet=quiet, runs_per_task=20)
+            later.join()
+        assert report["finished"] == 20
+        assert ("plan: waiting for workers" in capfd.readouterr().err) == (not quiet)
+
+
+def test_lost_scheduler_is_an_error(plan):
+    with dask.config.set({"distributed.comm.timeouts.connect": "1s"}):
+        with distributed.LocalCluster(n_workers=0, processes=False, protocol="tcp://", dashboard_address=":0", silence_logs=50) as cluster:
+            client = distributed.Client(cluster.scheduler_address)
+        with client:
+            error = refused(module.sweep, plan, client, output="new/results")
+    assert error.what == "keyword `client`" and not Path("new").exists()
+
+
+def test_own_cluster_warns_of_no_port_in_use(plan):
+    with socket.socket() as other, warnings.catch_warnings():
+        other.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            other.bind(("", 8787))
+            other.listen()
+        except OSError:
+            pass  # Another program uses the port.
+        warnings.simplefilter("error", UserWarning)
+        assert module.sweep(plan, quiet=True, runs_per_task=40)["finished"] == 20
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no such signals there")
@@ -177,7 +290,7 @@ def test_workers_reject_other_programs_and_files(plan, capfd, tmp_path):
         error = refused(module.sweep, plan, client, runs_per_task=10)
         assert error.what == str(plan) and "differs" in error.problem and "same release" in error.remedy
         client.run(use_program, PROGRAM)
-        assert not list(plan.with_suffix("").iterdir()), "nothing was run"
+        assert not plan.with_suffix("").exists(), "nothing was run"
         gone = refused(lambda: client.submit(raised, client.submit(module._sweep.run_part, "/none/a", "1/1", "plan.toml", "")).result())
         assert "does not exist" in gone.problem
     for name in ("plan.toml", "scene.toml", "blade.rom.safetensors"):
@@ -206,7 +319,7 @@ def test_worker_without_the_module_is_an_error(plan, tmp_path):
                 assert "cannot import the module" in error.value.problem
             finally:
                 worker.terminate()
-    assert not list(plan.with_suffix("").glob("*"))
+    assert not plan.with_suffix("").exists()
 
 
 def use_program(path):
@@ -219,13 +332,19 @@ def raised(error):
 
 def test_errors_are_reported_once_and_print_nothing(plan, capfd, monkeypatch):
     assert "none.toml" in refused(module.sweep, "none.toml").what
+    assert refused(module.sweep, "").what == "plan" and refused(module.sweep, plan, output="").what == "keyword `output`"
     plan.write_text(plan.read_text().replace('"speed"', '"sped"'))
     assert "speed" in refused(module.sweep, plan).remedy
     written(plan, 2e-3)
     for wrong in (0, 1.5, True, "all"):
         assert refused(module.sweep, plan, runs_per_task=wrong).what == "keyword `runs_per_task`"
-    for wrong in ("nonsense", 3):
-        assert refused(module.sweep, plan, wrong).what == "keyword `client`"
+    options = dict(n_workers=0, processes=False, dashboard_address=":0", silence_logs=50)
+    with distributed.LocalCluster(**options) as closed_cluster, distributed.Client(closed_cluster) as closed:
+        pass
+    before = set(plan.parent.iterdir())
+    for wrong in ("nonsense", 3, closed, closed_cluster):
+        assert refused(module.sweep, plan, wrong, output="new/results").what == "keyword `client`"
+    assert set(plan.parent.iterdir()) == before, "no directory was created"
     module.sweep(plan, runs_per_task=10)
     error = refused(module.sweep, plan, runs_per_task=20)
     assert error.exit_code == 2 and "4 parts" in error.problem

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
+import glob
 import importlib
 import logging
 import math
 import os
 import re
+import shutil
+import socket
 import sys
+import tempfile
 import time
 from pathlib import Path
 from typing import Any, Iterator, Optional, Sequence, Union
@@ -25,6 +30,8 @@ PILOT_RUNS = 3
 LOCKED, RETRY_SECONDS = "another process is working on this part", 0.5
 #: Time (s) between two lines of progress.
 PROGRESS_SECONDS = 5.0
+#: Time (s) that a cluster without workers has to start one, before a line reports it.
+WORKER_SECONDS = 3.0
 #: Expression that is true if this module can be imported.
 HAS_MODULE = "__import__('importlib.util').util.find_spec('tiprub') is not None"
 #: Part that contains the last run of every plan and few others.
@@ -52,7 +59,8 @@ def sweep(
     client : distributed.Client, distributed cluster or str
         Client, cluster, or address of a scheduler. By default, a LocalCluster with one thread per processor.
     output : path
-        Directory for the results, by default the name of the plan without `.toml`, in the current directory. All workers must share it.
+        Directory for the results of this plan alone, shared by all workers. By default, it has the name of the plan without `.toml`, and is
+        in the current directory even if the plan is in another one.
     runs_per_task : int
         Runs of a task. By default, a few runs are measured, and a task takes about ten seconds or a quarter of a thread's work.
     quiet : bool
@@ -72,40 +80,43 @@ def sweep(
     distributed, parquet = _package("distributed"), _package("pyarrow.parquet")
     if runs_per_task is not None and (not isinstance(runs_per_task, int) or isinstance(runs_per_task, bool) or runs_per_task < 1):
         raise Error("keyword `runs_per_task`", f"{runs_per_task!r} is not a number of runs", "Give 1 or more", 2)
+    for what, path in (("plan", plan), ("keyword `output`", output)):
+        if path is not None and not place(what, path):
+            raise Error(what, "is an empty path", "Give the path of a file (`plan`) or directory (`output`)", 2)
     clock = time.monotonic()
     file = Path(place("plan", plan)).absolute()
     directory = Path(place("keyword `output`", output) if output is not None else file.stem).absolute()
     histories = directory.with_name(f"{directory.name}-histories")
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-        # The program looks for them beside the rows.
-        _move(histories, directory)
-    except OSError as error:
-        raise Error(str(directory), f"cannot be written: {error}", "Give another directory with `output`") from None
-    check = call(["sweep", "--check", f"--part={LAST_PART}", f"--output={directory / 'check.parquet'}"], [str(file)], quiet=True)
+    # The check writes a journal and reduced models beside its output.
+    with tempfile.TemporaryDirectory() as elsewhere:
+        check = call(["sweep", "--check", f"--part={LAST_PART}", f"--output={Path(elsewhere) / 'check.parquet'}"], [str(file)], quiet=True)
     task = {"plan": str(file), "digest": check["digest"]}
-    with _connected(distributed, client) as cluster:
-        _check_workers(cluster)
+    with _connected(distributed, client) as cluster, _created(directory):
+        count = _known_parts(directory, histories, file.stem)
+        _check_workers(cluster, file.stem, quiet)
         threads = sum(cluster.nthreads().values())
-        count = _known_parts(directory, file.stem)
         if count is None and runs_per_task is None:
             runs_per_task, pilot = _pilot(cluster, task, directory, check["plan_runs"], threads, parquet)
         else:
             pilot = None
         wanted = count if runs_per_task is None else math.ceil(check["plan_runs"] / runs_per_task)
         if count not in (None, wanted):
-            problem = f"contains {count} parts of this plan, but these runs per task give {wanted}"
+            problem = f"contains, with `{histories.name}`, results of this plan in {count} parts, but these runs per task give {wanted}"
             raise Error(str(directory), problem, "Leave out `runs_per_task`, or give another directory with `output`", 2)
         digits = len(str(wanted))
         parts = [f"{number}/{wanted}" for number in range(1, wanted + 1)]
         files = [str(directory / f"{file.stem}-{number:0{digits}}-of-{wanted}.parquet") for number in range(1, wanted + 1)]
         _adopt_pilot(directory, files[0])
+        # The program looks for them beside the rows.
+        _move(histories, directory, file.stem)
         answers = _gather(distributed, cluster, files, parts, task, file.stem, quiet)
     report = _sums(answers)
     if pilot is not None:
-        report["finished_before"] -= pilot["runs"] - pilot["finished_before"]
+        # There were no other results. The first part may repeat these runs to store their outputs over time.
+        report["finished_before"] = pilot["finished_before"]
     _equal_columns(files, parquet)
-    _move(directory, histories)
+    _equal_columns(_history_files(directory, file.stem), parquet)
+    _move(directory, histories, file.stem)
     report.update(plan=str(file), output=str(directory), tasks=wanted, seconds=time.monotonic() - clock)
     return Report(report, directory)
 
@@ -118,13 +129,37 @@ def _package(name: str) -> Any:
         raise Error("tiprub.sweep", f"needs a package that is missing: {error}", "Install the extra: pip install 'tiprub[dask]'") from None
 
 
-def _move(source: Path, target: Path) -> None:
+@contextlib.contextmanager
+def _created(directory: Path) -> Iterator[None]:
+    """Create a directory. At the end, remove the directories that are new and empty."""
+    try:
+        new = [path for path in (directory, *directory.parents) if not path.exists()]
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise Error(str(directory), f"cannot be written: {error}", "Give another directory with `output`") from None
+    try:
+        yield
+    finally:
+        with contextlib.suppress(OSError):
+            for path in new:
+                path.rmdir()
+
+
+def _history_files(directory: Path, stem: str) -> list[Path]:
+    """Return the files of outputs over time of a plan in a directory."""
+    return sorted(directory.glob(f"{glob.escape(stem)}-[0-9]*-of-*.histories.parquet"))
+
+
+def _move(source: Path, target: Path, stem: str) -> None:
     """Move the files of outputs over time."""
-    found = list(source.glob("*.histories.parquet"))
-    if found:
-        target.mkdir(exist_ok=True)
-    for file in found:
-        os.replace(file, target / file.name)
+    found = _history_files(source, stem)
+    try:
+        if found:
+            target.mkdir(exist_ok=True)
+        for file in found:
+            os.replace(file, target / file.name)
+    except OSError as error:
+        raise Error(str(target), f"cannot be written: {error}", "Give another directory with `output`") from None
     if found and not any(source.iterdir()):
         source.rmdir()
 
@@ -132,39 +167,75 @@ def _move(source: Path, target: Path) -> None:
 @contextlib.contextmanager
 def _connected(distributed: Any, client: Any) -> Iterator[Any]:
     """Return a client of the cluster; one that is created here is closed at the end."""
+    remedy = "Give an open distributed.Client, a cluster, or the address of a scheduler"
     if isinstance(client, distributed.Client):
+        if client.status not in ("running", "connecting"):
+            raise Error("keyword `client`", f"{client!r} is {client.status}", remedy)
         yield client
         return
     # The work takes place in processes of the program, so threads suffice for the workers.
-    local = {"processes": False, "dashboard_address": None, "silence_logs": logging.CRITICAL} if client is None else {}
+    local: dict[str, Any] = {}
+    if client is None:
+        # Without an address, Dask would open port 8787, and warn if it is in use.
+        address = {"dashboard_address": "127.0.0.1:0", "scheduler_kwargs": {"dashboard": False}}
+        local = {"processes": False, "silence_logs": logging.CRITICAL, **address}
     try:
         own = distributed.Client(client, **local)
-    except (OSError, TypeError, ValueError) as error:
-        remedy = "Give a distributed.Client, a cluster, or the address of a scheduler"
+    except (OSError, RuntimeError, TypeError, ValueError) as error:
         raise Error("keyword `client`", f"there is no connection to {client!r}: {error}", remedy) from None
     with own:
         yield own
 
 
-def _check_workers(cluster: Any) -> None:
+def _check_workers(cluster: Any, title: str, quiet: bool) -> None:
     """Check that the scheduler and the workers that exist can import this module. Without it, tasks would wait forever."""
-    # A function of this module could not be sent to them.
-    places = {"the scheduler": cluster.run_on_scheduler(eval, HAS_MODULE), **cluster.run(eval, HAS_MODULE, on_error="return")}
+    try:
+        # A function of this module could not be sent to them.
+        places = {"scheduler": cluster.run_on_scheduler(eval, HAS_MODULE)}
+        try:
+            cluster.wait_for_workers(1, timeout=WORKER_SECONDS)
+        except asyncio.TimeoutError:
+            # This is no error: an adaptive cluster starts workers only for tasks.
+            _print_progress(f"{title}: waiting for workers", quiet)
+        places.update(cluster.run(eval, HAS_MODULE, on_error="return"))
+    except OSError as error:
+        raise Error("keyword `client`", f"the scheduler of {cluster!r} does not answer: {error}", "Start it again") from None
     lacking = [name for name, has_module in places.items() if has_module is not True]
     if lacking:
         more = f" and {len(lacking) - 1} more" if len(lacking) > 1 else ""
-        problem = f"{lacking[0]}{more} cannot import the module `tiprub`"
-        raise Error("dask", problem, "Install the same release of tiprub on the scheduler and all workers")
+        remedy = "Install the same release of tiprub on the scheduler and all workers"
+        raise Error(f"Dask, {lacking[0]}{more}", "cannot import the module `tiprub`", remedy)
 
 
-def _known_parts(directory: Path, stem: str) -> Optional[int]:
-    """Return the number of parts of the results in a directory; None if there are none."""
-    name = re.compile(re.escape(stem) + r"-\d+-of-(\d+)\.parquet(\.journal)?")
-    counts = {int(match[1]) for match in map(name.fullmatch, os.listdir(directory)) if match}
+def _print_progress(line: str, quiet: bool) -> None:
+    if not quiet and sys.stderr is not None:
+        print(line, file=sys.stderr)
+
+
+def _known_parts(directory: Path, histories: Path, stem: str) -> Optional[int]:
+    """Return the number of parts of the results in two directories; None if there are none. Other results in the first one are an error."""
+    # Left by the check of an earlier release.
+    for path in list(directory.glob("check.parquet.*")):
+        _remove(path)
+    own = re.compile(rf"(pilot|{re.escape(stem)}-\d+-of-(\d+))(\.histories)?\.parquet(\..+)?")
+    for path in directory.rglob("*.parquet*"):
+        name = path.relative_to(directory)
+        # Readers of Parquet skip names with these first letters.
+        is_hidden = any(part.startswith((".", "_")) for part in name.parts)
+        if not is_hidden and not own.fullmatch(str(name)):
+            problem = f"contains `{name}`, which is not a part of the plan `{stem}`"
+            raise Error(str(directory), problem, "Give each plan a directory of its own with `output`", 2)
+    names = (path.name for parent in (directory, histories) for path in parent.glob("*.parquet*"))
+    counts = {int(match[2]) for match in map(own.fullmatch, names) if match and match[2]}
     if len(counts) > 1:
-        problem = f"contains results of this plan in {' and in '.join(map(str, sorted(counts)))} parts"
+        problem = f"contains, with `{histories.name}`, results of this plan in {' and in '.join(map(str, sorted(counts)))} parts"
         raise Error(str(directory), problem, "Remove one of them, or give another directory with `output`", 2)
     return min(counts, default=None)
+
+
+def _remove(path: Path) -> None:
+    """Remove a file or directory, if it exists."""
+    shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
 
 
 def _pilot(cluster: Any, task: dict[str, str], directory: Path, runs: int, threads: int, parquet: Any) -> tuple[int, Optional[dict[str, Any]]]:
@@ -174,7 +245,7 @@ def _pilot(cluster: Any, task: dict[str, str], directory: Path, runs: int, threa
         return shared, None
     output = str(directory / "pilot.parquet")
     future = cluster.submit(run_part, output, f"1/{runs // PILOT_RUNS}", **task, pure=False)
-    answer = _answer(future)
+    answer = _answer(future, output)
     # The first run may have made the slow checks at the start, which the others share.
     seconds = sorted(parquet.ParquetFile(output).read(["seconds"])["seconds"].to_pylist())[PILOT_RUNS // 2]
     return min(shared, max(1, math.ceil(TASK_SECONDS / max(seconds, 1e-6)))), answer
@@ -182,17 +253,18 @@ def _pilot(cluster: Any, task: dict[str, str], directory: Path, runs: int, threa
 
 def _adopt_pilot(directory: Path, first: str) -> None:
     """Make the runs that were measured, or begun, rows of the first part. Rows that the part already has are the same."""
-    for end in (".parquet", ".parquet.journal", ".histories.parquet", ".parquet.histories-journal"):
+    for end in (".parquet", ".parquet.journal", ".histories.parquet", ".parquet.histories-journal", ".parquet.models"):
         found, target = directory / f"pilot{end}", Path(first.removesuffix(".parquet") + end)
         if found.exists() and not target.exists() and end != ".histories.parquet":
             os.replace(found, target)
-        found.unlink(missing_ok=True)
+        _remove(found)
 
 
 def run_part(output: str, part: str, plan: str, digest: str) -> Union[dict[str, Any], Error]:
     """Run a part of a plan on a worker. Returns an error instead of raising it: Dask would also print it."""
     if not Path(output).parent.is_dir():
-        return Error(str(Path(output).parent), "does not exist on a worker", "Give a directory with `output` that all workers share")
+        problem = f"does not exist on the worker {socket.gethostname()}"
+        return Error(str(Path(output).parent), problem, "Give a directory with `output` that all workers share")
     words = ["sweep", "--threads=1", f"--part={part}", f"--digest={digest}", f"--output={output}"]
     while True:
         try:
@@ -204,13 +276,13 @@ def run_part(output: str, part: str, plan: str, digest: str) -> Union[dict[str, 
         time.sleep(RETRY_SECONDS)
 
 
-def _answer(future: Any) -> dict[str, Any]:
-    """Return the answer of a task."""
+def _answer(future: Any, output: str) -> dict[str, Any]:
+    """Return the answer of a task that writes `output`."""
     try:
         answer = future.result()
     except Exception as error:
         problem = f"a task failed: {type(error).__name__}: {error}"
-        raise Error("dask", problem, "Install the same release of tiprub on the scheduler and all workers, and see their logs") from None
+        raise Error(output, problem, "Install the same release of tiprub on the scheduler and all workers, and see their logs") from None
     if isinstance(answer, Error):
         raise answer
     return answer
@@ -223,12 +295,13 @@ def _gather(
     futures, answers, shown = [], [], time.monotonic()
     try:
         futures = cluster.map(run_part, files, parts, **task, pure=False)
+        outputs = dict(zip(futures, files))
         for future in distributed.as_completed(futures):
-            answers.append(_answer(future))
+            answers.append(_answer(future, outputs[future]))
             future.release()
-            if not quiet and time.monotonic() - shown >= PROGRESS_SECONDS and sys.stderr is not None:
+            if time.monotonic() - shown >= PROGRESS_SECONDS:
                 shown = time.monotonic()
-                print(f"{title}: {len(answers)} of {len(files)} tasks are finished", file=sys.stderr)
+                _print_progress(f"{title}: {len(answers)} of {len(files)} tasks are finished", quiet)
         return answers
     finally:
         if len(answers) < len(futures):
@@ -244,12 +317,13 @@ def _sums(answers: Sequence[dict[str, Any]]) -> dict[str, Any]:
     return {**sums, "reasons": list(reasons.values())}
 
 
-def _equal_columns(files: Sequence[str], parquet: Any) -> None:
+def _equal_columns(files: Sequence[Union[str, Path]], parquet: Any) -> None:
     """Give all files the same columns: parts whose runs were all refused lack some."""
     arrow = _package("pyarrow")
     try:
         schemas = [parquet.read_schema(file) for file in files]
-        common = arrow.unify_schemas([schema.remove_metadata() for schema in schemas], promote_options="permissive")
+        plain = [schema.remove_metadata() for schema in schemas]
+        common = arrow.unify_schemas(plain, promote_options="permissive") if plain else None
         for file, schema in zip(files, schemas):
             if not schema.equals(common):
                 table = parquet.ParquetFile(file).read()
@@ -258,5 +332,5 @@ def _equal_columns(files: Sequence[str], parquet: Any) -> None:
                 whole = arrow.Table.from_arrays(columns, schema=common.with_metadata(schema.metadata))
                 parquet.write_table(whole, f"{file}.new")
                 os.replace(f"{file}.new", file)
-    except OSError as error:
-        raise Error("tiprub.sweep", f"results cannot be read: {error}", "Give a directory with `output` that all workers share") from None
+    except (OSError, ValueError) as error:
+        raise Error(str(Path(files[0]).parent), f"results cannot be read: {error}", "Give a directory with `output` that all workers share") from None
