@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use tiprub_gallery::builtin::DiskModel;
-use tiprub_packaging::commands;
 use tiprub_shell::{
     Result,
     console::{CommandOutcome, Console},
@@ -330,7 +329,7 @@ impl LabCli {
             LabCommand::Scaling(common) => ("scaling", common),
             LabCommand::Wear(common) => ("wear", common),
         };
-        let directory = commands::study::directory(name, common);
+        let directory = common.directory(name);
         output_file::try_directory(&directory)?;
         study::output::write(&self.study(console)?, &directory)
     }
