@@ -147,8 +147,8 @@ def _connected(distributed: Any, client: Any) -> Iterator[Any]:
 
 
 def _check_workers(cluster: Any) -> None:
-    """Check that the scheduler and the workers that exist can import this module. Without it, tasks would wait forever."""
-    # A function of this module could not be sent to them.
+    """Check that the scheduler and the current workers can import this module. Without the module, tasks would wait forever."""
+    # This is an expression, because workers without the module cannot receive its functions.
     places = {"the scheduler": cluster.run_on_scheduler(eval, HAS_MODULE), **cluster.run(eval, HAS_MODULE, on_error="return")}
     lacking = [name for name, has_module in places.items() if has_module is not True]
     if lacking:

@@ -419,9 +419,9 @@ fn stopped_sweep_keeps_its_rows() {
     assert!(engine::run(&request(&running, &output)).unwrap().is_complete);
 }
 
-/// A part without a finished run has the same columns as the others.
+/// A part without a finished run has the same columns as the other parts.
 #[test]
-fn refused_part_has_all_columns() {
+fn part_with_only_rejected_runs_has_all_columns() {
     let bench = Bench::new();
     let plan = "scene = \"scene.toml\"\n[[variable]]\nname = \"friction_coefficient\"\nvalues = [-1.0, 0.1]";
     for number in [1, 2] {
@@ -460,9 +460,9 @@ fn names_and_keys_that_clash_are_rejected() {
     }
 }
 
-/// Files of users with the same columns as results, and files of outputs over time of other sweeps, are never replaced.
+/// A sweep never replaces a file that no sweep wrote, even if it has the columns of results.
 #[test]
-fn foreign_files_are_kept() {
+fn files_of_users_are_not_replaced() {
     let bench = Bench::new();
     let cells = |name: &str| tiprub_table::Column::new(name, vec![Some(Cell::Text("mine".into()))]);
     let mine = Table { columns: vec![cells("status"), cells("digest")] };
