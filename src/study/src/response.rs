@@ -41,7 +41,7 @@ impl Spectrum {
     /// Transforms samples with a constant `spacing` (s), with a Hann window. `None` if there are too few samples.
     ///
     /// # Errors
-    /// The transform fails (not observed).
+    /// The transform fails.
     pub fn from_samples(samples: &[f64], spacing: f64) -> Result<Option<Self>> {
         if samples.len() < MIN_SAMPLES {
             return Ok(None);
@@ -70,7 +70,7 @@ impl Spectrogram {
     /// samples.
     ///
     /// # Errors
-    /// The transform fails (not observed).
+    /// The transform fails.
     pub fn from_samples(samples: &[f64], start: f64, spacing: f64) -> Result<Option<Self>> {
         let length = (samples.len() / WINDOWS).max(MIN_SAMPLES);
         if samples.len() < 2 * MIN_SAMPLES {

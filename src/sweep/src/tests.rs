@@ -447,12 +447,12 @@ fn names_and_keys_that_clash_are_rejected() {
     for (text, words) in [
         (gap("mean_torque", "contact[1].gap"), "name of an output or a result"),
         (gap("friction_loss", "contact[1].gap"), "name of an output or a result"),
-        (gap("a", "contact[1].gap") + &gap("b", "contact.gap"), "`contact[1].gap`, which `a` sets, too"),
+        (gap("a", "contact[1].gap") + &gap("b", "contact.gap"), "`contact[1].gap`, which `a` also sets"),
         (
             "[[variable]]\nname = \"a\"\nfield = \"structure[rotor].rom\"\nvalues = [\"b.rom.safetensors\"]\n\
              [rom.rotor]\nfile = \"small.rom.safetensors\"\n"
                 .to_owned(),
-            "which `[rom]` sets, too",
+            "which `[rom]` also sets",
         ),
     ] {
         let failure = bench.try_part(&format!("{scene}{text}"), "a.parquet", Part::WHOLE, 1).unwrap_err();

@@ -95,7 +95,7 @@ impl Capture {
     /// Chooses the times of the animation, and returns its data.
     ///
     /// # Errors
-    /// The data cannot be compressed (not observed).
+    /// The data cannot be compressed.
     pub fn animation(&self) -> Result<Animation> {
         let (chosen, is_cut) = self.chosen_frames();
         let frames: Vec<&Frame> = chosen.iter().map(|index| &self.frames[*index]).collect();
