@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Run the gallery, or an example that couples the FMU with other models: create a Python environment from pinned packages, build
-# tiprub unless it is given, run the example, and write figures and tables to target/examples/NAME.
+# tiprub unless TIPRUB is set, run the example, and write figures and tables to target/examples/NAME.
 #
 #     examples/run.sh NAME [options of the example]     examples/run.sh NAME --help
 #

@@ -1,4 +1,4 @@
-"""The cases of the gallery. Each function runs a scene file beside this one, draws a picture and returns the numbers of its text."""
+"""The cases of the gallery. Each function runs a scene of this directory, draws a picture, and returns the numbers of its text."""
 
 import math
 import os
@@ -38,11 +38,11 @@ MODELS = ROOT / "tests" / "data" / "models"
 
 
 def command(*words):
-    """Run a command that has no function in the module; returns its output."""
+    """Run a command of the program that has no function in the module, and return its output."""
     try:
         done = subprocess.run([tiprub.program(), *map(str, words)], capture_output=True, text=True, check=False)
     except OSError as error:
-        raise tiprub.Error(tiprub.program(), f"cannot be started: {error}", "Set TIPRUB to the program, or start with examples/run.sh gallery") from error
+        raise tiprub.Error(tiprub.program(), f"cannot be started: {error}", "Set TIPRUB to the path of the program, or start with examples/run.sh gallery") from error
     if done.returncode != 0:
         raise tiprub.Error(f"tiprub {words[0]}", done.stderr.strip())
     return done.stdout
@@ -68,13 +68,13 @@ class Work:
         return tiprub.run(self.scene, quiet=True, **more)
 
     def fields(self, **more):
-        """Run the scene; returns the outputs, and the meshes at the end of the run by the names of their parts."""
+        """Run the scene; return the outputs, and the meshes at the end of the run by the names of their parts."""
         result = self.run(vtk=self.place / "fields", vtk_every=10**6, **more)
         files = sorted((self.place / "fields").glob("*.vtu"), key=lambda file: int(file.stem.rsplit("_", 1)[1]))
         return result, {file.stem.rsplit("_", 1)[0]: pyvista.read(file) for file in files}
 
     def unit(self, words, library):
-        """Make FMUs, with the library that an environment variable names or with that of the program; returns the one of FMI 2.0."""
+        """Package FMUs, with the library in the environment variable `library` if it is set; return the path of the FMU for FMI 2.0."""
         found, place = os.environ.get(library), self.place / words[0]
         command(*words, "--quiet", "--output", place, *(["--library", found] if found else []))
         return next(place.glob("*_fmi2.fmu"))
@@ -84,17 +84,17 @@ class Work:
 
 
 def family(result, stem):
-    """Columns stem[1], stem[2], ... as an array (times, elements)."""
+    """Return the columns stem[1], stem[2], ... as an array (times, elements)."""
     return result[[name for name in result.columns if name.startswith(stem + "[")]].to_numpy()
 
 
 def grown(mesh, factor):
-    """The mesh with displacements multiplied by a factor."""
+    """Return the mesh, deformed by its displacements times a factor."""
     return mesh.warp_by_vector("displacement", factor=factor)
 
 
 def sized(unit, *meshes):
-    """Add the magnitude of displacements, times `unit`, to meshes; returns its range, for colours."""
+    """Add the magnitude of the displacements, times `unit`, to meshes; return its range, for the colours."""
     for mesh in meshes:
         mesh["size"] = unit * numpy.linalg.norm(mesh["displacement"], axis=1)
     return 0.0, float(max(mesh["size"].max() for mesh in meshes))
@@ -162,7 +162,7 @@ def wear(work):
 def thermal(work, stop=4.0, tolerance=0.5):
     rub = work.unit(["package", work.scene, "--scalars"], "TIPRUB_LIBRARY")
     casing = work.unit(["thermal"], "TIPRUB_LIBRARY_THERMAL")
-    # The units log known warnings: unresolved modes of the rub, and steps that are short for surface temperatures, which are not used.
+    # The FMUs log known warnings: the rub does not resolve all modes, and the steps are too short for surface temperatures, which are not used.
     with silence(), Unit(rub, name="rub") as one, Unit(casing, name="casing") as other:
         received = Casing(other)
         journey = cycle_jump(Rub(one, share=0.5), received, Plan(REVOLUTION / 10, 10, tolerance), stop)
@@ -235,7 +235,7 @@ def whirl(work, unbalance=3e-3, at=1e-3, step=5e-5, stop=0.06):
 
 
 def vibration(result):
-    """Amplitude (µm) of the vibration of blade 1 at 20 to 40 kHz over time, and its growth rate (1/s) and frequency (kHz) from 5.5 to 7 ms."""
+    """Return the amplitude (µm) of the vibration of blade 1 at 20 to 40 kHz over time (ms), and its growth rate (1/s) and frequency (kHz) from 5.5 to 7 ms."""
     time = result.index.to_numpy()
     band = butter(4, [20e3, 40e3], "band", fs=1.0 / (time[1] - time[0]), output="sos")
     motion = hilbert(sosfiltfilt(band, result["blade[1].tip_tangential_displacement[1]"]))
@@ -349,7 +349,7 @@ def mesh(work):
     surface = {"scalars": "size", "clim": limits, "show_edges": True, "edge_color": "#5b6168", "line_width": 0.8}
     points = {"color": BLUE, "point_size": 36, "render_points_as_spheres": True}
     angle = widest["rotor_angle"].iloc[-1] - 0.4
-    tip.points *= 1.001  # before the faces of the tip
+    tip.points *= 1.001  # slightly in front of the faces of the tip
     view(left, [(grown(blade, 10.0), surface), (pyvista.PolyData(grown(tip, 10.0).points), points)], (math.cos(angle), math.sin(angle), 0.6))
     scale(figure, left, limits, "displacement (µm)")
     right.plot(1e3 * result.index, forces / 1e3, color=BLUE)
@@ -380,7 +380,7 @@ def sweep(work):
     command("sweep", work.scene, "--quiet", "--output", work.place / "sweep.parquet")
     rows = pandas.read_parquet(work.place / "sweep.parquet")
     if (rows["status"] != "finished").any():
-        raise tiprub.Error("sweep", "some runs did not finish", "See the column `reason` of sweep.parquet")
+        raise tiprub.Error("sweep", "some runs did not finish", f"See the column `reason` of {work.place / 'sweep.parquet'}")
     table = rows.pivot(index="gap_offset", columns="speed", values="largest_node_normal_force")
     speeds, gaps, forces = table.columns.to_numpy(), 1e6 * table.index.to_numpy(), table.to_numpy()
     limit, intrusion = 1000.0, 71.2

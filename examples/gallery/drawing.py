@@ -1,4 +1,4 @@
-"""One style for all pictures of the gallery, and views of VTK files without a screen."""
+"""Style of all pictures of the gallery, and off-screen views of VTK files."""
 
 import matplotlib
 import numpy
@@ -6,11 +6,11 @@ import pyvista
 from matplotlib import pyplot
 
 pyplot.switch_backend("Agg")
-# Without a screen, VTK warns that it has none.
+# Silences the warning of VTK that there is no screen.
 pyvista.vtk_verbosity("off")
 
 BLUE, ORANGE, GREEN, GREY, DARK = "#1f6fb2", "#d9601a", "#2c8c4b", "#9aa1a9", "#23272b"
-# Colour maps: forces and amplitudes from white to dark, and sizes on bodies, on which shades stay visible.
+# Colour maps: one for forces and amplitudes, from white to dark, and one for displacements on bodies, on which shades stay visible.
 LEVELS, SIZES = "magma_r", matplotlib.colors.LinearSegmentedColormap.from_list("sizes", ["#e9e4d8", "#f2b04a", "#d9501a", "#7a1630"])
 WIDTH, HEIGHT, RESOLUTION = 6.0, 3.1, 150
 
@@ -34,20 +34,20 @@ pyplot.rcParams.update(
 
 
 def panels(*widths, height=HEIGHT):
-    """A figure with axes side by side, as wide as `widths` say."""
+    """Return a figure and its axes, which are side by side with the width ratios `widths`."""
     figure, axes = pyplot.subplots(1, len(widths), figsize=(WIDTH, height), width_ratios=widths, layout="constrained", squeeze=False)
     figure.get_layout_engine().set(w_pad=0.08)
     return figure, *axes[0]
 
 
 def bar(figure, image, axis, label):
-    """A colour bar beside an axis."""
+    """Draw a colour bar beside an axis."""
     colours = figure.colorbar(image, ax=axis, pad=0.02, aspect=25, label=label)
     colours.outline.set_visible(False)
 
 
 def scale(figure, axis, limits, label):
-    """A colour bar under a 3-D view, for its size."""
+    """Draw a colour bar below a 3-D view, for the displacements."""
     image = matplotlib.cm.ScalarMappable(matplotlib.colors.Normalize(*limits), SIZES)
     colours = figure.colorbar(image, cax=axis.inset_axes([0.12, -0.04, 0.76, 0.04]), orientation="horizontal", label=label)
     colours.outline.set_visible(False)

@@ -6,7 +6,7 @@ All cases run if you name none. The page is gallery.md, and the pictures are in 
 
 import os
 
-# Matrices are small, so threads of the linear algebra would only wait for each other. Set this before importing NumPy.
+# The matrices are small, so threads of the linear algebra would only wait for each other. This must be set before NumPy is imported.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import argparse
@@ -32,13 +32,13 @@ def arguments():
 
 
 def wrapped(text):
-    """Text whose paragraphs, except for lines of code, have lines of at most 160 characters."""
+    """Return the text with lines of at most 160 characters, except for code."""
     paragraphs = [part if part.startswith("    ") else fill(part, 160, break_long_words=False, break_on_hyphens=False) for part in text.strip("\n").split("\n\n")]
     return "\n\n".join(paragraphs)
 
 
 def section(name, facts):
-    """The part of the page about one case: its text with the numbers of the run, its picture and its scene."""
+    """Return the section of the page about one case: its text with the numbers of the run, its picture and its scene."""
     title, text = (HERE / f"{name}.md").read_text(encoding="utf-8").format_map(facts).split("\n", 1)
     title = title.removeprefix("# ")
     return f"""## {title}

@@ -20,12 +20,12 @@ pub struct AnswerLine {
     pub meaning: String,
 }
 
-/// Returns the five lines of a run of a scene with replaced start values.
-pub fn of_scene(recording: &Recording, settings: &SceneSettings, set: &[(String, String)]) -> [AnswerLine; 5] {
+/// Returns the five lines of a run of a scene; `set` contains the replaced start values (name, value as text).
+pub fn scene_lines(recording: &Recording, settings: &SceneSettings, set: &[(String, String)]) -> [AnswerLine; 5] {
     lines(recording, allowed_error(settings, set))
 }
 
-/// Returns the largest gap or penetration of a closed contact with adaptive steps (m); 0 with fixed steps.
+/// Returns the largest gap or penetration (m) that adaptive steps accept in a closed contact; 0 with fixed steps.
 fn allowed_error(settings: &SceneSettings, set: &[(String, String)]) -> f64 {
     let Some(tolerance) = estimate::time_in_use(settings, set).step_tolerance() else { return 0.0 };
     let gap = |contact: &ContactSettings| contact.nominal_gap();

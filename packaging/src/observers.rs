@@ -13,10 +13,11 @@ use tiprub_shell::{
     schedule::Schedule,
 };
 
-/// Requested observers of a run.
+/// Requested observers of a run, and the scene that they observe.
 pub struct Observers {
-    /// Scene whose outputs include those that the observers read.
+    /// Scene with the outputs that the observers read.
     scene: Scene,
+    /// Outputs of the original scene, which the results of the run have.
     observed: ObservedScene,
     /// Files for ParaView.
     pub fields: Option<FieldSeries>,
@@ -25,7 +26,7 @@ pub struct Observers {
 }
 
 impl Observers {
-    /// Prepares the observers of a run, and warns about structures without a surface. `None` if none is requested.
+    /// Prepares the observers of a run, and warns about structures without a surface. `None` if no observer is requested.
     ///
     /// # Errors
     /// The options of the fields are wrong, or the scene is rejected.
@@ -41,7 +42,7 @@ impl Observers {
             (Some(fields), false) => fields.scene(scene)?,
             (None, true) => observed_scene(scene, &[])?,
             (Some(fields), true) => {
-                // The sectors of the fields are checked, and the report needs all.
+                // This call only checks the chosen sectors; the report needs all sectors.
                 fields.scene(scene)?;
                 observed_scene(scene, &[])?
             }
@@ -79,12 +80,13 @@ impl Observers {
             })
         });
         let Some(fields) = fields else { return observed };
-        // If the run fails, its files up to then can be used.
+        // The list of files is also written if the run fails, so that its files can be used.
         observed.and_then(|run| fields.finish().map(|()| run)).inspect_err(|_| drop(fields.finish()))
     }
 }
 
-/// Finds the surfaces of the structures of a scene: in the cache, or in shape files beside the ROMs.
+/// Finds the surfaces of the structures of a scene, which was loaded from `argument`, in the cache or in shape files beside the
+/// ROMs.
 ///
 /// # Errors
 /// A shape file is damaged, or a built-in model cannot be reduced.

@@ -1,4 +1,4 @@
-//! Report of a run: one HTML file that opens offline and shows the contact as a picture that moves.
+//! Report of a run: one HTML file that opens offline, with an animation of the contact.
 
 mod details;
 mod figures;

@@ -59,7 +59,7 @@ pub struct RunArguments {
     /// Changes to the scene.
     #[command(flatten)]
     pub options: SceneOptions,
-    /// Where built-in models are kept.
+    /// Cache of built-in models.
     #[command(flatten)]
     pub cache: CacheArguments,
 }

@@ -3,7 +3,7 @@
     python browser.py PAGE WIDTH HEIGHT light|dark EXPRESSION... [--shot FILE]
 
 The page counts as loaded when `ready` is true in it. Each expression is a function body that may return a value; between two
-expressions the page can draw. Exit code 77: no browser can run here; the last line on stderr is the reason.
+expressions, the page has time to draw. Exit code 77: no browser can run here; the last line on stderr is the reason.
 """
 
 import json
@@ -19,6 +19,7 @@ os.environ["QTWEBENGINE_CHROMIUM_FLAGS"] = "--use-gl=angle --use-angle=swiftshad
 os.environ["QTWEBENGINE_CHROMIUM_FLAGS"] += f" --blink-settings=preferredColorScheme={0 if 'dark' in sys.argv[4:5] else 1}"
 READY = "document.readyState === 'complete' && (!document.getElementById('viewer') || document.getElementById('viewer').dataset.ready === 'true' || !document.querySelector('.note').hidden)"
 UNAVAILABLE = 77
+#: Timeout (ms).
 PATIENCE = 60_000
 
 try:
@@ -32,7 +33,7 @@ except ImportError as error:
 
 
 class Page(QWebEnginePage):
-    """Page that collects what it prints on the console."""
+    """Page that collects its console messages."""
 
     def __init__(self, view):
         super().__init__(view)
@@ -96,11 +97,11 @@ def main():
         del arguments[at : at + 2]
     path, width, height, _, *expressions = arguments
     application = QApplication([sys.argv[0]])
-    # Without a name the session would be freed.
+    # Without this variable, Python would free the session.
     session = Session(application, path, int(width), int(height), shot, expressions)
     application.exec()
     assert session
-    # Chromium's threads need not end in order.
+    # Exit without waiting for the threads of Chromium.
     sys.stdout.flush()
     os._exit(0)
 

@@ -17,7 +17,7 @@ NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]\d+)?")
 
 
 def sections(page):
-    """Text of each case by its name, without headings and marks."""
+    """Text of each case by its name, without headings and comments."""
     texts = re.findall(r"<!-- written: examples/run.sh gallery (\w+); 20\S+, version \S+ -->\n(.*?)\n<!-- end -->", page, re.DOTALL)
     return {name: " ".join(text.split()) for name, text in texts}
 
@@ -38,7 +38,7 @@ def made(tmp_path_factory):
 
 
 def digits(number):
-    """A unit of the last digit that is shown."""
+    """Value of one unit in the last shown digit."""
     mantissa, _, exponent = number.partition("e")
     return 10.0 ** (int(exponent or 0) - len(mantissa.partition(".")[2]))
 
@@ -86,7 +86,7 @@ def test_every_case_is_on_the_page():
     assert min(sizes) > 20_000 and sum(sizes) < 1_200_000
 
 
-def test_errors_are_clear(tmp_path):
+def test_errors_state_problem_and_remedy(tmp_path):
     done = run(GALLERY / "gallery.py", "rubb", "--into", tmp_path)
     assert done.returncode == 2 and "unknown case 'rubb': choose from rub, wear" in done.stderr
     done = run(GALLERY / "gallery.py", "rub", "--into", tmp_path, TIPRUB=str(tmp_path / "none"))

@@ -10,14 +10,14 @@ from conftest import ROOT
 
 NOTEBOOKS = ROOT / "examples" / "notebooks"
 LIBRARY, THERMAL = os.environ.get("TIPRUB_LIBRARY"), os.environ.get("TIPRUB_LIBRARY_THERMAL")
-#: A cell in place of the parameters, and one with properties of the results at the end.
+#: Values of the parameters, and a last cell that checks the results.
 QUICK = {
     "first_rub": (
         {"revolutions": 1, "frictions": [0.05, 0.15], "library": LIBRARY},
         """
         heats = heat["friction heat (J)"].to_numpy()
         assert 0.0 < heats[0] < heats[1] == result["friction_loss"].iloc[-1]
-        assert (heat["residual of the energy"] < 1e-12).all()
+        assert (heat["residual of the energy balance"] < 1e-12).all()
         assert rows > 300 and set(difference.values()) == {0.0}, difference
         """,
     ),

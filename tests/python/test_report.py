@@ -1,4 +1,4 @@
-"""The report in headless Chromium: nothing fails, the animation is drawn, sliders change it, and the page fits a phone."""
+"""The report in headless Chromium: no error occurs, the animation is drawn, sliders change it, and the page fits a phone."""
 
 import json
 import subprocess
@@ -24,7 +24,7 @@ PAUSE = 'const button = document.querySelector(".play"); if (button.textContent 
 
 
 def slide(name, value):
-    """Move a slider and tell the page."""
+    """JavaScript that moves a slider and sends its event."""
     return f'const own = document.querySelector("input[name={name}]"); own.value = {value}; own.dispatchEvent(new Event("input", {{ bubbles: true }}));'
 
 
@@ -34,7 +34,7 @@ def started(page, *expressions, width=1400, height=900, scheme="light"):
 
 
 def browse(page, *expressions, **options):
-    """Run expressions in the page, without an error on its console."""
+    """Run expressions in the page, and check that its console shows no error."""
     result = started(page, *expressions, **options)
     assert result.returncode == 0, result.stderr
     answer = json.loads(result.stdout.strip().splitlines()[-1])
@@ -113,7 +113,7 @@ def test_sliders_and_views_change_the_picture(reports):
 
 
 def test_contacts_light_up(reports):
-    """The page starts with the largest force; at the start of the run nothing touches."""
+    """Contacts are orange at the time of the largest force, and nothing is orange at the start of the run."""
     (_, _, before, _, during) = browse(
         reports["rotor"],
         PAUSE,

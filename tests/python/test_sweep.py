@@ -439,7 +439,7 @@ def test_empty_tasks_cost_little(tmp_path):
     assert "1000 tasks" in answer.stdout
 
 
-def test_ways_to_run_a_sweep_are_measured():
+def test_script_measures_runs_with_equal_tables():
     script = [sys.executable, ROOT / "examples" / "clusters" / "many_runs.py", "--speeds", "3", "--offsets", "2"]
     answer = subprocess.run(script, env={**os.environ, "PYTHONPATH": PACKAGE}, capture_output=True, text=True, check=True)
     assert answer.stdout.startswith("6 runs, equal tables") and answer.stdout.count("times as fast") == 4

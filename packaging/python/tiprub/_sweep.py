@@ -188,9 +188,9 @@ def _connected(distributed: Any, client: Any) -> Iterator[Any]:
 
 
 def _check_workers(cluster: Any, title: str, quiet: bool) -> None:
-    """Check that the scheduler and the workers that exist can import this module. Without it, tasks would wait forever."""
+    """Check that the scheduler and the current workers can import this module. Without the module, tasks would wait forever."""
     try:
-        # A function of this module could not be sent to them.
+        # This is an expression, because workers without the module cannot receive its functions.
         places = {"scheduler": cluster.run_on_scheduler(eval, HAS_MODULE)}
         try:
             cluster.wait_for_workers(1, timeout=WORKER_SECONDS)

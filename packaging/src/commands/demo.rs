@@ -145,7 +145,7 @@ fn write_inputs(directory: &Path, reduction: &Reduction, scene_text: &str) -> Re
     scene_source::load(&scene, &RomCache::off(), &Console::new(true, false))
 }
 
-/// Repeats the native run with an observer, which costs computing time.
+/// Repeats the native run with the observer of the report, so that the computing times of the first run do not include it.
 fn observe(scene: &Scene, reduction: &Reduction, schedule: &Schedule, console: &Console) -> Result<Capture> {
     let shapes = || Ok(vec![reduction.shapes.clone()]);
     let observers = Observers::new(scene, schedule, (None, true), shapes, console)?;
@@ -192,7 +192,7 @@ impl Demo<'_> {
             schedule: &self.schedule,
             native: &self.native,
             capture: &self.capture,
-            answer: &answer::of_scene(&self.native.recording, &self.scene.settings, &[]),
+            answer: &answer::scene_lines(&self.native.recording, &self.scene.settings, &[]),
             facts: &self.facts,
             imported: &self.imported,
             estimates: &self.estimates,

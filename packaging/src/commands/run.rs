@@ -87,7 +87,7 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<CommandOutcome
     // A parameter on the command line replaces that of the scene.
     let is_set = arguments.set.iter().any(|(name, _)| name == "scheme");
     let scheme = if is_set { "set on the command line".to_owned() } else { scene_features::scheme(&scene.settings) };
-    let answer = answer::of_scene(&run.recording, &scene.settings, &arguments.set);
+    let answer = answer::scene_lines(&run.recording, &scene.settings, &arguments.set);
     let [warnings, warning_details] = warnings_json(&run.warnings);
     let estimates = estimated(&scene, arguments, &schedule, console)?;
     let fields = observers.as_ref().and_then(|observers| observers.fields.as_ref());
@@ -146,12 +146,12 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<CommandOutcome
     });
     let rest = if arguments.all {
         let outputs = outputs(&run.recording.names, run.recording.row(rows - 1));
-        let fields = written(fields, report);
+        let fields = written_lines(fields, report);
         format!("\n{outputs}\n{}{fields}", summary(&json, &extremes, &run.warnings) + &lines(&estimates))
     } else {
         let reported =
             if estimates.is_empty() { String::new() } else { format!("\n{}", estimate::errors_text(&estimates)) };
-        let fields = written(fields, report);
+        let fields = written_lines(fields, report);
         let hint =
             if arguments.estimate { "" } else { "\nto estimate the errors of this run with coarser runs: --estimate" };
         format!("{}{fields}{reported}{hint}", where_the_rest_is(&json, !run.warnings.is_empty()))
@@ -174,8 +174,8 @@ fn fields_json(fields: &FieldSeries) -> Value {
     })
 }
 
-/// Returns lines about the files of fields over time and the report.
-fn written(fields: Option<&FieldSeries>, report: Option<(&Path, usize)>) -> String {
+/// Returns one line for the fields over time and one for the report, as far as they were written.
+fn written_lines(fields: Option<&FieldSeries>, report: Option<(&Path, usize)>) -> String {
     let mut text = String::new();
     if let Some(fields) = fields {
         let (files, bytes) = fields.written();

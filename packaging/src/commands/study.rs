@@ -48,7 +48,7 @@ pub fn run(arguments: &StudyArguments, console: &Console) -> Result<CommandOutco
             journals.map_or(Ok(()), TaskJournals::remove)?;
             Ok(outcome)
         }
-        StudyOutcome::Part(part) => Ok(of_part(&part)),
+        StudyOutcome::Part(part) => Ok(part_outcome(&part)),
     }
 }
 
@@ -84,10 +84,10 @@ fn convergence(own: &ConvergenceCommand, console: &Console) -> Result<CommandOut
 }
 
 /// Summarises a part of a study.
-fn of_part(FinishedPart { part, tasks, all, journal }: &FinishedPart) -> CommandOutcome {
+fn part_outcome(FinishedPart { part, tasks, all, journal }: &FinishedPart) -> CommandOutcome {
     let text = format!(
-        "part {part}: {tasks} of {all} runs are finished, their results are in {}\n\
-         When all parts are finished, run the command without --part in the same place to make the study",
+        "part {part}: {tasks} of {all} runs are finished; their results are in {}\n\
+         When all parts are finished, run the same command without --part to make the study",
         journal.display()
     );
     let json = json!({ "part": part.to_string(), "runs": tasks, "all_runs": all, "journal": shown_path(journal) });

@@ -11,7 +11,7 @@ use super::input::{ReportFile, ReportInput};
 use super::numbers::{rounded, scientific};
 use crate::rom_facts::{CheckRow, OmittedRows, ROWS_SHOWN, RomFacts, not_negative_zero, order_text, sectors_text};
 
-/// Describes the reduced-order models; empty without their facts.
+/// Returns the section about the reduced-order models; empty without facts about them.
 pub(super) fn rom_section(facts: &[RomFacts]) -> String {
     if facts.is_empty() {
         return String::new();
@@ -81,7 +81,7 @@ fn checks_table(checks: &[CheckRow]) -> String {
     html
 }
 
-/// Describes the run with its warnings and computing times.
+/// Returns the section about the run, with its warnings and computing times.
 pub(super) fn run_section(input: &ReportInput<'_>) -> String {
     let (native, schedule) = (input.native, input.schedule);
     let stepping = native.stepping.as_secs_f64();
@@ -134,7 +134,7 @@ pub(super) fn run_section(input: &ReportInput<'_>) -> String {
     html
 }
 
-/// Compares FMUs with the native run; empty without imported runs.
+/// Returns the section that compares FMUs with the native run; empty without imported runs.
 pub(super) fn agreement_section(input: &ReportInput<'_>) -> String {
     if input.imported.is_empty() {
         return String::new();
@@ -169,7 +169,7 @@ pub(super) fn agreement_section(input: &ReportInput<'_>) -> String {
     html
 }
 
-/// Shows all settings of the scene.
+/// Returns the section with all settings of the scene.
 pub(super) fn scene_section(input: &ReportInput<'_>) -> String {
     format!(
         "<section><h2>Scene</h2><details><summary>All settings, defaults included</summary><pre>{}</pre></details></section>\n",
@@ -177,7 +177,7 @@ pub(super) fn scene_section(input: &ReportInput<'_>) -> String {
     )
 }
 
-/// Lists the files beside the report; empty if there are none.
+/// Returns the section with the files beside the report; empty without files.
 pub(super) fn files_section(files: &[ReportFile]) -> String {
     if files.is_empty() {
         return String::new();

@@ -23,11 +23,13 @@ use super::numbers::rounded;
 
 /// Largest number of contact nodes that are drawn as lines instead of a map.
 const MAX_LINES: usize = 4;
-/// The response is shown up to a factor above its highest peak with this fraction of the largest amplitude.
+/// Smallest peak that the frequency range must include, as a fraction of the largest peak.
 const SHOWN_PEAK: f64 = 0.18;
+/// End of the frequency range, as a multiple of the highest frequency of these peaks.
 const ABOVE: f64 = 1.2;
-/// Number of modes that are shown at least, and largest number of lines of modes.
+/// Number of modes that the frequency range must include.
 const MIN_MODES: usize = 2;
+/// Largest number of lines of modes.
 const MAX_MODES: usize = 60;
 /// Largest number of engine orders.
 const MAX_ORDERS: usize = 36;
@@ -57,11 +59,12 @@ impl<'a> Results<'a> {
         self.column(quantity)?.last().copied()
     }
 
-    /// Returns points of time in ms and value.
+    /// Returns the points (ms, value) of a column.
     fn points(&self, column: &[f64]) -> Vec<(f64, f64)> {
         self.recording.times.iter().zip(column).map(|(time, value)| (1e3 * time, *value)).collect()
     }
 
+    /// Returns a scalar quantity over time as a line.
     fn series(&self, label: &str, quantity: Quantity) -> Option<Series> {
         self.column(quantity).map(|column| Series::line(label, self.points(&column)))
     }
@@ -114,7 +117,7 @@ fn clearances(input: &ReportInput<'_>) -> Result<Vec<Captioned>> {
         };
         let rest = at_rest(input, &own.name, own.smallest.len())?;
         let curves = rest.into_iter().chain([smallest]).collect();
-        let turn = if input.capture.angle_clearances().len() > 1 {
+        let owner = if input.capture.angle_clearances().len() > 1 {
             format!(" of {}", escape(&own.name))
         } else {
             String::new()
@@ -122,7 +125,7 @@ fn clearances(input: &ReportInput<'_>) -> Result<Vec<Captioned>> {
         figures.push(Captioned {
             body: Polar { label: "clearance (µm)".into(), curves }.to_html(),
             caption: format!(
-                "Clearance{turn} around the casing, seen along the axis. The outer circle is the casing: where the curve \
+                "Clearance{owner} around the casing, seen along the axis. The outer circle is the casing: where the curve \
                  reaches it, a tip touches. Angles are fixed in space."
             ),
         });
@@ -140,14 +143,14 @@ fn clearances(input: &ReportInput<'_>) -> Result<Vec<Captioned>> {
         figures.push(Captioned {
             body: map.to_html(),
             caption: format!(
-                "Smallest clearance{turn} at each place around the casing over time. Where the colour is strongest, a tip touches."
+                "Smallest clearance{owner} at each angle around the casing over time. The strongest colour marks clearances close to 0."
             ),
         });
     }
     Ok(figures)
 }
 
-/// Returns the clearance of an undeformed blade from a casing that is only shaped, without elastic deformation.
+/// Returns the clearance (µm) of an undeformed blade from a casing with its prescribed shape, without elastic deformation.
 fn at_rest(input: &ReportInput<'_>, rotor: &str, count: usize) -> Result<Option<PolarCurve>> {
     let settings = &input.scene.settings;
     let Some(contact) = settings.contacts.iter().find(|contact| contact.master == rotor) else { return Ok(None) };
@@ -160,8 +163,8 @@ fn at_rest(input: &ReportInput<'_>, rotor: &str, count: usize) -> Result<Option<
         1e6 * (contact.nominal_gap() + shape.evaluate(angle).0).max(0.0)
     };
     let label = match surface.shape {
-        Shape::Circular {} => "blade and casing undeformed",
-        _ => "blade undeformed, casing with its full shape only",
+        Shape::Circular {} => "undeformed blade and casing",
+        _ => "undeformed blade, casing with its full prescribed shape",
     };
     Ok(Some(PolarCurve { label: label.into(), values: (0..count).map(clearance).collect() }))
 }
@@ -179,7 +182,7 @@ fn wear(input: &ReportInput<'_>) -> Vec<Captioned> {
             shows: Shows::Largest,
             decades: None,
         };
-        let caption = format!("Wear of the coating of {} at the end of the run, unrolled.", escape(&map.name));
+        let caption = format!("Wear depth of the coating of {} at the end of the run, unrolled.", escape(&map.name));
         Captioned { body: picture.to_html(), caption }
     };
     input.capture.wear().iter().map(figure).collect()
@@ -230,7 +233,8 @@ fn forces(input: &ReportInput<'_>, results: &Results<'_>, blade: Option<&HitBlad
             figures.push(Captioned {
                 body,
                 caption: format!(
-                    "Normal force on each contact node of {whose}, which is hit hardest: mean over each communication step."
+                    "Normal force on each contact node of {whose}, which is hit hardest. Values are means over a communication \
+                     step; a long run shows the largest of several steps."
                 ),
             });
         }
@@ -252,7 +256,7 @@ fn vibration(input: &ReportInput<'_>, history: Option<(&HitBlade, &TipHistory)>)
     let Some((blade, history)) = history else { return Ok(Vec::new()) };
     let spacing = input.capture.spacing();
     let micro: Vec<f64> = history.values.iter().map(|value| 1e6 * value).collect();
-    let Some(spectrum) = Spectrum::of(&micro, spacing)? else { return Ok(Vec::new()) };
+    let Some(spectrum) = Spectrum::from_samples(&micro, spacing)? else { return Ok(Vec::new()) };
     let whose = if blade.sectors > 1 { format!("blade {}", blade.sector + 1) } else { escape(&blade.name) };
     let what = format!("{} displacement of {whose} at its {}", history.direction, escape(&readable(&history.node)));
     let prediction = FrequencyPrediction::with_settings(input.scene, input.settings, 0.0).ok();
@@ -270,7 +274,7 @@ fn vibration(input: &ReportInput<'_>, history: Option<(&HitBlade, &TipHistory)>)
     if let (Some(prediction), Some(speed)) = (&prediction, speed.filter(|speed| *speed != 0.0)) {
         figures.push(campbell(prediction, speed.abs(), top, &spectrum, &what));
     }
-    if let Some(found) = Spectrogram::of(&micro, first, spacing)? {
+    if let Some(found) = Spectrogram::from_samples(&micro, first, spacing)? {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a number of frequencies")]
         let count = ((top / found.resolution).ceil() as usize).clamp(2, found.amplitudes[0].len());
         let row = |bin: usize| found.amplitudes.iter().map(|column| column[bin]).collect();
@@ -289,7 +293,7 @@ fn vibration(input: &ReportInput<'_>, history: Option<(&HitBlade, &TipHistory)>)
         figures.push(Captioned {
             body: map.to_html(),
             caption: format!(
-                "Spectrogram of the {what}: windows of {:.3} ms, frequencies {:.0} Hz apart. Lines: natural frequencies at rest \
+                "Spectrogram of the {what}: windows of {:.3} ms, frequencies {:.0} Hz apart. Lines are natural frequencies at rest \
                  {}.",
                 1e3 * found.window,
                 found.resolution,
@@ -323,7 +327,10 @@ fn campbell(prediction: &FrequencyPrediction, speed: f64, top: f64, spectrum: &S
     let strongest = peaks.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1));
     let strongest = strongest.map_or(String::new(), |(found, amplitude)| {
         let order = found * std::f64::consts::TAU / speed;
-        format!(" The largest amplitude, {} µm, is at {found:.0} Hz ({order:.2} times the speed).", rounded(amplitude))
+        format!(
+            " The largest amplitude, {} µm, is at {found:.0} Hz ({order:.2} times the rotational frequency).",
+            rounded(amplitude)
+        )
     });
     let campbell = Campbell {
         speed,
@@ -338,7 +345,7 @@ fn campbell(prediction: &FrequencyPrediction, speed: f64, top: f64, spectrum: &S
         body: campbell.to_html(),
         caption: format!(
             "Campbell diagram with the response to the rub. Left: natural frequencies (solid), engine orders (dotted; numbered \
-             and stronger if the casing excites them), and circles for the peaks of the run at its speed. Right: amplitude of \
+             and drawn stronger if the casing excites them), and peaks of the run at its speed (circles). Right: amplitude of \
              the {what} over the whole run.{strongest}"
         ),
     }
@@ -360,7 +367,7 @@ fn energies(results: &Results<'_>) -> Result<Vec<Captioned>> {
         ),
         (
             &exchanged[..],
-            "External work of the drive and the casing, and friction heat, since the start. The difference is the vibration \
+            "External work of the drive and the casing, and friction heat, since the start. Their difference is the vibration \
              energy and the losses to damping and impacts.",
         ),
     ] {

@@ -23,7 +23,7 @@ pub struct ImportedSummary {
 pub struct ReportFile {
     /// File name, relative to the report.
     pub name: String,
-    /// Meaning of the value.
+    /// Contents of the file, in words.
     pub meaning: String,
     /// Size in bytes.
     pub bytes: u64,
@@ -35,7 +35,7 @@ pub struct ReportInput<'a> {
     pub scene: &'a Scene,
     /// Variables of the run.
     pub table: &'a VariableTable,
-    /// Start values from the command line (name, value).
+    /// Replaced start values (name, value as text).
     pub settings: &'a [(String, String)],
     /// Communication points.
     pub schedule: &'a Schedule,
@@ -45,7 +45,7 @@ pub struct ReportInput<'a> {
     pub capture: &'a Capture,
     /// Main results of the run.
     pub answer: &'a [AnswerLine],
-    /// Facts of the ROMs; may be empty.
+    /// Facts about the ROMs; may be empty.
     pub facts: &'a [RomFacts],
     /// Runs through the C interfaces of FMI.
     pub imported: &'a [ImportedSummary],

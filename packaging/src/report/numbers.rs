@@ -1,4 +1,4 @@
-//! Numbers as people read them.
+//! Formatting of numbers for readers.
 
 /// Formats a value with three significant digits.
 pub(super) fn rounded(value: f64) -> String {
@@ -8,7 +8,7 @@ pub(super) fn rounded(value: f64) -> String {
     if !(1e-3..1e6).contains(&value.abs()) {
         return scientific(value);
     }
-    // 0.9997 has the digits of 1.
+    // 0.9997 is rounded to 1.00, so the rounded value determines the number of digits.
     let three = format!("{value:.2e}").parse().unwrap_or(value);
     let (mut digits, mut magnitude) = (2_usize, f64::abs(three));
     while magnitude >= 10.0 && digits > 0 {
@@ -22,7 +22,7 @@ pub(super) fn rounded(value: f64) -> String {
     format!("{value:.digits$}")
 }
 
-/// Formats a value with at most four significant digits; powers of ten are written out, in HTML.
+/// Formats a value as HTML with at most four significant digits and a power of ten.
 pub(super) fn scientific(value: f64) -> String {
     let text = format!("{value:.3e}");
     match text.split_once('e') {
@@ -40,7 +40,7 @@ pub(super) fn with_prefix(value: f64, unit: &str) -> String {
     const PREFIXES: [(f64, &str); 7] =
         [(1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n")];
     let magnitude = value.abs();
-    // 999.6 is shown as 1.00 of the next prefix.
+    // 999.6 is rounded to 1.00 with the next prefix.
     let found = PREFIXES.into_iter().find(|(factor, _)| magnitude >= 0.9995 * factor);
     let (factor, prefix) = found.filter(|_| magnitude > 0.0).unwrap_or((1.0, ""));
     format!("{}\u{a0}{prefix}{unit}", rounded(value / factor).replace('-', "−"))

@@ -1,4 +1,4 @@
-//! Page of the report: answer, animation, figures and details.
+//! Page of the report: main results, animation, figures and details.
 
 use std::fmt::Write as _;
 
@@ -8,18 +8,18 @@ use tiprub_shell::Result;
 use super::input::ReportInput;
 use super::{details, figures, summary::Summary, viewer};
 
-/// Style sheet of the report, after that of all pages.
+/// Style sheet of the report, which follows the style sheet of all pages.
 const OWN_STYLE: &str = include_str!("report.css");
 
 /// Renders the whole page.
 ///
 /// # Errors
-/// A plot cannot be drawn.
+/// A figure cannot be drawn, or the data of the animation cannot be compressed.
 pub fn render(input: &ReportInput<'_>) -> Result<String> {
     let settings = &input.scene.settings;
     let title = escape(&settings.name);
     let blade = input.capture.hardest_hit();
-    let summary = Summary::of(input);
+    let summary = Summary::new(input);
     let mut page = format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\

@@ -1,4 +1,4 @@
-//! The answer in words, and five numbers: how hard, how long, how hot, how much wear, and whether vibration grows.
+//! Main results in words and in five numbers: force, duration of contact, heat, wear, and growth of vibration.
 
 use std::fmt::Write as _;
 
@@ -10,7 +10,7 @@ use tiprub_shell::extremes;
 use super::input::ReportInput;
 use super::numbers::{rounded, with_prefix};
 
-/// Vibration whose largest energy changes by less than this factor is steady.
+/// Factor on the largest vibration energy up to which vibration counts as steady.
 const STEADY: f64 = 1.1;
 
 /// Times of contact.
@@ -27,7 +27,7 @@ pub(super) struct Summary {
     /// Largest total normal force (N) and the end of its communication step (s).
     force: Option<(f64, f64)>,
     contact: Option<ContactTime>,
-    /// Friction heat (J) and the largest friction power (W).
+    /// Friction heat (J), and the largest friction power (W) if the scene reports it.
     heat: Option<(f64, Option<f64>)>,
     /// Largest wear depth (m).
     wear: Option<f64>,
@@ -41,7 +41,7 @@ pub(super) struct Summary {
 }
 
 impl Summary {
-    pub(super) fn of(input: &ReportInput<'_>) -> Self {
+    pub(super) fn new(input: &ReportInput<'_>) -> Self {
         let recording = &input.native.recording;
         let value = |name: &str| input.answer.iter().find(|line| line.name == name).and_then(|line| line.value);
         let extremes = extremes::extremes(recording);
@@ -74,7 +74,7 @@ impl Summary {
         };
         let long = match self.contact {
             Some(contact) if contact.total > 0.0 => {
-                let note = format!("{} % of the run has contact", rounded(100.0 * contact.total / self.length));
+                let note = format!("contact during {} % of the run", rounded(100.0 * contact.total / self.length));
                 (with_prefix(contact.total, "s"), note)
             }
             Some(_) => ("0 s".to_owned(), "no contact occurred".to_owned()),
@@ -96,7 +96,7 @@ impl Summary {
         let grows = match self.growth {
             Some(growth) => {
                 let word = if growth > STEADY { "yes" } else { "no" };
-                let note = "largest vibration energy of the last third of the run over that of the middle third";
+                let note = "largest vibration energy of the last third of the run, divided by that of the middle third";
                 (format!("{word}, ×{}", rounded(growth)), note.to_owned())
             }
             None => missing("the run reports no vibration energy before its last third"),
@@ -109,7 +109,7 @@ impl Summary {
         html + "</dl>"
     }
 
-    /// Returns the answer in words as HTML.
+    /// Returns the main results in words as HTML.
     pub(super) fn words(&self, input: &ReportInput<'_>, blade: Option<&HitBlade>) -> String {
         let has_rotor = input.scene.settings.structures.iter().any(|own| own.motion == BodyMotion::Rotating);
         let [tips, touch] = if has_rotor { ["The blades", "touch the casing"] } else { ["The bodies", "touch"] };

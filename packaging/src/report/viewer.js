@@ -5,8 +5,8 @@ const find = name => root.querySelector(name), note = find(".note");
 const fail = text => { note.textContent = text; note.hidden = false; find(".controls").hidden = true; };
 const header = JSON.parse(document.getElementById("run-header").textContent);
 const gl = canvas.getContext("webgl2", { antialias: true, preserveDrawingBuffer: true, premultipliedAlpha: true });
-if (!gl) { fail("This browser has no WebGL 2, which the animation needs. The figures below are complete without it."); return; }
-if (!self.DecompressionStream) { fail("This browser is too old for the animation. The figures below are complete without it."); return; }
+if (!gl) { fail("The animation needs WebGL 2, which this browser does not provide. Enable it, or use another browser. The figures below are complete without it."); return; }
+if (!self.DecompressionStream) { fail("This browser cannot decompress the data of the animation. Update it, or use another browser. The figures below are complete without it."); return; }
 
 const packed = Uint8Array.from(atob(document.getElementById("run-data").textContent), c => c.charCodeAt(0));
 new Response(new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"))).arrayBuffer()
@@ -74,7 +74,7 @@ void main() {
 function start(buffer) {
   const program = link();
   const uniform = new Proxy({}, { get: (known, name) => known[name] ??= gl.getUniformLocation(program, name) });
-  // Low bytes come before high bytes.
+  // All low bytes of an array come before all high bytes.
   const u16 = (place, count) => { const [low, high] = [0, count].map(more => new Uint8Array(buffer, place + more, count)); return Uint16Array.from(low, (byte, i) => byte | high[i] << 8); };
   const i16 = ([place, unit], count) => Float32Array.from(new Int16Array(u16(place, count).buffer), v => v * unit);
   const times = header.times, frames = times.length, ANGLES = header.angles;
@@ -139,7 +139,7 @@ function start(buffer) {
     result.largest = sizes(result, basis);
     return result;
   }
-  // Largest displacement, from the coefficients at all times at a part of the points.
+  // Largest displacement (m) of a subset of the points at a subset of the times.
   function sizes(own, basis) {
     let most = 0;
     const step = Math.max(1, Math.floor(own.points / 60)), jump = Math.max(1, Math.floor(frames * own.sectors / 1500));
@@ -188,7 +188,7 @@ function start(buffer) {
     return own;
   }
 
-  // State at a time: motion is interpolated between two stored times.
+  // Sets the state at the time of the slider, interpolated between two stored times.
   const mix = (a, b, share) => a + (b - a) * share;
   function set_time() {
     const f = Math.min(Math.floor(state.at), Math.max(0, frames - 2)), g = Math.min(f + 1, frames - 1), share = state.at - f;

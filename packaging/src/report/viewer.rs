@@ -10,7 +10,7 @@ use tiprub_shell::Result;
 use super::input::ReportInput;
 use super::numbers::{rounded, with_prefix};
 
-/// Program of the animation.
+/// JavaScript program of the animation.
 const PROGRAM: &str = include_str!("viewer.js");
 
 /// Returns the section with the animation.
@@ -27,7 +27,7 @@ pub(super) fn section(input: &ReportInput<'_>, blade: Option<&HitBlade>) -> Resu
     let [start, stop] = animation.interval;
     let mut html = String::from(
         "<section class=\"viewer\" id=\"viewer\" aria-label=\"Animation of the contact\">\n<div class=\"stage\">\
-         <canvas tabindex=\"0\" role=\"img\" aria-label=\"Three-dimensional picture of the run. Arrow keys turn it, plus and minus \
+         <canvas tabindex=\"0\" role=\"img\" aria-label=\"Three-dimensional picture of the run. The arrow keys rotate it; plus and minus \
          zoom.\"></canvas><output class=\"now\"></output><p class=\"note\" hidden></p><div class=\"key\" aria-hidden=\"true\">\
          <span><i class=\"cool\"></i>displacement <b></b></span><span><i class=\"hot\"></i>contact force <b></b></span></div></div>\n",
     );
@@ -35,7 +35,7 @@ pub(super) fn section(input: &ReportInput<'_>, blade: Option<&HitBlade>) -> Resu
         format!(
             "<fieldset><legend>View</legend><label><input type=\"radio\" name=\"view\" value=\"all\" checked>whole rotor</label>\
              <label><input type=\"radio\" name=\"view\" value=\"blade\">blade {}</label>\
-             <label><input type=\"checkbox\" name=\"turn\">turn with the rotor</label></fieldset>",
+             <label><input type=\"checkbox\" name=\"turn\">rotate with the rotor</label></fieldset>",
             blade.sector + 1
         )
     });
@@ -47,7 +47,7 @@ pub(super) fn section(input: &ReportInput<'_>, blade: Option<&HitBlade>) -> Resu
          <input type=\"range\" name=\"time\" min=\"0\" max=\"2000\" step=\"1\" value=\"0\"></label>\
          <label class=\"scale\"><span>Exaggeration <b class=\"value\"></b></span>\
          <input type=\"range\" name=\"scale\" min=\"0\" max=\"1000\" step=\"1\" value=\"500\"></label>\
-         <label class=\"pace\"><span>Pace</span><select name=\"pace\"><option value=\"0.25\">¼</option><option value=\"0.5\">½</option>\
+         <label class=\"pace\"><span>Playback</span><select name=\"pace\"><option value=\"0.25\">¼</option><option value=\"0.5\">½</option>\
          <option value=\"1\" selected>1</option><option value=\"2\">2</option></select></label>{views}</div>"
     );
     let _ = writeln!(
@@ -65,31 +65,31 @@ pub(super) fn section(input: &ReportInput<'_>, blade: Option<&HitBlade>) -> Resu
     Ok(html)
 }
 
-/// Explains what is exaggerated and what is missing.
+/// Explains which interval is shown, what is exaggerated and what is missing, as HTML.
 fn explanation(input: &ReportInput<'_>, [start, stop]: [f64; 2], is_cut: bool, deviation: f64) -> String {
     let whole = stop - start >= 0.999 * (input.schedule.stop - input.schedule.start);
     let interval = if whole {
         "The animation shows the whole run".to_owned()
     } else {
-        format!("The animation shows {} to {}", with_prefix(start, "s"), with_prefix(stop, "s"))
+        format!("The animation shows the run from {} to {}", with_prefix(start, "s"), with_prefix(stop, "s"))
     };
-    let cut = if is_cut { ", with the largest force; contact also occurs at other times" } else { "" };
+    let cut = if is_cut { ", which includes the largest force; contact also occurs at other times" } else { "" };
     let mut text = format!("<p>{interval}{cut}.");
     if input.capture.has_rings() {
         text.push_str(
             " Displacements, the gap between tips and casing and the shape of the casing are exaggerated by the same factor, so \
-             that contact nodes meet the casing in the picture when they do in the run. Sizes of blades and casing, and the \
-             rotation, are true. A grey drum replaces the disk if the model has none.",
+             that contact nodes meet the casing in the picture when they do in the run. The sizes of blades and casing and the \
+             rotation are not exaggerated. A grey drum replaces the disk if the model has none.",
         );
     } else {
         text.push_str(
-            " Elastic displacements are exaggerated, the flight of a body is not: with a large factor, bodies that touch may \
-             overlap in the picture.",
+            " Elastic displacements are exaggerated, but the rigid motion of free bodies is not. With a large factor, bodies that \
+             touch may overlap in the picture.",
         );
     }
     text.push_str(
-        " Orange light marks contacts: its strength is the mean normal force of a communication step relative to the largest of the \
-         interval.",
+        " Orange light marks contacts. Its strength shows the mean normal force of a communication step, relative to the largest \
+         one of the interval.",
     );
     if deviation > 0.0 {
         let _ =
@@ -100,10 +100,10 @@ fn explanation(input: &ReportInput<'_>, [start, stop]: [f64; 2], is_cut: bool, d
         let verb = if alone.len() == 1 { "is" } else { "are" };
         let _ = write!(
             text,
-            " <b>{} {verb} shown by contact nodes only</b>, because no shape file belongs to the model; <code>tiprub reduce</code> \
+            " <b>{} {verb} shown by contact nodes only</b>, because no shape file belongs to the ROM; <code>tiprub reduce</code> \
              writes one beside the ROM of a mesh.",
             alone.join(", ")
         );
     }
-    text + " Drag to turn, Ctrl and the mouse wheel to zoom, double-click for the first view.</p>"
+    text + " Drag the picture to rotate it, use Ctrl and the mouse wheel to zoom, and double-click to restore the first view.</p>"
 }

@@ -1,4 +1,4 @@
-//! Report of a run: complete, offline, small, without effect on the results.
+//! Report of a run: it is complete and small, opens offline, and does not change the results.
 
 use std::fs;
 
@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use crate::project::{Project, SCENE};
 
-/// Elements without an end.
+/// Elements without a closing tag.
 const VOID: [&str; 4] = ["meta", "input", "br", "!DOCTYPE"];
 
 /// Checks that all elements of a page are closed in their order; text of scripts and styles is skipped.
@@ -31,7 +31,7 @@ fn assert_well_formed(html: &str) {
     assert!(open.is_empty(), "{open:?}");
 }
 
-/// Checks what every report has; returns it.
+/// Reads a report, and checks the properties of every report.
 #[track_caller]
 fn read(project: &Project, name: &str) -> String {
     let html = fs::read_to_string(project.path(name)).unwrap();
@@ -93,7 +93,7 @@ fn report_is_complete_and_does_not_change_the_results() {
 }
 
 #[test]
-fn report_without_contact_says_so() {
+fn report_states_that_no_contact_occurred() {
     let project = Project::new();
     fs::write(project.path("scene.toml"), SCENE.replace("amplitude = 2e-3", "amplitude = 2e-5")).unwrap();
     let printed = project.succeed(&["--json", "run", "scene.toml", "--report", "free.html"]);

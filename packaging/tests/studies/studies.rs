@@ -129,9 +129,9 @@ fn killed_stability_study_continues() {
     assert!(page("killed") == page("whole") && !journal.exists());
 }
 
-/// A map that is killed continues, and parts of a map join: both give the same numbers as one undisturbed run.
+/// A killed map that continues, and a map of several parts, have the same numbers as an uninterrupted map.
 #[test]
-fn killed_map_continues_and_parts_join() {
+fn killed_map_continues_and_parts_are_combined() {
     let root = tempfile::tempdir().unwrap();
     let cache = env!("CARGO_TARGET_TMPDIR");
     let map = |more: &[&str]| -> Value {

@@ -1,4 +1,4 @@
-//! Cells between points: contact nodes, and copies for each sector.
+//! Cells between contact nodes, and copies of cells for all sectors.
 
 use tiprub_core::Rom;
 use tiprub_core::scene::settings::ContactSettings;
@@ -6,14 +6,15 @@ use tiprub_core::scene::settings::ContactSettings;
 use crate::structure::Structure;
 use crate::vtu::cell;
 
-/// Cells by their corners and types.
+/// Cells with their corners and VTK types.
 pub(crate) type Cells = Vec<(Vec<usize>, u8)>;
 
+/// Returns one cell for each of `count` points.
 pub(crate) fn points_alone(count: usize) -> Cells {
     (0..count).map(|point| (vec![point], cell::VERTEX)).collect()
 }
 
-/// Repeats the cells for each sector of `points` points.
+/// Repeats the cells of one sector, which has `points` points, for each sector.
 pub(crate) fn repeated(cells: &Cells, points: usize, sectors: usize) -> Cells {
     let of_sector = |sector: usize| {
         let moved = move |corners: &[usize]| corners.iter().map(|corner| sector * points + corner).collect();

@@ -10,9 +10,9 @@ use tiprub_shell::{Failure, Result};
 
 /// Points around and along the rigid surface of a contact without a coating.
 const RING: [usize; 2] = [360, 8];
-/// Contact nodes within this fraction of their radius along the axis have no axial extent; a surface then extends by
-/// this fraction of the radius to both sides.
+/// Axial extent of contact nodes, as a fraction of their radius, up to which they count as lying in one plane.
 const FLAT: f64 = 1e-6;
+/// Axial extent of the surface to both sides of contact nodes in one plane, as a fraction of the radius.
 const HALF_STRIP: f64 = 0.05;
 
 /// Surface of revolution of a contact.
@@ -22,13 +22,15 @@ pub(crate) struct Ring {
     pub(crate) contact: usize,
     /// Unique name.
     pub(crate) name: String,
+    /// Prescribed shape.
     shape: CompiledShape,
     /// Radius and axial position of each ring of points (m).
     pub(crate) rows: Vec<[f64; 2]>,
+    /// Number of points around the axis.
     pub(crate) around: usize,
     /// Nominal gap (m), which the radii include.
     pub(crate) gap: f64,
-    /// Index of the structure that carries the surface and deforms.
+    /// Index of the structure with which the surface deforms; `None` for a rigid surface.
     pub(crate) carrier: Option<usize>,
     /// Name of the output with the wear of each cell; `None` without a coating.
     pub(crate) wear: Option<String>,
@@ -39,7 +41,7 @@ impl Ring {
     ///
     /// # Errors
     /// The shape of the surface cannot be evaluated.
-    pub(crate) fn of_contact(contact: usize, scene: &Scene) -> Result<Option<Self>> {
+    pub(crate) fn for_contact(contact: usize, scene: &Scene) -> Result<Option<Self>> {
         let settings = &scene.settings;
         let own = &settings.contacts[contact];
         let Some(surface) = settings.surfaces.iter().find(|surface| surface.name == own.slave) else { return Ok(None) };
@@ -74,6 +76,7 @@ impl Ring {
     }
 }
 
+/// Returns the unique name of the surface of a contact.
 fn surface_name(contacts: usize, surface: &SurfaceSettings, contact: usize) -> String {
     if contacts > 1 { format!("{}_surface_{}", surface.name, contact + 1) } else { format!("{}_surface", surface.name) }
 }

@@ -55,7 +55,7 @@ impl FieldOptions {
     /// Returns the scene with the outputs from which the fields are read, see [`observed_scene`].
     ///
     /// # Errors
-    /// A chosen sector that no structure has, or that is given twice.
+    /// No structure has a chosen sector, or a sector is given twice.
     pub fn scene(&self, scene: &Scene) -> Result<Scene> {
         observed_scene(scene, &self.sectors)
     }
@@ -66,11 +66,11 @@ impl FieldOptions {
     }
 }
 
-/// Returns the scene with the outputs that an observer reads: the chosen sectors (1-based; all if there are none) are watched, and
-/// wear and stress are reported as far as the scene has them. Its results are those of the scene.
+/// Returns the scene with the outputs that an observer reads: the chosen sectors (1-based; all if `sectors` is empty) are watched, and
+/// wear and stress are reported as far as the scene has them. The results are those of the original scene.
 ///
 /// # Errors
-/// A chosen sector that no structure has, or that is given twice.
+/// No structure has a chosen sector, or a sector is given twice.
 pub fn observed_scene(scene: &Scene, sectors: &[usize]) -> Result<Scene> {
     let mut extended = scene.clone();
     let settings = &scene.settings;
@@ -320,9 +320,9 @@ fn contact_part(index: usize, structure: &Structure, scene: &Scene) -> Result<Pa
     part(format!("{}_contact", structure.name), structure, cells, Source::Contact(index))
 }
 
-/// Returns a surface of revolution: one without a structure, or with a coating.
+/// Returns the part of a surface of revolution; `None` unless the surface is rigid or has a coating.
 fn ring_part(contact: usize, scene: &Scene) -> Result<Option<Part>> {
-    let Some(ring) = Ring::of_contact(contact, scene)?.filter(|ring| ring.carrier.is_none() || ring.wear.is_some())
+    let Some(ring) = Ring::for_contact(contact, scene)?.filter(|ring| ring.carrier.is_none() || ring.wear.is_some())
     else {
         return Ok(None);
     };

@@ -116,22 +116,22 @@ pub(crate) enum Coordinates {
 /// Mass-normalised mode shapes of a structure in reduced coordinates.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum ModalShapes<'a> {
-    /// Of one sector.
+    /// Shapes of one sector.
     Uncoupled(Cow<'a, DMatrix<f64>>),
-    /// Of each nodal diameter.
+    /// Shapes of each nodal diameter.
     Coupled(Vec<Cow<'a, DMatrix<Complex<f64>>>>),
 }
 
 impl<'a> ModalShapes<'a> {
     /// Returns the shapes of a bank.
-    pub(crate) fn of(bank: &'a ModalBank) -> Self {
+    pub(crate) fn from_bank(bank: &'a ModalBank) -> Self {
         match bank.disk() {
             None => Self::Uncoupled(Cow::Borrowed(&bank.model().shapes)),
             Some(disk) => Self::Coupled(disk.model().diameters.iter().map(|own| Cow::Borrowed(&own.shapes)).collect()),
         }
     }
 
-    /// Returns the shapes for use after the run.
+    /// Copies the shapes, for use after the run.
     pub(crate) fn into_owned(self) -> ModalShapes<'static> {
         match self {
             Self::Uncoupled(shapes) => ModalShapes::Uncoupled(Cow::Owned(shapes.into_owned())),
@@ -286,7 +286,7 @@ impl Structure {
         Some(self.sectors.iter().flat_map(of_sector).collect())
     }
 
-    /// Returns the period (s) of the slowest elastic mode of the undamped structure; `None` if it cannot be determined.
+    /// Returns the period (s) of the slowest elastic mode of the structure; `None` if it has none, or if its modes cannot be computed.
     pub(crate) fn slowest_period(&self) -> Option<f64> {
         let model = ModalModel::from_rom(&self.rom, self.rom.damping_ratio).ok()?;
         let slowest = model.frequencies.into_iter().find(|frequency| *frequency > 0.0)?;
@@ -306,7 +306,7 @@ impl Structure {
         Some(simulation.system().structures()[self.index?].modes())
     }
 
-    /// Returns the current rigid motion, without that of the sectors.
+    /// Returns the current rigid motion of the structure, without the angle of a sector.
     pub(crate) fn rigid_motion(&self, simulation: &Simulation) -> RigidMotion {
         let mut motion = RigidMotion::default();
         let value = |name: &str| variable(simulation, &format!("{}{name}", self.prefix));
@@ -321,8 +321,8 @@ impl Structure {
         motion
     }
 
-    /// Returns the displacements of contact nodes and surface from the reduced coordinates, sector by sector, in the
-    /// directions of the first sector. Those of contact nodes have the directions of the ROM.
+    /// Returns the displacements (m) of contact nodes and surface from the reduced coordinates, sector by sector, in the
+    /// directions of the first sector. Displacements of contact nodes have the directions of the ROM.
     pub(crate) fn sector_displacements(&self, coordinates: Option<&Coordinates>) -> [Vec<Vec<f64>>; 2] {
         let count = self.rom.sectors;
         let points = self.shapes.as_ref().map(|shapes| shapes.points.len());
@@ -343,7 +343,7 @@ impl Structure {
     pub(crate) fn moved(&self, simulation: &Simulation) -> Moved {
         let (motion, count) = (self.rigid_motion(simulation), self.rom.sectors);
         let coordinates = self.bank(simulation).map(|bank| {
-            let shapes = ModalShapes::of(bank);
+            let shapes = ModalShapes::from_bank(bank);
             shapes.coordinates(&shapes.amplitudes(bank, &self.sectors))
         });
         let [contact, surface] = self.sector_displacements(coordinates.as_ref());

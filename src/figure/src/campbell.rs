@@ -1,10 +1,10 @@
-//! Campbell diagrams with a response: natural frequencies and engine orders over speed, and beside them the amplitudes of a run.
+//! Campbell diagrams with the response of a run: natural frequencies and engine orders over speed, and the spectrum of the run beside them.
 
 use std::fmt::Write as _;
 
 use crate::{axis::tick, escape, grid_map::round_values};
 
-/// Part of the speed axis beyond the speed of the run.
+/// Largest speed of the axis, as a multiple of the speed of the run.
 const BEYOND: f64 = 1.25;
 /// Radius of the largest circle (SVG units).
 const CIRCLE: f64 = 13.0;
@@ -22,19 +22,20 @@ pub struct Campbell {
     pub orders: Vec<(usize, bool)>,
     /// Spectrum of the run: points (Hz, amplitude), ascending.
     pub response: Vec<(f64, f64)>,
-    /// Peaks of the spectrum (Hz, amplitude).
+    /// Peaks of the spectrum: points (Hz, amplitude).
     pub peaks: Vec<(f64, f64)>,
     /// Quantity of the spectrum, with unit.
     pub response_label: String,
 }
 
-/// Sizes of a picture (SVG units).
+/// Sizes of a picture (SVG units), and the class of its element.
 struct Size {
     class: &'static str,
     width: f64,
     height: f64,
     left: f64,
     font: f64,
+    /// Approximate number of ticks of the speed axis.
     ticks: f64,
 }
 
@@ -42,7 +43,9 @@ const SIZES: [Size; 2] = [
     Size { class: "wide", width: 920.0, height: 430.0, left: 72.0, font: 13.0, ticks: 7.0 },
     Size { class: "narrow", width: 340.0, height: 330.0, left: 56.0, font: 12.0, ticks: 3.0 },
 ];
+/// Space below the diagram, for the axis (SVG units).
 const BELOW: f64 = 48.0;
+/// Space above the diagram (SVG units).
 const ABOVE: f64 = 8.0;
 
 impl Campbell {
@@ -120,7 +123,7 @@ impl Campbell {
     fn draw_spectrum(&self, svg: &mut String, [start, end]: [f64; 2], bottom: f64, y: &dyn Fn(f64) -> f64, most: f64) {
         let x = |amplitude: f64| start + (end - start) * amplitude / most;
         let mut path = format!("M{start:.1} {bottom}");
-        // Frequencies that fall on one line of the picture share their largest amplitude.
+        // Frequencies within one unit of the picture are drawn as one point with their largest amplitude.
         for own in self.response.chunk_by(|a, b| y(a.0).round().to_bits() == y(b.0).round().to_bits()) {
             if own[0].0 <= self.top {
                 let largest = own.iter().map(|point| point.1).fold(0.0, f64::max);

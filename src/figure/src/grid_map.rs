@@ -9,16 +9,18 @@ use crate::{
 
 /// Number of colours of the scale, which the style sheet of the page defines (`--q0` to `--q8`).
 const LEVELS: usize = 9;
-/// Heights in the picture (SVG units): of a row, of the space above the rows, and of the axis below them.
+/// Largest height of a named row (SVG units).
 const ROW: f64 = 14.0;
+/// Space above the rows, below them for the axis, and to the right (SVG units).
 const ABOVE: f64 = 9.0;
 const BELOW: f64 = 46.0;
 const RIGHT: f64 = 16.0;
-/// Height of all rows if they have a scale instead of names, and the largest height of rows with names.
+/// Height of all scaled rows together (SVG units).
 const SCALED: f64 = 260.0;
+/// Largest height of all named rows together (SVG units).
 const NAMED: f64 = 420.0;
 
-/// Value of a cell that covers several times, and the direction of the colour scale.
+/// Value that a cell shows if it covers several values, and the direction of the colour scale.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Shows {
     /// Largest value; large values have strong colours.
@@ -62,13 +64,15 @@ pub struct GridMap {
     pub decades: Option<f64>,
 }
 
-/// Sizes of a picture.
+/// Sizes of a picture (SVG units), and the class of its element.
 struct MapSize {
     class: &'static str,
     width: f64,
     left: f64,
+    /// Largest number of columns.
     bins: usize,
     font: f64,
+    /// Approximate number of ticks of the horizontal axis.
     ticks: f64,
 }
 
@@ -104,6 +108,7 @@ impl GridMap {
         [down, (high / step).ceil() * step]
     }
 
+    /// Returns the index of the colour of a value.
     fn level(&self, value: f64, [low, high]: [f64; 2]) -> usize {
         let share = match self.decades {
             Some(decades) => 1.0 + (value.max(f64::MIN_POSITIVE) / high).log10() / decades,
@@ -117,6 +122,7 @@ impl GridMap {
         level.min(LEVELS - 1)
     }
 
+    /// Returns the colour scale as HTML.
     fn scale(&self, [low, high]: [f64; 2]) -> String {
         let ends = if self.shows == Shows::Smallest { [high, low] } else { [low, high] };
         let [weak, strong] = ends.map(tick);
@@ -127,7 +133,7 @@ impl GridMap {
         )
     }
 
-    /// Returns the height of a row.
+    /// Returns the height of a row (SVG units).
     fn row(&self) -> f64 {
         let count = self.values.len().max(1) as f64;
         match &self.rows {
@@ -182,7 +188,7 @@ impl GridMap {
         svg
     }
 
-    /// Left edge of the cells.
+    /// Returns the left edge of the cells (SVG units).
     fn left(&self, size: &MapSize) -> f64 {
         match &self.rows {
             MapRows::Named(names) => {
@@ -193,7 +199,7 @@ impl GridMap {
         }
     }
 
-    /// Draws one path per colour; neighbouring cells of one colour are merged.
+    /// Draws one path for each colour, and merges neighbouring cells of one colour.
     fn cells(&self, svg: &mut String, range: [f64; 2], size: &MapSize) {
         let (left, row) = (self.left(size), self.row());
         let bins = size.bins.min(self.values.first().map_or(1, Vec::len)).max(1);
@@ -201,10 +207,10 @@ impl GridMap {
         let line = if row > 8.0 { 1.0 } else { 0.0 };
         let mut paths = vec![String::new(); LEVELS];
         for (index, values) in self.values.iter().enumerate() {
-            let level = |bin: usize| Some(self.of_bin(values, bin, bins)).filter(|value| value.is_finite());
+            let level = |bin: usize| Some(self.bin_value(values, bin, bins)).filter(|value| value.is_finite());
             let levels: Vec<Option<usize>> =
                 (0..bins).map(|bin| level(bin).map(|value| self.level(value, range))).collect();
-            // Rounded edges, so that neighbours leave no gap.
+            // Neighbouring rows use the same rounded edge, so that no gap appears.
             let [y, below] = [index, index + 1].map(|index| ABOVE + row * index as f64);
             let mut from = 0;
             for run in levels.chunk_by(|a, b| a == b) {
@@ -220,7 +226,8 @@ impl GridMap {
         }
     }
 
-    fn of_bin(&self, values: &[f64], bin: usize, bins: usize) -> f64 {
+    /// Returns the value that a column of a row shows.
+    fn bin_value(&self, values: &[f64], bin: usize, bins: usize) -> f64 {
         let ends = [bin, bin + 1].map(|end| end * values.len() / bins);
         let own = values[ends[0]..ends[1].max(ends[0] + 1).min(values.len())].iter().copied();
         match self.shows {
@@ -286,7 +293,7 @@ mod tests {
     }
 
     #[test]
-    fn small_clearances_are_strong_and_negative_rounding_is_zero() {
+    fn small_clearances_have_strong_colours_and_rounding_errors_count_as_zero() {
         let map = map(Shows::Smallest, vec![-3e-16, 50.0, 100.0, 400.0]);
         let range = map.range();
         assert_eq!(range.map(f64::to_bits), [0.0, 400.0].map(f64::to_bits));
@@ -317,7 +324,7 @@ mod tests {
     }
 
     #[test]
-    fn draws_degenerate_maps() {
+    fn draws_maps_that_are_empty_or_constant() {
         for values in [vec![], vec![0.0], vec![f64::NAN; 3], vec![-1.0; 3]] {
             let mut map = map(Shows::Largest, values.clone());
             map.values[1].clone_from(&values);

@@ -1,22 +1,24 @@
-//! Polar diagrams of a clearance around a casing: the outer circle is the casing, and curves reach it where they touch.
+//! Polar diagrams of the clearance around a casing. The outer circle is the casing; a curve reaches it where the clearance is 0.
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 
 use crate::{axis::tick, escape, grid_map::round_values};
 
-/// Size of the picture and radius of the outer circle (SVG units).
+/// Width and height of the picture (SVG units).
 const SIZE: f64 = 460.0;
+/// Radius of the outer circle (SVG units).
 const OUTER: f64 = 180.0;
 /// Radius of the largest clearance, as a fraction of the outer circle.
 const INNER: f64 = 0.35;
 
-/// One curve.
+/// Curve of a polar diagram.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PolarCurve {
     /// Label in the legend.
     pub label: String,
-    /// Values at equal angles from 0 (to the right), counterclockwise; gaps where they are not finite.
+    /// Values at the middles of equal ranges of angle, counterclockwise from 0 (to the right). The curve has a gap where a value
+    /// is not finite.
     pub values: Vec<f64>,
 }
 
@@ -39,11 +41,12 @@ impl Polar {
         format!("<div class=\"legend\">{legend}</div><div class=\"polar\">{}</div>", self.to_svg())
     }
 
-    /// Index of the colour of a curve: the last one is that of contact.
+    /// Returns the index of the colour of a curve; the last curve has the colour of contact.
     fn color(&self, index: usize) -> usize {
         if index + 1 == self.curves.len() { 1 } else { 4 }
     }
 
+    /// Returns the largest finite value.
     fn largest(&self) -> f64 {
         let values = self.curves.iter().flat_map(|curve| &curve.values).copied().filter(|value| value.is_finite());
         values.fold(f64::MIN_POSITIVE, f64::max)
@@ -89,7 +92,7 @@ impl Polar {
             let (sine, cosine) = (TAU * (position as f64 + 0.5) / count as f64).sin_cos();
             format!("{:.1} {:.1}", 0.5 * SIZE + radius * cosine, 0.5 * SIZE - radius * sine)
         };
-        // A gap interrupts the line, and the first point follows the last.
+        // A gap interrupts the line. The first point is also the last one.
         let mut path = String::new();
         let mut pen = 'M';
         for position in 0..=count {

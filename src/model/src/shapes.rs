@@ -116,8 +116,8 @@ impl DiameterShapes {
 }
 
 impl SurfaceShapes {
-    /// Returns the surface with at most `most` of its points; itself if it has no more. Points of the two sides of a thin
-    /// structure do not represent each other.
+    /// Returns the surface with at most `most` of its points, unchanged if it has no more. A point never represents points of the
+    /// other side of a thin structure.
     #[must_use]
     pub fn thinned(self, most: usize) -> Self {
         if self.points.len() <= most {
@@ -142,8 +142,8 @@ impl SurfaceShapes {
         Self { points, corners, ends, diameters: diameters.collect() }
     }
 
-    /// Returns the positions whose cells are thinned: of a ring around the z axis, radius, arc and z, so that its cross-section is
-    /// the same everywhere; else x, y, z.
+    /// Returns the positions from which thinning finds the cells of points: radius, arc length and z (m) for a ring around the z
+    /// axis, so that its cross-section is the same everywhere; otherwise x, y and z (m).
     fn cell_positions(&self) -> Vec<[f64; 3]> {
         let radii = self.points.iter().map(|[x, y, _]| x.hypot(*y));
         let [low, high] = radii.fold([f64::INFINITY, 0.0], |[low, high], r: f64| [low.min(r), high.max(r)]);
@@ -153,7 +153,8 @@ impl SurfaceShapes {
         self.points.iter().map(|[x, y, z]| [x.hypot(*y), high * y.atan2(*x), *z]).collect()
     }
 
-    /// Returns the direction of the normal of each point: the number of its largest component, and its sign.
+    /// Returns a number for the direction of the normal at each point: twice the axis (0 to 2) of its largest component, plus 1
+    /// if this component is negative.
     fn sides(&self) -> Vec<u8> {
         let mut normals = vec![[0.0; 3]; self.points.len()];
         for face in self.faces() {
@@ -183,7 +184,7 @@ impl SurfaceShapes {
     }
 }
 
-/// Faces over fewer points.
+/// Faces of a thinned surface.
 struct Merged {
     /// Points that remain, ascending.
     kept: Vec<usize>,
@@ -192,7 +193,7 @@ struct Merged {
     ends: Vec<u32>,
 }
 
-/// Replaces the corners of faces by their representatives; faces that collapse are omitted.
+/// Replaces the corners of faces by their representatives, and omits faces that collapse.
 fn merged(faces: impl Iterator<Item = Vec<usize>>, representative: &BTreeMap<usize, usize>) -> Merged {
     let kept: BTreeSet<usize> = representative.values().copied().collect();
     let kept: Vec<usize> = kept.into_iter().collect();
@@ -222,8 +223,8 @@ fn single(value: f64) -> f32 {
     value as f32
 }
 
-/// Returns the representative of each of these nodes, which is on the same `side`; there are at most `most` representatives. The
-/// first cells are finer by the factor `fineness` than evenly spread points would be.
+/// Returns the representative of each of these nodes, which is on the same `side`. There are at most `most` representatives. The
+/// search starts with cells that are smaller by the factor `fineness` than the spacing of evenly spread points.
 fn thinned(
     positions: &[[f64; 3]],
     nodes: &[usize],
@@ -243,7 +244,7 @@ fn thinned(
     // Coarser than the points of a surface would be if they were evenly spread over the largest two extents.
     let mut size = largest / (most as f64).sqrt() / fineness;
     loop {
-        #[expect(clippy::cast_possible_truncation, reason = "there are few cells")]
+        #[expect(clippy::cast_possible_truncation, reason = "cell indices are small")]
         let cell = |node: usize| [0, 1, 2].map(|axis| ((positions[node][axis] - extents[axis][0]) / size) as i64);
         let distance = |node: usize| {
             let cell = cell(node);
@@ -313,7 +314,7 @@ mod tests {
     }
 
     #[test]
-    fn thinned_shapes_keep_the_displacements_of_their_points() {
+    fn thinned_surface_keeps_the_displacements_of_its_points() {
         let surface = Surface::new(&plate(), &[]);
         let place = |point: &[f64; 3]| point.map(single);
         let real: Vec<f32> = surface.positions.iter().flat_map(place).collect();

@@ -48,13 +48,13 @@ pub fn totals(run: &NativeRun) -> Vec<NamedValue> {
 
 /// Returns the names of all means and totals of a run with these outputs.
 pub fn names(names: &[String], columns: &[OutputColumn]) -> Vec<String> {
-    let of = |is_wanted: &dyn Fn(&OutputColumn) -> bool| -> Vec<&String> {
+    let select = |is_wanted: &dyn Fn(&OutputColumn) -> bool| -> Vec<&String> {
         let scalars = names.iter().zip(columns).filter(|(_, facts)| !facts.is_element && is_wanted(facts));
         scalars.map(|(name, _)| name).collect()
     };
     let force = names.iter().any(|name| name == "normal_impulse").then(|| "mean_total_normal_force".to_owned());
-    let means = of(&|facts| facts.span == Span::Mean).into_iter().map(|name| with_prefix("mean_", name));
-    let totals = of(&|facts| facts.span == Span::Total || facts.is_energy).into_iter().cloned();
+    let means = select(&|facts| facts.span == Span::Mean).into_iter().map(|name| with_prefix("mean_", name));
+    let totals = select(&|facts| facts.span == Span::Total || facts.is_energy).into_iter().cloned();
     force.into_iter().chain(means).chain(totals).collect()
 }
 

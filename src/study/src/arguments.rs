@@ -55,8 +55,8 @@ pub struct MapArguments {
     #[arg(long, value_name = "N", value_parser = transient)]
     pub transient: Option<usize>,
     /// Run only this part of the angular velocities, so that several machines can share them, and store the results in the
-    /// output directory. The same command without --part reads the results of all parts there, runs what is missing, and
-    /// makes the map.
+    /// output directory. The same command without --part reads the results of all parts from there, runs the missing
+    /// angular velocities, and makes the map.
     #[arg(long, value_name = "K/N")]
     pub part: Option<Part>,
     /// Start value of an input or parameter, such as friction_coefficient=0 or gap_offset=1e-5; may be repeated.

@@ -2,8 +2,8 @@
 //!
 //! A study is a function that returns a [`Study`]: facts, figures with the numbers behind them, and statements with their results. [`output`] writes
 //! every study in the same form: one HTML page that opens offline, an SVG and a CSV per figure, and `results.json`. Independent runs go through
-//! `tiprub_shell::sweep`; maps and stability studies store their results in journals (`tiprub_sweep::tasks`), so that they continue if they were
-//! interrupted.
+//! `tiprub_shell::sweep`; maps and stability studies store their results in journals (`tiprub_sweep::tasks`), so that an interrupted study
+//! continues.
 
 pub mod arguments;
 pub mod convergence;
@@ -92,9 +92,9 @@ pub struct Study {
 /// Outcome of a study.
 #[derive(Debug)]
 pub enum StudyOutcome {
-    /// The study is finished. The journals of its runs are removed when its files have been written.
+    /// Finished study, and the journals of its runs, which the caller removes after writing the files of the study.
     Finished(Box<Study>, Option<TaskJournals>),
-    /// Only a part of its runs was requested.
+    /// Finished part of the runs, if only a part was requested.
     Part(FinishedPart),
 }
 

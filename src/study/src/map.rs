@@ -40,7 +40,7 @@ const RANGE: [f64; 2] = [0.8, 1.2 * LEAN];
 /// Ratio of the highest speed of the map to a crossing up to a fifth above the middle, which is the largest shift of resonance observed for rotor
 /// 37; the middle itself has more room.
 const LEAN: f64 = 1.25;
-/// Name of the study, for files.
+/// Name of the study, also of its files.
 const NAME: &str = "map";
 const COUNT: usize = 141;
 const QUICK_COUNT: usize = 8;
@@ -83,7 +83,7 @@ struct Map {
 /// Runs the study: simulates all speeds, transforms the responses, draws and compares.
 ///
 /// # Errors
-/// The scene cannot be loaded, or is rejected at every speed; a journal in the output directory cannot be used.
+/// The scene cannot be loaded, the scene is rejected at every speed, or a journal in the output directory cannot be used.
 pub fn study(arguments: &MapArguments, console: &Console) -> Result<StudyOutcome> {
     let name = arguments.scene.as_str();
     // Checked before any model is reduced.

@@ -1,4 +1,4 @@
-//! Vibration of a run over frequency: spectrum, peaks, and spectrum over time.
+//! Vibration of a run over frequency: spectrum, peaks and spectrogram.
 
 use tiprub_shell::Result;
 
@@ -6,17 +6,19 @@ use crate::map::spectrum::{Analyser, peaks};
 
 /// Smallest number of samples of a spectrum.
 const MIN_SAMPLES: usize = 64;
-/// Number of windows, without overlap, in a run; and number of times of a spectrogram.
+/// Length of a run divided by that of a window of its spectrogram.
 const WINDOWS: usize = 4;
+/// Largest number of times of a spectrogram.
 const TIMES: usize = 120;
-/// Peaks below this fraction of the largest are not listed, and the largest number of peaks.
+/// Smallest peak that is listed, as a fraction of the largest.
 const MIN_PEAK: f64 = 0.03;
+/// Largest number of peaks.
 const MAX_PEAKS: usize = 8;
 
 /// Amplitudes of a signal over frequency.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Spectrum {
-    /// Distance of the frequencies (Hz).
+    /// Spacing of the frequencies (Hz).
     pub resolution: f64,
     /// Amplitudes from frequency 0, in the unit of the signal.
     pub amplitudes: Vec<f64>,
@@ -25,9 +27,9 @@ pub struct Spectrum {
 /// Amplitudes of a signal over frequency and time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Spectrogram {
-    /// Distance of the frequencies (Hz).
+    /// Spacing of the frequencies (Hz).
     pub resolution: f64,
-    /// First and last time: middles of the windows (s).
+    /// Middles of the first and the last window (s).
     pub times: [f64; 2],
     /// Length of a window (s).
     pub window: f64,
@@ -36,11 +38,11 @@ pub struct Spectrogram {
 }
 
 impl Spectrum {
-    /// Transforms samples with one spacing (s), with a Hann window. `None` if there are too few.
+    /// Transforms samples with a constant `spacing` (s), with a Hann window. `None` if there are too few samples.
     ///
     /// # Errors
-    /// The transform fails (not observed).
-    pub fn of(samples: &[f64], spacing: f64) -> Result<Option<Self>> {
+    /// The transform fails.
+    pub fn from_samples(samples: &[f64], spacing: f64) -> Result<Option<Self>> {
         if samples.len() < MIN_SAMPLES {
             return Ok(None);
         }
@@ -64,11 +66,12 @@ impl Spectrum {
 }
 
 impl Spectrogram {
-    /// Transforms overlapping parts of samples with one spacing (s). `None` if there are too few.
+    /// Transforms overlapping windows of samples that begin at the time `start` (s) and have a constant `spacing` (s). `None` if there are too few
+    /// samples.
     ///
     /// # Errors
-    /// The transform fails (not observed).
-    pub fn of(samples: &[f64], start: f64, spacing: f64) -> Result<Option<Self>> {
+    /// The transform fails.
+    pub fn from_samples(samples: &[f64], start: f64, spacing: f64) -> Result<Option<Self>> {
         let length = (samples.len() / WINDOWS).max(MIN_SAMPLES);
         if samples.len() < 2 * MIN_SAMPLES {
             return Ok(None);
@@ -95,7 +98,7 @@ impl Spectrogram {
 mod tests {
     use super::*;
 
-    /// Returns a sine of 500 Hz that becomes one of 1500 Hz with half the amplitude, 1000 samples of 0.1 ms.
+    /// Returns 1000 samples at a spacing of 0.1 ms of a sine of 500 Hz, followed by one of 1500 Hz with half the amplitude.
     fn changing() -> Vec<f64> {
         let sine = |hertz: f64, time: f64| (std::f64::consts::TAU * hertz * time).sin();
         let value = |time: f64| if time < 0.05 { 2.0 * sine(500.0, time) } else { sine(1500.0, time) };
@@ -104,7 +107,7 @@ mod tests {
 
     #[test]
     fn spectrum_contains_both_frequencies() {
-        let spectrum = Spectrum::of(&changing(), 1e-4).unwrap().unwrap();
+        let spectrum = Spectrum::from_samples(&changing(), 1e-4).unwrap().unwrap();
         assert!((spectrum.resolution - 10.0).abs() < 1e-9);
         let peaks = spectrum.peaks();
         for wanted in [500.0, 1500.0] {
@@ -114,7 +117,7 @@ mod tests {
 
     #[test]
     fn spectrogram_follows_the_change() {
-        let found = Spectrogram::of(&changing(), 0.2, 1e-4).unwrap().unwrap();
+        let found = Spectrogram::from_samples(&changing(), 0.2, 1e-4).unwrap().unwrap();
         let largest = |column: &Vec<f64>| {
             let most = (0..column.len()).max_by(|a, b| column[*a].total_cmp(&column[*b])).unwrap();
             (most as f64 * found.resolution, column[most])
@@ -128,8 +131,8 @@ mod tests {
 
     #[test]
     fn short_signals_have_no_spectrum() {
-        assert_eq!(Spectrum::of(&[1.0; 63], 1e-4).unwrap(), None);
-        assert_eq!(Spectrogram::of(&[1.0; 127], 0.0, 1e-4).unwrap(), None);
-        assert_eq!(Spectrum::of(&[1.0; 64], 1e-4).unwrap().unwrap().peaks(), []);
+        assert_eq!(Spectrum::from_samples(&[1.0; 63], 1e-4).unwrap(), None);
+        assert_eq!(Spectrogram::from_samples(&[1.0; 127], 0.0, 1e-4).unwrap(), None);
+        assert_eq!(Spectrum::from_samples(&[1.0; 64], 1e-4).unwrap().unwrap().peaks(), []);
     }
 }

@@ -107,7 +107,7 @@ pub struct StabilityResult {
 /// Runs the study of a scene.
 ///
 /// # Errors
-/// The scene cannot be read, is rejected for all values, or start values are wrong; a journal in the output directory cannot be used.
+/// The scene cannot be read, the scene is rejected for all values, start values are wrong, or a journal in the output directory cannot be used.
 pub fn study(arguments: &StabilityArguments, console: &Console) -> Result<StudyOutcome> {
     refuse_compared(&arguments.set)?;
     let scene = arguments.common.options.load(&arguments.scene, &arguments.common.cache.cache(), console)?;
@@ -129,7 +129,7 @@ pub fn study(arguments: &StabilityArguments, console: &Console) -> Result<StudyO
     let shared = [scene_digest(&scene), format!("{:?} {own:?} {}", arguments.set, arguments.common.quick)];
     let mut journals = TaskJournals::open(&arguments.common.directory(NAME), NAME, Part::WHOLE, &shared)?;
     let mut work = StoredWork { threads, journals: &mut journals, console, forecast: &forecast };
-    let limits = limits::of(&asked, &own, arguments.common.quick, &mut work)?;
+    let limits = limits::find_all(&asked, &own, arguments.common.quick, &mut work)?;
     let usable = limits.iter().find(|usable| usable.method == own.method).and_then(limits::Usable::step);
     let grid = StabilityGrid::new(arguments, &own, coupled, usable)?;
     let structures = structures(&scene, &own, &grid)?;
@@ -142,7 +142,7 @@ pub fn study(arguments: &StabilityArguments, console: &Console) -> Result<StudyO
     Ok(StudyOutcome::Finished(Box::new(page::study(&found)?), Some(journals)))
 }
 
-/// Tasks that run on several threads, with results in journals.
+/// Runs tasks on several threads and stores their results in journals.
 pub(super) struct StoredWork<'a> {
     threads: usize,
     journals: &'a mut TaskJournals,
@@ -151,7 +151,7 @@ pub(super) struct StoredWork<'a> {
 }
 
 impl StoredWork<'_> {
-    /// Does tasks of a kind, each with this share of the planned work of the forecast.
+    /// Runs the tasks `name`. Each of them is `share` units of the planned work of this kind in the forecast.
     fn run<T: Debug + Sync, R: Serialize + DeserializeOwned + Send>(
         &mut self,
         (kind, name, share): (usize, &str, f64),
@@ -162,12 +162,16 @@ impl StoredWork<'_> {
         let progress = |done: usize| self.forecast.done(kind, share * (done - before.replace(done)) as f64);
         match self.journals.run(name, items, self.threads, work, self.console, progress)? {
             TaskResults::All(results) => Ok(results),
-            TaskResults::Part(part) => Err(Failure::new("study stability", format!("has no parts: {part:?}"), "")),
+            TaskResults::Part(part) => Err(Failure::new(
+                "study stability",
+                format!("unexpected part of the tasks: {part:?}"),
+                "Report this to the developers",
+            )),
         }
     }
 }
 
-/// Name of the study, for files.
+/// Name of the study, also of its files.
 const NAME: &str = "stability";
 /// Kinds of work in a forecast.
 pub(super) const LIMITS: usize = 0;

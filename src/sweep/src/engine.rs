@@ -156,7 +156,10 @@ pub fn check(request: &SweepRequest) -> Result<SweepSize> {
     Ok(SweepSize { plan_runs: request.plan.design.runs(), runs, pending })
 }
 
-/// Checks that a file of outputs over time, if it exists, is one that a sweep wrote.
+/// Checks that an existing file for outputs over time was written by a sweep.
+///
+/// # Errors
+/// The file exists, and no sweep wrote it.
 fn check_histories(path: &Path) -> Result<()> {
     let has_fact = || parquet_file::facts(path).is_ok_and(|facts| facts.iter().any(|(key, _)| key == ROWS_FACT));
     if !path.exists() || has_fact() {
@@ -190,7 +193,7 @@ struct PartRun<'a> {
     journal: Journal,
     histories: Option<HistoryJournal>,
     store: RomStore<'a>,
-    /// Names of the means and totals of a run, if a scene of the plan is accepted.
+    /// Names of the means and totals of a run; empty if no scene of the plan is accepted.
     results: Vec<String>,
 }
 

@@ -57,7 +57,7 @@ pub fn set(scene: &mut Table, path: &str, value: Value) -> Result<()> {
     Ok(())
 }
 
-/// Returns the path of a key of the scene, with the number (from 1) of every entry of a list.
+/// Returns the unique path of a key of the scene, in which a number (from 1) selects every entry of a list.
 ///
 /// # Errors
 /// The scene has no such entry.
@@ -65,7 +65,8 @@ pub(crate) fn place(scene: &Table, path: &str) -> Result<String> {
     let (mut scene, mut place) = (Value::Table(scene.clone()), String::new());
     let mut table = &mut scene;
     for step in steps(path)? {
-        let missing = || Failure::new(format!("field `{path}`"), "is not in the scene", "");
+        let missing =
+            || Failure::new(format!("field `{path}`"), "is not in the scene", "Correct the path of the field");
         let below = table.get_mut(step.key).ok_or_else(missing)?;
         let separator = if place.is_empty() { "" } else { "." };
         place.push_str(&format!("{separator}{}", step.key));
@@ -84,7 +85,7 @@ pub(crate) fn place(scene: &Table, path: &str) -> Result<String> {
     Ok(place)
 }
 
-/// Returns the index of the entry of a list that is selected by a number (from 1), by a name, or as the only one.
+/// Returns the index of the entry of a list that is selected by a number (from 1) or by a name. Without a selection, the list must have one entry.
 fn position(entries: &[Value], selected: Option<&str>) -> Option<usize> {
     let named = |entry: &Value| entry.get("name").and_then(Value::as_str).map(str::to_owned);
     match selected {
@@ -169,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn two_paths_of_one_key_have_the_same_place() {
+    fn paths_to_the_same_key_have_one_unique_path() {
         let scene: Table = toml::from_str(SCENE).unwrap();
         for (path, place) in [
             ("structure[2].name", "structure[2].name"),

@@ -80,14 +80,14 @@ pub(crate) fn open_locked(path: &Path, header: &[u8]) -> Result<(File, Vec<u8>)>
     let mut options = File::options();
     let mut file = options.read(true).write(true).create(true).truncate(false).open(path).map_err(failed)?;
     if let Err(TryLockError::WouldBlock) = file.try_lock() {
-        let remedy = "Wait until it has finished, or give another output";
+        let remedy = "Wait until the other process has finished, or write to another file or directory";
         return Err(Failure::new(path.display(), "another process is working on this part", remedy));
     }
     let mut bytes = Vec::new();
     file.read_to_end(&mut bytes).map_err(failed)?;
     let common = header.len().min(bytes.len());
     if bytes[..common] != header[..common] {
-        let remedy = "Remove it, or give another output";
+        let remedy = "Remove the file, or write to another file or directory";
         return Err(Failure::new(path.display(), "exists and is not a journal of this release", remedy));
     }
     Ok((file, bytes))

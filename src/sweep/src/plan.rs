@@ -237,7 +237,7 @@ impl Plan {
                 fields::set(&mut document, path, field_value(value))?;
                 let place = fields::place(&document, path)?;
                 if let Some((_, other)) = places.iter().find(|(known, _)| *known == place) {
-                    let problem = format!("sets the key `{place}`, which `{other}` sets, too");
+                    let problem = format!("sets the key `{place}`, which `{other}` also sets");
                     return Err(Failure::new(format!("variable `{}`", variable.name), problem, "Remove one of them"));
                 }
                 places.push((place, &variable.name));

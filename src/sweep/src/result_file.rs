@@ -13,7 +13,7 @@ use crate::{
 /// Key of the digest of all rows in the files of a sweep.
 pub(crate) const ROWS_FACT: &str = "tiprub.rows";
 
-/// Returns the table of runs (from 1) and their rows, with columns for all `results`, even if no run has finished.
+/// Returns the table of runs (numbered from 1) and their rows. It has columns for all `results`, even if no run has finished.
 pub fn table(plan: &Plan, rows: &[(usize, &Row)], results: &[String]) -> Table {
     let number = |run: usize| Some(Cell::Integer(i64::try_from(run).unwrap_or(i64::MAX)));
     let runs = rows.iter().map(|(run, _)| number(*run)).collect();

@@ -1,5 +1,5 @@
-//! Independent tasks of a study, whose results are stored in journals in one directory, so that a study that was interrupted continues, and
-//! several machines can share its work.
+//! Independent tasks of a study. Their results are stored in journals in one directory, so that an interrupted study continues, and several
+//! machines can share its work.
 
 use std::{
     collections::HashMap,
@@ -21,7 +21,7 @@ use crate::{cases::digest_of, journal::Journal, part::Part, row::Row};
 /// Names of the values in a row: the result, and the digest of everything that determines the results of all tasks.
 const RESULT: &str = "result";
 const SHARED: &str = "shared";
-/// End of the names of journals.
+/// Suffix of the file names of journals.
 const SUFFIX: &str = ".journal";
 
 /// Journals of a study. While they are open, no other process can open them.
@@ -36,7 +36,7 @@ pub struct TaskJournals {
     part: Part,
     /// Digest of everything that determines the results of all tasks.
     shared: String,
-    /// Name of the journal.
+    /// Path of the journal to which results are appended.
     path: PathBuf,
 }
 
@@ -54,7 +54,7 @@ pub enum TaskResults<R> {
 pub struct FinishedPart {
     /// The part.
     pub part: Part,
-    /// Number of tasks of the part and of the study.
+    /// Number of tasks of the part.
     pub tasks: usize,
     /// Number of tasks of the study.
     pub all: usize,
@@ -73,15 +73,16 @@ impl TaskJournals {
         let shared = digest_of([name, LIBRARY_RELEASE].into_iter().chain(shared.iter().map(String::as_str)));
         let open = |path: &Path| {
             let (journal, rows) = Journal::open(path)?;
-            let own = |row: &Row| matches!(row.cell(SHARED), Some(Cell::Text(digest)) if *digest == shared);
-            if rows.iter().all(own) {
+            let is_same_study = |row: &Row| matches!(row.cell(SHARED), Some(Cell::Text(digest)) if *digest == shared);
+            if rows.iter().all(is_same_study) {
                 return Ok((journal, rows));
             }
             let problem = format!(
-                "contains {} results of the study with another scene, other options or another release",
+                "contains {} results of this study with another scene, other options or another release",
                 rows.len()
             );
-            let remedy = "Repeat the command with those, give another directory with --out, or remove the file";
+            let remedy =
+                "Use the scene, options and release of the file, give another directory with --out, or remove the file";
             Err(Failure::new(path.display(), problem, remedy))
         };
         let (journal, mut rows) = open(&path)?;
@@ -104,11 +105,11 @@ impl TaskJournals {
         Ok(Self { journal, others, known, part, shared, path })
     }
 
-    /// Does the tasks of the part that have no result yet, on `threads` threads. `kind` tells apart tasks with equal values. `progress` receives the
-    /// number of finished tasks, including those that were finished before. A result that JSON cannot represent is not stored.
+    /// Runs the tasks of the part that have no result yet, on `threads` threads. `kind` distinguishes tasks with equal values. `progress` receives
+    /// the number of finished tasks, including those with a stored result. A result that JSON cannot represent is not stored.
     ///
     /// # Errors
-    /// The first failure of a task, or a journal cannot be written.
+    /// A task fails (the first failure is returned), or a journal cannot be written.
     pub fn run<T: Debug + Sync, R: Serialize + DeserializeOwned + Send>(
         &mut self,
         kind: &str,
@@ -122,11 +123,11 @@ impl TaskJournals {
             items.iter().map(|item| digest_of([&self.shared, kind, &format!("{item:?}")].into_iter())).collect();
         let known = |digest: &String| self.known.get(digest).and_then(|json| serde_json::from_str(json).ok());
         let mut results: Vec<Option<R>> = digests.iter().map(known).collect();
-        let own = self.part.runs(items.len());
-        let pending: Vec<usize> = own.clone().filter(|task| results[*task].is_none()).collect();
-        let mut done = own.len() - pending.len();
+        let range = self.part.runs(items.len());
+        let pending: Vec<usize> = range.clone().filter(|task| results[*task].is_none()).collect();
+        let mut done = range.len() - pending.len();
         if done > 0 {
-            console.print_progress(format_args!("{done} of {} runs are already finished", own.len()));
+            console.print_progress(format_args!("{done} of {} runs are already finished", range.len()));
         }
         progress(done);
         let (stop, mut failed) = (AtomicBool::new(false), None);
@@ -157,7 +158,7 @@ impl TaskJournals {
         }
         if self.part != Part::WHOLE {
             let (part, journal) = (self.part, self.path.clone());
-            return Ok(TaskResults::Part(FinishedPart { part, tasks: own.len(), all: items.len(), journal }));
+            return Ok(TaskResults::Part(FinishedPart { part, tasks: range.len(), all: items.len(), journal }));
         }
         let lost = || Failure::new("study", "a worker thread ended unexpectedly", "Report this to the developers");
         results.into_iter().map(|result| result.ok_or_else(lost)).collect::<Result<_>>().map(TaskResults::All)
@@ -193,7 +194,7 @@ mod tests {
 
     use super::*;
 
-    /// Squares numbers, and lists those that were squared.
+    /// Squares numbers, and also returns those for which the task ran.
     fn squares(directory: &Path, part: Part, shared: &str, items: &[f64]) -> (Result<TaskResults<f64>>, Vec<f64>) {
         let tried = Mutex::new(Vec::new());
         let work = |item: &f64| {
@@ -216,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn failed_study_continues_and_repeats_no_task() {
+    fn failed_study_continues_without_repeating_tasks() {
         let root = tempfile::tempdir().unwrap();
         let items: Vec<f64> = (1..=20).map(|item| f64::from(item) / 3.0).collect();
         let mut broken = items.clone();
@@ -226,12 +227,12 @@ mod tests {
         let (results, second) = squares(root.path(), Part::WHOLE, "scene", &items);
         let expected: Vec<f64> = items.iter().map(|item| item * item).collect();
         assert_eq!(all(results), expected);
-        // Every task was done once.
+        // Every task ran once.
         let mut tried = [first, second].concat();
         tried.retain(|item| *item > 0.0);
         tried.sort_by(f64::total_cmp);
         assert_eq!(tried, items);
-        // The results of another scene are not mixed with these, and not lost.
+        // The results of this scene are neither used for another scene nor lost.
         let other = TaskJournals::open(root.path(), "map", Part::WHOLE, &["another scene".to_owned()]).unwrap_err();
         assert!(other.problem.contains("20 results"), "{other}");
         let (results, third) = squares(root.path(), Part::WHOLE, "scene", &items);
@@ -239,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn parts_are_combined_and_missing_tasks_are_done() {
+    fn parts_are_combined_and_missing_tasks_run() {
         let root = tempfile::tempdir().unwrap();
         let items: Vec<f64> = (0..10).map(f64::from).collect();
         for number in [1, 3] {

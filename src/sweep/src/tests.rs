@@ -419,9 +419,9 @@ fn stopped_sweep_keeps_its_rows() {
     assert!(engine::run(&request(&running, &output)).unwrap().is_complete);
 }
 
-/// A part without a finished run has the same columns as the others.
+/// A part without a finished run has the same columns as the other parts.
 #[test]
-fn refused_part_has_all_columns() {
+fn part_with_only_rejected_runs_has_all_columns() {
     let bench = Bench::new();
     let plan = "scene = \"scene.toml\"\n[[variable]]\nname = \"friction_coefficient\"\nvalues = [-1.0, 0.1]";
     for number in [1, 2] {
@@ -447,12 +447,12 @@ fn names_and_keys_that_clash_are_rejected() {
     for (text, words) in [
         (gap("mean_torque", "contact[1].gap"), "name of an output or a result"),
         (gap("friction_loss", "contact[1].gap"), "name of an output or a result"),
-        (gap("a", "contact[1].gap") + &gap("b", "contact.gap"), "`contact[1].gap`, which `a` sets, too"),
+        (gap("a", "contact[1].gap") + &gap("b", "contact.gap"), "`contact[1].gap`, which `a` also sets"),
         (
             "[[variable]]\nname = \"a\"\nfield = \"structure[rotor].rom\"\nvalues = [\"b.rom.safetensors\"]\n\
              [rom.rotor]\nfile = \"small.rom.safetensors\"\n"
                 .to_owned(),
-            "which `[rom]` sets, too",
+            "which `[rom]` also sets",
         ),
     ] {
         let failure = bench.try_part(&format!("{scene}{text}"), "a.parquet", Part::WHOLE, 1).unwrap_err();
@@ -460,9 +460,9 @@ fn names_and_keys_that_clash_are_rejected() {
     }
 }
 
-/// Files of users with the same columns as results, and files of outputs over time of other sweeps, are never replaced.
+/// A sweep never replaces a file that no sweep wrote, even if it has the columns of results.
 #[test]
-fn foreign_files_are_kept() {
+fn files_of_users_are_not_replaced() {
     let bench = Bench::new();
     let cells = |name: &str| tiprub_table::Column::new(name, vec![Some(Cell::Text("mine".into()))]);
     let mine = Table { columns: vec![cells("status"), cells("digest")] };

@@ -201,7 +201,8 @@ pub fn write(target: &Path, table: &Table, facts: &[(&str, String)]) -> Result<(
 /// The file cannot be opened, is damaged, or has a column of a type that has no [`ColumnType`].
 pub fn read(path: &Path) -> Result<Table> {
     let file = tiprub_format::open_file(path).map_err(|error| Failure::file(path, "cannot be opened", &error))?;
-    let remedy = "Write the file again with columns of whole numbers, doubles, text, true and false, and with Snappy compression";
+    let remedy =
+        "Write the file again with Snappy compression, and with columns of integers, real numbers, text or Booleans";
     let failed = |error: ParquetError| Failure::new(path.display(), format!("cannot be read: {error}"), remedy);
     let file = SerializedFileReader::new(file).map_err(failed)?;
     let schema = file.metadata().file_metadata().schema_descr_ptr();
@@ -222,7 +223,7 @@ pub fn read(path: &Path) -> Result<Table> {
     Ok(Table { columns })
 }
 
-/// Types of whole numbers.
+/// Annotations of columns of integers.
 const INTEGERS: [ConvertedType; 9] = [
     ConvertedType::NONE,
     ConvertedType::INT_8,
@@ -255,7 +256,7 @@ fn column_type(descriptor: &ColumnDescriptor) -> parquet::errors::Result<ColumnT
     }
     let annotated = descriptor.converted_type();
     match (descriptor.physical_type(), annotated) {
-        // The annotation gives such numbers another meaning, for example that of a scaled number or a time.
+        // Such an annotation gives the numbers another meaning, for example a decimal number or a date.
         (PhysicalType::INT32 | PhysicalType::INT64, other) if !INTEGERS.contains(&other) => {
             Err(ParquetError::General(format!("column `{name}` has the unsupported type {other}")))
         }
@@ -388,9 +389,9 @@ mod tests {
         assert!(read(&root.path().join("none")).is_err());
     }
 
-    /// Scaled numbers and times must not be read as the whole numbers that represent them.
+    /// Decimal numbers and dates must not be read as the integers that store them.
     #[test]
-    fn annotated_numbers_are_rejected() {
+    fn rejects_decimal_numbers_and_dates() {
         use parquet::{data_type::Int32Type, schema::parser::parse_message_type};
         let root = tempfile::tempdir().unwrap();
         let path = root.path().join("a.parquet");

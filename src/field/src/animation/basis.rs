@@ -1,37 +1,38 @@
-//! Approximation of many displacement fields by few.
+//! Approximation of many displacement fields by few vectors.
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
-/// Number of vectors of the search beyond the largest rank.
+/// Number of search directions beyond the largest rank.
 const EXTRA: usize = 8;
-/// Number of times that the search is repeated with its result.
+/// Number of subspace iterations after the random start.
 const REPEATS: usize = 1;
-/// One field of so many takes part in the search.
+/// On average, one of `SPARSE` fields takes part in the search.
 const SPARSE: u32 = 5;
-/// Number of fields up to which all take part.
+/// Largest number of fields that all take part in the search.
 const FEW: usize = 500;
-/// Directions shorter than this fraction of the longest are rounding.
+/// Directions shorter than this fraction of the longest one consist of rounding errors.
 const ROUNDING: f64 = 1e-6;
 
-/// Fields u_s ≈ Σ_k c_sk v_k with orthonormal v.
+/// Approximation u_s ≈ Σ_k c_sk v_k of fields u_s by orthonormal vectors v_k.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Basis {
-    /// Vectors v, with descending contribution.
+    /// Vectors v, in the order of descending contribution.
     pub(crate) vectors: Vec<Vec<f32>>,
     /// Coefficients c, `[field][vector]`.
     pub(crate) coefficients: Vec<Vec<f32>>,
-    /// Largest deviation of a value of any field, as a fraction of the largest value.
+    /// Largest deviation of a value of any field, as a fraction of the largest value of all fields.
     pub(crate) deviation: f64,
 }
 
 impl Basis {
-    /// Finds the best basis of at most `rank` vectors, or of so few that the deviation is below `enough`: randomised subspace iteration with fixed numbers (Halko, Martinsson,
-    /// Tropp 2011), then the eigenvectors of the small matrix C Cᵀ. All fields have one length.
-    pub(crate) fn new(fields: &[Vec<f32>], rank: usize, enough: f64) -> Self {
+    /// Finds a basis of at most `rank` vectors, with as few vectors as keep the deviation below `max_deviation`. The method is a
+    /// randomised subspace iteration with a fixed seed (Halko, Martinsson, Tropp 2011), followed by the eigenvectors of the small
+    /// matrix C Cᵀ of the coefficients C. All fields have the same length.
+    pub(crate) fn new(fields: &[Vec<f32>], rank: usize, max_deviation: f64) -> Self {
         let length = fields.first().map_or(0, Vec::len);
         let count = (rank + EXTRA).min(fields.len()).min(length);
         let mut directions = vec![vec![0.0_f32; length]; count];
-        // A linear congruential generator; its high bits decide.
+        // A linear congruential generator, of which the high bits are used.
         let mut number = 1_u32;
         let mut next = || {
             number = number.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -57,25 +58,25 @@ impl Basis {
         }
         let found: Vec<Vec<f64>> =
             fields.iter().map(|field| directions.iter().map(|own| dot(own, field)).collect()).collect();
-        let (vectors, turn) = turned(&directions, &found, rank);
+        let (vectors, turn) = principal_vectors(&directions, &found, rank);
         let coefficients: Vec<Vec<f32>> =
             found.iter().map(|own| turn.iter().map(|t| single(sum(t, own))).collect()).collect();
         let deviations = deviations(fields, &vectors, &coefficients);
-        let needed = deviations.iter().position(|deviation| *deviation <= enough).unwrap_or(vectors.len());
+        let needed = deviations.iter().position(|deviation| *deviation <= max_deviation).unwrap_or(vectors.len());
         let mut basis = Self { vectors, coefficients, deviation: deviations[needed] };
         basis.vectors.truncate(needed);
         basis.coefficients.iter_mut().for_each(|own| own.truncate(needed));
         basis
     }
 
-    /// Describes other fields with the vectors of this basis.
-    pub(crate) fn extended(self, fields: impl Iterator<Item = Vec<f32>>) -> Self {
+    /// Approximates other fields by the vectors of this basis.
+    pub(crate) fn project(self, fields: impl Iterator<Item = Vec<f32>>) -> Self {
         let (mut coefficients, mut largest, mut deviation) = (Vec::new(), 0.0_f32, 0.0_f32);
         for mut field in fields {
             let own: Vec<f32> = self.vectors.iter().map(|vector| single(dot(vector, &field))).collect();
-            largest = largest.max(most(&field));
+            largest = largest.max(largest_magnitude(&field));
             self.vectors.iter().zip(&own).for_each(|(vector, weight)| add(&mut field, -weight, vector));
-            deviation = deviation.max(most(&field));
+            deviation = deviation.max(largest_magnitude(&field));
             coefficients.push(own);
         }
         let deviation = if largest > 0.0 { f64::from(deviation / largest) } else { 0.0 };
@@ -83,15 +84,15 @@ impl Basis {
     }
 }
 
-/// Returns the deviation for each number of vectors, from none to all, as in [`Basis::deviation`].
+/// Returns [`Basis::deviation`] for each number of vectors, from none to all.
 fn deviations(fields: &[Vec<f32>], vectors: &[Vec<f32>], coefficients: &[Vec<f32>]) -> Vec<f64> {
     let mut largest = vec![0.0_f32; vectors.len() + 1];
     for (field, own) in fields.iter().zip(coefficients) {
         let mut rest = field.clone();
-        largest[0] = largest[0].max(most(&rest));
+        largest[0] = largest[0].max(largest_magnitude(&rest));
         for (number, (vector, weight)) in vectors.iter().zip(own).enumerate() {
             add(&mut rest, -weight, vector);
-            largest[number + 1] = largest[number + 1].max(most(&rest));
+            largest[number + 1] = largest[number + 1].max(largest_magnitude(&rest));
         }
     }
     let whole = largest[0];
@@ -99,12 +100,12 @@ fn deviations(fields: &[Vec<f32>], vectors: &[Vec<f32>], coefficients: &[Vec<f32
 }
 
 /// Returns the largest magnitude.
-fn most(values: &[f32]) -> f32 {
+fn largest_magnitude(values: &[f32]) -> f32 {
     values.iter().fold(0.0_f32, |most, value| most.max(value.abs()))
 }
 
 /// Returns at most `rank` vectors in the order of their contribution, and their components along `directions`.
-fn turned(directions: &[Vec<f32>], found: &[Vec<f64>], rank: usize) -> (Vec<Vec<f32>>, Vec<Vec<f64>>) {
+fn principal_vectors(directions: &[Vec<f32>], found: &[Vec<f64>], rank: usize) -> (Vec<Vec<f32>>, Vec<Vec<f64>>) {
     let count = directions.len();
     let products = DMatrix::from_fn(count, count, |i, k| found.iter().map(|own| own[i] * own[k]).sum::<f64>());
     if count == 0 {
@@ -126,7 +127,7 @@ fn turned(directions: &[Vec<f32>], found: &[Vec<f64>], rank: usize) -> (Vec<Vec<
     (turn.iter().map(vector).collect(), turn)
 }
 
-/// Gram-Schmidt, twice; vectors that depend on others are removed.
+/// Orthonormalises vectors by two passes of Gram-Schmidt, and removes those that depend linearly on others.
 fn orthonormalise(vectors: &mut Vec<Vec<f32>>) {
     let length = |vector: &[f32]| dot(vector, vector).sqrt();
     let longest = vectors.iter().map(|vector| length(vector)).fold(0.0, f64::max);
@@ -145,11 +146,12 @@ fn orthonormalise(vectors: &mut Vec<Vec<f32>>) {
     *vectors = kept;
 }
 
+/// Adds `factor` times `values` to `sum`.
 fn add(sum: &mut [f32], factor: f32, values: &[f32]) {
     sum.iter_mut().zip(values).for_each(|(sum, value)| *sum += factor * value);
 }
 
-/// Sixteen sums, which the compiler turns into vector instructions.
+/// Returns the dot product, from sixteen sums that the compiler turns into vector instructions.
 fn dot(a: &[f32], b: &[f32]) -> f64 {
     let (heads_a, rest_a) = a.as_chunks::<16>();
     let (heads_b, rest_b) = b.as_chunks::<16>();
@@ -161,6 +163,7 @@ fn dot(a: &[f32], b: &[f32]) -> f64 {
     sums.iter().map(|sum| f64::from(*sum)).sum::<f64>() + rest.sum::<f64>()
 }
 
+/// Returns the dot product of two short vectors.
 fn sum(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
@@ -174,7 +177,7 @@ fn single(value: f64) -> f32 {
 mod tests {
     use super::*;
 
-    /// Returns fields of three independent shapes; the third is small.
+    /// Returns 40 combinations of three independent shapes, of which the third is small.
     fn fields() -> Vec<Vec<f32>> {
         let shape = |k: u32, x: u32| ((k + 1) as f32 * x as f32 * 0.037).sin();
         let field = |s: u32| {
@@ -203,14 +206,14 @@ mod tests {
         let enough = Basis::new(&fields(), 12, 0.01);
         assert!(enough.vectors.len() == 2 && enough.coefficients[0].len() == 2);
         assert!((enough.deviation / basis.deviation - 1.0).abs() < 1e-2, "{} {}", enough.deviation, basis.deviation);
-        let kept = basis.clone().extended(fields().into_iter());
+        let kept = basis.clone().project(fields().into_iter());
         assert!((kept.deviation / basis.deviation - 1.0).abs() < 1e-2 && kept.coefficients.len() == 40);
         let one = Basis::new(&fields(), 1, 0.0);
         assert!(one.deviation > 0.05, "{}", one.deviation);
     }
 
     #[test]
-    fn accepts_fields_at_rest() {
+    fn accepts_zero_fields_and_no_fields() {
         let basis = Basis::new(&vec![vec![0.0; 12]; 5], 4, 0.0);
         assert!(basis.vectors.is_empty() && basis.coefficients == vec![Vec::<f32>::new(); 5] && basis.deviation == 0.0);
         assert!(Basis::new(&[], 4, 0.0).vectors.is_empty());

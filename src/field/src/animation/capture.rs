@@ -14,7 +14,7 @@ use super::{ANGLES, MAX_BYTES, MAX_POINTS, MAX_TIMES};
 use crate::ring::Ring;
 use crate::structure::{ModalShapes, RigidMotion, Role, Structure, variable};
 
-/// State of all structures at a communication point, with the largest forces and the smallest clearances since the frame before.
+/// State of all structures at a communication point, with the largest forces and the smallest clearances since the previous frame.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Frame {
     /// Time (s).
@@ -26,41 +26,43 @@ pub(super) struct Frame {
 /// State of one structure.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct BodyFrame {
-    /// Modal amplitudes.
+    /// Modal amplitudes, in the order of `ModalShapes::amplitudes`.
     pub(super) amplitudes: Vec<f32>,
     /// Rigid motion; the angle counts revolutions.
     pub(super) motion: RigidMotion,
-    /// Normal force per contact node, mean over a communication step (N), sector by sector.
+    /// Normal force on each contact node (N), mean over a communication step, sector by sector.
     pub(super) forces: Vec<f32>,
-    /// Sum of these forces of each sector, and of the structure (N).
+    /// Sum of these forces for each sector (N).
     pub(super) sector_forces: Vec<f32>,
+    /// Sum of these forces for the structure (N).
     pub(super) total: f32,
-    /// Smallest clearance of each sector (m); infinite without a surface to touch.
+    /// Smallest clearance of each sector (m); infinite if no surface is opposite.
     pub(super) clearances: Vec<f32>,
 }
 
 /// State of the surface of a contact.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct RingFrame {
+    /// Prescribed motion.
     pub(super) drive: PrescribedMotion,
     /// Mean wear along the axis at [`ANGLES`] angles (m); empty without a coating.
     pub(super) wear: Vec<f32>,
 }
 
-/// Observer of a run.
+/// Observer of a run that keeps its motion and contacts in bounded memory.
 pub struct Capture {
     pub(super) structures: Vec<Structure>,
     pub(super) shapes: Vec<Option<ModalShapes<'static>>>,
     pub(super) rings: Vec<Ring>,
-    /// Variable with the forces of each sector: value reference and number of elements.
+    /// Variable with the forces on each sector of each structure: value reference and number of elements.
     forces: Vec<Vec<(u32, usize)>>,
     schedule: Schedule,
     /// Number of communication steps between two frames.
     stride: usize,
-    /// Largest number of frames, even.
+    /// Largest number of frames, which is even; 0 before the first frame.
     most: usize,
     pub(super) frames: Vec<Frame>,
-    /// Forces and clearances of points since the last frame.
+    /// Forces and clearances since the last frame.
     pending: Option<Vec<BodyFrame>>,
     /// Smallest clearance at [`ANGLES`] angles over the run, of each rotor (m); infinite where no blade was.
     pub(super) by_angle: Vec<Vec<f32>>,
@@ -80,7 +82,7 @@ impl Capture {
         let shapes = shapes.into_iter().zip(&scene.roms).map(thin).collect();
         let structures = Structure::of_scene(scene, shapes, &[]);
         let rings =
-            (0..scene.settings.contacts.len()).filter_map(|contact| Ring::of_contact(contact, scene).transpose());
+            (0..scene.settings.contacts.len()).filter_map(|contact| Ring::for_contact(contact, scene).transpose());
         let by_angle = structures.iter().map(|own| match own.role {
             Role::Rotor => vec![f32::INFINITY; ANGLES],
             _ => Vec::new(),
@@ -100,7 +102,7 @@ impl Capture {
         })
     }
 
-    /// As [`Capture::new`], with at most this even number of frames.
+    /// Prepares a capture with at most `most` frames, rounded down to an even number.
     ///
     /// # Errors
     /// The errors of [`Capture::new`].
@@ -113,7 +115,7 @@ impl Capture {
         Ok(Self { most: most & !1, ..Self::new(scene, shapes, schedule)? })
     }
 
-    /// Names of the structures that are shown by their contact nodes only.
+    /// Returns the names of the structures that are shown by their contact nodes only.
     pub fn without_surface(&self) -> Vec<&str> {
         self.structures.iter().filter(|own| own.shapes.is_none()).map(|own| own.name.as_str()).collect()
     }
@@ -125,7 +127,7 @@ impl Capture {
         }
         let is_kept = index.is_multiple_of(self.stride);
         let mut bodies: Vec<BodyFrame> = (0..self.structures.len()).map(|own| self.contacts(own, simulation)).collect();
-        self.note_angles(&bodies);
+        self.record_angles(&bodies);
         if let Some(pending) = self.pending.take() {
             bodies.iter_mut().zip(&pending).for_each(|(own, other)| own.merge(other));
         }
@@ -158,8 +160,11 @@ impl Capture {
 
     /// Reads the mode shapes, and finds the variables with the forces.
     fn start(&mut self, simulation: &Simulation) {
-        self.shapes =
-            self.structures.iter().map(|own| Some(ModalShapes::of(own.bank(simulation)?).into_owned())).collect();
+        self.shapes = self
+            .structures
+            .iter()
+            .map(|own| Some(ModalShapes::from_bank(own.bank(simulation)?).into_owned()))
+            .collect();
         let variables = |own: &Structure| -> Vec<(u32, usize)> {
             let found = |name: String| simulation.table().find(&name).map(|found| (found.reference, found.len()));
             let names = own.sectors.iter().map(|sector| own.sector_variable(*sector, "normal_force"));
@@ -168,6 +173,7 @@ impl Capture {
         self.forces = self.structures.iter().map(variables).collect();
     }
 
+    /// Reads the modal amplitudes of a structure.
     fn amplitudes(&self, own: usize, simulation: &Simulation) -> Vec<f64> {
         let structure = &self.structures[own];
         let read = |shapes: &ModalShapes<'_>| Some(shapes.amplitudes(structure.bank(simulation)?, &structure.sectors));
@@ -195,7 +201,8 @@ impl Capture {
         BodyFrame { amplitudes: Vec::new(), motion, forces, sector_forces, total, clearances }
     }
 
-    fn note_angles(&mut self, bodies: &[BodyFrame]) {
+    /// Updates the smallest clearance at each angle.
+    fn record_angles(&mut self, bodies: &[BodyFrame]) {
         for ((smallest, structure), body) in self.by_angle.iter_mut().zip(&self.structures).zip(bodies) {
             // Only rotors have angles.
             if smallest.is_empty() {
@@ -208,7 +215,7 @@ impl Capture {
         }
     }
 
-    /// Drops every other frame.
+    /// Drops every second frame, and merges its contacts into the next one.
     fn halve(&mut self) {
         self.stride *= 2;
         let mut kept: Vec<Frame> = Vec::with_capacity(self.frames.len() / 2 + 1);
@@ -237,12 +244,13 @@ impl Capture {
         !self.rings.is_empty()
     }
 
-    /// Time between two frames (s).
+    /// Returns the time between two frames (s).
     pub fn spacing(&self) -> f64 {
         self.stride as f64 * self.schedule.step
     }
 
-    /// Returns the displacements of the contact nodes per modal amplitude, as an uncoupled or coupled map.
+    /// Returns the displacements of a contact node per unit of each modal amplitude: one matrix for uncoupled sectors, or one
+    /// per nodal diameter.
     pub(super) fn contact_modes(&self, own: usize, node: usize) -> Vec<DMatrix<Complex<f64>>> {
         let rom = &self.structures[own].rom;
         let rows = |map: &DMatrix<Complex<f64>>| map.rows(3 * node, 3).into_owned();
@@ -260,7 +268,7 @@ impl Capture {
     }
 }
 
-/// Returns the index of the angle at which a sector is, among `count` equal angles.
+/// Returns in which of `count` equal ranges of angle a sector is.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a fraction of a turn")]
 pub(super) fn angle_bin(motion: RigidMotion, sector: usize, sectors: usize, count: usize) -> usize {
     let turn = motion.of_sector(sector, sectors).angle.rem_euclid(TAU) / TAU;
@@ -268,6 +276,7 @@ pub(super) fn angle_bin(motion: RigidMotion, sector: usize, sectors: usize, coun
 }
 
 impl Frame {
+    /// Returns the approximate memory of the frame (bytes).
     fn bytes(&self) -> usize {
         let body = |own: &BodyFrame| {
             4 * (own.amplitudes.len() + own.forces.len() + own.sector_forces.len() + own.clearances.len()) + 128
@@ -278,7 +287,7 @@ impl Frame {
 }
 
 impl BodyFrame {
-    /// Adds the contacts of another point.
+    /// Includes the contacts of another communication point: the larger forces and the smaller clearances.
     fn merge(&mut self, other: &Self) {
         let largest =
             |own: &mut [f32], other: &[f32]| own.iter_mut().zip(other).for_each(|(own, other)| *own = own.max(*other));

@@ -1,4 +1,4 @@
-//! The bytes of an animation: thinned surfaces, their displacements of low rank, contact forces and casings over time.
+//! Binary data of an animation: thinned surfaces, their low-rank displacements, contact forces and casings over time.
 
 use std::io::Write as _;
 
@@ -14,26 +14,28 @@ use super::{ANGLES, MAX_TIMES};
 use crate::cells::{contact_cells, points_alone};
 use crate::structure::{Role, Structure};
 
-/// Largest rank of the displacements of one structure, and the deviation at which a lower rank suffices.
+/// Largest rank of the displacements of one structure.
 const MAX_RANK: usize = 28;
+/// Deviation below which a lower rank suffices.
 const DEVIATION: f64 = 0.01;
 /// Largest number of displacement values of one structure in memory.
 const MAX_VALUES: usize = 25_000_000;
-/// Times per period of the slowest mode that moves much.
+/// Number of times per period of the slowest elastic mode.
 const TIMES_PER_PERIOD: f64 = 8.0;
 /// Fraction of the interval that lies before the largest force, if the interval is shorter than the contact.
 const BEFORE_PEAK: f64 = 0.4;
-/// Distance over which a contact force lights the surface, as a fraction of the extent of the contact nodes.
+/// Radius around a contact node in which a contact force lights the surface, as a fraction of the extent of the contact nodes.
 const LIGHT: f64 = 0.12;
 /// Index of a point that no contact lights.
 const NO_NODE: u16 = u16::MAX;
-/// Steps of the largest contribution to displacements, and of the smallest.
+/// Number of quantisation steps of the vector with the largest contribution to the displacements.
 const STEPS: f64 = 4000.0;
+/// Smallest number of quantisation steps of a vector.
 const MIN_STEPS: f64 = 30.0;
-/// Largest value of an `i16` that is used, and of a force.
+/// Number of quantisation steps of positions and forces, which is the largest value of an `i16`.
 const FULL: f64 = 32_767.0;
 
-/// A run as bytes for a picture that moves.
+/// Data of an animation of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Animation {
     /// Description of bodies, casings and times, with offsets into the data.
@@ -42,60 +44,62 @@ pub struct Animation {
     pub data: String,
     /// First and last time (s).
     pub interval: [f64; 2],
-    /// True if contact also occurs outside the interval.
+    /// Whether contact also occurs outside the interval.
     pub is_cut: bool,
     /// Largest deviation of a displacement from the run, as a fraction of the largest displacement of its structure.
     pub deviation: f64,
 }
 
-/// Data in the order of the offsets.
+/// Binary data, to which arrays are appended.
 #[derive(Default)]
 struct Packer(Vec<u8>);
 
 impl Packer {
-    fn start(&mut self) -> usize {
+    /// Pads the data to a multiple of four bytes, and returns its length.
+    fn align(&mut self) -> usize {
         while !self.0.len().is_multiple_of(4) {
             self.0.push(0);
         }
         self.0.len()
     }
 
-    /// Adds numbers: first their low bytes, then their high bytes, which compresses better.
-    fn words(&mut self, values: &[[u8; 2]]) -> usize {
-        let start = self.start();
+    /// Adds two-byte numbers: first all low bytes, then all high bytes, which compresses better. Returns the offset.
+    fn append_words(&mut self, values: &[[u8; 2]]) -> usize {
+        let start = self.align();
         self.0.extend(values.iter().map(|word| word[0]));
         self.0.extend(values.iter().map(|word| word[1]));
         start
     }
 
-    fn whole(&mut self, values: impl Iterator<Item = u16>) -> usize {
-        self.words(&values.map(u16::to_le_bytes).collect::<Vec<_>>())
+    /// Adds integers, and returns the offset.
+    fn append_integers(&mut self, values: impl Iterator<Item = u16>) -> usize {
+        self.append_words(&values.map(u16::to_le_bytes).collect::<Vec<_>>())
     }
 
-    /// Adds values as fractions of the largest; returns the offset and the value of one unit.
-    fn scaled(&mut self, values: &[f64]) -> (usize, f64) {
-        self.stepped(values, FULL)
+    /// Adds values in [`FULL`] steps from 0 to the largest magnitude; returns the offset and the value of one step.
+    fn append_scaled(&mut self, values: &[f64]) -> (usize, f64) {
+        self.append_quantised(values, FULL)
     }
 
-    /// Adds values in `steps` steps from 0 to the largest; returns the offset and the value of one unit.
+    /// Adds values in `steps` steps from 0 to the largest magnitude; returns the offset and the value of one step.
     #[expect(clippy::cast_possible_truncation, reason = "scaled to the range of the type")]
-    fn stepped(&mut self, values: &[f64], steps: f64) -> (usize, f64) {
+    fn append_quantised(&mut self, values: &[f64], steps: f64) -> (usize, f64) {
         let largest = values.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
         let unit = if largest > 0.0 { largest / steps } else { 1.0 };
         let words: Vec<[u8; 2]> = values.iter().map(|value| ((value / unit).round() as i16).to_le_bytes()).collect();
-        (self.words(&words), unit)
+        (self.append_words(&words), unit)
     }
 }
 
 impl Capture {
-    /// Chooses times and returns the run as bytes.
+    /// Chooses the times of the animation, and returns its data.
     ///
     /// # Errors
-    /// The data cannot be compressed (not observed).
+    /// The data cannot be compressed.
     pub fn animation(&self) -> Result<Animation> {
         let (chosen, is_cut) = self.chosen_frames();
         let frames: Vec<&Frame> = chosen.iter().map(|index| &self.frames[*index]).collect();
-        // Contacts of frames between the chosen ones belong to the next of them.
+        // Contacts of frames between two chosen frames belong to the later one.
         let from = |place: usize| if place == 0 { chosen[0] } else { chosen[place - 1] + 1 };
         let total = |frame: &Frame| frame.bodies.iter().map(|body| f64::from(body.total)).sum::<f64>();
         let totals = (0..frames.len())
@@ -162,7 +166,7 @@ impl Capture {
         (chosen, is_cut)
     }
 
-    /// Returns the period (s) of the slowest elastic mode of the structures that touch, if any.
+    /// Returns the period (s) of the slowest elastic mode of all structures; `None` if no structure has one.
     fn period(&self) -> Option<f64> {
         self.structures.iter().filter_map(|own| own.slowest_period()).reduce(f64::max)
     }
@@ -181,7 +185,7 @@ impl Capture {
         let points: Vec<[f64; 3]> = surface.iter().chain(&nodes).copied().collect();
         let basis = self.basis(own, structure, frames, points.len());
         let rank = basis.vectors.len();
-        // Vectors of small contribution need fewer steps, and their bytes compress better.
+        // Vectors with a small contribution need fewer steps, which compress better.
         let largest = |values: &mut dyn Iterator<Item = f32>| values.fold(0.0_f32, |most, value| most.max(value.abs()));
         let contribution = |k: usize| {
             let weight = largest(&mut basis.coefficients.iter().map(|own| own[k]));
@@ -193,11 +197,11 @@ impl Capture {
         for (k, own) in contributions.iter().enumerate() {
             let steps = (STEPS * own / most).clamp(MIN_STEPS, FULL).round();
             let series: Vec<f64> = basis.coefficients.iter().map(|own| f64::from(own[k])).collect();
-            coefficients.push(packer.stepped(&series, steps));
+            coefficients.push(packer.append_quantised(&series, steps));
             let vector: Vec<f64> = basis.vectors[k].iter().map(|value| f64::from(*value)).collect();
-            vectors.push(packer.stepped(&vector, steps));
+            vectors.push(packer.append_quantised(&vector, steps));
         }
-        let (place, unit) = packer.scaled(&points.iter().flatten().copied().collect::<Vec<_>>());
+        let (place, unit) = packer.append_scaled(&points.iter().flatten().copied().collect::<Vec<_>>());
         let (triangles, lines) = (triangles(structure), lines(structure));
         let short = |index: usize| u16::try_from(index).unwrap_or(NO_NODE);
         let lights = lights(&points, &nodes);
@@ -208,7 +212,7 @@ impl Capture {
                 [motion.angle, motion.shift[0], motion.shift[1], motion.shift[2]]
             })
             .collect();
-        let (force_place, force_unit) = packer.scaled(forces);
+        let (force_place, force_unit) = packer.append_scaled(forces);
         let ring = self.rings.iter().position(|ring| ring.carrier == Some(own));
         let value = json!({
             "name": structure.name,
@@ -227,10 +231,10 @@ impl Capture {
             "place": [place, unit],
             "basis": vectors,
             "weights": coefficients,
-            "triangles": [packer.whole(triangles.iter().map(|index| short(*index))), triangles.len()],
-            "lines": [packer.whole(lines.iter().map(|index| short(index + surface.len()))), lines.len()],
-            "lights": packer.whole(lights.iter().map(|(node, _)| *node)),
-            "light": packer.whole(lights.iter().map(|(_, strength)| *strength)),
+            "triangles": [packer.append_integers(triangles.iter().map(|index| short(*index))), triangles.len()],
+            "lines": [packer.append_integers(lines.iter().map(|index| short(index + surface.len()))), lines.len()],
+            "lights": packer.append_integers(lights.iter().map(|(node, _)| *node)),
+            "light": packer.append_integers(lights.iter().map(|(_, strength)| *strength)),
             "forces": [force_place, force_unit, if forces.is_empty() { 0 } else { 1 }],
         });
         (value, basis.deviation)
@@ -239,7 +243,7 @@ impl Capture {
     /// Finds the displacements of all points of all sectors at the chosen times.
     fn basis(&self, own: usize, structure: &Structure, frames: &[&Frame], points: usize) -> Basis {
         let values = frames.len() * structure.sectors.len() * 3 * points;
-        // Very large rotors are described by fewer snapshots.
+        // The basis of very large rotors comes from fewer frames.
         let every = values.div_ceil(MAX_VALUES).max(1);
         let field = |frame: &&Frame| -> Vec<Vec<f32>> {
             let body = &frame.bodies[own];
@@ -262,9 +266,10 @@ impl Capture {
         let shown = frames.iter().step_by(every).flat_map(field).collect::<Vec<_>>();
         let found = Basis::new(&shown, MAX_RANK, DEVIATION);
         drop(shown);
-        found.extended(frames.iter().flat_map(field))
+        found.project(frames.iter().flat_map(field))
     }
 
+    /// Packs the surface of a contact; returns its description.
     fn wall(&self, index: usize, frames: &[&Frame], packer: &mut Packer) -> Value {
         let ring = &self.rings[index];
         let change = |frame: &&Frame| -> Vec<f64> {
@@ -273,12 +278,12 @@ impl Capture {
             ring.radius_changes(&own.drive, ANGLES).zip(wear).map(|(change, wear)| change + wear).collect()
         };
         let changes: Vec<f64> = frames.iter().flat_map(change).collect();
-        let (place, unit) = packer.scaled(&changes);
+        let (place, unit) = packer.append_scaled(&changes);
         json!({ "name": ring.name, "rows": ring.rows, "gap": ring.gap, "carrier": ring.carrier, "change": [place, unit] })
     }
 }
 
-/// Returns the corners of the triangles of a surface.
+/// Returns the corners of the triangles of the surface of a structure.
 fn triangles(structure: &Structure) -> Vec<usize> {
     let faces = structure.shapes.iter().flat_map(|shapes| shapes.faces());
     faces
@@ -302,7 +307,7 @@ fn lines(structure: &Structure) -> Vec<usize> {
     around.collect()
 }
 
-/// Returns for each point the contact node that lights it, and how strongly (0 to [`FULL`]).
+/// Returns for each point the contact node whose force lights it, and the strength of this light (0 to [`FULL`]).
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "scaled to the range of the type")]
 fn lights(points: &[[f64; 3]], nodes: &[[f64; 3]]) -> Vec<(u16, u16)> {
     let square = |a: &[f64; 3], b: &[f64; 3]| (0..3).map(|axis| (a[axis] - b[axis]).powi(2)).sum::<f64>();

@@ -1,4 +1,4 @@
-//! What the tips did: forces, clearances, displacements and wear, for figures.
+//! Forces, clearances, displacements and wear of the tips, for figures.
 
 use nalgebra::Complex;
 use tiprub_core::Simulation;
@@ -11,7 +11,7 @@ use crate::structure::{Coordinates, DisplacementMap, ModalShapes, Role, elements
 /// Largest number of rows of a map over the circumference.
 const MAX_ROWS: usize = 72;
 
-/// Blade or body with the largest contact force.
+/// Blade or free body with the largest contact force.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HitBlade {
     /// Index of the structure.
@@ -35,7 +35,7 @@ pub struct TipHistory {
     pub node: String,
     /// Direction with the largest motion, such as `tangential`.
     pub direction: &'static str,
-    /// Times (s), with one spacing.
+    /// Times (s), equally spaced.
     pub times: Vec<f64>,
     /// Displacement in that direction (m).
     pub values: Vec<f64>,
@@ -53,6 +53,7 @@ pub struct WearMap {
 }
 
 impl WearMap {
+    /// Reads the wear of all coatings.
     pub(super) fn all(rings: &[Ring], simulation: &Simulation) -> Vec<Self> {
         let map = |ring: &Ring| {
             let cells = elements(simulation, ring.wear.as_ref()?)?;
@@ -64,7 +65,7 @@ impl WearMap {
     }
 }
 
-/// Returns the wear of a coating at equal angles (m), mean along the axis; empty without a coating.
+/// Returns the wear depth of a coating (m), averaged along the axis, at [`super::ANGLES`] angles; empty without a coating.
 #[expect(clippy::cast_possible_truncation, reason = "rounding is intended")]
 pub(super) fn mean_wear(ring: &Ring, simulation: &Simulation) -> Vec<f32> {
     let cells = ring.wear.as_ref().and_then(|name| elements(simulation, name)).unwrap_or_default();
@@ -81,22 +82,22 @@ pub(super) fn mean_wear(ring: &Ring, simulation: &Simulation) -> Vec<f32> {
 pub struct AngleClearances {
     /// Name of the rotor.
     pub name: String,
-    /// Smallest clearance over the run at equal angles from 0 (m); infinite where no blade was.
+    /// Smallest clearance of the run in equal ranges of angle from 0 (m); infinite where no blade was.
     pub smallest: Vec<f64>,
     /// Times (s).
     pub times: Vec<f64>,
-    /// Smallest clearance at equal angles over time (m), `[angle][time]`; infinite where no blade was.
+    /// Smallest clearance in equal ranges of angle over time (m), `[angle][time]`; infinite where no blade was.
     pub over_time: Vec<Vec<f64>>,
 }
 
 impl Capture {
-    /// Times of the frames (s).
+    /// Returns the times of the frames (s).
     pub fn times(&self) -> Vec<f64> {
         self.frames.iter().map(|frame| frame.time).collect()
     }
 
-    /// Returns the blade or body with the largest contact force; without contact, the one with the smallest clearance.
-    /// `None` if the scene has no rotor and no body.
+    /// Returns the blade or free body with the largest contact force; without contact, the one with the smallest clearance.
+    /// `None` if the scene has neither a rotor nor a free body.
     pub fn hardest_hit(&self) -> Option<HitBlade> {
         let movers = self.structures.iter().enumerate().filter(|(_, own)| matches!(own.role, Role::Rotor | Role::Free));
         let mut found: Option<(f64, HitBlade)> = None;
@@ -118,8 +119,8 @@ impl Capture {
         found.map(|(_, blade)| blade)
     }
 
-    /// Returns the normal force on each contact node of a blade over time (N), by the names of the nodes; empty if the scene does
-    /// not report it.
+    /// Returns the name of each contact node of a blade, and the normal force on it over time (N); empty if the scene does not
+    /// report these forces.
     pub fn node_forces(&self, blade: &HitBlade) -> Vec<(String, Vec<f64>)> {
         let nodes = &self.structures[blade.structure].rom.contact_nodes;
         let first = blade.sector * nodes.len();

@@ -82,7 +82,7 @@ impl FrequencyPrediction {
         Ok(Self { speeds, frequencies, sectors: rom.sectors, base_order: base_order(scene, start)?, stiffening })
     }
 
-    /// Predicts frequencies of the first master of a scene with replaced start values.
+    /// Predicts the frequencies of the first master of a scene with replaced start values (name, value), up to the speed `fastest` (rad/s).
     ///
     /// # Errors
     /// The first master does not rotate, a start value is wrong, or the errors of [`FrequencyPrediction::new`].

@@ -113,7 +113,7 @@ impl WindowTally {
 }
 
 impl MapSetup {
-    /// Returns everything that determines the results of a run, except for its speed.
+    /// Returns texts that change with everything that determines the result of a run, except for its speed.
     pub fn digests(&self) -> Vec<String> {
         let Self { scene, settings, samples, transient, revolutions, top } = self;
         let mut settings = settings.clone();

@@ -30,8 +30,8 @@ fn around(crossing: f64, half: f64, count: usize) -> Speeds {
     Speeds { from: (1.0 - half) * crossing, to: (1.0 + half) * crossing, count }
 }
 
-/// Makes a map, and returns its warnings, too.
-fn of_scene(scene: Scene, request: &MapRequest, threads: usize) -> Result<(Study, Vec<String>)> {
+/// Makes a map, and also returns its warnings.
+fn make_map(scene: Scene, request: &MapRequest, threads: usize) -> Result<(Study, Vec<String>)> {
     let (map, speeds) = Map::prepare(scene, request)?;
     let runs = sweep::sweep(&speeds, threads, |speed| map.setup.run(*speed), |_| {})?;
     map.finish(runs, request.quick)
@@ -39,7 +39,7 @@ fn of_scene(scene: Scene, request: &MapRequest, threads: usize) -> Result<(Study
 
 #[track_caller]
 fn run(scene: Scene, request: &MapRequest, threads: usize) -> Study {
-    of_scene(scene, request, threads).unwrap().0
+    make_map(scene, request, threads).unwrap().0
 }
 
 /// Returns one blade of rotor 37 without friction; the damping makes the free vibration decay soon.
@@ -236,7 +236,7 @@ fn rejects_a_master_at_rest_before_reduction() {
     assert!(failure.usage && failure.problem.contains("`cube` is a free body"), "{failure}");
     assert!(failure.remedy.contains("builtin:rotor37"), "{failure}");
     let without = Scene { settings, roms: Vec::new() };
-    assert_eq!(of_scene(without, &MapRequest::default(), 1).unwrap_err(), failure);
+    assert_eq!(make_map(without, &MapRequest::default(), 1).unwrap_err(), failure);
 }
 
 #[test]
@@ -281,7 +281,7 @@ fn rejected_speeds_are_marked_and_fail_if_all_rejected() {
         map.sheet.rows.iter().filter(|row| row[1].is_nan()).map(|row| row[0]).collect::<Vec<_>>(),
         [170.0, 190.0]
     );
-    let failure = of_scene(scene, &request(speeds(170.0, 190.0)), 1).unwrap_err();
+    let failure = make_map(scene, &request(speeds(170.0, 190.0)), 1).unwrap_err();
     assert!(failure.problem.contains("all angular velocities were rejected"), "{failure}");
 }
 
@@ -290,10 +290,10 @@ fn rejects_too_coarse_steps_and_a_speed_override() {
     let mut coarse = request(BUMP, around(CROSSING, 0.1, 2));
     coarse.settings.retain(|(name, _)| name != "internal_step_max");
     coarse.settings.push(("internal_step_max".into(), "1e-4".into()));
-    let failure = of_scene(scene(FIRST, 2), &coarse, 1).unwrap_err();
+    let failure = make_map(scene(FIRST, 2), &coarse, 1).unwrap_err();
     assert!(failure.problem.contains("internal_step_max="), "{failure}");
     let request = MapRequest { settings: vec![("speed".into(), "1".into())], ..MapRequest::default() };
-    assert!(of_scene(scene(FIRST, 2), &request, 1).unwrap_err().usage);
+    assert!(make_map(scene(FIRST, 2), &request, 1).unwrap_err().usage);
 }
 
 /// With friction, the sense of rotation matters; a blade mirrored about its middle that rotates in the opposite sense gives the mirrored result.
@@ -359,7 +359,7 @@ fn rejects_excessive_requests_before_running() {
 fn planned_steps_match_the_work_done() {
     let request = MapRequest { revolutions: Some(4), transient: Some(3), ..request(BUMP, around(CROSSING, 0.1, 2)) };
     let (map, speeds) = Map::prepare(scene(FIRST, 4), &request).unwrap();
-    let (study, _) = of_scene(scene(FIRST, 4), &request, 1).unwrap();
+    let (study, _) = make_map(scene(FIRST, 4), &request, 1).unwrap();
     let done = study.results["internal_steps"].as_f64().unwrap();
     assert!((map.internal_steps(&speeds) / done - 1.0).abs() < 0.02, "{done}");
 }

@@ -66,7 +66,12 @@ fn highest(asked: &StabilityScene) -> f64 {
 ///
 /// # Errors
 /// A thread fails.
-pub(super) fn of(asked: &StabilityScene, own: &SceneStart, quick: bool, work: &mut StoredWork) -> Result<Vec<Usable>> {
+pub(super) fn find_all(
+    asked: &StabilityScene,
+    own: &SceneStart,
+    quick: bool,
+    work: &mut StoredWork,
+) -> Result<Vec<Usable>> {
     let place = [OperatingPoint { friction: own.friction, speed: own.speed }];
     let highest = highest(asked);
     let range = TRIED.map(|product| product / highest);
@@ -79,7 +84,7 @@ pub(super) fn of(asked: &StabilityScene, own: &SceneStart, quick: bool, work: &m
         let sought = |solver: Solver, range: [f64; 2]| seek(range, known, |step| ask(solver, step).map(drop));
         let mut found: Vec<Sought<String>> = Vec::new();
         for solver in Solver::ALL {
-            let like = found.iter().find(|other| alike(other, &|step| ask(solver, step)));
+            let like = found.iter().find(|other| has_same_limit(other, &|step| ask(solver, step)));
             let sought = match like {
                 Some(other) => other.clone(),
                 None => match sought(solver, range) {
@@ -98,8 +103,8 @@ pub(super) fn of(asked: &StabilityScene, own: &SceneStart, quick: bool, work: &m
     Ok(methods.zip(found.concat()).map(|(method, sought)| Usable { method, sought }).collect())
 }
 
-/// Returns whether another solver gives the same answers just below and just above a limit, with the same reason.
-fn alike(other: &Sought<String>, ask: &dyn Fn(f64) -> ScreeningResult) -> bool {
+/// Returns whether a solver accepts a step just below the limit of another solver, and rejects a step just above it for the same reason.
+fn has_same_limit(other: &Sought<String>, ask: &dyn Fn(f64) -> ScreeningResult) -> bool {
     let Sought::Below(step, why) = other else { return false };
     // Twice the width of the last interval.
     ask(step * (1.0 - 1e-6)).is_ok() && ask(step * 1.02).is_err_and(|refusal| same_reason(&refusal, why))

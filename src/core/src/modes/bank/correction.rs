@@ -52,7 +52,7 @@ impl ModalBank {
         let lanes = self.lanes;
         // Quasi-static modes, which come last, do not respond to delayed forces.
         let used = used_len(&self.correction);
-        // Whole groups of four modes give the same sums as all modes.
+        // Sums over whole groups of four modes have the same bits as sums over all modes.
         let values = &self.correction[..used.next_multiple_of(4).min(self.modes)];
         let matrix = &self.contact_modes[..values.len() * self.rows];
         if lanes == 1 {

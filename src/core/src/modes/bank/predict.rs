@@ -89,7 +89,7 @@ impl<const WIDTH: usize, const LOSS: bool, const SPECIAL: bool> Kernel for Predi
                 modes.advance::<WIDTH, 0, LOSS, SPECIAL>(position, before, increment, loss, displacement);
                 let sums = &mut displacement[..rows];
                 sums.fill(0.0);
-                // Whole groups of four modes give the same sums as all modes.
+                // Sums over whole groups of four modes have the same bits as sums over all modes.
                 let summed = moving.next_multiple_of(4).min(position.len());
                 Accumulate { sums, matrix: &shapes[..summed * rows], values: &position[..summed] }.run();
                 continue;
@@ -129,7 +129,7 @@ struct ChunkModes<'a> {
     /// Modal loads if the pass is special.
     modal_load: &'a [f64],
     shapes: &'a [f64],
-    /// Number of modes that can differ from 0 after the prediction; the first ones.
+    /// Number of modes, counted from the first, that can differ from 0 after the prediction.
     moving: usize,
     rows: usize,
     lanes: usize,

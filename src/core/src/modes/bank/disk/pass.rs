@@ -41,7 +41,7 @@ impl LaneCoefficients {
 /// step (massless-boundary). `LOSS`: add the damping loss of the previous step. `ADVANCE`: predict and recover.
 pub(super) struct Pass<'a, const APPLY: bool, const DELAYED: bool, const LOSS: bool, const ADVANCE: bool> {
     pub modes: usize,
-    /// Number of modes of each block that can differ from 0 after the prediction; the first ones.
+    /// Number of modes of each block, counted from the first, that can differ from 0 after the prediction.
     pub moving: &'a [usize],
     pub rows: usize,
     /// Contact nodes on which the forces act.
