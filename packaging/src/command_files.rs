@@ -33,12 +33,12 @@ pub fn check(command: &Command) -> Result<()> {
             let inputs = NamedFile::option("--inputs", &arguments.inputs);
             let read: Vec<NamedFile> = scene(&arguments.scene).into_iter().chain(inputs).collect();
             let parquet = NamedFile::option("--parquet", &arguments.parquet);
-            let list = arguments.fields().map(|fields| NamedFile::new("--vtk", fields.directory.join(series::INDEX)));
             let report = NamedFile::option("--report", &arguments.report);
-            let files = [parquet, report, list].into_iter().flatten();
+            let files = [parquet, report].into_iter().flatten();
             let written = Vec::from_iter(NamedFile::option("--csv", &csv).into_iter().chain(files));
             outputs(&read, &written)?;
             let Some(fields) = arguments.fields() else { return Ok(()) };
+            apart(&written, &[NamedFile::new("--vtk", fields.directory.join(series::INDEX))])?;
             keep_inputs(&read, ("--vtk", &fields.directory), &series::FILES)?;
             fields.check_directory()
         }
