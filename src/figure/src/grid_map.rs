@@ -293,7 +293,7 @@ mod tests {
     }
 
     #[test]
-    fn small_clearances_have_strong_colours_and_rounding_errors_count_as_zero() {
+    fn small_clearances_have_strong_colours() {
         let map = map(Shows::Smallest, vec![-3e-16, 50.0, 100.0, 400.0]);
         let range = map.range();
         assert_eq!(range.map(f64::to_bits), [0.0, 400.0].map(f64::to_bits));

@@ -260,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn results_that_json_cannot_represent_are_returned_but_not_stored() {
+    fn infinite_results_are_returned_but_not_stored() {
         let root = tempfile::tempdir().unwrap();
         for _ in 0..2 {
             let (results, tried) = squares(root.path(), Part::WHOLE, "scene", &[1.0 / 3.0, 1e200]);
