@@ -9,7 +9,7 @@ use guide::print_row;
 use nalgebra::DMatrix;
 use rods::{NEARLY_NONE, StraightRod};
 use tiprub_core::geometry::{FixedGap, GapLaw, PrescribedMotion, Vector3};
-use tiprub_core::limits::massless::MasslessCheck;
+use tiprub_core::limits::massless::{CarrierUnderNodes, MasslessCheck};
 use tiprub_core::modes::modal::ModalModel;
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::system::{System, SystemSettings};
@@ -187,11 +187,12 @@ fn step_limit_accounts_for_slave_flexibility() {
             let master = model(vec![own, 1e3, 1e3, 1e3], [1.0, 0.0, 0.0, 0.0], 3);
             let other = model(vec![slave], [seen, 0.0, 0.0, 0.0], 0);
             let check = |carriers| MasslessCheck { model: &master, normals: vec![-Vector3::x()], carriers };
-            let flexible = check(vec![(DMatrix::from_element(1, 1, seen), &other)]);
+            let under = |seen: f64| CarrierUnderNodes { normals: DMatrix::from_element(1, 1, seen), model: &other };
+            let flexible = check(vec![under(seen)]);
             let (limit, alone) =
                 (flexible.limit(100.0).unwrap().closed, check(Vec::new()).limit(100.0).unwrap().closed);
             // Two slaves with 1/√2 of the participation are equivalent to one.
-            let half = || (DMatrix::from_element(1, 1, seen * std::f64::consts::FRAC_1_SQRT_2), &other);
+            let half = || under(seen * std::f64::consts::FRAC_1_SQRT_2);
             let halves = check(vec![half(), half()]).limit(100.0).unwrap().closed;
             assert!((halves / limit - 1.0).abs() < 1e-9, "{halves} and {limit}");
             let first = (1..).map(|i| 1e-3 * f64::from(i)).find(|step| joined([own, slave], [1.0, seen], *step) > 1e3);

@@ -11,6 +11,8 @@ use crate::scene::method::Scheme;
 
 /// Growth per step below this is rounding of the eigenvalue solver.
 pub(crate) const GROWTH_NOISE: f64 = 1e-7;
+/// Motions whose frequencies differ by less than this fraction are the same.
+const SAME_MOTION: f64 = 0.1;
 /// Largest number of modes for which growth rates are computed.
 pub(crate) const GROWTH_UP_TO: usize = 150;
 
@@ -46,6 +48,12 @@ impl GrowthRates {
     pub fn added(&self) -> f64 {
         let added = self.stepped - self.continuous.max(0.0);
         if added > self.noise { added } else { 0.0 }
+    }
+
+    /// Returns whether the fastest motion of the steps is the one that grows by the differential equations: both have the same
+    /// frequency.
+    pub(crate) fn is_of_equations(&self) -> bool {
+        self.is_flutter() && (self.swing - self.frequency).abs() < SAME_MOTION * self.frequency
     }
 
     /// Returns whether the differential equations themselves are unstable.

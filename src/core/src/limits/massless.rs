@@ -6,8 +6,9 @@
 //!
 //! A flexible carrier has its own D_s < 4 and X_s; several carriers under one blade have those of all their modes. With the modes of both, and
 //! U = L⁻¹[Φ_n X½, Ψ_n X_s½], G_nn = L Lᵀ, all eigenvalues are below 4 while those of the sum over modes U(4 − D)⁻¹Uᵀ are below 1. The part
-//! of the master has no eigenvalue above µ/4, so that the carrier adds the largest eigenvalue of G_nn⁻¹ Ψ_n X_s(1 − D_s/4)⁻¹ Ψ_nᵀ to µ, per
-//! blade in contact.
+//! of the master has no eigenvalue above µ/4, so that the carrier adds the largest eigenvalue of G_nn⁻¹ Ψ_n X_s(1 − D_s/4)⁻¹ Ψ_nᵀ to µ. For
+//! all blades in contact, G_nn and Ψ_n have the nodes of all blades; contact at fewer nodes adds no more, since G_nn⁻¹ of some nodes is at
+//! most that of all. The number of blades times the eigenvalue of one is a simple upper bound.
 //!
 //! Steps may have any length up to the limit, and a mode comes closest to D = 4 at ω_d h = π: each mode counts with its worst case at steps
 //! up to h. By itself this does not reach 4, since contact does not excite modes in which it does not participate.
@@ -36,6 +37,10 @@ const STIFF: f64 = 10.0;
 const TOO_STIFF: f64 = 300.0;
 /// Fraction of the limit up to which the same blades gain no energy without damping: at 0.5 they gain a fifth of their energy.
 pub const QUIET: f64 = 0.4;
+/// Damping ratio with which they gain no energy up to [`USABLE`].
+pub const DAMPED: f64 = 1e-3;
+/// Sum of eigenvalues below which closed contact is stable.
+pub(crate) const STABLE: f64 = 4.0;
 
 /// Step limits of the scheme (s).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,11 +49,22 @@ pub struct MasslessLimit {
     pub closed: f64,
     /// Contact that opens and closes gains hardly any energy below this step.
     pub usable: f64,
+    /// Contact that opens and closes gains no energy below this step.
+    pub quiet: f64,
 }
 
 impl MasslessLimit {
     /// No limit.
-    pub const NONE: Self = Self { closed: f64::INFINITY, usable: f64::INFINITY };
+    pub const NONE: Self = Self { closed: f64::INFINITY, usable: f64::INFINITY, quiet: f64::INFINITY };
+
+    /// Returns the smaller of each limit.
+    pub(crate) fn tightest(self, other: Self) -> Self {
+        Self {
+            closed: self.closed.min(other.closed),
+            usable: self.usable.min(other.usable),
+            quiet: self.quiet.min(other.quiet),
+        }
+    }
 }
 
 /// Data that the limit depends on.
@@ -58,46 +74,75 @@ pub struct MasslessCheck<'a> {
     pub model: &'a ModalModel,
     /// Unit normal of every contact node.
     pub normals: Vec<Vector3>,
-    /// Modes of every structure under the nodes along those normals, nodes × modes, and the structure.
-    pub carriers: Vec<(DMatrix<f64>, &'a ModalModel)>,
+    /// Carriers of the surfaces that the nodes touch.
+    pub carriers: Vec<CarrierUnderNodes<'a>>,
+}
+
+/// A surface carrier under the contact nodes of a master.
+#[derive(Debug, Clone)]
+pub struct CarrierUnderNodes<'a> {
+    /// Its modes along the normals of the nodes, nodes × modes.
+    pub normals: DMatrix<f64>,
+    /// Its modes.
+    pub model: &'a ModalModel,
+}
+
+impl CarrierUnderNodes<'_> {
+    /// Returns Ψ_n (X_s(1 − D_s/4)⁻¹)½ at all h up to `step` (s).
+    pub(crate) fn scaled(&self, step: f64) -> DMatrix<f64> {
+        let mut scaled = self.normals.clone();
+        for (mode, mut column) in scaled.column_iter_mut().enumerate() {
+            let [kept, moved] = worst(self.model, mode, step);
+            column *= (moved / (1.0 - 0.25 * kept)).sqrt();
+        }
+        scaled
+    }
 }
 
 impl MasslessCheck<'_> {
     /// Bound on the eigenvalues of the step of closed contact at all h up to `step` (s): (master, carrier per blade); stable while the sum is
     /// below 4. `None` if the residual flexibility is singular.
     pub fn eigenvalues(&self, step: f64) -> Option<(f64, f64)> {
-        let coefficients = self.model.coefficients(Scheme::MasslessBoundary, step);
         let dynamic = self.model.dynamic_modes(Scheme::MasslessBoundary);
-        let nodes = self.normals.len();
-        let seen = DMatrix::from_fn(nodes, self.model.len(), |node, mode| {
-            self.normals[node].dot(&vector3_at(self.model.contact_modes.column(mode).as_slice(), node))
-        });
-        let residual = DMatrix::from_fn(nodes, nodes, |a, b| {
-            (dynamic..self.model.len())
-                .map(|mode| seen[(a, mode)] * coefficients[mode].compliance * seen[(b, mode)])
-                .sum()
-        });
-        let lower = residual.cholesky()?.l();
-        let scaled = |count: usize, entry: &dyn Fn(usize, usize) -> f64| {
-            lower.solve_lower_triangular(&DMatrix::from_fn(nodes, count, entry))
-        };
+        let seen = self.seen();
+        let lower = self.flexibility_factor(step)?;
         // D + X½ K_c X½ with K_c = (L⁻¹Φ)ᵀ(L⁻¹Φ).
         let own: Vec<[f64; 2]> = (0..dynamic).map(|mode| worst(self.model, mode, step)).collect();
-        let half = scaled(dynamic, &|node, mode| seen[(node, mode)] * own[mode][1].sqrt())?;
+        let half = DMatrix::from_fn(self.normals.len(), dynamic, |node, mode| seen[(node, mode)] * own[mode][1].sqrt());
+        let half = lower.solve_lower_triangular(&half)?;
         let mut matrix = half.transpose() * &half;
         for (mode, [kept, _]) in own.iter().enumerate() {
             matrix[(mode, mode)] += kept;
         }
         let master = if dynamic == 0 { 0.0 } else { matrix.symmetric_eigenvalues().max() };
-        let mut added = DMatrix::zeros(nodes, nodes);
-        for (seen, model) in &self.carriers {
-            let own: Vec<[f64; 2]> = (0..model.len()).map(|mode| worst(model, mode, step)).collect();
-            let raised = |[kept, moved]: [f64; 2]| (moved / (1.0 - 0.25 * kept)).sqrt();
-            let half = scaled(model.len(), &|node, mode| seen[(node, mode)] * raised(own[mode]))?;
+        let mut added = DMatrix::zeros(self.normals.len(), self.normals.len());
+        for carrier in &self.carriers {
+            let half = lower.solve_lower_triangular(&carrier.scaled(step))?;
             added += &half * half.transpose();
         }
         let carrier = if self.carriers.is_empty() { 0.0 } else { added.symmetric_eigenvalues().max() };
         Some((master, carrier))
+    }
+
+    /// Modes along the normals, nodes × modes.
+    fn seen(&self) -> DMatrix<f64> {
+        DMatrix::from_fn(self.normals.len(), self.model.len(), |node, mode| {
+            self.normals[node].dot(&vector3_at(self.model.contact_modes.column(mode).as_slice(), node))
+        })
+    }
+
+    /// Returns the Cholesky factor L of the residual flexibility G_nn = L Lᵀ along the normals (m/N), nodes × nodes, with a step (s); `None`
+    /// if it is singular.
+    pub(crate) fn flexibility_factor(&self, step: f64) -> Option<DMatrix<f64>> {
+        let coefficients = self.model.coefficients(Scheme::MasslessBoundary, step);
+        let dynamic = self.model.dynamic_modes(Scheme::MasslessBoundary);
+        let (seen, nodes) = (self.seen(), self.normals.len());
+        let residual = DMatrix::from_fn(nodes, nodes, |a, b| {
+            (dynamic..self.model.len())
+                .map(|mode| seen[(a, mode)] * coefficients[mode].compliance * seen[(b, mode)])
+                .sum()
+        });
+        Some(residual.cholesky()?.l())
     }
 
     /// Returns the steps (s) at which closed contact becomes unstable and up to which the scheme is used, searched up to `largest`;
@@ -115,7 +160,9 @@ impl MasslessCheck<'_> {
             return Ok(MasslessLimit::NONE);
         }
         let share = if stiffening > STIFF { USABLE_STIFF } else { USABLE };
-        Ok(MasslessLimit { closed, usable: share * closed })
+        let is_damped = self.damping_ratios().all(|ratio| ratio >= DAMPED);
+        let quiet = if is_damped { f64::INFINITY } else { QUIET * closed };
+        Ok(MasslessLimit { closed, usable: share * closed, quiet })
     }
 
     /// Factor by which closed contact raises the square of the highest frequency of the modes with inertia, at a small step (s).
@@ -126,9 +173,15 @@ impl MasslessCheck<'_> {
         self.eigenvalues(step).map_or(1.0, |(master, carrier)| (master + carrier) / open)
     }
 
+    /// Damping ratios of all modes with inertia, and of the carriers.
+    fn damping_ratios(&self) -> impl Iterator<Item = f64> {
+        let own = &self.model.damping_ratios[..self.model.dynamic_modes(Scheme::MasslessBoundary)];
+        own.iter().chain(self.carriers.iter().flat_map(|carrier| &carrier.model.damping_ratios)).copied()
+    }
+
     fn closed(&self, largest: f64) -> Result<f64, ErrorKind> {
         let unstable = |step: f64| {
-            let found = self.eigenvalues(step).map(|(master, carrier)| master + carrier >= 4.0 * (1.0 - MARGIN));
+            let found = self.eigenvalues(step).map(|(master, carrier)| master + carrier >= STABLE * (1.0 - MARGIN));
             found.ok_or(ErrorKind::RigidNormal)
         };
         let first = 1e-3 / self.model.largest_frequency();
@@ -168,7 +221,12 @@ pub fn check(step: f64, limit: MasslessLimit) -> Result<(), ErrorKind> {
     if step < limit.usable { Ok(()) } else { Err(ErrorKind::MasslessStep { step, limit }) }
 }
 
-/// Warning for a step (s) at which contact that opens and closes gains energy unless damping dissipates it.
+/// Returns whether closed contact with this sum of eigenvalues is stable.
+pub(crate) fn is_stable(eigenvalues: f64) -> bool {
+    eigenvalues < STABLE
+}
+
+/// Warning for a step (s) at which contact that opens and closes gains energy, because damping does not dissipate it.
 pub fn warning(step: f64, limit: MasslessLimit) -> Option<WarningKind> {
-    (step >= QUIET * limit.closed).then_some(WarningKind::MasslessEnergy { step, limit })
+    (step >= limit.quiet).then_some(WarningKind::MasslessEnergy { step, limit })
 }

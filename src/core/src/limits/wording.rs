@@ -238,8 +238,9 @@ impl WarningKind {
                 format!("Set `time.step` below {:.2e} s", rounded_down(unresolved::NEAR * limit))
             }
             Self::MasslessEnergy { limit, .. } => {
-                let step = rounded_down(massless::QUIET * limit.closed);
-                format!("Set `time.step` below {step:.2e} s, or a damping ratio of at least 1e-3")
+                let step = rounded_down(limit.quiet);
+                let damped = massless::DAMPED;
+                format!("Set `time.step` below {step:.2e} s, or damping ratios of at least {damped:.0e}")
             }
             Self::Flutter { opens_after: Some(time), .. } => {
                 format!("No action is needed: contact opens after at most {time:.2e} s, before the growth matters")

@@ -2,6 +2,7 @@
 
 mod checking;
 mod closing;
+mod delayed_contact;
 mod free;
 mod known;
 mod sliding;
@@ -353,7 +354,7 @@ impl Compiled {
         let masters = at.models.iter().map(|model| limits::unresolved::limit(model, &radial(model)));
         let unresolved = self.unresolved(body, masters, parameters.scheme);
         let resolved = limits::unresolved::check(parameters.scheme, expected, unresolved, at.largest_frequency());
-        let (outcome, massless) = match resolved.and_then(|()| at.massless(expected)) {
+        let (outcome, massless) = match resolved.and_then(|()| at.delayed_contact(expected)) {
             Ok((mut more, limit)) => {
                 more.extend(limits::unresolved::warning(parameters.scheme, expected, unresolved));
                 (at.warnings(expected, in_range(&carriers, expected).cloned(), more), limit)

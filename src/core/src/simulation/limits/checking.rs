@@ -6,8 +6,7 @@ use crate::geometry::frame::PolarFrame;
 use crate::geometry::spline::SplineGap;
 use crate::geometry::{GapLaw, Vector3};
 use crate::limits::finding::{Checked, ErrorKind, Finding, Subject, WarningKind};
-use crate::limits::massless::MasslessLimit;
-use crate::limits::{self, ContactDirections, massless};
+use crate::limits::{self, ContactDirections};
 use crate::math::vector::vector3_at;
 use crate::modes::cyclic::CyclicModel;
 use crate::modes::modal::ModalModel;
@@ -26,16 +25,21 @@ use std::cell::LazyCell;
 const ALL_COMBINATIONS_UP_TO: usize = 3;
 
 /// Number of angles at which a flexible surface carrier is checked.
-const CARRIER_ANGLES: u32 = 48;
+pub(super) const CARRIER_ANGLES: u32 = 48;
 
-fn carrier_angle(place: u32) -> f64 {
+pub(super) fn carrier_angle(place: u32) -> f64 {
     std::f64::consts::TAU * f64::from(place) / f64::from(CARRIER_ANGLES)
 }
 
 /// Modes of the surface carrier along normals and tangents of `nodes` of a blade at `angle` (rad), nodes × modes; 0 for
 /// nodes that do not face the
 /// carrier.
-fn carrier_at(law: &SplineGap, modes: &ModalModel, nodes: &[usize], angle: f64) -> (DMatrix<f64>, DMatrix<f64>) {
+pub(super) fn carrier_at(
+    law: &SplineGap,
+    modes: &ModalModel,
+    nodes: &[usize],
+    angle: f64,
+) -> (DMatrix<f64>, DMatrix<f64>) {
     let zeros = || DMatrix::zeros(nodes.len(), modes.len());
     let mut seen = (zeros(), zeros());
     for (row, &node) in nodes.iter().enumerate().filter(|(_, node)| law.nodes.contains(node)) {
@@ -69,22 +73,6 @@ fn lowest_ratio(
     let eigenvalues = ((&matrix + matrix.transpose()) * 0.5).symmetric_eigenvalues();
     let largest = eigenvalues.amax();
     if largest > 0.0 { eigenvalues.min() / largest } else { 0.0 }
-}
-
-/// Checks a casing, which may differ around the circumference, where its nodes under a blade are most compliant.
-fn yielding_most<'a>(
-    check: massless::MasslessCheck<'a>,
-    places: impl Iterator<Item = Vec<(DMatrix<f64>, &'a ModalModel)>>,
-    step: f64,
-) -> massless::MasslessCheck<'a> {
-    let (mut most, mut chosen) = (f64::NEG_INFINITY, check.clone());
-    for carriers in places {
-        let tried = massless::MasslessCheck { carriers, ..check.clone() };
-        if let Some((_, found)) = tried.eigenvalues(step).filter(|(_, found)| *found > most) {
-            (most, chosen) = (found, tried);
-        }
-    }
-    chosen
 }
 
 /// A structure of a scene with some parameters, to be checked with all surfaces it touches.
@@ -138,7 +126,7 @@ impl<'a> Checking<'a> {
     }
 
     /// Returns the surfaces that carriers deform: gap functions, and modes of the carriers at their control points.
-    fn carried(&self) -> Vec<(&SplineGap, usize, ModalModel)> {
+    pub(super) fn carried(&self) -> Vec<(&SplineGap, usize, ModalModel)> {
         let carried = |(index, pair): (usize, &PairPlan)| {
             let (gap, carrier) = (self.system.pairs()[index].gap(), pair.carrier?);
             let GapLaw::Spline(spline) = gap else { return None };
@@ -247,54 +235,6 @@ impl<'a> Checking<'a> {
         steps.into_iter().map(|step| (step, worst_at(step))).collect()
     }
 
-    /// Returns the largest stable step if contact forces act one step late, and a warning if many blades in
-    /// simultaneous contact may reduce this step.
-    pub(super) fn massless(&self, step: f64) -> Result<(Vec<WarningKind>, MasslessLimit), ErrorKind> {
-        if !self.parameters.scheme.properties().delays_contact {
-            return Ok((Vec::new(), MasslessLimit::NONE));
-        }
-        // Each surface has its own carrier: several surfaces of one carrier are rejected.
-        let carried = self.carried();
-        let largest = 1.01 * self.parameters.step.max(step) / massless::USABLE_STIFF;
-        let (mut limit, mut worst) = (MasslessLimit::NONE, (0.0, 0.0));
-        for (diameter, model) in self.models.iter().enumerate() {
-            let normals = self.normals(model);
-            let mut check = massless::MasslessCheck { model, normals, carriers: Vec::new() };
-            if !carried.is_empty() {
-                let seen_at = |angle: f64, gap: &SplineGap, modes: &ModalModel| {
-                    self.seen_by(diameter, carrier_at(gap, modes, &self.nodes, angle).0)
-                };
-                let at = |place| {
-                    let all = carried.iter();
-                    all.map(|(gap, _, modes)| (seen_at(carrier_angle(place), gap, modes), modes)).collect()
-                };
-                check = yielding_most(check, (0..CARRIER_ANGLES).map(at), step);
-            }
-            // Only the tightest of several limits counts.
-            let own = check.limit(largest.min(limit.closed))?;
-            limit = MasslessLimit { closed: limit.closed.min(own.closed), usable: limit.usable.min(own.usable) };
-            let found = check.eigenvalues(step).unwrap_or(worst);
-            worst = (found.0.max(worst.0), found.1.max(worst.1));
-        }
-        massless::check(step, limit)?;
-        let sectors = self.compiled.body(self.body).1.sectors;
-        let all = f64::from(u32::try_from(sectors).unwrap_or(u32::MAX));
-        let (master, carrier) = worst;
-        let some = (master + all * carrier >= 4.0)
-            .then(|| WarningKind::MasslessBlades { stable: ((4.0 - master) / carrier).floor(), sectors });
-        let warnings = massless::warning(step, limit).into_iter().chain(some).collect();
-        Ok((warnings, limit))
-    }
-
-    /// Projects the modes of the surface carrier on the real part of a nodal diameter. A contact of one blade acts
-    /// equally on all nodal diameters, so the most compliant one bounds the contribution of the carrier.
-    fn seen_by(&self, diameter: usize, seen: DMatrix<f64>) -> DMatrix<f64> {
-        let Some(disk) = self.disk() else { return seen };
-        let rows = self.models[diameter].contact_modes.nrows() / 3;
-        let weight = disk.weight(diameter);
-        DMatrix::from_fn(rows, seen.ncols(), |i, j| if i < seen.nrows() { weight * seen[(i, j)] } else { 0.0 })
-    }
-
     pub(super) fn largest_frequency(&self) -> f64 {
         self.models.iter().fold(0.0, |largest, model| f64::max(largest, model.largest_frequency()))
     }
@@ -326,7 +266,7 @@ impl<'a> Checking<'a> {
         self.parameters.friction[self.pair_at(node)]
     }
 
-    fn normals(&self, model: &ModalModel) -> Vec<Vector3> {
+    pub(super) fn normals(&self, model: &ModalModel) -> Vec<Vector3> {
         self.directions(model, 1.0).into_iter().map(|(normal, _)| normal).collect()
     }
 

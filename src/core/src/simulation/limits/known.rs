@@ -14,7 +14,7 @@ use crate::simulation::compile::Compiled;
 
 /// First word of stored results, and version of their layout and of the checks.
 const MAGIC: u64 = u64::from_le_bytes(*b"tiprubCK");
-const VERSION: u64 = 2;
+const VERSION: u64 = 3;
 
 /// Hash of everything that a result depends on.
 type Key = [u64; 2];
@@ -35,6 +35,8 @@ pub(super) enum CheckPart {
     Carriers,
     /// Growth while blades cut.
     Cutting,
+    /// Eigenvalue that surface carriers add while all blades are in contact.
+    AllBladesOnCarrier,
 }
 
 /// Stored results, and the results of the last check.
