@@ -20,7 +20,7 @@ os.environ["QTWEBENGINE_CHROMIUM_FLAGS"] += f" --blink-settings=preferredColorSc
 READY = "document.readyState === 'complete' && (!document.getElementById('viewer') || document.getElementById('viewer').dataset.ready === 'true' || !document.querySelector('.note').hidden) && document.body.dataset.busy !== 'true'"
 UNAVAILABLE = 77
 #: Timeout (ms).
-PATIENCE = 60_000
+PATIENCE = 110_000
 
 try:
     from PySide6.QtCore import QTimer, QUrl

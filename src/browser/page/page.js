@@ -67,7 +67,7 @@ function run() {
   if (state.done) state.before = state.rows;
   Object.assign(state, { id: state.id + 1, rows: [], done: false, numbers: null });
   const set = Object.entries(given).map(([name, value]) => `--set ${name}=${value}`);
-  find(".command").textContent = ["tiprub run builtin:rotor37", ...set].join(" ");
+  find(".command").textContent = ["tiprub run builtin:rotor37", ...set].join(" \\\n  ");
   note.hidden = true;
   find(".warnings").hidden = true;
   document.body.dataset.busy = "true";
@@ -149,7 +149,7 @@ function showNumbers() {
 
 // ---- Drawing
 
-let colors = {}, layers_old = true, last_frame = 0;
+let colors = {}, layers_old = true, layers_drawn = 0, index_drawn = -1, last_frame = 0;
 const dirty = () => { layers_old = true; };
 
 function readColors() {
@@ -164,7 +164,6 @@ function context(canvas) {
   if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
     canvas.width = Math.round(width * ratio);
     canvas.height = Math.round(height * ratio);
-    dirty();
   }
   const pen = canvas.getContext("2d");
   pen.setTransform(ratio, 0, 0, ratio, 0, 0);
@@ -226,11 +225,11 @@ const plots = [
   { canvas: find(".forces"), unit: 1000, value: force, color: "hot", least: 2 },
 ];
 
-function drawPlot(plot, index) {
+function drawPlot(plot, index, is_due) {
   const { canvas } = plot, pen = context(canvas), [width, height] = [canvas.clientWidth, canvas.clientHeight];
   const [left, right, top, bottom] = [44, 10, 8, 24], length = state.count / STEPS_PER_MS;
   const x = i => left + (width - left - right) * i / state.count, y = value => height - bottom - (height - top - bottom) * value / plot.limit;
-  if (layers_old || !plot.layer) {
+  if (is_due || !plot.layer) {
     plot.layer ??= document.createElement("canvas");
     plot.layer.width = canvas.width; plot.layer.height = canvas.height;
     const own = plot.layer.getContext("2d"), ratio = devicePixelRatio || 1;
@@ -238,8 +237,8 @@ function drawPlot(plot, index) {
     own.clearRect(0, 0, width, height);
     let most = plot.least;
     for (const rows of [state.rows, state.before]) rows.forEach((_, i) => { most = Math.max(most, plot.value(rows, i) / plot.unit); });
-    if (plot.all) for (const row of state.rows) for (const value of plot.all(row)) most = Math.max(most, Math.min(value / plot.unit, 600));
-    const tick = [1, 2, 5].map(digit => digit * 10 ** Math.floor(Math.log10(most / 2))).reduce((best, step) => most / step >= 2.5 ? step : best, 10 ** Math.floor(Math.log10(most / 4)));
+    if (plot.all) for (const row of state.rows) for (const value of plot.all(row)) most = Math.max(most, value / plot.unit);
+    const decade = 10 ** Math.floor(Math.log10(most / 5)), tick = decade * [1, 2, 5, 10].find(factor => most / (factor * decade) <= 5);
     plot.limit = tick * Math.ceil(1.02 * most / tick);
     own.font = "12px system-ui, sans-serif";
     own.textBaseline = "middle";
@@ -273,15 +272,16 @@ function drawPlot(plot, index) {
   }
 }
 
-function draw() {
+function draw(now) {
   const index = Math.min(Math.floor(state.at), state.rows.length - 1);
-  if (index < 0) return;
+  // Layers are drawn a few times per second during a computation, to leave the processor to it.
+  const is_due = layers_old && (state.done || now - layers_drawn > 200);
+  if (index < 0 || !(is_due || index !== index_drawn)) return;
   const row = state.rows[index];
-  // A canvas that changed its size makes its layer out of date, which the same frame then draws.
   drawRotor(row, index);
-  plots.forEach(plot => { context(plot.canvas); });
-  plots.forEach(plot => drawPlot(plot, index));
-  layers_old = false;
+  plots.forEach(plot => drawPlot(plot, index, is_due));
+  if (is_due) [layers_old, layers_drawn] = [false, now];
+  index_drawn = index;
   clock.value = String(index);
   const time = `${(1000 * row[TIME]).toFixed(2)} ms`;
   clock.setAttribute("aria-valuetext", time);
@@ -300,7 +300,7 @@ function frame(now) {
     if (state.at <= reached) state.at = Math.min(state.at + passed / 1000 * STEPS_PER_MS, reached);
     if (state.done && state.at >= state.count) setPlaying(false);
   }
-  draw();
+  draw(now);
   requestAnimationFrame(frame);
 }
 
@@ -313,9 +313,9 @@ function setPlaying(playing) {
 // ---- Controls
 
 function label(slider) {
-  const value = Number(slider.value), output = slider.closest("label").querySelector("output");
+  const value = Number(slider.value), shown = slider.closest("label").querySelector("b");
   const texts = { speed: `${value} rad/s = ${Math.round(value * 30 / Math.PI).toLocaleString("en")} rpm`, friction: value.toFixed(2), clearance: `${value} µm` };
-  output.textContent = texts[slider.name];
+  shown.textContent = texts[slider.name];
   slider.setAttribute("aria-valuetext", texts[slider.name]);
 }
 
@@ -327,6 +327,7 @@ clock.addEventListener("input", () => { setPlaying(false); state.at = Number(clo
 play.addEventListener("click", () => setPlaying(!state.playing));
 find(".reset").addEventListener("click", () => { sliders.forEach(slider => { slider.value = slider.defaultValue; label(slider); }); run(); });
 find(".again").addEventListener("click", () => start(null, true));
+addEventListener("resize", dirty);
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", readColors);
 
 readColors();
