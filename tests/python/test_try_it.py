@@ -178,3 +178,15 @@ def test_run_button_plays_and_pauses(page):
 def test_controls_have_labels(page):
     (labels,) = browse(page, 'return [...document.querySelectorAll("button, input, canvas, progress")].map(own => (own.labels?.[0] ?? own).textContent.trim() || own.getAttribute("aria-label"));')
     assert len(labels) >= 10 and all(labels), labels
+
+
+def test_book_shows_the_page_in_a_frame_of_its_height(page):
+    """The script of the book replaces the picture by the page, also in a book that is opened as a file."""
+    script = (ROOT / "docs" / "try-it.js").read_text()
+    link = re.search(r'(?s)<a href="rub.html" id="try-it">.*?</a>', (ROOT / "docs" / "try-it.md").read_text()).group()
+    book = page.with_name("book.html")
+    book.write_text(f'<!DOCTYPE html><title>book</title><main style="width: 750px">{link}</main><script>{script}</script>')
+    look = 'const frame = document.querySelector("iframe"); return [frame.src.split("/").pop(), frame.offsetHeight, document.querySelectorAll("a").length];'
+    name, height, links = browse(book, "", "", look)[-1]
+    assert name == page.name == "rub.html" and links == 0
+    assert 900 < height < 2000 and height != 1400

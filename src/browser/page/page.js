@@ -343,6 +343,9 @@ if (typeof WebAssembly !== "object" || typeof DecompressionStream !== "function"
 }
 requestAnimationFrame(frame);
 
+// The book shows this page in a frame.
+if (parent !== window) new ResizeObserver(() => parent.postMessage({ height: document.documentElement.offsetHeight }, "*")).observe(document.documentElement);
+
 // For tests.
 window.tryIt = { state, start, NAMES, WIDTH };
 })();
