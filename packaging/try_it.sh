@@ -3,7 +3,7 @@
 #
 #     packaging/try_it.sh FILE.html [ROM]
 #
-# Without ROM, `tiprub reduce rotor37` computes it into target/wasm, unless it is newer than the program.
+# Without ROM, `tiprub reduce rotor37` computes it into target/wasm. A ROM there that is newer than the program is used again.
 set -euo pipefail
 here=$(CDPATH= cd -- "$(dirname -- "$0")" && pwd)
 output=$(realpath -m -- "${1:?give the HTML file to write}")
@@ -26,7 +26,7 @@ if [ -z "$rom" ]; then
     cargo build --quiet --release -p tiprub
     program=${CARGO_TARGET_DIR:-$PWD/target}/release/tiprub
     rom=$build/rotor37.rom.safetensors
-    [ "$rom" -nt "$program" ] || "$program" reduce rotor37 --quiet --output "$rom" > /dev/null
+    [ "$rom" -nt "$program" ] || "$program" reduce rotor37 --quiet -o "$rom" > /dev/null
 fi
 # The built-in scene, with the clearance and the force of every blade as outputs.
 scene=$build/rotor37.toml
