@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Build the guide as a book, target/book/index.html, with mdBook. Warnings are errors.
+# Build the guide as a book, target/book/index.html, with mdBook and the page that steps a rub. Warnings are errors.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 if ! command -v mdbook >/dev/null; then
@@ -12,4 +12,5 @@ if grep -qE 'WARN|ERROR' <<<"$log"; then
     echo "$log" >&2
     exit 1
 fi
+packaging/try_it.sh "$directory/rub.html"
 echo "$directory/index.html: $(find "$directory" -name '*.html' | wc -l) pages"

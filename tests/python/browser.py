@@ -2,8 +2,8 @@
 
     python browser.py PAGE WIDTH HEIGHT light|dark EXPRESSION... [--shot FILE]
 
-The page counts as loaded when `ready` is true in it. Each expression is a function body that may return a value; between two
-expressions, the page has time to draw. Exit code 77: no browser can run here; the last line on stderr is the reason.
+The page counts as loaded when `READY` is true in it. Each expression is a function body that may return a value; before the next
+expression, the page has time to draw, and `READY` is true again. Exit code 77: no browser can run here; the last line on stderr is the reason.
 """
 
 import json
@@ -17,10 +17,10 @@ os.environ["QTWEBENGINE_DISABLE_SANDBOX"] = "1"
 os.environ["QTWEBENGINE_CHROMIUM_FLAGS"] = "--use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader --ignore-gpu-blocklist --log-level=3"
 # Blink's numbers for dark and light.
 os.environ["QTWEBENGINE_CHROMIUM_FLAGS"] += f" --blink-settings=preferredColorScheme={0 if 'dark' in sys.argv[4:5] else 1}"
-READY = "document.readyState === 'complete' && (!document.getElementById('viewer') || document.getElementById('viewer').dataset.ready === 'true' || !document.querySelector('.note').hidden)"
+READY = "document.readyState === 'complete' && (!document.getElementById('viewer') || document.getElementById('viewer').dataset.ready === 'true' || !document.querySelector('.note').hidden) && document.body.dataset.busy !== 'true'"
 UNAVAILABLE = 77
 #: Timeout (ms).
-PATIENCE = 60_000
+PATIENCE = 110_000
 
 try:
     from PySide6.QtCore import QTimer, QUrl
@@ -75,7 +75,7 @@ class Session:
 
     def take(self, value):
         self.results.append(json.loads(value) if value else None)
-        QTimer.singleShot(250, self.next)
+        QTimer.singleShot(100, self.wait)
 
     def finish(self):
         if self.shot:

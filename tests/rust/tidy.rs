@@ -47,6 +47,9 @@ fn crate_dependencies_respect_the_layers() {
     free_of("tiprub-fmi-host", &["tiprub-fmi", "tiprub-model", "tiprub-gallery", "tiprub-figure", "clap", "faer"]);
     free_of("tiprub-figure", &["tiprub-gallery", "tiprub-study", "tiprub-fmi-host", "clap"]);
     let above_field = ["tiprub-gallery", "tiprub-study", "tiprub-figure", "tiprub-fmi-host", "tiprub"];
+    let bindings = ["wasm-bindgen", "js-sys", "web-sys", "console_error_panic_hook"];
+    let above_browser = ["tiprub-shell", "tiprub-fmi", "tiprub-fmi-facade", "tiprub-gallery"];
+    free_of("tiprub-browser", &[&offline[..], &floors, &bindings, &above_browser].concat());
     free_of("tiprub-field", &[&above_field[..], &["tiprub-table", "clap", "plotters", "zip"]].concat());
     free_of("tiprub-gallery", &["tiprub-figure", "tiprub-study", "tiprub-fmi-host", "clap", "plotters"]);
     free_of("tiprub-table", &["tiprub-model", "tiprub-gallery", "tiprub-fmi-host", "clap", "plotters", "arrow-array"]);
@@ -137,7 +140,7 @@ fn unsafe_code_is_confined_to_the_fmi_boundary() {
         let blocks: Vec<_> = lines_with(path, "unsafe").into_iter().filter(|line| line.contains("unsafe {")).collect();
         assert!(blocks.is_empty(), "{}: {blocks:?}", path.display());
     }
-    for unit in ["fmi/src", "fmi/thermal/src", "src/cosim/src", "src/thermal/src"] {
+    for unit in ["fmi/src", "fmi/thermal/src", "src/browser/src", "src/cosim/src", "src/thermal/src"] {
         let mut files = Vec::new();
         sources(&root().join(unit), &mut files);
         assert!(!files.is_empty() && files.iter().all(|path| lines_with(path, "unsafe {").is_empty()), "{unit}");
