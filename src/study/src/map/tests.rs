@@ -33,7 +33,7 @@ fn around(crossing: f64, half: f64, count: usize) -> Speeds {
 /// Makes a map, and also returns its warnings.
 fn make_map(scene: Scene, request: &MapRequest, threads: usize) -> Result<(Study, Vec<String>)> {
     let (map, speeds) = Map::prepare(scene, request)?;
-    let runs = sweep::sweep(&speeds, threads, |speed| map.setup.run(*speed), |_| {})?;
+    let runs = sweep::sweep(&speeds, threads, |speed| map.setup.run(*speed, &AtomicU64::new(0)), |_| {})?;
     map.finish(runs, request.quick)
 }
 
