@@ -106,7 +106,8 @@ impl TaskJournals {
     }
 
     /// Runs the tasks of the part that have no result yet, on `threads` threads. `kind` distinguishes tasks with equal values. `progress` receives
-    /// the number of finished tasks, including those with a stored result. A result that JSON cannot represent is not stored.
+    /// the number of finished tasks, including those with a stored result. `idle` is called a few times per second while no task finishes. A result
+    /// that JSON cannot represent is not stored.
     ///
     /// # Errors
     /// A task fails (the first failure is returned), or a journal cannot be written.
@@ -118,6 +119,7 @@ impl TaskJournals {
         work: impl Fn(&T) -> Result<R> + Sync,
         console: &Console,
         progress: impl Fn(usize),
+        idle: impl FnMut(),
     ) -> Result<TaskResults<R>> {
         let digests: Vec<String> =
             items.iter().map(|item| digest_of([&self.shared, kind, &format!("{item:?}")].into_iter())).collect();
@@ -152,7 +154,7 @@ impl TaskJournals {
             progress(done);
             Ok(())
         };
-        sweep::for_each(&pending, threads, &stop, |task| work(&items[*task]), finished, || {})?;
+        sweep::for_each(&pending, threads, &stop, |task| work(&items[*task]), finished, idle)?;
         if let Some(failure) = failed {
             return Err(failure);
         }
@@ -203,7 +205,7 @@ mod tests {
         };
         let console = Console::new(true, false);
         let mut journals = TaskJournals::open(directory, "map", part, &[shared.to_owned()]).unwrap();
-        let results = journals.run("square", items, 2, work, &console, |_| {});
+        let results = journals.run("square", items, 2, work, &console, |_| {}, || {});
         let mut tried = tried.into_inner().unwrap();
         tried.sort_by(f64::total_cmp);
         (results, tried)
