@@ -1,10 +1,10 @@
 //! `tiprub study convergence` on built-in models and meshes.
 
-use std::{fs, path::Path};
+use std::{fs, path::Path, process::Command};
 
 use serde_json::{Value, json};
 
-use crate::studies::{around, own_scene, tiprub};
+use crate::studies::{errors_of_a_file, around, own_scene, tiprub};
 
 /// Arguments for the mesh from which the ROM of `own.toml` was reduced.
 const MESH: [&str; 6] = ["--mesh", "blade.inp", "--contact-set", "TIP", "--clamp-set", "HUB"];

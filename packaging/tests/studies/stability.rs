@@ -1,6 +1,6 @@
 //! `tiprub study stability` on small scenes.
 
-use std::{fs, path::Path};
+use std::{fs, path::Path, process::Command};
 
 use serde_json::Value;
 

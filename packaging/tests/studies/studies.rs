@@ -292,7 +292,7 @@ fn totals(total: &Value, cheapest: &str) {
 }
 
 /// Checks that without a finer model of a ROM from a file, no error is called total, and that the errors in the ROM are reported beside.
-fn errors_of_a_file(root: &Path, reported: &str) {
+pub(super) fn errors_of_a_file(root: &Path, reported: &str) {
     let json: Value = serde_json::from_str(reported).unwrap();
     let of = &json["results"]["own_model"];
     assert_eq!([&of["refined"], &of["not_refined"]], [&json!(["steps"]), &json!(["modes", "nodes", "mesh"])], "{of:#}");
