@@ -4,7 +4,7 @@ use std::{fs, path::Path, process::Command};
 
 use serde_json::{Value, json};
 
-use crate::studies::{errors_of_a_file, around, own_scene, tiprub};
+use crate::studies::{around, errors_of_a_file, own_scene, tiprub};
 
 /// Arguments for the mesh from which the ROM of `own.toml` was reduced.
 const MESH: [&str; 6] = ["--mesh", "blade.inp", "--contact-set", "TIP", "--clamp-set", "HUB"];
