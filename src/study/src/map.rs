@@ -109,18 +109,17 @@ pub fn study(arguments: &MapArguments, console: &Console) -> Result<StudyOutcome
         let title = format!("Running {count} angular velocities of the interaction map");
         let forecast = Forecast::new(console, &title, WorkPlan::new(0.0));
         let (taken, shown, is_planned) = (AtomicU64::new(0), Cell::new(0), Cell::new(false));
-        let show = || {
+        let progress = |done: usize| {
+            if !is_planned.replace(true) {
+                forecast.plan(0, steps as f64 * (count - done) as f64);
+            }
             let taken = taken.load(Ordering::Relaxed);
             if taken > shown.get() {
                 forecast.done(0, (taken - shown.replace(taken)) as f64);
             }
         };
-        let progress = |done: usize| match is_planned.replace(true) {
-            false => forecast.plan(0, steps as f64 * (count - done) as f64),
-            true => show(),
-        };
         let run = |speed: &f64| map.setup.run(*speed, &taken);
-        let runs = journals.run("speed", &speeds, threads, run, console, progress, show)?;
+        let runs = journals.run("speed", &speeds, threads, run, console, progress)?;
         forecast.finish();
         runs
     };
