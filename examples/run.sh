@@ -9,9 +9,16 @@ set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
 known=$(shopt -s nullglob; cd "$root/examples" && for main in */*.py; do [ "${main%/*}" = "$(basename "$main" .py)" ] && echo -n " ${main%/*}"; done; true)
 name=${1:-}
-if [ -z "$name" ] || [ ! -f "$root/examples/$name/$name.py" ]; then
+if [ -z "$name" ]; then
     sed -n '2,7s/^# \{0,1\}//p' "$0" >&2
     echo "Examples:$known" >&2
+    exit 2
+fi
+if [ ! -f "$root/examples/$name/$name.py" ]; then
+    echo "error: there is no example \`$name\`. Examples:$known." >&2
+    if [ -f "$root/examples/gallery/$name.toml" ]; then
+        echo "\`$name\` is a case of the gallery: run examples/run.sh gallery $name" >&2
+    fi
     exit 2
 fi
 shift

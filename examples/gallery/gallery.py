@@ -37,10 +37,19 @@ def wrapped(text):
     return "\n\n".join(paragraphs)
 
 
+def title_of(name):
+    """Return the title of a case."""
+    return (HERE / f"{name}.md").read_text(encoding="utf-8").split("\n", 1)[0].removeprefix("# ")
+
+
+def contents(names):
+    """Return the list of contents of the page, with a link to each case."""
+    return "\n".join(f"* [{title_of(name)}](#{title_of(name).lower().replace(' ', '-')})" for name in names)
+
+
 def section(name, facts):
     """Return the section of the page about one case: its text with the numbers of the run, its picture and its scene."""
-    title, text = (HERE / f"{name}.md").read_text(encoding="utf-8").format_map(facts).split("\n", 1)
-    title = title.removeprefix("# ")
+    title, text = title_of(name), (HERE / f"{name}.md").read_text(encoding="utf-8").format_map(facts).split("\n", 1)[1]
     return f"""## {title}
 
 ![{title}](images/gallery-{name}.png)
@@ -66,7 +75,8 @@ def main():
     except ImportError as error:
         sys.exit(f"error: {error}. Start with examples/run.sh gallery, or run: pip install -r {HERE / 'requirements.txt'}")
     title, text = (HERE / "page.md").read_text(encoding="utf-8").split("\n", 1)
-    parts, names = [f"{title}\n\n{wrapped(text)}\n"], given.cases or NAMES
+    names = given.cases or NAMES
+    parts = [f"{title}\n\n{wrapped(text).replace('{contents}', contents(names))}\n"]
     started = time.monotonic()
     try:
         # The code of the other examples runs the same program.

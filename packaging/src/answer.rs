@@ -117,16 +117,29 @@ fn clearance(recording: &Recording, found: &[Extreme], tolerance: f64) -> Answer
             let column = recording.column("clearance_minimum").unwrap_or_default();
             let touch = column.iter().zip(&recording.times).find(|(clearance, _)| **clearance < tolerance);
             let first = touch.map_or(extreme.time, |(_, time)| *time);
-            // In closed contact, the clearance is rounding.
-            let is_rounding = extreme.value.abs() < ROUNDING;
-            let value = if is_rounding { 0.0 } else { extreme.value };
-            let within = if is_rounding { "" } else { " within the tolerance of the adaptive steps" };
             let impulses = recording.column("normal_impulse");
             let is_loaded = impulses.is_none_or(|impulses| impulses.iter().any(|impulse| *impulse != 0.0));
-            let how = if is_loaded { "tips touch" } else { "tips reach the casing without a contact force" };
-            (Some((value, "m")), format!("smallest: {how}{within}, first at t = {} s", six_digits(first)))
+            let how = if is_loaded { "in contact" } else { "tips reach the casing without a contact force" };
+            // In closed contact, the clearance is rounding or an error of the steps.
+            let is_rounding = extreme.value.abs() < ROUNDING;
+            let [length, tolerance] = [extreme.value.abs(), tolerance].map(six_digits);
+            let deviation = if extreme.value < 0.0 {
+                format!("tips overlap the casing by up to {length} m")
+            } else {
+                format!("tips come within {length} m of the casing")
+            };
+            let allowed = if is_rounding {
+                String::new()
+            } else {
+                format!(" ({deviation}, less than the tolerance of the adaptive steps, {tolerance} m)")
+            };
+            (Some((0.0, "m")), format!("{how}, first at t = {} s{allowed}", six_digits(first)))
         }
-        Some(extreme) => (Some((extreme.value, "m")), format!("smallest, {}", at(extreme))),
+        Some(extreme) => {
+            let penetrates =
+                if extreme.value < 0.0 { "; it is negative, because tips penetrate the casing" } else { "" };
+            (Some((extreme.value, "m")), format!("smallest, {}{penetrates}", at(extreme)))
+        }
         None => (None, "some contact nodes face no surface; use --all to list the clearance of each node".to_owned()),
     };
     AnswerLine { name: "clearance", value, meaning }
@@ -190,7 +203,7 @@ mod tests {
         // 4 N·s in 0.5 s; the mean of −1 to −6 N m; (3 + 3)/(2 + 1) J.
         let expected = [["force", "8"], ["heat", "1234.57"], ["torque", "-3.5"], ["clearance", "0"], ["growth", "2"]];
         assert_eq!(values, expected, "{text}");
-        assert!(text.contains("largest") && text.contains("tips touch, first at t = 1 s"), "{text}");
+        assert!(text.contains("largest") && text.contains("in contact, first at t = 1 s"), "{text}");
         assert_eq!(json(&lines)["growth"], json!(2.0));
     }
 
@@ -200,15 +213,22 @@ mod tests {
             let rows: [&[f64]; 3] = [&[1e-4], &[clearance], &[1e-4]];
             text(&lines(&recording(&["clearance_minimum"], &rows), 1e-7))
         };
-        assert!(
-            at(-6e-9).contains("-6e-9 m") && at(-6e-9).contains("tips touch within the tolerance"),
-            "{}",
-            at(-6e-9)
-        );
-        assert!(!at(-6e-7).contains("touch") && at(-6e-7).contains("smallest, at t = 0.5 s"), "{}", at(-6e-7));
+        for (clearance, words) in
+            [(-6e-9, "overlap the casing by up to 6e-9 m"), (6e-9, "come within 6e-9 m of the casing")]
+        {
+            let text = at(clearance);
+            assert!(
+                text.contains(&format!("{words}, less than the tolerance of the adaptive steps, 1e-7 m")),
+                "{text}"
+            );
+            assert!(text.contains("clearance  0 m") && text.contains("in contact, first at t = 0.5 s"), "{text}");
+        }
+        let penetration = at(-6e-7);
+        assert!(penetration.contains("-6e-7 m") && penetration.contains("tips penetrate the casing"), "{penetration}");
+        assert!(!penetration.contains("in contact"), "{penetration}");
         let rows: [&[f64]; 3] = [&[1e-4, 0.0], &[0.0, 0.0], &[1e-4, 0.0]];
         let grazing = text(&lines(&recording(&["clearance_minimum", "normal_impulse"], &rows), 1e-7));
-        assert!(grazing.contains("without a contact force") && !grazing.contains("tips touch"), "{grazing}");
+        assert!(grazing.contains("without a contact force") && !grazing.contains("in contact"), "{grazing}");
     }
 
     #[test]

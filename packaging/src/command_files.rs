@@ -66,9 +66,9 @@ pub fn check(command: &Command) -> Result<()> {
             outputs(&read, &fmus(&targets))
         }
         Command::Sweep(arguments) => {
-            let plan = NamedFile::new("PLAN", &arguments.plan);
+            let plan = NamedFile::new("the plan", &arguments.plan);
             let named =
-                plan::input_files(&arguments.plan).into_iter().map(|path| NamedFile::new("a file of PLAN", path));
+                plan::input_files(&arguments.plan).into_iter().map(|path| NamedFile::new("a file of the plan", path));
             let read: Vec<NamedFile> = [plan].into_iter().chain(named).collect();
             let SweepFiles { rows, histories, .. } = SweepFiles::new(&arguments.output());
             outputs(&read, &[NamedFile::new("--output", rows), NamedFile::new("--output", histories)])
@@ -101,7 +101,7 @@ fn scene(argument: &str) -> Vec<NamedFile> {
     let files = scene_source::files(argument).into_iter();
     files
         .enumerate()
-        .map(|(index, path)| NamedFile::new(if index == 0 { "SCENE" } else { "a ROM of SCENE" }, path))
+        .map(|(index, path)| NamedFile::new(if index == 0 { "the scene" } else { "a ROM of the scene" }, path))
         .collect()
 }
 

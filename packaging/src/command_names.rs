@@ -6,6 +6,7 @@ use clap::{
     CommandFactory, Parser,
     error::{ContextKind, ContextValue, ErrorKind},
 };
+use tiprub_format::name_hint;
 use tiprub_shell::{Failure, console::Console};
 
 use crate::cli::Cli;
@@ -34,7 +35,7 @@ fn study(name: &str) -> Option<Failure> {
     if name.starts_with('-') || name == "help" || known.iter().any(|known| known == name) {
         return None;
     }
-    let remedy = format!("Choose {}; see `tiprub study --help`", listed(&known));
+    let remedy = format!("{}Choose {}; see `tiprub study --help`", hint(name, &known), listed(&known));
     Some(Failure::usage(format!("study {name}"), "no such study", remedy))
 }
 
@@ -43,6 +44,11 @@ fn subcommands(of: &str) -> Vec<String> {
     let cli = Cli::command();
     let command = cli.find_subcommand(of).into_iter().flat_map(clap::Command::get_subcommands);
     command.map(|command| command.get_name().to_owned()).collect()
+}
+
+/// Returns the question whether a similar known name was meant.
+fn hint(name: &str, known: &[String]) -> String {
+    name_hint(name, known.iter().map(String::as_str))
 }
 
 /// Formats names as "`a`, `b` or `c`".
@@ -103,11 +109,11 @@ fn is_mesh(word: &str) -> bool {
 
 /// Returns the error of an unknown kind of model, with the similar name and the command for user meshes.
 fn no_model(name: &str, models: &[String]) -> Failure {
-    let near = models.iter().map(|model| (strsim::jaro_winkler(name, model), model));
-    let near = near.filter(|(score, _)| *score > 0.8).max_by(|a, b| a.0.total_cmp(&b.0));
-    let hint = near.map_or(String::new(), |(_, model)| format!("Did you mean `{model}`? "));
-    let remedy =
-        format!("{hint}Choose {}; for your own mesh (.inp or .msh), use `tiprub reduce blade FILE`", listed(models));
+    let remedy = format!(
+        "{}Choose {}; for your own mesh (.inp or .msh), use `tiprub reduce blade FILE`",
+        hint(name, models),
+        listed(models)
+    );
     Failure::usage(format!("reduce {name}"), "no such kind of model", remedy)
 }
 
@@ -213,6 +219,8 @@ mod tests {
         let failure = check_names(&words("reduce rotor38")).unwrap();
         assert!(failure.remedy.starts_with("Did you mean `rotor37`? Choose `blade`, "), "{failure}");
         assert!(check_names(&words("study tip")).unwrap().remedy.starts_with("Choose `map`, "));
+        let failure = check_names(&words("study stabilty")).unwrap();
+        assert!(failure.remedy.starts_with("Did you mean `stability`? Choose `map`, "), "{failure}");
         for line in ["study map", "study error --help", "study --help", "study"] {
             assert_eq!(check_names(&words(line)), None, "{line}");
         }

@@ -345,10 +345,10 @@ impl MeshSource<'_> {
 
     /// Returns all files that are read.
     pub fn files(&self) -> Vec<NamedFile> {
-        let mesh = self.file.map(|path| NamedFile::new("FILE", path));
+        let mesh = self.file.map(|path| NamedFile::new("the mesh", path));
         let mut parts = Vec::new();
         self.file.iter().for_each(|path| included::collect(path, &mut parts));
-        let parts = parts.into_iter().map(|path| NamedFile::new("a file that FILE includes,", path));
+        let parts = parts.into_iter().map(|path| NamedFile::new("a file that the mesh includes,", path));
         let matrices = self.matrices.into_iter().flat_map(|own| {
             // Without --dofs, the list beside CalculiX's stiffness file is read.
             let storage = own.stiffness.as_ref().filter(|path| path.extension().is_some_and(|kind| kind == "sti"));

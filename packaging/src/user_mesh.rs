@@ -164,7 +164,7 @@ pub struct ConductingMesh {
 
 fn no_mesh() -> Failure {
     let problem = "a casing requires a mesh of one material";
-    Failure::usage("FILE", problem, "Give a mesh file whose elements share one material")
+    Failure::usage("mesh", problem, "Give a mesh file whose elements share one material")
 }
 
 /// Checks the model, chooses the nodes, reduces with the set of clamped nodes, and describes the result.
@@ -301,7 +301,7 @@ fn import(source: &MeshSource, console: &Console) -> Result<Imported> {
     let matrices = source.matrices.and_then(|own| Some((own, own.stiffness.as_ref()?, own.mass.as_ref()?)));
     let Some((matrices, stiffness, mass)) = matrices else {
         let Some(path) = source.file else {
-            return Err(Failure::usage("FILE", "no file is given", "Give a mesh file, or --stiffness and --mass"));
+            return Err(Failure::usage("mesh", "no file is given", "Give a mesh file, or --stiffness and --mass"));
         };
         let options =
             MeshOptions { units: options.units(), axis: options.axis(), material, temperature: options.temperature };

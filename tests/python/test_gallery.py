@@ -82,8 +82,17 @@ def test_every_case_is_on_the_page():
         assert len(scene.splitlines()) <= 20, name
         assert f"```toml\n{scene.strip()}\n```" in page, f"{name}.toml differs from docs/gallery.md"
         assert f"images/gallery-{name}.png" in page
+        title = (GALLERY / f"{name}.md").read_text(encoding="utf-8").split("\n", 1)[0].removeprefix("# ")
+        assert f"* [{title}](#{title.lower().replace(' ', '-')})\n" in page and f"\n## {title}\n" in page
+    assert "(python.md#notebooks)" in page
     sizes = [(ROOT / "docs" / "images" / f"gallery-{name}.png").stat().st_size for name in scenes]
     assert min(sizes) > 20_000 and sum(sizes) < 1_200_000
+
+
+@pytest.mark.parametrize(("name", "words"), [("rubb", "Examples: gallery shaft thermal."), ("rub", "examples/run.sh gallery rub")])
+def test_unknown_example_is_rejected_with_the_known_names(name, words):
+    done = subprocess.run([ROOT / "examples" / "run.sh", name], capture_output=True, text=True, check=False)
+    assert done.returncode == 2 and f"there is no example `{name}`" in done.stderr and words in done.stderr, done.stderr
 
 
 def test_errors_state_problem_and_remedy(tmp_path):

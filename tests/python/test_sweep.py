@@ -1,6 +1,7 @@
 """Sweeps on a cluster: `tiprub.sweep`, and the scripts of the guide for other engines."""
 
 import os
+import shutil
 import signal
 import socket
 import stat
@@ -162,6 +163,19 @@ def test_directory_contains_one_plan(plan):
     (interrupted / "plan-1-of-2.parquet.journal").touch()
     assert "plan-1-of-2.parquet.journal" in refused(module.sweep, other, output=interrupted).problem
     assert module.sweep(plan, output=interrupted, quiet=True)["tasks"] == 2
+
+
+def test_plan_of_the_same_name_keeps_its_results(plan, tmp_path):
+    report = module.sweep(plan, output="results", runs_per_task=20, quiet=True)
+    before = pandas.read_parquet(report)
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    for name in ("scene.toml", "blade.rom.safetensors"):
+        shutil.copy(tmp_path / name, elsewhere)
+    other = written(elsewhere / plan.name, 1e-3)
+    error = refused(module.sweep, other, output=report.path)
+    assert "results of another plan with the name `plan`" in error.problem
+    assert pandas.read_parquet(report).equals(before)
 
 
 def test_histories_of_other_parts_are_not_mixed(plan):
@@ -350,7 +364,7 @@ def test_errors_are_reported_once_and_print_nothing(plan, capfd, monkeypatch):
     assert error.exit_code == 2 and "4 parts" in error.problem
     assert refused(module.sweep, plan, output="scene.toml").what.endswith("scene.toml")
     monkeypatch.setitem(sys.modules, "distributed", None)
-    assert "pip install 'tiprub[dask]'" in refused(module.sweep, plan).remedy
+    assert "pip install distributed pyarrow" in refused(module.sweep, plan).remedy
     assert capfd.readouterr() == ("", "")
 
 

@@ -50,7 +50,7 @@ def sweep(
 
     Every task runs a part of the plan with `tiprub sweep --part` and writes one Parquet file. A task whose worker was killed is repeated
     on another worker, and continues with the runs that have no row yet. Call the function again to continue after the driver was killed.
-    It requires `pip install 'tiprub[dask]'`.
+    It requires `pip install distributed pyarrow`.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ def _package(name: str) -> Any:
     try:
         return importlib.import_module(name)
     except ImportError as error:
-        raise Error("tiprub.sweep", f"needs a package that is missing: {error}", "Install the extra: pip install 'tiprub[dask]'") from None
+        raise Error("tiprub.sweep", f"needs a package that is missing: {error}", "Install it: pip install distributed pyarrow") from None
 
 
 @contextlib.contextmanager

@@ -160,7 +160,7 @@ fn included_mesh_files_are_protected_as_inputs() {
     for (name, protected) in [(&part, true), (&nodes, true), (&root.path().join("none.inp"), false)] {
         let line = format!("reduce blade {} --contact-set A --clamp-set B --vtk {}", mesh.display(), name.display());
         assert_eq!(
-            answer(&line).is_err_and(|failure| failure.problem.contains("a file that FILE includes")),
+            answer(&line).is_err_and(|failure| failure.problem.contains("a file that the mesh includes")),
             protected,
             "{line}"
         );

@@ -25,7 +25,7 @@ use tiprub_shell::{
 use tiprub_study::estimate::{self, Estimate};
 
 use crate::{
-    answer,
+    answer::{self, AnswerLine},
     cli::DemoArguments,
     fmu::{FmiVersion, FmuPackage},
     library::{self, LibraryBuild, LibraryUnit},
@@ -50,8 +50,8 @@ pub const FILES: [&str; 6] = [ROM_FILE, SCENE_FILE, REPORT_FILE, CSV_FILE, "roto
 const LARGEST_SCENE: u64 = 1 << 20;
 
 /// Note about the error study, which the demo does not run.
-const STUDY: &str = "To measure the error against run time of every method on this machine (takes minutes), run\n  \
-                     tiprub study error builtin:rotor37 --quick\n";
+const STUDY: &str = "to measure the error against run time of every method on this machine (takes minutes): \
+                     tiprub study error builtin:rotor37 --quick";
 
 /// Remedy if the directory contains a scene that was changed.
 const KEEP: &str = "Choose another directory with --out, or move your file elsewhere";
@@ -109,7 +109,9 @@ pub fn run(arguments: &DemoArguments, console: &Console) -> Result<CommandOutcom
     let estimates = watch.measure("estimating errors", || estimate::estimates(&scene, &[], schedule.count, console))?;
     let capture = watch.measure("run for the report", || observe(&scene, &reduction, &schedule, console))?;
     let facts = scene.roms.iter().map(|rom| RomFacts::of(rom, None)).collect::<Result<Vec<_>>>()?;
-    let demo = Demo { estimates, capture, directory, scene, schedule, facts, native, imported, durations: watch.0 };
+    let answer = answer::scene_lines(&native.recording, &scene.settings, &[]);
+    let demo =
+        Demo { answer, estimates, capture, directory, scene, schedule, facts, native, imported, durations: watch.0 };
     demo.write_report()?;
     demo.outcome()
 }
@@ -176,6 +178,7 @@ struct Demo<'a> {
     schedule: Schedule,
     facts: Vec<RomFacts>,
     native: NativeRun,
+    answer: [AnswerLine; 5],
     imported: Vec<ImportedSummary>,
     estimates: Vec<Estimate>,
     capture: Capture,
@@ -192,7 +195,7 @@ impl Demo<'_> {
             schedule: &self.schedule,
             native: &self.native,
             capture: &self.capture,
-            answer: &answer::scene_lines(&self.native.recording, &self.scene.settings, &[]),
+            answer: &self.answer,
             facts: &self.facts,
             imported: &self.imported,
             estimates: &self.estimates,
@@ -237,22 +240,25 @@ impl Demo<'_> {
         let simulated = self.schedule.stop - self.schedule.start;
         let per_step = 1e6 * stepping / self.native.internal_steps as f64;
         let report = self.directory.join(REPORT_FILE);
-        let text = format!(
-            "{}\n\nsimulated      {:.4} ms in {} communication steps, {} internal steps\n\
-             per step       {per_step:.3} µs, {:.3} s of computing per simulated second\n\
-             agreement      {}: all {} outputs at all {} points, bit for bit\n{}{}\nopen {}",
-            self.facts.iter().map(RomFacts::to_text).collect::<String>().trim_end(),
-            1e3 * simulated,
-            self.schedule.count,
-            self.native.internal_steps,
-            stepping / simulated,
-            self.imported.iter().map(|run| run.label.as_str()).chain(["native"]).collect::<Vec<_>>().join(" = "),
+        let [seconds, per_second] = [stepping, stepping / simulated];
+        let rest = format!(
+            "\n{}: t = {} s to {} s, computed in {seconds:.3} s ({per_second:.3} s of computing per simulated second)\n\
+             {} and the native run agree in all bits: {} outputs at {} communication points\n\
+             {} (estimated from coarser runs, like `tiprub run --estimate`)\n\
+             written into {}: {}\n\
+             open {} in a browser: it shows the contact and the checks of the ROM\n{STUDY}",
+            self.scene.settings.name,
+            self.schedule.start,
+            self.schedule.stop,
+            self.imported.iter().map(|run| run.label.as_str()).collect::<Vec<_>>().join(", "),
             self.native.recording.names.len(),
             self.native.recording.rows(),
-            STUDY,
             estimate::errors_text(&self.estimates),
-            report.display()
+            self.directory.display(),
+            self.files().iter().map(|file| file.name.clone()).collect::<Vec<_>>().join(", "),
+            report.display(),
         );
+        let text = answer::text(&self.answer);
         let json = json!({
             "model": self.scene.settings.name,
             "report": shown_path(&report),
@@ -275,9 +281,10 @@ impl Demo<'_> {
             "seconds": self.durations.iter().map(|(what, seconds)| (what.clone(), json!(seconds)))
                 .collect::<serde_json::Map<_, _>>(),
             "estimated_errors": self.estimates.iter().map(Estimate::json).collect::<serde_json::Map<_, _>>(),
+            "answer": answer::json(&self.answer),
             "warnings": warnings_json(&self.native.warnings)[0],
         });
-        Ok(CommandOutcome { text, warnings: self.native.warnings.clone(), json, ..CommandOutcome::default() })
+        Ok(CommandOutcome { text, warnings: self.native.warnings.clone(), rest, json })
     }
 }
 

@@ -34,7 +34,7 @@ const MAX_MODES: usize = 60;
 /// Largest number of engine orders.
 const MAX_ORDERS: usize = 36;
 /// Decades of the spectrogram.
-const DECADES: f64 = 3.0;
+const DECADES: f64 = 2.0;
 
 /// Results of a run, found by quantity instead of by name.
 pub(super) struct Results<'a> {
@@ -293,10 +293,10 @@ fn vibration(input: &ReportInput<'_>, history: Option<(&HitBlade, &TipHistory)>)
         figures.push(Captioned {
             body: map.to_html(),
             caption: format!(
-                "Spectrogram of the {what}: windows of {:.3} ms, frequencies {:.0} Hz apart. Lines are natural frequencies at rest \
-                 {}.",
+                "Spectrogram of the {what}. The window of {:.3} ms distinguishes frequencies that are {:.0} Hz apart; values between \
+                 them are interpolated. Lines are natural frequencies at rest {}.",
                 1e3 * found.window,
-                found.resolution,
+                1.0 / found.window,
                 if input.scene.roms.iter().any(tiprub_core::Rom::is_cyclic) { "of nodal diameter 0" } else { "of a blade" }
             ),
         });

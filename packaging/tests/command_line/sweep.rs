@@ -228,7 +228,7 @@ fn unknown_names_end_the_sweep_before_any_run() {
     assert_eq!(swept(&project, &["--check", "--part", "2/5"])["runs"], 5);
     assert_eq!(project.files(), files, "a check leaves no files");
     let error = project.fail(&["sweep", "plan.toml", "-o", "scene.toml"], 2);
-    assert!(error.contains("same file as a file of PLAN"), "{error}");
+    assert!(error.contains("same file as a file of the plan"), "{error}");
 }
 
 #[test]

@@ -71,7 +71,10 @@ fn a_warning_is_silenced_by_its_identifier() {
     fs::write(project.path("scene.toml"), format!("silence = [\"{}\", \"{}\"]\n{coarse}", all[0], all[1])).unwrap();
     assert!(ids(&["run", "scene.toml", "--quiet"]).is_empty());
     let unknown = project.fail(&["run", "scene.toml", "--silence", "fluter"], 2);
-    assert!(unknown.contains("no warning has the identifier \"fluter\"") && unknown.contains("flutter"), "{unknown}");
+    assert!(
+        unknown.contains("no warning has the identifier \"fluter\"") && unknown.contains("Did you mean `flutter`?"),
+        "{unknown}"
+    );
 }
 
 /// Slips end with an error, unless the scene or the command line accepts them; an FMU then contains that setting, too.

@@ -10,7 +10,7 @@ use std::{
 
 use serde_json::{Value, json};
 
-fn tiprub(directory: &Path, cache: &str, arguments: &[&str]) -> (String, String) {
+pub(super) fn tiprub(directory: &Path, cache: &str, arguments: &[&str]) -> (String, String) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_tiprub"));
     let output = command.current_dir(directory).env("TIPRUB_CACHE", cache).args(arguments).output().unwrap();
     let [stdout, stderr] = [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
@@ -20,7 +20,7 @@ fn tiprub(directory: &Path, cache: &str, arguments: &[&str]) -> (String, String)
 
 /// Checks that exactly these statements are answered with no.
 #[track_caller]
-fn only_no(json: &Value, no: &[&str]) {
+pub(super) fn only_no(json: &Value, no: &[&str]) {
     let statements = json["statements"].as_array().unwrap();
     let begins = |start: &&str| statements.iter().any(|one| one["expected"].as_str().unwrap().starts_with(*start));
     assert!(no.iter().all(begins), "{no:?} of {statements:#?}");
@@ -30,7 +30,7 @@ fn only_no(json: &Value, no: &[&str]) {
     }
 }
 
-fn columns(path: &Path) -> (Vec<String>, Vec<Vec<f64>>) {
+pub(super) fn columns(path: &Path) -> (Vec<String>, Vec<Vec<f64>>) {
     let text = fs::read_to_string(path).unwrap();
     let mut lines = text.lines();
     let names = lines.next().unwrap().split(',').map(String::from).collect();
@@ -292,7 +292,7 @@ fn totals(total: &Value, cheapest: &str) {
 }
 
 /// Checks that without a finer model of a ROM from a file, no error is called total, and that the errors in the ROM are reported beside.
-fn errors_of_a_file(root: &Path, reported: &str) {
+pub(super) fn errors_of_a_file(root: &Path, reported: &str) {
     let json: Value = serde_json::from_str(reported).unwrap();
     let of = &json["results"]["own_model"];
     assert_eq!([&of["refined"], &of["not_refined"]], [&json!(["steps"]), &json!(["modes", "nodes", "mesh"])], "{of:#}");
@@ -315,288 +315,21 @@ fn errors_of_a_file(root: &Path, reported: &str) {
 }
 
 /// Writes a user scene around a coarse blade.
-fn own_scene(root: &Path) {
+pub(super) fn own_scene(root: &Path) {
     let reduce = ["reduce", "rotor37", "--mesh", "6x1x8", "--modes", "4", "--contact-nodes", "2", "--quiet"];
     tiprub(root, "", &[&reduce[..], &["-o", "coarse.rom.safetensors", "--inp", "blade.inp"]].concat());
     fs::write(root.join("own.toml"), around("coarse.rom.safetensors")).unwrap();
 }
 
 /// Returns the built-in scene around another blade with few contact nodes, for which longer steps are sufficient.
-fn around(rom: &str) -> String {
+pub(super) fn around(rom: &str) -> String {
     with_rom("rotor37-one-row", rom)
 }
 
-fn with_rom(scene: &str, rom: &str) -> String {
+pub(super) fn with_rom(scene: &str, rom: &str) -> String {
     let (_, shipped) = tiprub_gallery::scene_source::BUILTIN_SCENES.iter().find(|(name, _)| *name == scene).unwrap();
     assert!(shipped.contains("step = 5.0e-7 "));
     shipped.replace("builtin:rotor37-one-row", rom).replace("step = 5.0e-7 ", "step = 1.0e-6 ")
-}
-
-/// Returns the result of the stability study of a scene at two frictions, speeds and steps.
-fn stability(root: &Path, scene: &str) -> Value {
-    let arguments = ["study", "stability", scene, "--friction", "0.15:0.9:2", "--speeds=-1800:1800:2"];
-    let more = ["--steps", "1e-6:1.6e-5:2", "--json", "--quiet", "--out", "out"];
-    serde_json::from_str(&tiprub(root, "", &[&arguments[..], &more].concat()).0).unwrap()
-}
-
-/// Runs three steps of the scene with a friction coefficient, a speed, a step and `scheme + solver`.
-fn three_steps(root: &Path, [friction, speed, step]: [f64; 3], method: &str) -> Value {
-    let (scheme, solver) = method.split_once(" + ").unwrap();
-    let values = [
-        format!("--set=friction_coefficient={friction:?}"),
-        format!("--set=speed={speed:?}"),
-        format!("--set=internal_step_max={step:?}"),
-        format!("--set=scheme={scheme}"),
-        format!("--set=solver={solver}"),
-        format!("--step={step:?}"),
-        format!("--stop={:?}", 3.0 * step),
-    ];
-    let mut command = Command::new(env!("CARGO_BIN_EXE_tiprub"));
-    let output = command.current_dir(root).args(["run", "own.toml", "--json", "--quiet"]).args(values).output();
-    serde_json::from_slice(&output.unwrap().stdout).unwrap()
-}
-
-/// Every answer of the study agrees with a run with the same start values and step, and the largest accepted steps separate accepted from rejected
-/// ones.
-#[test]
-fn stability_study_agrees_with_runs() {
-    let root = tempfile::tempdir().unwrap();
-    own_scene(root.path());
-    let json = stability(root.path(), "own.toml");
-    only_no(&json, &[]);
-    let number = |value: &Value, name: &str| value[name].as_f64().unwrap();
-    let points = json["results"]["points"].as_array().unwrap();
-    assert_eq!(points.len(), 8);
-    for point in points {
-        let [friction, speed, step] = ["friction", "speed", "internal_step"].map(|name| number(point, name));
-        let reported = three_steps(root.path(), [friction, speed, step], "modal-exact + lcp");
-        match point["refusal"].as_str() {
-            // Place and problem are separate in JSON.
-            Some(text) => {
-                let reported = reported["error"]["problem"].as_str().unwrap();
-                assert!(text.starts_with(reported), "{text} {reported}");
-            }
-            None => assert_eq!(reported["warnings"], point["warnings"], "{point:#}"),
-        }
-    }
-    let answers: Vec<&str> = points.iter().map(|point| point["answer"].as_str().unwrap()).collect();
-    assert!(["right", "warned", "flutter", "refused"].iter().all(|kind| answers.contains(kind)), "{answers:?}");
-    let limits = json["results"]["largest_steps"].as_array().unwrap();
-    assert_eq!(limits.len(), 9);
-    for limit in limits.iter().filter(|limit| !limit["method"].as_str().unwrap().ends_with("coulomb")) {
-        if limit["method"] == "massless-boundary + film" {
-            let rule = limit["refusal_beyond"].as_str().unwrap();
-            assert!(limit["step"].is_null() && rule.contains("cannot be combined with"), "{limit:#}");
-            continue;
-        }
-        for (factor, accepted) in [(0.999, true), (1.02, false)] {
-            let step = factor * number(limit, "step");
-            let reported = three_steps(root.path(), [0.15, 1800.0, step], limit["method"].as_str().unwrap());
-            assert_eq!(reported["error"].is_null(), accepted, "{limit:#} {reported:#}");
-        }
-    }
-    for row in columns(&root.path().join("out/answers.csv")).1 {
-        assert_eq!(row[6].is_finite(), row[4] > 0.0, "what flutters has a frequency: {row:?}");
-    }
-    let page = fs::read_to_string(root.path().join("out/index.html")).unwrap();
-    assert!(page.contains("Largest internal step that passes the checks") && page.contains("Read a column"));
-}
-
-#[test]
-fn stability_study_works_without_friction_in_the_scene() {
-    let root = tempfile::tempdir().unwrap();
-    own_scene(root.path());
-    let scene = fs::read_to_string(root.path().join("own.toml")).unwrap();
-    fs::write(root.path().join("dry.toml"), scene.replace("friction = 0.15", "friction = 0.0")).unwrap();
-    let (own, dry) = (stability(root.path(), "own.toml"), stability(root.path(), "dry.toml"));
-    assert_eq!(dry["results"]["own"]["friction"], 0.0);
-    let rubbing = |point: &&Value| point["friction"] != 0.0;
-    let (with, without) = dry["results"]["points"].as_array().unwrap().iter().partition::<Vec<_>, _>(rubbing);
-    assert!(
-        with.iter().zip(own["results"]["points"].as_array().unwrap()).all(|(a, b)| *a == b) && without.len() == 4,
-        "{with:#?}"
-    );
-    assert!(
-        without.iter().all(|point| point["refusal"].is_null() && point["growth_of_steps"].is_null()),
-        "{without:#?}"
-    );
-}
-
-#[test]
-fn stability_study_shows_usable_steps_below_a_long_one() {
-    let root = tempfile::tempdir().unwrap();
-    own_scene(root.path());
-    let scene = fs::read_to_string(root.path().join("own.toml")).unwrap();
-    let text = scene
-        .replace("step = 1.0e-6 ", "step = 1.0e-4 ")
-        .replace("communication_step = 1.0e-5", "communication_step = 1.0e-4");
-    fs::write(root.path().join("long.toml"), text).unwrap();
-    let arguments = ["study", "stability", "long.toml", "--quick", "--json", "--quiet", "--out", "long"];
-    let long: Value = serde_json::from_str(&tiprub(root.path(), "", &arguments).0).unwrap();
-    only_no(&long, &["The scene as it stands is accepted", "Its internal step does not exceed"]);
-    let accepted = ["right", "warned"].map(|kind| long["results"]["counts"][kind].as_u64().unwrap());
-    assert!(accepted[0] + accepted[1] > 0, "{}", long["results"]["counts"]);
-}
-
-/// Arguments for the mesh from which the ROM of `own.toml` was reduced.
-const MESH: [&str; 6] = ["--mesh", "blade.inp", "--contact-set", "TIP", "--clamp-set", "HUB"];
-
-fn convergence(root: &Path, more: &[&str]) -> Value {
-    let own = ["study", "convergence", "own.toml", "--quick", "--json", "--quiet", "--out", "out"];
-    serde_json::from_str(&tiprub(root, "", &[&own[..], more].concat()).0).unwrap()
-}
-
-/// Refines steps of any scene and reduces modes of any ROM; more modes and other contact nodes need the mesh from which the ROM was reduced.
-#[test]
-fn convergence_study_reports_what_it_cannot_refine() {
-    let root = tempfile::tempdir().unwrap();
-    own_scene(root.path());
-    let study = |more: &[&str]| convergence(root.path(), more);
-    let values = |direction: &Value| -> Vec<f64> {
-        direction["levels"].as_array().unwrap().iter().map(|level| level["value"].as_f64().unwrap()).collect()
-    };
-    let scope = study(&[])["results"].clone();
-    let alone = &scope["directions"];
-    assert_eq!([values(&alone[0]), values(&alone[1])], [vec![2e-6, 1e-6, 5e-7], vec![2.0, 4.0]]);
-    assert!(values(&alone[2]).is_empty());
-    for direction in [1, 2, 3] {
-        assert!(alone[direction]["not_refined"].as_str().unwrap().contains("--mesh FILE"), "{alone:#}");
-    }
-    assert_eq!(scope["refined"], json!(["internal step"]));
-    assert_eq!(scope["coarser_only"], json!(["modes of rotor"]));
-    assert_eq!(scope["not_refined"], json!(["contact nodes of rotor", "mesh of rotor"]));
-    let page = fs::read_to_string(root.path().join("out/index.html")).unwrap();
-    let reported = "finer levels: internal step; coarser levels only: modes of rotor; not refined: contact nodes of rotor, mesh of rotor";
-    assert!(page.contains(reported) && !page.to_lowercase().contains("total"), "{reported}");
-    // If no error was found, the output reports that there is nothing to write; directories of files are created as for all outputs.
-    let (text, _) = tiprub(
-        root.path(),
-        "",
-        &["study", "convergence", "own.toml", "--quick", "--quiet", "--out", "out", "--into", "new/at.rom"],
-    );
-    let none = text.contains(
-        "warning: new/at.rom contains the ROM unchanged: no error due to its modes, patches or mesh could be determined",
-    );
-    let kept = fs::read(root.path().join("new/at.rom")).unwrap()
-        == fs::read(root.path().join("coarse.rom.safetensors")).unwrap();
-    assert!(none && kept && !text.contains("unknown"), "{text}");
-    let whole = study(&[&MESH[..], &["--sectors", "36"]].concat());
-    let found = &whole["results"]["directions"];
-    assert_eq!([values(&found[1]), values(&found[2])], [vec![2.0, 4.0, 6.0], vec![2.0, 3.0]]);
-    let all = found.as_array().unwrap();
-    assert!(all[..3].iter().all(|direction| direction["not_refined"].is_null()), "{found:#}");
-    assert!(all[3]["not_refined"].as_str().unwrap().contains("--other-mesh FILE"), "{found:#}");
-    // The unchanged scene gives the same run in every direction, and without a mesh.
-    let standing = |directions: &Value| -> Vec<Value> {
-        let levels = directions.as_array().unwrap().iter().flat_map(|one| one["levels"].as_array().unwrap());
-        let own = levels.filter(|level| level["own"] == true);
-        own.map(|level| {
-            ["impulse", "friction_work", "peak_force", "strain_energy"].map(|name| level[name].clone()).to_vec().into()
-        })
-        .collect()
-    };
-    let all = standing(found);
-    assert!(all.len() == 3 && all.iter().all(|one| *one == all[0]) && all[0] == standing(alone)[0], "{all:?}");
-    // A change is that to the next run; the step changes least of all.
-    let change = |direction: &Value, level: usize, name: &str| {
-        direction["levels"][level]["changes_to_next"][name].as_f64().unwrap()
-    };
-    let steps = [0, 1].map(|level| change(&found[0], level, "displacements"));
-    assert!(steps.iter().all(|step| (1e-6..0.01).contains(step)), "{steps:?}");
-    assert!(steps[1] < 0.1 * change(&found[1], 1, "displacements"), "{found:#}");
-    let impulse = |level: usize| found[1]["levels"][level]["impulse"].as_f64().unwrap();
-    let expected = (impulse(1) - impulse(2)).abs() / impulse(1).max(impulse(2));
-    assert!((change(&found[1], 1, "impulse") / expected - 1.0).abs() < 1e-9);
-    assert!(fs::read_to_string(root.path().join("out/levels.csv")).unwrap().lines().count() == 1 + 3 + 3 + 2);
-}
-
-/// Just below the limit of central differences, models with more modes or nodes are rejected.
-#[test]
-fn rejected_refinements_are_repeated_with_half_the_step() {
-    let root = tempfile::tempdir().unwrap();
-    own_scene(root.path());
-    let scene = fs::read_to_string(root.path().join("own.toml")).unwrap();
-    let replaced = |line: &str| match line.split(' ').next() {
-        Some("scheme") => "scheme = \"central-difference\"".to_owned(),
-        Some("step") => "step = 4.4e-6".to_owned(),
-        Some("communication_step") => "communication_step = 8.8e-6".to_owned(),
-        _ => line.to_owned(),
-    };
-    fs::write(root.path().join("own.toml"), scene.lines().map(replaced).collect::<Vec<_>>().join("\n")).unwrap();
-    let limited = convergence(root.path(), &[&MESH[..], &["--sectors", "36"]].concat());
-    let found = limited["results"]["directions"].as_array().unwrap();
-    let divided: Vec<u64> = found.iter().map(|one| one["step_divided_by"].as_u64().unwrap()).collect();
-    assert_eq!(divided, [1, 2, 2, 1]);
-    let refused =
-        |one: &Value| one["levels"].as_array().unwrap().iter().filter(|level| level["refused"].is_string()).count();
-    assert_eq!(found.iter().map(refused).collect::<Vec<_>>(), [1, 0, 0, 0], "{limited:#}");
-}
-
-/// Two other meshes of the blade show the limit of the sequence; the ROM that is written with the result reports it in later runs.
-#[test]
-fn mesh_error_is_estimated_and_stored_in_the_rom() {
-    let root = tempfile::tempdir().unwrap();
-    own_scene(root.path());
-    for mesh in ["4x1x6", "8x1x12"] {
-        let reduce = ["reduce", "rotor37", "--mesh", mesh, "--modes", "4", "--contact-nodes", "2", "--quiet"];
-        let written = ["-o", &format!("{mesh}.rom.safetensors"), "--inp", &format!("{mesh}.inp")];
-        tiprub(root.path(), "", &[&reduce[..], &written].concat());
-    }
-    let into = ["--sectors", "36", "--into", "known.rom.safetensors"];
-    let others = ["--other-mesh", "8x1x12.inp", "--other-mesh", "4x1x6.inp"];
-    let json = convergence(root.path(), &[&MESH[..], &others, &into].concat());
-    let mesh = &json["results"]["directions"][3];
-    let levels = mesh["levels"].as_array().unwrap();
-    let values: Vec<f64> = levels.iter().map(|level| level["value"].as_f64().unwrap()).collect();
-    assert!(levels.len() == 3 && levels[1]["own"] == true && values.is_sorted(), "{mesh:#}");
-    // The contact nodes are the edges of the tip on every mesh, so that displacements are compared.
-    let changes = [0, 1].map(|level| levels[level]["changes_to_next"]["displacements"].as_f64().unwrap());
-    assert!(changes.iter().all(|change| (1e-4..0.5).contains(change)), "{mesh:#}");
-    let limits = fs::read_to_string(root.path().join("out/limits.csv")).unwrap();
-    assert!(limits.lines().filter(|line| line.starts_with("mesh of rotor,")).count() == 5, "{limits}");
-    let found = mesh["error"]["displacements"].as_f64();
-    // A sequence with decreasing changes has a limit, and the scene is farther from it than from the finest mesh.
-    assert_eq!(found.is_some(), changes[0] > 1.2 * changes[1], "{mesh:#}");
-    assert!(found.is_none_or(|found| found > changes[1]), "{mesh:#}");
-    let reported = |command: &[&str]| tiprub(root.path(), "", command).0;
-    let inspected: Value = serde_json::from_str(&reported(&["inspect", "known.rom.safetensors", "--json"])).unwrap();
-    let errors = &inspected["rom"]["rub_errors"];
-    assert_eq!(errors["mesh"].as_f64(), found, "{errors}");
-    assert!(errors["found_on"].as_str().unwrap().starts_with("rotor37_rub_one_row, "), "{errors}");
-    fs::write(root.path().join("known.toml"), around("known.rom.safetensors")).unwrap();
-    let run = reported(&["run", "known.toml", "--stop", "1e-4", "--quiet"]);
-    let last = run.lines().rfind(|line| line.starts_with("estimated error")).unwrap();
-    let mesh = found.map_or("mesh unknown".to_owned(), |found| format!("mesh {:.2} %", 100.0 * found));
-    assert!(last.contains("steps unknown") && last.contains(&mesh), "{run}");
-    // A ROM without a study carries no errors, and its file is unchanged.
-    assert!(!reported(&["run", "own.toml", "--stop", "1e-4", "--quiet"]).contains("estimated error"));
-    let mut command = Command::new(env!("CARGO_BIN_EXE_tiprub"));
-    errors_of_a_file(
-        root.path(),
-        &reported(&["study", "error", "known.toml", "--quick", "--json", "--quiet", "--window", "2e-3"]),
-    );
-    let again = ["study", "convergence", "own.toml", "--quick", "--into", "known.rom.safetensors"];
-    let output = command.current_dir(root.path()).args(again).output().unwrap();
-    assert_eq!(output.status.code(), Some(1));
-    assert!(String::from_utf8(output.stderr).unwrap().contains("known.rom.safetensors: already exists"));
-}
-
-#[test]
-fn convergence_study_rejects_a_different_mesh() {
-    let root = tempfile::tempdir().unwrap();
-    own_scene(root.path());
-    let refuse = |more: &[&str], code: i32| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_tiprub"));
-        let output = command.current_dir(root.path()).args(["study", "convergence", "own.toml", "--quick"]).args(more);
-        let output = output.output().unwrap();
-        assert_eq!(output.status.code(), Some(code), "{more:?}");
-        String::from_utf8(output.stderr).unwrap()
-    };
-    let other = refuse(&[&MESH[..], &["--sectors", "36", "--material", "steel"]].concat(), 1);
-    assert!(other.contains("the mesh does not reproduce the ROM `rotor37` of the scene: first frequency"), "{other}");
-    assert!(refuse(&MESH, 1).contains("1 sectors instead of"), "sectors");
-    assert!(refuse(&MESH[2..], 2).contains("--mesh: an option describes a mesh, but no mesh is given"));
-    assert!(refuse(&[&MESH[..], &["--modes", "9"]].concat(), 2).contains("unexpected argument '--modes'"));
 }
 
 /// Reported immediately: no model is reduced, and no directory is created.

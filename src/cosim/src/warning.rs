@@ -56,9 +56,10 @@ macro_rules! topics {
 
 topics! {
     Flutter "flutter"
-        "Sliding contact that stays closed makes vibration grow. This is a note if contact opens before the growth \
+        "Friction makes vibration grow while contact stays closed. This is a note if contact opens before the growth \
          matters."
-        "Use less friction or more damping. A note needs no action.";
+        "A note needs no action. If it is a warning, use less friction or more damping. With adaptive steps, also compare \
+         with a smaller `time.tolerance`, because vibration far below the tolerance may decay in the run.";
     LockUp "lock-up"
         "Friction drives the tip into the casing faster than the casing deflects, so the contact force grows without limit \
          (self-locking). Clearances and energies are meaningless once this happens."

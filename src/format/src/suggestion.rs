@@ -2,14 +2,46 @@
 
 use strsim::{damerau_levenshtein, jaro_winkler};
 
-/// Returns the accepted name closest to `given`, if one is close enough.
-pub(crate) fn closest<'a>(given: &str, accepted: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+/// Similarity of two names (0 to 1) above which one is proposed for the other.
+const CLOSE: f64 = 0.9;
+/// Smallest number of letters of a word that identifies a name.
+const SHORTEST_WORD: usize = 3;
+
+/// Returns the accepted name closest to `given`, if one is close enough or has a word in common with it.
+///
+/// # Examples
+/// ```
+/// use tiprub_format::closest_name;
+///
+/// let names = ["speed", "friction_coefficient"];
+/// assert_eq!(closest_name("sped", names), Some("speed"));
+/// assert_eq!(closest_name("contact.friction", names), Some("friction_coefficient"));
+/// assert_eq!(closest_name("viscosity", names), None);
+/// ```
+pub fn closest_name<'a>(given: &str, accepted: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let given = normalised(given);
     let similarity = |name: &str| jaro_winkler(&given, &normalised(name));
-    let best = accepted.into_iter().max_by(|a, b| similarity(a).total_cmp(&similarity(b)))?;
+    let mut accepted: Vec<&str> = accepted.into_iter().collect();
+    // The first of equally similar names comes last.
+    accepted.reverse();
+    let best = *accepted.iter().max_by(|a, b| similarity(a).total_cmp(&similarity(b)))?;
     let distance = damerau_levenshtein(&given, &normalised(best));
-    let allowed = (given.chars().count() / 3).max(2);
-    (distance <= allowed || similarity(best) > 0.9).then_some(best)
+    let allowed = (given.chars().count() / 4).max(2);
+    if distance <= allowed || similarity(best) > CLOSE {
+        return Some(best);
+    }
+    let common = |name: &&str| {
+        let name = normalised(name);
+        let pairs = words(&given).flat_map(|given| words(&name).map(move |word| jaro_winkler(given, word)));
+        pairs.fold(0.0, f64::max)
+    };
+    let sharing = accepted.into_iter().filter(|name| common(name) > CLOSE);
+    sharing.max_by(|a, b| common(a).total_cmp(&common(b)).then(similarity(a).total_cmp(&similarity(b))))
+}
+
+/// Returns the words of a name that are long enough to identify it.
+fn words(name: &str) -> impl Iterator<Item = &str> {
+    name.split(|letter: char| !letter.is_alphanumeric()).filter(|word| word.chars().count() >= SHORTEST_WORD)
 }
 
 /// Returns the name without differences in case and between `-` and `_`, which are the most common slips and do not
@@ -18,16 +50,24 @@ fn normalised(name: &str) -> String {
     name.to_lowercase().replace('-', "_")
 }
 
+/// Returns the question `Did you mean `x`? ` if an accepted name is close, otherwise an empty text.
+///
+/// # Examples
+/// ```
+/// assert_eq!(tiprub_format::name_hint("sped", ["speed"]), "Did you mean `speed`? ");
+/// assert_eq!(tiprub_format::name_hint("sped", ["torque"]), "");
+/// ```
+pub fn name_hint<'a>(given: &str, accepted: impl IntoIterator<Item = &'a str>) -> String {
+    closest_name(given, accepted).map_or(String::new(), |name| format!("Did you mean `{name}`? "))
+}
+
 /// Returns `Did you mean `x`? Accepted here: `x`, `y`, `z`` (the question only if a name is close).
 pub(crate) fn remedy(given: &str, accepted: &[&str]) -> String {
     if accepted.is_empty() {
         return "No further keys are accepted here".to_owned();
     }
     let list = accepted.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
-    match closest(given, accepted.iter().copied()) {
-        Some(name) => format!("Did you mean `{name}`? Accepted here: {list}"),
-        None => format!("Accepted here: {list}"),
-    }
+    format!("{}Accepted here: {list}", name_hint(given, accepted.iter().copied()))
 }
 
 #[cfg(test)]
@@ -37,11 +77,22 @@ mod tests {
     #[test]
     fn suggests_typos_but_not_unrelated_names() {
         let names = ["gap", "friction", "sector_gaps", "master", "slave"];
-        assert_eq!(closest("gpa", names), Some("gap"));
-        assert_eq!(closest("Sector-Gaps", names), Some("sector_gaps"));
-        assert_eq!(closest("frction", names), Some("friction"));
-        assert_eq!(closest("viscosity", names), None);
-        assert_eq!(closest("x", []), None);
+        assert_eq!(closest_name("gpa", names), Some("gap"));
+        assert_eq!(closest_name("Sector-Gaps", names), Some("sector_gaps"));
+        assert_eq!(closest_name("frction", names), Some("friction"));
+        assert_eq!(closest_name("viscosity", names), None);
+        assert_eq!(closest_name("x", []), None);
+        let start_values = ["speed", "friction_coefficient", "gap_offset", "tolerance", "internal_step_max"];
+        for (given, name) in [
+            ("frction", Some("friction_coefficient")),
+            ("SPEED", Some("speed")),
+            ("structure[1].speed", Some("speed")),
+            ("time.step", Some("internal_step_max")),
+            ("clearance", None),
+            ("mu", None),
+        ] {
+            assert_eq!(closest_name(given, start_values), name, "{given}");
+        }
         assert_eq!(remedy("viscosity", &["gap"]), "Accepted here: `gap`");
         assert_eq!(remedy("viscosity", &[]), "No further keys are accepted here");
     }

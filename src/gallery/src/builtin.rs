@@ -4,6 +4,7 @@ use std::fmt::Debug;
 
 use tiprub_core::Rom;
 use tiprub_field::shape_file;
+use tiprub_format::name_hint;
 use tiprub_model::{
     CasingOptions, Mesh, Rotor37Options, SurfaceShapes,
     casing::CASING37,
@@ -19,6 +20,7 @@ use crate::{
     known,
     reduction::{self, with_progress},
     rom_cache::{CachedModel, RomCache},
+    scene_source::BUILTIN,
 };
 
 /// Rotor 37, recommended: nine patches along the chord in two rows at the sides of the tip.
@@ -47,7 +49,6 @@ pub const CUBE: &str = "cube";
 pub const RINGS: [(&str, RingSide); 2] = [("ring-left", RingSide::Left), ("ring-right", RingSide::Right)];
 
 /// All names of models.
-#[cfg(test)]
 pub(crate) const NAMES: [&str; 13] = [
     ROTOR37,
     ROTOR37_ONE_ROW,
@@ -63,6 +64,16 @@ pub(crate) const NAMES: [&str; 13] = [
     RINGS[0].0,
     RINGS[1].0,
 ];
+
+/// Returns the remedy for an unknown name of a built-in model, with a similar name if there is one.
+pub fn similar_models(name: &str) -> String {
+    format!("{}Give a ROM file, or one of {}", name_hint(name, NAMES), with_prefix(&NAMES))
+}
+
+/// Returns the names of built-in scenes or models with their prefix.
+pub(crate) fn with_prefix(names: &[&str]) -> String {
+    names.iter().map(|name| format!("{BUILTIN}{name}")).collect::<Vec<_>>().join(", ")
+}
 
 /// Returns the model of this name; `None` if there is no such model.
 pub fn rom(name: &str, cache: &RomCache, console: &Console) -> Option<Result<Rom>> {

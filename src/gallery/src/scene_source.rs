@@ -9,7 +9,7 @@ use std::{
 
 use tiprub_core::scene::settings::SceneSettings;
 use tiprub_core::{Rom, Scene};
-use tiprub_format::builtin_model;
+use tiprub_format::{builtin_model, name_hint};
 use tiprub_shell::{Failure, Result, console::Console};
 
 use crate::{builtin, rom_cache::RomCache};
@@ -49,10 +49,23 @@ pub const BUILTIN: &str = "builtin:";
 /// # Errors
 /// Files are missing or wrong; the error names file, line, field and remedy.
 pub fn load(argument: impl AsRef<OsStr>, cache: &RomCache, console: &Console) -> Result<Scene> {
-    let reduce = |name: &str| Some(builtin::rom(name, cache, console)?.map_err(|failure| failure.to_string()));
+    let unknown = RefCell::new(None);
+    let reduce = |name: &str| {
+        let model = builtin::rom(name, cache, console);
+        if model.is_none() {
+            *unknown.borrow_mut() = Some(name.to_owned());
+        }
+        Some(model?.map_err(|failure| failure.to_string()))
+    };
     match source(argument.as_ref())? {
         SceneSource::Embedded(name, text) => builtin_scene(name, text, &reduce),
-        SceneSource::File(path) => tiprub_format::load_scene(path, &reduce).map_err(Failure::from),
+        SceneSource::File(path) => tiprub_format::load_scene(path, &reduce).map_err(|error| {
+            let mut failure = Failure::from(error);
+            if let Some(name) = unknown.take() {
+                failure.diagnostic.remedy = builtin::similar_models(&name);
+            }
+            failure
+        }),
     }
 }
 
@@ -134,9 +147,10 @@ fn source(argument: &OsStr) -> Result<SceneSource<'_>> {
     if let Some(argument) = argument.to_str().filter(|argument| argument.starts_with(BUILTIN)) {
         let name = &argument[BUILTIN.len()..];
         let Some((_, text)) = BUILTIN_SCENES.iter().find(|(known, _)| *known == name) else {
-            let names: Vec<String> = BUILTIN_SCENES.iter().map(|(known, _)| format!("{BUILTIN}{known}")).collect();
-            let problem = format!("there is no built-in scene `{name}`");
-            return Err(Failure::usage("SCENE", problem, format!("Give a scene file, or one of {}", names.join(", "))));
+            let names = BUILTIN_SCENES.map(|(known, _)| known);
+            let known = builtin::with_prefix(&names);
+            let remedy = format!("{}Give a scene file, or one of {known}", name_hint(name, names));
+            return Err(Failure::usage(argument, "there is no such built-in scene", remedy));
         };
         return Ok(SceneSource::Embedded(argument, text));
     }
@@ -260,7 +274,17 @@ mod tests {
         let missing = load("/nowhere/scene.toml", &console).unwrap_err();
         assert!(missing.to_string().starts_with("/nowhere/scene.toml"), "{missing}");
         let failure = load("builtin:rotor38", &console).unwrap_err();
-        assert!(failure.problem.contains("rotor38") && failure.remedy.contains("builtin:abradable"), "{failure}");
+        assert_eq!(failure.what, "builtin:rotor38");
+        for words in ["Did you mean `rotor37`?", "builtin:abradable"] {
+            assert!(failure.remedy.contains(words), "{failure}");
+        }
+        let root = tempfile::tempdir().unwrap();
+        let path = root.path().join("scene.toml");
+        fs::write(&path, ROTOR37_SCENE.replace("builtin:rotor37", "builtin:rotor73")).unwrap();
+        let failure = super::load(&path, &RomCache::off(), &console).unwrap_err();
+        for words in ["`rotor73`", "Did you mean `rotor37`?", "builtin:casing37"] {
+            assert!(failure.to_string().contains(words), "{failure}");
+        }
         for (name, kind) in [("rub.fmu", "an FMU"), ("blade.rom.safetensors", "a ROM")] {
             let failure = load(name, &console).unwrap_err();
             assert!(failure.problem.contains(kind) && failure.remedy.contains("inspect"), "{failure}");

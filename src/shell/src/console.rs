@@ -112,18 +112,20 @@ impl Console {
 
     /// Prints warnings without an identifier, one line each, on stderr; `quiet` does not suppress them.
     pub fn warn_texts(&self, warnings: &[String]) {
+        self.warn_lines(&warnings.iter().map(|warning| format!("warning: {warning}")).collect::<Vec<_>>());
+    }
+
+    /// Prints warnings that are already formatted, on stderr; `quiet` does not suppress them.
+    pub fn warn_lines(&self, warnings: &[String]) {
         for warning in warnings {
             // A closed stderr must not stop the work.
-            let _ = writeln!(std::io::stderr(), "warning: {}", printable(warning));
+            let _ = writeln!(std::io::stderr(), "{}", printable(warning));
         }
     }
 
     /// Prints warnings, two lines for every topic, on stderr; `quiet` does not suppress them.
     pub fn warn(&self, warnings: &[Warning]) {
-        for lines in warning_lines(warnings) {
-            // A closed stderr must not stop the work.
-            let _ = writeln!(std::io::stderr(), "{}", printable(&lines));
-        }
+        self.warn_lines(&warning_lines(warnings));
     }
 
     /// Starts a task of known length (`Some(total)`) or of unknown length (`None`: a spinner).

@@ -16,6 +16,8 @@ const PARTS: u64 = 1000;
 /// Fraction of the work, or time (s), after which another line is written to a log.
 const LINE_SHARE: f64 = 0.1;
 const LINE_AFTER: Duration = Duration::from_secs(30);
+/// Time (s) after which the first line is written to a log.
+const FIRST_LINE_AFTER: Duration = Duration::from_secs(2);
 /// Largest displayed fraction before the work is finished.
 const MOST_SHOWN: f64 = 0.999;
 /// Shortest duration (s) that is announced.
@@ -102,6 +104,8 @@ struct ForecastState {
     last: Instant,
     /// Fraction and time of the last line.
     line: (f64, Instant),
+    /// True once a line has been written.
+    has_line: bool,
 }
 
 impl Forecast {
@@ -113,7 +117,11 @@ impl Forecast {
         }
         let (last, line) = (Instant::now(), (0.0, Instant::now()));
         let task = console.task(title, Some(PARTS));
-        Self { task, title: title.to_owned(), state: RefCell::new(ForecastState { ledger, last, line }) }
+        Self {
+            task,
+            title: title.to_owned(),
+            state: RefCell::new(ForecastState { ledger, last, line, has_line: false }),
+        }
     }
 
     /// Plans more work of a kind.
@@ -133,7 +141,9 @@ impl Forecast {
         self.task.at((share * PARTS as f64) as u64);
         let text = format!("{:.0} %, about {} left", (100.0 * share).floor(), duration(left));
         self.task.now(&format!("{}: {text}", self.title));
-        if share - state.line.0 >= LINE_SHARE || now - state.line.1 >= LINE_AFTER {
+        let after = if state.has_line { LINE_AFTER } else { FIRST_LINE_AFTER };
+        if share - state.line.0 >= LINE_SHARE || now - state.line.1 >= after {
+            state.has_line = true;
             state.line = (share, now);
             self.task.line(&text);
         }

@@ -163,7 +163,7 @@ impl<'a> StartedRun<'a> {
         let mut warnings = [simulation.warnings(), &schedule.warnings()].concat();
         warnings.extend(given.history.map(|history| history.warnings(schedule.step)).unwrap_or_default());
         warnings.retain(|warning| !scene.settings.is_silenced(warning.topic()));
-        let parameters = used_parameters(&simulation).map_err(in_scene)?;
+        let parameters = start_values(&simulation).map_err(in_scene)?;
         let mut outputs = Outputs::of(simulation.table());
         if let Some(observed) = given.observed {
             outputs.keep(&observed.columns);
@@ -240,8 +240,11 @@ pub fn compiled(scene: &Scene, schedule: &Schedule) -> Result<Simulation> {
     compile(&scene)
 }
 
-/// Returns the current values of all inputs and parameters.
-fn used_parameters(simulation: &Simulation) -> tiprub_core::Result<Vec<UsedParameter>> {
+/// Returns the current values of all inputs and parameters, which are the start values before initialisation.
+///
+/// # Errors
+/// Only programming errors.
+pub fn start_values(simulation: &Simulation) -> tiprub_core::Result<Vec<UsedParameter>> {
     let read = |variable: &Variable| {
         let first = variable.reference;
         let value = match variable.kind {
@@ -449,9 +452,8 @@ pub(crate) fn suggestion(name: &str, candidates: &[&str]) -> String {
 
 /// Returns the remedy for an unknown name: the similar name, or all candidates, whose `kind` is given.
 pub fn similar(name: &str, candidates: &[&str], kind: &str) -> String {
-    let scored = candidates.iter().map(|candidate| (strsim::jaro_winkler(name, candidate), *candidate));
-    match scored.max_by(|a, b| a.0.total_cmp(&b.0)) {
-        Some((score, candidate)) if score > 0.8 => format!("Did you mean `{candidate}`?"),
+    match tiprub_format::closest_name(name, candidates.iter().copied()) {
+        Some(candidate) => format!("Did you mean `{candidate}`?"),
         _ if candidates.len() > MOST_LISTED => format!(
             "Available {kind}: {}, and {} more; use `tiprub inspect` to list those of an FMU",
             candidates[..MOST_LISTED].join(", "),

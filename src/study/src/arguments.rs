@@ -4,7 +4,8 @@ use std::{ffi::OsStr, path::PathBuf};
 
 use clap::Args;
 use tiprub_core::Scene;
-use tiprub_cosim::warning::Topic;
+use tiprub_cosim::{Diagnostic, warning::Topic};
+use tiprub_format::name_hint;
 use tiprub_gallery::{rom_cache::RomCache, scene_source};
 use tiprub_shell::console::Console;
 use tiprub_sweep::part::Part;
@@ -15,7 +16,8 @@ pub struct StudyCommon {
     /// Output directory of the study; created if missing [default: study-STUDY].
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Run a quick form of the study with few, short runs: seconds instead of minutes.
+    /// Run a quick form of the study with few, short runs, for a first look. It takes from seconds to a few minutes, depending on the
+    /// study and the scene; the remaining time is printed.
     #[arg(long)]
     pub quick: bool,
     /// Changes to the scene.
@@ -230,7 +232,11 @@ impl SceneOptions {
 
 /// Parses the identifier of a warning.
 fn topic(text: &str) -> Result<String, String> {
-    Topic::find("--silence", text).map(|topic| topic.id().to_owned()).map_err(|error| error.to_string())
+    let found = Topic::find("--silence", text).map(|topic| topic.id().to_owned());
+    found.map_err(|error| {
+        let Diagnostic { problem, remedy, .. } = error.into_diagnostic();
+        format!("{problem}. {}{remedy}", name_hint(text, Topic::ALL.iter().map(|topic| topic.id())))
+    })
 }
 
 /// Whether built-in models are kept from one command to the next.

@@ -14,6 +14,7 @@ use findings::{Coincidence, MapPeak};
 use prediction::{Crossing, FrequencyPrediction};
 use serde_json::json;
 use std::cell::Cell;
+use std::sync::atomic::{AtomicU64, Ordering};
 use tiprub_core::Scene;
 use tiprub_core::scene::settings::SpinSettings;
 use tiprub_gallery::scene_source;
@@ -103,15 +104,22 @@ pub fn study(arguments: &MapArguments, console: &Console) -> Result<StudyOutcome
     let part = arguments.part.unwrap_or(Part::WHOLE);
     let mut journals = TaskJournals::open(&arguments.common.directory(NAME), NAME, part, &map.setup.digests())?;
     let runs = {
-        // The rate is unknown before the first run has finished.
-        let forecast = Forecast::new(console, "Running the interaction map", WorkPlan::new(0.0));
-        let (count, steps) = (part.runs(speeds.len()).len(), map.internal_steps(&speeds) / speeds.len() as f64);
-        let is_planned = Cell::new(false);
-        let progress = |done: usize| match is_planned.replace(true) {
-            false => forecast.plan(0, steps * (count - done) as f64),
-            true => forecast.done(0, steps),
+        // The rate is unknown before the first steps have been taken.
+        let (count, steps) = (part.runs(speeds.len()).len(), map.setup.communication_steps());
+        let title = format!("Running {count} angular velocities of the interaction map");
+        let forecast = Forecast::new(console, &title, WorkPlan::new(0.0));
+        let (taken, shown, is_planned) = (AtomicU64::new(0), Cell::new(0), Cell::new(false));
+        let progress = |done: usize| {
+            if !is_planned.replace(true) {
+                forecast.plan(0, steps as f64 * (count - done) as f64);
+            }
+            let taken = taken.load(Ordering::Relaxed);
+            if taken > shown.get() {
+                forecast.done(0, (taken - shown.replace(taken)) as f64);
+            }
         };
-        let runs = journals.run("speed", &speeds, threads, |speed| map.setup.run(*speed), console, progress)?;
+        let run = |speed: &f64| map.setup.run(*speed, &taken);
+        let runs = journals.run("speed", &speeds, threads, run, console, progress)?;
         forecast.finish();
         runs
     };
@@ -120,7 +128,7 @@ pub fn study(arguments: &MapArguments, console: &Console) -> Result<StudyOutcome
         TaskResults::Part(part) => return Ok(StudyOutcome::Part(part)),
     };
     let (study, warnings) = map.finish(runs, request.quick)?;
-    console.warn_texts(&warnings);
+    console.warn_lines(&warnings);
     Ok(StudyOutcome::Finished(Box::new(study), Some(journals)))
 }
 
@@ -158,7 +166,7 @@ impl Map {
         self.peaks = findings::peaks(&self.runs);
         self.coincidences =
             findings::coincidences(&self.runs, &self.prediction, &self.crossings, self.setup.revolutions);
-        let warnings = self.warnings();
+        let warnings = self.warning_lines();
         Ok((self.report(quick)?, warnings))
     }
 
@@ -210,14 +218,6 @@ impl Map {
         Ok((map, speeds))
     }
 
-    /// Returns the number of internal steps of the runs at these speeds (rad/s).
-    fn internal_steps(&self, speeds: &[f64]) -> f64 {
-        let MapSetup { samples, transient, revolutions, .. } = self.setup;
-        let count = (transient as f64 + revolutions as f64) * samples as f64;
-        let per_sample = |speed: &f64| std::f64::consts::TAU / (speed * samples as f64 * self.start.longest_step);
-        speeds.iter().map(|speed| count * per_sample(speed).ceil().max(1.0)).sum()
-    }
-
     /// Returns the runs that were not rejected.
     fn answered(&self) -> impl Iterator<Item = (f64, &SpeedResponse)> {
         self.runs.iter().filter_map(|run| Some((run.speed, run.outcome.as_ref().ok()?)))
@@ -225,10 +225,17 @@ impl Map {
 
     /// Returns every warning once, even if several runs report it.
     fn warnings(&self) -> Vec<String> {
-        let mut all: Vec<String> = self.answered().flat_map(|(_, response)| response.warnings.clone()).collect();
+        let texts = |response: &SpeedResponse| response.warnings.iter().map(|warning| warning.text.clone()).collect();
+        let mut all: Vec<String> =
+            self.answered().flat_map(|(_, response)| -> Vec<String> { texts(response) }).collect();
         all.sort();
         all.dedup();
         all
+    }
+
+    /// Returns two lines for every kind of warning.
+    fn warning_lines(&self) -> Vec<String> {
+        run::warning_lines(&self.answered().collect::<Vec<_>>())
     }
 
     fn report(&self, quick: bool) -> Result<Study> {

@@ -6,10 +6,13 @@ use crate::map::spectrum::{Analyser, peaks};
 
 /// Smallest number of samples of a spectrum.
 const MIN_SAMPLES: usize = 64;
-/// Length of a run divided by that of a window of its spectrogram.
-const WINDOWS: usize = 4;
+/// Length of a run divided by that of a window of its spectrogram: for few samples, and for at least [`MANY_SAMPLES`].
+const WINDOWS: [usize; 2] = [4, 8];
+const MANY_SAMPLES: usize = 2048;
 /// Largest number of times of a spectrogram.
-const TIMES: usize = 120;
+const TIMES: usize = 240;
+/// Number of frequencies of a spectrogram per 1/length of a window; those between are interpolated.
+const INTERPOLATION: usize = 4;
 /// Smallest peak that is listed, as a fraction of the largest.
 const MIN_PEAK: f64 = 0.03;
 /// Largest number of peaks.
@@ -72,11 +75,11 @@ impl Spectrogram {
     /// # Errors
     /// The transform fails.
     pub fn from_samples(samples: &[f64], start: f64, spacing: f64) -> Result<Option<Self>> {
-        let length = (samples.len() / WINDOWS).max(MIN_SAMPLES);
+        let length = (samples.len() / WINDOWS[usize::from(samples.len() >= MANY_SAMPLES)]).max(MIN_SAMPLES);
         if samples.len() < 2 * MIN_SAMPLES {
             return Ok(None);
         }
-        let analyser = Analyser::new(length, length);
+        let analyser = Analyser::interpolated(length, INTERPOLATION, length * INTERPOLATION);
         let last = samples.len() - length;
         let count = TIMES.min(last + 1);
         let amplitudes = (0..count).map(|column| {
@@ -86,7 +89,7 @@ impl Spectrogram {
         });
         let window = length as f64 * spacing;
         Ok(Some(Self {
-            resolution: 1.0 / window,
+            resolution: 1.0 / (window * INTERPOLATION as f64),
             times: [start + 0.5 * window, start + 0.5 * window + last as f64 * spacing],
             window,
             amplitudes: amplitudes.collect::<Result<_>>()?,
@@ -127,6 +130,11 @@ mod tests {
         assert!((last.0 - 1500.0).abs() < 41.0 && (last.1 - 1.0).abs() < 0.2, "{last:?}");
         assert!((found.times[0] - 0.2125).abs() < 1e-9 && (found.times[1] - 0.2875).abs() < 1e-9);
         assert_eq!(found.amplitudes.len(), TIMES);
+        // Frequencies every 10 Hz, although a window of 25 ms alone distinguishes 40 Hz.
+        assert!((found.resolution - 10.0).abs() < 1e-9 && found.amplitudes[0].len() == 501);
+        // The change lies in the middle of the run, where a column contains both frequencies.
+        let change = found.amplitudes.iter().position(|column| largest(column).0 > 1000.0).unwrap();
+        assert!((0.45..0.6).contains(&(change as f64 / TIMES as f64)), "{change}");
     }
 
     #[test]

@@ -159,7 +159,11 @@ impl StoredWork<'_> {
         work: impl Fn(&T) -> Result<R> + Sync,
     ) -> Result<Vec<R>> {
         let before = Cell::new(0);
-        let progress = |done: usize| self.forecast.done(kind, share * (done - before.replace(done)) as f64);
+        let progress = |done: usize| {
+            if done > before.get() {
+                self.forecast.done(kind, share * (done - before.replace(done)) as f64);
+            }
+        };
         match self.journals.run(name, items, self.threads, work, self.console, progress)? {
             TaskResults::All(results) => Ok(results),
             TaskResults::Part(part) => Err(Failure::new(

@@ -4,6 +4,7 @@ use sha2::{Digest, Sha256};
 use tiprub_core::Scene;
 use tiprub_format::{LIBRARY_RELEASE, read_scene};
 use tiprub_shell::{Failure, Result};
+use tiprub_table::Cell;
 use toml::Value;
 
 use crate::{
@@ -67,6 +68,21 @@ impl Case {
         }
         let text = if has_changed { document.to_string() } else { plan.scene.text.clone() };
         Ok(Self { text, roms, settings })
+    }
+
+    /// Returns the case of a run (from 0) in which the field of a variable (by index) has another value, or that of the scene (`None`).
+    ///
+    /// # Errors
+    /// The scene has no such field or entry.
+    pub(crate) fn with_field(plan: &Plan, run: usize, variable: usize, value: Option<&Cell>) -> Result<Self> {
+        let mut document = plan.document.clone();
+        for (index, (other, own)) in plan.values(run).enumerate() {
+            let value = if index == variable { value } else { Some(own) };
+            if let (VariableTarget::Field(path), Some(value)) = (&other.target, value) {
+                fields::set(&mut document, path, field_value(value))?;
+            }
+        }
+        Ok(Self { text: document.to_string(), ..Self::new(plan, run)? })
     }
 
     /// Returns the digests of the case.

@@ -1,25 +1,19 @@
 //! Runs a part of a plan on several threads.
 
+mod names;
+mod worker;
+
 use std::{
     collections::{HashMap, HashSet},
-    panic::{AssertUnwindSafe, catch_unwind},
     path::{Path, PathBuf},
-    sync::{
-        Arc, Mutex,
-        atomic::{AtomicBool, Ordering},
-    },
-    time::Instant,
+    sync::atomic::{AtomicBool, Ordering},
 };
 
-use tiprub_core::{CoSimulation, Scene};
-use tiprub_cosim::variables::Causality;
 use tiprub_gallery::rom_cache::{RomCache, content_digest};
 use tiprub_shell::{
     Failure, Result,
     console::Console,
     forecast::{Forecast, WorkPlan},
-    native::{self, NativeRun, RunInputs, StartedRun},
-    schedule::Schedule,
     sweep,
 };
 use tiprub_table::parquet_file;
@@ -30,18 +24,12 @@ use crate::{
     journal::Journal,
     models::{RomStore, SweepSources},
     part::Part,
-    plan::{Plan, VariableTarget},
+    plan::Plan,
+    plan_digest::{check_results, plan_facts},
     result_file::{self, ROWS_FACT},
     row::{Row, Status},
 };
-
-/// Number of runs whose scenes are tried for the check of names, until one is accepted.
-const MOST_TRIED: usize = 8;
-/// Number of results of slow checks that are kept.
-const MOST_CHECKS: usize = 256;
-/// Parts of the names of parameters on which slow checks depend.
-const CHECKED_PARAMETERS: [&str; 7] =
-    ["friction", "damping", "internal_step", "scheme", "solver", "tolerance", "velocity"];
+use worker::Worker;
 
 /// Request of a part of a sweep.
 pub struct SweepRequest<'a> {
@@ -210,6 +198,7 @@ impl<'a> PartRun<'a> {
         let digests: Vec<CaseDigest> = runs.map(digest).collect::<Result<_>>().map_err(in_plan)?;
         let mut rows: HashMap<String, Row> = HashMap::new();
         if output.exists() {
+            check_results(plan, output)?;
             rows.extend(result_file::read(output)?.into_iter().map(|row| (row.digest.clone(), row)));
         }
         let journals = [&files.journal, &files.history_journal];
@@ -277,51 +266,6 @@ impl<'a> PartRun<'a> {
         Ok(())
     }
 
-    /// Checks that all variables and outputs of the plan exist, with the first of the pending runs whose scene is accepted. If no scene is accepted,
-    /// the reasons become rows.
-    fn check_names(&mut self) -> Result<()> {
-        let plan = self.request.plan;
-        let in_plan = |failure: Failure| {
-            let mut failure = Failure { usage: true, ..failure };
-            if let Some(name) = failure.diagnostic.what.strip_prefix("--set ") {
-                failure.diagnostic.what = format!("variable `{name}`");
-            }
-            failure.at(plan.path.display())
-        };
-        for run in self.pending.iter().copied().take(MOST_TRIED).collect::<Vec<_>>() {
-            self.load_models(run)?;
-            let scene = self.case(run).and_then(|case| case.scene(&self.store));
-            let compiled = scene.and_then(|scene| native::compiled(&scene, &plan.schedule(&scene.settings)?));
-            let Ok(simulation) = compiled else { continue };
-            let table = simulation.table();
-            let start_values = plan.variables.iter().filter_map(|variable| match &variable.target {
-                VariableTarget::StartValue(name) => Some(name.as_str()),
-                _ => None,
-            });
-            for name in plan.set.iter().map(|(name, _)| name.as_str()).chain(start_values) {
-                native::check_settable(table, name).map_err(in_plan)?;
-            }
-            for output in plan.histories.iter().flat_map(|request| &request.outputs) {
-                native::output_columns(table, output).map_err(in_plan)?;
-            }
-            let outputs = table.variables().iter().filter(|variable| variable.causality == Causality::Output);
-            let results = native::result_names(table);
-            let clash = outputs
-                .map(|output| &output.name)
-                .chain(&results)
-                .find(|name| plan.variables.iter().any(|variable| variable.name == **name));
-            if let Some(name) = clash {
-                let remedy = "Give the variable another name";
-                let failure =
-                    Failure::new(format!("variable `{name}`"), "has the name of an output or a result", remedy);
-                return Err(in_plan(failure));
-            }
-            self.results = results;
-            return Ok(());
-        }
-        Ok(())
-    }
-
     /// Does the pending runs, and appends each row to the journal.
     fn run_pending(&mut self) -> Result<()> {
         let SweepRequest { stop, console, threads, .. } = *self.request;
@@ -340,14 +284,7 @@ impl<'a> PartRun<'a> {
         let title = format!("Running {}", self.request.plan.name);
         let forecast = Forecast::new(console, &title, plan);
         let (rows, journal, histories) = (&mut self.rows, &mut self.journal, &mut self.histories);
-        let worker = Worker {
-            request: self.request,
-            first: self.first,
-            digests: &self.digests,
-            store: &self.store,
-            scene: Mutex::new(None),
-            checks: Mutex::default(),
-        };
+        let worker = Worker::new(self.request, self.first, &self.digests, &self.store);
         let mut is_announced = false;
         let finished = |_, (row, history): (Row, Option<History>)| {
             if let (Some(journal), Some(history)) = (histories.as_mut(), history) {
@@ -397,12 +334,13 @@ impl<'a> PartRun<'a> {
 
     fn facts(&self) -> Vec<(&'static str, String)> {
         let SweepRequest { plan, part, .. } = *self.request;
-        vec![
+        let own = [
             ("tiprub.release", env!("CARGO_PKG_VERSION").to_owned()),
             ("tiprub.plan", plan.name.clone()),
             ("tiprub.part", part.to_string()),
             (ROWS_FACT, self.rows_digest()),
-        ]
+        ];
+        own.into_iter().chain(plan_facts(plan)).collect()
     }
 
     fn outcome(&self, is_complete: bool) -> SweepOutcome {
@@ -431,100 +369,5 @@ impl<'a> PartRun<'a> {
             reasons,
             is_complete,
         }
-    }
-}
-
-/// Returns a key for results of slow checks. A result has its own key in the simulation, so a coarse key here never changes a row.
-fn checks_key(scene: &str, settings: &[(String, String)]) -> String {
-    let matters = |name: &str| CHECKED_PARAMETERS.iter().any(|part| name.contains(part));
-    let settings = settings.iter().filter(|(name, _)| matters(name));
-    settings.fold(scene.to_owned(), |key, (name, value)| format!("{key}\n{name}={value}"))
-}
-
-/// Does single runs, on any thread.
-struct Worker<'a> {
-    request: &'a SweepRequest<'a>,
-    first: usize,
-    digests: &'a [CaseDigest],
-    store: &'a RomStore<'a>,
-    /// Last scene with its digest; runs that differ in start values only share it.
-    scene: Mutex<Option<(String, Arc<Scene>)>>,
-    /// Results of slow checks, by the scene and the start values on which they may depend.
-    checks: Mutex<HashMap<String, Arc<Vec<u8>>>>,
-}
-
-impl Worker<'_> {
-    /// Does a run (from 0). A panic is a failure of this run alone.
-    fn run(&self, run: usize) -> (Row, Option<History>) {
-        let digest = &self.digests[run - self.first];
-        let clock = Instant::now();
-        let work = catch_unwind(AssertUnwindSafe(|| self.results(run, digest)));
-        let result = work.unwrap_or_else(|_| {
-            let remedy = "Report it to the developers, with the plan and the messages on the terminal";
-            Err(Box::new((Status::Failed, Failure::new("tiprub", "an internal error stopped the run", remedy))))
-        });
-        let seconds = clock.elapsed().as_secs_f64();
-        match result {
-            Ok((results, schedule)) => {
-                let request = self.request.plan.histories.as_ref();
-                let history = request.map(|request| History::of(&results.recording, request));
-                (Row::finished(&digest.run, &results, &schedule, seconds), history)
-            }
-            Err(end) => (Row::without_results(&digest.run, end.0, &end.1, seconds), None),
-        }
-    }
-
-    fn results(&self, run: usize, digest: &CaseDigest) -> Result<(NativeRun, Schedule), Box<(Status, Failure)>> {
-        let refused = |failure| Box::new((Status::Refused, failure));
-        let plan = self.request.plan;
-        let case = Case::new(plan, run).map_err(refused)?;
-        let scene = self.scene(&case, &digest.scene).map_err(refused)?;
-        let schedule = plan.schedule(&scene.settings).map_err(refused)?;
-        let key = checks_key(&digest.scene, &case.settings);
-        let known = self.checks.lock().ok().and_then(|checks| checks.get(&key).cloned());
-        let known = known.unwrap_or_else(|| Arc::new(self.request.cache.checks(&scene)));
-        let given = RunInputs { settings: &case.settings, checks: &known, ..RunInputs::default() };
-        let started = StartedRun::new(&scene, &schedule, given).map_err(refused)?;
-        let results = started.finish(&|_| {}).map_err(|failure| Box::new((Status::Failed, failure)))?;
-        if let Ok(mut checks) = self.checks.lock() {
-            // For the other parts on this machine.
-            if checks.is_empty() && *known != results.checks {
-                self.request.cache.keep_checks(&scene, &results.checks);
-            }
-            if checks.len() >= MOST_CHECKS {
-                checks.clear();
-            }
-            checks.entry(key).or_insert_with(|| Arc::new(results.checks.clone()));
-        }
-        Ok((results, schedule))
-    }
-
-    fn scene(&self, case: &Case, digest: &str) -> Result<Arc<Scene>> {
-        let last = self.scene.lock().ok().and_then(|last| last.clone());
-        if let Some((_, scene)) = last.filter(|(other, _)| other == digest) {
-            return Ok(scene);
-        }
-        let scene = Arc::new(case.scene(self.store)?);
-        if let Ok(mut last) = self.scene.lock() {
-            *last = Some((digest.to_owned(), scene.clone()));
-        }
-        Ok(scene)
-    }
-}
-
-#[cfg(test)]
-mod unit_tests {
-    use super::*;
-
-    #[test]
-    fn runs_that_differ_in_speed_share_slow_checks() {
-        let key = |settings: &[(&str, &str)]| {
-            let pairs = settings.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned()));
-            checks_key("scene", &pairs.collect::<Vec<_>>())
-        };
-        let base = key(&[("speed", "1"), ("friction_coefficient", "0.1")]);
-        assert_eq!(key(&[("speed", "2"), ("friction_coefficient", "0.1"), ("gap_offset", "1e-5")]), base);
-        assert_ne!(key(&[("speed", "1"), ("friction_coefficient", "0.2")]), base);
-        assert_ne!(key(&[("speed", "1"), ("friction_coefficient", "0.1"), ("solver", "film")]), base);
     }
 }

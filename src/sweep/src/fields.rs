@@ -57,6 +57,18 @@ pub fn set(scene: &mut Table, path: &str, value: Value) -> Result<()> {
     Ok(())
 }
 
+/// Returns the key of a path as the description of scene files names it, without numbers and names of entries.
+///
+/// # Errors
+/// The text is not a path.
+pub(crate) fn key(path: &str) -> Result<String> {
+    Ok(joined(&steps(path)?))
+}
+
+fn joined(steps: &[Step]) -> String {
+    steps.iter().map(|step| step.key).collect::<Vec<_>>().join(".")
+}
+
 /// Returns the unique path of a key of the scene, in which a number (from 1) selects every entry of a list.
 ///
 /// # Errors
@@ -99,7 +111,7 @@ fn position(entries: &[Value], selected: Option<&str>) -> Option<usize> {
 
 /// Checks that scene files have such a key.
 fn check_key(path: &str, steps: &[Step]) -> Result<()> {
-    let name = steps.iter().map(|step| step.key).collect::<Vec<_>>().join(".");
+    let name = joined(steps);
     if FIELDS.iter().any(|field| field.path == name) {
         return Ok(());
     }

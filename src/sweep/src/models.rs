@@ -132,7 +132,7 @@ impl<'a> RomStore<'a> {
         }
         let rom = match origin {
             RomOrigin::Builtin(name) => builtin::rom(name, self.cache, console).unwrap_or_else(|| {
-                let remedy = "Give a ROM file or a built-in model such as `builtin:rotor37`";
+                let remedy = builtin::similar_models(name);
                 Err(Failure::new(origin, "there is no such built-in model", remedy))
             }),
             RomOrigin::File(path) => scene_source::read_rom(path),

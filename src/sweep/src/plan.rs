@@ -1,22 +1,27 @@
 //! The plan of a sweep: a TOML file.
 
+mod values;
+
 use std::{
     collections::BTreeMap,
     path::{Path, PathBuf},
 };
 
 use serde::Deserialize;
+use tiprub_format::name_hint;
 use tiprub_gallery::scene_source::{self, BUILTIN, SceneText};
 use tiprub_shell::{Failure, Result, native::similar, schedule::Schedule};
 use tiprub_table::{Cell, Column, ColumnType, Table, csv_file, parquet_file};
 use toml::Value;
 
 use crate::{
-    design::{Combination, Design, MOST_RUNS},
+    design::{Combination, Design},
     fields,
     models::SweepSources,
     row::RESERVED_NAMES,
 };
+pub(crate) use values::field_value;
+use values::{cells, flatten};
 
 /// Largest plan (bytes).
 const LARGEST_PLAN: u64 = 16 << 20;
@@ -146,24 +151,6 @@ struct RomEntry {
     reduce: Option<String>,
 }
 
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RangeEntry {
-    from: f64,
-    to: f64,
-    count: usize,
-    #[serde(default)]
-    spacing: Spacing,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
-#[serde(rename_all = "lowercase")]
-enum Spacing {
-    #[default]
-    Linear,
-    Logarithmic,
-}
-
 impl Plan {
     /// Reads a plan. Paths in it are relative to its directory.
     ///
@@ -263,21 +250,6 @@ pub fn input_files(path: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// Returns the value of a key of the scene file.
-pub(crate) fn field_value(cell: &Cell) -> Value {
-    match cell {
-        Cell::Integer(value) => Value::Integer(*value),
-        Cell::Real(value) => Value::Float(*value),
-        Cell::Boolean(value) => Value::Boolean(*value),
-        // A list in a table of values is a text.
-        Cell::Text(text) if text.starts_with(['[', '{']) => {
-            let parsed = toml::from_str::<toml::Table>(&format!("value = {text}"));
-            parsed.ok().and_then(|mut table| table.remove("value")).unwrap_or_else(|| Value::String(text.clone()))
-        }
-        Cell::Text(text) => Value::String(text.clone()),
-    }
-}
-
 fn directory(path: &Path) -> &Path {
     path.parent().unwrap_or(Path::new(""))
 }
@@ -290,8 +262,17 @@ fn parse(path: &Path) -> Result<PlanFile> {
     toml::from_str(&text).map_err(|error| {
         let line = error.span().map_or(1, |span| 1 + text[..span.start.min(text.len())].matches('\n').count());
         let remedy = "Correct the plan; the guide page \"Sweeps\" lists its keys";
+        let remedy = format!("{}{remedy}", hint(error.message()));
         Failure::usage(format!("{}:{line}", path.display()), error.message(), remedy)
     })
+}
+
+/// Returns the question whether a similar key or value was meant. The parser's message about an unknown name has this name and all accepted ones in
+/// backquotes.
+fn hint(message: &str) -> String {
+    let mut names = message.split('`').skip(1).step_by(2);
+    let given = names.next().filter(|_| message.starts_with("unknown "));
+    given.map_or(String::new(), |given| name_hint(given, names))
 }
 
 /// Returns the rules of the `[rom]` tables.
@@ -366,82 +347,6 @@ fn table_columns<'a>(file: &'a PlanFile, directory: &Path) -> Result<(NamedEntri
     }
     let entry = |name: &String| file.variable.iter().find(|entry| entry.name == *name);
     Ok((columns.iter().map(|column| (column.name.clone(), entry(&column.name))).collect(), columns))
-}
-
-/// Returns the values of a list or a range.
-fn cells(values: &Value) -> Result<Vec<Cell>> {
-    match values {
-        Value::Array(list) => list.iter().map(cell).collect(),
-        Value::Table(_) => {
-            let range: RangeEntry = values.clone().try_into().map_err(|error: toml::de::Error| {
-                Failure::new("values", error.message(), "Give { from = ..., to = ..., count = ... }")
-            })?;
-            range.cells()
-        }
-        _ => Err(Failure::new("values", "are neither a list nor a range", "Give a list, or { from, to, count }")),
-    }
-}
-
-impl RangeEntry {
-    fn cells(&self) -> Result<Vec<Cell>> {
-        let Self { from, to, count, spacing } = *self;
-        let wrong = |problem: &str, remedy: &str| Err(Failure::new("values", problem, remedy));
-        if !(from.is_finite() && to.is_finite() && (2..=MOST_RUNS).contains(&count)) {
-            return wrong("the range is not usable", "Give finite ends and a count of 2 or more");
-        }
-        if spacing == Spacing::Logarithmic && !(from > 0.0 && to > 0.0) {
-            return wrong("the ends of a logarithmic range are not positive", "Give positive ends, or linear spacing");
-        }
-        let value = |index: usize| match index {
-            0 => from,
-            _ if index + 1 == count => to,
-            _ => {
-                let fraction = index as f64 / (count - 1) as f64;
-                match spacing {
-                    Spacing::Linear => from + (to - from) * fraction,
-                    Spacing::Logarithmic => from * (to / from).powf(fraction),
-                }
-            }
-        };
-        Ok((0..count).map(|index| Cell::Real(value(index))).collect())
-    }
-}
-
-fn cell(value: &Value) -> Result<Cell> {
-    Ok(match value {
-        Value::Integer(value) => Cell::Integer(*value),
-        Value::Float(value) => Cell::Real(*value),
-        Value::Boolean(value) => Cell::Boolean(*value),
-        Value::String(value) => Cell::Text(value.clone()),
-        Value::Array(_) => Cell::Text(text(value)?),
-        Value::Table(_) | Value::Datetime(_) => {
-            return Err(Failure::new(
-                "values",
-                "contain a table or a date",
-                "Give numbers, true, false, text or lists",
-            ));
-        }
-    })
-}
-
-/// Returns a value as the text of a start value.
-fn text(value: &Value) -> Result<String> {
-    match value {
-        Value::Array(list) => Ok(format!("[{}]", list.iter().map(text).collect::<Result<Vec<_>>>()?.join(", "))),
-        other => Ok(cell(other)?.to_string()),
-    }
-}
-
-/// Appends start values; keys with points may be nested tables.
-fn flatten(table: &toml::Table, prefix: &str, found: &mut Vec<(String, String)>) -> Result<()> {
-    for (key, value) in table {
-        let name = format!("{prefix}{key}");
-        match value {
-            Value::Table(below) => flatten(below, &format!("{name}."), found)?,
-            value => found.push((name.clone(), text(value).map_err(|failure| failure.at(format!("set.{name}")))?)),
-        }
-    }
-    Ok(())
 }
 
 /// Returns the variables with the places of their values.

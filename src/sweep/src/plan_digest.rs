@@ -4,6 +4,7 @@ use std::path::Path;
 
 use tiprub_gallery::rom_cache::{RomCache, content_digest};
 use tiprub_shell::{Failure, Result};
+use tiprub_table::parquet_file;
 
 use crate::{
     cases::Case,
@@ -34,4 +35,29 @@ pub fn plan_digest(plan: &Plan, program: &Path, sources: &dyn SweepSources) -> R
         }
     }
     Ok(content_digest(items.join("\n").as_bytes()))
+}
+
+/// Returns the facts in result files that identify a plan: digests of its path, and of its text and scene.
+pub(crate) fn plan_facts(plan: &Plan) -> [(&'static str, String); 2] {
+    let path = std::fs::canonicalize(&plan.path).unwrap_or_else(|_| plan.path.clone());
+    let text = std::fs::read(&plan.path).unwrap_or_default();
+    let content = [content_digest(&text), content_digest(plan.scene.text.as_bytes())].join("\n");
+    [
+        ("tiprub.plan_path", content_digest(path.as_os_str().as_encoded_bytes())),
+        ("tiprub.plan_content", content_digest(content.as_bytes())),
+    ]
+}
+
+/// Checks that an existing file of results belongs to this plan: to the plan at this path, or to a copy of it.
+///
+/// # Errors
+/// The file contains the results of another plan.
+pub(crate) fn check_results(plan: &Plan, output: &Path) -> Result<()> {
+    let found = parquet_file::facts(output).unwrap_or_default();
+    let differs = |(own, digest): &(&str, String)| found.iter().any(|(key, value)| key == own && value != digest);
+    if plan_facts(plan).iter().all(differs) {
+        let problem = format!("contains the results of another plan with the name `{}`", plan.name);
+        return Err(Failure::new(output.display(), problem, "Give another file or directory for the output"));
+    }
+    Ok(())
 }

@@ -2,6 +2,7 @@
 //! machines can share its work.
 
 use std::{
+    cell::Cell as Counter,
     collections::HashMap,
     fmt::Debug,
     fs,
@@ -106,7 +107,8 @@ impl TaskJournals {
     }
 
     /// Runs the tasks of the part that have no result yet, on `threads` threads. `kind` distinguishes tasks with equal values. `progress` receives
-    /// the number of finished tasks, including those with a stored result. A result that JSON cannot represent is not stored.
+    /// the number of finished tasks, including those with a stored result, after each of them, and a few times per second while no task finishes. A
+    /// result that JSON cannot represent is not stored.
     ///
     /// # Errors
     /// A task fails (the first failure is returned), or a journal cannot be written.
@@ -125,11 +127,12 @@ impl TaskJournals {
         let mut results: Vec<Option<R>> = digests.iter().map(known).collect();
         let range = self.part.runs(items.len());
         let pending: Vec<usize> = range.clone().filter(|task| results[*task].is_none()).collect();
-        let mut done = range.len() - pending.len();
-        if done > 0 {
+        let done = Counter::new(range.len() - pending.len());
+        if done.get() > 0 {
+            let done = done.get();
             console.print_progress(format_args!("{done} of {} runs are already finished", range.len()));
         }
-        progress(done);
+        progress(done.get());
         let (stop, mut failed) = (AtomicBool::new(false), None);
         let finished = |index: usize, result: Result<R>| {
             let (task, result) = match result {
@@ -148,11 +151,11 @@ impl TaskJournals {
                 self.journal.append(&Row { digest: digests[task].clone(), cells })?;
             }
             results[task] = Some(result);
-            done += 1;
-            progress(done);
+            done.set(done.get() + 1);
+            progress(done.get());
             Ok(())
         };
-        sweep::for_each(&pending, threads, &stop, |task| work(&items[*task]), finished, || {})?;
+        sweep::for_each(&pending, threads, &stop, |task| work(&items[*task]), finished, || progress(done.get()))?;
         if let Some(failure) = failed {
             return Err(failure);
         }

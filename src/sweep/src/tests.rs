@@ -367,7 +367,9 @@ fn wrong_plans_are_rejected_with_place_and_remedy() {
         (variable("name = \"seconds\"\nvalues = [1]"), "column of the results", "another name"),
         (variable("name = \"torque\"\nlabel = true\nvalues = [1]"), "name of an output", "another name"),
         (variable("name = \"threads\"\nvalues = [2]"), "one thread", "--threads"),
-        (variable("name = \"speed\"\nvalues = [1]\nvalue = 3"), "unknown field", "Correct the plan"),
+        (variable("name = \"speed\"\nvalues = [1]\nvalue = 3"), "unknown field", "Did you mean `values`?"),
+        ("scene = \"scene.toml\"\ndesign = \"tabel\"".to_owned(), "unknown variant", "Did you mean `table`?"),
+        ("scene = \"scene.toml\"\n[sett]\nspeed = 3".to_owned(), "unknown field", "Did you mean `set`?"),
         ("scene = \"scene.toml\"\n[set]\nsped = 3".to_owned(), "no such variable", "`speed`"),
         ("scene = \"scene.toml\"\ndesign = \"table\"".to_owned(), "missing", "runs.csv"),
         ("scene = \"scene.toml\"\ndesign = \"table\"\ntable = \"runs.csv\"".to_owned(), "no such variable", "`speed`"),
@@ -383,6 +385,55 @@ fn wrong_plans_are_rejected_with_place_and_remedy() {
         assert!(shown.contains("plan.toml") || shown.contains("none.toml"), "{text}\n{shown}");
         assert!(!bench.files().iter().any(|name| name.starts_with("a.parquet")), "{:?}", bench.files());
     }
+}
+
+/// A start value would replace the field, so that the values of the field would have no effect.
+#[test]
+fn field_that_a_start_value_replaces_is_rejected() {
+    let bench = Bench::new();
+    let plan = |field: &str, values: &str, more: &str| {
+        format!("scene = \"scene.toml\"\n[[variable]]\nname = \"a\"\nfield = \"{field}\"\nvalues = {values}\n{more}")
+    };
+    let variable = |name: &str, values: &str| format!("[[variable]]\nname = \"{name}\"\nvalues = {values}");
+    for (field, values, more, name) in [
+        ("contact[1].friction", "[0.1, 0.2]", variable("friction_coefficient", "[0.15, 0.25]"), "friction_coefficient"),
+        ("contact[1].friction", "[0.2]", "[set]\nfriction_coefficient = 0.15".to_owned(), "friction_coefficient"),
+        ("structure[rotor].speed", "[90.0, 100.0]", variable("speed", "[95.0]"), "speed"),
+        ("time.step", "[1e-4, 5e-5]", "[set]\ninternal_step_max = 2e-5".to_owned(), "internal_step_max"),
+    ] {
+        let text = plan(field, values, &more);
+        let failure = bench.try_part(&text, "a.parquet", Part::WHOLE, 1).expect_err(&text);
+        assert_eq!(failure.what, "variable `a`", "{failure}");
+        assert!(failure.problem.contains(&format!("the start value `{name}` of the plan replaces")), "{failure}");
+    }
+    // These start values act together with the field.
+    for (field, values, more) in [
+        ("contact[1].gap", "[5e-4, 1e-3]", variable("gap_offset", "[0.0, 1e-4]")),
+        ("contact[1].friction", "[0.1, 0.2]", variable("speed", "[90.0, 100.0]")),
+        ("time.scheme", "[\"modal-exact\", \"central-difference\"]", variable("internal_step_max", "[1e-4, 5e-5]")),
+    ] {
+        let text = plan(field, values, &more);
+        bench.try_part(&text, &format!("{}.parquet", field.replace(['[', ']'], "")), Part::WHOLE, 1).expect(&text);
+    }
+}
+
+/// Plans of the same name in other directories keep their results; a plan that is edited or copied continues with its rows.
+#[test]
+fn results_of_a_plan_of_the_same_name_are_kept() {
+    let bench = Bench::new();
+    bench.run(GRID, "a.parquet");
+    let whole = bench.table("a.parquet");
+    let edited = bench.run(&GRID.replace("count = 3", "count = 5"), "a.parquet");
+    assert_eq!((edited.runs, edited.resumed), (10, 6));
+    bench.run(GRID, "a.parquet");
+    let elsewhere = Bench::new();
+    fs::copy(bench.path("a.parquet"), elsewhere.path("a.parquet")).unwrap();
+    assert_eq!(elsewhere.run(GRID, "a.parquet").resumed, 6, "a copy of the plan");
+    fs::copy(bench.path("a.parquet"), elsewhere.path("a.parquet")).unwrap();
+    let other = GRID.replace("to = 120", "to = 110");
+    let failure = elsewhere.try_part(&other, "a.parquet", Part::WHOLE, 1).unwrap_err();
+    assert!(failure.problem.contains("results of another plan with the name `plan`"), "{failure}");
+    assert_eq!(elsewhere.table("a.parquet"), whole);
 }
 
 #[test]

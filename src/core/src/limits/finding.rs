@@ -5,6 +5,10 @@ use super::{Fastest, GrowthRates};
 use crate::scene::method::Scheme;
 use tiprub_cosim::warning::Topic;
 
+/// Growth by this factor before contact opens turns an insignificant motion, a thousandth of the clearance, into one as large as the
+/// clearance.
+pub(crate) const GROWTH_THAT_MATTERS: f64 = 1e3;
+
 /// Part of a scene that a finding concerns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Subject {
@@ -89,6 +93,8 @@ pub enum WarningKind {
         share: f64,
         /// Time after which contact opens (s), if that is before the growth matters.
         opens_after: Option<f64>,
+        /// Tolerance of adaptive steps, which do not resolve far smaller vibration.
+        tolerance: Option<f64>,
     },
     /// The step makes vibration in closed contact grow.
     StepGrowth(Box<StepGrowth>),

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 use std::fmt::{Display, Formatter};
 
-use super::finding::{ClosedContact, ErrorKind, Finding, StepGrowth, Subject, WarningKind};
+use super::finding::{ClosedContact, ErrorKind, Finding, GROWTH_THAT_MATTERS, StepGrowth, Subject, WarningKind};
 use super::{Fastest, GROWTH_UP_TO, massless, unresolved};
 use crate::scene::method::{Scheme, Solver};
 use crate::{Error, Rom, Warning};
@@ -164,7 +164,8 @@ impl WarningKind {
                 format!("sliding contact locks up above µ* = {friction:.3}{rate}: {}", context.contact(contact))
             }
             Self::Flutter { contact, motion: Fastest { rate, frequency }, .. } => format!(
-                "vibration in closed contact grows at {rate:.2e} 1/s at {:.4} kHz: {}",
+                "friction makes vibration grow while contact stays closed: it grows at {rate:.2e} 1/s at {:.4} kHz with \
+                 contact {}",
                 kilohertz(*frequency),
                 context.contact(contact)
             ),
@@ -243,10 +244,22 @@ impl WarningKind {
                 format!("Set `time.step` below {step:.2e} s, or damping ratios of at least {damped:.0e}")
             }
             Self::Flutter { opens_after: Some(time), .. } => {
-                format!("No action is needed: contact opens after at most {time:.2e} s, before the growth matters")
+                format!(
+                    "No action is needed: contact opens after at most {time:.2e} s, before this vibration has grown by a \
+                     factor of {GROWTH_THAT_MATTERS:.0}"
+                )
             }
-            Self::Flutter { .. } => {
-                "Use less friction or more damping, or let contact open sooner; a shorter step does not help".to_owned()
+            Self::Flutter { tolerance, .. } => {
+                let remedy =
+                    "Use less friction or more damping, or let contact open sooner; a shorter step does not help";
+                let unresolved = tolerance.map_or(String::new(), |tolerance| {
+                    format!(
+                        ". Vibration far below the tolerance of the adaptive steps ({}) is not resolved and may decay in \
+                         the run: compare with a smaller `time.tolerance`",
+                        shown(tolerance)
+                    )
+                });
+                format!("{remedy}{unresolved}")
             }
             Self::StepGrowth(growth) => growth.silent.map_or_else(
                 || "Use less friction or more damping".to_owned(),

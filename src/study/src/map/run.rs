@@ -1,5 +1,6 @@
 //! Runs the interaction map at one speed: after the start-up, a window is recorded and transformed.
 
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
@@ -8,6 +9,7 @@ use tiprub_core::system::System;
 use tiprub_core::{CoSimulation, Scene, Simulation};
 use tiprub_cosim::shown;
 use tiprub_cosim::variables::Quantity;
+use tiprub_cosim::warning::{Severity, Warning};
 use tiprub_shell::{Failure, Result, native};
 use tiprub_sweep::tasks::scene_digest;
 
@@ -85,7 +87,53 @@ pub struct SpeedResponse {
     /// Time spent for stepping.
     pub stepping: Duration,
     /// Warnings of the simulation.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<RunWarning>,
+}
+
+/// Warning of a run.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RunWarning {
+    /// Identifier of the topic.
+    pub id: String,
+    /// True if the warning is only a note.
+    pub is_note: bool,
+    /// Problem and remedy.
+    pub lines: [String; 2],
+    /// Whole text.
+    pub text: String,
+}
+
+impl RunWarning {
+    fn new(warning: &Warning) -> Self {
+        Self {
+            id: warning.topic().id().to_owned(),
+            is_note: warning.level() == Severity::Note,
+            lines: warning.lines().clone(),
+            text: warning.to_string(),
+        }
+    }
+}
+
+/// Returns two lines for every topic and level of the warnings of runs, which are given with their speeds (rad/s): the first warning, and the number
+/// of runs that report one, because the numbers in the warnings differ from run to run.
+pub fn warning_lines(runs: &[(f64, &SpeedResponse)]) -> Vec<String> {
+    let all = || runs.iter().flat_map(|(speed, run)| run.warnings.iter().map(move |warning| (*speed, warning)));
+    let kind = |warning: &RunWarning| (warning.id.clone(), warning.is_note);
+    let mut kinds: Vec<(String, bool)> = Vec::new();
+    for (_, warning) in all() {
+        if !kinds.contains(&kind(warning)) {
+            kinds.push(kind(warning));
+        }
+    }
+    let lines = |own: &(String, bool)| {
+        let (speed, RunWarning { id, is_note, lines: [problem, remedy], .. }) =
+            all().find(|(_, warning)| kind(warning) == *own)?;
+        let count = runs.iter().filter(|(_, run)| run.warnings.iter().any(|warning| kind(warning) == *own)).count();
+        let level = if *is_note { Severity::Note } else { Severity::Warning }.name();
+        let numbers = format!("{count} of {} runs; numbers of the run at {} rad/s", runs.len(), shown(speed));
+        Some(format!("{level} [{id}] {problem}\n    {remedy} ({numbers})"))
+    };
+    kinds.iter().filter_map(lines).collect()
 }
 
 /// Sums over the window.
@@ -172,12 +220,24 @@ impl MapSetup {
         Failure::from_core(format!("scene `{}` at {} rad/s", self.scene.settings.name, shown(speed)), error)
     }
 
-    /// Runs the scene at one speed (rad/s). A rejection is an outcome, not an error.
+    /// Returns the number of communication steps of a run: the start-up, the window, the step that is measured, and the end of the filter.
+    pub fn communication_steps(&self) -> u64 {
+        ((self.transient + self.revolutions) * self.samples + 1 + Decimator::TAIL) as u64
+    }
+
+    /// Runs the scene at one speed (rad/s), and adds its communication steps to `taken`, those that a rejected run omits at its end. A rejection is
+    /// an outcome, not an error.
     ///
     /// # Errors
     /// Only programming errors.
-    pub fn run(&self, speed: f64) -> Result<SpeedRun> {
-        let outcome = self.response(speed).map_err(|failure| failure.to_string());
+    pub fn run(&self, speed: f64, taken: &AtomicU64) -> Result<SpeedRun> {
+        let mut own = 0;
+        let mut step = || {
+            own += 1;
+            taken.fetch_add(1, Ordering::Relaxed);
+        };
+        let outcome = self.response(speed, &mut step).map_err(|failure| failure.to_string());
+        taken.fetch_add(self.communication_steps().saturating_sub(own), Ordering::Relaxed);
         Ok(SpeedRun { speed, outcome })
     }
 
@@ -196,7 +256,7 @@ impl MapSetup {
         Ok(())
     }
 
-    fn response(&self, speed: f64) -> Result<SpeedResponse> {
+    fn response(&self, speed: f64, on_step: &mut dyn FnMut()) -> Result<SpeedResponse> {
         let mut simulation = self.simulation(speed)?;
         let start = self.scene.settings.experiment.start;
         // With a whole number of samples per revolution, engine orders lie in the middle of bins.
@@ -216,7 +276,7 @@ impl MapSetup {
                 ));
             }
         }
-        let mut march = March { setup: self, speed, start, step, simulation, internal_steps: 0, index: 0 };
+        let mut march = March { setup: self, speed, start, step, simulation, internal_steps: 0, index: 0, on_step };
         let clock = Instant::now();
         march.skip(self.transient.saturating_mul(self.samples))?;
         let recording = march.record()?;
@@ -235,6 +295,8 @@ struct March<'a> {
     internal_steps: u64,
     /// Number of finished communication steps.
     index: usize,
+    /// Called after every communication step.
+    on_step: &'a mut dyn FnMut(),
 }
 
 /// Recorded data of the window.
@@ -268,6 +330,7 @@ impl March<'_> {
         };
         march().map_err(|error| self.setup.at(self.speed, error))?;
         self.index += 1;
+        (self.on_step)();
         Ok(())
     }
 
@@ -359,7 +422,7 @@ impl March<'_> {
             factor,
             internal_steps: self.internal_steps,
             stepping,
-            warnings: tiprub_cosim::warning::texts(self.simulation.warnings()),
+            warnings: self.simulation.warnings().iter().map(RunWarning::new).collect(),
         })
     }
 }
@@ -384,4 +447,44 @@ fn distances(decimator: &Decimator, channels: [usize; 3], count: usize) -> Vec<f
         squares.iter_mut().zip(decimator.channel(channel)).for_each(|(sum, value)| *sum += (value - mean).powi(2));
     }
     squares.iter().map(|square: &f64| square.sqrt()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tiprub_cosim::warning::Topic;
+
+    /// Numbers in a warning differ from run to run; each topic and level is printed once, with the number of its runs.
+    #[test]
+    fn warnings_of_all_runs_are_counted_by_topic() {
+        let flutter = |time: f64| {
+            Warning::new(Topic::Flutter, "vibration grows", format!("contact opens after {time} s"))
+                .at_level(Severity::Note)
+        };
+        let sticking = Warning::new(Topic::Sticking, "too slow", "Turn faster");
+        let response = |warnings: &[Warning]| SpeedResponse {
+            resolution: 1.0,
+            first_blade: Default::default(),
+            largest_blade: Default::default(),
+            deflection: [0.0; 2],
+            contact_share: 0.0,
+            normal_force: 0.0,
+            largest_force: 0.0,
+            penetration: 0.0,
+            drift: 0.0,
+            energy_residual: 0.0,
+            factor: 4,
+            internal_steps: 1,
+            stepping: Duration::ZERO,
+            warnings: warnings.iter().map(RunWarning::new).collect(),
+        };
+        let runs = [response(&[flutter(1e-3)]), response(&[flutter(2e-3), sticking]), response(&[])];
+        let runs: Vec<(f64, &SpeedResponse)> = [100.0, 200.0, 300.0].into_iter().zip(&runs).collect();
+        let expected = [
+            "note [flutter] vibration grows\n    contact opens after 0.001 s (2 of 3 runs; numbers of the run at 100 rad/s)",
+            "warning [sticking] too slow\n    Turn faster (1 of 3 runs; numbers of the run at 200 rad/s)",
+        ];
+        assert_eq!(warning_lines(&runs), expected);
+        assert!(warning_lines(&runs[2..]).is_empty());
+    }
 }

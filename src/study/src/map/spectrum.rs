@@ -84,11 +84,17 @@ pub struct Analyser {
 impl Analyser {
     /// Creates an analyser for windows of `count` samples and the first `bins` bins.
     pub fn new(count: usize, bins: usize) -> Self {
+        Self::interpolated(count, 1, bins)
+    }
+
+    /// Creates an analyser whose bins are `factor` times closer than 1/length of the window: zeros after the window interpolate the spectrum.
+    pub fn interpolated(count: usize, factor: usize, bins: usize) -> Self {
         let turn = std::f64::consts::TAU / count as f64;
+        let length = count * factor;
         Self {
-            transform: RealFftPlanner::new().plan_fft_forward(count),
+            transform: RealFftPlanner::new().plan_fft_forward(length),
             window: (0..count).map(|index| 0.5 * (1.0 - (turn * index as f64).cos())).collect(),
-            bins: bins.min(count / 2 + 1),
+            bins: bins.min(length / 2 + 1),
         }
     }
 
@@ -101,6 +107,9 @@ impl Analyser {
         let count = input.len() as f64;
         let mean = input.iter().sum::<f64>() / count;
         input.iter_mut().zip(&self.window).for_each(|(value, weight)| *value = (*value - mean) * weight);
+        if input.len() == self.window.len() {
+            input.resize(self.transform.len(), 0.0);
+        }
         let mut output = self.transform.make_output_vec();
         let transformed = self.transform.process(&mut input, &mut output);
         transformed.map_err(|error| Failure::new("spectrum", error, "Report this to the developers"))?;

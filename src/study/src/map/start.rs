@@ -22,8 +22,6 @@ pub struct MapStart {
     pub friction: f64,
     /// Time in which the shape of the casing grows (s).
     pub ramp_time: f64,
-    /// Largest internal step (s).
-    pub longest_step: f64,
 }
 
 impl Default for MapStart {
@@ -36,7 +34,6 @@ impl Default for MapStart {
             damping_ratio: 0.0,
             friction: 0.0,
             ramp_time: 0.0,
-            longest_step: f64::INFINITY,
         }
     }
 }
@@ -76,7 +73,6 @@ impl MapStart {
             damping_ratio: or_nothing(Quantity::DampingRatio),
             friction: or_nothing(Quantity::Friction),
             ramp_time: or_nothing(Quantity::RampTime),
-            longest_step: value(Quantity::StepMax).unwrap_or(f64::INFINITY),
         })
     }
 

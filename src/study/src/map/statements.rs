@@ -34,7 +34,7 @@ pub fn statements(map: &Map) -> Vec<Statement> {
         map.answered().all(|(_, response)| response.energy_residual < LEDGER),
         format!("largest residual {residual:.1e}"),
     ));
-    let warned = map.warnings();
+    let warned: Vec<String> = map.warning_lines().iter().map(|lines| lines.replace("\n    ", ". ")).collect();
     all.push(Statement::remark(
         "Warnings of the runs",
         if warned.is_empty() { "none".into() } else { warned.join("; ") },

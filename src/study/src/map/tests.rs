@@ -33,7 +33,7 @@ fn around(crossing: f64, half: f64, count: usize) -> Speeds {
 /// Makes a map, and also returns its warnings.
 fn make_map(scene: Scene, request: &MapRequest, threads: usize) -> Result<(Study, Vec<String>)> {
     let (map, speeds) = Map::prepare(scene, request)?;
-    let runs = sweep::sweep(&speeds, threads, |speed| map.setup.run(*speed), |_| {})?;
+    let runs = sweep::sweep(&speeds, threads, |speed| map.setup.run(*speed, &AtomicU64::new(0)), |_| {})?;
     map.finish(runs, request.quick)
 }
 
@@ -359,9 +359,15 @@ fn rejects_excessive_requests_before_running() {
 fn planned_steps_match_the_work_done() {
     let request = MapRequest { revolutions: Some(4), transient: Some(3), ..request(BUMP, around(CROSSING, 0.1, 2)) };
     let (map, speeds) = Map::prepare(scene(FIRST, 4), &request).unwrap();
-    let (study, _) = make_map(scene(FIRST, 4), &request, 1).unwrap();
-    let done = study.results["internal_steps"].as_f64().unwrap();
-    assert!((map.internal_steps(&speeds) / done - 1.0).abs() < 0.02, "{done}");
+    let taken = AtomicU64::new(0);
+    let run = map.setup.run(speeds[0], &taken).unwrap();
+    // All steps of a run are counted as they are taken, so nothing is added at its end.
+    let steps = map.setup.communication_steps();
+    let internal = steps * run.outcome.as_ref().unwrap().factor as u64;
+    assert_eq!((taken.load(Ordering::Relaxed), run.outcome.unwrap().internal_steps), (steps, internal));
+    // A rejected run takes no step.
+    let refused = map.setup.run(1e9, &taken).unwrap();
+    assert!(refused.outcome.is_err() && taken.load(Ordering::Relaxed) == 2 * steps);
 }
 
 #[test]

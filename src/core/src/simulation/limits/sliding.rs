@@ -4,16 +4,13 @@
 use super::checking::Checking;
 use super::in_range;
 use super::known::CheckPart;
-use crate::limits::finding::{ClosedContact, ErrorKind, StepGrowth, WarningKind};
+use crate::limits::finding::{ClosedContact, ErrorKind, GROWTH_THAT_MATTERS, StepGrowth, WarningKind};
 use crate::limits::judged::{self, SetGrowth};
 use crate::limits::{self, ContactDirections, Fastest, SlidingContacts, lock_up};
 use crate::modes::modal::ModalModel;
 use crate::simulation::clock::SAME_STEP;
 use tiprub_cosim::persist_fields;
 
-/// Growth by this factor before contact opens turns an insignificant motion, a thousandth of the clearance, into one as large as the
-/// clearance.
-const MATTERS: f64 = 1e3;
 /// A motion whose frequency (rad/s) is below this fraction of its rate grows without oscillation.
 const SWINGS: f64 = 0.1;
 /// Number of steps checked per octave, and number of octaves from the step at which every mode is resolved well. Longer steps are far
@@ -82,7 +79,7 @@ impl Sense {
         self.grows.iter().map(move |kind| {
             let mut kind = kind.clone();
             if let WarningKind::Flutter { motion, opens_after, .. } = &mut kind {
-                *opens_after = (motion.rate * closed < MATTERS.ln()).then_some(closed);
+                *opens_after = (motion.rate * closed < GROWTH_THAT_MATTERS.ln()).then_some(closed);
             }
             kind
         })
@@ -322,6 +319,7 @@ impl Checking<'_> {
             with_mass,
             share,
             opens_after: None,
+            tolerance: self.parameters.scheme.properties().adaptive.then_some(self.parameters.tolerance),
         });
         Sense { grows: lock_up.into_iter().chain(flutter).collect(), expected, ranges: Vec::new() }
     }
@@ -355,8 +353,15 @@ mod tests {
         let contact = ClosedContact { nodes: vec![0], all_sectors: false, sense: 0, frictions: vec![0.5] };
         let lock_up = WarningKind::LockUp { contact: contact.clone(), friction: 0.4, rate: None };
         let motion = Fastest { rate: 1e3, frequency: 1e4 };
-        let flutter = WarningKind::Flutter { contact, motion, with_mass: None, share: 1.0, opens_after: None };
-        let sense = Sense { grows: vec![lock_up, flutter], ..Sense::default() };
+        let flutter = |tolerance| WarningKind::Flutter {
+            contact: contact.clone(),
+            motion,
+            with_mass: None,
+            share: 1.0,
+            opens_after: None,
+            tolerance,
+        };
+        let sense = Sense { grows: vec![lock_up, flutter(Some(0.01)), flutter(None)], ..Sense::default() };
         // ln 1000 = 6.9 at 1000 1/s.
         for (closed, level) in [(6e-3, Severity::Note), (7e-3, Severity::Warning), (f64::INFINITY, Severity::Warning)] {
             let rendered = |kind: WarningKind| kind.of(Subject::Scene).warning(&Context::default());
@@ -366,7 +371,10 @@ mod tests {
             for text in [&found[1].lines()[1], &*found[1]] {
                 assert_eq!(text.contains("No action is needed"), level == Severity::Note, "{text}");
                 assert_eq!(text.contains("Use less friction"), level == Severity::Warning, "{text}");
+                let is_about_tolerance = text.contains("far below the tolerance of the adaptive steps (0.01)");
+                assert_eq!(is_about_tolerance, level == Severity::Warning, "{text}");
             }
+            assert!(!found[2].contains("tolerance"), "fixed steps have none: {}", &*found[2]);
         }
     }
 }

@@ -1,0 +1,127 @@
+//! Checks of the names in a plan, before its first run.
+
+use tiprub_core::{CoSimulation, Simulation};
+use tiprub_cosim::variables::Causality;
+use tiprub_shell::{Failure, Result, native};
+
+use super::PartRun;
+use crate::{
+    cases::Case,
+    fields,
+    plan::{Plan, VariableTarget},
+};
+
+/// Number of runs whose scenes are tried for the check of names, until one is accepted.
+const MOST_TRIED: usize = 8;
+/// Keys of the scene whose value is the start value of a variable, and the end of the name of this variable.
+const REPLACED_FIELDS: [(&str, &str); 11] = [
+    ("structure.speed", "speed"),
+    ("structure.damping_ratio", "damping_ratio"),
+    ("structure.excitation.order", "excitation_order"),
+    ("surface.ramp_time", "casing_ramp_time"),
+    ("contact.friction", "friction_coefficient"),
+    ("contact.solver", "solver"),
+    ("contact.slave_heat_fraction", "casing_heat_fraction"),
+    ("time.scheme", "scheme"),
+    ("time.step", "internal_step_max"),
+    ("time.tolerance", "tolerance"),
+    ("time.max_internal_steps", "max_internal_steps"),
+];
+
+/// Returns the names of all start values of a plan.
+fn start_values(plan: &Plan) -> impl Iterator<Item = &str> {
+    let varied = plan.variables.iter().filter_map(|variable| match &variable.target {
+        VariableTarget::StartValue(name) => Some(name.as_str()),
+        _ => None,
+    });
+    plan.set.iter().map(|(name, _)| name.as_str()).chain(varied)
+}
+
+impl PartRun<'_> {
+    /// Checks that all variables and outputs of the plan exist, with the first of the pending runs whose scene is accepted. If no scene is accepted,
+    /// the reasons become rows.
+    pub(super) fn check_names(&mut self) -> Result<()> {
+        let plan = self.request.plan;
+        let in_plan = |failure: Failure| {
+            let mut failure = Failure { usage: true, ..failure };
+            if let Some(name) = failure.diagnostic.what.strip_prefix("--set ") {
+                failure.diagnostic.what = format!("variable `{name}`");
+            }
+            failure.at(plan.path.display())
+        };
+        for run in self.pending.iter().copied().take(MOST_TRIED).collect::<Vec<_>>() {
+            self.load_models(run)?;
+            let scene = self.case(run).and_then(|case| case.scene(&self.store));
+            let compiled = scene.and_then(|scene| native::compiled(&scene, &plan.schedule(&scene.settings)?));
+            let Ok(simulation) = compiled else { continue };
+            let table = simulation.table();
+            for name in start_values(plan) {
+                native::check_settable(table, name).map_err(in_plan)?;
+            }
+            for output in plan.histories.iter().flat_map(|request| &request.outputs) {
+                native::output_columns(table, output).map_err(in_plan)?;
+            }
+            let outputs = table.variables().iter().filter(|variable| variable.causality == Causality::Output);
+            let results = native::result_names(table);
+            let clash = outputs
+                .map(|output| &output.name)
+                .chain(&results)
+                .find(|name| plan.variables.iter().any(|variable| variable.name == **name));
+            if let Some(name) = clash {
+                let remedy = "Give the variable another name";
+                let failure =
+                    Failure::new(format!("variable `{name}`"), "has the name of an output or a result", remedy);
+                return Err(in_plan(failure));
+            }
+            self.check_replaced_fields(run, &simulation).map_err(in_plan)?;
+            self.results = results;
+            return Ok(());
+        }
+        Ok(())
+    }
+
+    /// Rejects a plan in which a start value replaces a field that also varies, so that the values of the field have no effect. `simulation` is the
+    /// scene of a run.
+    fn check_replaced_fields(&self, run: usize, simulation: &Simulation) -> Result<()> {
+        let plan = self.request.plan;
+        for (index, variable) in plan.variables.iter().enumerate() {
+            let VariableTarget::Field(path) = &variable.target else { continue };
+            let key = fields::key(path)?;
+            for (_, end) in REPLACED_FIELDS.iter().filter(|(field, _)| *field == key) {
+                let mut candidates = start_values(plan).filter(|name| array_name(name).ends_with(end));
+                let Some(name) = candidates.find(|name| self.has_effect(run, index, array_name(name), simulation))
+                else {
+                    continue;
+                };
+                let problem = format!("sets `{path}`, which the start value `{name}` of the plan replaces");
+                return Err(Failure::new(format!("variable `{}`", variable.name), problem, "Remove one of them"));
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns whether a start value of the scene changes with the field of a variable (by index): without this field, or with its next value.
+    fn has_effect(&self, run: usize, variable: usize, name: &str, simulation: &Simulation) -> bool {
+        let plan = self.request.plan;
+        let start_value = |simulation: &Simulation| {
+            let all = native::start_values(simulation).unwrap_or_default();
+            all.into_iter().find(|own| own.name == name).map(|own| own.value)
+        };
+        let own = start_value(simulation);
+        let value = plan.design.value(run, variable);
+        let next = (0..plan.design.runs()).map(|run| plan.design.value(run, variable)).find(|other| *other != value);
+        [None].into_iter().chain(next.map(Some)).any(|other| {
+            let scene = Case::with_field(plan, run, variable, other).and_then(|case| case.scene(&self.store));
+            let changed = scene.and_then(|scene| native::compiled(&scene, &plan.schedule(&scene.settings)?));
+            changed.is_ok_and(|changed| start_value(&changed) != own)
+        })
+    }
+}
+
+/// Returns the name of a variable without the index of an element.
+fn array_name(name: &str) -> &str {
+    match name.strip_suffix(']').and_then(|rest| rest.rsplit_once('[')) {
+        Some((array, _)) => array,
+        None => name,
+    }
+}
