@@ -2,6 +2,7 @@
 (() => {
 const find = name => document.querySelector(name);
 const NOMINAL = 356; // clearance of the scene (µm)
+const TOLERANCE = 1e-2 * 3.56e-4; // error of the adaptive steps in closed contact (m)
 const BLADES = 36, TURN = 2 * Math.PI;
 const STEPS_PER_MS = 100; // communication steps of the scene
 // Outputs that the page reads, in the order of a row after the time.
@@ -128,7 +129,7 @@ function numbers(rows) {
     force: largest,
     heat: last[HEAT],
     torque: torque / (last[TIME] - rows[0][TIME]),
-    clearance: Math.abs(clearance) < 1e-12 ? 0 : clearance,
+    clearance: Math.abs(clearance) < TOLERANCE ? 0 : clearance,
     growth: middle > 0 ? end / middle : null,
   };
 }
