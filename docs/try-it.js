@@ -1,4 +1,4 @@
-// In the book, replaces the picture of the page "Try it in the browser" by the rub itself.
+// Replaces the picture on the page "Try it in the browser" of the book with a frame that contains the rub.
 (() => {
   const link = document.getElementById("try-it");
   if (!link) return;

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Build the guide as a book, target/book/index.html, with mdBook and the page that steps a rub. Warnings are errors.
+# Build the guide as a book, target/book/index.html, with mdBook, and the page that runs a rub in the browser. Warnings are errors.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 if ! command -v mdbook >/dev/null; then

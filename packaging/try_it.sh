@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# Build the page that steps a rub in the browser: one HTML file with the simulation as WebAssembly, a ROM and a scene.
+# Build the page that runs a rub in the browser: one HTML file with the simulation as WebAssembly, a ROM and a scene.
 #
 #     packaging/try_it.sh FILE.html [ROM]
 #
-# Without ROM, `tiprub reduce rotor37` computes it into target/wasm. A ROM there that is newer than the program is used again.
+# Without ROM, `tiprub reduce rotor37` writes one to target/wasm. It is reused as long as it is newer than the program.
 set -euo pipefail
 here=$(CDPATH= cd -- "$(dirname -- "$0")" && pwd)
 output=$(realpath -m -- "${1:?give the HTML file to write}")
@@ -14,7 +14,7 @@ if ! [ -d "$(rustc --print sysroot)/lib/rustlib/$target" ]; then
     echo "the Rust target $target is not installed: rustup target add $target" >&2
     exit 1
 fi
-# A directory for this target alone, so that the build can run beside others.
+# A separate directory, so that other builds can run at the same time.
 build=${CARGO_TARGET_DIR:-$PWD/target}/wasm
 . packaging/remap.sh
 separator=$(printf '\037')

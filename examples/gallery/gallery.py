@@ -37,19 +37,19 @@ def wrapped(text):
     return "\n\n".join(paragraphs)
 
 
-def title_of(name):
+def case_title(name):
     """Return the title of a case."""
     return (HERE / f"{name}.md").read_text(encoding="utf-8").split("\n", 1)[0].removeprefix("# ")
 
 
 def contents(names):
     """Return the list of contents of the page, with a link to each case."""
-    return "\n".join(f"* [{title_of(name)}](#{title_of(name).lower().replace(' ', '-')})" for name in names)
+    return "\n".join(f"* [{case_title(name)}](#{case_title(name).lower().replace(' ', '-')})" for name in names)
 
 
 def section(name, facts):
     """Return the section of the page about one case: its text with the numbers of the run, its picture and its scene."""
-    title, text = title_of(name), (HERE / f"{name}.md").read_text(encoding="utf-8").format_map(facts).split("\n", 1)[1]
+    title, text = case_title(name), (HERE / f"{name}.md").read_text(encoding="utf-8").format_map(facts).split("\n", 1)[1]
     return f"""## {title}
 
 ![{title}](images/gallery-{name}.png)
