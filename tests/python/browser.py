@@ -2,8 +2,8 @@
 
     python browser.py PAGE WIDTH HEIGHT light|dark EXPRESSION... [--shot FILE]
 
-The page counts as loaded when `READY` is true in it. Each expression is a function body that may return a value; before the next
-expression, the page has time to draw, and `READY` is true again. Exit code 77: no browser can run here; the last line on stderr is the reason.
+The page counts as loaded when `READY` is true in it. Each expression is a function body that may return a value. The next
+expression runs after the page had time to draw and `READY` is true again. Exit code 77: no browser can run here; the last line on stderr is the reason.
 """
 
 import json

@@ -1,4 +1,4 @@
-"""The page that steps a rub in the browser: the bits of the program, controls, errors, and its layout."""
+"""The page that runs a rub in the browser: bits, controls, errors and layout."""
 
 import base64
 import csv
@@ -16,7 +16,7 @@ from test_report import browse, browser, slide  # noqa: F401 (a fixture)
 
 TARGET = "wasm32-unknown-unknown"
 SCENE = ROOT / "src" / "gallery" / "scenes" / "rotor37.toml"
-# The rows of the run as bytes, and the five numbers.
+# Reads the rows of a run as bytes, and the five numbers.
 RUN = """
 const rows = tryIt.state.rows, bytes = new Uint8Array(8 * tryIt.WIDTH * rows.length);
 rows.forEach((row, index) => bytes.set(new Uint8Array(row.buffer, row.byteOffset, row.byteLength), 8 * tryIt.WIDTH * index));
@@ -25,7 +25,7 @@ for (let i = 0; i < bytes.length; i += 4096) text += String.fromCharCode(...byte
 return { names: tryIt.NAMES, rows: btoa(text), numbers: tryIt.state.numbers, worker: tryIt.state.inWorker,
   shown: [...document.querySelectorAll(".numbers dd[data-name]")].map(own => own.textContent), command: document.querySelector(".command").textContent };
 """
-# Speed (rad/s), friction and clearance (µm) of the sliders. With the last, no blade touches.
+# Speed (rad/s), friction and clearance (µm) of the sliders. With the last setting, no blade touches.
 SETTINGS = [(1800, 0.15, 356), (1100, 0.34, 330), (2240, 0.04, 300), (1800, 0.0, 356), (1800, 0.15, 440)]
 
 
@@ -46,8 +46,8 @@ def page(browser, tiprub, work):  # noqa: F811
     return file
 
 
-def chosen(speed, friction, clearance):
-    """JavaScript that moves the sliders."""
+def move_sliders(speed, friction, clearance):
+    """Return JavaScript that moves the sliders."""
     return "".join(f"{{ {slide(name, value)} }}" for name, value in [("speed", speed), ("friction", friction), ("clearance", clearance)])
 
 
@@ -68,7 +68,7 @@ def bits(values):
 @pytest.fixture(scope="module")
 def runs(page):
     """Runs of the page, one for each setting."""
-    expressions = [expression for setting in SETTINGS for expression in [chosen(*setting), RUN]]
+    expressions = [expression for setting in SETTINGS for expression in [move_sliders(*setting), RUN]]
     return [result for result in browse(page, *expressions) if result]
 
 
@@ -93,20 +93,20 @@ def test_page_has_the_bits_of_the_program(runs, tiprub, scene_of_the_page, work,
     assert not different.any(), [names[column] for column, differs in zip(columns, different) if differs]
     answer = {name: value for name, value in summary["answer"].items() if name in run["numbers"]}
     assert len(answer) == 5 and run["numbers"] == answer
-    # Contact and friction take part, except where the setting excludes them.
+    # Blades rub with friction, unless the setting excludes contact or friction.
     forces = found[:, 1 + run["names"].index("normal_impulse")]
     assert forces.any() == (clearance < 420) and (summary["answer"]["heat"] > 0) == (clearance < 420 and friction > 0)
 
 
 def test_command_on_the_page_gives_its_numbers(runs, tiprub):
-    """The command has no outputs of every blade; the page's numbers are those of the built-in scene all the same."""
+    """The command does not request the outputs of every blade, but prints the same five numbers as the page."""
     words = runs[1]["command"].replace("\\\n", " ").split()
     assert words[:3] == ["tiprub", "run", "builtin:rotor37"] and words.count("--set") == 3
     assert tiprub(*words[1:])["answer"] == runs[1]["numbers"]
 
 
 def test_other_settings_have_other_bits(runs):
-    """The comparison would notice a slider without effect."""
+    """Every slider has an effect, so the comparison of bits is not trivial."""
     first = bits(rows_of(runs[0]))
     for run in runs[1:]:
         assert (bits(rows_of(run))[:, 1:] != first[:, 1:]).any(axis=0).mean() > 0.5
@@ -119,7 +119,7 @@ def test_page_without_workers_has_the_same_bits(page, runs):
 
 
 def test_page_stays_responsive_while_it_computes(page):
-    """Frames are drawn during a run, also if it runs in the page itself."""
+    """Frames are drawn during a run, even if it runs in the page instead of a worker."""
     count = "window.frames_drawn = 0; window.longest = 0; let last = performance.now(); (function next(now) { if (document.body.dataset.busy === 'true') { frames_drawn++; longest = Math.max(longest, performance.now() - last); } last = performance.now(); requestAnimationFrame(next); })();"
     for worker in ["true", "false"]:
         results = browse(page, f"tryIt.start(null, {worker});", count + slide("speed", 1500), "return [frames_drawn, longest, tryIt.state.done];")
@@ -181,7 +181,7 @@ def test_controls_have_labels(page):
 
 
 def test_book_shows_the_page_in_a_frame_of_its_height(page):
-    """The script of the book replaces the picture by the page, also in a book that is opened as a file."""
+    """The script of the book replaces the picture with the page, even if the book is opened from a file."""
     script = (ROOT / "docs" / "try-it.js").read_text()
     link = re.search(r'(?s)<a href="rub.html" id="try-it">.*?</a>', (ROOT / "docs" / "try-it.md").read_text()).group()
     book = page.with_name("book.html")

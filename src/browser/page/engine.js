@@ -1,20 +1,21 @@
 "use strict";
-// The simulation behind messages. It runs in a worker, or in the page itself if the browser starts no worker.
+// Runs the simulation and exchanges messages with the page, in a worker, or in the page if the browser starts no worker.
+// `post` sends a message. `slice` is the longest computing time (ms) between two messages.
 //
 // In:  { kind: "load", wasm, scene, rom, names }, { kind: "run", id, values: { NAME: VALUE } }
 // Out: { kind: "loaded", count }, { kind: "rows", id, first, width, rows }, { kind: "done", id, seconds, warnings },
-//      { kind: "failed", id, text }. A row holds the time (s) and the outputs `names` (SI units).
+//      { kind: "failed", id, text }. A row contains the time (s) and the outputs `names` (SI units).
 function createEngine(post, slice) {
   let wasm = null, timer = 0;
 
   const text = () => new TextDecoder().decode(new Uint8Array(wasm.memory.buffer, wasm.tiprub_text(), wasm.tiprub_text_length()));
-  function put(content) {
+  function writeInput(content) {
     const bytes = typeof content === "string" ? new TextEncoder().encode(content) : content;
-    const place = wasm.tiprub_input(bytes.length);
-    new Uint8Array(wasm.memory.buffer, place, bytes.length).set(bytes);
+    const address = wasm.tiprub_input(bytes.length);
+    new Uint8Array(wasm.memory.buffer, address, bytes.length).set(bytes);
   }
   function check(status) { if (status) throw new Error(text()); }
-  // If the module traps, its text is the message of the panic.
+  // After a trap, the text of the module is the message of the panic.
   function fail(id, error) {
     clearTimeout(timer);
     const trapped = wasm && error instanceof WebAssembly.RuntimeError;
@@ -25,18 +26,18 @@ function createEngine(post, slice) {
     const { instance } = await WebAssembly.instantiate(message.wasm, {});
     wasm = instance.exports;
     wasm.tiprub_start();
-    for (const file of [message.scene, message.rom, message.names.join("\n")]) { put(file); wasm.tiprub_add_file(); }
+    for (const file of [message.scene, message.rom, message.names.join("\n")]) { writeInput(file); wasm.tiprub_add_file(); }
     check(wasm.tiprub_create());
-    post({ kind: "loaded", count: wasm.tiprub_count() });
+    post({ kind: "loaded", count: wasm.tiprub_step_count() });
   }
 
   function run({ id, values }) {
     clearTimeout(timer);
     check(wasm.tiprub_reset());
-    for (const [name, value] of Object.entries(values)) { put(name); check(wasm.tiprub_set(value)); }
+    for (const [name, value] of Object.entries(values)) { writeInput(name); check(wasm.tiprub_set(value)); }
     check(wasm.tiprub_initialise());
     wasm.tiprub_warnings();
-    const width = wasm.tiprub_row_length(), count = wasm.tiprub_count();
+    const width = wasm.tiprub_row_length(), count = wasm.tiprub_step_count();
     let warnings = text(), reached = -1, seconds = 0;
     const advance = () => {
       const start = performance.now(), first = reached + 1, rows = [];

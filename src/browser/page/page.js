@@ -1,7 +1,7 @@
 "use strict";
 (() => {
 const find = name => document.querySelector(name);
-const NOMINAL = 356; // clearance of the scene (µm)
+const NOMINAL = 356; // clearance in the scene (µm)
 const TOLERANCE = 1e-2 * 3.56e-4; // error of the adaptive steps in closed contact (m)
 const BLADES = 36, TURN = 2 * Math.PI;
 const STEPS_PER_MS = 100; // communication steps of the scene
@@ -26,7 +26,7 @@ async function unpack(id) {
 
 // ---- Runs
 
-/** Starts the simulation in a worker, or in this page, and loads a scene. */
+/** Starts the simulation in a worker or in this page, and loads a scene. */
 function start(scene, useWorker) {
   state.stop?.();
   note.hidden = true;
@@ -47,7 +47,7 @@ function start(scene, useWorker) {
       state.inWorker = true;
       state.engine(loading);
       return;
-    } catch { /* no workers here */ }
+    } catch { /* The browser starts no worker. */ }
   }
   let alive = true;
   const engine = createEngine(message => { if (alive) receive(message); }, 10);
@@ -64,15 +64,15 @@ function values() {
 
 /** Runs the scene with the values of the sliders. */
 function run() {
-  const given = values();
+  const settings = values();
   if (state.done) state.before = state.rows;
   Object.assign(state, { id: state.id + 1, rows: [], done: false, numbers: null });
-  const set = Object.entries(given).map(([name, value]) => `--set ${name}=${value}`);
-  find(".command").textContent = ["tiprub run builtin:rotor37", ...set].join(" \\\n  ");
+  const options = Object.entries(settings).map(([name, value]) => `--set ${name}=${value}`);
+  find(".command").textContent = ["tiprub run builtin:rotor37", ...options].join(" \\\n  ");
   note.hidden = true;
   find(".warnings").hidden = true;
   document.body.dataset.busy = "true";
-  if (state.count) state.engine({ kind: "run", id: state.id, values: given });
+  if (state.count) state.engine({ kind: "run", id: state.id, values: settings });
 }
 
 function receive(message) {
@@ -123,8 +123,8 @@ function numbers(rows) {
     if (index) torque += (row[TIME] - rows[index - 1][TIME]) * row[TORQUE];
   });
   const last = rows[rows.length - 1], third = Math.floor(rows.length / 3);
-  const most = part => part.reduce((most, row) => Math.max(most, row[KINETIC] + row[STRAIN]), 0);
-  const [middle, end] = [most(rows.slice(third, 2 * third)), most(rows.slice(2 * third))];
+  const largestEnergy = part => part.reduce((largest, row) => Math.max(largest, row[KINETIC] + row[STRAIN]), 0);
+  const [middle, end] = [largestEnergy(rows.slice(third, 2 * third)), largestEnergy(rows.slice(2 * third))];
   return {
     force: largest,
     heat: last[HEAT],
@@ -150,8 +150,8 @@ function showNumbers() {
 
 // ---- Drawing
 
-let colors = {}, layers_old = true, layers_drawn = 0, index_drawn = -1, last_frame = 0;
-const dirty = () => { layers_old = true; };
+let colors = {}, layersOutdated = true, layersDrawn = 0, indexDrawn = -1, lastFrame = 0;
+const dirty = () => { layersOutdated = true; };
 
 function readColors() {
   const style = getComputedStyle(document.documentElement);
@@ -220,49 +220,49 @@ function drawRotor(row, index) {
   }
 }
 
-/** Plots over time. Each has a drawn layer that is kept until it is out of date. */
+/** Plots over time. Each plot is cached in a layer until the data change. */
 const plots = [
-  { canvas: find(".clearances"), unit: 1e-6, all: row => row.subarray(GAPS, FORCES), value: (rows, i) => rows[i][CLEARANCE], color: "accent", least: 100 },
-  { canvas: find(".forces"), unit: 1000, value: force, color: "hot", least: 2 },
+  { canvas: find(".clearances"), unit: 1e-6, all: row => row.subarray(GAPS, FORCES), value: (rows, i) => rows[i][CLEARANCE], color: "accent", smallestLimit: 100 },
+  { canvas: find(".forces"), unit: 1000, value: force, color: "hot", smallestLimit: 2 },
 ];
 
-function drawPlot(plot, index, is_due) {
+function drawPlot(plot, index, isDue) {
   const { canvas } = plot, pen = context(canvas), [width, height] = [canvas.clientWidth, canvas.clientHeight];
   const [left, right, top, bottom] = [44, 10, 8, 24], length = state.count / STEPS_PER_MS;
   const x = i => left + (width - left - right) * i / state.count, y = value => height - bottom - (height - top - bottom) * value / plot.limit;
-  if (is_due || !plot.layer) {
+  if (isDue || !plot.layer) {
     plot.layer ??= document.createElement("canvas");
     plot.layer.width = canvas.width; plot.layer.height = canvas.height;
-    const own = plot.layer.getContext("2d"), ratio = devicePixelRatio || 1;
-    own.setTransform(ratio, 0, 0, ratio, 0, 0);
-    own.clearRect(0, 0, width, height);
-    let most = plot.least;
-    for (const rows of [state.rows, state.before]) rows.forEach((_, i) => { most = Math.max(most, plot.value(rows, i) / plot.unit); });
-    if (plot.all) for (const row of state.rows) for (const value of plot.all(row)) most = Math.max(most, value / plot.unit);
-    const decade = 10 ** Math.floor(Math.log10(most / 5)), tick = decade * [1, 2, 5, 10].find(factor => most / (factor * decade) <= 5);
-    plot.limit = tick * Math.ceil(1.02 * most / tick);
-    own.font = "12px system-ui, sans-serif";
-    own.textBaseline = "middle";
-    own.lineWidth = 1;
+    const layerPen = plot.layer.getContext("2d"), ratio = devicePixelRatio || 1;
+    layerPen.setTransform(ratio, 0, 0, ratio, 0, 0);
+    layerPen.clearRect(0, 0, width, height);
+    let largest = plot.smallestLimit;
+    for (const rows of [state.rows, state.before]) rows.forEach((_, i) => { largest = Math.max(largest, plot.value(rows, i) / plot.unit); });
+    if (plot.all) for (const row of state.rows) for (const value of plot.all(row)) largest = Math.max(largest, value / plot.unit);
+    const decade = 10 ** Math.floor(Math.log10(largest / 5)), tick = decade * [1, 2, 5, 10].find(factor => largest / (factor * decade) <= 5);
+    plot.limit = tick * Math.ceil(1.02 * largest / tick);
+    layerPen.font = "12px system-ui, sans-serif";
+    layerPen.textBaseline = "middle";
+    layerPen.lineWidth = 1;
     for (let value = 0; value <= plot.limit * 1.001; value += tick) {
-      own.strokeStyle = colors.line; own.beginPath(); own.moveTo(left, y(value)); own.lineTo(width - right, y(value)); own.stroke();
-      own.fillStyle = colors.soft; own.textAlign = "right"; own.fillText(String(Number(value.toPrecision(6))), left - 6, y(value));
+      layerPen.strokeStyle = colors.line; layerPen.beginPath(); layerPen.moveTo(left, y(value)); layerPen.lineTo(width - right, y(value)); layerPen.stroke();
+      layerPen.fillStyle = colors.soft; layerPen.textAlign = "right"; layerPen.fillText(String(Number(value.toPrecision(6))), left - 6, y(value));
     }
-    own.textAlign = "center";
-    for (let time = 0; time <= length; time += 2) own.fillText(time === 10 ? "10 ms" : String(time), x(time * STEPS_PER_MS), height - bottom + 13);
-    own.save();
-    own.beginPath(); own.rect(left, 0, width - left - right, height - bottom + 1); own.clip();
+    layerPen.textAlign = "center";
+    for (let time = 0; time <= length; time += 2) layerPen.fillText(time === 10 ? "10 ms" : String(time), x(time * STEPS_PER_MS), height - bottom + 13);
+    layerPen.save();
+    layerPen.beginPath(); layerPen.rect(left, 0, width - left - right, height - bottom + 1); layerPen.clip();
     const line = (rows, value, color, thick, alpha) => {
-      own.strokeStyle = color; own.lineWidth = thick; own.globalAlpha = alpha; own.lineJoin = "round";
-      own.beginPath();
-      rows.forEach((_, i) => own[i ? "lineTo" : "moveTo"](x(i), y(value(rows, i) / plot.unit)));
-      own.stroke();
-      own.globalAlpha = 1;
+      layerPen.strokeStyle = color; layerPen.lineWidth = thick; layerPen.globalAlpha = alpha; layerPen.lineJoin = "round";
+      layerPen.beginPath();
+      rows.forEach((_, i) => layerPen[i ? "lineTo" : "moveTo"](x(i), y(value(rows, i) / plot.unit)));
+      layerPen.stroke();
+      layerPen.globalAlpha = 1;
     };
     if (plot.all) for (const blade of blades) line(state.rows, (rows, i) => rows[i][GAPS + blade], colors.cool, 1, 0.22);
     line(state.before, plot.value, colors.soft, 1.2, 0.5);
     line(state.rows, plot.value, colors[plot.color], 2, 1);
-    own.restore();
+    layerPen.restore();
   }
   pen.drawImage(plot.layer, 0, 0, width, height);
   if (state.rows.length) {
@@ -275,14 +275,14 @@ function drawPlot(plot, index, is_due) {
 
 function draw(now) {
   const index = Math.min(Math.floor(state.at), state.rows.length - 1);
-  // Layers are drawn a few times per second during a computation, to leave the processor to it.
-  const is_due = layers_old && (state.done || now - layers_drawn > 200);
-  if (index < 0 || !(is_due || index !== index_drawn)) return;
+  // During a computation, layers are drawn only a few times per second, because drawing would slow it down.
+  const isDue = layersOutdated && (state.done || now - layersDrawn > 200);
+  if (index < 0 || !(isDue || index !== indexDrawn)) return;
   const row = state.rows[index];
   drawRotor(row, index);
-  plots.forEach(plot => drawPlot(plot, index, is_due));
-  if (is_due) [layers_old, layers_drawn] = [false, now];
-  index_drawn = index;
+  plots.forEach(plot => drawPlot(plot, index, isDue));
+  if (isDue) [layersOutdated, layersDrawn] = [false, now];
+  indexDrawn = index;
   clock.value = String(index);
   const time = `${(1000 * row[TIME]).toFixed(2)} ms`;
   clock.setAttribute("aria-valuetext", time);
@@ -293,10 +293,10 @@ function draw(now) {
 }
 
 function frame(now) {
-  const passed = Math.min(now - last_frame, 100);
-  last_frame = now;
+  const passed = Math.min(now - lastFrame, 100);
+  lastFrame = now;
   if (state.playing && state.rows.length) {
-    // A thousand times slower than the rotor: one second shows one millisecond.
+    // Playback is a thousand times slower than the rotor: one second shows one millisecond.
     const reached = state.rows.length - 1;
     if (state.at <= reached) state.at = Math.min(state.at + passed / 1000 * STEPS_PER_MS, reached);
     if (state.done && state.at >= state.count) setPlaying(false);
@@ -335,18 +335,18 @@ readColors();
 setPlaying(!matchMedia("(prefers-reduced-motion: reduce)").matches);
 document.body.dataset.busy = "true";
 if (typeof WebAssembly !== "object" || typeof DecompressionStream !== "function") {
-  failed("this browser cannot run the simulation: it needs WebAssembly and DecompressionStream. Update it, or use another browser.");
+  failed("this browser cannot run the simulation: it needs WebAssembly and DecompressionStream. Update the browser, or use another one.");
 } else {
   Promise.all(["wasm", "rom", "scene"].map(unpack)).then(([wasm, rom, scene]) => {
     state.files = { wasm, rom, scene };
     start(null, true);
-  }).catch(error => failed(`the data of the page cannot be read: ${error.message}. Load the page again.`));
+  }).catch(error => failed(`the data of the page cannot be read: ${error.message}. Reload the page.`));
 }
 requestAnimationFrame(frame);
 
 // The book shows this page in a frame.
 if (parent !== window) new ResizeObserver(() => parent.postMessage({ height: document.documentElement.offsetHeight }, "*")).observe(document.documentElement);
 
-// For tests.
+// Used by tests.
 window.tryIt = { state, start, NAMES, WIDTH };
 })();

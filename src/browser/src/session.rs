@@ -1,4 +1,4 @@
-//! One scene that is run step by step, with chosen outputs as numbers.
+//! Run of one scene, step by step, with selected outputs as numbers.
 
 use tiprub_core::scene::settings::ExperimentSettings;
 use tiprub_core::{CoSimulation, Simulation};
@@ -8,18 +8,18 @@ use tiprub_cosim::{Diagnostic, Error};
 /// Result whose error is a text for the user.
 pub(crate) type Result<T> = core::result::Result<T, String>;
 
-/// A scene, and the communication step that its run has reached.
+/// Simulation of a scene, and the number of its finished communication steps.
 pub(crate) struct Session {
     simulation: Simulation,
     experiment: ExperimentSettings,
-    /// Type and value reference of the chosen outputs.
+    /// Types and value references of the selected outputs.
     outputs: Vec<(DataType, u32)>,
-    /// Number of communication steps taken.
+    /// Number of finished communication steps.
     steps: u32,
 }
 
 impl Session {
-    /// Reads a scene whose structures all use the same ROM, and chooses outputs by name, one per line.
+    /// Reads a scene whose structures all use the same ROM. `names` selects outputs by name, one per line.
     ///
     /// # Errors
     /// The scene, the ROM or a name is rejected.
@@ -27,7 +27,7 @@ impl Session {
         let read = |_: usize, _: &_| tiprub_format::read_rom(rom, "ROM");
         let scene = tiprub_format::read_scene(scene, "scene", read).map_err(|error: Diagnostic| error.to_string())?;
         let experiment = scene.settings.experiment.clone();
-        let simulation = Simulation::new(scene).map_err(text)?;
+        let simulation = Simulation::new(scene).map_err(message)?;
         let outputs = names.lines().map(|name| locate(&simulation, name)).collect::<Result<_>>()?;
         Ok(Self { simulation, experiment, outputs, steps: 0 })
     }
@@ -44,7 +44,7 @@ impl Session {
     /// The name is unknown, or the value is rejected.
     pub(crate) fn set(&mut self, name: &str, value: f64) -> Result<()> {
         let (_, reference) = locate(&self.simulation, name)?;
-        self.simulation.set(reference, Value::Real(value)).map_err(text)
+        self.simulation.set(reference, Value::Real(value)).map_err(message)
     }
 
     /// Initialises the run at the start time of the scene.
@@ -52,16 +52,16 @@ impl Session {
     /// # Errors
     /// A start value is rejected.
     pub(crate) fn initialise(&mut self) -> Result<()> {
-        self.simulation.initialise(self.experiment.start).map_err(text)
+        self.simulation.initialise(self.experiment.start).map_err(message)
     }
 
-    /// Takes one communication step of the scene.
+    /// Performs one communication step of the scene.
     ///
     /// # Errors
     /// The step fails.
     pub(crate) fn step(&mut self) -> Result<()> {
         let [time, next] = [self.steps, self.steps + 1].map(|index| self.time(index));
-        self.simulation.do_step(time, next - time).map_err(text)?;
+        self.simulation.do_step(time, next - time).map_err(message)?;
         self.steps += 1;
         Ok(())
     }
@@ -72,16 +72,16 @@ impl Session {
         clippy::cast_sign_loss,
         reason = "a cast saturates, and the count is positive"
     )]
-    pub(crate) fn count(&self) -> u32 {
+    pub(crate) fn step_count(&self) -> u32 {
         ((self.experiment.stop - self.experiment.start) / self.experiment.communication_step).round() as u32
     }
 
-    /// Returns a communication point (s), with the same bits as in a run of the command line.
+    /// Returns the time (s) of a communication point, with the same bits as in `tiprub run`.
     fn time(&self, index: u32) -> f64 {
         self.experiment.start + f64::from(index) * self.experiment.communication_step
     }
 
-    /// Returns the time (s) and the chosen outputs (SI units).
+    /// Returns the time (s) and the selected outputs (SI units).
     ///
     /// # Errors
     /// An output is not a number.
@@ -93,7 +93,7 @@ impl Session {
                 DataType::Boolean => self.simulation.boolean(*reference).map(|value| f64::from(u8::from(value))),
                 _ => self.simulation.integer(*reference).map(f64::from),
             };
-            row.push(value.map_err(text)?);
+            row.push(value.map_err(message)?);
         }
         Ok(row)
     }
@@ -106,7 +106,7 @@ impl Session {
     }
 }
 
-/// Returns type and value reference of the variable or element of this name.
+/// Returns the type and the value reference of the variable or array element with this name.
 fn locate(simulation: &Simulation, name: &str) -> Result<(DataType, u32)> {
     for variable in simulation.table().variables() {
         let references = (variable.reference..).take(variable.len());
@@ -117,7 +117,7 @@ fn locate(simulation: &Simulation, name: &str) -> Result<(DataType, u32)> {
     Err(format!("variable `{name}`: the scene has no such variable. Correct the name."))
 }
 
-fn text(error: Error) -> String {
+fn message(error: Error) -> String {
     error.to_string()
 }
 
@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn row_has_time_and_chosen_outputs() {
+    fn row_has_time_and_selected_outputs() {
         let mut session = session("clearance_minimum\nin_contact\ncontact_count").unwrap();
         session.initialise().unwrap();
         session.step().unwrap();
@@ -150,7 +150,7 @@ mod tests {
             session.reset();
             session.set("gap_offset", gap_offset).unwrap();
             session.initialise().unwrap();
-            let rows = (0..session.count()).map(|_| session.step().and_then(|()| session.row()).unwrap());
+            let rows = (0..session.step_count()).map(|_| session.step().and_then(|()| session.row()).unwrap());
             rows.flatten().map(f64::to_bits).collect::<Vec<_>>()
         };
         let first = run(0.0);
