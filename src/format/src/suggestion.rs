@@ -7,7 +7,7 @@ const CLOSE: f64 = 0.9;
 /// Smallest number of letters of a word that identifies a name.
 const SHORTEST_WORD: usize = 3;
 
-/// Returns the accepted name closest to `given`, if one is close enough or has a word in common with it.
+/// Returns the accepted name closest to `given`, if a name is close enough, or contains a word close to one of `given`.
 ///
 /// # Examples
 /// ```
@@ -22,7 +22,7 @@ pub fn closest_name<'a>(given: &str, accepted: impl IntoIterator<Item = &'a str>
     let given = normalised(given);
     let similarity = |name: &str| jaro_winkler(&given, &normalised(name));
     let mut accepted: Vec<&str> = accepted.into_iter().collect();
-    // The first of equally similar names comes last.
+    // `max_by` returns the last of several equally similar names, so the order is reversed to prefer the first.
     accepted.reverse();
     let best = *accepted.iter().max_by(|a, b| similarity(a).total_cmp(&similarity(b)))?;
     let distance = damerau_levenshtein(&given, &normalised(best));
@@ -30,13 +30,14 @@ pub fn closest_name<'a>(given: &str, accepted: impl IntoIterator<Item = &'a str>
     if distance <= allowed || similarity(best) > CLOSE {
         return Some(best);
     }
-    let common = |name: &&str| {
+    let word_similarity = |name: &&str| {
         let name = normalised(name);
         let pairs = words(&given).flat_map(|given| words(&name).map(move |word| jaro_winkler(given, word)));
         pairs.fold(0.0, f64::max)
     };
-    let sharing = accepted.into_iter().filter(|name| common(name) > CLOSE);
-    sharing.max_by(|a, b| common(a).total_cmp(&common(b)).then(similarity(a).total_cmp(&similarity(b))))
+    let similar = accepted.into_iter().filter(|name| word_similarity(name) > CLOSE);
+    similar
+        .max_by(|a, b| word_similarity(a).total_cmp(&word_similarity(b)).then(similarity(a).total_cmp(&similarity(b))))
 }
 
 /// Returns the words of a name that are long enough to identify it.

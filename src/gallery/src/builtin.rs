@@ -65,8 +65,8 @@ pub(crate) const NAMES: [&str; 13] = [
     RINGS[1].0,
 ];
 
-/// Returns the remedy for an unknown name of a built-in model, with a similar name if there is one.
-pub fn similar_models(name: &str) -> String {
+/// Returns the remedy for an unknown name of a built-in model. It proposes a similar name if there is one.
+pub fn unknown_model_remedy(name: &str) -> String {
     format!("{}Give a ROM file, or one of {}", name_hint(name, NAMES), with_prefix(&NAMES))
 }
 

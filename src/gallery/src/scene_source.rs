@@ -62,7 +62,7 @@ pub fn load(argument: impl AsRef<OsStr>, cache: &RomCache, console: &Console) ->
         SceneSource::File(path) => tiprub_format::load_scene(path, &reduce).map_err(|error| {
             let mut failure = Failure::from(error);
             if let Some(name) = unknown.take() {
-                failure.diagnostic.remedy = builtin::similar_models(&name);
+                failure.diagnostic.remedy = builtin::unknown_model_remedy(&name);
             }
             failure
         }),

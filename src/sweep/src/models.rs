@@ -132,7 +132,7 @@ impl<'a> RomStore<'a> {
         }
         let rom = match origin {
             RomOrigin::Builtin(name) => builtin::rom(name, self.cache, console).unwrap_or_else(|| {
-                let remedy = builtin::similar_models(name);
+                let remedy = builtin::unknown_model_remedy(name);
                 Err(Failure::new(origin, "there is no such built-in model", remedy))
             }),
             RomOrigin::File(path) => scene_source::read_rom(path),

@@ -5,9 +5,8 @@ use super::{Fastest, GrowthRates};
 use crate::scene::method::Scheme;
 use tiprub_cosim::warning::Topic;
 
-/// Growth by this factor before contact opens turns an insignificant motion, a thousandth of the clearance, into one as large as the
-/// clearance.
-pub(crate) const GROWTH_THAT_MATTERS: f64 = 1e3;
+/// Growth factor that counts as significant: it turns a motion of a thousandth of the clearance into one as large as the clearance.
+pub(crate) const SIGNIFICANT_GROWTH: f64 = 1e3;
 
 /// Part of a scene that a finding concerns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -91,9 +90,9 @@ pub enum WarningKind {
         with_mass: Option<Fastest>,
         /// Fraction of the contact displacement that this motion contributes until contact opens.
         share: f64,
-        /// Time after which contact opens (s), if that is before the growth matters.
+        /// Time after which contact opens (s), if the growth until then is not significant.
         opens_after: Option<f64>,
-        /// Tolerance of adaptive steps, which do not resolve far smaller vibration.
+        /// Tolerance of adaptive steps, which do not resolve vibration far below it; `None` for fixed steps.
         tolerance: Option<f64>,
     },
     /// The step makes vibration in closed contact grow.

@@ -11,7 +11,7 @@ use crate::scene::method::Scheme;
 
 /// Growth per step below this is rounding of the eigenvalue solver.
 pub(crate) const GROWTH_NOISE: f64 = 1e-7;
-/// Motions whose frequencies differ by less than this fraction are the same.
+/// Two motions count as the same if their frequencies differ by less than this fraction.
 const SAME_MOTION: f64 = 0.1;
 /// Largest number of modes for which growth rates are computed.
 pub(crate) const GROWTH_UP_TO: usize = 150;
@@ -50,9 +50,8 @@ impl GrowthRates {
         if added > self.noise { added } else { 0.0 }
     }
 
-    /// Returns whether the fastest motion of the steps is the one that grows by the differential equations: both have the same
-    /// frequency.
-    pub(crate) fn is_of_equations(&self) -> bool {
+    /// Returns whether the differential equations flutter with the frequency at which the motion of the steps grows fastest.
+    pub(crate) fn matches_flutter(&self) -> bool {
         self.is_flutter() && (self.swing - self.frequency).abs() < SAME_MOTION * self.frequency
     }
 

@@ -40,8 +40,8 @@ impl SetGrowth {
     pub fn new(contacts: SlidingContacts, scheme: Scheme, step: f64, growth: GrowthRates) -> Self {
         // Contact forces that act a step late cause motions of their own, above the frequencies of all modes. So do motions that change
         // sign from step to step. With central differences the sampled frequency is higher than the frequency of the motion.
-        let is_late = scheme.properties().delays_contact && !growth.is_of_equations();
-        let is_of_step = is_late || growth.swing * step > ALTERNATES;
+        let is_caused_by_delay = scheme.properties().delays_contact && !growth.matches_flutter();
+        let is_of_step = is_caused_by_delay || growth.swing * step > ALTERNATES;
         let frequency = growth.swing.min(contacts.model.largest_frequency());
         let share = if is_of_step { 1.0 } else { share_of(contacts.model, contacts.directions, frequency) };
         Self { growth, share }
@@ -198,7 +198,7 @@ mod tests {
         let share = |scheme: Scheme| SetGrowth::new(contacts, scheme, 1e-5, growth).share;
         let [exact, massless] = [Scheme::ModalExact, Scheme::MasslessBoundary].map(share);
         assert!((exact - 0.2).abs() < 1e-15 && (massless - 1.0).abs() < 1e-15, "{exact}, {massless}");
-        // Flutter of the equations is bounded by its modes, unless its frequency in the steps differs.
+        // The modes bound flutter of the equations, unless the steps change its frequency.
         for (swing, expected) in [(1450.0, 0.2), (1700.0, 1.0)] {
             let growth = GrowthRates { continuous: 5.0, frequency: 1430.0, stepped: 6.0, swing, noise: 0.0 };
             let share = SetGrowth::new(contacts, Scheme::MasslessBoundary, 1e-5, growth).share;

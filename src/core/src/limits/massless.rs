@@ -6,9 +6,9 @@
 //!
 //! A flexible carrier has its own D_s < 4 and X_s; several carriers under one blade have those of all their modes. With the modes of both, and
 //! U = L⁻¹[Φ_n X½, Ψ_n X_s½], G_nn = L Lᵀ, all eigenvalues are below 4 while those of the sum over modes U(4 − D)⁻¹Uᵀ are below 1. The part
-//! of the master has no eigenvalue above µ/4, so that the carrier adds the largest eigenvalue of G_nn⁻¹ Ψ_n X_s(1 − D_s/4)⁻¹ Ψ_nᵀ to µ. For
-//! all blades in contact, G_nn and Ψ_n have the nodes of all blades; contact at fewer nodes adds no more, since G_nn⁻¹ of some nodes is at
-//! most that of all. The number of blades times the eigenvalue of one is a simple upper bound.
+//! of the master has no eigenvalue above µ/4, so that the carrier adds the largest eigenvalue of G_nn⁻¹ Ψ_n X_s(1 − D_s/4)⁻¹ Ψ_nᵀ to µ. If
+//! all blades are in contact, G_nn and Ψ_n contain the nodes of all blades. Contact at fewer nodes adds no more, because G_nn⁻¹ of a subset
+//! of the nodes is at most that of all nodes. The number of blades times the eigenvalue of one blade is a simple upper bound.
 //!
 //! Steps may have any length up to the limit, and a mode comes closest to D = 4 at ω_d h = π: each mode counts with its worst case at steps
 //! up to h. By itself this does not reach 4, since contact does not excite modes in which it does not participate.
@@ -37,7 +37,7 @@ const STIFF: f64 = 10.0;
 const TOO_STIFF: f64 = 300.0;
 /// Fraction of the limit up to which the same blades gain no energy without damping: at 0.5 they gain a fifth of their energy.
 pub const QUIET: f64 = 0.4;
-/// Damping ratio with which they gain no energy up to [`USABLE`].
+/// Damping ratio with which the same blades gain no energy up to [`USABLE`].
 pub const DAMPED: f64 = 1e-3;
 /// Sum of eigenvalues below which closed contact is stable.
 pub(crate) const STABLE: f64 = 4.0;
@@ -57,7 +57,7 @@ impl MasslessLimit {
     /// No limit.
     pub const NONE: Self = Self { closed: f64::INFINITY, usable: f64::INFINITY, quiet: f64::INFINITY };
 
-    /// Returns the smaller of each limit.
+    /// Returns the smaller value of each limit.
     pub(crate) fn tightest(self, other: Self) -> Self {
         Self {
             closed: self.closed.min(other.closed),
@@ -81,19 +81,19 @@ pub struct MasslessCheck<'a> {
 /// A surface carrier under the contact nodes of a master.
 #[derive(Debug, Clone)]
 pub struct CarrierUnderNodes<'a> {
-    /// Its modes along the normals of the nodes, nodes × modes.
+    /// Modes of the carrier along the normals of the nodes, nodes × modes.
     pub normals: DMatrix<f64>,
-    /// Its modes.
+    /// Modes of the carrier.
     pub model: &'a ModalModel,
 }
 
 impl CarrierUnderNodes<'_> {
-    /// Returns Ψ_n (X_s(1 − D_s/4)⁻¹)½ at all h up to `step` (s).
-    pub(crate) fn scaled(&self, step: f64) -> DMatrix<f64> {
+    /// Returns Ψ_n (X_s(1 − D_s/4)⁻¹)½, an upper bound for all steps up to `step` (s), nodes × modes.
+    pub(crate) fn scaled_normals(&self, step: f64) -> DMatrix<f64> {
         let mut scaled = self.normals.clone();
         for (mode, mut column) in scaled.column_iter_mut().enumerate() {
-            let [kept, moved] = worst(self.model, mode, step);
-            column *= (moved / (1.0 - 0.25 * kept)).sqrt();
+            let [d, x] = worst(self.model, mode, step);
+            column *= (x / (1.0 - 0.25 * d)).sqrt();
         }
         scaled
     }
@@ -104,11 +104,13 @@ impl MasslessCheck<'_> {
     /// below 4. `None` if the residual flexibility is singular.
     pub fn eigenvalues(&self, step: f64) -> Option<(f64, f64)> {
         let dynamic = self.model.dynamic_modes(Scheme::MasslessBoundary);
-        let seen = self.seen();
+        let along_normals = self.modes_along_normals();
         let lower = self.flexibility_factor(step)?;
         // D + X½ K_c X½ with K_c = (L⁻¹Φ)ᵀ(L⁻¹Φ).
         let own: Vec<[f64; 2]> = (0..dynamic).map(|mode| worst(self.model, mode, step)).collect();
-        let half = DMatrix::from_fn(self.normals.len(), dynamic, |node, mode| seen[(node, mode)] * own[mode][1].sqrt());
+        let half = DMatrix::from_fn(self.normals.len(), dynamic, |node, mode| {
+            along_normals[(node, mode)] * own[mode][1].sqrt()
+        });
         let half = lower.solve_lower_triangular(&half)?;
         let mut matrix = half.transpose() * &half;
         for (mode, [kept, _]) in own.iter().enumerate() {
@@ -117,29 +119,29 @@ impl MasslessCheck<'_> {
         let master = if dynamic == 0 { 0.0 } else { matrix.symmetric_eigenvalues().max() };
         let mut added = DMatrix::zeros(self.normals.len(), self.normals.len());
         for carrier in &self.carriers {
-            let half = lower.solve_lower_triangular(&carrier.scaled(step))?;
+            let half = lower.solve_lower_triangular(&carrier.scaled_normals(step))?;
             added += &half * half.transpose();
         }
         let carrier = if self.carriers.is_empty() { 0.0 } else { added.symmetric_eigenvalues().max() };
         Some((master, carrier))
     }
 
-    /// Modes along the normals, nodes × modes.
-    fn seen(&self) -> DMatrix<f64> {
+    /// Returns the modes along the normals of the nodes, nodes × modes.
+    fn modes_along_normals(&self) -> DMatrix<f64> {
         DMatrix::from_fn(self.normals.len(), self.model.len(), |node, mode| {
             self.normals[node].dot(&vector3_at(self.model.contact_modes.column(mode).as_slice(), node))
         })
     }
 
-    /// Returns the Cholesky factor L of the residual flexibility G_nn = L Lᵀ along the normals (m/N), nodes × nodes, with a step (s); `None`
-    /// if it is singular.
+    /// Returns the Cholesky factor L of the residual flexibility G_nn = L Lᵀ (m/N) along the normals for a step (s), nodes × nodes; `None`
+    /// if the flexibility is singular.
     pub(crate) fn flexibility_factor(&self, step: f64) -> Option<DMatrix<f64>> {
         let coefficients = self.model.coefficients(Scheme::MasslessBoundary, step);
         let dynamic = self.model.dynamic_modes(Scheme::MasslessBoundary);
-        let (seen, nodes) = (self.seen(), self.normals.len());
+        let (along_normals, nodes) = (self.modes_along_normals(), self.normals.len());
         let residual = DMatrix::from_fn(nodes, nodes, |a, b| {
             (dynamic..self.model.len())
-                .map(|mode| seen[(a, mode)] * coefficients[mode].compliance * seen[(b, mode)])
+                .map(|mode| along_normals[(a, mode)] * coefficients[mode].compliance * along_normals[(b, mode)])
                 .sum()
         });
         Some(residual.cholesky()?.l())
@@ -173,7 +175,7 @@ impl MasslessCheck<'_> {
         self.eigenvalues(step).map_or(1.0, |(master, carrier)| (master + carrier) / open)
     }
 
-    /// Damping ratios of all modes with inertia, and of the carriers.
+    /// Returns the damping ratios of all modes with inertia, and of the modes of the carriers.
     fn damping_ratios(&self) -> impl Iterator<Item = f64> {
         let own = &self.model.damping_ratios[..self.model.dynamic_modes(Scheme::MasslessBoundary)];
         own.iter().chain(self.carriers.iter().flat_map(|carrier| &carrier.model.damping_ratios)).copied()
@@ -226,7 +228,7 @@ pub(crate) fn is_stable(eigenvalues: f64) -> bool {
     eigenvalues < STABLE
 }
 
-/// Warning for a step (s) at which contact that opens and closes gains energy, because damping does not dissipate it.
+/// Returns a warning if contact that opens and closes gains energy at a step (s), because damping does not dissipate it.
 pub fn warning(step: f64, limit: MasslessLimit) -> Option<WarningKind> {
     (step >= limit.quiet).then_some(WarningKind::MasslessEnergy { step, limit })
 }

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 use std::fmt::{Display, Formatter};
 
-use super::finding::{ClosedContact, ErrorKind, Finding, GROWTH_THAT_MATTERS, StepGrowth, Subject, WarningKind};
+use super::finding::{ClosedContact, ErrorKind, Finding, SIGNIFICANT_GROWTH, StepGrowth, Subject, WarningKind};
 use super::{Fastest, GROWTH_UP_TO, massless, unresolved};
 use crate::scene::method::{Scheme, Solver};
 use crate::{Error, Rom, Warning};
@@ -246,7 +246,7 @@ impl WarningKind {
             Self::Flutter { opens_after: Some(time), .. } => {
                 format!(
                     "No action is needed: contact opens after at most {time:.2e} s, before this vibration has grown by a \
-                     factor of {GROWTH_THAT_MATTERS:.0}"
+                     factor of {SIGNIFICANT_GROWTH:.0}"
                 )
             }
             Self::Flutter { tolerance, .. } => {

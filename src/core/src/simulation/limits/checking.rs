@@ -31,9 +31,8 @@ pub(super) fn carrier_angle(place: u32) -> f64 {
     std::f64::consts::TAU * f64::from(place) / f64::from(CARRIER_ANGLES)
 }
 
-/// Modes of the surface carrier along normals and tangents of `nodes` of a blade at `angle` (rad), nodes × modes; 0 for
-/// nodes that do not face the
-/// carrier.
+/// Returns the modes of the surface carrier along normals and tangents of `nodes` of a blade at `angle` (rad), nodes × modes; 0 for
+/// nodes that do not face the carrier.
 pub(super) fn carrier_at(
     law: &SplineGap,
     modes: &ModalModel,

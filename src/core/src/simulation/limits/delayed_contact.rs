@@ -1,4 +1,4 @@
-//! Step limits of a structure whose contact forces act one step late, alone and on surface carriers.
+//! Step limits of a structure whose contact forces act one step late, with and without surface carriers.
 
 use std::f64::consts::TAU;
 
@@ -17,9 +17,9 @@ use crate::modes::modal::ModalModel;
 const ANGLES_PER_SECTOR: u8 = 4;
 
 /// The surfaces that carriers deform, and the modes of the carriers at the control points of these surfaces.
-type Carried<'a> = [(&'a SplineGap, usize, ModalModel)];
+type CarriedSurfaces<'a> = [(&'a SplineGap, usize, ModalModel)];
 
-/// Checks a casing, which may differ around the circumference, where its nodes under a blade are most compliant.
+/// Returns the check at the place where the carriers are most compliant, because a casing may differ around the circumference.
 fn most_compliant<'a>(
     check: MasslessCheck<'a>,
     places: impl Iterator<Item = Vec<CarrierUnderNodes<'a>>>,
@@ -36,8 +36,8 @@ fn most_compliant<'a>(
 }
 
 impl Checking<'_> {
-    /// Returns the largest stable step if contact forces act one step late, and warnings at the expected step (s): of energy that contact may
-    /// gain, and of more blades in simultaneous contact than are proven to be stable.
+    /// Returns warnings for the expected `step` (s), and the step limits, if contact forces act one step late. The warnings concern energy
+    /// that contact may gain, and blades in simultaneous contact for which stability is not proven.
     pub(super) fn delayed_contact(&self, step: f64) -> Result<(Vec<WarningKind>, MasslessLimit), ErrorKind> {
         if !self.parameters.scheme.properties().delays_contact {
             return Ok((Vec::new(), MasslessLimit::NONE));
@@ -61,40 +61,46 @@ impl Checking<'_> {
         let (master, carrier) = worst;
         let sectors = self.compiled.body(self.body).1.sectors;
         let are_all_stable = || {
-            let together = || self.carrier_eigenvalue_of_all_blades(&carried, step);
-            let together = self.known.get(CheckPart::AllBladesOnCarrier, &[step.to_bits()], together);
-            together.is_some_and(|together| massless::is_stable(master + together))
+            let compute = || self.carrier_eigenvalue_of_all_blades(&carried, step);
+            let added = self.known.get(CheckPart::AllBladesOnCarrier, &[step.to_bits()], compute);
+            added.is_some_and(|added| massless::is_stable(master + added))
         };
-        let unproven = !massless::is_stable(master + real(sectors) * carrier) && !are_all_stable();
-        let blades = unproven.then(|| {
+        let is_unproven = !massless::is_stable(master + real(sectors) * carrier) && !are_all_stable();
+        let blades = is_unproven.then(|| {
             let stable = ((massless::STABLE - master) / carrier).floor();
             WarningKind::MasslessBlades { stable, sectors }
         });
         Ok((massless::warning(step, limit).into_iter().chain(blades).collect(), limit))
     }
 
+    /// Returns the check of a model on rigid surfaces.
     fn without_carriers<'a>(&self, model: &'a ModalModel) -> MasslessCheck<'a> {
         MasslessCheck { model, normals: self.normals(model), carriers: Vec::new() }
     }
 
-    /// Returns the modes of the carriers under one blade at an angle (rad), as one nodal diameter of coupled sectors sees them. A contact
+    /// Returns the modes of the carriers under one blade at an angle (rad), projected on one nodal diameter of coupled sectors. A contact
     /// of one blade acts equally on all nodal diameters, so the most compliant one bounds the contribution of the carrier.
-    fn carriers_under<'a>(&self, carried: &'a Carried, diameter: usize, angle: f64) -> Vec<CarrierUnderNodes<'a>> {
+    fn carriers_under<'a>(
+        &self,
+        carried: &'a CarriedSurfaces,
+        diameter: usize,
+        angle: f64,
+    ) -> Vec<CarrierUnderNodes<'a>> {
         let rows = self.models[diameter].contact_modes.nrows() / 3;
         let weight = self.disk().map_or(1.0, |disk| disk.weight(diameter));
         let under = |(gap, _, model): &'a (&SplineGap, usize, ModalModel)| {
-            let seen = carrier_at(gap, model, &self.nodes, angle).0;
+            let along_normals = carrier_at(gap, model, &self.nodes, angle).0;
             // The real part of the displacement pattern comes first.
-            let normals = (seen * weight).resize_vertically(rows, 0.0);
+            let normals = (along_normals * weight).resize_vertically(rows, 0.0);
             CarrierUnderNodes { normals, model }
         };
         carried.iter().map(under).collect()
     }
 
-    /// Returns the largest eigenvalue that the carriers add to those of a step (s) while all blades are in contact, at any rotor angle.
-    /// Blades that are apart add little to each other, so it is much smaller than the sum over the blades. `None` if the flexibility of
-    /// the contact nodes is singular.
-    fn carrier_eigenvalue_of_all_blades(&self, carried: &Carried, step: f64) -> Option<f64> {
+    /// Returns the largest eigenvalue that the carriers add at a step (s) while all blades are in contact, over all checked rotor angles.
+    /// Distant blades hardly interact, so it is much smaller than the sum over the blades. `None` if the flexibility of the contact nodes
+    /// is singular.
+    fn carrier_eigenvalue_of_all_blades(&self, carried: &CarriedSurfaces, step: f64) -> Option<f64> {
         let sectors = self.compiled.body(self.body).1.sectors;
         let pitch = TAU / real(sectors);
         let flexibilities: Vec<DMatrix<f64>> = self
@@ -107,9 +113,9 @@ impl Checking<'_> {
                 let angle = first + pitch * real(sector);
                 let each = carried.iter().map(|(gap, _, model)| {
                     let normals = carrier_at(gap, model, &self.nodes, angle).0;
-                    CarrierUnderNodes { normals, model }.scaled(step)
+                    CarrierUnderNodes { normals, model }.scaled_normals(step)
                 });
-                side_by_side(&each.collect::<Vec<_>>())
+                join_columns(&each.collect::<Vec<_>>())
             };
             let blades: Vec<DMatrix<f64>> = (0..sectors).map(under).collect();
             largest_eigenvalue(&blades, &flexibilities, self.disk())
@@ -119,8 +125,8 @@ impl Checking<'_> {
     }
 }
 
-/// Returns the largest eigenvalue of Ψᵀ G⁻¹ Ψ, where Ψ has the rows `blades` of all blades. The factors L of G = L Lᵀ are those of one
-/// uncoupled blade, or of all nodal diameters of a disk. `None` if a factor is singular.
+/// Returns the largest eigenvalue of Ψᵀ G⁻¹ Ψ. `blades` contains the rows of Ψ for every blade. `factors` contains the L of G = L Lᵀ for
+/// one uncoupled blade, or for every nodal diameter of a disk. `None` if a factor is singular.
 fn largest_eigenvalue(blades: &[DMatrix<f64>], factors: &[DMatrix<f64>], disk: Option<&CyclicModel>) -> Option<f64> {
     let mut sum = DMatrix::zeros(blades[0].ncols(), blades[0].ncols());
     let mut add = |factor: &DMatrix<f64>, rows: &DMatrix<f64>| {
@@ -131,15 +137,15 @@ fn largest_eigenvalue(blades: &[DMatrix<f64>], factors: &[DMatrix<f64>], disk: O
     match disk {
         None => blades.iter().try_for_each(|blade| add(&factors[0], blade))?,
         Some(disk) => factors.iter().enumerate().try_for_each(|(diameter, factor)| {
-            // The flexibility of a nodal diameter contains the square of its weight, and so do two orthonormal patterns.
+            // The flexibility of a nodal diameter contains the square of its weight, and so does a product of two orthonormal patterns.
             add(factor, &(pattern(blades, diameter, disk.is_real(diameter)) * disk.weight(diameter).powi(2)))
         })?,
     }
     Some(sum.symmetric_eigenvalues().max())
 }
 
-/// Joins matrices with the same number of rows.
-fn side_by_side(parts: &[DMatrix<f64>]) -> DMatrix<f64> {
+/// Joins the columns of matrices with the same number of rows.
+fn join_columns(parts: &[DMatrix<f64>]) -> DMatrix<f64> {
     let columns: Vec<_> = parts.iter().flat_map(|part| part.column_iter()).collect();
     DMatrix::from_columns(&columns)
 }
@@ -163,7 +169,7 @@ mod tests {
     use nalgebra::Complex;
     use tiprub_test_models::SeededRandom;
 
-    /// Flexibility of one nodal diameter: Hermitian, or real.
+    /// Returns the flexibility of one nodal diameter: a Hermitian matrix, or a real one.
     fn flexibility(random: &mut SeededRandom, nodes: usize, is_real: bool) -> DMatrix<Complex<f64>> {
         let imaginary = if is_real { 0.0 } else { 1.0 };
         let root = random
@@ -172,17 +178,17 @@ mod tests {
         &root * root.adjoint() + DMatrix::identity(nodes, nodes) * Complex::new(0.1, 0.0)
     }
 
-    /// Displacements of all sectors under unit forces: u_s = Σ_n Re(G_n Σ_r f_r e^(iφ_n(s − r))).
-    fn of_all_sectors(flexibilities: &[DMatrix<Complex<f64>>], sectors: usize) -> DMatrix<f64> {
+    /// Returns the displacements of all sectors under unit forces: u_s = Σ_n Re(G_n Σ_r f_r e^(iφ_n(s − r))).
+    fn disk_flexibility(flexibilities: &[DMatrix<Complex<f64>>], sectors: usize) -> DMatrix<f64> {
         let nodes = flexibilities[0].nrows();
         DMatrix::from_fn(sectors * nodes, sectors * nodes, |row, column| {
             let apart = real(row / nodes) - real(column / nodes);
-            let one = |(n, of): (usize, &DMatrix<Complex<f64>>)| {
+            let term = |(n, flexibility): (usize, &DMatrix<Complex<f64>>)| {
                 let angle = TAU * real(n) * apart / real(sectors);
                 let turn = Complex::new(angle.cos(), angle.sin());
-                (of[(row % nodes, column % nodes)] * turn).re
+                (flexibility[(row % nodes, column % nodes)] * turn).re
             };
-            flexibilities.iter().enumerate().map(one).sum()
+            flexibilities.iter().enumerate().map(term).sum()
         })
     }
 
@@ -196,9 +202,9 @@ mod tests {
                 diameters.clone().map(|n| flexibility(&mut random, nodes, disk.is_real(n))).collect();
             let factors: Vec<_> = diameters
                 .map(|n| {
-                    let (of, parts) = (&flexibilities[n], if disk.is_real(n) { 1 } else { 2 });
+                    let (flexibility, parts) = (&flexibilities[n], if disk.is_real(n) { 1 } else { 2 });
                     let paired = DMatrix::from_fn(parts * nodes, parts * nodes, |row, column| {
-                        let value = of[(row % nodes, column % nodes)];
+                        let value = flexibility[(row % nodes, column % nodes)];
                         match (row / nodes, column / nodes) {
                             (0, 0) | (1, 1) => value.re,
                             (0, _) => -value.im,
@@ -210,7 +216,7 @@ mod tests {
                 .collect();
             let blades: Vec<_> = (0..sectors).map(|_| random.matrix(nodes, modes)).collect();
             let all = DMatrix::from_fn(sectors * nodes, modes, |row, mode| blades[row / nodes][(row % nodes, mode)]);
-            let whole = of_all_sectors(&flexibilities, sectors).cholesky().unwrap();
+            let whole = disk_flexibility(&flexibilities, sectors).cholesky().unwrap();
             let expected = (all.transpose() * whole.solve(&all)).symmetric_eigenvalues().max();
             let found = largest_eigenvalue(&blades, &factors, Some(&disk)).unwrap();
             assert!((found / expected - 1.0).abs() < 1e-12, "{sectors} sectors: {found}, expected {expected}");
@@ -218,10 +224,10 @@ mod tests {
             let few: Vec<_> =
                 blades.iter().enumerate().map(|(s, blade)| if s < 2 { blade.clone() } else { blade * 0.0 }).collect();
             assert!(largest_eigenvalue(&few, &factors, Some(&disk)).unwrap() < found);
-            let alone = largest_eigenvalue(&blades, &factors[..1], None).unwrap();
-            let separate: f64 =
-                blades.iter().map(|one| largest_eigenvalue(&[one.clone()], &factors[..1], None).unwrap()).sum();
-            assert!(alone <= separate * (1.0 + 1e-12), "{alone} of {separate}");
+            let uncoupled = largest_eigenvalue(&blades, &factors[..1], None).unwrap();
+            let bound: f64 =
+                blades.iter().map(|blade| largest_eigenvalue(&[blade.clone()], &factors[..1], None).unwrap()).sum();
+            assert!(uncoupled <= bound * (1.0 + 1e-12), "{uncoupled} above {bound}");
         }
     }
 }

@@ -4,7 +4,7 @@
 use super::checking::Checking;
 use super::in_range;
 use super::known::CheckPart;
-use crate::limits::finding::{ClosedContact, ErrorKind, GROWTH_THAT_MATTERS, StepGrowth, WarningKind};
+use crate::limits::finding::{ClosedContact, ErrorKind, SIGNIFICANT_GROWTH, StepGrowth, WarningKind};
 use crate::limits::judged::{self, SetGrowth};
 use crate::limits::{self, ContactDirections, Fastest, SlidingContacts, lock_up};
 use crate::modes::modal::ModalModel;
@@ -79,7 +79,7 @@ impl Sense {
         self.grows.iter().map(move |kind| {
             let mut kind = kind.clone();
             if let WarningKind::Flutter { motion, opens_after, .. } = &mut kind {
-                *opens_after = (motion.rate * closed < GROWTH_THAT_MATTERS.ln()).then_some(closed);
+                *opens_after = (motion.rate * closed < SIGNIFICANT_GROWTH.ln()).then_some(closed);
             }
             kind
         })
