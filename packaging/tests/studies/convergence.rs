@@ -4,7 +4,7 @@ use std::{fs, path::Path, process::Command};
 
 use serde_json::{Value, json};
 
-use crate::studies::{around, errors_of_a_file, own_scene, tiprub};
+use crate::studies::{check_errors_of_a_file, scene_with_blade, tiprub, write_user_scene};
 
 /// Arguments for the mesh from which the ROM of `own.toml` was reduced.
 const MESH: [&str; 6] = ["--mesh", "blade.inp", "--contact-set", "TIP", "--clamp-set", "HUB"];
@@ -18,17 +18,17 @@ fn convergence(root: &Path, more: &[&str]) -> Value {
 #[test]
 fn convergence_study_reports_what_it_cannot_refine() {
     let root = tempfile::tempdir().unwrap();
-    own_scene(root.path());
+    write_user_scene(root.path());
     let study = |more: &[&str]| convergence(root.path(), more);
     let values = |direction: &Value| -> Vec<f64> {
         direction["levels"].as_array().unwrap().iter().map(|level| level["value"].as_f64().unwrap()).collect()
     };
     let scope = study(&[])["results"].clone();
-    let alone = &scope["directions"];
-    assert_eq!([values(&alone[0]), values(&alone[1])], [vec![2e-6, 1e-6, 5e-7], vec![2.0, 4.0]]);
-    assert!(values(&alone[2]).is_empty());
+    let without_mesh = &scope["directions"];
+    assert_eq!([values(&without_mesh[0]), values(&without_mesh[1])], [vec![2e-6, 1e-6, 5e-7], vec![2.0, 4.0]]);
+    assert!(values(&without_mesh[2]).is_empty());
     for direction in [1, 2, 3] {
-        assert!(alone[direction]["not_refined"].as_str().unwrap().contains("--mesh FILE"), "{alone:#}");
+        assert!(without_mesh[direction]["not_refined"].as_str().unwrap().contains("--mesh FILE"), "{without_mesh:#}");
     }
     assert_eq!(scope["refined"], json!(["internal step"]));
     assert_eq!(scope["coarser_only"], json!(["modes of rotor"]));
@@ -36,7 +36,7 @@ fn convergence_study_reports_what_it_cannot_refine() {
     let page = fs::read_to_string(root.path().join("out/index.html")).unwrap();
     let reported = "finer levels: internal step; coarser levels only: modes of rotor; not refined: contact nodes of rotor, mesh of rotor";
     assert!(page.contains(reported) && !page.to_lowercase().contains("total"), "{reported}");
-    // If no error was found, the output reports that there is nothing to write; directories of files are created as for all outputs.
+    // If no error was found, a warning reports that the ROM is unchanged. The directory of the file is created as for all outputs.
     let (text, _) = tiprub(
         root.path(),
         "",
@@ -48,14 +48,14 @@ fn convergence_study_reports_what_it_cannot_refine() {
     let kept = fs::read(root.path().join("new/at.rom")).unwrap()
         == fs::read(root.path().join("coarse.rom.safetensors")).unwrap();
     assert!(none && kept && !text.contains("unknown"), "{text}");
-    let whole = study(&[&MESH[..], &["--sectors", "36"]].concat());
-    let found = &whole["results"]["directions"];
+    let with_mesh = study(&[&MESH[..], &["--sectors", "36"]].concat());
+    let found = &with_mesh["results"]["directions"];
     assert_eq!([values(&found[1]), values(&found[2])], [vec![2.0, 4.0, 6.0], vec![2.0, 3.0]]);
     let all = found.as_array().unwrap();
     assert!(all[..3].iter().all(|direction| direction["not_refined"].is_null()), "{found:#}");
     assert!(all[3]["not_refined"].as_str().unwrap().contains("--other-mesh FILE"), "{found:#}");
     // The unchanged scene gives the same run in every direction, and without a mesh.
-    let standing = |directions: &Value| -> Vec<Value> {
+    let unchanged_runs = |directions: &Value| -> Vec<Value> {
         let levels = directions.as_array().unwrap().iter().flat_map(|one| one["levels"].as_array().unwrap());
         let own = levels.filter(|level| level["own"] == true);
         own.map(|level| {
@@ -63,9 +63,12 @@ fn convergence_study_reports_what_it_cannot_refine() {
         })
         .collect()
     };
-    let all = standing(found);
-    assert!(all.len() == 3 && all.iter().all(|one| *one == all[0]) && all[0] == standing(alone)[0], "{all:?}");
-    // A change is that to the next run; the step changes least of all.
+    let all = unchanged_runs(found);
+    assert!(
+        all.len() == 3 && all.iter().all(|one| *one == all[0]) && all[0] == unchanged_runs(without_mesh)[0],
+        "{all:?}"
+    );
+    // Changes are differences from the next run. Refining the step changes the results least.
     let change = |direction: &Value, level: usize, name: &str| {
         direction["levels"][level]["changes_to_next"][name].as_f64().unwrap()
     };
@@ -82,7 +85,7 @@ fn convergence_study_reports_what_it_cannot_refine() {
 #[test]
 fn rejected_refinements_are_repeated_with_half_the_step() {
     let root = tempfile::tempdir().unwrap();
-    own_scene(root.path());
+    write_user_scene(root.path());
     let scene = fs::read_to_string(root.path().join("own.toml")).unwrap();
     let replaced = |line: &str| match line.split(' ').next() {
         Some("scheme") => "scheme = \"central-difference\"".to_owned(),
@@ -104,7 +107,7 @@ fn rejected_refinements_are_repeated_with_half_the_step() {
 #[test]
 fn mesh_error_is_estimated_and_stored_in_the_rom() {
     let root = tempfile::tempdir().unwrap();
-    own_scene(root.path());
+    write_user_scene(root.path());
     for mesh in ["4x1x6", "8x1x12"] {
         let reduce = ["reduce", "rotor37", "--mesh", mesh, "--modes", "4", "--contact-nodes", "2", "--quiet"];
         let written = ["-o", &format!("{mesh}.rom.safetensors"), "--inp", &format!("{mesh}.inp")];
@@ -131,7 +134,7 @@ fn mesh_error_is_estimated_and_stored_in_the_rom() {
     let errors = &inspected["rom"]["rub_errors"];
     assert_eq!(errors["mesh"].as_f64(), found, "{errors}");
     assert!(errors["found_on"].as_str().unwrap().starts_with("rotor37_rub_one_row, "), "{errors}");
-    fs::write(root.path().join("known.toml"), around("known.rom.safetensors")).unwrap();
+    fs::write(root.path().join("known.toml"), scene_with_blade("known.rom.safetensors")).unwrap();
     let run = reported(&["run", "known.toml", "--stop", "1e-4", "--quiet"]);
     let last = run.lines().rfind(|line| line.starts_with("estimated error")).unwrap();
     let mesh = found.map_or("mesh unknown".to_owned(), |found| format!("mesh {:.2} %", 100.0 * found));
@@ -139,7 +142,7 @@ fn mesh_error_is_estimated_and_stored_in_the_rom() {
     // A ROM without a study carries no errors, and its file is unchanged.
     assert!(!reported(&["run", "own.toml", "--stop", "1e-4", "--quiet"]).contains("estimated error"));
     let mut command = Command::new(env!("CARGO_BIN_EXE_tiprub"));
-    errors_of_a_file(
+    check_errors_of_a_file(
         root.path(),
         &reported(&["study", "error", "known.toml", "--quick", "--json", "--quiet", "--window", "2e-3"]),
     );
@@ -152,7 +155,7 @@ fn mesh_error_is_estimated_and_stored_in_the_rom() {
 #[test]
 fn convergence_study_rejects_a_different_mesh() {
     let root = tempfile::tempdir().unwrap();
-    own_scene(root.path());
+    write_user_scene(root.path());
     let refuse = |more: &[&str], code: i32| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_tiprub"));
         let output = command.current_dir(root.path()).args(["study", "convergence", "own.toml", "--quick"]).args(more);

@@ -4,7 +4,7 @@ use std::{fs, path::Path, process::Command};
 
 use serde_json::Value;
 
-use crate::studies::{columns, only_no, own_scene, tiprub};
+use crate::studies::{assert_only_no, columns, tiprub, write_user_scene};
 
 /// Returns the result of the stability study of a scene at two frictions, speeds and steps.
 fn stability(root: &Path, scene: &str) -> Value {
@@ -35,9 +35,9 @@ fn three_steps(root: &Path, [friction, speed, step]: [f64; 3], method: &str) -> 
 #[test]
 fn stability_study_agrees_with_runs() {
     let root = tempfile::tempdir().unwrap();
-    own_scene(root.path());
+    write_user_scene(root.path());
     let json = stability(root.path(), "own.toml");
-    only_no(&json, &[]);
+    assert_only_no(&json, &[]);
     let number = |value: &Value, name: &str| value[name].as_f64().unwrap();
     let points = json["results"]["points"].as_array().unwrap();
     assert_eq!(points.len(), 8);
@@ -70,7 +70,7 @@ fn stability_study_agrees_with_runs() {
         }
     }
     for row in columns(&root.path().join("out/answers.csv")).1 {
-        assert_eq!(row[6].is_finite(), row[4] > 0.0, "what flutters has a frequency: {row:?}");
+        assert_eq!(row[6].is_finite(), row[4] > 0.0, "only flutter has a frequency: {row:?}");
     }
     let page = fs::read_to_string(root.path().join("out/index.html")).unwrap();
     assert!(page.contains("Largest internal step that passes the checks") && page.contains("Read a column"));
@@ -79,7 +79,7 @@ fn stability_study_agrees_with_runs() {
 #[test]
 fn stability_study_works_without_friction_in_the_scene() {
     let root = tempfile::tempdir().unwrap();
-    own_scene(root.path());
+    write_user_scene(root.path());
     let scene = fs::read_to_string(root.path().join("own.toml")).unwrap();
     fs::write(root.path().join("dry.toml"), scene.replace("friction = 0.15", "friction = 0.0")).unwrap();
     let (own, dry) = (stability(root.path(), "own.toml"), stability(root.path(), "dry.toml"));
@@ -99,7 +99,7 @@ fn stability_study_works_without_friction_in_the_scene() {
 #[test]
 fn stability_study_shows_usable_steps_below_a_long_one() {
     let root = tempfile::tempdir().unwrap();
-    own_scene(root.path());
+    write_user_scene(root.path());
     let scene = fs::read_to_string(root.path().join("own.toml")).unwrap();
     let text = scene
         .replace("step = 1.0e-6 ", "step = 1.0e-4 ")
@@ -107,7 +107,7 @@ fn stability_study_shows_usable_steps_below_a_long_one() {
     fs::write(root.path().join("long.toml"), text).unwrap();
     let arguments = ["study", "stability", "long.toml", "--quick", "--json", "--quiet", "--out", "long"];
     let long: Value = serde_json::from_str(&tiprub(root.path(), "", &arguments).0).unwrap();
-    only_no(&long, &["The scene as it stands is accepted", "Its internal step does not exceed"]);
+    assert_only_no(&long, &["The scene as it stands is accepted", "Its internal step does not exceed"]);
     let accepted = ["right", "warned"].map(|kind| long["results"]["counts"][kind].as_u64().unwrap());
     assert!(accepted[0] + accepted[1] > 0, "{}", long["results"]["counts"]);
 }

@@ -20,7 +20,7 @@ pub(super) fn tiprub(directory: &Path, cache: &str, arguments: &[&str]) -> (Stri
 
 /// Checks that exactly these statements are answered with no.
 #[track_caller]
-pub(super) fn only_no(json: &Value, no: &[&str]) {
+pub(super) fn assert_only_no(json: &Value, no: &[&str]) {
     let statements = json["statements"].as_array().unwrap();
     let begins = |start: &&str| statements.iter().any(|one| one["expected"].as_str().unwrap().starts_with(*start));
     assert!(no.iter().all(begins), "{no:?} of {statements:#?}");
@@ -42,13 +42,13 @@ pub(super) fn columns(path: &Path) -> (Vec<String>, Vec<Vec<f64>>) {
 #[test]
 fn quick_interaction_map_shows_the_leaning_branch() {
     let root = tempfile::tempdir().unwrap();
-    fs::write(root.path().join("scene.toml"), around("builtin:rotor37-paper")).unwrap();
+    fs::write(root.path().join("scene.toml"), scene_with_blade("builtin:rotor37-paper")).unwrap();
     let arguments = ["study", "map", "scene.toml", "--quick", "--json", "--quiet", "--out", "out"];
     let (stdout, _) = tiprub(root.path(), env!("CARGO_TARGET_TMPDIR"), &arguments);
     let json: Value = serde_json::from_str(&stdout).unwrap();
     let no =
         ["The response repeats", "The largest response lies at a predicted", "The effective displacement is steady"];
-    only_no(&json, &no);
+    assert_only_no(&json, &no);
     let number = |value: &Value, name: &str| value[name].as_f64().unwrap();
     let results = &json["results"];
     let speeds: Vec<f64> = results["speeds"].as_array().unwrap().iter().map(|speed| speed.as_f64().unwrap()).collect();
@@ -172,7 +172,7 @@ fn killed_map_continues_and_parts_are_combined() {
 #[test]
 fn quick_error_study_accepts_any_scene() {
     let root = tempfile::tempdir().unwrap();
-    fs::write(root.path().join("scene.toml"), around("builtin:rotor37-paper")).unwrap();
+    fs::write(root.path().join("scene.toml"), scene_with_blade("builtin:rotor37-paper")).unwrap();
     // Contact nodes do not define the width of the tip.
     let coated = with_rom("abradable", "builtin:rotor37-paper");
     let coated = coated.replace("\n[time]", "contact_width = 3e-3\n\n[time]");
@@ -182,7 +182,7 @@ fn quick_error_study_accepts_any_scene() {
         let arguments = ["study", "error", scene, "--quick", "--json", "--quiet", "--out", "out"];
         let (stdout, _) = tiprub(root.path(), env!("CARGO_TARGET_TMPDIR"), &[&arguments[..], &more].concat());
         let json: Value = serde_json::from_str(&stdout).unwrap();
-        only_no(&json, &[]);
+        assert_only_no(&json, &[]);
         let found = &json["results"]["scenes"][0];
         let rows = found["rows"].as_array().unwrap();
         assert_eq!(rows.len(), 9 * 4 + 4, "every scheme and solver at every step, and four tolerances");
@@ -206,7 +206,7 @@ fn quick_error_study_accepts_any_scene() {
 #[test]
 fn error_study_supports_adaptive_scenes() {
     let root = tempfile::tempdir().unwrap();
-    let scene = around("builtin:rotor37-paper")
+    let scene = scene_with_blade("builtin:rotor37-paper")
         .replace("step = 1.0e-6 ", "step = 8.0e-5 ")
         .replace("\"modal-exact\"", "\"galerkin\"\ntolerance = 1e-3");
     fs::write(root.path().join("scene.toml"), scene).unwrap();
@@ -215,7 +215,7 @@ fn error_study_supports_adaptive_scenes() {
         serde_json::from_str(&tiprub(root.path(), env!("CARGO_TARGET_TMPDIR"), &all).0).unwrap()
     };
     let json = run(&["study", "error", "scene.toml", "--quick", "--window", "1.5e-3", "--out", "out"]);
-    only_no(&json, &[]);
+    assert_only_no(&json, &[]);
     let found = &json["results"]["scenes"][0];
     let rows = found["rows"].as_array().unwrap();
     let errors = |name: &str, which: &str| -> Vec<f64> {
@@ -292,7 +292,7 @@ fn totals(total: &Value, cheapest: &str) {
 }
 
 /// Checks that without a finer model of a ROM from a file, no error is called total, and that the errors in the ROM are reported beside.
-pub(super) fn errors_of_a_file(root: &Path, reported: &str) {
+pub(super) fn check_errors_of_a_file(root: &Path, reported: &str) {
     let json: Value = serde_json::from_str(reported).unwrap();
     let of = &json["results"]["own_model"];
     assert_eq!([&of["refined"], &of["not_refined"]], [&json!(["steps"]), &json!(["modes", "nodes", "mesh"])], "{of:#}");
@@ -315,14 +315,14 @@ pub(super) fn errors_of_a_file(root: &Path, reported: &str) {
 }
 
 /// Writes a user scene around a coarse blade.
-pub(super) fn own_scene(root: &Path) {
+pub(super) fn write_user_scene(root: &Path) {
     let reduce = ["reduce", "rotor37", "--mesh", "6x1x8", "--modes", "4", "--contact-nodes", "2", "--quiet"];
     tiprub(root, "", &[&reduce[..], &["-o", "coarse.rom.safetensors", "--inp", "blade.inp"]].concat());
-    fs::write(root.join("own.toml"), around("coarse.rom.safetensors")).unwrap();
+    fs::write(root.join("own.toml"), scene_with_blade("coarse.rom.safetensors")).unwrap();
 }
 
 /// Returns the built-in scene around another blade with few contact nodes, for which longer steps are sufficient.
-pub(super) fn around(rom: &str) -> String {
+pub(super) fn scene_with_blade(rom: &str) -> String {
     with_rom("rotor37-one-row", rom)
 }
 
@@ -364,7 +364,7 @@ fn built_in_models_are_cached_unless_disabled() {
     let root = tempfile::tempdir().unwrap();
     let kept = root.path().join("kept");
     let kept = kept.to_str().unwrap();
-    fs::write(root.path().join("scene.toml"), around("builtin:rotor37-paper")).unwrap();
+    fs::write(root.path().join("scene.toml"), scene_with_blade("builtin:rotor37-paper")).unwrap();
     let run = |cache: &str, more: &[&str]| {
         tiprub(root.path(), cache, &[&["run", "scene.toml", "--stop", "1e-4", "--csv", "out.csv"], more].concat()).1
     };
