@@ -46,7 +46,7 @@ fn subcommands(of: &str) -> Vec<String> {
     command.map(|command| command.get_name().to_owned()).collect()
 }
 
-/// Returns the question whether a similar known name was meant.
+/// Returns the question whether a similar known name was meant; empty if no known name is similar.
 fn hint(name: &str, known: &[String]) -> String {
     name_hint(name, known.iter().map(String::as_str))
 }

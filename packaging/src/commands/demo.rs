@@ -49,7 +49,7 @@ pub const FILES: [&str; 6] = [ROM_FILE, SCENE_FILE, REPORT_FILE, CSV_FILE, "roto
 /// Largest size (bytes) of a scene file that a demo may have written.
 const LARGEST_SCENE: u64 = 1 << 20;
 
-/// Note about the error study, which the demo does not run.
+/// Hint at the error study, which the demo does not run.
 const STUDY: &str = "to measure the error against run time of every method on this machine (takes minutes): \
                      tiprub study error builtin:rotor37 --quick";
 
@@ -245,7 +245,7 @@ impl Demo<'_> {
             "\n{}: t = {} s to {} s, computed in {seconds:.3} s ({per_second:.3} s of computing per simulated second)\n\
              {} and the native run agree in all bits: {} outputs at {} communication points\n\
              {} (estimated from coarser runs, like `tiprub run --estimate`)\n\
-             written into {}: {}\n\
+             files in {}: {}\n\
              open {} in a browser: it shows the contact and the checks of the ROM\n{STUDY}",
             self.scene.settings.name,
             self.schedule.start,

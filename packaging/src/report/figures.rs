@@ -293,8 +293,8 @@ fn vibration(input: &ReportInput<'_>, history: Option<(&HitBlade, &TipHistory)>)
         figures.push(Captioned {
             body: map.to_html(),
             caption: format!(
-                "Spectrogram of the {what}. The window of {:.3} ms distinguishes frequencies that are {:.0} Hz apart; values between \
-                 them are interpolated. Lines are natural frequencies at rest {}.",
+                "Spectrogram of the {what}. Windows of {:.3} ms distinguish frequencies that are {:.0} Hz apart; values between \
+                 them are interpolated. Lines are natural frequencies {} at rest.",
                 1e3 * found.window,
                 1.0 / found.window,
                 if input.scene.roms.iter().any(tiprub_core::Rom::is_cyclic) { "of nodal diameter 0" } else { "of a blade" }

@@ -16,8 +16,8 @@ pub struct StudyCommon {
     /// Output directory of the study; created if missing [default: study-STUDY].
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Run a quick form of the study with few, short runs, for a first look. It takes from seconds to a few minutes, depending on the
-    /// study and the scene; the remaining time is printed.
+    /// Run a quick form of the study with few, short runs. It takes from seconds to a few minutes, depending on the study and the scene.
+    /// The remaining time is printed.
     #[arg(long)]
     pub quick: bool,
     /// Changes to the scene.

@@ -104,21 +104,21 @@ pub fn study(arguments: &MapArguments, console: &Console) -> Result<StudyOutcome
     let part = arguments.part.unwrap_or(Part::WHOLE);
     let mut journals = TaskJournals::open(&arguments.common.directory(NAME), NAME, part, &map.setup.digests())?;
     let runs = {
-        // The rate is unknown before the first steps have been taken.
+        // The rate is unknown until the first steps are finished.
         let (count, steps) = (part.runs(speeds.len()).len(), map.setup.communication_steps());
-        let title = format!("Running {count} angular velocities of the interaction map");
+        let title = format!("Running the interaction map at {count} angular velocities");
         let forecast = Forecast::new(console, &title, WorkPlan::new(0.0));
-        let (taken, shown, is_planned) = (AtomicU64::new(0), Cell::new(0), Cell::new(false));
+        let (finished, displayed, is_planned) = (AtomicU64::new(0), Cell::new(0), Cell::new(false));
         let progress = |done: usize| {
             if !is_planned.replace(true) {
                 forecast.plan(0, steps as f64 * (count - done) as f64);
             }
-            let taken = taken.load(Ordering::Relaxed);
-            if taken > shown.get() {
-                forecast.done(0, (taken - shown.replace(taken)) as f64);
+            let finished = finished.load(Ordering::Relaxed);
+            if finished > displayed.get() {
+                forecast.done(0, (finished - displayed.replace(finished)) as f64);
             }
         };
-        let run = |speed: &f64| map.setup.run(*speed, &taken);
+        let run = |speed: &f64| map.setup.run(*speed, &finished);
         let runs = journals.run("speed", &speeds, threads, run, console, progress)?;
         forecast.finish();
         runs

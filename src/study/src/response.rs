@@ -6,12 +6,13 @@ use crate::map::spectrum::{Analyser, peaks};
 
 /// Smallest number of samples of a spectrum.
 const MIN_SAMPLES: usize = 64;
-/// Length of a run divided by that of a window of its spectrogram: for few samples, and for at least [`MANY_SAMPLES`].
+/// Length of a run divided by that of a window of its spectrogram: with fewer than [`MANY_SAMPLES`], and with at least as many.
 const WINDOWS: [usize; 2] = [4, 8];
+/// Number of samples from which windows are shorter.
 const MANY_SAMPLES: usize = 2048;
 /// Largest number of times of a spectrogram.
 const TIMES: usize = 240;
-/// Number of frequencies of a spectrogram per 1/length of a window; those between are interpolated.
+/// Number of frequencies of a spectrogram per 1/(length of a window). Frequencies between multiples of 1/length are interpolated.
 const INTERPOLATION: usize = 4;
 /// Smallest peak that is listed, as a fraction of the largest.
 const MIN_PEAK: f64 = 0.03;
@@ -132,7 +133,7 @@ mod tests {
         assert_eq!(found.amplitudes.len(), TIMES);
         // Frequencies every 10 Hz, although a window of 25 ms alone distinguishes 40 Hz.
         assert!((found.resolution - 10.0).abs() < 1e-9 && found.amplitudes[0].len() == 501);
-        // The change lies in the middle of the run, where a column contains both frequencies.
+        // The frequency changes in the middle of the run, where a column contains both frequencies.
         let change = found.amplitudes.iter().position(|column| largest(column).0 > 1000.0).unwrap();
         assert!((0.45..0.6).contains(&(change as f64 / TIMES as f64)), "{change}");
     }

@@ -70,7 +70,7 @@ impl Case {
         Ok(Self { text, roms, settings })
     }
 
-    /// Returns the case of a run (from 0) in which the field of a variable (by index) has another value, or that of the scene (`None`).
+    /// Returns the case of a run (counted from 0) in which the field of one variable (by index) has `value`, or its value in the scene (`None`).
     ///
     /// # Errors
     /// The scene has no such field or entry.

@@ -57,7 +57,7 @@ pub fn set(scene: &mut Table, path: &str, value: Value) -> Result<()> {
     Ok(())
 }
 
-/// Returns the key of a path as the description of scene files names it, without numbers and names of entries.
+/// Returns the key of a path without numbers and names of entries, as the reference of scene files lists it.
 ///
 /// # Errors
 /// The text is not a path.

@@ -267,8 +267,8 @@ fn parse(path: &Path) -> Result<PlanFile> {
     })
 }
 
-/// Returns the question whether a similar key or value was meant. The parser's message about an unknown name has this name and all accepted ones in
-/// backquotes.
+/// Returns the question whether a similar key or value was meant; empty if none is similar. The parser's message about an unknown name quotes this name
+/// and all accepted names in backticks.
 fn hint(message: &str) -> String {
     let mut names = message.split('`').skip(1).step_by(2);
     let given = names.next().filter(|_| message.starts_with("unknown "));

@@ -37,7 +37,7 @@ pub fn plan_digest(plan: &Plan, program: &Path, sources: &dyn SweepSources) -> R
     Ok(content_digest(items.join("\n").as_bytes()))
 }
 
-/// Returns the facts in result files that identify a plan: digests of its path, and of its text and scene.
+/// Returns the metadata of result files that identify a plan: the digest of its path, and the digest of its text and scene.
 pub(crate) fn plan_facts(plan: &Plan) -> [(&'static str, String); 2] {
     let path = std::fs::canonicalize(&plan.path).unwrap_or_else(|_| plan.path.clone());
     let text = std::fs::read(&plan.path).unwrap_or_default();
@@ -48,7 +48,7 @@ pub(crate) fn plan_facts(plan: &Plan) -> [(&'static str, String); 2] {
     ]
 }
 
-/// Checks that an existing file of results belongs to this plan: to the plan at this path, or to a copy of it.
+/// Checks that an existing result file belongs to the plan at this path, or to a copy of it.
 ///
 /// # Errors
 /// The file contains the results of another plan.

@@ -107,8 +107,8 @@ impl TaskJournals {
     }
 
     /// Runs the tasks of the part that have no result yet, on `threads` threads. `kind` distinguishes tasks with equal values. `progress` receives
-    /// the number of finished tasks, including those with a stored result, after each of them, and a few times per second while no task finishes. A
-    /// result that JSON cannot represent is not stored.
+    /// the number of finished tasks, including those with a stored result: after every task, and a few times per second between tasks. A result that
+    /// JSON cannot represent is not stored.
     ///
     /// # Errors
     /// A task fails (the first failure is returned), or a journal cannot be written.

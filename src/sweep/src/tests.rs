@@ -387,7 +387,7 @@ fn wrong_plans_are_rejected_with_place_and_remedy() {
     }
 }
 
-/// A start value would replace the field, so that the values of the field would have no effect.
+/// The values of the field would have no effect.
 #[test]
 fn field_that_a_start_value_replaces_is_rejected() {
     let bench = Bench::new();
@@ -406,7 +406,7 @@ fn field_that_a_start_value_replaces_is_rejected() {
         assert_eq!(failure.what, "variable `a`", "{failure}");
         assert!(failure.problem.contains(&format!("the start value `{name}` of the plan replaces")), "{failure}");
     }
-    // These start values act together with the field.
+    // These start values do not replace the field.
     for (field, values, more) in [
         ("contact[1].gap", "[5e-4, 1e-3]", variable("gap_offset", "[0.0, 1e-4]")),
         ("contact[1].friction", "[0.1, 0.2]", variable("speed", "[90.0, 100.0]")),
@@ -417,7 +417,7 @@ fn field_that_a_start_value_replaces_is_rejected() {
     }
 }
 
-/// Plans of the same name in other directories keep their results; a plan that is edited or copied continues with its rows.
+/// A plan does not replace the results of another plan with the same name. An edited or copied plan continues with its rows.
 #[test]
 fn results_of_a_plan_of_the_same_name_are_kept() {
     let bench = Bench::new();

@@ -99,7 +99,7 @@ pub struct RunWarning {
     pub is_note: bool,
     /// Problem and remedy.
     pub lines: [String; 2],
-    /// Whole text.
+    /// Problem and remedy as one text.
     pub text: String,
 }
 
@@ -114,8 +114,8 @@ impl RunWarning {
     }
 }
 
-/// Returns two lines for every topic and level of the warnings of runs, which are given with their speeds (rad/s): the first warning, and the number
-/// of runs that report one, because the numbers in the warnings differ from run to run.
+/// Returns two lines for every topic and level of the warnings of `runs`, which contains the speed (rad/s) and the response of every run. The numbers
+/// in warnings differ from run to run, so the lines contain the first warning and the number of runs with a warning of this topic and level.
 pub fn warning_lines(runs: &[(f64, &SpeedResponse)]) -> Vec<String> {
     let all = || runs.iter().flat_map(|(speed, run)| run.warnings.iter().map(move |warning| (*speed, warning)));
     let kind = |warning: &RunWarning| (warning.id.clone(), warning.is_note);
@@ -130,8 +130,8 @@ pub fn warning_lines(runs: &[(f64, &SpeedResponse)]) -> Vec<String> {
             all().find(|(_, warning)| kind(warning) == *own)?;
         let count = runs.iter().filter(|(_, run)| run.warnings.iter().any(|warning| kind(warning) == *own)).count();
         let level = if *is_note { Severity::Note } else { Severity::Warning }.name();
-        let numbers = format!("{count} of {} runs; numbers of the run at {} rad/s", runs.len(), shown(speed));
-        Some(format!("{level} [{id}] {problem}\n    {remedy} ({numbers})"))
+        let source = format!("{count} of {} runs; values from the run at {} rad/s", runs.len(), shown(speed));
+        Some(format!("{level} [{id}] {problem}\n    {remedy} ({source})"))
     };
     kinds.iter().filter_map(lines).collect()
 }
@@ -220,24 +220,24 @@ impl MapSetup {
         Failure::from_core(format!("scene `{}` at {} rad/s", self.scene.settings.name, shown(speed)), error)
     }
 
-    /// Returns the number of communication steps of a run: the start-up, the window, the step that is measured, and the end of the filter.
+    /// Returns the number of communication steps of a run: start-up, window, the measured step, and the tail of the filter.
     pub fn communication_steps(&self) -> u64 {
         ((self.transient + self.revolutions) * self.samples + 1 + Decimator::TAIL) as u64
     }
 
-    /// Runs the scene at one speed (rad/s), and adds its communication steps to `taken`, those that a rejected run omits at its end. A rejection is
-    /// an outcome, not an error.
+    /// Runs the scene at one speed (rad/s), and adds each of its communication steps to `finished`. If the run ends early, its missing steps are added
+    /// at the end. A rejection is an outcome, not an error.
     ///
     /// # Errors
     /// Only programming errors.
-    pub fn run(&self, speed: f64, taken: &AtomicU64) -> Result<SpeedRun> {
-        let mut own = 0;
+    pub fn run(&self, speed: f64, finished: &AtomicU64) -> Result<SpeedRun> {
+        let mut count = 0;
         let mut step = || {
-            own += 1;
-            taken.fetch_add(1, Ordering::Relaxed);
+            count += 1;
+            finished.fetch_add(1, Ordering::Relaxed);
         };
         let outcome = self.response(speed, &mut step).map_err(|failure| failure.to_string());
-        taken.fetch_add(self.communication_steps().saturating_sub(own), Ordering::Relaxed);
+        finished.fetch_add(self.communication_steps().saturating_sub(count), Ordering::Relaxed);
         Ok(SpeedRun { speed, outcome })
     }
 
@@ -454,7 +454,7 @@ mod tests {
     use super::*;
     use tiprub_cosim::warning::Topic;
 
-    /// Numbers in a warning differ from run to run; each topic and level is printed once, with the number of its runs.
+    /// Each topic and level is printed once, with the number of its runs, although the numbers in the warnings differ.
     #[test]
     fn warnings_of_all_runs_are_counted_by_topic() {
         let flutter = |time: f64| {
@@ -481,8 +481,8 @@ mod tests {
         let runs = [response(&[flutter(1e-3)]), response(&[flutter(2e-3), sticking]), response(&[])];
         let runs: Vec<(f64, &SpeedResponse)> = [100.0, 200.0, 300.0].into_iter().zip(&runs).collect();
         let expected = [
-            "note [flutter] vibration grows\n    contact opens after 0.001 s (2 of 3 runs; numbers of the run at 100 rad/s)",
-            "warning [sticking] too slow\n    Turn faster (1 of 3 runs; numbers of the run at 200 rad/s)",
+            "note [flutter] vibration grows\n    contact opens after 0.001 s (2 of 3 runs; values from the run at 100 rad/s)",
+            "warning [sticking] too slow\n    Turn faster (1 of 3 runs; values from the run at 200 rad/s)",
         ];
         assert_eq!(warning_lines(&runs), expected);
         assert!(warning_lines(&runs[2..]).is_empty());

@@ -359,15 +359,15 @@ fn rejects_excessive_requests_before_running() {
 fn planned_steps_match_the_work_done() {
     let request = MapRequest { revolutions: Some(4), transient: Some(3), ..request(BUMP, around(CROSSING, 0.1, 2)) };
     let (map, speeds) = Map::prepare(scene(FIRST, 4), &request).unwrap();
-    let taken = AtomicU64::new(0);
-    let run = map.setup.run(speeds[0], &taken).unwrap();
-    // All steps of a run are counted as they are taken, so nothing is added at its end.
+    let finished = AtomicU64::new(0);
+    let run = map.setup.run(speeds[0], &finished).unwrap();
+    // Every step of a completed run is counted when it finishes, so none is missing at the end.
     let steps = map.setup.communication_steps();
     let internal = steps * run.outcome.as_ref().unwrap().factor as u64;
-    assert_eq!((taken.load(Ordering::Relaxed), run.outcome.unwrap().internal_steps), (steps, internal));
-    // A rejected run takes no step.
-    let refused = map.setup.run(1e9, &taken).unwrap();
-    assert!(refused.outcome.is_err() && taken.load(Ordering::Relaxed) == 2 * steps);
+    assert_eq!((finished.load(Ordering::Relaxed), run.outcome.unwrap().internal_steps), (steps, internal));
+    // A rejected run performs no step, and all its steps are added at the end.
+    let rejected = map.setup.run(1e9, &finished).unwrap();
+    assert!(rejected.outcome.is_err() && finished.load(Ordering::Relaxed) == 2 * steps);
 }
 
 #[test]

@@ -11,9 +11,9 @@ use crate::{
     plan::{Plan, VariableTarget},
 };
 
-/// Number of runs whose scenes are tried for the check of names, until one is accepted.
-const MOST_TRIED: usize = 8;
-/// Keys of the scene whose value is the start value of a variable, and the end of the name of this variable.
+/// Largest number of runs whose scenes are tried for the check of names, until one is accepted.
+const MAX_TRIED_RUNS: usize = 8;
+/// Keys of the scene whose value is the start value of a variable, each with the last part of the variable's name.
 const REPLACED_FIELDS: [(&str, &str); 11] = [
     ("structure.speed", "speed"),
     ("structure.damping_ratio", "damping_ratio"),
@@ -38,8 +38,8 @@ fn start_values(plan: &Plan) -> impl Iterator<Item = &str> {
 }
 
 impl PartRun<'_> {
-    /// Checks that all variables and outputs of the plan exist, with the first of the pending runs whose scene is accepted. If no scene is accepted,
-    /// the reasons become rows.
+    /// Checks that all variables and outputs of the plan exist, in the first pending run whose scene is accepted. If no scene is accepted, the
+    /// reasons become rows.
     pub(super) fn check_names(&mut self) -> Result<()> {
         let plan = self.request.plan;
         let in_plan = |failure: Failure| {
@@ -49,7 +49,7 @@ impl PartRun<'_> {
             }
             failure.at(plan.path.display())
         };
-        for run in self.pending.iter().copied().take(MOST_TRIED).collect::<Vec<_>>() {
+        for run in self.pending.iter().copied().take(MAX_TRIED_RUNS).collect::<Vec<_>>() {
             self.load_models(run)?;
             let scene = self.case(run).and_then(|case| case.scene(&self.store));
             let compiled = scene.and_then(|scene| native::compiled(&scene, &plan.schedule(&scene.settings)?));
@@ -80,8 +80,8 @@ impl PartRun<'_> {
         Ok(())
     }
 
-    /// Rejects a plan in which a start value replaces a field that also varies, so that the values of the field have no effect. `simulation` is the
-    /// scene of a run.
+    /// Rejects a plan in which a start value replaces a field that also varies, because the values of this field would have no effect. `simulation`
+    /// is that of the run.
     fn check_replaced_fields(&self, run: usize, simulation: &Simulation) -> Result<()> {
         let plan = self.request.plan;
         for (index, variable) in plan.variables.iter().enumerate() {
@@ -100,7 +100,8 @@ impl PartRun<'_> {
         Ok(())
     }
 
-    /// Returns whether a start value of the scene changes with the field of a variable (by index): without this field, or with its next value.
+    /// Returns whether the start value `name` depends on the field of a variable (by index): whether it changes if the field has its value in the
+    /// scene, or another value of the plan.
     fn has_effect(&self, run: usize, variable: usize, name: &str, simulation: &Simulation) -> bool {
         let plan = self.request.plan;
         let start_value = |simulation: &Simulation| {

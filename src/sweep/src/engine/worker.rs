@@ -22,8 +22,8 @@ use crate::{
     row::{Row, Status},
 };
 
-/// Number of results of slow checks that are kept.
-const MOST_CHECKS: usize = 256;
+/// Largest number of cached results of slow checks.
+const MAX_CACHED_CHECKS: usize = 256;
 /// Parts of the names of parameters on which slow checks depend.
 const CHECKED_PARAMETERS: [&str; 7] =
     ["friction", "damping", "internal_step", "scheme", "solver", "tolerance", "velocity"];
@@ -35,13 +35,13 @@ fn checks_key(scene: &str, settings: &[(String, String)]) -> String {
     settings.fold(scene.to_owned(), |key, (name, value)| format!("{key}\n{name}={value}"))
 }
 
-/// Does single runs, on any thread.
+/// Performs single runs, on any thread.
 pub(super) struct Worker<'a> {
     request: &'a SweepRequest<'a>,
     first: usize,
     digests: &'a [CaseDigest],
     store: &'a RomStore<'a>,
-    /// Last scene with its digest; runs that differ in start values only share it.
+    /// Last scene with its digest. Runs that differ only in start values share it.
     scene: Mutex<Option<(String, Arc<Scene>)>>,
     /// Results of slow checks, by the scene and the start values on which they may depend.
     checks: Mutex<HashMap<String, Arc<Vec<u8>>>>,
@@ -58,7 +58,7 @@ impl<'a> Worker<'a> {
         Self { request, first, digests, store, scene: Mutex::new(None), checks: Mutex::default() }
     }
 
-    /// Does a run (from 0). A panic is a failure of this run alone.
+    /// Performs a run (counted from 0). A panic fails only this run.
     pub(super) fn run(&self, run: usize) -> (Row, Option<History>) {
         let digest = &self.digests[run - self.first];
         let clock = Instant::now();
@@ -79,23 +79,23 @@ impl<'a> Worker<'a> {
     }
 
     fn results(&self, run: usize, digest: &CaseDigest) -> Result<(NativeRun, Schedule), Box<(Status, Failure)>> {
-        let refused = |failure| Box::new((Status::Refused, failure));
+        let rejected = |failure| Box::new((Status::Refused, failure));
         let plan = self.request.plan;
-        let case = Case::new(plan, run).map_err(refused)?;
-        let scene = self.scene(&case, &digest.scene).map_err(refused)?;
-        let schedule = plan.schedule(&scene.settings).map_err(refused)?;
+        let case = Case::new(plan, run).map_err(rejected)?;
+        let scene = self.scene(&case, &digest.scene).map_err(rejected)?;
+        let schedule = plan.schedule(&scene.settings).map_err(rejected)?;
         let key = checks_key(&digest.scene, &case.settings);
         let known = self.checks.lock().ok().and_then(|checks| checks.get(&key).cloned());
         let known = known.unwrap_or_else(|| Arc::new(self.request.cache.checks(&scene)));
         let given = RunInputs { settings: &case.settings, checks: &known, ..RunInputs::default() };
-        let started = StartedRun::new(&scene, &schedule, given).map_err(refused)?;
+        let started = StartedRun::new(&scene, &schedule, given).map_err(rejected)?;
         let results = started.finish(&|_| {}).map_err(|failure| Box::new((Status::Failed, failure)))?;
         if let Ok(mut checks) = self.checks.lock() {
-            // For the other parts on this machine.
+            // The first results are written to the cache for the other parts on this machine.
             if checks.is_empty() && *known != results.checks {
                 self.request.cache.keep_checks(&scene, &results.checks);
             }
-            if checks.len() >= MOST_CHECKS {
+            if checks.len() >= MAX_CACHED_CHECKS {
                 checks.clear();
             }
             checks.entry(key).or_insert_with(|| Arc::new(results.checks.clone()));

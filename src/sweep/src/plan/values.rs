@@ -104,7 +104,7 @@ fn text(value: &Value) -> Result<String> {
     }
 }
 
-/// Appends start values; keys with points may be nested tables.
+/// Appends start values. Keys that contain dots may be nested tables.
 pub(super) fn flatten(table: &toml::Table, prefix: &str, found: &mut Vec<(String, String)>) -> Result<()> {
     for (key, value) in table {
         let name = format!("{prefix}{key}");
