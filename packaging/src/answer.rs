@@ -112,14 +112,11 @@ fn torque(recording: &Recording) -> AnswerLine {
 
 fn clearance(recording: &Recording, found: &[Extreme], tolerance: f64) -> AnswerLine {
     let least = found.iter().find(|extreme| extreme.name == "smallest_clearance");
+    let touch = Touch::new(recording, tolerance);
     let (value, meaning) = match least {
-        Some(extreme) if extreme.value.abs() < tolerance => {
-            let column = recording.column("clearance_minimum").unwrap_or_default();
-            let touch = column.iter().zip(&recording.times).find(|(clearance, _)| **clearance < tolerance);
-            let first = touch.map_or(extreme.time, |(_, time)| *time);
-            let impulses = recording.column("normal_impulse");
-            let is_loaded = impulses.is_none_or(|impulses| impulses.iter().any(|impulse| *impulse != 0.0));
-            let how = if is_loaded { "in contact" } else { "tips reach the casing without a contact force" };
+        Some(extreme) if extreme.value.abs() < touch.limit => {
+            let first = touch.time.unwrap_or(extreme.time);
+            let how = if touch.has_force { "in contact" } else { "tips reach the casing without a contact force" };
             // In closed contact, the clearance is rounding or an error of the steps.
             let is_rounding = extreme.value.abs() < ROUNDING;
             let [length, tolerance] = [extreme.value.abs(), tolerance].map(six_digits);
@@ -147,6 +144,31 @@ fn clearance(recording: &Recording, found: &[Extreme], tolerance: f64) -> Answer
 
 /// Clearances (m) below this belong to closed contact.
 const ROUNDING: f64 = 1e-12;
+
+/// First contact of a run.
+struct Touch {
+    /// False if the run has no contact force.
+    has_force: bool,
+    /// Clearance (m) below which tips are in contact: the tolerance of the steps, or rounding in a run without contact forces.
+    limit: f64,
+    /// Time of the first contact (s).
+    time: Option<f64>,
+}
+
+impl Touch {
+    fn new(recording: &Recording, tolerance: f64) -> Self {
+        let impulses = recording.column("normal_impulse");
+        let has_force = impulses.as_ref().is_none_or(|impulses| impulses.iter().any(|impulse| *impulse != 0.0));
+        let limit = if has_force { tolerance } else { ROUNDING };
+        let closed = |clearances: Vec<f64>| clearances.into_iter().map(|clearance| clearance < limit).collect();
+        let touches: Vec<bool> = match impulses.filter(|_| has_force) {
+            Some(impulses) => impulses.into_iter().map(|impulse| impulse != 0.0).collect(),
+            None => recording.column("clearance_minimum").map_or_else(Vec::new, closed),
+        };
+        let time = touches.iter().zip(&recording.times).find(|(touches, _)| **touches).map(|(_, time)| *time);
+        Self { has_force, limit, time }
+    }
+}
 
 /// Returns the largest vibration energy of the last third of the run relative to that of the middle third.
 fn growth(recording: &Recording) -> AnswerLine {
@@ -229,6 +251,13 @@ mod tests {
         let rows: [&[f64]; 3] = [&[1e-4, 0.0], &[0.0, 0.0], &[1e-4, 0.0]];
         let grazing = text(&lines(&recording(&["clearance_minimum", "normal_impulse"], &rows), 1e-7));
         assert!(grazing.contains("without a contact force") && !grazing.contains("in contact"), "{grazing}");
+        // Without a contact force, tips that come closer than the tolerance do not touch.
+        let rows: [&[f64]; 3] = [&[1e-4, 0.0], &[6e-9, 0.0], &[1e-4, 0.0]];
+        let missed = text(&lines(&recording(&["clearance_minimum", "normal_impulse"], &rows), 1e-7));
+        assert!(missed.contains("clearance  6e-9 m") && missed.contains("smallest, at t = 0.5 s"), "{missed}");
+        let rows: [&[f64]; 3] = [&[6e-9, 0.0], &[6e-9, 2.0], &[1e-4, 0.0]];
+        let late = text(&lines(&recording(&["clearance_minimum", "normal_impulse"], &rows), 1e-7));
+        assert!(late.contains("in contact, first at t = 0.5 s"), "{late}");
     }
 
     #[test]

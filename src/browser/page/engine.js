@@ -61,7 +61,9 @@ function createEngine(post, slice) {
 
   return async message => {
     try {
-      if (message.kind === "load") await load(message); else run(message);
+      if (message.kind === "stop") clearTimeout(timer);
+      else if (message.kind === "load") await load(message);
+      else run(message);
     } catch (error) { fail(message.id, error); }
   };
 }

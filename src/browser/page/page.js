@@ -3,6 +3,7 @@
 const find = name => document.querySelector(name);
 const NOMINAL = 356; // clearance in the scene (µm)
 const TOLERANCE = 1e-2 * 3.56e-4; // error of the adaptive steps in closed contact (m)
+const ROUNDING = 1e-12; // rounding of a clearance (m)
 const BLADES = 36, TURN = 2 * Math.PI;
 const STEPS_PER_MS = 100; // communication steps of the scene
 // Outputs that the page reads, in the order of a row after the time.
@@ -30,7 +31,7 @@ async function unpack(id) {
 function start(scene, useWorker) {
   state.stop?.();
   note.hidden = true;
-  state.count = 0;
+  Object.assign(state, { count: 0, loading: true });
   document.body.dataset.busy = "true";
   const { wasm, rom } = state.files;
   const loading = { kind: "load", wasm, rom, scene: scene ?? state.files.scene, names: NAMES };
@@ -51,7 +52,7 @@ function start(scene, useWorker) {
   }
   let alive = true;
   const engine = createEngine(message => { if (alive) receive(message); }, 10);
-  state.stop = () => { alive = false; };
+  state.stop = () => { alive = false; engine({ kind: "stop" }); };
   state.engine = engine;
   state.inWorker = false;
   engine(loading);
@@ -64,6 +65,7 @@ function values() {
 
 /** Runs the scene with the values of the sliders. */
 function run() {
+  if (!state.files) return;
   const settings = values();
   if (state.done) state.before = state.rows;
   Object.assign(state, { id: state.id + 1, rows: [], done: false, numbers: null });
@@ -72,12 +74,15 @@ function run() {
   note.hidden = true;
   find(".warnings").hidden = true;
   document.body.dataset.busy = "true";
+  clearNumbers();
   if (state.count) state.engine({ kind: "run", id: state.id, values: settings });
+  else if (!state.loading) start(null, true);
 }
 
 function receive(message) {
   if (message.kind === "failed" && (message.id === undefined || message.id === state.id)) { failed(message.text); return; }
   if (message.kind === "loaded") {
+    state.loading = false;
     state.count = message.count;
     clock.max = String(message.count);
     run();
@@ -102,7 +107,8 @@ function receive(message) {
 }
 
 function failed(text) {
-  state.done = false;
+  Object.assign(state, { done: false, loading: false });
+  find(".again").hidden = !state.files;
   note.hidden = false;
   find(".note span").textContent = text;
   find(".status").textContent = "stopped";
@@ -116,10 +122,11 @@ function force(rows, index) { return index ? rows[index][IMPULSE] / (rows[index]
 
 /** The five numbers that `tiprub run` prints, computed in the same order of operations. */
 function numbers(rows) {
-  let largest = 0, torque = 0, clearance = Infinity;
+  let largest = 0, torque = 0, clearance = Infinity, touches = false;
   rows.forEach((row, index) => {
     largest = Math.max(largest, force(rows, index));
     clearance = Math.min(clearance, row[CLEARANCE]);
+    touches ||= row[IMPULSE] !== 0;
     if (index) torque += (row[TIME] - rows[index - 1][TIME]) * row[TORQUE];
   });
   const last = rows[rows.length - 1], third = Math.floor(rows.length / 3);
@@ -129,7 +136,7 @@ function numbers(rows) {
     force: largest,
     heat: last[HEAT],
     torque: torque / (last[TIME] - rows[0][TIME]),
-    clearance: Math.abs(clearance) < TOLERANCE ? 0 : clearance,
+    clearance: Math.abs(clearance) < (touches ? TOLERANCE : ROUNDING) ? 0 : clearance,
     growth: middle > 0 ? end / middle : null,
   };
 }
@@ -138,6 +145,11 @@ function digits(value) {
   if (value === null) return "–";
   const size = Math.abs(value), places = size >= 100 || size === 0 ? 0 : size >= 10 ? 1 : size >= 1 ? 2 : 3;
   return (Number(value.toFixed(places)) || 0).toLocaleString("en", { minimumFractionDigits: places, maximumFractionDigits: places }).replace("-", "−");
+}
+
+/** Removes the numbers of the previous run. */
+function clearNumbers() {
+  document.querySelectorAll(".numbers [data-name]").forEach(number => { number.textContent = "–"; });
 }
 
 function showNumbers() {

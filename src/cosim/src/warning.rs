@@ -87,7 +87,7 @@ topics! {
         "Use a smaller `time.step` or adaptive steps.";
     MasslessEnergy "massless-energy"
         "`massless-boundary` with this step may add energy when contact opens and closes."
-        "Use a smaller `time.step`, damping ratios of at least 1e-3, or adaptive steps.";
+        "Use a smaller `time.step` or adaptive steps, or compare the energies with those of half the step.";
     MasslessBlades "massless-blades"
         "`massless-boundary` is proven stable for a limited number of blades in contact at the same time, not for \
          all blades."

@@ -4,7 +4,7 @@ use std::fmt::Debug;
 
 use tiprub_core::Rom;
 use tiprub_field::shape_file;
-use tiprub_format::name_hint;
+use tiprub_format::closest_name;
 use tiprub_model::{
     CasingOptions, Mesh, Rotor37Options, SurfaceShapes,
     casing::CASING37,
@@ -67,7 +67,12 @@ pub(crate) const NAMES: [&str; 13] = [
 
 /// Returns the remedy for an unknown name of a built-in model. It proposes a similar name if there is one.
 pub fn unknown_model_remedy(name: &str) -> String {
-    format!("{}Give a ROM file, or one of {}", name_hint(name, NAMES), with_prefix(&NAMES))
+    format!("{}Give a ROM file, or one of {}", hint_with_prefix(name, NAMES), with_prefix(&NAMES))
+}
+
+/// Returns the question whether a similar built-in name is meant, with its prefix; an empty text if there is none.
+pub fn hint_with_prefix<'a>(name: &str, accepted: impl IntoIterator<Item = &'a str>) -> String {
+    closest_name(name, accepted).map_or(String::new(), |name| format!("Did you mean `{BUILTIN}{name}`? "))
 }
 
 /// Returns the names of built-in scenes or models with their prefix.

@@ -9,7 +9,7 @@ use std::{
 
 use tiprub_core::scene::settings::SceneSettings;
 use tiprub_core::{Rom, Scene};
-use tiprub_format::{builtin_model, name_hint};
+use tiprub_format::builtin_model;
 use tiprub_shell::{Failure, Result, console::Console};
 
 use crate::{builtin, rom_cache::RomCache};
@@ -149,7 +149,7 @@ fn source(argument: &OsStr) -> Result<SceneSource<'_>> {
         let Some((_, text)) = BUILTIN_SCENES.iter().find(|(known, _)| *known == name) else {
             let names = BUILTIN_SCENES.map(|(known, _)| known);
             let known = builtin::with_prefix(&names);
-            let remedy = format!("{}Give a scene file, or one of {known}", name_hint(name, names));
+            let remedy = format!("{}Give a scene file, or one of {known}", builtin::hint_with_prefix(name, names));
             return Err(Failure::usage(argument, "there is no such built-in scene", remedy));
         };
         return Ok(SceneSource::Embedded(argument, text));
@@ -275,14 +275,14 @@ mod tests {
         assert!(missing.to_string().starts_with("/nowhere/scene.toml"), "{missing}");
         let failure = load("builtin:rotor38", &console).unwrap_err();
         assert_eq!(failure.what, "builtin:rotor38");
-        for words in ["Did you mean `rotor37`?", "builtin:abradable"] {
+        for words in ["Did you mean `builtin:rotor37`?", "builtin:abradable"] {
             assert!(failure.remedy.contains(words), "{failure}");
         }
         let root = tempfile::tempdir().unwrap();
         let path = root.path().join("scene.toml");
         fs::write(&path, ROTOR37_SCENE.replace("builtin:rotor37", "builtin:rotor73")).unwrap();
         let failure = super::load(&path, &RomCache::off(), &console).unwrap_err();
-        for words in ["`rotor73`", "Did you mean `rotor37`?", "builtin:casing37"] {
+        for words in ["`rotor73`", "Did you mean `builtin:rotor37`?", "builtin:casing37"] {
             assert!(failure.to_string().contains(words), "{failure}");
         }
         for (name, kind) in [("rub.fmu", "an FMU"), ("blade.rom.safetensors", "a ROM")] {

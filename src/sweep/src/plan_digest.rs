@@ -37,14 +37,17 @@ pub fn plan_digest(plan: &Plan, program: &Path, sources: &dyn SweepSources) -> R
     Ok(content_digest(items.join("\n").as_bytes()))
 }
 
-/// Returns the metadata of result files that identify a plan: the digest of its path, and the digest of its text and scene.
+/// Returns the metadata of result files that identify a plan: the digest of its path, and the digest of its text, its scene, and the files that
+/// it names.
 pub(crate) fn plan_facts(plan: &Plan) -> [(&'static str, String); 2] {
     let path = std::fs::canonicalize(&plan.path).unwrap_or_else(|_| plan.path.clone());
     let text = std::fs::read(&plan.path).unwrap_or_default();
-    let content = [content_digest(&text), content_digest(plan.scene.text.as_bytes())].join("\n");
+    let mut content = vec![content_digest(&text), content_digest(plan.scene.text.as_bytes())];
+    let files = plan::input_files(&plan.path);
+    content.extend(files.iter().map(|path| std::fs::read(path).map_or(String::new(), |bytes| content_digest(&bytes))));
     [
         ("tiprub.plan_path", content_digest(path.as_os_str().as_encoded_bytes())),
-        ("tiprub.plan_content", content_digest(content.as_bytes())),
+        ("tiprub.plan_content", content_digest(content.join("\n").as_bytes())),
     ]
 }
 

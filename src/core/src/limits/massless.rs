@@ -26,7 +26,7 @@ const MARGIN: f64 = 1e-6;
 /// Fraction of the limit up to which steps are accepted. Closed contact is stable up to the limit, but a node that opens and closes
 /// switches between two springs, which pumps energy in bands of step sizes. Twelve blades pressed on a round casing for 0.1 s with 1e-3 of
 /// damping gain no energy at 0.8 of the limit, and hundreds of times their energy at 0.85.
-const USABLE: f64 = 0.8;
+pub(crate) const USABLE: f64 = 0.8;
 /// Fraction of the limit if closed contact is much stiffer than the modes with inertia, whose damping then has too little effect on
 /// bouncing nodes: nodes a hundred times as stiff as their base settle there with a damping ratio of 0.02, but not from 0.5 on.
 pub(crate) const USABLE_STIFF: f64 = 0.25;
@@ -37,8 +37,6 @@ const STIFF: f64 = 10.0;
 const TOO_STIFF: f64 = 300.0;
 /// Fraction of the limit up to which the same blades gain no energy without damping: at 0.5 they gain a fifth of their energy.
 pub const QUIET: f64 = 0.4;
-/// Damping ratio with which the same blades gain no energy up to [`USABLE`].
-pub const DAMPED: f64 = 1e-3;
 /// Sum of eigenvalues below which closed contact is stable.
 pub(crate) const STABLE: f64 = 4.0;
 
@@ -49,21 +47,15 @@ pub struct MasslessLimit {
     pub closed: f64,
     /// Contact that opens and closes gains hardly any energy below this step.
     pub usable: f64,
-    /// Contact that opens and closes gains no energy below this step.
-    pub quiet: f64,
 }
 
 impl MasslessLimit {
     /// No limit.
-    pub const NONE: Self = Self { closed: f64::INFINITY, usable: f64::INFINITY, quiet: f64::INFINITY };
+    pub const NONE: Self = Self { closed: f64::INFINITY, usable: f64::INFINITY };
 
     /// Returns the smaller value of each limit.
     pub(crate) fn tightest(self, other: Self) -> Self {
-        Self {
-            closed: self.closed.min(other.closed),
-            usable: self.usable.min(other.usable),
-            quiet: self.quiet.min(other.quiet),
-        }
+        Self { closed: self.closed.min(other.closed), usable: self.usable.min(other.usable) }
     }
 }
 
@@ -153,7 +145,8 @@ impl MasslessCheck<'_> {
     /// # Errors
     /// Residual flexibility that is singular along the normals, or much stiffer than the modes with inertia.
     pub fn limit(&self, largest: f64) -> Result<MasslessLimit, ErrorKind> {
-        let stiffening = self.stiffening(1e-3 / self.model.largest_frequency());
+        let small = small_step(self.model);
+        let stiffening = self.eigenvalues(small).map_or(1.0, |(own, carrier)| self.stiffening(small, own + carrier));
         if stiffening > TOO_STIFF {
             return Err(ErrorKind::StiffContact { factor: stiffening });
         }
@@ -161,24 +154,16 @@ impl MasslessCheck<'_> {
         if closed.is_infinite() {
             return Ok(MasslessLimit::NONE);
         }
-        let share = if stiffening > STIFF { USABLE_STIFF } else { USABLE };
-        let is_damped = self.damping_ratios().all(|ratio| ratio >= DAMPED);
-        let quiet = if is_damped { f64::INFINITY } else { QUIET * closed };
-        Ok(MasslessLimit { closed, usable: share * closed, quiet })
+        Ok(MasslessLimit { closed, usable: usable_fraction(stiffening) * closed })
     }
 
-    /// Factor by which closed contact raises the square of the highest frequency of the modes with inertia, at a small step (s).
-    fn stiffening(&self, step: f64) -> f64 {
+    /// Returns the factor by which closed contact raises the square of the highest frequency of the modes with inertia. `eigenvalue` is
+    /// that of closed contact at a small step (s).
+    pub(crate) fn stiffening(&self, step: f64, eigenvalue: f64) -> f64 {
         let coefficients = self.model.coefficients(Scheme::MasslessBoundary, step);
         let dynamic = self.model.dynamic_modes(Scheme::MasslessBoundary);
         let open = coefficients[..dynamic].iter().fold(0.0, |most: f64, mode| most.max(per_mass(mode, mode.kappa)));
-        self.eigenvalues(step).map_or(1.0, |(master, carrier)| (master + carrier) / open)
-    }
-
-    /// Returns the damping ratios of all modes with inertia, and of the modes of the carriers.
-    fn damping_ratios(&self) -> impl Iterator<Item = f64> {
-        let own = &self.model.damping_ratios[..self.model.dynamic_modes(Scheme::MasslessBoundary)];
-        own.iter().chain(self.carriers.iter().flat_map(|carrier| &carrier.model.damping_ratios)).copied()
+        eigenvalue / open
     }
 
     fn closed(&self, largest: f64) -> Result<f64, ErrorKind> {
@@ -186,7 +171,7 @@ impl MasslessCheck<'_> {
             let found = self.eigenvalues(step).map(|(master, carrier)| master + carrier >= STABLE * (1.0 - MARGIN));
             found.ok_or(ErrorKind::RigidNormal)
         };
-        let first = 1e-3 / self.model.largest_frequency();
+        let first = small_step(self.model);
         let mut high = first.min(largest);
         while !unstable(high)? {
             if high >= largest {
@@ -201,6 +186,16 @@ impl MasslessCheck<'_> {
         }
         Ok(high)
     }
+}
+
+/// A step (s) that resolves all modes well.
+pub(crate) fn small_step(model: &ModalModel) -> f64 {
+    1e-3 / model.largest_frequency()
+}
+
+/// Returns the fraction of the limit up to which steps are accepted if closed contact stiffens by this factor.
+pub(crate) fn usable_fraction(stiffening: f64) -> f64 {
+    if stiffening > STIFF { USABLE_STIFF } else { USABLE }
 }
 
 /// D and X of a mode with inertia in the worst case at steps up to `step` (s): at ω_d h = π if the step exceeds it.
@@ -223,12 +218,7 @@ pub fn check(step: f64, limit: MasslessLimit) -> Result<(), ErrorKind> {
     if step < limit.usable { Ok(()) } else { Err(ErrorKind::MasslessStep { step, limit }) }
 }
 
-/// Returns whether closed contact with this sum of eigenvalues is stable.
-pub(crate) fn is_stable(eigenvalues: f64) -> bool {
-    eigenvalues < STABLE
-}
-
-/// Returns a warning if contact that opens and closes gains energy at a step (s), because damping does not dissipate it.
+/// Returns a warning if contact that opens and closes may gain energy at a step (s).
 pub fn warning(step: f64, limit: MasslessLimit) -> Option<WarningKind> {
-    (step >= limit.quiet).then_some(WarningKind::MasslessEnergy { step, limit })
+    (step >= QUIET * limit.closed).then_some(WarningKind::MasslessEnergy { step, limit })
 }

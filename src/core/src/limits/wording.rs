@@ -239,9 +239,8 @@ impl WarningKind {
                 format!("Set `time.step` below {:.2e} s", rounded_down(unresolved::NEAR * limit))
             }
             Self::MasslessEnergy { limit, .. } => {
-                let step = rounded_down(limit.quiet);
-                let damped = massless::DAMPED;
-                format!("Set `time.step` below {step:.2e} s, or damping ratios of at least {damped:.0e}")
+                let step = rounded_down(massless::QUIET * limit.closed);
+                format!("Set `time.step` below {step:.2e} s, or compare the energies with those of half the step")
             }
             Self::Flutter { opens_after: Some(time), .. } => {
                 format!(

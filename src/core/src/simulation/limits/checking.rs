@@ -7,6 +7,7 @@ use crate::geometry::spline::SplineGap;
 use crate::geometry::{GapLaw, Vector3};
 use crate::limits::finding::{Checked, ErrorKind, Finding, Subject, WarningKind};
 use crate::limits::{self, ContactDirections};
+use crate::math::real;
 use crate::math::vector::vector3_at;
 use crate::modes::cyclic::CyclicModel;
 use crate::modes::modal::ModalModel;
@@ -25,10 +26,10 @@ use std::cell::LazyCell;
 const ALL_COMBINATIONS_UP_TO: usize = 3;
 
 /// Number of angles at which a flexible surface carrier is checked.
-pub(super) const CARRIER_ANGLES: u32 = 48;
+pub(super) const CARRIER_ANGLES: usize = 48;
 
-pub(super) fn carrier_angle(place: u32) -> f64 {
-    std::f64::consts::TAU * f64::from(place) / f64::from(CARRIER_ANGLES)
+pub(super) fn carrier_angle(place: usize) -> f64 {
+    std::f64::consts::TAU * real(place) / real(CARRIER_ANGLES)
 }
 
 /// Returns the modes of the surface carrier along normals and tangents of `nodes` of a blade at `angle` (rad), nodes × modes; 0 for

@@ -13,8 +13,8 @@ use crate::math::real;
 use crate::modes::cyclic::CyclicModel;
 use crate::modes::modal::ModalModel;
 
-/// Number of rotor angles per sector at which all blades are checked together.
-const ANGLES_PER_SECTOR: u8 = 4;
+/// Smallest number of rotor angles per sector at which all blades are checked together.
+const ANGLES_PER_SECTOR: usize = 4;
 
 /// The surfaces that carriers deform, and the modes of the carriers at the control points of these surfaces.
 type CarriedSurfaces<'a> = [(&'a SplineGap, usize, ModalModel)];
@@ -54,20 +54,19 @@ impl Checking<'_> {
             }
             // Only the tightest of several limits counts.
             limit = limit.tightest(check.limit(largest.min(limit.closed))?);
-            let found = check.eigenvalues(step).unwrap_or(worst);
+            let found = check.eigenvalues(step / massless::USABLE).unwrap_or(worst);
             worst = (found.0.max(worst.0), found.1.max(worst.1));
         }
         massless::check(step, limit)?;
         let (master, carrier) = worst;
         let sectors = self.compiled.body(self.body).1.sectors;
         let are_all_stable = || {
-            let compute = || self.carrier_eigenvalue_of_all_blades(&carried, step);
-            let added = self.known.get(CheckPart::AllBladesOnCarrier, &[step.to_bits()], compute);
-            added.is_some_and(|added| massless::is_stable(master + added))
+            let compute = || self.eigenvalue_of_all_blades(&carried, step);
+            let found = self.known.get(CheckPart::AllBladesOnCarrier, &[step.to_bits()], compute);
+            found.is_some_and(|found| found < massless::STABLE)
         };
-        let is_unproven = !massless::is_stable(master + real(sectors) * carrier) && !are_all_stable();
-        let blades = is_unproven.then(|| {
-            let stable = ((massless::STABLE - master) / carrier).floor();
+        let blades = (!carried.is_empty() && !are_all_stable()).then(|| {
+            let stable = ((massless::STABLE - master) / carrier).floor().max(1.0);
             WarningKind::MasslessBlades { stable, sectors }
         });
         Ok((massless::warning(step, limit).into_iter().chain(blades).collect(), limit))
@@ -97,6 +96,22 @@ impl Checking<'_> {
         carried.iter().map(under).collect()
     }
 
+    /// Returns a bound on the eigenvalues of closed contact of all blades, at a step that is longer than `step` (s) by the margin of the
+    /// accepted steps. `None` if the flexibility of the contact nodes is singular.
+    fn eigenvalue_of_all_blades(&self, carried: &CarriedSurfaces, step: f64) -> Option<f64> {
+        let small = massless::small_step(&self.models[0]);
+        let added = self.carrier_eigenvalue_of_all_blades(carried, small)?;
+        let mut stiffenings = self.models.iter().map(|model| {
+            let check = self.without_carriers(model);
+            Some(check.stiffening(small, check.eigenvalues(small)?.0 + added))
+        });
+        let stiffening = stiffenings.try_fold(0.0, |most: f64, found| Some(most.max(found?)))?;
+        let longer = step / massless::usable_fraction(stiffening);
+        let mut masters = self.models.iter().map(|model| Some(self.without_carriers(model).eigenvalues(longer)?.0));
+        let master = masters.try_fold(0.0, |most: f64, found| Some(most.max(found?)))?;
+        Some(master + self.carrier_eigenvalue_of_all_blades(carried, longer)?)
+    }
+
     /// Returns the largest eigenvalue that the carriers add at a step (s) while all blades are in contact, over all checked rotor angles.
     /// Distant blades hardly interact, so it is much smaller than the sum over the blades. `None` if the flexibility of the contact nodes
     /// is singular.
@@ -108,7 +123,7 @@ impl Checking<'_> {
             .iter()
             .map(|model| self.without_carriers(model).flexibility_factor(step))
             .collect::<Option<_>>()?;
-        let at_angle = |first: f64| {
+        let at_angle = |first: f64| -> Option<f64> {
             let under = |sector: usize| {
                 let angle = first + pitch * real(sector);
                 let each = carried.iter().map(|(gap, _, model)| {
@@ -120,7 +135,9 @@ impl Checking<'_> {
             let blades: Vec<DMatrix<f64>> = (0..sectors).map(under).collect();
             largest_eigenvalue(&blades, &flexibilities, self.disk())
         };
-        let angles = (0..ANGLES_PER_SECTOR).map(|place| pitch * f64::from(place) / f64::from(ANGLES_PER_SECTOR));
+        // At least as many angles as for one blade.
+        let count = ANGLES_PER_SECTOR.max(CARRIER_ANGLES.div_ceil(sectors));
+        let angles = (0..count).map(|place| pitch * real(place) / real(count));
         angles.map(at_angle).try_fold(0.0, |most: f64, found| Some(most.max(found?)))
     }
 }
