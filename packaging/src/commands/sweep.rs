@@ -92,10 +92,9 @@ pub fn run(arguments: &SweepArguments, console: &Console) -> Result<CommandOutco
 /// Checks the plan without running it.
 fn check(request: &SweepRequest, digest: &str) -> Result<CommandOutcome> {
     let size = engine::check(request)?;
-    let done = size.runs - size.pending;
     let text = format!(
-        "the plan has {} runs; part {} has {}, of which {done} need no work\ndigest: {digest}",
-        size.plan_runs, request.part, size.runs
+        "the plan has {} runs; {} of the {} runs of part {} are not finished\ndigest: {digest}",
+        size.plan_runs, size.pending, size.runs, request.part
     );
     let json = json!({
         "plan_runs": size.plan_runs,

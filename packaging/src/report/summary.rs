@@ -16,7 +16,7 @@ const STEADY: f64 = 1.1;
 /// Times of contact.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ContactTime {
-    /// Start of the first communication step with contact (s).
+    /// End of the first communication step with contact (s).
     pub(super) first: f64,
     /// Total length of the communication steps with contact (s).
     pub(super) total: f64,
@@ -174,7 +174,7 @@ fn contact_time(recording: &tiprub_shell::recording::Recording) -> Option<Contac
     let impulses = recording.column("normal_impulse")?;
     let steps = recording.times.windows(2).zip(&impulses[1.min(impulses.len())..]);
     let touching: Vec<(f64, f64)> =
-        steps.filter(|(_, impulse)| **impulse != 0.0).map(|(ends, _)| (ends[0], ends[1] - ends[0])).collect();
+        steps.filter(|(_, impulse)| **impulse != 0.0).map(|(ends, _)| (ends[1], ends[1] - ends[0])).collect();
     let first = touching.first().map_or(0.0, |step| step.0);
     Some(ContactTime { first, total: touching.iter().fold(0.0, |sum, step| sum + step.1) })
 }
@@ -191,7 +191,7 @@ mod tests {
             values: vec![0.0, 0.0, 2.0, 0.0, 1.0],
         };
         let found = contact_time(&recording).unwrap();
-        assert_eq!(found, ContactTime { first: 1.0, total: 1.5 });
+        assert_eq!(found, ContactTime { first: 2.0, total: 1.5 });
         let free = tiprub_shell::recording::Recording { values: vec![0.0; 5], ..recording };
         assert_eq!(contact_time(&free).unwrap().total.to_bits(), 0.0_f64.to_bits());
     }

@@ -242,8 +242,10 @@ mod tests {
                 blades.iter().enumerate().map(|(s, blade)| if s < 2 { blade.clone() } else { blade * 0.0 }).collect();
             assert!(largest_eigenvalue(&few, &factors, Some(&disk)).unwrap() < found);
             let uncoupled = largest_eigenvalue(&blades, &factors[..1], None).unwrap();
-            let bound: f64 =
-                blades.iter().map(|blade| largest_eigenvalue(&[blade.clone()], &factors[..1], None).unwrap()).sum();
+            let bound: f64 = blades
+                .iter()
+                .map(|blade| largest_eigenvalue(std::slice::from_ref(blade), &factors[..1], None).unwrap())
+                .sum();
             assert!(uncoupled <= bound * (1.0 + 1e-12), "{uncoupled} above {bound}");
         }
     }
