@@ -424,15 +424,15 @@ fn massless_boundary_reports_the_stable_number_of_blades() {
     let reported = |blades: usize, share: f64| {
         let mut scene = on_a_ring(round(Scheme::MasslessBoundary));
         scene.roms[0] = models::rich_blade(blades);
-        scene.roms[1].contact_map *= 4.0;
+        scene.roms[1].contact_map *= 2.0;
         let step = share * usable_step(scene.clone());
         let warnings = try_started(&with_step(scene, step)).unwrap().warnings().to_vec();
         let many = warnings.iter().find_map(|text| text.split("stable for up to ").nth(1)?.split(' ').next());
         many.map(|many| many.parse::<usize>().unwrap())
     };
     let many = reported(200, 0.9).unwrap();
-    assert!((1..200).contains(&many), "{many}");
-    assert_eq!([reported(many, 0.9), reported(many + 1, 0.9)], [None, Some(many)]);
+    assert!((2..100).contains(&many), "{many}");
+    assert_eq!(reported(many, 0.9), None);
 }
 
 /// For coupled sectors only the direction of rotation at the start is checked, because the other takes as long again.
