@@ -26,7 +26,7 @@ if [ -z "$rom" ]; then
     cargo build --quiet --release -p tiprub
     program=${CARGO_TARGET_DIR:-$PWD/target}/release/tiprub
     rom=$build/rotor37.rom.safetensors
-    [ "$rom" -nt "$program" ] || "$program" reduce rotor37 --quiet -o "$rom" > /dev/null
+    [ "$rom" -nt "$program" ] || "$program" reduce rotor37 --quiet --force -o "$rom" > /dev/null
 fi
 # The built-in scene, with the clearance and the force of every blade as outputs.
 scene=$build/rotor37.toml
