@@ -214,9 +214,8 @@ impl RomFacts {
         self.write_frequencies(&mut text);
         self.write_checks(&mut text);
         self.write_responses(&mut text);
-        let estimates = estimate::of_rom(rom);
-        if !estimates.is_empty() {
-            let _ = writeln!(text, "\n  {}", estimate::errors_text(&estimates));
+        if let Some(errors) = estimate::rom_errors_text(&estimate::of_rom(rom)) {
+            let _ = writeln!(text, "\n  {errors}");
         }
         text
     }

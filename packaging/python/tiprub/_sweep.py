@@ -100,6 +100,9 @@ def sweep(
         else:
             pilot = None
         wanted = count if runs_per_task is None else math.ceil(check["plan_runs"] / runs_per_task)
+        if pilot is not None:
+            # The first part contains all runs that were measured.
+            wanted = min(wanted, check["plan_runs"] // pilot["runs"])
         if count not in (None, wanted):
             problem = f"contains, with `{histories.name}`, results of this plan in {count} parts, but these runs per task give {wanted}"
             raise Error(str(directory), problem, "Leave out `runs_per_task`, or give another directory with `output`", 2)

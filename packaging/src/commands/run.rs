@@ -208,8 +208,8 @@ fn where_the_rest_is(json: &Value, warned: bool) -> String {
          scheme: {}\n\
          for final outputs, extremes, times and full warnings: --all; outputs over time: {}",
         json["model"].as_str().unwrap_or_default(),
-        json["start"],
-        json["stop"],
+        number("start"),
+        number("stop"),
         number("stepping_seconds"),
         number("real_time_factor"),
         json["scheme"].as_str().unwrap_or_default(),
@@ -252,8 +252,8 @@ fn summary(json: &Value, extremes: &[Extreme], warnings: &[Warning]) -> String {
          stepping took {:.3} s: {:.3} µs per internal step, {:.3} s of computing per simulated second\n\
          one communication step took {:.3} ms on average, {:.3} ms at most\n",
         json["model"].as_str().unwrap_or_default(),
-        json["start"],
-        json["stop"],
+        number("start"),
+        number("stop"),
         json["communication_steps"],
         json["internal_steps"],
         json["scheme"].as_str().unwrap_or_default(),

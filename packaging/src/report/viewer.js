@@ -320,7 +320,7 @@ function start(buffer) {
 
   const most = totals.reduce((a, b) => Math.max(a, b), 0);
   find(".strip path").setAttribute("d", "M0 24" + totals.map((force, f) => `L${(1000 * f / Math.max(1, frames - 1)).toFixed(1)} ${(24 - 23 * (most > 0 ? force / most : 0)).toFixed(1)}`).join("") + "L1000 24z");
-  find(".key .cool + b").textContent = `0 to ${prefix(moving, "m")}`; find(".key .hot + b").textContent = hardest > 0 ? `up to ${prefix(hardest, "N")} per node` : "none";
+  find(".key .cool + b").textContent = `0 to ${prefix(moving, "m")}`; find(".key .hot + b").textContent = hardest > 0 ? `up to ${prefix(hardest, "N")} per contact node` : "none";
   // The first picture shows the largest force; the animation starts shortly before it.
   state.at = Math.max(0, most > 0 ? totals.indexOf(most) : 0);
   slider("time").value = Math.round(steps * state.at / Math.max(1, frames - 1));

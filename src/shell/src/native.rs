@@ -145,7 +145,11 @@ impl<'a> StartedRun<'a> {
             Some(observed) => simulation.search_minima_of(&observed.watched_sectors),
             None => simulation.skip_unneeded_states(),
         }
-        for (variable, value) in given.settings {
+        for (index, (variable, value)) in given.settings.iter().enumerate() {
+            if given.settings[..index].iter().any(|(other, _)| other == variable) {
+                let remedy = "Give one value per variable";
+                return Err(Failure::usage(format!("--set {variable}"), "this variable is set twice", remedy));
+            }
             if given.history.is_some_and(|history| history.holds(variable)) {
                 let problem = "the file given with --inputs also has a column for this variable";
                 let remedy = "Set the variable with either --set or --inputs";
@@ -433,6 +437,12 @@ fn locate(table: &VariableTable, name: &str) -> Result<(DataType, Option<usize>,
         if let Some((_, reference)) = element {
             return Ok((variable.kind, None, reference));
         }
+    }
+    if let Some((whole, _)) = name.split_once('[')
+        && table.find(whole).is_some_and(|variable| variable.dimension.is_none())
+    {
+        let remedy = format!("Write `{whole}`, without an index");
+        return Err(Failure::usage(format!("--set {name}"), format!("`{whole}` has a single value"), remedy));
     }
     let settable: Vec<&str> = table
         .variables()

@@ -202,7 +202,7 @@ impl<'a> PartRun<'a> {
             rows.extend(result_file::read(output)?.into_iter().map(|row| (row.digest.clone(), row)));
         }
         let journals = [&files.journal, &files.history_journal];
-        let created = journals.into_iter().filter(|path| !path.exists()).cloned().collect();
+        let created: Vec<PathBuf> = journals.into_iter().filter(|path| !path.exists()).cloned().collect();
         let (journal, found) = Journal::open(&files.journal)?;
         rows.extend(found.into_iter().map(|row| (row.digest.clone(), row)));
         if plan.histories.is_some() {
@@ -222,8 +222,42 @@ impl<'a> PartRun<'a> {
             store,
             results: Vec::new(),
         };
+        if let Err(failure) = part.check_old_rows() {
+            remove(&created);
+            return Err(failure);
+        }
         part.find_pending();
         Ok((part, created))
+    }
+
+    /// Checks that completing the part loses no results of runs that the plan had before.
+    ///
+    /// # Errors
+    /// The plan no longer has a run whose results are stored.
+    fn check_old_rows(&mut self) -> Result<()> {
+        let plan = self.request.plan;
+        let mut lost: HashSet<&str> =
+            self.rows.values().filter(|row| !row.has_status(Status::Refused)).map(|row| row.digest.as_str()).collect();
+        for digest in &self.digests {
+            lost.remove(digest.run.as_str());
+        }
+        // If the plan has more runs than before, another part may have the run.
+        for run in 0..plan.design.runs() {
+            if lost.is_empty() {
+                return Ok(());
+            }
+            lost.remove(Case::new(plan, run)?.digest(plan, &mut self.store)?.run.as_str());
+        }
+        if lost.is_empty() {
+            return Ok(());
+        }
+        let path = if self.files.rows.exists() { &self.files.rows } else { &self.files.journal };
+        let problem = format!(
+            "contains the results of {} runs that the plan no longer has, because the plan, its files or the release of tiprub are different",
+            lost.len()
+        );
+        let remedy = "Write to another file or directory with --output, or remove this file if you do not need it";
+        Err(Failure::new(path.display(), problem, remedy))
     }
 
     fn find_pending(&mut self) {

@@ -24,7 +24,7 @@ use crate::{
     part::Part,
     plan::Plan,
     result_file,
-    row::Status,
+    row::{Row, Status},
 };
 
 const SCENE: &str = r#"
@@ -226,17 +226,41 @@ fn journal_rows_are_not_computed_again() {
     assert_eq!(texts(&bench.table("new.parquet"), "most_contacts")[6], "77");
 }
 
+/// A changed plan, ROM or scene does not replace finished runs.
 #[test]
-fn changed_scene_rom_or_times_repeat_all_runs() {
+fn results_of_runs_that_a_plan_no_longer_has_are_kept() {
     let bench = Bench::new();
     bench.run(GRID, "a.parquet");
-    assert_eq!(bench.run(&format!("stop = 0.005\n{GRID}"), "a.parquet").resumed, 0);
-    assert_eq!(bench.run(GRID, "a.parquet").resumed, 0);
-    assert_eq!(bench.run(GRID, "a.parquet").resumed, 6);
+    let whole = bench.table("a.parquet");
+    let rejected = |plan: &str, output: &str, runs: &str| {
+        let failure = bench.try_part(plan, output, Part::WHOLE, 1).unwrap_err();
+        assert!(failure.problem.contains(&format!("results of {runs} runs that the plan no longer has")), "{failure}");
+    };
+    rejected(&format!("stop = 0.005\n{GRID}"), "a.parquet", "6");
+    rejected(&GRID.replace("values = [5e-4, 1e-3]", "values = [1e-3]"), "a.parquet", "3");
     fs::write(bench.path("small.rom.safetensors"), tiprub_format::write_rom(&rom(2e5))).unwrap();
-    assert_eq!(bench.run(GRID, "a.parquet").resumed, 0);
+    rejected(GRID, "a.parquet", "6");
+    fs::write(bench.path("small.rom.safetensors"), tiprub_format::write_rom(&rom(1e5))).unwrap();
     fs::write(bench.path("scene.toml"), SCENE.replace("friction = 0.1", "friction = 0.2")).unwrap();
-    assert_eq!(bench.run(GRID, "a.parquet").resumed, 0);
+    rejected(GRID, "a.parquet", "6");
+    assert_eq!(bench.run(GRID, "b.parquet").resumed, 0);
+    assert!(bench.table("a.parquet") == whole && !bench.path("a.parquet.journal").exists());
+    // A journal of an interrupted sweep is kept as well.
+    let row = Row::without_results(&"0".repeat(64), Status::Failed, &Failure::new("a", "b", "c"), 1.0);
+    Journal::open(&bench.path("c.parquet.journal")).unwrap().0.append(&row).unwrap();
+    rejected(GRID, "c.parquet", "1");
+    assert!(bench.path("c.parquet.journal").exists() && !bench.path("c.parquet").exists());
+}
+
+/// More values move runs to other parts. This is no error, because the plan still has them.
+#[test]
+fn parts_of_a_longer_plan_may_have_other_runs() {
+    let bench = Bench::new();
+    let second = Part::new(2, 2).unwrap();
+    bench.try_part(GRID, "two.parquet", second, 1).unwrap();
+    let longer =
+        bench.try_part(&GRID.replace("to = 120, count = 3", "to = 160, count = 5"), "two.parquet", second, 1).unwrap();
+    assert!(longer.runs == 5 && longer.finished == 5 && longer.resumed == 1, "{longer:?}");
 }
 
 #[test]
@@ -425,6 +449,7 @@ fn results_of_a_plan_of_the_same_name_are_kept() {
     let whole = bench.table("a.parquet");
     let edited = bench.run(&GRID.replace("count = 3", "count = 5"), "a.parquet");
     assert_eq!((edited.runs, edited.resumed), (10, 6));
+    fs::remove_file(bench.path("a.parquet")).unwrap();
     bench.run(GRID, "a.parquet");
     let elsewhere = Bench::new();
     fs::copy(bench.path("a.parquet"), elsewhere.path("a.parquet")).unwrap();

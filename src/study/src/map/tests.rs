@@ -1,5 +1,6 @@
 use tiprub_core::Scene;
 use tiprub_core::scene::rom::Spin;
+use tiprub_cosim::warning::{Severity, Topic, Warning};
 
 use super::prediction::tests::scene;
 use super::*;
@@ -134,6 +135,27 @@ fn runs_of_order(order: usize, speeds: &[f64], amplitude: impl Fn(f64) -> f64) -
         }
     };
     speeds.iter().map(|&speed| SpeedRun { speed, outcome: Ok(response(speed)) }).collect()
+}
+
+/// Each topic and level is printed once, with the number of its runs, although the numbers in the warnings differ.
+#[test]
+fn warnings_of_all_runs_are_counted_by_topic() {
+    let flutter = |time: f64| {
+        Warning::new(Topic::Flutter, "vibration grows", format!("contact opens after {time} s"))
+            .at_level(Severity::Note)
+    };
+    let sticking = Warning::new(Topic::Sticking, "too slow", "Turn faster");
+    let mut runs = runs_of_order(1, &[100.0, 200.0, 300.0], |_| 0.0);
+    for (run, warnings) in runs.iter_mut().zip([vec![flutter(1e-3)], vec![flutter(2e-3), sticking], vec![]]) {
+        run.outcome.as_mut().unwrap().warnings = warnings.iter().map(run::RunWarning::new).collect();
+    }
+    let runs: Vec<(f64, &SpeedResponse)> = runs.iter().map(|run| (run.speed, run.outcome.as_ref().unwrap())).collect();
+    let expected = [
+        "note [flutter] vibration grows\n    contact opens after 0.001 s (2 of 3 runs; values from the run at 100 rad/s)",
+        "warning [sticking] too slow\n    Turn faster (1 of 3 runs; values from the run at 200 rad/s)",
+    ];
+    assert_eq!(run::warning_lines(&runs), expected);
+    assert!(run::warning_lines(&runs[2..]).is_empty());
 }
 
 /// Returns a bell curve of this height around a speed.
