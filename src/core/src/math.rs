@@ -2,6 +2,7 @@
 
 pub(crate) mod cubic;
 pub(crate) mod octet;
+pub(crate) mod scan;
 pub(crate) mod simd;
 pub(crate) mod vector;
 

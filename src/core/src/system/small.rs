@@ -2,6 +2,9 @@
 
 use super::{ContactPair, StepFailure, System};
 use crate::geometry::GapLaw;
+use crate::math::scan::LargestMagnitude;
+use crate::math::simd::Kernel;
+use crate::modes::bank::LANES;
 
 /// Clearances below this fraction of the radius belong to a press fit, in which errors of this size do not matter.
 pub(crate) const LEAST_CLEARANCE: f64 = 1e-4;
@@ -67,23 +70,25 @@ impl System {
             return if distorted { Err(StepFailure::Implausible { structure, sector: 0 }) } else { Ok(()) };
         }
         let limit = pair.gap().largest_displacement();
-        let displacements = modes.displacement();
-        let is_beyond = |displacement: &f64| displacement.abs() > limit;
-        // The compiler vectorises this loop because it has no early exit.
-        if !displacements.iter().fold(false, |any, displacement| any | is_beyond(displacement)) {
+        let (displacements, mut largest) = (modes.displacement(), 0.0);
+        modes.instruction_set.run(LargestMagnitude { values: displacements, largest: &mut largest });
+        if largest <= limit {
             return Ok(());
         }
         displacements
             .iter()
-            .position(is_beyond)
+            .position(|displacement| displacement.abs() > limit)
             .map_or(Ok(()), |index| Err(StepFailure::Implausible { structure, sector: index % modes.lanes() }))
     }
 
     /// Returns the node of one structure with the largest error of linear kinematics. A node that moves by u_θ along
     /// its tangent is u_θ²/2r further from the axis, which a gap linear in the displacements neglects. On a spline the
     /// positions are exact, but a bending blade shortens by at least this amount, which its modes, being straight
-    /// lines, neglect: the measure applies there too. `None` if nothing turns around an axis.
+    /// lines, neglect: the measure applies there too. `None` if no error reaches [`CURVED_SHARE`] of the clearance.
     pub(crate) fn most_curved_of(&self, structure: usize) -> Option<Curved> {
+        if self.largest_curved_share(structure) < CURVED_SHARE {
+            return None;
+        }
         let mut most: Option<Curved> = None;
         for pair in self.pairs.iter().filter(|pair| pair.structure() == structure) {
             let Some(layout) = pair.gap().layout() else { continue };
@@ -107,5 +112,56 @@ impl System {
             }
         }
         most
+    }
+
+    /// Returns the largest [`Curved::share`] of a structure.
+    fn largest_curved_share(&self, structure: usize) -> f64 {
+        let (modes, mut largest) = (self.structures[structure].modes(), 0.0);
+        for pair in self.pairs.iter().filter(|pair| pair.structure() == structure) {
+            let Some(layout) = pair.gap().layout() else { continue };
+            for &node in pair.nodes() {
+                modes.instruction_set.run(CurvedShare {
+                    moved: &modes.displacement()[(3 * node + 1) * modes.lanes()..][..modes.sectors()],
+                    clearances: &layout.clearances[..modes.sectors()],
+                    per_radius: layout.per_radius[node],
+                    largest: &mut largest,
+                });
+            }
+        }
+        largest
+    }
+}
+
+/// Raises `largest` to the largest [`Curved::share`] of a node in all sectors.
+struct CurvedShare<'a> {
+    /// Displacements around the axis (m).
+    moved: &'a [f64],
+    /// Clearances of the sectors (m).
+    clearances: &'a [f64],
+    /// 1/radius of the node (1/m).
+    per_radius: f64,
+    largest: &'a mut f64,
+}
+
+impl Kernel for CurvedShare<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { per_radius, largest, .. } = self;
+        let smallest = LEAST_CLEARANCE / per_radius;
+        let larger = |most: f64, moved: f64, clearance: f64| {
+            let clearance = if clearance > smallest { clearance } else { smallest };
+            let share = 0.5 * moved * moved * per_radius / clearance;
+            if share > most { share } else { most }
+        };
+        let (moved, more_moved) = self.moved.as_chunks::<LANES>();
+        let (clearances, more_clearances) = self.clearances.as_chunks::<LANES>();
+        let mut most = [*largest; LANES];
+        for (moved, clearances) in moved.iter().zip(clearances) {
+            for lane in 0..LANES {
+                most[lane] = larger(most[lane], moved[lane], clearances[lane]);
+            }
+        }
+        let rest = more_moved.iter().zip(more_clearances).map(|(moved, clearance)| larger(0.0, *moved, *clearance));
+        *largest = most.into_iter().chain(rest).fold(*largest, f64::max);
     }
 }

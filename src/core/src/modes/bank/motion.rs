@@ -1,6 +1,7 @@
 //! Motion of the modes: setting and reading states, states of rest, and recovery of displacements.
 
 use super::{FLUSH_BELOW, LANES, ModalBank};
+use crate::math::scan::AllFinite;
 
 impl ModalBank {
     /// Modal position and increment of one mode of a sector, or of the real part of a nodal diameter.
@@ -169,10 +170,10 @@ impl ModalBank {
 
     /// Returns whether every modal coordinate is finite.
     pub fn is_finite(&self) -> bool {
-        // The compiler vectorises this loop because it has no early exit.
-        let all_finite = |values: &[f64]| values.iter().fold(true, |all, value| all & value.is_finite());
-        all_finite(&self.state.position)
-            && all_finite(&self.state.increment)
-            && self.disk.as_ref().is_none_or(|disk| disk.state.is_finite())
+        let mut all = true;
+        for values in [&self.state.position, &self.state.increment] {
+            self.instruction_set.run(AllFinite { values, all: &mut all });
+        }
+        all && self.disk.as_ref().is_none_or(|disk| disk.state.is_finite())
     }
 }

@@ -1,0 +1,72 @@
+//! Scans of long arrays.
+
+use super::simd::Kernel;
+
+/// Number of values that are scanned together, which hides the latency of additions.
+const TOGETHER: usize = 32;
+
+/// Clears `all` unless every value is finite.
+pub(crate) struct AllFinite<'a> {
+    pub values: &'a [f64],
+    pub all: &'a mut bool,
+}
+
+impl Kernel for AllFinite<'_> {
+    #[inline(always)]
+    fn run(self) {
+        // Zero times a finite number is zero; zero times any other number is not a number.
+        let mut sums = [0.0; TOGETHER];
+        let (chunks, rest) = self.values.as_chunks::<TOGETHER>();
+        for chunk in chunks {
+            for lane in 0..TOGETHER {
+                sums[lane] += 0.0 * chunk[lane];
+            }
+        }
+        *self.all &= sums.iter().all(|sum| *sum == 0.0) && rest.iter().all(|value| value.is_finite());
+    }
+}
+
+/// Raises `largest` to the largest magnitude of all values. Values that are not numbers do not count.
+pub(crate) struct LargestMagnitude<'a> {
+    pub values: &'a [f64],
+    pub largest: &'a mut f64,
+}
+
+impl Kernel for LargestMagnitude<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let larger = |most: f64, value: f64| if value.abs() > most { value.abs() } else { most };
+        let mut most = [0.0; TOGETHER];
+        let (chunks, rest) = self.values.as_chunks::<TOGETHER>();
+        for chunk in chunks {
+            for lane in 0..TOGETHER {
+                most[lane] = larger(most[lane], chunk[lane]);
+            }
+        }
+        *self.largest = most.iter().chain(rest).fold(*self.largest, |most, value| larger(most, *value));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::simd::InstructionSet;
+
+    #[test]
+    fn scans_find_every_exception() {
+        for length in [0, 1, 31, 32, 33, 100] {
+            for place in 0..length {
+                for (exception, expected) in [(f64::NAN, 2.0), (f64::INFINITY, f64::INFINITY), (-3.0, 3.0)] {
+                    let mut values = vec![-2.0; length];
+                    values[place] = exception;
+                    let (mut all, mut largest) = (true, 0.0);
+                    let instructions = InstructionSet::detect();
+                    instructions.run(AllFinite { values: &values, all: &mut all });
+                    instructions.run(LargestMagnitude { values: &values, largest: &mut largest });
+                    let expected = if length == 1 && exception.is_nan() { 0.0 } else { expected };
+                    assert_eq!((all, largest), (exception.is_finite(), expected), "{exception} at {place} of {length}");
+                }
+            }
+        }
+    }
+}
