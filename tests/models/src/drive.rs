@@ -1,6 +1,6 @@
 //! A simulation driven by the names of its variables.
 
-use tiprub_core::{CoSimulation, Result, Scene, Simulation};
+use tiprub_core::{CoSimulation, Result, Scene, Simulation, Warning};
 use tiprub_cosim::variables::DataType;
 
 /// Returns the first reference of a variable.
@@ -60,6 +60,12 @@ pub fn try_started(scene: &Scene) -> Result<Simulation> {
     let mut simulation = Simulation::new(scene)?;
     simulation.initialise(0.0)?;
     Ok(simulation)
+}
+
+/// Returns the number of blades in simultaneous contact for which `massless-boundary` is proven stable, if a warning reports it.
+pub fn stable_blades(simulation: &Simulation) -> Option<usize> {
+    let number = |text: &Warning| text.split("stable for up to ").nth(1)?.split(' ').next()?.parse().ok();
+    simulation.warnings().iter().find_map(number)
 }
 
 /// Creates a simulation initialised at time zero.

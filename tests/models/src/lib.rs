@@ -21,7 +21,8 @@ use tiprub_core::scene::rom::{ContactGrid, ContactNode, DisplacementFrame, RomCh
 use tiprub_cosim::ThermalPatch;
 
 pub use drive::{
-    bits, element, go, move_on, real, reference, saved, set, set_element, slope, started, started_at, try_started,
+    bits, element, go, move_on, real, reference, saved, set, set_element, slope, stable_blades, started, started_at,
+    try_started,
 };
 pub use random::SeededRandom;
 pub use relative::relative;
