@@ -14,7 +14,7 @@ if ! [ -d "$(rustc --print sysroot)/lib/rustlib/$target" ]; then
     echo "the Rust target $target is not installed: rustup target add $target" >&2
     exit 1
 fi
-# A separate directory, so that other builds can run at the same time.
+# With a separate directory, other builds can run at the same time.
 build=${CARGO_TARGET_DIR:-$PWD/target}/wasm
 . packaging/remap.sh
 separator=$(printf '\037')
@@ -28,7 +28,7 @@ if [ -z "$rom" ]; then
     rom=$build/rotor37.rom.safetensors
     [ "$rom" -nt "$program" ] || "$program" reduce rotor37 --quiet --force -o "$rom" > /dev/null
 fi
-# The built-in scene, with the clearance and the force of every blade as outputs.
+# The page needs the clearance and the force of every blade as outputs.
 scene=$build/rotor37.toml
 awk '{ print } /^watched_sectors = / { print "all_sectors = true" }' src/gallery/scenes/rotor37.toml > "$scene"
 grep -q '^all_sectors = true$' "$scene"

@@ -112,12 +112,12 @@ fn torque(recording: &Recording) -> AnswerLine {
 
 fn clearance(recording: &Recording, found: &[Extreme], tolerance: f64) -> AnswerLine {
     let least = found.iter().find(|extreme| extreme.name == "smallest_clearance");
-    let touch = Touch::new(recording, tolerance);
+    let touch = FirstContact::new(recording, tolerance);
     let (value, meaning) = match least {
         Some(extreme) if extreme.value.abs() < touch.limit => {
             let first = touch.time.unwrap_or(extreme.time);
             let how = if touch.has_force { "in contact" } else { "tips reach the casing without a contact force" };
-            // In closed contact, the clearance is rounding or an error of the steps.
+            // In closed contact, the clearance is a rounding error, or an error of the adaptive steps.
             let is_rounding = extreme.value.abs() < ROUNDING;
             let [length, tolerance] = [extreme.value.abs(), tolerance].map(six_digits);
             let deviation = if extreme.value < 0.0 {
@@ -142,11 +142,11 @@ fn clearance(recording: &Recording, found: &[Extreme], tolerance: f64) -> Answer
     AnswerLine { name: "clearance", value, meaning }
 }
 
-/// Clearances (m) below this belong to closed contact.
+/// Largest rounding error of a clearance in closed contact (m).
 const ROUNDING: f64 = 1e-12;
 
 /// First contact of a run.
-struct Touch {
+struct FirstContact {
     /// False if the run has no contact force.
     has_force: bool,
     /// Clearance (m) below which tips are in contact: the tolerance of the steps, or rounding in a run without contact forces.
@@ -155,7 +155,7 @@ struct Touch {
     time: Option<f64>,
 }
 
-impl Touch {
+impl FirstContact {
     fn new(recording: &Recording, tolerance: f64) -> Self {
         let impulses = recording.column("normal_impulse");
         let has_force = impulses.as_ref().is_none_or(|impulses| impulses.iter().any(|impulse| *impulse != 0.0));

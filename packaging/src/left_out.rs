@@ -149,7 +149,7 @@ fn cost_text(cost: Option<&Result<Cost, FeatureRefusal>>) -> String {
         }
         Some(Ok(Cost { variables, bytes, state, time })) => {
             let time = time.map_or(String::new(), |time| format!(", {time:.2} times the time per step"));
-            // The text of a scene can become a few bytes shorter.
+            // A feature can make the text of the scene a few bytes shorter, which is not a gain.
             let bytes = bytes.max(&0);
             format!("\n  {:<51} costs {variables:+} variables, {bytes:+} bytes, state {state:+} bytes{time}", "")
         }

@@ -3,7 +3,7 @@
     python browser.py PAGE WIDTH HEIGHT light|dark EXPRESSION... [--shot FILE]
 
 The page counts as loaded when `READY` is true in it. Each expression is a function body that may return a value. The next
-expression runs after the page had time to draw and `READY` is true again. Exit code 77: no browser can run here; the last line on stderr is the reason.
+expression runs after the page has had time to draw and `READY` is true again. Exit code 77: no browser can run here; the last line on stderr is the reason.
 """
 
 import json
@@ -19,8 +19,8 @@ os.environ["QTWEBENGINE_CHROMIUM_FLAGS"] = "--use-gl=angle --use-angle=swiftshad
 os.environ["QTWEBENGINE_CHROMIUM_FLAGS"] += f" --blink-settings=preferredColorScheme={0 if 'dark' in sys.argv[4:5] else 1}"
 READY = "document.readyState === 'complete' && (!document.getElementById('viewer') || document.getElementById('viewer').dataset.ready === 'true' || !document.querySelector('.note').hidden) && document.body.dataset.busy !== 'true'"
 UNAVAILABLE = 77
-#: Timeout (ms).
-PATIENCE = 110_000
+#: Longest duration of a session (ms).
+TIMEOUT = 110_000
 
 try:
     from PySide6.QtCore import QTimer, QUrl
@@ -55,7 +55,7 @@ class Session:
         self.view.show()
         self.page.loadFinished.connect(self.loaded)
         self.page.load(QUrl.fromLocalFile(os.path.abspath(path)))
-        QTimer.singleShot(PATIENCE, lambda: self.end("timeout"))
+        QTimer.singleShot(TIMEOUT, lambda: self.end("timeout"))
 
     def loaded(self, succeeded):
         if not succeeded:

@@ -51,11 +51,11 @@ def move_sliders(speed, friction, clearance):
     return "".join(f"{{ {slide(name, value)} }}" for name, value in [("speed", speed), ("friction", friction), ("clearance", clearance)])
 
 
-def rows_of(run):
+def decode_rows(run):
     return numpy.frombuffer(base64.b64decode(run["rows"])).reshape(-1, len(run["names"]) + 1)
 
 
-def table_of(file):
+def read_table(file):
     with file.open(newline="") as lines:
         names, *rows = csv.reader(lines)
     return names, numpy.array(rows, dtype=float)
@@ -85,8 +85,8 @@ def test_page_has_the_bits_of_the_program(runs, tiprub, scene_of_the_page, work,
     run, (speed, friction, clearance) = runs[index], SETTINGS[index]
     settings = ["--set", f"speed={speed}", "--set", f"friction_coefficient={friction}", "--set", f"gap_offset={clearance - 356}e-6"]
     summary = tiprub("run", scene_of_the_page, "--csv", work / "try_it.csv", *settings)
-    names, native = table_of(work / "try_it.csv")
-    found = rows_of(run)
+    names, native = read_table(work / "try_it.csv")
+    found = decode_rows(run)
     columns = [names.index(name) for name in ["time", *run["names"]]]
     assert len(columns) > 75 and found.shape == (1051, len(columns))
     different = (bits(found) != bits(native[:, columns])).any(axis=0)
@@ -107,9 +107,9 @@ def test_command_on_the_page_gives_its_numbers(runs, tiprub):
 
 def test_other_settings_have_other_bits(runs):
     """Every slider has an effect, so the comparison of bits is not trivial."""
-    first = bits(rows_of(runs[0]))
+    first = bits(decode_rows(runs[0]))
     for run in runs[1:]:
-        assert (bits(rows_of(run))[:, 1:] != first[:, 1:]).any(axis=0).mean() > 0.5
+        assert (bits(decode_rows(run))[:, 1:] != first[:, 1:]).any(axis=0).mean() > 0.5
 
 
 def test_page_without_workers_has_the_same_bits(page, runs):
@@ -128,19 +128,20 @@ def test_page_stays_responsive_while_it_computes(page):
 
 
 def test_errors_are_shown_and_the_page_starts_again(page):
-    """A value that the simulation rejects, and a module that stops, are reported; the page then starts again."""
+    """The page shows a rejected value, a wrong scene and a module that stops. It then starts again."""
     wrong = 'tryIt.state.engine({ kind: "run", id: tryIt.state.id, values: { speed: NaN } });'
     wait = 'document.body.dataset.busy = "true";'
-    look = 'const own = document.querySelector(".note"); return { shown: !own.hidden, text: own.querySelector("span").textContent };'
+    read_note = 'const own = document.querySelector(".note"); return { shown: !own.hidden, text: own.querySelector("span").textContent };'
     again = 'document.querySelector(".again").click();'
     broken = 'tryIt.start("speed = ", true);'
     # The module cannot allocate a file of this size: it panics and traps.
     huge = "tryIt.start({ length: 4e9 }, true);"
-    results = browse(page, wait + wrong, look, again, look, broken, look, again, look, huge, look, again, look)
-    looks = results[1::2]
-    assert [seen["shown"] for seen in looks] == [True, False] * 3, looks
-    rejected, scene, trapped = (seen["text"] for seen in looks[::2])
-    assert "speed" in rejected and "scene" in scene and "the simulation stopped" in trapped and "capacity" in trapped, looks
+    causes = [wait + wrong, broken, huge]
+    results = browse(page, *(expression for cause in causes for expression in (cause, read_note, again, read_note)))
+    notes = results[1::2]
+    assert [note["shown"] for note in notes] == [True, False] * 3, notes
+    rejected, scene, trapped = (note["text"] for note in notes[::2])
+    assert "speed" in rejected and "scene" in scene and "the simulation stopped" in trapped and "capacity" in trapped, notes
 
 
 @pytest.mark.parametrize("width", [400, 700, 1000, 1400])
@@ -186,7 +187,7 @@ def test_book_shows_the_page_in_a_frame_of_its_height(page):
     link = re.search(r'(?s)<a href="rub.html" id="try-it">.*?</a>', (ROOT / "docs" / "try-it.md").read_text()).group()
     book = page.with_name("book.html")
     book.write_text(f'<!DOCTYPE html><title>book</title><main style="width: 750px">{link}</main><script>{script}</script>')
-    look = 'const frame = document.querySelector("iframe"); return [frame.src.split("/").pop(), frame.offsetHeight, document.querySelectorAll("a").length];'
-    name, height, links = browse(book, "", "", look)[-1]
+    read_frame = 'const frame = document.querySelector("iframe"); return [frame.src.split("/").pop(), frame.offsetHeight, document.querySelectorAll("a").length];'
+    name, height, links = browse(book, "", "", read_frame)[-1]
     assert name == page.name == "rub.html" and links == 0
     assert 900 < height < 2000 and height != 1400

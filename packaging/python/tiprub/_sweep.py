@@ -99,16 +99,16 @@ def sweep(
             runs_per_task, pilot = _pilot(cluster, task, directory, check["plan_runs"], threads, parquet)
         else:
             pilot = None
-        wanted = count if runs_per_task is None else math.ceil(check["plan_runs"] / runs_per_task)
+        part_count = count if runs_per_task is None else math.ceil(check["plan_runs"] / runs_per_task)
         if pilot is not None:
-            # The first part contains all runs that were measured.
-            wanted = min(wanted, check["plan_runs"] // pilot["runs"])
-        if count not in (None, wanted):
-            problem = f"contains, with `{histories.name}`, results of this plan in {count} parts, but these runs per task give {wanted}"
+            # The first part must contain all measured runs.
+            part_count = min(part_count, check["plan_runs"] // pilot["runs"])
+        if count not in (None, part_count):
+            problem = f"contains, with `{histories.name}`, results of this plan in {count} parts, but these runs per task give {part_count}"
             raise Error(str(directory), problem, "Leave out `runs_per_task`, or give another directory with `output`", 2)
-        digits = len(str(wanted))
-        parts = [f"{number}/{wanted}" for number in range(1, wanted + 1)]
-        files = [str(directory / f"{file.stem}-{number:0{digits}}-of-{wanted}.parquet") for number in range(1, wanted + 1)]
+        digits = len(str(part_count))
+        parts = [f"{number}/{part_count}" for number in range(1, part_count + 1)]
+        files = [str(directory / f"{file.stem}-{number:0{digits}}-of-{part_count}.parquet") for number in range(1, part_count + 1)]
         _adopt_pilot(directory, files[0])
         # The program looks for them beside the rows.
         _move(histories, directory, file.stem)
@@ -120,7 +120,7 @@ def sweep(
     _equal_columns(files, parquet)
     _equal_columns(_history_files(directory, file.stem), parquet)
     _move(directory, histories, file.stem)
-    report.update(plan=str(file), output=str(directory), tasks=wanted, seconds=time.monotonic() - clock)
+    report.update(plan=str(file), output=str(directory), tasks=part_count, seconds=time.monotonic() - clock)
     return Report(report, directory)
 
 

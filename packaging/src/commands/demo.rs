@@ -244,7 +244,7 @@ impl Demo<'_> {
         let rest = format!(
             "\n{}: t = {} s to {} s, computed in {seconds:.3} s ({per_second:.3} s of computing per simulated second)\n\
              {} and the native run agree in all bits: {} outputs at {} communication points\n\
-             {} (estimated from coarser runs, like `tiprub run --estimate`)\n\
+             {} (estimated from coarser runs, as with `tiprub run --estimate`)\n\
              files in {}: {}\n\
              open {} in a browser: it shows the contact and the checks of the ROM\n{STUDY}",
             self.scene.settings.name,

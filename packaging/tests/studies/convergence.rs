@@ -14,7 +14,7 @@ fn convergence(root: &Path, more: &[&str]) -> Value {
     serde_json::from_str(&tiprub(root, "", &[&own[..], more].concat()).0).unwrap()
 }
 
-/// Refines steps of any scene and reduces modes of any ROM; more modes and other contact nodes need the mesh from which the ROM was reduced.
+/// The study shortens the steps of any scene and removes modes of any ROM. More modes and other contact nodes need the mesh of the ROM.
 #[test]
 fn convergence_study_reports_what_it_cannot_refine() {
     let root = tempfile::tempdir().unwrap();
@@ -36,7 +36,7 @@ fn convergence_study_reports_what_it_cannot_refine() {
     let page = fs::read_to_string(root.path().join("out/index.html")).unwrap();
     let reported = "finer levels: internal step; coarser levels only: modes of rotor; not refined: contact nodes of rotor, mesh of rotor";
     assert!(page.contains(reported) && !page.to_lowercase().contains("total"), "{reported}");
-    // If no error was found, a warning reports that the ROM is unchanged. The directory of the file is created as for all outputs.
+    // If no error was found, a warning reports that the ROM is unchanged. The directory of the file is created, as for all outputs.
     let (text, _) = tiprub(
         root.path(),
         "",
@@ -103,7 +103,7 @@ fn rejected_refinements_are_repeated_with_half_the_step() {
     assert_eq!(found.iter().map(refused).collect::<Vec<_>>(), [1, 0, 0, 0], "{limited:#}");
 }
 
-/// Two other meshes of the blade show the limit of the sequence; the ROM that is written with the result reports it in later runs.
+/// Two other meshes of the blade give a sequence whose limit is extrapolated. The written ROM contains the error, which later runs report.
 #[test]
 fn mesh_error_is_estimated_and_stored_in_the_rom() {
     let root = tempfile::tempdir().unwrap();
@@ -139,7 +139,7 @@ fn mesh_error_is_estimated_and_stored_in_the_rom() {
     let last = run.lines().rfind(|line| line.starts_with("estimated error")).unwrap();
     let mesh = found.map_or("mesh unknown".to_owned(), |found| format!("mesh {:.2} %", 100.0 * found));
     assert!(last.contains("steps unknown") && last.contains(&mesh), "{run}");
-    // A ROM without a study carries no errors, and its file is unchanged.
+    // A run of a ROM without a study prints no estimated error.
     assert!(!reported(&["run", "own.toml", "--stop", "1e-4", "--quiet"]).contains("estimated error"));
     let mut command = Command::new(env!("CARGO_BIN_EXE_tiprub"));
     check_errors_of_a_file(

@@ -291,7 +291,8 @@ fn totals(total: &Value, cheapest: &str) {
     );
 }
 
-/// Checks that without a finer model of a ROM from a file, no error is called total, and that the errors in the ROM are reported beside.
+/// Checks the errors of a scene with a ROM from a file. Without a finer model of the ROM, no error is called total, and the errors that the
+/// ROM contains are also reported.
 pub(super) fn check_errors_of_a_file(root: &Path, reported: &str) {
     let json: Value = serde_json::from_str(reported).unwrap();
     let of = &json["results"]["own_model"];

@@ -1,5 +1,5 @@
 "use strict";
-// Runs the simulation and exchanges messages with the page, in a worker, or in the page if the browser starts no worker.
+// Runs the simulation and exchanges messages with the page, in a worker, or in the page if the browser cannot start a worker.
 // `post` sends a message. `slice` is the longest computing time (ms) between two messages.
 //
 // In:  { kind: "load", wasm, scene, rom, names }, { kind: "run", id, values: { NAME: VALUE } }

@@ -48,7 +48,7 @@ function start(scene, useWorker) {
       state.inWorker = true;
       state.engine(loading);
       return;
-    } catch { /* The browser starts no worker. */ }
+    } catch { /* The browser cannot start a worker. */ }
   }
   let alive = true;
   const engine = createEngine(message => { if (alive) receive(message); }, 10);
@@ -186,7 +186,7 @@ function context(canvas) {
 
 function mix(fraction) { return `color-mix(in srgb, ${colors.hot} ${Math.round(100 * fraction)}%, ${colors.steel})`; }
 
-/** Draws the rotor in the frame of the casing. Clearances are exaggerated; the wall is drawn round. */
+/** Draws the rotor in the frame of the casing. Clearances are exaggerated; the casing is drawn as a circle. */
 function drawRotor(row, index) {
   const canvas = find(".rotor"), pen = context(canvas), size = Math.min(canvas.clientWidth, canvas.clientHeight);
   const [x, y] = [canvas.clientWidth / 2, canvas.clientHeight / 2];

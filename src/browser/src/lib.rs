@@ -93,7 +93,7 @@ pub extern "C" fn tiprub_step_count() -> u32 {
     MODULE.with_borrow(|module| module.session.as_ref().map_or(0, Session::step_count))
 }
 
-/// Returns to the start values of the scene.
+/// Resets the session to the start values of the scene.
 #[unsafe(no_mangle)]
 pub extern "C" fn tiprub_reset() -> u32 {
     with_session(|session, _, _| {

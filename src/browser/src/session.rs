@@ -32,7 +32,7 @@ impl Session {
         Ok(Self { simulation, experiment, outputs, steps: 0 })
     }
 
-    /// Returns to the start values of the scene.
+    /// Resets the simulation to the start values of the scene.
     pub(crate) fn reset(&mut self) {
         self.simulation.reset();
         self.steps = 0;
@@ -84,7 +84,7 @@ impl Session {
     /// Returns the time (s) and the selected outputs (SI units).
     ///
     /// # Errors
-    /// An output is not a number.
+    /// An output is not numeric.
     pub(crate) fn row(&self) -> Result<Vec<f64>> {
         let mut row = vec![self.time(self.steps)];
         for (kind, reference) in &self.outputs {

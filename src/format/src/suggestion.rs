@@ -7,7 +7,8 @@ const CLOSE: f64 = 0.9;
 /// Smallest number of letters of a word that identifies a name.
 const SHORTEST_WORD: usize = 3;
 
-/// Returns the accepted name closest to `given`, if a name is close enough, or contains a word close to one of `given`.
+/// Returns the accepted name that is most similar to `given`. If no name is similar enough, single words of the names
+/// are compared. `None` if they are not similar either.
 ///
 /// # Examples
 /// ```

@@ -16,7 +16,7 @@ const PARTS: u64 = 1000;
 /// Fraction of the work, or time (s), after which another line is written to a log.
 const LINE_SHARE: f64 = 0.1;
 const LINE_AFTER: Duration = Duration::from_secs(30);
-/// Time (s) after which the first line is written to a log.
+/// Time after which the first line is written to a log.
 const FIRST_LINE_AFTER: Duration = Duration::from_secs(2);
 /// Largest displayed fraction before the work is finished.
 const MOST_SHOWN: f64 = 0.999;

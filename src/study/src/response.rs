@@ -6,7 +6,7 @@ use crate::map::spectrum::{Analyser, peaks};
 
 /// Smallest number of samples of a spectrum.
 const MIN_SAMPLES: usize = 64;
-/// Length of a run divided by that of a window of its spectrogram: with fewer than [`MANY_SAMPLES`], and with at least as many.
+/// Length of a run divided by the length of a window of its spectrogram: for fewer than [`MANY_SAMPLES`] samples, and for at least that many.
 const WINDOWS: [usize; 2] = [4, 8];
 /// Number of samples from which windows are shorter.
 const MANY_SAMPLES: usize = 2048;

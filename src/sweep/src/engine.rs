@@ -230,7 +230,7 @@ impl<'a> PartRun<'a> {
         Ok((part, created))
     }
 
-    /// Checks that completing the part loses no results of runs that the plan had before.
+    /// Checks that the part keeps all stored results: a complete part replaces its file, and contains only runs of the plan.
     ///
     /// # Errors
     /// The plan no longer has a run whose results are stored.
@@ -241,7 +241,7 @@ impl<'a> PartRun<'a> {
         for digest in &self.digests {
             lost.remove(digest.run.as_str());
         }
-        // If the plan has more runs than before, another part may have the run.
+        // If values were added to the plan, the run may belong to another part now.
         for run in 0..plan.design.runs() {
             if lost.is_empty() {
                 return Ok(());
@@ -253,7 +253,7 @@ impl<'a> PartRun<'a> {
         }
         let path = if self.files.rows.exists() { &self.files.rows } else { &self.files.journal };
         let problem = format!(
-            "contains the results of {} runs that the plan no longer has, because the plan, its files or the release of tiprub are different",
+            "contains the results of {} runs that the plan no longer has, because the plan, one of its files or the release of tiprub has changed",
             lost.len()
         );
         let remedy = "Write to another file or directory with --output, or remove this file if you do not need it";

@@ -62,10 +62,10 @@ pub fn set(scene: &mut Table, path: &str, value: Value) -> Result<()> {
 /// # Errors
 /// The text is not a path.
 pub(crate) fn key(path: &str) -> Result<String> {
-    Ok(joined(&steps(path)?))
+    Ok(join_keys(&steps(path)?))
 }
 
-fn joined(steps: &[Step]) -> String {
+fn join_keys(steps: &[Step]) -> String {
     steps.iter().map(|step| step.key).collect::<Vec<_>>().join(".")
 }
 
@@ -111,7 +111,7 @@ fn position(entries: &[Value], selected: Option<&str>) -> Option<usize> {
 
 /// Checks that scene files have such a key.
 fn check_key(path: &str, steps: &[Step]) -> Result<()> {
-    let name = joined(steps);
+    let name = join_keys(steps);
     if FIELDS.iter().any(|field| field.path == name) {
         return Ok(());
     }

@@ -228,7 +228,7 @@ fn journal_rows_are_not_computed_again() {
 
 /// A changed plan, ROM or scene does not replace finished runs.
 #[test]
-fn results_of_runs_that_a_plan_no_longer_has_are_kept() {
+fn edited_plan_keeps_results_of_removed_runs() {
     let bench = Bench::new();
     bench.run(GRID, "a.parquet");
     let whole = bench.table("a.parquet");
@@ -252,9 +252,9 @@ fn results_of_runs_that_a_plan_no_longer_has_are_kept() {
     assert!(bench.path("c.parquet.journal").exists() && !bench.path("c.parquet").exists());
 }
 
-/// More values move runs to other parts. This is no error, because the plan still has them.
+/// A run that moves to another part is no error, because the plan still contains it.
 #[test]
-fn parts_of_a_longer_plan_may_have_other_runs() {
+fn added_values_may_move_runs_to_other_parts() {
     let bench = Bench::new();
     let second = Part::new(2, 2).unwrap();
     bench.try_part(GRID, "two.parquet", second, 1).unwrap();
@@ -411,7 +411,7 @@ fn wrong_plans_are_rejected_with_place_and_remedy() {
     }
 }
 
-/// The values of the field would have no effect.
+/// Otherwise the values of the field would have no effect.
 #[test]
 fn field_that_a_start_value_replaces_is_rejected() {
     let bench = Bench::new();
@@ -443,7 +443,7 @@ fn field_that_a_start_value_replaces_is_rejected() {
 
 /// A plan does not replace the results of another plan with the same name. An edited or copied plan continues with its rows.
 #[test]
-fn results_of_a_plan_of_the_same_name_are_kept() {
+fn plan_keeps_results_of_another_plan_with_the_same_name() {
     let bench = Bench::new();
     bench.run(GRID, "a.parquet");
     let whole = bench.table("a.parquet");

@@ -50,7 +50,7 @@ impl GrowthRates {
         if added > self.noise { added } else { 0.0 }
     }
 
-    /// Returns whether the differential equations flutter with the frequency at which the motion of the steps grows fastest.
+    /// Returns whether the fastest-growing motion of the time steps has the flutter frequency of the differential equations.
     pub(crate) fn matches_flutter(&self) -> bool {
         self.is_flutter() && (self.swing - self.frequency).abs() < SAME_MOTION * self.frequency
     }

@@ -38,8 +38,9 @@ const ALTERNATES: f64 = 0.9 * std::f64::consts::PI;
 impl SetGrowth {
     /// Computes the growth of a model under a scheme with a step (s), with all contacts closed.
     pub fn new(contacts: SlidingContacts, scheme: Scheme, step: f64, growth: GrowthRates) -> Self {
-        // Contact forces that act a step late cause motions of their own, above the frequencies of all modes. So do motions that change
-        // sign from step to step. With central differences the sampled frequency is higher than the frequency of the motion.
+        // Contact forces that act one step late cause additional motions, above the frequencies of all modes. Motions that change sign
+        // from step to step also belong to the step and not to a mode. With central differences the sampled frequency is higher than the
+        // frequency of the motion.
         let is_caused_by_delay = scheme.properties().delays_contact && !growth.matches_flutter();
         let is_of_step = is_caused_by_delay || growth.swing * step > ALTERNATES;
         let frequency = growth.swing.min(contacts.model.largest_frequency());
@@ -191,7 +192,7 @@ mod tests {
         for (frequency, share) in [(1400.0, 1.0), (1430.0, 0.2), (2800.0, 0.2), (2850.0, 0.0)] {
             assert!((share_of(&model, &radial(), frequency) - share).abs() < 1e-15, "{frequency}");
         }
-        // A force that acts a step late causes motions of its own, which no mode bounds.
+        // A force that acts one step late causes additional motions, which no mode bounds.
         let growth = GrowthRates { continuous: -1.0, frequency: 0.0, stepped: 1.0, swing: 1430.0, noise: 0.0 };
         let directions = radial();
         let contacts = SlidingContacts::new(&model, 0.0, &directions);

@@ -188,7 +188,7 @@ impl MasslessCheck<'_> {
     }
 }
 
-/// A step (s) that resolves all modes well.
+/// Returns a step (s) that is much shorter than the period of every mode.
 pub(crate) fn small_step(model: &ModalModel) -> f64 {
     1e-3 / model.largest_frequency()
 }

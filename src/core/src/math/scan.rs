@@ -2,8 +2,8 @@
 
 use super::simd::Kernel;
 
-/// Number of values that are scanned together, which hides the latency of additions.
-const TOGETHER: usize = 32;
+/// Number of values per chunk. Independent results for the places in a chunk hide the latency of additions.
+const CHUNK: usize = 32;
 
 /// Clears `all` unless every value is finite.
 pub(crate) struct AllFinite<'a> {
@@ -14,11 +14,11 @@ pub(crate) struct AllFinite<'a> {
 impl Kernel for AllFinite<'_> {
     #[inline(always)]
     fn run(self) {
-        // Zero times a finite number is zero; zero times any other number is not a number.
-        let mut sums = [0.0; TOGETHER];
-        let (chunks, rest) = self.values.as_chunks::<TOGETHER>();
+        // Zero times a finite number is zero; zero times infinity or NaN is NaN.
+        let mut sums = [0.0; CHUNK];
+        let (chunks, rest) = self.values.as_chunks::<CHUNK>();
         for chunk in chunks {
-            for lane in 0..TOGETHER {
+            for lane in 0..CHUNK {
                 sums[lane] += 0.0 * chunk[lane];
             }
         }
@@ -26,7 +26,7 @@ impl Kernel for AllFinite<'_> {
     }
 }
 
-/// Raises `largest` to the largest magnitude of all values. Values that are not numbers do not count.
+/// Raises `largest` to the largest magnitude of all values. NaN is ignored.
 pub(crate) struct LargestMagnitude<'a> {
     pub values: &'a [f64],
     pub largest: &'a mut f64,
@@ -35,15 +35,15 @@ pub(crate) struct LargestMagnitude<'a> {
 impl Kernel for LargestMagnitude<'_> {
     #[inline(always)]
     fn run(self) {
-        let larger = |most: f64, value: f64| if value.abs() > most { value.abs() } else { most };
-        let mut most = [0.0; TOGETHER];
-        let (chunks, rest) = self.values.as_chunks::<TOGETHER>();
+        let larger = |largest: f64, value: f64| if value.abs() > largest { value.abs() } else { largest };
+        let mut maxima = [0.0; CHUNK];
+        let (chunks, rest) = self.values.as_chunks::<CHUNK>();
         for chunk in chunks {
-            for lane in 0..TOGETHER {
-                most[lane] = larger(most[lane], chunk[lane]);
+            for lane in 0..CHUNK {
+                maxima[lane] = larger(maxima[lane], chunk[lane]);
             }
         }
-        *self.largest = most.iter().chain(rest).fold(*self.largest, |most, value| larger(most, *value));
+        *self.largest = maxima.iter().chain(rest).fold(*self.largest, |largest, value| larger(largest, *value));
     }
 }
 
@@ -53,7 +53,7 @@ mod tests {
     use crate::math::simd::InstructionSet;
 
     #[test]
-    fn scans_find_every_exception() {
+    fn scans_find_one_unusual_value_at_every_place() {
         for length in [0, 1, 31, 32, 33, 100] {
             for place in 0..length {
                 for (exception, expected) in [(f64::NAN, 2.0), (f64::INFINITY, f64::INFINITY), (-3.0, 3.0)] {

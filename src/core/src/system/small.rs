@@ -134,7 +134,7 @@ impl System {
 
 /// Raises `largest` to the largest [`Curved::share`] of a node in all sectors.
 struct CurvedShare<'a> {
-    /// Displacements around the axis (m).
+    /// Tangential displacements of the node in every sector (m).
     moved: &'a [f64],
     /// Clearances of the sectors (m).
     clearances: &'a [f64],

@@ -87,8 +87,8 @@ impl Analyser {
         Self::interpolated(count, 1, bins)
     }
 
-    /// Creates an analyser for windows of `count` samples and the first `bins` bins, which are `factor` times closer than 1/(length of the window). Zeros
-    /// after the window interpolate the spectrum.
+    /// Creates an analyser for windows of `count` samples and the first `bins` bins, whose spacing is 1/(`factor` × length of the window). Zeros after
+    /// the window interpolate the spectrum.
     pub fn interpolated(count: usize, factor: usize, bins: usize) -> Self {
         let turn = std::f64::consts::TAU / count as f64;
         let length = count * factor;

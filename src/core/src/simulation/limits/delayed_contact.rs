@@ -20,7 +20,7 @@ const ANGLES_PER_SECTOR: usize = 4;
 type CarriedSurfaces<'a> = [(&'a SplineGap, usize, ModalModel)];
 
 /// Returns the check at the place where the carriers are most compliant, because a casing may differ around the circumference.
-fn most_compliant<'a>(
+fn choose_most_compliant<'a>(
     check: MasslessCheck<'a>,
     places: impl Iterator<Item = Vec<CarrierUnderNodes<'a>>>,
     step: f64,
@@ -50,7 +50,7 @@ impl Checking<'_> {
             let mut check = self.without_carriers(model);
             if !carried.is_empty() {
                 let at = |place| self.carriers_under(&carried, diameter, carrier_angle(place));
-                check = most_compliant(check, (0..CARRIER_ANGLES).map(at), step);
+                check = choose_most_compliant(check, (0..CARRIER_ANGLES).map(at), step);
             }
             // Only the tightest of several limits counts.
             limit = limit.tightest(check.limit(largest.min(limit.closed))?);
@@ -135,7 +135,7 @@ impl Checking<'_> {
             let blades: Vec<DMatrix<f64>> = (0..sectors).map(under).collect();
             largest_eigenvalue(&blades, &flexibilities, self.disk())
         };
-        // At least as many angles as for one blade.
+        // The number of angles on the casing is at least that of the check of one blade.
         let count = ANGLES_PER_SECTOR.max(CARRIER_ANGLES.div_ceil(sectors));
         let angles = (0..count).map(|place| pitch * real(place) / real(count));
         angles.map(at_angle).try_fold(0.0, |most: f64, found| Some(most.max(found?)))
@@ -155,7 +155,7 @@ fn largest_eigenvalue(blades: &[DMatrix<f64>], factors: &[DMatrix<f64>], disk: O
         None => blades.iter().try_for_each(|blade| add(&factors[0], blade))?,
         Some(disk) => factors.iter().enumerate().try_for_each(|(diameter, factor)| {
             // The flexibility of a nodal diameter contains the square of its weight, and so does a product of two orthonormal patterns.
-            add(factor, &(pattern(blades, diameter, disk.is_real(diameter)) * disk.weight(diameter).powi(2)))
+            add(factor, &(project(blades, diameter, disk.is_real(diameter)) * disk.weight(diameter).powi(2)))
         })?,
     }
     Some(sum.symmetric_eigenvalues().max())
@@ -168,7 +168,7 @@ fn join_columns(parts: &[DMatrix<f64>]) -> DMatrix<f64> {
 }
 
 /// Sums the rows of all blades with the phases of a nodal diameter: the real parts, then the imaginary parts unless they are zero.
-fn pattern(blades: &[DMatrix<f64>], diameter: usize, is_real: bool) -> DMatrix<f64> {
+fn project(blades: &[DMatrix<f64>], diameter: usize, is_real: bool) -> DMatrix<f64> {
     let (rows, columns) = blades[0].shape();
     let mut sums = DMatrix::zeros(if is_real { rows } else { 2 * rows }, columns);
     for (sector, blade) in blades.iter().enumerate() {
