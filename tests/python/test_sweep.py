@@ -1,5 +1,6 @@
 """Sweeps on a cluster: `tiprub.sweep`, and the scripts of the guide for other engines."""
 
+import math
 import os
 import shutil
 import signal
@@ -107,12 +108,15 @@ def test_cluster_gives_the_table_of_the_program(plan, capfd):
 
     again = module.sweep(plan, quiet=True)
     assert (again["finished_before"], again["tasks"]) == (40, 7) and pandas.read_parquet(again).equals(results)
-    # The plan becomes longer, and then has fewer runs than parts.
-    text = plan.read_text()
+    # The plan becomes longer, and then has fewer runs than parts. No part replaces finished runs, and none begins.
+    text, before = plan.read_text(), {file: file.read_bytes() for file in report.path.iterdir()}
     for changes, runs in ((("3.0]", "3.0, 4.0]"), 60), (("20 }", "2 }"), 4)):
         plan.write_text(text.replace(*changes))
-        report = module.sweep(plan, quiet=True)
-        assert (report["runs"], report["tasks"]) == (runs, 7) and len(pandas.read_parquet(report)) == runs
+        with pytest.raises(module.Error, match="runs that this part does not have"):
+            module.sweep(plan, quiet=True)
+        assert {file: file.read_bytes() for file in report.path.iterdir()} == before
+        other = module.sweep(plan, output=f"{runs}_runs", quiet=True, runs_per_task=math.ceil(runs / 7))
+        assert other["runs"] == runs and len(pandas.read_parquet(other)) == runs
 
 
 def test_number_of_runs_of_a_task_is_measured(plan, monkeypatch):
@@ -293,6 +297,25 @@ def test_killed_driver_continues(plan):
     assert (report["runs"], report["tasks"], report["finished"]) == (40, 10, 20) and report["finished_before"] >= len(known)
     kept_rows(known, report)
     assert pandas.read_parquet(report).drop(columns=TIMES).equals(whole(plan))
+
+
+@pytest.mark.parametrize("options", [{"runs_per_task": 1}, {}])
+def test_runs_that_a_killed_driver_measured_are_kept(plan, options):
+    """The program that measures runs outlives the driver, and still computes them when the sweep continues."""
+    written(plan, 0.1)
+    directory = plan.with_suffix("")
+    directory.mkdir()
+    words = [PROGRAM, "--quiet", "sweep", plan, "--threads=1", "--part=1/13", "-o", directory / "pilot.parquet"]
+    with subprocess.Popen(words, stdout=subprocess.DEVNULL) as measuring:
+        wait_for_rows(directory, 1, measuring)
+        with distributed.Client(processes=False, n_workers=1, threads_per_worker=4, dashboard_address=None) as client:
+            report = module.sweep(plan, client, quiet=True, **options)
+        assert measuring.wait() == 0
+    results = pandas.read_parquet(report)
+    assert list(results["run"]) == list(range(1, 41)) and results.drop(columns=TIMES).equals(whole(plan))
+    # No measured run is repeated.
+    assert report["finished_before"] >= 1 and report["tasks"] == 13 if options else report["tasks"] <= 13
+    assert not list(directory.glob("pilot*"))
 
 
 def test_workers_reject_other_programs_and_files(plan, capfd, tmp_path):

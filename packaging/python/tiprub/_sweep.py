@@ -95,26 +95,33 @@ def sweep(
         count = _known_parts(directory, histories, file.stem)
         _check_workers(cluster, file.stem, quiet)
         threads = sum(cluster.nthreads().values())
+        runs = check["plan_runs"]
+        shared = max(1, runs // (TASKS_PER_THREAD * max(1, threads)))
+        # A driver that was killed may leave measured runs, and the program that computes them.
+        is_left = any(directory.glob("pilot.parquet*"))
+        pilot = None
+        if is_left or (count is None and runs_per_task is None and shared > PILOT_RUNS):
+            pilot, seconds = _pilot(cluster, task, directory, runs, parquet)
+            shared = min(shared, max(1, math.ceil(TASK_SECONDS / max(seconds, 1e-6))))
         if count is None and runs_per_task is None:
-            runs_per_task, pilot = _pilot(cluster, task, directory, check["plan_runs"], threads, parquet)
-        else:
-            pilot = None
-        part_count = count if runs_per_task is None else math.ceil(check["plan_runs"] / runs_per_task)
-        if pilot is not None:
-            # The first part must contain all measured runs.
-            part_count = min(part_count, check["plan_runs"] // pilot["runs"])
+            runs_per_task = shared
+        part_count = count if runs_per_task is None else math.ceil(runs / runs_per_task)
+        if pilot is not None and count is None:
+            # The first part contains all runs that were measured.
+            part_count = max(1, min(part_count, runs // pilot["runs"]))
         if count not in (None, part_count):
             problem = f"contains, with `{histories.name}`, results of this plan in {count} parts, but these runs per task give {part_count}"
             raise Error(str(directory), problem, "Leave out `runs_per_task`, or give another directory with `output`", 2)
         digits = len(str(part_count))
         parts = [f"{number}/{part_count}" for number in range(1, part_count + 1)]
         files = [str(directory / f"{file.stem}-{number:0{digits}}-of-{part_count}.parquet") for number in range(1, part_count + 1)]
+        _check_known_parts(files, parts, str(file), check["facts"], parquet)
         _adopt_pilot(directory, files[0])
         # The program looks for them beside the rows.
         _move(histories, directory, file.stem)
         answers = _gather(distributed, cluster, files, parts, task, file.stem, quiet)
     report = _sums(answers)
-    if pilot is not None:
+    if pilot is not None and count is None:
         # There were no other results. The first part may repeat these runs to store their outputs over time.
         report["finished_before"] = pilot["finished_before"]
     _equal_columns(files, parquet)
@@ -241,17 +248,26 @@ def _remove(path: Path) -> None:
     shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
 
 
-def _pilot(cluster: Any, task: dict[str, str], directory: Path, runs: int, threads: int, parquet: Any) -> tuple[int, Optional[dict[str, Any]]]:
-    """Choose the number of runs of a task. Also returns the answer for the runs that were measured, which are in a file of their own."""
-    shared = max(1, runs // (TASKS_PER_THREAD * max(1, threads)))
-    if shared <= PILOT_RUNS:
-        return shared, None
+def _pilot(cluster: Any, task: dict[str, str], directory: Path, runs: int, parquet: Any) -> tuple[dict[str, Any], float]:
+    """Run and measure a few runs, whose results are in a file of their own. Return the answer, and the time of a run (s)."""
     output = str(directory / "pilot.parquet")
-    future = cluster.submit(run_part, output, f"1/{runs // PILOT_RUNS}", **task, pure=False)
+    future = cluster.submit(run_part, output, f"1/{max(1, runs // PILOT_RUNS)}", **task, pure=False)
     answer = _answer(future, output)
     # The first run may have made the slow checks at the start, which the others share.
-    seconds = sorted(parquet.ParquetFile(output).read(["seconds"])["seconds"].to_pylist())[PILOT_RUNS // 2]
-    return min(shared, max(1, math.ceil(TASK_SECONDS / max(seconds, 1e-6)))), answer
+    seconds = sorted(parquet.ParquetFile(output).read(["seconds"])["seconds"].to_pylist())
+    return answer, seconds[len(seconds) // 2]
+
+
+def _check_known_parts(files: Sequence[str], parts: Sequence[str], plan: str, facts: dict[str, str], parquet: Any) -> None:
+    """Check that no part of an edited plan would replace finished runs, before the first part begins."""
+    for path, part in zip(files, parts):
+        if Path(path).exists():
+            known = parquet.read_metadata(path).metadata or {}
+            has_changed = any(known.get(name.encode()) != value.encode() for name, value in facts.items())
+        else:
+            has_changed = Path(f"{path}.journal").exists()
+        if has_changed:
+            call(["sweep", "--check", f"--part={part}", f"--output={path}"], [plan], quiet=True)
 
 
 def _adopt_pilot(directory: Path, first: str) -> None:

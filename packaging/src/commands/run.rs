@@ -246,10 +246,14 @@ const MOST_LISTED: usize = 12;
 fn summary(json: &Value, extremes: &[Extreme], warnings: &[Warning]) -> String {
     let number = |name: &str| json[name].as_f64().unwrap_or(f64::NAN);
     let per_step = |name: &str| json["milliseconds_per_communication_step"][name].as_f64().unwrap_or(f64::NAN);
+    let per_internal_step = match json["microseconds_per_internal_step"].as_f64() {
+        Some(microseconds) => format!("{microseconds:.3} µs per internal step, "),
+        None => String::new(),
+    };
     let mut text = format!(
         "{}: t = {} s to {} s, communication steps: {}, internal steps: {}\n\
          scheme: {}\n\
-         stepping took {:.3} s: {:.3} µs per internal step, {:.3} s of computing per simulated second\n\
+         stepping took {:.3} s: {per_internal_step}{:.3} s of computing per simulated second\n\
          one communication step took {:.3} ms on average, {:.3} ms at most\n",
         json["model"].as_str().unwrap_or_default(),
         number("start"),
@@ -258,7 +262,6 @@ fn summary(json: &Value, extremes: &[Extreme], warnings: &[Warning]) -> String {
         json["internal_steps"],
         json["scheme"].as_str().unwrap_or_default(),
         number("stepping_seconds"),
-        number("microseconds_per_internal_step"),
         number("real_time_factor"),
         per_step("mean"),
         per_step("most"),

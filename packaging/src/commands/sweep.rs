@@ -1,6 +1,7 @@
 //! `tiprub sweep`: runs a plan, or a part of it, with one row of results per run.
 
 use std::{
+    collections::HashMap,
     fmt::Write as _,
     sync::{Arc, atomic::AtomicBool},
     time::Instant,
@@ -16,7 +17,7 @@ use tiprub_shell::{
 use tiprub_sweep::{
     engine::{self, SweepFiles, SweepOutcome, SweepRequest},
     plan::Plan,
-    plan_digest::plan_digest,
+    plan_digest::{plan_digest, plan_facts},
 };
 
 use crate::{cli::SweepArguments, sweep_sources::ProgramSources};
@@ -102,6 +103,7 @@ fn check(request: &SweepRequest, digest: &str) -> Result<CommandOutcome> {
         "runs": size.runs,
         "pending": size.pending,
         "digest": digest,
+        "facts": plan_facts(request.plan).into_iter().collect::<HashMap<_, _>>(),
         "output": shown_path(request.output),
     });
     Ok(CommandOutcome { text, json, ..CommandOutcome::default() })

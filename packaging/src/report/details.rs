@@ -91,11 +91,15 @@ pub(super) fn run_section(input: &ReportInput<'_>) -> String {
         ("communication steps", format!("{} of H = {} s", schedule.count, scientific(schedule.step))),
         ("internal steps", native.internal_steps.to_string()),
         ("stepping time", format!("{} s", rounded(stepping))),
-        ("computing time per internal step", format!("{} µs", rounded(1e6 * stepping / native.internal_steps as f64))),
         ("computing time per simulated second", format!("{} s", rounded(stepping / simulated))),
     ];
+    if native.internal_steps > 0 {
+        let per_step = 1e6 * stepping / native.internal_steps as f64;
+        rows.insert(3, ("computing time per internal step", format!("{} µs", rounded(per_step))));
+    }
     let settings = &input.scene.settings;
-    if let Some(tolerance) = settings.time.step_tolerance() {
+    let set = |name: &str| input.settings.iter().find(|(own, _)| own == name).and_then(|(_, value)| value.parse().ok());
+    if let Some(tolerance) = settings.time.step_tolerance().map(|own| set("tolerance").unwrap_or(own)) {
         rows.insert(2, ("adaptive steps", format!("tolerance {} of the clearance", scientific(tolerance))));
     } else if let Some(step) = results.last(Quantity::InternalStep) {
         rows.insert(2, ("internal step h", format!("{} s", scientific(step))));
@@ -171,8 +175,22 @@ pub(super) fn agreement_section(input: &ReportInput<'_>) -> String {
 
 /// Returns the section with all settings of the scene.
 pub(super) fn scene_section(input: &ReportInput<'_>) -> String {
+    let replaced: Vec<String> = input
+        .settings
+        .iter()
+        .map(|(name, value)| format!("<code>{} = {}</code>", escape(name), escape(value)))
+        .collect();
+    let start_values = match &replaced[..] {
+        [] => String::new(),
+        values => format!(" In this run, start values replace settings of the scene: {}.", values.join(", ")),
+    };
+    let schedule = input.schedule;
     format!(
-        "<section><h2>Scene</h2><details><summary>All settings, defaults included</summary><pre>{}</pre></details></section>\n",
+        "<section><h2>Scene</h2><p>The run is from {} s to {} s, with communication steps of {} s.{start_values}</p>\
+         <details><summary>All settings of the scene, defaults included</summary><pre>{}</pre></details></section>\n",
+        scientific(schedule.start),
+        scientific(schedule.stop),
+        scientific(schedule.step),
         escape(&tiprub_format::write_scene(&input.scene.settings))
     )
 }

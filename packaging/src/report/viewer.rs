@@ -92,8 +92,11 @@ fn explanation(input: &ReportInput<'_>, [start, stop]: [f64; 2], is_cut: bool, d
          one of the interval.",
     );
     if deviation > 0.0 {
-        let _ =
-            write!(text, " The drawn displacements deviate from the run by at most {} %.", rounded(100.0 * deviation));
+        let _ = write!(
+            text,
+            " The drawn displacements deviate from the run by at most {} %. Points and instants that are not drawn may have larger ones.",
+            rounded(100.0 * deviation)
+        );
     }
     let alone: Vec<String> = input.capture.without_surface().into_iter().map(escape).collect();
     if !alone.is_empty() {

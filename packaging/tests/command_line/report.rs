@@ -75,7 +75,7 @@ fn report_is_complete_and_does_not_change_the_results() {
         "Spectrogram",
         "energy (J)",
         "rotor is shown by contact nodes only",
-        "All settings, defaults included",
+        "All settings of the scene, defaults included",
     ] {
         assert!(html.contains(wanted), "{wanted}");
     }

@@ -58,7 +58,7 @@ topics! {
     Flutter "flutter"
         "Friction makes vibration grow while contact stays closed. This is a note if contact opens before the growth \
          matters."
-        "A note needs no action. If it is a warning, use less friction or more damping. With adaptive steps, also compare \
+        "A note needs no action. For a warning, use less friction or more damping. With adaptive steps, also compare \
          with a smaller `time.tolerance`, because vibration far below the tolerance may decay in the run.";
     LockUp "lock-up"
         "Friction drives the tip into the casing faster than the casing deflects, so the contact force grows without limit \

@@ -145,11 +145,8 @@ impl<'a> StartedRun<'a> {
             Some(observed) => simulation.search_minima_of(&observed.watched_sectors),
             None => simulation.skip_unneeded_states(),
         }
-        for (index, (variable, value)) in given.settings.iter().enumerate() {
-            if given.settings[..index].iter().any(|(other, _)| other == variable) {
-                let remedy = "Give one value per variable";
-                return Err(Failure::usage(format!("--set {variable}"), "this variable is set twice", remedy));
-            }
+        check_set_once(given.settings.iter().map(|(name, _)| name.as_str()))?;
+        for (variable, value) in given.settings {
             if given.history.is_some_and(|history| history.holds(variable)) {
                 let problem = "the file given with --inputs also has a column for this variable";
                 let remedy = "Set the variable with either --set or --inputs";
@@ -330,6 +327,24 @@ impl Outputs {
     }
 }
 
+/// Checks that no start value has no effect because a later one replaces it. An array may come before its elements.
+///
+/// # Errors
+/// Names of a variable that is set twice, or of an array that comes after one of its elements.
+pub fn check_set_once<'a>(names: impl Iterator<Item = &'a str> + Clone) -> Result<()> {
+    for (index, name) in names.clone().enumerate() {
+        let is_element = |other: &str| other.strip_prefix(name).is_some_and(|rest| rest.starts_with('['));
+        let mut earlier = names.clone().take(index);
+        let problem = match earlier.find(|other| *other == name || is_element(other)) {
+            Some(other) if other == name => "this variable is set twice".to_owned(),
+            Some(other) => format!("replaces the value of `{other}`, which is set before it"),
+            None => continue,
+        };
+        return Err(Failure::usage(format!("--set {name}"), problem, "Give one value per variable"));
+    }
+    Ok(())
+}
+
 /// Sets a start value by name: a scalar, one element `name[i]`, all elements of an array to one value, or each element to its value of a list in
 /// brackets.
 pub fn set(simulation: &mut Simulation, name: &str, text: &str) -> Result<()> {
@@ -438,11 +453,15 @@ fn locate(table: &VariableTable, name: &str) -> Result<(DataType, Option<usize>,
             return Ok((variable.kind, None, reference));
         }
     }
-    if let Some((whole, _)) = name.split_once('[')
-        && table.find(whole).is_some_and(|variable| variable.dimension.is_none())
-    {
-        let remedy = format!("Write `{whole}`, without an index");
-        return Err(Failure::usage(format!("--set {name}"), format!("`{whole}` has a single value"), remedy));
+    if let Some(variable) = name.rsplit_once('[').and_then(|(whole, _)| table.find(whole)) {
+        let whole = &variable.name;
+        let (problem, remedy) = match variable.dimension {
+            None => (format!("`{whole}` has a single value"), format!("Write `{whole}`, without an index")),
+            Some(count) => {
+                (format!("`{whole}` has {count} elements"), format!("Write `{whole}[1]` to `{whole}[{count}]`"))
+            }
+        };
+        return Err(Failure::usage(format!("--set {name}"), problem, remedy));
     }
     let settable: Vec<&str> = table
         .variables()
@@ -476,6 +495,25 @@ pub fn similar(name: &str, candidates: &[&str], kind: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A variable with one value has no index, and every variable is set once.
+    #[test]
+    fn superfluous_indices_and_repeated_names_are_rejected() {
+        let scene = tiprub_test_models::rub(4);
+        let mut simulation = Simulation::new(&scene).unwrap();
+        let failure = set(&mut simulation, "speed[2]", "3").unwrap_err();
+        let text = "--set speed[2]: `speed` has a single value. Write `speed`, without an index.";
+        assert_eq!(failure.to_string(), text);
+        let schedule = Schedule::new(&scene.settings.experiment, None, None).unwrap();
+        let settings = [("speed", "3"), ("friction_coefficient", "0"), ("speed", "4")];
+        let settings = settings.map(|(name, value)| (name.to_owned(), value.to_owned()));
+        let given = RunInputs { settings: &settings, ..RunInputs::default() };
+        let failure = StartedRun::new(&scene, &schedule, given).err().unwrap();
+        assert_eq!(failure.to_string(), "--set speed: this variable is set twice. Give one value per variable.");
+        assert!(check_set_once(["a", "a[1]", "b", "ab"].into_iter()).is_ok());
+        let failure = check_set_once(["a[2]", "b", "a"].into_iter()).unwrap_err();
+        assert!(failure.problem.contains("replaces the value of `a[2]`"), "{failure}");
+    }
 
     #[test]
     fn suggests_similar_name_or_lists_all_names() {

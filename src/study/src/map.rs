@@ -88,6 +88,7 @@ struct Map {
 pub fn study(arguments: &MapArguments, console: &Console) -> Result<StudyOutcome> {
     let name = arguments.scene.as_str();
     // Checked before any model is reduced.
+    tiprub_shell::native::check_set_once(arguments.set.iter().map(|(name, _)| name.as_str()))?;
     let settings = scene_source::settings(name)?;
     start::master(&settings)?;
     one_rotor_and_friction(&settings)?;

@@ -97,7 +97,10 @@ impl Case {
         let scene = digest_of(scene.iter().map(String::as_str));
         let mut items = vec![ROW_VERSION.to_owned(), LIBRARY_RELEASE.to_owned(), scene.clone()];
         items.extend(plan.times.iter().map(|time| format!("{time:?}")));
-        items.extend(self.settings.iter().flat_map(|(name, value)| [name.clone(), value.clone()]));
+        // Their order has no effect.
+        let mut settings: Vec<_> = self.settings.iter().collect();
+        settings.sort();
+        items.extend(settings.into_iter().flat_map(|(name, value)| [name.clone(), value.clone()]));
         items.extend(plan.histories.iter().map(|request| format!("{request:?}")));
         Ok(CaseDigest { scene, run: digest_of(items.iter().map(String::as_str)) })
     }

@@ -113,10 +113,10 @@ pub struct SweepOutcome {
 /// A variable does not exist, a reduction has wrong arguments, or a file cannot be written. Rejected and failed runs are rows, not errors.
 pub fn run(request: &SweepRequest) -> Result<SweepOutcome> {
     let (mut part, created) = PartRun::prepare(request)?;
-    if !part.pending.is_empty() {
+    if !part.pending.is_empty() || part.results.is_empty() {
         part.check_names().inspect_err(|_| remove(&created))?;
-        part.run_pending()?;
     }
+    part.run_pending()?;
     part.complete()
 }
 
@@ -131,30 +131,18 @@ pub struct SweepSize {
     pub pending: usize,
 }
 
-/// Checks a part like [`run`], up to its first run. Only the models of the first run are reduced.
+/// Checks a part like [`run`], up to its first run. Only the models of the first run are reduced, and none if the file of the part exists.
 ///
 /// # Errors
 /// The errors of [`run`].
 pub fn check(request: &SweepRequest) -> Result<SweepSize> {
     let (mut part, created) = PartRun::prepare(request)?;
-    let checked = part.check_names();
+    // A part that exists was checked before.
+    let checked = if part.results.is_empty() { part.check_names() } else { Ok(()) };
     remove(&created);
     checked?;
     let (runs, pending) = (part.digests.len(), part.pending.len());
     Ok(SweepSize { plan_runs: request.plan.design.runs(), runs, pending })
-}
-
-/// Checks that an existing file for outputs over time was written by a sweep.
-///
-/// # Errors
-/// The file exists, and no sweep wrote it.
-fn check_histories(path: &Path) -> Result<()> {
-    let has_fact = || parquet_file::facts(path).is_ok_and(|facts| facts.iter().any(|(key, _)| key == ROWS_FACT));
-    if !path.exists() || has_fact() {
-        return Ok(());
-    }
-    let remedy = "Give another file with --output, or remove this one";
-    Err(Failure::new(path.display(), "exists and does not contain the outputs over time of a sweep", remedy))
 }
 
 /// Removes journals without rows.
@@ -181,7 +169,7 @@ struct PartRun<'a> {
     journal: Journal,
     histories: Option<HistoryJournal>,
     store: RomStore<'a>,
-    /// Names of the means and totals of a run; empty if no scene of the plan is accepted.
+    /// Names of the means and totals of a run; empty if no scene of the plan was accepted.
     results: Vec<String>,
 }
 
@@ -196,19 +184,17 @@ impl<'a> PartRun<'a> {
         let digest = |run| Case::new(plan, run)?.digest(plan, &mut store);
         let in_plan = |failure: Failure| Failure { usage: true, ..failure }.at(plan.path.display());
         let digests: Vec<CaseDigest> = runs.map(digest).collect::<Result<_>>().map_err(in_plan)?;
-        let mut rows: HashMap<String, Row> = HashMap::new();
+        let (mut stored, mut results) = (Vec::new(), Vec::new());
         if output.exists() {
             check_results(plan, output)?;
-            rows.extend(result_file::read(output)?.into_iter().map(|row| (row.digest.clone(), row)));
+            (stored, results) = result_file::read(output)?;
         }
         let journals = [&files.journal, &files.history_journal];
         let created: Vec<PathBuf> = journals.into_iter().filter(|path| !path.exists()).cloned().collect();
         let (journal, found) = Journal::open(&files.journal)?;
-        rows.extend(found.into_iter().map(|row| (row.digest.clone(), row)));
-        if plan.histories.is_some() {
-            check_histories(&files.histories)?;
-        }
-        let histories = plan.histories.as_ref().map(|_| HistoryJournal::open(&files.history_journal)).transpose()?;
+        let digests_of = |rows: &[Row]| rows.iter().map(|row| row.digest.clone()).collect::<HashSet<_>>();
+        let old = [digests_of(&stored), digests_of(&found)];
+        let rows = stored.into_iter().chain(found).map(|row| (row.digest.clone(), row)).collect();
         let mut part = Self {
             request,
             files,
@@ -218,46 +204,72 @@ impl<'a> PartRun<'a> {
             pending: Vec::new(),
             resumed: 0,
             journal,
-            histories,
+            histories: None,
             store,
-            results: Vec::new(),
+            results,
         };
-        if let Err(failure) = part.check_old_rows() {
+        if let Err(failure) = part.check_old_rows(old).and_then(|()| part.check_old_histories()) {
             remove(&created);
             return Err(failure);
         }
+        let journal = &part.files.history_journal;
+        part.histories = plan.histories.as_ref().map(|_| HistoryJournal::open(journal)).transpose()?;
         part.find_pending();
         Ok((part, created))
     }
 
-    /// Checks that the part keeps all stored results: a complete part replaces its file, and contains only runs of the plan.
+    /// Checks that the part keeps all stored results: a complete part replaces its file. `stored` contains the digests in the file of results and in the journal.
     ///
     /// # Errors
-    /// The plan no longer has a run whose results are stored.
-    fn check_old_rows(&mut self) -> Result<()> {
-        let plan = self.request.plan;
-        let mut lost: HashSet<&str> =
-            self.rows.values().filter(|row| !row.has_status(Status::Refused)).map(|row| row.digest.as_str()).collect();
-        for digest in &self.digests {
-            lost.remove(digest.run.as_str());
-        }
-        // If values were added to the plan, the run may belong to another part now.
-        for run in 0..plan.design.runs() {
-            if lost.is_empty() {
-                return Ok(());
+    /// A file contains results of a run that the part does not have.
+    fn check_old_rows(&self, stored: [HashSet<String>; 2]) -> Result<()> {
+        let own: HashSet<&str> = self.digests.iter().map(|digest| digest.run.as_str()).collect();
+        let is_result = |digest: &str| self.rows.get(digest).is_some_and(|row| !row.has_status(Status::Refused));
+        for (path, digests) in [&self.files.rows, &self.files.journal].into_iter().zip(stored) {
+            let lost = digests.iter().filter(|digest| !own.contains(digest.as_str()) && is_result(digest)).count();
+            if lost == 0 {
+                continue;
             }
-            lost.remove(Case::new(plan, run)?.digest(plan, &mut self.store)?.run.as_str());
+            let runs = if lost == 1 { "run" } else { "runs" };
+            let (what, reason) = match self.request.part {
+                Part::WHOLE => {
+                    ("the plan no longer has", "the plan, one of its files or the release of tiprub has changed")
+                }
+                _ => (
+                    "this part does not have",
+                    "it is of another part, or the plan, one of its files or the release of tiprub has changed",
+                ),
+            };
+            let problem = format!("contains the results of {lost} {runs} that {what}, because {reason}");
+            let remedy =
+                "Write to another file or directory with --output (in Python: `output`), or move this file elsewhere";
+            return Err(Failure::new(path.display(), problem, remedy));
         }
-        if lost.is_empty() {
+        Ok(())
+    }
+
+    /// Checks that writing outputs over time replaces none of other runs.
+    ///
+    /// # Errors
+    /// The file exists and is not of a sweep, or it has the outputs of other runs.
+    fn check_old_histories(&self) -> Result<()> {
+        let path = &self.files.histories;
+        if self.request.plan.histories.is_none() || !path.exists() {
             return Ok(());
         }
-        let path = if self.files.rows.exists() { &self.files.rows } else { &self.files.journal };
-        let problem = format!(
-            "contains the results of {} runs that the plan no longer has, because the plan, one of its files or the release of tiprub has changed",
-            lost.len()
-        );
-        let remedy = "Write to another file or directory with --output, or remove this file if you do not need it";
-        Err(Failure::new(path.display(), problem, remedy))
+        let remedy = "Write to another file with --output, or move this one elsewhere";
+        let facts = parquet_file::facts(path).unwrap_or_default();
+        let Some((_, rows)) = facts.into_iter().find(|(key, _)| key == ROWS_FACT) else {
+            return Err(Failure::new(
+                path.display(),
+                "exists and does not contain the outputs over time of a sweep",
+                remedy,
+            ));
+        };
+        if !self.files.rows.exists() && rows != self.rows_digest() {
+            return Err(Failure::new(path.display(), "contains the outputs over time of other runs", remedy));
+        }
+        Ok(())
     }
 
     fn find_pending(&mut self) {
@@ -303,6 +315,9 @@ impl<'a> PartRun<'a> {
     /// Does the pending runs, and appends each row to the journal.
     fn run_pending(&mut self) -> Result<()> {
         let SweepRequest { stop, console, threads, .. } = *self.request;
+        if self.pending.is_empty() {
+            return Ok(());
+        }
         if self.resumed > 0 {
             let (done, all) = (self.resumed, self.digests.len());
             console.print_progress(format_args!("{done} of {all} runs are already finished"));

@@ -39,7 +39,7 @@ pub fn plan_digest(plan: &Plan, program: &Path, sources: &dyn SweepSources) -> R
 
 /// Returns the metadata of result files that identify a plan: the digest of its path, and the digest of its text, its scene, and the files that
 /// it names.
-pub(crate) fn plan_facts(plan: &Plan) -> [(&'static str, String); 2] {
+pub fn plan_facts(plan: &Plan) -> [(&'static str, String); 2] {
     let path = std::fs::canonicalize(&plan.path).unwrap_or_else(|_| plan.path.clone());
     let text = std::fs::read(&plan.path).unwrap_or_default();
     let mut content = vec![content_digest(&text), content_digest(plan.scene.text.as_bytes())];

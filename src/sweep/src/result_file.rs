@@ -48,11 +48,11 @@ pub fn table(plan: &Plan, rows: &[(usize, &Row)], results: &[String]) -> Table {
     Table { columns }
 }
 
-/// Reads the rows of a file that a sweep wrote before.
+/// Reads the rows of a file that a sweep wrote before, and the names of its means and totals.
 ///
 /// # Errors
 /// The file cannot be read, or is not the result of a sweep.
-pub fn read(path: &Path) -> Result<Vec<Row>> {
+pub fn read(path: &Path) -> Result<(Vec<Row>, Vec<String>)> {
     let other = || {
         let remedy = "Give another file with --output, or remove this one";
         Failure::new(path.display(), "exists and is not the result of a sweep", remedy)
@@ -70,5 +70,7 @@ pub fn read(path: &Path) -> Result<Vec<Row>> {
         let cells = results.filter_map(|column| Some((column.name.clone(), column.cells[row].clone()?)));
         Some(Row { digest: digest.clone(), cells: cells.collect() })
     });
-    Ok(rows.collect())
+    let is_common = |name: &str| FIRST_COLUMNS.iter().chain(&LAST_COLUMNS).any(|(common, _)| *common == name);
+    let names = columns[first..].iter().map(|column| column.name.clone()).filter(|name| !is_common(name));
+    Ok((rows.collect(), names.collect()))
 }

@@ -188,6 +188,7 @@ fn rows_do_not_depend_on_threads_and_parts() {
     for number in 1..=4 {
         bench.try_part(GRID, "part.parquet", Part::new(number, 4).unwrap(), 2).unwrap();
         let part = bench.table("part.parquet");
+        fs::remove_file(bench.path("part.parquet")).unwrap();
         match &mut joined {
             None => joined = Some(part),
             Some(joined) => {
@@ -206,7 +207,7 @@ fn rows_do_not_depend_on_threads_and_parts() {
 fn journal_rows_are_not_computed_again() {
     let bench = Bench::new();
     bench.run(GRID, "whole.parquet");
-    let rows = result_file::read(&bench.path("whole.parquet")).unwrap();
+    let (rows, _) = result_file::read(&bench.path("whole.parquet")).unwrap();
     let files = SweepFiles::new(&bench.path("new.parquet"));
     let (mut journal, _) = Journal::open(&files.journal).unwrap();
     // The marked value shows that the row is taken from the journal.
@@ -234,33 +235,56 @@ fn edited_plan_keeps_results_of_removed_runs() {
     let whole = bench.table("a.parquet");
     let rejected = |plan: &str, output: &str, runs: &str| {
         let failure = bench.try_part(plan, output, Part::WHOLE, 1).unwrap_err();
-        assert!(failure.problem.contains(&format!("results of {runs} runs that the plan no longer has")), "{failure}");
+        assert!(failure.problem.contains(&format!("results of {runs} that the plan no longer has")), "{failure}");
     };
-    rejected(&format!("stop = 0.005\n{GRID}"), "a.parquet", "6");
-    rejected(&GRID.replace("values = [5e-4, 1e-3]", "values = [1e-3]"), "a.parquet", "3");
+    rejected(&format!("stop = 0.005\n{GRID}"), "a.parquet", "6 runs");
+    rejected(&GRID.replace("values = [5e-4, 1e-3]", "values = [1e-3]"), "a.parquet", "3 runs");
     fs::write(bench.path("small.rom.safetensors"), tiprub_format::write_rom(&rom(2e5))).unwrap();
-    rejected(GRID, "a.parquet", "6");
+    rejected(GRID, "a.parquet", "6 runs");
     fs::write(bench.path("small.rom.safetensors"), tiprub_format::write_rom(&rom(1e5))).unwrap();
     fs::write(bench.path("scene.toml"), SCENE.replace("friction = 0.1", "friction = 0.2")).unwrap();
-    rejected(GRID, "a.parquet", "6");
+    rejected(GRID, "a.parquet", "6 runs");
     assert_eq!(bench.run(GRID, "b.parquet").resumed, 0);
     assert!(bench.table("a.parquet") == whole && !bench.path("a.parquet.journal").exists());
     // A journal of an interrupted sweep is kept as well.
     let row = Row::without_results(&"0".repeat(64), Status::Failed, &Failure::new("a", "b", "c"), 1.0);
     Journal::open(&bench.path("c.parquet.journal")).unwrap().0.append(&row).unwrap();
-    rejected(GRID, "c.parquet", "1");
+    rejected(GRID, "c.parquet", "1 run");
     assert!(bench.path("c.parquet.journal").exists() && !bench.path("c.parquet").exists());
 }
 
-/// A run that moves to another part is no error, because the plan still contains it.
+/// A part does not replace finished runs of another part, or runs that more values of the plan move to another part.
 #[test]
-fn added_values_may_move_runs_to_other_parts() {
+fn results_of_runs_of_other_parts_are_kept() {
     let bench = Bench::new();
-    let second = Part::new(2, 2).unwrap();
+    let [first, second] = [1, 2].map(|number| Part::new(number, 2).unwrap());
     bench.try_part(GRID, "two.parquet", second, 1).unwrap();
-    let longer =
-        bench.try_part(&GRID.replace("to = 120, count = 3", "to = 160, count = 5"), "two.parquet", second, 1).unwrap();
-    assert!(longer.runs == 5 && longer.finished == 5 && longer.resumed == 1, "{longer:?}");
+    let whole = bench.table("two.parquet");
+    let longer = GRID.replace("to = 120, count = 3", "to = 160, count = 5");
+    for (plan, part, runs) in [(&longer, second, "2 runs"), (&GRID.to_owned(), first, "3 runs")] {
+        let failure = bench.try_part(plan, "two.parquet", part, 1).unwrap_err();
+        assert!(failure.problem.contains(&format!("results of {runs} that this part does not have")), "{failure}");
+    }
+    assert_eq!(bench.table("two.parquet"), whole);
+    assert_eq!(bench.run(GRID, "two.parquet").resumed, 3, "the whole plan has all runs of its parts");
+}
+
+/// The error names the file with the runs, and outputs over time are kept as well.
+#[test]
+fn journals_and_outputs_over_time_of_other_runs_are_kept() {
+    let bench = Bench::new();
+    let plan = format!("{GRID}[histories]\noutputs = [\"torque\"]\n");
+    bench.run(&plan, "a.parquet");
+    let row = Row::without_results(&"0".repeat(64), Status::Failed, &Failure::new("a", "b", "c"), 1.0);
+    Journal::open(&bench.path("a.parquet.journal")).unwrap().0.append(&row).unwrap();
+    let failure = bench.try_part(&plan, "a.parquet", Part::WHOLE, 1).unwrap_err();
+    assert!(failure.to_string().contains("a.parquet.journal: contains the results of 1 run "), "{failure}");
+    fs::remove_file(bench.path("a.parquet.journal")).unwrap();
+    fs::rename(bench.path("a.parquet"), bench.path("b.parquet")).unwrap();
+    let other = plan.replace("to = 120", "to = 110");
+    let failure = bench.try_part(&other, "a.parquet", Part::WHOLE, 1).unwrap_err();
+    assert!(failure.to_string().contains("a.histories.parquet: contains the outputs over time of other"), "{failure}");
+    assert!(!bench.path("a.parquet.journal").exists());
 }
 
 #[test]
@@ -495,7 +519,7 @@ fn stopped_sweep_keeps_its_rows() {
     assert!(engine::run(&request(&running, &output)).unwrap().is_complete);
 }
 
-/// A part without a finished run has the same columns as the other parts.
+/// A part without a finished run, or without any run, has the same columns as the other parts.
 #[test]
 fn part_with_only_rejected_runs_has_all_columns() {
     let bench = Bench::new();
@@ -512,6 +536,12 @@ fn part_with_only_rejected_runs_has_all_columns() {
         |table: &Table| -> Vec<_> { table.columns.iter().map(|column| (column.name.clone(), column.kind)).collect() };
     assert_eq!(facts(&refused), facts(&finished));
     assert_eq!(texts(&refused, "friction_loss"), [""]);
+    // The same part again, and a part without runs.
+    bench.try_part(plan, "1.parquet", Part::new(1, 2).unwrap(), 1).unwrap();
+    assert_eq!(bench.table("1.parquet"), refused);
+    bench.try_part(plan, "none.parquet", Part::new(1, 3).unwrap(), 1).unwrap();
+    let names = |table: &Table| -> Vec<_> { table.columns.iter().map(|column| column.name.clone()).collect() };
+    assert_eq!(names(&bench.table("none.parquet")), names(&finished));
 }
 
 #[test]

@@ -36,6 +36,7 @@ const COMPARED: [&str; 4] = ["scheme", "solver", "internal_step_max", "tolerance
 /// # Errors
 /// One of the start values is such a parameter.
 pub fn refuse_compared(settings: &[(String, String)]) -> Result<()> {
+    tiprub_shell::native::check_set_once(settings.iter().map(|(name, _)| name.as_str()))?;
     match settings.iter().find(|(name, _)| COMPARED.contains(&name.as_str())) {
         Some((name, _)) => {
             let problem = "the study varies this setting itself";

@@ -14,10 +14,14 @@ use crate::{
 /// Largest number of runs whose scenes are tried for the check of names, until one is accepted.
 const MAX_TRIED_RUNS: usize = 8;
 /// Keys of the scene whose value is the start value of a variable, each with the last part of the variable's name.
-const REPLACED_FIELDS: [(&str, &str); 11] = [
+const REPLACED_FIELDS: [(&str, &str); 15] = [
     ("structure.speed", "speed"),
     ("structure.damping_ratio", "damping_ratio"),
+    ("structure.damping_ratios", "damping_ratios"),
+    ("structure.excitation.amplitude", "excitation_amplitude"),
     ("structure.excitation.order", "excitation_order"),
+    ("structure.excitation.phase", "excitation_phase"),
+    ("structure.initial.displacement", "initial_displacement"),
     ("surface.ramp_time", "casing_ramp_time"),
     ("contact.friction", "friction_coefficient"),
     ("contact.solver", "solver"),
@@ -29,7 +33,7 @@ const REPLACED_FIELDS: [(&str, &str); 11] = [
 ];
 
 /// Returns the names of all start values of a plan.
-fn start_values(plan: &Plan) -> impl Iterator<Item = &str> {
+fn start_values(plan: &Plan) -> impl Iterator<Item = &str> + Clone {
     let varied = plan.variables.iter().filter_map(|variable| match &variable.target {
         VariableTarget::StartValue(name) => Some(name.as_str()),
         _ => None,
@@ -38,8 +42,8 @@ fn start_values(plan: &Plan) -> impl Iterator<Item = &str> {
 }
 
 impl PartRun<'_> {
-    /// Checks that all variables and outputs of the plan exist, in the first pending run whose scene is accepted. If no scene is accepted, the
-    /// reasons become rows.
+    /// Checks that all variables and outputs of the plan exist, in the first pending run whose scene is accepted, or without such a run in another
+    /// one. If no scene is accepted, the reasons become rows.
     pub(super) fn check_names(&mut self) -> Result<()> {
         let plan = self.request.plan;
         let in_plan = |failure: Failure| {
@@ -49,7 +53,9 @@ impl PartRun<'_> {
             }
             failure.at(plan.path.display())
         };
-        for run in self.pending.iter().copied().take(MAX_TRIED_RUNS).collect::<Vec<_>>() {
+        let pending = self.pending.iter().copied().take(MAX_TRIED_RUNS);
+        let others = (0..plan.design.runs()).take(MAX_TRIED_RUNS);
+        for run in pending.chain(others).collect::<Vec<_>>() {
             self.load_models(run)?;
             let scene = self.case(run).and_then(|case| case.scene(&self.store));
             let compiled = scene.and_then(|scene| native::compiled(&scene, &plan.schedule(&scene.settings)?));
@@ -58,6 +64,7 @@ impl PartRun<'_> {
             for name in start_values(plan) {
                 native::check_settable(table, name).map_err(in_plan)?;
             }
+            native::check_set_once(start_values(plan)).map_err(in_plan)?;
             for output in plan.histories.iter().flat_map(|request| &request.outputs) {
                 native::output_columns(table, output).map_err(in_plan)?;
             }
