@@ -266,8 +266,14 @@ def _check_known_parts(files: Sequence[str], parts: Sequence[str], plan: str, fa
             has_changed = any(known.get(name.encode()) != value.encode() for name, value in facts.items())
         else:
             has_changed = Path(f"{path}.journal").exists()
-        if has_changed:
+        if not has_changed:
+            continue
+        try:
             call(["sweep", "--check", f"--part={part}", f"--output={path}"], [plan], quiet=True)
+        except Error as error:
+            # The program of a worker that was killed completes its part.
+            if error.problem != LOCKED:
+                raise
 
 
 def _adopt_pilot(directory: Path, first: str) -> None:
