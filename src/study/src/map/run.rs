@@ -104,7 +104,7 @@ pub struct RunWarning {
 }
 
 impl RunWarning {
-    fn new(warning: &Warning) -> Self {
+    pub(super) fn new(warning: &Warning) -> Self {
         Self {
             id: warning.topic().id().to_owned(),
             is_note: warning.level() == Severity::Note,
