@@ -22,7 +22,7 @@ impl Kernel for AllFinite<'_> {
                 sums[lane] += 0.0 * chunk[lane];
             }
         }
-        *self.all &= sums.iter().all(|sum| *sum == 0.0) && rest.iter().all(|value| value.is_finite());
+        *self.all &= sums.iter().sum::<f64>() == 0.0 && rest.iter().all(|value| value.is_finite());
     }
 }
 
