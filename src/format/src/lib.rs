@@ -9,12 +9,14 @@
 
 mod input;
 mod load;
+mod remedy;
 mod resources;
 mod rom_file;
 mod rom_layout;
 mod scene_diagnosis;
 mod scene_file;
 mod scene_layout;
+#[cfg(feature = "suggestions")]
 mod suggestion;
 mod thermal_file;
 
@@ -28,6 +30,7 @@ pub use rom_file::{read_rom, write_rom};
 pub use rom_layout::{ARRAYS, ArrayLayout, METADATA, MetadataLayout};
 pub use scene_file::{builtin_model, parse_scene, position_of, read_scene, write_scene};
 pub use scene_layout::{FIELDS, SceneField};
+#[cfg(feature = "suggestions")]
 pub use suggestion::{closest_name, name_hint};
 pub use thermal_file::{
     THERMAL_FILE, ThermalResources, load_thermal_resources, read_thermal, thermal_resource_files, write_thermal,

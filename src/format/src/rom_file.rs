@@ -13,8 +13,9 @@ mod extras;
 mod harmonics;
 mod rub_errors;
 
+use crate::Result;
+use crate::remedy::name_remedy;
 use crate::rom_layout::{ARRAYS, METADATA, NUMBER, ROM_FORMAT, ROM_FORMAT_VERSION, units_text};
-use crate::{Result, suggestion};
 
 const WRITE_AGAIN: &str = "Write the ROM again; the ROM file chapter of the user guide lists the arrays and metadata";
 
@@ -86,7 +87,7 @@ impl RomReader<'_> {
             return Err(self.error(
                 format!("metadata `{unknown}`"),
                 "unknown metadata entry",
-                suggestion::remedy(unknown, &known),
+                name_remedy(unknown, &known),
             ));
         }
         let container = SafeTensors::deserialize(bytes).map_err(|error| self.container_error(&error, bytes))?;
@@ -97,7 +98,7 @@ impl RomReader<'_> {
         for (name, view) in views {
             let listed = known.contains(&name.as_str()) && !name.contains(NUMBER);
             if !listed && harmonics::parts(&name).is_none() {
-                let remedy = suggestion::remedy(&name, &known);
+                let remedy = name_remedy(&name, &known);
                 return Err(self.error(format!("array `{name}`"), "unknown array", remedy));
             }
             if view.dtype() != Dtype::F64 {
@@ -299,7 +300,7 @@ impl RomReader<'_> {
             other => Err(self.error(
                 "metadata `frame`",
                 format!("unknown frame {other:?}"),
-                suggestion::remedy(other, &["cylindrical", "cartesian"]),
+                name_remedy(other, &["cylindrical", "cartesian"]),
             )),
         }
     }

@@ -11,8 +11,8 @@ use toml::de::{DeArray, DeTable, DeValue};
 
 use tiprub_cosim::Diagnostic;
 
+use crate::remedy::name_remedy;
 use crate::scene_layout::{FIELDS, INNER_TABLES, REPEATED_TABLES, SINGLE_TABLES, header};
-use crate::suggestion;
 
 /// A syntactically correct scene file.
 pub(crate) struct Document<'a> {
@@ -137,7 +137,7 @@ pub(crate) fn diagnose(document: &Document, error: &toml::de::Error) -> Diagnost
         return unknown_key(document, &place, name, &accepted(message));
     }
     if let Some(name) = quoted(message, "unknown variant") {
-        let remedy = suggestion::remedy(name, &accepted(message));
+        let remedy = name_remedy(name, &accepted(message));
         return document.error(Some(place.span), &place.path, format!("\"{name}\" is not an accepted value"), remedy);
     }
     wrong_value(document, place, message)
@@ -158,7 +158,7 @@ fn unknown_key(document: &Document, place: &TomlNode, name: &str, accepted: &[&s
     let is_key = place.path.rsplit('.').next() == Some(name);
     let path = if is_key { place.path.clone() } else { format!("{}.{name}", place.path) };
     let span = document.places().into_iter().find(|other| other.path == path).map(|other| other.span);
-    let mut remedy = suggestion::remedy(name, accepted);
+    let mut remedy = name_remedy(name, accepted);
     let table = if is_key { place.fields.rsplit_once('.').map_or("", |(table, _)| table) } else { &place.fields };
     if FIELDS.iter().any(|field| field.key() == name && field.table() == table) {
         remedy = format!("`{name}` belongs to another `kind` of {}. {remedy}", header(table));

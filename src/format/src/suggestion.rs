@@ -63,15 +63,6 @@ pub fn name_hint<'a>(given: &str, accepted: impl IntoIterator<Item = &'a str>) -
     closest_name(given, accepted).map_or(String::new(), |name| format!("Did you mean `{name}`? "))
 }
 
-/// Returns `Did you mean `x`? Accepted here: `x`, `y`, `z`` (the question only if a name is close).
-pub(crate) fn remedy(given: &str, accepted: &[&str]) -> String {
-    if accepted.is_empty() {
-        return "No further keys are accepted here".to_owned();
-    }
-    let list = accepted.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
-    format!("{}Accepted here: {list}", name_hint(given, accepted.iter().copied()))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -95,7 +86,5 @@ mod tests {
         ] {
             assert_eq!(closest_name(given, start_values), name, "{given}");
         }
-        assert_eq!(remedy("viscosity", &["gap"]), "Accepted here: `gap`");
-        assert_eq!(remedy("viscosity", &[]), "No further keys are accepted here");
     }
 }

@@ -9,11 +9,12 @@ use tiprub_core::scene::rom::{
 use tiprub_cosim::ThermalPatch;
 
 use super::{Array, Arrays, Metadata, RomReader, WRITE_AGAIN, list, matrix, names};
+use crate::Result;
+use crate::remedy::name_remedy;
 use crate::rom_layout::{
     SPIN_ARRAYS, STRESS_ARRAYS, STRESS_CENTRIFUGAL, STRESS_THERMAL, SUPPORT_ARRAYS, SUPPORT_THERMAL, THERMAL_ARRAYS,
     WATCHED_ARRAYS,
 };
-use crate::{Result, suggestion};
 
 /// Third word of a contact grid with free edges all around.
 const OPEN: &str = "open";
@@ -62,7 +63,7 @@ impl RomReader<'_> {
         match BASES.iter().find(|(name, _)| name == text) {
             Some((_, basis)) => Ok(*basis),
             None => {
-                let remedy = suggestion::remedy(text, &BASES.map(|(name, _)| name));
+                let remedy = name_remedy(text, &BASES.map(|(name, _)| name));
                 Err(self.error("metadata `basis`", format!("unknown basis {text:?}"), remedy))
             }
         }

@@ -3,7 +3,8 @@
 use tiprub_core::scene::rom::RubErrors;
 
 use super::{Metadata, RomReader};
-use crate::{Result, suggestion};
+use crate::Result;
+use crate::remedy::name_remedy;
 
 /// Entries of the metadata.
 const ERRORS: &str = "rub_errors";
@@ -28,7 +29,7 @@ impl RomReader<'_> {
             match (place, value) {
                 (Some(place), Some(value)) if found[place].is_none() => found[place] = Some(value),
                 (None, _) => {
-                    let remedy = suggestion::remedy(name.trim(), &DIRECTIONS);
+                    let remedy = name_remedy(name.trim(), &DIRECTIONS);
                     let problem = format!("{part:?} does not name a known error");
                     return Err(self.error(format!("metadata `{ERRORS}`"), problem, remedy));
                 }
