@@ -35,6 +35,10 @@ pub fn check(command: &Command) -> Result<()> {
             let parquet = NamedFile::option("--parquet", &arguments.parquet);
             let report = NamedFile::option("--report", &arguments.report);
             let files = [parquet, report].into_iter().flatten();
+            if let Some(file) = files.clone().find(|file| file.path == Path::new("-")) {
+                let remedy = "Give the name of a file, or ./- for a file with this name";
+                return Err(Failure::usage(format!("{} -", file.role), "cannot be printed on stdout", remedy));
+            }
             let written = Vec::from_iter(NamedFile::option("--csv", &csv).into_iter().chain(files));
             outputs(&read, &written)?;
             let Some(fields) = arguments.fields() else { return Ok(()) };

@@ -132,6 +132,9 @@ pub fn parsed<C: Parser>(asked: &Console) -> C {
     C::try_parse().unwrap_or_else(|error| {
         if let Some(failure) = failure(&error, C::command().get_name()) {
             asked.answer(&failure);
+            if !asked.prints_errors() {
+                std::process::exit(error.exit_code());
+            }
         }
         error.exit()
     })

@@ -209,6 +209,15 @@ def test_progress_goes_to_stderr_unless_quiet(blade, tmp_path, capsys):
     assert capsys.readouterr() == ("", "")
 
 
+def test_caught_errors_print_nothing(tmp_path, capfd):
+    for call in (module.run, module.package, module.inspect):
+        with pytest.raises(module.Error, match="none.toml: cannot be read"):
+            call("none.toml")
+    with pytest.raises(module.Error, match="unexpected argument"):
+        module.run(SCENE, directory=tmp_path, sett=1)
+    assert capfd.readouterr() == ("", "")
+
+
 def test_reductions_say_where_they_are(tmp_path):
     made = module.reduce("casing", output=tmp_path / "casing.rom.safetensors", element="hex8", mesh="24x1x6", contact_grid="12x3", patches="0x0", modes=12, quiet=True)
     assert made.path == tmp_path / "casing.rom.safetensors" and made.path.is_file() and made["rom"]["name"]

@@ -231,7 +231,7 @@ def _interrupts_wait() -> Iterator[None]:
 def call(words: Iterable[str], files: Iterable[str] = (), quiet: bool = False) -> dict[str, Any]:
     """Run a command and return its JSON object.
 
-    Progress and warnings are printed on stderr, also in a notebook; `quiet` suppresses them.
+    Progress and warnings are printed on stderr, also in a notebook; `quiet` suppresses them. Errors are raised and not printed.
 
     Raises
     ------
@@ -242,11 +242,12 @@ def call(words: Iterable[str], files: Iterable[str] = (), quiet: bool = False) -
     # A terminal shows progress bars; a Python stream, as in a notebook, shows lines.
     inherited = sys.stderr is sys.__stderr__ and sys.stderr is not None
     stderr = subprocess.DEVNULL if quiet else None if inherited else subprocess.PIPE
+    environment = {**os.environ, "TIPRUB_ERRORS_IN_JSON": "1"}
     with tempfile.TemporaryFile() as answer:
         process = None
         try:
             with _interrupts_wait():
-                process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=answer, stderr=stderr)
+                process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=answer, stderr=stderr, env=environment)
             for line in process.stderr or ():
                 if sys.stderr is not None:
                     sys.stderr.write(line.decode("utf-8", "replace"))

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use tiprub_cosim::variables::Quantity;
 use tiprub_figure::escape;
+use tiprub_shell::extremes::six_digits;
 use tiprub_study::estimate;
 
 use super::figures::Results;
@@ -188,9 +189,9 @@ pub(super) fn scene_section(input: &ReportInput<'_>) -> String {
     format!(
         "<section><h2>Scene</h2><p>The run is from {} s to {} s, with communication steps of {} s.{start_values}</p>\
          <details><summary>All settings of the scene, defaults included</summary><pre>{}</pre></details></section>\n",
-        scientific(schedule.start),
-        scientific(schedule.stop),
-        scientific(schedule.step),
+        six_digits(schedule.start),
+        six_digits(schedule.stop),
+        six_digits(schedule.step),
         escape(&tiprub_format::write_scene(&input.scene.settings))
     )
 }

@@ -2,7 +2,9 @@
 
 use std::fs;
 
+use nalgebra::{DMatrix, DVector};
 use serde_json::Value;
+use tiprub_core::Rom;
 
 use crate::project::{Project, SCENE};
 
@@ -102,6 +104,46 @@ fn report_states_that_no_contact_occurred() {
     let html = read(&project, "free.html");
     assert!(html.contains("No blade touches the casing in") && html.contains("no contact occurred"));
     assert!(!html.contains("is hit hardest"));
+}
+
+/// The page shows the values of the run, not those of the scene.
+#[test]
+fn report_shows_the_values_that_replace_those_of_the_scene() {
+    let project = Project::new();
+    project.succeed(&["run", "scene.toml", "--report", "scene.html"]);
+    let html = read(&project, "scene.html");
+    assert!(!html.contains("start values replace") && html.contains("from 0 s to 0.05 s"));
+    let run = "run scene.toml --set speed=90 --set internal_step_max=5e-5 --stop 0.04 --step 2e-3 --report run.html";
+    project.succeed(&run.split(' ').collect::<Vec<_>>());
+    let html = read(&project, "run.html");
+    for wanted in [
+        "start values replace settings of the scene: <code>speed = 90</code>, <code>internal_step_max = 5e-5</code>.",
+        "from 0 s to 0.04 s, with communication steps of 0.002 s",
+        "<th>internal step h</th><td>5·10<sup>−5</sup> s",
+    ] {
+        assert!(html.contains(wanted), "{wanted}");
+    }
+}
+
+/// Blades far from the casing take no step in a run of one short communication step, so there is no time per step.
+#[test]
+fn run_without_internal_steps_has_no_time_per_step() {
+    let project = Project::new();
+    let rom = project.path("small.rom.safetensors");
+    let small = tiprub_format::read_rom(&fs::read(&rom).unwrap(), "small").unwrap();
+    // Adaptive steps need more modes than contact directions.
+    let stiffness = DMatrix::from_diagonal(&DVector::from_fn(6, |mode, _| 1e5 * (1.0 + mode as f64)));
+    let contact_map = DMatrix::from_fn(3, 6, |row, mode| if mode % 3 == row { 1.0 / (1.0 + mode as f64) } else { 0.0 });
+    let adaptive = Rom { mass: DMatrix::identity(6, 6) * 0.1, stiffness, contact_map, ..small };
+    fs::write(&rom, tiprub_format::write_rom(&adaptive)).unwrap();
+    let scene = SCENE.replace("[time]", "[time]\nscheme = \"galerkin\"").replace("gap = 1e-3", "gap = 0.01");
+    fs::write(project.path("scene.toml"), scene).unwrap();
+    let run = ["run", "scene.toml", "--all", "--stop", "1e-5", "--step", "1e-5", "--report", "run.html"];
+    let printed = project.succeed(&run);
+    assert!(printed.contains("internal steps: 0\n") && !printed.contains("per internal step"), "{printed}");
+    assert!(!printed.contains("inf") && !printed.contains("NaN"), "{printed}");
+    let html = read(&project, "run.html");
+    assert!(html.contains("<th>internal steps</th><td>0</td>") && !html.contains("per internal step"));
 }
 
 #[test]

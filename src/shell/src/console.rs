@@ -45,6 +45,8 @@ fn is_obeyed(character: char) -> bool {
 
 /// Exit code if the reader of stdout closed it early, such as `head`: the code that shells report for a program ended by SIGPIPE.
 const READER_LEFT: u8 = 128 + 13;
+/// Environment variable that leaves out the text of errors that are printed as JSON. The Python module sets it, so that a caught error prints nothing.
+pub const ERRORS_IN_JSON: &str = "TIPRUB_ERRORS_IN_JSON";
 
 /// Result of a command, as text and as JSON.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -176,11 +178,19 @@ impl Console {
         print(&printable(outcome.rest.trim_end()))
     }
 
-    /// Prints a failure: text on stderr, and with `--json` the object on stdout.
+    /// Prints a failure: text on stderr, and with `--json` the object on stdout. A caller that reports the object itself sets the environment variable
+    /// [`ERRORS_IN_JSON`], which leaves out the text.
     pub fn fail(&self, failure: &Failure) {
         self.warn(&failure.warnings);
-        let _ = writeln!(std::io::stderr(), "error: {}", printable(&failure.to_string()));
+        if self.prints_errors() {
+            let _ = writeln!(std::io::stderr(), "error: {}", printable(&failure.to_string()));
+        }
         self.answer(failure);
+    }
+
+    /// Returns whether errors are printed as text.
+    pub fn prints_errors(&self) -> bool {
+        !self.json || std::env::var_os(ERRORS_IN_JSON).is_none()
     }
 
     /// Prints the object of a failure on stdout if `--json` is set.

@@ -454,6 +454,21 @@ fn field_that_a_start_value_replaces_is_rejected() {
         assert_eq!(failure.what, "variable `a`", "{failure}");
         assert!(failure.problem.contains(&format!("the start value `{name}` of the plan replaces")), "{failure}");
     }
+    let motion = "[structure.excitation]\norder = 2\nmode = 1\namplitude = 1.0\n[[structure.initial]]\nmode = 1\n\
+                  displacement = 1e-6\n[[surface]]";
+    fs::write(bench.path("scene.toml"), SCENE.replacen("[[surface]]", motion, 1)).unwrap();
+    for (field, values, name, value) in [
+        ("structure[rotor].damping_ratios", "[[0.01], [0.02]]", "damping_ratios", "0.03"),
+        ("structure[rotor].excitation.amplitude", "[1.0, 2.0]", "excitation_amplitude", "3.0"),
+        ("structure[rotor].excitation.order", "[2, 3]", "excitation_order", "4"),
+        ("structure[rotor].excitation.phase", "[0.0, 1.0]", "excitation_phase", "2.0"),
+        ("structure[rotor].initial[1].displacement", "[1e-6, 2e-6]", "initial_displacement", "3e-6"),
+    ] {
+        let text = plan(field, values, &format!("[set]\n{name} = {value}"));
+        let failure = bench.try_part(&text, "a.parquet", Part::WHOLE, 1).expect_err(&text);
+        assert!(failure.problem.contains(&format!("sets `{field}`, which the start value `{name}`")), "{failure}");
+    }
+    fs::write(bench.path("scene.toml"), SCENE).unwrap();
     // These start values do not replace the field.
     for (field, values, more) in [
         ("contact[1].gap", "[5e-4, 1e-3]", variable("gap_offset", "[0.0, 1e-4]")),
