@@ -284,10 +284,16 @@ impl SurfaceSpline {
         if self.ends == Ends::Open {
             return self.nearest_data_point(point);
         }
-        let turns = (libm::atan2(point[1], point[0]) - self.first_angle) / std::f64::consts::TAU;
+        self.locate_at(libm::atan2(point[1], point[0]), point[2])
+    }
+
+    /// Returns a place at about an angle about z (rad) and an axial position (m), on the edge for positions beyond it; closed surfaces only.
+    #[inline(always)]
+    pub(crate) fn locate_at(&self, angle: f64, axial: f64) -> ClosestPoint {
+        let turns = (angle - self.first_angle) / std::f64::consts::TAU;
         let (p, s) = split((turns - turns.floor()) * real(self.around), self.around);
-        let q = self.rings[1..self.along - 1].iter().filter(|axial| **axial <= point[2]).count();
-        let t = (point[2] - self.rings[q]) / (self.rings[q + 1] - self.rings[q]);
+        let q = self.rings[1..self.along - 1].iter().filter(|ring| **ring <= axial).count();
+        let t = (axial - self.rings[q]) / (self.rings[q + 1] - self.rings[q]);
         ClosestPoint { patch: [p, q], s, t: if t.is_finite() { t.clamp(0.0, 1.0) } else { 0.0 } }
     }
 

@@ -13,7 +13,8 @@ const NEARBY: f64 = 1e-3;
 pub(crate) struct NearSearch<'a> {
     gap: &'a SplineGap,
     drive: &'a PrescribedMotion,
-    /// Rotation of the rotor relative to the shape, and of the shape.
+    /// Rotation of the rotor relative to the shape, as an angle (rad) and as a frame, and of the shape.
+    turned: f64,
     rotor: PolarFrame,
     shape: PolarFrame,
     /// Centre of the shaft in the directions of the shape (m).
@@ -40,8 +41,17 @@ impl<'a> NearSearch<'a> {
     /// Prepares the search for the current surface and prescribed motion.
     pub fn new(gap: &'a SplineGap, drive: &'a PrescribedMotion) -> Self {
         let shape = PolarFrame::new(drive.shape_rotation);
-        let rotor = PolarFrame::new(drive.rotor_angle - drive.shape_rotation);
-        Self { gap, drive, rotor, shape, centre: shape.local(drive.shaft), reach: gap.surface.extension() / 6.0 }
+        let turned = drive.rotor_angle - drive.shape_rotation;
+        let rotor = PolarFrame::new(turned);
+        Self {
+            gap,
+            drive,
+            turned,
+            rotor,
+            shape,
+            centre: shape.local(drive.shaft),
+            reach: gap.surface.extension() / 6.0,
+        }
     }
 
     /// Position of a node displaced by `local` (m) in the directions of the shape, and its own directions there.
@@ -89,6 +99,22 @@ impl<'a> NearSearch<'a> {
         let found = match self.gap.surface.project_close(x, guess, NEARBY) {
             Some(found) => found,
             None => self.search(x, guess),
+        };
+        Gap { normal: frame.local(found.normal), ..found }
+    }
+
+    /// Finds the gap of a node displaced by `local` (m) without an initial guess, with the normal in the directions of the node.
+    #[inline(always)]
+    pub fn gap_from_angle(&self, [node, index]: [usize; 2], local: Vector3) -> Gap {
+        let (x, frame) = self.position(node, index, local);
+        let own = frame.local(x);
+        // Displacements and the shaft turn a node by a small angle, whose fifth power is negligible.
+        let aside = own[1] / own[0];
+        let angle = self.gap.layout.angles[index] + self.turned + aside * (1.0 - aside * aside / 3.0);
+        let guess = self.gap.surface.step_closer(x, self.gap.surface.locate_at(angle, x[2]));
+        let found = match self.gap.surface.project_close(x, guess, NEARBY) {
+            Some(found) => found,
+            None => self.search(x, self.gap.surface.locate(x)),
         };
         Gap { normal: frame.local(found.normal), ..found }
     }

@@ -133,6 +133,17 @@ impl SurfaceSpline {
         Some(Gap { distance: (x - (point + moved)).dot(&normal), normal, foot: place })
     }
 
+    /// Returns a place closer to the closest point to `x` (m) than `guess`, on a smooth surface around an axis: a Gauss-Newton step. Its error is
+    /// about that of `guess` times distance over radius of curvature.
+    #[inline(always)]
+    pub(crate) fn step_closer(&self, x: Vector3, guess: ClosestPoint) -> ClosestPoint {
+        let foot = FootPoint::seen(x, guess, self.evaluate_bicubic::<false>(guess));
+        let metric = foot.metric();
+        let area = metric[0] * metric[2] - metric[1] * metric[1];
+        let [s, t] = solve(metric, 1.0 / area, foot.gradient());
+        self.settle(guess.patch, guess.s + s, guess.t + t)
+    }
+
     /// Returns whether the seam of free ends is too far away for a closer point on its other side.
     fn is_far_from_seam(&self, foot: &FootPoint, length_s: f64) -> bool {
         let column = foot.place.patch[0];

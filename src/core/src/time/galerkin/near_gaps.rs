@@ -2,7 +2,7 @@
 
 use super::compliance::Lanes;
 use super::obstacle_view::ObstacleView;
-use super::record::SpanRecord;
+use super::record::{PairRecord, SpanRecord};
 use super::trial::Obstacle;
 use crate::geometry::spline::SplineGap;
 use crate::geometry::spline::near::NearSearch;
@@ -21,8 +21,9 @@ struct NearGaps<'a> {
     point: usize,
     /// Displacements (m).
     moved: &'a [f64],
-    /// Initial guesses of the closest points, which the results replace.
+    /// Initial guesses of the closest points, which the results replace; unknown unless `located` is true.
     places: &'a mut [ClosestPoint],
+    located: bool,
     gaps: &'a mut [f64],
     normals: &'a mut [f64],
 }
@@ -33,7 +34,12 @@ impl Kernel for NearGaps<'_> {
         for node in self.nodes {
             let lane = self.lanes.at(self.point, *node);
             let index = [*node, node * self.stride + self.sector];
-            let gap = self.search.gap(index, self.lanes.vector3(self.moved, lane), self.places[*node]);
+            let moved = self.lanes.vector3(self.moved, lane);
+            let gap = if self.located {
+                self.search.gap(index, moved, self.places[*node])
+            } else {
+                self.search.gap_from_angle(index, moved)
+            };
             self.gaps[lane] = gap.distance;
             self.lanes.set(self.normals, lane, gap.normal);
             self.places[*node] = gap.foot;
@@ -51,7 +57,7 @@ impl ObstacleView<'_> {
         gaps: &mut [f64],
         normals: &mut [f64],
     ) {
-        self.find_near_gaps(point, lanes, moved, gaps, normals);
+        self.find_near_gaps(point, lanes, moved, gaps, normals, true);
         for node in 0..lanes.nodes {
             if self.smooth_ring(node).is_none() {
                 let lane = lanes.at(point, node);
@@ -62,13 +68,45 @@ impl ObstacleView<'_> {
         }
     }
 
+    /// Finds gaps (m) and normals of all nodes at all points. All nodes must face rigid smooth rings.
+    pub(super) fn find_gaps_to_rigid_rings(
+        &mut self,
+        lanes: Lanes,
+        moved: &[f64],
+        gaps: &mut [f64],
+        normals: &mut [f64],
+    ) {
+        for point in 1..=lanes.points {
+            for PairRecord { pair, drives, .. } in &self.record.pairs {
+                self.pairs[*pair].bend(drives[point].0.shape_factor, &[]);
+            }
+            self.find_near_gaps(point, lanes, moved, gaps, normals, self.record.located);
+        }
+        self.record.located = true;
+    }
+
+    /// Returns whether all nodes face smooth rings that no structure carries.
+    pub(super) fn faces_rigid_rings(&self) -> bool {
+        self.record.pairs.iter().all(|own| own.carrier.is_none())
+            && (0..self.record.pair_of.len()).all(|node| self.smooth_ring(node).is_some())
+    }
+
     /// Returns the gap function of a node that faces a smooth ring.
     fn smooth_ring(&self, node: usize) -> Option<&SplineGap> {
         self.pair(node)?.0.gap().smooth_ring()
     }
 
-    /// Finds gaps (m) and normals of the nodes that face smooth rings, at a point of the step.
-    fn find_near_gaps(&mut self, point: usize, lanes: Lanes, moved: &[f64], gaps: &mut [f64], normals: &mut [f64]) {
+    /// Finds gaps (m) and normals of the nodes that face smooth rings, at a point of the step. If `located` is true, the search starts at the
+    /// known places of the nodes.
+    fn find_near_gaps(
+        &mut self,
+        point: usize,
+        lanes: Lanes,
+        moved: &[f64],
+        gaps: &mut [f64],
+        normals: &mut [f64],
+        located: bool,
+    ) {
         let SpanRecord { pairs, places, lanes: stride, sector, instructions, .. } = &mut *self.record;
         for own in pairs {
             let pair = &self.pairs[own.pair];
@@ -82,6 +120,7 @@ impl ObstacleView<'_> {
                     point,
                     moved,
                     places: &mut places[point],
+                    located,
                     gaps,
                     normals,
                 });

@@ -119,6 +119,9 @@ impl Obstacle for ObstacleView<'_> {
         {
             return law.of_lanes(&mut self.record.instants, moved, gaps, normals);
         }
+        if self.record.faces_rigid_rings {
+            return self.find_gaps_to_rigid_rings(lanes, moved, gaps, normals);
+        }
         node_by_node(self, lanes, moved, gaps, normals);
     }
 
@@ -258,6 +261,7 @@ impl Witness for ObstacleView<'_> {
         }
         (self.record.solutions, self.record.step) = (0, [from, length]);
         self.record.slips.iter_mut().for_each(|slips| slips.fill(None));
+        (self.record.located, self.record.faces_rigid_rings) = (false, self.faces_rigid_rings());
         self.record.lanes_of = self.enter_lanes(Lanes { points: points.len() - 1, nodes: self.record.pair_of.len() });
     }
 

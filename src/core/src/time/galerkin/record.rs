@@ -323,6 +323,9 @@ pub(crate) struct SpanRecord {
     /// Gaps within free flight are searched if they may be smaller than at its ends by more than this (m).
     pub tolerance: f64,
     pub places: [Vec<ClosestPoint>; POINTS],
+    /// True if all nodes face smooth rings that no structure carries, and if their places at the points of the tried step are known.
+    pub faces_rigid_rings: bool,
+    pub located: bool,
     /// Places at which forces were applied to surface carriers: those of the pass before the one in which the gaps converged.
     pub acted: [Vec<ClosestPoint>; POINTS],
     /// Sliding of nodes along open surfaces at the points (m), where it was requested in this trial; and the number of requests.
@@ -359,6 +362,8 @@ impl SpanRecord {
             needed_below: vec![f64::INFINITY; nodes],
             lowest_of_all: vec![f64::INFINITY; nodes],
             places: std::array::from_fn(|_| vec![ClosestPoint::default(); nodes]),
+            faces_rigid_rings: false,
+            located: false,
             acted: std::array::from_fn(|_| vec![ClosestPoint::default(); nodes]),
             slips: std::array::from_fn(|_| vec![None; nodes]),
             solutions: 0,
