@@ -36,8 +36,7 @@ pub fn check(command: &Command) -> Result<()> {
             let report = NamedFile::option("--report", &arguments.report);
             let files = [parquet, report].into_iter().flatten();
             if let Some(file) = files.clone().find(|file| file.path == Path::new("-")) {
-                let remedy = "Give the name of a file, or ./- for a file with this name";
-                return Err(Failure::usage(format!("{} -", file.role), "cannot be printed on stdout", remedy));
+                return Err(not_stdout(&file.role));
             }
             let written = Vec::from_iter(NamedFile::option("--csv", &csv).into_iter().chain(files));
             outputs(&read, &written)?;
@@ -74,6 +73,9 @@ pub fn check(command: &Command) -> Result<()> {
             let named =
                 plan::input_files(&arguments.plan).into_iter().map(|path| NamedFile::new("a file of the plan", path));
             let read: Vec<NamedFile> = [plan].into_iter().chain(named).collect();
+            if arguments.output() == Path::new("-") {
+                return Err(not_stdout("--output"));
+            }
             let SweepFiles { rows, histories, .. } = SweepFiles::new(&arguments.output());
             outputs(&read, &[NamedFile::new("--output", rows), NamedFile::new("--output", histories)])
         }
@@ -89,6 +91,12 @@ fn package(arguments: &PackageArguments) -> Result<()> {
     let name = scene_source::settings(&arguments.scene)?.name;
     let read: Vec<NamedFile> = scene(&arguments.scene).into_iter().chain(read).collect();
     outputs(&read, &fmus(&targets(arguments.fmi, &arguments.output, &name)?))
+}
+
+/// Returns the error of an output that is always a file.
+fn not_stdout(option: &str) -> Failure {
+    let remedy = "Give the name of a file, or ./- for a file with this name";
+    Failure::usage(format!("{option} -"), "cannot be printed on stdout", remedy)
 }
 
 fn fmus(targets: &[(FmiVersion, PathBuf)]) -> Vec<NamedFile> {

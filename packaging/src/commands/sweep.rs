@@ -39,7 +39,13 @@ pub fn run(arguments: &SweepArguments, console: &Console) -> Result<CommandOutco
             .map_err(|error| Failure::new("tiprub", format!("its executable cannot be found: {error}"), ""))?;
         plan_digest(&plan, &program, &sources)
     };
-    if arguments.digest.is_some() && arguments.digest != Some(digest()?) {
+    if let Some(given) = &arguments.digest
+        && !given.eq_ignore_ascii_case(&digest()?)
+    {
+        if given.len() != 64 || !given.bytes().all(|byte| byte.is_ascii_hexdigit()) {
+            let remedy = "Give the 64 hexadecimal digits that `tiprub sweep --check` prints";
+            return Err(Failure::usage(format!("--digest {given}"), "is not a digest", remedy));
+        }
         let problem = "the program, the plan, or a file that it names differs from those of the digest";
         let remedy = "Install the same release and give the same files on all machines";
         return Err(Failure::new(plan.path.display(), problem, remedy));

@@ -35,6 +35,18 @@ fn project() -> Project {
     project
 }
 
+#[test]
+fn digests_are_checked_before_they_are_compared() {
+    let project = project();
+    for (digest, problem) in [("", "is not a digest"), ("12ab", "is not a digest"), (&"0".repeat(64), "differs")] {
+        let message = project.fail(&["sweep", "plan.toml", "--digest", digest], if digest.len() == 64 { 1 } else { 2 });
+        assert!(message.contains(problem), "{message}");
+    }
+    let check: Value = serde_json::from_str(&project.succeed(&["sweep", "plan.toml", "--check", "--json"])).unwrap();
+    let digest = check["digest"].as_str().unwrap().to_uppercase();
+    project.succeed(&["sweep", "plan.toml", "--part", "1/24", "--digest", &digest]);
+}
+
 /// Project whose runs are long enough to be killed in the middle of the sweep, also on a busy machine.
 fn slow_project() -> Project {
     let project = Project::new();

@@ -61,6 +61,7 @@ fn every_error_is_available_as_one_json_object() {
         ("package scene.toml --library none.so --json", 1, "none.so", "cannot be read"),
         ("study stability none.toml --json", 1, "none.toml", "cannot be read"),
         ("run scene.toml --report - --json", 2, "--report -", "cannot be printed on stdout"),
+        ("sweep none.toml --output - --json", 2, "--output -", "cannot be printed on stdout"),
         ("run scene.toml --parquet - --json", 2, "--parquet -", "cannot be printed on stdout"),
         ("study error scene.toml --set gap_offset=0 --set gap_offset=1e-5 --json", 2, "--set gap_offset", "set twice"),
         ("study map scene.toml --set gap_offset=0 --set gap_offset=1e-5 --json", 2, "--set gap_offset", "set twice"),

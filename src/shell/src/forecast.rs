@@ -156,9 +156,10 @@ impl Forecast {
     }
 }
 
-/// Formats a duration with the accuracy of a forecast: "40 s", "3 min", "2.5 h".
+/// Formats a duration with the accuracy of a forecast: "4 s", "40 s", "3 min", "2.5 h".
 pub fn duration(seconds: f64) -> String {
     match seconds {
+        _ if seconds < 10.0 => format!("{:.0} s", seconds.ceil()),
         _ if seconds < 90.0 => format!("{:.0} s", 10.0 * (seconds / 10.0).ceil()),
         _ if seconds < 5400.0 => format!("{:.0} min", (seconds / 60.0).ceil()),
         _ => format!("{:.1} h", seconds / 3600.0),
@@ -207,6 +208,6 @@ mod tests {
 
     #[test]
     fn forecasts_are_rounded_to_few_digits() {
-        assert_eq!([3.0, 61.0, 200.0, 9000.0].map(duration), ["10 s", "70 s", "4 min", "2.5 h"]);
+        assert_eq!([2.3, 12.0, 61.0, 200.0, 9000.0].map(duration), ["3 s", "20 s", "70 s", "4 min", "2.5 h"]);
     }
 }

@@ -53,7 +53,7 @@ impl Case {
                     fields::set(&mut document, path, field_value(value))?;
                     has_changed = true;
                 }
-                VariableTarget::Label => {}
+                VariableTarget::RomPart | VariableTarget::Label => {}
             }
         }
         let entries = document.get("structure").and_then(Value::as_array).map(Vec::as_slice).unwrap_or_default();

@@ -184,14 +184,15 @@ impl<'a> PartRun<'a> {
         let digest = |run| Case::new(plan, run)?.digest(plan, &mut store);
         let in_plan = |failure: Failure| Failure { usage: true, ..failure }.at(plan.path.display());
         let digests: Vec<CaseDigest> = runs.map(digest).collect::<Result<_>>().map_err(in_plan)?;
-        let (mut stored, mut results) = (Vec::new(), Vec::new());
-        if output.exists() {
-            check_results(plan, output)?;
-            (stored, results) = result_file::read(output)?;
-        }
         let journals = [&files.journal, &files.history_journal];
         let created: Vec<PathBuf> = journals.into_iter().filter(|path| !path.exists()).cloned().collect();
+        // The open journal keeps other processes from writing the results.
         let (journal, found) = Journal::open(&files.journal)?;
+        let (mut stored, mut results) = (Vec::new(), Vec::new());
+        if output.exists() {
+            let read = || check_results(plan, output).and_then(|()| result_file::read(output));
+            (stored, results) = read().inspect_err(|_| remove(&created))?;
+        }
         let digests_of = |rows: &[Row]| rows.iter().map(|row| row.digest.clone()).collect::<HashSet<_>>();
         let old = [digests_of(&stored), digests_of(&found)];
         let rows = stored.into_iter().chain(found).map(|row| (row.digest.clone(), row)).collect();

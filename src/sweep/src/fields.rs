@@ -1,6 +1,6 @@
 //! Values of the keys of a scene file, named by paths such as `contact[1].gap`.
 
-use tiprub_format::FIELDS;
+use tiprub_format::{FIELDS, SceneField};
 use tiprub_shell::{Failure, Result, native::similar};
 use toml::{Table, Value};
 
@@ -34,7 +34,15 @@ fn parsed_step(part: &str) -> Option<Step<'_>> {
 /// The scene file has no such key, with similar keys; or the scene has no such entry.
 pub fn set(scene: &mut Table, path: &str, value: Value) -> Result<()> {
     let steps = steps(path)?;
-    check_key(path, &steps)?;
+    let field = check_key(path, &steps)?;
+    let value = match value {
+        // The values of a range are real numbers.
+        #[expect(clippy::cast_possible_truncation, reason = "whole, and far below 2^63")]
+        Value::Float(number) if field.value.starts_with("whole") && number.fract() == 0.0 && number.abs() < 1e15 => {
+            Value::Integer(number as i64)
+        }
+        other => other,
+    };
     let (last, tables) = steps.split_last().expect("a path has at least one step");
     let mut table = scene;
     for step in tables {
@@ -97,6 +105,14 @@ pub(crate) fn place(scene: &Table, path: &str) -> Result<String> {
     Ok(place)
 }
 
+/// Returns whether two places, as [`place`] returns them, are the same key, or one contains the other.
+pub(crate) fn overlap(one: &str, two: &str) -> bool {
+    let contains = |whole: &str, part: &str| {
+        part.strip_prefix(whole).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
+    };
+    contains(one, two) || contains(two, one)
+}
+
 /// Returns the index of the entry of a list that is selected by a number (from 1) or by a name. Without a selection, the list must have one entry.
 fn position(entries: &[Value], selected: Option<&str>) -> Option<usize> {
     let named = |entry: &Value| entry.get("name").and_then(Value::as_str).map(str::to_owned);
@@ -109,11 +125,11 @@ fn position(entries: &[Value], selected: Option<&str>) -> Option<usize> {
     }
 }
 
-/// Checks that scene files have such a key.
-fn check_key(path: &str, steps: &[Step]) -> Result<()> {
+/// Returns the key of scene files.
+fn check_key(path: &str, steps: &[Step]) -> Result<&'static SceneField> {
     let name = join_keys(steps);
-    if FIELDS.iter().any(|field| field.path == name) {
-        return Ok(());
+    if let Some(field) = FIELDS.iter().find(|field| field.path == name) {
+        return Ok(field);
     }
     let known: Vec<&str> = FIELDS.iter().map(|field| field.path).collect();
     let remedy = similar(&name, &known, "keys of scene files");
@@ -179,6 +195,19 @@ mod tests {
             }
             assert_eq!(value.as_float(), Some(0.25), "{path}");
         }
+    }
+
+    /// The values of a range are real numbers, but some keys need whole ones.
+    #[test]
+    fn whole_numbers_of_ranges_are_accepted() {
+        let excited = "structure[front].excitation.order";
+        let order = |value: f64| {
+            let scene = Value::Table(changed(excited, Value::Float(value)).unwrap());
+            scene["structure"][0]["excitation"]["order"].clone()
+        };
+        assert_eq!([order(3.0), order(2.5)], [Value::Integer(3), Value::Float(2.5)]);
+        let speed = changed("structure[front].speed", Value::Float(3.0)).unwrap();
+        assert_eq!(speed["structure"][0]["speed"], Value::Float(3.0));
     }
 
     #[test]

@@ -77,12 +77,18 @@ pub(crate) fn open_locked(path: &Path, header: &[u8]) -> Result<(File, Vec<u8>)>
         output_file::create_directory(parent)?;
     }
     let failed = |error: std::io::Error| Failure::file(path, "cannot be opened for writing", &error);
-    let mut options = File::options();
-    let mut file = options.read(true).write(true).create(true).truncate(false).open(path).map_err(failed)?;
-    if let Err(TryLockError::WouldBlock) = file.try_lock() {
-        let remedy = "Wait until the other process has finished, or write to another file or directory";
-        return Err(Failure::new(path.display(), "another process is working on this part", remedy));
-    }
+    let mut file = loop {
+        let mut options = File::options();
+        let file = options.read(true).write(true).create(true).truncate(false).open(path).map_err(failed)?;
+        if let Err(TryLockError::WouldBlock) = file.try_lock() {
+            let remedy = "Wait until the other process has finished, or write to another file or directory";
+            return Err(Failure::new(path.display(), "another process is working on this part", remedy));
+        }
+        // The process that had locked the file may have removed it.
+        if is_at(&file, path) {
+            break file;
+        }
+    };
     let mut bytes = Vec::new();
     file.read_to_end(&mut bytes).map_err(failed)?;
     let common = header.len().min(bytes.len());
@@ -91,6 +97,21 @@ pub(crate) fn open_locked(path: &Path, header: &[u8]) -> Result<(File, Vec<u8>)>
         return Err(Failure::new(path.display(), "exists and is not a journal of this release", remedy));
     }
     Ok((file, bytes))
+}
+
+/// Returns whether the path is still that of an open file.
+#[cfg(unix)]
+fn is_at(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let identity = |found: std::io::Result<fs::Metadata>| found.ok().map(|data| (data.dev(), data.ino()));
+    let open = identity(file.metadata());
+    open.is_some() && open == identity(fs::metadata(path))
+}
+
+/// Returns whether the path is still that of an open file. A file that is open cannot be removed here.
+#[cfg(not(unix))]
+fn is_at(_file: &File, _path: &Path) -> bool {
+    true
 }
 
 fn encoded(row: &Row) -> String {
@@ -178,6 +199,20 @@ mod tests {
         let rows: Vec<Row> = (0..count).map(row).collect();
         rows.iter().for_each(|row| journal.append(row).unwrap());
         rows
+    }
+
+    /// The process that had locked the file may have removed it, and a third one may have made a new file.
+    #[cfg(unix)]
+    #[test]
+    fn removed_files_are_recognised() {
+        let root = tempfile::tempdir().unwrap();
+        let path = root.path().join("a.journal");
+        let file = File::create(&path).unwrap();
+        assert!(is_at(&file, &path));
+        fs::remove_file(&path).unwrap();
+        assert!(!is_at(&file, &path));
+        fs::write(&path, "").unwrap();
+        assert!(!is_at(&file, &path));
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! ROMs of a sweep, each read or reduced once.
 
 use std::{
+    cell::Cell,
     collections::HashMap,
     fmt,
     path::{Path, PathBuf},
@@ -86,6 +87,20 @@ pub struct RomStore<'a> {
     roms: HashMap<RomOrigin, StoredRom>,
 }
 
+/// Returns the digest of the content of a file, or the reason why it cannot be read.
+fn file_digest(content: &std::io::Result<Vec<u8>>) -> String {
+    content.as_ref().map_or_else(|error| format!("unreadable: {error}"), |bytes| content_digest(bytes))
+}
+
+/// Checks that a model is the one whose digest is part of the digests of its runs.
+fn check_unchanged(origin: &RomOrigin, before: &str, now: &str) -> Result<()> {
+    if before == now {
+        return Ok(());
+    }
+    let remedy = "Start the sweep again, and leave the files of the plan unchanged until it ends";
+    Err(Failure::new(origin, "has changed since the sweep began", remedy))
+}
+
 /// First word of the names of files in the directory of reduced models.
 const CACHED_NAME: &str = "model";
 
@@ -104,27 +119,25 @@ impl<'a> RomStore<'a> {
         if let Some(stored) = self.roms.get(origin) {
             return Ok(stored.digest.clone());
         }
-        let content = |path: &Path| {
-            let bytes = tiprub_format::read_file(path, tiprub_format::LARGEST_ROM);
-            bytes.map_or_else(|error| format!("unreadable: {error}"), |bytes| content_digest(&bytes))
-        };
         let digest = match origin {
             RomOrigin::Builtin(name) => model_digest(name, &"built-in"),
-            RomOrigin::File(path) => content(path),
-            RomOrigin::Reduction(arguments) => {
-                let files = self.sources.reduction_files(arguments, &self.directory)?;
-                let files: Vec<String> = files.iter().map(|path| content(path)).collect();
-                model_digest(arguments, &files)
-            }
+            RomOrigin::File(path) => file_digest(&tiprub_format::read_file(path, tiprub_format::LARGEST_ROM)),
+            RomOrigin::Reduction(arguments) => self.reduction_digest(arguments)?,
         };
         self.roms.insert(origin.clone(), StoredRom { digest: digest.clone(), loaded: None });
         Ok(digest)
     }
 
+    fn reduction_digest(&self, arguments: &str) -> Result<String> {
+        let files = self.sources.reduction_files(arguments, &self.directory)?;
+        let content = |path: &PathBuf| file_digest(&tiprub_format::read_file(path, tiprub_format::LARGEST_ROM));
+        Ok(model_digest(arguments, &files.iter().map(content).collect::<Vec<String>>()))
+    }
+
     /// Reads or reduces a ROM, unless this has been done. A failure is kept for the runs that need the ROM.
     ///
     /// # Errors
-    /// The errors of [`RomStore::digest`].
+    /// The errors of [`RomStore::digest`], or a file has changed since its digest was computed.
     pub fn load(&mut self, origin: &RomOrigin, console: &Console) -> Result<()> {
         let digest = self.digest(origin)?;
         if self.roms.get(origin).is_some_and(|stored| stored.loaded.is_some()) {
@@ -135,12 +148,27 @@ impl<'a> RomStore<'a> {
                 let remedy = builtin::unknown_model_remedy(name);
                 Err(Failure::new(origin, "there is no such built-in model", remedy))
             }),
-            RomOrigin::File(path) => scene_source::read_rom(path),
+            RomOrigin::File(path) => {
+                let bytes = tiprub_format::read_file(path, tiprub_format::LARGEST_ROM);
+                check_unchanged(origin, &digest, &file_digest(&bytes))?;
+                let bytes = bytes.map_err(|error| Failure::file(path, "cannot be read", &error));
+                bytes.and_then(|bytes| Ok(tiprub_format::read_rom(&bytes, &path.display().to_string())?))
+            }
             RomOrigin::Reduction(arguments) => {
-                let reduce = || self.sources.reduce(arguments, &self.directory, console);
+                let has_changed = Cell::new(false);
+                let reduce = || {
+                    let rom = self.sources.reduce(arguments, &self.directory, console);
+                    let unchanged = check_unchanged(origin, &digest, &self.reduction_digest(arguments)?);
+                    has_changed.set(unchanged.is_err());
+                    unchanged.and(rom)
+                };
                 // The messages of this cache refer to options of built-in models.
                 let quiet = Console::new(true, false);
-                self.reduced.get(&format!("{CACHED_NAME}-{}", &digest[..12]), &digest, &quiet, &reduce)
+                let rom = self.reduced.get(&format!("{CACHED_NAME}-{}", &digest[..12]), &digest, &quiet, &reduce);
+                if has_changed.get() {
+                    return rom.map(drop);
+                }
+                rom
             }
         };
         self.roms.insert(origin.clone(), StoredRom { digest, loaded: Some(rom.map(Arc::new)) });

@@ -49,6 +49,8 @@ pub struct Plan {
     pub roms: Vec<RomRule>,
     /// Values of the variables.
     pub design: Design,
+    /// True if the values come from a table.
+    pub is_table: bool,
     /// Outputs over time to store, if any.
     pub histories: Option<HistoryRequest>,
 }
@@ -69,7 +71,9 @@ pub enum VariableTarget {
     StartValue(String),
     /// Key of the scene file.
     Field(String),
-    /// Only into the braces of a `[rom]` entry, or into the results.
+    /// Only into the braces of a `[rom]` entry, and into the results.
+    RomPart,
+    /// Only into the results, and into the braces of `[rom]` entries.
     Label,
 }
 
@@ -183,10 +187,15 @@ impl Plan {
             variables,
             roms,
             design: Design::new(columns, combination).map_err(in_plan)?,
+            is_table: file.design == DesignKind::Table,
             histories: file.histories,
             scene,
         };
         plan.check_fields().map_err(in_plan)?;
+        if plan.histories.as_ref().is_some_and(|request| request.outputs.is_empty()) {
+            let remedy = "Name outputs, or remove the table [histories]";
+            return Err(in_plan(Failure::new("histories.outputs", "is empty", remedy)));
+        }
         Ok(plan)
     }
 
@@ -219,12 +228,21 @@ impl Plan {
         for rule in &self.roms {
             places.push((format!("structure[{}].rom", rule.structure + 1), "[rom]"));
         }
+        for (time, key) in self.times.iter().zip(["stop", "communication_step"]) {
+            if time.is_some() {
+                places.push((format!("experiment.{key}"), key));
+            }
+        }
         for (variable, value) in self.values(0) {
             if let VariableTarget::Field(path) = &variable.target {
                 fields::set(&mut document, path, field_value(value))?;
                 let place = fields::place(&document, path)?;
-                if let Some((_, other)) = places.iter().find(|(known, _)| *known == place) {
-                    let problem = format!("sets the key `{place}`, which `{other}` also sets");
+                if let Some((known, other)) = places.iter().find(|(known, _)| fields::overlap(known, &place)) {
+                    let problem = if *known == place {
+                        format!("sets the key `{place}`, which `{other}` also sets")
+                    } else {
+                        format!("sets the key `{place}`, but `{other}` sets the key `{known}`")
+                    };
                     return Err(Failure::new(format!("variable `{}`", variable.name), problem, "Remove one of them"));
                 }
                 places.push((place, &variable.name));
@@ -366,7 +384,7 @@ fn targets(file: &PlanFile, variables: NamedEntries, roms: &[RomRule]) -> Result
     let target = |name: &String, entry: Option<&VariableEntry>| match entry {
         Some(VariableEntry { field: Some(path), .. }) => VariableTarget::Field(path.clone()),
         Some(VariableEntry { label: true, .. }) => VariableTarget::Label,
-        _ if in_roms.contains(name) => VariableTarget::Label,
+        _ if in_roms.contains(name) => VariableTarget::RomPart,
         _ => VariableTarget::StartValue(name.clone()),
     };
     if let Some(entry) = file.variable.iter().find(|entry| entry.label && entry.field.is_some()) {

@@ -1,5 +1,7 @@
 //! Sweeps of a small scene.
 
+mod conflicts;
+
 use std::{
     fs,
     path::{Path, PathBuf},
@@ -432,51 +434,6 @@ fn wrong_plans_are_rejected_with_place_and_remedy() {
         assert!(failure.problem.contains(problem) && failure.remedy.contains(remedy), "{text}\n{shown}");
         assert!(shown.contains("plan.toml") || shown.contains("none.toml"), "{text}\n{shown}");
         assert!(!bench.files().iter().any(|name| name.starts_with("a.parquet")), "{:?}", bench.files());
-    }
-}
-
-/// Otherwise the values of the field would have no effect.
-#[test]
-fn field_that_a_start_value_replaces_is_rejected() {
-    let bench = Bench::new();
-    let plan = |field: &str, values: &str, more: &str| {
-        format!("scene = \"scene.toml\"\n[[variable]]\nname = \"a\"\nfield = \"{field}\"\nvalues = {values}\n{more}")
-    };
-    let variable = |name: &str, values: &str| format!("[[variable]]\nname = \"{name}\"\nvalues = {values}");
-    for (field, values, more, name) in [
-        ("contact[1].friction", "[0.1, 0.2]", variable("friction_coefficient", "[0.15, 0.25]"), "friction_coefficient"),
-        ("contact[1].friction", "[0.2]", "[set]\nfriction_coefficient = 0.15".to_owned(), "friction_coefficient"),
-        ("structure[rotor].speed", "[90.0, 100.0]", variable("speed", "[95.0]"), "speed"),
-        ("time.step", "[1e-4, 5e-5]", "[set]\ninternal_step_max = 2e-5".to_owned(), "internal_step_max"),
-    ] {
-        let text = plan(field, values, &more);
-        let failure = bench.try_part(&text, "a.parquet", Part::WHOLE, 1).expect_err(&text);
-        assert_eq!(failure.what, "variable `a`", "{failure}");
-        assert!(failure.problem.contains(&format!("the start value `{name}` of the plan replaces")), "{failure}");
-    }
-    let motion = "[structure.excitation]\norder = 2\nmode = 1\namplitude = 1.0\n[[structure.initial]]\nmode = 1\n\
-                  displacement = 1e-6\n[[surface]]";
-    fs::write(bench.path("scene.toml"), SCENE.replacen("[[surface]]", motion, 1)).unwrap();
-    for (field, values, name, value) in [
-        ("structure[rotor].damping_ratios", "[[0.01], [0.02]]", "damping_ratios", "0.03"),
-        ("structure[rotor].excitation.amplitude", "[1.0, 2.0]", "excitation_amplitude", "3.0"),
-        ("structure[rotor].excitation.order", "[2, 3]", "excitation_order", "4"),
-        ("structure[rotor].excitation.phase", "[0.0, 1.0]", "excitation_phase", "2.0"),
-        ("structure[rotor].initial[1].displacement", "[1e-6, 2e-6]", "initial_displacement", "3e-6"),
-    ] {
-        let text = plan(field, values, &format!("[set]\n{name} = {value}"));
-        let failure = bench.try_part(&text, "a.parquet", Part::WHOLE, 1).expect_err(&text);
-        assert!(failure.problem.contains(&format!("sets `{field}`, which the start value `{name}`")), "{failure}");
-    }
-    fs::write(bench.path("scene.toml"), SCENE).unwrap();
-    // These start values do not replace the field.
-    for (field, values, more) in [
-        ("contact[1].gap", "[5e-4, 1e-3]", variable("gap_offset", "[0.0, 1e-4]")),
-        ("contact[1].friction", "[0.1, 0.2]", variable("speed", "[90.0, 100.0]")),
-        ("time.scheme", "[\"modal-exact\", \"central-difference\"]", variable("internal_step_max", "[1e-4, 5e-5]")),
-    ] {
-        let text = plan(field, values, &more);
-        bench.try_part(&text, &format!("{}.parquet", field.replace(['[', ']'], "")), Part::WHOLE, 1).expect(&text);
     }
 }
 

@@ -4,13 +4,13 @@ use std::path::Path;
 
 use tiprub_shell::{Failure, Result};
 
-use crate::{Cell, Column, Table};
+use crate::{Cell, Column, ColumnType, Table};
 
 /// Maximum size of a file (bytes).
 const LARGEST: u64 = 512 << 20;
 
 /// Reads a CSV file with a line of names. Every column has the narrowest type that fits all its values: whole numbers, real numbers, `true` and
-/// `false`, or text.
+/// `false`, or text. Columns of text keep their characters: numbers with leading zeros or a plus sign and numbers that 64 bits cannot hold are text.
 ///
 /// # Errors
 /// The file cannot be read, a line has another number of values, or a name is missing or occurs twice.
@@ -20,7 +20,7 @@ pub fn read(path: &Path) -> Result<Table> {
     let wrong = |problem: String, remedy: &str| Failure::new(path.display(), problem, remedy);
     // Spreadsheets begin UTF-8 files with a mark.
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes);
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(bytes);
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(bytes);
     let names = reader.headers().map_err(|error| wrong(error.to_string(), "Save the file as UTF-8"))?.clone();
     if names.is_empty() {
         return Err(wrong("is empty".to_owned(), "Give the names of the columns in the first line"));
@@ -33,21 +33,34 @@ pub fn read(path: &Path) -> Result<Table> {
             return Err(wrong(format!("two columns have the name `{name}`"), "Give each column its own name"));
         }
     }
-    let mut columns: Vec<Vec<Option<Cell>>> = vec![Vec::new(); names.len()];
+    let mut columns: Vec<Vec<Option<String>>> = vec![Vec::new(); names.len()];
     for record in reader.records() {
         let record = record.map_err(|error| wrong(error.to_string(), "Give one value per column in every line"))?;
         for (column, text) in columns.iter_mut().zip(&record) {
-            column.push((!text.is_empty()).then(|| value(text)));
+            column.push((!text.is_empty()).then(|| text.to_owned()));
         }
     }
-    let columns = names.iter().zip(columns).map(|(name, cells)| Column::new(name, cells)).collect();
+    let columns = names.iter().zip(columns).map(|(name, texts)| column(name, texts)).collect();
     Ok(Table { columns })
+}
+
+/// Returns a column of the narrowest type.
+fn column(name: &str, texts: Vec<Option<String>>) -> Column {
+    let typed = Column::new(name, texts.iter().map(|text| text.as_deref().map(value)).collect());
+    if typed.kind != ColumnType::Text {
+        return typed;
+    }
+    Column { cells: texts.into_iter().map(|text| text.map(Cell::Text)).collect(), ..typed }
 }
 
 /// Returns the value with the narrowest type.
 fn value(text: &str) -> Cell {
-    let whole = || text.parse().ok().map(Cell::Integer);
-    let real = || text.parse().ok().map(Cell::Real);
+    let digits = text.strip_prefix('-').unwrap_or(text);
+    let has_leading_zero = digits.len() > 1 && digits.starts_with('0') && !digits.starts_with("0.");
+    let is_plain = !(digits.starts_with('+') || has_leading_zero);
+    let is_whole = digits.bytes().all(|byte| byte.is_ascii_digit());
+    let whole = || text.parse().ok().filter(|_| is_plain).map(Cell::Integer);
+    let real = || text.parse().ok().filter(|value: &f64| is_plain && !is_whole && value.is_finite()).map(Cell::Real);
     let truth = || text.parse().ok().map(Cell::Boolean);
     whole().or_else(real).or_else(truth).unwrap_or_else(|| Cell::Text(text.to_owned()))
 }
@@ -55,14 +68,12 @@ fn value(text: &str) -> Cell {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ColumnType;
 
     #[test]
     fn columns_get_types_and_errors_name_the_file() {
         let root = tempfile::tempdir().unwrap();
         let path = root.path().join("a.csv");
-        std::fs::write(&path, "\u{feff}speed, modes ,scheme,on\n# remark\n1e3,20,galerkin,true\n2,40,,false\n")
-            .unwrap();
+        std::fs::write(&path, "\u{feff}speed, modes ,scheme,on\n1e3,20,galerkin,true\n2,40,,false\n").unwrap();
         let table = read(&path).unwrap();
         let kinds: Vec<_> = table.columns.iter().map(|column| (column.name.as_str(), column.kind)).collect();
         let expected = [ColumnType::Real, ColumnType::Integer, ColumnType::Text, ColumnType::Boolean];
@@ -74,6 +85,26 @@ mod tests {
             std::fs::write(&path, text).unwrap();
             let failure = read(&path).unwrap_err();
             assert!(failure.problem.contains(problem) && failure.what.contains("a.csv"), "{failure}");
+        }
+    }
+
+    /// Different labels stay different, and no line is left out.
+    #[test]
+    fn texts_keep_their_characters() {
+        let root = tempfile::tempdir().unwrap();
+        let path = root.path().join("a.csv");
+        let texts = ["#1", "12e456", "1e3", "nan", "007", "+5", "9223372036854775808", "0.5"];
+        std::fs::write(&path, format!("id\n{}\n", texts.join("\n"))).unwrap();
+        let cells: Vec<String> = read(&path).unwrap().columns[0].cells.iter().flatten().map(Cell::to_string).collect();
+        assert_eq!(cells, texts);
+        for (text, kind) in [
+            ("1e3\n-0.5\n0", ColumnType::Real),
+            ("-3\n0\n40", ColumnType::Integer),
+            ("1\n007", ColumnType::Text),
+            ("9223372036854775808", ColumnType::Text),
+        ] {
+            std::fs::write(&path, format!("id\n{text}\n")).unwrap();
+            assert_eq!(read(&path).unwrap().columns[0].kind, kind, "{text}");
         }
     }
 }

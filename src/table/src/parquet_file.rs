@@ -255,6 +255,13 @@ fn column_type(descriptor: &ColumnDescriptor) -> parquet::errors::Result<ColumnT
         return Err(ParquetError::General(format!("column `{name}` is nested")));
     }
     let annotated = descriptor.converted_type();
+    // Times in nanoseconds have no annotation of the older kind.
+    if let Some(logical) = descriptor.logical_type_ref()
+        && !matches!(logical, LogicalType::Integer { .. } | LogicalType::String | LogicalType::Enum | LogicalType::Json)
+        && matches!(descriptor.physical_type(), PhysicalType::INT32 | PhysicalType::INT64)
+    {
+        return Err(ParquetError::General(format!("column `{name}` has the unsupported type {logical:?}")));
+    }
     match (descriptor.physical_type(), annotated) {
         // Such an annotation gives the numbers another meaning, for example a decimal number or a date.
         (PhysicalType::INT32 | PhysicalType::INT64, other) if !INTEGERS.contains(&other) => {
@@ -301,7 +308,15 @@ fn read_cells(
             }
         }};
     }
+    let is_unsigned = matches!(descriptor.converted_type(), ConvertedType::UINT_32 | ConvertedType::UINT_64);
     match reader {
+        ColumnReader::Int32ColumnReader(reader) if is_unsigned => {
+            read!(reader, |value: i32| Ok(Cell::Integer(i64::from(value.cast_unsigned()))))
+        }
+        ColumnReader::Int64ColumnReader(reader) if is_unsigned => read!(reader, |value: i64| {
+            let too_large = || ParquetError::General("a whole number exceeds 9223372036854775807".to_owned());
+            i64::try_from(value.cast_unsigned()).map(Cell::Integer).map_err(|_| too_large())
+        }),
         ColumnReader::BoolColumnReader(reader) => read!(reader, |value| Ok(Cell::Boolean(value))),
         ColumnReader::Int32ColumnReader(reader) => read!(reader, |value| Ok(Cell::Integer(i64::from(value)))),
         ColumnReader::Int64ColumnReader(reader) => read!(reader, |value| Ok(Cell::Integer(value))),
@@ -413,6 +428,33 @@ mod tests {
                 }
                 Err(failure) => assert!(!is_number && failure.problem.contains("column `a`"), "{failure}"),
             }
+        }
+    }
+
+    /// Whole numbers without a sign keep their values, and times are not read as numbers.
+    #[test]
+    fn unsigned_numbers_keep_their_values() {
+        use parquet::{data_type::Int64Type, schema::parser::parse_message_type};
+        let root = tempfile::tempdir().unwrap();
+        let path = root.path().join("a.parquet");
+        let written = |annotation: &str, value: i64| {
+            let schema = parse_message_type(&format!("message schema {{ required int64 a ({annotation}); }}")).unwrap();
+            let file = std::fs::File::create(&path).unwrap();
+            let mut file = SerializedFileWriter::new(file, Arc::new(schema), Arc::default()).unwrap();
+            let mut group = file.next_row_group().unwrap();
+            let mut column = group.next_column().unwrap().unwrap();
+            column.typed::<Int64Type>().write_batch(&[value], None, None).unwrap();
+            column.close().unwrap();
+            group.close().unwrap();
+            file.close().unwrap();
+            read(&path).map(|table| table.columns[0].cells[0].clone())
+        };
+        assert_eq!(written("UINT_64", 1 << 40).unwrap(), Some(Cell::Integer(1 << 40)));
+        assert_eq!(written("INTEGER(64,false)", 7).unwrap(), Some(Cell::Integer(7)));
+        assert_eq!(written("INT_64", -1).unwrap(), Some(Cell::Integer(-1)));
+        assert!(written("UINT_64", -1).unwrap_err().problem.contains("exceeds"));
+        for annotation in ["TIMESTAMP(NANOS,true)", "TIME(NANOS,true)", "TIMESTAMP_MICROS"] {
+            assert!(written(annotation, 5).unwrap_err().problem.contains("unsupported type"), "{annotation}");
         }
     }
 

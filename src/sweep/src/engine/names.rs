@@ -1,6 +1,6 @@
 //! Checks of the names in a plan, before its first run.
 
-use tiprub_core::{CoSimulation, Simulation};
+use tiprub_core::{CoSimulation, Simulation, VariableTable};
 use tiprub_cosim::variables::Causality;
 use tiprub_shell::{Failure, Result, native};
 
@@ -8,7 +8,7 @@ use super::PartRun;
 use crate::{
     cases::Case,
     fields,
-    plan::{Plan, VariableTarget},
+    plan::{Plan, PlanVariable, VariableTarget},
 };
 
 /// Largest number of runs whose scenes are tried for the check of names, until one is accepted.
@@ -62,8 +62,9 @@ impl PartRun<'_> {
             let Ok(simulation) = compiled else { continue };
             let table = simulation.table();
             for name in start_values(plan) {
-                native::check_settable(table, name).map_err(in_plan)?;
+                native::check_settable(table, name).map_err(|failure| in_plan(with_label(plan, name, failure)))?;
             }
+            check_rom_parts(plan, table).map_err(in_plan)?;
             native::check_set_once(start_values(plan)).map_err(in_plan)?;
             for output in plan.histories.iter().flat_map(|request| &request.outputs) {
                 native::output_columns(table, output).map_err(in_plan)?;
@@ -124,6 +125,29 @@ impl PartRun<'_> {
             changed.is_ok_and(|changed| start_value(&changed) != own)
         })
     }
+}
+
+/// Adds to the error of an unknown name that a column of a table may also describe the runs only.
+fn with_label(plan: &Plan, name: &str, mut failure: Failure) -> Failure {
+    if plan.is_table && !plan.set.iter().any(|(other, _)| other == name) {
+        let how =
+            format!("If the column only describes the runs, add [[variable]] with name = \"{name}\" and label = true");
+        failure.diagnostic.remedy = format!("{}. {how}", failure.remedy.trim_end_matches('.'));
+    }
+    failure
+}
+
+/// Rejects a variable of a `[rom]` entry with the name of a start value, which it does not set.
+fn check_rom_parts(plan: &Plan, table: &VariableTable) -> Result<()> {
+    let is_part = |variable: &&PlanVariable| variable.target == VariableTarget::RomPart;
+    for PlanVariable { name, .. } in plan.variables.iter().filter(is_part) {
+        if native::check_settable(table, name).is_ok() {
+            let problem = "stands in braces of [rom] and has the name of a start value, which it would not set";
+            let remedy = "Give its `field` in the scene, which also fills the braces, or label = true if it is only part of the ROM's name";
+            return Err(Failure::new(format!("variable `{name}`"), problem, remedy));
+        }
+    }
+    Ok(())
 }
 
 /// Returns the name of a variable without the index of an element.

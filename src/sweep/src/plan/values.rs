@@ -34,7 +34,11 @@ pub(crate) fn field_value(cell: &Cell) -> Value {
         // A list in a table of values is a text.
         Cell::Text(text) if text.starts_with(['[', '{']) => {
             let parsed = toml::from_str::<toml::Table>(&format!("value = {text}"));
-            parsed.ok().and_then(|mut table| table.remove("value")).unwrap_or_else(|| Value::String(text.clone()))
+            parsed
+                .ok()
+                .filter(|table| table.len() == 1)
+                .and_then(|mut table| table.remove("value"))
+                .unwrap_or_else(|| Value::String(text.clone()))
         }
         Cell::Text(text) => Value::String(text.clone()),
     }
