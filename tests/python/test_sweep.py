@@ -142,6 +142,64 @@ def test_histories_are_a_data_set_of_their_own(plan):
         assert sorted(set(histories["run"])) == list(range(1, 21)) and list(histories.columns) == ["run", "time", "torque"]
 
 
+def test_errors_and_interrupts_leave_only_rows_in_the_directory(plan, monkeypatch):
+    plan.write_text(plan.read_text() + '[histories]\noutputs = ["torque"]\nevery = 10\n')
+    report = module.sweep(plan, quiet=True, runs_per_task=10)
+    both = [report.path, plan.with_name("plan-histories")]
+    before = [pandas.read_parquet(directory) for directory in both]
+    usual = module._sweep.call
+
+    def failing(error):
+        def call(words, files, quiet):
+            if "--part=2/4" in words and "--check" not in words:
+                raise error
+            return usual(words, files, quiet)
+        return call
+
+    monkeypatch.setattr(module._sweep, "call", failing(module.Error("part 2", "fails", "Repair it")))
+    assert refused(module.sweep, plan, quiet=True).what == "part 2"
+    assert all(pandas.read_parquet(directory).equals(table) for directory, table in zip(both, before))
+    monkeypatch.setattr(module._sweep, "call", usual)
+
+    def interrupted(futures):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(distributed, "as_completed", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            module.sweep(plan, quiet=True)
+    assert all(pandas.read_parquet(directory).equals(table) for directory, table in zip(both, before))
+    # Files of an earlier release, of a sweep that was killed.
+    for file in both[1].iterdir():
+        os.replace(file, both[0] / file.name)
+    assert module.sweep(plan, quiet=True)["finished_before"] == 40
+    assert all(pandas.read_parquet(directory).equals(table) for directory, table in zip(both, before))
+    assert not plan.with_name("plan-unfinished").exists()
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no such signals there")
+def test_killed_driver_leaves_only_rows_in_the_directory(plan):
+    written(plan, 0.1)
+    plan.write_text(plan.read_text() + '[histories]\noutputs = ["torque"]\nevery = 100\n')
+    directory, unfinished = plan.with_suffix(""), plan.with_name("plan-unfinished")
+    code = f"import sys; sys.path.insert(0, {PACKAGE!r}); import tiprub; tiprub.sweep('plan.toml', runs_per_task=4)"
+    with subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.DEVNULL) as driver:
+        while not list(directory.glob("*.parquet")):
+            assert driver.poll() is None
+            time.sleep(0.01)
+        wait_for_rows(unfinished, 1, driver)
+        driver.kill()
+    rows = pandas.read_parquet(directory)
+    assert 0 < len(rows) < 40 and rows["run"].is_unique and list(rows.columns)[:2] == ["run", "friction_coefficient"]
+    known = {**journaled(directory), **journaled(unfinished)}
+    report = module.sweep(plan, quiet=True)
+    assert (report["runs"], report["tasks"]) == (40, 10) and report["finished_before"] >= len(known)
+    kept_rows(known, report)
+    histories = pandas.read_parquet(plan.with_name("plan-histories"))
+    assert sorted(set(histories["run"])) == list(range(1, 21)) and list(histories.columns) == ["run", "time", "torque"]
+    assert not unfinished.exists()
+
+
 def test_parts_without_finished_runs_have_all_columns(plan):
     text = plan.read_text().replace("[0.05, 3.0]", "[3.0, 0.05]")
     plan.write_text(text + '[histories]\noutputs = ["torque"]\nevery = 10\n')

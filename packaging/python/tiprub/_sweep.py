@@ -14,6 +14,7 @@ import shutil
 import socket
 import sys
 import tempfile
+import threading
 import time
 from pathlib import Path
 from typing import Any, Iterator, Optional, Sequence, Union
@@ -32,6 +33,8 @@ LOCKED, RETRY_SECONDS = "another process is working on this part", 0.5
 PROGRESS_SECONDS = 5.0
 #: Time (s) that a cluster without workers has to start one, before a line reports it.
 WORKER_SECONDS = 3.0
+#: File of the runs that are measured.
+PILOT = "pilot.parquet"
 #: Expression that is true if this module can be imported.
 HAS_MODULE = "__import__('importlib.util').util.find_spec('tiprub') is not None"
 #: Part that contains the last run of every plan and few others.
@@ -70,7 +73,8 @@ def sweep(
     -------
     Report
         Numbers of `runs`, `finished`, `refused` and `failed` runs, `finished_before`, `tasks`, `reasons`, `seconds`. Its `path` is the
-        directory, a Parquet data set: `pandas.read_parquet(report)`. Outputs over time are in the directory `NAME-histories` beside it.
+        directory, a Parquet data set: `pandas.read_parquet(report)`. Outputs over time are in the directory `NAME-histories` beside it. A
+        plan with `[histories]` keeps its unfinished parts in `NAME-unfinished` until they are complete.
 
     Raises
     ------
@@ -90,18 +94,28 @@ def sweep(
     # The check writes a journal and reduced models beside its output.
     with tempfile.TemporaryDirectory() as elsewhere:
         check = call(["sweep", "--check", f"--part={LAST_PART}", f"--output={Path(elsewhere) / 'check.parquet'}"], [str(file)], quiet=True)
-    task = {"plan": str(file), "digest": check["digest"]}
-    with _connected(distributed, client) as cluster, _created(directory):
-        count = _known_parts(directory, histories, file.stem)
+    task: dict[str, Any] = {"plan": str(file), "digest": check["digest"]}
+    # The program writes outputs over time beside the rows, where readers of Parquet would take them for rows. Both are therefore written to a third
+    # directory, and moved when a part is complete. A plan without outputs over time may use it too, so the word suffices.
+    unfinished = directory.with_name(f"{directory.name}-unfinished")
+    is_apart = unfinished.exists() or b"histories" in file.read_bytes()
+    work = unfinished if is_apart else directory
+    new = [directory, histories, unfinished] if is_apart else [directory]
+    if is_apart:
+        task["targets"] = [str(directory), str(histories)]
+    with _connected(distributed, client) as cluster, _created(*new):
+        count = _known_parts([directory, histories, unfinished], file.stem)
+        if is_apart:
+            _set_apart(directory, unfinished, file.stem)
         _check_workers(cluster, file.stem, quiet)
         threads = sum(cluster.nthreads().values())
         runs = check["plan_runs"]
         shared = max(1, runs // (TASKS_PER_THREAD * max(1, threads)))
         # A driver that was killed may leave measured runs, and the program that computes them.
-        is_left = any(directory.glob("pilot.parquet*"))
+        is_left = any(work.glob("pilot.parquet*"))
         pilot = None
         if is_left or (count is None and runs_per_task is None and shared > PILOT_RUNS):
-            pilot, seconds = _pilot(cluster, task, directory, runs, parquet)
+            pilot, seconds = _pilot(cluster, task, work, runs, parquet)
             shared = min(shared, max(1, math.ceil(TASK_SECONDS / max(seconds, 1e-6))))
         if count is None and runs_per_task is None:
             runs_per_task = shared
@@ -110,23 +124,26 @@ def sweep(
             # The first part contains all runs that were measured.
             part_count = max(1, min(part_count, runs // pilot["runs"]))
         if count not in (None, part_count):
-            problem = f"contains, with `{histories.name}`, results of this plan in {count} parts, but these runs per task give {part_count}"
+            problem = f"contains, with {_beside(directory)}, results of this plan in {count} parts, but these runs per task give {part_count}"
             raise Error(str(directory), problem, "Leave out `runs_per_task`, or give another directory with `output`", 2)
         digits = len(str(part_count))
         parts = [f"{number}/{part_count}" for number in range(1, part_count + 1)]
-        files = [str(directory / f"{file.stem}-{number:0{digits}}-of-{part_count}.parquet") for number in range(1, part_count + 1)]
-        _check_known_parts(files, parts, str(file), check["facts"], parquet)
-        _adopt_pilot(directory, files[0])
-        # The program looks for them beside the rows.
-        _move(histories, directory, file.stem)
-        answers = _gather(distributed, cluster, files, parts, task, file.stem, quiet)
+        names = [f"{file.stem}-{number:0{digits}}-of-{part_count}.parquet" for number in range(1, part_count + 1)]
+        files, outputs = ([str(parent / name) for name in names] for parent in (directory, work))
+        for known in {directory: files, work: outputs}.values():
+            _check_known_parts(known, parts, str(file), check["facts"], parquet)
+        _adopt_pilot(work, outputs[0])
+        answers = _gather(distributed, cluster, outputs, parts, task, file.stem, quiet)
+        if is_apart:
+            # It has files if another driver runs the same plan.
+            with contextlib.suppress(OSError):
+                unfinished.rmdir()
     report = _sums(answers)
     if pilot is not None and count is None:
         # There were no other results. The first part may repeat these runs to store their outputs over time.
         report["finished_before"] = pilot["finished_before"]
     _equal_columns(files, parquet)
-    _equal_columns(_history_files(directory, file.stem), parquet)
-    _move(directory, histories, file.stem)
+    _equal_columns(sorted(histories.glob(f"{glob.escape(file.stem)}-[0-9]*-of-*.histories.parquet")), parquet)
     report.update(plan=str(file), output=str(directory), tasks=part_count, seconds=time.monotonic() - clock)
     return Report(report, directory)
 
@@ -140,38 +157,36 @@ def _package(name: str) -> Any:
 
 
 @contextlib.contextmanager
-def _created(directory: Path) -> Iterator[None]:
-    """Create a directory. At the end, remove the directories that are new and empty."""
+def _created(*directories: Path) -> Iterator[None]:
+    """Create directories. At the end, remove those that are new and empty."""
+    new = []
     try:
-        new = [path for path in (directory, *directory.parents) if not path.exists()]
-        directory.mkdir(parents=True, exist_ok=True)
+        for directory in directories:
+            new += [path for path in (directory, *directory.parents) if not path.exists()][::-1]
+            directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise Error(str(directory), f"cannot be written: {error}", "Give another directory with `output`") from None
     try:
         yield
     finally:
-        with contextlib.suppress(OSError):
-            for path in new:
+        for path in reversed(new):
+            with contextlib.suppress(OSError):
                 path.rmdir()
 
 
-def _history_files(directory: Path, stem: str) -> list[Path]:
-    """Return the files of outputs over time of a plan in a directory."""
-    return sorted(directory.glob(f"{glob.escape(stem)}-[0-9]*-of-*.histories.parquet"))
+def _beside(directory: Path) -> str:
+    """Return the names of the other directories of a sweep for messages."""
+    return f"`{directory.name}-histories` and `{directory.name}-unfinished`"
 
 
-def _move(source: Path, target: Path, stem: str) -> None:
-    """Move the files of outputs over time."""
-    found = _history_files(source, stem)
+def _set_apart(directory: Path, work: Path, stem: str) -> None:
+    """Move all files of parts except rows, which an earlier release or an earlier form of the plan left."""
     try:
-        if found:
-            target.mkdir(exist_ok=True)
-        for file in found:
-            os.replace(file, target / file.name)
+        for path in directory.glob(f"{glob.escape(stem)}-[0-9]*-of-*.parquet*"):
+            if not re.fullmatch(r"-\d+-of-\d+\.parquet", path.name[len(stem):]):
+                os.replace(path, work / path.name)
     except OSError as error:
-        raise Error(str(target), f"cannot be written: {error}", "Give another directory with `output`") from None
-    if found and not any(source.iterdir()):
-        source.rmdir()
+        raise Error(str(work), f"cannot be written: {error}", "Give another directory with `output`") from None
 
 
 @contextlib.contextmanager
@@ -222,8 +237,9 @@ def _print_progress(line: str, quiet: bool) -> None:
         print(line, file=sys.stderr)
 
 
-def _known_parts(directory: Path, histories: Path, stem: str) -> Optional[int]:
-    """Return the number of parts of the results in two directories; None if there are none. Other results in the first one are an error."""
+def _known_parts(directories: Sequence[Path], stem: str) -> Optional[int]:
+    """Return the number of parts of the results in directories; None if there are none. Other results in the first one are an error."""
+    directory = directories[0]
     # Left by the check of an earlier release.
     for path in list(directory.glob("check.parquet.*")):
         _remove(path)
@@ -235,10 +251,10 @@ def _known_parts(directory: Path, histories: Path, stem: str) -> Optional[int]:
         if not is_hidden and not own.fullmatch(str(name)):
             problem = f"contains `{name}`, which is not a part of the plan `{stem}`"
             raise Error(str(directory), problem, "Give each plan a directory of its own with `output`", 2)
-    names = (path.name for parent in (directory, histories) for path in parent.glob("*.parquet*"))
+    names = (path.name for parent in directories for path in parent.glob("*.parquet*"))
     counts = {int(match[2]) for match in map(own.fullmatch, names) if match and match[2]}
     if len(counts) > 1:
-        problem = f"contains, with `{histories.name}`, results of this plan in {' and in '.join(map(str, sorted(counts)))} parts"
+        problem = f"contains, with {_beside(directory)}, results of this plan in {' and in '.join(map(str, sorted(counts)))} parts"
         raise Error(str(directory), problem, "Remove one of them, or give another directory with `output`", 2)
     return min(counts, default=None)
 
@@ -250,7 +266,7 @@ def _remove(path: Path) -> None:
 
 def _pilot(cluster: Any, task: dict[str, str], directory: Path, runs: int, parquet: Any) -> tuple[dict[str, Any], float]:
     """Run and measure a few runs, whose results are in a file of their own. Return the answer, and the time of a run (s)."""
-    output = str(directory / "pilot.parquet")
+    output = str(directory / PILOT)
     future = cluster.submit(run_part, output, f"1/{max(1, runs // PILOT_RUNS)}", **task, pure=False)
     answer = _answer(future, output)
     # The first run may have made the slow checks at the start, which the others share.
@@ -285,20 +301,73 @@ def _adopt_pilot(directory: Path, first: str) -> None:
         _remove(found)
 
 
-def run_part(output: str, part: str, plan: str, digest: str) -> Union[dict[str, Any], Error]:
-    """Run a part of a plan on a worker. Returns an error instead of raising it: Dask would also print it."""
-    if not Path(output).parent.is_dir():
-        problem = f"does not exist on the worker {socket.gethostname()}"
-        return Error(str(Path(output).parent), problem, "Give a directory with `output` that all workers share")
+def run_part(output: str, part: str, plan: str, digest: str, targets: Optional[Sequence[str]] = None) -> Union[dict[str, Any], Error]:
+    """Run a part of a plan on a worker. Returns an error instead of raising it: Dask would also print it.
+
+    The files are moved to `targets`, the directories for rows and for outputs over time, when the part is complete.
+    """
+    for directory in (os.path.dirname(output), *(targets or ())):
+        if not Path(directory).is_dir():
+            problem = f"does not exist on the worker {socket.gethostname()}"
+            return Error(directory, problem, "Give a directory with `output` that all workers share")
     words = ["sweep", "--threads=1", f"--part={part}", f"--digest={digest}", f"--output={output}"]
     while True:
         try:
-            return call(words, [plan], quiet=True)
+            with _results_beside(output, targets):
+                return call(words, [plan], quiet=True)
         except Error as error:
             # The program of a worker that was killed completes its part.
             if error.problem != LOCKED:
                 return error
         time.sleep(RETRY_SECONDS)
+
+
+@contextlib.contextmanager
+def _results_beside(output: str, targets: Optional[Sequence[str]]) -> Iterator[None]:
+    """Give the program the results of a part in `targets`, and replace them by its files if it succeeds. Readers of `targets` always find complete files."""
+    if targets is None or Path(output).name == PILOT:
+        yield
+        return
+    histories = Path(output).with_suffix(".histories.parquet")
+    # Outputs over time come first: with rows alone, the program would repeat their runs.
+    pairs = [(Path(targets[1]) / histories.name, histories), (Path(targets[0]) / Path(output).name, Path(output))]
+    try:
+        for kept, file in pairs:
+            if kept.exists() and not file.exists():
+                _link(kept, file)
+        try:
+            yield
+        except Error as error:
+            if error.problem != LOCKED:
+                for kept, file in pairs:
+                    if kept.exists() and file.exists() and _is_copy(file, kept):
+                        file.unlink()
+            raise
+        for kept, file in pairs:
+            # Another driver may have moved it.
+            with contextlib.suppress(FileNotFoundError):
+                file.unlink() if kept.exists() and _is_copy(file, kept) else os.replace(file, kept)
+    except OSError as error:
+        raise Error(output, f"cannot be moved: {error}", "Give another directory with `output`") from None
+
+
+def _link(file: Path, link: Path) -> None:
+    """Make a link to a file, or a copy where there are no links."""
+    try:
+        os.link(file, link)
+    except FileExistsError:
+        # Another driver made it.
+        pass
+    except OSError:
+        new = link.with_name(f".{link.name}.{os.getpid()}-{threading.get_ident()}")
+        shutil.copy2(file, new)
+        os.replace(new, link)
+
+
+def _is_copy(file: Path, other: Path) -> bool:
+    """Return whether a file is a link to another, or an unchanged copy."""
+    found, expected = file.stat(), other.stat()
+    return (found.st_size, found.st_mtime_ns) == (expected.st_size, expected.st_mtime_ns)
 
 
 def _answer(future: Any, output: str) -> dict[str, Any]:
@@ -355,7 +424,9 @@ def _equal_columns(files: Sequence[Union[str, Path]], parquet: Any) -> None:
                 columns = [table[field.name].cast(field.type) if field.name in schema.names else arrow.nulls(len(table), field.type)
                            for field in common]
                 whole = arrow.Table.from_arrays(columns, schema=common.with_metadata(schema.metadata))
-                parquet.write_table(whole, f"{file}.new")
-                os.replace(f"{file}.new", file)
+                # Readers of Parquet skip names with this first letter.
+                new = Path(file).with_name(f".{Path(file).name}.new")
+                parquet.write_table(whole, new)
+                os.replace(new, file)
     except (OSError, ValueError) as error:
         raise Error(str(Path(files[0]).parent), f"results cannot be read: {error}", "Give a directory with `output` that all workers share") from None
