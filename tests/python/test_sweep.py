@@ -1,5 +1,6 @@
 """Sweeps on a cluster: `tiprub.sweep`, and the scripts of the guide for other engines."""
 
+import asyncio
 import math
 import os
 import shutil
@@ -304,6 +305,36 @@ def test_lost_scheduler_is_an_error(plan):
         with client:
             error = refused(module.sweep, plan, client, output="new/results")
     assert error.what == "keyword `client`" and not Path("new").exists()
+
+
+@pytest.mark.parametrize("closed", ["client", "cluster"])
+def test_client_that_is_closed_during_the_sweep_is_an_error(plan, closed):
+    written(plan, 1.0)
+    options = dict(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None, silence_logs=50)
+    with distributed.LocalCluster(**options) as cluster, distributed.Client(cluster) as client:
+        def close():
+            wait_for_rows(plan.with_suffix(""), 1)
+            (client if closed == "client" else cluster).close()
+
+        closing = threading.Thread(target=close)
+        closing.start()
+        error = refused(module.sweep, plan, client if closed == "client" else cluster, runs_per_task=4, quiet=True)
+        closing.join()
+    assert error.what == "keyword `client`" and "was closed" in error.problem and "again" in error.remedy
+    assert journaled(plan.with_suffix("")), "the rows are kept"
+
+
+def test_asynchronous_clients_are_rejected(plan):
+    async def sweep():
+        options = dict(processes=False, n_workers=0, asynchronous=True, dashboard_address=None)
+        async with distributed.LocalCluster(**options) as cluster, distributed.Client(cluster, asynchronous=True) as client:
+            return [refused(module.sweep, plan, one, output="new/results") for one in (client, cluster)]
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", RuntimeWarning)
+        errors = asyncio.run(sweep())
+    assert all(error.what == "keyword `client`" and "asynchronous" in error.remedy for error in errors)
+    assert not Path("new").exists()
 
 
 def test_own_cluster_warns_of_no_port_in_use(plan):

@@ -16,6 +16,7 @@ import sys
 import tempfile
 import threading
 import time
+from concurrent.futures import CancelledError
 from pathlib import Path
 from typing import Any, Iterator, Optional, Sequence, Union
 
@@ -193,10 +194,14 @@ def _set_apart(directory: Path, work: Path, stem: str) -> None:
 def _connected(distributed: Any, client: Any) -> Iterator[Any]:
     """Return a client of the cluster; one that is created here is closed at the end."""
     remedy = "Give an open distributed.Client, a cluster, or the address of a scheduler"
+    if getattr(client, "asynchronous", False):
+        remedy = "Give a client or cluster that was created without `asynchronous=True`, or the address of its scheduler"
+        raise Error("keyword `client`", f"{client!r} is asynchronous", remedy, 2)
     if isinstance(client, distributed.Client):
         if client.status not in ("running", "connecting"):
             raise Error("keyword `client`", f"{client!r} is {client.status}", remedy)
-        yield client
+        with _stays_open(client):
+            yield client
         return
     # The work takes place in processes of the program, so threads suffice for the workers.
     local: dict[str, Any] = {}
@@ -208,8 +213,22 @@ def _connected(distributed: Any, client: Any) -> Iterator[Any]:
         own = distributed.Client(client, **local)
     except (OSError, RuntimeError, TypeError, ValueError) as error:
         raise Error("keyword `client`", f"there is no connection to {client!r}: {error}", remedy) from None
-    with own:
+    with own, _stays_open(own):
         yield own
+
+
+@contextlib.contextmanager
+def _stays_open(cluster: Any) -> Iterator[None]:
+    """Report errors of Dask as a closed client, if the client was closed or tasks were cancelled."""
+    try:
+        yield
+    except Error:
+        raise
+    except Exception as error:
+        if cluster.status == "running" and not isinstance(error, CancelledError):
+            raise
+        problem = "the client was closed, or lost its scheduler or its tasks, during the sweep"
+        raise Error("keyword `client`", problem, "Keep the client and its cluster open, and call the function again to continue") from None
 
 
 def _check_workers(cluster: Any, title: str, quiet: bool) -> None:
@@ -374,6 +393,8 @@ def _answer(future: Any, output: str) -> dict[str, Any]:
     """Return the answer of a task that writes `output`."""
     try:
         answer = future.result()
+    except CancelledError:
+        raise
     except Exception as error:
         problem = f"a task failed: {type(error).__name__}: {error}"
         raise Error(output, problem, "Install the same release of tiprub on the scheduler and all workers, and see their logs") from None
@@ -399,7 +420,9 @@ def _gather(
         return answers
     finally:
         if len(answers) < len(futures):
-            cluster.cancel(futures)
+            # A closed client would hide the error.
+            with contextlib.suppress(Exception):
+                cluster.cancel(futures)
 
 
 def _sums(answers: Sequence[dict[str, Any]]) -> dict[str, Any]:
