@@ -414,7 +414,7 @@ def _gather(
         for future in distributed.as_completed(futures):
             answers.append(_answer(future, outputs[future]))
             future.release()
-            if time.monotonic() - shown >= PROGRESS_SECONDS:
+            if time.monotonic() - shown >= PROGRESS_SECONDS or len(answers) == len(files):
                 shown = time.monotonic()
                 _print_progress(f"{title}: {len(answers)} of {len(files)} tasks are finished", quiet)
         return answers
