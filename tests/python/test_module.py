@@ -174,7 +174,7 @@ def test_errors_have_what_problem_and_remedy(blade, tmp_path):
         module.run({**SCENE, "contact": [{**SCENE["contact"][0], "fricton": 0.1}]}, directory=tmp_path, quiet=True)
     with pytest.raises(module.Error) as caught:
         module.run(SCENE, directory=tmp_path, quiet=True, estimat=True)
-    assert caught.value.exit_code == 2 and "--estimat" in str(caught.value)
+    assert caught.value.exit_code == 2 and "keyword `estimat`" in str(caught.value)
     with pytest.raises(module.Error, match="no variable|speeed"):
         module.run(SCENE, directory=tmp_path, set={"speeed": 1.0}, quiet=True)
     assert module.inspect("builtin:rotor37-one-row").path is None
@@ -213,7 +213,7 @@ def test_caught_errors_print_nothing(tmp_path, capfd):
     for call in (module.run, module.package, module.inspect):
         with pytest.raises(module.Error, match="none.toml: cannot be read"):
             call("none.toml")
-    with pytest.raises(module.Error, match="unexpected argument"):
+    with pytest.raises(module.Error, match="no such argument"):
         module.run(SCENE, directory=tmp_path, sett=1)
     assert capfd.readouterr() == ("", "")
 
@@ -319,14 +319,31 @@ def test_keywords_of_other_functions_are_refused_by_name(monkeypatch):
                           ((module.package, SCENE), "out"), ((module.inspect, SCENE), "set")]:
         assert refused(*call, **{keyword: "x"}).what == f"keyword `{keyword}`"
     for value in ({"a": 1}, b"TIP", ["A", None], object()):
-        assert refused(module.reduce, "blade", "mesh.inp", contact_set=value).what == "--contact-set"
-    assert refused(module.package, SCENE, platforms={"x86_64-linux": True}).what == "--platform"
+        assert refused(module.reduce, "blade", "mesh.inp", contact_set=value).what == "keyword `contact_set`"
+    assert refused(module.package, SCENE, platforms={"x86_64-linux": True}).what == "keyword `platforms`"
     for kind in (None, 3, "", "--help"):
         for call in ((module.reduce, kind), (module.study, kind, SCENE)):
             assert refused(*call).what == "kind"
     assert refused(module.reduce, "blade", 3).what == "file"
     for call in ((module.demo, 3), (module.study, "map", SCENE, 3)):
         assert refused(*call).what == "keyword `out`"
+
+
+def test_misspelled_keywords_are_reported_as_keywords():
+    calls = {"run": (module.run, SCENE), "package": (module.package, SCENE), "reduce": (module.reduce, "blade", "mesh.inp"),
+             "study": (module.study, "map", SCENE), "inspect": (module.inspect, SCENE), "demo": (module.demo,)}
+    for function, wrong, value, similar in [
+        ("run", "stopp", 1, "stop"), ("run", "sett", {"speed": 1.0}, "set"), ("run", "quite", True, "quiet"), ("run", "estimat", True, "estimate"),
+        ("package", "platfrms", ["x86_64-linux"], "platforms"), ("package", "librarys", "a", "library"),
+        ("reduce", "contact_sets", "TIP", "contact_set"), ("study", "sped", "1:2:3", "speeds"), ("demo", "revolution", 1, "revolutions"),
+        ("inspect", "no_cash", True, "no_cache"), ("run", "csvv", "a.csv", None), ("run", "nonsense", 1, None),
+    ]:
+        call, *arguments = calls[function]
+        error = refused(call, *arguments, **{wrong: value})
+        command = f"{function} {arguments[0]}" if function in ("reduce", "study") else function
+        proposal = f"Did you mean `{similar}`? " if similar else ""
+        assert (error.what, error.exit_code) == (f"keyword `{wrong}`", 2) and error.problem == f"tiprub.{function} has no such argument"
+        assert error.remedy == f"{proposal}See help(tiprub.{function}) and `tiprub {command} --help`"
 
 
 def test_a_refused_rom_changes_no_file(blade, tmp_path):

@@ -100,7 +100,7 @@ def run(
     with scene_file(scene, directory) as file, tempfile.TemporaryDirectory(prefix="tiprub-") as own:
         csv = Path(own) / "result.csv"
         given = _history(inputs, Path(own) / "inputs.csv")
-        words = ["run", *options({"csv": csv, "stop": stop, "step": step, "inputs": given}, more), *assignments(set)]
+        words = ["run", *options({"csv": csv, "stop": stop, "step": step, "inputs": given}, more, "run"), *assignments(set)]
         answer = call(words, [file], quiet)
         with csv.open(encoding="utf-8", newline="") as table:
             names = next(_csv.reader(table))
@@ -161,7 +161,7 @@ def package(
     """
     asked = {"output": output, "fmi": fmi, "arrays": arrays, "scalars": scalars, "platform": platforms}
     with scene_file(scene, directory) as file:
-        answer = call(["package", *options(asked, more)], [file], quiet)
+        answer = call(["package", *options(asked, more, "package")], [file], quiet)
     return [Path(fmu["file"]) for fmu in answer["fmus"]]
 
 
@@ -191,7 +191,7 @@ def reduce(kind: str, file: Optional[Place] = None, output: Optional[Place] = No
     Error
         Files or options are wrong, or the file already exists (`force=True` replaces it).
     """
-    words = ["reduce", kind_of(kind), *options({"output": output}, more)]
+    words = ["reduce", kind_of(kind), *options({"output": output}, more, "reduce")]
     answer = call(words, [place("file", file)] if file is not None else [], quiet)
     return Report(answer, Path(answer["files"]["rom"]))
 
@@ -219,7 +219,7 @@ def inspect(path: Scene, *, directory: Place = ".", quiet: bool = True, **more: 
         The file is missing, of an unknown kind, damaged or rejected.
     """
     with scene_file(path, directory) as file:
-        answer = call(["inspect", *options({}, more)], [file], quiet)
+        answer = call(["inspect", *options({}, more, "inspect")], [file], quiet)
     named = isinstance(path, (str, os.PathLike)) and file == place("path", path) and not file.startswith(BUILTIN)
     return Report(answer, Path(file) if named else None)
 
@@ -259,7 +259,7 @@ def study(
     """
     kept = Path(place("keyword `out`", out) if out is not None else f"study-{kind_of(kind)}")
     with scene_file(scene, directory) as file:
-        call(["study", kind_of(kind), *options({"out": kept}, more), *assignments(set)], [file], quiet)
+        call(["study", kind_of(kind), *options({"out": kept}, more, "study"), *assignments(set)], [file], quiet)
     return Report(json.loads((kept / "results.json").read_text(encoding="utf-8")), kept)
 
 
@@ -288,4 +288,4 @@ def demo(out: Place = "demo", *, revolutions: Optional[float] = None, quiet: boo
         A step failed, or the runs do not agree bit for bit.
     """
     kept = Path(place("keyword `out`", out))
-    return Report(call(["demo", *options({"out": kept, "revolutions": revolutions}, more)], quiet=quiet), kept)
+    return Report(call(["demo", *options({"out": kept, "revolutions": revolutions}, more, "demo")], quiet=quiet), kept)

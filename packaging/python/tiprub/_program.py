@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import difflib
 import html
+import inspect
+import itertools
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -15,7 +19,7 @@ import tempfile
 import threading
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Iterable, Iterator, Mapping, Optional
+from typing import Any, Iterable, Iterator, Mapping, Optional, Sequence
 
 import numpy
 
@@ -123,13 +127,17 @@ INSTEAD = {
 }
 
 
-def options(own: Mapping[str, Any], more: Mapping[str, Any] = MappingProxyType({})) -> list[str]:
+#: Options of functions whose keyword has another name.
+KEYWORDS = {"platform": "platforms"}
+
+
+def options(own: Mapping[str, Any], more: Mapping[str, Any] = MappingProxyType({}), function: str = "") -> list[str]:
     """Convert keywords to options: `contact_nodes=3` is `--contact-nodes=3`, True gives an option without value, several values repeat it.
 
     Raises
     ------
     Error
-        A keyword of `more` is also among the function's `own` options or in `INSTEAD`, or a value has a wrong type.
+        A keyword of `more` is also among the `own` options of the function of this name or in `INSTEAD`, or a value has a wrong type.
     """
     for key in more:
         if key in own or key in INSTEAD:
@@ -144,8 +152,26 @@ def options(own: Mapping[str, Any], more: Mapping[str, Any] = MappingProxyType({
             if one is True:
                 words.append(option)
             elif several or (one is not None and one is not False):
-                words.append(f"{option}={text(option, one)}")
+                # The program, which knows all options, would reject a misspelled keyword. Values that it cannot receive are rejected before.
+                if key in more and not is_text(one) and similar_keyword(key, function):
+                    raise unknown_keyword(key, [function])
+                words.append(f"{option}={text(f'keyword `{KEYWORDS.get(key, key) if key in own else key}`', one)}")
     return words
+
+
+def similar_keyword(name: str, function: str, option: Optional[str] = None) -> Optional[str]:
+    """Return the keyword of a function of this module with a name similar to `name`, or else the `option` that the program proposes."""
+    known = getattr(sys.modules[__package__], function, None)
+    names = [] if known is None else [keyword for keyword in inspect.signature(known).parameters if keyword != "more"]
+    keyword = option.replace("-", "_") if option else None
+    return next(iter(difflib.get_close_matches(name, names, 1, 0.75)), keyword if keyword in names or keyword not in INSTEAD else None)
+
+
+def unknown_keyword(name: str, command: Sequence[str], option: Optional[str] = None) -> Error:
+    """Return the error for a keyword that neither the function nor the command has; `option` is the similar option that the program proposes."""
+    similar = similar_keyword(name, command[0], option)
+    remedy = f"See help(tiprub.{command[0]}) and `tiprub {' '.join(command)} --help`"
+    return Error(f"keyword `{name}`", f"tiprub.{command[0]} has no such argument", f"Did you mean `{similar}`? {remedy}" if similar else remedy, 2)
 
 
 def kind_of(kind: Any) -> str:
@@ -180,13 +206,18 @@ def start_value(what: str, value: Any) -> str:
 def text(what: str, value: Any) -> str:
     """Convert a value to text for the command line and TOML; numbers keep their bits. Errors name `what`."""
     value = value.tolist() if hasattr(value, "tolist") else value
+    if not is_text(value):
+        raise Error(what, f"is of type {type(value).__name__}", "Give a number, a text or a truth value", 2)
     if isinstance(value, (str, os.PathLike)):
         return place(what, value)
     if isinstance(value, bool):
         return str(value).lower()
-    if isinstance(value, (int, float)):
-        return repr(int(value) if isinstance(value, int) else float(value))
-    raise Error(what, f"is of type {type(value).__name__}", "Give a number, a text or a truth value", 2)
+    return repr(int(value) if isinstance(value, int) else float(value))
+
+
+def is_text(value: Any) -> bool:
+    """Return whether `text` accepts a value."""
+    return isinstance(value.tolist() if hasattr(value, "tolist") else value, (str, os.PathLike, int, float))
 
 
 def place(what: str, value: Any) -> str:
@@ -228,7 +259,7 @@ def _interrupts_wait() -> Iterator[None]:
             previous(*waiting[0])
 
 
-def call(words: Iterable[str], files: Iterable[str] = (), quiet: bool = False) -> dict[str, Any]:
+def call(words: Sequence[str], files: Iterable[str] = (), quiet: bool = False) -> dict[str, Any]:
     """Run a command and return its JSON object.
 
     Progress and warnings are printed on stderr, also in a notebook; `quiet` suppresses them. Errors are raised and not printed.
@@ -272,5 +303,10 @@ def call(words: Iterable[str], files: Iterable[str] = (), quiet: bool = False) -
         raise Error("tiprub", f"ended with {process.returncode} and without an answer", "See what it says on stderr") from None
     if "error" in result and process.returncode != 0:
         error = result["error"]
+        unknown = re.fullmatch("unexpected argument '--(.+)' found", error["problem"])
+        if unknown:
+            proposed = re.search("similar argument exists: '--(.+?)'", error["remedy"])
+            kind = itertools.takewhile(lambda word: not word.startswith("--"), words)
+            raise unknown_keyword(unknown[1].replace("-", "_"), list(kind), proposed[1] if proposed else None)
         raise Error(error["what"], error["problem"], error["remedy"], error["exit_code"])
     return result
