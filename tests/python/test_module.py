@@ -2,10 +2,12 @@
 
 import inspect
 import os
+import pickle
 import signal
 import subprocess
 import sys
 import time
+import traceback
 from pathlib import Path
 
 import numpy
@@ -180,6 +182,13 @@ def test_errors_have_what_problem_and_remedy(blade, tmp_path):
     assert module.inspect("builtin:rotor37-one-row").path is None
     with pytest.raises(TypeError):
         os.fspath(module.inspect(SCENE, directory=tmp_path))
+
+
+def test_errors_are_shown_and_pickled_by_their_public_name():
+    error = module.Error("plan.toml", "cannot be read", "Give a file", 2)
+    assert "".join(traceback.format_exception_only(type(error), error)) == "tiprub.Error: plan.toml: cannot be read. Give a file.\n"
+    again = pickle.loads(pickle.dumps(error))
+    assert type(again) is module.Error and (str(again), again.exit_code) == (str(error), 2)
 
 
 def test_the_program_is_found(monkeypatch, tmp_path):

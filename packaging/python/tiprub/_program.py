@@ -39,6 +39,9 @@ class Error(Exception):
         1: the work failed; 2: the request is wrong.
     """
 
+    # Tracebacks show the name that callers use.
+    __module__ = "tiprub"
+
     def __init__(self, what: str, problem: str, remedy: str = "", exit_code: int = 1) -> None:
         super().__init__(what, problem, remedy, exit_code)
         self.what, self.problem, self.remedy, self.exit_code = what, problem, remedy, exit_code
