@@ -494,6 +494,29 @@ def samples(page, language):
     return [part.split("```")[0] for part in (ROOT / "docs" / page).read_text().split(f"```{language}\n")[1:]]
 
 
+def test_plans_of_the_guide_run(tmp_path, monkeypatch):
+    """The plan with a reduction uses the scene of the first plan. It has fewer runs and steps here."""
+    monkeypatch.chdir(tmp_path)
+    first, reduced = samples("sweeps.md", "toml")
+    head = first.split("[set]")[0].replace("stop = 0.001 ", "stop = 0.0005 ")
+    Path("first.toml").write_text(first.replace("stop = 0.001 ", "stop = 0.0005 "))
+    Path("reduced.toml").write_text(head + reduced.replace("[20, 40, 80]", "[10, 20]"))
+    for name, runs, finished in (("first", 12, 8), ("reduced", 2, 2)):
+        subprocess.run([PROGRAM, "--quiet", "sweep", f"{name}.toml"], check=True, capture_output=True)
+        results = pandas.read_parquet(f"{name}.parquet")
+        assert len(results) == runs and sum(results["status"] == "finished") == finished, results["reason"].dropna().unique()
+
+
+def test_values_with_only_refused_runs_can_be_removed(plan):
+    assert module.sweep(plan, runs_per_task=40, quiet=True)["refused"] == 20
+    text = plan.read_text()
+    plan.write_text(text.replace("[0.05, 3.0]", "[0.05]"))
+    report = module.sweep(plan, quiet=True)
+    assert (report["runs"], report["finished"], report["finished_before"]) == (20, 20, 20) and len(pandas.read_parquet(report)) == 20
+    plan.write_text(text.replace("[0.05, 3.0]", "[3.0]"))
+    assert "20 runs" in refused(module.sweep, plan).problem
+
+
 @pytest.fixture
 def engines(plan, monkeypatch):
     """The plan, with the program on PATH and the digest in the environment, as the scripts of the guide expect it."""

@@ -35,8 +35,8 @@ class Result(pandas.DataFrame):
     """Outputs of a run over time: a pandas.DataFrame.
 
     The index is the time (s) of each communication point, the columns are the FMI 2.0 names of the outputs in the units of the
-    model description. `attrs` contains the results of `tiprub run --json`: `model`, `extremes`, `warnings`, `seconds`,
-    `internal_steps`, ... Parts of a result are plain DataFrames.
+    model description. `attrs` contains the results of `tiprub run --json` without `last` and `csv`: `model`, `extremes`, `warnings`,
+    `seconds`, `internal_steps`, ... Parts of a result are plain DataFrames.
     """
 
     @property
