@@ -1,6 +1,7 @@
 """Sweeps on a cluster: `tiprub.sweep`, and the scripts of the guide for other engines."""
 
 import asyncio
+import contextlib
 import math
 import os
 import shutil
@@ -62,15 +63,17 @@ def whole(plan):
 
 
 def journaled(directory):
-    """Computing times of the runs in journals and files of parts, by digest."""
+    """Computing times of the runs in journals and files of parts, by digest. A program that is running may remove a file."""
     seconds = {}
     for journal in directory.glob("*.journal"):
-        for line in journal.read_text().split("\n")[1:-1]:
-            cells = line.split("\t")
-            seconds[cells[0]] = float(cells[cells.index("seconds") + 1][1:])
-    for file in directory.glob("*.parquet"):
-        table = pandas.read_parquet(file)
-        seconds.update(zip(table["digest"], table["seconds"]))
+        with contextlib.suppress(FileNotFoundError):
+            for line in journal.read_text().split("\n")[1:-1]:
+                cells = line.split("\t")
+                seconds[cells[0]] = float(cells[cells.index("seconds") + 1][1:])
+    for file in directory.glob("*-of-*[0-9].parquet"):
+        with contextlib.suppress(FileNotFoundError):
+            table = pandas.read_parquet(file)
+            seconds.update(zip(table["digest"], table["seconds"]))
     return seconds
 
 
