@@ -168,6 +168,8 @@ struct PartRun<'a> {
     resumed: usize,
     journal: Journal,
     histories: Option<HistoryJournal>,
+    /// True if the file of outputs over time has been complete from the beginning, or none is needed.
+    has_all_histories: bool,
     store: RomStore<'a>,
     /// Names of the means and totals of a run; empty if no scene of the plan was accepted.
     results: Vec<String>,
@@ -206,6 +208,7 @@ impl<'a> PartRun<'a> {
             resumed: 0,
             journal,
             histories: None,
+            has_all_histories: false,
             store,
             results,
         };
@@ -274,7 +277,8 @@ impl<'a> PartRun<'a> {
     }
 
     fn find_pending(&mut self) {
-        let has_all_histories = self.histories.is_none() || self.has_complete_histories();
+        self.has_all_histories = self.histories.is_none() || self.has_complete_histories();
+        let has_all_histories = self.has_all_histories;
         let has_history = |row: &Row| {
             let is_stored = self.histories.as_ref().is_none_or(|journal| journal.holds(&row.digest));
             has_all_histories || is_stored || !row.has_status(Status::Finished)
@@ -366,7 +370,7 @@ impl<'a> PartRun<'a> {
         let numbers = (self.first + 1)..;
         let rows: Vec<(usize, &Row)> =
             numbers.zip(self.digests.iter().filter_map(|digest| self.rows.get(&digest.run))).collect();
-        let has_new_histories = !self.has_complete_histories();
+        let has_new_histories = !self.has_all_histories;
         let table = result_file::table(self.request.plan, &rows, &self.results);
         if let Some(mut journal) = self.histories.take() {
             if has_new_histories {
