@@ -67,9 +67,9 @@ impl Estimate {
         Self { direction, left: Err(why.into()), source: ErrorSource::Run }
     }
 
-    /// Returns the error of the steps of `scene` as measured in other rubs.
-    fn of_measured_steps(scene: &Scene) -> Self {
-        Self { direction: "steps", left: step_bound(scene), source: ErrorSource::Rubs }
+    /// Returns the error of the steps of `scene` as measured in other rubs. `set` contains start values other than those of the steps.
+    fn of_measured_steps(scene: &Scene, set: &[(String, String)]) -> Self {
+        Self { direction: "steps", left: step_bound(scene, set), source: ErrorSource::Rubs }
     }
 
     /// Replaces an unknown error of the model by the error that the ROM carries.
@@ -197,10 +197,7 @@ fn of_model(rom: &Rom) -> [Estimate; 4] {
 /// contains. `settings` are replaced start values (name, value as text). The list is empty if no error is known.
 pub fn without_runs(scene: &Scene, settings: &[(String, String)]) -> Vec<Estimate> {
     let (scene, others) = with_time_in_use(scene, settings);
-    let mut steps = Estimate::of_measured_steps(&scene);
-    if others.iter().any(|(name, _)| name.ends_with("solver")) {
-        steps.left = Err("it has not been measured for start values of the solver: use `tiprub run --estimate`".into());
-    }
+    let steps = Estimate::of_measured_steps(&scene, &others);
     let model = of_model(&scene.roms[crate::master(&scene)]);
     let all: Vec<Estimate> = std::iter::once(steps).chain(model).collect();
     if all.iter().any(|estimate| estimate.left.is_ok()) { all } else { Vec::new() }
@@ -315,7 +312,7 @@ pub fn estimates(
     let runner = Runner::new(settings, samples, console);
     let division = own_division(scene);
     let steps = of_steps(scene, division, &runner)?;
-    let measured = Estimate::of_measured_steps(scene);
+    let measured = Estimate::of_measured_steps(scene, settings);
     let mut found = vec![if steps.left.is_err() && measured.left.is_ok() { measured } else { steps }];
     let own =
         [("modes", modes(scene, division)), ("patches", patches(scene, division)), ("rows", rows(scene, division))];

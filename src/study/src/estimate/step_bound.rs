@@ -24,16 +24,16 @@ pub fn time_in_use(settings: &SceneSettings, set: &[(String, String)]) -> TimeSe
         match name.as_str() {
             "tolerance" => time.tolerance = value.parse().ok().or(time.tolerance),
             "internal_step_max" => time.step = value.parse().unwrap_or(time.step),
-            "scheme" => time.scheme = scheme_of_number(value).unwrap_or(time.scheme),
+            "scheme" => time.scheme = scheme_of_text(value).unwrap_or(time.scheme),
             _ => {}
         }
     }
     time
 }
 
-fn scheme_of_number(number: &str) -> Option<Scheme> {
-    let number: i32 = number.parse().ok()?;
-    Scheme::ALL.into_iter().find(|scheme| scheme.number() == number)
+/// Returns the scheme with this name or number, as start values give it.
+fn scheme_of_text(text: &str) -> Option<Scheme> {
+    Scheme::ALL.into_iter().find(|scheme| scheme.name() == text || text.parse() == Ok(scheme.number()))
 }
 
 /// Returns the scene with the time settings of the run, and the start values that do not replace them.
@@ -45,8 +45,8 @@ pub(super) fn with_time_in_use(scene: &Scene, set: &[(String, String)]) -> (Scen
 }
 
 /// Returns the largest error of the displacements that steps caused in measured rubs with the tolerance of the scene, or the reason why it is
-/// unknown.
-pub(super) fn step_bound(scene: &Scene) -> Result<f64, String> {
+/// unknown. `set` contains the start values that [`with_time_in_use`] did not apply.
+pub(super) fn step_bound(scene: &Scene, set: &[(String, String)]) -> Result<f64, String> {
     let Some(tolerance) = scene.settings.time.step_tolerance() else {
         return Err("it has not been measured for fixed steps: use `tiprub run --estimate`".into());
     };
@@ -55,6 +55,9 @@ pub(super) fn step_bound(scene: &Scene) -> Result<f64, String> {
             "it has been measured only for uncoupled blades that slide on rigid surfaces: use `tiprub run --estimate`"
                 .into(),
         );
+    }
+    if set.iter().any(|(name, _)| name == "solver") {
+        return Err("it has not been measured for start values of the solver: use `tiprub run --estimate`".into());
     }
     Ok(ERROR_PER_TOLERANCE * tolerance.max(SMALLEST))
 }
@@ -80,7 +83,7 @@ mod tests {
         let mut scene = scene(2);
         (scene.settings.time.scheme, scene.settings.time.tolerance) = (Scheme::ADAPTIVE, Some(2e-2));
         change(&mut scene);
-        step_bound(&scene)
+        step_bound(&scene, &[])
     }
 
     #[test]
@@ -102,6 +105,24 @@ mod tests {
         for change in changes {
             let why = with(change).unwrap_err();
             assert!(why.contains("only for uncoupled blades") && why.contains("--estimate"), "{why}");
+        }
+        let mut adaptive = scene(2);
+        adaptive.settings.time.scheme = Scheme::ADAPTIVE;
+        let why = step_bound(&adaptive, &[("solver".into(), "coulomb".into())]).unwrap_err();
+        assert!(why.contains("start values of the solver"), "{why}");
+    }
+
+    #[test]
+    fn scheme_has_the_same_effect_by_name_and_by_number() {
+        let mut scene = scene(2);
+        for own in Scheme::ALL {
+            scene.settings.time.scheme = own;
+            for scheme in Scheme::ALL {
+                for text in [scheme.name().to_owned(), scheme.number().to_string()] {
+                    let time = time_in_use(&scene.settings, &[("scheme".into(), text)]);
+                    assert_eq!(time.scheme, scheme);
+                }
+            }
         }
     }
 
