@@ -34,7 +34,8 @@ pub struct RunArguments {
     /// Write the files of --vtk at every K-th communication point, and at the last one.
     #[arg(long, value_name = "K", default_value = "1", requires = "vtk")]
     pub vtk_every: std::num::NonZero<usize>,
-    /// Accept a directory for --vtk that is not empty, and replace its files.
+    /// Accept a directory for --vtk that is not empty: the files that an earlier DIR/fields.pvd lists are removed first,
+    /// and files of the same names are replaced.
     #[arg(long, requires = "vtk")]
     pub force: bool,
     /// Stop time (s), instead of the scene's.

@@ -3,7 +3,12 @@
 //! A part is the surface of a structure, its contact nodes or patches, its stress points, or the rigid surface of a
 //! contact. Only the fields of one time are in memory.
 
-use std::{f64::consts::TAU, fs, io::Write, path::PathBuf};
+use std::{
+    f64::consts::TAU,
+    fs,
+    io::{ErrorKind, Write},
+    path::{Path, PathBuf},
+};
 
 use tiprub_core::scene::settings::BodyMotion;
 use tiprub_core::{Scene, Simulation};
@@ -29,7 +34,7 @@ pub struct FieldOptions {
     pub sectors: Vec<usize>,
     /// Number of communication steps between two times of the series; the last communication point is always included.
     pub every: usize,
-    /// True to accept a directory that is not empty, and to replace its files.
+    /// True to accept a directory that is not empty, and to replace an earlier series in it.
     pub force: bool,
 }
 
@@ -184,13 +189,16 @@ impl FieldSeries {
         Ok(Self { options, parts, structures, schedule, reached: 0, next_index: 1, bytes: 0, files: 0 })
     }
 
-    /// Writes the files of a communication point, if it belongs to the series.
+    /// Writes the files of a communication point, if it belongs to the series. The first call removes the files of an earlier series.
     ///
     /// # Errors
-    /// A file cannot be written.
+    /// A file cannot be written or removed.
     pub fn add(&mut self, index: usize, simulation: &Simulation) -> Result<()> {
         if !self.options.includes(index, self.schedule.count) {
             return Ok(());
+        }
+        if self.reached == 0 && self.options.force {
+            remove_series(&self.options.directory)?;
         }
         let moved: Vec<Moved> = self.structures.iter().map(|structure| structure.moved(simulation)).collect();
         for part in &self.parts {
@@ -268,6 +276,32 @@ impl FieldSeries {
         let file = file.into_inner().map_err(|error| failure(error.into_error()))?;
         output_file::persist(file, &path)
     }
+}
+
+/// Removes the files that the list of an earlier series names. ParaView would show them together with those of this series.
+fn remove_series(directory: &Path) -> Result<()> {
+    let index = directory.join(INDEX);
+    // Reading a pipe might block.
+    if !fs::metadata(&index).is_ok_and(|data| data.is_file()) {
+        return Ok(());
+    }
+    let list = fs::read(&index).map_err(|error| Failure::file(&index, "cannot be read", &error))?;
+    let list = String::from_utf8_lossy(&list);
+    let names = list.split(" file=\"").skip(1).filter_map(|rest| rest.split('"').next());
+    // A changed list may name files elsewhere.
+    let is_part = |name: &&str| {
+        let path = Path::new(name);
+        path.file_name() == Some(path.as_os_str()) && path.extension().is_some_and(|extension| extension == "vtu")
+    };
+    for path in names.filter(is_part).map(|name| directory.join(name)) {
+        match fs::remove_file(&path) {
+            Err(error) if error.kind() != ErrorKind::NotFound => {
+                return Err(Failure::file(&path, "cannot be removed", &error));
+            }
+            _ => {}
+        }
+    }
+    Ok(())
 }
 
 fn file_name(part: &str, index: usize) -> String {

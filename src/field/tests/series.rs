@@ -90,9 +90,14 @@ struct Bench {
 impl Bench {
     /// Runs a scene with fields; `watched` are the sectors of which the recording has all outputs.
     fn run(scene: &Scene, sectors: &[usize], every: usize) -> Self {
-        let root = tempfile::tempdir().unwrap();
+        Self::run_in(tempfile::tempdir().unwrap(), scene, sectors, every)
+    }
+
+    /// Runs a scene in this directory, and replaces an earlier series in it.
+    fn run_in(root: tempfile::TempDir, scene: &Scene, sectors: &[usize], every: usize) -> Self {
         let directory = root.path().join("fields");
-        let options = FieldOptions { directory, sectors: sectors.to_vec(), every, force: false };
+        let force = directory.exists();
+        let options = FieldOptions { directory, sectors: sectors.to_vec(), every, force };
         options.check_directory().unwrap();
         let extended = options.scene(scene).unwrap();
         let schedule = Schedule::new(&scene.settings.experiment, None, None).unwrap();
@@ -198,6 +203,37 @@ fn chosen_sectors_are_shown_in_their_place() {
     let bench = Bench::run(&scene, &[5, 2], 100);
     check_rotor(&bench, &scene, &[2, 5], 100);
     assert_eq!(bench.array("rotor", 100, "sector"), [2.0, 5.0]);
+}
+
+#[test]
+fn series_replaces_exactly_the_files_of_an_earlier_one() {
+    let scene = rub();
+    let files = |root: &Path| {
+        let entries = std::fs::read_dir(root.join("fields")).unwrap();
+        let mut names: Vec<String> = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    };
+    let expected = files(Bench::run(&scene, &[], 100).root.path());
+    let first = Bench::run(&scene, &[], 10);
+    let place = |name: &str| first.root.path().join("fields").join(name);
+    let own = ["other_000010.vtu", "notes.txt", "../outside.vtu"];
+    own.iter().for_each(|name| std::fs::write(place(name), "").unwrap());
+    // A list may have been changed.
+    let list = std::fs::read_to_string(place("fields.pvd")).unwrap();
+    let changed =
+        list.replacen("<DataSet", "<DataSet file=\"../outside.vtu\"/><DataSet file=\"notes.txt\"/>\n<DataSet", 1);
+    std::fs::write(place("fields.pvd"), changed).unwrap();
+    let count = files(first.root.path()).len();
+    let second = Bench::run_in(first.root, &scene, &[], 100);
+    let found = files(second.root.path());
+    let kept = ["notes.txt", "other_000010.vtu"].map(str::to_owned);
+    assert!(count > found.len(), "{count} {}", found.len());
+    assert_eq!(
+        found.iter().filter(|name| !kept.contains(name)).collect::<Vec<_>>(),
+        expected.iter().collect::<Vec<_>>()
+    );
+    assert!(kept.iter().all(|name| found.contains(name)) && second.root.path().join("outside.vtu").exists());
 }
 
 #[test]
