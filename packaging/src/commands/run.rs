@@ -62,9 +62,7 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<CommandOutcome
         run.map_err(|failure| if is_set { failure } else { scene_source::located(&arguments.scene, failure) })?
     };
     let wall = clock.elapsed().as_secs_f64();
-    if run.checks != known {
-        cache.keep_checks(&scene, &run.checks);
-    }
+    cache.keep_checks(&scene, &run.checks);
     if let Some(path) = arguments.csv.as_deref().filter(|_| !to_stdout) {
         run.recording.write_csv(path)?;
     }

@@ -24,6 +24,29 @@ fn a_native_run_writes_one_row_per_communication_point() {
     assert_eq!(columns(&again).1, rows, "the same run gives the same bits");
 }
 
+#[test]
+fn cached_checks_of_other_parameters_are_kept() {
+    let project = Project::new();
+    let stored = |friction: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_tiprub"));
+        command.current_dir(project.root.path()).env("TIPRUB_CACHE", project.path("cache"));
+        let set = format!("friction_coefficient={friction}");
+        assert!(command.args(["run", "scene.toml", "--quiet", "--set", &set]).output().unwrap().status.success());
+        let mut files = fs::read_dir(project.path("cache")).unwrap().map(|entry| entry.unwrap().path());
+        let file = files.find(|path| path.extension().is_some_and(|extension| extension == "checks")).unwrap();
+        assert!(files.next().is_none(), "one file per scene");
+        fs::read(file).unwrap()
+    };
+    let first = stored("0.1");
+    assert_eq!(stored("0.1"), first);
+    let both = stored("0.15");
+    assert!(both.len() > first.len(), "{} {}", both.len(), first.len());
+    // The results of the last run come first.
+    let again = stored("0.1");
+    assert!(again.len() == both.len() && again != both);
+    assert_eq!(stored("0.15"), both);
+}
+
 /// The extremes agree with the CSV; the lobes of the scene extend through the gap.
 #[test]
 fn run_summary_reports_extremes() {

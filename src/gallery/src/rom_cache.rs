@@ -14,7 +14,7 @@ use std::{
 
 use etcetera::BaseStrategy;
 use sha2::{Digest, Sha256};
-use tiprub_core::{Rom, Scene};
+use tiprub_core::{Rom, Scene, Simulation};
 use tiprub_field::shape_file;
 use tiprub_model::{Reduction, SurfaceShapes, cyclic::CyclicReduction};
 use tiprub_shell::{Result, console::Console, output_file};
@@ -35,6 +35,9 @@ const MAX_SHAPE_FILES: usize = 2;
 const CHECKS_PREFIX: &str = "scene";
 const CHECKS_SUFFIX: &str = ".checks";
 const MAX_CHECK_FILES: usize = 16;
+
+/// Number of results of checks of one scene that are cached; one start of a scene has up to a few hundred.
+const MAX_CHECKS: usize = 1 << 14;
 
 /// Model to cache.
 #[derive(Debug, Clone, PartialEq)]
@@ -171,7 +174,7 @@ impl RomCache {
         Some(self.directory.as_ref()?.join(format!("{name}-{}{}", &digest[..32], shape_file::SUFFIX)))
     }
 
-    /// Returns the results of slow checks of the last run of a scene, for
+    /// Returns the results of slow checks of the last runs of a scene, for
     /// [`Simulation::use_checks`](tiprub_core::Simulation::use_checks); empty if none are cached.
     pub fn checks(&self, scene: &Scene) -> Vec<u8> {
         let read = |path: PathBuf| {
@@ -183,11 +186,17 @@ impl RomCache {
         tiprub_format::read_checks(&file).to_vec()
     }
 
-    /// Caches the results of slow checks of a scene. If the file cannot be written, the run continues without it.
+    /// Adds the results of slow checks to those of the last runs of a scene, which may have had other parameters. If two processes write the file at
+    /// the same time, it has the results of one of them. If the file cannot be written, the run continues without it.
     pub fn keep_checks(&self, scene: &Scene, checks: &[u8]) {
         let (Some(directory), Some(path)) = (&self.directory, self.checks_path(scene)) else { return };
+        let stored = self.checks(scene);
+        let merged = Simulation::merge_checks(checks, &stored, MAX_CHECKS);
+        if merged == stored {
+            return;
+        }
         let _ = output_file::only_a_file(&path)
-            .and_then(|()| output_file::write(&path, tiprub_format::write_checks(checks)));
+            .and_then(|()| output_file::write(&path, tiprub_format::write_checks(&merged)));
         prune(directory, CHECKS_PREFIX, CHECKS_SUFFIX, MAX_CHECK_FILES);
     }
 

@@ -184,6 +184,23 @@ impl Simulation {
         self.diagnostics.known.to_bytes()
     }
 
+    /// Merges results of slow checks for [`Simulation::use_checks`]: those of `newest`, followed by results of `older` for
+    /// other parameters or scenes. If there are more than `most` results, the last ones are dropped, but none of `newest`.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::{CoSimulation, Simulation};
+    /// # let scene = tiprub_test_models::rub(2);
+    /// let mut simulation = Simulation::new(&scene)?;
+    /// simulation.initialise(0.0)?;
+    /// let checks = simulation.checks();
+    /// assert_eq!(Simulation::merge_checks(&checks, &checks, 1000), checks);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
+    pub fn merge_checks(newest: &[u8], older: &[u8], most: usize) -> Vec<u8> {
+        known::merge(newest, older, most)
+    }
+
     /// Updates the limits after a state with other parameters was restored. Before initialisation nothing has been computed from
     /// parameters, and invalid ones are not rejected yet.
     pub(super) fn renew_limits(&mut self) {

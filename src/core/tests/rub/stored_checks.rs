@@ -114,6 +114,27 @@ fn changed_parameters_are_checked_again() {
 }
 
 #[test]
+fn merged_checks_serve_all_their_parameters() {
+    for (name, scene) in scenes() {
+        let frictions = [0.02, 0.03].map(|friction| [("friction_coefficient", friction)]);
+        let [one, other] = frictions.map(|set| altered(&start(&scene, &[], &set).0));
+        let merged = Simulation::merge_checks(&one, &other, usize::MAX);
+        for (set, stored) in frictions.iter().zip([&one, &other]) {
+            assert_eq!(start(&scene, &merged, set).0, *stored, "{name}: nothing is computed");
+        }
+        // The newest results stay, and they replace older ones with the same keys.
+        let plain = start(&scene, &[], &frictions[0]).0;
+        for older in [&other[..], &plain, &[], b"damaged"] {
+            assert_eq!(Simulation::merge_checks(&one, older, 0), one, "{name}");
+        }
+        assert_eq!(Simulation::merge_checks(&one, &plain, usize::MAX), one, "{name}");
+        assert_eq!(Simulation::merge_checks(&[], &merged, usize::MAX), merged, "{name}");
+        let fewer = Simulation::merge_checks(&[], &merged, 1);
+        assert!(!fewer.is_empty() && fewer.len() < one.len(), "{name}: {}", fewer.len());
+    }
+}
+
+#[test]
 fn adaptive_steps_use_checks_of_their_tolerance_only() {
     let mut scene = models::rub(4);
     scene.roms[0] = models::rich_blade(4);

@@ -4,7 +4,7 @@
 //! result is used only for a check with the same key.
 
 use std::cell::RefCell;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use tiprub_cosim::persist::{Persist, StateReader, fingerprint, to_bytes};
@@ -49,21 +49,12 @@ pub(crate) struct KnownChecks {
 impl KnownChecks {
     /// Reads results that [`KnownChecks::to_bytes`] wrote; reads none if the bytes are damaged or from another version.
     pub(crate) fn from_bytes(bytes: &[u8]) -> Self {
-        Self { stored: Arc::new(read(bytes).unwrap_or_default()), used: Results::new() }
+        Self { stored: Arc::new(read(bytes).unwrap_or_default().into_iter().collect()), used: Results::new() }
     }
 
     /// Returns the results of the last check as bytes; empty if nothing was checked.
     pub(crate) fn to_bytes(&self) -> Vec<u8> {
-        if self.used.is_empty() {
-            return Vec::new();
-        }
-        let mut bytes = to_bytes(&[&[MAGIC, VERSION]]);
-        for (key, result) in &self.used {
-            bytes.extend(to_bytes(&[key, &result.len()]));
-            bytes.extend(result);
-        }
-        bytes.extend(fingerprint(&bytes, 0).to_le_bytes());
-        bytes
+        write(self.used.iter())
     }
 
     /// Begins a check: removes the results of the previous one.
@@ -72,14 +63,37 @@ impl KnownChecks {
     }
 }
 
-/// Reads results; `None` if the bytes are damaged.
-fn read(bytes: &[u8]) -> Option<Results> {
+/// Returns the results of `newest`, followed by those of `older` with other keys, as far as there are at most `most` results.
+pub(crate) fn merge(newest: &[u8], older: &[u8], most: usize) -> Vec<u8> {
+    let [newest, older] = [newest, older].map(|bytes| read(bytes).unwrap_or_default());
+    let most = most.max(newest.len());
+    let mut known = BTreeSet::new();
+    let results: Vec<_> = newest.into_iter().chain(older).filter(|(key, _)| known.insert(*key)).take(most).collect();
+    write(results.iter().map(|(key, result)| (key, result)))
+}
+
+/// Formats results in the given order; empty if there are none.
+fn write<'a>(results: impl ExactSizeIterator<Item = (&'a Key, &'a Vec<u8>)>) -> Vec<u8> {
+    if results.len() == 0 {
+        return Vec::new();
+    }
+    let mut bytes = to_bytes(&[&[MAGIC, VERSION]]);
+    for (key, result) in results {
+        bytes.extend(to_bytes(&[key, &result.len()]));
+        bytes.extend(result);
+    }
+    bytes.extend(fingerprint(&bytes, 0).to_le_bytes());
+    bytes
+}
+
+/// Reads results in their order; `None` if the bytes are damaged.
+fn read(bytes: &[u8]) -> Option<Vec<(Key, Vec<u8>)>> {
     let (content, checksum) = bytes.split_last_chunk()?;
     if fingerprint(content, 0) != u64::from_le_bytes(*checksum) {
         return None;
     }
     let mut rest = content.strip_prefix(&to_bytes(&[&[MAGIC, VERSION]])[..])?;
-    let mut results = Results::new();
+    let mut results = Vec::new();
     while !rest.is_empty() {
         let (mut key, mut length) = (Key::default(), 0_usize);
         let (head, others) = rest.split_at_checked(to_bytes(&[&key, &length]).len())?;
@@ -87,7 +101,7 @@ fn read(bytes: &[u8]) -> Option<Results> {
         key.restore(reader);
         length.restore(reader);
         let (result, others) = others.split_at_checked(length)?;
-        results.insert(key, result.to_vec());
+        results.push((key, result.to_vec()));
         rest = others;
     }
     Some(results)
