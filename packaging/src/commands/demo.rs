@@ -192,6 +192,7 @@ impl Demo<'_> {
             scene: &self.scene,
             table: simulation.table(),
             settings: &[],
+            history: None,
             schedule: &self.schedule,
             native: &self.native,
             capture: &self.capture,

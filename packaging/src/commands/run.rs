@@ -97,6 +97,7 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<CommandOutcome
                 scene: &scene,
                 table: native::compiled(&scene, &schedule)?.table(),
                 settings: &arguments.set,
+                history: history.as_ref(),
                 schedule: &schedule,
                 native: &run,
                 capture,

@@ -12,6 +12,9 @@ use super::input::{ReportFile, ReportInput};
 use super::numbers::{rounded, scientific};
 use crate::rom_facts::{CheckRow, OmittedRows, ROWS_SHOWN, RomFacts, not_negative_zero, order_text, sectors_text};
 
+/// Largest number of inputs from a file that are listed.
+const MAX_INPUTS: usize = 24;
+
 /// Returns the section about the reduced-order models; empty without facts about them.
 pub(super) fn rom_section(facts: &[RomFacts]) -> String {
     if facts.is_empty() {
@@ -98,9 +101,8 @@ pub(super) fn run_section(input: &ReportInput<'_>) -> String {
         let per_step = 1e6 * stepping / native.internal_steps as f64;
         rows.insert(3, ("computing time per internal step", format!("{} µs", rounded(per_step))));
     }
-    let settings = &input.scene.settings;
-    let set = |name: &str| input.settings.iter().find(|(own, _)| own == name).and_then(|(_, value)| value.parse().ok());
-    if let Some(tolerance) = settings.time.step_tolerance().map(|own| set("tolerance").unwrap_or(own)) {
+    let time = estimate::time_in_use(&input.scene.settings, input.settings);
+    if let Some(tolerance) = time.step_tolerance() {
         rows.insert(2, ("adaptive steps", format!("tolerance {} of the clearance", scientific(tolerance))));
     } else if let Some(step) = results.last(Quantity::InternalStep) {
         rows.insert(2, ("internal step h", format!("{} s", scientific(step))));
@@ -185,9 +187,18 @@ pub(super) fn scene_section(input: &ReportInput<'_>) -> String {
         [] => String::new(),
         values => format!(" In this run, start values replace settings of the scene: {}.", values.join(", ")),
     };
+    let inputs_over_time = input.history.map_or(String::new(), |history| {
+        let names = history.variables();
+        let mut listed: Vec<String> =
+            names.iter().take(MAX_INPUTS).map(|name| format!("<code>{}</code>", escape(name))).collect();
+        if names.len() > MAX_INPUTS {
+            listed.push(format!("and {} more", names.len() - MAX_INPUTS));
+        }
+        format!(" Inputs over time come from the file <code>{}</code>: {}.", escape(history.name()), listed.join(", "))
+    });
     let schedule = input.schedule;
     format!(
-        "<section><h2>Scene</h2><p>The run is from {} s to {} s, with communication steps of {} s.{start_values}</p>\
+        "<section><h2>Scene</h2><p>The run is from {} s to {} s, with communication steps of {} s.{start_values}{inputs_over_time}</p>\
          <details><summary>All settings of the scene, defaults included</summary><pre>{}</pre></details></section>\n",
         six_digits(schedule.start),
         six_digits(schedule.stop),

@@ -3,18 +3,18 @@
 use std::fmt::Write as _;
 
 use tiprub_core::VariableTable;
-use tiprub_core::scene::settings::Shape;
+use tiprub_core::scene::settings::{Shape, StructureSettings};
 use tiprub_core::scene::shape::CompiledShape;
-use tiprub_cosim::variables::Quantity;
+use tiprub_cosim::variables::{Quantity, Variable};
 use tiprub_field::animation::{HitBlade, TipHistory};
 use tiprub_figure::{
-    campbell::Campbell,
+    campbell::{BEYOND, Campbell},
     escape,
     grid_map::{GridMap, MapRows, Shows},
     plots::{Plot, Series},
     polar::{Polar, PolarCurve},
 };
-use tiprub_shell::{Failure, Result, recording::Recording};
+use tiprub_shell::{Failure, Result, native::ParameterValue, recording::Recording};
 use tiprub_study::map::prediction::FrequencyPrediction;
 use tiprub_study::response::{Spectrogram, Spectrum};
 
@@ -95,7 +95,7 @@ pub(super) fn sections(input: &ReportInput<'_>, blade: Option<&HitBlade>) -> Res
         section("Where do the tips touch?", [clearances(input)?, wear(input)].into_iter().flatten().collect()),
         section("How hard is the contact?", forces(input, &results, blade)?),
         section("Which vibration does it cause?", vibration(input, history)?),
-        section("Where does the energy go?", energies(&results)?),
+        section("Where does the energy go?", energies(input, &results)?),
     ];
     Ok(all.into_iter().filter(|(_, html)| !html.is_empty()).collect())
 }
@@ -205,7 +205,7 @@ fn forces(input: &ReportInput<'_>, results: &Results<'_>, blade: Option<&HitBlad
         }
     }
     if let Some(blade) = blade.filter(|blade| blade.force > 0.0) {
-        let whose = if blade.sectors > 1 { format!("blade {}", blade.sector + 1) } else { escape(&blade.name) };
+        let whose = input.blade_name(blade);
         let rows = input.capture.node_forces(blade);
         let times = input.capture.times();
         let body = if rows.is_empty() {
@@ -239,17 +239,50 @@ fn forces(input: &ReportInput<'_>, results: &Results<'_>, blade: Option<&HitBlad
             });
         }
     }
-    let torque = results.series("torque", Quantity::Moment(2));
-    if let Some(series) = torque.filter(|series| series.points.iter().any(|point| point.1 != 0.0)) {
-        let plot = Plot { height: 200, ..Plot::new("time (ms)", "torque on the rotor (N·m)", vec![series]) };
+    let torques = torques(input, results);
+    if torques.iter().flat_map(|series| &series.points).any(|point| point.1 != 0.0) {
+        let rotor = if torques.len() == 1 { "the rotor" } else { "each rotor" };
+        let plot = Plot { height: 200, ..Plot::new("time (ms)", format!("torque on {rotor} (N·m)"), torques) };
         figures.push(Captioned {
             body: plot.to_html()?,
-            caption: "Torque of the contacts on the rotor, mean over each communication step; negative values brake a \
-                      rotor that turns in the positive direction."
-                .into(),
+            caption: format!(
+                "Torque of the contacts on {rotor}, mean over each communication step; negative values brake a rotor that \
+                 turns in the positive direction."
+            ),
         });
     }
     Ok(figures)
+}
+
+/// Returns the contact torque on each rotor over time, with the name of the rotor if there are several.
+fn torques(input: &ReportInput<'_>, results: &Results<'_>) -> Vec<Series> {
+    let series = |rotor: &StructureSettings| {
+        let variable = variable_of(input, rotor, Quantity::Moment(2))?;
+        let column = results.recording.column(&variable.name)?;
+        let label = if input.rotors().count() > 1 { rotor.name.as_str() } else { "torque" };
+        Some(Series::line(label, results.points(&column)))
+    };
+    input.rotors().filter_map(series).collect()
+}
+
+/// Returns the scalar variable of a rotor with this quantity. Its name starts with that of the rotor if there are several.
+fn variable_of<'a>(input: &ReportInput<'a>, rotor: &StructureSettings, quantity: Quantity) -> Option<&'a Variable> {
+    let mut variables = input.table.variables().iter().filter(|variable| variable.quantity == quantity);
+    let is_of_rotor = |name: &str| name.rsplit_once('.').is_none_or(|(owner, _)| owner == rotor.name);
+    variables.find(|variable| is_of_rotor(&variable.name))
+}
+
+/// Returns the smallest and the largest absolute speed of a rotor during the run (rad/s).
+fn speeds(input: &ReportInput<'_>, rotor: &StructureSettings) -> Option<[f64; 2]> {
+    let name = &variable_of(input, rotor, Quantity::Speed)?.name;
+    let driven = input.history.and_then(|history| history.range(name, [input.schedule.start, input.schedule.stop]));
+    let [low, high] = driven.or_else(|| {
+        let parameter = input.native.parameters.iter().find(|parameter| parameter.name == *name)?;
+        let ParameterValue::Real(speed) = parameter.value else { return None };
+        Some([speed; 2])
+    })?;
+    let slowest = if low * high < 0.0 { 0.0 } else { low.abs().min(high.abs()) };
+    Some([slowest, low.abs().max(high.abs())])
 }
 
 fn vibration(input: &ReportInput<'_>, history: Option<(&HitBlade, &TipHistory)>) -> Result<Vec<Captioned>> {
@@ -257,9 +290,12 @@ fn vibration(input: &ReportInput<'_>, history: Option<(&HitBlade, &TipHistory)>)
     let spacing = input.capture.spacing();
     let micro: Vec<f64> = history.values.iter().map(|value| 1e6 * value).collect();
     let Some(spectrum) = Spectrum::from_samples(&micro, spacing)? else { return Ok(Vec::new()) };
-    let whose = if blade.sectors > 1 { format!("blade {}", blade.sector + 1) } else { escape(&blade.name) };
+    let whose = input.blade_name(blade);
     let what = format!("{} displacement of {whose} at its {}", history.direction, escape(&readable(&history.node)));
-    let prediction = FrequencyPrediction::with_settings(input.scene, input.settings, 0.0).ok();
+    let rotor = input.rotors().find(|rotor| rotor.name == blade.name);
+    let speeds = rotor.and_then(|rotor| speeds(input, rotor)).filter(|[_, fastest]| *fastest > 0.0);
+    let prediction =
+        rotor.and_then(|rotor| predicted(input, rotor, speeds.map_or(0.0, |[_, fastest]| BEYOND * fastest)));
     let first = input.native.recording.times.first().copied().unwrap_or(0.0);
     let nyquist = 0.5 / spacing;
     let modes = prediction.as_ref().map(|own| own.modes(0, 0.0)).unwrap_or_default();
@@ -269,10 +305,8 @@ fn vibration(input: &ReportInput<'_>, history: Option<(&HitBlade, &TipHistory)>)
     let highest = peaks.iter().filter(|peak| peak.1 >= SHOWN_PEAK * largest).map(|peak| peak.0).fold(0.0, f64::max);
     let top = (ABOVE * highest).max(1.15 * needed).clamp(4.0 * spectrum.resolution, nyquist);
     let mut figures = Vec::new();
-    let speed =
-        Results::new(input.table, &input.native.recording).last(Quantity::Speed).or_else(|| master_speed(input));
-    if let (Some(prediction), Some(speed)) = (&prediction, speed.filter(|speed| *speed != 0.0)) {
-        figures.push(campbell(prediction, speed.abs(), top, &spectrum, &what));
+    if let (Some(prediction), Some(speeds)) = (&prediction, speeds) {
+        figures.push(campbell(prediction, speeds, top, &spectrum, &what));
     }
     if let Some(found) = Spectrogram::from_samples(&micro, first, spacing)? {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a number of frequencies")]
@@ -304,36 +338,56 @@ fn vibration(input: &ReportInput<'_>, history: Option<(&HitBlade, &TipHistory)>)
     Ok(figures)
 }
 
-/// Returns the prescribed speed of the master of the first contact (rad/s).
-fn master_speed(input: &ReportInput<'_>) -> Option<f64> {
-    let settings = &input.scene.settings;
-    let master = &settings.contacts.first()?.master;
-    let given = input.settings.iter().find(|(name, _)| name == "speed").and_then(|(_, value)| value.parse().ok());
-    given.or_else(|| settings.structures.iter().find(|own| own.name == *master).map(|own| own.speed))
+/// Predicts the natural frequencies of a rotor up to a speed (rad/s); `None` if it has no contact or its model cannot be evaluated.
+fn predicted(input: &ReportInput<'_>, rotor: &StructureSettings, fastest: f64) -> Option<FrequencyPrediction> {
+    // The prediction describes the master of the first contact in the casing of the first surface.
+    let mut scene = input.scene.clone();
+    let settings = &mut scene.settings;
+    settings.contacts.sort_by_key(|contact| contact.master != rotor.name);
+    let casing = settings.contacts.first().filter(|contact| contact.master == rotor.name)?.slave.clone();
+    settings.surfaces.sort_by_key(|surface| surface.name != casing);
+    FrequencyPrediction::with_settings(&scene, input.settings, fastest).ok()
 }
 
-fn campbell(prediction: &FrequencyPrediction, speed: f64, top: f64, spectrum: &Spectrum, what: &str) -> Captioned {
-    let last = 1.25 * speed;
+fn campbell(
+    prediction: &FrequencyPrediction,
+    speeds: [f64; 2],
+    top: f64,
+    spectrum: &Spectrum,
+    what: &str,
+) -> Captioned {
+    let [slowest, fastest] = speeds;
+    let last = BEYOND * fastest;
     let grid: Vec<f64> = (0..=12).map(|index| last * f64::from(index) / 12.0).collect();
     let columns: Vec<Vec<f64>> = grid.iter().map(|speed| prediction.lines(*speed)).collect();
     let lines = (0..columns[0].len()).filter(|mode| (0.0..top).contains(&columns[0][*mode]) && columns[0][*mode] > 0.0);
     let modes =
         lines.take(MAX_MODES).map(|mode| grid.iter().zip(&columns).map(|(x, column)| (*x, column[mode])).collect());
-    let hertz = |order: usize| order as f64 * speed / std::f64::consts::TAU;
+    let hertz = |order: usize| order as f64 * fastest / std::f64::consts::TAU;
     let orders = (1..=MAX_ORDERS).take_while(|order| hertz(*order) <= top);
     let response: Vec<(f64, f64)> =
         spectrum.amplitudes.iter().enumerate().map(|(bin, value)| (bin as f64 * spectrum.resolution, *value)).collect();
     let peaks: Vec<(f64, f64)> = spectrum.peaks().into_iter().filter(|peak| peak.0 <= top).collect();
     let strongest = peaks.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1));
     let strongest = strongest.map_or(String::new(), |(found, amplitude)| {
-        let order = found * std::f64::consts::TAU / speed;
-        format!(
-            " The largest amplitude, {} µm, is at {found:.0} Hz ({order:.2} times the rotational frequency).",
-            rounded(amplitude)
-        )
+        let order = if slowest < fastest {
+            String::new()
+        } else {
+            format!(" ({:.2} times the rotational frequency)", found * std::f64::consts::TAU / fastest)
+        };
+        format!(" The largest amplitude, {} µm, is at {found:.0} Hz{order}.", rounded(amplitude))
     });
+    let marks = if slowest < fastest {
+        let [slowest, fastest] = speeds.map(rounded);
+        format!(
+            "and peaks of the run over its range of speeds, {slowest} rad/s to {fastest} rad/s (horizontal bars). The speed \
+             varied, so the peaks belong to no single speed"
+        )
+    } else {
+        "and peaks of the run at its speed (circles)".to_owned()
+    };
     let campbell = Campbell {
-        speed,
+        speeds,
         top,
         modes: modes.collect(),
         orders: orders.map(|order| (order, prediction.excites(order))).collect(),
@@ -345,14 +399,19 @@ fn campbell(prediction: &FrequencyPrediction, speed: f64, top: f64, spectrum: &S
         body: campbell.to_html(),
         caption: format!(
             "Campbell diagram with the response to the rub. Left: natural frequencies (solid), engine orders (dotted; numbered \
-             and drawn stronger if the casing excites them), and peaks of the run at its speed (circles). Right: amplitude of \
-             the {what} over the whole run.{strongest}"
+             and drawn stronger if the casing excites them), {marks}. Right: amplitude of the {what} over the whole run.{strongest}"
         ),
     }
 }
 
-fn energies(results: &Results<'_>) -> Result<Vec<Captioned>> {
+fn energies(input: &ReportInput<'_>, results: &Results<'_>) -> Result<Vec<Captioned>> {
     let mut figures = Vec::new();
+    let works =
+        if input.rotors().next().is_some() { "External work of the drive and the casing" } else { "External work" };
+    let exchange = format!(
+        "{works}, and friction heat, since the start. Their difference is the vibration energy and the losses to damping and \
+         impacts."
+    );
     let vibration = [
         ("kinetic", Quantity::KineticEnergy),
         ("strain", Quantity::StrainEnergy),
@@ -365,11 +424,7 @@ fn energies(results: &Results<'_>) -> Result<Vec<Captioned>> {
             &vibration[..],
             "Vibration energy of all structures, and the energy dissipated by damping and impacts since the start.",
         ),
-        (
-            &exchanged[..],
-            "External work of the drive and the casing, and friction heat, since the start. Their difference is the vibration \
-             energy and the losses to damping and impacts.",
-        ),
+        (&exchanged[..], exchange.as_str()),
     ] {
         let series = list.iter().filter_map(|(label, quantity)| results.series(label, *quantity));
         let series: Vec<Series> = series.filter(|series| series.points.iter().any(|point| point.1 != 0.0)).collect();

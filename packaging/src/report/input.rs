@@ -1,8 +1,10 @@
 //! Data for the report.
 
+use tiprub_core::scene::settings::{BodyMotion, StructureSettings};
 use tiprub_core::{Scene, VariableTable};
-use tiprub_field::animation::Capture;
-use tiprub_shell::{native::NativeRun, recording::RecordingDifference, schedule::Schedule};
+use tiprub_field::animation::{Capture, HitBlade};
+use tiprub_figure::escape;
+use tiprub_shell::{history::InputHistory, native::NativeRun, recording::RecordingDifference, schedule::Schedule};
 use tiprub_study::estimate::Estimate;
 
 use crate::{answer::AnswerLine, rom_facts::RomFacts};
@@ -37,6 +39,8 @@ pub struct ReportInput<'a> {
     pub table: &'a VariableTable,
     /// Replaced start values (name, value as text).
     pub settings: &'a [(String, String)],
+    /// Inputs over time from a file.
+    pub history: Option<&'a InputHistory>,
     /// Communication points.
     pub schedule: &'a Schedule,
     /// The native run.
@@ -55,4 +59,21 @@ pub struct ReportInput<'a> {
     pub files: &'a [ReportFile],
     /// Wall times of the parts of the work (name, s).
     pub durations: &'a [(String, f64)],
+}
+
+impl ReportInput<'_> {
+    /// Returns the rotors of the scene.
+    pub(super) fn rotors(&self) -> impl Iterator<Item = &StructureSettings> {
+        self.scene.settings.structures.iter().filter(|own| own.motion == BodyMotion::Rotating)
+    }
+
+    /// Returns the name of a blade as HTML, with its rotor if there are several: "blade 4 of front". A structure with a single sector has only its name.
+    pub(super) fn blade_name(&self, blade: &HitBlade) -> String {
+        let name = escape(&blade.name);
+        match (blade.sectors, self.rotors().count()) {
+            (..=1, _) => name,
+            (_, ..=1) => format!("blade {}", blade.sector + 1),
+            _ => format!("blade {} of {name}", blade.sector + 1),
+        }
+    }
 }

@@ -2,9 +2,7 @@
 
 use std::fmt::Write as _;
 
-use tiprub_core::scene::settings::BodyMotion;
 use tiprub_field::animation::HitBlade;
-use tiprub_figure::escape;
 use tiprub_shell::extremes;
 
 use super::input::ReportInput;
@@ -111,7 +109,7 @@ impl Summary {
 
     /// Returns the main results in words as HTML.
     pub(super) fn words(&self, input: &ReportInput<'_>, blade: Option<&HitBlade>) -> String {
-        let has_rotor = input.scene.settings.structures.iter().any(|own| own.motion == BodyMotion::Rotating);
+        let has_rotor = input.rotors().next().is_some();
         let [tips, touch] = if has_rotor { ["The blades", "touch the casing"] } else { ["The bodies", "touch"] };
         let Some(contact) = self.contact.filter(|contact| contact.total > 0.0) else {
             let what = if has_rotor { "No blade touches the casing" } else { "No body touches another" };
@@ -124,26 +122,9 @@ impl Summary {
             with_prefix(self.length, "s")
         );
         if let Some(blade) = blade.filter(|blade| blade.force > 0.0 && blade.sectors > 1) {
-            let rotor = if input
-                .scene
-                .settings
-                .structures
-                .iter()
-                .filter(|own| own.motion == BodyMotion::Rotating)
-                .count()
-                > 1
-            {
-                format!(" of {}", escape(&blade.name))
-            } else {
-                String::new()
-            };
-            let _ = write!(
-                text,
-                " Blade {}{rotor} is hit hardest, with {} at {}.",
-                blade.sector + 1,
-                with_prefix(blade.force, "N"),
-                with_prefix(blade.time, "s")
-            );
+            let name = input.blade_name(blade).replacen("blade", "Blade", 1);
+            let [force, time] = [(blade.force, "N"), (blade.time, "s")].map(|(value, unit)| with_prefix(value, unit));
+            let _ = write!(text, " {name} is hit hardest, with {force} at {time}.");
         }
         if let Some((heat, _)) = self.heat {
             let _ = write!(text, " Friction turns {} into heat", with_prefix(heat, "J"));

@@ -34,9 +34,9 @@ pub(super) fn section(input: &ReportInput<'_>, blade: Option<&HitBlade>) -> Resu
     let views = blade.filter(|blade| blade.sectors > 1).map_or(String::new(), |blade| {
         format!(
             "<fieldset><legend>View</legend><label><input type=\"radio\" name=\"view\" value=\"all\" checked>whole rotor</label>\
-             <label><input type=\"radio\" name=\"view\" value=\"blade\">blade {}</label>\
+             <label><input type=\"radio\" name=\"view\" value=\"blade\">{}</label>\
              <label><input type=\"checkbox\" name=\"turn\">rotate with the rotor</label></fieldset>",
-            blade.sector + 1
+            input.blade_name(blade)
         )
     });
     let _ = writeln!(

@@ -125,9 +125,8 @@ fn report_shows_the_values_that_replace_those_of_the_scene() {
     }
 }
 
-/// Blades far from the casing take no step in a run of one short communication step, so there is no time per step.
-#[test]
-fn run_without_internal_steps_has_no_time_per_step() {
+/// Returns a project with adaptive steps.
+fn adaptive() -> Project {
     let project = Project::new();
     let rom = project.path("small.rom.safetensors");
     let small = tiprub_format::read_rom(&fs::read(&rom).unwrap(), "small").unwrap();
@@ -136,7 +135,88 @@ fn run_without_internal_steps_has_no_time_per_step() {
     let contact_map = DMatrix::from_fn(3, 6, |row, mode| if mode % 3 == row { 1.0 / (1.0 + mode as f64) } else { 0.0 });
     let adaptive = Rom { mass: DMatrix::identity(6, 6) * 0.1, stiffness, contact_map, ..small };
     fs::write(&rom, tiprub_format::write_rom(&adaptive)).unwrap();
-    let scene = SCENE.replace("[time]", "[time]\nscheme = \"galerkin\"").replace("gap = 1e-3", "gap = 0.01");
+    fs::write(project.path("scene.toml"), SCENE.replace("[time]", "[time]\nscheme = \"galerkin\"")).unwrap();
+    project
+}
+
+#[test]
+fn report_describes_the_steps_of_the_run() {
+    let project = adaptive();
+    let [adaptive, fixed] = [
+        "<th>adaptive steps</th><td>tolerance 1·10<sup>−3</sup> of",
+        "<th>internal step h</th><td>5·10<sup>−5</sup> s",
+    ];
+    let page = |set: &[&str]| {
+        let run = [&["run", "scene.toml", "--stop", "0.005", "--report", "run.html"], set].concat();
+        project.succeed(&run);
+        read(&project, "run.html")
+    };
+    let html = page(&["--set", "tolerance=1e-3"]);
+    assert!(html.contains(adaptive) && !html.contains("internal step h"));
+    for scheme in ["scheme=modal-exact", "scheme=2"] {
+        let html = page(&["--set", scheme, "--set", "internal_step_max=5e-5"]);
+        assert!(html.contains(fixed) && !html.contains("adaptive steps"), "{scheme}");
+    }
+}
+
+#[test]
+fn report_describes_inputs_over_time() {
+    let project = Project::new();
+    let page = |lines: &str| {
+        fs::write(project.path("in.csv"), lines).unwrap();
+        project.succeed(&["run", "scene.toml", "--step", "2e-4", "--inputs", "in.csv", "--report", "run.html"]);
+        read(&project, "run.html")
+    };
+    let html = page("time,speed,gap_offset\n0,-80,0\n0.04,-120,0\n0.09,-900,0\n");
+    for wanted in [
+        "Inputs over time come from the file <code>in.csv</code>: <code>speed</code>, <code>gap_offset</code>.",
+        "over its range of speeds, 80.0 rad/s to 276 rad/s (horizontal bars)",
+    ] {
+        assert!(html.contains(wanted), "{wanted}");
+    }
+    assert!(!html.contains("times the rotational frequency") && !html.contains("at its speed"));
+    let html = page("time,gap_offset\n0,0\n0.05,1e-5\n");
+    assert!(html.contains("<code>in.csv</code>: <code>gap_offset</code>.") && html.contains("at its speed (circles)"));
+}
+
+/// Names the rotor in words and figures, and uses the speed and the modes of the rotor that is hit hardest.
+#[test]
+fn report_tells_several_rotors_apart() {
+    let project = Project::new();
+    let stiff = tiprub_format::read_rom(&fs::read(project.path("small.rom.safetensors")).unwrap(), "small").unwrap();
+    let stiff = Rom { stiffness: stiff.stiffness.clone() * 4.0, ..stiff };
+    fs::write(project.path("stiff.rom.safetensors"), tiprub_format::write_rom(&stiff)).unwrap();
+    let rear = "[[structure]]\nname = \"rear\"\nrom = \"stiff.rom.safetensors\"\nspeed = 100.0\n\
+                [[surface]]\nname = \"around_rear\"\nshape = { kind = \"lobes\", amplitude = 2.5e-3, order = 3 }\nramp_time = 0.02\n\
+                [[contact]]\nmaster = \"rear\"\nslave = \"around_rear\"\ngap = 1e-3\nfriction = 0.1\n";
+    fs::write(project.path("scene.toml"), format!("{SCENE}{rear}")).unwrap();
+    project.succeed(&["run", "scene.toml", "--step", "2e-4", "--set", "rear.speed=70", "--report", "run.html"]);
+    let html = read(&project, "run.html");
+    for wanted in [
+        " of rear is hit hardest",
+        "each contact node of blade",
+        " of rear, which is hit hardest",
+        " of rear</label>",
+        "Torque of the contacts on each rotor",
+        "</i>rear</span>",
+    ] {
+        assert!(html.contains(wanted), "{wanted}");
+    }
+    // The caption has the frequency of the largest amplitude and its multiple of the rotational frequency.
+    let caption = html.split("The largest amplitude, ").nth(1).unwrap().split(" times the").next().unwrap();
+    let number = |text: &str| text.trim_matches(|other: char| !other.is_ascii_digit()).parse::<f64>().unwrap();
+    let (hertz, order) = caption.split_once(" is at ").unwrap().1.split_once(" Hz (").unwrap();
+    let speed = std::f64::consts::TAU * number(hertz) / number(order);
+    assert!((speed / 70.0 - 1.0).abs() < 0.02, "{caption}: {speed}");
+    // A mass of 0.1 kg on a spring of 4e5 N/m has a natural frequency of 318 Hz.
+    assert!(html.contains("mode 1: 318 Hz") && !html.contains("mode 1: 159 Hz"));
+}
+
+/// Blades far from the casing take no step in a run of one short communication step, so there is no time per step.
+#[test]
+fn run_without_internal_steps_has_no_time_per_step() {
+    let project = adaptive();
+    let scene = fs::read_to_string(project.path("scene.toml")).unwrap().replace("gap = 1e-3", "gap = 0.01");
     fs::write(project.path("scene.toml"), scene).unwrap();
     let run = ["run", "scene.toml", "--all", "--stop", "1e-5", "--step", "1e-5", "--report", "run.html"];
     let printed = project.succeed(&run);

@@ -80,6 +80,17 @@ fn built_in_abradable_casing_wears_irreversibly() {
 }
 
 #[test]
+fn report_of_a_free_body_shows_no_rotor() {
+    let project = tempfile::tempdir().unwrap();
+    succeed(&project, &["run", "builtin:cube-between-rings", "--report", "out.html", "--quiet"]);
+    let report = fs::read_to_string(project.path().join("out.html")).unwrap();
+    assert!(report.contains("The bodies touch") && report.contains("External work, and friction heat"));
+    for word in ["Torque of the contacts", "torque", "rotor", "drive and the casing"] {
+        assert!(!report.split("<section>").skip(1).any(|section| section.contains(word)), "{word}");
+    }
+}
+
+#[test]
 fn inspect_lists_the_features_of_a_built_in_scene() {
     let project = tempfile::tempdir().unwrap();
     let text = succeed(&project, &["inspect", "builtin:flexible-casing", "--quiet"]);

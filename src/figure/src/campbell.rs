@@ -4,16 +4,16 @@ use std::fmt::Write as _;
 
 use crate::{axis::tick, escape, grid_map::round_values};
 
-/// Largest speed of the axis, as a multiple of the speed of the run.
-const BEYOND: f64 = 1.25;
+/// Largest speed of the axis, as a multiple of the largest speed of the run.
+pub const BEYOND: f64 = 1.25;
 /// Radius of the largest circle (SVG units).
 const CIRCLE: f64 = 13.0;
 
-/// Campbell diagram of a run at one speed.
+/// Campbell diagram of a run at one speed, or over a range of speeds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Campbell {
-    /// Speed of the run (rad/s).
-    pub speed: f64,
+    /// Smallest and largest speed of the run (rad/s).
+    pub speeds: [f64; 2],
     /// Highest frequency (Hz).
     pub top: f64,
     /// Natural frequencies over speed: points (rad/s, Hz).
@@ -60,7 +60,8 @@ impl Campbell {
         let right = left + 0.66 * (width - left - 16.0);
         // The spectrum stands beside the diagram.
         let (start, end) = (right + 18.0, width - 12.0);
-        let last = if self.speed > 0.0 { BEYOND * self.speed } else { 1.0 };
+        let [slowest, fastest] = self.speeds;
+        let last = if fastest > 0.0 { BEYOND * fastest } else { 1.0 };
         let x = |speed: f64| left + (right - left) * speed / last;
         let y = |hertz: f64| bottom - (bottom - ABOVE) * (hertz / self.top).clamp(0.0, 1.0);
         let mut svg = format!(
@@ -98,18 +99,21 @@ impl Campbell {
             }
             let _ = write!(svg, r#"<path class="mode" d="{path}"/>"#);
         }
-        let _ = write!(svg, r#"<path class="mark" d="M{0:.1} {ABOVE}V{bottom}"/>"#, x(self.speed));
+        let is_varied = slowest < fastest;
+        for speed in [slowest, fastest].into_iter().take(if is_varied { 2 } else { 1 }) {
+            let _ = write!(svg, r#"<path class="mark" d="M{0:.1} {ABOVE}V{bottom}"/>"#, x(speed));
+        }
         let largest = self.response.iter().chain(&self.peaks).map(|point| point.1).fold(f64::MIN_POSITIVE, f64::max);
         for (hertz, amplitude) in &self.peaks {
             let radius = CIRCLE * (amplitude / largest).sqrt();
-            let _ = write!(
-                svg,
-                r#"<circle class="peak" cx="{:.1}" cy="{:.1}" r="{radius:.1}"><title>{} Hz: {}</title></circle>"#,
-                x(self.speed),
-                y(*hertz),
-                tick(hertz.round()),
-                tick(round3(*amplitude))
-            );
+            let title = format!("<title>{} Hz: {}</title>", tick(hertz.round()), tick(round3(*amplitude)));
+            let _ = if is_varied {
+                let ([from, to], y) = ([slowest, fastest].map(x), y(*hertz));
+                write!(svg, r#"<path class="peak" d="M{from:.1} {y:.1}H{to:.1}">{title}</path>"#)
+            } else {
+                let (x, y) = (x(fastest), y(*hertz));
+                write!(svg, r#"<circle class="peak" cx="{x:.1}" cy="{y:.1}" r="{radius:.1}">{title}</circle>"#)
+            };
         }
         self.draw_spectrum(&mut svg, [start, end], bottom, &y, largest);
         text(&mut svg, [0.5 * (left + right), height - 8.0], "middle", "angular velocity (rad/s)");
@@ -154,7 +158,7 @@ mod tests {
     #[test]
     fn shows_modes_orders_and_the_response() {
         let campbell = Campbell {
-            speed: 1000.0,
+            speeds: [1000.0; 2],
             top: 2000.0,
             modes: vec![vec![(0.0, 400.0), (1250.0, 500.0)], vec![(0.0, 5000.0), (1250.0, 5000.0)]],
             orders: vec![(1, false), (2, true), (40, false)],
@@ -169,7 +173,10 @@ mod tests {
         assert!(html.contains(">2</text>") && html.contains("450 Hz: 1") && html.contains("amplitude (µm)"), "{html}");
         // A line of 40 orders leaves the picture at the top.
         assert!(!html.contains("NaN") && !html.contains(" -"), "{html}");
-        let still = Campbell { speed: 0.0, response: Vec::new(), peaks: Vec::new(), ..campbell };
+        assert_eq!([html.matches("class=\"mark\"").count(), html.matches("<circle").count()], [2, 2]);
+        let varied = Campbell { speeds: [500.0, 1000.0], ..campbell.clone() }.to_html();
+        assert_eq!([varied.matches("class=\"mark\"").count(), varied.matches("<circle").count()], [4, 0]);
+        let still = Campbell { speeds: [0.0; 2], response: Vec::new(), peaks: Vec::new(), ..campbell };
         assert!(!still.to_html().contains("NaN") && !still.to_html().contains("inf"));
     }
 }

@@ -99,6 +99,24 @@ impl InputHistory {
         }
     }
 
+    /// Returns the origin of the data.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Returns the names of the variables.
+    pub fn variables(&self) -> &[String] {
+        &self.names
+    }
+
+    /// Returns the smallest and the largest value of a variable during an interval (s); `None` if there is no column for it.
+    pub fn range(&self, name: &str, [start, stop]: [f64; 2]) -> Option<[f64; 2]> {
+        let column = self.names.iter().position(|own| own == name)?;
+        let within = self.times.iter().copied().filter(|time| (start..stop).contains(time));
+        let values = within.chain([start, stop]).map(|time| self.at(column, time));
+        Some(values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)]))
+    }
+
     /// Assigns the columns to variables of a simulation.
     ///
     /// # Errors
@@ -258,6 +276,9 @@ mod tests {
             assert_eq!(at(time).map(f64::to_bits), expected.map(f64::to_bits), "{time}");
         }
         assert!(history.holds("a") && !history.holds("c"));
+        let range = |interval| history.range("a", interval);
+        assert_eq!([range([0.0, 0.4]), range([1.0, 1.75])], [Some([1.0, 1.0]), Some([1.5, 3.0])]);
+        assert_eq!((range([-1.0, 9.0]), history.range("c", [0.0, 1.0])), (Some([0.0, 3.0]), None));
         assert_eq!(history.warnings(0.5).len(), 0);
         assert!(history.warnings(0.6)[0].contains("5.000e-1 s apart"));
     }
