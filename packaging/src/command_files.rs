@@ -93,7 +93,7 @@ fn package(arguments: &PackageArguments) -> Result<()> {
     outputs(&read, &fmus(&targets(arguments.fmi, &arguments.output, &name)?))
 }
 
-/// Returns the error of an output that is always a file.
+/// Returns the error for `-` as an output that must be a file.
 fn not_stdout(option: &str) -> Failure {
     let remedy = "Give the name of a file, or ./- for a file with this name";
     Failure::usage(format!("{option} -"), "cannot be printed on stdout", remedy)

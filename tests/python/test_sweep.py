@@ -63,7 +63,7 @@ def whole(plan):
 
 
 def journaled(directory):
-    """Computing times of the runs in journals and files of parts, by digest. A program that is running may remove a file."""
+    """Computing times of the runs in journals and files of parts, by digest. A running program may remove a file."""
     seconds = {}
     for journal in directory.glob("*.journal"):
         with contextlib.suppress(FileNotFoundError):
@@ -173,7 +173,7 @@ def test_errors_and_interrupts_leave_only_rows_in_the_directory(plan, monkeypatc
         with pytest.raises(KeyboardInterrupt):
             module.sweep(plan, quiet=True)
     assert all(pandas.read_parquet(directory).equals(table) for directory, table in zip(both, before))
-    # Files of an earlier release, of a sweep that was killed.
+    # Files as an earlier release left them after a sweep was killed.
     for file in both[1].iterdir():
         os.replace(file, both[0] / file.name)
     assert module.sweep(plan, quiet=True)["finished_before"] == 40

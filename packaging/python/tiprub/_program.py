@@ -130,7 +130,7 @@ INSTEAD = {
 }
 
 
-#: Options of functions whose keyword has another name.
+#: Keywords whose option has another name, by option.
 KEYWORDS = {"platform": "platforms"}
 
 
@@ -140,7 +140,7 @@ def options(own: Mapping[str, Any], more: Mapping[str, Any] = MappingProxyType({
     Raises
     ------
     Error
-        A keyword of `more` is also among the `own` options of the function of this name or in `INSTEAD`, or a value has a wrong type.
+        A keyword of `more` is also in `INSTEAD` or among the `own` options of `function`, or a value has a wrong type.
     """
     for key in more:
         if key in own or key in INSTEAD:
@@ -155,7 +155,7 @@ def options(own: Mapping[str, Any], more: Mapping[str, Any] = MappingProxyType({
             if one is True:
                 words.append(option)
             elif several or (one is not None and one is not False):
-                # The program, which knows all options, would reject a misspelled keyword. Values that it cannot receive are rejected before.
+                # The program rejects misspelled keywords. A value without a text form never reaches it, so such a keyword is checked here.
                 if key in more and not is_text(one) and similar_keyword(key, function):
                     raise unknown_keyword(key, [function])
                 words.append(f"{option}={text(f'keyword `{KEYWORDS.get(key, key) if key in own else key}`', one)}")
@@ -163,7 +163,7 @@ def options(own: Mapping[str, Any], more: Mapping[str, Any] = MappingProxyType({
 
 
 def similar_keyword(name: str, function: str, option: Optional[str] = None) -> Optional[str]:
-    """Return the keyword of a function of this module with a name similar to `name`, or else the `option` that the program proposes."""
+    """Return the keyword of a function of this module that is similar to `name`, or else the keyword of the `option` that the program proposes."""
     known = getattr(sys.modules[__package__], function, None)
     names = [] if known is None else [keyword for keyword in inspect.signature(known).parameters if keyword != "more"]
     keyword = option.replace("-", "_") if option else None

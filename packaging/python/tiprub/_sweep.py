@@ -34,7 +34,7 @@ LOCKED, RETRY_SECONDS = "another process is working on this part", 0.5
 PROGRESS_SECONDS = 5.0
 #: Time (s) that a cluster without workers has to start one, before a line reports it.
 WORKER_SECONDS = 3.0
-#: File of the runs that are measured.
+#: File with the rows of the measured runs.
 PILOT = "pilot.parquet"
 #: Expression that is true if this module can be imported.
 HAS_MODULE = "__import__('importlib.util').util.find_spec('tiprub') is not None"
@@ -96,18 +96,18 @@ def sweep(
     with tempfile.TemporaryDirectory() as elsewhere:
         check = call(["sweep", "--check", f"--part={LAST_PART}", f"--output={Path(elsewhere) / 'check.parquet'}"], [str(file)], quiet=True)
     task: dict[str, Any] = {"plan": str(file), "digest": check["digest"]}
-    # The program writes outputs over time beside the rows, where readers of Parquet would take them for rows. Both are therefore written to a third
-    # directory, and moved when a part is complete. A plan without outputs over time may use it too, so the word suffices.
+    # The program writes outputs over time beside the rows, where Parquet readers would read them as rows. Both are therefore written to a third
+    # directory, and moved when a part is complete. A plan without outputs over time may also use this directory, so finding the word suffices.
     unfinished = directory.with_name(f"{directory.name}-unfinished")
-    is_apart = unfinished.exists() or b"histories" in file.read_bytes()
-    work = unfinished if is_apart else directory
-    new = [directory, histories, unfinished] if is_apart else [directory]
-    if is_apart:
+    uses_unfinished = unfinished.exists() or b"histories" in file.read_bytes()
+    work = unfinished if uses_unfinished else directory
+    new = [directory, histories, unfinished] if uses_unfinished else [directory]
+    if uses_unfinished:
         task["targets"] = [str(directory), str(histories)]
     with _connected(distributed, client) as cluster, _created(*new):
         count = _known_parts([directory, histories, unfinished], file.stem)
-        if is_apart:
-            _set_apart(directory, unfinished, file.stem)
+        if uses_unfinished:
+            _move_unfinished(directory, unfinished, file.stem)
         _check_workers(cluster, file.stem, quiet)
         threads = sum(cluster.nthreads().values())
         runs = check["plan_runs"]
@@ -135,8 +135,8 @@ def sweep(
             _check_known_parts(known, parts, str(file), check["facts"], parquet)
         _adopt_pilot(work, outputs[0])
         answers = _gather(distributed, cluster, outputs, parts, task, file.stem, quiet)
-        if is_apart:
-            # It has files if another driver runs the same plan.
+        if uses_unfinished:
+            # The directory is not empty while another driver runs the same plan.
             with contextlib.suppress(OSError):
                 unfinished.rmdir()
     report = _sums(answers)
@@ -176,12 +176,12 @@ def _created(*directories: Path) -> Iterator[None]:
 
 
 def _beside(directory: Path) -> str:
-    """Return the names of the other directories of a sweep for messages."""
+    """Return the names of the directories beside the results of a sweep, for messages."""
     return f"`{directory.name}-histories` and `{directory.name}-unfinished`"
 
 
-def _set_apart(directory: Path, work: Path, stem: str) -> None:
-    """Move all files of parts except rows, which an earlier release or an earlier form of the plan left."""
+def _move_unfinished(directory: Path, work: Path, stem: str) -> None:
+    """Move journals and outputs over time that an earlier release, or an earlier form of the plan, wrote beside the rows."""
     try:
         for path in directory.glob(f"{glob.escape(stem)}-[0-9]*-of-*.parquet*"):
             if not re.fullmatch(r"-\d+-of-\d+\.parquet", path.name[len(stem):]):
@@ -200,7 +200,7 @@ def _connected(distributed: Any, client: Any) -> Iterator[Any]:
     if isinstance(client, distributed.Client):
         if client.status not in ("running", "connecting"):
             raise Error("keyword `client`", f"{client!r} is {client.status}", remedy)
-        with _stays_open(client):
+        with _report_closed_client(client):
             yield client
         return
     # The work takes place in processes of the program, so threads suffice for the workers.
@@ -213,13 +213,13 @@ def _connected(distributed: Any, client: Any) -> Iterator[Any]:
         own = distributed.Client(client, **local)
     except (OSError, RuntimeError, TypeError, ValueError) as error:
         raise Error("keyword `client`", f"there is no connection to {client!r}: {error}", remedy) from None
-    with own, _stays_open(own):
+    with own, _report_closed_client(own):
         yield own
 
 
 @contextlib.contextmanager
-def _stays_open(cluster: Any) -> Iterator[None]:
-    """Report errors of Dask as a closed client, if the client was closed or tasks were cancelled."""
+def _report_closed_client(cluster: Any) -> Iterator[None]:
+    """Raise one error in place of those of Dask, if the client was closed or tasks were cancelled."""
     try:
         yield
     except Error:
@@ -332,7 +332,7 @@ def run_part(output: str, part: str, plan: str, digest: str, targets: Optional[S
     words = ["sweep", "--threads=1", f"--part={part}", f"--digest={digest}", f"--output={output}"]
     while True:
         try:
-            with _results_beside(output, targets):
+            with _linked_results(output, targets):
                 return call(words, [plan], quiet=True)
         except Error as error:
             # The program of a worker that was killed completes its part.
@@ -342,13 +342,16 @@ def run_part(output: str, part: str, plan: str, digest: str, targets: Optional[S
 
 
 @contextlib.contextmanager
-def _results_beside(output: str, targets: Optional[Sequence[str]]) -> Iterator[None]:
-    """Give the program the results of a part in `targets`, and replace them by its files if it succeeds. Readers of `targets` always find complete files."""
+def _linked_results(output: str, targets: Optional[Sequence[str]]) -> Iterator[None]:
+    """Link the earlier results of a part from `targets` to `output`, where the program continues them; move the new files to `targets` if it succeeds.
+
+    Readers of `targets` always find complete files.
+    """
     if targets is None or Path(output).name == PILOT:
         yield
         return
     histories = Path(output).with_suffix(".histories.parquet")
-    # Outputs over time come first: with rows alone, the program would repeat their runs.
+    # Outputs over time come first: if it finds only rows, the program repeats their runs.
     pairs = [(Path(targets[1]) / histories.name, histories), (Path(targets[0]) / Path(output).name, Path(output))]
     try:
         for kept, file in pairs:
@@ -363,7 +366,7 @@ def _results_beside(output: str, targets: Optional[Sequence[str]]) -> Iterator[N
                         file.unlink()
             raise
         for kept, file in pairs:
-            # Another driver may have moved it.
+            # Another driver may have moved the file.
             with contextlib.suppress(FileNotFoundError):
                 file.unlink() if kept.exists() and _is_copy(file, kept) else os.replace(file, kept)
     except OSError as error:
@@ -371,11 +374,11 @@ def _results_beside(output: str, targets: Optional[Sequence[str]]) -> Iterator[N
 
 
 def _link(file: Path, link: Path) -> None:
-    """Make a link to a file, or a copy where there are no links."""
+    """Make a link to a file, or a copy if links are not supported."""
     try:
         os.link(file, link)
     except FileExistsError:
-        # Another driver made it.
+        # Another driver has made the link.
         pass
     except OSError:
         new = link.with_name(f".{link.name}.{os.getpid()}-{threading.get_ident()}")
@@ -384,7 +387,7 @@ def _link(file: Path, link: Path) -> None:
 
 
 def _is_copy(file: Path, other: Path) -> bool:
-    """Return whether a file is a link to another, or an unchanged copy."""
+    """Return whether a file is a link to another file, or an unchanged copy of it."""
     found, expected = file.stat(), other.stat()
     return (found.st_size, found.st_mtime_ns) == (expected.st_size, expected.st_mtime_ns)
 
@@ -420,7 +423,7 @@ def _gather(
         return answers
     finally:
         if len(answers) < len(futures):
-            # A closed client would hide the error.
+            # With a closed client, cancelling fails and would hide the first error.
             with contextlib.suppress(Exception):
                 cluster.cancel(futures)
 
@@ -447,7 +450,7 @@ def _equal_columns(files: Sequence[Union[str, Path]], parquet: Any) -> None:
                 columns = [table[field.name].cast(field.type) if field.name in schema.names else arrow.nulls(len(table), field.type)
                            for field in common]
                 whole = arrow.Table.from_arrays(columns, schema=common.with_metadata(schema.metadata))
-                # Readers of Parquet skip names with this first letter.
+                # Parquet readers skip files whose names begin with a dot.
                 new = Path(file).with_name(f".{Path(file).name}.new")
                 parquet.write_table(whole, new)
                 os.replace(new, file)

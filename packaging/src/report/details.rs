@@ -12,7 +12,7 @@ use super::input::{ReportFile, ReportInput};
 use super::numbers::{rounded, scientific};
 use crate::rom_facts::{CheckRow, OmittedRows, ROWS_SHOWN, RomFacts, not_negative_zero, order_text, sectors_text};
 
-/// Largest number of inputs from a file that are listed.
+/// Maximum number of inputs over time that are listed.
 const MAX_INPUTS: usize = 24;
 
 /// Returns the section about the reduced-order models; empty without facts about them.

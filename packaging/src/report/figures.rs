@@ -8,7 +8,7 @@ use tiprub_core::scene::shape::CompiledShape;
 use tiprub_cosim::variables::{Quantity, Variable};
 use tiprub_field::animation::{HitBlade, TipHistory};
 use tiprub_figure::{
-    campbell::{BEYOND, Campbell},
+    campbell::{Campbell, SPEED_AXIS_FACTOR},
     escape,
     grid_map::{GridMap, MapRows, Shows},
     plots::{Plot, Series},
@@ -254,7 +254,7 @@ fn forces(input: &ReportInput<'_>, results: &Results<'_>, blade: Option<&HitBlad
     Ok(figures)
 }
 
-/// Returns the contact torque on each rotor over time, with the name of the rotor if there are several.
+/// Returns the contact torque on each rotor over time, labelled with the name of the rotor if there are several.
 fn torques(input: &ReportInput<'_>, results: &Results<'_>) -> Vec<Series> {
     let series = |rotor: &StructureSettings| {
         let variable = variable_of(input, rotor, Quantity::Moment(2))?;
@@ -265,7 +265,7 @@ fn torques(input: &ReportInput<'_>, results: &Results<'_>) -> Vec<Series> {
     input.rotors().filter_map(series).collect()
 }
 
-/// Returns the scalar variable of a rotor with this quantity. Its name starts with that of the rotor if there are several.
+/// Returns the scalar variable of a rotor with this quantity. With several rotors, its name starts with the name of the rotor.
 fn variable_of<'a>(input: &ReportInput<'a>, rotor: &StructureSettings, quantity: Quantity) -> Option<&'a Variable> {
     let mut variables = input.table.variables().iter().filter(|variable| variable.quantity == quantity);
     let is_of_rotor = |name: &str| name.rsplit_once('.').is_none_or(|(owner, _)| owner == rotor.name);
@@ -294,8 +294,9 @@ fn vibration(input: &ReportInput<'_>, history: Option<(&HitBlade, &TipHistory)>)
     let what = format!("{} displacement of {whose} at its {}", history.direction, escape(&readable(&history.node)));
     let rotor = input.rotors().find(|rotor| rotor.name == blade.name);
     let speeds = rotor.and_then(|rotor| speeds(input, rotor)).filter(|[_, fastest]| *fastest > 0.0);
-    let prediction =
-        rotor.and_then(|rotor| predicted(input, rotor, speeds.map_or(0.0, |[_, fastest]| BEYOND * fastest)));
+    let prediction = rotor.and_then(|rotor| {
+        predict_frequencies(input, rotor, speeds.map_or(0.0, |[_, fastest]| SPEED_AXIS_FACTOR * fastest))
+    });
     let first = input.native.recording.times.first().copied().unwrap_or(0.0);
     let nyquist = 0.5 / spacing;
     let modes = prediction.as_ref().map(|own| own.modes(0, 0.0)).unwrap_or_default();
@@ -338,9 +339,13 @@ fn vibration(input: &ReportInput<'_>, history: Option<(&HitBlade, &TipHistory)>)
     Ok(figures)
 }
 
-/// Predicts the natural frequencies of a rotor up to a speed (rad/s); `None` if it has no contact or its model cannot be evaluated.
-fn predicted(input: &ReportInput<'_>, rotor: &StructureSettings, fastest: f64) -> Option<FrequencyPrediction> {
-    // The prediction describes the master of the first contact in the casing of the first surface.
+/// Predicts the natural frequencies of a rotor up to a speed (rad/s); `None` if the rotor is not the master of a contact, or if the prediction fails.
+fn predict_frequencies(
+    input: &ReportInput<'_>,
+    rotor: &StructureSettings,
+    fastest: f64,
+) -> Option<FrequencyPrediction> {
+    // The prediction uses the master of the first contact, and the first surface as its casing.
     let mut scene = input.scene.clone();
     let settings = &mut scene.settings;
     settings.contacts.sort_by_key(|contact| contact.master != rotor.name);
@@ -357,7 +362,7 @@ fn campbell(
     what: &str,
 ) -> Captioned {
     let [slowest, fastest] = speeds;
-    let last = BEYOND * fastest;
+    let last = SPEED_AXIS_FACTOR * fastest;
     let grid: Vec<f64> = (0..=12).map(|index| last * f64::from(index) / 12.0).collect();
     let columns: Vec<Vec<f64>> = grid.iter().map(|speed| prediction.lines(*speed)).collect();
     let lines = (0..columns[0].len()).filter(|mode| (0.0..top).contains(&columns[0][*mode]) && columns[0][*mode] > 0.0);

@@ -67,7 +67,7 @@ impl ReportInput<'_> {
         self.scene.settings.structures.iter().filter(|own| own.motion == BodyMotion::Rotating)
     }
 
-    /// Returns the name of a blade as HTML, with its rotor if there are several: "blade 4 of front". A structure with a single sector has only its name.
+    /// Returns the name of a blade as HTML, with its rotor if there are several: "blade 4 of front". A structure with one sector keeps its own name.
     pub(super) fn blade_name(&self, blade: &HitBlade) -> String {
         let name = escape(&blade.name);
         match (blade.sectors, self.rotors().count()) {

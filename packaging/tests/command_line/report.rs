@@ -106,9 +106,9 @@ fn report_states_that_no_contact_occurred() {
     assert!(!html.contains("is hit hardest"));
 }
 
-/// The page shows the values of the run, not those of the scene.
+/// The report shows the values of the run instead of those of the scene.
 #[test]
-fn report_shows_the_values_that_replace_those_of_the_scene() {
+fn report_shows_values_that_replace_scene_settings() {
     let project = Project::new();
     project.succeed(&["run", "scene.toml", "--report", "scene.html"]);
     let html = read(&project, "scene.html");
@@ -179,9 +179,9 @@ fn report_describes_inputs_over_time() {
     assert!(html.contains("<code>in.csv</code>: <code>gap_offset</code>.") && html.contains("at its speed (circles)"));
 }
 
-/// Names the rotor in words and figures, and uses the speed and the modes of the rotor that is hit hardest.
+/// The report names the rotor in text and figures, and uses speed and modes of the rotor that is hit hardest.
 #[test]
-fn report_tells_several_rotors_apart() {
+fn report_distinguishes_several_rotors() {
     let project = Project::new();
     let stiff = tiprub_format::read_rom(&fs::read(project.path("small.rom.safetensors")).unwrap(), "small").unwrap();
     let stiff = Rom { stiffness: stiff.stiffness.clone() * 4.0, ..stiff };
@@ -212,7 +212,7 @@ fn report_tells_several_rotors_apart() {
     assert!(html.contains("mode 1: 318 Hz") && !html.contains("mode 1: 159 Hz"));
 }
 
-/// Blades far from the casing take no step in a run of one short communication step, so there is no time per step.
+/// A run with one short communication step needs no internal steps if the blades are far from the casing.
 #[test]
 fn run_without_internal_steps_has_no_time_per_step() {
     let project = adaptive();

@@ -278,7 +278,7 @@ impl FieldSeries {
     }
 }
 
-/// Removes the files that the list of an earlier series names. ParaView would show them together with those of this series.
+/// Removes the files of an earlier series that its list names. ParaView would show them together with the new files.
 fn remove_series(directory: &Path) -> Result<()> {
     let index = directory.join(INDEX);
     // Reading a pipe might block.
@@ -288,7 +288,7 @@ fn remove_series(directory: &Path) -> Result<()> {
     let list = fs::read(&index).map_err(|error| Failure::file(&index, "cannot be read", &error))?;
     let list = String::from_utf8_lossy(&list);
     let names = list.split(" file=\"").skip(1).filter_map(|rest| rest.split('"').next());
-    // A changed list may name files elsewhere.
+    // An edited list may name files in other directories.
     let is_part = |name: &&str| {
         let path = Path::new(name);
         path.file_name() == Some(path.as_os_str()) && path.extension().is_some_and(|extension| extension == "vtu")

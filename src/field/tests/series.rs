@@ -219,7 +219,7 @@ fn series_replaces_exactly_the_files_of_an_earlier_one() {
     let place = |name: &str| first.root.path().join("fields").join(name);
     let own = ["other_000010.vtu", "notes.txt", "../outside.vtu"];
     own.iter().for_each(|name| std::fs::write(place(name), "").unwrap());
-    // A list may have been changed.
+    // The list may have been edited.
     let list = std::fs::read_to_string(place("fields.pvd")).unwrap();
     let changed =
         list.replacen("<DataSet", "<DataSet file=\"../outside.vtu\"/><DataSet file=\"notes.txt\"/>\n<DataSet", 1);

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use crate::{axis::tick, escape, grid_map::round_values};
 
 /// Largest speed of the axis, as a multiple of the largest speed of the run.
-pub const BEYOND: f64 = 1.25;
+pub const SPEED_AXIS_FACTOR: f64 = 1.25;
 /// Radius of the largest circle (SVG units).
 const CIRCLE: f64 = 13.0;
 
@@ -61,7 +61,7 @@ impl Campbell {
         // The spectrum stands beside the diagram.
         let (start, end) = (right + 18.0, width - 12.0);
         let [slowest, fastest] = self.speeds;
-        let last = if fastest > 0.0 { BEYOND * fastest } else { 1.0 };
+        let last = if fastest > 0.0 { SPEED_AXIS_FACTOR * fastest } else { 1.0 };
         let x = |speed: f64| left + (right - left) * speed / last;
         let y = |hertz: f64| bottom - (bottom - ABOVE) * (hertz / self.top).clamp(0.0, 1.0);
         let mut svg = format!(

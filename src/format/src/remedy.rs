@@ -1,7 +1,7 @@
 //! Remedies for names that are not accepted.
 
-/// Returns `Did you mean `x`? Accepted here: `x`, `y`, `z`` (the question only if a name is close, and only with the
-/// feature `suggestions`).
+/// Returns `Did you mean `x`? Accepted here: `x`, `y`, `z``. The question is omitted if no name is similar, or without the
+/// feature `suggestions`.
 pub(crate) fn name_remedy(given: &str, accepted: &[&str]) -> String {
     if accepted.is_empty() {
         return "No further keys are accepted here".to_owned();
@@ -32,7 +32,7 @@ mod tests {
 
     #[cfg(feature = "suggestions")]
     #[test]
-    fn asks_for_a_close_name() {
+    fn suggests_a_similar_name() {
         assert_eq!(name_remedy("gpa", &["gap", "speed"]), "Did you mean `gap`? Accepted here: `gap`, `speed`");
     }
 }

@@ -36,7 +36,7 @@ const CHECKS_PREFIX: &str = "scene";
 const CHECKS_SUFFIX: &str = ".checks";
 const MAX_CHECK_FILES: usize = 16;
 
-/// Number of results of checks of one scene that are cached; one start of a scene has up to a few hundred.
+/// Maximum number of cached check results of a scene; one run has up to a few hundred.
 const MAX_CHECKS: usize = 1 << 14;
 
 /// Model to cache.
@@ -174,7 +174,7 @@ impl RomCache {
         Some(self.directory.as_ref()?.join(format!("{name}-{}{}", &digest[..32], shape_file::SUFFIX)))
     }
 
-    /// Returns the results of slow checks of the last runs of a scene, for
+    /// Returns the results of slow checks of earlier runs of a scene, for
     /// [`Simulation::use_checks`](tiprub_core::Simulation::use_checks); empty if none are cached.
     pub fn checks(&self, scene: &Scene) -> Vec<u8> {
         let read = |path: PathBuf| {
@@ -186,8 +186,8 @@ impl RomCache {
         tiprub_format::read_checks(&file).to_vec()
     }
 
-    /// Adds the results of slow checks to those of the last runs of a scene, which may have had other parameters. If two processes write the file at
-    /// the same time, it has the results of one of them. If the file cannot be written, the run continues without it.
+    /// Adds the results of slow checks to those of earlier runs of a scene, which may have had other parameters. If two processes write the file at
+    /// the same time, only the results of one process are kept. If the file cannot be written, the run continues without it.
     pub fn keep_checks(&self, scene: &Scene, checks: &[u8]) {
         let (Some(directory), Some(path)) = (&self.directory, self.checks_path(scene)) else { return };
         let stored = self.checks(scene);

@@ -45,7 +45,7 @@ fn is_obeyed(character: char) -> bool {
 
 /// Exit code if the reader of stdout closed it early, such as `head`: the code that shells report for a program ended by SIGPIPE.
 const READER_LEFT: u8 = 128 + 13;
-/// Environment variable that leaves out the text of errors that are printed as JSON. The Python module sets it, so that a caught error prints nothing.
+/// Environment variable that suppresses the text of errors printed as JSON. The Python module sets it, so that a caught error prints nothing.
 pub const ERRORS_IN_JSON: &str = "TIPRUB_ERRORS_IN_JSON";
 
 /// Result of a command, as text and as JSON.
@@ -179,7 +179,7 @@ impl Console {
     }
 
     /// Prints a failure: text on stderr, and with `--json` the object on stdout. A caller that reports the object itself sets the environment variable
-    /// [`ERRORS_IN_JSON`], which leaves out the text.
+    /// [`ERRORS_IN_JSON`] to suppress the text.
     pub fn fail(&self, failure: &Failure) {
         self.warn(&failure.warnings);
         if self.prints_errors() {

@@ -99,17 +99,17 @@ impl InputHistory {
         }
     }
 
-    /// Returns the origin of the data.
+    /// Returns the origin of the data, such as the path of the file.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Returns the names of the variables.
+    /// Returns the names of the columns after the time.
     pub fn variables(&self) -> &[String] {
         &self.names
     }
 
-    /// Returns the smallest and the largest value of a variable during an interval (s); `None` if there is no column for it.
+    /// Returns the smallest and the largest value of a variable during an interval (s); `None` if the variable has no column.
     pub fn range(&self, name: &str, [start, stop]: [f64; 2]) -> Option<[f64; 2]> {
         let column = self.names.iter().position(|own| own == name)?;
         let within = self.times.iter().copied().filter(|time| (start..stop).contains(time));

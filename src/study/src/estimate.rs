@@ -67,7 +67,7 @@ impl Estimate {
         Self { direction, left: Err(why.into()), source: ErrorSource::Run }
     }
 
-    /// Returns the error of the steps of `scene` as measured in other rubs. `set` contains start values other than those of the steps.
+    /// Returns the error of the steps of `scene` as measured in other rubs. `set` contains the start values that are not applied to `scene`.
     fn of_measured_steps(scene: &Scene, set: &[(String, String)]) -> Self {
         Self { direction: "steps", left: step_bound(scene, set), source: ErrorSource::Rubs }
     }

@@ -168,7 +168,7 @@ struct PartRun<'a> {
     resumed: usize,
     journal: Journal,
     histories: Option<HistoryJournal>,
-    /// True if the file of outputs over time has been complete from the beginning, or none is needed.
+    /// True if the file of outputs over time was complete when this process began, or if the plan requests none.
     has_all_histories: bool,
     store: RomStore<'a>,
     /// Names of the means and totals of a run; empty if no scene of the plan was accepted.
@@ -188,7 +188,7 @@ impl<'a> PartRun<'a> {
         let digests: Vec<CaseDigest> = runs.map(digest).collect::<Result<_>>().map_err(in_plan)?;
         let journals = [&files.journal, &files.history_journal];
         let created: Vec<PathBuf> = journals.into_iter().filter(|path| !path.exists()).cloned().collect();
-        // The open journal keeps other processes from writing the results.
+        // The journal is locked while it is open, so no other process writes the results.
         let (journal, found) = Journal::open(&files.journal)?;
         let (mut stored, mut results) = (Vec::new(), Vec::new());
         if output.exists() {

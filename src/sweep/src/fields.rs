@@ -34,9 +34,9 @@ fn parsed_step(part: &str) -> Option<Step<'_>> {
 /// The scene file has no such key, with similar keys; or the scene has no such entry.
 pub fn set(scene: &mut Table, path: &str, value: Value) -> Result<()> {
     let steps = steps(path)?;
-    let field = check_key(path, &steps)?;
+    let field = find_key(path, &steps)?;
     let value = match value {
-        // The values of a range are real numbers.
+        // A range contains real numbers, but some keys need whole numbers.
         #[expect(clippy::cast_possible_truncation, reason = "whole, and far below 2^63")]
         Value::Float(number) if field.value.starts_with("whole") && number.fract() == 0.0 && number.abs() < 1e15 => {
             Value::Integer(number as i64)
@@ -105,7 +105,7 @@ pub(crate) fn place(scene: &Table, path: &str) -> Result<String> {
     Ok(place)
 }
 
-/// Returns whether two places, as [`place`] returns them, are the same key, or one contains the other.
+/// Returns whether two places from [`place`] are the same key, or one contains the other.
 pub(crate) fn overlap(one: &str, two: &str) -> bool {
     let contains = |whole: &str, part: &str| {
         part.strip_prefix(whole).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
@@ -125,8 +125,8 @@ fn position(entries: &[Value], selected: Option<&str>) -> Option<usize> {
     }
 }
 
-/// Returns the key of scene files.
-fn check_key(path: &str, steps: &[Step]) -> Result<&'static SceneField> {
+/// Returns the key of scene files that a path names, or an error with similar keys.
+fn find_key(path: &str, steps: &[Step]) -> Result<&'static SceneField> {
     let name = join_keys(steps);
     if let Some(field) = FIELDS.iter().find(|field| field.path == name) {
         return Ok(field);
@@ -197,7 +197,7 @@ mod tests {
         }
     }
 
-    /// The values of a range are real numbers, but some keys need whole ones.
+    /// A range contains real numbers, but some keys need whole numbers.
     #[test]
     fn whole_numbers_of_ranges_are_accepted() {
         let excited = "structure[front].excitation.order";

@@ -99,7 +99,7 @@ pub(crate) fn open_locked(path: &Path, header: &[u8]) -> Result<(File, Vec<u8>)>
     Ok((file, bytes))
 }
 
-/// Returns whether the path is still that of an open file.
+/// Returns whether the path still names an open file.
 #[cfg(unix)]
 fn is_at(file: &File, path: &Path) -> bool {
     use std::os::unix::fs::MetadataExt;
@@ -108,7 +108,7 @@ fn is_at(file: &File, path: &Path) -> bool {
     open.is_some() && open == identity(fs::metadata(path))
 }
 
-/// Returns whether the path is still that of an open file. A file that is open cannot be removed here.
+/// Returns whether the path still names an open file. These systems do not remove open files.
 #[cfg(not(unix))]
 fn is_at(_file: &File, _path: &Path) -> bool {
     true
@@ -201,7 +201,7 @@ mod tests {
         rows
     }
 
-    /// The process that had locked the file may have removed it, and a third one may have made a new file.
+    /// The process that had locked the file may have removed it, and another process may have created a new file.
     #[cfg(unix)]
     #[test]
     fn removed_files_are_recognised() {

@@ -92,7 +92,7 @@ fn file_digest(content: &std::io::Result<Vec<u8>>) -> String {
     content.as_ref().map_or_else(|error| format!("unreadable: {error}"), |bytes| content_digest(bytes))
 }
 
-/// Checks that a model is the one whose digest is part of the digests of its runs.
+/// Checks that a model still has the digest that is part of the digests of its runs.
 fn check_unchanged(origin: &RomOrigin, before: &str, now: &str) -> Result<()> {
     if before == now {
         return Ok(());

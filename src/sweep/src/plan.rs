@@ -71,9 +71,9 @@ pub enum VariableTarget {
     StartValue(String),
     /// Key of the scene file.
     Field(String),
-    /// Only into the braces of a `[rom]` entry, and into the results.
+    /// Braces of a `[rom]` entry, and the results; the plan gives neither `field` nor `label`.
     RomPart,
-    /// Only into the results, and into the braces of `[rom]` entries.
+    /// Results, and braces of `[rom]` entries; the plan gives `label = true`.
     Label,
 }
 

@@ -10,7 +10,7 @@ use crate::{Cell, Column, ColumnType, Table};
 const LARGEST: u64 = 512 << 20;
 
 /// Reads a CSV file with a line of names. Every column has the narrowest type that fits all its values: whole numbers, real numbers, `true` and
-/// `false`, or text. Columns of text keep their characters: numbers with leading zeros or a plus sign and numbers that 64 bits cannot hold are text.
+/// `false`, or text. Columns of text keep their characters. Numbers with leading zeros or a plus sign, and numbers beyond the range of 64 bits, are text.
 ///
 /// # Errors
 /// The file cannot be read, a line has another number of values, or a name is missing or occurs twice.

@@ -255,7 +255,7 @@ fn column_type(descriptor: &ColumnDescriptor) -> parquet::errors::Result<ColumnT
         return Err(ParquetError::General(format!("column `{name}` is nested")));
     }
     let annotated = descriptor.converted_type();
-    // Times in nanoseconds have no annotation of the older kind.
+    // Times in nanoseconds have a logical type, but no converted type.
     if let Some(logical) = descriptor.logical_type_ref()
         && !matches!(logical, LogicalType::Integer { .. } | LogicalType::String | LogicalType::Enum | LogicalType::Json)
         && matches!(descriptor.physical_type(), PhysicalType::INT32 | PhysicalType::INT64)
@@ -431,7 +431,7 @@ mod tests {
         }
     }
 
-    /// Whole numbers without a sign keep their values, and times are not read as numbers.
+    /// Unsigned whole numbers keep their values, and times are not read as numbers.
     #[test]
     fn unsigned_numbers_keep_their_values() {
         use parquet::{data_type::Int64Type, schema::parser::parse_message_type};

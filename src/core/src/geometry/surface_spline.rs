@@ -287,7 +287,7 @@ impl SurfaceSpline {
         self.locate_at(libm::atan2(point[1], point[0]), point[2])
     }
 
-    /// Returns a place at about an angle about z (rad) and an axial position (m), on the edge for positions beyond it; closed surfaces only.
+    /// Returns a place near an angle about z (rad) and an axial position (m) on a closed surface. For positions beyond an edge, the place is on this edge.
     #[inline(always)]
     pub(crate) fn locate_at(&self, angle: f64, axial: f64) -> ClosestPoint {
         let turns = (angle - self.first_angle) / std::f64::consts::TAU;

@@ -185,7 +185,7 @@ impl Simulation {
     }
 
     /// Merges results of slow checks for [`Simulation::use_checks`]: those of `newest`, followed by results of `older` for
-    /// other parameters or scenes. If there are more than `most` results, the last ones are dropped, but none of `newest`.
+    /// other parameters or scenes. At most `max_results` results are kept, the first ones, but always all of `newest`.
     ///
     /// # Examples
     /// ```
@@ -197,8 +197,8 @@ impl Simulation {
     /// assert_eq!(Simulation::merge_checks(&checks, &checks, 1000), checks);
     /// # Ok::<(), tiprub_core::Error>(())
     /// ```
-    pub fn merge_checks(newest: &[u8], older: &[u8], most: usize) -> Vec<u8> {
-        known::merge(newest, older, most)
+    pub fn merge_checks(newest: &[u8], older: &[u8], max_results: usize) -> Vec<u8> {
+        known::merge(newest, older, max_results)
     }
 
     /// Updates the limits after a state with other parameters was restored. Before initialisation nothing has been computed from

@@ -62,7 +62,7 @@ impl PartRun<'_> {
             let Ok(simulation) = compiled else { continue };
             let table = simulation.table();
             for name in start_values(plan) {
-                native::check_settable(table, name).map_err(|failure| in_plan(with_label(plan, name, failure)))?;
+                native::check_settable(table, name).map_err(|failure| in_plan(suggest_label(plan, name, failure)))?;
             }
             check_rom_parts(plan, table).map_err(in_plan)?;
             native::check_set_once(start_values(plan)).map_err(in_plan)?;
@@ -127,8 +127,8 @@ impl PartRun<'_> {
     }
 }
 
-/// Adds to the error of an unknown name that a column of a table may also describe the runs only.
-fn with_label(plan: &Plan, name: &str, mut failure: Failure) -> Failure {
+/// Adds a remedy to the error for an unknown name: a column of a table can be declared as a label.
+fn suggest_label(plan: &Plan, name: &str, mut failure: Failure) -> Failure {
     if plan.is_table && !plan.set.iter().any(|(other, _)| other == name) {
         let how =
             format!("If the column only describes the runs, add [[variable]] with name = \"{name}\" and label = true");
@@ -137,13 +137,13 @@ fn with_label(plan: &Plan, name: &str, mut failure: Failure) -> Failure {
     failure
 }
 
-/// Rejects a variable of a `[rom]` entry with the name of a start value, which it does not set.
+/// Rejects a variable in braces of `[rom]` that has the name of a start value but does not set it.
 fn check_rom_parts(plan: &Plan, table: &VariableTable) -> Result<()> {
     let is_part = |variable: &&PlanVariable| variable.target == VariableTarget::RomPart;
     for PlanVariable { name, .. } in plan.variables.iter().filter(is_part) {
         if native::check_settable(table, name).is_ok() {
-            let problem = "stands in braces of [rom] and has the name of a start value, which it would not set";
-            let remedy = "Give its `field` in the scene, which also fills the braces, or label = true if it is only part of the ROM's name";
+            let problem = "is in braces of [rom] and has the name of a start value, but would not set it";
+            let remedy = "Give its `field` in the scene, which also fills the braces, or add label = true if it is only part of the ROM's name";
             return Err(Failure::new(format!("variable `{name}`"), problem, remedy));
         }
     }

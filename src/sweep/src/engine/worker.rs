@@ -24,7 +24,8 @@ use crate::{
 
 /// Largest number of cached results of slow checks.
 const MAX_CACHED_CHECKS: usize = 256;
-/// Largest number of them that a part writes to the cache. With more values of friction or damping, other parts find few of their own values there.
+/// Results are written to the cache while fewer than this number are in memory. With more values of friction or damping, other parts find few of
+/// their own values there.
 const MAX_KEPT_CHECKS: usize = 16;
 /// Parts of the names of parameters on which slow checks depend.
 const CHECKED_PARAMETERS: [&str; 7] =
@@ -93,7 +94,7 @@ impl<'a> Worker<'a> {
         let started = StartedRun::new(&scene, &schedule, given).map_err(rejected)?;
         let results = started.finish(&|_| {}).map_err(|failure| Box::new((Status::Failed, failure)))?;
         if let Ok(mut checks) = self.checks.lock() {
-            // These results are written to the cache for the other parts on this machine.
+            // The cache passes the first results to the other parts on this machine.
             if checks.len() < MAX_KEPT_CHECKS && !checks.contains_key(&key) && *known != results.checks {
                 self.request.cache.keep_checks(&scene, &results.checks);
             }

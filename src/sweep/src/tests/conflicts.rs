@@ -75,9 +75,9 @@ fn variables_that_set_the_same_key_are_rejected() {
     assert_eq!(texts(&bench.table("a.parquet"), "communication_steps"), ["1", "2"]);
 }
 
-/// A variable in the braces of a ROM sets the start value of the same name only as a field.
+/// A variable in braces of `[rom]` sets a start value of the same name only if it has a `field`.
 #[test]
-fn part_of_a_rom_name_is_no_start_value() {
+fn part_of_a_rom_name_does_not_set_a_start_value() {
     let bench = Bench::new();
     for speed in [80, 90] {
         fs::copy(bench.path("small.rom.safetensors"), bench.path(&format!("rom{speed}.safetensors"))).unwrap();

@@ -13,8 +13,9 @@ const NEARBY: f64 = 1e-3;
 pub(crate) struct NearSearch<'a> {
     gap: &'a SplineGap,
     drive: &'a PrescribedMotion,
-    /// Rotation of the rotor relative to the shape, as an angle (rad) and as a frame, and of the shape.
-    turned: f64,
+    /// Angle of the rotor relative to the shape (rad).
+    relative_angle: f64,
+    /// Frames of the rotor relative to the shape, and of the shape.
     rotor: PolarFrame,
     shape: PolarFrame,
     /// Centre of the shaft in the directions of the shape (m).
@@ -41,12 +42,12 @@ impl<'a> NearSearch<'a> {
     /// Prepares the search for the current surface and prescribed motion.
     pub fn new(gap: &'a SplineGap, drive: &'a PrescribedMotion) -> Self {
         let shape = PolarFrame::new(drive.shape_rotation);
-        let turned = drive.rotor_angle - drive.shape_rotation;
-        let rotor = PolarFrame::new(turned);
+        let relative_angle = drive.rotor_angle - drive.shape_rotation;
+        let rotor = PolarFrame::new(relative_angle);
         Self {
             gap,
             drive,
-            turned,
+            relative_angle,
             rotor,
             shape,
             centre: shape.local(drive.shaft),
@@ -108,9 +109,9 @@ impl<'a> NearSearch<'a> {
     pub fn gap_from_angle(&self, [node, index]: [usize; 2], local: Vector3) -> Gap {
         let (x, frame) = self.position(node, index, local);
         let own = frame.local(x);
-        // Displacements and the shaft turn a node by a small angle, whose fifth power is negligible.
-        let aside = own[1] / own[0];
-        let angle = self.gap.layout.angles[index] + self.turned + aside * (1.0 - aside * aside / 3.0);
+        // The displacements of node and shaft rotate the node about z by a small angle. A guess may neglect the fifth power of its tangent.
+        let tangent = own[1] / own[0];
+        let angle = self.gap.layout.angles[index] + self.relative_angle + tangent * (1.0 - tangent * tangent / 3.0);
         let guess = self.gap.surface.step_closer(x, self.gap.surface.locate_at(angle, x[2]));
         let found = match self.gap.surface.project_close(x, guess, NEARBY) {
             Some(found) => found,

@@ -133,8 +133,8 @@ impl SurfaceSpline {
         Some(Gap { distance: (x - (point + moved)).dot(&normal), normal, foot: place })
     }
 
-    /// Returns a place closer to the closest point to `x` (m) than `guess`, on a smooth surface around an axis: a Gauss-Newton step. Its error is
-    /// about that of `guess` times distance over radius of curvature.
+    /// Improves `guess`, an estimate of the closest point to `x` (m) on a smooth surface around an axis, by a Gauss-Newton step. The step multiplies
+    /// the error by about the ratio of distance to radius of curvature.
     #[inline(always)]
     pub(crate) fn step_closer(&self, x: Vector3, guess: ClosestPoint) -> ClosestPoint {
         let foot = FootPoint::seen(x, guess, self.evaluate_bicubic::<false>(guess));

@@ -63,12 +63,13 @@ impl KnownChecks {
     }
 }
 
-/// Returns the results of `newest`, followed by those of `older` with other keys, as far as there are at most `most` results.
-pub(crate) fn merge(newest: &[u8], older: &[u8], most: usize) -> Vec<u8> {
+/// Returns the results of `newest`, followed by those of `older` with other keys, up to `max_results` results. Keeps all of `newest`.
+pub(crate) fn merge(newest: &[u8], older: &[u8], max_results: usize) -> Vec<u8> {
     let [newest, older] = [newest, older].map(|bytes| read(bytes).unwrap_or_default());
-    let most = most.max(newest.len());
+    let max_results = max_results.max(newest.len());
     let mut known = BTreeSet::new();
-    let results: Vec<_> = newest.into_iter().chain(older).filter(|(key, _)| known.insert(*key)).take(most).collect();
+    let results: Vec<_> =
+        newest.into_iter().chain(older).filter(|(key, _)| known.insert(*key)).take(max_results).collect();
     write(results.iter().map(|(key, result)| (key, result)))
 }
 

@@ -21,7 +21,7 @@ struct NearGaps<'a> {
     point: usize,
     /// Displacements (m).
     moved: &'a [f64],
-    /// Initial guesses of the closest points, which the results replace; unknown unless `located` is true.
+    /// Initial guesses of the closest points, valid if `located` is true; the results replace them.
     places: &'a mut [ClosestPoint],
     located: bool,
     gaps: &'a mut [f64],
@@ -97,7 +97,7 @@ impl ObstacleView<'_> {
     }
 
     /// Finds gaps (m) and normals of the nodes that face smooth rings, at a point of the step. If `located` is true, the search starts at the
-    /// known places of the nodes.
+    /// stored places of the nodes.
     fn find_near_gaps(
         &mut self,
         point: usize,

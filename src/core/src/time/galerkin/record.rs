@@ -323,8 +323,9 @@ pub(crate) struct SpanRecord {
     /// Gaps within free flight are searched if they may be smaller than at its ends by more than this (m).
     pub tolerance: f64,
     pub places: [Vec<ClosestPoint>; POINTS],
-    /// True if all nodes face smooth rings that no structure carries, and if their places at the points of the tried step are known.
+    /// True if all nodes face smooth rings that no structure carries.
     pub faces_rigid_rings: bool,
+    /// True if `places` contains the closest points of such nodes for the tried step.
     pub located: bool,
     /// Places at which forces were applied to surface carriers: those of the pass before the one in which the gaps converged.
     pub acted: [Vec<ClosestPoint>; POINTS],
