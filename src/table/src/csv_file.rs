@@ -56,7 +56,8 @@ fn column(name: &str, texts: Vec<Option<String>>) -> Column {
 /// Returns the value with the narrowest type.
 fn value(text: &str) -> Cell {
     let digits = text.strip_prefix('-').unwrap_or(text);
-    let has_leading_zero = digits.len() > 1 && digits.starts_with('0') && !digits.starts_with("0.");
+    let has_leading_zero =
+        digits.strip_prefix('0').is_some_and(|rest| rest.starts_with(|next: char| next.is_ascii_digit()));
     let is_plain = !(digits.starts_with('+') || has_leading_zero);
     let is_whole = digits.bytes().all(|byte| byte.is_ascii_digit());
     let whole = || text.parse().ok().filter(|_| is_plain).map(Cell::Integer);
@@ -98,7 +99,7 @@ mod tests {
         let cells: Vec<String> = read(&path).unwrap().columns[0].cells.iter().flatten().map(Cell::to_string).collect();
         assert_eq!(cells, texts);
         for (text, kind) in [
-            ("1e3\n-0.5\n0", ColumnType::Real),
+            ("1e3\n-0.5\n0\n0e0", ColumnType::Real),
             ("-3\n0\n40", ColumnType::Integer),
             ("1\n007", ColumnType::Text),
             ("9223372036854775808", ColumnType::Text),

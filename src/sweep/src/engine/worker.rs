@@ -3,7 +3,10 @@
 use std::{
     collections::HashMap,
     panic::{AssertUnwindSafe, catch_unwind},
-    sync::{Arc, Mutex},
+    sync::{
+        Arc, Mutex,
+        atomic::{AtomicUsize, Ordering},
+    },
     time::Instant,
 };
 
@@ -24,8 +27,8 @@ use crate::{
 
 /// Largest number of cached results of slow checks.
 const MAX_CACHED_CHECKS: usize = 256;
-/// Results are written to the cache while fewer than this number are in memory. With more values of friction or damping, other parts find few of
-/// their own values there.
+/// Largest number of times that a part writes results to the cache. With more values of friction or damping, other parts find few of their own values
+/// there.
 const MAX_KEPT_CHECKS: usize = 16;
 /// Parts of the names of parameters on which slow checks depend.
 const CHECKED_PARAMETERS: [&str; 7] =
@@ -48,6 +51,8 @@ pub(super) struct Worker<'a> {
     scene: Mutex<Option<(String, Arc<Scene>)>>,
     /// Results of slow checks, by the scene and the start values on which they may depend.
     checks: Mutex<HashMap<String, Arc<Vec<u8>>>>,
+    /// Number of results for the cache.
+    kept: AtomicUsize,
 }
 
 impl<'a> Worker<'a> {
@@ -58,7 +63,15 @@ impl<'a> Worker<'a> {
         digests: &'a [CaseDigest],
         store: &'a RomStore<'a>,
     ) -> Self {
-        Self { request, first, digests, store, scene: Mutex::new(None), checks: Mutex::default() }
+        Self {
+            request,
+            first,
+            digests,
+            store,
+            scene: Mutex::new(None),
+            checks: Mutex::default(),
+            kept: AtomicUsize::new(0),
+        }
     }
 
     /// Performs a run (counted from 0). A panic fails only this run.
@@ -95,7 +108,8 @@ impl<'a> Worker<'a> {
         let results = started.finish(&|_| {}).map_err(|failure| Box::new((Status::Failed, failure)))?;
         if let Ok(mut checks) = self.checks.lock() {
             // The cache passes the first results to the other parts on this machine.
-            if checks.len() < MAX_KEPT_CHECKS && !checks.contains_key(&key) && *known != results.checks {
+            let is_new = !checks.contains_key(&key) && *known != results.checks;
+            if is_new && self.kept.fetch_add(1, Ordering::Relaxed) < MAX_KEPT_CHECKS {
                 self.request.cache.keep_checks(&scene, &results.checks);
             }
             if checks.len() >= MAX_CACHED_CHECKS {
