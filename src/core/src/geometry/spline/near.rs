@@ -93,29 +93,22 @@ impl<'a> NearSearch<'a> {
         (self.near(found, frame), drift)
     }
 
-    /// Finds the gap of a node displaced by `local` (m) from a place near its closest point, with the normal in the directions of the node.
+    /// Finds the gap of a node displaced by `local` (m), with the normal in the directions of the node. The search starts from a place near the
+    /// closest point, or from the angle of the node.
     #[inline(always)]
-    pub fn gap(&self, [node, index]: [usize; 2], local: Vector3, guess: ClosestPoint) -> Gap {
+    pub fn gap(&self, [node, index]: [usize; 2], local: Vector3, guess: Option<ClosestPoint>) -> Gap {
         let (x, frame) = self.position(node, index, local);
-        let found = match self.gap.surface.project_close(x, guess, NEARBY) {
+        let surface = &self.gap.surface;
+        let start = guess.unwrap_or_else(|| {
+            let own = frame.local(x);
+            // The displacements of node and shaft rotate the node about z by a small angle. A guess may neglect the fifth power of its tangent.
+            let tangent = own[1] / own[0];
+            let angle = self.gap.layout.angles[index] + self.relative_angle + tangent * (1.0 - tangent * tangent / 3.0);
+            surface.step_closer(x, surface.locate_at(angle, x[2]))
+        });
+        let found = match surface.project_close(x, start, NEARBY) {
             Some(found) => found,
-            None => self.search(x, guess),
-        };
-        Gap { normal: frame.local(found.normal), ..found }
-    }
-
-    /// Finds the gap of a node displaced by `local` (m) without an initial guess, with the normal in the directions of the node.
-    #[inline(always)]
-    pub fn gap_from_angle(&self, [node, index]: [usize; 2], local: Vector3) -> Gap {
-        let (x, frame) = self.position(node, index, local);
-        let own = frame.local(x);
-        // The displacements of node and shaft rotate the node about z by a small angle. A guess may neglect the fifth power of its tangent.
-        let tangent = own[1] / own[0];
-        let angle = self.gap.layout.angles[index] + self.relative_angle + tangent * (1.0 - tangent * tangent / 3.0);
-        let guess = self.gap.surface.step_closer(x, self.gap.surface.locate_at(angle, x[2]));
-        let found = match self.gap.surface.project_close(x, guess, NEARBY) {
-            Some(found) => found,
-            None => self.search(x, self.gap.surface.locate(x)),
+            None => self.search(x, guess.unwrap_or_else(|| surface.locate(x))),
         };
         Gap { normal: frame.local(found.normal), ..found }
     }

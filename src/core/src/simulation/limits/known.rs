@@ -49,7 +49,7 @@ pub(crate) struct KnownChecks {
 impl KnownChecks {
     /// Reads results that [`KnownChecks::to_bytes`] wrote; reads none if the bytes are damaged or from another version.
     pub(crate) fn from_bytes(bytes: &[u8]) -> Self {
-        Self { stored: Arc::new(read(bytes).unwrap_or_default().into_iter().collect()), used: Results::new() }
+        Self { stored: Arc::new(read(bytes).unwrap_or_default()), used: Results::new() }
     }
 
     /// Returns the results of the last check as bytes; empty if nothing was checked.
@@ -65,7 +65,7 @@ impl KnownChecks {
 
 /// Returns the results of `newest`, followed by those of `older` with other keys, up to `max_results` results. Keeps all of `newest`.
 pub(crate) fn merge(newest: &[u8], older: &[u8], max_results: usize) -> Vec<u8> {
-    let [newest, older] = [newest, older].map(|bytes| read(bytes).unwrap_or_default());
+    let [newest, older] = [newest, older].map(|bytes| read::<Vec<_>>(bytes).unwrap_or_default());
     let max_results = max_results.max(newest.len());
     let mut known = BTreeSet::new();
     let results: Vec<_> =
@@ -88,13 +88,13 @@ fn write<'a>(results: impl ExactSizeIterator<Item = (&'a Key, &'a Vec<u8>)>) -> 
 }
 
 /// Reads results in their order; `None` if the bytes are damaged.
-fn read(bytes: &[u8]) -> Option<Vec<(Key, Vec<u8>)>> {
+fn read<R: Default + Extend<(Key, Vec<u8>)>>(bytes: &[u8]) -> Option<R> {
     let (content, checksum) = bytes.split_last_chunk()?;
     if fingerprint(content, 0) != u64::from_le_bytes(*checksum) {
         return None;
     }
     let mut rest = content.strip_prefix(&to_bytes(&[&[MAGIC, VERSION]])[..])?;
-    let mut results = Vec::new();
+    let mut results = R::default();
     while !rest.is_empty() {
         let (mut key, mut length) = (Key::default(), 0_usize);
         let (head, others) = rest.split_at_checked(to_bytes(&[&key, &length]).len())?;
@@ -102,7 +102,7 @@ fn read(bytes: &[u8]) -> Option<Vec<(Key, Vec<u8>)>> {
         key.restore(reader);
         length.restore(reader);
         let (result, others) = others.split_at_checked(length)?;
-        results.push((key, result.to_vec()));
+        results.extend([(key, result.to_vec())]);
         rest = others;
     }
     Some(results)

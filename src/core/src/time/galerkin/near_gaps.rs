@@ -35,11 +35,7 @@ impl Kernel for NearGaps<'_> {
             let lane = self.lanes.at(self.point, *node);
             let index = [*node, node * self.stride + self.sector];
             let moved = self.lanes.vector3(self.moved, lane);
-            let gap = if self.located {
-                self.search.gap(index, moved, self.places[*node])
-            } else {
-                self.search.gap_from_angle(index, moved)
-            };
+            let gap = self.search.gap(index, moved, self.located.then_some(self.places[*node]));
             self.gaps[lane] = gap.distance;
             self.lanes.set(self.normals, lane, gap.normal);
             self.places[*node] = gap.foot;
