@@ -6,6 +6,13 @@ pub(crate) mod scan;
 pub(crate) mod simd;
 pub(crate) mod vector;
 
+/// Returns the indices of the values in ascending order of the values. Equal values keep their order.
+pub(crate) fn ascending(values: &[f64]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..values.len()).collect();
+    order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
+    order
+}
+
 /// Converts a count to a factor.
 #[expect(clippy::cast_precision_loss, reason = "counts are far below 2^52")]
 pub(crate) fn real(count: usize) -> f64 {

@@ -9,6 +9,7 @@
 //! Smith, Journal of the ACM 17, 1970). Rounding of E counts as part of |P|. If a disc is too large nothing is returned.
 
 use super::held::HeldContacts;
+use crate::math::ascending;
 use nalgebra::{Complex, SMatrix};
 
 type Number = Complex<f64>;
@@ -113,8 +114,9 @@ impl<const K: usize> Secular<K> {
             modes.push((roots(*damping, *stiffness), seen));
         }
         let is_seen = |(_, seen): &(ZeroPair, Square<f64, K>)| seen.iter().any(|value| value.abs() > UNSEEN * largest);
-        let (mut modes, apart): (Vec<_>, Vec<_>) = modes.into_iter().partition(is_seen);
-        modes.sort_by(|a, b| a.0[0].norm_sqr().total_cmp(&b.0[0].norm_sqr()));
+        let (seen, apart): (Vec<_>, Vec<_>) = modes.into_iter().partition(is_seen);
+        let squares: Vec<f64> = seen.iter().map(|(poles, _)| poles[0].norm_sqr()).collect();
+        let modes: Vec<_> = ascending(&squares).into_iter().map(|mode| seen[mode]).collect();
         let residual = Square::from_fn(|i, j| held.residual.as_ref().map_or(0.0, |residual| residual[(i, j)]));
         let pairs = if held.residual.is_some() { modes.len() } else { modes.len().checked_sub(K)? };
         let apart = apart.into_iter().flat_map(|(poles, _)| poles).collect();

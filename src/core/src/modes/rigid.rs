@@ -5,6 +5,7 @@
 //! are the translations, orthonormal in the mass: motion along a line is then the motion of these modes alone, which give the
 //! momentum along an axis exactly.
 
+use crate::math::ascending;
 use nalgebra::DMatrix;
 
 use super::modal::ModalModel;
@@ -133,8 +134,7 @@ fn uncoupled(rest: &DMatrix<f64>, frequencies: &[f64]) -> (DMatrix<f64>, Vec<f64
     }
     let weighted = DMatrix::from_fn(rest.nrows(), rest.ncols(), |i, j| frequencies[i] * frequencies[i] * rest[(i, j)]);
     let eigen = (rest.transpose() * weighted).symmetric_eigen();
-    let mut order: Vec<usize> = (0..rest.ncols()).collect();
-    order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
+    let order = ascending(eigen.eigenvalues.as_slice());
     let values = order.iter().map(|index| eigen.eigenvalues[*index].max(0.0).sqrt()).collect();
     (rest * eigen.eigenvectors.select_columns(&order), values)
 }

@@ -3,6 +3,7 @@
 //! A surface of revolution takes its normals from the slopes, a surface spline from a curve through the positions. Both must describe the
 //! same contour.
 
+use crate::math::ascending;
 use tiprub_cosim::shown;
 
 use crate::{Error, Result, Rom};
@@ -78,9 +79,9 @@ fn contradicted(rom: &Rom, [low, high]: [AxialStation; 2], rise: f64, straight: 
 
 /// Returns the stations of some contact nodes in ascending axial order; empty if the nodes have no axial extent.
 fn places(rom: &Rom, nodes: &[usize]) -> Vec<AxialStation> {
-    let mut order = nodes.to_vec();
     let axial = |node: &usize| rom.contact_nodes[*node].position[2];
-    order.sort_by(|a, b| axial(a).total_cmp(&axial(b)));
+    let positions: Vec<f64> = nodes.iter().map(axial).collect();
+    let order: Vec<usize> = ascending(&positions).into_iter().map(|index| nodes[index]).collect();
     let mut places: Vec<AxialStation> = Vec::new();
     let [Some(first), Some(last)] = [order.first(), order.last()] else { return places };
     let extent = axial(last) - axial(first);

@@ -24,7 +24,9 @@ impl StructureSets {
         numbers.iter().enumerate().for_each(|(structure, number)| members[*number].push(structure));
         members.retain(|members| !members.is_empty());
         // The order of sets with contact nodes, and that of the others, stays the same.
-        members.sort_by_key(|members| !members.iter().any(|member| structures[*member].nodes() > 0));
+        let touches = |members: &Vec<usize>| members.iter().any(|member| structures[*member].nodes() > 0);
+        let (mut members, others): (Vec<_>, Vec<_>) = members.into_iter().partition(touches);
+        members.extend(others);
         let mut of = vec![0; structures.len()];
         for (set, members) in members.iter().enumerate() {
             members.iter().for_each(|member| of[*member] = set);

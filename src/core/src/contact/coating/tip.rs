@@ -1,5 +1,6 @@
 //! Tip of a blade in front of a coating: positions of its contact nodes, and widths around the circumference.
 
+use crate::math::ascending;
 use std::f64::consts::TAU;
 
 use crate::scene::rom::ContactNode;
@@ -65,8 +66,8 @@ fn widths_of_patches(nodes: &[&ContactNode], extent: [f64; 2]) -> Vec<f64> {
     if let [only] = nodes {
         return vec![only.area / (high - low)];
     }
-    let mut order: Vec<usize> = (0..nodes.len()).collect();
-    order.sort_by(|a, b| nodes[*a].position[2].total_cmp(&nodes[*b].position[2]));
+    let axial: Vec<f64> = nodes.iter().map(|node| node.position[2]).collect();
+    let order = ascending(&axial);
     let mut widths = vec![0.0; nodes.len()];
     for (place, node) in order.iter().enumerate() {
         let [before, after] = [place.saturating_sub(1), (place + 1).min(nodes.len() - 1)].map(|at| nodes[order[at]]);

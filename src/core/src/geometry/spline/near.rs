@@ -133,3 +133,80 @@ impl<'a> NearSearch<'a> {
         NearGap { distance, place: foot, normal: frame.local(normal), fixed: self.shape.fixed(normal), free }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::layout::Layout;
+    use crate::geometry::surface_spline::SurfaceSpline;
+    use crate::geometry::wrench::At;
+    use crate::scene::settings::{Closure, Interpolation};
+    use tiprub_test_models::SeededRandom;
+
+    const SECTORS: usize = 12;
+    const RADIUS: f64 = 0.25;
+    const CLEARANCE: f64 = 3e-4;
+
+    /// A flared casing with three lobes and unevenly spaced rings. Some nodes are on borders of patches while the rotor and the shaft are at
+    /// their initial positions.
+    fn flared_casing_with_lobes() -> SplineGap {
+        let ring = |z: f64| {
+            (0..24).map(move |i| {
+                let angle = std::f64::consts::TAU * f64::from(i) / 24.0;
+                let (sine, cosine) = libm::sincos(angle);
+                let radius = RADIUS + CLEARANCE + 0.1 * z + 2e-4 * libm::cos(3.0 * angle);
+                [radius * cosine, radius * sine, z]
+            })
+        };
+        let points: Vec<[f64; 3]> = [-0.012, -0.005, 0.003, 0.012].into_iter().flat_map(ring).collect();
+        let surface = SurfaceSpline::new(&points, 24, 4, Closure::Smooth, Interpolation::Spline).unwrap();
+        let places = [[RADIUS, 0.0, -0.005], [RADIUS, 0.01, 0.0], [RADIUS, -0.02, 0.0135]];
+        let layout = Layout::of_places(&places, SECTORS, &[CLEARANCE; SECTORS], SECTORS).unwrap();
+        SplineGap::new(layout, CLEARANCE, surface, Vec::new(), 1.0)
+    }
+
+    /// Without a place of an earlier step, the search from the angle of the node finds the closest point of the full search.
+    #[test]
+    fn searches_without_guess_find_the_closest_point() {
+        let gap = flared_casing_with_lobes();
+        let mut random = SeededRandom(7);
+        let (mut distances, mut normals) = (0.0_f64, 0.0_f64);
+        for trial in 0..400 {
+            let size = [0.0, 1e-4, 1e-3, 4e-3][trial % 4];
+            let drive = PrescribedMotion {
+                rotor_angle: if trial < 8 { 0.0 } else { random.within(-7.0, 700.0) },
+                shape_rotation: if trial < 8 { 0.0 } else { random.within(-7.0, 7.0) },
+                shaft: Vector3::from(random.vector(0.3 * size)),
+                gap_offset: random.within(-CLEARANCE, CLEARANCE),
+                ..PrescribedMotion::default()
+            };
+            let search = NearSearch::new(&gap, &drive);
+            for (node, sector) in (0..3).flat_map(|node| (0..SECTORS).map(move |sector| (node, sector))) {
+                let index = node * SECTORS + sector;
+                let moved = Vector3::from(random.vector(size));
+                let found = search.gap([node, index], moved, None);
+                let expected = gap.gap_to_current(At { node, index, drive: &drive }, moved);
+                assert!(found.distance.is_finite(), "{drive:?}: {found:?}, {expected:?}");
+                distances = distances.max((found.distance - expected.distance).abs());
+                normals = normals.max((found.normal - expected.normal).norm());
+            }
+        }
+        // Rounding of coordinates of 0.25 m.
+        assert!(distances < 1e-15, "{distances:e} m");
+        assert!(normals < 1e-10, "{normals:e}");
+    }
+
+    /// A node beyond the extension of the last ring has no surface to touch, whether or not a place is given.
+    #[test]
+    fn nodes_beyond_the_last_ring_have_no_gap() {
+        let gap = flared_casing_with_lobes();
+        let drive = PrescribedMotion { shaft: Vector3::new(0.0, 0.0, 0.02), ..PrescribedMotion::default() };
+        let search = NearSearch::new(&gap, &drive);
+        let beyond = search.gap([2, 2 * SECTORS], Vector3::zeros(), None);
+        assert_eq!(beyond.distance, f64::INFINITY, "{beyond:?}");
+        let again = search.gap([2, 2 * SECTORS], Vector3::zeros(), Some(beyond.foot));
+        assert_eq!(again.distance, f64::INFINITY, "{again:?}");
+        let within = search.gap([0, 0], Vector3::zeros(), None);
+        assert!(within.distance.is_finite(), "{within:?}");
+    }
+}

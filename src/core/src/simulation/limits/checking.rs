@@ -231,7 +231,8 @@ impl<'a> Checking<'a> {
         let is_other = |step: &f64| (step - expected).abs() > SAME_STEP * expected;
         let mut steps: Vec<f64> = limits::growth_steps(largest, self.parameters.step).filter(is_other).collect();
         steps.push(expected);
-        steps.sort_by(|a, b| b.total_cmp(a));
+        steps.sort_by(f64::total_cmp);
+        steps.reverse();
         steps.into_iter().map(|step| (step, worst_at(step))).collect()
     }
 

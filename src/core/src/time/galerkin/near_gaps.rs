@@ -81,12 +81,6 @@ impl ObstacleView<'_> {
         self.record.located = true;
     }
 
-    /// Returns whether all nodes face smooth rings that no structure carries.
-    pub(super) fn faces_rigid_rings(&self) -> bool {
-        self.record.pairs.iter().all(|own| own.carrier.is_none())
-            && (0..self.record.pair_of.len()).all(|node| self.smooth_ring(node).is_some())
-    }
-
     /// Returns the gap function of a node that faces a smooth ring.
     fn smooth_ring(&self, node: usize) -> Option<&SplineGap> {
         self.pair(node)?.0.gap().smooth_ring()

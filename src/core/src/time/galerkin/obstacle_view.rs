@@ -261,7 +261,7 @@ impl Witness for ObstacleView<'_> {
         }
         (self.record.solutions, self.record.step) = (0, [from, length]);
         self.record.slips.iter_mut().for_each(|slips| slips.fill(None));
-        (self.record.located, self.record.faces_rigid_rings) = (false, self.faces_rigid_rings());
+        self.record.located = false;
         self.record.lanes_of = self.enter_lanes(Lanes { points: points.len() - 1, nodes: self.record.pair_of.len() });
     }
 

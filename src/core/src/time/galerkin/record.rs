@@ -345,15 +345,25 @@ pub(crate) struct SpanRecord {
 }
 
 impl SpanRecord {
-    /// Allocates data for the first sector of a structure with these pairs, with errors of `tolerance` (m).
-    pub fn new(structure: usize, of: &Structure, pairs: Vec<PairRecord>, tolerance: f64) -> Self {
+    /// Allocates data for the first sector of a structure with these of all contact pairs, with errors of `tolerance` (m).
+    pub fn new(
+        structure: usize,
+        of: &Structure,
+        pairs: Vec<PairRecord>,
+        all_pairs: &[ContactPair],
+        tolerance: f64,
+    ) -> Self {
         let nodes = of.nodes();
         let number = |pair: &Option<usize>| pairs.iter().position(|own| Some(own.pair) == *pair);
+        let pair_of: Vec<Option<usize>> = of.pair_of.iter().map(number).collect();
+        let is_rigid_ring =
+            |own: &PairRecord| own.carrier.is_none() && all_pairs[own.pair].gap().smooth_ring().is_some();
         Self {
             structure,
             sector: 0,
             lanes: of.lanes(),
-            pair_of: of.pair_of.iter().map(number).collect(),
+            faces_rigid_rings: pairs.iter().all(is_rigid_ring) && pair_of.iter().all(Option::is_some),
+            pair_of,
             pairs,
             step: [0.0; 2],
             tolerance,
@@ -363,7 +373,6 @@ impl SpanRecord {
             needed_below: vec![f64::INFINITY; nodes],
             lowest_of_all: vec![f64::INFINITY; nodes],
             places: std::array::from_fn(|_| vec![ClosestPoint::default(); nodes]),
-            faces_rigid_rings: false,
             located: false,
             acted: std::array::from_fn(|_| vec![ClosestPoint::default(); nodes]),
             slips: std::array::from_fn(|_| vec![None; nodes]),

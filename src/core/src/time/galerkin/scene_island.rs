@@ -126,7 +126,7 @@ impl SceneIsland {
             let place = |pair| carriers.iter().position(|one| Some(one.structure) == carrier(pair));
             let pairs = own().filter(|(_, pair)| pair.structure() == structure);
             let pairs = pairs.map(|(index, pair)| PairRecord::new(index, place(pair))).collect();
-            let record = SpanRecord::new(structure, of, pairs, tolerance);
+            let record = SpanRecord::new(structure, of, pairs, &system.pairs, tolerance);
             for sector in 0..if takes_turns { 1 } else { of.modes().sectors() } {
                 let kind = of.bank().map_or(0, |bank| bank.set_of(sector));
                 let disk = disk.map(|disk| (disk, sector));

@@ -23,8 +23,9 @@ impl Galerkin {
     pub fn new(system: &mut System, longest: f64, tolerance: f64) -> Self {
         let touches = |set: &usize| !system.sets.pairs(*set).is_empty();
         let sets = (0..system.sets.count()).filter(touches);
-        let mut islands: Vec<_> = sets.map(|set| SceneIsland::new(set, system, longest, tolerance)).collect();
-        islands.sort_by_key(|island| !island.is_single());
+        let islands = sets.map(|set| SceneIsland::new(set, system, longest, tolerance));
+        let (mut islands, others): (Vec<_>, Vec<_>) = islands.partition(SceneIsland::is_single);
+        islands.extend(others);
         for structure in system.structures.iter_mut().filter(|structure| structure.nodes() > 0) {
             structure.lowest_in_span = vec![f64::INFINITY; structure.gaps().len()];
         }
