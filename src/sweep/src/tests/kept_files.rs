@@ -108,3 +108,38 @@ fn files_of_users_are_not_replaced() {
     let [two, three] = ["part.2", "part.3"].map(|name| SweepFiles::new(&bench.path(name)).histories);
     assert_ne!(two, three);
 }
+
+/// Each file is locked while one sweep works on it. A sweep that opens the journal just before another one removes it starts again.
+#[test]
+fn simultaneous_sweeps_compute_each_run_once() {
+    for round in 0..20 {
+        let bench = Bench::new();
+        let plan = bench.plan(GRID).unwrap();
+        let output = bench.path("a.parquet");
+        let sweep = || loop {
+            let (stop, cache, console) = (AtomicBool::new(false), RomCache::off(), Console::new(true, false));
+            let (plan, output, stop) = (&plan, &output, &stop);
+            let request = SweepRequest {
+                plan,
+                part: Part::WHOLE,
+                output,
+                threads: 1,
+                stop,
+                sources: &bench,
+                cache: &cache,
+                console: &console,
+            };
+            match engine::run(&request) {
+                Ok(outcome) => return outcome.finished - outcome.resumed,
+                Err(failure) => assert!(failure.problem.contains("another process"), "{failure}"),
+            }
+        };
+        let computed: Vec<usize> = std::thread::scope(|scope| {
+            let sweeps: Vec<_> = (0..4).map(|_| scope.spawn(sweep)).collect();
+            sweeps.into_iter().map(|sweep| sweep.join().unwrap()).collect()
+        });
+        assert_eq!(computed.iter().sum::<usize>(), 6, "round {round}: {computed:?}");
+        assert_eq!(bench.table("a.parquet").rows(), 6);
+        assert!(!bench.path("a.parquet.journal").exists());
+    }
+}
