@@ -386,6 +386,23 @@ mod tests {
         assert!(has_chord(ROTOR37_ONE_ROW_SPIN) && has_chord(STAGE) && !has_chord(STAGE_CASING) && !has_chord(CUBE));
     }
 
+    /// Saved states and stored results of slow checks must fit a model that has just been reduced, and the same model from a file.
+    #[test]
+    fn stored_models_equal_reduced_ones() {
+        for (name, tip) in [
+            (ROTOR37, TipContact::Rows([3, 2])),
+            (ROTOR37_ONE_ROW_SPIN, TipContact::Patches(3)),
+            (ROTOR37_PAPER, TipContact::Nodes(3)),
+            (STAGE_NODES_COARSE, TipContact::Nodes(3)),
+            (RINGS[0].0, TipContact::Nodes(0)),
+        ] {
+            let other = ModelVariant { modes: 0.25, tip, mesh: MESHES[0] };
+            let rom = refined(name, other, &RomCache::off(), &Console::new(true, false)).unwrap().unwrap();
+            let stored = tiprub_format::read_rom(&tiprub_format::write_rom(&rom), name).unwrap();
+            assert!(stored == rom, "{name}");
+        }
+    }
+
     /// Each mesh differs: the number of nodes grows with the factor, and a factor of 1 gives the built-in mesh.
     #[test]
     fn mesh_factor_scales_the_node_count() {

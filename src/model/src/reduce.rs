@@ -7,7 +7,7 @@ mod response;
 use faer::Mat;
 use nalgebra::DMatrix;
 use tiprub_core::Rom;
-use tiprub_core::scene::rom::{DisplacementFrame, ReductionBasis, RomChecks, WatchedPoints};
+use tiprub_core::scene::rom::{ContactNode, DisplacementFrame, ReductionBasis, RomChecks, WatchedPoints};
 use tiprub_cosim::shown;
 
 use crate::assembly::{Assembled, free_dofs};
@@ -499,9 +499,10 @@ fn watched(
     }
     let rows = contact_loads(free, &model.nodes, &options.watched, options.frame)?;
     let map = tall_product(rows.as_ref(), transformation.as_ref());
-    let points = options.watched.iter().map(|point| contact_node(&model.nodes, point, options.frame));
-    Ok(Some(WatchedPoints {
-        map: DMatrix::from_fn(map.nrows(), map.ncols(), |i, j| map[(i, j)]),
-        points: points.collect(),
-    }))
+    let map = DMatrix::from_fn(map.nrows(), map.ncols(), |i, j| map[(i, j)]);
+    let points = options.watched.iter().map(|point| {
+        let ContactNode { name, position, .. } = contact_node(&model.nodes, point, options.frame);
+        ContactNode { name, position, ..ContactNode::default() }
+    });
+    Ok(Some(WatchedPoints { map, points: points.collect() }))
 }

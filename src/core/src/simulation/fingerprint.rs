@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 use tiprub_cosim::persist::{fingerprint, fingerprint_numbers};
 
 use crate::Scene;
-use crate::scene::rom::{Harmonic, Rom, RomExtras, Spin, SupportRows, Thermal, WatchedPoints};
+use crate::scene::rom::{ContactNode, Harmonic, Rom, RomExtras, Spin, SupportRows, Thermal, WatchedPoints};
 use crate::scene::settings::SceneSettings;
 
 /// Hash of everything that determines the results of a scene.
@@ -67,7 +67,8 @@ fn rom_hash(rom: &Rom, seed: u64) -> u64 {
     }
     for WatchedPoints { map, points } in watched.iter().chain(stress) {
         hash.matrix(map);
-        hash.text(&format!("{points:?}"));
+        // Other data of the points have no effect, and files do not contain them.
+        points.iter().for_each(|ContactNode { name, position, .. }| hash.text(&format!("{name} {position:?}")));
     }
     if let Some(SupportRows { stiffness, mass, thermal }) = support {
         [stiffness, mass, thermal].into_iter().for_each(|matrix| hash.matrix(matrix));

@@ -12,7 +12,7 @@ pub struct WatchedPoints {
     /// Values per unit of each coordinate, rows (point, component) × n, directions as for contact nodes: three displacements, or six stresses σ₁₁,
     /// σ₂₂, σ₃₃, σ₁₂, σ₂₃, σ₃₁ (Pa).
     pub map: DMatrix<f64>,
-    /// Names and positions.
+    /// Names and positions; the other fields have no effect.
     pub points: Vec<ContactNode>,
 }
 
