@@ -6,8 +6,8 @@ pub(crate) mod scan;
 pub(crate) mod simd;
 pub(crate) mod vector;
 
-/// Returns the indices of the values in ascending order of the values. Equal values keep their order.
-pub(crate) fn ascending(values: &[f64]) -> Vec<usize> {
+/// Returns the indices that sort the values in ascending order. Equal values keep their order.
+pub(crate) fn argsort(values: &[f64]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
     order

@@ -386,7 +386,7 @@ mod tests {
         assert!(has_chord(ROTOR37_ONE_ROW_SPIN) && has_chord(STAGE) && !has_chord(STAGE_CASING) && !has_chord(CUBE));
     }
 
-    /// Saved states and stored results of slow checks must fit a model that has just been reduced, and the same model from a file.
+    /// A model read from its file equals the reduced model, so saved states and stored results of slow checks fit both.
     #[test]
     fn stored_models_equal_reduced_ones() {
         for (name, tip) in [
@@ -396,8 +396,8 @@ mod tests {
             (STAGE_NODES_COARSE, TipContact::Nodes(3)),
             (RINGS[0].0, TipContact::Nodes(0)),
         ] {
-            let other = ModelVariant { modes: 0.25, tip, mesh: MESHES[0] };
-            let rom = refined(name, other, &RomCache::off(), &Console::new(true, false)).unwrap().unwrap();
+            let variant = ModelVariant { modes: 0.25, tip, mesh: MESHES[0] };
+            let rom = refined(name, variant, &RomCache::off(), &Console::new(true, false)).unwrap().unwrap();
             let stored = tiprub_format::read_rom(&tiprub_format::write_rom(&rom), name).unwrap();
             assert!(stored == rom, "{name}");
         }

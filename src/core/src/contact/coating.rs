@@ -24,7 +24,7 @@ pub use tip::BladeTip;
 use tiprub_cosim::persist::{Persist, StateReader, StateWriter};
 use tiprub_cosim::shown;
 
-use crate::math::{ascending, real};
+use crate::math::{argsort, real};
 use crate::scene::settings::CoatingSettings;
 use crate::{Error, Result};
 
@@ -297,7 +297,7 @@ impl Persist for Coating {
 fn sorted(BladeTip { axial, radii, extent, .. }: &BladeTip) -> Result<Vec<usize>> {
     let length = extent[1] - extent[0];
     let refuse = |problem: String, remedy: &str| Err(Error::invalid("contact.coating", problem, remedy));
-    let order = ascending(axial);
+    let order = argsort(axial);
     if !(length.is_finite() && length > 0.0) || radii.len() != axial.len() {
         let problem = format!("{} contact nodes per blade over an axial length of {} m", axial.len(), shown(length));
         return refuse(problem, "Use a ROM with contact nodes at two or more axial positions");

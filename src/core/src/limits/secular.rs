@@ -9,7 +9,7 @@
 //! Smith, Journal of the ACM 17, 1970). Rounding of E counts as part of |P|. If a disc is too large nothing is returned.
 
 use super::held::HeldContacts;
-use crate::math::ascending;
+use crate::math::argsort;
 use nalgebra::{Complex, SMatrix};
 
 type Number = Complex<f64>;
@@ -115,8 +115,8 @@ impl<const K: usize> Secular<K> {
         }
         let is_seen = |(_, seen): &(ZeroPair, Square<f64, K>)| seen.iter().any(|value| value.abs() > UNSEEN * largest);
         let (seen, apart): (Vec<_>, Vec<_>) = modes.into_iter().partition(is_seen);
-        let squares: Vec<f64> = seen.iter().map(|(poles, _)| poles[0].norm_sqr()).collect();
-        let modes: Vec<_> = ascending(&squares).into_iter().map(|mode| seen[mode]).collect();
+        let squared_moduli: Vec<f64> = seen.iter().map(|(poles, _)| poles[0].norm_sqr()).collect();
+        let modes: Vec<_> = argsort(&squared_moduli).into_iter().map(|mode| seen[mode]).collect();
         let residual = Square::from_fn(|i, j| held.residual.as_ref().map_or(0.0, |residual| residual[(i, j)]));
         let pairs = if held.residual.is_some() { modes.len() } else { modes.len().checked_sub(K)? };
         let apart = apart.into_iter().flat_map(|(poles, _)| poles).collect();

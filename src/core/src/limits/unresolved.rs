@@ -20,7 +20,7 @@
 //! Steps are rejected if both ω_max h ≥ `HIGHEST` and the fraction exceeds [`SHARE`].
 
 use super::finding::{ErrorKind, WarningKind};
-use crate::math::{ascending, real};
+use crate::math::{argsort, real};
 use crate::modes::modal::ModalModel;
 use crate::scene::method::Scheme;
 
@@ -47,8 +47,8 @@ pub fn limit(model: &ModalModel, directions: &[[f64; 3]]) -> f64 {
     let total = |node: usize| (0..model.len()).filter(vibrating).map(|mode| seen(mode, node)).sum::<f64>();
     let totals: Vec<(usize, f64)> =
         (0..directions.len()).map(|node| (node, total(node))).filter(|(_, total)| *total > 0.0).collect();
-    let falling: Vec<f64> = model.frequencies.iter().map(|frequency| -frequency).collect();
-    let modes: Vec<usize> = ascending(&falling).into_iter().filter(vibrating).collect();
+    let negated: Vec<f64> = model.frequencies.iter().map(|frequency| -frequency).collect();
+    let modes: Vec<usize> = argsort(&negated).into_iter().filter(vibrating).collect();
     let enough = SHARE * real(totals.len());
     let mut passed = 0.0;
     for mode in &modes {

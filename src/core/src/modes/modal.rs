@@ -5,7 +5,7 @@
 use nalgebra::{ComplexField, DMatrix, Scalar, SymmetricEigen};
 use tiprub_cosim::shown;
 
-use crate::math::{ascending, real};
+use crate::math::{argsort, real};
 use crate::modes::schemes::{ModeCoefficients, Velocity};
 use crate::scene::method::Scheme;
 use crate::scene::rom::cholesky;
@@ -299,7 +299,7 @@ pub(super) fn eigenmodes<T: ModeNumber>(
     let half = lower.solve_lower_triangular(stiffness).unwrap_or_else(|| stiffness.clone());
     let full = lower.solve_lower_triangular(&half.adjoint()).unwrap_or(half);
     let eigen = SymmetricEigen::new((&full + full.adjoint()) * T::from_real(0.5));
-    let order = ascending(eigen.eigenvalues.as_slice());
+    let order = argsort(eigen.eigenvalues.as_slice());
     let largest = eigen.eigenvalues.amax();
     check_semidefinite(eigen.eigenvalues[order[0]], largest, suffix)?;
     let vectors = eigen.eigenvectors.select_columns(&order);

@@ -5,10 +5,10 @@
 //! are the translations, orthonormal in the mass: motion along a line is then the motion of these modes alone, which give the
 //! momentum along an axis exactly.
 
-use crate::math::ascending;
 use nalgebra::DMatrix;
 
 use super::modal::ModalModel;
+use crate::math::argsort;
 use crate::{Error, Result, Rom};
 
 /// Modes below this fraction of the highest frequency are treated as possibly rigid.
@@ -134,7 +134,7 @@ fn uncoupled(rest: &DMatrix<f64>, frequencies: &[f64]) -> (DMatrix<f64>, Vec<f64
     }
     let weighted = DMatrix::from_fn(rest.nrows(), rest.ncols(), |i, j| frequencies[i] * frequencies[i] * rest[(i, j)]);
     let eigen = (rest.transpose() * weighted).symmetric_eigen();
-    let order = ascending(eigen.eigenvalues.as_slice());
+    let order = argsort(eigen.eigenvalues.as_slice());
     let values = order.iter().map(|index| eigen.eigenvalues[*index].max(0.0).sqrt()).collect();
     (rest * eigen.eigenvectors.select_columns(&order), values)
 }

@@ -3,9 +3,9 @@
 //! A surface of revolution takes its normals from the slopes, a surface spline from a curve through the positions. Both must describe the
 //! same contour.
 
-use crate::math::ascending;
 use tiprub_cosim::shown;
 
+use crate::math::argsort;
 use crate::{Error, Result, Rom};
 
 /// Allowed difference between given slopes and slopes between positions (-), which turns a normal by 14 degrees. Reasons are means over
@@ -81,7 +81,7 @@ fn contradicted(rom: &Rom, [low, high]: [AxialStation; 2], rise: f64, straight: 
 fn places(rom: &Rom, nodes: &[usize]) -> Vec<AxialStation> {
     let axial = |node: &usize| rom.contact_nodes[*node].position[2];
     let positions: Vec<f64> = nodes.iter().map(axial).collect();
-    let order: Vec<usize> = ascending(&positions).into_iter().map(|index| nodes[index]).collect();
+    let order: Vec<usize> = argsort(&positions).into_iter().map(|index| nodes[index]).collect();
     let mut places: Vec<AxialStation> = Vec::new();
     let [Some(first), Some(last)] = [order.first(), order.last()] else { return places };
     let extent = axial(last) - axial(first);

@@ -15,7 +15,7 @@ pub fn of_scene(scene: &Scene) -> u64 {
     scene.roms.iter().fold(seed, |seed, rom| rom_hash(rom, seed))
 }
 
-/// Hash of a ROM: of all its numbers, and of its other data as text. Origin and quality of the reduction are left out,
+/// Hash of a ROM: of all its numbers, and of its other data as text. The name, the origin and the quality checks are left out,
 /// because they do not change results.
 fn rom_hash(rom: &Rom, seed: u64) -> u64 {
     let Rom {
@@ -67,7 +67,7 @@ fn rom_hash(rom: &Rom, seed: u64) -> u64 {
     }
     for WatchedPoints { map, points } in watched.iter().chain(stress) {
         hash.matrix(map);
-        // Other data of the points have no effect, and files do not contain them.
+        // The other fields of the points have no effect, and ROM files do not contain them.
         points.iter().for_each(|ContactNode { name, position, .. }| hash.text(&format!("{name} {position:?}")));
     }
     if let Some(SupportRows { stiffness, mass, thermal }) = support {

@@ -5,7 +5,7 @@ use crate::geometry::frame::PolarFrame;
 use crate::geometry::layout::Layout;
 use crate::geometry::spline::SplineGap;
 use crate::geometry::surface_spline::SurfaceSpline;
-use crate::math::{ascending, real};
+use crate::math::{argsort, real};
 use crate::modes::modal::ModalModel;
 use crate::scene::rom::{ContactNode, DisplacementFrame};
 use crate::scene::settings::{ContactSettings, SplineSettings, SurfaceSettings};
@@ -243,7 +243,7 @@ impl TipContour {
         let places: Vec<[f64; 3]> = nodes.iter().map(|node| rom.contact_nodes[*node].position).collect();
         let axial: Vec<f64> = places.iter().map(|place| place[2]).collect();
         let point = |index: usize| (places[index][2], places[index][0], 0.0);
-        let mut points: Vec<(f64, f64, f64)> = ascending(&axial).into_iter().map(point).collect();
+        let mut points: Vec<(f64, f64, f64)> = argsort(&axial).into_iter().map(point).collect();
         let apart = 1e-9 * points[0].1;
         points.dedup_by(|a, b| (a.0 - b.0).abs() < apart);
         second_derivatives(&mut points);

@@ -23,9 +23,9 @@ impl StructureSets {
         let mut members = vec![Vec::new(); structures.len()];
         numbers.iter().enumerate().for_each(|(structure, number)| members[*number].push(structure));
         members.retain(|members| !members.is_empty());
-        // The order of sets with contact nodes, and that of the others, stays the same.
-        let touches = |members: &Vec<usize>| members.iter().any(|member| structures[*member].nodes() > 0);
-        let (mut members, others): (Vec<_>, Vec<_>) = members.into_iter().partition(touches);
+        // Sets with contact nodes keep their order, and so do the others.
+        let has_contact_nodes = |members: &Vec<usize>| members.iter().any(|member| structures[*member].nodes() > 0);
+        let (mut members, others): (Vec<_>, Vec<_>) = members.into_iter().partition(has_contact_nodes);
         members.extend(others);
         let mut of = vec![0; structures.len()];
         for (set, members) in members.iter().enumerate() {

@@ -28,7 +28,7 @@ fn edited_plan_keeps_results_of_removed_runs() {
     assert!(bench.path("c.parquet.journal").exists() && !bench.path("c.parquet").exists());
 }
 
-/// A part does not replace finished runs of another part, or runs that more values of the plan move to another part.
+/// A part does not replace finished runs of another part, or runs that move to another part when values are added to the plan.
 #[test]
 fn results_of_runs_of_other_parts_are_kept() {
     let bench = Bench::new();
@@ -44,7 +44,7 @@ fn results_of_runs_of_other_parts_are_kept() {
     assert_eq!(bench.run(GRID, "two.parquet").resumed, 3, "the whole plan has all runs of its parts");
 }
 
-/// The error names the file with the runs, and outputs over time are kept as well.
+/// Journals and outputs over time of other runs are kept, and the error names their file.
 #[test]
 fn journals_and_outputs_over_time_of_other_runs_are_kept() {
     let bench = Bench::new();
@@ -109,7 +109,7 @@ fn files_of_users_are_not_replaced() {
     assert_ne!(two, three);
 }
 
-/// Each file is locked while one sweep works on it. A sweep that opens the journal just before another one removes it starts again.
+/// A sweep locks its journal. If another sweep removes the journal just after it was opened, it is opened again.
 #[test]
 fn simultaneous_sweeps_compute_each_run_once() {
     for round in 0..20 {

@@ -1,8 +1,8 @@
 //! Tip of a blade in front of a coating: positions of its contact nodes, and widths around the circumference.
 
-use crate::math::ascending;
 use std::f64::consts::TAU;
 
+use crate::math::argsort;
 use crate::scene::rom::ContactNode;
 use crate::scene::settings::CoatingSettings;
 
@@ -67,7 +67,7 @@ fn widths_of_patches(nodes: &[&ContactNode], extent: [f64; 2]) -> Vec<f64> {
         return vec![only.area / (high - low)];
     }
     let axial: Vec<f64> = nodes.iter().map(|node| node.position[2]).collect();
-    let order = ascending(&axial);
+    let order = argsort(&axial);
     let mut widths = vec![0.0; nodes.len()];
     for (place, node) in order.iter().enumerate() {
         let [before, after] = [place.saturating_sub(1), (place + 1).min(nodes.len() - 1)].map(|at| nodes[order[at]]);

@@ -6,7 +6,7 @@ use crate::geometry::surface_spline::{ClosestPoint, Projection};
 use crate::geometry::{Gap, PrescribedMotion, Vector3};
 
 /// Largest error of the initial guess of a closest point (in patches) for which one evaluation of the surface is sufficient. On a casing with
-/// 24 columns, errors of gaps are then below 1e-13 m, and the error of the closest point is about squared. The next evaluation starts there.
+/// 24 columns, errors of gaps are then below 1e-13 m. The evaluation about squares the error of the closest point, which is the next initial guess.
 const NEARBY: f64 = 1e-3;
 
 /// A search for closest points of many nodes at one instant.
@@ -93,16 +93,16 @@ impl<'a> NearSearch<'a> {
         (self.near(found, frame), drift)
     }
 
-    /// Finds the gap of a node displaced by `local` (m), with the normal in the directions of the node. The search starts from a place near the
-    /// closest point, or from the angle of the node.
+    /// Finds the gap of a node displaced by `local` (m), with the normal in the directions of the node. The search starts from `guess`, a place
+    /// near the closest point; without it, from the angle of the node.
     #[inline(always)]
     pub fn gap(&self, [node, index]: [usize; 2], local: Vector3, guess: Option<ClosestPoint>) -> Gap {
         let (x, frame) = self.position(node, index, local);
         let surface = &self.gap.surface;
         let start = guess.unwrap_or_else(|| {
-            let own = frame.local(x);
+            let position = frame.local(x);
             // The displacements of node and shaft rotate the node about z by a small angle. A guess may neglect the fifth power of its tangent.
-            let tangent = own[1] / own[0];
+            let tangent = position[1] / position[0];
             let angle = self.gap.layout.angles[index] + self.relative_angle + tangent * (1.0 - tangent * tangent / 3.0);
             surface.step_closer(x, surface.locate_at(angle, x[2]))
         });
@@ -165,7 +165,7 @@ mod tests {
         SplineGap::new(layout, CLEARANCE, surface, Vec::new(), 1.0)
     }
 
-    /// Without a place of an earlier step, the search from the angle of the node finds the closest point of the full search.
+    /// Without an initial guess, the search starts from the angle of the node, and finds the same closest point as the full search.
     #[test]
     fn searches_without_guess_find_the_closest_point() {
         let gap = flared_casing_with_lobes();
@@ -196,9 +196,9 @@ mod tests {
         assert!(normals < 1e-10, "{normals:e}");
     }
 
-    /// A node beyond the extension of the last ring has no surface to touch, whether or not a place is given.
+    /// The gap of a node beyond the extension of the last ring is infinite, with and without an initial guess.
     #[test]
-    fn nodes_beyond_the_last_ring_have_no_gap() {
+    fn gap_beyond_the_last_ring_is_infinite() {
         let gap = flared_casing_with_lobes();
         let drive = PrescribedMotion { shaft: Vector3::new(0.0, 0.0, 0.02), ..PrescribedMotion::default() };
         let search = NearSearch::new(&gap, &drive);

@@ -345,7 +345,8 @@ pub(crate) struct SpanRecord {
 }
 
 impl SpanRecord {
-    /// Allocates data for the first sector of a structure with these of all contact pairs, with errors of `tolerance` (m).
+    /// Allocates data for the first sector of a structure. `pairs` are the contact pairs of the structure, and `all_pairs` those of the system.
+    /// `tolerance` (m) bounds the errors of smallest gaps.
     pub fn new(
         structure: usize,
         of: &Structure,
