@@ -29,7 +29,7 @@ use crate::{
 const MAX_CACHED_CHECKS: usize = 256;
 /// Largest number of times that a part writes results to the cache. With more values of friction or damping, other parts find few of their own values
 /// there.
-const MAX_KEPT_CHECKS: usize = 16;
+const MAX_CACHE_WRITES: usize = 16;
 /// Parts of the names of parameters on which slow checks depend.
 const CHECKED_PARAMETERS: [&str; 7] =
     ["friction", "damping", "internal_step", "scheme", "solver", "tolerance", "velocity"];
@@ -109,7 +109,7 @@ impl<'a> Worker<'a> {
         if let Ok(mut checks) = self.checks.lock() {
             // The cache passes the first results to the other parts on this machine.
             let is_new = !checks.contains_key(&key) && *known != results.checks;
-            if is_new && self.kept.fetch_add(1, Ordering::Relaxed) < MAX_KEPT_CHECKS {
+            if is_new && self.kept.fetch_add(1, Ordering::Relaxed) < MAX_CACHE_WRITES {
                 self.request.cache.keep_checks(&scene, &results.checks);
             }
             if checks.len() >= MAX_CACHED_CHECKS {
