@@ -212,7 +212,8 @@ impl<'a> PartRun<'a> {
             store,
             results,
         };
-        if let Err(failure) = part.check_old_rows(old).and_then(|()| part.check_old_histories()) {
+        let checked = part.check_old_rows(old).and_then(|()| part.check_old_histories());
+        if let Err(failure) = checked.and_then(|()| part.check_variable_names()) {
             remove(&created);
             return Err(failure);
         }
@@ -371,15 +372,15 @@ impl<'a> PartRun<'a> {
         let rows: Vec<(usize, &Row)> =
             numbers.zip(self.digests.iter().filter_map(|digest| self.rows.get(&digest.run))).collect();
         let has_new_histories = !self.has_all_histories;
-        let table = result_file::table(self.request.plan, &rows, &self.results);
+        let table = result_file::table(self.request.plan, &rows, &self.results)?;
         if let Some(mut journal) = self.histories.take() {
             if has_new_histories {
                 histories::write(&self.files.histories, &mut journal, &rows, &facts)?;
             }
-            parquet_file::write(&self.files.rows, &table, &facts)?;
+            result_file::write(&self.files.rows, &table, &facts)?;
             journal.remove()?;
         } else {
-            parquet_file::write(&self.files.rows, &table, &facts)?;
+            result_file::write(&self.files.rows, &table, &facts)?;
         }
         self.journal.remove()?;
         self.store.remove_reduced();

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use tiprub_gallery::rom_cache::content_digest;
 use tiprub_shell::{Failure, Result};
 use tiprub_table::{Cell, Column, ColumnType, Table, parquet_file};
 
@@ -13,8 +14,41 @@ use crate::{
 /// Key of the digest of all rows in the files of a sweep.
 pub(crate) const ROWS_FACT: &str = "tiprub.rows";
 
+/// Key of the digest of all values in the files of results.
+const VALUES_FACT: &str = "tiprub.values";
+
+/// Writes a table of results with its metadata and a digest of its values.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write(path: &Path, table: &Table, facts: &[(&str, String)]) -> Result<()> {
+    parquet_file::write(path, table, &[facts, &[(VALUES_FACT, values_digest(table))]].concat())
+}
+
+/// Returns the digest of the names and the values of all columns. It does not depend on the order of columns, on columns without values, or on
+/// the type of numbers, because these may change if the parts of a plan get the same columns.
+fn values_digest(Table { columns }: &Table) -> String {
+    let text = |cell: &Option<Cell>| match cell {
+        Some(Cell::Integer(value)) => value.to_string(),
+        Some(Cell::Real(value)) => value.to_string(),
+        Some(Cell::Boolean(value)) => value.to_string(),
+        Some(Cell::Text(value)) => format!("{value:?}"),
+        None => String::new(),
+    };
+    let has_values = |column: &&Column| column.cells.iter().any(Option::is_some);
+    let mut columns: Vec<&Column> = columns.iter().filter(has_values).collect();
+    columns.sort_by(|a, b| a.name.cmp(&b.name));
+    let lines = columns
+        .iter()
+        .map(|column| format!("{:?} {}\n", column.name, column.cells.iter().map(text).collect::<Vec<_>>().join(" ")));
+    content_digest(lines.collect::<String>().as_bytes())
+}
+
 /// Returns the table of runs (numbered from 1) and their rows. It has columns for all `results`, even if no run has finished.
-pub fn table(plan: &Plan, rows: &[(usize, &Row)], results: &[String]) -> Table {
+///
+/// # Errors
+/// A variable has the name of a result, which may exist in the scenes of some runs only. Its column would replace that of the result.
+pub fn table(plan: &Plan, rows: &[(usize, &Row)], results: &[String]) -> Result<Table> {
     let number = |run: usize| Some(Cell::Integer(i64::try_from(run).unwrap_or(i64::MAX)));
     let runs = rows.iter().map(|(run, _)| number(*run)).collect();
     let mut columns = vec![Column { name: RUN.to_owned(), kind: ColumnType::Integer, cells: runs }];
@@ -27,8 +61,10 @@ pub fn table(plan: &Plan, rows: &[(usize, &Row)], results: &[String]) -> Table {
     }
     let mut others: Vec<&str> = Vec::new();
     for name in results.iter().chain(rows.iter().flat_map(|(_, row)| row.cells.iter().map(|(name, _)| name))) {
-        let is_variable = plan.variables.iter().any(|variable| variable.name == *name);
-        if !is_variable && !RESERVED_NAMES.contains(&name.as_str()) && !others.contains(&name.as_str()) {
+        if plan.variables.iter().any(|variable| variable.name == *name) {
+            return Err(named_like_a_result(name).at(plan.path.display()));
+        }
+        if !RESERVED_NAMES.contains(&name.as_str()) && !others.contains(&name.as_str()) {
             others.push(name);
         }
     }
@@ -45,13 +81,22 @@ pub fn table(plan: &Plan, rows: &[(usize, &Row)], results: &[String]) -> Table {
         };
         Column { name: name.to_owned(), kind, cells: rows.iter().map(|(_, row)| cell(row)).collect() }
     }));
-    Table { columns }
+    Ok(Table { columns })
+}
+
+/// Returns the error for a variable of a plan with the name of an output or a result.
+pub(crate) fn named_like_a_result(name: &str) -> Failure {
+    Failure::new(
+        format!("variable `{name}`"),
+        "has the name of an output or a result",
+        "Give the variable another name",
+    )
 }
 
 /// Reads the rows of a file that a sweep wrote before, and the names of its means and totals.
 ///
 /// # Errors
-/// The file cannot be read, or is not the result of a sweep.
+/// The file cannot be read, is not the result of a sweep, or is damaged.
 pub fn read(path: &Path) -> Result<(Vec<Row>, Vec<String>)> {
     let other = || {
         let remedy = "Give another file with --output, or remove this one";
@@ -61,7 +106,15 @@ pub fn read(path: &Path) -> Result<(Vec<Row>, Vec<String>)> {
     if !facts.iter().any(|(key, _)| key == ROWS_FACT) {
         return Err(other());
     }
-    let Table { columns } = parquet_file::read(path).map_err(|_| other())?;
+    let damaged = || {
+        let remedy = "Restore it, or remove it to repeat its runs";
+        Failure::new(path.display(), "is damaged: its values are not those that a sweep wrote", remedy)
+    };
+    let table = parquet_file::read(path).map_err(|_| damaged())?;
+    if !facts.iter().any(|(key, value)| key == VALUES_FACT && *value == values_digest(&table)) {
+        return Err(damaged());
+    }
+    let Table { columns } = table;
     let position = |name: &str| columns.iter().position(|column| column.name == name);
     let (Some(first), Some(digest)) = (position(STATUS), position(DIGEST)) else { return Err(other()) };
     let rows = columns[digest].cells.iter().enumerate().filter_map(|(row, cell)| {

@@ -5,7 +5,7 @@ use super::{apart, print_row, scene};
 use tiprub_core::scene::method::Scheme;
 use tiprub_core::scene::settings::{OutputSettings, Shape};
 use tiprub_core::{CoSimulation, Scene, Simulation};
-use tiprub_test_models::{SeededRandom, bits, bumps, element, go, real, rich_blade, saved, set, started};
+use tiprub_test_models::{SeededRandom, bits, bumps, element, go, real, reference, rich_blade, saved, set, started};
 
 /// A communication step whose multiples are exact binary numbers (s).
 const TICK: f64 = 1.0 / 131_072.0;
@@ -42,6 +42,23 @@ fn run(scene: &Scene, ticks: &[u32]) -> Vec<(Vec<u64>, Vec<u64>)> {
         at.push(instant(&simulation));
     }
     at
+}
+
+/// A scene with fixed steps stores no open steps. If a start value selects adaptive steps, all steps end at communication points.
+#[test]
+fn adaptive_steps_may_be_a_start_value() {
+    let mut simulation = Simulation::new(scene(Scheme::ModalExact, 4e-5, 1e-5)).unwrap();
+    simulation.set_integer(reference(&simulation, "scheme"), Scheme::Galerkin.number()).unwrap();
+    simulation.initialise(0.0).unwrap();
+    let mut adaptive = started(&scene(Scheme::Galerkin, 4e-5, 1e-5));
+    for _ in 0..64 {
+        go(&mut simulation, 8.0 * TICK);
+        go(&mut adaptive, 8.0 * TICK);
+    }
+    let [found, expected] = [&simulation, &adaptive].map(|one| one.system().bank().displacement().to_vec());
+    assert!(real(&adaptive, "friction_loss") > 0.0);
+    let error = apart(&found, &expected);
+    assert!(error < 1e-3, "{error:e}");
 }
 
 #[test]

@@ -9,12 +9,13 @@ use crate::{
     cases::Case,
     fields,
     plan::{Plan, PlanVariable, VariableTarget},
+    result_file::named_like_a_result,
 };
 
 /// Largest number of runs whose scenes are tried for the check of names, until one is accepted.
 const MAX_TRIED_RUNS: usize = 8;
 /// Keys of the scene whose value is the start value of a variable, each with the last part of the variable's name.
-const REPLACED_FIELDS: [(&str, &str); 15] = [
+const REPLACED_FIELDS: [(&str, &str); 23] = [
     ("structure.speed", "speed"),
     ("structure.damping_ratio", "damping_ratio"),
     ("structure.damping_ratios", "damping_ratios"),
@@ -22,11 +23,19 @@ const REPLACED_FIELDS: [(&str, &str); 15] = [
     ("structure.excitation.order", "excitation_order"),
     ("structure.excitation.phase", "excitation_phase"),
     ("structure.initial.displacement", "initial_displacement"),
+    ("structure.initial.velocity", "initial_velocity"),
+    ("structure.load.amplitude", "casing_load_amplitude"),
+    ("structure.load.order", "casing_load_order"),
+    ("structure.load.phase", "casing_load_phase"),
+    ("structure.velocity", "initial_velocity_x"),
+    ("structure.velocity", "initial_velocity_y"),
+    ("structure.velocity", "initial_velocity_z"),
     ("surface.ramp_time", "casing_ramp_time"),
     ("contact.friction", "friction_coefficient"),
     ("contact.solver", "solver"),
     ("contact.slave_heat_fraction", "casing_heat_fraction"),
     ("time.scheme", "scheme"),
+    ("time.input_interpolation", "input_interpolation"),
     ("time.step", "internal_step_max"),
     ("time.tolerance", "tolerance"),
     ("time.max_internal_steps", "max_internal_steps"),
@@ -76,16 +85,20 @@ impl PartRun<'_> {
                 .chain(&results)
                 .find(|name| plan.variables.iter().any(|variable| variable.name == **name));
             if let Some(name) = clash {
-                let remedy = "Give the variable another name";
-                let failure =
-                    Failure::new(format!("variable `{name}`"), "has the name of an output or a result", remedy);
-                return Err(in_plan(failure));
+                return Err(in_plan(named_like_a_result(name)));
             }
             self.check_replaced_fields(run, &simulation).map_err(in_plan)?;
             self.results = results;
             return Ok(());
         }
         Ok(())
+    }
+
+    /// Rejects a variable with the name of a result of an earlier sweep.
+    pub(super) fn check_variable_names(&self) -> Result<()> {
+        let plan = self.request.plan;
+        let clash = self.results.iter().find(|name| plan.variables.iter().any(|variable| variable.name == **name));
+        clash.map_or(Ok(()), |name| Err(Failure { usage: true, ..named_like_a_result(name) }.at(plan.path.display())))
     }
 
     /// Rejects a plan in which a start value replaces a field that also varies, because the values of this field would have no effect. `simulation`
@@ -155,5 +168,17 @@ fn array_name(name: &str) -> &str {
     match name.strip_suffix(']').and_then(|rest| rest.rsplit_once('[')) {
         Some((array, _)) => array,
         None => name,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_key_that_is_a_start_value_is_checked() {
+        let mut keys = tiprub_format::FIELDS.iter().filter(|field| field.description.starts_with("Start value of"));
+        let unknown = keys.find(|field| !REPLACED_FIELDS.iter().any(|(key, _)| *key == field.path));
+        assert!(unknown.is_none(), "{unknown:?}");
     }
 }

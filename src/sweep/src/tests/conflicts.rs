@@ -31,6 +31,8 @@ fn field_that_a_start_value_replaces_is_rejected() {
         ("structure[rotor].excitation.order", "[2, 3]", "excitation_order", "4"),
         ("structure[rotor].excitation.phase", "[0.0, 1.0]", "excitation_phase", "2.0"),
         ("structure[rotor].initial[1].displacement", "[1e-6, 2e-6]", "initial_displacement", "3e-6"),
+        ("structure[rotor].initial[1].velocity", "[0.01, 0.02]", "initial_velocity", "0.03"),
+        ("time.input_interpolation", "[\"hold\", \"linear\"]", "input_interpolation", "1"),
     ] {
         let text = plan(field, values, &format!("[set]\n{name} = {value}"));
         let failure = bench.try_part(&text, "a.parquet", Part::WHOLE, 1).expect_err(&text);
@@ -116,4 +118,28 @@ fn rom_that_changes_during_the_sweep_ends_it() {
     fs::write(&path, tiprub_format::write_rom(&rom(1e5))).unwrap();
     store.load(&origin, &console).unwrap();
     assert!(store.get(&origin).is_ok());
+}
+
+/// A column with the name of a result would replace the result.
+#[test]
+fn label_with_the_name_of_a_result_is_rejected() {
+    let bench = Bench::new();
+    bench.run(GRID, "a.parquet");
+    let whole = bench.table("a.parquet");
+    let label = "[[variable]]\nname = \"friction_loss\"\nlabel = true\nvalues = [77]\n";
+    let rejected = |plan: &str, output: &str| {
+        let failure = bench.try_part(plan, output, Part::WHOLE, 1).unwrap_err();
+        assert!(failure.what.contains("variable `friction_loss`"), "{failure}");
+        assert!(failure.problem.contains("has the name of an output or a result"), "{failure}");
+    };
+    rejected(&format!("{GRID}{label}"), "a.parquet");
+    assert!(bench.table("a.parquet") == whole && !bench.path("a.parquet.journal").exists());
+    // Only the scene of the second run has this result. The rows stay in the journal until the label has another name.
+    let energies = "[[variable]]\nname = \"energies\"\nfield = \"outputs.energies\"\nvalues = [false, true]\n";
+    let plan = format!("scene = \"scene.toml\"\n{energies}{label}");
+    rejected(&plan, "b.parquet");
+    let outcome = bench.run(&plan.replace("friction_loss", "label"), "b.parquet");
+    assert_eq!((outcome.resumed, outcome.finished), (2, 2));
+    let loss = bench.table("b.parquet").columns.into_iter().find(|column| column.name == "friction_loss").unwrap();
+    assert!(loss.cells[0].is_none() && loss.cells[1].is_some(), "{loss:?}");
 }

@@ -143,3 +143,27 @@ fn simultaneous_sweeps_compute_each_run_once() {
         assert!(!bench.path("a.parquet.journal").exists());
     }
 }
+
+/// Values that no sweep wrote are never taken over.
+#[test]
+fn damaged_results_are_rejected() {
+    let bench = Bench::new();
+    bench.run(GRID, "a.parquet");
+    let (path, whole) = (bench.path("a.parquet"), bench.table("a.parquet"));
+    let bytes = fs::read(&path).unwrap();
+    let mut damaged = 0;
+    for place in (0..bytes.len()).step_by(97) {
+        let mut other = bytes.clone();
+        other[place] ^= 4;
+        fs::write(&path, &other).unwrap();
+        match bench.try_part(GRID, "a.parquet", Part::WHOLE, 1) {
+            Ok(outcome) => assert!(outcome.resumed == 6 && bench.table("a.parquet") == whole, "{place}"),
+            Err(failure) => {
+                damaged += usize::from(failure.problem.contains("is damaged"));
+                assert_eq!(fs::read(&path).unwrap(), other, "{failure}");
+            }
+        }
+        assert!(!bench.path("a.parquet.journal").exists(), "{place}");
+    }
+    assert!(damaged > 5, "{damaged}");
+}

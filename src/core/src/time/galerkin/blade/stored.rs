@@ -141,9 +141,9 @@ impl BladeInSpan<'_> {
 pub(crate) struct StoredStep<'a>(&'a [f64]);
 
 impl<'a> StoredStep<'a> {
-    /// Reads an array. Returns `None` if it contains no step.
+    /// Reads an array. Returns `None` if it contains no step, or is empty because all steps end at internal points.
     pub fn new(numbers: &'a [f64]) -> Option<Self> {
-        (numbers[0] != 0.0).then_some(Self(numbers))
+        numbers.first().is_some_and(|first| *first != 0.0).then_some(Self(numbers))
     }
 
     /// Returns whether the gaps of the sector at the last communication point are known.
