@@ -213,7 +213,7 @@ impl<'a> PartRun<'a> {
             results,
         };
         let checked = part.check_old_rows(old).and_then(|()| part.check_old_histories());
-        if let Err(failure) = checked.and_then(|()| part.check_variable_names()) {
+        if let Err(failure) = checked.and_then(|()| result_file::check_variable_names(plan, &part.results)) {
             remove(&created);
             return Err(failure);
         }

@@ -61,9 +61,7 @@ pub fn table(plan: &Plan, rows: &[(usize, &Row)], results: &[String]) -> Result<
     }
     let mut others: Vec<&str> = Vec::new();
     for name in results.iter().chain(rows.iter().flat_map(|(_, row)| row.cells.iter().map(|(name, _)| name))) {
-        if plan.variables.iter().any(|variable| variable.name == *name) {
-            return Err(named_like_a_result(name).at(plan.path.display()));
-        }
+        check_variable_names(plan, [name])?;
         if !RESERVED_NAMES.contains(&name.as_str()) && !others.contains(&name.as_str()) {
             others.push(name);
         }
@@ -84,13 +82,13 @@ pub fn table(plan: &Plan, rows: &[(usize, &Row)], results: &[String]) -> Result<
     Ok(Table { columns })
 }
 
-/// Returns the error for a variable of a plan with the name of an output or a result.
-pub(crate) fn named_like_a_result(name: &str) -> Failure {
-    Failure::new(
-        format!("variable `{name}`"),
-        "has the name of an output or a result",
-        "Give the variable another name",
-    )
+/// Rejects a variable of a plan with the name of one of these outputs or results.
+pub(crate) fn check_variable_names<'a>(plan: &Plan, results: impl IntoIterator<Item = &'a String>) -> Result<()> {
+    let is_variable = |name: &&String| plan.variables.iter().any(|variable| variable.name == **name);
+    let Some(name) = results.into_iter().find(is_variable) else { return Ok(()) };
+    let (what, remedy) = (format!("variable `{name}`"), "Give the variable another name");
+    let failure = Failure::new(what, "has the name of an output or a result", remedy);
+    Err(Failure { usage: true, ..failure }.at(plan.path.display()))
 }
 
 /// Reads the rows of a file that a sweep wrote before, and the names of its means and totals.
@@ -126,4 +124,31 @@ pub fn read(path: &Path) -> Result<(Vec<Row>, Vec<String>)> {
     let is_common = |name: &str| FIRST_COLUMNS.iter().chain(&LAST_COLUMNS).any(|(common, _)| *common == name);
     let names = columns[first..].iter().map(|column| column.name.clone()).filter(|name| !is_common(name));
     Ok((rows.collect(), names.collect()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `tiprub.sweep` gives the files of all parts the same columns and types. The digest must accept this, but no other value.
+    #[test]
+    fn digest_accepts_common_columns_but_no_other_values() {
+        let column = |name: &str, cells: &[Option<Cell>]| Column::new(name, cells.to_vec());
+        let steps = column("steps", &[Some(Cell::Integer(7)), None]);
+        let force = column("force", &[Some(Cell::Real(0.1)), Some(Cell::Real(-2e-300))]);
+        let digest =
+            |columns: &[&Column]| values_digest(&Table { columns: columns.iter().copied().cloned().collect() });
+        let written = digest(&[&steps, &force]);
+        let reals = column("steps", &[Some(Cell::Real(7.0)), None]);
+        assert_eq!(digest(&[&force, &reals, &column("torque", &[None, None])]), written);
+        for other in [
+            column("steps", &[Some(Cell::Integer(8)), None]),
+            column("steps", &[None, Some(Cell::Integer(7))]),
+            column("step", &[Some(Cell::Integer(7)), None]),
+            column("steps", &[Some(Cell::Text("7".into())), None]),
+        ] {
+            assert_ne!(digest(&[&other, &force]), written, "{other:?}");
+        }
+        assert_ne!(digest(&[&force]), written);
+    }
 }

@@ -136,10 +136,13 @@ impl Bench {
 
     /// Runs a part with this number of threads.
     fn try_part(&self, text: &str, output: &str, part: Part, threads: usize) -> Result<SweepOutcome> {
-        let plan = self.plan(text)?;
+        self.sweep(&self.plan(text)?, output, part, threads)
+    }
+
+    fn sweep(&self, plan: &Plan, output: &str, part: Part, threads: usize) -> Result<SweepOutcome> {
         let (stop, cache, console) = (AtomicBool::new(false), RomCache::off(), Console::new(true, false));
         engine::run(&SweepRequest {
-            plan: &plan,
+            plan,
             part,
             output: &self.path(output),
             threads,

@@ -9,7 +9,7 @@ use crate::{
     cases::Case,
     fields,
     plan::{Plan, PlanVariable, VariableTarget},
-    result_file::named_like_a_result,
+    result_file::check_variable_names,
 };
 
 /// Largest number of runs whose scenes are tried for the check of names, until one is accepted.
@@ -80,25 +80,12 @@ impl PartRun<'_> {
             }
             let outputs = table.variables().iter().filter(|variable| variable.causality == Causality::Output);
             let results = native::result_names(table);
-            let clash = outputs
-                .map(|output| &output.name)
-                .chain(&results)
-                .find(|name| plan.variables.iter().any(|variable| variable.name == **name));
-            if let Some(name) = clash {
-                return Err(in_plan(named_like_a_result(name)));
-            }
+            check_variable_names(plan, outputs.map(|output| &output.name).chain(&results))?;
             self.check_replaced_fields(run, &simulation).map_err(in_plan)?;
             self.results = results;
             return Ok(());
         }
         Ok(())
-    }
-
-    /// Rejects a variable with the name of a result of an earlier sweep.
-    pub(super) fn check_variable_names(&self) -> Result<()> {
-        let plan = self.request.plan;
-        let clash = self.results.iter().find(|name| plan.variables.iter().any(|variable| variable.name == **name));
-        clash.map_or(Ok(()), |name| Err(Failure { usage: true, ..named_like_a_result(name) }.at(plan.path.display())))
     }
 
     /// Rejects a plan in which a start value replaces a field that also varies, because the values of this field would have no effect. `simulation`

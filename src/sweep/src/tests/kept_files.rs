@@ -115,21 +115,8 @@ fn simultaneous_sweeps_compute_each_run_once() {
     for round in 0..20 {
         let bench = Bench::new();
         let plan = bench.plan(GRID).unwrap();
-        let output = bench.path("a.parquet");
         let sweep = || loop {
-            let (stop, cache, console) = (AtomicBool::new(false), RomCache::off(), Console::new(true, false));
-            let (plan, output, stop) = (&plan, &output, &stop);
-            let request = SweepRequest {
-                plan,
-                part: Part::WHOLE,
-                output,
-                threads: 1,
-                stop,
-                sources: &bench,
-                cache: &cache,
-                console: &console,
-            };
-            match engine::run(&request) {
+            match bench.sweep(&plan, "a.parquet", Part::WHOLE, 1) {
                 Ok(outcome) => return outcome.finished - outcome.resumed,
                 Err(failure) => assert!(failure.problem.contains("another process"), "{failure}"),
             }

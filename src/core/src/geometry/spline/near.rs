@@ -6,7 +6,7 @@ use crate::geometry::surface_spline::{ClosestPoint, Projection};
 use crate::geometry::{Gap, PrescribedMotion, Vector3};
 
 /// Largest error of the initial guess of a closest point (in patches) for which one evaluation of the surface is sufficient. On a casing with
-/// 24 columns, errors of gaps are then below 1e-13 m. The evaluation about squares the error of the closest point, which is the next initial guess.
+/// 24 columns, errors of gaps are then below 1e-13 m. The evaluation roughly squares the error of the closest point, which is the next initial guess.
 const NEARBY: f64 = 1e-3;
 
 /// A search for closest points of many nodes at one instant.
