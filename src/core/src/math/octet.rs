@@ -45,6 +45,10 @@ pub(crate) trait Octet:
     fn load(from: &Eight) -> Self;
     /// Writes eight numbers.
     fn store(self, to: &mut Eight);
+    /// Reads eight numbers of any alignment.
+    fn read(from: &[f64; 8]) -> Self;
+    /// Writes eight numbers of any alignment.
+    fn write(self, to: &mut [f64; 8]);
     /// Eight equal numbers.
     fn splat(value: f64) -> Self;
     /// Magnitudes.
@@ -175,6 +179,14 @@ impl Octet for Portable {
         to.0 = self.0;
     }
     #[inline(always)]
+    fn read(from: &[f64; 8]) -> Self {
+        Self(*from)
+    }
+    #[inline(always)]
+    fn write(self, to: &mut [f64; 8]) {
+        *to = self.0;
+    }
+    #[inline(always)]
     fn splat(value: f64) -> Self {
         Self([value; 8])
     }
@@ -218,11 +230,12 @@ pub(crate) mod wide {
     use std::arch::x86_64::{
         __m256d, __m256i, __m512d, _CMP_LT_OQ, _mm256_add_epi64, _mm256_add_pd, _mm256_and_pd, _mm256_and_si256,
         _mm256_blendv_pd, _mm256_castpd_si256, _mm256_castsi256_pd, _mm256_cmp_pd, _mm256_cmpeq_epi64, _mm256_div_pd,
-        _mm256_load_pd, _mm256_max_pd, _mm256_min_pd, _mm256_movemask_pd, _mm256_mul_pd, _mm256_set1_epi64x,
-        _mm256_set1_pd, _mm256_setr_epi64x, _mm256_slli_epi64, _mm256_sqrt_pd, _mm256_store_pd, _mm256_sub_pd,
-        _mm512_abs_pd, _mm512_add_epi64, _mm512_add_pd, _mm512_castpd_si512, _mm512_castsi512_pd, _mm512_cmp_pd_mask,
-        _mm512_div_pd, _mm512_load_pd, _mm512_mask_blend_pd, _mm512_max_pd, _mm512_min_pd, _mm512_mul_pd,
-        _mm512_set1_epi64, _mm512_set1_pd, _mm512_slli_epi64, _mm512_sqrt_pd, _mm512_store_pd, _mm512_sub_pd,
+        _mm256_load_pd, _mm256_loadu_pd, _mm256_max_pd, _mm256_min_pd, _mm256_movemask_pd, _mm256_mul_pd,
+        _mm256_set1_epi64x, _mm256_set1_pd, _mm256_setr_epi64x, _mm256_slli_epi64, _mm256_sqrt_pd, _mm256_store_pd,
+        _mm256_storeu_pd, _mm256_sub_pd, _mm512_abs_pd, _mm512_add_epi64, _mm512_add_pd, _mm512_castpd_si512,
+        _mm512_castsi512_pd, _mm512_cmp_pd_mask, _mm512_div_pd, _mm512_load_pd, _mm512_loadu_pd, _mm512_mask_blend_pd,
+        _mm512_max_pd, _mm512_min_pd, _mm512_mul_pd, _mm512_set1_epi64, _mm512_set1_pd, _mm512_slli_epi64,
+        _mm512_sqrt_pd, _mm512_store_pd, _mm512_storeu_pd, _mm512_sub_pd,
     };
     use std::ops::{Add, Div, Mul, Sub};
 
@@ -285,6 +298,16 @@ pub(crate) mod wide {
             unsafe { _mm512_store_pd(to.0.as_mut_ptr(), self.0) }
         }
         #[inline(always)]
+        fn read(from: &[f64; 8]) -> Self {
+            // SAFETY: see the module.
+            Self(unsafe { _mm512_loadu_pd(from.as_ptr()) })
+        }
+        #[inline(always)]
+        fn write(self, to: &mut [f64; 8]) {
+            // SAFETY: see the module.
+            unsafe { _mm512_storeu_pd(to.as_mut_ptr(), self.0) }
+        }
+        #[inline(always)]
         fn splat(value: f64) -> Self {
             // SAFETY: see the module.
             Self(unsafe { _mm512_set1_pd(value) })
@@ -340,6 +363,20 @@ pub(crate) mod wide {
             for half in [0, 1] {
                 // SAFETY: see the module; both halves of `Eight` are aligned to 32 bytes.
                 unsafe { _mm256_store_pd(halves[half].as_mut_ptr(), self.0[half]) }
+            }
+        }
+        #[inline(always)]
+        fn read(from: &[f64; 8]) -> Self {
+            let (halves, _) = from.as_chunks::<4>();
+            // SAFETY: see the module.
+            Self(both(|half| unsafe { _mm256_loadu_pd(halves[half].as_ptr()) }))
+        }
+        #[inline(always)]
+        fn write(self, to: &mut [f64; 8]) {
+            let (halves, _) = to.as_chunks_mut::<4>();
+            for half in [0, 1] {
+                // SAFETY: see the module.
+                unsafe { _mm256_storeu_pd(halves[half].as_mut_ptr(), self.0[half]) }
             }
         }
         #[inline(always)]

@@ -159,7 +159,7 @@ impl Reaction {
             let moved = &mut self.moved[stride * columns.start..stride * columns.end];
             let (touches, columns) = (&self.touches[start..end], &self.columns[columns]);
             let flexibility = bank.columns();
-            bank.instruction_set.run(MoveSurface { touches, columns, per, flexibility, stride, moved });
+            bank.instruction_set.run_octets(MoveSurface { touches, columns, per, flexibility, stride, moved });
             start = end;
         }
         for (slot, first) in self.firsts.iter().enumerate() {

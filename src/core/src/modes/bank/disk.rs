@@ -17,7 +17,7 @@ use crate::modes::cyclic::CyclicModel;
 use crate::modes::schemes::ModeCoefficients;
 use crate::scene::method::Scheme;
 use fourier::{Fourier, Synthesis};
-use pass::{Combination, Complexes, Gather, LaneCoefficients, ModalForces, Pass, modal_force};
+use pass::{Combination, Complexes, Gather, LaneCoefficients, ModalForces, Pass, modal_force_of};
 
 const NOTHING: Complexes = [[0.0; LANES]; 2];
 
@@ -196,7 +196,7 @@ impl Disk {
     /// Computes the effect of contact forces (sector, node, force in N) on the predicted step; [`Disk::moved`] returns the result.
     pub(crate) fn ask(&mut self, forces: impl Iterator<Item = (usize, usize, Vector3)>) {
         self.gather(forces.filter(|(.., force)| *force != Vector3::zeros()));
-        self.instruction_set.run(Combination {
+        self.instruction_set.run_octets(Combination {
             columns: self.rows,
             rows: self.rows,
             matrix: &self.spectral_flexibility,
@@ -237,7 +237,7 @@ impl Disk {
     /// Computes the modal forces of the gathered forces, `[block][mode][part][lane]`.
     fn find_modal_forces(&self, to: &mut [f64]) {
         let Self { modes, rows, shapes, asked_force: force, asked_nodes: touched, .. } = self;
-        self.instruction_set.run(ModalForces { modes: *modes, rows: *rows, shapes, force, touched, to });
+        self.instruction_set.run_octets(ModalForces { modes: *modes, rows: *rows, shapes, force, touched, to });
     }
 
     /// Modal force (re, im) on one mode by the forces of [`Disk::gather_rows`].
@@ -248,7 +248,7 @@ impl Disk {
     /// Modal force (re, im) of a spectrum of contact forces on one mode.
     pub(super) fn modal_force(&self, mode: usize, n: usize, touched: &[bool], force: &[Complexes]) -> [f64; 2] {
         let shapes = &self.shapes[(n / LANES * self.modes + mode) * self.rows..][..self.rows];
-        modal_force(touched, shapes, &force[n / LANES * self.rows..][..self.rows]).map(|part| part[n % LANES])
+        modal_force_of(touched, shapes, &force[n / LANES * self.rows..][..self.rows]).map(|part| part[n % LANES])
     }
 
     /// Adds the displacements caused by the amplitude (re, im) of one mode to the spectrum.
@@ -342,7 +342,7 @@ impl ModalBank {
             increments.reverse();
         }
         let [increment, older] = increments.map(|values| complexes_mut(values));
-        disk.instruction_set.run(Pass::<APPLY, DELAYED, LOSS, ADVANCE> {
+        disk.instruction_set.run_octets(Pass::<APPLY, DELAYED, LOSS, ADVANCE> {
             modes: disk.modes,
             moving: &disk.moving,
             rows: disk.rows,

@@ -1,6 +1,7 @@
 //! Loops over the contacts on a surface and the rows of the structure that carries it.
 
 use super::Touch;
+use crate::math::octet::{Octet, OctetKernel};
 use crate::math::simd::Kernel;
 use crate::math::vector::Vector3;
 use crate::modes::bank::LANES;
@@ -24,16 +25,18 @@ pub(super) struct MoveSurface<'a> {
     pub moved: &'a mut [f64],
 }
 
-impl Kernel for MoveSurface<'_> {
+impl OctetKernel for MoveSurface<'_> {
+    type Output = ();
+
     #[inline(always)]
-    fn run(mut self) {
+    fn run<L: Octet>(mut self) {
         let mut column = 0;
         while column < self.columns.len() {
             column += match self.columns.len() - column {
-                4.. => self.fill::<TOGETHER>(column),
-                3 => self.fill::<3>(column),
-                2 => self.fill::<2>(column),
-                _ => self.fill::<1>(column),
+                4.. => self.fill::<L, TOGETHER>(column),
+                3 => self.fill::<L, 3>(column),
+                2 => self.fill::<L, 2>(column),
+                _ => self.fill::<L, 1>(column),
             };
         }
     }
@@ -42,7 +45,7 @@ impl Kernel for MoveSurface<'_> {
 impl MoveSurface<'_> {
     /// Fills `COUNT` columns from `first` on. Returns `COUNT`.
     #[inline(always)]
-    fn fill<const COUNT: usize>(&mut self, first: usize) -> usize {
+    fn fill<L: Octet, const COUNT: usize>(&mut self, first: usize) -> usize {
         let (stride, points) = (self.stride, self.touches[0].weights.len);
         let mut forces = [[0.0; COUNT]; ROWS];
         for offset in 0..COUNT {
@@ -55,21 +58,20 @@ impl MoveSurface<'_> {
         }
         let firsts = &self.touches[0].firsts[..points];
         for block in 0..stride / LANES {
-            let mut sums = [[0.0; LANES]; COUNT];
+            let mut sums = [L::zero(); COUNT];
             for (point, first) in firsts.iter().enumerate() {
                 for component in 0..3 {
                     let start = (first + component) * stride + block * LANES;
                     let Some(flexibility) = self.flexibility[start..].first_chunk::<LANES>() else { continue };
-                    let force = &forces[3 * point + component];
+                    let (flexibility, force) = (L::read(flexibility), &forces[3 * point + component]);
                     for offset in 0..COUNT {
-                        for lane in 0..LANES {
-                            sums[offset][lane] += flexibility[lane] * force[offset];
-                        }
+                        sums[offset] = sums[offset] + flexibility * L::splat(force[offset]);
                     }
                 }
             }
-            for (offset, sums) in sums.iter().enumerate() {
-                self.moved[(first + offset) * stride + block * LANES..][..LANES].copy_from_slice(sums);
+            for offset in 0..COUNT {
+                let (blocks, _) = self.moved[(first + offset) * stride..][..stride].as_chunks_mut::<LANES>();
+                sums[offset].write(&mut blocks[block]);
             }
         }
         COUNT

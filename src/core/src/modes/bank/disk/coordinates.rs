@@ -47,7 +47,7 @@ impl Disk {
 
     /// Computes displacements or velocities of the contact rows of all sectors, `[row][lane of sector]`, from given coordinates or their rates.
     pub(crate) fn rows_of(&mut self, coordinates: &[f64], values: &mut [f64]) {
-        self.instruction_set.run(Combination {
+        self.instruction_set.run_octets(Combination {
             columns: self.modes,
             rows: self.rows,
             matrix: &self.shapes,
@@ -60,7 +60,7 @@ impl Disk {
 
     /// Computes the displacements of the contact rows of all sectors for two sets of coordinates; see [`Disk::rows_of`].
     pub(crate) fn rows_of_two(&mut self, coordinates: [&[f64]; 2], values: [&mut [f64]; 2]) {
-        self.instruction_set.run(TwoCombinations {
+        self.instruction_set.run_octets(TwoCombinations {
             columns: self.modes,
             rows: self.rows,
             matrix: &self.shapes,
@@ -89,7 +89,7 @@ impl Disk {
         }
         let Self { modes, rows, shapes, asked_force, other_force, asked_nodes: touched, .. } = self;
         let forces = [&other_force[..], &asked_force[..]];
-        self.instruction_set.run(TwoModalForces { modes: *modes, rows: *rows, shapes, forces, touched, to });
+        self.instruction_set.run_octets(TwoModalForces { modes: *modes, rows: *rows, shapes, forces, touched, to });
     }
 
     /// Computes the forces on all coordinates that contact forces (sector, node, N) cause.

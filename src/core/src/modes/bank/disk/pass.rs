@@ -1,10 +1,11 @@
 //! The fused pass over all modes: forces of the previous step, damping loss, prediction and recovery.
 //!
 //! Contact forces of a step are applied to the modes in the next pass, which loads the contact modes anyway; until then they are
-//! stored as a spectrum (see `ModalBank::finish`). Accumulators stay in registers and sums run mode by mode for every lane, so that
-//! wider registers do not change the result.
+//! stored as a spectrum (see `ModalBank::finish`). Sums run mode by mode for every lane, so that wider registers do not change the result.
 
+use super::complexes_mut;
 use super::fourier::Fourier;
+use crate::math::octet::{Octet, OctetKernel, Portable};
 use crate::math::simd::Kernel;
 use crate::math::vector::Vector3;
 use crate::modes::bank::LANES;
@@ -14,8 +15,22 @@ use crate::modes::schemes::ModeCoefficients;
 /// One complex value per lane: real and imaginary parts.
 pub(in crate::modes::bank) type Complexes = [[f64; LANES]; 2];
 
-/// Rows recovered in the fused pass: three contact nodes.
-const FUSED: usize = 9;
+/// Columns whose entries are added together while a sum is in registers.
+const TOGETHER: usize = 4;
+
+/// Complex numbers of all lanes in registers.
+type Registers<L> = [L; 2];
+
+#[inline(always)]
+fn read<L: Octet>(from: &Complexes) -> Registers<L> {
+    [L::read(&from[0]), L::read(&from[1])]
+}
+
+#[inline(always)]
+fn write<L: Octet>(values: Registers<L>, to: &mut Complexes) {
+    values[0].write(&mut to[0]);
+    values[1].write(&mut to[1]);
+}
 
 /// Coefficients of one mode for the lanes of a block (see [`crate::modes::schemes`]); 0 where there is no such mode.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -62,17 +77,15 @@ pub(super) struct Pass<'a, const APPLY: bool, const DELAYED: bool, const LOSS: b
     pub spectrum: &'a mut [Complexes],
 }
 
-impl<const APPLY: bool, const DELAYED: bool, const LOSS: bool, const ADVANCE: bool> Kernel
+impl<const APPLY: bool, const DELAYED: bool, const LOSS: bool, const ADVANCE: bool> OctetKernel
     for Pass<'_, APPLY, DELAYED, LOSS, ADVANCE>
 {
+    type Output = ();
+
     #[inline(always)]
-    fn run(mut self) {
+    fn run<L: Octet>(mut self) {
         for block in 0..self.spectrum.len() / self.rows {
-            match self.rows {
-                9.. => self.block::<FUSED>(block),
-                6.. => self.block::<6>(block),
-                _ => self.block::<3>(block),
-            }
+            self.block::<L>(block);
         }
     }
 }
@@ -81,14 +94,13 @@ impl<const APPLY: bool, const DELAYED: bool, const LOSS: bool, const ADVANCE: bo
     Pass<'_, APPLY, DELAYED, LOSS, ADVANCE>
 {
     #[inline(always)]
-    fn block<const ROWS: usize>(&mut self, block: usize) {
+    fn block<L: Octet>(&mut self, block: usize) {
         let (modes, rows) = (self.modes, self.rows);
         let force = &self.force[block * rows..][..rows];
         // Loads rotate with the disk, so they act on nodal diameter 0 only.
         let loaded = block == 0 && !self.modal_load.is_empty();
         let moving = self.moving[block].max(if loaded { used_len(self.modal_load) } else { 0 });
-        let mut lost = [0.0; LANES];
-        let mut sums = [[[0.0; LANES]; 2]; ROWS];
+        let mut lost = L::zero();
         let states = self.position[block * modes..][..modes]
             .iter_mut()
             .zip(&mut self.increment[block * modes..][..modes])
@@ -96,61 +108,47 @@ impl<const APPLY: bool, const DELAYED: bool, const LOSS: bool, const ADVANCE: bo
         let shapes = self.shapes[block * modes * rows..][..modes * rows].chunks_exact(rows);
         let coefficients = &self.coefficients[block * modes..][..modes];
         for (mode, ((((position, increment), older), shapes), k)) in states.zip(shapes).zip(coefficients).enumerate() {
-            let (mut q, mut d) = (*position, *increment);
+            let [beta, kappa, loss] = [L::read(&k.beta), L::read(&k.kappa), L::read(&k.loss)];
+            let [compliance, delayed] = [L::read(&k.compliance), L::read(&k.delayed)];
             let modal_force =
-                if APPLY || DELAYED { modal_force(self.touched, shapes, force) } else { [[0.0; LANES]; 2] };
-            for part in 0..2 {
+                if APPLY || DELAYED { modal_force::<L>(self.touched, shapes, force) } else { [L::zero(); 2] };
+            for part in [0, 1] {
+                let (mut q, mut d) = (L::read(&position[part]), L::read(&increment[part]));
                 if APPLY {
-                    for lane in 0..LANES {
-                        let moved = k.compliance[lane] * modal_force[part][lane];
-                        q[part][lane] += moved;
-                        d[part][lane] += moved;
-                    }
+                    let moved = compliance * modal_force[part];
+                    (q, d) = (q + moved, d + moved);
                 }
                 if LOSS {
-                    for lane in 0..LANES {
-                        let twice = d[part][lane] + older[part][lane];
-                        lost[lane] += k.loss[lane] * (twice * twice);
-                    }
+                    let twice = d + L::read(&older[part]);
+                    lost = lost + loss * (twice * twice);
                 }
                 if ADVANCE {
-                    let mut new = [0.0; LANES];
-                    for lane in 0..LANES {
-                        new[lane] = k.beta[lane] * d[part][lane] - k.kappa[lane] * q[part][lane];
-                    }
+                    let mut new = beta * d - kappa * q;
                     if DELAYED {
-                        for lane in 0..LANES {
-                            new[lane] += k.delayed[lane] * modal_force[part][lane];
-                        }
+                        new = new + delayed * modal_force[part];
                     }
                     if loaded && part == 0 {
-                        new[0] += self.modal_load.get(mode).copied().unwrap_or(0.0);
+                        let load = self.modal_load.get(mode).copied().unwrap_or(0.0);
+                        new = L::select(1, new + L::splat(load), new);
                     }
-                    for lane in 0..LANES {
-                        q[part][lane] += new[lane];
-                    }
-                    older[part] = new;
+                    q = q + new;
+                    new.write(&mut older[part]);
                 }
-            }
-            if APPLY {
-                *increment = d;
-            }
-            if APPLY || ADVANCE {
-                *position = q;
-            }
-            if ADVANCE && mode < moving {
-                add_rows(&mut sums, shapes, &q);
+                if APPLY {
+                    d.write(&mut increment[part]);
+                }
+                if APPLY || ADVANCE {
+                    q.write(&mut position[part]);
+                }
             }
         }
         if LOSS {
-            for (loss, lost) in self.loss[block * LANES..][..LANES].iter_mut().zip(lost) {
-                *loss += lost;
-            }
+            let (sums, _) = self.loss[block * LANES..].as_chunks_mut::<LANES>();
+            (L::read(&sums[0]) + lost).write(&mut sums[0]);
         }
         if ADVANCE {
-            self.spectrum[block * rows..][..ROWS].copy_from_slice(&sums);
             let (shapes, position) = (&self.shapes[block * modes * rows..], &self.position[block * modes..][..moving]);
-            combine(shapes, position, None, ROWS, &mut self.spectrum[block * rows..][..rows]);
+            combine::<L, 1>(shapes, [position], None, [&mut self.spectrum[block * rows..][..rows]]);
         }
     }
 }
@@ -168,13 +166,15 @@ pub(super) struct Combination<'a> {
     pub spectrum: &'a mut [Complexes],
 }
 
-impl Kernel for Combination<'_> {
+impl OctetKernel for Combination<'_> {
+    type Output = ();
+
     #[inline(always)]
-    fn run(self) {
+    fn run<L: Octet>(self) {
         let Self { columns, rows, matrix, values, touched, spectrum } = self;
         let blocks = matrix.chunks_exact(columns * rows).zip(values.chunks_exact(columns));
         for ((matrix, values), spectrum) in blocks.zip(spectrum.chunks_exact_mut(rows)) {
-            combine(matrix, values, touched, 0, spectrum);
+            combine::<L, 1>(matrix, [values], touched, [spectrum]);
         }
     }
 }
@@ -190,114 +190,106 @@ pub(super) struct TwoCombinations<'a> {
     pub spectra: [&'a mut [Complexes]; 2],
 }
 
-impl Kernel for TwoCombinations<'_> {
+impl OctetKernel for TwoCombinations<'_> {
+    type Output = ();
+
     #[inline(always)]
-    fn run(self) {
+    fn run<L: Octet>(self) {
         let Self { columns, rows, matrix, values: [one, two], spectra: [first, second] } = self;
         let values = one.chunks_exact(columns).zip(two.chunks_exact(columns));
         let spectra = first.chunks_exact_mut(rows).zip(second.chunks_exact_mut(rows));
-        for ((matrix, values), (first, second)) in matrix.chunks_exact(columns * rows).zip(values).zip(spectra) {
-            let mut row = 0;
-            while row < rows {
-                let spectra = [&mut *first, &mut *second];
-                row += match rows - row {
-                    6.. => combine_two::<6>(matrix, values, row, spectra),
-                    _ => combine_two::<3>(matrix, values, row, spectra),
-                };
+        for ((matrix, (one, two)), (first, second)) in matrix.chunks_exact(columns * rows).zip(values).zip(spectra) {
+            combine::<L, 2>(matrix, [one, two], None, [first, second]);
+        }
+    }
+}
+
+/// Combines the columns of one block for some sets of amplitudes. The matrix is read in the order of memory.
+#[inline(always)]
+fn combine<L: Octet, const SETS: usize>(
+    matrix: &[Complexes],
+    values: [&[Complexes]; SETS],
+    touched: Option<&[bool]>,
+    mut spectra: [&mut [Complexes]; SETS],
+) {
+    spectra.iter_mut().for_each(|spectrum| spectrum.fill([[0.0; LANES]; 2]));
+    let count = values.iter().map(|values| values.len()).min().unwrap_or(0);
+    let mut columns = (0..count).filter(|column| touched.is_none_or(|touched| touched[column / 3]));
+    loop {
+        let (mut group, mut found) = ([0; TOGETHER], 0);
+        for column in columns.by_ref().take(TOGETHER) {
+            group[found] = column;
+            found += 1;
+        }
+        if found == TOGETHER {
+            add_columns::<L, SETS, TOGETHER>(matrix, values, group, &mut spectra);
+            continue;
+        }
+        for column in &group[..found] {
+            add_columns::<L, SETS, 1>(matrix, values, [*column], &mut spectra);
+        }
+        return;
+    }
+}
+
+/// Adds `COUNT` columns, one after the other, to the sums of all rows.
+#[inline(always)]
+fn add_columns<L: Octet, const SETS: usize, const COUNT: usize>(
+    matrix: &[Complexes],
+    values: [&[Complexes]; SETS],
+    columns: [usize; COUNT],
+    spectra: &mut [&mut [Complexes]; SETS],
+) {
+    let rows = spectra[0].len();
+    let entries: [&[Complexes]; COUNT] = std::array::from_fn(|place| &matrix[columns[place] * rows..][..rows]);
+    let mut amplitudes = [[[L::zero(); 2]; COUNT]; SETS];
+    for set in 0..SETS {
+        for place in 0..COUNT {
+            amplitudes[set][place] = read(&values[set][columns[place]]);
+        }
+    }
+    for row in 0..rows {
+        let mut sums = [[L::zero(); 2]; SETS];
+        for set in 0..SETS {
+            sums[set] = read(&spectra[set][row]);
+        }
+        for place in 0..COUNT {
+            let [real, imaginary] = read::<L>(&entries[place][row]);
+            for set in 0..SETS {
+                let [a, b] = amplitudes[set][place];
+                sums[set][0] = sums[set][0] + (real * a - imaginary * b);
+                sums[set][1] = sums[set][1] + (real * b + imaginary * a);
             }
         }
-    }
-}
-
-/// Combines the columns of `ROWS` rows from row `first` on, for two sets of amplitudes. Returns `ROWS`.
-#[inline(always)]
-fn combine_two<const ROWS: usize>(
-    matrix: &[Complexes],
-    values: (&[Complexes], &[Complexes]),
-    first: usize,
-    spectra: [&mut [Complexes]; 2],
-) -> usize {
-    let mut sums = [[[[0.0; LANES]; 2]; ROWS]; 2];
-    let [one, two] = &mut sums;
-    let columns = matrix.chunks_exact(spectra[0].len()).zip(values.0.iter().zip(values.1));
-    for (entries, (a, b)) in columns {
-        add_rows(one, &entries[first..], a);
-        add_rows(two, &entries[first..], b);
-    }
-    for (spectrum, sums) in spectra.into_iter().zip(&sums) {
-        spectrum[first..][..ROWS].copy_from_slice(sums);
-    }
-    ROWS
-}
-
-/// Combines the columns of the rows from `row` on, for one block, in groups of rows that fit the registers.
-#[inline(always)]
-fn combine(
-    matrix: &[Complexes],
-    values: &[Complexes],
-    touched: Option<&[bool]>,
-    mut row: usize,
-    spectrum: &mut [Complexes],
-) {
-    while row < spectrum.len() {
-        row += match spectrum.len() - row {
-            9.. => combine_rows::<9>(matrix, values, touched, row, spectrum),
-            6.. => combine_rows::<6>(matrix, values, touched, row, spectrum),
-            _ => combine_rows::<3>(matrix, values, touched, row, spectrum),
-        };
-    }
-}
-
-/// Combines the columns of `ROWS` rows from `first` on. Returns `ROWS`.
-#[inline(always)]
-fn combine_rows<const ROWS: usize>(
-    matrix: &[Complexes],
-    values: &[Complexes],
-    touched: Option<&[bool]>,
-    first: usize,
-    spectrum: &mut [Complexes],
-) -> usize {
-    let mut sums = [[[0.0; LANES]; 2]; ROWS];
-    for (column, (entries, value)) in matrix.chunks_exact(spectrum.len()).zip(values).enumerate() {
-        if touched.is_none_or(|touched| touched[column / 3]) {
-            add_rows(&mut sums, &entries[first..], value);
-        }
-    }
-    spectrum[first..][..ROWS].copy_from_slice(&sums);
-    ROWS
-}
-
-#[inline(always)]
-fn add_rows<const ROWS: usize>(sums: &mut [Complexes; ROWS], shapes: &[Complexes], q: &Complexes) {
-    let shapes = &shapes[..ROWS];
-    for row in 0..ROWS {
-        let [real, imaginary] = &shapes[row];
-        for lane in 0..LANES {
-            sums[row][0][lane] += real[lane] * q[0][lane] - imaginary[lane] * q[1][lane];
-            sums[row][1][lane] += real[lane] * q[1][lane] + imaginary[lane] * q[0][lane];
+        for set in 0..SETS {
+            write(sums[set], &mut spectra[set][row]);
         }
     }
 }
 
 /// Returns p = Ψᴴ F over the contact nodes with forces.
+pub(super) fn modal_force_of(touched: &[bool], shapes: &[Complexes], force: &[Complexes]) -> Complexes {
+    let mut found = [[0.0; LANES]; 2];
+    write(modal_force::<Portable>(touched, shapes, force), &mut found);
+    found
+}
+
+/// Returns p = Ψᴴ F over the contact nodes with forces.
 #[inline(always)]
-pub(super) fn modal_force(touched: &[bool], shapes: &[Complexes], force: &[Complexes]) -> Complexes {
-    let mut sums = [[0.0; LANES]; 2];
+fn modal_force<L: Octet>(touched: &[bool], shapes: &[Complexes], force: &[Complexes]) -> Registers<L> {
+    let mut sums = [L::zero(); 2];
     let (shapes, force) = (shapes.as_chunks::<3>().0, force.as_chunks::<3>().0);
     for ((touched, shapes), force) in touched.iter().zip(shapes).zip(force) {
         if *touched {
             // Separate sums for each node, so that the additions do not depend on each other.
-            let mut node = [[0.0; LANES]; 2];
-            for ([real, imaginary], [across, along]) in shapes.iter().zip(force) {
-                for lane in 0..LANES {
-                    node[0][lane] += real[lane] * across[lane] + imaginary[lane] * along[lane];
-                    node[1][lane] += real[lane] * along[lane] - imaginary[lane] * across[lane];
-                }
+            let mut node = [L::zero(); 2];
+            for component in 0..3 {
+                let ([real, imaginary], [across, along]) =
+                    (read::<L>(&shapes[component]), read::<L>(&force[component]));
+                node[0] = node[0] + (real * across + imaginary * along);
+                node[1] = node[1] + (real * along - imaginary * across);
             }
-            for lane in 0..LANES {
-                sums[0][lane] += node[0][lane];
-                sums[1][lane] += node[1][lane];
-            }
+            (sums[0], sums[1]) = (sums[0] + node[0], sums[1] + node[1]);
         }
     }
     sums
@@ -317,13 +309,15 @@ pub(super) struct ModalForces<'a> {
     pub to: &'a mut [f64],
 }
 
-impl Kernel for ModalForces<'_> {
+impl OctetKernel for ModalForces<'_> {
+    type Output = ();
+
     #[inline(always)]
-    fn run(self) {
-        for (place, to) in self.to.chunks_exact_mut(2 * LANES).enumerate() {
+    fn run<L: Octet>(self) {
+        for (place, to) in complexes_mut(self.to).iter_mut().enumerate() {
             let force = &self.force[place / self.modes * self.rows..][..self.rows];
             let shapes = &self.shapes[place * self.rows..][..self.rows];
-            to.copy_from_slice(modal_force(self.touched, shapes, force).as_flattened());
+            write(modal_force::<L>(self.touched, shapes, force), to);
         }
     }
 }
@@ -342,16 +336,17 @@ pub(super) struct TwoModalForces<'a> {
     pub to: [&'a mut [f64]; 2],
 }
 
-impl Kernel for TwoModalForces<'_> {
+impl OctetKernel for TwoModalForces<'_> {
+    type Output = ();
+
     #[inline(always)]
-    fn run(self) {
+    fn run<L: Octet>(self) {
         let Self { modes, rows, shapes, forces, touched, to: [one, two] } = self;
-        let targets = one.chunks_exact_mut(2 * LANES).zip(two.chunks_exact_mut(2 * LANES));
-        for (place, (one, two)) in targets.enumerate() {
+        for (place, (one, two)) in complexes_mut(one).iter_mut().zip(complexes_mut(two)).enumerate() {
             let [first, second] = forces.map(|force| &force[place / modes * rows..][..rows]);
             let shapes = &shapes[place * rows..][..rows];
-            one.copy_from_slice(modal_force(touched, shapes, first).as_flattened());
-            two.copy_from_slice(modal_force(touched, shapes, second).as_flattened());
+            write(modal_force::<L>(touched, shapes, first), one);
+            write(modal_force::<L>(touched, shapes, second), two);
         }
     }
 }
