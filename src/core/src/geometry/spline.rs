@@ -4,12 +4,14 @@ pub(crate) mod near;
 
 use super::frame::PolarFrame;
 use super::layout::Layout;
-use super::surface_spline::motion::largest_difference;
+use super::surface_spline::motion::PatchMotions;
 use super::surface_spline::{ClosestPoint, Projection, SurfaceSpline, split};
 use super::wrench::{At, MotionIncrement};
 use super::{Gap, Geometry, PrescribedMotion, Vector3};
 use crate::math::real;
+use crate::math::simd::InstructionSet;
 use crate::math::vector::{length, strided_vector3, vector3_at};
+use near::{NearSearch, RingGaps};
 
 /// Gap of a node without a surface to touch: infinite, so that it is never used as a distance.
 pub(crate) const NOTHING_TO_TOUCH: f64 = f64::INFINITY;
@@ -139,45 +141,72 @@ impl SplineGap {
         }
     }
 
+    /// Evaluates all gaps to a smooth ring, like [`SplineGap::evaluate`]. Searches start from the angles of the nodes.
+    pub(crate) fn evaluate_ring(
+        &mut self,
+        drive: &PrescribedMotion,
+        displacement: &[f64],
+        moved: &[f64],
+        instructions: InstructionSet,
+        geometry: &mut Geometry,
+        gaps: &mut [f64],
+    ) {
+        self.follow(drive.shape_factor, moved);
+        let search = NearSearch::new(self, drive);
+        instructions.run(RingGaps { search, displacement, geometry, gaps: &mut *gaps });
+        let lanes = self.layout.lanes;
+        let indices = self.nodes.iter().flat_map(|node| node * lanes..(node + 1) * lanes);
+        let mut faced = indices.filter(|index| self.layout.clearances[index % lanes].is_finite());
+        self.out_of_reach = faced.find(|index| gaps[*index] == NOTHING_TO_TOUCH);
+    }
+
     /// Computes upper bounds of the change of any gap of each sector over a step (m) by everything except the displacement of its node.
-    /// `rows` are the displacements of the control points at the end and at the beginning of the step (m).
+    /// `rows` are the displacements of the control points at the end and at the beginning of the step (m); `motions` is scratch memory.
     ///
     /// Let the rotor turn by an angle α relative to the shape. Apart from this rotation, a node moves by at most the changes of its
     /// clearance and of the shaft centre, plus (|α| + rotation of the shape) · |eccentricity|. The rotated surface differs from itself by
-    /// at most |α| times [`SurfaceSpline::turning_rates`], and it also deforms. A distance changes by no more than the sum of these terms.
+    /// at most |α| times [`SurfaceSpline::turning_rates`], and it also deforms ([`SurfaceSpline::patch_motions`]), where the sector faces
+    /// it. A distance changes by no more than the sum of these terms.
     pub(crate) fn gap_changes(
         &self,
         drive: &PrescribedMotion,
         motion: &MotionIncrement,
         rows: [&[f64]; 2],
+        motions: &mut PatchMotions,
         changes: &mut [f64],
     ) {
-        let turn = (motion.turn - motion.shape_rotation).abs();
+        let turn = motion.turn_over_shape();
         let off_centre = length(drive.shaft) + length(motion.shaft);
         let factor = drive.shape_factor.abs() + motion.shape_factor.abs();
-        // The surface is that of the beginning while it turns.
-        let bent_rate = self.surface.turning_rate_of_displacement(rows[1]);
         let shifted = length(motion.shaft) + motion.opening.abs() + (turn + motion.shape_rotation.abs()) * off_centre;
-        let bent = largest_difference(rows[0], rows[1]) + motion.shape_factor.abs() * self.shape_size;
-        let common = shifted + turn * bent_rate + self.surface.amplification() * bent;
-        let (turned, margin) = (drive.rotor_angle - drive.shape_rotation, LARGEST_SHIFT + turn);
-        for (change, angle) in changes.iter_mut().zip(&self.layout.angles) {
-            let ends = self.spread.map(|offset| angle + turned + offset);
-            *change = common + turn * self.turning_rate(self.surface.patches_at(ends, margin), factor);
+        let common = shifted + self.surface.amplification() * motion.shape_factor.abs() * self.shape_size;
+        // The surface is that of the beginning while it turns.
+        self.surface.patch_motions(rows, turn, motions);
+        let bound = |patch: usize| {
+            turn * (self.round_rates[patch] + factor * self.shape_rates[patch]) + motions.of_patch(patch)
+        };
+        for (lane, change) in changes.iter_mut().enumerate() {
+            *change = common + self.largest_faced(self.faced_patches(lane, drive, turn), bound);
         }
     }
 
-    /// Largest bound of [`SurfaceSpline::turning_rates`] for the current surface in a range of patches around (m/rad), not reduced to one
-    /// turn, at a factor of the shape.
-    fn turning_rate(&self, [first, last]: [f64; 2], factor: f64) -> f64 {
-        let whole = real(self.surface.around());
-        let rate = |patch: f64| {
-            let (patch, _) = split(patch - whole * (patch / whole).floor(), self.surface.around());
-            self.round_rates[patch] + factor * self.shape_rates[patch]
-        };
+    /// Patches around that the nodes of a sector may face while the rotor turns over the shape by up to `turn` (rad) to or from `drive`:
+    /// first and last, not reduced to one turn.
+    pub(crate) fn faced_patches(&self, lane: usize, drive: &PrescribedMotion, turn: f64) -> [f64; 2] {
+        let turned = drive.rotor_angle - drive.shape_rotation;
+        let ends = self.spread.map(|offset| self.layout.angles[lane] + turned + offset);
+        self.surface.patches_at(ends, LARGEST_SHIFT + turn)
+    }
+
+    /// Largest value of `of_patch` for the patches in a range of [`SplineGap::faced_patches`].
+    pub(crate) fn largest_faced(&self, [first, last]: [f64; 2], of_patch: impl Fn(usize) -> f64) -> f64 {
+        let around = self.surface.around();
+        let whole = real(around);
+        let (mut index, _) = split(first - whole * (first / whole).floor(), around);
         let (mut patch, mut largest) = (first, 0.0_f64);
         while patch <= last.min(first + whole) {
-            largest = largest.max(rate(patch));
+            largest = largest.max(of_patch(index));
+            index = if index + 1 == around { 0 } else { index + 1 };
             patch += 1.0;
         }
         largest

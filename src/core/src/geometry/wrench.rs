@@ -60,6 +60,11 @@ impl MotionIncrement {
         }
     }
 
+    /// Magnitude of the rotation of the rotor relative to the shape (rad).
+    pub(crate) fn turn_over_shape(&self) -> f64 {
+        (self.turn - self.shape_rotation).abs()
+    }
+
     /// Returns the mean of this step and the one before, like the displacements on which a force at the time in between does work; the turn
     /// of the rotor is that of this step alone, so that the mean torque times the speed is the power of the shaft.
     pub fn centred(&self, before: &Self) -> Self {

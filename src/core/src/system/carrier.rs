@@ -3,10 +3,11 @@
 mod kernels;
 
 use super::Structure;
-use super::pair::{ContactPair, SurfaceCarrier};
+use super::pair::SurfaceCarrier;
 use crate::geometry::Vector3;
 use crate::geometry::frame::PolarFrame;
-use crate::geometry::surface_spline::motion::largest_length;
+use crate::geometry::spline::SplineGap;
+use crate::geometry::surface_spline::motion::PatchMotions;
 use crate::geometry::surface_spline::{ClosestPoint, SurfaceSpline, Weights};
 use crate::math::vector::vector3_at;
 use crate::modes::bank::ModalBank;
@@ -92,6 +93,8 @@ pub struct Reaction {
     force: Vec<f64>,
     /// Displacement of the rows of the structure by the forces of a solution (m).
     response: Vec<f64>,
+    /// Scratch: bounds of the motion of a surface.
+    motions: PatchMotions,
 }
 
 /// A structure that carries surfaces has a single sector.
@@ -117,6 +120,7 @@ impl Reaction {
             load: vec![0.0; rows],
             force: vec![0.0; modes],
             response: vec![0.0; padded(rows)],
+            motions: PatchMotions::new(rows / 3),
         }
     }
 
@@ -199,11 +203,11 @@ impl Reaction {
         spot.interpolate(|row| self.response[row])
     }
 
-    /// Upper bound of the displacement of the surface of a pair by the last [`Reaction::respond`] (m).
-    pub(crate) fn surface_motion(&self, pair: &ContactPair) -> f64 {
-        let (Some(carrier), Some(surface)) = (pair.carrier(), pair.gap().spline()) else { return 0.0 };
-        let rows = &self.response[carrier.first_row..][..3 * surface.control_points().len()];
-        surface.amplification() * largest_length(rows)
+    /// Bounds the displacements of a surface, whose rows begin at `first`, by the last [`Reaction::respond`], in every patch around (m).
+    pub(crate) fn surface_motions(&mut self, gap: &SplineGap, first: usize) -> &PatchMotions {
+        let rows = &self.response[first..][..3 * gap.surface.control_points().len()];
+        gap.surface.patch_displacements(|point| vector3_at(rows, point).norm_squared(), &mut self.motions);
+        &self.motions
     }
 
     /// Applies the forces of the solution passed to the last [`Reaction::respond`].

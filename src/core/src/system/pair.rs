@@ -6,7 +6,8 @@ use super::Structure;
 use super::carrier::Spot;
 use crate::contact::ContactParameters;
 use crate::geometry::frame::PolarFrame;
-use crate::geometry::surface_spline::ClosestPoint;
+use crate::geometry::surface_spline::motion::PatchMotions;
+use crate::geometry::surface_spline::{ClosestPoint, SurfaceSpline};
 use crate::geometry::wrench::MotionIncrement;
 use crate::geometry::{GapLaw, PrescribedMotion};
 use crate::system::history::{ContactHistory, Two};
@@ -75,11 +76,15 @@ pub struct ContactPair {
     pub(crate) prescribed: Prescribed,
     /// Prescribed motion in the middle of the current span, and the growth of the shape, if a scheme needs them.
     pub(crate) middle: (PrescribedMotion, ShapeGrowth),
+    /// Scratch: bounds of the motion of the surface.
+    motions: PatchMotions,
 }
 
 impl ContactPair {
     pub(crate) fn new(parts: PairParts) -> Self {
-        Self { nodes: parts.gap.members(), parts, prescribed: Prescribed::default(), middle: Default::default() }
+        let (nodes, prescribed, middle) = (parts.gap.members(), Prescribed::default(), Default::default());
+        let motions = parts.gap.spline().map(SurfaceSpline::motions).unwrap_or_default();
+        Self { nodes, parts, prescribed, middle, motions }
     }
 
     /// Structure whose contact nodes touch.
@@ -149,20 +154,48 @@ impl ContactPair {
         self.parts.gap.bend(factor, moved);
     }
 
+    /// Finds upper bounds of the change of any gap of each sector over the last step (m), without the displacements of its nodes and of the
+    /// surface, whose control points are displaced by `rows` (m). Returns false if there are no such bounds.
+    pub(crate) fn find_prescribed_changes(&mut self, rows: &[f64], changes: &mut [f64]) -> bool {
+        let Self { parts, prescribed, motions, .. } = self;
+        let (Some(gap), Some(carrier)) = (parts.gap.smooth_ring(), parts.carrier) else { return false };
+        let rows = &rows[carrier.first_row..][..3 * gap.surface.control_points().len()];
+        gap.gap_changes(&prescribed.drive.now, &prescribed.motion.now, [rows, rows], motions, changes);
+        true
+    }
+
+    /// Bounds the motion of a smooth ring by the motion of its control points: `square_of` their first row (m²).
+    pub(crate) fn find_surface_motions(&mut self, square_of: impl Fn(usize) -> f64) {
+        let Self { parts, motions, .. } = self;
+        if let (Some(gap), Some(carrier)) = (parts.gap.smooth_ring(), parts.carrier) {
+            gap.surface.patch_displacements(|point| square_of(carrier.first_row + 3 * point), motions);
+        }
+    }
+
+    /// Largest of these bounds where a sector may face the surface at any time of the last step (m).
+    pub(crate) fn faced_motion(&self, sector: usize) -> f64 {
+        let Self { parts, prescribed, motions, .. } = self;
+        parts.gap.smooth_ring().map_or(0.0, |gap| {
+            let faced = gap.faced_patches(sector, &prescribed.drive.now, prescribed.motion.now.turn_over_shape());
+            gap.largest_faced(faced, |patch| motions.of_patch(patch))
+        })
+    }
+
     /// Finds the gaps of the nodes that may be in contact or that outputs need, at the displacements of the next step.
     pub(crate) fn find_near_gaps(&mut self, structures: &mut [Structure]) {
-        let is_skipping = structures[self.structure()].nearness.is_used();
+        let is_skipping = structures[self.structure()].nearness.is_used() && self.gap().smooth_ring().is_some();
         let (Some(carrier), true) = (self.carrier(), is_skipping) else {
             return self.find_gaps(structures, SearchStart::PreviousStep);
         };
-        let Self { parts: PairParts { structure, gap: GapLaw::Spline(gap), .. }, prescribed, .. } = self else {
+        let Self { parts: PairParts { structure, gap: GapLaw::Spline(gap), .. }, prescribed, motions, .. } = self
+        else {
             return self.find_gaps(structures, SearchStart::PreviousStep);
         };
         let rows = carrier.first_row..carrier.first_row + 3 * gap.surface.control_points().len();
         let (structure, carrier) = two(structures, [*structure, carrier.structure]);
         let (now, before) = (&carrier.modes.displacement()[rows.clone()], &carrier.modes.displacement_before()[rows]);
         let changes = &mut structure.nearness.changes;
-        gap.gap_changes(&prescribed.drive.now, &prescribed.motion.now, [now, before], changes);
+        gap.gap_changes(&prescribed.drive.now, &prescribed.motion.now, [now, before], motions, changes);
         structure.find_near_gaps(gap, &prescribed.drive.now, now);
     }
 
@@ -178,8 +211,17 @@ impl ContactPair {
             }
         };
         let ContactHistory { gap: gaps, geometry: Two { now, before }, .. } = &mut structure.history;
-        let before = (start == SearchStart::PreviousStep).then_some(&*before);
-        gap.evaluate(&prescribed.drive.now, structure.modes.displacement(), moved, before, now, &mut gaps.now);
+        let (drive, displacement) = (&prescribed.drive.now, structure.modes.displacement());
+        match gap {
+            GapLaw::Spline(ring) if start == SearchStart::Angles && ring.surface.is_smooth_ring() => {
+                let instructions = structure.modes.instruction_set;
+                ring.evaluate_ring(drive, displacement, moved, instructions, now, &mut gaps.now);
+            }
+            _ => {
+                let before = (start != SearchStart::Positions).then_some(&*before);
+                gap.evaluate(drive, displacement, moved, before, now, &mut gaps.now);
+            }
+        }
         if let Some(gap) = gap.spline_law().filter(|_| structure.nearness.is_used()) {
             structure.note_all_evaluated(&gap.nodes);
         }
@@ -201,6 +243,8 @@ pub(crate) enum SearchStart {
     PreviousStep,
     /// The positions of the nodes.
     Positions,
+    /// The angles of the nodes on smooth rings, and the closest points of the previous step on other surfaces.
+    Angles,
 }
 
 /// Growth of the shape of a surface over a span: a factor that is linear in time, times ½(1 − cos(πt/T)) until T.

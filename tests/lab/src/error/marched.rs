@@ -164,7 +164,7 @@ impl<'a> RodMarch<'a> {
             dynamic,
             island,
             ground,
-            goal: StepGoal { tolerance, precision, most: u64::MAX },
+            goal: StepGoal { tolerance, precision, longest: interval, most: u64::MAX },
             effort: Effort::default(),
         }
     }

@@ -131,7 +131,7 @@ pub(super) fn energy(tolerance: f64, switches: u64) -> Option<SectorEnergy> {
         kinetic + strain
     };
     let (start, mut most, mut effort) = (energy(&island.sectors[0].state), 0.0_f64, Effort::default());
-    let goal = StepGoal { tolerance, precision: 1e-15, most: u64::MAX };
+    let goal = StepGoal { tolerance, precision: 1e-15, longest: span, most: u64::MAX };
     // The losses of switches may end contact permanently.
     while wall.switches < switches && effort.tried() < MOST_TRIED * switches {
         island.begin(&mut wall, goal).integrate(&mut effort).ok()?;
@@ -183,7 +183,7 @@ pub(super) fn problems(degree: usize, friction: f64, trials: u64) -> Problems {
             let mut wall = ScatterWall::new(2e-5 * random.unit(), friction);
             state.gaps.fill(wall.place);
             let (mut effort, goal) =
-                (Effort::default(), StepGoal { tolerance: 1e-7, precision: 1e-13, most: u64::MAX });
+                (Effort::default(), StepGoal { tolerance: 1e-7, precision: 1e-13, longest: span, most: u64::MAX });
             let outcome = (0..4).try_for_each(|_| island.begin(&mut wall, goal).integrate(&mut effort));
             found.given_up += u64::from(outcome.is_err());
             found.trials += effort.trials;

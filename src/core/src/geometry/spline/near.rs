@@ -3,7 +3,9 @@
 use super::SplineGap;
 use crate::geometry::frame::PolarFrame;
 use crate::geometry::surface_spline::{ClosestPoint, Projection};
-use crate::geometry::{Gap, PrescribedMotion, Vector3};
+use crate::geometry::{Gap, Geometry, PrescribedMotion, Vector3};
+use crate::math::simd::Kernel;
+use crate::math::vector::strided_vector3;
 
 /// Largest error of the initial guess of a closest point (in patches) for which one evaluation of the surface is sufficient. On a casing with
 /// 24 columns, errors of gaps are then below 1e-13 m. The evaluation roughly squares the error of the closest point, which is the next initial guess.
@@ -131,6 +133,32 @@ impl<'a> NearSearch<'a> {
         let is_free = distance.is_finite() && self.gap.surface.is_far_from_edges(foot);
         let free = if is_free { distance.min(self.reach).max(0.0) } else { 0.0 };
         NearGap { distance, place: foot, normal: frame.local(normal), fixed: self.shape.fixed(normal), free }
+    }
+}
+
+/// Evaluates the gaps of all nodes, and enters closest points and normals in `geometry`.
+pub(super) struct RingGaps<'a> {
+    pub search: NearSearch<'a>,
+    /// Displacements of the contact rows of all lanes (m).
+    pub displacement: &'a [f64],
+    pub geometry: &'a mut Geometry,
+    pub gaps: &'a mut [f64],
+}
+
+impl Kernel for RingGaps<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let SplineGap { layout, nodes, .. } = self.search.gap;
+        let lanes = layout.lanes;
+        for (node, lane) in nodes.iter().flat_map(|node| (0..lanes).map(move |lane| (*node, lane))) {
+            if layout.clearances[lane].is_finite() {
+                let index = node * lanes + lane;
+                let local = strided_vector3(self.displacement, 3 * node * lanes + lane, lanes);
+                let found = self.search.gap([node, index], local, None);
+                (self.gaps[index], self.geometry.places[index]) = (found.distance, found.foot);
+                self.geometry.set_normal(index, found.normal);
+            }
+        }
     }
 }
 

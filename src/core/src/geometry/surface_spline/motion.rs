@@ -4,7 +4,7 @@
 //! extension beyond the first and last ring have both signs: with Q₋₁ = 2 Q₀ − Q₁, the sum of their magnitudes is at most 1 + 2 (r³ + s³)/6
 //! ≤ 4/3, and the extension adds at most `reach` · |Q₁ − Q₀| ≤ 2 `reach` · max |Q|. So |Σ w Q| ≤ Λ max |Q| with Λ = 4/3 + 2 `reach`.
 
-use super::{Ends, SurfaceSpline, real};
+use super::{Ends, SurfaceSpline};
 use crate::math::vector::{Vector3, vector3_at};
 use crate::scene::settings::Interpolation;
 
@@ -71,33 +71,153 @@ impl SurfaceSpline {
         [position(low - margin) - 1.0, position(high + margin) + 1.0]
     }
 
-    /// Bound as [`SurfaceSpline::turning_rates`], for displacements of the control points (m, three each): S_s is a mean of differences of
-    /// neighbours. Less tight, but fast.
-    pub(crate) fn turning_rate_of_displacement(&self, moved: &[f64]) -> f64 {
-        let (mut size, mut change) = (0.0_f64, 0.0_f64);
-        for ring in moved.chunks_exact(3 * self.around) {
-            let mut before = vector3_at(ring, self.around - 1);
-            for point in 0..self.around {
-                let now = vector3_at(ring, point);
-                size = size.max(now.norm_squared());
-                change = change.max((now - before).norm_squared());
-                before = now;
+    /// Allocates memory for [`SurfaceSpline::patch_motions`].
+    pub(crate) fn motions(&self) -> PatchMotions {
+        PatchMotions::new(self.around)
+    }
+
+    /// Bounds the motion of the surface in every patch around, for control points that move from `before` to `now` (m, three each), while the
+    /// rotor turns by up to `turn` (rad) over the surface that `before` displaces.
+    ///
+    /// Around, a point depends on the control points of four columns, and S_s is a mean of differences of neighbouring columns. So the
+    /// displacement `before` changes [`SurfaceSpline::turning_rates`] by at most Λ (n/2π · largest difference + largest displacement).
+    pub(crate) fn patch_motions(&self, [now, before]: [&[f64]; 2], turn: f64, motions: &mut PatchMotions) {
+        motions.find(self.around, self.amplification(), |column| {
+            let last = (column + self.around - 1) % self.around;
+            let mut most = [0.0_f64; 3];
+            for ring in 0..self.along {
+                let first = ring * self.around;
+                let [at, neighbour] = [column, last].map(|column| vector3_at(before, first + column));
+                let moved = vector3_at(now, first + column) - at;
+                let squares = [moved, at, at - neighbour].map(|vector| vector.norm_squared());
+                most.iter_mut().zip(squares).for_each(|(most, square)| *most = most.max(square));
             }
-        }
-        self.amplification() * (real(self.around) / std::f64::consts::TAU * change.sqrt() + size.sqrt())
+            let [moved, size, difference] = most.map(f64::sqrt);
+            [moved + turn * size, turn * difference / self.spacing()]
+        });
+    }
+
+    /// Bounds the displacement of the surface in every patch around, for control points displaced by at most the root of `square_of`
+    /// their index (m²).
+    pub(crate) fn patch_displacements(&self, square_of: impl Fn(usize) -> f64, motions: &mut PatchMotions) {
+        motions.find(self.around, self.amplification(), |column| {
+            let squares = (0..self.along).map(|ring| square_of(ring * self.around + column));
+            [squares.fold(0.0, f64::max).sqrt(), 0.0]
+        });
     }
 }
 
-/// Largest difference of two sets of vectors (m, three components each).
-pub(crate) fn largest_difference(now: &[f64], before: &[f64]) -> f64 {
-    let pairs = now.chunks_exact(3).zip(before.chunks_exact(3));
-    let square = |(a, b): (&[f64], &[f64])| {
-        (a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2])
-    };
-    pairs.map(square).fold(0.0, f64::max).sqrt()
+/// Bounds of the motion of a surface in every patch around; allocated for the largest surface.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct PatchMotions {
+    /// For each column of control points, a bound of their motion, and of the change of this motion from the previous column (m).
+    columns: Vec<[f64; 2]>,
+    /// Bound for each patch around (m).
+    patches: Vec<f64>,
 }
 
-/// Largest length of vectors (m, three components each).
-pub(crate) fn largest_length(vectors: &[f64]) -> f64 {
-    vectors.chunks_exact(3).map(|v| v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).fold(0.0, f64::max).sqrt()
+impl PatchMotions {
+    /// Allocates bounds for surfaces with at most `around` patches around.
+    pub(crate) fn new(around: usize) -> Self {
+        Self { columns: vec![[0.0; 2]; around], patches: vec![0.0; around] }
+    }
+
+    /// Bound for a patch (m).
+    pub(crate) fn of_patch(&self, patch: usize) -> f64 {
+        self.patches[patch]
+    }
+
+    /// Finds the bounds of the patches from those of the columns. Patch p depends on the columns p − 1 … p + 2.
+    fn find(&mut self, around: usize, amplification: f64, of_column: impl Fn(usize) -> [f64; 2]) {
+        let (columns, patches) = (&mut self.columns[..around], &mut self.patches[..around]);
+        columns.iter_mut().enumerate().for_each(|(index, column)| *column = of_column(index));
+        let of_four = |[[a, _], [b, db], [c, dc], [d, dd]]: [[f64; 2]; 4]| {
+            amplification * (a.max(b).max(c.max(d)) + db.max(dc).max(dd))
+        };
+        for (bound, four) in patches[1..].iter_mut().zip(columns.windows(4)) {
+            *bound = of_four([four[0], four[1], four[2], four[3]]);
+        }
+        for patch in [0, around - 2, around - 1] {
+            patches[patch] = of_four(std::array::from_fn(|offset| columns[(patch + around - 1 + offset) % around]));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Projection, SurfaceSpline};
+    use super::*;
+    use crate::math::real;
+    use crate::scene::settings::{Closure, Interpolation};
+    use std::f64::consts::TAU;
+    use tiprub_test_models::SeededRandom;
+
+    /// Points of a wavy ring of radius 1.
+    fn ring(around: usize, along: usize, random: &mut SeededRandom) -> SurfaceSpline {
+        let data: Vec<[f64; 3]> = (0..along)
+            .flat_map(|ring| (0..around).map(move |column| (ring, column)))
+            .map(|(ring, column)| {
+                let (angle, radius) = (TAU * real(column) / real(around), 1.0 + 0.01 * random.signed());
+                [radius * angle.cos(), radius * angle.sin(), 0.1 * real(ring)]
+            })
+            .collect();
+        SurfaceSpline::new(&data, around, along, Closure::Smooth, Interpolation::Spline).unwrap()
+    }
+
+    /// Returns the distance of a point from a surface, and the patch around of the closest point.
+    fn distance(surface: &SurfaceSpline, point: Vector3) -> (f64, usize) {
+        match surface.project(point, surface.locate(point)) {
+            Projection::Found { gap, .. } => (gap.distance, gap.foot.patch[0]),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    /// A ring turns over a point while single control points move: the distance changes by no more than the bounds of the patches that
+    /// the point faces, and where only a few columns move, distant patches have smaller bounds.
+    #[test]
+    fn patch_motions_bound_change_of_distance() {
+        let (mut random, mut tightest) = (SeededRandom(36), 0.0_f64);
+        for case in 0..60 {
+            let (around, along) = (8 + random.below(20), 2 + random.below(3));
+            let mut surface = ring(around, along, &mut random);
+            let round = surface.control_points().to_vec();
+            let rates = surface.turning_rates(&round);
+            let moving = random.below(around);
+            let mut rows = [(); 2].map(|()| vec![0.0; 3 * round.len()]);
+            for row in &mut rows {
+                for (index, value) in row.iter_mut().enumerate() {
+                    let column = (index / 3 + around - moving) % around;
+                    *value = if column < 2 { 1e-3 * random.signed() } else { 0.0 };
+                }
+            }
+            let [now, before] = &rows;
+            let (turn, mut motions) = (1e-3 * random.signed(), surface.motions());
+            surface.patch_motions([now, before], turn.abs(), &mut motions);
+            let at = |random: &mut SeededRandom| {
+                let angle = TAU * random.unit();
+                let (radius, axial) = (0.97, 0.1 * real(along - 1) * random.unit());
+                Vector3::new(radius * angle.cos(), radius * angle.sin(), axial)
+            };
+            let points: Vec<Vector3> = (0..60).map(|_| at(&mut random)).collect();
+            let [first, second] = [(before, 0.0), (now, turn)].map(|(rows, turn): (&Vec<f64>, f64)| {
+                surface.set_control_points(|index| round[index] + vector3_at(rows, index));
+                let turned = |point: &Vector3| {
+                    let (sin, cos) = turn.sin_cos();
+                    Vector3::new(cos * point[0] - sin * point[1], sin * point[0] + cos * point[1], point[2])
+                };
+                points.iter().map(|point| distance(&surface, turned(point))).collect::<Vec<_>>()
+            });
+            for ((before, patch), (now, _)) in first.iter().zip(&second) {
+                let faced = [*patch + around - 1, *patch, *patch + 1].map(|patch| patch % around);
+                let bound = |patch: usize| turn.abs() * rates[patch] + motions.of_patch(patch);
+                let bound = faced.map(bound).into_iter().fold(0.0, f64::max);
+                let change = (now - before).abs();
+                assert!(change <= bound * (1.0 + 1e-9) + 1e-14, "case {case}: {change:e} beyond {bound:e}");
+                tightest = tightest.max(change / bound);
+            }
+            let opposite = motions.of_patch((moving + around / 2) % around);
+            assert!(opposite < 1e-12, "case {case}: {opposite:e}");
+        }
+        assert!(tightest > 0.2, "{tightest}");
+    }
 }

@@ -68,11 +68,15 @@ impl ContactGroup {
         let side = &mut self.sides[side];
         let lanes = bodies.structures[side.structure].lanes();
         for pair in bodies.pairs.iter().filter(|pair| pair.structure() == side.structure) {
-            let Some(carrier) = pair.carrier() else { continue };
-            let reaction = self.reactions.iter().find(|one| one.structure == carrier.structure);
-            let surface = reaction.map_or(0.0, |reaction| reaction.surface_motion(pair));
-            for node in pair.nodes() {
-                side.travel[node * lanes..(node + 1) * lanes].iter_mut().for_each(|travel| *travel += surface);
+            let Some((carrier, gap)) = pair.carrier().zip(pair.gap().spline_law()) else { continue };
+            let reaction = self.reactions.iter_mut().find(|one| one.structure == carrier.structure);
+            let Some(motions) = reaction.map(|reaction| reaction.surface_motions(gap, carrier.first_row)) else {
+                continue;
+            };
+            for lane in 0..lanes {
+                let faced = gap.faced_patches(lane, pair.drive_now(), 0.0);
+                let motion = gap.largest_faced(faced, |patch| motions.of_patch(patch));
+                pair.nodes().iter().for_each(|node| side.travel[node * lanes + lane] += motion);
             }
         }
     }

@@ -7,9 +7,8 @@ use super::shared_body::SharedBody;
 use super::surroundings::LaneStep;
 use super::trial::ForceInterpolation;
 use crate::geometry::frame::PolarFrame;
-use crate::geometry::surface_spline::motion::largest_difference;
 use crate::math::simd::{InstructionSet, Kernel};
-use crate::math::vector::Vector3;
+use crate::math::vector::{Vector3, vector3_at};
 use crate::modes::bank::ModalBank;
 use crate::modes::coordinates::Coordinates;
 use crate::system::carrier::Spot;
@@ -18,6 +17,9 @@ use std::ops::RangeInclusive;
 /// Largest number of sectors that exchange forces through the structure within a contact solution. Each of them has a block of lanes.
 /// All other sectors share block `BLOCKS`.
 pub(crate) const BLOCKS: usize = 32;
+
+/// Number of rows of a panel of the table of mode shapes: memory is read in order.
+const PANEL: usize = 4 * PADDED;
 
 /// Tables, state and scratch memory of a structure that carries surfaces.
 #[derive(Debug, Clone)]
@@ -36,10 +38,9 @@ pub struct CarrierIntegrator {
     /// Displacements of these rows at the points of the step (m), and velocities at its start (m/s).
     moved: [Vec<f64>; POINTS],
     velocity: Vec<f64>,
+    is_velocity_known: bool,
     /// Displacements of these rows at the start of the span (m).
     begun: Vec<f64>,
-    /// Bound of the largest motion of a point of a surface, divided by the largest motion of a control point.
-    pub(crate) amplification: f64,
     /// Displacements over which forces at each point of the accepted step do work, Σ_k S_ik u_k (m).
     worked: [Vec<f64>; POINTS],
     /// Weights of the work of forces at each point of the tried step.
@@ -76,11 +77,12 @@ impl CarrierIntegrator {
     pub fn new(structure: usize, bank: &ModalBank, degree: usize, lanes: Lanes) -> Self {
         let coordinates = coordinates(bank);
         let (modes, rows) = (bank.modes(), bank.rows());
-        let (stride, padded) = (modes.next_multiple_of(PADDED), rows.next_multiple_of(PADDED));
+        let (stride, padded) = (modes.next_multiple_of(PADDED), rows.next_multiple_of(PANEL));
         let (mut shapes, mut by_mode) = (vec![0.0; rows * stride], vec![0.0; padded * modes]);
         for (row, mode) in (0..rows).flat_map(|row| (0..modes).map(move |mode| (row, mode))) {
             let shape = bank.contact_row(row)[mode];
-            (shapes[row * stride + mode], by_mode[mode * padded + row]) = (shape, shape);
+            shapes[row * stride + mode] = shape;
+            by_mode[(row / PANEL * modes + mode) * PANEL + row % PANEL] = shape;
         }
         let lowest = coordinates.frequencies.iter().copied().filter(|w| *w > 0.0).fold(f64::INFINITY, f64::min);
         let of_mode = |mode: usize| {
@@ -98,8 +100,8 @@ impl CarrierIntegrator {
             instructions: InstructionSet::detect(),
             moved: std::array::from_fn(|_| vec![0.0; padded]),
             velocity: vec![0.0; padded],
+            is_velocity_known: false,
             begun: vec![0.0; padded],
-            amplification: 1.0,
             worked: std::array::from_fn(|_| vec![0.0; padded]),
             work_weights: [[0.0; POINTS]; POINTS],
             impulses: vec![0.0; modes],
@@ -126,32 +128,40 @@ impl CarrierIntegrator {
         &self.moved[point]
     }
 
-    /// Computes the rows at the points 1 … `points` of the step, under the forces there.
+    /// Computes the rows at the points 1 … `points` of the step, under the forces there; and their velocities at the start of the step, if
+    /// they are not known.
     pub fn recover(&mut self, points: usize) {
-        let Self { by_mode, all, moved: [_, one, two, three], body, instructions, .. } = self;
-        let (table, stride, columns) = (&by_mode[..], one.len(), &all[..]);
+        let Self { by_mode, all, moved: [_, one, two, three], velocity, is_velocity_known, body, instructions, .. } =
+            self;
         let [_, a, b, c] = body.at.each_ref().map(|at| &at[..]);
-        match points {
-            1 => instructions.run(Combine { table, stride, columns, coefficients: [a], sums: [one] }),
-            2 => instructions.run(Combine { table, stride, columns, coefficients: [a, b], sums: [one, two] }),
-            _ => instructions.run(Combine { table, stride, columns, coefficients: [a, b, c], sums: [one, two, three] }),
+        let v = &body.state.velocity[..];
+        let rows = RowSums { by_mode, all, instructions };
+        match (points, *is_velocity_known) {
+            (1, true) => rows.find([a], [one]),
+            (1, false) => rows.find([a, v], [one, velocity]),
+            (2, true) => rows.find([a, b], [one, two]),
+            (2, false) => rows.find([a, b, v], [one, two, velocity]),
+            (_, true) => rows.find([a, b, c], [one, two, three]),
+            (_, false) => rows.find([a, b, c, v], [one, two, three, velocity]),
         }
+        *is_velocity_known = true;
     }
 
     /// Finds displacements and velocities of the rows at the start of a span.
     pub(crate) fn find_start(&mut self) {
         self.body.settle();
         let Self { by_mode, all, moved: [start, ..], velocity, body, instructions, .. } = self;
-        let (table, stride, columns) = (&by_mode[..], start.len(), &all[..]);
-        let coefficients = [&body.at[0][..], &body.state.velocity];
-        instructions.run(Combine { table, stride, columns, coefficients, sums: [start, velocity] });
+        RowSums { by_mode, all, instructions }.find([&body.at[0], &body.state.velocity], [start, velocity]);
+        self.is_velocity_known = true;
         self.begun.copy_from_slice(&self.moved[0]);
     }
 
-    /// Largest motion of a surface since the start of the span at the points 1 … `points` of the step (m).
-    pub(crate) fn largest_motion(&self, points: usize) -> f64 {
-        let moved = self.moved[1..=points].iter().map(|moved| largest_difference(moved, &self.begun));
-        self.amplification * moved.fold(0.0, f64::max)
+    /// Largest square of the motion of a control point since the start of the span at the points 1 … `points` of the step (m²); `row` is its
+    /// first row.
+    pub(crate) fn largest_square_motion(&self, row: usize, points: usize) -> f64 {
+        let square =
+            |moved: &Vec<f64>| (vector3_at(&moved[row..], 0) - vector3_at(&self.begun[row..], 0)).norm_squared();
+        self.moved[1..=points].iter().map(square).fold(0.0, f64::max)
     }
 
     /// Advances to the end of an accepted step. Displacements at its end become those at the start of the next step.
@@ -159,10 +169,7 @@ impl CarrierIntegrator {
         self.body.take(level, kind);
         self.body.settle();
         self.moved.swap(0, points);
-        let Self { by_mode, all, velocity, body, instructions, .. } = self;
-        let (table, stride, columns) = (&by_mode[..], velocity.len(), &all[..]);
-        let coefficients = [&body.state.velocity[..]];
-        instructions.run(Combine { table, stride, columns, coefficients, sums: [velocity] });
+        self.is_velocity_known = false;
     }
 
     /// Velocity of a place at the start of the step (m/s), in the directions of the node.
@@ -388,6 +395,23 @@ impl CarrierIntegrator {
         let seen = x.iter().zip(y).zip(z);
         for ((to, response), ((x, y), z)) in self.force.iter_mut().zip(response).zip(seen) {
             *to = response * (a * x + b * y + c * z);
+        }
+    }
+}
+
+/// Sums over all modes at the rows.
+struct RowSums<'a> {
+    /// `[panel][mode][row]`.
+    by_mode: &'a [f64],
+    all: &'a [usize],
+    instructions: &'a InstructionSet,
+}
+
+impl RowSums<'_> {
+    fn find<const N: usize>(&self, coefficients: [&[f64]; N], mut sums: [&mut Vec<f64>; N]) {
+        for (panel, table) in self.by_mode.chunks_exact(PANEL * self.all.len()).enumerate() {
+            let sums = sums.each_mut().map(|sums| &mut sums[panel * PANEL..][..PANEL]);
+            self.instructions.run(Combine { table, stride: PANEL, columns: self.all, coefficients, sums });
         }
     }
 }

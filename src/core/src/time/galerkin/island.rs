@@ -11,7 +11,7 @@ use super::shared_body::SharedBody;
 use super::span::{Flight, SpanStep, SpanSteps, StepGoal, Stopped, integrate};
 use super::state::SectorState;
 use super::surroundings::{AcceptedStep, CarriersInStep, LaneStep, Surroundings, Witness};
-use super::tables::Tables;
+use super::tables::{HALVINGS, Tables, halved};
 use super::trial::{ForceInterpolation, Trial, TrialResult};
 use crate::scene::method::Solver;
 use crate::system::Effort;
@@ -125,14 +125,25 @@ impl Island {
         Self::new(tables, vec![sector], Vec::new(), Vec::new())
     }
 
-    /// Fills the tables for spans of length `span` (s).
+    /// Sets the length of the spans (s). The tables of coupled sectors are filled when a step first uses their level.
     pub fn set_span(&mut self, span: f64) {
         if span.to_bits() == self.span.to_bits() {
             return;
         }
         self.span = span;
-        self.tables.iter_mut().flatten().for_each(|tables| tables.set_span(span));
-        self.shared_bodies_mut().for_each(|body| body.set_span(span));
+        self.tables.iter_mut().flatten().for_each(|tables| tables.begin_span(span));
+        self.shared_bodies_mut().for_each(|body| body.begin_span(span));
+        if self.is_single() {
+            (0..=HALVINGS).for_each(|level| self.fill(level));
+        }
+    }
+
+    /// Fills the tables of a level, unless they are filled.
+    fn fill(&mut self, level: usize) {
+        self.tables.iter_mut().flatten().for_each(|tables| {
+            tables.fill(level);
+        });
+        self.shared_bodies_mut().for_each(|body| body.fill(level));
     }
 
     /// Returns whether the island is a single sector on rigid surfaces.
@@ -365,7 +376,7 @@ impl<S: Surroundings> SpanSteps for IslandInSpan<'_, S> {
     }
 
     fn length(&self, level: usize) -> f64 {
-        self.island.tables[0][0].levels[level].step
+        halved(self.island.span, level)
     }
 
     fn count(&self) -> u64 {
@@ -377,6 +388,7 @@ impl<S: Surroundings> SpanSteps for IslandInSpan<'_, S> {
     }
 
     fn fly(&mut self, step: SpanStep) -> Flight {
+        self.island.fill(step.level);
         let pushed = |one: &IslandSector| one.state.multipliers.iter().any(|value| *value != 0.0);
         if !self.island.carriers.is_empty() || self.island.sectors.iter().any(pushed) {
             return Flight::NeedsTrial;

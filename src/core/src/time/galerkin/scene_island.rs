@@ -33,8 +33,9 @@ use std::mem::take;
 
 /// Contacts count as closed within this fraction of the tolerance.
 const PRECISION: f64 = 1e-4;
-/// Trials of several sectors end at this fraction of the closed-gap precision, because other sectors have moved since; the last pass of
-/// a single sector is exact except for curvature.
+
+/// If contacts may stick, trials of several sectors end at this fraction of the closed-gap precision: errors of sticking contacts
+/// accumulate.
 const CLOSE: f64 = 1e-2;
 
 /// An island of a scene. The uncoupled sectors of one structure take turns in one island, because their tables are the same.
@@ -78,6 +79,19 @@ impl Surroundings for SceneSurroundings<'_> {
             let rows = carrier.map_or(&[][..], |carrier| carriers[carrier].moved(point));
             self.pairs[*pair].bend(drives[point].0.shape_factor, rows);
         }
+    }
+
+    fn find_surface_motions(&mut self, carriers: &[CarrierIntegrator], points: usize) {
+        let own = self.records.iter().filter(|record| record.sector == 0).flat_map(|record| &record.pairs);
+        for (pair, carrier) in own.filter_map(|record| Some((record.pair, record.carrier?))) {
+            self.pairs[pair].find_surface_motions(|row| carriers[carrier].largest_square_motion(row, points));
+        }
+    }
+
+    fn surface_motion(&self, sector: usize) -> f64 {
+        let SpanRecord { pairs, sector, .. } = &self.records[sector];
+        let carried = pairs.iter().filter(|record| record.carrier.is_some());
+        carried.map(|record| self.pairs[record.pair].faced_motion(*sector)).fold(0.0, f64::max)
     }
 
     fn disk(&mut self, structure: usize) -> Option<&mut Disk> {
@@ -140,14 +154,14 @@ impl SceneIsland {
         };
         let first = &structures[touching[0]];
         let blade = model.map(|model| Box::new(BladeSectors::new(model, first, &sectors[0].trial)));
-        let precision = if takes_turns { PRECISION } else { CLOSE * PRECISION };
+        let precision = if !takes_turns && solver.sticks() { CLOSE * PRECISION } else { PRECISION };
         Self {
             set,
             island: Island::new(tables, sectors, disks, carriers),
             records,
             blade,
             turns: if takes_turns { first.modes().sectors() } else { 1 },
-            goal: StepGoal { tolerance, precision: (precision * tolerance).max(rounding), most: u64::MAX },
+            goal: StepGoal { tolerance, precision: (precision * tolerance).max(rounding), longest, most: u64::MAX },
             flights,
         }
     }

@@ -110,7 +110,8 @@ impl Kernel for AddResponse<'_> {
 }
 
 impl SharedBody {
-    /// Creates a body with polynomials of degree `degree`; call [`SharedBody::set_span`] before the first step.
+    /// Creates a body with polynomials of degree `degree`; call [`SharedBody::begin_span`] before the first step, and [`SharedBody::fill`] before the
+    /// first step of a level.
     pub fn new(coordinates: Coordinates, degree: usize) -> Self {
         let count = coordinates.inertia.len();
         let zeros = || vec![0.0; count];
@@ -142,11 +143,15 @@ impl SharedBody {
         self
     }
 
-    /// Fills the tables for spans of length `span` (s).
-    pub fn set_span(&mut self, span: f64) {
-        self.tables.set_span(span);
-        for (response, level) in self.responses.iter_mut().zip(&self.tables.levels) {
-            response.fill(&level.influence, &self.coordinates);
+    /// Sets the length of the spans (s).
+    pub fn begin_span(&mut self, span: f64) {
+        self.tables.begin_span(span);
+    }
+
+    /// Fills the tables of a level, unless they are filled.
+    pub fn fill(&mut self, level: usize) {
+        if self.tables.fill(level) {
+            self.responses[level].fill(&self.tables.levels[level].influence, &self.coordinates);
         }
     }
 
@@ -318,7 +323,8 @@ mod tests {
             let frequencies: Vec<f64> = (0..7).map(|_| random.scale(1e3, 3e5)).collect();
             let ratios: Vec<f64> = (0..7).map(|_| random.of(&[0.0, 0.01, 0.2])).collect();
             let mut whole = SharedBody::new(Coordinates::new(&frequencies, &ratios, 5), degree).loaded();
-            whole.set_span(4e-5);
+            whole.begin_span(4e-5);
+            (0..4).for_each(|level| whole.fill(level));
             whole.state.position[..5].iter_mut().for_each(|q| *q = 1e-5 * random.signed());
             whole.state.velocity[..5].iter_mut().for_each(|v| *v = random.signed());
             let energy = |whole: &SharedBody| -> f64 {

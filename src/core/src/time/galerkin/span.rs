@@ -7,12 +7,12 @@ use crate::system::Effort;
 
 /// The next step is twice as long if the error is below this fraction of the tolerance.
 const LENGTHEN: f64 = 1.0 / 32.0;
-/// Steps that would add to a bank that still holds energy are halved down to this level.
-const SAVED: usize = 3;
+/// Steps that would add to a bank that still holds energy are halved down to this fraction of the longest step.
+const SAVING: f64 = 0.125;
 /// The bank is full at this fraction of the largest energy so far; steps that would add to a full bank are halved down to the shortest.
 const FULL: f64 = 0.01;
-/// Shortest step that is halved because a node comes near between the points (s).
-pub(crate) const SHORTEST_LOOK: f64 = 2.5e-6;
+/// Steps up to this length are not halved because a node comes near between the points (s).
+pub(crate) const SHORTEST_LOOK: f64 = 4e-6;
 
 /// A step within a span: its level, and its start and length as fractions of the span.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -47,6 +47,8 @@ pub struct StepGoal {
     pub tolerance: f64,
     /// Largest gap of a contact that counts as closed (m).
     pub precision: f64,
+    /// Longest step (s); spans may be shorter.
+    pub longest: f64,
     /// Largest number of attempted steps ([`Effort::tried`]).
     pub most: u64,
 }
@@ -185,8 +187,9 @@ impl<S: SpanSteps> StepChoice<'_, S> {
     /// Returns whether a step adds too much energy (J) to the bank: more than the allowance while it still holds energy, or more than its limit.
     fn adds_too_much(&mut self, step: SpanStep, paid: f64) -> bool {
         let (allowance, holds) = (self.steps.bank_allowance(), self.steps.control().bank > 0.0);
+        let must_save = holds && self.steps.length(step.level) > SAVING * self.steps.goal().longest;
         let is_negligible = allowance > 0.0 && paid <= allowance * self.steps.largest_energy();
-        (step.level < SAVED && holds && !is_negligible) || self.overflows_bank(paid)
+        (must_save && !is_negligible) || self.overflows_bank(paid)
     }
 
     /// Returns whether the bank would exceed its limit if `paid` (J) were added. Without any energy so far there is no limit.

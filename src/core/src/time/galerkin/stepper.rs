@@ -65,7 +65,7 @@ impl Stepper for Galerkin {
         islands.iter_mut().try_for_each(|island| island.integrate(system, span, *most_tried, workers))?;
         system.counted.factorisations += system.counted.effort.factorisations - factorisations;
         system.check_travel()?;
-        system.find_gaps(SearchStart::PreviousStep);
+        system.find_gaps(SearchStart::Angles);
         system.structures.iter_mut().for_each(Structure::include_gaps_now);
         system.check_edges()?;
         system.counted.steps += 1;
@@ -84,7 +84,7 @@ impl Stepper for Galerkin {
         self.islands.iter_mut().for_each(|island| island.fly(system, length));
         system.events.now.clear();
         system.events.before.clear();
-        system.find_gaps(SearchStart::PreviousStep);
+        system.find_gaps(SearchStart::Angles);
         system.counted.steps += 1;
         true
     }
@@ -125,7 +125,7 @@ impl Stepper for Galerkin {
             .try_for_each(|island| island.close_steps(system, SteadyInterval { from: time, to: time, span }))?;
         system.counted.factorisations += system.counted.effort.factorisations - factorisations;
         system.steady_phase.active = false;
-        system.find_gaps(SearchStart::PreviousStep);
+        system.find_gaps(SearchStart::Angles);
         Ok(())
     }
 

@@ -97,6 +97,14 @@ pub trait Surroundings {
     /// Deforms the surfaces as at a point of the step.
     fn bend(&mut self, _carriers: &[CarrierIntegrator], _point: usize) {}
 
+    /// Finds bounds on the motion of the surfaces since the start of the span, at the points 1 … `points` of the step.
+    fn find_surface_motions(&mut self, _carriers: &[CarrierIntegrator], _points: usize) {}
+
+    /// Largest of these bounds where a sector may touch a surface (m); 0 if all surfaces are rigid.
+    fn surface_motion(&self, _sector: usize) -> f64 {
+        0.0
+    }
+
     /// Returns the modes of the structure of a disk.
     fn disk(&mut self, _structure: usize) -> Option<&mut Disk> {
         None

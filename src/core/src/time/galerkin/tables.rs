@@ -20,6 +20,8 @@ pub struct Tables {
     /// Tables of a higher degree, for steps in which no sticking contact changes its status; empty without sticking.
     pub steady: Vec<StepTables>,
     modes: ContactModes,
+    /// Length of the span (s).
+    span: f64,
 }
 
 impl Tables {
@@ -39,7 +41,7 @@ impl Tables {
     /// Creates tables of a degree that is known to be suitable.
     pub(crate) fn of_degree(modes: ContactModes, degree: usize) -> Self {
         let levels = (0..=HALVINGS).map(|_| StepTables::new(&modes, degree)).collect();
-        Self { rows: ContactRows::new(&modes), levels, steady: Vec::new(), modes }
+        Self { rows: ContactRows::new(&modes), levels, steady: Vec::new(), modes, span: 0.0 }
     }
 
     /// Modes with inertia, and the flexibility of the others.
@@ -72,17 +74,32 @@ impl Tables {
         steady.unwrap_or(&self.levels[level])
     }
 
-    /// Fills the tables for spans of length `span` (s). Does not allocate.
+    /// Fills the tables of all levels for spans of length `span` (s). Does not allocate.
     pub fn set_span(&mut self, span: f64) {
-        if self.levels[0].step.to_bits() == span.to_bits() {
-            return;
+        self.begin_span(span);
+        (0..self.levels.len()).for_each(|level| {
+            self.fill(level);
+        });
+    }
+
+    /// Sets the length of the spans (s). [`Tables::fill`] then fills the tables of the levels that steps use.
+    pub(crate) fn begin_span(&mut self, span: f64) {
+        self.span = span;
+    }
+
+    /// Fills the tables of a level, unless they are filled. Returns whether they have changed. Does not allocate.
+    pub(crate) fn fill(&mut self, level: usize) -> bool {
+        let step = halved(self.span, level);
+        if self.levels[level].step.to_bits() == step.to_bits() {
+            return false;
         }
         for levels in [&mut self.levels, &mut self.steady] {
-            for (halvings, level) in levels.iter_mut().enumerate() {
-                level.set_step(&self.modes, halved(span, halvings));
-                level.share = halved(1.0, halvings);
+            if let Some(tables) = levels.get_mut(level) {
+                tables.set_step(&self.modes, step);
+                tables.share = halved(1.0, level);
             }
         }
+        true
     }
 }
 

@@ -187,7 +187,7 @@ fn run(modes: &ContactModes, mut wall: MovingWall, span: f64, spans: usize, tole
     let sum = |(kinetic, strain): (f64, f64)| kinetic + strain;
     let start = sum(state.energies(&modes.frequencies, &modes.residual));
     let (mut effort, mut displacements, mut residual, mut most) = (Effort::default(), Vec::new(), 0.0_f64, start);
-    let goal = StepGoal { tolerance, precision: 1e-15, most: u64::MAX };
+    let goal = StepGoal { tolerance, precision: 1e-15, longest: span, most: u64::MAX };
     let mut energy = start;
     for n in 0..spans {
         (wall.start, wall.span) = (span * f64::from(u32::try_from(n).unwrap()), span);
@@ -264,7 +264,7 @@ fn contact_between_the_ends_of_a_short_linear_step_is_found() {
     let state = &mut island.sectors[0].state;
     (state.velocity[0], wall.span) = (amplitude * frequency, span);
     state.gaps.fill(clearance);
-    let goal = StepGoal { tolerance: 1e-8, precision: 1e-15, most: u64::MAX };
+    let goal = StepGoal { tolerance: 1e-8, precision: 1e-15, longest: span, most: u64::MAX };
     island.begin(&mut wall, goal).integrate(&mut effort).unwrap();
     assert!(effort.steps > 1 && wall.impulse > 0.0, "{effort:?}, {} N·s", wall.impulse);
 }

@@ -306,13 +306,13 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         if self.island.active.len() == self.island.sectors.len() {
             return false;
         }
-        let motions = self.island.carriers.iter().map(|carrier| carrier.largest_motion(points));
-        let of_surfaces = motions.fold(0.0, f64::max);
+        self.surroundings.find_surface_motions(&self.island.carriers, points);
         self.island.disks.iter_mut().for_each(|disk| disk.find_motions(points));
         let Island { disks, sectors, active, .. } = &mut *self.island;
         let before = active.len();
         for (index, one) in sectors.iter_mut().enumerate() {
-            let motion = of_surfaces + one.disk.map_or(0.0, |(disk, lane)| disks[disk].motion(lane));
+            let motion =
+                self.surroundings.surface_motion(index) + one.disk.map_or(0.0, |(disk, lane)| disks[disk].motion(lane));
             if one.allowance.is_some_and(|allowance| allowance <= BETWEEN_POINTS_FACTOR * motion) {
                 one.allowance = None;
                 one.trial.forget();

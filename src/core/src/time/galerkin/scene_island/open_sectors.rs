@@ -17,7 +17,7 @@ const PRESCRIBED_MOTION_FACTOR: f64 = 2.0;
 impl SceneIsland {
     /// Selects the sectors that may touch in a span (s), or whose smallest gap an output may need. The others stay open while bodies move by
     /// less than their allowance.
-    pub(super) fn choose_active(&mut self, structures: &[Structure], pairs: &[ContactPair], span: f64) {
+    pub(super) fn choose_active(&mut self, structures: &[Structure], pairs: &mut [ContactPair], span: f64) {
         if !self.island.carriers.is_empty() {
             self.island.sectors.iter_mut().for_each(|one| one.allowance = Some(f64::INFINITY));
             for disk in &mut self.island.disks {
@@ -36,25 +36,24 @@ impl SceneIsland {
     }
 
     /// Finds the allowances of all sectors of a structure.
-    fn find_allowances(&mut self, sectors: Range<usize>, structures: &[Structure], pairs: &[ContactPair], span: f64) {
+    fn find_allowances(
+        &mut self,
+        sectors: Range<usize>,
+        structures: &[Structure],
+        pairs: &mut [ContactPair],
+        span: f64,
+    ) {
         let first = sectors.start;
         let structure = &structures[self.records[first].structure];
         for number in 0..self.records[first].pairs.len() {
-            let pair = &pairs[self.records[first].pairs[number].pair];
-            let ring = pair.gap().smooth_ring().filter(|_| !structure.needed_minima.by_sector).zip(pair.carrier());
-            if let Some((gap, carrier)) = ring {
-                let rows = &structures[carrier.structure].modes().displacement()[carrier.first_row..];
-                let rows = &rows[..3 * gap.surface.control_points().len()];
-                let (drive, motion) = (pair.drive_now(), &pair.prescribed.motion.now);
-                gap.gap_changes(drive, motion, [rows, rows], &mut self.records[first].changes);
-                let mut carriers = self.island.carriers.iter_mut();
-                if let Some(one) = carriers.find(|one| one.structure == carrier.structure) {
-                    one.amplification = one.amplification.max(gap.surface.amplification());
-                }
-            }
+            let pair = &mut pairs[self.records[first].pairs[number].pair];
+            let rows = pair.carrier().map_or(&[][..], |carrier| structures[carrier.structure].modes().displacement());
+            let has_bounds = !structure.needed_minima.by_sector
+                && pair.find_prescribed_changes(rows, &mut self.records[first].changes);
+            let ring = pair.gap().smooth_ring().filter(|_| has_bounds);
             for index in sectors.clone() {
                 let change = self.records[first].changes[self.records[index].sector];
-                let allowance = ring.and_then(|(gap, _)| self.allowance(index, structure, gap, span));
+                let allowance = ring.and_then(|gap| self.allowance(index, structure, gap, span));
                 let allowance =
                     allowance.map(|allowance| allowance - PRESCRIBED_MOTION_FACTOR * change).filter(|left| *left > 0.0);
                 let own = &mut self.island.sectors[index].allowance;
