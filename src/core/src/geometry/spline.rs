@@ -175,16 +175,15 @@ impl SplineGap {
         motions: &mut PatchMotions,
         changes: &mut [f64],
     ) {
-        let turn = motion.turn_over_shape();
+        let turn = motion.relative_turn();
         let off_centre = length(drive.shaft) + length(motion.shaft);
         let factor = drive.shape_factor.abs() + motion.shape_factor.abs();
         let shifted = length(motion.shaft) + motion.opening.abs() + (turn + motion.shape_rotation.abs()) * off_centre;
         let common = shifted + self.surface.amplification() * motion.shape_factor.abs() * self.shape_size;
         // The surface is that of the beginning while it turns.
         self.surface.patch_motions(rows, turn, motions);
-        let bound = |patch: usize| {
-            turn * (self.round_rates[patch] + factor * self.shape_rates[patch]) + motions.of_patch(patch)
-        };
+        let bound =
+            |patch: usize| turn * (self.round_rates[patch] + factor * self.shape_rates[patch]) + motions.bound(patch);
         for (lane, change) in changes.iter_mut().enumerate() {
             *change = common + self.largest_faced(self.faced_patches(lane, drive, turn), bound);
         }
@@ -198,14 +197,14 @@ impl SplineGap {
         self.surface.patches_at(ends, LARGEST_SHIFT + turn)
     }
 
-    /// Largest value of `of_patch` for the patches in a range of [`SplineGap::faced_patches`].
-    pub(crate) fn largest_faced(&self, [first, last]: [f64; 2], of_patch: impl Fn(usize) -> f64) -> f64 {
+    /// Largest `value` of the patches in a range of [`SplineGap::faced_patches`].
+    pub(crate) fn largest_faced(&self, [first, last]: [f64; 2], value: impl Fn(usize) -> f64) -> f64 {
         let around = self.surface.around();
         let whole = real(around);
         let (mut index, _) = split(first - whole * (first / whole).floor(), around);
         let (mut patch, mut largest) = (first, 0.0_f64);
         while patch <= last.min(first + whole) {
-            largest = largest.max(of_patch(index));
+            largest = largest.max(value(index));
             index = if index + 1 == around { 0 } else { index + 1 };
             patch += 1.0;
         }

@@ -61,7 +61,7 @@ impl MotionIncrement {
     }
 
     /// Magnitude of the rotation of the rotor relative to the shape (rad).
-    pub(crate) fn turn_over_shape(&self) -> f64 {
+    pub(crate) fn relative_turn(&self) -> f64 {
         (self.turn - self.shape_rotation).abs()
     }
 

@@ -203,7 +203,8 @@ impl Reaction {
         spot.interpolate(|row| self.response[row])
     }
 
-    /// Bounds the displacements of a surface, whose rows begin at `first`, by the last [`Reaction::respond`], in every patch around (m).
+    /// Bounds the displacements that the last [`Reaction::respond`] causes in every patch of a surface (m); `first` is the first row of the
+    /// surface.
     pub(crate) fn surface_motions(&mut self, gap: &SplineGap, first: usize) -> &PatchMotions {
         let rows = &self.response[first..][..3 * gap.surface.control_points().len()];
         gap.surface.patch_displacements(|point| vector3_at(rows, point).norm_squared(), &mut self.motions);

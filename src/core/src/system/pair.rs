@@ -154,8 +154,8 @@ impl ContactPair {
         self.parts.gap.bend(factor, moved);
     }
 
-    /// Finds upper bounds of the change of any gap of each sector over the last step (m), without the displacements of its nodes and of the
-    /// surface, whose control points are displaced by `rows` (m). Returns false if there are no such bounds.
+    /// Finds upper bounds of the change of any gap of each sector over the last step (m) by prescribed motion alone. `rows` are the current
+    /// displacements of all rows of the surface carrier (m). Returns false unless the surface is a smooth ring with a carrier.
     pub(crate) fn find_prescribed_changes(&mut self, rows: &[f64], changes: &mut [f64]) -> bool {
         let Self { parts, prescribed, motions, .. } = self;
         let (Some(gap), Some(carrier)) = (parts.gap.smooth_ring(), parts.carrier) else { return false };
@@ -164,7 +164,8 @@ impl ContactPair {
         true
     }
 
-    /// Bounds the motion of a smooth ring by the motion of its control points: `square_of` their first row (m²).
+    /// Bounds the motion of a smooth ring in every patch around. `square_of` returns the largest squared motion (m²) of the control point
+    /// whose first row in the carrier is its argument.
     pub(crate) fn find_surface_motions(&mut self, square_of: impl Fn(usize) -> f64) {
         let Self { parts, motions, .. } = self;
         if let (Some(gap), Some(carrier)) = (parts.gap.smooth_ring(), parts.carrier) {
@@ -172,12 +173,13 @@ impl ContactPair {
         }
     }
 
-    /// Largest of these bounds where a sector may face the surface at any time of the last step (m).
+    /// Largest bound of [`ContactPair::find_surface_motions`] in the patches that a sector may face during the last step (m); 0 if the surface
+    /// is not a smooth ring.
     pub(crate) fn faced_motion(&self, sector: usize) -> f64 {
         let Self { parts, prescribed, motions, .. } = self;
         parts.gap.smooth_ring().map_or(0.0, |gap| {
-            let faced = gap.faced_patches(sector, &prescribed.drive.now, prescribed.motion.now.turn_over_shape());
-            gap.largest_faced(faced, |patch| motions.of_patch(patch))
+            let faced = gap.faced_patches(sector, &prescribed.drive.now, prescribed.motion.now.relative_turn());
+            gap.largest_faced(faced, |patch| motions.bound(patch))
         })
     }
 

@@ -169,12 +169,12 @@ pub(super) fn problems(degree: usize, friction: f64, trials: u64) -> Problems {
         // With little residual flexibility the degree is 2.
         let modes = modes(count, nodes, random.scale(1e-3, 10.0), &mut random);
         let span = random.scale(5e-6, 8e-5);
-        let mut tables = Tables::new(modes, span);
+        let tables = Tables::new(modes, span);
         if tables.levels[0].basis.degree != degree {
             continue;
         }
-        tables.set_span(span);
         let mut island = Island::of_one(tables);
+        island.set_span(span);
         for _ in 0..20 {
             island.control = StepControl::default();
             let state = &mut island.sectors[0].state;

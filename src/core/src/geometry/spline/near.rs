@@ -136,7 +136,7 @@ impl<'a> NearSearch<'a> {
     }
 }
 
-/// Evaluates the gaps of all nodes, and enters closest points and normals in `geometry`.
+/// Evaluates the gaps of all nodes (m, `[node · lanes + lane]`), and stores closest points and normals in `geometry`. Skips padding lanes.
 pub(super) struct RingGaps<'a> {
     pub search: NearSearch<'a>,
     /// Displacements of the contact rows of all lanes (m).

@@ -81,26 +81,27 @@ impl SurfaceSpline {
     ///
     /// Around, a point depends on the control points of four columns, and S_s is a mean of differences of neighbouring columns. So the
     /// displacement `before` changes [`SurfaceSpline::turning_rates`] by at most Λ (n/2π · largest difference + largest displacement).
+    /// The bounds do not contain `turn` times the turning rates of the surface without displacement; add them.
     pub(crate) fn patch_motions(&self, [now, before]: [&[f64]; 2], turn: f64, motions: &mut PatchMotions) {
-        motions.find(self.around, self.amplification(), |column| {
+        motions.set_bounds(self.around, self.amplification(), |column| {
             let last = (column + self.around - 1) % self.around;
-            let mut most = [0.0_f64; 3];
+            let mut largest_squares = [0.0_f64; 3];
             for ring in 0..self.along {
                 let first = ring * self.around;
                 let [at, neighbour] = [column, last].map(|column| vector3_at(before, first + column));
                 let moved = vector3_at(now, first + column) - at;
                 let squares = [moved, at, at - neighbour].map(|vector| vector.norm_squared());
-                most.iter_mut().zip(squares).for_each(|(most, square)| *most = most.max(square));
+                largest_squares.iter_mut().zip(squares).for_each(|(largest, square)| *largest = largest.max(square));
             }
-            let [moved, size, difference] = most.map(f64::sqrt);
+            let [moved, size, difference] = largest_squares.map(f64::sqrt);
             [moved + turn * size, turn * difference / self.spacing()]
         });
     }
 
-    /// Bounds the displacement of the surface in every patch around, for control points displaced by at most the root of `square_of`
-    /// their index (m²).
+    /// Bounds the displacement of the surface in every patch around. `square_of` returns the largest squared displacement of the control
+    /// point with an index (m²).
     pub(crate) fn patch_displacements(&self, square_of: impl Fn(usize) -> f64, motions: &mut PatchMotions) {
-        motions.find(self.around, self.amplification(), |column| {
+        motions.set_bounds(self.around, self.amplification(), |column| {
             let squares = (0..self.along).map(|ring| square_of(ring * self.around + column));
             [squares.fold(0.0, f64::max).sqrt(), 0.0]
         });
@@ -110,7 +111,8 @@ impl SurfaceSpline {
 /// Bounds of the motion of a surface in every patch around; allocated for the largest surface.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct PatchMotions {
-    /// For each column of control points, a bound of their motion, and of the change of this motion from the previous column (m).
+    /// For each column of control points (m): a bound of their motion, and, while the rotor turns, a bound of the effect of the difference
+    /// between their displacements and those of the previous column.
     columns: Vec<[f64; 2]>,
     /// Bound for each patch around (m).
     patches: Vec<f64>,
@@ -123,22 +125,22 @@ impl PatchMotions {
     }
 
     /// Bound for a patch (m).
-    pub(crate) fn of_patch(&self, patch: usize) -> f64 {
+    pub(crate) fn bound(&self, patch: usize) -> f64 {
         self.patches[patch]
     }
 
-    /// Finds the bounds of the patches from those of the columns. Patch p depends on the columns p − 1 … p + 2.
-    fn find(&mut self, around: usize, amplification: f64, of_column: impl Fn(usize) -> [f64; 2]) {
+    /// Sets the bounds of the columns, and finds those of the patches. Patch p depends on the columns p − 1 … p + 2.
+    fn set_bounds(&mut self, around: usize, amplification: f64, column_bounds: impl Fn(usize) -> [f64; 2]) {
         let (columns, patches) = (&mut self.columns[..around], &mut self.patches[..around]);
-        columns.iter_mut().enumerate().for_each(|(index, column)| *column = of_column(index));
-        let of_four = |[[a, _], [b, db], [c, dc], [d, dd]]: [[f64; 2]; 4]| {
+        columns.iter_mut().enumerate().for_each(|(index, column)| *column = column_bounds(index));
+        let patch_bound = |[[a, _], [b, db], [c, dc], [d, dd]]: [[f64; 2]; 4]| {
             amplification * (a.max(b).max(c.max(d)) + db.max(dc).max(dd))
         };
         for (bound, four) in patches[1..].iter_mut().zip(columns.windows(4)) {
-            *bound = of_four([four[0], four[1], four[2], four[3]]);
+            *bound = patch_bound([four[0], four[1], four[2], four[3]]);
         }
         for patch in [0, around - 2, around - 1] {
-            patches[patch] = of_four(std::array::from_fn(|offset| columns[(patch + around - 1 + offset) % around]));
+            patches[patch] = patch_bound(std::array::from_fn(|offset| columns[(patch + around - 1 + offset) % around]));
         }
     }
 }
@@ -152,7 +154,7 @@ mod tests {
     use std::f64::consts::TAU;
     use tiprub_test_models::SeededRandom;
 
-    /// Points of a wavy ring of radius 1.
+    /// Returns a ring through points whose radii deviate from 1 m by up to 1 % at random.
     fn ring(around: usize, along: usize, random: &mut SeededRandom) -> SurfaceSpline {
         let data: Vec<[f64; 3]> = (0..along)
             .flat_map(|ring| (0..around).map(move |column| (ring, column)))
@@ -172,8 +174,8 @@ mod tests {
         }
     }
 
-    /// A ring turns over a point while single control points move: the distance changes by no more than the bounds of the patches that
-    /// the point faces, and where only a few columns move, distant patches have smaller bounds.
+    /// A point turns about the axis of a ring while two columns of control points move. Its distance changes by no more than the bounds of
+    /// the patches that it faces. The patch on the opposite side does not move.
     #[test]
     fn patch_motions_bound_change_of_distance() {
         let (mut random, mut tightest) = (SeededRandom(36), 0.0_f64);
@@ -209,13 +211,13 @@ mod tests {
             });
             for ((before, patch), (now, _)) in first.iter().zip(&second) {
                 let faced = [*patch + around - 1, *patch, *patch + 1].map(|patch| patch % around);
-                let bound = |patch: usize| turn.abs() * rates[patch] + motions.of_patch(patch);
+                let bound = |patch: usize| turn.abs() * rates[patch] + motions.bound(patch);
                 let bound = faced.map(bound).into_iter().fold(0.0, f64::max);
                 let change = (now - before).abs();
                 assert!(change <= bound * (1.0 + 1e-9) + 1e-14, "case {case}: {change:e} beyond {bound:e}");
                 tightest = tightest.max(change / bound);
             }
-            let opposite = motions.of_patch((moving + around / 2) % around);
+            let opposite = motions.bound((moving + around / 2) % around);
             assert!(opposite < 1e-12, "case {case}: {opposite:e}");
         }
         assert!(tightest > 0.2, "{tightest}");

@@ -17,7 +17,7 @@ use crate::modes::cyclic::CyclicModel;
 use crate::modes::schemes::ModeCoefficients;
 use crate::scene::method::Scheme;
 use fourier::{Fourier, Synthesis};
-use pass::{Combination, Complexes, Gather, LaneCoefficients, ModalForces, Pass, modal_force_of};
+use pass::{Combination, Complexes, Gather, LaneCoefficients, ModalForces, Pass, find_modal_force};
 
 const NOTHING: Complexes = [[0.0; LANES]; 2];
 
@@ -248,7 +248,7 @@ impl Disk {
     /// Modal force (re, im) of a spectrum of contact forces on one mode.
     pub(super) fn modal_force(&self, mode: usize, n: usize, touched: &[bool], force: &[Complexes]) -> [f64; 2] {
         let shapes = &self.shapes[(n / LANES * self.modes + mode) * self.rows..][..self.rows];
-        modal_force_of(touched, shapes, &force[n / LANES * self.rows..][..self.rows]).map(|part| part[n % LANES])
+        find_modal_force(touched, shapes, &force[n / LANES * self.rows..][..self.rows]).map(|part| part[n % LANES])
     }
 
     /// Adds the displacements caused by the amplitude (re, im) of one mode to the spectrum.

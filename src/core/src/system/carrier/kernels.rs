@@ -47,12 +47,12 @@ impl MoveSurface<'_> {
     #[inline(always)]
     fn fill<L: Octet, const COUNT: usize>(&mut self, first: usize) -> usize {
         let (stride, points) = (self.stride, self.touches[0].weights.len);
-        let mut forces = [[0.0; COUNT]; ROWS];
+        let mut forces = [[0.0; ROWS]; COUNT];
         for offset in 0..COUNT {
             let (touch, direction) = (&self.touches[(first + offset) / self.per], self.columns[first + offset]);
             for (point, weight) in touch.weights.values[..points].iter().enumerate() {
                 for component in 0..3 {
-                    forces[3 * point + component][offset] = weight * direction[component];
+                    forces[offset][3 * point + component] = weight * direction[component];
                 }
             }
         }
@@ -63,9 +63,9 @@ impl MoveSurface<'_> {
                 for component in 0..3 {
                     let start = (first + component) * stride + block * LANES;
                     let Some(flexibility) = self.flexibility[start..].first_chunk::<LANES>() else { continue };
-                    let (flexibility, force) = (L::read(flexibility), &forces[3 * point + component]);
+                    let flexibility = L::read(flexibility);
                     for offset in 0..COUNT {
-                        sums[offset] = sums[offset] + flexibility * L::splat(force[offset]);
+                        sums[offset] = sums[offset] + flexibility * L::splat(forces[offset][3 * point + component]);
                     }
                 }
             }

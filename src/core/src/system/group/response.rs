@@ -75,7 +75,7 @@ impl ContactGroup {
             };
             for lane in 0..lanes {
                 let faced = gap.faced_patches(lane, pair.drive_now(), 0.0);
-                let motion = gap.largest_faced(faced, |patch| motions.of_patch(patch));
+                let motion = gap.largest_faced(faced, |patch| motions.bound(patch));
                 pair.nodes().iter().for_each(|node| side.travel[node * lanes + lane] += motion);
             }
         }

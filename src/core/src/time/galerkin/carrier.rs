@@ -18,7 +18,7 @@ use std::ops::RangeInclusive;
 /// All other sectors share block `BLOCKS`.
 pub(crate) const BLOCKS: usize = 32;
 
-/// Number of rows of a panel of the table of mode shapes: memory is read in order.
+/// Number of rows in a panel of mode shapes. All modes of a panel are contiguous, so sums over modes read memory in order.
 const PANEL: usize = 4 * PADDED;
 
 /// Tables, state and scratch memory of a structure that carries surfaces.
@@ -30,7 +30,7 @@ pub struct CarrierIntegrator {
     pub body: SharedBody,
     /// `[row][mode]` of the rows that move control points, modes padded to whole registers.
     shapes: Vec<f64>,
-    /// `[mode][row]`, rows padded to whole registers.
+    /// Mode shapes in panels of [`PANEL`] rows, `[panel][mode][row of the panel]`, rows padded to whole panels.
     by_mode: Vec<f64>,
     /// The indices 0, 1, 2, … of all modes.
     all: Vec<usize>,
@@ -38,6 +38,7 @@ pub struct CarrierIntegrator {
     /// Displacements of these rows at the points of the step (m), and velocities at its start (m/s).
     moved: [Vec<f64>; POINTS],
     velocity: Vec<f64>,
+    /// True if `velocity` belongs to the start of the current step.
     is_velocity_known: bool,
     /// Displacements of these rows at the start of the span (m).
     begun: Vec<f64>,
@@ -401,7 +402,7 @@ impl CarrierIntegrator {
 
 /// Sums over all modes at the rows.
 struct RowSums<'a> {
-    /// `[panel][mode][row]`.
+    /// `[panel][mode][row of the panel]`.
     by_mode: &'a [f64],
     all: &'a [usize],
     instructions: &'a InstructionSet,
@@ -409,7 +410,7 @@ struct RowSums<'a> {
 
 impl RowSums<'_> {
     fn find<const N: usize>(&self, coefficients: [&[f64]; N], mut sums: [&mut Vec<f64>; N]) {
-        for (panel, table) in self.by_mode.chunks_exact(PANEL * self.all.len()).enumerate() {
+        for (panel, table) in self.by_mode.chunks_exact(PANEL * self.all.len().max(1)).enumerate() {
             let sums = sums.each_mut().map(|sums| &mut sums[panel * PANEL..][..PANEL]);
             self.instructions.run(Combine { table, stride: PANEL, columns: self.all, coefficients, sums });
         }

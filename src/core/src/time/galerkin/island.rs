@@ -125,14 +125,15 @@ impl Island {
         Self::new(tables, vec![sector], Vec::new(), Vec::new())
     }
 
-    /// Sets the length of the spans (s). The tables of coupled sectors are filled when a step first uses their level.
+    /// Sets the length of the spans (s). Fills all tables of a single sector on rigid surfaces; in other islands, the first step of a level
+    /// fills the tables of this level.
     pub fn set_span(&mut self, span: f64) {
         if span.to_bits() == self.span.to_bits() {
             return;
         }
         self.span = span;
-        self.tables.iter_mut().flatten().for_each(|tables| tables.begin_span(span));
-        self.shared_bodies_mut().for_each(|body| body.begin_span(span));
+        self.tables.iter_mut().flatten().for_each(|tables| tables.set_span_length(span));
+        self.shared_bodies_mut().for_each(|body| body.set_span_length(span));
         if self.is_single() {
             (0..=HALVINGS).for_each(|level| self.fill(level));
         }

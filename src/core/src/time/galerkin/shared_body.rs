@@ -110,7 +110,7 @@ impl Kernel for AddResponse<'_> {
 }
 
 impl SharedBody {
-    /// Creates a body with polynomials of degree `degree`; call [`SharedBody::begin_span`] before the first step, and [`SharedBody::fill`] before the
+    /// Creates a body with polynomials of degree `degree`; call [`SharedBody::set_span_length`] before the first step, and [`SharedBody::fill`] before the
     /// first step of a level.
     pub fn new(coordinates: Coordinates, degree: usize) -> Self {
         let count = coordinates.inertia.len();
@@ -144,8 +144,8 @@ impl SharedBody {
     }
 
     /// Sets the length of the spans (s).
-    pub fn begin_span(&mut self, span: f64) {
-        self.tables.begin_span(span);
+    pub fn set_span_length(&mut self, span: f64) {
+        self.tables.set_span_length(span);
     }
 
     /// Fills the tables of a level, unless they are filled.
@@ -323,7 +323,7 @@ mod tests {
             let frequencies: Vec<f64> = (0..7).map(|_| random.scale(1e3, 3e5)).collect();
             let ratios: Vec<f64> = (0..7).map(|_| random.of(&[0.0, 0.01, 0.2])).collect();
             let mut whole = SharedBody::new(Coordinates::new(&frequencies, &ratios, 5), degree).loaded();
-            whole.begin_span(4e-5);
+            whole.set_span_length(4e-5);
             (0..4).for_each(|level| whole.fill(level));
             whole.state.position[..5].iter_mut().for_each(|q| *q = 1e-5 * random.signed());
             whole.state.velocity[..5].iter_mut().for_each(|v| *v = random.signed());

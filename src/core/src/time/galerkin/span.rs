@@ -11,8 +11,8 @@ const LENGTHEN: f64 = 1.0 / 32.0;
 const SAVING: f64 = 0.125;
 /// The bank is full at this fraction of the largest energy so far; steps that would add to a full bank are halved down to the shortest.
 const FULL: f64 = 0.01;
-/// Steps up to this length are not halved because a node comes near between the points (s).
-pub(crate) const SHORTEST_LOOK: f64 = 4e-6;
+/// Longest step (s) that is accepted although an open node comes near zero between its points.
+pub(crate) const LONGEST_NEAR_STEP: f64 = 4e-6;
 
 /// A step within a span: its level, and its start and length as fractions of the span.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -179,12 +179,13 @@ impl<S: SpanSteps> StepChoice<'_, S> {
         }
         let bank = self.steps.control().bank;
         result.misses(tolerance)
-            || (result.near && self.steps.length(step.level) > SHORTEST_LOOK)
+            || (result.near && self.steps.length(step.level) > LONGEST_NEAR_STEP)
             || (result.switches && result.switched > bank)
             || (result.switched < 0.0 && self.adds_too_much(step, -result.switched))
     }
 
-    /// Returns whether a step adds too much energy (J) to the bank: more than the allowance while it still holds energy, or more than its limit.
+    /// Returns whether a step that adds `paid` (J) to the bank is rejected: it exceeds the limit of the bank, or it adds more than the
+    /// allowance to a bank that still holds energy and is longer than [`SAVING`] times the longest step.
     fn adds_too_much(&mut self, step: SpanStep, paid: f64) -> bool {
         let (allowance, holds) = (self.steps.bank_allowance(), self.steps.control().bank > 0.0);
         let must_save = holds && self.steps.length(step.level) > SAVING * self.steps.goal().longest;

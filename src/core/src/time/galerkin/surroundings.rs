@@ -100,7 +100,7 @@ pub trait Surroundings {
     /// Finds bounds on the motion of the surfaces since the start of the span, at the points 1 … `points` of the step.
     fn find_surface_motions(&mut self, _carriers: &[CarrierIntegrator], _points: usize) {}
 
-    /// Largest of these bounds where a sector may touch a surface (m); 0 if all surfaces are rigid.
+    /// Largest bound of [`Surroundings::find_surface_motions`] where a sector may touch a surface (m); 0 if all surfaces are rigid.
     fn surface_motion(&self, _sector: usize) -> f64 {
         0.0
     }

@@ -25,7 +25,8 @@ pub struct Tables {
 }
 
 impl Tables {
-    /// Creates tables for spans up to `longest` (s); call [`Tables::set_span`] before the first span.
+    /// Creates tables for spans up to `longest` (s); call `set_span_length` before the first span, and `fill` before the
+    /// first step of a level.
     pub fn new(modes: ContactModes, longest: f64) -> Self {
         let degree = modes.degree_up_to(longest);
         Self::of_degree(modes, degree)
@@ -74,16 +75,8 @@ impl Tables {
         steady.unwrap_or(&self.levels[level])
     }
 
-    /// Fills the tables of all levels for spans of length `span` (s). Does not allocate.
-    pub fn set_span(&mut self, span: f64) {
-        self.begin_span(span);
-        (0..self.levels.len()).for_each(|level| {
-            self.fill(level);
-        });
-    }
-
     /// Sets the length of the spans (s). [`Tables::fill`] then fills the tables of the levels that steps use.
-    pub(crate) fn begin_span(&mut self, span: f64) {
+    pub(crate) fn set_span_length(&mut self, span: f64) {
         self.span = span;
     }
 

@@ -1,4 +1,4 @@
-//! The fused pass over all modes: forces of the previous step, damping loss, prediction and recovery.
+//! The pass over all modes, block by block: forces of the previous step, damping loss and prediction in one loop, then recovery.
 //!
 //! Contact forces of a step are applied to the modes in the next pass, which loads the contact modes anyway; until then they are
 //! stored as a spectrum (see `ModalBank::finish`). Sums run mode by mode for every lane, so that wider registers do not change the result.
@@ -15,8 +15,8 @@ use crate::modes::schemes::ModeCoefficients;
 /// One complex value per lane: real and imaginary parts.
 pub(in crate::modes::bank) type Complexes = [[f64; LANES]; 2];
 
-/// Columns whose entries are added together while a sum is in registers.
-const TOGETHER: usize = 4;
+/// Number of columns that are added, one after the other, to a sum while it stays in registers.
+const COLUMNS_PER_GROUP: usize = 4;
 
 /// Complex numbers of all lanes in registers.
 type Registers<L> = [L; 2];
@@ -204,7 +204,7 @@ impl OctetKernel for TwoCombinations<'_> {
     }
 }
 
-/// Combines the columns of one block for some sets of amplitudes. The matrix is read in the order of memory.
+/// Computes the spectra of one block for `SETS` sets of amplitudes, from the columns of the contact nodes in `touched`, or from all columns.
 #[inline(always)]
 fn combine<L: Octet, const SETS: usize>(
     matrix: &[Complexes],
@@ -216,13 +216,13 @@ fn combine<L: Octet, const SETS: usize>(
     let count = values.iter().map(|values| values.len()).min().unwrap_or(0);
     let mut columns = (0..count).filter(|column| touched.is_none_or(|touched| touched[column / 3]));
     loop {
-        let (mut group, mut found) = ([0; TOGETHER], 0);
-        for column in columns.by_ref().take(TOGETHER) {
+        let (mut group, mut found) = ([0; COLUMNS_PER_GROUP], 0);
+        for column in columns.by_ref().take(COLUMNS_PER_GROUP) {
             group[found] = column;
             found += 1;
         }
-        if found == TOGETHER {
-            add_columns::<L, SETS, TOGETHER>(matrix, values, group, &mut spectra);
+        if found == COLUMNS_PER_GROUP {
+            add_columns::<L, SETS, COLUMNS_PER_GROUP>(matrix, values, group, &mut spectra);
             continue;
         }
         for column in &group[..found] {
@@ -267,8 +267,8 @@ fn add_columns<L: Octet, const SETS: usize, const COUNT: usize>(
     }
 }
 
-/// Returns p = Ψᴴ F over the contact nodes with forces.
-pub(super) fn modal_force_of(touched: &[bool], shapes: &[Complexes], force: &[Complexes]) -> Complexes {
+/// Returns p = Ψᴴ F over the contact nodes with forces, for callers outside SIMD kernels.
+pub(super) fn find_modal_force(touched: &[bool], shapes: &[Complexes], force: &[Complexes]) -> Complexes {
     let mut found = [[0.0; LANES]; 2];
     write(modal_force::<Portable>(touched, shapes, force), &mut found);
     found

@@ -20,7 +20,7 @@ use crate::system::structure::NeededMinima;
 use crate::time::galerkin::basis::POINTS;
 use crate::time::galerkin::island::StepControl;
 use crate::time::galerkin::record::{MotionCourse, TurningMotion};
-use crate::time::galerkin::span::{Flight, SHORTEST_LOOK, SpanStep, SpanSteps, StepGoal};
+use crate::time::galerkin::span::{Flight, LONGEST_NEAR_STEP, SpanStep, SpanSteps, StepGoal};
 use crate::time::galerkin::state::SectorState;
 use crate::time::galerkin::tables::{HALVINGS, Tables};
 use crate::time::galerkin::trial::{ForceInterpolation, TrialResult};
@@ -421,7 +421,7 @@ impl SpanSteps for BladeInSpan<'_> {
         let is_off_centre = self.place.course.is_off_centre();
         let is_clear = (step.level == 0 || is_off_centre) && self.is_clear(step);
         if !is_clear && (is_off_centre || !self.cubics_stay_open(step)) {
-            let is_shortest = step.level == HALVINGS || self.length(step.level) <= SHORTEST_LOOK;
+            let is_shortest = step.level == HALVINGS || self.length(step.level) <= LONGEST_NEAR_STEP;
             return if is_off_centre || is_shortest { Flight::NeedsTrial } else { Flight::TooLong };
         }
         // Results of a rejected trial do not belong to this step.
