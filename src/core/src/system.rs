@@ -23,7 +23,6 @@ pub(crate) mod work;
 use tiprub_cosim::persist_fields;
 
 use crate::contact::coating::Coating;
-use crate::geometry::surface_spline::SurfaceSpline;
 use crate::geometry::{GapLaw, PrescribedMotion};
 use crate::modes::bank::{BankOptions, ModalBank, SectorModel};
 use crate::modes::modal::ModalModel;
@@ -424,11 +423,13 @@ fn made(part: StructureParts, own: &[usize], pairs: &[PairParts]) -> Structure {
     Structure::touching(model, options, pair_of, has_places)
 }
 
-/// Lets structures skip nodes that face surfaces of other structures. `is_coated` returns whether nodes share cells of a coating.
+/// Lets structures skip nodes that face surfaces of other structures, if all of these surfaces are smooth rings. `is_coated` returns whether
+/// nodes share cells of a coating.
 fn allow_skipping(structures: &mut [Structure], pairs: &[ContactPair], is_coated: impl Fn(usize) -> bool) {
-    for pair in pairs {
-        let surface = pair.gap().spline_law().filter(|_| pair.carrier().is_some()).map(|gap| &gap.surface);
-        if surface.is_some_and(SurfaceSpline::is_smooth_ring) && !is_coated(pair.structure()) {
+    let carried = || pairs.iter().filter(|pair| pair.carrier().is_some());
+    for pair in carried() {
+        let mut own = carried().filter(|other| other.structure() == pair.structure());
+        if own.all(|other| other.gap().smooth_ring().is_some()) && !is_coated(pair.structure()) {
             let structure = &mut structures[pair.structure()];
             structure.nearness = Nearness::new(structure.nodes(), structure.lanes());
         }

@@ -16,9 +16,8 @@ use near::{NearSearch, RingGaps};
 /// Gap of a node without a surface to touch: infinite, so that it is never used as a distance.
 pub(crate) const NOTHING_TO_TOUCH: f64 = f64::INFINITY;
 
-/// Largest angle (rad) by which the closest point of a node lies beside its undisplaced position: a run ends at smaller displacements,
-/// because u²/2r then exceeds the clearance.
-const LARGEST_SHIFT: f64 = 0.06;
+/// Least assumed value of [`SplineGap::largest_shift`] (rad).
+const LEAST_SHIFT: f64 = 0.06;
 
 /// Contact nodes of equally spaced sectors facing a surface spline.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,6 +47,11 @@ pub struct SplineGap {
     shape_rates: Vec<f64>,
     /// Smallest and largest angle of a node from the first node of its sector (rad).
     spread: [f64; 2],
+    /// Largest angle (rad) by which the closest point of a node lies beside its undisplaced position, without the eccentricity of the shaft: a
+    /// run ends when u²/2r exceeds the clearance.
+    largest_shift: f64,
+    /// Smallest radius of a node (m).
+    smallest_radius: f64,
     /// Deviation of a ring through this number of points from a circle (m).
     pub ripple: f64,
     factor: f64,
@@ -70,11 +74,15 @@ impl SplineGap {
         let largest = shape.iter().fold(0.0, |most: f64, change| most.max(change.dot(change)));
         let radius = layout.radii.iter().fold(0.0, |most: f64, radius| most.max(*radius));
         let round = surface.control_points().to_vec();
+        let smallest_radius = layout.radii.iter().copied().fold(f64::INFINITY, f64::min);
+        let clearance = layout.clearances.iter().copied().filter(|one| one.is_finite()).fold(0.0, f64::max);
         Self {
             shape_size: largest.sqrt(),
             round_rates: surface.turning_rates(&round),
             shape_rates: surface.turning_rates(&shape),
             spread: spread(&layout),
+            largest_shift: (2.0 * clearance / smallest_radius).sqrt().max(LEAST_SHIFT),
+            smallest_radius,
             // The sagitta of a facet.
             ripple: 0.125 * radius * surface.spacing() * surface.spacing(),
             nodes: (0..layout.nodes()).collect(),
@@ -194,7 +202,8 @@ impl SplineGap {
     pub(crate) fn faced_patches(&self, lane: usize, drive: &PrescribedMotion, turn: f64) -> [f64; 2] {
         let turned = drive.rotor_angle - drive.shape_rotation;
         let ends = self.spread.map(|offset| self.layout.angles[lane] + turned + offset);
-        self.surface.patches_at(ends, LARGEST_SHIFT + turn)
+        let beside = length(drive.shaft) / self.smallest_radius;
+        self.surface.patches_at(ends, self.largest_shift + beside + turn)
     }
 
     /// Largest `value` of the patches in a range of [`SplineGap::faced_patches`].

@@ -185,7 +185,7 @@ impl ContactPair {
 
     /// Finds the gaps of the nodes that may be in contact or that outputs need, at the displacements of the next step.
     pub(crate) fn find_near_gaps(&mut self, structures: &mut [Structure]) {
-        let is_skipping = structures[self.structure()].nearness.is_used() && self.gap().smooth_ring().is_some();
+        let is_skipping = structures[self.structure()].nearness.is_used();
         let (Some(carrier), true) = (self.carrier(), is_skipping) else {
             return self.find_gaps(structures, SearchStart::PreviousStep);
         };

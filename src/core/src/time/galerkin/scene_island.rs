@@ -34,8 +34,8 @@ use std::mem::take;
 /// Contacts count as closed within this fraction of the tolerance.
 const PRECISION: f64 = 1e-4;
 
-/// If contacts may stick, trials of several sectors end at this fraction of the closed-gap precision: errors of sticking contacts
-/// accumulate.
+/// Trials of sectors of a disk, and of several sectors whose contacts may stick, end at this fraction of the closed-gap precision. Errors of
+/// sticking contacts accumulate. On a disk, the work on small gaps of many closed contacts would overdraw the energy bank.
 const CLOSE: f64 = 1e-2;
 
 /// An island of a scene. The uncoupled sectors of one structure take turns in one island, because their tables are the same.
@@ -154,7 +154,8 @@ impl SceneIsland {
         };
         let first = &structures[touching[0]];
         let blade = model.map(|model| Box::new(BladeSectors::new(model, first, &sectors[0].trial)));
-        let precision = if !takes_turns && solver.sticks() { CLOSE * PRECISION } else { PRECISION };
+        let is_close = !disks.is_empty() || (!takes_turns && solver.sticks());
+        let precision = if is_close { CLOSE * PRECISION } else { PRECISION };
         Self {
             set,
             island: Island::new(tables, sectors, disks, carriers),

@@ -177,7 +177,8 @@ impl<S: SpanSteps> StepChoice<'_, S> {
         if !result.solved || kind == ForceInterpolation::Constant {
             return !result.solved;
         }
-        let bank = self.steps.control().bank;
+        // Small gaps of closed contacts can overdraw the bank slightly. Steps that lose energy fill it again.
+        let bank = self.steps.control().bank.max(0.0);
         result.misses(tolerance)
             || (result.near && self.steps.length(step.level) > LONGEST_NEAR_STEP)
             || (result.switches && result.switched > bank)
@@ -208,7 +209,7 @@ impl<S: SpanSteps> StepChoice<'_, S> {
     /// Tries one step; a shortest step is tried with a constant force if the polynomial is rejected.
     fn try_step(&mut self, step: SpanStep, effort: &mut Effort) -> Result<(TrialResult, ForceInterpolation), Stopped> {
         let result = self.run_trial(step, ForceInterpolation::Polynomial, effort);
-        let affordable = result.solved && !(result.switches && result.switched > self.steps.control().bank);
+        let affordable = result.solved && !(result.switches && result.switched > self.steps.control().bank.max(0.0));
         if step.level < HALVINGS || affordable {
             return Ok((result, ForceInterpolation::Polynomial));
         }
