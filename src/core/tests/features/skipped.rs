@@ -1,10 +1,10 @@
 //! Contact nodes that are certainly open are not evaluated: in every step their gaps are lower bounds, smallest gaps are exact, and no
 //! contact is missed.
 
-use tiprub_core::scene::settings::Shape;
+use tiprub_core::scene::settings::{Closure, ContactSettings, Shape};
 use tiprub_core::{CoSimulation, Rom, Scene, Simulation};
 use tiprub_test_models::disk::TestDisk;
-use tiprub_test_models::{self as models, SeededRandom, flexible, real, set, started};
+use tiprub_test_models::{self as models, SeededRandom, flexible, go, real, rub, set, started};
 
 const LENGTH: f64 = 2e-5;
 const CLEARANCE: f64 = 3.56e-4;
@@ -123,5 +123,42 @@ fn compare_contacts(run: &Simulation, every: &Simulation, totals: &mut Totals) {
         totals.worst = totals.worst.max((a.normal - b.normal).abs());
         totals.largest = totals.largest.max(b.normal);
         totals.contacts += 1;
+    }
+}
+
+/// Mid-chord nodes touch a surface with free ends. Their forces do not depend on the other nodes, which face other surfaces of the same ring
+/// and never touch: smooth elastic ones, on which nodes could be skipped, or rigid ones.
+#[test]
+fn nodes_on_other_surfaces_of_a_ring_do_not_change_contact() {
+    let of = |others_are_elastic: bool| {
+        let mut scene = rub(6);
+        scene.settings.time.step = 5e-7;
+        flexible(&mut scene);
+        let (contact, surface) = (scene.settings.contacts[0].clone(), scene.settings.surfaces[0].clone());
+        scene.settings.contacts.clear();
+        scene.settings.surfaces.clear();
+        for nodes in ["leading", "mid", "trailing"] {
+            let touches = nodes == "mid";
+            let mut own = surface.clone();
+            own.name = nodes.into();
+            if touches {
+                own.spline.get_or_insert_default().closure = Closure::FreeEnds;
+            } else {
+                own.shape = Shape::Circular {};
+                own.structure = own.structure.filter(|_| others_are_elastic);
+            }
+            let gap = if touches { contact.gap } else { 20.0 * contact.gap };
+            scene.settings.surfaces.push(own);
+            let (nodes, slave) = (Some(nodes.into()), nodes.into());
+            scene.settings.contacts.push(ContactSettings { nodes, slave, gap, ..contact.clone() });
+        }
+        let mut simulation = started(&scene);
+        (0..100).for_each(|_| go(&mut simulation, 2e-5));
+        ["friction_loss", "impact_loss", "kinetic_energy"].map(|name| real(&simulation, name))
+    };
+    let [elastic, rigid] = [true, false].map(of);
+    assert!(rigid[1] > 0.0, "{rigid:?}");
+    for (elastic, rigid) in elastic.into_iter().zip(rigid) {
+        assert!((elastic - rigid).abs() < 1e-7 * rigid, "{elastic:e} {rigid:e}");
     }
 }
