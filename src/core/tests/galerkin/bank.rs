@@ -49,10 +49,10 @@ fn blades_conserve_energy_over_thousands_of_impacts() {
     guide::hold("cargo test -p tiprub-core --test galerkin bank");
 }
 
-/// A round casing closes on all blades of a disk. Small gaps of the closed contacts do not overdraw the bank, which would make all steps
-/// shortest steps.
+/// A round casing closes on all blades of a disk. The work on small gaps of closed contacts does not overdraw the bank. Otherwise the blades
+/// would gain energy, or need shortest steps.
 #[test]
-fn closed_contacts_of_a_disk_do_not_shorten_steps() {
+fn closed_contacts_of_a_disk_do_not_overdraw_the_energy_bank() {
     let mut scene = bumps(TestDisk::random(8, 3, 10, 0.25, 3).cyclic());
     scene.settings.time = TimeSettings { tolerance: Some(0.1), ..scene_time() };
     scene.settings.outputs.energies = true;
