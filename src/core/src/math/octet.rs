@@ -433,8 +433,13 @@ mod tests {
         #[inline(always)]
         fn run<L: Octet>(self) -> Vec<u64> {
             let (a, b) = (L::load(&self.one), L::load(&self.other));
-            let mask = a.less(b);
+            let (mask, mut shifted) = (a.less(b), [0.0; 9]);
+            // Not aligned.
+            let (_, unaligned) = shifted.split_first_chunk_mut::<1>().expect("nine numbers");
+            let unaligned: &mut [f64; 8] = unaligned.try_into().expect("eight numbers");
+            (a * b).write(unaligned);
             let all = [
+                L::read(unaligned),
                 a + b,
                 a - b,
                 a * b,
