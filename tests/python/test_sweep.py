@@ -100,6 +100,10 @@ def test_cluster_gives_the_table_of_the_program(plan, capfd):
     assert [(one["first_run"], one["runs"]) for one in report["reasons"]] == [(21, 20)] and "friction" in report["reasons"][0]["reason"]
     expected = whole(plan)
     results = pandas.read_parquet(report)
+    warned = results["warnings"].dropna()
+    assert report["runs_with_warnings"] == len(warned)
+    counts = {one["id"]: one["runs"] for one in report["warning_counts"]}
+    assert counts == warned.str.split(", ").explode().value_counts().to_dict()
     assert results.drop(columns=TIMES).equals(expected)
     # The last parts contain only refused runs, and have the same columns as the others.
     assert len(list(report.path.iterdir())) == 7

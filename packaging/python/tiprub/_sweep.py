@@ -73,9 +73,10 @@ def sweep(
     Returns
     -------
     Report
-        Numbers of `runs`, `finished`, `refused` and `failed` runs, `finished_before`, `tasks`, `reasons`, `seconds`. Its `path` is the
-        directory, a Parquet data set: `pandas.read_parquet(report)`. Outputs over time are in the directory `NAME-histories` beside it. A
-        plan with `[histories]` keeps its unfinished parts in `NAME-unfinished` until they are complete.
+        Numbers of `runs`, `finished`, `refused` and `failed` runs, `finished_before`, `runs_with_warnings`, `tasks`, `reasons`,
+        `warning_counts`, `seconds`. Its `path` is the directory, a Parquet data set: `pandas.read_parquet(report)`. Outputs over time are in
+        the directory `NAME-histories` beside it. A plan with `[histories]` keeps its unfinished parts in `NAME-unfinished` until they are
+        complete.
 
     Raises
     ------
@@ -430,11 +431,14 @@ def _gather(
 
 def _sums(answers: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """Combine the answers of all parts."""
-    sums: dict[str, Any] = {key: sum(answer[key] for answer in answers) for key in ("runs", "finished", "refused", "failed", "finished_before")}
-    reasons: dict[str, dict[str, Any]] = {}
-    for found in sorted((one for answer in answers for one in answer["reasons"]), key=lambda one: one["first_run"]):
-        reasons.setdefault(found["reason"], {**found, "runs": 0})["runs"] += found["runs"]
-    return {**sums, "reasons": list(reasons.values())}
+    numbers = ("runs", "finished", "refused", "failed", "finished_before", "runs_with_warnings")
+    sums: dict[str, Any] = {key: sum(answer[key] for answer in answers) for key in numbers}
+    for key, name in (("reasons", "reason"), ("warning_counts", "id")):
+        counts: dict[str, dict[str, Any]] = {}
+        for found in sorted((one for answer in answers for one in answer[key]), key=lambda one: one["first_run"]):
+            counts.setdefault(found[name], {**found, "runs": 0})["runs"] += found["runs"]
+        sums[key] = list(counts.values())
+    return sums
 
 
 def _equal_columns(files: Sequence[Union[str, Path]], parquet: Any) -> None:

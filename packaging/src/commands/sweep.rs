@@ -84,6 +84,10 @@ pub fn run(arguments: &SweepArguments, console: &Console) -> Result<CommandOutco
         "reasons": outcome.reasons.iter().map(|(reason, run, count)| json!({
             "reason": reason, "first_run": run, "runs": count,
         })).collect::<Vec<_>>(),
+        "runs_with_warnings": outcome.runs_with_warnings,
+        "warning_counts": outcome.warnings.iter().map(|(id, run, count)| json!({
+            "id": id, "first_run": run, "runs": count,
+        })).collect::<Vec<_>>(),
         "seconds": seconds,
         "output": shown_path(&output),
         "histories": has_histories.then(|| shown_path(&files.histories)),
@@ -136,10 +140,18 @@ fn interrupted(outcome: &SweepOutcome, request: &SweepRequest) -> Failure {
     )
 }
 
+/// Returns the noun for a number of runs.
+fn noun(count: usize) -> &'static str {
+    if count == 1 { "run" } else { "runs" }
+}
+
 fn summary(outcome: &SweepOutcome, request: &SweepRequest) -> String {
-    let SweepOutcome { plan_runs, runs, resumed, finished, refused, failed, reasons, .. } = outcome;
+    let SweepOutcome {
+        plan_runs, runs, resumed, finished, refused, failed, reasons, runs_with_warnings, warnings, ..
+    } = outcome;
     let of_plan = if plan_runs == runs { String::new() } else { format!(" (part {} of {plan_runs})", request.part) };
-    let mut text = format!("{runs} runs{of_plan}: {finished} finished, {refused} refused, {failed} failed\n");
+    let mut text =
+        format!("{runs} {}{of_plan}: {finished} finished, {refused} refused, {failed} failed\n", noun(*runs));
     if *resumed > 0 {
         let _ = writeln!(text, "{resumed} of them were done before");
     }
@@ -149,6 +161,15 @@ fn summary(outcome: &SweepOutcome, request: &SweepRequest) -> String {
     }
     if reasons.len() > MOST_REASONS {
         let _ = writeln!(text, "  and {} other reasons in the column `reason`", reasons.len() - MOST_REASONS);
+    }
+    if *runs_with_warnings > 0 {
+        let each: Vec<String> = warnings.iter().map(|(id, _, count)| format!("{id} in {count}")).collect();
+        let _ = writeln!(
+            text,
+            "{runs_with_warnings} {} with warnings or notes: {}",
+            noun(*runs_with_warnings),
+            each.join(", ")
+        );
     }
     text
 }

@@ -9,7 +9,7 @@ use std::{
 use serde_json::Value;
 use tiprub_table::{Cell, Table, parquet_file};
 
-use crate::project::{Project, columns};
+use crate::project::{Project, SCENE, columns};
 
 /// A plan of 24 runs, one of which is refused.
 const PLAN: &str = r#"
@@ -241,6 +241,33 @@ fn unknown_names_end_the_sweep_before_any_run() {
     assert_eq!(project.files(), files, "a check leaves no files");
     let error = project.fail(&["sweep", "plan.toml", "-o", "scene.toml"], 2);
     assert!(error.contains("same file as a file of the plan"), "{error}");
+}
+
+/// The step is slightly too long for the modes, which causes warnings in every run.
+#[test]
+fn summary_counts_runs_with_warnings() {
+    let project = project();
+    let coarse = SCENE.replace("step = 1e-4", "step = 2.05e-3").replace("step = 1e-3", "step = 4.1e-3");
+    fs::write(project.path("scene.toml"), coarse).unwrap();
+    let text = project.succeed(&["sweep", "plan.toml", "--quiet"]);
+    let table = table(&project, "plan.parquet");
+    let warnings = texts(&table, "warnings");
+    let count = warnings.iter().filter(|topics| !topics.is_empty()).count();
+    assert!(count >= 18, "{warnings:?}");
+    let line = text.lines().find(|line| line.starts_with(&format!("{count} runs with warnings or notes: ")));
+    let line = line.unwrap_or_else(|| panic!("{count}: {text}"));
+    // All rows are read again.
+    let answer = swept(&project, &[]);
+    assert_eq!(answer["runs_with_warnings"], count);
+    let topics = answer["warning_counts"].as_array().unwrap();
+    assert!(topics.len() > 1, "{answer}");
+    for topic in topics {
+        let id = topic["id"].as_str().unwrap();
+        let runs = warnings.iter().filter(|topics| topics.split(", ").any(|topic| topic == id)).count();
+        let first = warnings.iter().position(|topics| topics.split(", ").any(|topic| topic == id)).unwrap();
+        assert_eq!((&topic["runs"], &topic["first_run"]), (&runs.into(), &(first + 1).into()), "{id}");
+        assert!(line.contains(&format!("{id} in {runs}")), "{line}");
+    }
 }
 
 #[test]

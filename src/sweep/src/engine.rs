@@ -103,6 +103,10 @@ pub struct SweepOutcome {
     pub failed: usize,
     /// Reasons of refusals and failures, with the number of the first run (from 1) and the number of runs.
     pub reasons: Vec<(String, usize, usize)>,
+    /// Runs with at least one warning.
+    pub runs_with_warnings: usize,
+    /// Identifiers of the warnings, with the number of the first run (from 1) and the number of runs.
+    pub warnings: Vec<(String, usize, usize)>,
     /// False if the part was interrupted; its rows are then in the journal.
     pub is_complete: bool,
 }
@@ -118,6 +122,24 @@ pub fn run(request: &SweepRequest) -> Result<SweepOutcome> {
     }
     part.run_pending()?;
     part.complete()
+}
+
+/// Texts of runs, each with the number of the first run (from 1) and the number of runs.
+#[derive(Debug, Default)]
+struct RunsByText {
+    texts: Vec<(String, usize, usize)>,
+    places: HashMap<String, usize>,
+}
+
+impl RunsByText {
+    /// Adds the text of a run.
+    fn add(&mut self, text: &str, run: usize) {
+        let place = *self.places.entry(text.to_owned()).or_insert(self.texts.len());
+        match self.texts.get_mut(place) {
+            Some((.., count)) => *count += 1,
+            None => self.texts.push((text.to_owned(), run, 1)),
+        }
+    }
 }
 
 /// Number of runs of a plan and of a part, and how many of them have no row yet.
@@ -405,14 +427,14 @@ impl<'a> PartRun<'a> {
             numbers.zip(&self.digests).filter_map(known)
         };
         let count = |status| rows().filter(|(_, row)| row.has_status(status)).count();
-        let (mut reasons, mut places) = (Vec::<(String, usize, usize)>::new(), HashMap::new());
+        let (mut reasons, mut warnings, mut runs_with_warnings) = (RunsByText::default(), RunsByText::default(), 0);
         for (run, row) in rows() {
-            let Some(reason) = row.cell("reason").map(ToString::to_string) else { continue };
-            let place = *places.entry(reason.clone()).or_insert(reasons.len());
-            match reasons.get_mut(place) {
-                Some((.., count)) => *count += 1,
-                None => reasons.push((reason, run, 1)),
+            if let Some(reason) = row.cell("reason") {
+                reasons.add(&reason.to_string(), run);
             }
+            let topics = row.warnings();
+            runs_with_warnings += usize::from(!topics.is_empty());
+            topics.iter().for_each(|topic| warnings.add(topic, run));
         }
         SweepOutcome {
             plan_runs: self.request.plan.design.runs(),
@@ -421,7 +443,9 @@ impl<'a> PartRun<'a> {
             finished: count(Status::Finished),
             refused: count(Status::Refused),
             failed: count(Status::Failed),
-            reasons,
+            reasons: reasons.texts,
+            runs_with_warnings,
+            warnings: warnings.texts,
             is_complete,
         }
     }

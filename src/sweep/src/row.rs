@@ -12,6 +12,10 @@ pub const RUN: &str = "run";
 pub const STATUS: &str = "status";
 /// Digest of everything that determines a row.
 pub const DIGEST: &str = "digest";
+/// Identifiers of the warnings of a run.
+const WARNINGS: &str = "warnings";
+/// Text between two identifiers of warnings.
+const TOPIC_SEPARATOR: &str = ", ";
 
 /// Columns that every result has, after the variables. Other means and totals follow them, and [`LAST_COLUMNS`].
 pub const FIRST_COLUMNS: [(&str, ColumnType); 13] = [
@@ -32,7 +36,7 @@ pub const FIRST_COLUMNS: [(&str, ColumnType); 13] = [
 
 /// Columns at the end of every result.
 pub const LAST_COLUMNS: [(&str, ColumnType); 5] = [
-    ("warnings", ColumnType::Text),
+    (WARNINGS, ColumnType::Text),
     ("warning_texts", ColumnType::Text),
     ("seconds", ColumnType::Real),
     ("stepping_seconds", ColumnType::Real),
@@ -125,7 +129,7 @@ impl Row {
             }
         }
         if !warnings.is_empty() {
-            cells.push(("warnings".to_owned(), Cell::Text(topics.join(", "))));
+            cells.push((WARNINGS.to_owned(), Cell::Text(topics.join(TOPIC_SEPARATOR))));
             cells.push(("warning_texts".to_owned(), Cell::Text(warning::texts(warnings).join("\n"))));
         }
         cells.push(("seconds".to_owned(), Cell::Real(seconds)));
@@ -135,6 +139,14 @@ impl Row {
     /// Returns a value by its name.
     pub fn cell(&self, name: &str) -> Option<&Cell> {
         self.cells.iter().find(|(other, _)| other == name).map(|(_, cell)| cell)
+    }
+
+    /// Returns the identifiers of the warnings, each once.
+    pub fn warnings(&self) -> Vec<&str> {
+        match self.cell(WARNINGS) {
+            Some(Cell::Text(topics)) => topics.split(TOPIC_SEPARATOR).collect(),
+            _ => Vec::new(),
+        }
     }
 
     /// Returns whether the run ended in this way.
