@@ -285,7 +285,7 @@ impl Demo<'_> {
             "answer": answer::json(&self.answer),
             "warnings": warnings_json(&self.native.warnings)[0],
         });
-        Ok(CommandOutcome { text, warnings: self.native.warnings.clone(), rest, json })
+        Ok(CommandOutcome { text, warnings: self.native.warnings.clone(), rest, json, failure: None })
     }
 }
 

@@ -159,7 +159,7 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<CommandOutcome
     if !estimates.is_empty() {
         json["estimated_errors"] = Value::Object(estimates.iter().map(Estimate::json).collect());
     }
-    Ok(CommandOutcome { text, warnings: run.warnings, rest, json })
+    Ok(CommandOutcome { text, warnings: run.warnings, rest, json, failure: None })
 }
 
 /// Describes the files of fields over time.

@@ -27,7 +27,7 @@ const ENDED_BY_USER: i32 = 128 + 2;
 /// Number of different reasons that are listed.
 const MOST_REASONS: usize = 5;
 
-/// Runs the part, or checks it.
+/// Runs the part, or checks it. If no run of a whole plan finished, the outcome contains a failure.
 ///
 /// # Errors
 /// The plan is wrong, a file cannot be written, or the user interrupts the sweep. Rejected and failed runs are no errors.
@@ -97,7 +97,19 @@ pub fn run(arguments: &SweepArguments, console: &Console) -> Result<CommandOutco
     if has_histories {
         let _ = write!(text, "\nwritten: {}", files.histories.display());
     }
-    Ok(CommandOutcome { text, json, ..CommandOutcome::default() })
+    // Programs that share a plan would repeat a failed part.
+    let failure = if arguments.part.is_none() { nothing_finished(&outcome, &request) } else { None };
+    Ok(CommandOutcome { text, json, failure, ..CommandOutcome::default() })
+}
+
+/// Returns the failure of a sweep that has runs, none of which finished.
+fn nothing_finished(SweepOutcome { runs, finished, .. }: &SweepOutcome, request: &SweepRequest) -> Option<Failure> {
+    let problem = match (runs, finished) {
+        (1.., 0) => "no run finished",
+        _ => return None,
+    };
+    let remedy = format!("Correct the plan; the column `reason` of {} contains the reasons", request.output.display());
+    Some(Failure::new(request.plan.path.display(), problem, remedy))
 }
 
 /// Checks the plan without running it.

@@ -270,6 +270,31 @@ fn summary_counts_runs_with_warnings() {
     }
 }
 
+/// The results are complete all the same. Parts succeed, because programs that share a plan would repeat a part that failed.
+#[test]
+fn sweep_without_a_finished_run_fails() {
+    let project = project();
+    fs::write(project.path("plan.toml"), PLAN.replace("[0.0, 0.1, 0.2, -1.0]", "[-1.0]")).unwrap();
+    for arguments in [&["sweep", "plan.toml"][..], &["sweep", "plan.toml", "--json"]] {
+        let output = project.run(arguments);
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{stderr}");
+        assert!(stderr.contains("error: plan.toml: no run finished. ") && stderr.contains("plan.parquet"), "{stderr}");
+        let stdout = String::from_utf8(output.stdout).unwrap();
+        if arguments.contains(&"--json") {
+            let answer: Value = serde_json::from_str(&stdout).unwrap();
+            assert_eq!((&answer["refused"], &answer["error"]["exit_code"]), (&6.into(), &1.into()), "{answer}");
+            assert_eq!(answer["error"]["problem"], "no run finished");
+        } else {
+            assert!(stdout.starts_with("6 runs: 0 finished, 6 refused, 0 failed\n"), "{stdout}");
+        }
+    }
+    assert_eq!(texts(&table(&project, "plan.parquet"), "status"), ["refused"; 6]);
+    let answer = swept(&project, &["--part", "1/6"]);
+    assert!(answer["refused"] == 1 && answer.get("error").is_none(), "{answer}");
+    assert!(project.succeed(&["sweep", "plan.toml", "--part", "2/6"]).starts_with("1 run (part 2/6 of 6): 0 finished"));
+}
+
 #[test]
 fn digest_covers_the_files_of_a_plan() {
     let project = project();

@@ -59,6 +59,19 @@ pub struct CommandOutcome {
     pub rest: String,
     /// Answer as one JSON object.
     pub json: serde_json::Value,
+    /// Failure of work that has an answer all the same. It is printed after the answer, and determines the exit code.
+    pub failure: Option<Failure>,
+}
+
+impl CommandOutcome {
+    /// Returns the JSON object, with the error of a failure.
+    fn json(&self) -> serde_json::Value {
+        let mut json = self.json.clone();
+        if let Some(failure) = &self.failure {
+            json["error"] = failure.to_json()["error"].take();
+        }
+        json
+    }
 }
 
 /// Returns warnings as JSON: their full texts, and their identifiers, levels and lines in the same order.
@@ -168,10 +181,14 @@ impl Console {
     /// # Errors
     /// Stdout does not accept all bytes, for example a file on a full disk.
     fn deliver(&self, outcome: &CommandOutcome) -> Result<ExitCode> {
-        let json = self.json.then(|| format!("{:#}", outcome.json));
+        let json = self.json.then(|| format!("{:#}", outcome.json()));
         let text = json.as_deref().map_or_else(|| printable(outcome.text.trim_end()), printable_json);
         let code = print(&text)?;
         self.warn(&outcome.warnings);
+        if let Some(failure) = &outcome.failure {
+            self.print_error(failure);
+            return Ok(ExitCode::from(failure.exit_code()));
+        }
         if self.json || outcome.rest.is_empty() || code != ExitCode::SUCCESS {
             return Ok(code);
         }
@@ -182,10 +199,15 @@ impl Console {
     /// [`ERRORS_IN_JSON`] to suppress the text.
     pub fn fail(&self, failure: &Failure) {
         self.warn(&failure.warnings);
+        self.print_error(failure);
+        self.answer(failure);
+    }
+
+    /// Prints the text of a failure on stderr.
+    fn print_error(&self, failure: &Failure) {
         if self.prints_errors() {
             let _ = writeln!(std::io::stderr(), "error: {}", printable(&failure.to_string()));
         }
-        self.answer(failure);
     }
 
     /// Returns whether errors are printed as text.
