@@ -244,7 +244,7 @@ def test_plan_of_the_same_name_keeps_its_results(plan, tmp_path):
         shutil.copy(tmp_path / name, elsewhere)
     other = written(elsewhere / plan.name, 1e-3)
     error = refused(module.sweep, other, output=report.path)
-    assert "results of another plan with the name `plan`" in error.problem
+    assert "results of another plan that is also named `plan`" in error.problem
     assert pandas.read_parquet(report).equals(before)
 
 

@@ -25,7 +25,7 @@ use crate::{
     models::{RomStore, SweepSources},
     part::Part,
     plan::Plan,
-    plan_digest::{check_results, plan_facts},
+    plan_digest::{PLAN_FACT, check_results, plan_facts},
     result_file::{self, ROWS_FACT},
     row::{Row, Status},
 };
@@ -413,7 +413,7 @@ impl<'a> PartRun<'a> {
         let SweepRequest { plan, part, .. } = *self.request;
         let own = [
             ("tiprub.release", env!("CARGO_PKG_VERSION").to_owned()),
-            ("tiprub.plan", plan.name.clone()),
+            (PLAN_FACT, plan.name.clone()),
             ("tiprub.part", part.to_string()),
             (ROWS_FACT, self.rows_digest()),
         ];

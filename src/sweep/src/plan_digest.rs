@@ -12,6 +12,9 @@ use crate::{
     plan::{self, Plan, VariableTarget},
 };
 
+/// Key of the name of the plan in the metadata of result files.
+pub(crate) const PLAN_FACT: &str = "tiprub.plan";
+
 /// Returns the SHA-256 of the executable `program`, the plan, its scene and table, and the ROMs of all of its runs. No model is loaded.
 ///
 /// # Errors
@@ -59,8 +62,15 @@ pub(crate) fn check_results(plan: &Plan, output: &Path) -> Result<()> {
     let found = parquet_file::facts(output).unwrap_or_default();
     let differs = |(own, digest): &(&str, String)| found.iter().any(|(key, value)| key == own && value != digest);
     if plan_facts(plan).iter().all(differs) {
-        let problem = format!("contains the results of another plan with the name `{}`", plan.name);
-        return Err(Failure::new(output.display(), problem, "Give another file or directory for the output"));
+        let problem = match found.iter().find(|(key, _)| key == PLAN_FACT) {
+            Some((_, name)) if *name != plan.name => {
+                format!("contains the results of the plan `{name}`, not of `{}`", plan.path.display())
+            }
+            _ => format!("contains the results of another plan that is also named `{}`", plan.name),
+        };
+        let remedy =
+            "Write to another file or directory with --output (in Python: `output`), or move this file elsewhere";
+        return Err(Failure::new(output.display(), problem, remedy));
     }
     Ok(())
 }

@@ -78,7 +78,14 @@ fn plan_keeps_results_of_another_plan_with_the_same_name() {
     fs::copy(bench.path("a.parquet"), elsewhere.path("a.parquet")).unwrap();
     let other = GRID.replace("to = 120", "to = 110");
     let failure = elsewhere.try_part(&other, "a.parquet", Part::WHOLE, 1).unwrap_err();
-    assert!(failure.problem.contains("results of another plan with the name `plan`"), "{failure}");
+    assert!(failure.problem.contains("results of another plan that is also named `plan`"), "{failure}");
+    fs::copy(elsewhere.path("a.parquet"), bench.path("b.parquet")).unwrap();
+    let copied = bench.path("copy.toml");
+    fs::write(&copied, other).unwrap();
+    let copied = Plan::load(&copied, &bench).unwrap();
+    let failure = bench.sweep(&copied, "b.parquet", Part::WHOLE, 1).unwrap_err();
+    assert!(failure.problem.contains("results of the plan `plan`, not of `"), "{failure}");
+    assert!(failure.problem.contains("copy.toml") && failure.remedy.contains("--output"), "{failure}");
     assert_eq!(elsewhere.table("a.parquet"), whole);
 }
 
