@@ -22,6 +22,9 @@ use crate::{
 /// Extensions of the files that a study writes.
 const STUDY_FILES: [&str; 5] = ["csv", "html", "json", "md", "svg"];
 
+/// Extensions of tables that are not Parquet files.
+const OTHER_TABLES: [&str; 6] = ["csv", "json", "tsv", "txt", "xls", "xlsx"];
+
 /// Checks all files that a command line names, before any work.
 ///
 /// # Errors
@@ -40,6 +43,12 @@ pub fn check(command: &Command) -> Result<()> {
             }
             let written = Vec::from_iter(NamedFile::option("--csv", &csv).into_iter().chain(files));
             outputs(&read, &written)?;
+            if let Some(file) = NamedFile::option("--csv", &csv) {
+                reject_kinds(&file, "CSV", &["parquet"], "Use --parquet for a Parquet file")?;
+            }
+            if let Some(file) = NamedFile::option("--parquet", &arguments.parquet) {
+                reject_kinds(&file, "Parquet", &OTHER_TABLES, "Use --csv for a CSV file")?;
+            }
             let Some(fields) = arguments.fields() else { return Ok(()) };
             apart(&written, &[NamedFile::new("--vtk", fields.directory.join(series::INDEX))])?;
             keep_inputs(&read, ("--vtk", &fields.directory), &series::FILES)?;
@@ -77,7 +86,14 @@ pub fn check(command: &Command) -> Result<()> {
                 return Err(not_stdout("--output"));
             }
             let SweepFiles { rows, histories, .. } = SweepFiles::new(&arguments.output());
-            outputs(&read, &[NamedFile::new("--output", rows), NamedFile::new("--output", histories)])
+            let rows = NamedFile::new("--output", rows);
+            outputs(&read, &[rows.clone(), NamedFile::new("--output", histories)])?;
+            reject_kinds(
+                &rows,
+                "Parquet",
+                &OTHER_TABLES,
+                "Give a name that ends in .parquet; sweeps write no other format",
+            )
         }
         Command::Inspect(_) => Ok(()),
     }
@@ -137,10 +153,7 @@ fn study(argument: &str, out: &Path, more: Vec<NamedFile>) -> Result<()> {
 
 /// Checks a command that names its files itself in the directory of an option: no input may be there with one of these extensions.
 fn keep_inputs(inputs: &[NamedFile], (option, out): (&str, &Path), extensions: &[&str]) -> Result<()> {
-    let replaced = |path: &PathBuf| {
-        let kind = path.extension().and_then(|kind| kind.to_str()).unwrap_or_default().to_ascii_lowercase();
-        extensions.contains(&kind.as_str())
-    };
+    let replaced = |path: &PathBuf| extensions.contains(&extension(path).as_str());
     // If the directory does not exist, there are no files.
     let files = out.read_dir().into_iter().flatten().flatten().map(|entry| entry.path()).filter(replaced);
     let files: Vec<Identity> = files.filter_map(|path| identity(&path)).collect();
@@ -151,6 +164,21 @@ fn keep_inputs(inputs: &[NamedFile], (option, out): (&str, &Path), extensions: &
         }
     }
     Ok(())
+}
+
+/// Rejects an output of a format whose name has an extension of another format.
+fn reject_kinds(file: &NamedFile, format: &str, others: &[&str], remedy: &str) -> Result<()> {
+    let kind = extension(&file.path);
+    if !others.contains(&kind.as_str()) {
+        return Ok(());
+    }
+    let what = format!("{} {}", file.role, file.path.display());
+    Err(Failure::usage(what, format!("would contain {format}, but its name ends in .{kind}"), remedy))
+}
+
+/// Returns the extension of a file in lower case; empty if it has none.
+fn extension(path: &Path) -> String {
+    path.extension().and_then(|kind| kind.to_str()).unwrap_or_default().to_ascii_lowercase()
 }
 
 #[cfg(test)]

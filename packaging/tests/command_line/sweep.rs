@@ -296,6 +296,30 @@ fn sweep_without_a_finished_run_fails() {
 }
 
 #[test]
+fn rejects_names_of_other_table_formats_for_results() {
+    let project = project();
+    for (arguments, problem) in [
+        (
+            &["sweep", "plan.toml", "-o", "x.csv"][..],
+            "--output x.csv: would contain Parquet, but its name ends in .csv",
+        ),
+        (
+            &["run", "scene.toml", "--parquet", "x.CSV"],
+            "--parquet x.CSV: would contain Parquet, but its name ends in .csv",
+        ),
+        (
+            &["run", "scene.toml", "--csv", "x.parquet"],
+            "--csv x.parquet: would contain CSV, but its name ends in .parquet",
+        ),
+    ] {
+        let error = project.fail(arguments, 2);
+        assert!(error.contains(problem), "{error}");
+        assert!(error.contains("--csv for") || error.contains("--parquet for") || error.contains("ends in .parquet"));
+    }
+    assert!(!project.files().iter().any(|name| name.starts_with("x.")), "{:?}", project.files());
+}
+
+#[test]
 fn digest_covers_the_files_of_a_plan() {
     let project = project();
     let digest = || swept(&project, &["--check"])["digest"].as_str().unwrap().to_owned();
