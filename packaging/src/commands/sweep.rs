@@ -116,8 +116,13 @@ fn nothing_finished(SweepOutcome { runs, finished, .. }: &SweepOutcome, request:
 fn check(request: &SweepRequest, digest: &str) -> Result<CommandOutcome> {
     let size = engine::check(request)?;
     let text = format!(
-        "the plan has {} runs; {} of the {} runs of part {} are not finished\ndigest: {digest}",
-        size.plan_runs, size.pending, size.runs, request.part
+        "the plan has {} {}; part {} has {} {}; not finished: {}\ndigest: {digest}",
+        size.plan_runs,
+        noun(size.plan_runs),
+        request.part,
+        size.runs,
+        noun(size.runs),
+        size.pending
     );
     let json = json!({
         "plan_runs": size.plan_runs,

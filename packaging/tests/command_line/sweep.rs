@@ -320,6 +320,16 @@ fn rejects_names_of_other_table_formats_for_results() {
 }
 
 #[test]
+fn suggestion_ends_with_a_question_mark() {
+    let project = project();
+    fs::write(project.path("runs.csv"), "sped\n90\n").unwrap();
+    let plan = "scene = \"scene.toml\"\ndesign = \"table\"\ntable = \"runs.csv\"\n";
+    fs::write(project.path("plan.toml"), plan).unwrap();
+    let error = project.fail(&["sweep", "plan.toml"], 2);
+    assert!(error.contains("Did you mean `speed`? If the column only describes the runs"), "{error}");
+}
+
+#[test]
 fn digest_covers_the_files_of_a_plan() {
     let project = project();
     let digest = || swept(&project, &["--check"])["digest"].as_str().unwrap().to_owned();

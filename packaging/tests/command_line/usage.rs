@@ -41,6 +41,7 @@ fn failures_exit_with_one_and_are_available_as_json() {
 #[test]
 fn every_error_is_available_as_one_json_object() {
     let project = Project::new();
+    fs::write(project.path("plan.toml"), "scene = \"scene.toml\"\n").unwrap();
     for (line, code, what, words) in [
         ("run --json", 2, "<SCENE>", "required"),
         ("frobnicate --json", 2, "frobnicate", "unrecognized subcommand"),
@@ -66,6 +67,16 @@ fn every_error_is_available_as_one_json_object() {
         ("study error scene.toml --set gap_offset=0 --set gap_offset=1e-5 --json", 2, "--set gap_offset", "set twice"),
         ("study map scene.toml --set gap_offset=0 --set gap_offset=1e-5 --json", 2, "--set gap_offset", "set twice"),
         ("study error scene.toml --set scheme=1 --json", 2, "--set scheme", "varies this setting itself"),
+        ("sweep plan.toml --threads 0 --json", 2, "--threads", "give a whole number of 1 or more"),
+        ("run scene.toml --vtk x --vtk-every 0 --json", 2, "--vtk-every", "give a whole number of 1 or more"),
+        ("study map scene.toml --revolutions 0 --json", 2, "--revolutions", "give a whole number of 1 or more"),
+        ("study stability scene.toml --threads 0 --json", 2, "--threads", "give a whole number of 1 or more"),
+        ("run none.toml --json", 1, "none.toml", "Give the path of a scene file (TOML), or one of builtin:rotor37,"),
+        ("run rotor37 --json", 1, "rotor37", "Did you mean `builtin:rotor37`?"),
+        ("package abradabel.toml --json", 1, "abradabel.toml", "Did you mean `builtin:abradable`?"),
+        ("run plan.toml --json", 1, "plan.toml:1:1: scene", "use `tiprub sweep`"),
+        ("sweep none.toml --json", 1, "none.toml", "Give the path of a plan (TOML)"),
+        ("sweep scene.toml --json", 2, "scene.toml", "use `tiprub run`"),
         ("demo --out scene.toml --json", 1, "scene.toml", "directory"),
     ] {
         let output = project.run(&line.split(' ').collect::<Vec<_>>());

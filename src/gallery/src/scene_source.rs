@@ -64,7 +64,7 @@ pub fn load(argument: impl AsRef<OsStr>, cache: &RomCache, console: &Console) ->
             if let Some(name) = unknown.take() {
                 failure.diagnostic.remedy = builtin::unknown_model_remedy(&name);
             }
-            failure
+            with_remedy(path, failure)
         }),
     }
 }
@@ -76,8 +76,26 @@ pub fn load(argument: impl AsRef<OsStr>, cache: &RomCache, console: &Console) ->
 pub fn settings(argument: impl AsRef<OsStr>) -> Result<SceneSettings> {
     Ok(match source(argument.as_ref())? {
         SceneSource::Embedded(name, text) => tiprub_format::parse_scene(text, name)?,
-        SceneSource::File(path) => tiprub_format::load_settings(path)?,
+        SceneSource::File(path) => file_settings(path)?,
     })
+}
+
+fn file_settings(path: &Path) -> Result<SceneSettings> {
+    tiprub_format::load_settings(path).map_err(|error| with_remedy(path, error.into()))
+}
+
+/// Adds a better remedy to the failure of a scene file that does not exist, or that is the plan of a sweep.
+fn with_remedy(path: &Path, mut failure: Failure) -> Failure {
+    if !path.exists() {
+        let names = BUILTIN_SCENES.map(|(known, _)| known);
+        let name = path.file_stem().unwrap_or_default().to_string_lossy();
+        let hint = builtin::hint_with_prefix(&name, names);
+        let known = builtin::with_prefix(&names);
+        failure.diagnostic.remedy = format!("{hint}Give the path of a scene file (TOML), or one of {known}");
+    } else if failure.what == "scene" {
+        failure.diagnostic.remedy = "This file is the plan of a sweep: use `tiprub sweep`".to_owned();
+    }
+    failure
 }
 
 /// Returns the files that [`load`] would read: the scene and its ROMs; empty for a built-in or invalid scene.
@@ -111,7 +129,7 @@ pub fn text(argument: impl AsRef<OsStr>) -> Result<SceneText> {
         }
         SceneSource::File(path) => {
             // Checks the text and the size of the file.
-            tiprub_format::load_settings(path)?;
+            file_settings(path)?;
             let text = fs::read_to_string(path).map_err(|error| Failure::file(path, "cannot be read", &error))?;
             let directory = path.parent().unwrap_or(Path::new("")).to_owned();
             Ok(SceneText { name: path.display().to_string(), text, directory })

@@ -156,8 +156,15 @@ fn entry<'a>(path: &str, step: &Step, value: &'a mut Value) -> Result<&'a mut Va
         let names = if names.is_empty() { String::new() } else { format!(" or a name of {}", names.join(", ")) };
         Failure::usage(
             format!("field `{path}`"),
-            format!("the scene has {count} entries `{}`, and none is selected", step.key),
-            format!("Write `{}[...]` with a number from 1 to {count}{names}", step.key),
+            match step.entry {
+                Some(entry) => format!("the scene has no entry `{}[{entry}]`", step.key),
+                None => format!("the scene has {count} entries `{}`, and the path selects none of them", step.key),
+            },
+            match count {
+                0 => format!("Add an entry `{}` to the scene, or correct the path", step.key),
+                1 => format!("Write `{}` without brackets, or `{}[1]`", step.key, step.key),
+                _ => format!("Write `{}[...]` with a number from 1 to {count}{names}", step.key),
+            },
         )
     })
 }

@@ -273,16 +273,31 @@ fn directory(path: &Path) -> &Path {
 }
 
 fn parse(path: &Path) -> Result<PlanFile> {
-    let bytes =
-        tiprub_format::read_file(path, LARGEST_PLAN).map_err(|error| Failure::file(path, "cannot be read", &error))?;
+    let bytes = tiprub_format::read_file(path, LARGEST_PLAN).map_err(|error| unreadable(path, &error))?;
     let text = String::from_utf8(bytes)
         .map_err(|_| Failure::usage(path.display(), "is not UTF-8 text", "Give a plan (TOML)"))?;
     toml::from_str(&text).map_err(|error| {
         let line = error.span().map_or(1, |span| 1 + text[..span.start.min(text.len())].matches('\n').count());
         let remedy = "Correct the plan; the guide page \"Sweeps\" lists its keys";
         let remedy = format!("{}{remedy}", hint(error.message()));
-        Failure::usage(format!("{}:{line}", path.display()), error.message(), remedy)
+        let is_scene = toml::from_str::<toml::Table>(&text).is_ok_and(|keys| keys.contains_key("structure"));
+        let remedy = if is_scene {
+            "This file is a scene: use `tiprub run`, or name it in the plan with the key `scene`"
+        } else {
+            &remedy
+        };
+        let problem = error.message().replace("a nonzero usize", "a whole number of 1 or more");
+        Failure::usage(format!("{}:{line}", path.display()), problem, remedy)
     })
+}
+
+/// Returns the failure of a plan that cannot be read.
+fn unreadable(path: &Path, error: &std::io::Error) -> Failure {
+    let mut failure = Failure::file(path, "cannot be read", error);
+    if error.kind() == std::io::ErrorKind::NotFound {
+        failure.diagnostic.remedy = "Give the path of a plan (TOML); `tiprub run` runs a single scene".to_owned();
+    }
+    failure
 }
 
 /// Returns the question whether a similar key or value was meant; empty if none is similar. The parser's message about an unknown name quotes this name

@@ -132,7 +132,8 @@ fn suggest_label(plan: &Plan, name: &str, mut failure: Failure) -> Failure {
     if plan.is_table && !plan.set.iter().any(|(other, _)| other == name) {
         let how =
             format!("If the column only describes the runs, add [[variable]] with name = \"{name}\" and label = true");
-        failure.diagnostic.remedy = format!("{}. {how}", failure.remedy.trim_end_matches('.'));
+        let end = if failure.remedy.ends_with('?') { "" } else { "." };
+        failure.diagnostic.remedy = format!("{}{end} {how}", failure.remedy.trim_end_matches('.'));
     }
     failure
 }
