@@ -50,6 +50,7 @@ pub fn check(command: &Command) -> Result<()> {
                 reject_kinds(&file, "Parquet", &OTHER_TABLES, "Use --csv for a CSV file")?;
             }
             let Some(fields) = arguments.fields() else { return Ok(()) };
+            outside(&written, ("--vtk", &fields.directory), &series::FILES)?;
             apart(&written, &[NamedFile::new("--vtk", fields.directory.join(series::INDEX))])?;
             keep_inputs(&read, ("--vtk", &fields.directory), &series::FILES)?;
             fields.check_directory()
@@ -174,6 +175,20 @@ fn reject_kinds(file: &NamedFile, format: &str, others: &[&str], remedy: &str) -
     }
     let what = format!("{} {}", file.role, file.path.display());
     Err(Failure::usage(what, format!("would contain {format}, but its name ends in .{kind}"), remedy))
+}
+
+/// Rejects outputs in the directory of an option, if they have an extension of the files that are written there.
+fn outside(outputs: &[NamedFile], (option, directory): (&str, &Path), extensions: &[&str]) -> Result<()> {
+    let Some(directory_identity) = identity(directory) else { return Ok(()) };
+    for output in outputs.iter().filter(|output| extensions.contains(&extension(&output.path).as_str())) {
+        let path = output_file::destination(&output.path).unwrap_or_else(|_| output.path.clone());
+        if path.parent().and_then(identity).as_ref() == Some(&directory_identity) {
+            let what = format!("{} {}", output.role, output.path.display());
+            let problem = format!("may be the same file as one of {option} {}", directory.display());
+            return Err(Failure::usage(what, problem, "Give a file in another directory"));
+        }
+    }
+    Ok(())
 }
 
 /// Returns the extension of a file in lower case; empty if it has none.

@@ -45,6 +45,24 @@ fn accepts_file_names_that_are_not_utf8() {
     assert_eq!((inspect.status.code(), &json(&inspect)["kind"]), (Some(0), &"scene".into()), "{inspect:?}");
 }
 
+/// A table of results must not be replaced by one of the files that `--vtk` writes.
+#[test]
+fn results_are_not_among_the_files_of_fields() {
+    let project = Project::new();
+    fs::create_dir(project.path("fields")).unwrap();
+    for (option, file, directory) in [
+        ("--csv", "fields/rotor_000001.vtu", "fields"),
+        ("--parquet", "fields/../fields/x.VTU", "fields"),
+        ("--report", "new/fields.pvd", "./new"),
+        ("--csv", "x.vtu", "."),
+    ] {
+        let error = project.fail(&["run", "scene.toml", option, file, "--vtk", directory, "--force"], 2);
+        assert!(error.contains(&format!("{option} {file}")) && error.contains("--vtk"), "{error}");
+    }
+    assert!(!project.path("new").exists());
+    project.succeed(&["run", "scene.toml", "--csv", "fields/run.csv", "--vtk", "fields", "--force"]);
+}
+
 #[cfg(unix)]
 fn pipe(project: &Project, name: &str) -> PathBuf {
     let path = project.path(name);

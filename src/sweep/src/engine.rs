@@ -286,14 +286,18 @@ impl<'a> PartRun<'a> {
         }
         let remedy = "Write to another file with --output, or move this one elsewhere";
         let facts = parquet_file::facts(path).unwrap_or_default();
-        let Some((_, rows)) = facts.into_iter().find(|(key, _)| key == ROWS_FACT) else {
+        let Some((_, rows)) = facts.iter().find(|(key, _)| key == ROWS_FACT) else {
             return Err(Failure::new(
                 path.display(),
                 "exists and does not contain the outputs over time of a sweep",
                 remedy,
             ));
         };
-        if !self.files.rows.exists() && rows != self.rows_digest() {
+        if result_file::is_result(&facts) {
+            let problem = "contains the results of another sweep, which outputs over time would replace";
+            return Err(Failure::new(path.display(), problem, remedy));
+        }
+        if !self.files.rows.exists() && *rows != self.rows_digest() {
             return Err(Failure::new(path.display(), "contains the outputs over time of other runs", remedy));
         }
         Ok(())

@@ -25,6 +25,11 @@ pub fn write(path: &Path, table: &Table, facts: &[(&str, String)]) -> Result<()>
     parquet_file::write(path, table, &[facts, &[(VALUES_FACT, values_digest(table))]].concat())
 }
 
+/// Returns whether a file with this metadata contains the results of a sweep, and not its outputs over time.
+pub(crate) fn is_result(facts: &[(String, String)]) -> bool {
+    facts.iter().any(|(key, _)| key == VALUES_FACT)
+}
+
 /// Returns the digest of the names and the values of all columns. It does not depend on the order of columns, on columns without values, or on
 /// the type of numbers, because these may change if the parts of a plan get the same columns.
 fn values_digest(Table { columns }: &Table) -> String {
@@ -101,7 +106,7 @@ pub fn read(path: &Path) -> Result<(Vec<Row>, Vec<String>)> {
         Failure::new(path.display(), "exists and is not the result of a sweep", remedy)
     };
     let facts = parquet_file::facts(path).map_err(|_| other())?;
-    if !facts.iter().any(|(key, _)| key == ROWS_FACT) {
+    if !facts.iter().any(|(key, _)| key == ROWS_FACT) || !is_result(&facts) {
         return Err(other());
     }
     let damaged = || {

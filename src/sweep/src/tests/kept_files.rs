@@ -116,6 +116,24 @@ fn files_of_users_are_not_replaced() {
     assert_ne!(two, three);
 }
 
+/// The results of the plan `a.histories` have the name of the outputs over time of the plan `a`.
+#[test]
+fn outputs_over_time_do_not_replace_results_of_another_plan() {
+    let bench = Bench::new();
+    let plan = format!("{GRID}[histories]\noutputs = [\"torque\"]\n");
+    bench.run(&plan, "a.parquet");
+    fs::remove_file(bench.path("a.histories.parquet")).unwrap();
+    bench.run(GRID, "a.histories.parquet");
+    let results = fs::read(bench.path("a.histories.parquet")).unwrap();
+    let failure = bench.try_part(&plan, "a.parquet", Part::WHOLE, 1).unwrap_err();
+    assert!(failure.to_string().contains("a.histories.parquet: contains the results of another sweep"), "{failure}");
+    assert_eq!(fs::read(bench.path("a.histories.parquet")).unwrap(), results);
+    fs::remove_file(bench.path("a.histories.parquet")).unwrap();
+    bench.run(&plan, "a.parquet");
+    let failure = bench.try_part(GRID, "a.histories.parquet", Part::WHOLE, 1).unwrap_err();
+    assert!(failure.problem.contains("is not the result of a sweep"), "{failure}");
+}
+
 /// A sweep locks its journal. If another sweep removes the journal just after it was opened, it is opened again.
 #[test]
 fn simultaneous_sweeps_compute_each_run_once() {
