@@ -41,6 +41,12 @@ def blade(tmp_path):
     return module.rom(tmp_path / "blade.rom.safetensors", MASS, STIFFNESS, MAP, POSITIONS, **BLADE)
 
 
+def test_missing_rom_of_a_dict_is_not_relative_to_a_file(tmp_path):
+    error = refused(module.run, SCENE, directory=tmp_path, quiet=True)
+    assert error.what == str(tmp_path / "blade.rom.safetensors") and "structure[1].rom in scene" in error.remedy
+    assert "relative" not in error.remedy
+
+
 def test_a_dict_a_text_and_a_file_are_the_same_scene(blade, tmp_path, tiprub):
     result = module.run(SCENE, directory=tmp_path, quiet=True)
     assert isinstance(result, pandas.DataFrame) and result.index.name == "time"

@@ -37,6 +37,19 @@ fn failures_exit_with_one_and_are_available_as_json() {
     assert!(truncated.contains("small.rom.safetensors"), "{truncated}");
 }
 
+/// Only a relative path depends on the place of the scene file. The Python module gives absolute paths for scenes without a file.
+#[test]
+fn remedy_for_a_missing_rom_explains_relative_paths() {
+    let project = Project::new();
+    for (rom, is_relative) in [("none.safetensors".into(), true), (project.path("none.safetensors"), false)] {
+        let scene = SCENE.replace("\"small.rom.safetensors\"", &format!("{:?}", rom.display().to_string()));
+        fs::write(project.path("missing.toml"), scene).unwrap();
+        let error = project.fail(&["run", "missing.toml"], 1);
+        assert!(error.contains("Correct structure[1].rom in missing.toml"), "{error}");
+        assert_eq!(error.contains("relative to the scene file"), is_relative, "{error}");
+    }
+}
+
 /// Errors of every command, from the parser, the check of names, or the work.
 #[test]
 fn every_error_is_available_as_one_json_object() {

@@ -66,9 +66,10 @@ pub fn load_scene(path: &Path, builtin: &dyn Fn(&str) -> Option<Result<Rom, Stri
     read_scene(&scene_text(path)?, &path.display().to_string(), |index, structure| match builtin_model(structure) {
         Some(name) => builtin_rom(path, index, name, builtin(name)),
         None => {
+            let relative =
+                if Path::new(&structure.rom).is_relative() { " (a path relative to the scene file)" } else { "" };
             let remedy = format!(
-                "Correct structure[{}].rom in {} (a path relative to the scene file), or create the file with `tiprub \
-                 reduce`",
+                "Correct structure[{}].rom in {}{relative}, or create the file with `tiprub reduce`",
                 index + 1,
                 path.display()
             );
