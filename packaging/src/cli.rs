@@ -210,7 +210,11 @@ pub struct InspectArguments {
     /// An .fmu, a ROM (.safetensors), a scene (.toml) or a built-in scene (`builtin:abradable`).
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
-    /// Also measure the computing time of each effect that the scene omits, over its first 100 communication steps.
+    /// Also print the cost of each effect that the scene omits, and the features that are off.
+    #[arg(long)]
+    pub all: bool,
+    /// Also measure the computing time of each effect that the scene omits, over its first 100 communication steps; implies
+    /// --all.
     #[arg(long)]
     pub measure: bool,
     /// Changes to the scene.

@@ -123,14 +123,15 @@ fn seconds(scene: &Scene) -> Option<f64> {
     Some(run()?.min(run()?))
 }
 
-/// Formats the list as text.
-pub fn text(all: &[LeftOut]) -> String {
+/// Formats the list as text: the effects alone, or effects and features with their costs.
+pub fn text(all: &[LeftOut], has_costs: bool) -> String {
     let mut text = String::new();
     let groups = [(RowGroup::Physics, "effects left out here"), (RowGroup::Machinery, "features that are off")];
-    for (group, title) in groups {
+    for (group, title) in groups.into_iter().take(if has_costs { 2 } else { 1 }) {
         let _ = writeln!(text, "\n{title:<53} how to include it");
         for LeftOut { effect, cost } in all.iter().filter(|one| one.effect.group == group) {
-            let _ = writeln!(text, "  {:<51} {}{}", effect.name, effect.takes, cost_text(cost.as_ref()));
+            let cost = if has_costs { cost_text(cost.as_ref()) } else { String::new() };
+            let _ = writeln!(text, "  {:<51} {}{cost}", effect.name, effect.takes);
         }
     }
     text
@@ -245,7 +246,10 @@ mod tests {
         // The ROM has no spin matrices either.
         let spin = refused("centrifugal stiffening");
         assert!(!spin.allowed_with_fixed_steps && spin.reason.contains("With fixed steps, "), "{spin:?}");
-        assert!(text(&all_adaptive).contains("needs fixed steps"));
-        assert!(text(&all).contains("left out here") && json(&all)[0]["name"].is_string());
+        assert!(text(&all_adaptive, true).contains("needs fixed steps"));
+        let [short, long] = [false, true].map(|has_costs| text(&all, has_costs));
+        assert!(long.contains("features that are off") && long.contains(" costs +"), "{long}");
+        assert!(!short.contains("features that are off") && !short.contains(" costs +"), "{short}");
+        assert!(short.contains("left out here") && json(&all)[0]["name"].is_string());
     }
 }

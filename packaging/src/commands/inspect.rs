@@ -37,7 +37,7 @@ enum FileKind {
 pub fn run(arguments: &InspectArguments, console: &Console) -> Result<CommandOutcome> {
     let path = arguments.file.as_path();
     match kind(path)? {
-        FileKind::Fmu => inspect_fmu(path, arguments.measure, console),
+        FileKind::Fmu => inspect_fmu(path, detail(arguments), console),
         FileKind::Rom => {
             let facts = RomFacts::of(&scene_source::read_rom(path)?, None)?;
             let slips = facts.slips();
@@ -48,12 +48,31 @@ pub fn run(arguments: &InspectArguments, console: &Console) -> Result<CommandOut
         }
         FileKind::Scene => {
             let scene = arguments.options.load(path, &arguments.cache.cache(), console)?;
-            let described = describe_scene(&scene, arguments.measure, console);
-            let Described { text, warnings, json } =
+            let described = describe_scene(&scene, detail(arguments), console);
+            let Described { text, warnings, rest, json } =
                 described.map_err(|failure| scene_source::located(path, failure))?;
             let json = json!({ "kind": "scene", "scene": json });
-            Ok(CommandOutcome { text, warnings, json, ..CommandOutcome::default() })
+            Ok(CommandOutcome { text, warnings, rest, json, ..CommandOutcome::default() })
         }
+    }
+}
+
+/// What is printed about effects that a scene leaves out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Detail {
+    /// Effects, without costs.
+    Effects,
+    /// Effects and features, with costs.
+    All,
+    /// The same with measured times.
+    Measured,
+}
+
+fn detail(arguments: &InspectArguments) -> Detail {
+    match (arguments.measure, arguments.all) {
+        (true, _) => Detail::Measured,
+        (false, true) => Detail::All,
+        (false, false) => Detail::Effects,
     }
 }
 
@@ -81,7 +100,7 @@ fn kind(path: &Path) -> Result<FileKind> {
     }
 }
 
-fn inspect_fmu(path: &Path, measure: bool, console: &Console) -> Result<CommandOutcome> {
+fn inspect_fmu(path: &Path, detail: Detail, console: &Console) -> Result<CommandOutcome> {
     let in_file = |failure: Failure| failure.at(path.display());
     let files = entries(&mut open_archive(path)?).map_err(in_file)?;
     let resource = |name: &str| name.strip_prefix("resources/").and_then(tiprub_format::largest_resource);
@@ -113,11 +132,12 @@ fn inspect_fmu(path: &Path, measure: bool, console: &Console) -> Result<CommandO
         let name = format!("{}{elements}", variable.name);
         let _ = writeln!(text, "  {:<11} {name:<34} {unit:<8} {meaning}", variable.causality);
     }
-    let resources = inspect_resources(&fmu, measure, console)?;
-    let mut warnings = Vec::new();
+    let resources = inspect_resources(&fmu, detail, console)?;
+    let (mut warnings, mut rest) = (Vec::new(), String::new());
     if let Some(scene) = &resources {
         let _ = write!(text, "\n{}", scene.text);
         warnings.clone_from(&scene.warnings);
+        rest.clone_from(&scene.rest);
     }
     let json = json!({
         "kind": "fmu",
@@ -133,11 +153,11 @@ fn inspect_fmu(path: &Path, measure: bool, console: &Console) -> Result<CommandO
             .collect::<serde_json::Map<_, _>>(),
         "scene": resources.map(|scene| scene.json),
     });
-    Ok(CommandOutcome { text, warnings, json, ..CommandOutcome::default() })
+    Ok(CommandOutcome { text, warnings, rest, json, ..CommandOutcome::default() })
 }
 
 /// Reads the scene inside a tiprub FMU and checks it against the token; `None` for FMUs of other tools.
-fn inspect_resources(fmu: &UnpackedFmu, measure: bool, console: &Console) -> Result<Option<Described>> {
+fn inspect_resources(fmu: &UnpackedFmu, detail: Detail, console: &Console) -> Result<Option<Described>> {
     let directory: PathBuf = fmu.resources();
     if !directory.join(tiprub_format::SCENE_FILE).is_file() {
         return Ok(None);
@@ -150,17 +170,19 @@ fn inspect_resources(fmu: &UnpackedFmu, measure: bool, console: &Console) -> Res
             "Package the FMU again with `tiprub package`; the scene or modelDescription.xml was modified",
         ));
     }
-    describe_scene(&resources.scene, measure, console).map(Some)
+    describe_scene(&resources.scene, detail, console).map(Some)
 }
 
 /// Description of a scene.
 struct Described {
     text: String,
     warnings: Vec<Warning>,
+    /// Reference to more results.
+    rest: String,
     json: Value,
 }
 
-fn describe_scene(scene: &Scene, measure: bool, console: &Console) -> Result<Described> {
+fn describe_scene(scene: &Scene, detail: Detail, console: &Console) -> Result<Described> {
     let settings = &scene.settings;
     let in_scene = |error| Failure::from_core(format!("scene `{}`", settings.name), error);
     // This takes long for many coupled sectors.
@@ -196,8 +218,10 @@ fn describe_scene(scene: &Scene, measure: bool, console: &Console) -> Result<Des
         json["structure"] = json!(structure.name);
         roms.push(json);
     }
-    let absent = left_out::left_out(scene, measure).map_err(in_scene)?;
-    text.push_str(&left_out::text(&absent));
+    let absent = left_out::left_out(scene, detail == Detail::Measured).map_err(in_scene)?;
+    let has_all = detail != Detail::Effects;
+    text.push_str(&left_out::text(&absent, has_all));
+    let rest = if has_all { "" } else { "for the cost of each effect in this scene, and features that are off: --all" };
     drop(task);
     let [texts, details] = warnings_json(simulation.warnings());
     let json = json!({
@@ -214,7 +238,7 @@ fn describe_scene(scene: &Scene, measure: bool, console: &Console) -> Result<Des
         },
         "roms": roms,
     });
-    Ok(Described { text, warnings: simulation.warnings().to_vec(), json })
+    Ok(Described { text, warnings: simulation.warnings().to_vec(), rest: rest.to_owned(), json })
 }
 
 fn gap_text(contact: &ContactSettings) -> String {
@@ -314,6 +338,7 @@ mod tests {
                 file: path,
                 cache: CacheArguments::default(),
                 options: SceneOptions::default(),
+                all: false,
                 measure: false,
             },
             &Console::new(true, false),
@@ -342,6 +367,7 @@ mod tests {
                 file: "/nowhere/x.fmu".into(),
                 cache: CacheArguments::default(),
                 options: SceneOptions::default(),
+                all: false,
                 measure: false,
             },
             &Console::new(true, false),

@@ -39,6 +39,24 @@ fn inspect_shows_contact_nodes_and_settings() {
     assert!(scene.contains("\nstructure rotor, ROM small: One mass"), "{scene}");
 }
 
+#[test]
+fn inspect_prints_costs_of_absent_effects_only_on_request() {
+    let project = Project::new();
+    project.succeed(&["package", "scene.toml", "--fmi", "3", "-o", "x.fmu", "--library", "library.so"]);
+    for file in ["scene.toml", "x.fmu"] {
+        let [short, all, measured] =
+            [&["inspect", file][..], &["inspect", file, "--all"], &["inspect", file, "--measure"]]
+                .map(|arguments| project.succeed(arguments));
+        assert!(short.contains("effects left out here") && !short.contains(" costs +"), "{short}");
+        assert!(short.ends_with("features that are off: --all\n"), "{short}");
+        for long in [&all, &measured] {
+            assert!(long.contains("\nfeatures that are off  ") && long.contains(" costs +"), "{long}");
+            assert!(!long.contains("--all"), "{long}");
+        }
+        assert!(measured.contains("times the time per step") && !all.contains("times the time per step"));
+    }
+}
+
 /// A scheme that is chosen when the scene is read goes with its reason into the FMU, whose scene names it.
 #[test]
 fn run_inspect_and_the_fmu_report_the_scheme_and_its_reason() {
