@@ -154,13 +154,18 @@ impl ContactPair {
         self.parts.gap.bend(factor, moved);
     }
 
-    /// Finds upper bounds of the change of any gap of each sector over the last step (m) by prescribed motion alone. `rows` are the current
-    /// displacements of all rows of the surface carrier (m). Returns false unless the surface is a smooth ring with a carrier.
-    pub(crate) fn find_prescribed_changes(&mut self, rows: &[f64], changes: &mut [f64]) -> bool {
+    /// Finds upper bounds of the change of any gap of each sector over the last step (m) by the prescribed `motion` alone. `rows` are the
+    /// current displacements of all rows of the surface carrier (m). Returns false unless the surface is a smooth ring with a carrier.
+    pub(crate) fn find_prescribed_changes(
+        &mut self,
+        motion: &MotionIncrement,
+        rows: &[f64],
+        changes: &mut [f64],
+    ) -> bool {
         let Self { parts, prescribed, motions, .. } = self;
         let (Some(gap), Some(carrier)) = (parts.gap.smooth_ring(), parts.carrier) else { return false };
         let rows = &rows[carrier.first_row..][..3 * gap.surface.control_points().len()];
-        gap.gap_changes(&prescribed.drive.now, &prescribed.motion.now, [rows, rows], motions, changes);
+        gap.gap_changes(&prescribed.drive.now, motion, [rows, rows], motions, changes);
         true
     }
 

@@ -40,7 +40,7 @@ pub struct CarrierIntegrator {
     velocity: Vec<f64>,
     /// True if `velocity` belongs to the start of the current step.
     is_velocity_known: bool,
-    /// Displacements of these rows at the start of the span (m).
+    /// Displacements of these rows from which motion is measured (m).
     begun: Vec<f64>,
     /// Displacements over which forces at each point of the accepted step do work, Σ_k S_ik u_k (m).
     worked: [Vec<f64>; POINTS],
@@ -154,15 +154,20 @@ impl CarrierIntegrator {
         let Self { by_mode, all, moved: [start, ..], velocity, body, instructions, .. } = self;
         RowSums { by_mode, all, instructions }.find([&body.at[0], &body.state.velocity], [start, velocity]);
         self.is_velocity_known = true;
+        self.begin_motions();
+    }
+
+    /// Measures motion from the displacements at the start of the step.
+    pub(crate) fn begin_motions(&mut self) {
         self.begun.copy_from_slice(&self.moved[0]);
     }
 
-    /// Largest square of the motion of a control point since the start of the span at the points 1 … `points` of the step (m²); `row` is its
-    /// first row.
-    pub(crate) fn largest_square_motion(&self, row: usize, points: usize) -> f64 {
+    /// Largest square of the motion of a control point since [`CarrierIntegrator::begin_motions`] at some points of the step (m²); `row` is
+    /// its first row.
+    pub(crate) fn largest_square_motion(&self, row: usize, points: RangeInclusive<usize>) -> f64 {
         let square =
             |moved: &Vec<f64>| (vector3_at(&moved[row..], 0) - vector3_at(&self.begun[row..], 0)).norm_squared();
-        self.moved[1..=points].iter().map(square).fold(0.0, f64::max)
+        self.moved[points].iter().map(square).fold(0.0, f64::max)
     }
 
     /// Advances to the end of an accepted step. Displacements at its end become those at the start of the next step.

@@ -7,6 +7,7 @@ use super::trial::ForceInterpolation;
 use crate::math::simd::{InstructionSet, Kernel};
 use crate::math::vector::{Vector3, strided_vector3};
 use crate::modes::bank::{Disk, ModalBank};
+use std::ops::RangeInclusive;
 
 /// A disk of coupled sectors.
 #[derive(Debug, Clone)]
@@ -26,7 +27,8 @@ pub struct CoupledDisk {
     pub reach: Vec<f64>,
     /// Error of the judged step (m).
     pub error: f64,
-    /// Displacements (m) and unit normals at the start of the span, and bound of the change of the gaps of each sector since then (m).
+    /// Displacements from which motion is measured (m), unit normals at the start of the span, and bounds of the change of the gaps of each
+    /// sector by this motion (m).
     begun: Vec<f64>,
     normals: [Vec<f64>; 3],
     motions: Vec<f64>,
@@ -148,8 +150,8 @@ impl CoupledDisk {
         strided_vector3(&self.moved[point], 3 * node * self.lanes + sector, self.lanes)
     }
 
-    /// Begins a span. The displacements at its start must be known.
-    pub(crate) fn begin_span(&mut self) {
+    /// Measures motion from the displacements at the start of the step, which must be known.
+    pub(crate) fn begin_motions(&mut self) {
         self.begun.copy_from_slice(&self.moved[0]);
     }
 
@@ -158,11 +160,11 @@ impl CoupledDisk {
         self.normals.iter_mut().zip(normals).for_each(|(own, normals)| own.copy_from_slice(normals));
     }
 
-    /// Bounds the changes of the gaps of each sector (m) by the motion of its nodes since the start of the span, at the points
-    /// 1 … `points` of the step.
-    pub(crate) fn find_motions(&mut self, points: usize) {
+    /// Bounds the changes of the gaps of each sector (m) by the motion of its nodes since [`CoupledDisk::begin_motions`], at some
+    /// points of the step.
+    pub(crate) fn find_motions(&mut self, points: RangeInclusive<usize>) {
         self.motions.fill(0.0);
-        for moved in &self.moved[1..=points] {
+        for moved in &self.moved[points] {
             let Self { lanes, begun, normals, motions, .. } = self;
             self.instructions.run(FindMotions { lanes: *lanes, moved, begun, normals, motions });
         }

@@ -1,7 +1,7 @@
 //! Islands: sectors and bodies that must step together, as one type. A blade on rigid surfaces is an island of one sector; the sectors of
 //! a coupled disk, and all sectors that touch surfaces of one carrier, are an island with shared bodies.
 
-mod attempt;
+pub(in crate::time::galerkin) mod attempt;
 
 use super::advance::Advance;
 use super::carrier::{BLOCKS, CarrierIntegrator};
@@ -12,7 +12,7 @@ use super::span::{Flight, SpanStep, SpanSteps, StepGoal, Stopped, integrate};
 use super::state::SectorState;
 use super::surroundings::{AcceptedStep, CarriersInStep, LaneStep, Surroundings, Witness};
 use super::tables::{HALVINGS, Tables, halved};
-use super::trial::{ForceInterpolation, Trial, TrialResult};
+use super::trial::{ForceInterpolation, Travel, Trial, TrialResult};
 use crate::scene::method::Solver;
 use crate::system::Effort;
 
@@ -20,6 +20,18 @@ use crate::system::Effort;
 /// closes in most of these steps, so all steps would be short without this allowance. On `builtin:stage` with a tolerance of 1e-3 it halves
 /// the number of trials, and the error is 3e-4 instead of 1e-4.
 const BANK_ALLOWANCE: f64 = 1e-6;
+
+/// Limits up to which an inactive sector certainly stays open.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct OpenLimits {
+    /// Time from the start of the span, as a fraction of the span.
+    pub until: f64,
+    /// Motion of the surfaces, and of the nodes of a coupled sector, since the start of the step (m).
+    pub motion: f64,
+}
+
+/// Time after which an active sector that would not stay open is checked again, in lengths of the step.
+pub(crate) const RETRY: f64 = 4.0;
 
 /// State of step control that persists from span to span.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -37,7 +49,7 @@ pub struct StepControl {
 pub struct Island {
     /// Sectors with contact nodes.
     pub sectors: Vec<IslandSector>,
-    /// Indices of the sectors that may touch in the current span; the others are in free motion.
+    /// Indices of the sectors that may touch in the current step; the others are in free motion.
     pub(crate) active: Vec<usize>,
     /// Disks whose modes move the sectors.
     pub disks: Vec<CoupledDisk>,
@@ -66,8 +78,12 @@ pub struct IslandSector {
     pub state: SectorState,
     pub(super) trial: Trial,
     advance: Advance,
-    /// Motion of the nodes and surfaces (m) up to which the sector stays open in the current span; `None` for active sectors.
-    pub(crate) allowance: Option<f64>,
+    /// Limits up to which the sector stays open; `None` for active sectors.
+    pub(crate) limits: Option<OpenLimits>,
+    /// Fraction of the span up to which an active sector is not checked again.
+    pub(crate) retry: f64,
+    /// Motion of the surfaces, and of the nodes of a coupled sector, over the last step (m); 0 at the start of a span.
+    pub(crate) last_motion: f64,
     /// Block of lanes of the sector on surface carriers in the current trial; `None` before its first contact problem.
     block: Option<usize>,
     /// True if no force acts on the sector and its gaps are so wide that they are evaluated only after the contact problems of the other
@@ -87,7 +103,9 @@ impl IslandSector {
             state: SectorState::new(modes, nodes),
             trial: if own.steady.is_empty() { trial } else { trial.steady() },
             advance: Advance::new(modes, nodes),
-            allowance: None,
+            limits: None,
+            retry: 0.0,
+            last_motion: 0.0,
             block: None,
             far: false,
         }
@@ -159,16 +177,49 @@ impl Island {
         self.carriers.iter_mut().for_each(CarrierIntegrator::find_start);
         let mut island = IslandInSpan { island: self, surroundings, goal };
         island.find_start();
-        island.island.disks.iter_mut().for_each(CoupledDisk::begin_span);
+        island.island.disks.iter_mut().for_each(CoupledDisk::begin_motions);
         island
     }
 
-    /// Returns upper bounds of the displacement of each contact row of a sector from its current position over a time `span` (s) without
-    /// contact (m); `None` for sectors of a disk.
-    pub(crate) fn travel(&mut self, index: usize, span: f64) -> Option<&[f64]> {
+    /// Bounds the displacements of the nodes of a sector over a time `longest` (s) without contact; `None` for sectors of a disk.
+    pub(crate) fn travel(&mut self, index: usize, longest: f64) -> Option<Travel<'_>> {
         let IslandSector { table, disk, trial, state, .. } = &mut self.sectors[index];
         let rows = &self.tables[table[0]][table[1]].rows;
-        disk.is_none().then(|| trial.travel(rows, state, span))
+        disk.is_none().then(|| trial.travel(rows, state, longest))
+    }
+
+    /// Length of the spans (s).
+    pub(crate) fn span(&self) -> f64 {
+        self.span
+    }
+
+    /// Lists the active sectors.
+    pub(crate) fn list_active(&mut self) {
+        let active = self.sectors.iter().enumerate().filter(|(_, one)| one.limits.is_none());
+        self.active.clear();
+        self.active.extend(active.map(|(index, _)| index));
+    }
+
+    /// Bound of the changes of the gaps of a sector (m) by the last known motion of its disk.
+    pub(crate) fn disk_motion(&self, index: usize) -> f64 {
+        self.sectors[index].disk.map_or(0.0, |(disk, lane)| self.disks[disk].motion(lane))
+    }
+
+    /// Returns the displacements of the contact rows of an inactive sector at the start of the step (m), and its gaps (m).
+    pub(crate) fn start_of_inactive(&mut self, index: usize) -> (&[f64], &mut [f64]) {
+        self.restart(index);
+        let IslandSector { table, trial, state, .. } = &mut self.sectors[index];
+        let moved = trial.find_start(&self.tables[table[0]][table[1]].rows, state);
+        (moved, &mut state.gaps)
+    }
+
+    /// Prepares an inactive sector for the next trial.
+    fn restart(&mut self, index: usize) {
+        let one = &mut self.sectors[index];
+        one.trial.forget();
+        if let Some((disk, lane)) = one.disk {
+            one.trial.start_at(|row| self.disks[disk].row_at_start(row, lane));
+        }
     }
 
     /// Kinetic and strain energy of all bodies at the start of the step (J).
@@ -334,7 +385,7 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
     fn accept_states(&mut self, step: SpanStep, kind: ForceInterpolation) {
         self.island.fresh = false;
         for index in 0..self.island.sectors.len() {
-            let is_active = self.island.sectors[index].allowance.is_none();
+            let is_active = self.island.sectors[index].limits.is_none();
             let SectorInStep { mut surfaces, tables, disk, trial, state, advance } = self.sector(index, step, kind);
             if !is_active {
                 if disk.is_none() {

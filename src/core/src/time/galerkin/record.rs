@@ -103,6 +103,21 @@ impl MotionCourse {
         }
     }
 
+    /// Returns the motion over a span in which everything moves, and the rotor turns over the shape, at its largest rate of this span.
+    pub(crate) fn largest_motion(&self) -> MotionIncrement {
+        let ([linear, quadratic], growth) = (&self.parts, &self.growth);
+        let most = |of: &dyn Fn(&MotionIncrement) -> f64| of(linear).abs() + 2.0 * of(quadratic).abs();
+        let shape_rotation = most(&|part| part.shape_rotation);
+        MotionIncrement {
+            step: linear.step,
+            turn: shape_rotation + most(&|part| part.turn - part.shape_rotation),
+            shaft: Vector3::new(most(&|part| part.shaft[0]), most(&|part| part.shaft[1]), most(&|part| part.shaft[2])),
+            opening: most(&|part| part.opening),
+            shape_factor: growth.largest_derivatives([0.0, 1.0])[0],
+            shape_rotation,
+        }
+    }
+
     /// Growth of the shape over the span.
     pub(crate) fn growth(&self) -> &ShapeGrowth {
         &self.growth
@@ -288,13 +303,18 @@ pub(crate) struct PairRecord {
     pub drives: [(PrescribedMotion, MotionIncrement); POINTS],
     /// Weighted motion over which forces at each point of the accepted step do work.
     pub motions: [MotionIncrement; POINTS],
+    /// Bounds of the change of the gaps of each sector over the span (m) by prescribed motion at its largest rate; in the first sector of a
+    /// structure.
+    pub changes: Vec<f64>,
+    /// True if these bounds are known; sectors may then be inactive.
+    pub has_bounds: bool,
 }
 
 impl PairRecord {
-    /// Creates the record of a pair.
-    pub fn new(pair: usize, carrier: Option<usize>) -> Self {
+    /// Creates the record of a pair, whose structure has `lanes` lanes.
+    pub fn new(pair: usize, carrier: Option<usize>, lanes: usize) -> Self {
         let (course, drives, motions) = Default::default();
-        Self { pair, carrier, course, drives, motions }
+        Self { pair, carrier, course, drives, motions, changes: vec![0.0; lanes], has_bounds: false }
     }
 }
 
@@ -334,8 +354,6 @@ pub(crate) struct SpanRecord {
     pub solutions: usize,
     pub instants: Instants,
     pub instructions: InstructionSet,
-    /// Scratch: bounds of the change of the gaps of each sector over the span (m), without the motion of the nodes.
-    pub changes: Vec<f64>,
     /// Pair to whose surface all nodes at all points are entered in `instants`.
     pub lanes_of: Option<usize>,
     /// True if a contact exceeds the limits of small displacements.
@@ -379,7 +397,6 @@ impl SpanRecord {
             slips: std::array::from_fn(|_| vec![None; nodes]),
             solutions: 0,
             instructions: InstructionSet::detect(),
-            changes: vec![0.0; of.lanes()],
             instants: Instants::new(Lanes { points: MOST, nodes }.width()),
             lanes_of: None,
             implausible: false,
@@ -448,8 +465,8 @@ impl SpanRecord {
         }
     }
 
-    /// Starts a span in which all sectors of the structure take turns.
-    pub(crate) fn begin_turns(&mut self, of: &Structure) {
+    /// Finds the smallest gap of each node over all sectors of the structure at the start of the span.
+    pub(crate) fn find_lowest_of_all(&mut self, of: &Structure) {
         let (gaps, sectors) = (&of.history.gap.before, of.modes().sectors());
         for (lowest, gaps) in self.lowest_of_all.iter_mut().zip(gaps.chunks_exact(self.lanes)) {
             *lowest = gaps[..sectors].iter().copied().fold(f64::INFINITY, f64::min);
@@ -496,6 +513,42 @@ impl SpanRecord {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use tiprub_test_models::SeededRandom;
+
+    /// Between any two times of a span, everything moves by at most its share of the motion at the largest rate, also if it turns back.
+    #[test]
+    fn motion_at_the_largest_rate_bounds_motion_between_any_times() {
+        let mut random = SeededRandom(9);
+        for case in 0..200 {
+            let mut at = |angle: f64| PrescribedMotion {
+                rotor_angle: angle + 0.1 * random.signed(),
+                gap_offset: 1e-4 * random.signed(),
+                shaft: Vector3::new(random.signed(), random.signed(), random.signed()),
+                shape_rotation: 0.1 * random.signed(),
+                ..PrescribedMotion::default()
+            };
+            let [before, middle, end] = [at(0.0), at(0.0), at(0.0)];
+            let growth = ShapeGrowth {
+                factors: [random.signed(), random.signed()],
+                elapsed: [0.0, random.within(0.1, 2.0)],
+                length: random.of(&[0.0, 1.0]),
+            };
+            let course = MotionCourse::new(&before, &middle, growth, &end, 1.0);
+            let values = |motion: &MotionIncrement| {
+                let MotionIncrement { turn, shaft, opening, shape_factor, shape_rotation, .. } = *motion;
+                [turn - shape_rotation, shape_rotation, opening, shape_factor, shaft[0], shaft[1], shaft[2]]
+            };
+            let bounds = values(&course.largest_motion());
+            for _ in 0..50 {
+                let times = [random.unit(), random.unit()];
+                let [from, to] = times.map(|theta| values(&course.at(theta).1));
+                let part = (times[1] - times[0]).abs();
+                for ((from, to), bound) in from.iter().zip(to).zip(bounds) {
+                    assert!((to - from).abs() <= part * bound * (1.0 + 1e-9) + 1e-15, "case {case}");
+                }
+            }
+        }
+    }
 
     /// A rotor that accelerates on an accelerated shaft: places follow the motion at any time, velocities are its rates.
     #[test]

@@ -23,6 +23,7 @@ pub struct ContactRows {
     error_form: DMatrix<f64>,
     /// ξω and 1/ω_d of each mode; 1/ω_d is infinite for rigid-body modes.
     rates: Vec<[f64; 2]>,
+    motions: Vec<FreeMotion>,
     /// The indices 0, 1, 2, …
     all: Vec<usize>,
 }
@@ -87,6 +88,8 @@ impl ContactRows {
             entries.iter_mut().zip(shapes.iter()).for_each(|(entry, shape)| *entry = *shape);
         }
         let rates = modes.frequencies.iter().zip(&modes.damping_ratios);
+        let rates: Vec<[f64; 2]> =
+            rates.map(|(w, ratio)| [ratio * w, 1.0 / (w * (1.0 - ratio * ratio).sqrt())]).collect();
         Self {
             magnitudes: by_mode.iter().map(|shape| shape.abs()).collect(),
             by_mode,
@@ -95,7 +98,8 @@ impl ContactRows {
             instructions: InstructionSet::detect(),
             residual: modes.residual.clone(),
             error_form: modes.error_form(),
-            rates: rates.map(|(w, ratio)| [ratio * w, 1.0 / (w * (1.0 - ratio * ratio).sqrt())]).collect(),
+            motions: rates.iter().copied().map(FreeMotion::new).collect(),
+            rates,
             all: (0..count).collect(),
         }
     }
@@ -165,10 +169,13 @@ impl ContactRows {
     /// magnitude of the first set of `velocities` (slow modes, m/s), plus `rest` (m).
     pub(crate) fn travel(&self, span: f64, state: &SectorState, velocities: &mut Sums<2>, rest: &mut Sums<1>) {
         let ([slow, _], [bounds]) = (&mut velocities.coefficients, &mut rest.coefficients);
-        let modes = self.rates.iter().zip(state.position.iter().zip(&state.velocity));
-        for ((slow, bound), (rates, (q, v))) in slow.iter_mut().zip(bounds).zip(modes) {
-            [*slow, *bound] = travel(*rates, [*q, *v], span);
-        }
+        self.instructions.run(Travel {
+            motions: &self.motions,
+            state: [&state.position, &state.velocity],
+            span,
+            slow,
+            bounds,
+        });
         let ([one, _], [two]) = (&mut velocities.rows, &mut rest.rows);
         self.add_up(&self.by_mode, [&velocities.coefficients[0]], [one]);
         self.add_up(&self.magnitudes, [&rest.coefficients[0]], [two]);
@@ -193,19 +200,52 @@ impl ContactRows {
     }
 }
 
-/// Bounds the displacement of a mode with the decay rate ξω (1/s) and 1/ω_d (s) over a time `span` (s), from its displacement q and velocity
-/// v. Returns a velocity and a rest: the bound is `span` times the magnitude of the velocity, plus the rest. For a slow mode, the rest bounds
-/// the acceleration term ½ q̈ t². A fast mode of amplitude A moves by at most 2 A.
-fn travel([rate, per_frequency]: [f64; 2], [q, v]: [f64; 2], span: f64) -> [f64; 2] {
-    if !per_frequency.is_finite() {
-        return [v, 0.0];
+/// Free motion of a mode.
+#[derive(Debug, Clone, Copy)]
+struct FreeMotion {
+    /// Decay rate ξω (1/s), and 1/ω_d (s); 0 for a rigid-body mode.
+    rate: f64,
+    per_frequency: f64,
+    /// Half the largest acceleration per amplitude (1/s²).
+    bend: f64,
+}
+
+impl FreeMotion {
+    fn new([rate, per_frequency]: [f64; 2]) -> Self {
+        if !per_frequency.is_finite() {
+            return Self { rate, per_frequency: 0.0, bend: 0.0 };
+        }
+        // |q| ≤ A and |q̇| ≤ A ω, so |q̈| ≤ A ω (ω + 2ξω).
+        let frequency = 1.0 / per_frequency + rate;
+        Self { rate, per_frequency, bend: 0.5 * frequency * (frequency + 2.0 * rate) }
     }
-    let turned = (v + rate * q) * per_frequency;
-    let amplitude = (q * q + turned * turned).sqrt();
-    // |q| ≤ A and |q̇| ≤ A ω, so |q̈| ≤ A ω (ω + 2ξω).
-    let frequency = 1.0 / per_frequency + rate;
-    let parabola = 0.5 * frequency * (frequency + 2.0 * rate) * span * span;
-    if parabola < 2.0 { [v, parabola * amplitude] } else { [0.0, 2.0 * amplitude] }
+}
+
+/// Bounds the displacements of the modes over a time `span` (s), from their displacements q and velocities v. The bound is `span` times the
+/// magnitude of the velocity `slow`, plus the rest in `bounds`. For a slow mode, the rest bounds the acceleration term ½ q̈ t². A fast mode
+/// of amplitude A moves by at most 2 A.
+struct Travel<'a> {
+    motions: &'a [FreeMotion],
+    state: [&'a [f64]; 2],
+    span: f64,
+    slow: &'a mut [f64],
+    bounds: &'a mut [f64],
+}
+
+impl Kernel for Travel<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { motions, state: [position, velocity], span, slow, bounds } = self;
+        let state = position.iter().zip(velocity);
+        for ((slow, bound), (motion, (q, v))) in slow.iter_mut().zip(bounds).zip(motions.iter().zip(state)) {
+            let turned = (v + motion.rate * q) * motion.per_frequency;
+            let amplitude = (q * q + turned * turned).sqrt();
+            let parabola = motion.bend * span * span;
+            let is_slow = parabola < 2.0;
+            *slow = if is_slow { *v } else { 0.0 };
+            *bound = amplitude * if is_slow { parabola } else { 2.0 };
+        }
+    }
 }
 
 #[cfg(test)]

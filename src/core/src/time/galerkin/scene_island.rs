@@ -14,7 +14,7 @@ use super::flight::FreeFlight;
 use super::island::{Island, IslandSector};
 use super::obstacle_view::ObstacleView;
 use super::record::{PairRecord, SpanRecord};
-use super::span::{StepGoal, Stopped};
+use super::span::{SpanStep, StepGoal, Stopped};
 use super::state::SectorState;
 use super::surroundings::{CarriersInStep, Surroundings};
 use super::tables::Tables;
@@ -30,6 +30,7 @@ use crate::time::workers::Workers;
 use blade_sectors::{BladeSectors, SectorSpan, SpanOfSectors};
 use nalgebra::DMatrix;
 use std::mem::take;
+use std::ops::RangeInclusive;
 
 /// Contacts count as closed within this fraction of the tolerance.
 const PRECISION: f64 = 1e-4;
@@ -81,10 +82,14 @@ impl Surroundings for SceneSurroundings<'_> {
         }
     }
 
-    fn find_surface_motions(&mut self, carriers: &[CarrierIntegrator], points: usize) {
+    fn choose_active(&mut self, island: &mut Island, step: SpanStep) {
+        self.choose_open_sectors(island, step);
+    }
+
+    fn find_surface_motions(&mut self, carriers: &[CarrierIntegrator], points: RangeInclusive<usize>) {
         let own = self.records.iter().filter(|record| record.sector == 0).flat_map(|record| &record.pairs);
         for (pair, carrier) in own.filter_map(|record| Some((record.pair, record.carrier?))) {
-            self.pairs[pair].find_surface_motions(|row| carriers[carrier].largest_square_motion(row, points));
+            self.pairs[pair].find_surface_motions(|row| carriers[carrier].largest_square_motion(row, points.clone()));
         }
     }
 
@@ -139,7 +144,7 @@ impl SceneIsland {
             let carrier = |pair: &ContactPair| pair.carrier().map(|carrier| carrier.structure);
             let place = |pair| carriers.iter().position(|one| Some(one.structure) == carrier(pair));
             let pairs = own().filter(|(_, pair)| pair.structure() == structure);
-            let pairs = pairs.map(|(index, pair)| PairRecord::new(index, place(pair))).collect();
+            let pairs = pairs.map(|(index, pair)| PairRecord::new(index, place(pair), of.lanes())).collect();
             let record = SpanRecord::new(structure, of, pairs, &system.pairs, tolerance);
             for sector in 0..if takes_turns { 1 } else { of.modes().sectors() } {
                 let kind = of.bank().map_or(0, |bank| bank.set_of(sector));
@@ -220,7 +225,7 @@ impl SceneIsland {
         }
         if self.is_single() {
             let record = &mut self.records[0];
-            record.begin_turns(&system.structures[record.structure]);
+            record.find_lowest_of_all(&system.structures[record.structure]);
         }
         (0..self.turns).try_for_each(|turn| self.take_turn(turn, system, span, most_tried))
     }
@@ -258,7 +263,7 @@ impl SceneIsland {
             let record = &mut self.records[0];
             record.choose_minima(&structures[record.structure].needed_minima);
         }
-        self.choose_active(structures, pairs, span);
+        self.activate_all(structures, pairs);
         let goal = StepGoal { most: most_tried, ..self.goal };
         let Self { island, records, .. } = &mut *self;
         let mut surroundings = SceneSurroundings { structures, pairs, records };

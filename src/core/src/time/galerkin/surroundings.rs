@@ -2,10 +2,13 @@
 
 use super::carrier::CarrierIntegrator;
 use super::compliance::Lanes;
+use super::island::Island;
 use super::level::StepTables;
+use super::span::SpanStep;
 use super::trial::{ForceInterpolation, Obstacle, Trial};
 use crate::math::vector::Vector3;
 use crate::modes::bank::Disk;
+use std::ops::RangeInclusive;
 
 /// A step that is accepted.
 #[derive(Debug)]
@@ -97,8 +100,11 @@ pub trait Surroundings {
     /// Deforms the surfaces as at a point of the step.
     fn bend(&mut self, _carriers: &[CarrierIntegrator], _point: usize) {}
 
-    /// Finds bounds on the motion of the surfaces since the start of the span, at the points 1 … `points` of the step.
-    fn find_surface_motions(&mut self, _carriers: &[CarrierIntegrator], _points: usize) {}
+    /// Selects the sectors of an island that are evaluated in a step; the others certainly stay open.
+    fn choose_active(&mut self, _island: &mut Island, _step: SpanStep) {}
+
+    /// Finds bounds on the motion of the surfaces since the start of the step, at some points of the step.
+    fn find_surface_motions(&mut self, _carriers: &[CarrierIntegrator], _points: RangeInclusive<usize>) {}
 
     /// Largest bound of [`Surroundings::find_surface_motions`] where a sector may touch a surface (m); 0 if all surfaces are rigid.
     fn surface_motion(&self, _sector: usize) -> f64 {

@@ -1,88 +1,179 @@
-//! Sectors that stay open over a span, whose gaps need no evaluation.
+//! Sectors that stay open for a while, whose gaps need no evaluation.
 //!
-//! As with fixed steps (`system/nearness.rs`), a gap changes by no more than the motion of its node and of its surface. The contact forces of
-//! the span also move surfaces and coupled sectors. This motion is unknown at the start of the span, so every step compares it with the
-//! allowance of each sector.
+//! As with fixed steps (`system/nearness.rs`), a gap changes by no more than the motion of its node and of its surface. Before every step,
+//! bounds of this motion show which sectors stay open during the next steps, and these sectors become inactive. Contact forces also move
+//! surfaces and coupled sectors. This motion is unknown before a step, so every step compares it with the limit of each inactive sector.
 
-use super::SceneIsland;
+use super::{SceneIsland, SceneSurroundings};
 use crate::geometry::spline::SplineGap;
+use crate::geometry::spline::near::NearSearch;
 use crate::math::vector::vector3_at;
 use crate::system::{ContactPair, Structure};
-use crate::time::galerkin::disk::largest_gap_change;
-use std::ops::Range;
+use crate::time::galerkin::carrier::CarrierIntegrator;
+use crate::time::galerkin::disk::{CoupledDisk, largest_gap_change};
+use crate::time::galerkin::island::attempt::BETWEEN_POINTS_FACTOR;
+use crate::time::galerkin::island::{Island, IslandSector, OpenLimits, RETRY};
+use crate::time::galerkin::span::SpanStep;
+use crate::time::galerkin::surroundings::Surroundings;
 
-/// Factor on the prescribed motion over the span, because the motion may be larger within the span than at its end.
-const PRESCRIBED_MOTION_FACTOR: f64 = 2.0;
+/// Times for which sectors can become inactive, in lengths of the next step. A sector becomes inactive for the first time of this list for which
+/// it certainly stays open.
+const INACTIVE_STEPS: [f64; 3] = [8.0, 2.0, 1.0];
 
 impl SceneIsland {
-    /// Selects the sectors that may touch in a span (s), or whose smallest gap an output may need. The others stay open while bodies move by
-    /// less than their allowance.
-    pub(super) fn choose_active(&mut self, structures: &[Structure], pairs: &mut [ContactPair], span: f64) {
-        if !self.island.carriers.is_empty() {
-            self.island.sectors.iter_mut().for_each(|one| one.allowance = Some(f64::INFINITY));
-            for disk in &mut self.island.disks {
-                disk.set_normals(&structures[disk.structure].history.geometry.before.normal);
+    /// Activates all sectors at the start of a span, and bounds the effect of prescribed motion on their gaps.
+    pub(super) fn activate_all(&mut self, structures: &[Structure], pairs: &mut [ContactPair]) {
+        let Self { island, records, .. } = self;
+        island.sectors.iter_mut().for_each(|one| (one.limits, one.retry, one.last_motion) = (None, 0.0, 0.0));
+        island.list_active();
+        if island.carriers.is_empty() {
+            return;
+        }
+        for disk in &mut island.disks {
+            disk.set_normals(&structures[disk.structure].history.geometry.before.normal);
+        }
+        for record in records.iter_mut().filter(|record| record.sector == 0) {
+            let structure = &structures[record.structure];
+            record.find_lowest_of_all(structure);
+            for own in &mut record.pairs {
+                let pair = &mut pairs[own.pair];
+                let rows =
+                    pair.carrier().map_or(&[][..], |carrier| structures[carrier.structure].modes().displacement());
+                own.has_bounds = !structure.needed_minima.by_sector
+                    && pair.find_prescribed_changes(&own.course.largest_motion(), rows, &mut own.changes);
             }
-            for index in 0..self.records.len() {
-                if self.records[index].sector == 0 {
-                    let sectors = index..index + structures[self.records[index].structure].modes().sectors();
-                    self.find_allowances(sectors, structures, pairs, span);
+        }
+    }
+}
+
+impl SceneSurroundings<'_> {
+    /// Selects the sectors that may touch in a step, or whose smallest gap an output may need. The others stay open while bodies move by
+    /// less than their limits.
+    pub(super) fn choose_open_sectors(&mut self, island: &mut Island, step: SpanStep) {
+        if island.carriers.is_empty() {
+            return;
+        }
+        self.shift_limits(island, step);
+        let (end, mut is_bent) = (step.from + step.length, false);
+        for index in 0..island.sectors.len() {
+            let one = &island.sectors[index];
+            let limits = one.limits;
+            if limits.map_or(one.retry > step.from, |limits| limits.until >= end) || !self.may_stay_open(index, one) {
+                continue;
+            }
+            let free = limits.map_or_else(|| self.free_distance(island, index), |limits| limits.motion);
+            let mut found = self.find_limits(island, index, step, free);
+            if found.is_none() && limits.is_some() {
+                if !is_bent {
+                    is_bent = true;
+                    self.bend_at_start(island, step);
+                }
+                self.find_gaps_at_start(island, index, step);
+                let free = self.free_distance(island, index);
+                found = self.find_limits(island, index, step, free);
+            }
+            let one = &mut island.sectors[index];
+            one.limits = found;
+            if found.is_none() {
+                one.retry = step.from + RETRY * step.length;
+            }
+        }
+        island.list_active();
+    }
+
+    /// Subtracts the motion in the last step from the limits, so that they hold for the motion since the start of this step.
+    fn shift_limits(&mut self, island: &mut Island, step: SpanStep) {
+        if step.from > 0.0 || island.active.len() < island.sectors.len() {
+            self.find_surface_motions(&island.carriers, 0..=0);
+            island.disks.iter_mut().for_each(|disk| disk.find_motions(0..=0));
+            for index in 0..island.sectors.len() {
+                let motion = self.surface_motion(index) + island.disk_motion(index);
+                let one = &mut island.sectors[index];
+                // A step that is tried again has not moved anything.
+                one.last_motion = if motion > 0.0 { motion } else { one.last_motion };
+                if let Some(limits) = &mut one.limits {
+                    limits.motion -= motion;
                 }
             }
         }
-        let active = self.island.sectors.iter().enumerate().filter(|(_, one)| one.allowance.is_none());
-        self.island.active.clear();
-        self.island.active.extend(active.map(|(index, _)| index));
+        island.disks.iter_mut().for_each(CoupledDisk::begin_motions);
+        island.carriers.iter_mut().for_each(CarrierIntegrator::begin_motions);
     }
 
-    /// Finds the allowances of all sectors of a structure.
-    fn find_allowances(
-        &mut self,
-        sectors: Range<usize>,
-        structures: &[Structure],
-        pairs: &mut [ContactPair],
-        span: f64,
-    ) {
-        let first = sectors.start;
-        let structure = &structures[self.records[first].structure];
-        for number in 0..self.records[first].pairs.len() {
-            let pair = &mut pairs[self.records[first].pairs[number].pair];
-            let rows = pair.carrier().map_or(&[][..], |carrier| structures[carrier.structure].modes().displacement());
-            let has_bounds = !structure.needed_minima.by_sector
-                && pair.find_prescribed_changes(rows, &mut self.records[first].changes);
-            let ring = pair.gap().smooth_ring().filter(|_| has_bounds);
-            for index in sectors.clone() {
-                let change = self.records[first].changes[self.records[index].sector];
-                let allowance = ring.and_then(|gap| self.allowance(index, structure, gap, span));
-                let allowance =
-                    allowance.map(|allowance| allowance - PRESCRIBED_MOTION_FACTOR * change).filter(|left| *left > 0.0);
-                let own = &mut self.island.sectors[index].allowance;
-                *own = own.zip(allowance).map(|(own, allowance)| own.min(allowance));
+    /// Records of the first sector of the structure of a sector, and rings that the sector may touch.
+    fn rings(&self, index: usize) -> impl Iterator<Item = (&[f64], &SplineGap)> {
+        let first = &self.records[index - self.records[index].sector];
+        first.pairs.iter().filter_map(|own| Some((&own.changes[..], self.pairs[own.pair].gap().smooth_ring()?)))
+    }
+
+    /// Returns whether a sector could become inactive.
+    fn may_stay_open(&self, index: usize, one: &IslandSector) -> bool {
+        let record = &self.records[index];
+        one.state.gaps_known
+            && !one.state.is_loaded()
+            && !self.structures[record.structure].needed_minima.all_of(record.sector)
+            && self.records[index - record.sector].pairs.iter().all(|own| own.has_bounds)
+    }
+
+    /// Returns the smallest amount (m) by which a known gap of a sector exceeds 0 and the smallest gap of any sector at the start of the span.
+    fn free_distance(&self, island: &Island, index: usize) -> f64 {
+        let least = &self.records[index - self.records[index].sector].lowest_of_all;
+        let gaps = &island.sectors[index].state.gaps;
+        let nodes = self.rings(index).flat_map(|(_, ring)| &ring.nodes);
+        nodes.map(|node| gaps[*node] - least[*node].max(0.0)).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Returns the limits of a sector whose gaps may become smaller by `free` (m); `None` if this may happen soon without
+    /// contact forces, or with as much motion as in the last step.
+    fn find_limits(&self, island: &mut Island, index: usize, step: SpanStep, free: f64) -> Option<OpenLimits> {
+        let sector = self.records[index].sector;
+        let prescribed = self.rings(index).map(|(changes, _)| changes[sector]).fold(0.0, f64::max);
+        let least = BETWEEN_POINTS_FACTOR * island.sectors[index].last_motion;
+        INACTIVE_STEPS.iter().find_map(|steps| {
+            let part = (steps * step.length).min(1.0 - step.from);
+            let mut motion = free - part * prescribed;
+            // Avoids bounding the travel in vain.
+            if motion > least {
+                motion -= self.largest_change(island, index, part);
             }
-        }
+            (motion > least && motion.is_finite()).then_some(OpenLimits { until: step.from + part, motion })
+        })
     }
 
-    /// Returns the allowance of a sector (m): the motion of its surface, and of its nodes if it is coupled, up to which its gaps stay open and
-    /// larger than those of another sector. `None` if a gap may become smaller without such motion.
-    fn allowance(&mut self, index: usize, structure: &Structure, gap: &SplineGap, span: f64) -> Option<f64> {
-        let (sector, lanes, gaps) = (self.records[index].sector, structure.lanes(), &structure.history.gap.before);
-        if structure.needed_minima.all_of(sector) || self.island.sectors[index].state.is_loaded() {
-            return None;
-        }
-        let travel = self.island.travel(index, span);
+    /// Bounds the change of the gaps of a sector (m) by its own motion over a fraction of the span.
+    fn largest_change(&self, island: &mut Island, index: usize, part: f64) -> f64 {
+        let SceneSurroundings { structures, records, .. } = self;
+        let (sector, structure) = (records[index].sector, &structures[records[index].structure]);
+        let time = part * island.span();
+        let Some(travel) = island.travel(index, time) else { return 0.0 };
         let normals = &structure.history.geometry.before.normal;
-        let normal = |node: usize| normals.each_ref().map(|normals| normals[node * lanes + sector]);
-        let mut smallest = f64::INFINITY;
-        for node in &gap.nodes {
-            let row = &gaps[node * lanes..(node + 1) * lanes];
-            let others = row.iter().copied().fold(f64::INFINITY, f64::min).max(0.0);
-            let own = travel.map_or(0.0, |travel| largest_gap_change(vector3_at(travel, *node).into(), normal(*node)));
-            let free = row[sector] - others - own;
-            if !(free > 0.0 && free.is_finite()) {
-                return None;
+        let change = |node: usize| {
+            let normal = normals.each_ref().map(|normals| normals[structure.index(node, sector)]);
+            largest_gap_change(travel.of_node(node, time).into(), normal)
+        };
+        self.rings(index).flat_map(|(_, ring)| &ring.nodes).map(|node| change(*node)).fold(0.0, f64::max)
+    }
+
+    /// Deforms the surfaces as at the start of a step.
+    fn bend_at_start(&mut self, island: &Island, step: SpanStep) {
+        let pairs = self.records.iter_mut().filter(|record| record.sector == 0).flat_map(|record| &mut record.pairs);
+        pairs.for_each(|own| own.drives[0] = own.course.at(step.from));
+        self.bend(&island.carriers, 0);
+    }
+
+    /// Finds the gaps of an inactive sector at the start of a step, for which the surfaces are deformed.
+    fn find_gaps_at_start(&mut self, island: &mut Island, index: usize, step: SpanStep) {
+        let SceneSurroundings { pairs, records, .. } = self;
+        let record = &mut records[index];
+        let (moved, gaps) = island.start_of_inactive(index);
+        for own in &record.pairs {
+            let Some(ring) = pairs[own.pair].gap().smooth_ring() else { continue };
+            let drive = own.course.at(step.from).0;
+            let search = NearSearch::new(ring, &drive);
+            for node in &ring.nodes {
+                let found = search.gap([*node, node * record.lanes + record.sector], vector3_at(moved, *node), None);
+                (gaps[*node], record.places[0][*node]) = (found.distance, found.foot);
             }
-            smallest = smallest.min(free);
         }
-        Some(smallest)
     }
 }

@@ -45,7 +45,7 @@ impl Trial {
         swap(&mut self.law, &mut own.sliding_law);
         self.steady = Some(own);
         if result.solved {
-            self.judge(level, rows, obstacle, &mut result);
+            self.judge(level, rows, obstacle, 0.0, &mut result);
             if self.has_depth() {
                 result.depth = self.depth(obstacle);
             }

@@ -3,9 +3,24 @@
 use super::{ForceInterpolation, Trial};
 use crate::math::vector::{Vector3, set_vector3_at, vector3_at};
 use crate::time::galerkin::basis::{MOST, TimeBasis};
-use crate::time::galerkin::rows::ContactRows;
+use crate::time::galerkin::rows::{ContactRows, Sums};
 use crate::time::galerkin::state::SectorState;
 use nalgebra::DMatrix;
+
+/// Bounds of the displacements of the nodes of a sector from their current positions over some time without contact.
+pub(crate) struct Travel<'a> {
+    /// Velocities of slow modes (m/s), and bounds for the rest (m).
+    slow: &'a Sums<2>,
+    rest: &'a Sums<1>,
+    nodes: usize,
+}
+
+impl Travel<'_> {
+    /// Bound of the displacement components of a node after up to `time` (s), which must not exceed the time for which the bounds were found.
+    pub fn of_node(&self, node: usize, time: f64) -> Vector3 {
+        time * self.slow.vector3(0, node, self.nodes).abs() + self.rest.vector3(0, node, self.nodes)
+    }
+}
 
 impl Trial {
     /// Returns the largest displacement of each row from rest (m) without contact.
@@ -17,16 +32,11 @@ impl Trial {
         reach
     }
 
-    /// Returns upper bounds of the displacement of each row from its current position over a time `span` (s), without contact (m).
-    pub(crate) fn travel(&mut self, rows: &ContactRows, state: &SectorState, span: f64) -> &[f64] {
-        let ((rest, reach), now) = (&mut self.reach, &mut self.now);
-        rows.travel(span, state, now, rest);
-        let nodes = self.lanes.nodes;
-        for node in 0..nodes {
-            let straight = span * now.vector3(0, node, nodes).abs();
-            set_vector3_at(reach, node, straight + rest.vector3(0, node, nodes));
-        }
-        reach
+    /// Bounds the displacements of the nodes from their current positions over a time `longest` (s) without contact.
+    pub(crate) fn travel(&mut self, rows: &ContactRows, state: &SectorState, longest: f64) -> Travel<'_> {
+        let ((rest, _), now) = (&mut self.reach, &mut self.now);
+        rows.travel(longest, state, now, rest);
+        Travel { slow: now, rest, nodes: self.lanes.nodes }
     }
 
     /// Number of points at which forces are unknown: s, or 1 if the force is constant.

@@ -79,7 +79,7 @@ impl Trial {
         }
         self.steady = Some(own);
         if verdict.solved {
-            self.judge(level, rows, obstacle, &mut verdict);
+            self.judge(level, rows, obstacle, 0.0, &mut verdict);
             verdict.depth = self.depth(obstacle);
             // The energy supplied by friction at the start would have to come from the bank.
             verdict.solved = !verdict.switches;
