@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use tiprub_study::arguments::{CacheArguments, MapArguments, SceneOptions, StabilityArguments, count, positive};
+use tiprub_study::arguments::{
+    CacheArguments, MapArguments, SceneOptions, StabilityArguments, positive, positive_count,
+};
 use tiprub_sweep::part::Part;
 
 use crate::{
@@ -176,7 +178,7 @@ pub struct SweepArguments {
     #[arg(long, short, value_name = "FILE")]
     pub output: Option<PathBuf>,
     /// Number of runs at the same time; each run uses one thread [default: one per processor].
-    #[arg(long, value_name = "N", value_parser = count)]
+    #[arg(long, value_name = "N", value_parser = positive_count)]
     pub threads: Option<std::num::NonZero<usize>>,
     /// Check the plan up to its first run, and print the number of runs; run nothing.
     #[arg(long)]

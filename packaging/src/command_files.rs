@@ -23,7 +23,7 @@ use crate::{
 const STUDY_FILES: [&str; 5] = ["csv", "html", "json", "md", "svg"];
 
 /// Extensions of tables that are not Parquet files.
-const OTHER_TABLES: [&str; 6] = ["csv", "json", "tsv", "txt", "xls", "xlsx"];
+const OTHER_TABLE_EXTENSIONS: [&str; 6] = ["csv", "json", "tsv", "txt", "xls", "xlsx"];
 
 /// Checks all files that a command line names, before any work.
 ///
@@ -44,13 +44,13 @@ pub fn check(command: &Command) -> Result<()> {
             let written = Vec::from_iter(NamedFile::option("--csv", &csv).into_iter().chain(files));
             outputs(&read, &written)?;
             if let Some(file) = NamedFile::option("--csv", &csv) {
-                reject_kinds(&file, "CSV", &["parquet"], "Use --parquet for a Parquet file")?;
+                reject_other_formats(&file, "CSV", &["parquet"], "Use --parquet for a Parquet file")?;
             }
             if let Some(file) = NamedFile::option("--parquet", &arguments.parquet) {
-                reject_kinds(&file, "Parquet", &OTHER_TABLES, "Use --csv for a CSV file")?;
+                reject_other_formats(&file, "Parquet", &OTHER_TABLE_EXTENSIONS, "Use --csv for a CSV file")?;
             }
             let Some(fields) = arguments.fields() else { return Ok(()) };
-            outside(&written, ("--vtk", &fields.directory), &series::FILES)?;
+            reject_outputs_inside(&written, ("--vtk", &fields.directory), &series::FILES)?;
             apart(&written, &[NamedFile::new("--vtk", fields.directory.join(series::INDEX))])?;
             keep_inputs(&read, ("--vtk", &fields.directory), &series::FILES)?;
             fields.check_directory()
@@ -89,10 +89,10 @@ pub fn check(command: &Command) -> Result<()> {
             let SweepFiles { rows, histories, .. } = SweepFiles::new(&arguments.output());
             let rows = NamedFile::new("--output", rows);
             outputs(&read, &[rows.clone(), NamedFile::new("--output", histories)])?;
-            reject_kinds(
+            reject_other_formats(
                 &rows,
                 "Parquet",
-                &OTHER_TABLES,
+                &OTHER_TABLE_EXTENSIONS,
                 "Give a name that ends in .parquet; sweeps write no other format",
             )
         }
@@ -167,8 +167,8 @@ fn keep_inputs(inputs: &[NamedFile], (option, out): (&str, &Path), extensions: &
     Ok(())
 }
 
-/// Rejects an output of a format whose name has an extension of another format.
-fn reject_kinds(file: &NamedFile, format: &str, others: &[&str], remedy: &str) -> Result<()> {
+/// Rejects an output in a format, if its name has one of the extensions `others` of other formats.
+fn reject_other_formats(file: &NamedFile, format: &str, others: &[&str], remedy: &str) -> Result<()> {
     let kind = extension(&file.path);
     if !others.contains(&kind.as_str()) {
         return Ok(());
@@ -177,15 +177,15 @@ fn reject_kinds(file: &NamedFile, format: &str, others: &[&str], remedy: &str) -
     Err(Failure::usage(what, format!("would contain {format}, but its name ends in .{kind}"), remedy))
 }
 
-/// Rejects outputs in the directory of an option, if they have an extension of the files that are written there.
-fn outside(outputs: &[NamedFile], (option, directory): (&str, &Path), extensions: &[&str]) -> Result<()> {
+/// Rejects outputs in the directory of an option that have an extension of the files that this option writes there.
+fn reject_outputs_inside(outputs: &[NamedFile], (option, directory): (&str, &Path), extensions: &[&str]) -> Result<()> {
     let Some(directory_identity) = identity(directory) else { return Ok(()) };
     for output in outputs.iter().filter(|output| extensions.contains(&extension(&output.path).as_str())) {
         let path = output_file::destination(&output.path).unwrap_or_else(|_| output.path.clone());
         if path.parent().and_then(identity).as_ref() == Some(&directory_identity) {
             let what = format!("{} {}", output.role, output.path.display());
-            let problem = format!("may be the same file as one of {option} {}", directory.display());
-            return Err(Failure::usage(what, problem, "Give a file in another directory"));
+            let problem = format!("may be a file that {option} {} also writes", directory.display());
+            return Err(Failure::usage(what, problem, "Give a file in another directory, or with another extension"));
         }
     }
     Ok(())

@@ -123,7 +123,7 @@ fn seconds(scene: &Scene) -> Option<f64> {
     Some(run()?.min(run()?))
 }
 
-/// Formats the list as text: the effects alone, or effects and features with their costs.
+/// Formats the list as text: the effects alone or, if `has_costs`, effects and features with their costs.
 pub fn text(all: &[LeftOut], has_costs: bool) -> String {
     let mut text = String::new();
     let groups = [(RowGroup::Physics, "effects left out here"), (RowGroup::Machinery, "features that are off")];

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use tiprub_field::FieldOptions;
-use tiprub_study::arguments::{CacheArguments, SceneOptions, assignment, count};
+use tiprub_study::arguments::{CacheArguments, SceneOptions, assignment, positive_count};
 
 /// Arguments of `tiprub run`.
 #[derive(Debug, Args)]
@@ -32,7 +32,7 @@ pub struct RunArguments {
     #[arg(long, value_name = "N,N,...", value_delimiter = ',', requires = "vtk")]
     pub vtk_sectors: Vec<usize>,
     /// Write the files of --vtk at every K-th communication point, and at the last one.
-    #[arg(long, value_name = "K", default_value = "1", value_parser = count, requires = "vtk")]
+    #[arg(long, value_name = "K", default_value = "1", value_parser = positive_count, requires = "vtk")]
     pub vtk_every: std::num::NonZero<usize>,
     /// Accept a directory for --vtk that is not empty: the files that an earlier DIR/fields.pvd lists are removed first,
     /// and files of the same names are replaced.

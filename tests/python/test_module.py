@@ -41,7 +41,7 @@ def blade(tmp_path):
     return module.rom(tmp_path / "blade.rom.safetensors", MASS, STIFFNESS, MAP, POSITIONS, **BLADE)
 
 
-def test_missing_rom_of_a_dict_is_not_relative_to_a_file(tmp_path):
+def test_missing_rom_of_a_dict_has_no_hint_on_relative_paths(tmp_path):
     error = refused(module.run, SCENE, directory=tmp_path, quiet=True)
     assert error.what == str(tmp_path / "blade.rom.safetensors") and "structure[1].rom in scene" in error.remedy
     assert "relative" not in error.remedy

@@ -57,14 +57,14 @@ pub fn run(arguments: &InspectArguments, console: &Console) -> Result<CommandOut
     }
 }
 
-/// What is printed about effects that a scene leaves out.
+/// Level of detail in the list of effects that a scene leaves out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Detail {
     /// Effects, without costs.
     Effects,
     /// Effects and features, with costs.
     All,
-    /// The same with measured times.
+    /// Effects and features, with costs and measured times.
     Measured,
 }
 
@@ -219,9 +219,10 @@ fn describe_scene(scene: &Scene, detail: Detail, console: &Console) -> Result<De
         roms.push(json);
     }
     let absent = left_out::left_out(scene, detail == Detail::Measured).map_err(in_scene)?;
-    let has_all = detail != Detail::Effects;
-    text.push_str(&left_out::text(&absent, has_all));
-    let rest = if has_all { "" } else { "for the cost of each effect in this scene, and features that are off: --all" };
+    let has_costs = detail != Detail::Effects;
+    text.push_str(&left_out::text(&absent, has_costs));
+    let rest =
+        if has_costs { "" } else { "for the cost of each effect in this scene, and the features that are off: --all" };
     drop(task);
     let [texts, details] = warnings_json(simulation.warnings());
     let json = json!({

@@ -97,13 +97,13 @@ pub fn run(arguments: &SweepArguments, console: &Console) -> Result<CommandOutco
     if has_histories {
         let _ = write!(text, "\nwritten: {}", files.histories.display());
     }
-    // Programs that share a plan would repeat a failed part.
-    let failure = if arguments.part.is_none() { nothing_finished(&outcome, &request) } else { None };
+    // A part succeeds even if none of its runs finished, because workflow managers repeat a part that failed.
+    let failure = if arguments.part.is_none() { no_run_finished(&outcome, &request) } else { None };
     Ok(CommandOutcome { text, json, failure, ..CommandOutcome::default() })
 }
 
-/// Returns the failure of a sweep that has runs, none of which finished.
-fn nothing_finished(SweepOutcome { runs, finished, .. }: &SweepOutcome, request: &SweepRequest) -> Option<Failure> {
+/// Returns a failure if the sweep has runs and none of them finished.
+fn no_run_finished(SweepOutcome { runs, finished, .. }: &SweepOutcome, request: &SweepRequest) -> Option<Failure> {
     let problem = match (runs, finished) {
         (1.., 0) => "no run finished",
         _ => return None,
@@ -118,10 +118,10 @@ fn check(request: &SweepRequest, digest: &str) -> Result<CommandOutcome> {
     let text = format!(
         "the plan has {} {}; part {} has {} {}; not finished: {}\ndigest: {digest}",
         size.plan_runs,
-        noun(size.plan_runs),
+        run_or_runs(size.plan_runs),
         request.part,
         size.runs,
-        noun(size.runs),
+        run_or_runs(size.runs),
         size.pending
     );
     let json = json!({
@@ -157,8 +157,8 @@ fn interrupted(outcome: &SweepOutcome, request: &SweepRequest) -> Failure {
     )
 }
 
-/// Returns the noun for a number of runs.
-fn noun(count: usize) -> &'static str {
+/// Returns the singular or the plural of "run" for a number of runs.
+fn run_or_runs(count: usize) -> &'static str {
     if count == 1 { "run" } else { "runs" }
 }
 
@@ -168,7 +168,7 @@ fn summary(outcome: &SweepOutcome, request: &SweepRequest) -> String {
     } = outcome;
     let of_plan = if plan_runs == runs { String::new() } else { format!(" (part {} of {plan_runs})", request.part) };
     let mut text =
-        format!("{runs} {}{of_plan}: {finished} finished, {refused} refused, {failed} failed\n", noun(*runs));
+        format!("{runs} {}{of_plan}: {finished} finished, {refused} refused, {failed} failed\n", run_or_runs(*runs));
     if *resumed > 0 {
         let _ = writeln!(text, "{resumed} of them were done before");
     }
@@ -184,7 +184,7 @@ fn summary(outcome: &SweepOutcome, request: &SweepRequest) -> String {
         let _ = writeln!(
             text,
             "{runs_with_warnings} {} with warnings or notes: {}",
-            noun(*runs_with_warnings),
+            run_or_runs(*runs_with_warnings),
             each.join(", ")
         );
     }

@@ -47,7 +47,7 @@ fn accepts_file_names_that_are_not_utf8() {
 
 /// A table of results must not be replaced by one of the files that `--vtk` writes.
 #[test]
-fn results_are_not_among_the_files_of_fields() {
+fn rejects_results_with_names_of_vtk_files() {
     let project = Project::new();
     fs::create_dir(project.path("fields")).unwrap();
     for (option, file, directory) in [

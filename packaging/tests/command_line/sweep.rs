@@ -243,7 +243,7 @@ fn unknown_names_end_the_sweep_before_any_run() {
     assert!(error.contains("same file as a file of the plan"), "{error}");
 }
 
-/// The step is slightly too long for the modes, which causes warnings in every run.
+/// The step is slightly too long for the modes, which causes warnings in most runs.
 #[test]
 fn summary_counts_runs_with_warnings() {
     let project = project();
@@ -256,7 +256,7 @@ fn summary_counts_runs_with_warnings() {
     assert!(count >= 18, "{warnings:?}");
     let line = text.lines().find(|line| line.starts_with(&format!("{count} runs with warnings or notes: ")));
     let line = line.unwrap_or_else(|| panic!("{count}: {text}"));
-    // All rows are read again.
+    // The second sweep only reads the rows of the finished file.
     let answer = swept(&project, &[]);
     assert_eq!(answer["runs_with_warnings"], count);
     let topics = answer["warning_counts"].as_array().unwrap();
@@ -270,7 +270,7 @@ fn summary_counts_runs_with_warnings() {
     }
 }
 
-/// The results are complete all the same. Parts succeed, because programs that share a plan would repeat a part that failed.
+/// The results are written even so. A part succeeds, because workflow managers repeat a part that failed.
 #[test]
 fn sweep_without_a_finished_run_fails() {
     let project = project();

@@ -37,7 +37,7 @@ fn failures_exit_with_one_and_are_available_as_json() {
     assert!(truncated.contains("small.rom.safetensors"), "{truncated}");
 }
 
-/// Only a relative path depends on the place of the scene file. The Python module gives absolute paths for scenes without a file.
+/// Only a relative path depends on the location of the scene file. The Python module passes absolute paths for scenes without a file.
 #[test]
 fn remedy_for_a_missing_rom_explains_relative_paths() {
     let project = Project::new();

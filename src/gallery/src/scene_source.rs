@@ -64,7 +64,7 @@ pub fn load(argument: impl AsRef<OsStr>, cache: &RomCache, console: &Console) ->
             if let Some(name) = unknown.take() {
                 failure.diagnostic.remedy = builtin::unknown_model_remedy(&name);
             }
-            with_remedy(path, failure)
+            with_specific_remedy(path, failure)
         }),
     }
 }
@@ -81,11 +81,11 @@ pub fn settings(argument: impl AsRef<OsStr>) -> Result<SceneSettings> {
 }
 
 fn file_settings(path: &Path) -> Result<SceneSettings> {
-    tiprub_format::load_settings(path).map_err(|error| with_remedy(path, error.into()))
+    tiprub_format::load_settings(path).map_err(|error| with_specific_remedy(path, error.into()))
 }
 
-/// Adds a better remedy to the failure of a scene file that does not exist, or that is the plan of a sweep.
-fn with_remedy(path: &Path, mut failure: Failure) -> Failure {
+/// Replaces the remedy of a failure if the scene file does not exist, or if it is the plan of a sweep.
+fn with_specific_remedy(path: &Path, mut failure: Failure) -> Failure {
     if !path.exists() {
         let names = BUILTIN_SCENES.map(|(known, _)| known);
         let name = path.file_stem().unwrap_or_default().to_string_lossy();

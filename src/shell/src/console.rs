@@ -59,12 +59,12 @@ pub struct CommandOutcome {
     pub rest: String,
     /// Answer as one JSON object.
     pub json: serde_json::Value,
-    /// Failure of work that has an answer all the same. It is printed after the answer, and determines the exit code.
+    /// Failure of a command that has an answer nevertheless. It is printed after the answer, and determines the exit code.
     pub failure: Option<Failure>,
 }
 
 impl CommandOutcome {
-    /// Returns the JSON object, with the error of a failure.
+    /// Returns the JSON object; if there is a failure, with the key `error`.
     fn json(&self) -> serde_json::Value {
         let mut json = self.json.clone();
         if let Some(failure) = &self.failure {
@@ -203,7 +203,7 @@ impl Console {
         self.answer(failure);
     }
 
-    /// Prints the text of a failure on stderr.
+    /// Prints a failure on stderr, unless its text is suppressed.
     fn print_error(&self, failure: &Failure) {
         if self.prints_errors() {
             let _ = writeln!(std::io::stderr(), "error: {}", printable(&failure.to_string()));

@@ -46,11 +46,11 @@ pub struct MapArguments {
     #[arg(long, value_name = "FROM:TO:COUNT", value_parser = speeds)]
     pub speeds: Option<Speeds>,
     /// Number of parallel runs [default: one per processor].
-    #[arg(long, value_name = "N", value_parser = count)]
+    #[arg(long, value_name = "N", value_parser = positive_count)]
     pub threads: Option<std::num::NonZero<usize>>,
     /// Revolutions in the window of the Fourier transform; the frequency resolution is 1/N of the rotational frequency
     /// [default: 64].
-    #[arg(long, value_name = "N", value_parser = count)]
+    #[arg(long, value_name = "N", value_parser = positive_count)]
     pub revolutions: Option<std::num::NonZero<usize>>,
     /// Start-up revolutions before the window [default: the casing's ramp plus five decay times of the first mode, within 20 to
     /// 400].
@@ -106,7 +106,7 @@ pub struct StabilityArguments {
     #[arg(long, value_name = "FROM:TO:COUNT", value_parser = steps, allow_hyphen_values = true)]
     pub steps: Option<NumberRange>,
     /// Number of parallel checks [default: one per processor].
-    #[arg(long, value_name = "N", value_parser = count)]
+    #[arg(long, value_name = "N", value_parser = positive_count)]
     pub threads: Option<std::num::NonZero<usize>>,
     /// Start value of an input or parameter; may be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment, allow_hyphen_values = true)]
@@ -133,7 +133,7 @@ pub struct ConvergenceArguments {
     #[arg(long, value_name = "T", value_parser = positive, allow_negative_numbers = true)]
     pub window: Option<f64>,
     /// Number of parallel runs [default: one per processor].
-    #[arg(long, value_name = "N", value_parser = count)]
+    #[arg(long, value_name = "N", value_parser = positive_count)]
     pub threads: Option<std::num::NonZero<usize>>,
     /// Start value of an input or parameter; may be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment, allow_hyphen_values = true)]
@@ -263,11 +263,11 @@ fn transient(text: &str) -> Result<usize, String> {
     count.ok_or_else(|| format!("give a number of revolutions, at most {MOST_TRANSIENT}"))
 }
 
-/// Parses a count of at least 1.
+/// Parses a whole number of at least 1.
 ///
 /// # Errors
-/// The text is not such a count.
-pub fn count(text: &str) -> Result<std::num::NonZero<usize>, String> {
+/// The text is not a whole number of at least 1.
+pub fn positive_count(text: &str) -> Result<std::num::NonZero<usize>, String> {
     text.parse().map_err(|_| "give a whole number of 1 or more".into())
 }
 

@@ -103,7 +103,7 @@ pub struct SweepOutcome {
     pub failed: usize,
     /// Reasons of refusals and failures, with the number of the first run (from 1) and the number of runs.
     pub reasons: Vec<(String, usize, usize)>,
-    /// Runs with at least one warning.
+    /// Number of runs with at least one warning or note.
     pub runs_with_warnings: usize,
     /// Identifiers of the warnings, with the number of the first run (from 1) and the number of runs.
     pub warnings: Vec<(String, usize, usize)>,
@@ -124,15 +124,17 @@ pub fn run(request: &SweepRequest) -> Result<SweepOutcome> {
     part.complete()
 }
 
-/// Texts of runs, each with the number of the first run (from 1) and the number of runs.
+/// Numbers of runs that have the same text, such as a reason or the identifier of a warning.
 #[derive(Debug, Default)]
 struct RunsByText {
+    /// Each text with the number of its first run (from 1) and its number of runs.
     texts: Vec<(String, usize, usize)>,
+    /// Index of each text in `texts`.
     places: HashMap<String, usize>,
 }
 
 impl RunsByText {
-    /// Adds the text of a run.
+    /// Counts a run that has this text.
     fn add(&mut self, text: &str, run: usize) {
         let place = *self.places.entry(text.to_owned()).or_insert(self.texts.len());
         match self.texts.get_mut(place) {
@@ -436,7 +438,7 @@ impl<'a> PartRun<'a> {
             if let Some(reason) = row.cell("reason") {
                 reasons.add(&reason.to_string(), run);
             }
-            let topics = row.warnings();
+            let topics = row.warning_ids();
             runs_with_warnings += usize::from(!topics.is_empty());
             topics.iter().for_each(|topic| warnings.add(topic, run));
         }

@@ -282,7 +282,7 @@ fn parse(path: &Path) -> Result<PlanFile> {
         let remedy = format!("{}{remedy}", hint(error.message()));
         let is_scene = toml::from_str::<toml::Table>(&text).is_ok_and(|keys| keys.contains_key("structure"));
         let remedy = if is_scene {
-            "This file is a scene: use `tiprub run`, or name it in the plan with the key `scene`"
+            "This file is a scene: use `tiprub run`, or name it in a plan with the key `scene`"
         } else {
             &remedy
         };

@@ -25,7 +25,7 @@ pub fn write(path: &Path, table: &Table, facts: &[(&str, String)]) -> Result<()>
     parquet_file::write(path, table, &[facts, &[(VALUES_FACT, values_digest(table))]].concat())
 }
 
-/// Returns whether a file with this metadata contains the results of a sweep, and not its outputs over time.
+/// Returns whether a file with this metadata contains the results of a sweep. Outputs over time do not count as results.
 pub(crate) fn is_result(facts: &[(String, String)]) -> bool {
     facts.iter().any(|(key, _)| key == VALUES_FACT)
 }

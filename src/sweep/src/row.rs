@@ -14,8 +14,8 @@ pub const STATUS: &str = "status";
 pub const DIGEST: &str = "digest";
 /// Identifiers of the warnings of a run.
 const WARNINGS: &str = "warnings";
-/// Text between two identifiers of warnings.
-const TOPIC_SEPARATOR: &str = ", ";
+/// Separator of the identifiers in [`WARNINGS`].
+const WARNING_SEPARATOR: &str = ", ";
 
 /// Columns that every result has, after the variables. Other means and totals follow them, and [`LAST_COLUMNS`].
 pub const FIRST_COLUMNS: [(&str, ColumnType); 13] = [
@@ -129,7 +129,7 @@ impl Row {
             }
         }
         if !warnings.is_empty() {
-            cells.push((WARNINGS.to_owned(), Cell::Text(topics.join(TOPIC_SEPARATOR))));
+            cells.push((WARNINGS.to_owned(), Cell::Text(topics.join(WARNING_SEPARATOR))));
             cells.push(("warning_texts".to_owned(), Cell::Text(warning::texts(warnings).join("\n"))));
         }
         cells.push(("seconds".to_owned(), Cell::Real(seconds)));
@@ -142,9 +142,9 @@ impl Row {
     }
 
     /// Returns the identifiers of the warnings, each once.
-    pub fn warnings(&self) -> Vec<&str> {
+    pub fn warning_ids(&self) -> Vec<&str> {
         match self.cell(WARNINGS) {
-            Some(Cell::Text(topics)) => topics.split(TOPIC_SEPARATOR).collect(),
+            Some(Cell::Text(topics)) => topics.split(WARNING_SEPARATOR).collect(),
             _ => Vec::new(),
         }
     }

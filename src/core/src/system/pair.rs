@@ -154,8 +154,8 @@ impl ContactPair {
         self.parts.gap.bend(factor, moved);
     }
 
-    /// Finds upper bounds of the change of any gap of each sector over the last step (m) by the prescribed `motion` alone. `rows` are the
-    /// current displacements of all rows of the surface carrier (m). Returns false unless the surface is a smooth ring with a carrier.
+    /// Finds upper bounds of the change of any gap of each sector (m) by the prescribed `motion` alone, from the current position. `rows` are
+    /// the current displacements of all rows of the surface carrier (m). Returns false unless the surface is a smooth ring with a carrier.
     pub(crate) fn find_prescribed_changes(
         &mut self,
         motion: &MotionIncrement,

@@ -72,7 +72,7 @@ fn skipped_nodes_miss_no_contact() {
 }
 
 /// With adaptive steps, blades that certainly stay open are left out of some steps. Inputs move the casing by up to
-/// its clearance within a communication step, so that blades begin to touch within one.
+/// the clearance in a communication step, so that blades begin to touch within a communication step.
 #[test]
 fn blades_left_out_of_adaptive_steps_miss_no_contact() {
     let disk = || TestDisk::random(6, 2, 9, 0.25, 5).cyclic();

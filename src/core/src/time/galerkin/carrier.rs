@@ -40,8 +40,8 @@ pub struct CarrierIntegrator {
     velocity: Vec<f64>,
     /// True if `velocity` belongs to the start of the current step.
     is_velocity_known: bool,
-    /// Displacements of these rows from which motion is measured (m).
-    begun: Vec<f64>,
+    /// Displacements of these rows (m) at the last call of [`CarrierIntegrator::set_motion_origin`].
+    motion_origin: Vec<f64>,
     /// Displacements over which forces at each point of the accepted step do work, Σ_k S_ik u_k (m).
     worked: [Vec<f64>; POINTS],
     /// Weights of the work of forces at each point of the tried step.
@@ -102,7 +102,7 @@ impl CarrierIntegrator {
             moved: std::array::from_fn(|_| vec![0.0; padded]),
             velocity: vec![0.0; padded],
             is_velocity_known: false,
-            begun: vec![0.0; padded],
+            motion_origin: vec![0.0; padded],
             worked: std::array::from_fn(|_| vec![0.0; padded]),
             work_weights: [[0.0; POINTS]; POINTS],
             impulses: vec![0.0; modes],
@@ -154,19 +154,20 @@ impl CarrierIntegrator {
         let Self { by_mode, all, moved: [start, ..], velocity, body, instructions, .. } = self;
         RowSums { by_mode, all, instructions }.find([&body.at[0], &body.state.velocity], [start, velocity]);
         self.is_velocity_known = true;
-        self.begin_motions();
+        self.set_motion_origin();
     }
 
-    /// Measures motion from the displacements at the start of the step.
-    pub(crate) fn begin_motions(&mut self) {
-        self.begun.copy_from_slice(&self.moved[0]);
+    /// Makes the displacements at the start of the step the origin from which motion is measured.
+    pub(crate) fn set_motion_origin(&mut self) {
+        self.motion_origin.copy_from_slice(&self.moved[0]);
     }
 
-    /// Largest square of the motion of a control point since [`CarrierIntegrator::begin_motions`] at some points of the step (m²); `row` is
-    /// its first row.
+    /// Largest square of the motion of a control point since [`CarrierIntegrator::set_motion_origin`] at the given points of the step (m²);
+    /// `row` is its first row.
     pub(crate) fn largest_square_motion(&self, row: usize, points: RangeInclusive<usize>) -> f64 {
-        let square =
-            |moved: &Vec<f64>| (vector3_at(&moved[row..], 0) - vector3_at(&self.begun[row..], 0)).norm_squared();
+        let square = |moved: &Vec<f64>| {
+            (vector3_at(&moved[row..], 0) - vector3_at(&self.motion_origin[row..], 0)).norm_squared()
+        };
         self.moved[points].iter().map(square).fold(0.0, f64::max)
     }
 

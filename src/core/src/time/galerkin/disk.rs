@@ -27,10 +27,11 @@ pub struct CoupledDisk {
     pub reach: Vec<f64>,
     /// Error of the judged step (m).
     pub error: f64,
-    /// Displacements from which motion is measured (m), unit normals at the start of the span, and bounds of the change of the gaps of each
-    /// sector by this motion (m).
-    begun: Vec<f64>,
+    /// Displacements at the last call of [`CoupledDisk::set_motion_origin`] (m).
+    motion_origin: Vec<f64>,
+    /// Unit normals at the start of the span.
     normals: [Vec<f64>; 3],
+    /// Bounds of the change of the gaps of each sector by the motion of its nodes (m).
     motions: Vec<f64>,
     instructions: InstructionSet,
 }
@@ -50,7 +51,7 @@ pub(super) fn largest_gap_change(motion: [f64; 3], normal: [f64; 3]) -> f64 {
 struct FindMotions<'a> {
     lanes: usize,
     moved: &'a [f64],
-    begun: &'a [f64],
+    motion_origin: &'a [f64],
     normals: &'a [Vec<f64>; 3],
     motions: &'a mut [f64],
 }
@@ -59,7 +60,7 @@ impl Kernel for FindMotions<'_> {
     #[inline(always)]
     fn run(self) {
         let lanes = self.lanes;
-        let nodes = self.moved.chunks_exact(3 * lanes).zip(self.begun.chunks_exact(3 * lanes));
+        let nodes = self.moved.chunks_exact(3 * lanes).zip(self.motion_origin.chunks_exact(3 * lanes));
         for (node, (now, before)) in nodes.enumerate() {
             let [a, b, c] = self.normals.each_ref().map(|normals| &normals[node * lanes..][..lanes]);
             let change = |row: usize, lane: usize| now[row * lanes + lane] - before[row * lanes + lane];
@@ -85,7 +86,7 @@ impl CoupledDisk {
             amplitudes: vec![0.0; coordinates.inertia.len()],
             reach: vec![0.0; bank.rows()],
             error: 0.0,
-            begun: vec![0.0; rows],
+            motion_origin: vec![0.0; rows],
             normals: std::array::from_fn(|_| vec![0.0; rows / 3]),
             motions: vec![0.0; bank.lanes()],
             instructions: InstructionSet::detect(),
@@ -150,9 +151,9 @@ impl CoupledDisk {
         strided_vector3(&self.moved[point], 3 * node * self.lanes + sector, self.lanes)
     }
 
-    /// Measures motion from the displacements at the start of the step, which must be known.
-    pub(crate) fn begin_motions(&mut self) {
-        self.begun.copy_from_slice(&self.moved[0]);
+    /// Makes the displacements at the start of the step, which must be known, the origin from which motion is measured.
+    pub(crate) fn set_motion_origin(&mut self) {
+        self.motion_origin.copy_from_slice(&self.moved[0]);
     }
 
     /// Sets the normals at the start of the span, `[component][node · lanes + sector]`.
@@ -160,13 +161,13 @@ impl CoupledDisk {
         self.normals.iter_mut().zip(normals).for_each(|(own, normals)| own.copy_from_slice(normals));
     }
 
-    /// Bounds the changes of the gaps of each sector (m) by the motion of its nodes since [`CoupledDisk::begin_motions`], at some
-    /// points of the step.
+    /// Bounds the changes of the gaps of each sector (m) by the motion of its nodes since [`CoupledDisk::set_motion_origin`], at the
+    /// given points of the step.
     pub(crate) fn find_motions(&mut self, points: RangeInclusive<usize>) {
         self.motions.fill(0.0);
         for moved in &self.moved[points] {
-            let Self { lanes, begun, normals, motions, .. } = self;
-            self.instructions.run(FindMotions { lanes: *lanes, moved, begun, normals, motions });
+            let Self { lanes, motion_origin, normals, motions, .. } = self;
+            self.instructions.run(FindMotions { lanes: *lanes, moved, motion_origin, normals, motions });
         }
     }
 

@@ -12,7 +12,7 @@ use super::span::{Flight, SpanStep, SpanSteps, StepGoal, Stopped, integrate};
 use super::state::SectorState;
 use super::surroundings::{AcceptedStep, CarriersInStep, LaneStep, Surroundings, Witness};
 use super::tables::{HALVINGS, Tables, halved};
-use super::trial::{ForceInterpolation, Travel, Trial, TrialResult};
+use super::trial::{ForceInterpolation, TravelBounds, Trial, TrialResult};
 use crate::scene::method::Solver;
 use crate::system::Effort;
 
@@ -26,12 +26,12 @@ const BANK_ALLOWANCE: f64 = 1e-6;
 pub(crate) struct OpenLimits {
     /// Time from the start of the span, as a fraction of the span.
     pub until: f64,
-    /// Motion of the surfaces, and of the nodes of a coupled sector, since the start of the step (m).
+    /// Largest allowed motion of the surfaces, and of the nodes of a coupled sector, since the start of the step (m).
     pub motion: f64,
 }
 
-/// Time after which an active sector that would not stay open is checked again, in lengths of the step.
-pub(crate) const RETRY: f64 = 4.0;
+/// Time until the next check whether an active sector stays open, after a check that failed, in lengths of the step.
+pub(crate) const RECHECK_STEPS: f64 = 4.0;
 
 /// State of step control that persists from span to span.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -80,9 +80,9 @@ pub struct IslandSector {
     advance: Advance,
     /// Limits up to which the sector stays open; `None` for active sectors.
     pub(crate) limits: Option<OpenLimits>,
-    /// Fraction of the span up to which an active sector is not checked again.
-    pub(crate) retry: f64,
-    /// Motion of the surfaces, and of the nodes of a coupled sector, over the last step (m); 0 at the start of a span.
+    /// Earliest time at which an active sector may become inactive, as a fraction of the span.
+    pub(crate) recheck_from: f64,
+    /// Bound of the motion of the surfaces, and of the nodes of a coupled sector, over the last step (m); 0 at the start of a span.
     pub(crate) last_motion: f64,
     /// Block of lanes of the sector on surface carriers in the current trial; `None` before its first contact problem.
     block: Option<usize>,
@@ -104,7 +104,7 @@ impl IslandSector {
             trial: if own.steady.is_empty() { trial } else { trial.steady() },
             advance: Advance::new(modes, nodes),
             limits: None,
-            retry: 0.0,
+            recheck_from: 0.0,
             last_motion: 0.0,
             block: None,
             far: false,
@@ -177,15 +177,15 @@ impl Island {
         self.carriers.iter_mut().for_each(CarrierIntegrator::find_start);
         let mut island = IslandInSpan { island: self, surroundings, goal };
         island.find_start();
-        island.island.disks.iter_mut().for_each(CoupledDisk::begin_motions);
+        island.island.disks.iter_mut().for_each(CoupledDisk::set_motion_origin);
         island
     }
 
-    /// Bounds the displacements of the nodes of a sector over a time `longest` (s) without contact; `None` for sectors of a disk.
-    pub(crate) fn travel(&mut self, index: usize, longest: f64) -> Option<Travel<'_>> {
+    /// Bounds the displacements of the nodes of a sector over up to `max_time` (s) without contact; `None` for sectors of a disk.
+    pub(crate) fn travel(&mut self, index: usize, max_time: f64) -> Option<TravelBounds<'_>> {
         let IslandSector { table, disk, trial, state, .. } = &mut self.sectors[index];
         let rows = &self.tables[table[0]][table[1]].rows;
-        disk.is_none().then(|| trial.travel(rows, state, longest))
+        disk.is_none().then(|| trial.travel(rows, state, max_time))
     }
 
     /// Length of the spans (s).
@@ -193,14 +193,15 @@ impl Island {
         self.span
     }
 
-    /// Lists the active sectors.
+    /// Refills `active` with the sectors that have no limits.
     pub(crate) fn list_active(&mut self) {
         let active = self.sectors.iter().enumerate().filter(|(_, one)| one.limits.is_none());
         self.active.clear();
         self.active.extend(active.map(|(index, _)| index));
     }
 
-    /// Bound of the changes of the gaps of a sector (m) by the last known motion of its disk.
+    /// Bound of the changes of the gaps of a sector (m) by the motion of its disk, from the last call of [`CoupledDisk::find_motions`]; 0 for
+    /// uncoupled sectors.
     pub(crate) fn disk_motion(&self, index: usize) -> f64 {
         self.sectors[index].disk.map_or(0.0, |(disk, lane)| self.disks[disk].motion(lane))
     }

@@ -103,16 +103,18 @@ impl MotionCourse {
         }
     }
 
-    /// Returns the motion over a span in which everything moves, and the rotor turns over the shape, at its largest rate of this span.
+    /// Returns an upper bound of the motion over the span: each component changes at its largest rate in the span. The `turn` is the sum of
+    /// the bounds of the rotation of the shape and of the rotation of the rotor relative to the shape.
     pub(crate) fn largest_motion(&self) -> MotionIncrement {
         let ([linear, quadratic], growth) = (&self.parts, &self.growth);
-        let most = |of: &dyn Fn(&MotionIncrement) -> f64| of(linear).abs() + 2.0 * of(quadratic).abs();
-        let shape_rotation = most(&|part| part.shape_rotation);
+        let max =
+            |component: &dyn Fn(&MotionIncrement) -> f64| component(linear).abs() + 2.0 * component(quadratic).abs();
+        let shape_rotation = max(&|part| part.shape_rotation);
         MotionIncrement {
             step: linear.step,
-            turn: shape_rotation + most(&|part| part.turn - part.shape_rotation),
-            shaft: Vector3::new(most(&|part| part.shaft[0]), most(&|part| part.shaft[1]), most(&|part| part.shaft[2])),
-            opening: most(&|part| part.opening),
+            turn: shape_rotation + max(&|part| part.turn - part.shape_rotation),
+            shaft: Vector3::new(max(&|part| part.shaft[0]), max(&|part| part.shaft[1]), max(&|part| part.shaft[2])),
+            opening: max(&|part| part.opening),
             shape_factor: growth.largest_derivatives([0.0, 1.0])[0],
             shape_rotation,
         }
@@ -303,7 +305,7 @@ pub(crate) struct PairRecord {
     pub drives: [(PrescribedMotion, MotionIncrement); POINTS],
     /// Weighted motion over which forces at each point of the accepted step do work.
     pub motions: [MotionIncrement; POINTS],
-    /// Bounds of the change of the gaps of each sector over the span (m) by prescribed motion at its largest rate; in the first sector of a
+    /// Bounds of the change of the gaps of each sector (m) by [`MotionCourse::largest_motion`]; used in the record of the first sector of a
     /// structure.
     pub changes: Vec<f64>,
     /// True if these bounds are known; sectors may then be inactive.
@@ -515,7 +517,7 @@ mod tests {
     use super::*;
     use tiprub_test_models::SeededRandom;
 
-    /// Between any two times of a span, everything moves by at most its share of the motion at the largest rate, also if it turns back.
+    /// Between any two times of a span, each component changes by at most the same fraction of the largest motion, even if it reverses.
     #[test]
     fn motion_at_the_largest_rate_bounds_motion_between_any_times() {
         let mut random = SeededRandom(9);

@@ -23,6 +23,7 @@ pub struct ContactRows {
     error_form: DMatrix<f64>,
     /// ξω and 1/ω_d of each mode; 1/ω_d is infinite for rigid-body modes.
     rates: Vec<[f64; 2]>,
+    /// Coefficients of the bound on the displacement of each mode.
     motions: Vec<FreeMotion>,
     /// The indices 0, 1, 2, …
     all: Vec<usize>,
@@ -169,7 +170,7 @@ impl ContactRows {
     /// magnitude of the first set of `velocities` (slow modes, m/s), plus `rest` (m).
     pub(crate) fn travel(&self, span: f64, state: &SectorState, velocities: &mut Sums<2>, rest: &mut Sums<1>) {
         let ([slow, _], [bounds]) = (&mut velocities.coefficients, &mut rest.coefficients);
-        self.instructions.run(Travel {
+        self.instructions.run(FindTravel {
             motions: &self.motions,
             state: [&state.position, &state.velocity],
             span,
@@ -200,31 +201,32 @@ impl ContactRows {
     }
 }
 
-/// Free motion of a mode.
+/// Coefficients of the bound on the displacement of a mode without forces.
 #[derive(Debug, Clone, Copy)]
 struct FreeMotion {
-    /// Decay rate ξω (1/s), and 1/ω_d (s); 0 for a rigid-body mode.
+    /// Decay rate ξω (1/s).
     rate: f64,
+    /// 1/ω_d (s); 0 for a rigid-body mode.
     per_frequency: f64,
-    /// Half the largest acceleration per amplitude (1/s²).
-    bend: f64,
+    /// Half the largest acceleration, divided by the amplitude (1/s²); 0 for a rigid-body mode.
+    half_acceleration: f64,
 }
 
 impl FreeMotion {
     fn new([rate, per_frequency]: [f64; 2]) -> Self {
         if !per_frequency.is_finite() {
-            return Self { rate, per_frequency: 0.0, bend: 0.0 };
+            return Self { rate, per_frequency: 0.0, half_acceleration: 0.0 };
         }
         // |q| ≤ A and |q̇| ≤ A ω, so |q̈| ≤ A ω (ω + 2ξω).
         let frequency = 1.0 / per_frequency + rate;
-        Self { rate, per_frequency, bend: 0.5 * frequency * (frequency + 2.0 * rate) }
+        Self { rate, per_frequency, half_acceleration: 0.5 * frequency * (frequency + 2.0 * rate) }
     }
 }
 
-/// Bounds the displacements of the modes over a time `span` (s), from their displacements q and velocities v. The bound is `span` times the
-/// magnitude of the velocity `slow`, plus the rest in `bounds`. For a slow mode, the rest bounds the acceleration term ½ q̈ t². A fast mode
-/// of amplitude A moves by at most 2 A.
-struct Travel<'a> {
+/// Bounds the displacements of the modes over a time `span` (s), from their displacements q and velocities v. The bound of a mode is `span`
+/// times the magnitude of its velocity in `slow`, plus its rest in `bounds`. For a slow mode, the rest bounds the acceleration
+/// term ½ q̈ t². A fast mode of amplitude A moves by at most 2 A.
+struct FindTravel<'a> {
     motions: &'a [FreeMotion],
     state: [&'a [f64]; 2],
     span: f64,
@@ -232,7 +234,7 @@ struct Travel<'a> {
     bounds: &'a mut [f64],
 }
 
-impl Kernel for Travel<'_> {
+impl Kernel for FindTravel<'_> {
     #[inline(always)]
     fn run(self) {
         let Self { motions, state: [position, velocity], span, slow, bounds } = self;
@@ -240,7 +242,7 @@ impl Kernel for Travel<'_> {
         for ((slow, bound), (motion, (q, v))) in slow.iter_mut().zip(bounds).zip(motions.iter().zip(state)) {
             let turned = (v + motion.rate * q) * motion.per_frequency;
             let amplitude = (q * q + turned * turned).sqrt();
-            let parabola = motion.bend * span * span;
+            let parabola = motion.half_acceleration * span * span;
             let is_slow = parabola < 2.0;
             *slow = if is_slow { *v } else { 0.0 };
             *bound = amplitude * if is_slow { parabola } else { 2.0 };

@@ -103,7 +103,7 @@ pub trait Surroundings {
     /// Selects the sectors of an island that are evaluated in a step; the others certainly stay open.
     fn choose_active(&mut self, _island: &mut Island, _step: SpanStep) {}
 
-    /// Finds bounds on the motion of the surfaces since the start of the step, at some points of the step.
+    /// Finds bounds on the motion of the surfaces (m) since `CarrierIntegrator::set_motion_origin`, at the given points of the step.
     fn find_surface_motions(&mut self, _carriers: &[CarrierIntegrator], _points: RangeInclusive<usize>) {}
 
     /// Largest bound of [`Surroundings::find_surface_motions`] where a sector may touch a surface (m); 0 if all surfaces are rigid.

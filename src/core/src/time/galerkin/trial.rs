@@ -29,7 +29,7 @@ use minima::Minima;
 use nalgebra::DMatrix;
 pub(crate) use obstacle::node_by_node;
 pub use obstacle::{Obstacle, SlidingState};
-pub(crate) use outcome::Travel;
+pub(crate) use outcome::TravelBounds;
 use prediction::{LanePrediction, LaneValues};
 use steady::Steady;
 use sticking::Sticking;

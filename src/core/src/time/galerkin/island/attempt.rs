@@ -1,7 +1,7 @@
 //! Tries a step of an island: evaluates motion, gaps and forces in turn until they are consistent, then assesses the
 //! step.
 
-use super::{Island, IslandInSpan, IslandSector, RETRY, SectorInStep};
+use super::{Island, IslandInSpan, IslandSector, RECHECK_STEPS, SectorInStep};
 use crate::time::galerkin::carrier::{BLOCKS, CarrierIntegrator};
 use crate::time::galerkin::span::{SpanStep, StepGoal};
 use crate::time::galerkin::surroundings::{Surroundings, Witness};
@@ -25,9 +25,9 @@ const FAR: f64 = 20.0;
 /// Assumed largest motion of bodies between the points of a step, divided by their largest motion at the points.
 pub(crate) const BETWEEN_POINTS_FACTOR: f64 = 2.0;
 
-/// Depth, in tolerances, by which open nodes may enter a surface between the points of a step of coupled sectors. Some node of many sectors
-/// comes near in most steps, so all steps would be short if none were allowed. On `builtin:stage` with a tolerance of 1e-2 it more than halves
-/// the number of trials at the same error.
+/// Depth, in tolerances, by which open nodes may enter a surface between the points of a step of coupled sectors. In most steps, some node
+/// of the sectors comes near a surface, so most steps would be short if no depth were allowed. On `builtin:stage` with a tolerance of 1e-2,
+/// this depth more than halves the number of trials at the same error.
 const ALLOWED_DEPTH: f64 = 0.3;
 
 /// Gaps of an island at the points of a step.
@@ -306,7 +306,7 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         self.attempt_active(step, kind)
     }
 
-    /// Activates the sectors that may touch because bodies move further than their allowance. Returns whether one of them touches.
+    /// Activates the sectors that may touch because bodies move further than their limits. Returns whether one of them touches.
     fn activate_sectors(&mut self, step: SpanStep, kind: ForceInterpolation, points: usize) -> bool {
         if self.island.active.len() == self.island.sectors.len() {
             return false;
@@ -318,7 +318,8 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
             let motion = self.surroundings.surface_motion(index) + self.island.disk_motion(index);
             let one = &mut self.island.sectors[index];
             if one.limits.is_some_and(|limits| limits.motion <= BETWEEN_POINTS_FACTOR * motion) {
-                (one.limits, one.retry, one.state.gaps_known) = (None, step.from + RETRY * step.length, false);
+                (one.limits, one.recheck_from, one.state.gaps_known) =
+                    (None, step.from + RECHECK_STEPS * step.length, false);
                 self.island.restart(index);
                 self.island.active.push(index);
             }
@@ -410,7 +411,7 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         self.island.carriers.iter_mut().for_each(CarrierIntegrator::clear_loads);
         self.island.disks.iter_mut().for_each(|disk| disk.error = 0.0);
         let is_single = self.island.is_single();
-        let allowed = if is_single { 0.0 } else { ALLOWED_DEPTH * self.goal.tolerance };
+        let allowed_depth = if is_single { 0.0 } else { ALLOWED_DEPTH * self.goal.tolerance };
         for place in self.places() {
             let index = self.index(place);
             self.island.sectors[index].far = false;
@@ -420,7 +421,7 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
             if is_single {
                 trial.find_free_motion(level, &tables.rows, state);
             }
-            trial.judge(level, &tables.rows, &surfaces, allowed, &mut own);
+            trial.judge(level, &tables.rows, &surfaces, allowed_depth, &mut own);
             match disk {
                 // The error of one sector makes all sectors of its disk vibrate.
                 Some(disk) => disk.error = disk.error.hypot(own.error),

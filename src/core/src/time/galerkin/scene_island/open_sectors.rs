@@ -1,4 +1,4 @@
-//! Sectors that stay open for a while, whose gaps need no evaluation.
+//! Sectors that certainly stay open for some steps, whose gaps need no evaluation.
 //!
 //! As with fixed steps (`system/nearness.rs`), a gap changes by no more than the motion of its node and of its surface. Before every step,
 //! bounds of this motion show which sectors stay open during the next steps, and these sectors become inactive. Contact forces also move
@@ -12,19 +12,19 @@ use crate::system::{ContactPair, Structure};
 use crate::time::galerkin::carrier::CarrierIntegrator;
 use crate::time::galerkin::disk::{CoupledDisk, largest_gap_change};
 use crate::time::galerkin::island::attempt::BETWEEN_POINTS_FACTOR;
-use crate::time::galerkin::island::{Island, IslandSector, OpenLimits, RETRY};
+use crate::time::galerkin::island::{Island, IslandSector, OpenLimits, RECHECK_STEPS};
 use crate::time::galerkin::span::SpanStep;
 use crate::time::galerkin::surroundings::Surroundings;
 
-/// Times for which sectors can become inactive, in lengths of the next step. A sector becomes inactive for the first time of this list for which
-/// it certainly stays open.
+/// Durations for which a sector can become inactive, in lengths of the next step. A sector becomes inactive for the first of these durations
+/// over which it certainly stays open.
 const INACTIVE_STEPS: [f64; 3] = [8.0, 2.0, 1.0];
 
 impl SceneIsland {
     /// Activates all sectors at the start of a span, and bounds the effect of prescribed motion on their gaps.
     pub(super) fn activate_all(&mut self, structures: &[Structure], pairs: &mut [ContactPair]) {
         let Self { island, records, .. } = self;
-        island.sectors.iter_mut().for_each(|one| (one.limits, one.retry, one.last_motion) = (None, 0.0, 0.0));
+        island.sectors.iter_mut().for_each(|one| (one.limits, one.recheck_from, one.last_motion) = (None, 0.0, 0.0));
         island.list_active();
         if island.carriers.is_empty() {
             return;
@@ -47,8 +47,8 @@ impl SceneIsland {
 }
 
 impl SceneSurroundings<'_> {
-    /// Selects the sectors that may touch in a step, or whose smallest gap an output may need. The others stay open while bodies move by
-    /// less than their limits.
+    /// Makes sectors inactive that certainly stay open in a step and whose smallest gaps no output needs. This holds while bodies move by less
+    /// than the limits of these sectors. All other sectors become active.
     pub(super) fn choose_open_sectors(&mut self, island: &mut Island, step: SpanStep) {
         if island.carriers.is_empty() {
             return;
@@ -58,7 +58,9 @@ impl SceneSurroundings<'_> {
         for index in 0..island.sectors.len() {
             let one = &island.sectors[index];
             let limits = one.limits;
-            if limits.map_or(one.retry > step.from, |limits| limits.until >= end) || !self.may_stay_open(index, one) {
+            if limits.map_or(one.recheck_from > step.from, |limits| limits.until >= end)
+                || !self.may_become_inactive(index, one)
+            {
                 continue;
             }
             let free = limits.map_or_else(|| self.free_distance(island, index), |limits| limits.motion);
@@ -75,13 +77,13 @@ impl SceneSurroundings<'_> {
             let one = &mut island.sectors[index];
             one.limits = found;
             if found.is_none() {
-                one.retry = step.from + RETRY * step.length;
+                one.recheck_from = step.from + RECHECK_STEPS * step.length;
             }
         }
         island.list_active();
     }
 
-    /// Subtracts the motion in the last step from the limits, so that they hold for the motion since the start of this step.
+    /// Subtracts the motion in the last step from the limits, so that they hold for the motion since the start of this step. Stores this motion.
     fn shift_limits(&mut self, island: &mut Island, step: SpanStep) {
         if step.from > 0.0 || island.active.len() < island.sectors.len() {
             self.find_surface_motions(&island.carriers, 0..=0);
@@ -89,25 +91,26 @@ impl SceneSurroundings<'_> {
             for index in 0..island.sectors.len() {
                 let motion = self.surface_motion(index) + island.disk_motion(index);
                 let one = &mut island.sectors[index];
-                // A step that is tried again has not moved anything.
+                // If a step is repeated, nothing has moved since its first attempt.
                 one.last_motion = if motion > 0.0 { motion } else { one.last_motion };
                 if let Some(limits) = &mut one.limits {
                     limits.motion -= motion;
                 }
             }
         }
-        island.disks.iter_mut().for_each(CoupledDisk::begin_motions);
-        island.carriers.iter_mut().for_each(CarrierIntegrator::begin_motions);
+        island.disks.iter_mut().for_each(CoupledDisk::set_motion_origin);
+        island.carriers.iter_mut().for_each(CarrierIntegrator::set_motion_origin);
     }
 
-    /// Records of the first sector of the structure of a sector, and rings that the sector may touch.
+    /// Returns the rings that a sector may touch, each with the bounds of the changes of the gaps of all sectors by prescribed motion (m).
     fn rings(&self, index: usize) -> impl Iterator<Item = (&[f64], &SplineGap)> {
         let first = &self.records[index - self.records[index].sector];
         first.pairs.iter().filter_map(|own| Some((&own.changes[..], self.pairs[own.pair].gap().smooth_ring()?)))
     }
 
-    /// Returns whether a sector could become inactive.
-    fn may_stay_open(&self, index: usize, one: &IslandSector) -> bool {
+    /// Returns whether a sector may become inactive: its gaps are known, no force acts on it, no output needs all of its gaps, and the
+    /// effect of prescribed motion is bounded.
+    fn may_become_inactive(&self, index: usize, one: &IslandSector) -> bool {
         let record = &self.records[index];
         one.state.gaps_known
             && !one.state.is_loaded()
@@ -115,32 +118,34 @@ impl SceneSurroundings<'_> {
             && self.records[index - record.sector].pairs.iter().all(|own| own.has_bounds)
     }
 
-    /// Returns the smallest amount (m) by which a known gap of a sector exceeds 0 and the smallest gap of any sector at the start of the span.
+    /// Returns the smallest amount (m) by which the gaps of a sector exceed both 0 and the smallest gap of the same node over all sectors at
+    /// the start of the span.
     fn free_distance(&self, island: &Island, index: usize) -> f64 {
-        let least = &self.records[index - self.records[index].sector].lowest_of_all;
+        let lowest = &self.records[index - self.records[index].sector].lowest_of_all;
         let gaps = &island.sectors[index].state.gaps;
         let nodes = self.rings(index).flat_map(|(_, ring)| &ring.nodes);
-        nodes.map(|node| gaps[*node] - least[*node].max(0.0)).fold(f64::INFINITY, f64::min)
+        nodes.map(|node| gaps[*node] - lowest[*node].max(0.0)).fold(f64::INFINITY, f64::min)
     }
 
-    /// Returns the limits of a sector whose gaps may become smaller by `free` (m); `None` if this may happen soon without
-    /// contact forces, or with as much motion as in the last step.
+    /// Returns the limits of a sector whose gaps may become smaller by `free` (m). Returns `None` if they may become smaller than that within
+    /// the step without contact forces, or with twice the motion of the last step.
     fn find_limits(&self, island: &mut Island, index: usize, step: SpanStep, free: f64) -> Option<OpenLimits> {
         let sector = self.records[index].sector;
         let prescribed = self.rings(index).map(|(changes, _)| changes[sector]).fold(0.0, f64::max);
-        let least = BETWEEN_POINTS_FACTOR * island.sectors[index].last_motion;
+        let min_motion = BETWEEN_POINTS_FACTOR * island.sectors[index].last_motion;
         INACTIVE_STEPS.iter().find_map(|steps| {
             let part = (steps * step.length).min(1.0 - step.from);
             let mut motion = free - part * prescribed;
-            // Avoids bounding the travel in vain.
-            if motion > least {
+            // The travel can only reduce `motion`, so it is not needed if `motion` is too small already.
+            if motion > min_motion {
                 motion -= self.largest_change(island, index, part);
             }
-            (motion > least && motion.is_finite()).then_some(OpenLimits { until: step.from + part, motion })
+            (motion > min_motion && motion.is_finite()).then_some(OpenLimits { until: step.from + part, motion })
         })
     }
 
-    /// Bounds the change of the gaps of a sector (m) by its own motion over a fraction of the span.
+    /// Bounds the change of the gaps of a sector (m) by its free vibration over a fraction `part` of the span; 0 for sectors of a disk, whose
+    /// motion counts against the limits.
     fn largest_change(&self, island: &mut Island, index: usize, part: f64) -> f64 {
         let SceneSurroundings { structures, records, .. } = self;
         let (sector, structure) = (records[index].sector, &structures[records[index].structure]);
@@ -161,7 +166,7 @@ impl SceneSurroundings<'_> {
         self.bend(&island.carriers, 0);
     }
 
-    /// Finds the gaps of an inactive sector at the start of a step, for which the surfaces are deformed.
+    /// Finds the gaps of an inactive sector at the start of a step. The surfaces must be deformed as at this time.
     fn find_gaps_at_start(&mut self, island: &mut Island, index: usize, step: SpanStep) {
         let SceneSurroundings { pairs, records, .. } = self;
         let record = &mut records[index];

@@ -57,7 +57,7 @@ pub struct TrialResult {
     pub switches: bool,
     /// Energy added by switching contacts (J): Σ λ_i S_ik g_k of their nodes plus the energy supplied by friction.
     pub switched: f64,
-    /// True if an open node may have entered a surface between the points, by more than is allowed.
+    /// True if an open node may have entered a surface between the points by more than the allowed depth.
     pub near: bool,
     /// Depth of open nodes within a surface between the points (m), from the polynomial through their gaps.
     pub depth: f64,
@@ -90,13 +90,13 @@ impl Trial {
         }
     }
 
-    /// Finds error, switches and near misses of a solved step. Open nodes may enter a surface between the points by `allowed` (m).
+    /// Finds error, switches and near misses of a solved step. Open nodes may enter a surface between the points by `allowed_depth` (m).
     pub fn judge(
         &mut self,
         level: &StepTables,
         rows: &ContactRows,
         obstacle: &impl Obstacle,
-        allowed: f64,
+        allowed_depth: f64,
         verdict: &mut TrialResult,
     ) {
         let (basis, count) = (&level.basis, level.basis.count());
@@ -109,7 +109,7 @@ impl Trial {
             let pushes = |point: usize| self.multiplier(point, node) > 0.0;
             let (any, all) = ((0..count).any(pushes), (0..count).all(pushes));
             if !any {
-                let (near, depth) = self.comes_near(level, node, obstacle, allowed);
+                let (near, depth) = self.comes_near(level, node, obstacle, allowed_depth);
                 verdict.near |= near;
                 self.depths[node] = depth;
                 continue;
@@ -189,8 +189,8 @@ impl Trial {
         (gap - self.start_contacts.gaps[node]).abs()
     }
 
-    /// Returns whether an open node may enter a surface between the points by more than `allowed` (m), and its depth there (m).
-    fn comes_near(&self, level: &StepTables, node: usize, obstacle: &impl Obstacle, allowed: f64) -> (bool, f64) {
+    /// Returns whether an open node may enter a surface between the points by more than `allowed_depth` (m), and its depth there (m).
+    fn comes_near(&self, level: &StepTables, node: usize, obstacle: &impl Obstacle, allowed_depth: f64) -> (bool, f64) {
         let basis = &level.basis;
         let mut gaps = [0.0; POINTS];
         let gaps = &mut gaps[..basis.count()];
@@ -201,7 +201,7 @@ impl Trial {
         if basis.degree == 1 {
             let (lowest, bend) = self.bend_of_gap(level.step, node, [gaps[0], gaps[1]], obstacle);
             // A parabola with this deviation falls below its ends and its middle by at most a quarter of it.
-            return (lowest + allowed < 0.25 * NEAR * bend, (-lowest).max(0.0));
+            return (lowest + allowed_depth < 0.25 * NEAR * bend, (-lowest).max(0.0));
         }
         // Between its points, a cubic exceeds their range by less than half of it, and its interpolation error is less than the range.
         let extremes = |(low, high): (f64, f64), gap: &f64| (gap.min(low), gap.max(high));
@@ -212,7 +212,7 @@ impl Trial {
         let sum = |weights: &[f64; POINTS]| gaps.iter().zip(weights).map(|(gap, weight)| gap * weight).sum::<f64>();
         let left = NEAR * sum(&basis.left_out).abs();
         let lowest = basis.between.iter().map(sum).fold(f64::INFINITY, f64::min);
-        (lowest + allowed < left, (-lowest).max(0.0))
+        (lowest + allowed_depth < left, (-lowest).max(0.0))
     }
 
     /// Estimates the smallest gap of a node at the ends and in the middle of the step (m), and by how much the gap in the middle can deviate from

@@ -7,16 +7,18 @@ use crate::time::galerkin::rows::{ContactRows, Sums};
 use crate::time::galerkin::state::SectorState;
 use nalgebra::DMatrix;
 
-/// Bounds of the displacements of the nodes of a sector from their current positions over some time without contact.
-pub(crate) struct Travel<'a> {
-    /// Velocities of slow modes (m/s), and bounds for the rest (m).
+/// Bounds of the displacements of the nodes of a sector from their current positions, over a limited time without contact.
+pub(crate) struct TravelBounds<'a> {
+    /// Velocities of the rows by slow modes (m/s), in the first set.
     slow: &'a Sums<2>,
+    /// Bounds of the other displacements of the rows (m).
     rest: &'a Sums<1>,
+    /// Number of nodes.
     nodes: usize,
 }
 
-impl Travel<'_> {
-    /// Bound of the displacement components of a node after up to `time` (s), which must not exceed the time for which the bounds were found.
+impl TravelBounds<'_> {
+    /// Bounds of the displacement components of a node (m) over up to `time` (s), which must not exceed the time for which the bounds hold.
     pub fn of_node(&self, node: usize, time: f64) -> Vector3 {
         time * self.slow.vector3(0, node, self.nodes).abs() + self.rest.vector3(0, node, self.nodes)
     }
@@ -32,11 +34,11 @@ impl Trial {
         reach
     }
 
-    /// Bounds the displacements of the nodes from their current positions over a time `longest` (s) without contact.
-    pub(crate) fn travel(&mut self, rows: &ContactRows, state: &SectorState, longest: f64) -> Travel<'_> {
+    /// Bounds the displacements of the nodes from their current positions over up to `max_time` (s) without contact.
+    pub(crate) fn travel(&mut self, rows: &ContactRows, state: &SectorState, max_time: f64) -> TravelBounds<'_> {
         let ((rest, _), now) = (&mut self.reach, &mut self.now);
-        rows.travel(longest, state, now, rest);
-        Travel { slow: now, rest, nodes: self.lanes.nodes }
+        rows.travel(max_time, state, now, rest);
+        TravelBounds { slow: now, rest, nodes: self.lanes.nodes }
     }
 
     /// Number of points at which forces are unknown: s, or 1 if the force is constant.
