@@ -18,7 +18,7 @@ use crate::time::galerkin::surroundings::Surroundings;
 
 /// Durations for which a sector can become inactive, in lengths of the next step. A sector becomes inactive for the first of these durations
 /// over which it certainly stays open.
-const INACTIVE_STEPS: [f64; 3] = [8.0, 2.0, 1.0];
+const INACTIVE_STEPS: [f64; 2] = [4.0, 1.0];
 
 impl SceneIsland {
     /// Activates all sectors at the start of a span, and bounds the effect of prescribed motion on their gaps.
