@@ -31,7 +31,7 @@ pub(crate) struct OpenLimits {
 }
 
 /// Time until the next check whether an active sector stays open, after a check that failed, in lengths of the step.
-pub(crate) const RECHECK_STEPS: f64 = 4.0;
+const RECHECK_STEPS: f64 = 4.0;
 
 /// State of step control that persists from span to span.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -80,10 +80,12 @@ pub struct IslandSector {
     advance: Advance,
     /// Limits up to which the sector stays open; `None` for active sectors.
     pub(crate) limits: Option<OpenLimits>,
-    /// Earliest time at which an active sector may become inactive, as a fraction of the span.
-    pub(crate) recheck_from: f64,
+    /// Time at which it was last found that the sector must be active, as a fraction of the span; `None` at the start of a span.
+    pub(crate) checked_at: Option<f64>,
     /// Bound of the motion of the surfaces, and of the nodes of a coupled sector, over the last step (m); 0 at the start of a span.
     pub(crate) last_motion: f64,
+    /// Sum of these motions since the start of the span (m).
+    pub(crate) drift: f64,
     /// Block of lanes of the sector on surface carriers in the current trial; `None` before its first contact problem.
     block: Option<usize>,
     /// True if no force acts on the sector and its gaps are so wide that they are evaluated only after the contact problems of the other
@@ -104,11 +106,17 @@ impl IslandSector {
             trial: if own.steady.is_empty() { trial } else { trial.steady() },
             advance: Advance::new(modes, nodes),
             limits: None,
-            recheck_from: 0.0,
+            checked_at: None,
             last_motion: 0.0,
+            drift: 0.0,
             block: None,
             far: false,
         }
+    }
+
+    /// Returns whether it was found recently that the sector must be active.
+    pub(crate) fn was_checked(&self, step: SpanStep) -> bool {
+        self.checked_at.is_some_and(|time| step.from < time + RECHECK_STEPS * step.length)
     }
 
     /// Returns the displacements of the contact rows (m) and the state.

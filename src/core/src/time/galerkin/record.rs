@@ -308,6 +308,9 @@ pub(crate) struct PairRecord {
     /// Bounds of the change of the gaps of each sector (m) by [`MotionCourse::largest_motion`]; used in the record of the first sector of a
     /// structure.
     pub changes: Vec<f64>,
+    /// Bound of the additional change of a gap over the span while the rotor turns, per motion of the surface since the start of the span (see
+    /// `SurfaceSpline::patch_motions`).
+    pub drift_factor: f64,
     /// True if these bounds are known; sectors may then be inactive.
     pub has_bounds: bool,
 }
@@ -316,7 +319,7 @@ impl PairRecord {
     /// Creates the record of a pair, whose structure has `lanes` lanes.
     pub fn new(pair: usize, carrier: Option<usize>, lanes: usize) -> Self {
         let (course, drives, motions) = Default::default();
-        Self { pair, carrier, course, drives, motions, changes: vec![0.0; lanes], has_bounds: false }
+        Self { pair, carrier, course, drives, motions, changes: vec![0.0; lanes], drift_factor: 0.0, has_bounds: false }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Tries a step of an island: evaluates motion, gaps and forces in turn until they are consistent, then assesses the
 //! step.
 
-use super::{Island, IslandInSpan, IslandSector, RECHECK_STEPS, SectorInStep};
+use super::{Island, IslandInSpan, IslandSector, SectorInStep};
 use crate::time::galerkin::carrier::{BLOCKS, CarrierIntegrator};
 use crate::time::galerkin::span::{SpanStep, StepGoal};
 use crate::time::galerkin::surroundings::{Surroundings, Witness};
@@ -318,8 +318,7 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
             let motion = self.surroundings.surface_motion(index) + self.island.disk_motion(index);
             let one = &mut self.island.sectors[index];
             if one.limits.is_some_and(|limits| limits.motion <= BETWEEN_POINTS_FACTOR * motion) {
-                (one.limits, one.recheck_from, one.state.gaps_known) =
-                    (None, step.from + RECHECK_STEPS * step.length, false);
+                (one.limits, one.checked_at, one.state.gaps_known) = (None, Some(step.from), false);
                 self.island.restart(index);
                 self.island.active.push(index);
             }

@@ -12,7 +12,7 @@ use crate::system::{ContactPair, Structure};
 use crate::time::galerkin::carrier::CarrierIntegrator;
 use crate::time::galerkin::disk::{CoupledDisk, largest_gap_change};
 use crate::time::galerkin::island::attempt::BETWEEN_POINTS_FACTOR;
-use crate::time::galerkin::island::{Island, IslandSector, OpenLimits, RECHECK_STEPS};
+use crate::time::galerkin::island::{Island, IslandSector, OpenLimits};
 use crate::time::galerkin::span::SpanStep;
 use crate::time::galerkin::surroundings::Surroundings;
 
@@ -24,7 +24,9 @@ impl SceneIsland {
     /// Activates all sectors at the start of a span, and bounds the effect of prescribed motion on their gaps.
     pub(super) fn activate_all(&mut self, structures: &[Structure], pairs: &mut [ContactPair]) {
         let Self { island, records, .. } = self;
-        island.sectors.iter_mut().for_each(|one| (one.limits, one.recheck_from, one.last_motion) = (None, 0.0, 0.0));
+        for one in &mut island.sectors {
+            (one.limits, one.checked_at, one.last_motion, one.drift) = (None, None, 0.0, 0.0);
+        }
         island.list_active();
         if island.carriers.is_empty() {
             return;
@@ -39,8 +41,11 @@ impl SceneIsland {
                 let pair = &mut pairs[own.pair];
                 let rows =
                     pair.carrier().map_or(&[][..], |carrier| structures[carrier.structure].modes().displacement());
-                own.has_bounds = !structure.needed_minima.by_sector
-                    && pair.find_prescribed_changes(&own.course.largest_motion(), rows, &mut own.changes);
+                let motion = own.course.largest_motion();
+                own.has_bounds =
+                    !structure.needed_minima.by_sector && pair.find_prescribed_changes(&motion, rows, &mut own.changes);
+                let spacing = pair.gap().smooth_ring().map_or(f64::INFINITY, |ring| ring.surface.spacing());
+                own.drift_factor = motion.relative_turn() * (1.0 + 2.0 / spacing);
             }
         }
     }
@@ -58,7 +63,7 @@ impl SceneSurroundings<'_> {
         for index in 0..island.sectors.len() {
             let one = &island.sectors[index];
             let limits = one.limits;
-            if limits.map_or(one.recheck_from > step.from, |limits| limits.until >= end)
+            if limits.map_or(one.was_checked(step), |limits| limits.until >= end)
                 || !self.may_become_inactive(index, one)
             {
                 continue;
@@ -77,7 +82,7 @@ impl SceneSurroundings<'_> {
             let one = &mut island.sectors[index];
             one.limits = found;
             if found.is_none() {
-                one.recheck_from = step.from + RECHECK_STEPS * step.length;
+                one.checked_at = Some(step.from);
             }
         }
         island.list_active();
@@ -93,6 +98,7 @@ impl SceneSurroundings<'_> {
                 let one = &mut island.sectors[index];
                 // If a step is repeated, nothing has moved since its first attempt.
                 one.last_motion = if motion > 0.0 { motion } else { one.last_motion };
+                one.drift += motion;
                 if let Some(limits) = &mut one.limits {
                     limits.motion -= motion;
                 }
@@ -102,10 +108,10 @@ impl SceneSurroundings<'_> {
         island.carriers.iter_mut().for_each(CarrierIntegrator::set_motion_origin);
     }
 
-    /// Returns the rings that a sector may touch, each with the bounds of the changes of the gaps of all sectors by prescribed motion (m).
-    fn rings(&self, index: usize) -> impl Iterator<Item = (&[f64], &SplineGap)> {
+    /// Returns the rings that a sector may touch.
+    fn rings(&self, index: usize) -> impl Iterator<Item = &SplineGap> {
         let first = &self.records[index - self.records[index].sector];
-        first.pairs.iter().filter_map(|own| Some((&own.changes[..], self.pairs[own.pair].gap().smooth_ring()?)))
+        first.pairs.iter().filter_map(|own| self.pairs[own.pair].gap().smooth_ring())
     }
 
     /// Returns whether a sector may become inactive: its gaps are known, no force acts on it, no output needs all of its gaps, and the
@@ -123,15 +129,20 @@ impl SceneSurroundings<'_> {
     fn free_distance(&self, island: &Island, index: usize) -> f64 {
         let lowest = &self.records[index - self.records[index].sector].lowest_of_all;
         let gaps = &island.sectors[index].state.gaps;
-        let nodes = self.rings(index).flat_map(|(_, ring)| &ring.nodes);
-        nodes.map(|node| gaps[*node] - lowest[*node].max(0.0)).fold(f64::INFINITY, f64::min)
+        let nodes = self.rings(index).flat_map(|ring| &ring.nodes);
+        let free = nodes.map(|node| gaps[*node] - lowest[*node].max(0.0));
+        // `f64::min` would ignore NaN.
+        free.fold(f64::INFINITY, |smallest, free| if free.is_finite() { smallest.min(free) } else { f64::NEG_INFINITY })
     }
 
     /// Returns the limits of a sector whose gaps may become smaller by `free` (m). Returns `None` if they may become smaller than that within
     /// the step without contact forces, or with twice the motion of the last step.
     fn find_limits(&self, island: &mut Island, index: usize, step: SpanStep, free: f64) -> Option<OpenLimits> {
         let sector = self.records[index].sector;
-        let prescribed = self.rings(index).map(|(changes, _)| changes[sector]).fold(0.0, f64::max);
+        let drift = island.sectors[index].drift;
+        let first = &self.records[index - sector];
+        let prescribed =
+            first.pairs.iter().map(|own| own.changes[sector] + own.drift_factor * drift).fold(0.0, f64::max);
         let min_motion = BETWEEN_POINTS_FACTOR * island.sectors[index].last_motion;
         INACTIVE_STEPS.iter().find_map(|steps| {
             let part = (steps * step.length).min(1.0 - step.from);
@@ -156,7 +167,7 @@ impl SceneSurroundings<'_> {
             let normal = normals.each_ref().map(|normals| normals[structure.index(node, sector)]);
             largest_gap_change(travel.of_node(node, time).into(), normal)
         };
-        self.rings(index).flat_map(|(_, ring)| &ring.nodes).map(|node| change(*node)).fold(0.0, f64::max)
+        self.rings(index).flat_map(|ring| &ring.nodes).map(|node| change(*node)).fold(0.0, f64::max)
     }
 
     /// Deforms the surfaces as at the start of a step.
