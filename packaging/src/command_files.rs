@@ -22,8 +22,9 @@ use crate::{
 /// Extensions of the files that a study writes.
 const STUDY_FILES: [&str; 5] = ["csv", "html", "json", "md", "svg"];
 
-/// Extensions of tables that are not Parquet files.
-const OTHER_TABLE_EXTENSIONS: [&str; 6] = ["csv", "json", "tsv", "txt", "xls", "xlsx"];
+/// Extensions of other formats than Parquet: of tables, and of the files that other options and commands read or write.
+const NOT_PARQUET: [&str; 12] =
+    ["csv", "fmu", "html", "json", "pvd", "safetensors", "toml", "tsv", "txt", "vtu", "xls", "xlsx"];
 
 /// Checks all files that a command line names, before any work.
 ///
@@ -47,7 +48,12 @@ pub fn check(command: &Command) -> Result<()> {
                 reject_other_formats(&file, "CSV", &["parquet"], "Use --parquet for a Parquet file")?;
             }
             if let Some(file) = NamedFile::option("--parquet", &arguments.parquet) {
-                reject_other_formats(&file, "Parquet", &OTHER_TABLE_EXTENSIONS, "Use --csv for a CSV file")?;
+                reject_other_formats(
+                    &file,
+                    "Parquet",
+                    &NOT_PARQUET,
+                    "Give a name that ends in .parquet, or use --csv for a CSV file",
+                )?;
             }
             let Some(fields) = arguments.fields() else { return Ok(()) };
             reject_outputs_inside(&written, ("--vtk", &fields.directory), &series::FILES)?;
@@ -80,6 +86,14 @@ pub fn check(command: &Command) -> Result<()> {
         }
         Command::Sweep(arguments) => {
             let plan = NamedFile::new("the plan", &arguments.plan);
+            if extension(&plan.path) == "parquet" {
+                let remedy = "Give the TOML file of the plan whose results these are";
+                return Err(Failure::usage(
+                    plan.path.display().to_string(),
+                    "is a table of results, not a plan",
+                    remedy,
+                ));
+            }
             let named =
                 plan::input_files(&arguments.plan).into_iter().map(|path| NamedFile::new("a file of the plan", path));
             let read: Vec<NamedFile> = [plan].into_iter().chain(named).collect();
@@ -92,7 +106,7 @@ pub fn check(command: &Command) -> Result<()> {
             reject_other_formats(
                 &rows,
                 "Parquet",
-                &OTHER_TABLE_EXTENSIONS,
+                &NOT_PARQUET,
                 "Give a name that ends in .parquet; sweeps write no other format",
             )
         }
@@ -177,9 +191,18 @@ fn reject_other_formats(file: &NamedFile, format: &str, others: &[&str], remedy:
     Err(Failure::usage(what, format!("would contain {format}, but its name ends in .{kind}"), remedy))
 }
 
-/// Rejects outputs in the directory of an option that have an extension of the files that this option writes there.
+/// Rejects outputs that are the directory of an option or contain it, and outputs in this directory that have an extension of the files that the
+/// option writes there.
 fn reject_outputs_inside(outputs: &[NamedFile], (option, directory): (&str, &Path), extensions: &[&str]) -> Result<()> {
     let Some(directory_identity) = identity(directory) else { return Ok(()) };
+    let with_parents: Vec<Identity> = directory.ancestors().filter_map(identity).collect();
+    if let Some(output) =
+        outputs.iter().find(|output| identity(&output.path).is_some_and(|own| with_parents.contains(&own)))
+    {
+        let what = format!("{} {}", output.role, output.path.display());
+        let problem = format!("is a directory of {option} {}", directory.display());
+        return Err(Failure::usage(what, problem, "Give another name"));
+    }
     for output in outputs.iter().filter(|output| extensions.contains(&extension(&output.path).as_str())) {
         let path = output_file::destination(&output.path).unwrap_or_else(|_| output.path.clone());
         if path.parent().and_then(identity).as_ref() == Some(&directory_identity) {

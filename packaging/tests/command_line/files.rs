@@ -52,12 +52,18 @@ fn rejects_results_with_names_of_vtk_files() {
     fs::create_dir(project.path("fields")).unwrap();
     for (option, file, directory) in [
         ("--csv", "fields/rotor_000001.vtu", "fields"),
-        ("--parquet", "fields/../fields/x.VTU", "fields"),
+        ("--csv", "fields/../fields/x.VTU", "fields"),
         ("--report", "new/fields.pvd", "./new"),
         ("--csv", "x.vtu", "."),
     ] {
         let error = project.fail(&["run", "scene.toml", option, file, "--vtk", directory, "--force"], 2);
         assert!(error.contains(&format!("{option} {file}")) && error.contains("--vtk"), "{error}");
+    }
+    for (option, file, directory) in
+        [("--csv", "new", "new"), ("--parquet", "./new", "new/"), ("--report", "new", "new/a/b")]
+    {
+        let error = project.fail(&["run", "scene.toml", option, file, "--vtk", directory, "--force"], 2);
+        assert!(error.contains(&format!("{option} {file}: is a directory of --vtk {directory}")), "{error}");
     }
     assert!(!project.path("new").exists());
     project.succeed(&["run", "scene.toml", "--csv", "fields/run.csv", "--vtk", "fields", "--force"]);

@@ -308,6 +308,10 @@ fn rejects_names_of_other_table_formats_for_results() {
             "--parquet x.CSV: would contain Parquet, but its name ends in .csv",
         ),
         (
+            &["run", "scene.toml", "--parquet", "x.vtu"],
+            "--parquet x.vtu: would contain Parquet, but its name ends in .vtu",
+        ),
+        (
             &["run", "scene.toml", "--csv", "x.parquet"],
             "--csv x.parquet: would contain CSV, but its name ends in .parquet",
         ),
@@ -316,6 +320,8 @@ fn rejects_names_of_other_table_formats_for_results() {
         assert!(error.contains(problem), "{error}");
         assert!(error.contains("--csv for") || error.contains("--parquet for") || error.contains("ends in .parquet"));
     }
+    let error = project.fail(&["sweep", "x.parquet"], 2);
+    assert!(error.contains("x.parquet: is a table of results, not a plan"), "{error}");
     assert!(!project.files().iter().any(|name| name.starts_with("x.")), "{:?}", project.files());
 }
 
