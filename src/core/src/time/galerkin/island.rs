@@ -1,7 +1,7 @@
 //! Islands: sectors and bodies that must step together, as one type. A blade on rigid surfaces is an island of one sector; the sectors of
 //! a coupled disk, and all sectors that touch surfaces of one carrier, are an island with shared bodies.
 
-pub(in crate::time::galerkin) mod attempt;
+mod attempt;
 
 use super::advance::Advance;
 use super::carrier::{BLOCKS, CarrierIntegrator};
@@ -29,6 +29,9 @@ pub(crate) struct OpenLimits {
     /// Largest allowed motion of the surfaces, and of the nodes of a coupled sector, since the start of the step (m).
     pub motion: f64,
 }
+
+/// Assumed largest motion of bodies between the points of a step, divided by their largest motion at the points.
+pub(crate) const BETWEEN_POINTS_FACTOR: f64 = 2.0;
 
 /// Time until the next check whether an active sector stays open, after a check that failed, in lengths of the step.
 const RECHECK_STEPS: f64 = 4.0;

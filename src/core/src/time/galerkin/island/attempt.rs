@@ -1,7 +1,7 @@
 //! Tries a step of an island: evaluates motion, gaps and forces in turn until they are consistent, then assesses the
 //! step.
 
-use super::{Island, IslandInSpan, IslandSector, SectorInStep};
+use super::{BETWEEN_POINTS_FACTOR, Island, IslandInSpan, IslandSector, SectorInStep};
 use crate::time::galerkin::carrier::{BLOCKS, CarrierIntegrator};
 use crate::time::galerkin::span::{SpanStep, StepGoal};
 use crate::time::galerkin::surroundings::{Surroundings, Witness};
@@ -23,9 +23,6 @@ const EXCHANGE_PRECISION_ON_DISKS: f64 = 1e-3;
 /// Sectors whose gaps at the start of a step exceed this many tolerances are evaluated only after the contact problems of the other sectors are
 /// solved.
 const FAR: f64 = 20.0;
-
-/// Assumed largest motion of bodies between the points of a step, divided by their largest motion at the points.
-pub(crate) const BETWEEN_POINTS_FACTOR: f64 = 2.0;
 
 /// Depth, in tolerances, by which open nodes may enter a surface between the points of a step of coupled sectors. In most steps, some node
 /// of the sectors comes near a surface, so most steps would be short if no depth were allowed. On `builtin:stage` with a tolerance of 1e-2,

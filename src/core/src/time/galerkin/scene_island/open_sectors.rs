@@ -11,8 +11,7 @@ use crate::math::vector::vector3_at;
 use crate::system::{ContactPair, Structure};
 use crate::time::galerkin::carrier::CarrierIntegrator;
 use crate::time::galerkin::disk::{CoupledDisk, largest_gap_change};
-use crate::time::galerkin::island::attempt::BETWEEN_POINTS_FACTOR;
-use crate::time::galerkin::island::{Island, IslandSector, OpenLimits};
+use crate::time::galerkin::island::{BETWEEN_POINTS_FACTOR, Island, IslandSector, OpenLimits};
 use crate::time::galerkin::span::SpanStep;
 use crate::time::galerkin::surroundings::Surroundings;
 
