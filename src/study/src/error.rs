@@ -41,6 +41,9 @@ use crate::{
     convergence::refine::{Again, FINEST_TIP, RomSource},
 };
 
+/// Cases of a study, each with its measurements.
+pub type MeasuredCases = Vec<(Box<dyn ErrorCase>, Measured)>;
+
 /// Largest accepted distance between the two references of a scene.
 const MEET: f64 = 2e-3;
 
@@ -71,7 +74,7 @@ pub fn study(arguments: &ErrorArguments, source: Option<&dyn RomSource>, console
         arguments.scene,
         if total.as_ref().is_ok_and(|total| total.is_total()) { "a finer reference model" } else { "one reference" }
     );
-    let mut study = of_cases(vec![Box::new(case)], &[], (quick, summary), &forecast)?;
+    let (mut study, _) = study_cases(vec![Box::new(case)], &[], (quick, summary), &forecast)?;
     forecast.finish();
     match total {
         Err(why) => study
@@ -125,16 +128,17 @@ pub fn planned(cases: &[Box<dyn ErrorCase>], smooth: &[&dyn ErrorCase], quick: b
     ledger
 }
 
-/// Runs the study of several cases; for the cases `smooth`, only orders of convergence are reported.
+/// Runs the study of several cases. Returns the study and the measurements of each case. The cases in `smooth`
+/// contribute only orders of convergence.
 ///
 /// # Errors
 /// A reference fails.
-pub fn of_cases(
+pub fn study_cases(
     cases: Vec<Box<dyn ErrorCase>>,
     smooth: &[&dyn ErrorCase],
     (quick, summary): (bool, String),
     forecast: &Forecast,
-) -> Result<Study> {
+) -> Result<(Study, MeasuredCases)> {
     let mut study = Study {
         name: "error",
         title: "Error against run time".into(),
@@ -166,16 +170,12 @@ pub fn of_cases(
     }
     text.push_str(&format!("\n## Orders\n\n{}", orders.to_markdown()));
     study.files.push(("tables.md".into(), "pictures and tables as Markdown".into(), text.into_bytes()));
-    add_summary(&mut study, &measured);
     study.results = json!({ "scenes": results, "quick": quick });
-    Ok(study)
+    Ok((study, measured))
 }
 
-/// Adds tables over all scenes if there are several.
-fn add_summary(study: &mut Study, measured: &[(Box<dyn ErrorCase>, Measured)]) {
-    if measured.len() < 2 {
-        return;
-    }
+/// Adds tables that compare all scenes.
+pub fn add_summary(study: &mut Study, measured: &[(Box<dyn ErrorCase>, Measured)]) {
     let scenes: Vec<(&dyn ErrorCase, &Measured)> =
         measured.iter().map(|(case, found)| (case.as_ref(), found)).collect();
     let tables = [

@@ -26,7 +26,7 @@ use tiprub_gallery::rom_cache::RomCache;
 use tiprub_shell::{Failure, Result, console::Console, forecast::Forecast};
 use tiprub_study::{
     Study,
-    error::{case, clock, competitor, measure, of_cases, planned, run, scene, window},
+    error::{add_summary, case, clock, competitor, measure, planned, run, scene, study_cases, window},
 };
 
 use crate::cli::{ErrorScene, LabErrorArguments};
@@ -57,8 +57,9 @@ pub(crate) fn study(arguments: &LabErrorArguments, console: &Console) -> Result<
                    standard problems, compared with methods that share no code with them."
         .to_owned();
     let forecast = Forecast::new(console, "Error against run time", planned(&cases, &smooth, quick));
-    let mut study = of_cases(cases, &smooth, (quick, summary), &forecast)?;
+    let (mut study, measured) = study_cases(cases, &smooth, (quick, summary), &forecast)?;
     forecast.finish();
+    add_summary(&mut study, &measured);
     if let Some(table) = communication {
         let text = table.to_markdown().into_bytes();
         study.files.push((COMMUNICATION.into(), "time and error against the communication step".into(), text));
