@@ -36,14 +36,6 @@ impl Spot<'_> {
         (weights, weights.indices.map(|point| self.carrier.first_row + 3 * point as usize))
     }
 
-    /// Writes the modal components along a direction of the contact node, from those along x, y, z.
-    pub fn components(&self, direction: Vector3, seen: [&[f64]; 3], to: &mut [f64]) {
-        let ([x, y, z], [a, b, c]) = (seen, self.frame.fixed(direction).into());
-        for (((to, x), y), z) in to.iter_mut().zip(x).zip(y).zip(z) {
-            *to = a * x + b * y + c * z;
-        }
-    }
-
     /// Interpolates values per row of the carrier, in the directions of the contact node.
     pub fn interpolate(&self, value: impl Fn(usize) -> f64) -> Vector3 {
         let mut sum = Vector3::zeros();

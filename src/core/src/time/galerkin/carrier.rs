@@ -7,6 +7,7 @@ use super::shared_body::SharedBody;
 use super::surroundings::LaneStep;
 use super::trial::ForceInterpolation;
 use crate::geometry::frame::PolarFrame;
+use crate::geometry::surface_spline::Weights;
 use crate::math::simd::{InstructionSet, Kernel};
 use crate::math::vector::{Vector3, vector3_at};
 use crate::modes::bank::ModalBank;
@@ -53,6 +54,8 @@ pub struct CarrierIntegrator {
     /// Modal components of each lane of the current sector in fixed directions, and directions of the lanes.
     seen: [Vec<f64>; 3],
     frames: Vec<PolarFrame>,
+    /// Places of the lanes of the current sector.
+    places: Vec<LanePlace>,
     /// Modal components along the normals and along the forces of the lanes of all blocks, and true for lanes on this structure.
     along: Vec<f64>,
     acting: Vec<f64>,
@@ -108,6 +111,7 @@ impl CarrierIntegrator {
             impulses: vec![0.0; modes],
             seen: std::array::from_fn(|_| vec![0.0; lanes.len() * stride]),
             frames: vec![PolarFrame::FIXED; lanes.len()],
+            places: vec![LanePlace::UNASSIGNED; lanes.len()],
             along: vec![0.0; (BLOCKS + 1) * lanes.len() * stride],
             acting: vec![0.0; (BLOCKS + 1) * lanes.len() * stride],
             touches: vec![false; (BLOCKS + 1) * lanes.len()],
@@ -278,21 +282,45 @@ impl CarrierIntegrator {
         self.touches[block * self.lanes..][..self.lanes].fill(false);
     }
 
-    /// Assigns a lane of the current sector to a place, with this normal.
+    /// Assigns a lane of the current sector to a place with this `normal` (in the directions of the node). Call
+    /// [`CarrierIntegrator::find_modal_components`] after the last lane.
     pub(crate) fn set_lane(&mut self, block: usize, lane: usize, spot: Spot, normal: Vector3) {
-        let (padded, place) = (self.force.len(), block * self.lanes + lane);
-        (self.touches[place], self.frames[lane]) = (true, spot.frame);
+        self.touches[block * self.lanes + lane] = true;
+        self.frames[lane] = spot.frame;
         let (weights, first) = spot.rows();
-        let window = lane * padded..(lane + 1) * padded;
-        let Self { seen, shapes, along, instructions, .. } = self;
-        for (component, seen) in seen.iter_mut().enumerate() {
-            let rows = first.map(|row| row + component);
-            let (columns, coefficients) = (&rows[..weights.len], [&weights.values[..weights.len]]);
-            let sums = [&mut seen[window.clone()]];
-            instructions.run(Combine { table: shapes, stride: padded, columns, coefficients, sums });
+        self.places[lane] = LanePlace { weights, first, normal: spot.frame.fixed(normal).into() };
+    }
+
+    /// Computes the modal components of all assigned lanes of a block in fixed directions and along their normals. Most points of a node share
+    /// their control points, because nodes move little in a step; the mode shapes are then read once.
+    pub(crate) fn find_modal_components(&mut self, block: usize, lanes: Lanes) {
+        let (padded, first) = (self.force.len(), block * self.lanes);
+        let Self { seen, along, shapes, places, touches, instructions, .. } = self;
+        let touches = &touches[first..][..lanes.len()];
+        for node in 0..lanes.nodes {
+            let (mut node_lanes, mut count) = ([0; MOST], 0);
+            for lane in (1..=lanes.points).map(|point| lanes.at(point, node)).filter(|lane| touches[*lane]) {
+                node_lanes[count] = lane;
+                count += 1;
+            }
+            let group = &node_lanes[..count];
+            let control_points = |lane: usize| (places[lane].first, places[lane].weights.len);
+            let is_common = group.iter().all(|lane| control_points(*lane) == control_points(group[0]));
+            let mut components = ModeShapeInterpolation { seen, shapes, places, instructions };
+            match *group {
+                [a, b] if is_common => components.find([a, b]),
+                [a, b, c] if is_common => components.find([a, b, c]),
+                _ => group.iter().for_each(|lane| components.find([*lane])),
+            }
         }
-        let seen = seen.each_ref().map(|seen| &seen[window.clone()]);
-        spot.components(normal, seen, &mut along[place * padded..][..padded]);
+        for lane in (0..lanes.len()).filter(|lane| touches[*lane]) {
+            let to = component_window_mut(along, first + lane, padded);
+            instructions.run(Project {
+                seen: fixed_components(seen, lane, padded),
+                direction: places[lane].normal,
+                to,
+            });
+        }
     }
 
     /// Adds the displacement at all lanes (m, along their normals) per λ of one lane, whose force per λ is `direction`, to
@@ -308,14 +336,16 @@ impl CarrierIntegrator {
         if !self.touches[first + lane] {
             return;
         }
-        self.find_acting(first, lane, direction);
+        self.instructions.run(Project {
+            seen: fixed_components(&self.seen, lane, padded),
+            direction: self.frames[lane].fixed(direction).into(),
+            to: component_window_mut(&mut self.acting, first + lane, padded),
+        });
         let (k, _) = lanes.place(lane);
         for i in 1..=lanes.points {
             let Self { force, along, acting, touches, instructions, body, .. } = self;
-            let response = body.response(step.level, step.kind, i, k);
-            for ((to, response), acting) in force.iter_mut().zip(response).zip(&acting[(first + lane) * padded..]) {
-                *to = response * acting;
-            }
+            let (response, acting) = (body.response(step.level, step.kind, i, k), &acting[(first + lane) * padded..]);
+            instructions.run(ModalResponse { response, acting, to: force });
             let others = i * lanes.nodes - lanes.nodes..i * lanes.nodes;
             let places = first + others.start..first + others.end;
             instructions.run(AddAlong {
@@ -324,17 +354,6 @@ impl CarrierIntegrator {
                 touches: &touches[places],
                 sums: &mut carrier_compliance[others],
             });
-        }
-    }
-
-    /// Finds the modal components along the force of a lane per λ.
-    fn find_acting(&mut self, first: usize, lane: usize, direction: Vector3) {
-        let padded = self.force.len();
-        let [x, y, z] = self.seen.each_ref().map(|seen| &seen[lane * padded..][..padded]);
-        let [a, b, c] = self.frames[lane].fixed(direction).into();
-        let seen = x.iter().zip(y).zip(z);
-        for (to, ((x, y), z)) in self.acting[(first + lane) * padded..][..padded].iter_mut().zip(seen) {
-            *to = a * x + b * y + c * z;
         }
     }
 
@@ -395,13 +414,98 @@ impl CarrierIntegrator {
             return self.force.fill(0.0);
         }
         let padded = self.force.len();
-        let [x, y, z] = self.seen.each_ref().map(|seen| &seen[lane * padded..][..padded]);
+        let [x, y, z] = fixed_components(&self.seen, lane, padded);
         let (k, _) = lanes.place(lane);
         let [a, b, c] = self.frames[lane].fixed(force).into();
         let response = self.body.response(level, kind, i, k);
         let seen = x.iter().zip(y).zip(z);
         for ((to, response), ((x, y), z)) in self.force.iter_mut().zip(response).zip(seen) {
             *to = response * (a * x + b * y + c * z);
+        }
+    }
+}
+
+/// The place of a lane on the surface.
+#[derive(Debug, Clone, Copy)]
+struct LanePlace {
+    /// Weights of the control points around it, and the first row of each.
+    weights: Weights,
+    first: [usize; 16],
+    /// Normal in fixed directions.
+    normal: [f64; 3],
+}
+
+impl LanePlace {
+    const UNASSIGNED: Self =
+        Self { weights: Weights { indices: [0; 16], values: [0.0; 16], len: 0 }, first: [0; 16], normal: [0.0; 3] };
+}
+
+/// Modal components of a lane in fixed directions.
+fn fixed_components(seen: &[Vec<f64>; 3], lane: usize, padded: usize) -> [&[f64]; 3] {
+    seen.each_ref().map(|seen| &seen[lane * padded..][..padded])
+}
+
+/// Modal components of a lane in one direction.
+fn component_window_mut(components: &mut [f64], lane: usize, padded: usize) -> &mut [f64] {
+    &mut components[lane * padded..][..padded]
+}
+
+/// Interpolates the mode shapes at lanes.
+struct ModeShapeInterpolation<'a> {
+    /// Components of all lanes in fixed directions.
+    seen: &'a mut [Vec<f64>; 3],
+    /// `[row][mode]`.
+    shapes: &'a [f64],
+    places: &'a [LanePlace],
+    instructions: &'a InstructionSet,
+}
+
+impl ModeShapeInterpolation<'_> {
+    /// Finds the components of lanes that have the same control points.
+    fn find<const N: usize>(&mut self, lanes: [usize; N]) {
+        let padded = self.seen[0].len() / self.places.len();
+        let LanePlace { first, weights: Weights { len, .. }, .. } = self.places[lanes[0]];
+        let coefficients = lanes.map(|lane| &self.places[lane].weights.values[..len]);
+        for (component, seen) in self.seen.iter_mut().enumerate() {
+            let rows = first.map(|row| row + component);
+            let Ok(sums) = seen.get_disjoint_mut(lanes.map(|lane| lane * padded..(lane + 1) * padded)) else {
+                unreachable!("lanes differ")
+            };
+            let (table, columns) = (self.shapes, &rows[..len]);
+            self.instructions.run(Combine { table, stride: padded, columns, coefficients, sums });
+        }
+    }
+}
+
+/// Modal components along a direction from those along x, y and z.
+struct Project<'a> {
+    seen: [&'a [f64]; 3],
+    direction: [f64; 3],
+    to: &'a mut [f64],
+}
+
+impl Kernel for Project<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let ([x, y, z], [a, b, c]) = (self.seen, self.direction);
+        for (((to, x), y), z) in self.to.iter_mut().zip(x).zip(y).zip(z) {
+            *to = a * x + b * y + c * z;
+        }
+    }
+}
+
+/// Modal displacements `to` = `response` (per unit of modal force) · `acting` (modal force per λ).
+struct ModalResponse<'a> {
+    response: &'a [f64],
+    acting: &'a [f64],
+    to: &'a mut [f64],
+}
+
+impl Kernel for ModalResponse<'_> {
+    #[inline(always)]
+    fn run(self) {
+        for ((to, response), acting) in self.to.iter_mut().zip(self.response).zip(self.acting) {
+            *to = response * acting;
         }
     }
 }

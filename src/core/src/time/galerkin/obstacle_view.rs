@@ -195,6 +195,7 @@ impl Obstacle for ObstacleView<'_> {
             let normal = lanes.vector3(normals, lane);
             self.with_carrier_mut(node, point, |carrier, spot| carrier.set_lane(block, lane, spot, normal));
         }
+        self.carriers.carriers.iter_mut().for_each(|carrier| carrier.find_modal_components(block, lanes));
         true
     }
 
