@@ -112,8 +112,7 @@ impl CoupledDisk {
 
     /// Finds displacements and velocities of all rows at the start of a step.
     pub(crate) fn find_rows(&mut self, disk: &mut Disk) {
-        disk.rows_of(&self.body.at[0], &mut self.moved[0]);
-        self.find_velocity(disk);
+        disk.rows_of_two([&self.body.at[0], &self.body.state.velocity], [&mut self.moved[0], &mut self.velocity]);
     }
 
     /// Advances to the end of an accepted step, whose displacements become those at the start of the next one.

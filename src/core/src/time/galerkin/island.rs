@@ -416,7 +416,10 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         self.island.carriers.iter_mut().for_each(|carrier| carrier.take(step.level, kind, points));
         for disk in &mut self.island.disks {
             disk.take(step.level, kind, points);
-            if let Some(bank) = self.surroundings.disk(disk.structure) {
+            // At the end of a span this is unnecessary: the next span computes displacements and velocities of all rows from the modal state,
+            // and sets those of the sectors again.
+            let bank = self.surroundings.disk(disk.structure).filter(|_| step.from + step.length < 1.0);
+            if let Some(bank) = bank {
                 disk.find_velocity(bank);
             }
         }
