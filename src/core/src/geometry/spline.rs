@@ -11,7 +11,7 @@ use super::{Gap, Geometry, PrescribedMotion, Vector3};
 use crate::math::real;
 use crate::math::simd::InstructionSet;
 use crate::math::vector::{length, strided_vector3, vector3_at};
-use near::{NearSearch, RingGaps};
+use near::{NearNode, NearSearch};
 
 /// Gap of a node without a surface to touch: infinite, so that it is never used as a distance.
 pub(crate) const NOTHING_TO_TOUCH: f64 = f64::INFINITY;
@@ -57,6 +57,7 @@ pub struct SplineGap {
     factor: f64,
     /// Revolutions of the rotor over the current step.
     pub turned: f64,
+    instruction_set: InstructionSet,
     /// The first node, `node · lanes + lane`, that is beyond the extension of the surface ([`super::surface_spline::REACH`]).
     pub out_of_reach: Option<usize>,
 }
@@ -96,6 +97,7 @@ impl SplineGap {
             angular_scale,
             factor: 0.0,
             turned: 0.0,
+            instruction_set: InstructionSet::detect(),
             out_of_reach: None,
         }
     }
@@ -149,23 +151,34 @@ impl SplineGap {
         }
     }
 
-    /// Evaluates all gaps to a smooth ring, like [`SplineGap::evaluate`]. Searches start from the angles of the nodes.
+    /// Evaluates all gaps to a smooth ring, like [`SplineGap::evaluate`]. `guess` are the closest points before the rotor turned by
+    /// [`SplineGap::turned`]; without them, searches start from the angles of the nodes.
     pub(crate) fn evaluate_ring(
         &mut self,
         drive: &PrescribedMotion,
         displacement: &[f64],
         moved: &[f64],
-        instructions: InstructionSet,
+        guess: Option<&[ClosestPoint]>,
         geometry: &mut Geometry,
         gaps: &mut [f64],
     ) {
         self.follow(drive.shape_factor, moved);
-        let search = NearSearch::new(self, drive);
-        instructions.run(RingGaps { search, displacement, geometry, gaps: &mut *gaps });
-        let lanes = self.layout.lanes;
-        let indices = self.nodes.iter().flat_map(|node| node * lanes..(node + 1) * lanes);
-        let mut faced = indices.filter(|index| self.layout.clearances[index % lanes].is_finite());
-        self.out_of_reach = faced.find(|index| gaps[*index] == NOTHING_TO_TOUCH);
+        let (search, lanes, mut out_of_reach) = (NearSearch::new(self, drive), self.layout.lanes, None);
+        let nodes = self.nodes.iter().flat_map(|node| (0..lanes).map(move |lane| (*node, lane)));
+        let faced = nodes.filter(|(_, lane)| self.layout.clearances[*lane].is_finite()).map(|(node, lane)| {
+            let index = node * lanes + lane;
+            let local = strided_vector3(displacement, 3 * node * lanes + lane, lanes);
+            let guess = guess.map(|places| self.surface.advance(places[index], self.turned));
+            NearNode { node, index, local, guess }
+        });
+        search.find_gaps(faced, |NearNode { index, .. }, found| {
+            (gaps[index], geometry.places[index]) = (found.distance, found.foot);
+            geometry.set_normal(index, found.normal);
+            if found.distance == NOTHING_TO_TOUCH {
+                out_of_reach = out_of_reach.or(Some(index));
+            }
+        });
+        self.out_of_reach = out_of_reach;
     }
 
     /// Computes upper bounds of the change of any gap of each sector over a step (m) by everything except the displacement of its node.

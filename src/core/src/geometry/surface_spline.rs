@@ -20,6 +20,7 @@
 //! weights. A node that moves over the last ring and back thus always has a distance. An open surface, which is not around an axis, ends at
 //! its edges.
 
+pub(crate) mod close;
 mod creases;
 mod foot;
 mod interpolation;

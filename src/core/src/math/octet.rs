@@ -37,6 +37,38 @@ pub(crate) fn both<T>(of: impl Fn(usize) -> T) -> [T; 2] {
 /// Adding and subtracting this rounds to the nearest integer (1.5·2⁵²).
 pub(crate) const ROUNDER: f64 = 6_755_399_441_055_744.0;
 
+/// Arithmetic that is shared by one number and by eight numbers in registers.
+pub(crate) trait Numbers:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
+{
+    /// Returns `value`, repeated for eight numbers.
+    fn from_number(value: f64) -> Self;
+    /// Returns the square root of each number.
+    fn square_root(self) -> Self;
+}
+
+impl Numbers for f64 {
+    #[inline(always)]
+    fn from_number(value: f64) -> Self {
+        value
+    }
+    #[inline(always)]
+    fn square_root(self) -> Self {
+        self.sqrt()
+    }
+}
+
+impl<L: Octet> Numbers for L {
+    #[inline(always)]
+    fn from_number(value: f64) -> Self {
+        L::splat(value)
+    }
+    #[inline(always)]
+    fn square_root(self) -> Self {
+        self.sqrt()
+    }
+}
+
 /// Eight numbers in registers. A mask has bit `i` set where number `i` is selected.
 pub(crate) trait Octet:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>

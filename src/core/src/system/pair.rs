@@ -220,9 +220,11 @@ impl ContactPair {
         let ContactHistory { gap: gaps, geometry: Two { now, before }, .. } = &mut structure.history;
         let (drive, displacement) = (&prescribed.drive.now, structure.modes.displacement());
         match gap {
-            GapLaw::Spline(ring) if start == SearchStart::Angles && ring.surface.is_smooth_ring() => {
-                let instructions = structure.modes.instruction_set;
-                ring.evaluate_ring(drive, displacement, moved, instructions, now, &mut gaps.now);
+            GapLaw::Spline(ring)
+                if matches!(start, SearchStart::Angles | SearchStart::StartOfSpan) && ring.surface.is_smooth_ring() =>
+            {
+                let guess = (start == SearchStart::StartOfSpan).then_some(&before.places[..]);
+                ring.evaluate_ring(drive, displacement, moved, guess, now, &mut gaps.now);
             }
             _ => {
                 let before = (start != SearchStart::Positions).then_some(&*before);
@@ -250,6 +252,9 @@ pub(crate) enum SearchStart {
     PreviousStep,
     /// The positions of the nodes.
     Positions,
+    /// The closest points of the previous communication step, improved by Newton steps on smooth rings. Other surfaces use the general search,
+    /// as with `PreviousStep`.
+    StartOfSpan,
     /// The angles of the nodes on smooth rings, and the closest points of the previous step on other surfaces.
     Angles,
 }

@@ -2,14 +2,20 @@
 
 use super::SplineGap;
 use crate::geometry::frame::PolarFrame;
+use crate::geometry::surface_spline::close::EightNodes;
 use crate::geometry::surface_spline::{ClosestPoint, Projection};
-use crate::geometry::{Gap, Geometry, PrescribedMotion, Vector3};
-use crate::math::simd::Kernel;
-use crate::math::vector::strided_vector3;
+use crate::geometry::{Gap, PrescribedMotion, Vector3};
+use crate::math::octet::{Eight, Octet, OctetKernel};
 
-/// Largest error of the initial guess of a closest point (in patches) for which one evaluation of the surface is sufficient. On a casing with
-/// 24 columns, errors of gaps are then below 1e-13 m. The evaluation roughly squares the error of the closest point, which is the next initial guess.
-const NEARBY: f64 = 1e-3;
+/// Longest Newton step (in patches) whose extrapolated end is accepted. On a casing with 24 columns, errors of gaps are then below 1e-12 m.
+/// The step roughly squares the error of the closest point, which is the next initial guess.
+const NEARBY: f64 = 2e-3;
+
+/// Largest number of Newton steps from a guess before the general search.
+const NEWTON_STEPS: usize = 4;
+
+/// Minimum number of nodes for which the vectorised search is faster than single searches.
+const MIN_NODES_TOGETHER: usize = 3;
 
 /// A search for closest points of many nodes at one instant.
 pub(crate) struct NearSearch<'a> {
@@ -24,6 +30,18 @@ pub(crate) struct NearSearch<'a> {
     centre: Vector3,
     /// Largest distance over which a node may be skipped (m).
     reach: f64,
+}
+
+/// A node whose gap is to be found.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct NearNode {
+    /// Contact node, and its index `node · lanes + lane`.
+    pub node: usize,
+    pub index: usize,
+    /// Displacement in the directions of the node (m).
+    pub local: Vector3,
+    /// Guess of the closest point at the current angle of the rotor; `None` to start from the angle of the node.
+    pub guess: Option<ClosestPoint>,
 }
 
 /// Gap of a node, with the normal in its own directions and in fixed directions.
@@ -78,7 +96,7 @@ impl<'a> NearSearch<'a> {
         let (x, frame) = self.position(node, index, local);
         let ClosestPoint { patch, s, t } = self.gap.surface.advance(before, self.gap.turned);
         let guess = ClosestPoint { patch, s: s + drift[0], t: t + drift[1] };
-        let found = self.gap.surface.project_close(x, guess, NEARBY)?;
+        let found = self.gap.surface.project_close(x, guess, NEARBY).ok()?;
         *drift = [found.foot.s - s, found.foot.t - t];
         Some(self.near(found, frame))
     }
@@ -95,24 +113,66 @@ impl<'a> NearSearch<'a> {
         (self.near(found, frame), drift)
     }
 
-    /// Finds the gap of a node displaced by `local` (m), with the normal in the directions of the node. The search starts from `guess`, a place
-    /// near the closest point; without it, from the angle of the node.
-    #[inline(always)]
-    pub fn gap(&self, [node, index]: [usize; 2], local: Vector3, guess: Option<ClosestPoint>) -> Gap {
-        let (x, frame) = self.position(node, index, local);
-        let surface = &self.gap.surface;
-        let start = guess.unwrap_or_else(|| {
-            let position = frame.local(x);
-            // The displacements of node and shaft rotate the node about z by a small angle. A guess may neglect the fifth power of its tangent.
-            let tangent = position[1] / position[0];
-            let angle = self.gap.layout.angles[index] + self.relative_angle + tangent * (1.0 - tangent * tangent / 3.0);
-            surface.step_closer(x, surface.locate_at(angle, x[2]))
-        });
-        let found = match surface.project_close(x, start, NEARBY) {
-            Some(found) => found,
-            None => self.search(x, guess.unwrap_or_else(|| surface.locate(x))),
-        };
+    /// Finds the gaps of nodes, with the normals in the directions of the nodes, and calls `store` with each of them.
+    pub fn find_gaps(&self, mut nodes: impl Iterator<Item = NearNode>, mut store: impl FnMut(NearNode, Gap)) {
+        loop {
+            let (mut group, mut count) = ([NearNode::default(); 8], 0);
+            for (place, node) in group.iter_mut().zip(nodes.by_ref().take(8)) {
+                *place = node;
+                count += 1;
+            }
+            if count == 0 {
+                return;
+            }
+            let group = &group[..count];
+            group.iter().zip(self.gaps(group)).for_each(|(node, gap)| store(*node, gap));
+        }
+    }
+
+    /// Finds the gap of a node, with the normal in the directions of the node.
+    fn gap(&self, node: NearNode) -> Gap {
+        let (x, frame) = self.position(node.node, node.index, node.local);
+        let found = self.closest(x, self.initial_guess(&node, x, frame), NEWTON_STEPS, node.guess);
         Gap { normal: frame.local(found.normal), ..found }
+    }
+
+    /// Finds the gaps of up to eight nodes, with the normals in the directions of the nodes. Further entries have no meaning.
+    fn gaps(&self, nodes: &[NearNode]) -> [Gap; 8] {
+        if nodes.len() < MIN_NODES_TOGETHER {
+            let mut gaps = [Gap::NOTHING; 8];
+            gaps.iter_mut().zip(nodes).for_each(|(gap, node)| *gap = self.gap(*node));
+            return gaps;
+        }
+        self.gap.instruction_set.run_octets(EightNodeSearch { search: self, nodes })
+    }
+
+    /// Returns the given guess of the closest point of a node at `x` (m), or a guess from the angle of the node.
+    #[inline(always)]
+    fn initial_guess(&self, node: &NearNode, x: Vector3, frame: PolarFrame) -> ClosestPoint {
+        if let Some(guess) = node.guess {
+            return guess;
+        }
+        let (surface, position) = (&self.gap.surface, frame.local(x));
+        // The displacements of node and shaft rotate the node about z by a small angle. A guess may neglect the fifth power of its tangent.
+        let tangent = position[1] / position[0];
+        let turned = tangent * (1.0 - tangent * tangent / 3.0);
+        let angle = self.gap.layout.angles[node.index] + self.relative_angle + turned;
+        surface.step_closer(x, surface.locate_at(angle, x[2]))
+    }
+
+    /// Finds the closest point to `x` (m) by up to `steps` Newton steps from `start`. If they fail, runs the general search from `guess`, or from
+    /// the position `x` without a guess. The normal is in the directions of the shape.
+    fn closest(&self, x: Vector3, start: ClosestPoint, steps: usize, guess: Option<ClosestPoint>) -> Gap {
+        let surface = &self.gap.surface;
+        let mut place = start;
+        for _ in 0..steps {
+            match surface.project_close(x, place, NEARBY) {
+                Ok(gap) => return gap,
+                Err(Some(next)) => place = next,
+                Err(None) => break,
+            }
+        }
+        self.search(x, guess.unwrap_or_else(|| surface.locate(x)))
     }
 
     /// Searches the closest point to a position. The normal has the directions of the shape. The gap is infinite beyond the extension of the
@@ -136,29 +196,42 @@ impl<'a> NearSearch<'a> {
     }
 }
 
-/// Evaluates the gaps of all nodes (m, `[node · lanes + lane]`), and stores closest points and normals in `geometry`. Skips padding lanes.
-pub(super) struct RingGaps<'a> {
-    pub search: NearSearch<'a>,
-    /// Displacements of the contact rows of all lanes (m).
-    pub displacement: &'a [f64],
-    pub geometry: &'a mut Geometry,
-    pub gaps: &'a mut [f64],
+/// Finds the gaps of up to eight nodes, with the bits of [`NearSearch::gap`].
+struct EightNodeSearch<'a> {
+    search: &'a NearSearch<'a>,
+    nodes: &'a [NearNode],
 }
 
-impl Kernel for RingGaps<'_> {
+impl OctetKernel for EightNodeSearch<'_> {
+    type Output = [Gap; 8];
+
     #[inline(always)]
-    fn run(self) {
-        let SplineGap { layout, nodes, .. } = self.search.gap;
-        let lanes = layout.lanes;
-        for (node, lane) in nodes.iter().flat_map(|node| (0..lanes).map(move |lane| (*node, lane))) {
-            if layout.clearances[lane].is_finite() {
-                let index = node * lanes + lane;
-                let local = strided_vector3(self.displacement, 3 * node * lanes + lane, lanes);
-                let found = self.search.gap([node, index], local, None);
-                (self.gaps[index], self.geometry.places[index]) = (found.distance, found.foot);
-                self.geometry.set_normal(index, found.normal);
+    fn run<L: Octet>(self) -> [Gap; 8] {
+        let Self { search, nodes } = self;
+        let mut frames = [PolarFrame::FIXED; 8];
+        let mut eight = EightNodes { x: [Eight::ZERO; 3], guesses: [ClosestPoint::default(); 8], count: nodes.len() };
+        for (place, node) in nodes.iter().enumerate() {
+            let (x, frame) = search.position(node.node, node.index, node.local);
+            (frames[place], eight.guesses[place]) = (frame, search.initial_guess(node, x, frame));
+            for component in 0..3 {
+                eight.x[component].0[place] = x[component];
             }
         }
+        let found = search.gap.surface.project_eight::<L>(&eight, NEARBY);
+        let mut gaps = [Gap::NOTHING; 8];
+        for (place, node) in nodes.iter().enumerate() {
+            let end = ClosestPoint { s: found.s[place], t: found.t[place], ..eight.guesses[place] };
+            let gap = if found.found >> place & 1 == 1 {
+                let normal = found.normals.each_ref().map(|normals| normals[place]);
+                Gap { distance: found.distances[place], normal: normal.into(), foot: end }
+            } else {
+                let steps = if found.near >> place & 1 == 1 { NEWTON_STEPS - 1 } else { 0 };
+                let x = eight.x.each_ref().map(|x| x.0[place]);
+                search.closest(x.into(), search.gap.surface.settle(end), steps, node.guess)
+            };
+            gaps[place] = Gap { normal: frames[place].local(gap.normal), ..gap };
+        }
+        gaps
     }
 }
 
@@ -212,7 +285,7 @@ mod tests {
             for (node, sector) in (0..3).flat_map(|node| (0..SECTORS).map(move |sector| (node, sector))) {
                 let index = node * SECTORS + sector;
                 let moved = Vector3::from(random.vector(size));
-                let found = search.gap([node, index], moved, None);
+                let found = search.gap(NearNode { node, index, local: moved, guess: None });
                 let expected = gap.gap_to_current(At { node, index, drive: &drive }, moved);
                 assert!(found.distance.is_finite(), "{drive:?}: {found:?}, {expected:?}");
                 distances = distances.max((found.distance - expected.distance).abs());
@@ -230,11 +303,12 @@ mod tests {
         let gap = flared_casing_with_lobes();
         let drive = PrescribedMotion { shaft: Vector3::new(0.0, 0.0, 0.02), ..PrescribedMotion::default() };
         let search = NearSearch::new(&gap, &drive);
-        let beyond = search.gap([2, 2 * SECTORS], Vector3::zeros(), None);
+        let last = NearNode { node: 2, index: 2 * SECTORS, ..NearNode::default() };
+        let beyond = search.gap(last);
         assert!(beyond.distance.is_infinite(), "{beyond:?}");
-        let again = search.gap([2, 2 * SECTORS], Vector3::zeros(), Some(beyond.foot));
+        let again = search.gap(NearNode { guess: Some(beyond.foot), ..last });
         assert!(again.distance.is_infinite(), "{again:?}");
-        let within = search.gap([0, 0], Vector3::zeros(), None);
+        let within = search.gap(NearNode::default());
         assert!(within.distance.is_finite(), "{within:?}");
     }
 }

@@ -4,6 +4,7 @@
 
 use super::{ClosestPoint, Evaluation, Projection, SurfaceSpline};
 use crate::geometry::Gap;
+use crate::math::octet::Numbers;
 use crate::math::vector::{Vector3, length};
 
 /// The surface is degenerate if its tangents are closer to parallel than this (squared sine).
@@ -148,7 +149,7 @@ impl FootPoint {
 
 /// −matrix⁻¹ gradient.
 #[inline(always)]
-pub(super) fn solve([a, b, c]: [f64; 3], per_determinant: f64, gradient: [f64; 2]) -> [f64; 2] {
+pub(super) fn solve<N: Numbers>([a, b, c]: [N; 3], per_determinant: N, gradient: [N; 2]) -> [N; 2] {
     [(b * gradient[1] - c * gradient[0]) * per_determinant, (b * gradient[0] - a * gradient[1]) * per_determinant]
 }
 

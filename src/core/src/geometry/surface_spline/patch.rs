@@ -1,6 +1,7 @@
 //! One patch: point, derivatives, and the weights of the control points.
 
 use super::{ClosestPoint, Ends, SurfaceSpline};
+use crate::math::octet::Numbers;
 use crate::math::vector::Vector3;
 use crate::scene::settings::Interpolation;
 
@@ -40,33 +41,41 @@ impl Weights {
 }
 
 /// Basis functions of the control points −1..=2 of a direction: values, first and second derivatives.
-type SplineBasis = [[f64; 4]; 3];
+pub(super) type SplineBasis<N> = [[N; 4]; 3];
 
 const SIXTH: f64 = 1.0 / 6.0;
 
 /// Evaluates the columns of (s³, s², s, 1) H and their derivatives.
 #[inline(always)]
-fn cubic(s: f64) -> SplineBasis {
-    let r = 1.0 - s;
+pub(super) fn cubic<N: Numbers>(s: N) -> SplineBasis<N> {
+    let n = N::from_number;
+    let (one, two, sixth) = (n(1.0), n(2.0), n(SIXTH));
+    let r = one - s;
     let (ss, rr) = (s * s, r * r);
+    let middle = |square: N, s: N| n(2.0 / 3.0) - square * (one - n(0.5) * s);
     [
-        [rr * r * SIXTH, 2.0 / 3.0 - ss * (1.0 - 0.5 * s), 2.0 / 3.0 - rr * (1.0 - 0.5 * r), ss * s * SIXTH],
-        [-0.5 * rr, s * (1.5 * s - 2.0), r * (2.0 - 1.5 * r), 0.5 * ss],
-        [r, 3.0 * s - 2.0, 3.0 * r - 2.0, s],
+        [rr * r * sixth, middle(ss, s), middle(rr, r), ss * s * sixth],
+        [n(-0.5) * rr, s * (n(1.5) * s - two), r * (two - n(1.5) * r), n(0.5) * ss],
+        [r, n(3.0) * s - two, n(3.0) * r - two, s],
     ]
 }
 
-/// Evaluates [`cubic`] along the axis: beyond t = 0 and 1 the tangent continues, S(s, t) = S(s, 1) + (t − 1) S_t(s, 1). At a free edge, the
-/// only end of a patch of this kind, S_tt = 0: the surface stays twice continuously differentiable.
+/// Evaluates [`cubic`] along the axis at t; `edge` is t clamped to [0, 1]. Beyond this range the surface continues along its tangent, S(s, t) =
+/// S(s, 1) + (t − 1) S_t(s, 1). At a free edge, the only end of a patch of this kind, S_tt = 0: the surface stays twice continuously differentiable.
 #[inline(always)]
-fn cubic_and_beyond(t: f64) -> SplineBasis {
-    let edge = t.clamp(0.0, 1.0);
+pub(super) fn cubic_and_beyond<N: Numbers>(t: N, edge: N) -> SplineBasis<N> {
     let mut basis = cubic(edge);
     let [values, slopes, _] = &mut basis;
-    for (value, slope) in values.iter_mut().zip(slopes) {
-        *value += (t - edge) * *slope;
+    for i in 0..4 {
+        values[i] = values[i] + (t - edge) * slopes[i];
     }
     basis
+}
+
+/// Evaluates [`cubic_and_beyond`] at a single t.
+#[inline(always)]
+fn along_axis(t: f64) -> SplineBasis<f64> {
+    cubic_and_beyond(t, t.clamp(0.0, 1.0))
 }
 
 /// Σ weight · point.
@@ -123,16 +132,26 @@ impl SurfaceSpline {
     }
 
     #[inline(always)]
-    fn assert_exists(&self, place: ClosestPoint) {
+    pub(super) fn assert_exists(&self, place: ClosestPoint) {
         assert!(self.has_patch(place), "no such patch");
     }
 
     /// Evaluates a bicubic patch; without `SECOND` the second derivatives stay zero.
     #[inline(always)]
     pub(super) fn evaluate_bicubic<const SECOND: bool>(&self, place: ClosestPoint) -> Evaluation {
-        let ([p, q], width) = (place.patch, self.around + 3);
         self.assert_exists(place);
-        let (around, along) = (cubic(place.s), cubic_and_beyond(place.t));
+        self.blend::<SECOND>(place.patch, &cubic(place.s), &along_axis(place.t))
+    }
+
+    /// Evaluates a bicubic patch from the basis functions; without `SECOND` the second derivatives stay zero.
+    #[inline(always)]
+    pub(super) fn blend<const SECOND: bool>(
+        &self,
+        [p, q]: [usize; 2],
+        around: &SplineBasis<f64>,
+        along: &SplineBasis<f64>,
+    ) -> Evaluation {
+        let width = self.around + 3;
         let orders = if SECOND { 3 } else { 2 };
         let mut rows = [[[0.0; 4]; 4]; 3];
         for ring in 0..4 {
@@ -215,7 +234,7 @@ impl SurfaceSpline {
     }
 
     fn fold_along(&self, place: ClosestPoint) -> Fold {
-        let (count, q, [a, b, c, d]) = (self.along, place.patch[1], cubic_and_beyond(place.t)[0]);
+        let (count, q, [a, b, c, d]) = (self.along, place.patch[1], along_axis(place.t)[0]);
         // A phantom beyond a free end is twice the end minus its neighbour.
         let (first, values, len) = match (q == 0, q + 2 == count) {
             (false, false) => (q - 1, [a, b, c, d], 4),

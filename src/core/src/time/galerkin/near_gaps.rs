@@ -5,43 +5,8 @@ use super::obstacle_view::ObstacleView;
 use super::record::{PairRecord, SpanRecord};
 use super::trial::Obstacle;
 use crate::geometry::spline::SplineGap;
-use crate::geometry::spline::near::NearSearch;
-use crate::geometry::surface_spline::ClosestPoint;
-use crate::math::simd::Kernel;
-
-/// Gaps and normals of some nodes of a sector at a point of the step.
-struct NearGaps<'a> {
-    search: NearSearch<'a>,
-    /// Nodes, and their indices among all lanes of the structure: node · `stride` + `sector`.
-    nodes: &'a [usize],
-    stride: usize,
-    sector: usize,
-    /// Lanes of the step, and the point.
-    lanes: Lanes,
-    point: usize,
-    /// Displacements (m).
-    moved: &'a [f64],
-    /// Initial guesses of the closest points, valid if `located` is true; the results replace them.
-    places: &'a mut [ClosestPoint],
-    located: bool,
-    gaps: &'a mut [f64],
-    normals: &'a mut [f64],
-}
-
-impl Kernel for NearGaps<'_> {
-    #[inline(always)]
-    fn run(self) {
-        for node in self.nodes {
-            let lane = self.lanes.at(self.point, *node);
-            let index = [*node, node * self.stride + self.sector];
-            let moved = self.lanes.vector3(self.moved, lane);
-            let gap = self.search.gap(index, moved, self.located.then_some(self.places[*node]));
-            self.gaps[lane] = gap.distance;
-            self.lanes.set(self.normals, lane, gap.normal);
-            self.places[*node] = gap.foot;
-        }
-    }
-}
+use crate::geometry::spline::near::{NearNode, NearSearch};
+use std::cell::Cell;
 
 impl ObstacleView<'_> {
     /// Finds gaps (m) and normals of all nodes at a point of the step.
@@ -97,24 +62,23 @@ impl ObstacleView<'_> {
         normals: &mut [f64],
         located: bool,
     ) {
-        let SpanRecord { pairs, places, lanes: stride, sector, instructions, .. } = &mut *self.record;
+        let SpanRecord { pairs, places, lanes: stride, sector, .. } = &mut *self.record;
+        let places = Cell::from_mut(&mut places[point][..]).as_slice_of_cells();
         for own in pairs {
             let pair = &self.pairs[own.pair];
-            if let Some(law) = pair.gap().smooth_ring() {
-                instructions.run(NearGaps {
-                    search: NearSearch::new(law, &own.drives[point].0),
-                    nodes: pair.nodes(),
-                    stride: *stride,
-                    sector: *sector,
-                    lanes,
-                    point,
-                    moved,
-                    places: &mut places[point],
-                    located,
-                    gaps,
-                    normals,
-                });
-            }
+            let Some(law) = pair.gap().smooth_ring() else { continue };
+            let nodes = pair.nodes().iter().map(|node| NearNode {
+                node: *node,
+                index: node * *stride + *sector,
+                local: lanes.vector3(moved, lanes.at(point, *node)),
+                guess: located.then_some(places[*node].get()),
+            });
+            NearSearch::new(law, &own.drives[point].0).find_gaps(nodes, |NearNode { node, .. }, gap| {
+                let lane = lanes.at(point, node);
+                gaps[lane] = gap.distance;
+                lanes.set(normals, lane, gap.normal);
+                places[node].set(gap.foot);
+            });
         }
     }
 }

@@ -4,7 +4,6 @@ use crate::geometry::revolution::Instants;
 use crate::geometry::surface_spline::ClosestPoint;
 use crate::geometry::wrench::{MotionIncrement, Wrench};
 use crate::geometry::{PrescribedMotion, Vector3};
-use crate::math::simd::InstructionSet;
 use crate::math::vector::{ZERO, length};
 use crate::system::ShapeGrowth;
 use crate::system::carrier::Spot;
@@ -358,7 +357,6 @@ pub(crate) struct SpanRecord {
     pub slips: [Vec<Option<Vector3>>; POINTS],
     pub solutions: usize,
     pub instants: Instants,
-    pub instructions: InstructionSet,
     /// Pair to whose surface all nodes at all points are entered in `instants`.
     pub lanes_of: Option<usize>,
     /// True if a contact exceeds the limits of small displacements.
@@ -401,7 +399,6 @@ impl SpanRecord {
             acted: std::array::from_fn(|_| vec![ClosestPoint::default(); nodes]),
             slips: std::array::from_fn(|_| vec![None; nodes]),
             solutions: 0,
-            instructions: InstructionSet::detect(),
             instants: Instants::new(Lanes { points: MOST, nodes }.width()),
             lanes_of: None,
             implausible: false,

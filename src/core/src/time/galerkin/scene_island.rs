@@ -86,6 +86,10 @@ impl Surroundings for SceneSurroundings<'_> {
         self.choose_open_sectors(island, step);
     }
 
+    fn prepare_activated_sector(&mut self, island: &mut Island, sector: usize, step: SpanStep) {
+        self.find_gaps_at_start(island, sector, step);
+    }
+
     fn find_surface_motions(&mut self, carriers: &[CarrierIntegrator], points: RangeInclusive<usize>) {
         let own = self.records.iter().filter(|record| record.sector == 0).flat_map(|record| &record.pairs);
         for (pair, carrier) in own.filter_map(|record| Some((record.pair, record.carrier?))) {

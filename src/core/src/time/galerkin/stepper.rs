@@ -65,7 +65,7 @@ impl Stepper for Galerkin {
         islands.iter_mut().try_for_each(|island| island.integrate(system, span, *most_tried, workers))?;
         system.counted.factorisations += system.counted.effort.factorisations - factorisations;
         system.check_travel()?;
-        system.find_gaps(SearchStart::Angles);
+        system.find_gaps(SearchStart::StartOfSpan);
         system.structures.iter_mut().for_each(Structure::include_gaps_now);
         system.check_edges()?;
         system.counted.steps += 1;

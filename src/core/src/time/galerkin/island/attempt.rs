@@ -317,8 +317,7 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
             let motion = self.surroundings.surface_motion(index) + self.island.disk_motion(index);
             let one = &mut self.island.sectors[index];
             if one.limits.is_some_and(|limits| limits.motion <= BETWEEN_POINTS_FACTOR * motion) {
-                (one.limits, one.checked_at, one.state.gaps_known) = (None, Some(step.from), false);
-                self.island.restart(index);
+                (one.limits, one.checked_at) = (None, Some(step.from));
                 self.island.active.push(index);
             }
         }
@@ -328,6 +327,7 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         self.surroundings.bend(&self.island.carriers, 0);
         for place in before..self.island.active.len() {
             let index = self.index(place);
+            self.surroundings.prepare_activated_sector(self.island, index, step);
             let SectorInStep { mut surfaces, tables, .. } = self.sector(index, step, kind);
             surfaces.begin_step(step.from, step.length, &tables.levels[step.level], kind);
             surfaces.guess_start_places();

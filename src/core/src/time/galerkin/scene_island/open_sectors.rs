@@ -6,7 +6,7 @@
 
 use super::{SceneIsland, SceneSurroundings};
 use crate::geometry::spline::SplineGap;
-use crate::geometry::spline::near::NearSearch;
+use crate::geometry::spline::near::{NearNode, NearSearch};
 use crate::math::vector::vector3_at;
 use crate::system::{ContactPair, Structure};
 use crate::time::galerkin::carrier::CarrierIntegrator;
@@ -177,18 +177,20 @@ impl SceneSurroundings<'_> {
     }
 
     /// Finds the gaps of an inactive sector at the start of a step. The surfaces must be deformed as at this time.
-    fn find_gaps_at_start(&mut self, island: &mut Island, index: usize, step: SpanStep) {
+    pub(super) fn find_gaps_at_start(&mut self, island: &mut Island, index: usize, step: SpanStep) {
         let SceneSurroundings { pairs, records, .. } = self;
         let record = &mut records[index];
         let (moved, gaps) = island.start_of_inactive(index);
         for own in &record.pairs {
             let Some(ring) = pairs[own.pair].gap().smooth_ring() else { continue };
             let drive = own.course.at(step.from).0;
-            let search = NearSearch::new(ring, &drive);
-            for node in &ring.nodes {
-                let found = search.gap([*node, node * record.lanes + record.sector], vector3_at(moved, *node), None);
-                (gaps[*node], record.places[0][*node]) = (found.distance, found.foot);
-            }
+            let nodes = ring.nodes.iter().map(|node| {
+                let (index, local) = (node * record.lanes + record.sector, vector3_at(moved, *node));
+                NearNode { node: *node, index, local, guess: None }
+            });
+            NearSearch::new(ring, &drive).find_gaps(nodes, |NearNode { node, .. }, found| {
+                (gaps[node], record.places[0][node]) = (found.distance, found.foot);
+            });
         }
     }
 }
