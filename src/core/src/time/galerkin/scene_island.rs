@@ -35,8 +35,8 @@ use std::ops::RangeInclusive;
 /// Contacts count as closed within this fraction of the tolerance.
 const PRECISION: f64 = 1e-4;
 
-/// Trials of sectors of a disk, and of several sectors whose contacts may stick, end at this fraction of the closed-gap precision. Errors of
-/// sticking contacts accumulate. On a disk, the work on small gaps of many closed contacts would overdraw the energy bank.
+/// Trials of several sectors whose contacts may stick end at this fraction of the closed-gap precision, because errors of sticking contacts
+/// accumulate.
 const CLOSE: f64 = 1e-2;
 
 /// An island of a scene. The uncoupled sectors of one structure take turns in one island, because their tables are the same.
@@ -163,7 +163,7 @@ impl SceneIsland {
         };
         let first = &structures[touching[0]];
         let blade = model.map(|model| Box::new(BladeSectors::new(model, first, &sectors[0].trial)));
-        let is_close = !disks.is_empty() || (!takes_turns && solver.sticks());
+        let is_close = !takes_turns && solver.sticks();
         let precision = if is_close { CLOSE * PRECISION } else { PRECISION };
         Self {
             set,
