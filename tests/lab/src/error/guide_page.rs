@@ -78,10 +78,20 @@ fn with_rows(page: &str, name: &str, table: &str) -> String {
     let begin = format!("<!-- written: lab error {name};");
     let block = page.split_once(&begin).and_then(|(_, rest)| rest.split_once("<!-- end -->"));
     let known = block.map_or("", |(block, _)| block);
-    let added: Vec<&str> = table.lines().skip(2).collect();
-    let scenes: Vec<String> = added.iter().map(|row| scene(row)).collect();
-    let kept = known.lines().filter(|row| row.starts_with('|') && !scenes.contains(&scene(row)));
-    kept.chain(added.iter().copied()).collect::<Vec<_>>().join("\n")
+    let mut added: Vec<&str> = table.lines().skip(2).collect();
+    let mut rows = Vec::new();
+    for row in known.lines().filter(|row| row.starts_with('|')) {
+        if added.iter().any(|new| scene(new) == scene(row)) {
+            // The new rows replace those of their scene where the first one is.
+            let (own, others) = added.iter().copied().partition(|new| scene(new) == scene(row));
+            rows.extend::<Vec<&str>>(own);
+            added = others;
+        } else if !table.lines().skip(2).any(|new| scene(new) == scene(row)) {
+            rows.push(row);
+        }
+    }
+    rows.extend(added);
+    rows.join("\n")
 }
 
 /// Returns the page with the content of one block and its date replaced.
@@ -116,8 +126,8 @@ mod tests {
         let page = "<!-- written: lab error first; today -->\n| scene | error |\n|---|---|\n| a | 1 |\n| b | 2 |\n<!-- end -->\n| b | 3 |\n";
         let head = "| scene | error |\n|---|---|\n";
         assert_eq!(
-            with_rows(page, "first", &format!("{head}| b | 5 |\n| b | 6 |")),
-            format!("{head}| a | 1 |\n| b | 5 |\n| b | 6 |")
+            with_rows(page, "first", &format!("{head}| a | 5 |\n| a | 6 |")),
+            format!("{head}| a | 5 |\n| a | 6 |\n| b | 2 |")
         );
         assert_eq!(
             with_rows(page, "first", &format!("{head}| c | 7 |")),
