@@ -168,7 +168,7 @@ impl SplineGap {
         let faced = nodes.filter(|(_, lane)| self.layout.clearances[*lane].is_finite()).map(|(node, lane)| {
             let index = node * lanes + lane;
             let local = strided_vector3(displacement, 3 * node * lanes + lane, lanes);
-            let guess = guess.map(|places| self.surface.advance(places[index], self.turned));
+            let guess = guess.map(|places| search.advanced(places[index]));
             NearNode { node, index, local, guess }
         });
         search.find_gaps(faced, |NearNode { index, .. }, found| {

@@ -13,9 +13,10 @@ use tiprub_cosim::persist::{Persist, StateReader, StateWriter};
 use super::pair::ContactPair;
 use super::structure::Structure;
 use crate::geometry::spline::SplineGap;
-use crate::geometry::spline::near::{NearGap, NearSearch};
+use crate::geometry::spline::near::{NearGap, NearNode, NearSearch};
 use crate::geometry::surface_spline::ClosestPoint;
 use crate::geometry::{Geometry, PrescribedMotion};
+use crate::math::octet::{Octet, OctetKernel};
 use crate::math::simd::Kernel;
 use crate::math::vector::{Vector3, strided_vector3};
 use crate::modes::bank::LANES;
@@ -222,17 +223,30 @@ impl NearTarget<'_> {
     }
 }
 
-impl Kernel for EvaluateNear<'_> {
+impl OctetKernel for EvaluateNear<'_> {
+    type Output = ();
+
     #[inline(always)]
-    fn run(mut self) {
+    fn run<L: Octet>(mut self) {
         let lanes = self.lanes;
-        for index in self.evaluated {
-            let (index, node, lane) = (*index, index / lanes, index % lanes);
-            let local = strided_vector3(self.displacement, 3 * node * lanes + lane, lanes);
-            let drift = &mut self.drift[index];
-            match self.search.find_closely([node, index], local, self.before[index], drift) {
-                Some(found) => self.target.write(index, &found),
-                None => self.searched.push(index),
+        for group in self.evaluated.chunks(8) {
+            let (mut nodes, mut starts) = ([NearNode::default(); 8], [ClosestPoint::default(); 8]);
+            for (place, index) in group.iter().enumerate() {
+                let (node, lane, [s, t]) = (index / lanes, index % lanes, self.drift[*index]);
+                let start = self.search.advanced(self.before[*index]);
+                let guess = ClosestPoint { s: start.s + s, t: start.t + t, ..start };
+                let local = strided_vector3(self.displacement, 3 * node * lanes + lane, lanes);
+                (starts[place], nodes[place]) = (start, NearNode { node, index: *index, local, guess: Some(guess) });
+            }
+            let found = self.search.find_closely::<L>(&nodes[..group.len()]);
+            for ((index, start), found) in group.iter().zip(&starts).zip(&found) {
+                match found {
+                    Some(found) => {
+                        self.drift[*index] = [found.place.s - start.s, found.place.t - start.t];
+                        self.target.write(*index, found);
+                    }
+                    None => self.searched.push(*index),
+                }
             }
         }
     }
@@ -309,7 +323,7 @@ impl Structure {
         let Nearness { free, drift, evaluated, searched, fixed_normals, .. } = &mut self.nearness;
         let history = &mut self.history;
         let (gaps, geometry) = (&mut history.gap.now[..], &mut history.geometry.now);
-        self.modes.instruction_set.run(EvaluateNear {
+        self.modes.instruction_set.run_octets(EvaluateNear {
             search,
             evaluated: &evaluated[first..],
             lanes,

@@ -2,7 +2,7 @@
 
 use super::SplineGap;
 use crate::geometry::frame::PolarFrame;
-use crate::geometry::surface_spline::close::EightNodes;
+use crate::geometry::surface_spline::close::{EightGaps, EightNodes};
 use crate::geometry::surface_spline::{ClosestPoint, Projection};
 use crate::geometry::{Gap, PrescribedMotion, Vector3};
 use crate::math::octet::{Eight, Octet, OctetKernel};
@@ -83,29 +83,45 @@ impl<'a> NearSearch<'a> {
         (frame.fixed(arm) + self.centre, frame)
     }
 
-    /// Finds the gap of a node displaced by `local` (m) from its closest point `before` one step earlier and the motion `drift` of that
-    /// point in the step, which is updated. Returns `None` if the point cannot be found with a single evaluation of the surface.
+    /// Returns the closest point of the step before at the current angle of the rotor.
     #[inline(always)]
-    pub fn find_closely(
-        &self,
-        [node, index]: [usize; 2],
-        local: Vector3,
-        before: ClosestPoint,
-        drift: &mut [f64; 2],
-    ) -> Option<NearGap> {
-        let (x, frame) = self.position(node, index, local);
-        let ClosestPoint { patch, s, t } = self.gap.surface.advance(before, self.gap.turned);
-        let guess = ClosestPoint { patch, s: s + drift[0], t: t + drift[1] };
-        let found = self.gap.surface.project_close(x, guess, NEARBY).ok()?;
-        *drift = [found.foot.s - s, found.foot.t - t];
-        Some(self.near(found, frame))
+    pub fn advanced(&self, before: ClosestPoint) -> ClosestPoint {
+        self.gap.surface.advance(before, self.gap.turned)
+    }
+
+    /// Finds the gaps of up to eight nodes with guesses. Returns `None` for nodes whose closest points need more than one evaluation of the
+    /// surface.
+    #[inline(always)]
+    pub fn find_closely<L: Octet>(&self, nodes: &[NearNode]) -> [Option<NearGap>; 8] {
+        let (eight, frames, found) = self.project::<L>(nodes);
+        let mut gaps = [None; 8];
+        for place in 0..eight.count {
+            gaps[place] = found.gap(place, eight.guesses[place]).map(|gap| self.near(gap, frames[place]));
+        }
+        gaps
+    }
+
+    /// Takes a Newton step for each of up to eight nodes. Returns the nodes, their directions and the ends of the steps.
+    #[inline(always)]
+    fn project<L: Octet>(&self, nodes: &[NearNode]) -> (EightNodes, [PolarFrame; 8], EightGaps) {
+        let mut frames = [PolarFrame::FIXED; 8];
+        let mut eight = EightNodes { x: [Eight::ZERO; 3], guesses: [ClosestPoint::default(); 8], count: nodes.len() };
+        for (place, node) in nodes.iter().enumerate() {
+            let (x, frame) = self.position(node.node, node.index, node.local);
+            (frames[place], eight.guesses[place]) = (frame, self.initial_guess(node, x, frame));
+            for component in 0..3 {
+                eight.x[component].0[place] = x[component];
+            }
+        }
+        let found = self.gap.surface.project_eight::<L>(&eight, NEARBY);
+        (eight, frames, found)
     }
 
     /// Finds the gap of a node displaced by `local` (m) from its closest point `before` one step earlier, or from its angle, and the motion
     /// of the closest point in the step.
     pub fn find(&self, [node, index]: [usize; 2], local: Vector3, before: Option<ClosestPoint>) -> (NearGap, [f64; 2]) {
         let (x, frame) = self.position(node, index, local);
-        let start = before.map(|before| self.gap.surface.advance(before, self.gap.turned));
+        let start = before.map(|before| self.advanced(before));
         let guess = start.unwrap_or_else(|| self.gap.surface.locate(x));
         let found = self.search(x, guess);
         let (foot, is_near) = (found.foot, start.is_some_and(|start| start.patch == found.foot.patch));
@@ -208,27 +224,15 @@ impl OctetKernel for EightNodeSearch<'_> {
     #[inline(always)]
     fn run<L: Octet>(self) -> [Gap; 8] {
         let Self { search, nodes } = self;
-        let mut frames = [PolarFrame::FIXED; 8];
-        let mut eight = EightNodes { x: [Eight::ZERO; 3], guesses: [ClosestPoint::default(); 8], count: nodes.len() };
-        for (place, node) in nodes.iter().enumerate() {
-            let (x, frame) = search.position(node.node, node.index, node.local);
-            (frames[place], eight.guesses[place]) = (frame, search.initial_guess(node, x, frame));
-            for component in 0..3 {
-                eight.x[component].0[place] = x[component];
-            }
-        }
-        let found = search.gap.surface.project_eight::<L>(&eight, NEARBY);
+        let (eight, frames, found) = search.project::<L>(nodes);
         let mut gaps = [Gap::NOTHING; 8];
         for (place, node) in nodes.iter().enumerate() {
-            let end = ClosestPoint { s: found.s[place], t: found.t[place], ..eight.guesses[place] };
-            let gap = if found.found >> place & 1 == 1 {
-                let normal = found.normals.each_ref().map(|normals| normals[place]);
-                Gap { distance: found.distances[place], normal: normal.into(), foot: end }
-            } else {
+            let guess = eight.guesses[place];
+            let gap = found.gap(place, guess).unwrap_or_else(|| {
                 let steps = if found.near >> place & 1 == 1 { NEWTON_STEPS - 1 } else { 0 };
-                let x = eight.x.each_ref().map(|x| x.0[place]);
+                let (x, end) = (eight.x.each_ref().map(|x| x.0[place]), found.end(place, guess));
                 search.closest(x.into(), search.gap.surface.settle(end), steps, node.guess)
-            };
+            });
             gaps[place] = Gap { normal: frames[place].local(gap.normal), ..gap };
         }
         gaps

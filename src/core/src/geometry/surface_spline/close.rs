@@ -130,6 +130,22 @@ pub(crate) struct EightGaps {
     pub t: [f64; 8],
 }
 
+impl EightGaps {
+    /// Returns the gap of a node, whose guess was `guess`, if its closest point was found.
+    #[inline(always)]
+    pub fn gap(&self, node: usize, guess: ClosestPoint) -> Option<Gap> {
+        let normal = self.normals.each_ref().map(|normals| normals[node]).into();
+        let foot = self.end(node, guess);
+        (self.found >> node & 1 == 1).then_some(Gap { distance: self.distances[node], normal, foot })
+    }
+
+    /// Returns the end of the step of a node, whose guess was `guess`.
+    #[inline(always)]
+    pub fn end(&self, node: usize, guess: ClosestPoint) -> ClosestPoint {
+        ClosestPoint { s: self.s[node], t: self.t[node], ..guess }
+    }
+}
+
 impl SurfaceSpline {
     /// Finds the closest point to `x` (m) on a smooth surface around an axis, by one Newton step from `guess`.
     ///
