@@ -24,8 +24,11 @@ pub fn features(scene: &Scene) -> Vec<String> {
         found.push(format!("the highest modes are quasi-static: contact nodes have no mass ({})", scheme.name()));
     }
     if let Some(tolerance) = settings.time.step_tolerance() {
+        let is_shared =
+            scene.roms.iter().any(Rom::is_cyclic) || settings.surfaces.iter().any(|one| one.structure.is_some());
+        let whose = if is_shared { "that all blades share" } else { "of every blade" };
         found.push(format!(
-            "adaptive steps of every blade, with a tolerance of {tolerance:e} of the clearance; contact nodes have no \
+            "adaptive steps {whose}, with a tolerance of {tolerance:e} of the clearance; contact nodes have no \
              mass (galerkin)"
         ));
     }
@@ -229,7 +232,7 @@ fn blades(coupled: bool, stiffens: bool) -> &'static str {
 #[cfg(test)]
 mod tests {
     use nalgebra::DMatrix;
-    use tiprub_core::scene::method::Solver;
+    use tiprub_core::scene::method::{Scheme, Solver};
     use tiprub_core::scene::rom::{DisplacementFrame, Harmonic, RomChecks, RomExtras};
 
     use super::*;
@@ -312,10 +315,16 @@ mod tests {
     #[test]
     fn coupled_blades_are_not_reported_as_uncoupled() {
         for coupled in [false, true] {
+            let adaptive = scene(|scene| {
+                scene.roms = vec![two_sectors(coupled)];
+                scene.settings.time.scheme = Scheme::Galerkin;
+            });
             let scene = scene(|scene| scene.roms = vec![two_sectors(coupled)]);
             assert_eq!(limits(&scene).concat().contains("not coupled"), !coupled);
             assert_eq!(limits(&scene).len(), 7);
             assert_eq!(features(&scene).concat().contains("are coupled: nodal diameters 0 to 1"), coupled);
+            let steps = features(&adaptive).concat();
+            assert!(steps.contains(if coupled { "steps that all blades share" } else { "steps of every blade" }));
         }
     }
 }

@@ -200,10 +200,10 @@ fn describe_scene(scene: &Scene, detail: Detail, console: &Console) -> Result<De
     }
     let _ = writeln!(
         text,
-        "  variables     {} inputs, {} parameters, {} outputs (as scalars)",
-        scalars(Causality::Input),
-        scalars(Causality::Parameter),
-        scalars(Causality::Output)
+        "  variables     {}, {}, {} (as scalars)",
+        counted(scalars(Causality::Input), "input"),
+        counted(scalars(Causality::Parameter), "parameter"),
+        counted(scalars(Causality::Output), "output")
     );
     for reversed in simulation.if_reversed() {
         let _ = writeln!(text, "  if reversed   {reversed}");
@@ -240,6 +240,11 @@ fn describe_scene(scene: &Scene, detail: Detail, console: &Console) -> Result<De
         "roms": roms,
     });
     Ok(Described { text, warnings: simulation.warnings().to_vec(), rest: rest.to_owned(), json })
+}
+
+/// Returns a number with the singular or the plural of what it counts.
+fn counted(count: usize, what: &str) -> String {
+    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
 
 fn gap_text(contact: &ContactSettings) -> String {

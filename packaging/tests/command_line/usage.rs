@@ -86,6 +86,8 @@ fn every_error_is_available_as_one_json_object() {
         ("study stability scene.toml --threads 0 --json", 2, "--threads", "give a whole number of 1 or more"),
         ("run none.toml --json", 1, "none.toml", "Give the path of a scene file (TOML), or one of builtin:rotor37,"),
         ("run rotor37 --json", 1, "rotor37", "Did you mean `builtin:rotor37`?"),
+        ("run bultin:rotor37 --json", 1, "bultin:rotor37", "Did you mean `builtin:rotor37`?"),
+        ("run builtin:casing37 --json", 2, "builtin:casing37", "Use it as `rom` in a scene file"),
         ("package abradabel.toml --json", 1, "abradabel.toml", "Did you mean `builtin:abradable`?"),
         ("run plan.toml --json", 1, "plan.toml:1:1: scene", "use `tiprub sweep`"),
         ("sweep none.toml --json", 1, "none.toml", "Give the path of a plan (TOML)"),

@@ -70,8 +70,10 @@ pub fn unknown_model_remedy(name: &str) -> String {
     format!("{}Give a ROM file, or one of {}", hint_with_prefix(name, NAMES), with_prefix(&NAMES))
 }
 
-/// Returns the question whether a similar built-in name is meant, with its prefix; an empty text if there is none.
+/// Returns the question whether a similar built-in name is meant, with its prefix; an empty text if there is none. A prefix of `name`, which
+/// may be misspelt, does not count.
 pub fn hint_with_prefix<'a>(name: &str, accepted: impl IntoIterator<Item = &'a str>) -> String {
+    let name = name.rsplit_once(':').map_or(name, |(_, own)| own);
     closest_name(name, accepted).map_or(String::new(), |name| format!("Did you mean `{BUILTIN}{name}`? "))
 }
 

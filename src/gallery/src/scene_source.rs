@@ -167,6 +167,10 @@ fn source(argument: &OsStr) -> Result<SceneSource<'_>> {
         let Some((_, text)) = BUILTIN_SCENES.iter().find(|(known, _)| *known == name) else {
             let names = BUILTIN_SCENES.map(|(known, _)| known);
             let known = builtin::with_prefix(&names);
+            if builtin::NAMES.contains(&name) {
+                let remedy = format!("Use it as `rom` in a scene file, or give one of the built-in scenes {known}");
+                return Err(Failure::usage(argument, "is a built-in model, not a scene", remedy));
+            }
             let remedy = format!("{}Give a scene file, or one of {known}", builtin::hint_with_prefix(name, names));
             return Err(Failure::usage(argument, "there is no such built-in scene", remedy));
         };
