@@ -166,7 +166,11 @@ fn summary(outcome: &SweepOutcome, request: &SweepRequest) -> String {
     let SweepOutcome {
         plan_runs, runs, resumed, finished, refused, failed, reasons, runs_with_warnings, warnings, ..
     } = outcome;
-    let of_plan = if plan_runs == runs { String::new() } else { format!(" (part {} of {plan_runs})", request.part) };
+    let of_plan = if plan_runs == runs {
+        String::new()
+    } else {
+        format!(" (part {} of a plan with {plan_runs} {})", request.part, run_or_runs(*plan_runs))
+    };
     let mut text =
         format!("{runs} {}{of_plan}: {finished} finished, {refused} refused, {failed} failed\n", run_or_runs(*runs));
     if *resumed > 0 {

@@ -292,7 +292,11 @@ fn sweep_without_a_finished_run_fails() {
     assert_eq!(texts(&table(&project, "plan.parquet"), "status"), ["refused"; 6]);
     let answer = swept(&project, &["--part", "1/6"]);
     assert!(answer["refused"] == 1 && answer.get("error").is_none(), "{answer}");
-    assert!(project.succeed(&["sweep", "plan.toml", "--part", "2/6"]).starts_with("1 run (part 2/6 of 6): 0 finished"));
+    assert!(
+        project
+            .succeed(&["sweep", "plan.toml", "--part", "2/6"])
+            .starts_with("1 run (part 2/6 of a plan with 6 runs): 0 finished")
+    );
 }
 
 #[test]
