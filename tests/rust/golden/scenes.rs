@@ -142,6 +142,7 @@ fn rotors() -> Vec<Scene> {
         galerkin("galerkin_steady_mistuned_lobes", &[mistuned, lobes]),
         galerkin("galerkin_whirl_spline", &[spline, shaft]),
         galerkin("galerkin_mistuned_lobes", &[mistuned, lobes]),
+        galerkin("galerkin_strongly_damped", &[|scene| scene.settings.structures[0].damping_ratio = Some(0.9)]),
         galerkin("galerkin_flexible_warm", &[warm, shaft]),
         galerkin("galerkin_coupled", &[coupled]),
         galerkin("galerkin_coupled_flexible", &[coupled, flexible, lobes]),
