@@ -21,8 +21,8 @@ pub struct Effort {
     pub factorisations: u64,
 }
 
-/// Work of the steps of blades on surfaces of revolution: evaluated blocks of eight nodes since the start. It depends on
-/// the communication step and on the outputs, so it is not part of a saved state.
+/// Work of adaptive steps since the start, in blocks of eight nodes: for blades on surfaces of revolution, and gaps to smooth rings within
+/// steps. It depends on the communication step and on the outputs, so it is not part of a saved state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct EvaluatedBlocks {
     /// Number of blocks of eight gaps that were evaluated.

@@ -6,6 +6,7 @@ use super::record::{PairRecord, SpanRecord};
 use super::trial::Obstacle;
 use crate::geometry::spline::SplineGap;
 use crate::geometry::spline::near::{NearNode, NearSearch};
+use crate::math::octet::Eight;
 use std::cell::Cell;
 
 impl ObstacleView<'_> {
@@ -62,11 +63,12 @@ impl ObstacleView<'_> {
         normals: &mut [f64],
         located: bool,
     ) {
-        let SpanRecord { pairs, places, lanes: stride, sector, .. } = &mut *self.record;
+        let SpanRecord { pairs, places, lanes: stride, sector, evaluated_gaps, .. } = &mut *self.record;
         let places = Cell::from_mut(&mut places[point][..]).as_slice_of_cells();
         for own in pairs {
             let pair = &self.pairs[own.pair];
             let Some(law) = pair.gap().smooth_ring() else { continue };
+            *evaluated_gaps += Eight::blocks(pair.nodes().len()) as u64;
             let nodes = pair.nodes().iter().map(|node| NearNode {
                 node: *node,
                 index: node * *stride + *sector,

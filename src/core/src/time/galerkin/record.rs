@@ -359,6 +359,8 @@ pub(crate) struct SpanRecord {
     pub instants: Instants,
     /// Pair to whose surface all nodes at all points are entered in `instants`.
     pub lanes_of: Option<usize>,
+    /// Number of blocks of up to eight gaps to smooth rings that were evaluated since the last addition to the total.
+    pub evaluated_gaps: u64,
     /// True if a contact exceeds the limits of small displacements.
     pub implausible: bool,
     /// Node that has passed a free edge and was already behind the surface, if any.
@@ -401,6 +403,7 @@ impl SpanRecord {
             solutions: 0,
             instants: Instants::new(Lanes { points: MOST, nodes }.width()),
             lanes_of: None,
+            evaluated_gaps: 0,
             implausible: false,
             behind_edge: None,
         }

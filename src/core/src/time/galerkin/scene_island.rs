@@ -261,7 +261,7 @@ impl SceneIsland {
     /// Integrates one sector after the other, or all together, over a span.
     fn take_turn(&mut self, turn: usize, system: &mut System, span: f64, most_tried: u64) -> Result<(), StepFailure> {
         self.aim(turn, &system.structures);
-        let System { structures, pairs, events, counted, .. } = system;
+        let System { structures, pairs, events, counted, evaluated, .. } = system;
         self.read(structures);
         if self.is_single() {
             let record = &mut self.records[0];
@@ -276,6 +276,7 @@ impl SceneIsland {
         if self.is_single() {
             self.records[0].end_turn();
         }
+        evaluated.gaps += self.records.iter_mut().map(|record| take(&mut record.evaluated_gaps)).sum::<u64>();
         self.records.iter().try_for_each(SpanRecord::check)?;
         outcome.map_err(|stopped| self.failure(stopped))?;
         let ledger = &mut counted.ledgers[self.set];

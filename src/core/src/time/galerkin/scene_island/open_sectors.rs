@@ -7,6 +7,7 @@
 use super::{SceneIsland, SceneSurroundings};
 use crate::geometry::spline::SplineGap;
 use crate::geometry::spline::near::{NearNode, NearSearch};
+use crate::math::octet::Eight;
 use crate::math::vector::vector3_at;
 use crate::system::{ContactPair, Structure};
 use crate::time::galerkin::carrier::CarrierIntegrator;
@@ -184,6 +185,7 @@ impl SceneSurroundings<'_> {
         for own in &record.pairs {
             let Some(ring) = pairs[own.pair].gap().smooth_ring() else { continue };
             let drive = own.course.at(step.from).0;
+            record.evaluated_gaps += Eight::blocks(ring.nodes.len()) as u64;
             let nodes = ring.nodes.iter().map(|node| {
                 let (index, local) = (node * record.lanes + record.sector, vector3_at(moved, *node));
                 NearNode { node: *node, index, local, guess: None }
