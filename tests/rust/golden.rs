@@ -225,8 +225,7 @@ const COUNTED: [&str; 9] = [
 ];
 
 /// The solver does no more work than before: numbers of steps, trials and factorisations are unchanged, and the numbers of
-/// evaluated blocks of gaps (surfaces of revolution and smooth rings) and displacements (surfaces of revolution). If open
-/// blades in an elastic casing were no longer left out of steps, more gaps would be evaluated.
+/// evaluated blocks of gaps (surfaces of revolution and smooth rings) and displacements (surfaces of revolution).
 #[test]
 fn work_of_the_solver_is_unchanged() {
     let mut found = String::new();
