@@ -90,6 +90,10 @@ pub(crate) trait ContactLaw {
         Self: Sized;
     /// Begins a group of `size` contacts.
     fn begin(&mut self, size: usize);
+    /// Begins a problem that differs from the last one in its predictions only. Returns false if it must begin like any other problem.
+    fn begin_again(&mut self) -> bool {
+        false
+    }
     /// Delassus matrix (m/N), to be filled.
     fn matrix(&mut self) -> &mut DMatrix<f64>;
     /// Adds contact `contact` of the group to the problem, in order; `directions` are its rows of the matrix.

@@ -82,6 +82,9 @@ pub struct ContactSolver {
     factor: DMatrix<f64>,
     /// Diagonal of W_AA in the order of `members`, without sign.
     diagonal: Vec<f64>,
+    /// True if `factor` belongs to the matrix and to `members`, and true if the next solution may start with it.
+    has_factor: bool,
+    keeps_factor: bool,
     /// Remaining matrix after elimination.
     remaining: Vec<f64>,
     right: Vec<f64>,
@@ -108,6 +111,8 @@ impl ContactSolver {
             active: vec![false; size],
             factor: DMatrix::zeros(size, size),
             diagonal: vec![0.0; size],
+            has_factor: false,
+            keeps_factor: false,
             remaining: vec![0.0; size],
             right: vec![0.0; size],
             members: Vec::with_capacity(size),
@@ -128,8 +133,16 @@ impl ContactSolver {
         let capacity = self.gaps.len();
         assert!(size <= capacity, "{size} contact nodes exceed the solver capacity of {capacity}");
         self.size = size;
+        (self.has_factor, self.keeps_factor) = (false, false);
         self.multipliers[size..].fill(0.0);
         self.active[size..].fill(false);
+    }
+
+    /// Announces a problem that differs from the last one in its gaps only. Returns false if the matrix must be filled in again, because the
+    /// last solution changed it.
+    pub(super) fn keep_matrix(&mut self) -> bool {
+        self.keeps_factor = self.has_factor;
+        self.has_factor
     }
 
     /// Solves by the paper's correction (eqs 10-11): equality on the nodes that penetrate in the prediction.
@@ -152,9 +165,12 @@ impl ContactSolver {
             let driven = self.drive_all(scale, drive_limit(self.size));
             outcome = SolverOutcome::direct(driven.solved, outcome.factorisations + driven.factorisations);
         }
+        self.has_factor &= !self.yielding.softened;
         if !outcome.solved && self.monotone {
+            self.has_factor = false;
             let approached = self.approach(scale);
             outcome = SolverOutcome::direct(approached.solved, outcome.factorisations + approached.factorisations);
+            self.has_factor = false;
         }
         outcome
     }
@@ -166,8 +182,12 @@ impl ContactSolver {
         }
         let limit = exchange_limit(self.size, self.monotone);
         let (mut best, mut patience) = (usize::MAX, PATIENCE);
-        for factorisations in 1..=limit {
-            self.solve_active(None);
+        let mut factorisations = 0;
+        for _ in 0..limit {
+            if !self.solve_with_factor() {
+                self.solve_active(None);
+                factorisations += 1;
+            }
             self.correct_gaps();
             let largest =
                 self.multipliers[..self.size].iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
@@ -191,7 +211,7 @@ impl ContactSolver {
                 self.active[last] = !self.active[last];
             }
         }
-        SolverOutcome::direct(false, limit)
+        SolverOutcome::direct(false, factorisations)
     }
 
     /// Solves iteratively from the predicted gaps, for any rank of W. Fails if no motion opens all contacts.
@@ -296,13 +316,39 @@ impl ContactSolver {
             }
         }
         let rank = self.eliminate(count);
+        self.has_factor = rank == count;
+        self.substitute(rank);
+        self.members.truncate(rank);
+    }
+
+    /// Solves as [`ContactSolver::solve_active`], to the bit, with the factor of the last solution. Returns false and does nothing if the factor
+    /// must not be kept, or belongs to another active set.
+    fn solve_with_factor(&mut self) -> bool {
+        let count = self.members.len();
+        if !std::mem::take(&mut self.keeps_factor)
+            || self.active[..self.size].iter().filter(|active| **active).count() != count
+            || self.members.iter().any(|node| !self.active[*node])
+        {
+            return false;
+        }
+        self.multipliers.fill(0.0);
+        for (right, node) in self.right.iter_mut().zip(&self.members) {
+            *right = -self.gaps[*node];
+        }
+        self.reduce_right(count);
+        self.substitute(count);
+        true
+    }
+
+    /// Finds the multipliers of the first `rank` members from the reduced right-hand side.
+    fn substitute(&mut self, rank: usize) {
+        let order = self.factor.nrows();
         for row in (0..rank).rev() {
             let factors = self.factor.as_slice()[row..].iter().step_by(order);
             let known: f64 = factors.zip(&self.right[..rank]).skip(row + 1).map(|(f, known)| f * known).sum();
             self.right[row] = (self.right[row] - known) / self.factor[(row, row)];
             self.multipliers[self.members[row]] = self.right[row];
         }
-        self.members.truncate(rank);
     }
 }
 

@@ -69,6 +69,10 @@ impl<R: SlidingRule> ContactLaw for SlidingLaw<R> {
         self.0.monotone = true;
     }
 
+    fn begin_again(&mut self) -> bool {
+        self.0.keep_matrix()
+    }
+
     fn matrix(&mut self) -> &mut DMatrix<f64> {
         &mut self.0.delassus
     }

@@ -40,6 +40,17 @@ impl ContactSolver {
         rank
     }
 
+    /// Reduces the right-hand side as [`ContactSolver::eliminate`] does, with its factors.
+    pub(super) fn reduce_right(&mut self, count: usize) {
+        let order = self.factor.nrows();
+        for (rank, column) in self.factor.as_slice().chunks_exact(order).take(count).enumerate() {
+            let (known, below) = self.right[..count].split_at_mut(rank + 1);
+            for (right, ratio) in below.iter_mut().zip(&column[rank + 1..count]) {
+                *right = reduced(*right, *ratio, known[rank]);
+            }
+        }
+    }
+
     /// Returns the node with the largest remaining fraction of its own flexibility, since nodes may differ by many orders of magnitude.
     /// `None` if the others are redundant.
     #[inline]

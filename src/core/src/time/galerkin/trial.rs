@@ -84,6 +84,8 @@ pub struct Trial {
     instructions: InstructionSet,
     /// Unknowns of the problem: lanes.
     members: Vec<usize>,
+    /// Number of members whose matrix the law has.
+    posed: usize,
     chosen: Vec<bool>,
     /// Selected columns of a table, and their coefficients.
     taken: Vec<usize>,
@@ -155,6 +157,7 @@ impl Trial {
             law: Law::new(solver, None, contacts),
             instructions: InstructionSet::detect(),
             members: Vec::with_capacity(lanes.len()),
+            posed: 0,
             chosen: vec![false; lanes.len()],
             taken: Vec::with_capacity(3 * lanes.len()),
             amounts: Vec::with_capacity(3 * lanes.len()),
@@ -324,6 +327,7 @@ impl Trial {
             to: &mut without[..width],
         });
         self.members.clear();
+        self.posed = 0;
         for lane in 0..lanes.len() {
             self.chosen[lane] = self.gaps[lane] <= 0.0 || self.multipliers[lane] > 0.0 || self.without[lane] < 0.0;
         }
@@ -439,12 +443,16 @@ impl Trial {
     /// Assembles the problem of the members.
     fn pose(&mut self, obstacle: &impl Obstacle) {
         let width = self.lanes.width();
-        self.law.begin(self.members.len());
-        let matrix = self.law.matrix();
-        for (column, lane) in self.members.iter().enumerate() {
-            let closing = &self.closing[lane * width..][..width];
-            let mut entries = matrix.column_mut(column);
-            entries.iter_mut().zip(&self.members).for_each(|(entry, row)| *entry = closing[*row]);
+        let count = self.members.len();
+        if self.posed != count || !self.law.begin_again() {
+            self.posed = count;
+            self.law.begin(count);
+            let matrix = self.law.matrix();
+            for (column, lane) in self.members.iter().enumerate() {
+                let closing = &self.closing[lane * width..][..width];
+                let mut entries = matrix.column_mut(column);
+                entries.iter_mut().zip(&self.members).for_each(|(entry, row)| *entry = closing[*row]);
+            }
         }
         let Self { law, members, rows, lanes, without, multipliers, normals, moved, .. } = self;
         let values = LaneValues { lanes: *lanes, without, multipliers, normals, moved };
