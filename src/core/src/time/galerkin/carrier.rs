@@ -22,6 +22,9 @@ pub(crate) const BLOCKS: usize = 32;
 /// Number of rows in a panel of mode shapes. All modes of a panel are contiguous, so sums over modes read memory in order.
 const PANEL: usize = 4 * PADDED;
 
+/// Numbers in single precision that are processed together. Columns of them are multiples of it, padded with zeros.
+const SINGLES: usize = 4 * PADDED;
+
 /// Tables, state and scratch memory of a structure that carries surfaces.
 #[derive(Debug, Clone)]
 pub struct CarrierIntegrator {
@@ -29,8 +32,10 @@ pub struct CarrierIntegrator {
     pub structure: usize,
     /// Modes of the structure.
     pub body: SharedBody,
-    /// `[row][mode]` of the rows that move control points, modes padded to whole registers.
+    /// `[row][mode]` of the rows that move control points, modes padded to whole registers. The compliance, which only has to make the passes
+    /// of a trial converge, is computed in single precision.
     shapes: Vec<f64>,
+    compliance_shapes: Vec<f32>,
     /// Mode shapes in panels of [`PANEL`] rows, `[panel][mode][row of the panel]`, rows padded to whole panels.
     by_mode: Vec<f64>,
     /// The indices 0, 1, 2, … of all modes.
@@ -52,21 +57,21 @@ pub struct CarrierIntegrator {
     /// Errors of impulses on the modes in the tried step.
     pub impulses: Vec<f64>,
     /// Modal components of each lane of the current sector in fixed directions, and directions of the lanes.
-    seen: [Vec<f64>; 3],
+    seen: [Vec<f32>; 3],
     frames: Vec<PolarFrame>,
     /// Places of the lanes of the current sector.
     places: Vec<LanePlace>,
     /// Modal components along the normals and along the forces of the lanes of all blocks, and true for lanes on this structure.
-    along: Vec<f64>,
-    acting: Vec<f64>,
+    along: Vec<f32>,
+    acting: Vec<f32>,
     touches: Vec<bool>,
     /// Number of lanes of a block.
     lanes: usize,
     /// Changes of the modal forces at the points 1 … s since the gaps were evaluated, and the modal displacements that they cause.
     changes: [Vec<f64>; MOST],
-    shifts: [Vec<f64>; MOST],
+    shifts: [Vec<f32>; MOST],
     /// Modal displacements per unit of λ of one lane.
-    force: Vec<f64>,
+    force: Vec<f32>,
     /// Loads on the rows at the points (N), indices of the rows with loads, and true for each of these rows.
     loads: [Vec<f64>; POINTS],
     loaded: Vec<usize>,
@@ -95,9 +100,12 @@ impl CarrierIntegrator {
         };
         let error_form = (0..modes).map(of_mode).collect();
         let body = SharedBody::new(coordinates, degree);
+        let single_stride = modes.next_multiple_of(SINGLES);
+        let compliance_shapes = single_precision(&shapes, stride, single_stride);
         Self {
             error_form,
             structure,
+            compliance_shapes,
             shapes,
             by_mode,
             all: (0..modes).collect(),
@@ -109,16 +117,16 @@ impl CarrierIntegrator {
             worked: std::array::from_fn(|_| vec![0.0; padded]),
             work_weights: [[0.0; POINTS]; POINTS],
             impulses: vec![0.0; modes],
-            seen: std::array::from_fn(|_| vec![0.0; lanes.len() * stride]),
+            seen: std::array::from_fn(|_| vec![0.0; lanes.len() * single_stride]),
             frames: vec![PolarFrame::FIXED; lanes.len()],
             places: vec![LanePlace::UNASSIGNED; lanes.len()],
-            along: vec![0.0; (BLOCKS + 1) * lanes.len() * stride],
-            acting: vec![0.0; (BLOCKS + 1) * lanes.len() * stride],
+            along: vec![0.0; (BLOCKS + 1) * lanes.len() * single_stride],
+            acting: vec![0.0; (BLOCKS + 1) * lanes.len() * single_stride],
             touches: vec![false; (BLOCKS + 1) * lanes.len()],
             lanes: lanes.len(),
             changes: std::array::from_fn(|_| vec![0.0; stride]),
-            shifts: std::array::from_fn(|_| vec![0.0; stride]),
-            force: vec![0.0; stride],
+            shifts: std::array::from_fn(|_| vec![0.0; single_stride]),
+            force: vec![0.0; single_stride],
             loads: std::array::from_fn(|_| vec![0.0; rows]),
             loaded: Vec::with_capacity(rows),
             is_loaded: vec![false; rows],
@@ -295,7 +303,7 @@ impl CarrierIntegrator {
     /// their control points, because nodes move little in a step; the mode shapes are then read once.
     pub(crate) fn find_modal_components(&mut self, block: usize, lanes: Lanes) {
         let (padded, first) = (self.force.len(), block * self.lanes);
-        let Self { seen, along, shapes, places, touches, instructions, .. } = self;
+        let Self { seen, along, compliance_shapes: shapes, places, touches, instructions, .. } = self;
         let touches = &touches[first..][..lanes.len()];
         for node in 0..lanes.nodes {
             let (mut node_lanes, mut count) = ([0; MOST], 0);
@@ -359,7 +367,8 @@ impl CarrierIntegrator {
 
     /// Sets all changes of forces to zero.
     pub(crate) fn clear_force_changes(&mut self) {
-        self.changes.iter_mut().chain(&mut self.shifts).for_each(|values| values.fill(0.0));
+        self.changes.iter_mut().for_each(|values| values.fill(0.0));
+        self.shifts.iter_mut().for_each(|values| values.fill(0.0));
     }
 
     /// Adds a change of λ of a lane since the last evaluation of the gaps (N).
@@ -367,7 +376,7 @@ impl CarrierIntegrator {
         let (padded, place) = (self.force.len(), step.block * self.lanes + lane);
         if self.touches[place] {
             let sums = &mut self.changes[step.lanes.place(lane).0 - 1];
-            let acting = &self.acting[place * padded..][..padded];
+            let acting = &self.acting[place * padded..][..sums.len()];
             self.instructions.run(AddMultiple { acting, change, sums });
         }
     }
@@ -402,7 +411,8 @@ impl CarrierIntegrator {
         let (padded, lanes, first) = (self.force.len(), step.lanes, step.block * self.lanes);
         self.move_modes(step, 1, lane, force);
         for other in (0..lanes.nodes).filter(|node| self.touches[first + node]) {
-            let fixed = self.seen.each_ref().map(|seen| dot_of(&seen[other * padded..][..padded], &self.force));
+            let fixed =
+                self.seen.each_ref().map(|seen| f64::from(dot_of(&seen[other * padded..][..padded], &self.force)));
             lanes.set(carrier_compliance, other, self.frames[other].local(fixed.into()));
         }
     }
@@ -416,11 +426,11 @@ impl CarrierIntegrator {
         let padded = self.force.len();
         let [x, y, z] = fixed_components(&self.seen, lane, padded);
         let (k, _) = lanes.place(lane);
-        let [a, b, c] = self.frames[lane].fixed(force).into();
+        let [a, b, c] = singles(self.frames[lane].fixed(force).into());
         let response = self.body.response(level, kind, i, k);
         let seen = x.iter().zip(y).zip(z);
         for ((to, response), ((x, y), z)) in self.force.iter_mut().zip(response).zip(seen) {
-            *to = response * (a * x + b * y + c * z);
+            *to = single(*response) * (a * x + b * y + c * z);
         }
     }
 }
@@ -441,21 +451,21 @@ impl LanePlace {
 }
 
 /// Modal components of a lane in fixed directions.
-fn fixed_components(seen: &[Vec<f64>; 3], lane: usize, padded: usize) -> [&[f64]; 3] {
+fn fixed_components(seen: &[Vec<f32>; 3], lane: usize, padded: usize) -> [&[f32]; 3] {
     seen.each_ref().map(|seen| &seen[lane * padded..][..padded])
 }
 
 /// Modal components of a lane in one direction.
-fn component_window_mut(components: &mut [f64], lane: usize, padded: usize) -> &mut [f64] {
+fn component_window_mut(components: &mut [f32], lane: usize, padded: usize) -> &mut [f32] {
     &mut components[lane * padded..][..padded]
 }
 
 /// Interpolates the mode shapes at lanes.
 struct ModeShapeInterpolation<'a> {
     /// Components of all lanes in fixed directions.
-    seen: &'a mut [Vec<f64>; 3],
+    seen: &'a mut [Vec<f32>; 3],
     /// `[row][mode]`.
-    shapes: &'a [f64],
+    shapes: &'a [f32],
     places: &'a [LanePlace],
     instructions: &'a InstructionSet,
 }
@@ -465,7 +475,8 @@ impl ModeShapeInterpolation<'_> {
     fn find<const N: usize>(&mut self, lanes: [usize; N]) {
         let padded = self.seen[0].len() / self.places.len();
         let LanePlace { first, weights: Weights { len, .. }, .. } = self.places[lanes[0]];
-        let coefficients = lanes.map(|lane| &self.places[lane].weights.values[..len]);
+        let weights = lanes.map(|lane| self.places[lane].weights.values.map(single));
+        let coefficients = weights.each_ref().map(|weights| &weights[..len]);
         for (component, seen) in self.seen.iter_mut().enumerate() {
             let rows = first.map(|row| row + component);
             let Ok(sums) = seen.get_disjoint_mut(lanes.map(|lane| lane * padded..(lane + 1) * padded)) else {
@@ -479,15 +490,15 @@ impl ModeShapeInterpolation<'_> {
 
 /// Modal components along a direction from those along x, y and z.
 struct Project<'a> {
-    seen: [&'a [f64]; 3],
+    seen: [&'a [f32]; 3],
     direction: [f64; 3],
-    to: &'a mut [f64],
+    to: &'a mut [f32],
 }
 
 impl Kernel for Project<'_> {
     #[inline(always)]
     fn run(self) {
-        let ([x, y, z], [a, b, c]) = (self.seen, self.direction);
+        let ([x, y, z], [a, b, c]) = (self.seen, singles(self.direction));
         for (((to, x), y), z) in self.to.iter_mut().zip(x).zip(y).zip(z) {
             *to = a * x + b * y + c * z;
         }
@@ -497,15 +508,15 @@ impl Kernel for Project<'_> {
 /// Modal displacements `to` = `response` (per unit of modal force) · `acting` (modal force per λ).
 struct ModalResponse<'a> {
     response: &'a [f64],
-    acting: &'a [f64],
-    to: &'a mut [f64],
+    acting: &'a [f32],
+    to: &'a mut [f32],
 }
 
 impl Kernel for ModalResponse<'_> {
     #[inline(always)]
     fn run(self) {
         for ((to, response), acting) in self.to.iter_mut().zip(self.response).zip(self.acting) {
-            *to = response * acting;
+            *to = single(*response) * acting;
         }
     }
 }
@@ -530,8 +541,8 @@ impl RowSums<'_> {
 /// Adds the displacements along the normals of some lanes, whose modal components are `along`, to `sums`.
 struct AddAlong<'a> {
     /// Displacements of the modes.
-    moved: &'a [f64],
-    along: &'a [f64],
+    moved: &'a [f32],
+    along: &'a [f32],
     /// True for lanes on the structure.
     touches: &'a [bool],
     sums: &'a mut [f64],
@@ -542,14 +553,14 @@ impl Kernel for AddAlong<'_> {
     fn run(self) {
         let lanes = self.along.chunks_exact(self.moved.len()).zip(self.touches).zip(self.sums);
         for ((along, _), sum) in lanes.filter(|((_, touches), _)| **touches) {
-            *sum += dot_of(along, self.moved);
+            *sum += f64::from(dot_of(along, self.moved));
         }
     }
 }
 
 /// Adds a multiple of the modal components of a force to `sums`.
 struct AddMultiple<'a> {
-    acting: &'a [f64],
+    acting: &'a [f32],
     change: f64,
     sums: &'a mut [f64],
 }
@@ -558,21 +569,43 @@ impl Kernel for AddMultiple<'_> {
     #[inline(always)]
     fn run(self) {
         for (sum, acting) in self.sums.iter_mut().zip(self.acting) {
-            *sum += self.change * acting;
+            *sum += self.change * f64::from(*acting);
         }
     }
 }
 
-/// Scalar product, summed in eight parts.
+/// Scalar product, summed in [`SINGLES`] parts.
 #[inline(always)]
-fn dot_of(a: &[f64], b: &[f64]) -> f64 {
-    let mut parts = [0.0; PADDED];
-    for (a, b) in a.as_chunks::<PADDED>().0.iter().zip(b.as_chunks::<PADDED>().0) {
-        for i in 0..PADDED {
+fn dot_of(a: &[f32], b: &[f32]) -> f32 {
+    let mut parts = [0.0; SINGLES];
+    for (a, b) in a.as_chunks::<SINGLES>().0.iter().zip(b.as_chunks::<SINGLES>().0) {
+        for i in 0..SINGLES {
             parts[i] += a[i] * b[i];
         }
     }
     parts.iter().sum()
+}
+
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "the compliance of a trial needs no more than single precision")]
+fn single(value: f64) -> f32 {
+    value as f32
+}
+
+#[inline(always)]
+fn singles(values: [f64; 3]) -> [f32; 3] {
+    values.map(single)
+}
+
+/// Copies a table to single precision, with columns of `to` entries in place of `from`. Entries below 1e-9 of the largest become zero, so that
+/// no product of them is subnormal.
+fn single_precision(table: &[f64], from: usize, to: usize) -> Vec<f32> {
+    let largest = table.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
+    let column = |column: &[f64]| {
+        let values = column.iter().map(|value| if value.abs() < 1e-9 * largest { 0.0 } else { single(*value) });
+        values.chain(std::iter::repeat(0.0)).take(to).collect::<Vec<f32>>()
+    };
+    table.chunks_exact(from.max(1)).flat_map(column).collect()
 }
 
 /// Modes of a structure that carries surfaces.

@@ -3,33 +3,40 @@
 use crate::math::simd::Kernel;
 use crate::math::vector::Vector3;
 use nalgebra::DMatrix;
+use std::ops::{AddAssign, Mul};
 
 /// Column lengths are multiples of this number of entries, padded with zeros.
 pub(crate) const PADDED: usize = 8;
 
+/// A number of single or double precision.
+pub(crate) trait Real: Copy + Default + AddAssign + Mul<Output = Self> {}
+
+impl Real for f32 {}
+impl Real for f64 {}
+
 /// `sums[a][i]` = Σ_t `coefficients[a][t]` · `table[columns[t]·stride + i]` for `N` sets of coefficients, in the order of t.
-pub(crate) struct Combine<'a, const N: usize> {
+pub(crate) struct Combine<'a, const N: usize, T = f64> {
     /// Columns, one after the other.
-    pub table: &'a [f64],
+    pub table: &'a [T],
     /// Length of a column, a multiple of [`PADDED`].
     pub stride: usize,
     /// Indices of the columns.
     pub columns: &'a [usize],
     /// Coefficients of the columns, for each set.
-    pub coefficients: [&'a [f64]; N],
+    pub coefficients: [&'a [T]; N],
     /// One sum of columns for each set.
-    pub sums: [&'a mut [f64]; N],
+    pub sums: [&'a mut [T]; N],
 }
 
-impl<const N: usize> Combine<'_, N> {
+impl<const N: usize, T: Real> Combine<'_, N, T> {
     /// Computes `K` registers of all sums from entry `from` on. Loops of fixed length over arrays stay in registers.
     #[inline(always)]
     #[expect(clippy::needless_range_loop, reason = "iterators over these arrays do not stay in registers")]
     fn registers<const K: usize>(&mut self, from: usize) {
-        let mut sums = [[[0.0; PADDED]; K]; N];
+        let mut sums = [[[T::default(); PADDED]; K]; N];
         for place in 0..self.columns.len() {
             let entries = self.table[self.columns[place] * self.stride + from..].as_chunks::<PADDED>().0;
-            let entries: &[[f64; PADDED]; K] = entries.first_chunk().expect("every column holds K registers");
+            let entries: &[[T; PADDED]; K] = entries.first_chunk().expect("every column holds K registers");
             for k in 0..K {
                 for a in 0..N {
                     let coefficient = self.coefficients[a][place];
@@ -45,7 +52,7 @@ impl<const N: usize> Combine<'_, N> {
     }
 }
 
-impl<const N: usize> Kernel for Combine<'_, N> {
+impl<const N: usize, T: Real> Kernel for Combine<'_, N, T> {
     #[inline(always)]
     fn run(mut self) {
         let mut from = 0;

@@ -97,14 +97,14 @@ impl Kernel for Push<'_> {
 struct AddResponse<'a> {
     response: &'a [f64],
     force: &'a [f64],
-    to: &'a mut [f64],
+    to: &'a mut [f32],
 }
 
 impl Kernel for AddResponse<'_> {
     #[inline(always)]
     fn run(self) {
         for (to, (response, force)) in self.to.iter_mut().zip(self.response.iter().zip(self.force)) {
-            *to += response * force;
+            *to += (response * force) as f32;
         }
     }
 }
@@ -243,7 +243,7 @@ impl SharedBody {
         kind: ForceInterpolation,
         i: usize,
         forces: &[Vec<f64>],
-        to: &mut [f64],
+        to: &mut [f32],
     ) {
         to.fill(0.0);
         for (k, force) in forces.iter().enumerate() {
