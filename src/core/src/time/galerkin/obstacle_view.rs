@@ -189,27 +189,29 @@ impl Obstacle for ObstacleView<'_> {
             return false;
         }
         let block = self.carriers.step.block;
-        self.carriers.carriers.iter_mut().for_each(|carrier| carrier.clear_lanes(block));
+        self.carriers.carriers.iter_mut().for_each(|carrier| carrier.compliance.clear_lanes(block));
         for lane in (0..lanes.len()).filter(|lane| chosen[*lane]) {
             let (point, node) = lanes.place(lane);
             let normal = lanes.vector3(normals, lane);
-            self.with_carrier_mut(node, point, |carrier, spot| carrier.set_lane(block, lane, spot, normal));
+            self.with_carrier_mut(node, point, |carrier, spot| {
+                carrier.compliance.set_lane(block, lane, spot, normal);
+            });
         }
-        self.carriers.carriers.iter_mut().for_each(|carrier| carrier.find_modal_components(block, lanes));
+        self.carriers.carriers.iter_mut().for_each(|carrier| carrier.compliance.find_modal_components(block, lanes));
         true
     }
 
     fn add_normal_compliance(&mut self, lane: usize, direction: Vector3, carrier_compliance: &mut [f64]) {
         carrier_compliance.fill(0.0);
         if let Some((carrier, step)) = self.carrier(lane) {
-            carrier.add_normal_compliance(step, lane, direction, carrier_compliance);
+            carrier.compliance.add_normal_compliance(&carrier.body, step, lane, direction, carrier_compliance);
         }
     }
 
     fn add_compliance(&mut self, lane: usize, force: Vector3, carrier_compliance: &mut [f64]) {
         carrier_compliance.fill(0.0);
         if let Some((carrier, step)) = self.carrier(lane) {
-            carrier.add_compliance(step, lane, force, carrier_compliance);
+            carrier.compliance.add_compliance(&carrier.body, step, lane, force, carrier_compliance);
         }
     }
 
@@ -219,18 +221,18 @@ impl Obstacle for ObstacleView<'_> {
 
     fn add_force_change(&mut self, lane: usize, change: f64) {
         if let Some((carrier, step)) = self.carrier(lane) {
-            carrier.add_force_change(step, lane, change);
+            carrier.compliance.add_force_change(step, lane, change);
         }
     }
 
     fn apply_force_changes(&mut self) {
         let CarriersInStep { carriers, step } = &mut self.carriers;
-        carriers.iter_mut().for_each(|carrier| carrier.apply_force_changes(*step));
+        carriers.iter_mut().for_each(|carrier| carrier.compliance.apply_force_changes(&carrier.body, *step));
     }
 
     fn gap_change(&self, lane: usize) -> f64 {
         let CarriersInStep { carriers, step } = &self.carriers;
-        carriers.iter().map(|carrier| carrier.gap_change(*step, lane)).sum()
+        carriers.iter().map(|carrier| carrier.compliance.gap_change(*step, lane)).sum()
     }
 
     fn parameters(&self, node: usize) -> &ContactParameters {

@@ -234,7 +234,7 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
     /// Finds forces that remove penetration, sector by sector. Sectors on elastic surfaces then exchange their new forces until their gaps
     /// agree to `precision` (m). Returns false if a contact problem has no solution.
     fn solve(&mut self, step: SpanStep, kind: ForceInterpolation, precision: f64, result: &mut TrialResult) -> bool {
-        self.island.carriers.iter_mut().for_each(CarrierIntegrator::clear_force_changes);
+        self.island.carriers.iter_mut().for_each(|carrier| carrier.compliance.clear_force_changes());
         let mut blocks = BLOCKS.min(self.island.sectors.iter().filter(|one| one.block.is_some()).count());
         let mut solved = 0;
         for place in self.places() {
