@@ -93,7 +93,7 @@ pub struct IslandSector {
     block: Option<usize>,
     /// True if no force acts on the sector and its gaps are so wide that they are evaluated only after the contact problems of the other
     /// sectors are solved.
-    far: bool,
+    pub(crate) far: bool,
 }
 
 impl IslandSector {
@@ -217,12 +217,11 @@ impl Island {
         self.sectors[index].disk.map_or(0.0, |(disk, lane)| self.disks[disk].motion(lane))
     }
 
-    /// Returns the displacements of the contact rows of an inactive sector at the start of the step (m), and its gaps (m).
-    pub(crate) fn start_of_inactive(&mut self, index: usize) -> (&[f64], &mut [f64]) {
+    /// Prepares an inactive sector for the next trial, and finds the displacements of its contact rows at the start of the step.
+    pub(crate) fn find_start_of_inactive(&mut self, index: usize) {
         self.restart(index);
         let IslandSector { table, trial, state, .. } = &mut self.sectors[index];
-        let moved = trial.find_start(&self.tables[table[0]][table[1]].rows, state);
-        (moved, &mut state.gaps)
+        trial.find_start(&self.tables[table[0]][table[1]].rows, state);
     }
 
     /// Prepares an inactive sector for the next trial.

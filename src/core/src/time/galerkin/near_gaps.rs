@@ -10,7 +10,7 @@ use crate::math::octet::Eight;
 use std::cell::Cell;
 
 impl ObstacleView<'_> {
-    /// Finds gaps (m) and normals of all nodes at a point of the step.
+    /// Finds gaps (m) and normals of all nodes that do not face smooth rings, at a point of the step.
     pub(super) fn find_gaps_at(
         &mut self,
         point: usize,
@@ -19,7 +19,6 @@ impl ObstacleView<'_> {
         gaps: &mut [f64],
         normals: &mut [f64],
     ) {
-        self.find_near_gaps(point, lanes, moved, gaps, normals, true);
         for node in 0..lanes.nodes {
             if self.smooth_ring(node).is_none() {
                 let lane = lanes.at(point, node);

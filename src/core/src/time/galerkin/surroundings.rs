@@ -103,10 +103,14 @@ pub trait Surroundings {
     /// Selects the sectors of an island that are evaluated in a step; the others certainly stay open.
     fn choose_active(&mut self, _island: &mut Island, _step: SpanStep) {}
 
-    /// Prepares a sector that joins the contact problem of a step: resets its trial, and finds its gaps to smooth rings (m) and closest points
-    /// at the start of the step. The surfaces must be deformed as at this time. Needed only if [`Surroundings::choose_active`] deactivates
-    /// sectors.
-    fn prepare_activated_sector(&mut self, _island: &mut Island, _sector: usize, _step: SpanStep) {}
+    /// Finds the gaps of active sectors to smooth rings at a point of the step, either of the far sectors or of the near sectors. The surfaces
+    /// must be deformed as at this point.
+    fn find_ring_gaps(&mut self, _island: &mut Island, _point: usize, _far: bool) {}
+
+    /// Prepares the active sectors from place `first` on, which join the contact problem of a step: resets their trials, and finds their gaps to
+    /// smooth rings (m) and closest points at the start of the step. The surfaces must be deformed as at this time. Needed only if
+    /// [`Surroundings::choose_active`] deactivates sectors.
+    fn prepare_activated_sectors(&mut self, _island: &mut Island, _first: usize) {}
 
     /// Finds bounds on the motion of the surfaces (m) since `CarrierIntegrator::set_motion_origin`, at the given points of the step.
     fn find_surface_motions(&mut self, _carriers: &[CarrierIntegrator], _points: RangeInclusive<usize>) {}

@@ -183,6 +183,7 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
             }
             for point in 1..=points {
                 self.surroundings.bend(&self.island.carriers, point);
+                self.surroundings.find_ring_gaps(self.island, point, far);
                 for place in self.places() {
                     let index = self.index(place);
                     if self.island.sectors[index].far == far {
@@ -325,9 +326,9 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
             return false;
         }
         self.surroundings.bend(&self.island.carriers, 0);
+        self.surroundings.prepare_activated_sectors(self.island, before);
         for place in before..self.island.active.len() {
             let index = self.index(place);
-            self.surroundings.prepare_activated_sector(self.island, index, step);
             let SectorInStep { mut surfaces, tables, .. } = self.sector(index, step, kind);
             surfaces.begin_step(step.from, step.length, &tables.levels[step.level], kind);
             surfaces.guess_start_places();

@@ -6,15 +6,13 @@
 
 use super::{SceneIsland, SceneSurroundings};
 use crate::geometry::spline::SplineGap;
-use crate::geometry::spline::near::{NearNode, NearSearch};
-use crate::math::octet::Eight;
-use crate::math::vector::vector3_at;
 use crate::system::{ContactPair, Structure};
 use crate::time::galerkin::carrier::CarrierIntegrator;
 use crate::time::galerkin::disk::{CoupledDisk, largest_gap_change};
 use crate::time::galerkin::island::{BETWEEN_POINTS_FACTOR, Island, IslandSector, OpenLimits};
 use crate::time::galerkin::span::SpanStep;
 use crate::time::galerkin::surroundings::Surroundings;
+use std::mem::take;
 
 /// Durations for which a sector can become inactive, in lengths of the next step. A sector becomes inactive for the first of these durations
 /// over which it certainly stays open.
@@ -59,7 +57,8 @@ impl SceneSurroundings<'_> {
             return;
         }
         self.shift_limits(island, step);
-        let (end, mut is_bent) = (step.from + step.length, false);
+        let (end, mut rechecked) = (step.from + step.length, take(&mut self.search.sectors));
+        rechecked.clear();
         for index in 0..island.sectors.len() {
             let one = &island.sectors[index];
             let limits = one.limits;
@@ -69,23 +68,32 @@ impl SceneSurroundings<'_> {
                 continue;
             }
             let free = limits.map_or_else(|| self.free_distance(island, index), |limits| limits.motion);
-            let mut found = self.find_limits(island, index, step, free);
-            if found.is_none() && limits.is_some() {
-                if !is_bent {
-                    is_bent = true;
-                    self.bend_at_start(island, step);
-                }
-                self.find_gaps_at_start(island, index, step);
-                let free = self.free_distance(island, index);
-                found = self.find_limits(island, index, step, free);
-            }
-            let one = &mut island.sectors[index];
-            one.limits = found;
-            if found.is_none() {
-                one.checked_at = Some(step.from);
+            self.limit(island, index, step, free);
+            if limits.is_some() && island.sectors[index].limits.is_none() {
+                rechecked.push(index);
             }
         }
+        // Limits from the last gaps have become too narrow.
+        if !rechecked.is_empty() {
+            self.bend_at_start(island, step);
+            self.find_gaps_at_start(island, &rechecked);
+            for index in &rechecked {
+                let free = self.free_distance(island, *index);
+                self.limit(island, *index, step, free);
+            }
+        }
+        self.search.sectors = rechecked;
         island.list_active();
+    }
+
+    /// Sets the limits of a sector whose gaps may become smaller by `free` (m).
+    fn limit(&self, island: &mut Island, index: usize, step: SpanStep, free: f64) {
+        let found = self.find_limits(island, index, step, free);
+        let one = &mut island.sectors[index];
+        one.limits = found;
+        if found.is_none() {
+            one.checked_at = Some(step.from);
+        }
     }
 
     /// Subtracts the motion in the last step from the limits, so that they hold for the motion since the start of this step. Stores this motion.
@@ -175,24 +183,5 @@ impl SceneSurroundings<'_> {
         let pairs = self.records.iter_mut().filter(|record| record.sector == 0).flat_map(|record| &mut record.pairs);
         pairs.for_each(|own| own.drives[0] = own.course.at(step.from));
         self.bend(&island.carriers, 0);
-    }
-
-    /// Finds the gaps of an inactive sector at the start of a step. The surfaces must be deformed as at this time.
-    pub(super) fn find_gaps_at_start(&mut self, island: &mut Island, index: usize, step: SpanStep) {
-        let SceneSurroundings { pairs, records, .. } = self;
-        let record = &mut records[index];
-        let (moved, gaps) = island.start_of_inactive(index);
-        for own in &record.pairs {
-            let Some(ring) = pairs[own.pair].gap().smooth_ring() else { continue };
-            let drive = own.course.at(step.from).0;
-            record.evaluated_gaps += Eight::blocks(ring.nodes.len()) as u64;
-            let nodes = ring.nodes.iter().map(|node| {
-                let (index, local) = (node * record.lanes + record.sector, vector3_at(moved, *node));
-                NearNode { node: *node, index, local, guess: None }
-            });
-            NearSearch::new(ring, &drive).find_gaps(nodes, |NearNode { node, .. }, found| {
-                (gaps[node], record.places[0][node]) = (found.distance, found.foot);
-            });
-        }
     }
 }

@@ -1,6 +1,7 @@
 //! Results of a trial: forces, gaps and displacements of the nodes at the points, and the state at the end.
 
 use super::{ForceInterpolation, Trial};
+use crate::geometry::Gap;
 use crate::math::vector::{Vector3, set_vector3_at, vector3_at};
 use crate::time::galerkin::basis::{MOST, TimeBasis};
 use crate::time::galerkin::rows::{ContactRows, Sums};
@@ -59,6 +60,13 @@ impl Trial {
     /// Force on a node at point 0 … s (N).
     pub fn force(&self, point: usize, node: usize) -> Vector3 {
         if point == 0 { vector3_at(&self.start_contacts.forces, node) } else { self.lane(&self.forces, point, node) }
+    }
+
+    /// Sets gap and normal of a node at point 1 … s.
+    pub(crate) fn set_gap(&mut self, point: usize, node: usize, gap: &Gap) {
+        let lane = self.lanes.at(point, node);
+        self.gaps[lane] = gap.distance;
+        self.lanes.set(&mut self.normals, lane, gap.normal);
     }
 
     /// Returns the gap of a node (m).
