@@ -178,8 +178,12 @@ impl ContactRows {
             bounds,
         });
         let ([one, _], [two]) = (&mut velocities.rows, &mut rest.rows);
-        self.add_up(&self.by_mode, [&velocities.coefficients[0]], [one]);
-        self.add_up(&self.magnitudes, [&rest.coefficients[0]], [two]);
+        self.instructions.run(AddTravel {
+            shapes: &self.by_mode,
+            stride: self.stride,
+            coefficients: [&velocities.coefficients[0], &rest.coefficients[0]],
+            sums: [one, two],
+        });
     }
 
     /// Velocities of the rows at the end of a step without forces (m/s).
@@ -246,6 +250,51 @@ impl Kernel for FindTravel<'_> {
             let is_slow = parabola < 2.0;
             *slow = if is_slow { *v } else { 0.0 };
             *bound = amplitude * if is_slow { parabola } else { 2.0 };
+        }
+    }
+}
+
+/// Sums of the modes at the rows with their signs, and of their magnitudes, in one loop.
+struct AddTravel<'a> {
+    /// `[mode][row]`, with `stride` rows.
+    shapes: &'a [f64],
+    stride: usize,
+    coefficients: [&'a [f64]; 2],
+    sums: [&'a mut [f64]; 2],
+}
+
+impl AddTravel<'_> {
+    #[inline(always)]
+    fn registers<const K: usize>(&mut self, from: usize) {
+        let mut sums = [[[0.0; PADDED]; K]; 2];
+        let modes = self.coefficients[0].iter().zip(self.coefficients[1]);
+        for (shapes, (signed, unsigned)) in self.shapes.chunks_exact(self.stride).zip(modes) {
+            let shapes: &[[f64; PADDED]; K] =
+                shapes[from..].as_chunks().0.first_chunk().expect("columns hold K registers");
+            for k in 0..K {
+                for i in 0..PADDED {
+                    sums[0][k][i] += shapes[k][i] * signed;
+                    sums[1][k][i] += shapes[k][i].abs() * unsigned;
+                }
+            }
+        }
+        for (target, sums) in self.sums.iter_mut().zip(&sums) {
+            target[from..from + K * PADDED].copy_from_slice(sums.as_flattened());
+        }
+    }
+}
+
+impl Kernel for AddTravel<'_> {
+    #[inline(always)]
+    fn run(mut self) {
+        let mut from = 0;
+        while from + 4 * PADDED <= self.stride {
+            self.registers::<4>(from);
+            from += 4 * PADDED;
+        }
+        while from < self.stride {
+            self.registers::<1>(from);
+            from += PADDED;
         }
     }
 }
