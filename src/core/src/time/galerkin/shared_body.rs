@@ -75,19 +75,42 @@ impl BodyResponse {
 }
 
 /// Computes `to` = `free` + Σ response · force, where `terms` lists pairs of response and force.
-struct Push<'a> {
+struct Push<'a, const N: usize> {
     free: &'a [f64],
-    terms: &'a [[&'a [f64]; 2]],
+    terms: [[&'a [f64]; 2]; N],
     to: &'a mut [f64],
 }
 
-impl Kernel for Push<'_> {
+impl<const N: usize> Kernel for Push<'_, N> {
     #[inline(always)]
     fn run(self) {
-        self.to.copy_from_slice(self.free);
-        for [response, force] in self.terms {
-            for (to, (response, force)) in self.to.iter_mut().zip(response.iter().zip(*force)) {
-                *to += response * force;
+        let count = self.to.len();
+        let (free, terms) = (&self.free[..count], self.terms.map(|pair| pair.map(|values| &values[..count])));
+        for mode in 0..count {
+            let pushed = terms.iter().fold(free[mode], |sum, [response, force]| sum + response[mode] * force[mode]);
+            self.to[mode] = pushed;
+        }
+    }
+}
+
+/// Computes `to` = Σ of `weights` times the forces at the points and the loads there, if there are loads.
+struct WeighForces<'a> {
+    weights: &'a [f64],
+    forces: &'a [Vec<f64>],
+    loads: &'a [Vec<f64>],
+    to: &'a mut [f64],
+}
+
+impl Kernel for WeighForces<'_> {
+    #[inline(always)]
+    fn run(self) {
+        self.to.fill(0.0);
+        for ((weight, forces), loads) in self.weights.iter().zip(self.forces).zip(self.loads) {
+            if loads.is_empty() {
+                self.to.iter_mut().zip(forces).for_each(|(to, force)| *to += weight * force);
+            } else {
+                let forces = forces.iter().zip(loads).map(|(force, load)| force + load);
+                self.to.iter_mut().zip(forces).for_each(|(to, force)| *to += weight * force);
             }
         }
     }
@@ -227,10 +250,15 @@ impl SharedBody {
         for i in 1..=points {
             let (free, to, BodyResponse { points: rows, constant }) = (&free[i - 1], &mut at[i], &responses[level]);
             match kind {
-                ForceInterpolation::Constant => instructions.run(Push { free, terms: &[[constant, &forces[1]]], to }),
+                ForceInterpolation::Constant => instructions.run(Push { free, terms: [[constant, &forces[1]]], to }),
                 ForceInterpolation::Polynomial => {
-                    let terms: [[&[f64]; 2]; POINTS] = std::array::from_fn(|k| [&rows[i - 1][k][..], &forces[k]]);
-                    instructions.run(Push { free, terms: &terms[..=points], to });
+                    let [a, b, c, d]: [[&[f64]; 2]; POINTS] =
+                        std::array::from_fn(|k| [&rows[i - 1][k][..], &forces[k]]);
+                    match points {
+                        1 => instructions.run(Push { free, terms: [a, b], to }),
+                        2 => instructions.run(Push { free, terms: [a, b, c], to }),
+                        _ => instructions.run(Push { free, terms: [a, b, c, d], to }),
+                    }
                 }
             }
         }
@@ -255,20 +283,18 @@ impl SharedBody {
     /// Accepts the step: advances the state to its end, whose forces become those at the start.
     pub fn take(&mut self, level: usize, kind: ForceInterpolation) {
         self.load_work += self.work_of_loads(&self.tables.levels[level].basis, kind);
-        let Self { coordinates, tables, state, forces, polynomial, advance, loads_at, .. } = self;
+        let Self { coordinates, tables, state, forces, polynomial, advance, loads_at, instructions, .. } = self;
         let table = &tables.levels[level];
         let basis = &table.basis;
         let points = kind.points(basis);
         for (a, polynomial) in polynomial.iter_mut().enumerate() {
-            for (mode, value) in polynomial.iter_mut().enumerate() {
-                let all = |k: usize| forces[k][mode] + loads_at[k].get(mode).copied().unwrap_or(0.0);
-                *value = coordinates.inertia[mode]
-                    * match kind {
-                        ForceInterpolation::Constant if a == 0 => all(1),
-                        ForceInterpolation::Constant => 0.0,
-                        ForceInterpolation::Polynomial => (0..=points).map(|k| basis.projection[a][k] * all(k)).sum(),
-                    };
-            }
+            let weights: &[f64] = match kind {
+                ForceInterpolation::Constant if a == 0 => &[0.0, 1.0],
+                ForceInterpolation::Constant => &[],
+                ForceInterpolation::Polynomial => &basis.projection[a][..=points],
+            };
+            instructions.run(WeighForces { weights, forces, loads: loads_at, to: polynomial });
+            polynomial.iter_mut().zip(&coordinates.inertia).for_each(|(value, inertia)| *value *= inertia);
         }
         let [first, rest @ ..] = forces;
         first.copy_from_slice(&rest[points - 1]);
