@@ -90,8 +90,9 @@ pub(crate) trait ContactLaw {
         Self: Sized;
     /// Begins a group of `size` contacts.
     fn begin(&mut self, size: usize);
-    /// Begins a problem that differs from the last one in its predictions only. Returns false if it must begin like any other problem.
-    fn begin_again(&mut self) -> bool {
+    /// Begins a problem that differs from the last one in its predictions only. Returns false if the matrix must be filled in again: then
+    /// call [`ContactLaw::begin`].
+    fn begin_with_same_matrix(&mut self) -> bool {
         false
     }
     /// Delassus matrix (m/N), to be filled.

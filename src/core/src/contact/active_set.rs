@@ -30,7 +30,7 @@ pub(super) const PATIENCE: usize = 8;
 
 /// Largest problem on which the least-index rule may try every active set.
 const ENUMERABLE: usize = 14;
-/// Factorisations allowed to larger ones before contacts are driven one by one; block exchanges need about ten.
+/// Largest number of exchanges of larger problems before contacts are driven one by one; about ten are needed.
 const BLOCK_LIMIT: usize = 50;
 /// Factorisations allowed for the iterative approximation of a solution, as a multiple of those for driving.
 const APPROACH: usize = 4;
@@ -82,9 +82,10 @@ pub struct ContactSolver {
     factor: DMatrix<f64>,
     /// Diagonal of W_AA in the order of `members`, without sign.
     diagonal: Vec<f64>,
-    /// True if `factor` belongs to the matrix and to `members`, and true if the next solution may start with it.
+    /// True if `factor` is the factor of all `members` of the current matrix.
     has_factor: bool,
-    keeps_factor: bool,
+    /// True if the next solution may start with this factor.
+    is_factor_reusable: bool,
     /// Remaining matrix after elimination.
     remaining: Vec<f64>,
     right: Vec<f64>,
@@ -112,7 +113,7 @@ impl ContactSolver {
             factor: DMatrix::zeros(size, size),
             diagonal: vec![0.0; size],
             has_factor: false,
-            keeps_factor: false,
+            is_factor_reusable: false,
             remaining: vec![0.0; size],
             right: vec![0.0; size],
             members: Vec::with_capacity(size),
@@ -133,15 +134,15 @@ impl ContactSolver {
         let capacity = self.gaps.len();
         assert!(size <= capacity, "{size} contact nodes exceed the solver capacity of {capacity}");
         self.size = size;
-        (self.has_factor, self.keeps_factor) = (false, false);
+        (self.has_factor, self.is_factor_reusable) = (false, false);
         self.multipliers[size..].fill(0.0);
         self.active[size..].fill(false);
     }
 
-    /// Announces a problem that differs from the last one in its gaps only. Returns false if the matrix must be filled in again, because the
-    /// last solution changed it.
-    pub(super) fn keep_matrix(&mut self) -> bool {
-        self.keeps_factor = self.has_factor;
+    /// Prepares a problem that differs from the last one in its gaps only. Returns false if the matrix must be filled in again: if there is
+    /// no factor of all active contacts, or if the last solution changed the matrix.
+    pub(super) fn begin_with_same_matrix(&mut self) -> bool {
+        self.is_factor_reusable = self.has_factor;
         self.has_factor
     }
 
@@ -167,7 +168,6 @@ impl ContactSolver {
         }
         self.has_factor &= !self.yielding.softened;
         if !outcome.solved && self.monotone {
-            self.has_factor = false;
             let approached = self.approach(scale);
             outcome = SolverOutcome::direct(approached.solved, outcome.factorisations + approached.factorisations);
             self.has_factor = false;
@@ -321,11 +321,11 @@ impl ContactSolver {
         self.members.truncate(rank);
     }
 
-    /// Solves as [`ContactSolver::solve_active`], to the bit, with the factor of the last solution. Returns false and does nothing if the factor
-    /// must not be kept, or belongs to another active set.
+    /// Solves with the factor of the last solution, with the same bits as [`ContactSolver::solve_active`] without a driven node. Returns
+    /// false and solves nothing if this factor is not reusable or belongs to another active set.
     fn solve_with_factor(&mut self) -> bool {
         let count = self.members.len();
-        if !std::mem::take(&mut self.keeps_factor)
+        if !std::mem::take(&mut self.is_factor_reusable)
             || self.active[..self.size].iter().filter(|active| **active).count() != count
             || self.members.iter().any(|node| !self.active[*node])
         {
@@ -352,7 +352,7 @@ impl ContactSolver {
     }
 }
 
-/// Largest number of factorisations of the exchange rules. All sets are tried only if there is no other method: with friction.
+/// Largest number of exchanges. All sets are tried only if there is no other method: with friction.
 fn exchange_limit(size: usize, monotone: bool) -> usize {
     match size {
         0..=ENUMERABLE if monotone => 100 + 20 * size,

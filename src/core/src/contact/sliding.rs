@@ -69,8 +69,8 @@ impl<R: SlidingRule> ContactLaw for SlidingLaw<R> {
         self.0.monotone = true;
     }
 
-    fn begin_again(&mut self) -> bool {
-        self.0.keep_matrix()
+    fn begin_with_same_matrix(&mut self) -> bool {
+        self.0.begin_with_same_matrix()
     }
 
     fn matrix(&mut self) -> &mut DMatrix<f64> {

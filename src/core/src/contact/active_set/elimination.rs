@@ -40,7 +40,7 @@ impl ContactSolver {
         rank
     }
 
-    /// Reduces the right-hand side as [`ContactSolver::eliminate`] does, with its factors.
+    /// Reduces the first `count` entries of the right-hand side with the stored factor, by the operations of [`ContactSolver::eliminate`].
     pub(super) fn reduce_right(&mut self, count: usize) {
         let order = self.factor.nrows();
         for (rank, column) in self.factor.as_slice().chunks_exact(order).take(count).enumerate() {

@@ -36,6 +36,59 @@ fn p_matrix(entries: &[f64], n: usize) -> DMatrix<f64> {
     &a * a.transpose() + DMatrix::identity(n, n) * 0.05 + skew
 }
 
+/// A problem with the matrix of the last one has the bits of a new problem, and needs no factorisation if the same contacts are active.
+#[test]
+fn kept_factor_gives_the_same_bits() {
+    let mut random = tiprub_test_models::SeededRandom(5);
+    let mut saved = 0;
+    for case in 0..400 {
+        let n = 1 + random.below(if case % 4 == 0 { 50 } else { 12 });
+        let entries: Vec<f64> =
+            (0..n * n).map(|_| random.signed() / f64::from(u32::try_from(n).unwrap()).sqrt()).collect();
+        let w = p_matrix(&entries, n);
+        let mut kept = ContactSolver::new(n);
+        kept.delassus.copy_from(&w);
+        let gaps: Vec<f64> = (0..n).map(|_| random.signed()).collect();
+        kept.gaps.copy_from_slice(&gaps);
+        assert!(kept.lcp().solved);
+        for _ in 0..3 {
+            let mut new = ContactSolver::new(n);
+            new.delassus.copy_from(&w);
+            let guess = kept.active.clone();
+            let change = random.of(&[1e-6, 0.3]);
+            new.gaps.iter_mut().zip(&gaps).for_each(|(new, gap)| *new = gap + change * random.signed());
+            assert!(kept.begin_with_same_matrix());
+            kept.gaps.copy_from_slice(&new.gaps);
+            new.active.copy_from_slice(&guess);
+            let [of_kept, of_new] = [kept.lcp(), new.lcp()];
+            assert_eq!(
+                (of_kept.solved, kept.multipliers.clone(), kept.gaps.clone()),
+                (true, new.multipliers, new.gaps)
+            );
+            assert!(of_kept.factorisations <= of_new.factorisations);
+            saved += of_new.factorisations - of_kept.factorisations;
+        }
+    }
+    assert!(saved > 300, "{saved}");
+}
+
+/// Redundant contacts have no factor, and softened contacts change the matrix: it must be filled in again.
+#[test]
+fn changed_matrix_is_not_kept() {
+    let mut solver = ContactSolver::new(2);
+    solver.delassus.copy_from(&DMatrix::from_element(2, 2, 1.0));
+    solver.gaps.copy_from_slice(&[-1.0, -1.0]);
+    assert!(!solver.begin_with_same_matrix());
+    assert!(solver.lcp().solved);
+    assert!(!solver.begin_with_same_matrix());
+    solver.delassus.copy_from(&DMatrix::identity(2, 2));
+    solver.set_size(2);
+    solver.gaps.copy_from_slice(&[-1.0, -1.0]);
+    assert!(solver.lcp().solved && solver.begin_with_same_matrix());
+    solver.set_size(2);
+    assert!(!solver.begin_with_same_matrix());
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(1000))]
     #[test]

@@ -1,6 +1,6 @@
 //! A structure that carries surfaces, during the steps of the sectors that touch them.
 
-mod compliance;
+mod modal_compliance;
 mod panels;
 
 use super::basis::{MOST, POINTS, real};
@@ -12,7 +12,7 @@ use crate::math::vector::{Vector3, vector3_at};
 use crate::modes::bank::ModalBank;
 use crate::modes::coordinates::Coordinates;
 use crate::system::carrier::Spot;
-use compliance::ModalCompliance;
+use modal_compliance::ModalCompliance;
 use panels::{PANEL, PanelMatrix};
 use std::ops::RangeInclusive;
 
@@ -48,12 +48,13 @@ pub struct CarrierIntegrator {
     error_form: Vec<f64>,
     /// Errors of impulses on the modes in the tried step.
     pub impulses: Vec<f64>,
-    /// Compliance at the lanes of the sectors.
+    /// Compliance at the lanes of the sectors, in single precision.
     pub(crate) compliance: ModalCompliance,
-    /// Loads on the rows at the points (N), indices of the rows with loads in ascending order, and true for each of these rows.
+    /// Loads on the rows at the points (N), and true for each row with loads.
     loads: [Vec<f64>; POINTS],
-    loaded: Vec<usize>,
     is_loaded: Vec<bool>,
+    /// Scratch: indices of the rows with loads, in ascending order.
+    loaded: Vec<usize>,
     /// Scratch: modal forces, padded to whole panels.
     modal: [Vec<f64>; MOST],
 }
@@ -105,14 +106,14 @@ impl CarrierIntegrator {
     pub fn recover(&mut self, points: usize) {
         let Self { shapes, all, moved: [_, one, two, three], velocity, is_velocity_known, body, .. } = self;
         let [_, a, b, c] = body.at.each_ref().map(|at| &at[..]);
-        let (v, kind) = (&body.state.velocity[..], self.instructions);
+        let (v, instructions) = (&body.state.velocity[..], self.instructions);
         match (points, *is_velocity_known) {
-            (1, true) => shapes.multiply(kind, all, [a], [one]),
-            (1, false) => shapes.multiply(kind, all, [a, v], [one, velocity]),
-            (2, true) => shapes.multiply(kind, all, [a, b], [one, two]),
-            (2, false) => shapes.multiply(kind, all, [a, b, v], [one, two, velocity]),
-            (_, true) => shapes.multiply(kind, all, [a, b, c], [one, two, three]),
-            (_, false) => shapes.multiply(kind, all, [a, b, c, v], [one, two, three, velocity]),
+            (1, true) => shapes.multiply(instructions, all, [a], [one]),
+            (1, false) => shapes.multiply(instructions, all, [a, v], [one, velocity]),
+            (2, true) => shapes.multiply(instructions, all, [a, b], [one, two]),
+            (2, false) => shapes.multiply(instructions, all, [a, b, v], [one, two, velocity]),
+            (_, true) => shapes.multiply(instructions, all, [a, b, c], [one, two, three]),
+            (_, false) => shapes.multiply(instructions, all, [a, b, c, v], [one, two, three, velocity]),
         }
         *is_velocity_known = true;
     }
@@ -226,7 +227,7 @@ impl CarrierIntegrator {
             [a] => transposed.multiply(instructions, loaded, [a], [one]),
             [a, b] => transposed.multiply(instructions, loaded, [a, b], [one, two]),
             [a, b, c] => transposed.multiply(instructions, loaded, [a, b, c], [one, two, three]),
-            _ => unreachable!("loads have one to three points"),
+            _ => unreachable!("loads are gathered at one to three points"),
         }
     }
 

@@ -93,7 +93,7 @@ pub struct IslandSector {
     block: Option<usize>,
     /// True if no force acts on the sector and its gaps are so wide that they are evaluated only after the contact problems of the other
     /// sectors are solved.
-    pub(crate) far: bool,
+    pub(crate) is_far: bool,
 }
 
 impl IslandSector {
@@ -113,7 +113,7 @@ impl IslandSector {
             last_motion: 0.0,
             drift: 0.0,
             block: None,
-            far: false,
+            is_far: false,
         }
     }
 
@@ -211,8 +211,8 @@ impl Island {
         self.active.extend(active.map(|(index, _)| index));
     }
 
-    /// Bound of the changes of the gaps of a sector (m) by the motion of its disk, from the last call of [`CoupledDisk::find_motions`]; 0 for
-    /// uncoupled sectors.
+    /// Bound of the changes of the gaps of a sector (m) by the motion of its disk, from the last call of [`CoupledDisk::find_motions`]; 0
+    /// for uncoupled sectors.
     pub(crate) fn disk_motion(&self, index: usize) -> f64 {
         self.sectors[index].disk.map_or(0.0, |(disk, lane)| self.disks[disk].motion(lane))
     }
@@ -504,7 +504,7 @@ impl<S: Surroundings> SpanSteps for IslandInSpan<'_, S> {
         self.find_minima(step, kind, is_resolved);
         for place in self.places() {
             let index = self.index(place);
-            self.island.sectors[index].far = false;
+            self.island.sectors[index].is_far = false;
             let SectorInStep { mut surfaces, tables, disk, trial, state, .. } = self.sector(index, step, kind);
             let own = if constant && disk.is_none() { trial.dropped(tables.rows.residual(), state) } else { 0.0 };
             closed += if constant { trial.closed() } else { 0.0 };

@@ -8,7 +8,7 @@ use std::ops::{AddAssign, Mul};
 /// Column lengths are multiples of this number of entries, padded with zeros.
 pub(crate) const PADDED: usize = 8;
 
-/// A number of single or double precision.
+/// A floating-point number in single or double precision.
 pub(crate) trait Real: Copy + Default + AddAssign + Mul<Output = Self> {}
 
 impl Real for f32 {}
@@ -65,6 +65,13 @@ impl<const N: usize, T: Real> Kernel for Combine<'_, N, T> {
             from += PADDED;
         }
     }
+}
+
+/// Rounds a number to single precision.
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "the caller needs no more than single precision")]
+pub(crate) fn to_f32(value: f64) -> f32 {
+    value as f32
 }
 
 /// `to` = `base` − n·u for every lane.

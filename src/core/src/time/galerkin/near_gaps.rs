@@ -1,4 +1,5 @@
-//! Gaps of the nodes of a sector to a smooth ring, from initial guesses of the closest points.
+//! Gaps of the nodes of one sector: to rigid smooth rings, from initial guesses of the closest points, and to surfaces that are not smooth
+//! rings.
 
 use super::compliance::Lanes;
 use super::obstacle_view::ObstacleView;
@@ -11,7 +12,7 @@ use std::cell::Cell;
 
 impl ObstacleView<'_> {
     /// Finds gaps (m) and normals of all nodes that do not face smooth rings, at a point of the step.
-    pub(super) fn find_gaps_at(
+    pub(super) fn find_gaps_to_other_surfaces(
         &mut self,
         point: usize,
         lanes: Lanes,
@@ -41,7 +42,7 @@ impl ObstacleView<'_> {
             for PairRecord { pair, drives, .. } in &self.record.pairs {
                 self.pairs[*pair].bend(drives[point].0.shape_factor, &[]);
             }
-            self.find_near_gaps(point, lanes, moved, gaps, normals, self.record.located);
+            self.find_near_gaps(point, lanes, moved, gaps, normals);
         }
         self.record.located = true;
     }
@@ -51,18 +52,10 @@ impl ObstacleView<'_> {
         self.pair(node)?.0.gap().smooth_ring()
     }
 
-    /// Finds gaps (m) and normals of the nodes that face smooth rings, at a point of the step. If `located` is true, the search starts at the
-    /// stored places of the nodes.
-    fn find_near_gaps(
-        &mut self,
-        point: usize,
-        lanes: Lanes,
-        moved: &[f64],
-        gaps: &mut [f64],
-        normals: &mut [f64],
-        located: bool,
-    ) {
-        let SpanRecord { pairs, places, lanes: stride, sector, evaluated_gaps, .. } = &mut *self.record;
+    /// Finds gaps (m) and normals of the nodes that face smooth rings, at a point of the step. If `record.located` is true, the search
+    /// starts at the stored closest points.
+    fn find_near_gaps(&mut self, point: usize, lanes: Lanes, moved: &[f64], gaps: &mut [f64], normals: &mut [f64]) {
+        let SpanRecord { pairs, places, lanes: stride, sector, evaluated_gaps, located, .. } = &mut *self.record;
         let places = Cell::from_mut(&mut places[point][..]).as_slice_of_cells();
         for own in pairs {
             let pair = &self.pairs[own.pair];
@@ -72,7 +65,7 @@ impl ObstacleView<'_> {
                 node: *node,
                 index: node * *stride + *sector,
                 local: lanes.vector3(moved, lanes.at(point, *node)),
-                guess: located.then_some(places[*node].get()),
+                guess: located.then(|| places[*node].get()),
             });
             NearSearch::new(law, &own.drives[point].0).find_gaps(nodes, |NearNode { node, .. }, gap| {
                 let lane = lanes.at(point, node);

@@ -126,7 +126,7 @@ impl Obstacle for ObstacleView<'_> {
     }
 
     fn gaps_at(&mut self, point: usize, lanes: Lanes, moved: &[f64], gaps: &mut [f64], normals: &mut [f64]) {
-        self.find_gaps_at(point, lanes, moved, gaps, normals);
+        self.find_gaps_to_other_surfaces(point, lanes, moved, gaps, normals);
     }
 
     fn gap_within(&self, node: usize, theta: f64, moved: Vector3) -> Option<f64> {

@@ -307,8 +307,8 @@ pub(crate) struct PairRecord {
     /// Bounds of the change of the gaps of each sector (m) by [`MotionCourse::largest_motion`]; used in the record of the first sector of a
     /// structure.
     pub changes: Vec<f64>,
-    /// Bound of the additional change of a gap over the span while the rotor turns, per motion of the surface since the start of the span (see
-    /// `SurfaceSpline::patch_motions`).
+    /// Bound of the additional change of a gap over the span while the rotor turns, per motion of the surface since the start of the span
+    /// (see `SurfaceSpline::patch_motions`).
     pub drift_factor: f64,
     /// True if these bounds are known; sectors may then be inactive.
     pub has_bounds: bool,
@@ -359,7 +359,8 @@ pub(crate) struct SpanRecord {
     pub instants: Instants,
     /// Pair to whose surface all nodes at all points are entered in `instants`.
     pub lanes_of: Option<usize>,
-    /// Number of blocks of up to eight gaps to smooth rings that were evaluated since the last addition to the total.
+    /// Number of blocks of up to eight gaps to smooth rings that were evaluated since the last addition to the total; for sectors that are
+    /// searched together, in the record of the first sector of the structure.
     pub evaluated_gaps: u64,
     /// True if a contact exceeds the limits of small displacements.
     pub implausible: bool,
@@ -368,8 +369,8 @@ pub(crate) struct SpanRecord {
 }
 
 impl SpanRecord {
-    /// Allocates data for the first sector of a structure. `pairs` are the contact pairs of the structure, and `all_pairs` those of the system.
-    /// `tolerance` (m) bounds the errors of smallest gaps.
+    /// Allocates data for the first sector of a structure. `pairs` are the contact pairs of the structure, and `all_pairs` those of the
+    /// system. `tolerance` (m) bounds the errors of smallest gaps.
     pub fn new(
         structure: usize,
         of: &Structure,

@@ -166,8 +166,8 @@ impl ContactRows {
         self.add_up(&self.magnitudes, [&sums.coefficients[0]], [one]);
     }
 
-    /// Bounds the displacements of the rows from their current positions over a time `span` (s) without forces. The bound is `span` times the
-    /// magnitude of the first set of `velocities` (slow modes, m/s), plus `rest` (m).
+    /// Bounds the displacements of the rows from their current positions over a time `span` (s) without forces. The bound is `span` times
+    /// the magnitude of the first set of `velocities` (slow modes, m/s), plus `rest` (m).
     pub(crate) fn travel(&self, span: f64, state: &SectorState, velocities: &mut Sums<2>, rest: &mut Sums<1>) {
         let ([slow, _], [bounds]) = (&mut velocities.coefficients, &mut rest.coefficients);
         self.instructions.run(FindTravel {
@@ -178,7 +178,7 @@ impl ContactRows {
             bounds,
         });
         let ([one, _], [two]) = (&mut velocities.rows, &mut rest.rows);
-        self.instructions.run(AddTravel {
+        self.instructions.run(SumTravel {
             shapes: &self.by_mode,
             stride: self.stride,
             coefficients: [&velocities.coefficients[0], &rest.coefficients[0]],
@@ -254,8 +254,9 @@ impl Kernel for FindTravel<'_> {
     }
 }
 
-/// Sums of the modes at the rows with their signs, and of their magnitudes, in one loop.
-struct AddTravel<'a> {
+/// Sums over the modes at the rows, in one loop: with the signed mode shapes and the first coefficients, and with the magnitudes of the
+/// mode shapes and the second coefficients.
+struct SumTravel<'a> {
     /// `[mode][row]`, with `stride` rows.
     shapes: &'a [f64],
     stride: usize,
@@ -263,7 +264,8 @@ struct AddTravel<'a> {
     sums: [&'a mut [f64]; 2],
 }
 
-impl AddTravel<'_> {
+impl SumTravel<'_> {
+    /// Computes `K` registers of both sums from row `from` on.
     #[inline(always)]
     fn registers<const K: usize>(&mut self, from: usize) {
         let mut sums = [[[0.0; PADDED]; K]; 2];
@@ -284,7 +286,7 @@ impl AddTravel<'_> {
     }
 }
 
-impl Kernel for AddTravel<'_> {
+impl Kernel for SumTravel<'_> {
     #[inline(always)]
     fn run(mut self) {
         let mut from = 0;

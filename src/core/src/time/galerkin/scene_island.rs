@@ -30,7 +30,7 @@ use crate::system::{ContactPair, StepFailure, Structure, System};
 use crate::time::workers::Workers;
 use blade_sectors::{BladeSectors, SectorSpan, SpanOfSectors};
 use nalgebra::DMatrix;
-use ring_gaps::RingSearch;
+use ring_gaps::RingScratch;
 use std::mem::take;
 use std::ops::RangeInclusive;
 
@@ -49,7 +49,7 @@ pub(crate) struct SceneIsland {
     island: Island,
     /// One for each sector of the island.
     records: Vec<SpanRecord>,
-    search: RingSearch,
+    ring_scratch: RingScratch,
     /// Number of sectors that take turns.
     turns: usize,
     goal: StepGoal,
@@ -64,7 +64,7 @@ struct SceneSurroundings<'a> {
     structures: &'a mut [Structure],
     pairs: &'a mut [ContactPair],
     records: &'a mut [SpanRecord],
-    search: &'a mut RingSearch,
+    ring_scratch: &'a mut RingScratch,
 }
 
 impl Surroundings for SceneSurroundings<'_> {
@@ -90,16 +90,16 @@ impl Surroundings for SceneSurroundings<'_> {
         self.choose_open_sectors(island, step);
     }
 
-    fn find_ring_gaps(&mut self, island: &mut Island, point: usize, far: bool) {
-        self.find_gaps_of_active_sectors(island, point, far);
+    fn find_ring_gaps(&mut self, island: &mut Island, point: usize, is_far: bool) {
+        self.find_gaps_of_active_sectors(island, point, is_far);
     }
 
     fn prepare_activated_sectors(&mut self, island: &mut Island, first: usize) {
-        let mut sectors = take(&mut self.search.sectors);
+        let mut sectors = take(&mut self.ring_scratch.sectors);
         sectors.clear();
         sectors.extend(&island.active[first..]);
         self.find_gaps_at_start(island, &sectors);
-        self.search.sectors = sectors;
+        self.ring_scratch.sectors = sectors;
     }
 
     fn find_surface_motions(&mut self, carriers: &[CarrierIntegrator], points: RangeInclusive<usize>) {
@@ -179,7 +179,7 @@ impl SceneIsland {
         let precision = if is_close { CLOSE * PRECISION } else { PRECISION };
         Self {
             set,
-            search: RingSearch::new(if carriers.is_empty() { 0 } else { records.len() }, nodes),
+            ring_scratch: RingScratch::new(if carriers.is_empty() { 0 } else { records.len() }, nodes),
             island: Island::new(tables, sectors, disks, carriers),
             records,
             blade,
@@ -282,8 +282,8 @@ impl SceneIsland {
         }
         self.activate_all(structures, pairs);
         let goal = StepGoal { most: most_tried, ..self.goal };
-        let Self { island, records, search, .. } = &mut *self;
-        let mut surroundings = SceneSurroundings { structures, pairs, records, search };
+        let Self { island, records, ring_scratch, .. } = &mut *self;
+        let mut surroundings = SceneSurroundings { structures, pairs, records, ring_scratch };
         let outcome = island.begin(&mut surroundings, goal).integrate(&mut counted.effort);
         let load_work = self.write(structures);
         if self.is_single() {

@@ -2,6 +2,7 @@
 
 use super::advance::Advance;
 use super::basis::{MOST, POINTS, TimeBasis};
+use super::kernels::to_f32;
 use super::level::Influence;
 use super::span::SpanStep;
 use super::state::SectorState;
@@ -93,7 +94,7 @@ impl<const N: usize> Kernel for Push<'_, N> {
     }
 }
 
-/// Computes `to` = Σ of `weights` times the forces at the points and the loads there, if there are loads.
+/// Computes `to` = Σ weight · (force + load) over the points; `loads` are empty for a body without loads.
 struct WeighForces<'a> {
     weights: &'a [f64],
     forces: &'a [Vec<f64>],
@@ -116,7 +117,7 @@ impl Kernel for WeighForces<'_> {
     }
 }
 
-/// Adds response · force to `to`.
+/// Adds response · force to `to`, in single precision.
 struct AddResponse<'a> {
     response: &'a [f64],
     force: &'a [f64],
@@ -127,14 +128,14 @@ impl Kernel for AddResponse<'_> {
     #[inline(always)]
     fn run(self) {
         for (to, (response, force)) in self.to.iter_mut().zip(self.response.iter().zip(self.force)) {
-            *to += (response * force) as f32;
+            *to += to_f32(response * force);
         }
     }
 }
 
 impl SharedBody {
-    /// Creates a body with polynomials of degree `degree`; call [`SharedBody::set_span_length`] before the first step, and [`SharedBody::fill`] before the
-    /// first step of a level.
+    /// Creates a body with polynomials of degree `degree`; call [`SharedBody::set_span_length`] before the first step, and
+    /// [`SharedBody::fill`] before the first step of a level.
     pub fn new(coordinates: Coordinates, degree: usize) -> Self {
         let count = coordinates.inertia.len();
         let zeros = || vec![0.0; count];
@@ -264,7 +265,8 @@ impl SharedBody {
         }
     }
 
-    /// Computes the modal displacements at point i caused only by the modal `forces` at the points 1, 2, …; padding is 0.
+    /// Computes the modal displacements at point i caused only by the modal `forces` at the points 1, 2, …, in single
+    /// precision. Entries beyond the modes are 0.
     pub(crate) fn displace(
         &self,
         level: usize,

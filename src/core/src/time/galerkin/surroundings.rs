@@ -103,13 +103,13 @@ pub trait Surroundings {
     /// Selects the sectors of an island that are evaluated in a step; the others certainly stay open.
     fn choose_active(&mut self, _island: &mut Island, _step: SpanStep) {}
 
-    /// Finds the gaps of active sectors to smooth rings at a point of the step, either of the far sectors or of the near sectors. The surfaces
-    /// must be deformed as at this point.
-    fn find_ring_gaps(&mut self, _island: &mut Island, _point: usize, _far: bool) {}
+    /// Finds gaps (m) to smooth rings, normals and closest points at a point of the step: of the far active sectors if `is_far` is true,
+    /// otherwise of the near ones. The surfaces must be deformed as at this point. Called only if the island has surface carriers.
+    fn find_ring_gaps(&mut self, _island: &mut Island, _point: usize, _is_far: bool) {}
 
-    /// Prepares the active sectors from place `first` on, which join the contact problem of a step: resets their trials, and finds their gaps to
-    /// smooth rings (m) and closest points at the start of the step. The surfaces must be deformed as at this time. Needed only if
-    /// [`Surroundings::choose_active`] deactivates sectors.
+    /// Prepares the active sectors from position `first` of the list on, which join the contact problem of a step: resets their trials, and
+    /// finds their gaps to smooth rings (m) and closest points at the start of the step. The surfaces must be deformed as at this time.
+    /// Needed only if [`Surroundings::choose_active`] deactivates sectors.
     fn prepare_activated_sectors(&mut self, _island: &mut Island, _first: usize) {}
 
     /// Finds bounds on the motion of the surfaces (m) since `CarrierIntegrator::set_motion_origin`, at the given points of the step.

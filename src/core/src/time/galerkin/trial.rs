@@ -70,8 +70,8 @@ pub struct Trial {
     closing: Vec<f64>,
     /// True if the obstacle is elastic.
     carrier_yields: bool,
-    /// Change of the gaps of all lanes per λ of each lane by the compliance of the obstacle, true for the lanes whose compliance is known in
-    /// this trial, and true if it was prepared for the current solution.
+    /// Change of the gaps of all lanes per λ of each lane by the compliance of the obstacle, true for the lanes whose compliance is known
+    /// in this trial, and true if it was prepared for the current solution.
     carrier_columns: Vec<f64>,
     carrier_known: Vec<bool>,
     carrier_is_fresh: bool,
@@ -84,8 +84,8 @@ pub struct Trial {
     instructions: InstructionSet,
     /// Unknowns of the problem: lanes.
     members: Vec<usize>,
-    /// Number of members whose matrix the law has.
-    posed: usize,
+    /// Number of members whose matrix is filled in the law; `None` if it must be filled in.
+    matrix_order: Option<usize>,
     chosen: Vec<bool>,
     /// Selected columns of a table, and their coefficients.
     taken: Vec<usize>,
@@ -157,7 +157,7 @@ impl Trial {
             law: Law::new(solver, None, contacts),
             instructions: InstructionSet::detect(),
             members: Vec::with_capacity(lanes.len()),
-            posed: 0,
+            matrix_order: None,
             chosen: vec![false; lanes.len()],
             taken: Vec::with_capacity(3 * lanes.len()),
             amounts: Vec::with_capacity(3 * lanes.len()),
@@ -193,16 +193,16 @@ impl Trial {
         self.known = false;
     }
 
-    /// Finds the displacements and velocities of the rows at the start.
-    pub(crate) fn find_start(&mut self, rows: &ContactRows, state: &SectorState) -> &[f64] {
+    /// Finds the displacements (m) and velocities (m/s) of the rows at the start, unless they are known.
+    pub(crate) fn find_start(&mut self, rows: &ContactRows, state: &SectorState) {
         if self.known {
-            return &self.start;
+            return;
         }
         self.known = true;
         rows.now(state, &mut self.now);
         let nodes = self.lanes.nodes;
         (0..nodes).for_each(|node| set_vector3_at(&mut self.velocities, node, self.now.vector3(1, node, nodes)));
-        self.set_displacements(rows, state)
+        self.set_displacements(rows, state);
     }
 
     /// Returns the displacements of the rows in a state (m). The stored start values become outdated.
@@ -327,7 +327,7 @@ impl Trial {
             to: &mut without[..width],
         });
         self.members.clear();
-        self.posed = 0;
+        self.matrix_order = None;
         for lane in 0..lanes.len() {
             self.chosen[lane] = self.gaps[lane] <= 0.0 || self.multipliers[lane] > 0.0 || self.without[lane] < 0.0;
         }
@@ -440,12 +440,12 @@ impl Trial {
         }
     }
 
-    /// Assembles the problem of the members.
+    /// Assembles the problem of the members. Fills in the matrix only if it has changed.
     fn pose(&mut self, obstacle: &impl Obstacle) {
         let width = self.lanes.width();
         let count = self.members.len();
-        if self.posed != count || !self.law.begin_again() {
-            self.posed = count;
+        if self.matrix_order != Some(count) || !self.law.begin_with_same_matrix() {
+            self.matrix_order = Some(count);
             self.law.begin(count);
             let matrix = self.law.matrix();
             for (column, lane) in self.members.iter().enumerate() {

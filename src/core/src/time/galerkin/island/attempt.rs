@@ -20,8 +20,8 @@ const MAX_EXCHANGES: usize = 12;
 const EXCHANGE_PRECISION: f64 = 1e-5;
 const EXCHANGE_PRECISION_ON_DISKS: f64 = 1e-3;
 
-/// Sectors whose gaps at the start of a step exceed this many tolerances are evaluated only after the contact problems of the other sectors are
-/// solved.
+/// Sectors whose gaps at the start of a step exceed this many tolerances are evaluated only after the contact problems of the other sectors
+/// are solved.
 const FAR: f64 = 20.0;
 
 /// Depth, in tolerances, by which open nodes may enter a surface between the points of a step of coupled sectors. In most steps, some node
@@ -76,7 +76,7 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         drop(surfaces);
         let distance = FAR * self.goal.tolerance;
         let one = &mut self.island.sectors[index];
-        one.far = !is_single && one.trial.rests() && one.trial.lowest_at_start() > distance;
+        one.is_far = !is_single && one.trial.rests() && one.trial.lowest_at_start() > distance;
     }
 
     /// Sets the prescribed motion at the points, and initial guesses of the closest points. Surfaces follow the motion of the first sector.
@@ -105,7 +105,7 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         self.island.carriers.iter_mut().for_each(CarrierIntegrator::clear_loads);
         for place in self.places() {
             let index = self.index(place);
-            if self.island.sectors[index].far {
+            if self.island.sectors[index].is_far {
                 continue;
             }
             let SectorInStep { mut surfaces, trial, .. } = self.sector(index, step, kind);
@@ -164,12 +164,12 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         step: SpanStep,
         kind: ForceInterpolation,
         points: usize,
-        far: bool,
+        is_far: bool,
     ) -> IslandGaps {
         if self.island.carriers.is_empty() {
             for place in self.places() {
                 let index = self.index(place);
-                if self.island.sectors[index].far == far {
+                if self.island.sectors[index].is_far == is_far {
                     let SectorInStep { mut surfaces, trial, .. } = self.sector(index, step, kind);
                     trial.find_gaps(&mut surfaces);
                 }
@@ -177,16 +177,16 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         } else {
             for place in self.places() {
                 let one = &mut self.island.sectors[self.island.active[place]];
-                if one.far == far {
+                if one.is_far == is_far {
                     one.trial.move_rows();
                 }
             }
             for point in 1..=points {
                 self.surroundings.bend(&self.island.carriers, point);
-                self.surroundings.find_ring_gaps(self.island, point, far);
+                self.surroundings.find_ring_gaps(self.island, point, is_far);
                 for place in self.places() {
                     let index = self.index(place);
-                    if self.island.sectors[index].far == far {
+                    if self.island.sectors[index].is_far == is_far {
                         let SectorInStep { mut surfaces, trial, .. } = self.sector(index, step, kind);
                         trial.find_gaps_at(point, &mut surfaces);
                     }
@@ -194,7 +194,7 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
             }
         }
         let mut found = IslandGaps { lowest: f64::INFINITY, largest: 0.0, rests: true };
-        for one in self.active().filter(|one| one.far == far) {
+        for one in self.active().filter(|one| one.is_far == is_far) {
             let (lowest, largest) = one.trial.extremes();
             let is_lost = lowest.is_nan() || found.lowest.is_nan();
             found.lowest = if is_lost { f64::NAN } else { found.lowest.min(lowest) };
@@ -208,19 +208,19 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
     fn separate_far_sectors(&mut self, lowest: f64) {
         for place in self.places() {
             let one = &mut self.island.sectors[self.island.active[place]];
-            one.far |= one.trial.rests() && one.trial.extremes().0 > -lowest;
+            one.is_far |= one.trial.rests() && one.trial.extremes().0 > -lowest;
         }
     }
 
     /// Rechecks the far sectors. Returns whether one of them touches, and marks that sector as near.
     fn recheck_far_sectors(&mut self, step: SpanStep, kind: ForceInterpolation, points: usize) -> bool {
-        if !self.active().any(|one| one.far) {
+        if !self.active().any(|one| one.is_far) {
             return false;
         }
         let IslandGaps { lowest, .. } = self.find_gaps(step, kind, points, true);
         for place in self.places() {
             let one = &mut self.island.sectors[self.island.active[place]];
-            one.far &= one.trial.extremes().0 >= 0.0;
+            one.is_far &= one.trial.extremes().0 >= 0.0;
         }
         // The next evaluation of the near sectors reports NaN gaps.
         lowest.is_nan() || lowest < 0.0
@@ -240,8 +240,8 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         let mut solved = 0;
         for place in self.places() {
             let index = self.index(place);
-            let IslandSector { far, trial, block, .. } = &mut self.island.sectors[index];
-            if *far || (trial.extremes().0 >= 0.0 && trial.rests()) {
+            let IslandSector { is_far, trial, block, .. } = &mut self.island.sectors[index];
+            if *is_far || (trial.extremes().0 >= 0.0 && trial.rests()) {
                 continue;
             }
             solved += 1;
@@ -277,8 +277,8 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
             let mut changed = false;
             for place in self.places() {
                 let index = self.index(place);
-                let IslandSector { far, trial, .. } = &self.island.sectors[index];
-                if *far || trial.sticks() || (trial.extremes().0 >= 0.0 && trial.rests()) {
+                let IslandSector { is_far, trial, .. } = &self.island.sectors[index];
+                if *is_far || trial.sticks() || (trial.extremes().0 >= 0.0 && trial.rests()) {
                     continue;
                 }
                 let SectorInStep { mut surfaces, tables, trial, .. } = self.sector(index, step, kind);
@@ -336,7 +336,7 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
             self.begin_trial(index, step, kind);
             let Island { disks, sectors, .. } = &mut *self.island;
             let one = &mut sectors[index];
-            one.far = true;
+            one.is_far = true;
             if let Some((disk, lane)) = one.disk {
                 one.trial.carry(|point, node| disks[disk].moved_at(point, node, lane));
             }
@@ -414,7 +414,7 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         let allowed_depth = if is_single { 0.0 } else { ALLOWED_DEPTH * self.goal.tolerance };
         for place in self.places() {
             let index = self.index(place);
-            self.island.sectors[index].far = false;
+            self.island.sectors[index].is_far = false;
             let SectorInStep { mut surfaces, tables, disk, trial, state, .. } =
                 self.sector(index, step, ForceInterpolation::Polynomial);
             let (level, mut own) = (&tables.levels[step.level], TrialResult::default());

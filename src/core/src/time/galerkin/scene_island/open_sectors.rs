@@ -14,8 +14,8 @@ use crate::time::galerkin::span::SpanStep;
 use crate::time::galerkin::surroundings::Surroundings;
 use std::mem::take;
 
-/// Durations for which a sector can become inactive, in lengths of the next step. A sector becomes inactive for the first of these durations
-/// over which it certainly stays open.
+/// Durations for which a sector can become inactive, in lengths of the next step. A sector becomes inactive for the first of these
+/// durations over which it certainly stays open.
 const INACTIVE_STEPS: [f64; 2] = [4.0, 1.0];
 
 impl SceneIsland {
@@ -50,14 +50,14 @@ impl SceneIsland {
 }
 
 impl SceneSurroundings<'_> {
-    /// Makes sectors inactive that certainly stay open in a step and whose smallest gaps no output needs. This holds while bodies move by less
-    /// than the limits of these sectors. All other sectors become active.
+    /// Makes sectors inactive that certainly stay open in a step and whose smallest gaps no output needs. This holds while bodies move by
+    /// less than the limits of these sectors. All other sectors become active.
     pub(super) fn choose_open_sectors(&mut self, island: &mut Island, step: SpanStep) {
         if island.carriers.is_empty() {
             return;
         }
         self.shift_limits(island, step);
-        let (end, mut rechecked) = (step.from + step.length, take(&mut self.search.sectors));
+        let (end, mut rechecked) = (step.from + step.length, take(&mut self.ring_scratch.sectors));
         rechecked.clear();
         for index in 0..island.sectors.len() {
             let one = &island.sectors[index];
@@ -68,35 +68,33 @@ impl SceneSurroundings<'_> {
                 continue;
             }
             let free = limits.map_or_else(|| self.free_distance(island, index), |limits| limits.motion);
-            self.limit(island, index, step, free);
+            self.update_limits(island, index, step, free);
             if limits.is_some() && island.sectors[index].limits.is_none() {
                 rechecked.push(index);
             }
         }
-        // Limits from the last gaps have become too narrow.
+        // The motion that remains for these sectors is too small, so their gaps are evaluated again.
         if !rechecked.is_empty() {
             self.bend_at_start(island, step);
             self.find_gaps_at_start(island, &rechecked);
             for index in &rechecked {
                 let free = self.free_distance(island, *index);
-                self.limit(island, *index, step, free);
+                self.update_limits(island, *index, step, free);
             }
         }
-        self.search.sectors = rechecked;
+        self.ring_scratch.sectors = rechecked;
         island.list_active();
     }
 
-    /// Sets the limits of a sector whose gaps may become smaller by `free` (m).
-    fn limit(&self, island: &mut Island, index: usize, step: SpanStep, free: f64) {
+    /// Updates the limits of a sector whose gaps may become smaller by `free` (m). A sector without limits must be active.
+    fn update_limits(&self, island: &mut Island, index: usize, step: SpanStep, free: f64) {
         let found = self.find_limits(island, index, step, free);
         let one = &mut island.sectors[index];
-        one.limits = found;
-        if found.is_none() {
-            one.checked_at = Some(step.from);
-        }
+        (one.limits, one.checked_at) = (found, found.is_none().then_some(step.from));
     }
 
-    /// Subtracts the motion in the last step from the limits, so that they hold for the motion since the start of this step. Stores this motion.
+    /// Subtracts the motion in the last step from the limits, so that they hold for the motion since the start of this step. Stores this
+    /// motion.
     fn shift_limits(&mut self, island: &mut Island, step: SpanStep) {
         if step.from > 0.0 || island.active.len() < island.sectors.len() {
             self.find_surface_motions(&island.carriers, 0..=0);
@@ -132,8 +130,8 @@ impl SceneSurroundings<'_> {
             && self.records[index - record.sector].pairs.iter().all(|own| own.has_bounds)
     }
 
-    /// Returns the smallest amount (m) by which the gaps of a sector exceed both 0 and the smallest gap of the same node over all sectors at
-    /// the start of the span.
+    /// Returns the smallest amount (m) by which the gaps of a sector exceed both 0 and the smallest gap of the same node over all sectors
+    /// at the start of the span.
     fn free_distance(&self, island: &Island, index: usize) -> f64 {
         let lowest = &self.records[index - self.records[index].sector].lowest_of_all;
         let gaps = &island.sectors[index].state.gaps;
@@ -143,8 +141,8 @@ impl SceneSurroundings<'_> {
         free.fold(f64::INFINITY, |smallest, free| if free.is_finite() { smallest.min(free) } else { f64::NEG_INFINITY })
     }
 
-    /// Returns the limits of a sector whose gaps may become smaller by `free` (m). Returns `None` if they may become smaller than that within
-    /// the step without contact forces, or with twice the motion of the last step.
+    /// Returns the limits of a sector whose gaps may become smaller by `free` (m). Returns `None` if they may become smaller than that
+    /// within the step without contact forces, or with twice the motion of the last step.
     fn find_limits(&self, island: &mut Island, index: usize, step: SpanStep, free: f64) -> Option<OpenLimits> {
         let sector = self.records[index].sector;
         let drift = island.sectors[index].drift;
@@ -163,8 +161,8 @@ impl SceneSurroundings<'_> {
         })
     }
 
-    /// Bounds the change of the gaps of a sector (m) by its free vibration over a fraction `part` of the span; 0 for sectors of a disk, whose
-    /// motion counts against the limits.
+    /// Bounds the change of the gaps of a sector (m) by its free vibration over a fraction `part` of the span; 0 for sectors of a disk,
+    /// whose motion counts against the limits.
     fn largest_change(&self, island: &mut Island, index: usize, part: f64) -> f64 {
         let SceneSurroundings { structures, records, .. } = self;
         let (sector, structure) = (records[index].sector, &structures[records[index].structure]);

@@ -1,4 +1,5 @@
-//! Gaps of several sectors to smooth rings. Nodes of different sectors are searched together, because one sector rarely fills registers.
+//! Gaps of several sectors to smooth rings on elastic casings. The closest points of several sectors are found together, because the nodes
+//! of one sector rarely fill the registers.
 
 use super::SceneSurroundings;
 use crate::geometry::spline::near::{NearNode, NearSearch};
@@ -7,14 +8,16 @@ use crate::math::octet::Eight;
 use crate::time::galerkin::island::{Island, IslandSector};
 use std::mem::take;
 
-/// Scratch memory: nodes that are searched together, and sectors in ascending order.
+/// Scratch memory of the search for closest points on smooth rings.
 #[derive(Debug, Clone, Default)]
-pub(super) struct RingSearch {
+pub(super) struct RingScratch {
+    /// Nodes that are searched together.
     nodes: Vec<NearNode>,
+    /// Indices of sectors, in ascending order.
     pub sectors: Vec<usize>,
 }
 
-impl RingSearch {
+impl RingScratch {
     /// Allocates memory for this many sectors and nodes per sector.
     pub fn new(sectors: usize, nodes: usize) -> Self {
         Self { nodes: Vec::with_capacity(sectors * nodes), sectors: Vec::with_capacity(sectors) }
@@ -22,27 +25,29 @@ impl RingSearch {
 }
 
 impl SceneSurroundings<'_> {
-    /// Finds gaps, normals and closest points of the active sectors at a point of the tried step, from their last closest points there; either of
-    /// the far sectors or of the near sectors.
-    pub(super) fn find_gaps_of_active_sectors(&mut self, island: &mut Island, point: usize, far: bool) {
-        let mut sectors = take(&mut self.search.sectors);
+    /// Finds gaps (m), normals and closest points of the far or of the near active sectors on smooth rings at a point of the tried step.
+    /// The search starts at their last closest points at this point.
+    pub(super) fn find_gaps_of_active_sectors(&mut self, island: &mut Island, point: usize, is_far: bool) {
+        let mut sectors = take(&mut self.ring_scratch.sectors);
         sectors.clear();
-        sectors.extend(island.active.iter().filter(|index| island.sectors[**index].far == far));
+        sectors.extend(island.active.iter().filter(|index| island.sectors[**index].is_far == is_far));
         let moved = |one: &IslandSector, node| one.trial.displacement(point, node);
-        self.find_ring_gaps(island, &sectors, point, true, moved, |one, node, gap| one.trial.set_gap(point, node, gap));
-        self.search.sectors = sectors;
+        self.search_rings(island, &sectors, point, true, moved, |one, node, gap| one.trial.set_gap(point, node, gap));
+        self.ring_scratch.sectors = sectors;
     }
 
-    /// Finds gaps and closest points of inactive sectors at the start of a step. The surfaces must be deformed as at this time.
+    /// Resets the trials of inactive sectors, and finds their gaps (m) to smooth rings and closest points at the start of a step. The
+    /// surfaces must be deformed as at this time, and `drives[0]` of the first sector of each structure must be the prescribed motion then.
     pub(super) fn find_gaps_at_start(&mut self, island: &mut Island, sectors: &[usize]) {
         sectors.iter().for_each(|index| island.find_start_of_inactive(*index));
         let moved = |one: &IslandSector, node| one.trial.displacement(0, node);
-        self.find_ring_gaps(island, sectors, 0, false, moved, |one, node, gap| one.state.gaps[node] = gap.distance);
+        self.search_rings(island, sectors, 0, false, moved, |one, node, gap| one.state.gaps[node] = gap.distance);
     }
 
-    /// Finds gaps and closest points of some sectors at a point of the step, for the displacements `moved`. If `is_located` is true, the search
-    /// starts at the last closest points.
-    fn find_ring_gaps(
+    /// Finds gaps (m), normals and closest points of `sectors`, in ascending order, on smooth rings at a point of the step. `moved` returns
+    /// the displacement of a node (m), and `store` receives each gap. If `is_located` is true, the search starts at the last closest
+    /// points.
+    fn search_rings(
         &mut self,
         island: &mut Island,
         sectors: &[usize],
@@ -51,7 +56,7 @@ impl SceneSurroundings<'_> {
         moved: impl Fn(&IslandSector, usize) -> Vector3,
         mut store: impl FnMut(&mut IslandSector, usize, &Gap),
     ) {
-        let Self { pairs, records, search, .. } = self;
+        let Self { pairs, records, ring_scratch: scratch, .. } = self;
         let mut sectors = sectors;
         while let Some(index) = sectors.first() {
             let first = index - records[*index].sector;
@@ -61,10 +66,10 @@ impl SceneSurroundings<'_> {
             for number in 0..records[first].pairs.len() {
                 let pair = &pairs[records[first].pairs[number].pair];
                 let Some(ring) = pair.gap().smooth_ring() else { continue };
-                search.nodes.clear();
+                scratch.nodes.clear();
                 for index in own {
                     let (record, one) = (&records[*index], &island.sectors[*index]);
-                    search.nodes.extend(ring.nodes.iter().map(|node| NearNode {
+                    scratch.nodes.extend(ring.nodes.iter().map(|node| NearNode {
                         node: *node,
                         index: node * record.lanes + record.sector,
                         local: moved(one, *node),
@@ -72,9 +77,9 @@ impl SceneSurroundings<'_> {
                     }));
                 }
                 let record = &mut records[first];
-                record.evaluated_gaps += Eight::blocks(search.nodes.len()) as u64;
+                record.evaluated_gaps += Eight::blocks(scratch.nodes.len()) as u64;
                 let (drive, lanes) = (record.pairs[number].drives[point].0, record.lanes);
-                NearSearch::new(ring, &drive).find_gaps(search.nodes.iter().copied(), |near, gap| {
+                NearSearch::new(ring, &drive).find_gaps(scratch.nodes.iter().copied(), |near, gap| {
                     let index = first + near.index % lanes;
                     records[index].places[point][near.node] = gap.foot;
                     store(&mut island.sectors[index], near.node, &gap);

@@ -37,7 +37,8 @@ impl Trial {
         }
     }
 
-    /// Finds gaps (m) and normals at point 1 … s, for the current displacements of the nodes (m).
+    /// Finds gaps (m) and normals at point 1 … s, for the current displacements of the nodes (m). [`Trial::set_gap`] sets the gaps to
+    /// smooth rings on elastic casings.
     pub(crate) fn find_gaps_at(&mut self, point: usize, obstacle: &mut impl Obstacle) {
         let Self { lanes, moved, gaps, normals, .. } = self;
         obstacle.gaps_at(point, *lanes, moved, gaps, normals);
@@ -97,8 +98,8 @@ impl Trial {
         obstacle.apply_force_changes();
     }
 
-    /// Solves the contact problem again if forces of other sectors have changed a gap by more than `precision` (m). Returns whether there is
-    /// a solution, and whether the problem was solved again.
+    /// Solves the contact problem again if forces of other sectors have changed a gap by more than `precision` (m). Returns whether there
+    /// is a solution, and whether the problem was solved again.
     pub(crate) fn solve_again(
         &mut self,
         compliance: &LaneCompliance,

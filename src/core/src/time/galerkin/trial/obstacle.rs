@@ -19,7 +19,9 @@ pub trait Obstacle {
         node_by_node(self, lanes, moved, gaps, normals);
     }
 
-    /// Finds gaps (m) and normals at one point. Surfaces must have their shape at this point. The arrays have the layout of [`Lanes`].
+    /// Finds gaps (m) and normals of the nodes at one point, except for those whose gaps
+    /// [`Surroundings::find_ring_gaps`](crate::time::galerkin::surroundings::Surroundings::find_ring_gaps) finds. Surfaces must have their
+    /// shape at this point. The arrays have the layout of [`Lanes`].
     fn gaps_at(&mut self, point: usize, lanes: Lanes, moved: &[f64], gaps: &mut [f64], normals: &mut [f64]) {
         for node in 0..lanes.nodes {
             let lane = lanes.at(point, node);

@@ -62,7 +62,7 @@ impl Trial {
         if point == 0 { vector3_at(&self.start_contacts.forces, node) } else { self.lane(&self.forces, point, node) }
     }
 
-    /// Sets gap and normal of a node at point 1 … s.
+    /// Sets the gap (m) and the normal of a node at point 1 … s.
     pub(crate) fn set_gap(&mut self, point: usize, node: usize, gap: &Gap) {
         let lane = self.lanes.at(point, node);
         self.gaps[lane] = gap.distance;
@@ -99,7 +99,7 @@ impl Trial {
         self.force(point, node) - self.multiplier(point, node) * self.solved_normal(point, node)
     }
 
-    /// Returns the displacement of a node (m); at the start only if a contact is closed.
+    /// Returns the displacement of a node (m); at the start only after [`Trial::find_start`] or [`Trial::start_at`].
     pub fn displacement(&self, point: usize, node: usize) -> Vector3 {
         if point == 0 { vector3_at(&self.start, node) } else { self.lane(&self.moved, point, node) }
     }

@@ -1,7 +1,7 @@
-//! Displacements of the lanes of several sectors per contact force, by all modes of a structure that carries surfaces.
+//! Displacements of a structure that carries surfaces at the lanes of several sectors, per contact force, from all of its modes.
 //!
-//! They only have to make the passes of a trial converge, because the next gaps are evaluated with the motion of the structure. Single
-//! precision is therefore sufficient.
+//! Their errors affect only the convergence of a trial, because every pass evaluates the gaps with the motion of the structure in double
+//! precision. Single precision is therefore sufficient.
 
 use super::BLOCKS;
 use crate::geometry::frame::PolarFrame;
@@ -12,22 +12,23 @@ use crate::modes::bank::ModalBank;
 use crate::system::carrier::Spot;
 use crate::time::galerkin::basis::MOST;
 use crate::time::galerkin::compliance::Lanes;
-use crate::time::galerkin::kernels::{Combine, PADDED};
+use crate::time::galerkin::kernels::{Combine, PADDED, to_f32};
 use crate::time::galerkin::shared_body::SharedBody;
 use crate::time::galerkin::surroundings::LaneStep;
 
-/// Numbers that are processed together. The modes are padded with zeros to a multiple of it.
-const SINGLES: usize = 4 * PADDED;
+/// Number of single-precision numbers that are processed together. The number of modes is padded to a multiple of it.
+const PADDED_SINGLES: usize = 4 * PADDED;
 
-/// Mode shapes below this fraction of the largest count as zero, so that no product of them is subnormal.
-const SMALL: f64 = 1e-9;
+/// Entries of mode shapes below this fraction of the largest entry count as zero, because products of small entries could be subnormal
+/// numbers, which are slow.
+const NEGLIGIBLE_SHAPE: f64 = 1e-9;
 
 /// Modal components of all lanes, and changes of the forces there; allocates only on creation.
 #[derive(Debug, Clone)]
 pub(crate) struct ModalCompliance {
-    /// `[row][mode]` of the rows that move control points, padded.
+    /// Mode shapes `[row][mode]` at the rows that move control points, with modes padded.
     shapes: Vec<f32>,
-    /// Number of modes, padded.
+    /// Number of modes with padding.
     padded: usize,
     instructions: InstructionSet,
     /// Modal components of each lane of the current sector in fixed directions, and directions of the lanes.
@@ -44,20 +45,20 @@ pub(crate) struct ModalCompliance {
     /// Changes of the modal forces at the points 1 … s since the gaps were evaluated, and the modal displacements that they cause.
     changes: [Vec<f64>; MOST],
     shifts: [Vec<f32>; MOST],
-    /// Scratch: modal displacements per unit of λ of one lane.
+    /// Scratch: displacements of the modes under the force on one lane.
     moved: Vec<f32>,
 }
 
 impl ModalCompliance {
-    /// Creates scratch memory for these lanes.
+    /// Copies the mode shapes in single precision, and allocates memory for sectors of at most these lanes.
     pub(super) fn new(bank: &ModalBank, lanes: Lanes) -> Self {
-        let (rows, padded) = (bank.rows(), bank.modes().next_multiple_of(SINGLES));
+        let (rows, padded) = (bank.rows(), bank.modes().next_multiple_of(PADDED_SINGLES));
         let all = (0..rows).flat_map(|row| bank.contact_row(row));
         let largest = all.fold(0.0, |most: f64, shape| most.max(shape.abs()));
         let mut shapes = vec![0.0; rows * padded];
         for (row, to) in shapes.chunks_exact_mut(padded).enumerate() {
             let shapes = bank.contact_row(row).iter();
-            let large = shapes.map(|shape| if shape.abs() > SMALL * largest { single(*shape) } else { 0.0 });
+            let large = shapes.map(|shape| if shape.abs() > NEGLIGIBLE_SHAPE * largest { to_f32(*shape) } else { 0.0 });
             to.iter_mut().zip(large).for_each(|(to, shape)| *to = shape);
         }
         Self {
@@ -91,8 +92,8 @@ impl ModalCompliance {
         self.places[lane] = LanePlace { weights, first, normal: spot.frame.fixed(normal).into() };
     }
 
-    /// Computes the modal components of all assigned lanes of a block in fixed directions and along their normals. Most points of a node share
-    /// their control points, because nodes move little in a step; the mode shapes are then read once.
+    /// Computes the modal components of all assigned lanes of a block in fixed directions and along their normals. Most points of a node
+    /// share their control points, because nodes move little in a step; the mode shapes are then read once.
     pub(crate) fn find_modal_components(&mut self, block: usize, lanes: Lanes) {
         let (padded, first) = (self.padded, block * self.lanes);
         let Self { seen, along, shapes, places, touches, instructions, .. } = self;
@@ -137,7 +138,7 @@ impl ModalCompliance {
         if !self.touches[first + lane] {
             return;
         }
-        self.find_acting(first, lane, direction);
+        self.find_modal_force(first, lane, direction);
         for i in 1..=lanes.points {
             self.move_modes(body, step, i, lane);
             let others = i * lanes.nodes - lanes.nodes..i * lanes.nodes;
@@ -151,7 +152,7 @@ impl ModalCompliance {
         }
     }
 
-    /// Finds the modal displacements at point i per λ of a lane.
+    /// Finds the displacements of the modes at point i under the force on a lane that [`ModalCompliance::find_modal_force`] has set.
     fn move_modes(&mut self, body: &SharedBody, step: LaneStep, i: usize, lane: usize) {
         let ((k, _), place) = (step.lanes.place(lane), step.block * self.lanes + lane);
         self.instructions.run(ModalResponse {
@@ -195,8 +196,8 @@ impl ModalCompliance {
         sums[0]
     }
 
-    /// Adds the displacement in the directions of each lane under a `force` on one lane at the end of the step (N), if the end is
-    /// the only point.
+    /// Sets `carrier_compliance` to the displacement (m) in the directions of each lane under a `force` on one lane at the end of the step
+    /// (N), if the end is the only point.
     pub(crate) fn add_compliance(
         &mut self,
         body: &SharedBody,
@@ -209,7 +210,7 @@ impl ModalCompliance {
         if !self.touches[first + lane] {
             return;
         }
-        self.find_acting(first, lane, force);
+        self.find_modal_force(first, lane, force);
         self.move_modes(body, step, 1, lane);
         for other in (0..lanes.nodes).filter(|node| self.touches[first + node]) {
             let fixed =
@@ -218,8 +219,8 @@ impl ModalCompliance {
         }
     }
 
-    /// Finds the modal components of a force on a lane, given in the directions of the node.
-    fn find_acting(&mut self, first: usize, lane: usize, force: Vector3) {
+    /// Finds the modal components of a `force` on a lane, in the directions of the node; `first` is the first lane of the block.
+    fn find_modal_force(&mut self, first: usize, lane: usize, force: Vector3) {
         self.instructions.run(Project {
             seen: fixed_components(&self.seen, lane, self.padded),
             direction: self.frames[lane].fixed(force).into(),
@@ -268,7 +269,7 @@ impl ModeShapeInterpolation<'_> {
     fn find<const N: usize>(&mut self, lanes: [usize; N]) {
         let padded = self.seen[0].len() / self.places.len();
         let LanePlace { first, weights: Weights { len, .. }, .. } = self.places[lanes[0]];
-        let weights = lanes.map(|lane| self.places[lane].weights.values.map(single));
+        let weights = lanes.map(|lane| self.places[lane].weights.values.map(to_f32));
         let coefficients = weights.each_ref().map(|weights| &weights[..len]);
         for (component, seen) in self.seen.iter_mut().enumerate() {
             let rows = first.map(|row| row + component);
@@ -291,7 +292,7 @@ struct Project<'a> {
 impl Kernel for Project<'_> {
     #[inline(always)]
     fn run(self) {
-        let ([x, y, z], [a, b, c]) = (self.seen, singles(self.direction));
+        let ([x, y, z], [a, b, c]) = (self.seen, self.direction.map(to_f32));
         for (((to, x), y), z) in self.to.iter_mut().zip(x).zip(y).zip(z) {
             *to = a * x + b * y + c * z;
         }
@@ -309,7 +310,7 @@ impl Kernel for ModalResponse<'_> {
     #[inline(always)]
     fn run(self) {
         for ((to, response), acting) in self.to.iter_mut().zip(self.response).zip(self.acting) {
-            *to = single(*response) * acting;
+            *to = to_f32(*response) * acting;
         }
     }
 }
@@ -350,25 +351,14 @@ impl Kernel for AddMultiple<'_> {
     }
 }
 
-/// Scalar product, summed in [`SINGLES`] parts.
+/// Scalar product, summed in [`PADDED_SINGLES`] parts.
 #[inline(always)]
 fn dot_of(a: &[f32], b: &[f32]) -> f32 {
-    let mut parts = [0.0; SINGLES];
-    for (a, b) in a.as_chunks::<SINGLES>().0.iter().zip(b.as_chunks::<SINGLES>().0) {
-        for i in 0..SINGLES {
+    let mut parts = [0.0; PADDED_SINGLES];
+    for (a, b) in a.as_chunks::<PADDED_SINGLES>().0.iter().zip(b.as_chunks::<PADDED_SINGLES>().0) {
+        for i in 0..PADDED_SINGLES {
             parts[i] += a[i] * b[i];
         }
     }
     parts.iter().sum()
-}
-
-#[inline(always)]
-#[expect(clippy::cast_possible_truncation, reason = "the compliance of a trial needs no more than single precision")]
-fn single(value: f64) -> f32 {
-    value as f32
-}
-
-#[inline(always)]
-fn singles(values: [f64; 3]) -> [f32; 3] {
-    values.map(single)
 }
