@@ -99,7 +99,7 @@ impl Trial {
         self.force(point, node) - self.multiplier(point, node) * self.solved_normal(point, node)
     }
 
-    /// Returns the displacement of a node (m); at the start only after [`Trial::find_start`] or [`Trial::start_at`].
+    /// Returns the displacement of a node (m); at the start only if the displacements there were found or set.
     pub fn displacement(&self, point: usize, node: usize) -> Vector3 {
         if point == 0 { vector3_at(&self.start, node) } else { self.lane(&self.moved, point, node) }
     }
