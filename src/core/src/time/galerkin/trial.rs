@@ -34,6 +34,11 @@ use prediction::{LanePrediction, LaneValues};
 use steady::Steady;
 use sticking::Sticking;
 
+/// Fraction by which the compliance of an elastic obstacle is larger at the place of the force. It exceeds the rounding of this compliance,
+/// which has single precision. Without it, the contact problem of nodes that nearly coincide might have no solution. Gaps are evaluated again
+/// after each solution, so only their convergence changes.
+const CARRIER_SOFTENING: f64 = 4e-6;
+
 /// Negative gaps within this fraction of the largest gap count as rounding.
 const ROUNDING: f64 = 1e-13;
 
@@ -434,9 +439,12 @@ impl Trial {
             }
             let closing = &mut self.closing[lane * width..][..width];
             let now = self.multipliers[lane];
-            for ((column, closing), without) in column.iter().zip(closing).zip(&mut self.without) {
+            for ((column, closing), without) in column.iter().zip(&mut *closing).zip(&mut self.without) {
                 (*closing, *without) = (*closing + column, *without - now * column);
             }
+            let softness = CARRIER_SOFTENING * column[lane];
+            closing[lane] += softness;
+            self.without[lane] -= now * softness;
         }
     }
 

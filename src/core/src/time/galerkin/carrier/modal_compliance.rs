@@ -1,7 +1,8 @@
 //! Displacements of a structure that carries surfaces at the lanes of several sectors, per contact force, from all of its modes.
 //!
 //! Their errors affect only the convergence of a trial, because every pass evaluates the gaps with the motion of the structure in double
-//! precision. Single precision is therefore sufficient.
+//! precision. Single precision is therefore sufficient, if the contact problem is softened by more than its rounding
+//! (`CARRIER_SOFTENING` of the trial).
 
 use super::BLOCKS;
 use crate::geometry::frame::PolarFrame;
