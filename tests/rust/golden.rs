@@ -212,7 +212,7 @@ fn assert_matches_the_core(library: &Path) {
 
 /// Scenes whose work is counted: blades with two and with three numbers per node, with steps that end at communication
 /// points and with others, mistuned, sticking, and in an elastic casing, with adaptive and with fixed steps.
-const COUNTED: [&str; 9] = [
+const COUNTED: [&str; 10] = [
     "galerkin",
     "galerkin_steady",
     "galerkin_steady_mistuned_lobes",
@@ -220,6 +220,7 @@ const COUNTED: [&str; 9] = [
     "galerkin_whirl_spline",
     "galerkin_coulomb",
     "galerkin_flexible_warm",
+    "galerkin_flexible_few_outputs",
     "flexible_warm",
     "coupled_lcp",
 ];
