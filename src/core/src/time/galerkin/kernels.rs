@@ -146,6 +146,61 @@ impl Kernel for AddProduct<'_> {
     }
 }
 
+/// `sum` = Σ_m `weight(m)`·φ_m φ_mᵀ over the columns φ_m of `shapes`, in the order of m.
+pub(crate) struct SumOuterProducts<'a, F> {
+    pub(super) shapes: &'a DMatrix<f64>,
+    pub(super) weight: F,
+    /// Square matrix.
+    pub(super) sum: &'a mut DMatrix<f64>,
+}
+
+impl<F: Fn(usize) -> f64> SumOuterProducts<'_, F> {
+    /// Computes the `R` × `C` entries from a row and a column on.
+    #[inline(always)]
+    fn tile<const R: usize, const C: usize>(&mut self, row: usize, column: usize) {
+        let count = self.shapes.nrows();
+        let mut sums = [[0.0; R]; C];
+        for (mode, shape) in self.shapes.as_slice().chunks_exact(count).enumerate() {
+            let weight = (self.weight)(mode);
+            let rows: &[f64; R] = shape[row..].first_chunk().expect("the tile is inside the matrix");
+            let columns: &[f64; C] = shape[column..].first_chunk().expect("the tile is inside the matrix");
+            let weighted = rows.map(|entry| weight * entry);
+            for c in 0..C {
+                for r in 0..R {
+                    sums[c][r] += weighted[r] * columns[c];
+                }
+            }
+        }
+        let entries = self.sum.as_mut_slice();
+        for (c, sums) in sums.iter().enumerate() {
+            entries[(column + c) * count + row..][..R].copy_from_slice(sums);
+        }
+    }
+}
+
+impl<F: Fn(usize) -> f64> Kernel for SumOuterProducts<'_, F> {
+    #[inline(always)]
+    fn run(mut self) {
+        const COLUMNS: usize = 4;
+        let count = self.shapes.nrows();
+        if count < PADDED {
+            for column in 0..count {
+                (column..count).for_each(|row| self.tile::<1, 1>(row, column));
+            }
+            self.sum.fill_upper_triangle_with_lower_triangle();
+            return;
+        }
+        // Tiles on and below the diagonal; the last ones overlap those before them.
+        for row in (0..count).step_by(PADDED) {
+            let row = row.min(count - PADDED);
+            for column in (0..row + PADDED).step_by(COLUMNS) {
+                self.tile::<PADDED, COLUMNS>(row, column.min(count - COLUMNS));
+            }
+        }
+        self.sum.fill_upper_triangle_with_lower_triangle();
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -202,6 +257,26 @@ mod tests {
             assert!((closing[lane] - along).abs() < 1e-12 && (to[lane] - (parts[0][lane] - along)).abs() < 1e-12);
             let expected = 0.3 * parts[0][lane] - 1.1 * parts[1][lane] + 0.7 * parts[2][lane];
             assert!((column[lane] - expected).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn sums_of_outer_products_are_correct_for_all_sizes() {
+        for rows in [1, 3, 7, 8, 9, 12, 27, 54] {
+            let shapes = DMatrix::from_vec(rows, 5, numbers(5 * rows));
+            let weights = numbers(5);
+            let run = |instructions: InstructionSet| {
+                let mut sum = DMatrix::from_element(rows, rows, f64::NAN);
+                instructions.run(SumOuterProducts { shapes: &shapes, weight: |mode| weights[mode], sum: &mut sum });
+                sum
+            };
+            let (found, expected) = (run(InstructionSet::Baseline), {
+                let weights = DMatrix::from_diagonal(&nalgebra::DVector::from_vec(weights.clone()));
+                &shapes * weights * shapes.transpose()
+            });
+            assert_eq!(found, run(InstructionSet::detect()));
+            assert_eq!(found, found.transpose());
+            assert!((&found - &expected).amax() < 1e-13 * expected.amax(), "{rows}");
         }
     }
 }

@@ -2,9 +2,10 @@
 
 use super::basis::{MOST, POINTS, TimeBasis, real};
 use super::compliance::{LaneCompliance, Lanes};
-use super::kernels::PADDED;
-use super::response::{ModalResponse, TERMS, by_points};
+use super::kernels::{PADDED, SumOuterProducts};
+use super::response::{GROUP, ModalResponse, TERMS, by_points};
 use super::trial::ForceInterpolation;
+use crate::math::simd::InstructionSet;
 use crate::modes::coordinates::ContactModes;
 use nalgebra::DMatrix;
 
@@ -17,13 +18,7 @@ impl ContactModes {
 
     /// Writes Σ c_m φφᵀ of the contact rows to `sum`.
     fn weigh(&self, weight: impl Fn(usize) -> f64, sum: &mut DMatrix<f64>) {
-        sum.fill(0.0);
-        for (mode, shape) in self.shapes.column_iter().enumerate() {
-            let weight = weight(mode);
-            for (mut column, other) in sum.column_iter_mut().zip(shape.iter()) {
-                column.axpy(weight * other, &shape, 1.0);
-            }
-        }
+        InstructionSet::detect().run(SumOuterProducts { shapes: &self.shapes, weight, sum });
     }
 
     /// Returns Σ c_m φφᵀ of the contact rows.
@@ -140,7 +135,7 @@ pub struct StepTables {
     pub modes: ModeSteps,
     /// Displacements at the points per force at the points, including residual flexibility.
     pub compliance: LaneCompliance,
-    /// Displacement at the end per constant force over the step, including residual flexibility.
+    /// Displacement at the end per constant force over the step, including residual flexibility. Only steps of the shortest length use it.
     pub constant: LaneCompliance,
     /// True if any mode is damped.
     pub damped: bool,
@@ -174,22 +169,30 @@ impl StepTables {
         }
     }
 
-    /// Fills the tables for step h (s). Does not allocate.
+    /// Fills the tables for step h (s), except for constant forces. Does not allocate.
     pub fn set_step(&mut self, modes: &ContactModes, step: f64) {
         let Self { basis, influence, block, .. } = self;
         self.step = step;
         self.damped = modes.damping_ratios.iter().any(|ratio| *ratio > 0.0);
+        let mut own = (0..modes.len()).filter(|mode| modes.twin(*mode).is_none());
+        loop {
+            let group: [Option<usize>; GROUP] = std::array::from_fn(|_| own.next());
+            let Some(first) = group[0] else { break };
+            let [frequencies, ratios] =
+                [&modes.frequencies, &modes.damping_ratios].map(|of| group.map(|mode| of[mode.unwrap_or(first)]));
+            let responses = ModalResponse::of_modes(frequencies, ratios, step);
+            for (mode, response) in group.into_iter().flatten().zip(&responses) {
+                let at = response.at_points(basis);
+                let points = at.map(|terms| by_points(&terms, basis));
+                influence[mode] = Influence { points, constant: response.position[2] };
+                self.modes.set(mode, response, &at);
+            }
+        }
         for mode in 0..modes.len() {
             if let Some(twin) = modes.twin(mode) {
                 influence[mode] = influence[twin];
                 self.modes.copy(twin, mode);
-                continue;
             }
-            let response = ModalResponse::new(modes.frequencies[mode], modes.damping_ratios[mode], step);
-            let at = response.at_points(basis);
-            let points = at.map(|terms| by_points(&terms, basis));
-            influence[mode] = Influence { points, constant: response.position[2] };
-            self.modes.set(mode, &response, &at);
         }
         for i in 1..=basis.degree {
             for k in 0..basis.count() {
@@ -200,10 +203,15 @@ impl StepTables {
                 self.compliance.set(i, k, block);
             }
         }
+        self.compliance.hold();
+    }
+
+    /// Fills the table of constant forces for the step that [`Self::set_step`] has set. Does not allocate.
+    pub fn set_constant(&mut self, modes: &ContactModes) {
+        let Self { influence, block, .. } = self;
         modes.weigh(|mode| influence[mode].constant, block);
         *block += &modes.residual;
         self.constant.set(1, 1, block);
-        self.compliance.hold();
         self.constant.hold();
     }
 }

@@ -1,13 +1,16 @@
-//! Exact response of one mode over a step to a force that is a polynomial in time.
+//! Exact responses of modes over a step to forces that are polynomials in time.
 
 use super::basis::{MOST, POINTS, TimeBasis, real};
-use nalgebra::SMatrix;
+use crate::math::octet::{Octet, OctetKernel};
+use crate::math::simd::InstructionSet;
 
 /// Modal state and force: q, q̇, and the coefficients p_a of θᵃ of the modal force.
 pub const TERMS: usize = 2 + MOST;
+/// Number of modes whose responses are computed together.
+pub(crate) const GROUP: usize = 8;
 
 /// Solution of q̈ + 2ξωq̇ + ω²q = Σ p_a θᵃ over one step, linear in (q, q̇, p₀, p₁, p₂) at its start.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct ModalResponse {
     /// q at the end.
     pub position: [f64; TERMS],
@@ -26,41 +29,18 @@ const FORCE: usize = 2;
 const INTEGRAL: usize = FORCE + MOST;
 const DOUBLE: usize = INTEGRAL + 1;
 const STATES: usize = DOUBLE + 1;
-const BOTH: usize = 2 * TERMS;
+
+/// Number of terms of the Taylor series.
+const SERIES: u8 = 18;
+
+/// First nonzero column of each row of the flow, and the column after the last one.
+const NONZERO: [[usize; 2]; STATES] = [[0, 5], [0, 5], [2, 5], [3, 5], [4, 5], [0, 6], [0, 7]];
 
 impl ModalResponse {
-    /// Response for angular frequency ω (rad/s; 0 for a rigid-body mode), damping ratio ξ and step h (s).
-    ///
-    /// The state is (q, q̇h/κ, p and its derivatives with respect to θ, ∫q, ∫∫q) with κ = max(ωh, 1). Its flow is a matrix
-    /// exponential (Taylor series, scaling and squaring).
-    pub fn new(frequency: f64, damping_ratio: f64, step: f64) -> Self {
-        let angle = frequency * step;
-        let kappa = angle.max(1.0);
-        let mut flow = SMatrix::<f64, STATES, STATES>::zeros();
-        flow[(POSITION, SPEED)] = kappa;
-        flow[(SPEED, POSITION)] = -angle * angle / kappa;
-        flow[(SPEED, SPEED)] = -2.0 * damping_ratio * angle;
-        flow[(SPEED, FORCE)] = 1.0;
-        for a in 1..MOST {
-            flow[(FORCE + a - 1, FORCE + a)] = 1.0;
-        }
-        flow[(INTEGRAL, POSITION)] = 1.0;
-        flow[(DOUBLE, INTEGRAL)] = 1.0;
-        let end = exponential(&flow);
-        // Columns of (q, q̇, p_a) from those of the state: p has the derivatives a! p_a.
-        let forced = step * step / kappa;
-        let scale = [1.0, step / kappa, forced, forced, 2.0 * forced];
-        let row = |row: usize, factor: f64| -> [f64; TERMS] {
-            std::array::from_fn(|term| factor * end[(row, term)] * scale[term])
-        };
-        let (integral, double) = (row(INTEGRAL, 1.0), row(DOUBLE, 1.0));
-        Self {
-            position: row(POSITION, 1.0),
-            velocity: row(SPEED, kappa / step),
-            // ∫∫q = ∫(1 − θ)q.
-            moments: [integral, std::array::from_fn(|term| integral[term] - double[term])],
-            loss: loss(&flow, 2.0 * damping_ratio * angle * kappa * kappa / (step * step), &scale),
-        }
+    /// Returns the responses for angular frequencies ω (rad/s; 0 for a rigid-body mode), damping ratios ξ and step h (s). Each of them depends
+    /// on its own mode only.
+    pub fn of_modes(frequencies: [f64; GROUP], damping_ratios: [f64; GROUP], step: f64) -> [Self; GROUP] {
+        InstructionSet::detect().run_octets(ComputeResponses { frequencies, damping_ratios, step })
     }
 
     /// Coefficients of (q, q̇, p_a) in q at point i = 1 … s, for the polynomial of degree s that preserves both end values and
@@ -90,52 +70,212 @@ impl ModalResponse {
     }
 }
 
-/// e^A by scaling to a norm below ½, twenty terms of the series, and squaring. (The version of nalgebra needs the mathematics of
-/// the standard library, whose bits depend on the machine.)
-fn exponential<const N: usize>(matrix: &SMatrix<f64, N, N>) -> SMatrix<f64, N, N> {
-    let (halvings, scale) = halvings(matrix);
-    let scaled = matrix * scale;
-    let identity = SMatrix::identity();
-    let series = (1..=20).rev().fold(identity, |sum, n| identity + scaled * sum / real(n));
-    (0..halvings).fold(series, |power, _| power * power)
-}
-
-/// Returns how often a matrix must be halved until the sums of the magnitudes of its rows are at most ½, and the resulting factor.
-fn halvings<const N: usize>(matrix: &SMatrix<f64, N, N>) -> (usize, f64) {
-    let mut largest = matrix.row_iter().map(|row| row.iter().map(|entry| entry.abs()).sum()).fold(0.0, f64::max);
-    let (mut count, mut scale) = (0, 1.0);
-    while largest > 0.5 {
-        (count, scale, largest) = (count + 1, 0.5 * scale, 0.5 * largest);
-    }
-    (count, scale)
-}
-
 /// Converts coefficients of θᵃ to coefficients of the forces at the points.
 pub(crate) fn by_points(terms: &[f64; TERMS], basis: &TimeBasis) -> [f64; POINTS] {
     std::array::from_fn(|k| (0..basis.degree).map(|a| terms[2 + a] * basis.projection[a][k]).sum())
 }
 
-/// `factor`·∫w² dθ of the state w = q̇h/κ. Over a short part of the step, from a matrix exponential (C. F. Van Loan, IEEE Trans. Automatic
-/// Control 23, 1978). Over the whole step this exponential would contain e^(2ξωh), and the difference of such numbers would be wrong for
-/// strongly damped modes. So the time is doubled: with the flow E over a time, the integral W becomes W + EᵀWE.
-fn loss(flow: &SMatrix<f64, STATES, STATES>, factor: f64, scale: &[f64; TERMS]) -> [[f64; TERMS]; TERMS] {
-    if factor == 0.0 {
-        return [[0.0; TERMS]; TERMS];
+/// Computes responses from the flow of the state (q, w, p and its derivatives with respect to θ, ∫q, ∫∫q), where w = q̇h/κ and κ = max(ωh, 1).
+///
+/// The flow E over a short part of the step comes from a Taylor series, and so does the integral W of the loss w² (C. F. Van Loan, IEEE Trans.
+/// Automatic Control 23, 1978). Then the time is doubled until it is the step: E becomes E², and W becomes W + EᵀWE. The series of W contains
+/// e^(2ξωt), so over the whole step it would be wrong for strongly damped modes.
+struct ComputeResponses {
+    frequencies: [f64; GROUP],
+    damping_ratios: [f64; GROUP],
+    step: f64,
+}
+
+/// Rates of change of the state, for a part of the step: a = `part`·A.
+struct Rates<L> {
+    part: L,
+    /// Change of q per w, and of w per q and per w.
+    swing: L,
+    restoring: L,
+    damping: L,
+}
+
+impl<L: Octet> Rates<L> {
+    /// Returns a·S.
+    #[inline(always)]
+    fn times(&self, s: &[[L; STATES]; STATES]) -> [[L; STATES]; STATES] {
+        let mut product = [[L::zero(); STATES]; STATES];
+        for i in 0..STATES {
+            product[POSITION][i] = self.swing * s[SPEED][i];
+            product[SPEED][i] = self.restoring * s[POSITION][i] + self.damping * s[SPEED][i] + self.part * s[FORCE][i];
+            for a in 1..MOST {
+                product[FORCE + a - 1][i] = self.part * s[FORCE + a][i];
+            }
+            product[INTEGRAL][i] = self.part * s[POSITION][i];
+            product[DOUBLE][i] = self.part * s[INTEGRAL][i];
+        }
+        product
     }
-    let flow = flow.fixed_view::<TERMS, TERMS>(0, 0).into_owned();
-    let (doublings, part) = halvings(&flow);
-    let mut block = SMatrix::<f64, BOTH, BOTH>::zeros();
-    block.fixed_view_mut::<TERMS, TERMS>(0, 0).copy_from(&(-part * flow.transpose()));
-    block.fixed_view_mut::<TERMS, TERMS>(TERMS, TERMS).copy_from(&(part * flow));
-    block[(SPEED, TERMS + SPEED)] = part;
-    let end = exponential(&block);
-    let mut flow = end.fixed_view::<TERMS, TERMS>(TERMS, TERMS).into_owned();
-    let mut form = flow.transpose() * end.fixed_view::<TERMS, TERMS>(0, TERMS);
-    for _ in 0..doublings {
-        form += flow.transpose() * form * flow;
-        flow *= flow;
+
+    /// Returns −aᵀS without the integrals of q.
+    #[inline(always)]
+    fn transposed_times(&self, s: &[[L; TERMS]; TERMS]) -> [[L; TERMS]; TERMS] {
+        let mut product = [[L::zero(); TERMS]; TERMS];
+        for i in 0..TERMS {
+            product[POSITION][i] = L::zero() - self.restoring * s[SPEED][i];
+            product[SPEED][i] = L::zero() - (self.swing * s[POSITION][i] + self.damping * s[SPEED][i]);
+            product[FORCE][i] = L::zero() - self.part * s[SPEED][i];
+            for a in 1..MOST {
+                product[FORCE + a][i] = L::zero() - self.part * s[FORCE + a - 1][i];
+            }
+        }
+        product
     }
-    std::array::from_fn(|i| std::array::from_fn(|k| 0.5 * factor * scale[i] * scale[k] * (form[(i, k)] + form[(k, i)])))
+}
+
+/// Returns E².
+#[inline(always)]
+fn squared<L: Octet>(flow: &[[L; STATES]; STATES]) -> [[L; STATES]; STATES] {
+    let mut square = [[L::zero(); STATES]; STATES];
+    for row in 0..STATES {
+        for k in NONZERO[row][0]..NONZERO[row][1] {
+            for column in NONZERO[k][0]..NONZERO[k][1] {
+                square[row][column] = square[row][column] + flow[row][k] * flow[k][column];
+            }
+        }
+    }
+    square
+}
+
+/// Returns W + EᵀWE for a symmetric form W.
+#[inline(always)]
+fn doubled<L: Octet>(form: &[[L; TERMS]; TERMS], flow: &[[L; STATES]; STATES]) -> [[L; TERMS]; TERMS] {
+    let mut product = [[L::zero(); TERMS]; TERMS];
+    for row in 0..TERMS {
+        for k in 0..TERMS {
+            for column in NONZERO[k][0]..NONZERO[k][1] {
+                product[row][column] = product[row][column] + form[row][k] * flow[k][column];
+            }
+        }
+    }
+    let mut sum = *form;
+    for row in 0..TERMS {
+        for column in row..TERMS {
+            // Rows of the flow after this one have no entry in this column of the flow.
+            for k in 0..=row.max(SPEED) {
+                sum[row][column] = sum[row][column] + flow[k][row] * product[k][column];
+            }
+            sum[column][row] = sum[row][column];
+        }
+    }
+    sum
+}
+
+impl OctetKernel for ComputeResponses {
+    type Output = [ModalResponse; GROUP];
+
+    #[inline(always)]
+    #[expect(clippy::needless_range_loop, reason = "iterators over these arrays do not stay in registers")]
+    fn run<L: Octet>(self) -> [ModalResponse; GROUP] {
+        let Self { frequencies, damping_ratios, step } = self;
+        let (mut angle, mut kappa, mut doublings) = ([0.0; GROUP], [1.0; GROUP], [0_u32; GROUP]);
+        let (mut part, mut loss) = ([1.0; GROUP], [0.0; GROUP]);
+        for i in 0..GROUP {
+            angle[i] = frequencies[i] * step;
+            kappa[i] = angle[i].max(1.0);
+            let twice = 2.0 * damping_ratios[i] * angle[i];
+            loss[i] = twice * kappa[i] * kappa[i] / (step * step);
+            // The sums of the magnitudes of rows and columns are at most ½ over a part of the step.
+            let mut largest = kappa[i] + twice + 1.0;
+            while largest > 0.5 && largest.is_finite() {
+                (doublings[i], part[i], largest) = (doublings[i] + 1, 0.5 * part[i], 0.5 * largest);
+            }
+        }
+        let (part, angle, kappa_of) = (L::read(&part), L::read(&angle), L::read(&kappa));
+        let damping = L::splat(-2.0) * L::read(&damping_ratios) * angle;
+        let rates = Rates {
+            part,
+            swing: part * kappa_of,
+            restoring: L::zero() - part * (angle * angle / kappa_of),
+            damping: part * damping,
+        };
+        let is_damped = loss.iter().any(|loss| *loss != 0.0);
+        let mut flow = [[L::zero(); STATES]; STATES];
+        let mut form = [[L::zero(); TERMS]; TERMS];
+        for state in 0..STATES {
+            flow[state][state] = L::splat(1.0);
+        }
+        // Nested form of the series of the flow and of ∫e^(−aᵀt) Q e^(at) dt, where Q contains the square of w.
+        for n in (1..=SERIES).rev() {
+            let share = L::splat(1.0 / f64::from(n));
+            if is_damped {
+                let mut next = rates.transposed_times(&form);
+                for column in 0..TERMS {
+                    next[SPEED][column] = next[SPEED][column] + part * flow[SPEED][column];
+                }
+                for row in 0..TERMS {
+                    for column in 0..TERMS {
+                        form[row][column] = next[row][column] * share;
+                    }
+                }
+            }
+            let next = rates.times(&flow);
+            for row in 0..STATES {
+                for column in NONZERO[row][0]..NONZERO[row][1] {
+                    flow[row][column] = next[row][column] * share;
+                }
+                flow[row][row] = flow[row][row] + L::splat(1.0);
+            }
+        }
+        // W = Eᵀ times the integral.
+        let mut integral = [[L::zero(); TERMS]; TERMS];
+        for row in 0..TERMS {
+            for column in 0..TERMS {
+                for k in 0..=row.max(SPEED) {
+                    integral[row][column] = integral[row][column] + flow[k][row] * form[k][column];
+                }
+            }
+        }
+        for row in 0..TERMS {
+            for column in 0..TERMS {
+                form[row][column] = (integral[row][column] + integral[column][row]) * L::splat(0.5);
+            }
+        }
+        for done in 0..doublings.into_iter().max().unwrap_or(0) {
+            let mask = (0..GROUP).fold(0, |mask, i| mask | u8::from(done < doublings[i]) << i);
+            if is_damped {
+                let next = doubled(&form, &flow);
+                for row in 0..TERMS {
+                    for column in 0..TERMS {
+                        form[row][column] = L::select(mask, next[row][column], form[row][column]);
+                    }
+                }
+            }
+            let next = squared(&flow);
+            for row in 0..STATES {
+                for column in NONZERO[row][0]..NONZERO[row][1] {
+                    flow[row][column] = L::select(mask, next[row][column], flow[row][column]);
+                }
+            }
+        }
+        let mut responses = [ModalResponse::default(); GROUP];
+        // Columns of (q, q̇, p_a) from those of the state: p has the derivatives a! p_a.
+        let [over, forced] = [step, step * step].map(|time| L::splat(time) / kappa_of);
+        let scale = [L::splat(1.0), over, forced, forced, L::splat(2.0) * forced];
+        let (velocity, loss) = (kappa_of / L::splat(step), L::read(&loss));
+        for term in 0..TERMS {
+            let of = |row: usize| flow[row][term] * scale[term];
+            let position = of(POSITION).array();
+            let speed = (velocity * of(SPEED)).array();
+            // ∫∫q = ∫(1 − θ)q.
+            let moments = [of(INTEGRAL).array(), (of(INTEGRAL) - of(DOUBLE)).array()];
+            for (i, response) in responses.iter_mut().enumerate() {
+                response.position[term] = position[i];
+                response.velocity[term] = speed[i];
+                (response.moments[0][term], response.moments[1][term]) = (moments[0][i], moments[1][i]);
+            }
+            for row in 0..TERMS {
+                let lost = (loss * scale[row] * scale[term] * form[row][term]).array();
+                responses.iter_mut().zip(lost).for_each(|(response, lost)| response.loss[row][term] = lost);
+            }
+        }
+        responses
+    }
 }
 
 #[cfg(test)]
@@ -175,7 +315,7 @@ mod tests {
     fn modal_response_satisfies_the_equation_of_motion() {
         for (frequency, ratio) in [(0.0, 0.0), (1.0, 0.02), (3e4, 0.0), (4e4, 0.01), (9e5, 0.005), (9e5, 0.9)] {
             let step = 4e-5;
-            let response = ModalResponse::new(frequency, ratio, step);
+            let response = ModalResponse::of_modes([frequency; GROUP], [ratio; GROUP], step)[3];
             let start = [1e-4, -0.3, 2e3, -3e3, 1.5e3];
             let (expected, lost) = marched(frequency, ratio, step, start);
             let of = |row: &[f64; TERMS]| row.iter().zip(start).map(|(a, b)| a * b).sum::<f64>();
@@ -191,6 +331,16 @@ mod tests {
         }
     }
 
+    #[test]
+    fn responses_do_not_depend_on_the_other_modes() {
+        let frequencies = [0.0, 3.0, 2e3, 3e4, 4e5, 9e5, 2e6, 5e4];
+        let ratios = [0.0, 0.02, 1e-3, 0.9, 0.0, 5e-3, 0.1, 2.0];
+        let together = ModalResponse::of_modes(frequencies, ratios, 4e-5);
+        for (i, response) in together.iter().enumerate() {
+            assert_eq!(*response, ModalResponse::of_modes([frequencies[i]; GROUP], [ratios[i]; GROUP], 4e-5)[i]);
+        }
+    }
+
     /// ΔE = ∫p q̇ − loss, with the work computed from the values at the points.
     #[test]
     fn energy_change_equals_work_minus_loss() {
@@ -201,7 +351,7 @@ mod tests {
                 [(0.0, 0.0), (2.0, 0.1), (8e3, 0.01), (6e4, 0.0), (8e5, 0.004), (8e5, 0.3), (8e5, 0.99)]
             {
                 let step = 8e-5;
-                let response = ModalResponse::new(frequency, ratio, step);
+                let response = ModalResponse::of_modes([frequency; GROUP], [ratio; GROUP], step)[3];
                 let forces = [500.0, -200.0, 900.0, 100.0];
                 let p: [f64; MOST] =
                     std::array::from_fn(|a| (0..=degree).map(|i| basis.projection[a][i] * forces[i]).sum());

@@ -100,7 +100,10 @@ impl BladeTables {
         general.set_step(&self.modes, self.length(halvings));
         let memory = match kind {
             ForceInterpolation::Polynomial => polynomial,
-            ForceInterpolation::Constant => constant,
+            ForceInterpolation::Constant => {
+                general.set_constant(&self.modes);
+                constant
+            }
         };
         let mut level = memory.pop().unwrap_or_else(|| unreachable!("memory for every level"));
         level.fill(&self.rows, general);
