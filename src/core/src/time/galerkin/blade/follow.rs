@@ -55,12 +55,13 @@ impl Part {
 /// gaps and their rates at the ends of a part. Parts are halved, starting with the whole step, until the cubic shows that
 /// the smallest gap is not needed, or is accurate enough to record its minimum. The modal forces must be known, and the
 /// modes must still be those at the start of the step.
-pub(super) struct Follow<'a, D> {
+pub(super) struct Follow<'a, D, H> {
     pub trial: &'a mut BladeTrial,
     pub rows: &'a BladeRows,
     pub level: &'a BladeLevel,
-    /// Tables for the length of the step, half this length, and so on.
-    pub halves: &'a [&'a BladeLevel],
+    /// Returns the tables for the length of the step after a number of halvings, up to `most_halvings`.
+    pub halved: H,
+    pub most_halvings: usize,
     pub faced: &'a FacedSurface<'a>,
     /// Returns the prescribed motion and its rates at a fraction of the step.
     pub drive_at: D,
@@ -81,7 +82,11 @@ pub(super) struct Follow<'a, D> {
     pub ends: [f64; 2],
 }
 
-impl<D: Fn(f64) -> (PointDrive, DriveRate)> OctetKernel for Follow<'_, D> {
+impl<'a, D, H> OctetKernel for Follow<'a, D, H>
+where
+    D: Fn(f64) -> (PointDrive, DriveRate),
+    H: Fn(usize) -> &'a BladeLevel,
+{
     type Output = ();
     #[inline(always)]
     fn run<L: Octet>(mut self) {
@@ -123,7 +128,11 @@ impl<D: Fn(f64) -> (PointDrive, DriveRate)> OctetKernel for Follow<'_, D> {
     }
 }
 
-impl<D: Fn(f64) -> (PointDrive, DriveRate)> Follow<'_, D> {
+impl<'a, D, H> Follow<'a, D, H>
+where
+    D: Fn(f64) -> (PointDrive, DriveRate),
+    H: Fn(usize) -> &'a BladeLevel,
+{
     /// Computes the amplitude of each mode times the largest closing displacement of a node per unit amplitude.
     #[inline(always)]
     fn find_amplitudes<L: Octet>(&mut self) {
@@ -153,7 +162,7 @@ impl<D: Fn(f64) -> (PointDrive, DriveRate)> Follow<'_, D> {
     fn needs_halving<L: Octet>(&mut self, part: Part, error: f64) -> bool {
         let length = self.level.step * fraction(1, 1 << part.halvings);
         let third = L::splat(length / 3.0);
-        let is_last = part.halvings + 1 == self.halves.len();
+        let is_last = part.halvings == self.most_halvings;
         let is_accurate = is_last || error <= MINIMUM_FRACTION * self.tolerance;
         let [begin, end] = part.span();
         let [from, to] = self.ends.map(|fraction| L::splat((fraction - begin) / (end - begin)));
@@ -328,8 +337,8 @@ impl<D: Fn(f64) -> (PointDrive, DriveRate)> Follow<'_, D> {
     /// Advances the modes under modal forces with `COUNT` − 2 coefficients.
     #[inline(always)]
     fn advance_terms<L: Octet, const COUNT: usize>(&mut self, part: Part, halvings: usize) {
-        let Self { trial, halves, .. } = self;
-        let table = halves[part.halvings + halvings];
+        let Self { trial, halved, .. } = self;
+        let table = halved(part.halvings + halvings);
         let BladeTrial { path, modal_forces, .. } = &mut **trial;
         let [first, last] = part.ends;
         let (from, length) = (L::splat(part.span()[0]), L::splat(fraction(1, 1 << (part.halvings + halvings))));

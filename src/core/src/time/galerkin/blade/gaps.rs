@@ -159,9 +159,6 @@ impl FollowedPath<'_> {
         ends: [f64; 2],
     ) {
         let Self { place, step, kind, .. } = *self;
-        let finest = MAX_HALVINGS.min(HALVINGS - step.level);
-        let halves: [_; MAX_HALVINGS + 1] =
-            std::array::from_fn(|k| tables.level(step.level + k.min(finest), ForceInterpolation::Polynomial));
         let level = tables.level(step.level, kind);
         let span = level.step / step.length;
         let (instructions, pushes) = (trial.instructions, trial.pushes);
@@ -169,7 +166,8 @@ impl FollowedPath<'_> {
             trial,
             rows: &tables.rows,
             level,
-            halves: &halves[..=finest],
+            halved: |halvings| tables.level(step.level + halvings, ForceInterpolation::Polynomial),
+            most_halvings: MAX_HALVINGS.min(HALVINGS - step.level),
             faced: &place.faced_surface(self.drives),
             drive_at: |theta| drive_and_rate_at(place, step.from + step.length * theta, span),
             shape_errors: place.shape_errors([step.from, step.from + step.length]),
