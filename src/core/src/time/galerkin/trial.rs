@@ -119,7 +119,7 @@ pub struct Trial {
     steady: Option<Box<Steady>>,
     end_slopes: [f64; POINTS],
     /// True if contacts that could stick slide fast in the tried step; and the directions of their slip at every lane, while the
-    /// contact problem of such a step is solved.
+    /// contact problem of such a step is solved. Zero where the direction is unknown.
     slides_fast: bool,
     slip_directions: Vec<Vector3>,
 }
@@ -402,8 +402,11 @@ impl Trial {
         let (point, node) = lanes.place(lane);
         let sliding = if obstacle.parameters(node).friction == 0.0 {
             Sliding::default()
-        } else if let Some(direction) = self.slip_directions.get(lane) {
-            Sliding { direction: *direction, ..Sliding::default() }
+        } else if let Some(&direction) = self.slip_directions.get(lane) {
+            let is_known = direction != Vector3::zeros();
+            let direction = if is_known { direction } else { self.find_slip_direction(node, point, obstacle) };
+            self.slip_directions[lane] = direction;
+            Sliding { direction, ..Sliding::default() }
         } else {
             let sliding = SlidingState {
                 moved: lanes.vector3(&self.moved, lane),
