@@ -18,6 +18,12 @@ pub fn tangential(vector: Vector3, normal: Vector3) -> Vector3 {
     vector - vector.dot(&normal) * normal
 }
 
+/// Returns the unit vector along a vector; zero if it is zero.
+#[inline(always)]
+pub fn direction(vector: Vector3) -> Vector3 {
+    vector / length(vector).max(f64::MIN_POSITIVE)
+}
+
 /// Returns two unit tangents; the first as near to the direction of sliding (second component) as the normal permits.
 pub fn tangents(normal: Vector3) -> [Vector3; 2] {
     let start = if normal[1].abs() < 0.9 { Vector3::y() } else { Vector3::z() };

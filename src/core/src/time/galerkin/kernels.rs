@@ -146,24 +146,24 @@ impl Kernel for AddProduct<'_> {
     }
 }
 
-/// `sum` = Σ_m `weight(m)`·φ_m φ_mᵀ over the columns φ_m of `shapes`, in the order of m.
+/// Computes `sum` = Σ_m `weight(m)`·φ_m φ_mᵀ over the columns φ_m of `shapes`, in the order of m.
 pub(crate) struct SumOuterProducts<'a, F> {
     pub(super) shapes: &'a DMatrix<f64>,
     pub(super) weight: F,
-    /// Square matrix.
+    /// Square matrix with as many rows as `shapes`.
     pub(super) sum: &'a mut DMatrix<f64>,
 }
 
 impl<F: Fn(usize) -> f64> SumOuterProducts<'_, F> {
-    /// Computes the `R` × `C` entries from a row and a column on.
+    /// Computes the `R` × `C` block of `sum` that begins at `row` and `column`.
     #[inline(always)]
-    fn tile<const R: usize, const C: usize>(&mut self, row: usize, column: usize) {
+    fn compute_block<const R: usize, const C: usize>(&mut self, row: usize, column: usize) {
         let count = self.shapes.nrows();
         let mut sums = [[0.0; R]; C];
         for (mode, shape) in self.shapes.as_slice().chunks_exact(count).enumerate() {
             let weight = (self.weight)(mode);
-            let rows: &[f64; R] = shape[row..].first_chunk().expect("the tile is inside the matrix");
-            let columns: &[f64; C] = shape[column..].first_chunk().expect("the tile is inside the matrix");
+            let rows: &[f64; R] = shape[row..].first_chunk().expect("the block is inside the matrix");
+            let columns: &[f64; C] = shape[column..].first_chunk().expect("the block is inside the matrix");
             let weighted = rows.map(|entry| weight * entry);
             for c in 0..C {
                 for r in 0..R {
@@ -185,16 +185,15 @@ impl<F: Fn(usize) -> f64> Kernel for SumOuterProducts<'_, F> {
         let count = self.shapes.nrows();
         if count < PADDED {
             for column in 0..count {
-                (column..count).for_each(|row| self.tile::<1, 1>(row, column));
+                (column..count).for_each(|row| self.compute_block::<1, 1>(row, column));
             }
-            self.sum.fill_upper_triangle_with_lower_triangle();
-            return;
-        }
-        // Tiles on and below the diagonal; the last ones overlap those before them.
-        for row in (0..count).step_by(PADDED) {
-            let row = row.min(count - PADDED);
-            for column in (0..row + PADDED).step_by(COLUMNS) {
-                self.tile::<PADDED, COLUMNS>(row, column.min(count - COLUMNS));
+        } else {
+            // Blocks on and below the diagonal. The last block of a row or column overlaps the one before it.
+            for row in (0..count).step_by(PADDED) {
+                let row = row.min(count - PADDED);
+                for column in (0..row + PADDED).step_by(COLUMNS) {
+                    self.compute_block::<PADDED, COLUMNS>(row, column.min(count - COLUMNS));
+                }
             }
         }
         self.sum.fill_upper_triangle_with_lower_triangle();

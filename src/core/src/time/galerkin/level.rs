@@ -135,7 +135,8 @@ pub struct StepTables {
     pub modes: ModeSteps,
     /// Displacements at the points per force at the points, including residual flexibility.
     pub compliance: LaneCompliance,
-    /// Displacement at the end per constant force over the step, including residual flexibility. Only steps of the shortest length use it.
+    /// Displacement at the end per constant force over the step, including residual flexibility. [`StepTables::set_constant`] fills it;
+    /// only steps of the shortest length need it.
     pub constant: LaneCompliance,
     /// True if any mode is damped.
     pub damped: bool,
@@ -169,18 +170,18 @@ impl StepTables {
         }
     }
 
-    /// Fills the tables for step h (s), except for constant forces. Does not allocate.
+    /// Fills all tables except `constant` for step h (s). Does not allocate.
     pub fn set_step(&mut self, modes: &ContactModes, step: f64) {
         let Self { basis, influence, block, .. } = self;
         self.step = step;
         self.damped = modes.damping_ratios.iter().any(|ratio| *ratio > 0.0);
-        let mut own = (0..modes.len()).filter(|mode| modes.twin(*mode).is_none());
-        loop {
-            let group: [Option<usize>; GROUP] = std::array::from_fn(|_| own.next());
-            let Some(first) = group[0] else { break };
-            let [frequencies, ratios] =
-                [&modes.frequencies, &modes.damping_ratios].map(|of| group.map(|mode| of[mode.unwrap_or(first)]));
-            let responses = ModalResponse::of_modes(frequencies, ratios, step);
+        let mut distinct = (0..modes.len()).filter(|mode| modes.twin(*mode).is_none());
+        // The last group is padded with its first mode.
+        while let Some(first) = distinct.next() {
+            let group: [_; GROUP] = std::array::from_fn(|i| if i == 0 { Some(first) } else { distinct.next() });
+            let [frequencies, ratios] = [&modes.frequencies, &modes.damping_ratios]
+                .map(|values| group.map(|mode| values[mode.unwrap_or(first)]));
+            let responses = ModalResponse::compute(frequencies, ratios, step);
             for (mode, response) in group.into_iter().flatten().zip(&responses) {
                 let at = response.at_points(basis);
                 let points = at.map(|terms| by_points(&terms, basis));
@@ -206,7 +207,7 @@ impl StepTables {
         self.compliance.hold();
     }
 
-    /// Fills the table of constant forces for the step that [`Self::set_step`] has set. Does not allocate.
+    /// Fills `constant` for the current step; call [`StepTables::set_step`] first. Does not allocate.
     pub fn set_constant(&mut self, modes: &ContactModes) {
         let Self { influence, block, .. } = self;
         modes.weigh(|mode| influence[mode].constant, block);

@@ -22,7 +22,7 @@ pub(crate) struct ModalResponse {
     pub loss: [[f64; TERMS]; TERMS],
 }
 
-/// Indices of the state vector of the matrix exponential.
+/// Indices of the state vector (q, w, p, p′, p″, ∫q, ∫∫q); see [`ComputeResponses`].
 const POSITION: usize = 0;
 const SPEED: usize = 1;
 const FORCE: usize = 2;
@@ -30,16 +30,16 @@ const INTEGRAL: usize = FORCE + MOST;
 const DOUBLE: usize = INTEGRAL + 1;
 const STATES: usize = DOUBLE + 1;
 
-/// Number of terms of the Taylor series.
+/// Number of terms of the Taylor series. The first omitted term is below 1e-22 of the flow, because the rates have norms of at most ½.
 const SERIES: u8 = 18;
 
 /// First nonzero column of each row of the flow, and the column after the last one.
 const NONZERO: [[usize; 2]; STATES] = [[0, 5], [0, 5], [2, 5], [3, 5], [4, 5], [0, 6], [0, 7]];
 
 impl ModalResponse {
-    /// Returns the responses for angular frequencies ω (rad/s; 0 for a rigid-body mode), damping ratios ξ and step h (s). Each of them depends
-    /// on its own mode only.
-    pub fn of_modes(frequencies: [f64; GROUP], damping_ratios: [f64; GROUP], step: f64) -> [Self; GROUP] {
+    /// Computes the responses of modes with angular frequencies ω (rad/s; 0 for a rigid-body mode) and damping ratios ξ over a step h (s).
+    /// The response of a mode does not depend on the other modes.
+    pub fn compute(frequencies: [f64; GROUP], damping_ratios: [f64; GROUP], step: f64) -> [Self; GROUP] {
         InstructionSet::detect().run_octets(ComputeResponses { frequencies, damping_ratios, step })
     }
 
@@ -75,22 +75,26 @@ pub(crate) fn by_points(terms: &[f64; TERMS], basis: &TimeBasis) -> [f64; POINTS
     std::array::from_fn(|k| (0..basis.degree).map(|a| terms[2 + a] * basis.projection[a][k]).sum())
 }
 
-/// Computes responses from the flow of the state (q, w, p and its derivatives with respect to θ, ∫q, ∫∫q), where w = q̇h/κ and κ = max(ωh, 1).
+/// Computes responses from the flow (state-transition matrix) E of the state (q, w, p and its derivatives with respect to θ, ∫q, ∫∫q),
+/// where w = q̇h/κ and κ = max(ωh, 1).
 ///
-/// The flow E over a short part of the step comes from a Taylor series, and so does the integral W of the loss w² (C. F. Van Loan, IEEE Trans.
-/// Automatic Control 23, 1978). Then the time is doubled until it is the step: E becomes E², and W becomes W + EᵀWE. The series of W contains
-/// e^(2ξωt), so over the whole step it would be wrong for strongly damped modes.
+/// Over a short part of the step, Taylor series give E and the quadratic form W of ∫w² dθ (C. F. Van Loan, IEEE Trans. Automatic
+/// Control 23, 1978). The part is then doubled until it is the whole step: E becomes E², and W becomes W + EᵀWE. The series of W contains
+/// e^(2ξωt). Over the whole step, this factor would amplify rounding errors of strongly damped modes.
 struct ComputeResponses {
     frequencies: [f64; GROUP],
     damping_ratios: [f64; GROUP],
     step: f64,
 }
 
-/// Rates of change of the state, for a part of the step: a = `part`·A.
+/// Nonzero entries of a = `part`·A, where A contains the rates of change of the state with respect to θ.
 struct Rates<L> {
+    /// Length of the part as a fraction of the step; also the entries in the rows of p and of the integrals of q, and in the row of w and
+    /// the column of p.
     part: L,
-    /// Change of q per w, and of w per q and per w.
+    /// Entry in the row of q and the column of w.
     swing: L,
+    /// Entries in the row of w, in the columns of q and w.
     restoring: L,
     damping: L,
 }
@@ -112,7 +116,7 @@ impl<L: Octet> Rates<L> {
         product
     }
 
-    /// Returns −aᵀS without the integrals of q.
+    /// Returns −aᵀS for the states without the integrals of q.
     #[inline(always)]
     fn transposed_times(&self, s: &[[L; TERMS]; TERMS]) -> [[L; TERMS]; TERMS] {
         let mut product = [[L::zero(); TERMS]; TERMS];
@@ -130,7 +134,7 @@ impl<L: Octet> Rates<L> {
 
 /// Returns E².
 #[inline(always)]
-fn squared<L: Octet>(flow: &[[L; STATES]; STATES]) -> [[L; STATES]; STATES] {
+fn square<L: Octet>(flow: &[[L; STATES]; STATES]) -> [[L; STATES]; STATES] {
     let mut square = [[L::zero(); STATES]; STATES];
     for row in 0..STATES {
         for k in NONZERO[row][0]..NONZERO[row][1] {
@@ -142,9 +146,9 @@ fn squared<L: Octet>(flow: &[[L; STATES]; STATES]) -> [[L; STATES]; STATES] {
     square
 }
 
-/// Returns W + EᵀWE for a symmetric form W.
+/// Returns the form W + EᵀWE of twice the time, for a symmetric form W.
 #[inline(always)]
-fn doubled<L: Octet>(form: &[[L; TERMS]; TERMS], flow: &[[L; STATES]; STATES]) -> [[L; TERMS]; TERMS] {
+fn double_duration<L: Octet>(form: &[[L; TERMS]; TERMS], flow: &[[L; STATES]; STATES]) -> [[L; TERMS]; TERMS] {
     let mut product = [[L::zero(); TERMS]; TERMS];
     for row in 0..TERMS {
         for k in 0..TERMS {
@@ -156,7 +160,7 @@ fn doubled<L: Octet>(form: &[[L; TERMS]; TERMS], flow: &[[L; STATES]; STATES]) -
     let mut sum = *form;
     for row in 0..TERMS {
         for column in row..TERMS {
-            // Rows of the flow after this one have no entry in this column of the flow.
+            // The flow is zero below the diagonal, except in the block of q and w.
             for k in 0..=row.max(SPEED) {
                 sum[row][column] = sum[row][column] + flow[k][row] * product[k][column];
             }
@@ -174,25 +178,24 @@ impl OctetKernel for ComputeResponses {
     fn run<L: Octet>(self) -> [ModalResponse; GROUP] {
         let Self { frequencies, damping_ratios, step } = self;
         let (mut angle, mut kappa, mut doublings) = ([0.0; GROUP], [1.0; GROUP], [0_u32; GROUP]);
-        let (mut part, mut loss) = ([1.0; GROUP], [0.0; GROUP]);
+        let (mut part, mut damping, mut loss) = ([1.0; GROUP], [0.0; GROUP], [0.0; GROUP]);
         for i in 0..GROUP {
             angle[i] = frequencies[i] * step;
             kappa[i] = angle[i].max(1.0);
-            let twice = 2.0 * damping_ratios[i] * angle[i];
-            loss[i] = twice * kappa[i] * kappa[i] / (step * step);
-            // The sums of the magnitudes of rows and columns are at most ½ over a part of the step.
-            let mut largest = kappa[i] + twice + 1.0;
+            damping[i] = 2.0 * damping_ratios[i] * angle[i];
+            loss[i] = damping[i] * kappa[i] * kappa[i] / (step * step);
+            // Halve the step until the magnitudes in each row and column of the rates add up to at most ½.
+            let mut largest = kappa[i] + damping[i] + 1.0;
             while largest > 0.5 && largest.is_finite() {
                 (doublings[i], part[i], largest) = (doublings[i] + 1, 0.5 * part[i], 0.5 * largest);
             }
         }
-        let (part, angle, kappa_of) = (L::read(&part), L::read(&angle), L::read(&kappa));
-        let damping = L::splat(-2.0) * L::read(&damping_ratios) * angle;
+        let (part, angle, kappa) = (L::read(&part), L::read(&angle), L::read(&kappa));
         let rates = Rates {
             part,
-            swing: part * kappa_of,
-            restoring: L::zero() - part * (angle * angle / kappa_of),
-            damping: part * damping,
+            swing: part * kappa,
+            restoring: L::zero() - part * (angle * angle / kappa),
+            damping: L::zero() - part * L::read(&damping),
         };
         let is_damped = loss.iter().any(|loss| *loss != 0.0);
         let mut flow = [[L::zero(); STATES]; STATES];
@@ -200,9 +203,9 @@ impl OctetKernel for ComputeResponses {
         for state in 0..STATES {
             flow[state][state] = L::splat(1.0);
         }
-        // Nested form of the series of the flow and of ∫e^(−aᵀt) Q e^(at) dt, where Q contains the square of w.
+        // Horner's scheme for the series of E and of ∫e^(−aᵀ(1 − t)) Q e^(at) dt over 0 ≤ t ≤ 1. Q has one entry: `part` at (w, w).
         for n in (1..=SERIES).rev() {
-            let share = L::splat(1.0 / f64::from(n));
+            let inverse = L::splat(1.0 / f64::from(n));
             if is_damped {
                 let mut next = rates.transposed_times(&form);
                 for column in 0..TERMS {
@@ -210,19 +213,19 @@ impl OctetKernel for ComputeResponses {
                 }
                 for row in 0..TERMS {
                     for column in 0..TERMS {
-                        form[row][column] = next[row][column] * share;
+                        form[row][column] = next[row][column] * inverse;
                     }
                 }
             }
             let next = rates.times(&flow);
             for row in 0..STATES {
                 for column in NONZERO[row][0]..NONZERO[row][1] {
-                    flow[row][column] = next[row][column] * share;
+                    flow[row][column] = next[row][column] * inverse;
                 }
                 flow[row][row] = flow[row][row] + L::splat(1.0);
             }
         }
-        // W = Eᵀ times the integral.
+        // W is Eᵀ times this integral. Averaging with the transpose makes it exactly symmetric.
         let mut integral = [[L::zero(); TERMS]; TERMS];
         for row in 0..TERMS {
             for column in 0..TERMS {
@@ -239,14 +242,14 @@ impl OctetKernel for ComputeResponses {
         for done in 0..doublings.into_iter().max().unwrap_or(0) {
             let mask = (0..GROUP).fold(0, |mask, i| mask | u8::from(done < doublings[i]) << i);
             if is_damped {
-                let next = doubled(&form, &flow);
+                let next = double_duration(&form, &flow);
                 for row in 0..TERMS {
                     for column in 0..TERMS {
                         form[row][column] = L::select(mask, next[row][column], form[row][column]);
                     }
                 }
             }
-            let next = squared(&flow);
+            let next = square(&flow);
             for row in 0..STATES {
                 for column in NONZERO[row][0]..NONZERO[row][1] {
                     flow[row][column] = L::select(mask, next[row][column], flow[row][column]);
@@ -255,15 +258,15 @@ impl OctetKernel for ComputeResponses {
         }
         let mut responses = [ModalResponse::default(); GROUP];
         // Columns of (q, q̇, p_a) from those of the state: p has the derivatives a! p_a.
-        let [over, forced] = [step, step * step].map(|time| L::splat(time) / kappa_of);
-        let scale = [L::splat(1.0), over, forced, forced, L::splat(2.0) * forced];
-        let (velocity, loss) = (kappa_of / L::splat(step), L::read(&loss));
+        let [rate_scale, force_scale] = [step, step * step].map(|time| L::splat(time) / kappa);
+        let scale = [L::splat(1.0), rate_scale, force_scale, force_scale, L::splat(2.0) * force_scale];
+        let (velocity, loss) = (kappa / L::splat(step), L::read(&loss));
         for term in 0..TERMS {
-            let of = |row: usize| flow[row][term] * scale[term];
-            let position = of(POSITION).array();
-            let speed = (velocity * of(SPEED)).array();
+            let entry = |row: usize| flow[row][term] * scale[term];
+            let position = entry(POSITION).array();
+            let speed = (velocity * entry(SPEED)).array();
             // ∫∫q = ∫(1 − θ)q.
-            let moments = [of(INTEGRAL).array(), (of(INTEGRAL) - of(DOUBLE)).array()];
+            let moments = [entry(INTEGRAL).array(), (entry(INTEGRAL) - entry(DOUBLE)).array()];
             for (i, response) in responses.iter_mut().enumerate() {
                 response.position[term] = position[i];
                 response.velocity[term] = speed[i];
@@ -315,7 +318,7 @@ mod tests {
     fn modal_response_satisfies_the_equation_of_motion() {
         for (frequency, ratio) in [(0.0, 0.0), (1.0, 0.02), (3e4, 0.0), (4e4, 0.01), (9e5, 0.005), (9e5, 0.9)] {
             let step = 4e-5;
-            let response = ModalResponse::of_modes([frequency; GROUP], [ratio; GROUP], step)[3];
+            let response = ModalResponse::compute([frequency; GROUP], [ratio; GROUP], step)[0];
             let start = [1e-4, -0.3, 2e3, -3e3, 1.5e3];
             let (expected, lost) = marched(frequency, ratio, step, start);
             let of = |row: &[f64; TERMS]| row.iter().zip(start).map(|(a, b)| a * b).sum::<f64>();
@@ -332,12 +335,14 @@ mod tests {
     }
 
     #[test]
-    fn responses_do_not_depend_on_the_other_modes() {
+    fn response_is_independent_of_other_modes() {
         let frequencies = [0.0, 3.0, 2e3, 3e4, 4e5, 9e5, 2e6, 5e4];
         let ratios = [0.0, 0.02, 1e-3, 0.9, 0.0, 5e-3, 0.1, 2.0];
-        let together = ModalResponse::of_modes(frequencies, ratios, 4e-5);
+        let together = ModalResponse::compute(frequencies, ratios, 4e-5);
+        let kernel = ComputeResponses { frequencies, damping_ratios: ratios, step: 4e-5 };
+        assert_eq!(together, InstructionSet::Baseline.run_octets(kernel));
         for (i, response) in together.iter().enumerate() {
-            assert_eq!(*response, ModalResponse::of_modes([frequencies[i]; GROUP], [ratios[i]; GROUP], 4e-5)[i]);
+            assert_eq!(*response, ModalResponse::compute([frequencies[i]; GROUP], [ratios[i]; GROUP], 4e-5)[i]);
         }
     }
 
@@ -351,7 +356,7 @@ mod tests {
                 [(0.0, 0.0), (2.0, 0.1), (8e3, 0.01), (6e4, 0.0), (8e5, 0.004), (8e5, 0.3), (8e5, 0.99)]
             {
                 let step = 8e-5;
-                let response = ModalResponse::of_modes([frequency; GROUP], [ratio; GROUP], step)[3];
+                let response = ModalResponse::compute([frequency; GROUP], [ratio; GROUP], step)[0];
                 let forces = [500.0, -200.0, 900.0, 100.0];
                 let p: [f64; MOST] =
                     std::array::from_fn(|a| (0..=degree).map(|i| basis.projection[a][i] * forces[i]).sum());

@@ -89,11 +89,11 @@ impl Tables {
         for levels in [&mut self.levels, &mut self.steady] {
             if let Some(tables) = levels.get_mut(level) {
                 tables.set_step(&self.modes, step);
-                if level == HALVINGS {
-                    tables.set_constant(&self.modes);
-                }
                 tables.share = halved(1.0, level);
             }
+        }
+        if level == HALVINGS {
+            self.levels[level].set_constant(&self.modes);
         }
         true
     }

@@ -402,9 +402,9 @@ impl Trial {
         let (point, node) = lanes.place(lane);
         let sliding = if obstacle.parameters(node).friction == 0.0 {
             Sliding::default()
-        } else if let Some(&direction) = self.slip_directions.get(lane) {
-            let is_known = direction != Vector3::zeros();
-            let direction = if is_known { direction } else { self.find_slip_direction(node, point, obstacle) };
+        } else if let Some(&known) = self.slip_directions.get(lane) {
+            let is_unknown = known == Vector3::zeros();
+            let direction = if is_unknown { self.find_slip_direction(node, point, obstacle) } else { known };
             self.slip_directions[lane] = direction;
             Sliding { direction, ..Sliding::default() }
         } else {

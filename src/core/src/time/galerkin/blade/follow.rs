@@ -6,9 +6,12 @@ use super::minima::{FOLLOW_FRACTION, MAX_HALVINGS, MINIMUM_FRACTION, amplitude, 
 use super::off_centre::{OffCentreGaps, directions_of};
 use super::rows::BladeRows;
 use super::surface::{DriveRate, FacedSurface, PointDrive};
+use super::tables::BladeTables;
 use super::trial::BladeTrial;
 use crate::math::octet::{Eight, Octet, OctetKernel, both};
 use crate::time::galerkin::response::TERMS;
+use crate::time::galerkin::tables::HALVINGS;
+use crate::time::galerkin::trial::ForceInterpolation;
 
 /// Largest number of followed nodes of a block of eight whose displacements are computed node by node.
 const FEW_PER_BLOCK: u32 = 3;
@@ -55,13 +58,13 @@ impl Part {
 /// gaps and their rates at the ends of a part. Parts are halved, starting with the whole step, until the cubic shows that
 /// the smallest gap is not needed, or is accurate enough to record its minimum. The modal forces must be known, and the
 /// modes must still be those at the start of the step.
-pub(super) struct Follow<'a, D, H> {
+pub(super) struct Follow<'a, D> {
     pub trial: &'a mut BladeTrial,
     pub rows: &'a BladeRows,
     pub level: &'a BladeLevel,
-    /// Returns the tables for the length of the step after a number of halvings, up to `most_halvings`.
-    pub halved: H,
-    pub most_halvings: usize,
+    /// Tables of all lengths, and number of halvings of the span for the length of the step.
+    pub tables: &'a BladeTables,
+    pub step_level: usize,
     pub faced: &'a FacedSurface<'a>,
     /// Returns the prescribed motion and its rates at a fraction of the step.
     pub drive_at: D,
@@ -82,11 +85,7 @@ pub(super) struct Follow<'a, D, H> {
     pub ends: [f64; 2],
 }
 
-impl<'a, D, H> OctetKernel for Follow<'a, D, H>
-where
-    D: Fn(f64) -> (PointDrive, DriveRate),
-    H: Fn(usize) -> &'a BladeLevel,
-{
+impl<D: Fn(f64) -> (PointDrive, DriveRate)> OctetKernel for Follow<'_, D> {
     type Output = ();
     #[inline(always)]
     fn run<L: Octet>(mut self) {
@@ -128,11 +127,7 @@ where
     }
 }
 
-impl<'a, D, H> Follow<'a, D, H>
-where
-    D: Fn(f64) -> (PointDrive, DriveRate),
-    H: Fn(usize) -> &'a BladeLevel,
-{
+impl<D: Fn(f64) -> (PointDrive, DriveRate)> Follow<'_, D> {
     /// Computes the amplitude of each mode times the largest closing displacement of a node per unit amplitude.
     #[inline(always)]
     fn find_amplitudes<L: Octet>(&mut self) {
@@ -162,7 +157,7 @@ where
     fn needs_halving<L: Octet>(&mut self, part: Part, error: f64) -> bool {
         let length = self.level.step * fraction(1, 1 << part.halvings);
         let third = L::splat(length / 3.0);
-        let is_last = part.halvings == self.most_halvings;
+        let is_last = part.halvings == MAX_HALVINGS.min(HALVINGS - self.step_level);
         let is_accurate = is_last || error <= MINIMUM_FRACTION * self.tolerance;
         let [begin, end] = part.span();
         let [from, to] = self.ends.map(|fraction| L::splat((fraction - begin) / (end - begin)));
@@ -337,9 +332,9 @@ where
     /// Advances the modes under modal forces with `COUNT` − 2 coefficients.
     #[inline(always)]
     fn advance_terms<L: Octet, const COUNT: usize>(&mut self, part: Part, halvings: usize) {
-        let Self { trial, halved, .. } = self;
-        let table = halved(part.halvings + halvings);
-        let BladeTrial { path, modal_forces, .. } = &mut **trial;
+        let level = self.step_level + part.halvings + halvings;
+        let table = self.tables.level(level, ForceInterpolation::Polynomial);
+        let BladeTrial { path, modal_forces, .. } = &mut *self.trial;
         let [first, last] = part.ends;
         let (from, length) = (L::splat(part.span()[0]), L::splat(fraction(1, 1 << (part.halvings + halvings))));
         for k in 0..self.rows.mode_blocks {

@@ -1,7 +1,7 @@
 //! Smallest gaps of the nodes within a tried step.
 
 use super::follow::Follow;
-use super::minima::{FOLLOW_FRACTION, MAX_HALVINGS, MINIMUM_FRACTION, RecordPoints, Search};
+use super::minima::{FOLLOW_FRACTION, MINIMUM_FRACTION, RecordPoints, Search};
 use super::span::{Blade, BladeInSpan, BladePlace, RecordScope, centred_drive_at, drive_at};
 use super::surface::{DriveRate, PointDrive};
 use super::tables::BladeTables;
@@ -166,8 +166,8 @@ impl FollowedPath<'_> {
             trial,
             rows: &tables.rows,
             level,
-            halved: |halvings| tables.level(step.level + halvings, ForceInterpolation::Polynomial),
-            most_halvings: MAX_HALVINGS.min(HALVINGS - step.level),
+            tables,
+            step_level: step.level,
             faced: &place.faced_surface(self.drives),
             drive_at: |theta| drive_and_rate_at(place, step.from + step.length * theta, span),
             shape_errors: place.shape_errors([step.from, step.from + step.length]),

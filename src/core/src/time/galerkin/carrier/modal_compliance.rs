@@ -156,7 +156,7 @@ impl ModalCompliance {
     /// Finds the displacements of the modes at point i under the force on a lane that [`ModalCompliance::find_modal_force`] has set.
     fn move_modes(&mut self, body: &SharedBody, step: LaneStep, i: usize, lane: usize) {
         let ((k, _), place) = (step.lanes.place(lane), step.block * self.lanes + lane);
-        self.instructions.run(ModalResponse {
+        self.instructions.run(ApplyResponse {
             response: body.response(step.level, step.kind, i, k),
             acting: &self.acting[place * self.padded..][..self.padded],
             to: &mut self.moved,
@@ -301,13 +301,13 @@ impl Kernel for Project<'_> {
 }
 
 /// Modal displacements `to` = `response` (per unit of modal force) · `acting` (modal force per λ).
-struct ModalResponse<'a> {
+struct ApplyResponse<'a> {
     response: &'a [f64],
     acting: &'a [f32],
     to: &'a mut [f32],
 }
 
-impl Kernel for ModalResponse<'_> {
+impl Kernel for ApplyResponse<'_> {
     #[inline(always)]
     fn run(self) {
         for ((to, response), acting) in self.to.iter_mut().zip(self.response).zip(self.acting) {

@@ -6,7 +6,7 @@
 
 use super::steady::Steady;
 use super::{ForceInterpolation, Obstacle, Trial, TrialResult};
-use crate::math::vector::{Vector3, length, tangential};
+use crate::math::vector::{Vector3, direction, length, tangential};
 use crate::time::galerkin::basis::POINTS;
 use crate::time::galerkin::level::StepTables;
 use crate::time::galerkin::rows::ContactRows;
@@ -23,10 +23,12 @@ const FULL_PASSES: usize = 8;
 /// Largest vibration velocity at which contacts slide fast, as a fraction of the sliding velocity by prescribed motion.
 const LARGEST_VIBRATION: f64 = 0.1;
 
-/// Accuracy of the displacements under changes of the directions of friction, as a multiple of the accuracy of gaps. In a light rub of rotor 37
-/// with tolerances of 1e-2, 1e-3 and 1e-4, errors are 1.1e-4, 2.4e-5 and 1.3e-5. With a multiple of 1 they are 1.1e-4, 3.3e-5 and 1.6e-5, and
-/// a step takes 15 to 18 % more time. With a multiple of 30, errors in slow stick-slip motion reach the tolerance (1e-5).
-const DIRECTION_PRECISION: f64 = 10.0;
+/// Largest displacement that the last change of the directions of friction may cause, as a multiple of the accuracy of gaps.
+///
+/// In a light rub of rotor 37 with tolerances of 1e-2, 1e-3 and 1e-4, the relative errors of displacements are 1.1e-4, 2.4e-5 and
+/// 1.3e-5. With a multiple of 1 they are 1.1e-4, 3.3e-5 and 1.6e-5, and a step takes 15 to 18 % more time. With a multiple of 30, errors
+/// in slow stick-slip motion reach the tolerance of 1e-5.
+const DIRECTION_PRECISION_FACTOR: f64 = 10.0;
 
 impl Trial {
     /// Tries a step in which all contacts slide fast. It counts as unsolved if one may stick.
@@ -67,6 +69,8 @@ impl Trial {
         precision: f64,
         result: &mut TrialResult,
     ) -> bool {
+        // `choose` finds the unknown directions of nodes that begin to touch.
+        own.directions.fill(Vector3::zeros());
         for pass in 0..PASSES {
             let (lowest, largest) = self.find_gaps(obstacle);
             if lowest.is_nan() {
@@ -78,8 +82,8 @@ impl Trial {
             let Some(moved) = self.find_fast_directions(&mut own.directions, level, pass, obstacle) else {
                 return false;
             };
-            let are_directions_known = moved <= DIRECTION_PRECISION * precision;
-            if pass > 0 && lowest >= -precision && largest <= precision && are_directions_known {
+            let have_directions_converged = moved <= DIRECTION_PRECISION_FACTOR * precision;
+            if pass > 0 && lowest >= -precision && largest <= precision && have_directions_converged {
                 return true;
             }
             self.slip_directions = take(&mut own.directions);
@@ -92,8 +96,8 @@ impl Trial {
         false
     }
 
-    /// Finds the directions of the slip of all nodes at all points. Returns by how much their changes may move touching nodes (m),
-    /// or `None` if a touching node may stick.
+    /// Finds the directions of the slip of touching nodes at all points. Returns the largest displacement that their changes may
+    /// cause (m), or `None` if a touching node may stick.
     fn find_fast_directions(
         &self,
         directions: &mut [Vector3],
@@ -112,10 +116,6 @@ impl Trial {
             let touches = (0..=last).any(|point| self.multiplier(point, node) > 0.0)
                 || (1..=last).any(|point| self.gap(point, node) < 0.0);
             if !touches {
-                if pass == 0 {
-                    // The solution finds the directions of nodes that begin to touch.
-                    (1..=last).for_each(|point| directions[lanes.at(point, node)] = Vector3::zeros());
-                }
                 continue;
             }
             let mut places = [Vector3::zeros(); POINTS];
@@ -134,10 +134,9 @@ impl Trial {
                 let lane = lanes.at(point, node);
                 let slip = if pass < POINTWISE_PASSES { slip } else { places[last] };
                 let before = directions[lane];
-                let along = tangential(slip, self.normal(point, node));
-                let along = along / length(along).max(f64::MIN_POSITIVE);
+                let along = direction(tangential(slip, self.normal(point, node)));
                 let along = if relaxation < 1.0 { before + relaxation * (along - before) } else { along };
-                directions[lane] = along / length(along).max(f64::MIN_POSITIVE);
+                directions[lane] = direction(along);
                 let flexibility = level.compliance.of_lane(lane);
                 let flexibility = (0..3).map(|c| lanes.vector3(flexibility[c], lane)[c]).fold(0.0, f64::max);
                 let turned = length(directions[lane] - before) / relaxation;
@@ -147,11 +146,11 @@ impl Trial {
         Some(largest)
     }
 
-    /// Returns the direction of the slip of a node at a point, under the current displacements.
+    /// Returns the unit vector of the slip over which friction on a node at a point does work, at the current displacements. Zero if the
+    /// node does not slip.
     pub(super) fn find_slip_direction(&self, node: usize, point: usize, obstacle: &impl Obstacle) -> Vector3 {
         let weights = self.work_weights[point];
         let slip: Vector3 = (1..=self.lanes.points).map(|k| weights[k] * self.slip(node, k, obstacle)).sum();
-        let along = tangential(slip, self.normal(point, node));
-        along / length(along).max(f64::MIN_POSITIVE)
+        direction(tangential(slip, self.normal(point, node)))
     }
 }
