@@ -286,7 +286,9 @@ impl RomFacts {
             Some(KnownContact { friction, speed }) if friction > 0.0 && !self.rom.is_cyclic() => {
                 let sense = if speed > 0.0 { "+θ" } else { "−θ" };
                 let sense = if speed == 0.0 { "either sense" } else { sense };
-                format!("for one sector, with µ = {friction} and sliding in {sense}")
+                format!(
+                    "for one sector, with µ = {friction} and sliding in {sense}; the friction check of a run may require smaller steps"
+                )
             }
             Some(sliding) if sliding.friction > 0.0 => {
                 "for the disk; with friction, a scene may require smaller steps".to_owned()
