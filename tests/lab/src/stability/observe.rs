@@ -151,8 +151,9 @@ impl StabilityWatch {
     pub(crate) fn step(&mut self, simulation: &mut Simulation, length: f64) -> Result<()> {
         simulation.begin_step(simulation.time(), length)?;
         loop {
+            let begun = simulation.time();
             let progress = simulation.advance()?;
-            self.look(simulation);
+            self.look(simulation, simulation.time() - begun);
             if progress.finished {
                 break;
             }
@@ -171,11 +172,12 @@ impl StabilityWatch {
         self.step(simulation, length)
     }
 
-    fn look(&mut self, simulation: &Simulation) {
+    /// Observes the state after an interval of `duration` (s), over which contact forces are means.
+    fn look(&mut self, simulation: &Simulation, duration: f64) {
         let system = simulation.system();
         self.contacts += system.events().len() as u64;
         let sum: f64 = system.events().iter().map(|event| event.normal).sum();
-        self.impulse += sum * system.bank().step();
+        self.impulse += sum * duration;
         self.largest = system.events().iter().fold(self.largest, |most, event| most.max(event.normal));
         let opening = if self.round { open(simulation) } else { f64::NAN };
         for node in 0..self.slopes.len() {
