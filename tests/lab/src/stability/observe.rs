@@ -172,12 +172,13 @@ impl StabilityWatch {
         self.step(simulation, length)
     }
 
-    /// Observes the state after an interval of `duration` (s), over which contact forces are means.
+    /// Observes the state after an interval of `duration` (s). With adaptive steps, contact forces are means over it; with fixed steps, they are
+    /// those of its last step.
     fn look(&mut self, simulation: &Simulation, duration: f64) {
         let system = simulation.system();
         self.contacts += system.events().len() as u64;
         let sum: f64 = system.events().iter().map(|event| event.normal).sum();
-        self.impulse += sum * duration;
+        self.impulse += sum * if self.galerkin { duration } else { system.bank().step() };
         self.largest = system.events().iter().fold(self.largest, |most, event| most.max(event.normal));
         let opening = if self.round { open(simulation) } else { f64::NAN };
         for node in 0..self.slopes.len() {
