@@ -25,9 +25,8 @@ const LARGEST_VIBRATION: f64 = 0.1;
 
 /// Largest displacement that the last change of the directions of friction may cause, as a multiple of the accuracy of gaps.
 ///
-/// In a light rub of rotor 37 with tolerances of 1e-2, 1e-3 and 1e-4, the relative errors of displacements are 1.1e-4, 2.4e-5 and
-/// 1.3e-5. With a multiple of 1 they are 1.1e-4, 3.3e-5 and 1.6e-5, and a step takes 15 to 18 % more time. With a multiple of 30, errors
-/// in slow stick-slip motion reach the tolerance of 1e-5.
+/// Larger multiples save evaluations, but with 30 the errors of slow stick-slip motion reach the tolerance
+/// (`core/tests/galerkin/sticking.rs`).
 const DIRECTION_PRECISION_FACTOR: f64 = 10.0;
 
 impl Trial {
