@@ -22,6 +22,8 @@ impl CoSimulation for Simulation {
 
     fn set(&mut self, reference: u32, value: Value) -> Result<()> {
         let (variable, _) = self.check(reference, value)?;
+        // Adding 0 turns −0 into 0, so replacing 0 by −0 does not count as a change.
+        let value = if let Value::Real(value) = value { Value::Real(value + 0.0) } else { value };
         let changes = value.number().to_bits() != self.state.values[reference as usize].to_bits();
         if variable.quantity == Quantity::Friction && self.is_initialised() && changes {
             let before = std::mem::replace(&mut self.state.values[reference as usize], value.number());

@@ -196,6 +196,9 @@ fn setting_the_same_value_again_changes_nothing() {
                     let value = real(&simulation, name);
                     set(&mut simulation, name, value);
                 }
+                for zero in [-0.0, 0.0] {
+                    set(&mut simulation, "gap_offset", zero);
+                }
             }
             go(&mut simulation, 1.3e-5);
         }
