@@ -5,7 +5,9 @@ use super::{apart, print_row, scene};
 use tiprub_core::scene::method::Scheme;
 use tiprub_core::scene::settings::{OutputSettings, Shape};
 use tiprub_core::{CoSimulation, Scene, Simulation};
-use tiprub_test_models::{SeededRandom, bits, bumps, element, go, real, reference, rich_blade, saved, set, started};
+use tiprub_test_models::{
+    GAP, SeededRandom, bits, bumps, element, go, real, reference, rich_blade, round, saved, set, started,
+};
 
 /// A communication step whose multiples are exact binary numbers (s).
 const TICK: f64 = 1.0 / 131_072.0;
@@ -205,6 +207,44 @@ fn setting_the_same_value_again_changes_nothing() {
         (bits(&simulation), *simulation.system().effort())
     };
     assert_eq!(run(true), run(false));
+}
+
+/// Within steps with contact, the reported gap is never smaller than the gap from the displacements. It is larger, by less than the tolerance,
+/// only where fast modes, which the steps represent only on average, carry a node into the casing.
+#[test]
+fn gaps_within_steps_agree_with_displacements() {
+    for tolerance in [1e-2, 1e-3, 1e-4] {
+        let mut scene = round(rich_blade(4));
+        (scene.settings.structures[0].damping_ratio, scene.settings.time.tolerance) = (Some(0.05), Some(tolerance));
+        (scene.settings.time.scheme, scene.settings.time.step) = (Scheme::Galerkin, 8e-5);
+        let slopes: Vec<f64> = scene.roms[0].contact_nodes.iter().map(|node| node.meridional_slope).collect();
+        let mut simulation = started(&scene);
+        let (mut contact_count, mut max_shortfall) = (0, 0.0_f64);
+        for step in 0..3000 {
+            let radius_change = -1.05 * GAP * (f64::from(step) * 1e-3).min(1.0);
+            set(&mut simulation, "casing_radius_change", radius_change);
+            go(&mut simulation, 1e-6);
+            let system = simulation.system();
+            for (node, slope) in slopes.iter().enumerate() {
+                let moved = |component: usize| system.bank().row(3 * node + component, 0);
+                let clearance = GAP + radius_change - moved(0) + slope * moved(2);
+                let (recomputed_gap, gap) = (clearance / (1.0 + slope * slope).sqrt() / GAP, system.gap(node, 0) / GAP);
+                assert!(
+                    recomputed_gap - gap < 1e-9,
+                    "tolerance {tolerance:e}: the gap is {gap:e}, below {recomputed_gap:e} from the displacements"
+                );
+                contact_count += usize::from(system.multiplier(node, 0) > 0.0);
+                max_shortfall = max_shortfall.max(gap - recomputed_gap);
+            }
+        }
+        print_row!(
+            "tolerance {tolerance:.0e}: gaps from the displacements are smaller by at most {max_shortfall:.1e} clearances"
+        );
+        assert!(
+            contact_count > 500 && max_shortfall < tolerance,
+            "{contact_count} nodes in contact, shortfall {max_shortfall:e}"
+        );
+    }
 }
 
 /// Inputs that change at some communication points end the open steps at these points.

@@ -93,15 +93,14 @@ impl OctetKernel for DenseOutput<'_> {
             sample.moved[along].copy_from_slice(&moved[..blocks]);
             sample.held[along].copy_from_slice(&moved[blocks..]);
         }
-        let mut weights = [0.0; POINTS];
         if self.pushes {
-            weights = match self.level.kind {
+            let weights = match self.level.kind {
                 ForceInterpolation::Polynomial => self.level.basis.weights_at(self.time / self.level.step),
                 ForceInterpolation::Constant => [0.0, 1.0, 0.0, 0.0],
             };
             self.find_forces::<L>(&weights);
         }
-        self.find_gaps::<L>(&weights);
+        self.find_gaps::<L>();
     }
 }
 
@@ -164,11 +163,11 @@ impl DenseOutput<'_> {
         }
     }
 
-    /// Finds the gaps F, their rates and σ. For nodes in contact during the step, F is the polynomial through its values at
-    /// the points, bounded below by the smallest of these values, because the points follow fast modes only in the mean.
-    /// Where a force acts, F is the smallest of these values, and σ follows from the direction of the force.
+    /// Finds the gaps F, their rates and σ from displacements and velocities. If a force acts on a node at any point of the step, F is at least
+    /// the smallest of its values at the points, because the points represent fast modes only on average. Where this bound applies, or a force
+    /// acts at this time, the rate is that of the polynomial through these values. Where a force acts at this time, σ follows from its direction.
     #[inline(always)]
-    fn find_gaps<L: Octet>(&mut self, weights: &[f64; POINTS]) {
+    fn find_gaps<L: Octet>(&mut self) {
         let Self { trial, rows, level, faced, rate: of_drive, pushes, .. } = self;
         let BladeTrial { start, sample, multipliers, gaps, angles, directions_of_nodes, rates, .. } = &mut **trial;
         let drive = &faced.drives[0];
@@ -195,20 +194,18 @@ impl DenseOutput<'_> {
             if *pushes {
                 let first = L::load(&start.gaps[block]);
                 let mut touches = L::zero().less(L::load(&start.multipliers[block]));
-                let (mut lowest, mut value, mut change) =
-                    (first, L::splat(weights[0]) * first, L::splat(slopes[0]) * first);
+                let (mut lowest, mut change) = (first, L::splat(slopes[0]) * first);
                 for point in 0..level.points() {
                     let lane = point * rows.blocks + block;
                     touches |= L::zero().less(L::load(&multipliers[lane]));
                     let at_point = L::load(&gaps[lane]);
                     lowest = lowest.min(at_point);
-                    value = value + L::splat(weights[point + 1]) * at_point;
                     change = change + L::splat(slopes[point + 1]) * at_point;
                 }
+                let penetrates = touches & gap.less(lowest);
+                gap = L::select(penetrates, lowest, gap);
                 let pushes = L::zero().less(L::load(&sample.multipliers[block]));
-                gap = L::select(touches, value.max(lowest), gap);
-                gap = L::select(pushes, lowest, gap);
-                rate = L::select(touches, change, rate);
+                rate = L::select(touches & (penetrates | pushes), change, rate);
                 let around = L::load(&sample.forces[1][block]) / L::load(&sample.multipliers[block]);
                 let of_force = around + L::load(&start.friction[block]) * steepness;
                 sigma = L::select(pushes, of_force, sigma);
