@@ -1,6 +1,6 @@
 //! Advances the modes of a sector from the start of a step to its end.
 
-use super::basis::MOST;
+use super::basis::{MOST, real};
 use super::kernels::PADDED;
 use super::level::{ModeSteps, StepTables};
 use super::response::TERMS;
@@ -17,6 +17,8 @@ pub struct Advance {
     forces: [Vec<f64>; MOST],
     /// φᵀp_a of every mode.
     modal: [Vec<f64>; MOST],
+    /// φᵀp_a of every mode, as coefficients of powers of the fraction of one part of the step.
+    part_modal_forces: [Vec<f64>; MOST],
     losses: Vec<f64>,
     instructions: InstructionSet,
 }
@@ -83,6 +85,7 @@ impl Advance {
             rows: Vec::with_capacity(3 * nodes),
             forces: std::array::from_fn(|_| vec![0.0; 3 * nodes]),
             modal: std::array::from_fn(|_| padded()),
+            part_modal_forces: std::array::from_fn(|_| padded()),
             losses: padded(),
             instructions: InstructionSet::detect(),
         }
@@ -102,6 +105,16 @@ impl Advance {
         state: &mut SectorState,
         forces: impl Fn(usize) -> Option<[Vector3; MOST]>,
     ) -> f64 {
+        if self.compute_modal_forces(rows, forces) {
+            self.finish::<TERMS>(level, state)
+        } else {
+            self.freely(level, state)
+        }
+    }
+
+    /// Computes the modal forces of a step, and returns whether any force acts; if not, `modal` is unchanged. `forces(node)` returns the
+    /// coefficients of θᵃ of the force on a node (N), or `None`.
+    fn compute_modal_forces(&mut self, rows: &ContactRows, forces: impl Fn(usize) -> Option<[Vector3; MOST]>) -> bool {
         self.rows.clear();
         for node in 0..self.forces[0].len() / 3 {
             let Some(coefficients) = forces(node) else { continue };
@@ -113,12 +126,46 @@ impl Advance {
             }
         }
         if self.rows.is_empty() {
-            return self.freely(level, state);
+            return false;
         }
         let [a, b, c] = &self.forces;
         let [one, two, three] = &mut self.modal;
         rows.modal_forces(&self.rows, [a, b, c], [one, two, three]);
-        self.finish::<TERMS>(level, state)
+        true
+    }
+
+    /// Computes and stores the modal forces of a step of length `step` (s), for the following calls of [`Self::advance_part`]. `forces(node)`
+    /// returns the coefficients of θᵃ of the force on a node (N), or `None`. Returns a bound on the error of cubics over the whole step (m);
+    /// see `ContactRows::cubic_error_bound`.
+    pub fn prepare_parts(
+        &mut self,
+        rows: &ContactRows,
+        state: &SectorState,
+        step: f64,
+        forces: impl Fn(usize) -> Option<[Vector3; MOST]>,
+    ) -> f64 {
+        let acts = self.compute_modal_forces(rows, forces);
+        rows.cubic_error_bound(step, state, acts.then(|| std::array::from_fn(|term| &self.modal[term][..])))
+    }
+
+    /// Advances q and q̇ over part `part` (from 0) of `parts` equal parts of the step of the last [`Self::prepare_parts`]. `level` has the length
+    /// of a part. Computes no damping loss.
+    pub fn advance_part(&mut self, level: &StepTables, state: &mut SectorState, part: usize, parts: usize) {
+        let state = [&mut state.position[..], &mut state.velocity];
+        if self.rows.is_empty() {
+            let modal = [0, 1, 2].map(|term| &self.modal[term][..]);
+            self.instructions.run(End::<2> { tables: &level.modes, state, modal, losses: None });
+            return;
+        }
+        let (part_start, part_fraction) = (real(part) / real(parts), 1.0 / real(parts));
+        let ([a, b, c], [one, two, three]) = (&self.modal, &mut self.part_modal_forces);
+        for mode in 0..a.len() {
+            one[mode] = a[mode] + part_start * (b[mode] + part_start * c[mode]);
+            two[mode] = part_fraction * (b[mode] + 2.0 * part_start * c[mode]);
+            three[mode] = part_fraction * part_fraction * c[mode];
+        }
+        let modal = [0, 1, 2].map(|term| &self.part_modal_forces[term][..]);
+        self.instructions.run(End::<TERMS> { tables: &level.modes, state, modal, losses: None });
     }
 
     /// Advances q and q̇ under known modal forces, given as coefficients of θᵃ, and returns the damping loss (J).

@@ -371,7 +371,8 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         }
     }
 
-    /// Finds where nodes may come closer between the points of a step; the motion of a single sector is followed exactly.
+    /// Finds where nodes may come closer between the points of a step. In a single sector, the motion of these nodes is followed; see
+    /// [`Trial::follow`].
     fn find_minima(&mut self, step: SpanStep, kind: ForceInterpolation, is_resolved: bool) {
         let (tolerance, is_single) = (self.goal.tolerance, self.island.is_single());
         for place in self.places() {
@@ -387,7 +388,7 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
             }
             trial.drop_jumps(&surfaces, tolerance);
             if is_single {
-                trial.follow(tables, level, step.level, state, advance);
+                trial.follow(tables, level, (step.level, tolerance), state, advance);
             }
         }
     }

@@ -1,5 +1,6 @@
 //! Mode shapes at the contact rows, arranged for sums over modes and over rows.
 
+use super::basis::MOST;
 use super::kernels::{Combine, PADDED};
 use super::level::StepTables;
 use super::state::SectorState;
@@ -23,6 +24,8 @@ pub struct ContactRows {
     error_form: DMatrix<f64>,
     /// ξω and 1/ω_d of each mode; 1/ω_d is infinite for rigid-body modes.
     rates: Vec<[f64; 2]>,
+    /// ω² of each mode (rad²/s²), and the largest displacement of any node per unit modal amplitude.
+    cubic_error_factors: Vec<[f64; 2]>,
     /// Coefficients of the bound on the displacement of each mode.
     motions: Vec<FreeMotion>,
     /// The indices 0, 1, 2, …
@@ -91,7 +94,13 @@ impl ContactRows {
         let rates = modes.frequencies.iter().zip(&modes.damping_ratios);
         let rates: Vec<[f64; 2]> =
             rates.map(|(w, ratio)| [ratio * w, 1.0 / (w * (1.0 - ratio * ratio).sqrt())]).collect();
+        let max_displacement =
+            |shape: &[f64]| shape.chunks_exact(3).map(|node| Vector3::from_row_slice(node).norm()).fold(0.0, f64::max);
+        let modes_and_shapes = modes.frequencies.iter().zip(modes.shapes.column_iter());
+        let cubic_error_factors =
+            modes_and_shapes.map(|(w, shape)| [w * w, max_displacement(shape.clone_owned().as_slice())]).collect();
         Self {
+            cubic_error_factors,
             magnitudes: by_mode.iter().map(|shape| shape.abs()).collect(),
             by_mode,
             stride,
@@ -164,6 +173,30 @@ impl ContactRows {
         }
         let [one] = &mut sums.rows;
         self.add_up(&self.magnitudes, [&sums.coefficients[0]], [one]);
+    }
+
+    /// Returns an upper bound (m) on the error of the cubics that interpolate displacements and velocities of the nodes between both ends of a
+    /// step of length `step` (s). `forces` are the modal forces as coefficients of θᵃ; `None` if no force acts. The bound is infinite if there
+    /// are rigid-body modes.
+    pub(crate) fn cubic_error_bound(&self, step: f64, state: &SectorState, forces: Option<[&[f64]; MOST]>) -> f64 {
+        let mut error = 0.0;
+        for (mode, ([rate, per_frequency], [squared_frequency, max_shape])) in
+            self.rates.iter().zip(&self.cubic_error_factors).enumerate()
+        {
+            let (mut q, mut v) = (state.position[mode], state.velocity[mode]);
+            if let Some(forces) = forces {
+                // Subtract the steady motion under the forces: it is a polynomial of degree 2, which cubics represent exactly.
+                let [one, two, three] = forces.map(|forces| forces[mode]);
+                let quadratic = three / (step * step * squared_frequency);
+                let linear = (two / step - 4.0 * rate * quadratic) / squared_frequency;
+                q -= (one - 2.0 * rate * linear - 2.0 * quadratic) / squared_frequency;
+                v -= linear;
+            }
+            let turned = (v + rate * q) * per_frequency;
+            error += max_shape * (q.abs() + turned.abs()) * squared_frequency * squared_frequency;
+        }
+        let error = error * (step * step) * (step * step) / 384.0;
+        if error.is_nan() { f64::INFINITY } else { error }
     }
 
     /// Bounds the displacements of the rows from their current positions over a time `span` (s) without forces. The bound is `span` times

@@ -1,29 +1,32 @@
-//! Smallest gaps between the points of a step, for nodes that stay open.
+//! Smallest gaps between the points of a step, for nodes that are open at all points.
 //!
-//! The polynomial through the gaps at the points shows where a node may come closer between them. There, its motion is followed
-//! exactly: all modes at the ends of eighths of the step, and cubics through their displacements and velocities in between. If a
-//! contact is closed at a point, only the gaps at the points are used.
+//! The polynomial through the gaps at the points shows where a node may come closer in between. In a single sector, the motion of these nodes is
+//! then followed: the step is divided into up to eight parts, all modes are evaluated at the ends of the parts, and cubics interpolate
+//! displacements and velocities in between. The error of the cubics is a fraction of the tolerance, unless the number of parts is at its limit.
+//! For nodes that are in contact at a point, only the gaps at the points are used.
 
 use super::judgement::{FALLING, NEAR};
 use super::{ForceInterpolation, Obstacle, Trial};
 use crate::math::cubic::{evaluate, interior_minimum};
 use crate::math::vector::Vector3;
 use crate::time::galerkin::advance::Advance;
-use crate::time::galerkin::basis::{MOST, POINTS, TimeBasis, real};
+use crate::time::galerkin::basis::{POINTS, TimeBasis, real};
 use crate::time::galerkin::level::StepTables;
 use crate::time::galerkin::rows::ContactRows;
 use crate::time::galerkin::state::SectorState;
 use crate::time::galerkin::tables::{HALVINGS, Tables};
 
-/// Number of halvings of a step at whose ends the motion is followed.
-const FINER: usize = 3;
-/// Number of these parts.
-pub const PARTS: usize = 1 << FINER;
+/// Largest number of halvings that divide a step into parts.
+const MAX_PART_HALVINGS: usize = 3;
+/// Largest number of parts of a step.
+pub const MAX_PARTS: usize = 1 << MAX_PART_HALVINGS;
+/// Error bound of the cubics, as a fraction of the tolerance, below which a step is not divided further.
+const CUBIC_ERROR: f64 = 0.1;
 /// Nodes are followed if they may come closer by more than this fraction of the tolerance.
 const SHARE: f64 = 0.1;
 
 /// Displacement of a node at the ends of parts of a step (m), and its change per part there.
-type Path = [[Vector3; 2]; PARTS + 1];
+type Path = [[Vector3; 2]; MAX_PARTS + 1];
 
 /// Smallest gaps between the points.
 #[derive(Debug, Clone)]
@@ -33,6 +36,8 @@ pub(super) struct Minima {
     /// Paths of the nodes, and the number of parts in which they are known; 0 if no paths were followed.
     paths: Vec<Path>,
     parts: usize,
+    /// Displacement of each node due to the residual flexibility (m), as coefficients of θᵃ.
+    residual_displacements: Vec<[Vector3; POINTS]>,
     /// State within the step.
     state: SectorState,
 }
@@ -42,8 +47,9 @@ impl Minima {
     pub(super) fn new(modes: usize, nodes: usize) -> Self {
         Self {
             at: vec![f64::NAN; nodes],
-            paths: vec![[[Vector3::zeros(); 2]; PARTS + 1]; nodes],
+            paths: vec![[[Vector3::zeros(); 2]; MAX_PARTS + 1]; nodes],
             parts: 0,
+            residual_displacements: vec![[Vector3::zeros(); POINTS]; nodes],
             state: SectorState::new(modes, 0),
         }
     }
@@ -104,60 +110,68 @@ impl Trial {
         }
     }
 
-    /// Follows the selected nodes over a step of a level, before its state is advanced.
+    /// Computes the paths of the selected nodes over a step. `state` is the state at its start, and `level` the number of halvings of the span.
+    /// Divides the step into the smallest number of parts for which the error bound of the cubics is at most `CUBIC_ERROR` times `tolerance`
+    /// (m), or into the largest number.
     pub fn follow(
         &mut self,
         tables: &Tables,
-        of: &StepTables,
-        level: usize,
+        step_tables: &StepTables,
+        (level, tolerance): (usize, f64),
         state: &SectorState,
         advance: &mut Advance,
     ) {
-        let finer = FINER.min(HALVINGS - level);
-        let (parts, rows) = (1_usize << finer, &tables.rows);
-        let (table, basis) = (&tables.levels[level + finer], &of.basis);
+        let (rows, basis) = (&tables.rows, &step_tables.basis);
         self.find_start(rows, state);
+        let polynomial = |node: usize| self.polynomial(basis, ForceInterpolation::Polynomial, node);
+        let error = advance.prepare_parts(rows, state, step_tables.step, polynomial);
+        let max_halvings = MAX_PART_HALVINGS.min(HALVINGS - level);
+        let is_accurate = |halvings: &usize| error <= CUBIC_ERROR * tolerance * real(1 << (4 * halvings));
+        let halvings = (0..max_halvings).find(is_accurate).unwrap_or(max_halvings);
+        let (parts, table) = (1_usize << halvings, &tables.levels[level + halvings]);
         let mut minima = std::mem::replace(&mut self.minima, Minima::new(0, 0));
         minima.state.position.copy_from_slice(&state.position);
         minima.state.velocity.copy_from_slice(&state.velocity);
         minima.parts = parts;
+        for node in (0..self.nodes()).filter(|node| !minima.at[*node].is_nan()) {
+            minima.residual_displacements[node] = self.residual_displacement(basis, rows, node);
+        }
         for part in 0..=parts {
+            let theta = real(part) / real(parts);
             for node in (0..self.nodes()).filter(|node| !minima.at[*node].is_nan()) {
                 let now = [&minima.state.position, &minima.state.velocity].map(|modes| rows.at_node(node, modes));
-                let bent = self.bent(basis, rows, node, real(part) / real(parts));
                 let [moved, velocity] = now;
-                minima.paths[node][part] = [moved + bent[0], table.step * velocity + bent[1] / real(parts)];
+                let [a, b, c, d] = &minima.residual_displacements[node];
+                let position = a + theta * (b + theta * (c + theta * d));
+                let slope = b + theta * (2.0 * c + 3.0 * theta * d);
+                minima.paths[node][part] = [moved + position, table.step * velocity + slope / real(parts)];
             }
             if part < parts {
-                let forces = |node: usize| {
-                    Some(within(&self.polynomial(basis, ForceInterpolation::Polynomial, node)?, part, parts))
-                };
-                advance.under(table, rows, &mut minima.state, forces);
+                advance.advance_part(table, &mut minima.state, part, parts);
             }
         }
         self.minima = minima;
     }
 
-    /// Returns the displacement of a node within the step by the residual flexibility (m), and its derivative with respect to the
-    /// fraction of the step.
-    fn bent(&self, basis: &TimeBasis, rows: &ContactRows, node: usize, theta: f64) -> [Vector3; 2] {
-        let mut sums = [Vector3::zeros(); 2];
+    /// Returns the displacement of a node due to the residual flexibility (m), as coefficients of θᵃ.
+    fn residual_displacement(&self, basis: &TimeBasis, rows: &ContactRows, node: usize) -> [Vector3; POINTS] {
+        let mut at_points = [Vector3::zeros(); POINTS];
         for other in 0..self.nodes() {
-            let pushes = |point: usize| self.multiplier(point, other) > 0.0;
-            if !(0..basis.count()).any(pushes) {
-                continue;
-            }
-            let (weights, slopes) = (basis.weights_at(theta), basis.slopes_at(theta));
-            for point in (0..basis.count()).filter(|point| pushes(*point)) {
-                let force = self.force(point, other);
-                for (row, column) in (0..3).flat_map(|row| (0..3).map(move |column| (row, column))) {
-                    let moved = rows.residual()[(3 * node + row, 3 * other + column)] * force[column];
-                    sums[0][row] += weights[point] * moved;
-                    sums[1][row] += slopes[point] * moved;
+            for (point, moved) in at_points[..basis.count()].iter_mut().enumerate() {
+                if self.multiplier(point, other) > 0.0 {
+                    let force = self.force(point, other);
+                    for (row, column) in (0..3).flat_map(|row| (0..3).map(move |column| (row, column))) {
+                        moved[row] += rows.residual()[(3 * node + row, 3 * other + column)] * force[column];
+                    }
                 }
             }
         }
-        sums
+        let mut coefficients = [Vector3::zeros(); POINTS];
+        for component in 0..3 {
+            let polynomial = basis.coefficients(&at_points.map(|moved| moved[component]));
+            coefficients.iter_mut().zip(polynomial).for_each(|(target, value)| target[component] = value);
+        }
+        coefficients
     }
 
     /// Returns the fraction of the step at which a node may come closer than at the points, if any.
@@ -206,11 +220,4 @@ impl Trial {
         let falling = basis.coefficients(&falling);
         interior_minimum(&falling).map_or(at_points, |theta| at_points.max(-evaluate(&falling, theta)))
     }
-}
-
-/// Coefficients of a polynomial of degree 2 over one of several equal parts.
-fn within(coefficients: &[Vector3; MOST], part: usize, parts: usize) -> [Vector3; MOST] {
-    let (from, length) = (real(part) / real(parts), 1.0 / real(parts));
-    let [a, b, c] = *coefficients;
-    [a + from * (b + from * c), length * (b + 2.0 * from * c), length * length * c]
 }
