@@ -6,7 +6,7 @@ use tiprub_study::error::clock;
 
 use super::super::{
     CaseEnd, Cases, Check, Expected, StabilityCase,
-    models::{GAP, StabilityMethod, Tower, allowed, on_ring, round},
+    models::{GAP, LONGEST, StabilityMethod, Tower, allowed, on_ring, round, with_step},
     observe::{StabilityWatch, begin, real, set, steps},
     press::Press,
 };
@@ -28,11 +28,11 @@ fn clearances() -> Vec<StabilityCase> {
         let (lcp, name) = (method.solver == Solver::Lcp, method.name());
         for gap in [1e-6, 1e-12, 1e-30, 1e-300, f64::MIN_POSITIVE, 5e-324, 0.02] {
             let against = "static contact, signs of the energy terms";
-            // A tolerance that is a fraction of such clearances is far below the rounding of displacements.
-            let expected = if method.is_galerkin() && gap < 1e-11 {
+            // The tolerance is a fraction of the clearance, and far below the rounding of displacements. The solver may then find no solution.
+            let expected = if method.is_galerkin() && method.solver == Solver::Coulomb && gap < 1e-11 {
                 Expected::either(against, ["the contact problem", "no solution"])
             } else if method.solver == Solver::Film && gap < 1e-18 {
-                // The same applies to film, whose penetration by rounding is a multiple of such a clearance.
+                // Rounding alone moves nodes into the casing by more than such a clearance, and film then reports penetration.
                 Expected::either(against, ["film has left contact node", "Use solver"])
             } else {
                 Expected::right(against)
@@ -71,6 +71,11 @@ fn clearances() -> Vec<StabilityCase> {
 
 fn pressed_from(method: StabilityMethod, gap: f64) -> CaseEnd {
     let mut scene = tower_scene(method);
+    if method.is_galerkin() && gap < 1e-20 {
+        // The tolerance is far below the rounding of displacements, so steps in contact are halved to the shortest length, 1/4096 of the longest
+        // step. With a longest step of 2 µs, twelve blades would take 2.5e7 steps per millisecond.
+        scene = with_step(scene, LONGEST);
+    }
     scene.settings.contacts[0].gap = gap;
     CaseEnd::of(Press::new(scene).run())
 }

@@ -301,7 +301,9 @@ fn shapes() -> Vec<StabilityCase> {
                         &["penetrated the casing by as much", "flank", "Check gap, casing shape"];
                     // Tips that vibrate this much slide back and forth, which ends the run as well.
                     let sliding: &[&str] = &["friction has added", "less friction"];
-                    Expected::either_as(against, &[deep, around, implausible, sliding])
+                    // When a tip crosses a steep bump, the contact normal may rotate too far within an internal step, which ends the run.
+                    let rotating: &[&str] = &["spurious energy", "normals rotate too far", "internal step"];
+                    Expected::either_as(against, &[deep, around, implausible, sliding, rotating])
                 } else {
                     Expected::right(against)
                 };

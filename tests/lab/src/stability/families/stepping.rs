@@ -275,9 +275,10 @@ fn drift(method: StabilityMethod, steps: f64) -> Result<(Vec<Check>, String)> {
     }
     let time = (clock::now() - start).as_secs_f64() / steps;
     let remark = format!("largest drift {most:.1e} over {steps:e} steps of {step:.2e} s, {:.0} ns each", 1e9 * time);
-    // Adaptive steps multiply each mode by a matrix whose determinant is 1 to rounding; the rounding adds up over 2.5e5
-    // steps of 80 µs.
-    let bound = if method.scheme == Scheme::Galerkin { 2.5e5 * f64::EPSILON } else { 1e-11 };
+    // Each adaptive step multiplies an undamped mode by a matrix of determinant 1. The determinant is a difference of products of two rounded
+    // entries, so its error is at most 2 ε per step. `galerkin` covers the longest case, 20 s, in 2.5e5 steps of 80 µs, in which equal errors
+    // add up. `galerkin-fixed` has the same bound.
+    let bound = if method.scheme == Scheme::Galerkin { 2.5e5 * 2.0 * f64::EPSILON } else { 1e-11 };
     Ok((vec![Check::so("the energy is positive", before > 0.0), Check::at_most("energy drift", most, bound)], remark))
 }
 

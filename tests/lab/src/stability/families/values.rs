@@ -331,7 +331,12 @@ fn refusals(field: &str) -> &'static [&'static [&'static str]] {
         "speed" => &[&["variable `speed`", "Use a lower speed"], &["structure[1].speed", "between -1e6 and 1e6"]],
         "damping_ratio" => &[&["structure[1].damping_ratio", "between 0 and 0.99"]],
         "frequency_factors" => &[&["structure[1].frequency_factors[4]", "between 0.5 and 2"]],
-        "gap" => &[&["contact[1].gap", "> 0"], &["contact[1].gap", "between 0 and"], &["contact.gap", "in metres"]],
+        "gap" => &[
+            &["contact[1].gap", "> 0"],
+            &["contact[1].gap", "missing or 0", "clearance (m)"],
+            &["contact[1].gap", "between 0 and"],
+            &["contact.gap", "in metres"],
+        ],
         "sector_gaps" => &[
             &["contact[1].sector_gaps", "> 0"],
             &["contact[1].sector_gaps", "between 0 and"],
