@@ -9,6 +9,8 @@ fn invalid_command_lines_exit_with_two_and_a_remedy() {
     let project = Project::new();
     let unknown = project.fail(&["run", "scene.toml", "--set", "sped=1"], 2);
     assert!(unknown.contains("no such variable") && unknown.contains("`speed`"), "{unknown}");
+    let fixed = project.fail(&["run", "builtin:rotor37-one-row", "--set", "tolerance=1e-2"], 2);
+    assert!(fixed.contains("only scenes with adaptive steps") && fixed.contains("galerkin"), "{fixed}");
     let wrong = project.fail(&["run", "scene.toml", "--set", "speed=fast"], 2);
     assert!(wrong.contains("not a number"), "{wrong}");
     let infinite = project.fail(&["run", "scene.toml", "--set", "speed=inf"], 2);

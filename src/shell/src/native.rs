@@ -463,6 +463,14 @@ fn locate(table: &VariableTable, name: &str) -> Result<(DataType, Option<usize>,
         };
         return Err(Failure::usage(format!("--set {name}"), problem, remedy));
     }
+    if name == "tolerance" {
+        let remedy = "Set `time.scheme = \"galerkin\"` in the scene";
+        return Err(Failure::usage(
+            format!("--set {name}"),
+            "only scenes with adaptive steps have a tolerance",
+            remedy,
+        ));
+    }
     let settable: Vec<&str> = table
         .variables()
         .iter()
