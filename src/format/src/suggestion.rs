@@ -52,7 +52,7 @@ fn normalised(name: &str) -> String {
     name.to_lowercase().replace('-', "_")
 }
 
-/// Returns the question `Did you mean `x`? ` if an accepted name is close, otherwise an empty text.
+/// Returns the question `Did you mean `x`? ` if an accepted name is close, otherwise an empty text. For `rpm`, returns the conversion to `speed`.
 ///
 /// # Examples
 /// ```
@@ -60,12 +60,22 @@ fn normalised(name: &str) -> String {
 /// assert_eq!(tiprub_format::name_hint("sped", ["torque"]), "");
 /// ```
 pub fn name_hint<'a>(given: &str, accepted: impl IntoIterator<Item = &'a str>) -> String {
+    let accepted: Vec<&str> = accepted.into_iter().collect();
+    if given == "rpm" && accepted.contains(&"speed") {
+        return "Use `speed`, in rad/s: 1 rpm is 0.10472 rad/s. ".to_owned();
+    }
     closest_name(given, accepted).map_or(String::new(), |name| format!("Did you mean `{name}`? "))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn converts_revolutions_per_minute() {
+        assert!(name_hint("rpm", ["rom", "speed"]).contains("`speed`, in rad/s"));
+        assert_eq!(name_hint("rpm", ["rom"]), "Did you mean `rom`? ");
+    }
 
     #[test]
     fn suggests_typos_but_not_unrelated_names() {
