@@ -103,7 +103,7 @@ fn run(trial: &RandomScene, faces: Option<&LibraryFaces>, row: &mut RandomRow) {
     row.findings.extend(record.end.as_deref().and_then(oracles::ends));
     row.findings.extend(watch.findings());
     row.findings.extend(states::restored(trial, &plan, &record));
-    row.findings.extend(states::differentiated(trial, &plan, &record));
+    row.findings.extend(states::differentiated(trial, &plan));
     if let Some(faces) = faces {
         row.findings.extend(faces.compare(trial, Native::Ran(&plan, &record)));
     }
