@@ -60,7 +60,7 @@ pub(crate) fn bits(simulation: &Simulation) -> Vec<u64> {
     outputs(simulation).into_iter().map(f64::to_bits).collect()
 }
 
-/// Returns the radial displacement of the first ring of the 36 × 3 nodes of the casing: amplitudes of cos nθ and of sin nθ, and the max_force rest at
+/// Returns the radial displacement of the first ring of the 36 × 3 nodes of the casing: amplitudes of cos nθ and of sin nθ, and the largest rest at
 /// any node (m).
 pub(crate) fn amplitudes(simulation: &Simulation, order: u32) -> [f64; 3] {
     let Some(row) = simulation.table().find("casing_displacement").map(|row| row.reference) else {
@@ -263,12 +263,12 @@ impl StabilityWatch {
         Check::at_most("energy residual", self.residual, 1e-9)
     }
 
-    /// Returns the max_force decrease of the impact loss in a communication step, relative to all energy exchanged.
+    /// Returns the largest decrease of the impact loss in a communication step, relative to all energy exchanged.
     pub(crate) fn impact_drop(&self) -> f64 {
         self.share(self.impact_drop)
     }
 
-    /// Returns the max_force decrease of the friction heat, likewise.
+    /// Returns the largest decrease of the friction heat, likewise.
     pub(crate) fn heat_drop(&self) -> f64 {
         self.share(self.heat_drop)
     }
@@ -315,15 +315,15 @@ fn open(simulation: &Simulation) -> f64 {
     real(simulation, "gap_offset") + if change.is_nan() { 0.0 } else { change }
 }
 
-/// Returns the max_force difference of two histories of displacements relative to the max_force value of the second.
+/// Returns the largest difference of two histories of displacements relative to the largest value of the second.
 pub(crate) fn apart(first: &[f64], second: &[f64]) -> f64 {
-    let max_force = second.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
+    let largest = second.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
     let square = |values: &mut dyn Iterator<Item = f64>| values.map(|value| value * value).sum::<f64>();
-    if max_force == 0.0 || first.len() != second.len() {
+    if largest == 0.0 || first.len() != second.len() {
         return if first == second { 0.0 } else { f64::INFINITY };
     }
-    let off = square(&mut first.iter().zip(second).map(|(a, b)| (a - b) / max_force));
-    (off / square(&mut second.iter().map(|value| value / max_force))).sqrt()
+    let off = square(&mut first.iter().zip(second).map(|(a, b)| (a - b) / largest));
+    (off / square(&mut second.iter().map(|value| value / largest))).sqrt()
 }
 
 /// Returns the displacements of all contact nodes of the sectors (m).
