@@ -160,6 +160,9 @@ pub enum GapLaw {
     Open(Box<OpenGap>),
 }
 
+/// Safety factor of the curvature of surfaces in [`GapLaw::largest_bends`]: nodes and normals move as well.
+const BEND_SAFETY: f64 = 2.0;
+
 impl GapLaw {
     /// Number of contact nodes per sector of the structure, including those of other pairs.
     pub fn nodes(&self) -> usize {
@@ -227,6 +230,16 @@ impl GapLaw {
             Self::Fixed(law) => 2.0 * law.normals[at.node].abs().dot(&reach),
             Self::Revolution(law) => law.approach(at, turned, reach),
             Self::Spline(_) | Self::Open(_) => f64::INFINITY,
+        }
+    }
+
+    /// Largest distance of the gap of a fixed node from a straight line in time (m), while the rotor turns by `turn` (rad) at a constant rate
+    /// and nothing else moves: the parts that are proportional to the angle and to its square. `None` if it is unknown.
+    pub fn largest_bends(&self, factor: f64, turn: f64) -> Option<[f64; 2]> {
+        match self {
+            Self::Fixed(_) => Some([0.0; 2]),
+            Self::Revolution(law) => Some(law.largest_bends(factor, turn)),
+            Self::Spline(_) | Self::Open(_) => self.smooth_ring().map(|law| [0.0, law.largest_bend(factor, turn)]),
         }
     }
 

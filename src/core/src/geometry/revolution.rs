@@ -10,6 +10,7 @@
 //!
 //! F = r_c(φ + δ) − ρ + m (u_z + e_z),  ∇F = (−cos δ − s' sin δ/ρ, (1 + u_r/r)(−sin δ + s' cos δ/ρ), m).
 
+use super::BEND_SAFETY;
 use super::frame::PolarFrame;
 use super::layout::Layout;
 use super::surface_spline::ClosestPoint;
@@ -166,6 +167,13 @@ impl RevolutionGap {
         let ends = self.surface.evaluate(from).0.min(self.surface.evaluate(to).0);
         let dip = drive.shape_factor * (ends - self.surface.lowest_between(from - around, to + around));
         dip + 2.0 * (reach[0] + self.slopes[node].abs() * reach[2])
+    }
+
+    /// See [`super::GapLaw::largest_bends`].
+    pub(super) fn largest_bends(&self, factor: f64, turn: f64) -> [f64; 2] {
+        let curvature = BEND_SAFETY * self.surface.largest_curvature();
+        [0.25 * self.surface.largest_kink() * turn.abs(), 0.125 * curvature * turn * turn]
+            .map(|bend| factor.abs() * bend)
     }
 
     /// See [`super::GapLaw::least`].

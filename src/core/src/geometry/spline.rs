@@ -2,6 +2,7 @@
 
 pub(crate) mod near;
 
+use super::BEND_SAFETY;
 use super::frame::PolarFrame;
 use super::layout::Layout;
 use super::surface_spline::motion::PatchMotions;
@@ -42,6 +43,9 @@ pub struct SplineGap {
     pub angular_scale: f64,
     /// Largest change of a control point by the shape at factor 1 (m).
     pub shape_size: f64,
+    /// Largest curvatures of the radius of a ring (m/rad²): by the shape at factor 1, and by different radii of the round surface.
+    shape_curvature: f64,
+    round_curvature: f64,
     /// Bounds of [`SurfaceSpline::turning_rates`] for the round surface and for the shape at factor 1 (m/rad).
     round_rates: Vec<f64>,
     shape_rates: Vec<f64>,
@@ -79,6 +83,10 @@ impl SplineGap {
         let clearance = layout.clearances.iter().copied().filter(|one| one.is_finite()).fold(0.0, f64::max);
         Self {
             shape_size: largest.sqrt(),
+            // The radial direction turns, so second differences of displacements differ from those of radii.
+            shape_curvature: largest_curvature(&surface, |index| shape.get(index).copied().unwrap_or_default())
+                + largest.sqrt(),
+            round_curvature: largest_curvature(&surface, |index| Vector3::x() * round[index].xy().norm()),
             round_rates: surface.turning_rates(&round),
             shape_rates: surface.turning_rates(&shape),
             spread: spread(&layout),
@@ -179,6 +187,13 @@ impl SplineGap {
             }
         });
         self.out_of_reach = out_of_reach;
+    }
+
+    /// See [`super::GapLaw::largest_bends`].
+    pub(super) fn largest_bend(&self, factor: f64, turn: f64) -> f64 {
+        // The radius of a ring through points on a circle has a curvature of up to `ripple` per squared radian.
+        let curvature = factor.abs() * self.shape_curvature + self.round_curvature + self.ripple;
+        0.125 * BEND_SAFETY * curvature * turn * turn
     }
 
     /// Computes upper bounds of the change of any gap of each sector over a step (m) by everything except the displacement of its node.
@@ -345,6 +360,17 @@ impl SplineGap {
 fn spread(layout: &Layout) -> [f64; 2] {
     let offsets = layout.angles.chunks_exact(layout.lanes).map(|row| row[0] - layout.angles[0]);
     offsets.fold([0.0; 2], |[low, high]: [f64; 2], offset| [low.min(offset), high.max(offset)])
+}
+
+/// Largest second difference of vectors at the control points of each ring, divided by the squared angle between points (m/rad²).
+fn largest_curvature(surface: &SurfaceSpline, of: impl Fn(usize) -> Vector3) -> f64 {
+    let around = surface.around();
+    let differences = (0..surface.control_points().len()).map(|index| {
+        let (ring, i) = (index - index % around, index % around);
+        let [before, after] = [(i + around - 1) % around, (i + 1) % around].map(|i| of(ring + i));
+        (before - 2.0 * of(index) + after).norm()
+    });
+    differences.fold(0.0, f64::max) / (surface.spacing() * surface.spacing())
 }
 
 fn frames(layout: &Layout) -> Vec<PolarFrame> {

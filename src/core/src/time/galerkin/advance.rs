@@ -4,7 +4,7 @@ use super::basis::{MOST, real};
 use super::kernels::PADDED;
 use super::level::{ModeSteps, StepTables};
 use super::response::TERMS;
-use super::rows::ContactRows;
+use super::rows::{ContactRows, Sums};
 use super::state::SectorState;
 use crate::math::simd::{InstructionSet, Kernel};
 use crate::math::vector::Vector3;
@@ -19,6 +19,8 @@ pub struct Advance {
     modal: [Vec<f64>; MOST],
     /// φᵀp_a of every mode, as coefficients of powers of the fraction of one part of the step.
     part_modal_forces: [Vec<f64>; MOST],
+    /// Amplitude of every mode in the step.
+    amplitudes: Vec<f64>,
     losses: Vec<f64>,
     instructions: InstructionSet,
 }
@@ -86,6 +88,7 @@ impl Advance {
             forces: std::array::from_fn(|_| vec![0.0; 3 * nodes]),
             modal: std::array::from_fn(|_| padded()),
             part_modal_forces: std::array::from_fn(|_| padded()),
+            amplitudes: padded(),
             losses: padded(),
             instructions: InstructionSet::detect(),
         }
@@ -96,25 +99,14 @@ impl Advance {
         self.finish::<2>(level, state)
     }
 
-    /// Advances q and q̇ under forces and returns the damping loss (J). `forces(node)` returns the coefficients of θᵃ of the
-    /// force on a node (N), if any.
-    pub fn under(
-        &mut self,
-        level: &StepTables,
-        rows: &ContactRows,
-        state: &mut SectorState,
-        forces: impl Fn(usize) -> Option<[Vector3; MOST]>,
-    ) -> f64 {
-        if self.compute_modal_forces(rows, forces) {
-            self.finish::<TERMS>(level, state)
-        } else {
-            self.freely(level, state)
-        }
+    /// Advances q and q̇ under the forces of the last [`Self::set_forces`], and returns the damping loss (J).
+    pub fn under_forces(&mut self, level: &StepTables, state: &mut SectorState) -> f64 {
+        if self.rows.is_empty() { self.freely(level, state) } else { self.finish::<TERMS>(level, state) }
     }
 
-    /// Computes the modal forces of a step, and returns whether any force acts; if not, `modal` is unchanged. `forces(node)` returns the
-    /// coefficients of θᵃ of the force on a node (N), or `None`.
-    fn compute_modal_forces(&mut self, rows: &ContactRows, forces: impl Fn(usize) -> Option<[Vector3; MOST]>) -> bool {
+    /// Computes and stores the modal forces of a step, for the calls below. `forces(node)` returns the coefficients of θᵃ of the force on a node
+    /// (N), or `None`.
+    pub fn set_forces(&mut self, rows: &ContactRows, forces: impl Fn(usize) -> Option<[Vector3; MOST]>) {
         self.rows.clear();
         for node in 0..self.forces[0].len() / 3 {
             let Some(coefficients) = forces(node) else { continue };
@@ -125,30 +117,33 @@ impl Advance {
                 self.rows.push(3 * node + component);
             }
         }
-        if self.rows.is_empty() {
-            return false;
+        if !self.rows.is_empty() {
+            let [a, b, c] = &self.forces;
+            let [one, two, three] = &mut self.modal;
+            rows.modal_forces(&self.rows, [a, b, c], [one, two, three]);
         }
-        let [a, b, c] = &self.forces;
-        let [one, two, three] = &mut self.modal;
-        rows.modal_forces(&self.rows, [a, b, c], [one, two, three]);
-        true
     }
 
-    /// Computes and stores the modal forces of a step of length `step` (s), for the following calls of [`Self::advance_part`]. `forces(node)`
-    /// returns the coefficients of θᵃ of the force on a node (N), or `None`. Returns a bound on the error of cubics over the whole step (m);
-    /// see `ContactRows::cubic_error_bound`.
-    pub fn prepare_parts(
-        &mut self,
-        rows: &ContactRows,
-        state: &SectorState,
-        step: f64,
-        forces: impl Fn(usize) -> Option<[Vector3; MOST]>,
-    ) -> f64 {
-        let acts = self.compute_modal_forces(rows, forces);
-        rows.cubic_error_bound(step, state, acts.then(|| std::array::from_fn(|term| &self.modal[term][..])))
+    /// Finds the amplitudes of all modes in a step of length `step` (s) under the forces of the last [`Self::set_forces`], for
+    /// [`Self::interpolation_error`]. Returns a bound on the distance between the displacement of any node and its polynomial of degree
+    /// `degree` (m).
+    pub fn find_amplitudes(&mut self, rows: &ContactRows, state: &SectorState, step: f64, degree: usize) -> f64 {
+        let forces = (!self.rows.is_empty()).then(|| std::array::from_fn(|term| &self.modal[term][..]));
+        rows.find_amplitudes(step, state, forces, degree == 1, &mut self.amplitudes)
     }
 
-    /// Advances q and q̇ over part `part` (from 0) of `parts` equal parts of the step of the last [`Self::prepare_parts`]. `level` has the length
+    /// Returns an upper bound on the error (m) of the cubics that interpolate displacements and velocities of the nodes between two times at a
+    /// distance of `length` (s), within the step of the last [`Self::find_amplitudes`].
+    pub fn interpolation_error(&self, rows: &ContactRows, length: f64) -> f64 {
+        rows.interpolation_error(length, &self.amplitudes)
+    }
+
+    /// Finds the same bounds for each row (m).
+    pub(crate) fn interpolation_errors(&self, rows: &ContactRows, length: f64, sums: &mut Sums<1>) {
+        rows.interpolation_errors(length, &self.amplitudes, sums);
+    }
+
+    /// Advances q and q̇ over part `part` (from 0) of `parts` equal parts of the step of the last [`Self::set_forces`]. `level` has the length
     /// of a part. Computes no damping loss.
     pub fn advance_part(&mut self, level: &StepTables, state: &mut SectorState, part: usize, parts: usize) {
         let state = [&mut state.position[..], &mut state.velocity];

@@ -105,6 +105,16 @@ impl TimeBasis {
         self.monomials.map(|row| row[1] + theta * (2.0 * row[2] + theta * 3.0 * row[3]))
     }
 
+    /// Weights with which values at the points after the start extrapolate to the start.
+    pub(crate) fn weights_before(&self) -> [f64; POINTS] {
+        let points = 1..self.count();
+        let weight = |i: usize| {
+            let others = points.clone().filter(|k| *k != i);
+            others.map(|k| self.points[k] / (self.points[k] - self.points[i])).product()
+        };
+        std::array::from_fn(|i| if points.contains(&i) { weight(i) } else { 0.0 })
+    }
+
     /// Number of points including the start.
     pub fn count(&self) -> usize {
         self.degree + 1

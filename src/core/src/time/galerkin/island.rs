@@ -8,11 +8,11 @@ use super::carrier::{BLOCKS, CarrierIntegrator};
 use super::compliance::Lanes;
 use super::disk::CoupledDisk;
 use super::shared_body::SharedBody;
-use super::span::{Flight, SpanStep, SpanSteps, StepGoal, Stopped, integrate};
+use super::span::{Flight, LONGEST_NEAR_STEP, SpanStep, SpanSteps, StepGoal, Stopped, integrate};
 use super::state::SectorState;
 use super::surroundings::{AcceptedStep, CarriersInStep, LaneStep, Surroundings, Witness};
 use super::tables::{HALVINGS, Tables, halved};
-use super::trial::{ForceInterpolation, TravelBounds, Trial, TrialResult};
+use super::trial::{ForceInterpolation, StepToFollow, TravelBounds, Trial, TrialResult};
 use crate::scene::method::Solver;
 use crate::system::Effort;
 
@@ -363,7 +363,11 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         for far in [false, true] {
             self.find_gaps(step, kind, points, far);
         }
-        self.find_minima(step, kind, true);
+        if self.island.is_single() {
+            self.follow(step, kind, true);
+        } else {
+            self.find_minima(step, kind, true);
+        }
         for place in self.places() {
             let index = self.index(place);
             let SectorInStep { mut surfaces, tables, trial, .. } = self.sector(index, step, kind);
@@ -371,24 +375,68 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
         }
     }
 
-    /// Finds where nodes may come closer between the points of a step. In a single sector, the motion of these nodes is followed; see
-    /// [`Trial::follow`].
+    /// Takes a step of a single sector near rigid surfaces without a trial, if its nodes stay open.
+    fn fly_near(&mut self, step: SpanStep) -> Flight {
+        let (kind, tolerance) = (ForceInterpolation::Constant, self.goal.tolerance);
+        if !self.island.is_single() || !self.island.sectors[0].state.gaps_known {
+            return Flight::NeedsTrial;
+        }
+        let Some(bends) = self.sector(0, step, kind).surfaces.largest_bends(step.from, step.length) else {
+            return Flight::NeedsTrial;
+        };
+        self.prepare(step, kind);
+        let rejected = if step.level == HALVINGS || self.length(step.level) <= LONGEST_NEAR_STEP {
+            Flight::NeedsTrial
+        } else {
+            Flight::TooLong
+        };
+        let lowest = self.find_gaps(step, kind, 1, false).lowest;
+        if lowest.is_nan() {
+            return Flight::NeedsTrial;
+        }
+        let SectorInStep { mut surfaces, tables, trial, state, advance, .. } = self.sector(0, step, kind);
+        let step_tables = &tables.levels[step.level];
+        let followed = StepToFollow { tables, level: step.level, step: step_tables, tolerance, state };
+        if lowest <= 0.0 || !trial.stays_open(&followed, advance, &surfaces, bends) {
+            return rejected;
+        }
+        surfaces.record_gaps(step_tables, trial);
+        surfaces.keep_places();
+        surfaces.record_damping(advance.freely(step_tables, state));
+        trial.leave(state);
+        Flight::Accepted
+    }
+
+    /// Finds how close the nodes of a single sector come between the points of a tried step, if the polynomials of the step describe the motion
+    /// there (`is_resolved`). Stores the modal forces of the step. Returns the smallest of these gaps (m).
+    fn follow(&mut self, step: SpanStep, kind: ForceInterpolation, is_resolved: bool) -> f64 {
+        let tolerance = self.goal.tolerance;
+        let SectorInStep { surfaces, tables, trial, state, advance, .. } = self.sector(0, step, kind);
+        let step_tables = tables.of_points(step.level, kind, trial.points());
+        advance.set_forces(&tables.rows, |node| trial.polynomial(&step_tables.basis, kind, node));
+        trial.forget_followed();
+        if !is_resolved {
+            return f64::INFINITY;
+        }
+        let followed = StepToFollow { tables, level: step.level, step: step_tables, tolerance, state };
+        trial.follow(&followed, advance, &surfaces)
+    }
+
+    /// Finds where nodes of several sectors may come closer between the points of a step, and stores the modal forces of the step.
     fn find_minima(&mut self, step: SpanStep, kind: ForceInterpolation, is_resolved: bool) {
-        let (tolerance, is_single) = (self.goal.tolerance, self.island.is_single());
+        let tolerance = self.goal.tolerance;
         for place in self.places() {
             let index = self.index(place);
             let SectorInStep { surfaces, tables, disk, trial, state, advance } = self.sector(index, step, kind);
             let level = tables.of_points(step.level, kind, trial.points());
-            let is_needed = |node: usize, bound: f64| surfaces.needs_minimum(node, bound);
-            if !trial.find_minima(&level.basis, is_resolved, tolerance, is_needed) {
-                continue;
-            }
             if disk.is_none() {
-                trial.find_start(&tables.rows, state);
+                advance.set_forces(&tables.rows, |node| trial.polynomial(&level.basis, kind, node));
             }
-            trial.drop_jumps(&surfaces, tolerance);
-            if is_single {
-                trial.follow(tables, level, (step.level, tolerance), state, advance);
+            if trial.find_minima(&level.basis, is_resolved, tolerance, |node| surfaces.needed_below(node)) {
+                if disk.is_none() {
+                    trial.find_start(&tables.rows, state);
+                }
+                trial.drop_jumps(&surfaces, tolerance);
             }
         }
     }
@@ -407,8 +455,7 @@ impl<S: Surroundings> IslandInSpan<'_, S> {
             }
             if disk.is_none() {
                 let level = tables.of_points(step.level, kind, trial.points());
-                let forces = |node| trial.polynomial(&level.basis, kind, node);
-                surfaces.record_damping(advance.under(level, &tables.rows, state, forces));
+                surfaces.record_damping(advance.under_forces(level, state));
             }
             trial.leave(state);
         }
@@ -465,12 +512,13 @@ impl<S: Surroundings> SpanSteps for IslandInSpan<'_, S> {
                 disk.find_reach(bank);
             }
         }
-        for place in self.places() {
+        let is_clear = self.places().all(|place| {
             let index = self.index(place);
             let (surfaces, reach) = self.reach(index, step);
-            if !surfaces.is_clear(step.from, step.length, reach) {
-                return Flight::NeedsTrial;
-            }
+            surfaces.is_clear(step.from, step.length, reach)
+        });
+        if !is_clear {
+            return self.fly_near(step);
         }
         self.follow_flight(step);
         for place in self.places() {
@@ -489,7 +537,15 @@ impl<S: Surroundings> SpanSteps for IslandInSpan<'_, S> {
     }
 
     fn attempt(&mut self, step: SpanStep, kind: ForceInterpolation) -> TrialResult {
-        self.attempt_step(step, kind)
+        let mut result = self.attempt_step(step, kind);
+        if result.solved && self.island.is_single() {
+            let (tolerance, is_shortest) = (self.goal.tolerance, step.level == HALVINGS);
+            let lowest = self.follow(step, kind, result.resolves_motion(kind, tolerance));
+            if lowest < -tolerance && !is_shortest {
+                result.depth = result.depth.max(-lowest);
+            }
+        }
+        result
     }
 
     fn accept(&mut self, step: SpanStep, kind: ForceInterpolation, result: &TrialResult) -> f64 {
@@ -501,8 +557,9 @@ impl<S: Surroundings> SpanSteps for IslandInSpan<'_, S> {
             dropped = self.island.shared_bodies().map(SharedBody::dropped).sum();
         }
         let mut of_bodies = dropped;
-        let is_resolved = result.resolves_motion(kind, self.goal.tolerance);
-        self.find_minima(step, kind, is_resolved);
+        if !self.island.is_single() {
+            self.find_minima(step, kind, result.resolves_motion(kind, self.goal.tolerance));
+        }
         for place in self.places() {
             let index = self.index(place);
             self.island.sectors[index].is_far = false;

@@ -1,6 +1,6 @@
 //! One sector and its surfaces over a span: gaps at any time, and a record of the contacts.
 
-use super::basis::{TimeBasis, real};
+use super::basis::TimeBasis;
 use super::carrier::{BLOCKS, CarrierIntegrator};
 use super::compliance::Lanes;
 use super::level::StepTables;
@@ -8,12 +8,14 @@ use super::record::{FORCE_ROUNDING, PairRecord, SpanRecord, SurfacePlace};
 use super::surroundings::{AcceptedStep, CarriersInStep, LaneStep, Witness};
 use super::trial::{ForceInterpolation, Obstacle, SlidingState, Trial, node_by_node};
 use crate::contact::ContactParameters;
+use crate::geometry::spline::near::{NearNode, NearSearch};
 use crate::geometry::wrench::{At, MotionIncrement};
 use crate::geometry::{Gap, GapLaw, PrescribedMotion, Sliding, Vector3, Vibration};
 use crate::math::vector::vector3_at;
 use crate::system::carrier::Spot;
 use crate::system::pair::ContactPair;
 use crate::system::work::WorkingForce;
+use std::iter;
 
 /// Number of contact solutions in a trial after which the sliding directions are frozen, because a node that hardly slides would
 /// change its direction in every solution.
@@ -136,7 +138,18 @@ impl Obstacle for ObstacleView<'_> {
         match pair.gap() {
             GapLaw::Fixed(law) => Some(law.gap(node, moved).distance),
             GapLaw::Revolution(law) => Some(law.gap(self.at(node, &drive), moved).distance),
-            GapLaw::Spline(_) | GapLaw::Open(_) => None,
+            GapLaw::Spline(_) | GapLaw::Open(_) => {
+                let ring = pair.gap().smooth_ring().filter(|_| own.carrier.is_none())?;
+                // The ring has its shape at a point of the step.
+                let end = own.course.at(from + length).0;
+                if drive.shape_factor.to_bits() != end.shape_factor.to_bits() {
+                    return None;
+                }
+                let mut distance = None;
+                let near = NearNode { node, index: self.record.index(node), local: moved, guess: None };
+                NearSearch::new(ring, &drive).find_gaps(iter::once(near), |_, gap| distance = Some(gap.distance));
+                distance
+            }
         }
     }
 
@@ -278,8 +291,23 @@ impl Witness for ObstacleView<'_> {
         self.any_node(from, length, |at, gap, end| gap.approach(at, end, vector3_at(reach, at.node)) > tolerance)
     }
 
-    fn needs_minimum(&self, node: usize, bound: f64) -> bool {
-        bound < self.record.needed_below[node].min(self.record.tallies[node].lowest)
+    fn largest_bends(&self, from: f64, length: f64) -> Option<[f64; 2]> {
+        self.record.pairs.iter().try_fold([0.0_f64; 2], |most, own| {
+            let is_known = own.course.only_turns() && own.carrier.is_none();
+            let [start, end] = [from, from + length].map(|theta| own.course.at(theta).0);
+            let turn = end.rotor_angle - start.rotor_angle;
+            let bends = self.pairs[own.pair].gap().largest_bends(end.shape_factor, turn).filter(|_| is_known)?;
+            Some([most[0].max(bends[0]), most[1].max(bends[1])])
+        })
+    }
+
+    fn keep_places(&mut self) {
+        let [first, second, ..] = &mut self.record.places;
+        first.copy_from_slice(second);
+    }
+
+    fn needed_below(&self, node: usize) -> f64 {
+        self.record.needed_below[node].min(self.record.tallies[node].lowest)
     }
 
     fn record_gaps(&mut self, level: &StepTables, trial: &Trial) {
@@ -343,15 +371,18 @@ const CLOSER: f64 = 0.25;
 impl ObstacleView<'_> {
     /// Smallest gap of a node (m) so far, at the points of a step, and between them if it stays open.
     fn lowest(&self, trial: &Trial, basis: &TimeBasis, node: usize) -> f64 {
-        let gaps = (1..=trial.points()).map(|point| trial.gap(point, node));
-        let lowest = gaps.fold(self.record.tallies[node].lowest, f64::min);
+        let so_far = self.record.tallies[node].lowest;
+        if let Some(minimum) = trial.followed_minimum(node) {
+            return so_far.min(minimum).min(trial.gap(trial.points(), node));
+        }
+        let lowest = (1..=trial.points()).map(|point| trial.gap(point, node)).fold(so_far, f64::min);
         match trial.minimum(node) {
             Some(theta) => lowest.min(self.lowest_near(trial, basis, node, theta)),
             _ => lowest,
         }
     }
 
-    /// Smallest gap of a node (m) within a step, near `theta` if its motion is not known in parts.
+    /// Smallest gap of a node (m) within a step, near `theta`.
     ///
     /// A surface of revolution and the displacements are not polynomials of time, so gaps are evaluated. Gaps to other surfaces
     /// are a polynomial.
@@ -368,13 +399,7 @@ impl ObstacleView<'_> {
             lowest = lowest.min(gap);
             gap
         };
-        let parts = real(trial.parts());
-        let ends = (1..trial.parts()).map(|part| real(part) / parts);
-        let (mut theta, _) = ends.fold((theta, f64::INFINITY), |(best, least), theta| {
-            let gap = look(theta);
-            if gap < least { (theta, gap) } else { (best, least) }
-        });
-        let mut apart = if trial.parts() > 1 { 0.5 / parts } else { 0.1 };
+        let (mut theta, mut apart) = (theta, 0.1);
         for _ in 0..PARABOLAS {
             theta = theta.clamp(apart, 1.0 - apart);
             let [before, here, after] = [theta - apart, theta, theta + apart].map(&mut look);

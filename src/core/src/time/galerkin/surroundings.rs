@@ -37,13 +37,23 @@ pub trait Witness: Obstacle {
         false
     }
 
-    /// Returns whether the smallest gap of a node within the step is needed if it may be as small as `bound` (m).
-    fn needs_minimum(&self, _node: usize, _bound: f64) -> bool {
-        true
+    /// Returns the largest distance (m) of the gaps of fixed nodes from straight lines in time during a step of `length` from `from` (fractions
+    /// of the span): the parts that are proportional to the length and to its square. Returns `None` if anything but a rotor moves, or if this is
+    /// unknown.
+    fn largest_bends(&self, _from: f64, _length: f64) -> Option<[f64; 2]> {
+        None
+    }
+
+    /// Returns the gap (m) below which the smallest gap of a node within the step is needed.
+    fn needed_below(&self, _node: usize) -> f64 {
+        f64::INFINITY
     }
 
     /// Called before the tried step is accepted, with gaps and displacements at its points.
     fn record_gaps(&mut self, _level: &StepTables, _trial: &Trial) {}
+
+    /// Starts the search for closest points at those of point 1 of the accepted step.
+    fn keep_places(&mut self) {}
 
     /// Records the damping loss of a step (J).
     fn record_damping(&mut self, damping_loss: f64);

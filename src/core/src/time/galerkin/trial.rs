@@ -2,6 +2,7 @@
 
 mod coupled;
 mod fast_sliding;
+mod follow;
 mod judgement;
 mod minima;
 mod obstacle;
@@ -22,10 +23,11 @@ use crate::geometry::Sliding;
 use crate::math::simd::InstructionSet;
 use crate::math::vector::{Vector3, set_vector3_at, vector3_at};
 use crate::scene::method::Solver;
+use follow::Followed;
+pub(crate) use follow::StepToFollow;
 use judgement::FreeMotion;
 pub use judgement::TrialResult;
 pub(crate) use judgement::{FALLING, KINK, NEAR};
-use minima::Minima;
 use nalgebra::DMatrix;
 pub(crate) use obstacle::node_by_node;
 pub use obstacle::{Obstacle, SlidingState};
@@ -111,7 +113,10 @@ pub struct Trial {
     left: Vec<f64>,
     /// Depth of each node between the points (m), 0 if it touches at a point.
     depths: Vec<f64>,
-    minima: Minima,
+    /// Fraction of the step at which the polynomial through the gaps of a node is smallest; NaN if that gap does not matter.
+    minima: Vec<f64>,
+    /// Nodes of a single sector that are followed between the points.
+    followed: Followed,
     /// Data for contacts that may stick; and 1/h of the step (1/s), 0 if its force does not continue that of the previous step.
     sticking: Option<Box<Sticking>>,
     per_step: f64,
@@ -176,7 +181,8 @@ impl Trial {
             impulses: rows(),
             left: rows(),
             depths: vec![0.0; nodes],
-            minima: Minima::new(modes, nodes),
+            minima: vec![f64::NAN; nodes],
+            followed: Followed::new(modes, nodes),
             sticking: solver.sticks().then(|| Box::new(Sticking::new(nodes))),
             per_step: 0.0,
             steady: None,

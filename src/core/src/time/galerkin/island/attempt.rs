@@ -32,7 +32,7 @@ const ALLOWED_DEPTH: f64 = 0.3;
 /// Gaps of an island at the points of a step.
 pub(super) struct IslandGaps {
     /// Smallest gap (m).
-    lowest: f64,
+    pub lowest: f64,
     /// Largest gap of an active contact (m).
     largest: f64,
     /// True if no contact is active.

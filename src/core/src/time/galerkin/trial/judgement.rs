@@ -31,7 +31,7 @@ pub(crate) const FALLING: f64 = 16.0;
 #[derive(Debug, Clone)]
 pub(super) struct FreeMotion {
     /// Velocities at the end (m/s).
-    end_velocities: Sums<1>,
+    pub(super) end_velocities: Sums<1>,
     /// Summed amplitudes of the modes that the step does not resolve (m).
     unresolved_amplitudes: Sums<1>,
     /// True if the velocities and the amplitudes belong to the tried step.
