@@ -192,6 +192,7 @@ fn steps_without_a_trial_find_every_bump() {
                 scene.settings.surfaces[0].shape = Shape::Lobes { amplitude: 1.03 * GAP, order: 8, phase };
                 (scene.settings.surfaces[0].ramp_time, scene.settings.contacts[0].friction) = (2e-5, 0.05);
                 scene.settings.structures[0].damping_ratio = Some(0.3);
+                scene.settings.contacts[0].nodes = Some(scene.roms[0].contact_nodes[1].name.clone());
                 change(&mut scene);
                 let mut simulation = started(&scene);
                 (0..40).for_each(|_| go(&mut simulation, 2.0 * H));
