@@ -1,7 +1,9 @@
-//! Smallest gaps within a step of a single sector on rigid surfaces, for nodes that are open at all points of the step.
+//! Smallest gaps within a step of a single sector on rigid surfaces, for nodes that stay open.
 //!
-//! At θ, the gap of a node is b(θ) + n(θ)·u(θ). Its displacement u is computed exactly from all modes. The normal n and b are polynomials
-//! through their values at the points of the step, so the error is of second order in the distance between u and the displacements at the points.
+//! At the fraction θ of the step, the gap of a node is b(θ) + n(θ)·u(θ). Its displacement u is computed exactly from all modes. The normal n and b
+//! are polynomials through their values at the points of the step, so the error is of second order in the distance between u and the displacements
+//! at the points. In a step without a trial, n is constant, and b is a line between both ends of a part, where the gap to the surface is evaluated.
+//!
 //! A cubic connects the gaps and their rates at both ends of a part of the step. Parts are halved, starting with the whole step, until the cubic
 //! shows that the smallest gap is not needed, or is accurate enough. At its minimum, the gap to the surface is evaluated.
 
@@ -46,7 +48,8 @@ struct FollowedNode {
     normal: [Vector3; POINTS],
     /// Displacement due to the residual flexibility (m).
     residual: [Vector3; POINTS],
-    /// Error of b over the whole step (m): the parts that are proportional to the length of an interval, and to its square.
+    /// Error of b over the whole step (m). The error of a line has parts that are proportional to the length of an interval and to its square.
+    /// The error of a polynomial is in the second place.
     errors: [f64; 2],
     /// True if b is a line between the values at both ends of each part, which follow from gaps to the surface.
     is_line: bool,
