@@ -5,6 +5,7 @@ use super::{Combination, H, apart, disk_displacements, goes_on_with_the_same_bit
 use crate::guide::{self, print_row};
 use tiprub_core::scene::method::{Scheme, Solver};
 use tiprub_core::scene::settings::{Shape, TimeSettings};
+use tiprub_core::system::Effort;
 use tiprub_core::{Rom, Scene};
 use tiprub_test_models::disk::TestDisk;
 use tiprub_test_models::{GAP, RADIUS, bumps, flexible, go, modal, node, real, started};
@@ -83,39 +84,76 @@ fn three_springs() -> Rom {
     Rom { damping_ratio: 0.002, ..modal("blade", &frequencies, shape, vec![tip]) }
 }
 
-/// A slow blade under passing lobes: it repeatedly sticks, slips and separates.
+/// Returns a scene in which a blade of three modes slides over two lobes.
+fn blade_under_lobes(speed: f64, friction: f64, phase: f64, tolerance: f64) -> Scene {
+    let mut scene = bumps(three_springs());
+    scene.settings.time = TimeSettings { tolerance: Some(tolerance), step: 2.0 * H, ..scene_time() };
+    scene.settings.outputs.energies = true;
+    scene.settings.structures[0].speed = speed;
+    scene.settings.surfaces[0].shape = Shape::TwoLobe { depth: 0.9, width: 0.15, phase };
+    (scene.settings.contacts[0].friction, scene.settings.contacts[0].solver) = (friction, Solver::Coulomb);
+    scene
+}
+
+/// Returns the displacements at all communication points (m) and the effort of a run.
+fn displacements_of(scene: &Scene, steps: usize) -> (Vec<f64>, Effort) {
+    let mut simulation = started(scene);
+    let mut displacements = Vec::new();
+    for _ in 0..steps {
+        go(&mut simulation, 2.0 * H);
+        let bank = simulation.system().bank();
+        displacements.extend((0..3).map(|row| bank.row(row, 0)));
+    }
+    let effort = *simulation.system().effort();
+    // Rounding grows with the number of steps.
+    let residual = real(&simulation, "energy_residual_relative").abs();
+    assert!(residual < 1e-14 + 1e-16 * f64::from(u32::try_from(effort.trials).unwrap()), "{residual:e}");
+    (displacements, effort)
+}
+
+/// Returns the largest difference between displacements, in clearances.
+fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / GAP
+}
+
+/// The blades hit slowly passing lobes and bounce. In the first two rubs, the vibration is much slower than the sliding. In the
+/// third one it is as fast, so that sliding reverses and tips stick for short times.
 #[test]
-fn errors_stay_near_the_tolerance_where_blades_stick_and_slip() {
-    for (speed, friction, steps) in [(60.0, 0.3, 600), (200.0, 0.2, 600)] {
-        let run = |tolerance: f64| {
-            let mut scene = bumps(three_springs());
-            scene.settings.time = TimeSettings { tolerance: Some(tolerance), step: 2.0 * H, ..scene_time() };
-            scene.settings.outputs.energies = true;
-            scene.settings.structures[0].speed = speed;
-            scene.settings.surfaces[0].shape = Shape::TwoLobe { depth: 0.9, width: 0.15, phase: 0.0 };
-            (scene.settings.contacts[0].friction, scene.settings.contacts[0].solver) = (friction, Solver::Coulomb);
-            let mut simulation = started(&scene);
-            let mut displacements = Vec::new();
-            for _ in 0..steps {
-                go(&mut simulation, 2.0 * H);
-                let bank = simulation.system().bank();
-                displacements.extend((0..3).map(|row| bank.row(row, 0)));
-            }
-            assert!(real(&simulation, "energy_residual_relative").abs() < 1e-12);
-            (displacements, *simulation.system().effort())
-        };
+fn errors_of_bouncing_blades_stay_near_the_tolerance() {
+    for (speed, friction, phase, limit) in [(60.0, 0.3, 0.0, 4.0), (200.0, 0.2, 0.0, 4.0), (12.0, 0.7, -1.67, 30.0)] {
+        let run = |tolerance: f64| displacements_of(&blade_under_lobes(speed, friction, phase, tolerance), 600);
         let (exact, _) = run(1e-6);
         for tolerance in [1e-2, 1e-3, 1e-4, 1e-5] {
             let (found, effort) = run(tolerance);
-            let error = found.iter().zip(&exact).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / GAP / tolerance;
+            let error = largest_difference(&found, &exact) / tolerance;
             print_row!(
                 "{speed} rad/s, tolerance {tolerance:.0e}: error over it {error:.2}, {} steps, {} trials, missed {}",
                 effort.steps,
                 effort.trials,
                 effort.missed
             );
-            assert!(error < 4.0, "{speed} rad/s, {tolerance:e}: {error}");
+            assert!(error < limit, "{speed} rad/s, {tolerance:e}: {error}");
         }
     }
-    guide::hold("cargo test -p tiprub-core --test galerkin stick and slip");
+    guide::hold("cargo test -p tiprub-core --test galerkin bouncing blades");
+}
+
+/// Blades of a fast rotor hardly ever stick, so that they need as few steps as without sticking. Errors are as large, too.
+#[test]
+fn blades_of_fast_rotors_need_no_more_steps_than_without_sticking() {
+    for (speed, friction) in [(800.0, 0.3), (1300.0, 0.15), (1300.0, 0.6)] {
+        for tolerance in [1e-2, 1e-3, 1e-4] {
+            let [sliding, sticking] = [Solver::Lcp, Solver::Coulomb].map(|solver| {
+                let run = |tolerance: f64| {
+                    let mut scene = blade_under_lobes(speed, friction, 0.0, tolerance);
+                    scene.settings.contacts[0].solver = solver;
+                    displacements_of(&scene, 150)
+                };
+                let ((found, effort), (exact, _)) = (run(tolerance), run(1e-7));
+                (largest_difference(&found, &exact) / tolerance, effort.trials)
+            });
+            println!("{speed} rad/s, µ = {friction}, tolerance {tolerance:e}: {sliding:?}, {sticking:?}");
+            assert!(sticking.0 < 4.0 && 10 * sticking.1 < 11 * sliding.1, "{sliding:?} {sticking:?}");
+        }
+    }
 }

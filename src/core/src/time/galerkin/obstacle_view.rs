@@ -188,6 +188,10 @@ impl Obstacle for ObstacleView<'_> {
         self.pair(node).map_or(0.0, of)
     }
 
+    fn largest_displacement(&self, node: usize) -> f64 {
+        self.pair(node).map_or(f64::INFINITY, |(pair, _)| pair.gap().largest_displacement())
+    }
+
     fn turns(&self) -> bool {
         let mut pairs = self.record.pairs.iter().map(|own| &self.pairs[own.pair]);
         pairs.any(|pair| pair.gap().slides_anywhere() && pair.parts.parameters.friction != 0.0)

@@ -26,6 +26,7 @@ pub struct ContactRows {
     /// ξω and 1/ω_d of each mode; 1/ω_d is infinite for rigid-body modes.
     rates: Vec<[f64; 2]>,
     mode_bounds: ModeBounds,
+    lowest_frequency: f64,
     /// Coefficients of the bound on the displacement of each mode.
     motions: Vec<FreeMotion>,
     /// The indices 0, 1, 2, …
@@ -213,6 +214,7 @@ impl ContactRows {
             rates.map(|(w, ratio)| [ratio * w, 1.0 / (w * (1.0 - ratio * ratio).sqrt())]).collect();
         Self {
             mode_bounds: ModeBounds::new(modes),
+            lowest_frequency: modes.frequencies.iter().copied().fold(f64::INFINITY, f64::min),
             magnitudes: by_mode.iter().map(|shape| shape.abs()).collect(),
             by_mode,
             stride,
@@ -224,6 +226,11 @@ impl ContactRows {
             rates,
             all: (0..count).collect(),
         }
+    }
+
+    /// Returns the lowest frequency of the modes (rad/s).
+    pub(crate) fn lowest_frequency(&self) -> f64 {
+        self.lowest_frequency
     }
 
     /// Residual flexibility G (m/N), rows 3·node + component.

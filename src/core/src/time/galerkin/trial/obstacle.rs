@@ -36,6 +36,11 @@ pub trait Obstacle {
         None
     }
 
+    /// Returns the displacement of a node (m) at which a run ends. Infinite if there is no limit.
+    fn largest_displacement(&self, _node: usize) -> f64 {
+        f64::INFINITY
+    }
+
     /// Returns whether sliding directions turn within a step, so that [`SlidingState::sliding_distance`] is needed.
     fn turns(&self) -> bool {
         false
