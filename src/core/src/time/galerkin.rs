@@ -18,6 +18,7 @@ pub mod kernels;
 pub mod level;
 mod near_gaps;
 mod obstacle_view;
+mod parts;
 mod record;
 pub mod response;
 pub mod rows;

@@ -2,21 +2,21 @@
 
 use super::columns::{add_modes, displace_nodes, put, sum, values_at_points};
 use super::level::BladeLevel;
-use super::minima::{FOLLOW_FRACTION, MAX_HALVINGS, MINIMUM_FRACTION, amplitude, fraction, relative_error};
+use super::minima::{amplitude, fraction, relative_error};
 use super::off_centre::{OffCentreGaps, directions_of};
 use super::rows::BladeRows;
 use super::surface::{DriveRate, FacedSurface, PointDrive};
 use super::tables::BladeTables;
 use super::trial::BladeTrial;
 use crate::math::octet::{Eight, Octet, OctetKernel, both};
+use crate::time::galerkin::parts::{FOLLOW_FRACTION, MAX_HALVINGS, MINIMUM_FRACTION, Part, PartSearch, search_parts};
 use crate::time::galerkin::response::TERMS;
 use crate::time::galerkin::tables::HALVINGS;
 use crate::time::galerkin::trial::ForceInterpolation;
+use std::marker::PhantomData;
 
 /// Largest number of followed nodes of a block of eight whose displacements are computed node by node.
 const FEW_PER_BLOCK: u32 = 3;
-/// Number of times in a step at which the motion is stored: its ends, and the middle of one part of each length.
-pub(super) const STORED_TIMES: usize = MAX_HALVINGS + 2;
 
 /// Exact motion of the followed nodes at a time within a step.
 #[derive(Debug, Clone)]
@@ -33,24 +33,6 @@ impl PathPoint {
     pub fn new(nodes: usize, modes: usize) -> Self {
         let of = |blocks: usize| vec![Eight::ZERO; blocks];
         Self { modes: [of(modes), of(modes)], gaps: of(nodes), rates: of(nodes) }
-    }
-}
-
-/// Part of a step that is halved `halvings` times. `index` counts the parts from the start of the step.
-#[derive(Debug, Clone, Copy, Default)]
-struct Part {
-    halvings: usize,
-    index: usize,
-    /// Indices of the stored times at both ends.
-    ends: [usize; 2],
-}
-
-impl Part {
-    /// Returns both ends as fractions of the step.
-    #[inline(always)]
-    fn span(&self) -> [f64; 2] {
-        let length = fraction(1, 1 << self.halvings);
-        [fraction(self.index, 1) * length, fraction(self.index + 1, 1) * length]
     }
 }
 
@@ -96,34 +78,36 @@ impl<D: Fn(f64) -> (PointDrive, DriveRate)> OctetKernel for Follow<'_, D> {
             self.find_amplitudes::<L>();
         }
         self.find_gaps::<L>(0, 0.0);
-        self.advance::<L>(Part { ends: [0, 1], ..Part::default() }, 0);
+        self.advance::<L>(Part::WHOLE, 0);
         self.find_gaps::<L>(1, 1.0);
-        let mut errors = [f64::NAN; MAX_HALVINGS + 1];
-        let mut parts = [Part::default(); MAX_HALVINGS + 1];
-        parts[0].ends = [0, 1];
-        let mut count = 1;
-        while count > 0 {
-            count -= 1;
-            let part = parts[count];
-            let [begin, end] = part.span();
-            if end <= self.ends[0] || begin >= self.ends[1] {
-                continue;
-            }
-            if errors[part.halvings].is_nan() {
-                errors[part.halvings] = self.interpolation_error::<L>(part.halvings);
-            }
-            if !self.needs_halving::<L>(part, errors[part.halvings]) {
-                continue;
-            }
-            let middle = 2 + part.halvings;
-            let [first, last] = part.ends;
-            self.advance::<L>(Part { ends: [first, middle], ..part }, 1);
-            self.find_gaps::<L>(middle, 0.5 * (begin + end));
-            let half = |index: usize, ends: [usize; 2]| Part { halvings: part.halvings + 1, index, ends };
-            parts[count] = half(2 * part.index + 1, [middle, last]);
-            parts[count + 1] = half(2 * part.index, [first, middle]);
-            count += 2;
-        }
+        search_parts(&mut FollowInParts { follow: self, lanes: PhantomData::<L> });
+    }
+}
+
+/// The search for smallest gaps in parts of the step.
+struct FollowInParts<'a, D, L> {
+    follow: Follow<'a, D>,
+    lanes: PhantomData<L>,
+}
+
+impl<D: Fn(f64) -> (PointDrive, DriveRate), L: Octet> PartSearch for FollowInParts<'_, D, L> {
+    #[inline(always)]
+    fn interpolation_error(&mut self, halvings: usize) -> f64 {
+        self.follow.interpolation_error::<L>(halvings)
+    }
+
+    #[inline(always)]
+    fn needs_halving(&mut self, part: Part, error: f64) -> bool {
+        let [begin, end] = part.span();
+        let is_recorded = end > self.follow.ends[0] && begin < self.follow.ends[1];
+        is_recorded && self.follow.needs_halving::<L>(part, error)
+    }
+
+    #[inline(always)]
+    fn find_middle(&mut self, part: Part, middle: usize) {
+        let [begin, end] = part.span();
+        self.follow.advance::<L>(Part { ends: [part.ends[0], middle], ..part }, 1);
+        self.follow.find_gaps::<L>(middle, 0.5 * (begin + end));
     }
 }
 
@@ -155,7 +139,7 @@ impl<D: Fn(f64) -> (PointDrive, DriveRate)> Follow<'_, D> {
     /// instead.
     #[inline(always)]
     fn needs_halving<L: Octet>(&mut self, part: Part, error: f64) -> bool {
-        let length = self.level.step * fraction(1, 1 << part.halvings);
+        let length = self.level.step * part.length();
         let third = L::splat(length / 3.0);
         let is_last = part.halvings == MAX_HALVINGS.min(HALVINGS - self.step_level);
         let is_accurate = is_last || error <= MINIMUM_FRACTION * self.tolerance;

@@ -1,13 +1,14 @@
 //! Smallest gaps of the nodes within a tried step.
 
 use super::follow::Follow;
-use super::minima::{FOLLOW_FRACTION, MINIMUM_FRACTION, RecordPoints, Search};
+use super::minima::{RecordPoints, Search};
 use super::span::{Blade, BladeInSpan, BladePlace, RecordScope, centred_drive_at, drive_at};
 use super::surface::{DriveRate, PointDrive};
 use super::tables::BladeTables;
 use super::trial::BladeTrial;
 use crate::math::octet::Eight;
 use crate::time::galerkin::basis::POINTS;
+use crate::time::galerkin::parts::{FOLLOW_FRACTION, MINIMUM_FRACTION};
 use crate::time::galerkin::span::SpanStep;
 use crate::time::galerkin::tables::HALVINGS;
 use crate::time::galerkin::trial::{ForceInterpolation, TrialResult};

@@ -11,14 +11,8 @@ use super::trial::{BladeTrial, StartContacts};
 use crate::math::octet::{Eight, Octet, OctetKernel, both};
 use crate::system::structure::UNKNOWN_GAP;
 use crate::time::galerkin::basis::{MOST, PLACES, POINTS};
+use crate::time::galerkin::parts::FOLLOW_FRACTION;
 use crate::time::galerkin::trial::{FALLING, NEAR};
-
-/// Largest number of halvings of a step into parts.
-pub(super) const MAX_HALVINGS: usize = 7;
-/// Nodes are followed if they may come closer between the points by more than this fraction of the tolerance.
-pub(super) const FOLLOW_FRACTION: f64 = 0.1;
-/// Largest error bound of a recorded minimum, as a fraction of the tolerance.
-pub(super) const MINIMUM_FRACTION: f64 = 0.3;
 
 impl BladeTrial {
     /// Bounds the interpolation error (m) of all modes between points at a distance `length` (s). If forces act, `length` must

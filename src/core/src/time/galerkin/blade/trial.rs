@@ -2,7 +2,7 @@
 
 use super::accept::{Advance, BeginNextStep, FindModalForces};
 use super::contact_free::SlowModeGaps;
-use super::follow::{PathPoint, STORED_TIMES};
+use super::follow::PathPoint;
 use super::level::BladeLevel;
 use super::meridional::FindMeridional;
 use super::minima::{Search, SelectFollowed};
@@ -17,6 +17,7 @@ use crate::math::simd::InstructionSet;
 use crate::math::vector::{set_vector3_at, vector3_at};
 use crate::system::EvaluatedBlocks;
 use crate::time::galerkin::basis::MOST;
+use crate::time::galerkin::parts::STORED_TIMES;
 use crate::time::galerkin::record::ShaftBounds;
 use crate::time::galerkin::state::SectorState;
 use crate::time::galerkin::tables::HALVINGS;

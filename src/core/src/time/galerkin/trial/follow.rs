@@ -14,18 +14,15 @@ use crate::math::vector::{Vector3, vector3_at};
 use crate::time::galerkin::advance::Advance;
 use crate::time::galerkin::basis::{MOST, POINTS, TimeBasis, real};
 use crate::time::galerkin::level::StepTables;
+use crate::time::galerkin::parts::{
+    FOLLOW_FRACTION, MAX_HALVINGS, MINIMUM_FRACTION, Part, PartSearch, STORED_TIMES, search_parts,
+};
 use crate::time::galerkin::rows::ContactRows;
 use crate::time::galerkin::state::SectorState;
 use crate::time::galerkin::surroundings::Witness;
 use crate::time::galerkin::tables::{HALVINGS, Tables};
 use std::mem::{replace, take};
 
-/// Largest number of halvings of a step into parts.
-const MAX_HALVINGS: usize = 7;
-/// Largest error bound of a cubic whose minimum is recorded, as a fraction of the tolerance.
-const MINIMUM_FRACTION: f64 = 0.3;
-/// Nodes are followed if they may come closer than at the points by more than this fraction of the tolerance.
-const FOLLOW_FRACTION: f64 = 0.1;
 /// Largest number of followed nodes whose displacements are computed node by node.
 const FEW_NODES: usize = 3;
 
@@ -75,15 +72,6 @@ struct NodeMotion {
     approach: f64,
 }
 
-/// Part of a step that is halved `halvings` times. `index` counts the parts from the start of the step.
-#[derive(Debug, Clone, Copy, Default)]
-struct Part {
-    halvings: usize,
-    index: usize,
-    /// Indices of the instants at both ends.
-    ends: [usize; 2],
-}
-
 /// The step whose nodes are followed.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct StepToFollow<'a> {
@@ -103,7 +91,7 @@ impl Followed {
         let instant = || Instant { modes: SectorState::new(modes, 0), nodes: vec![NodeMotion::default(); nodes] };
         Self {
             nodes: Vec::with_capacity(nodes),
-            instants: (0..MAX_HALVINGS + 2).map(|_| instant()).collect(),
+            instants: (0..STORED_TIMES).map(|_| instant()).collect(),
             lowest: vec![f64::NAN; nodes],
         }
     }
@@ -324,40 +312,14 @@ impl Trial {
 
     /// Halves parts of the step until the smallest gaps of all followed nodes are known.
     fn search(&mut self, followed: &mut Followed, of: &StepToFollow, advance: &mut Advance, surfaces: &impl Witness) {
-        let StepToFollow { tables, level, step, tolerance, state } = *of;
-        let most = MAX_HALVINGS.min(HALVINGS - level);
+        let StepToFollow { tables, level, step, state, .. } = *of;
         let first = &mut followed.instants[0].modes;
         first.position.copy_from_slice(&state.position);
         first.velocity.copy_from_slice(&state.velocity);
         self.find_motion(followed, step, &tables.rows, 0, 0.0);
         advance_between(followed, [0, 1], |modes| advance.advance_part(&tables.levels[level], modes, 0, 1));
         self.find_motion(followed, step, &tables.rows, 1, 1.0);
-        let mut errors = [f64::NAN; MAX_HALVINGS + 1];
-        let mut parts = [Part::default(); MAX_HALVINGS + 1];
-        parts[0].ends = [0, 1];
-        let mut count = 1;
-        while count > 0 {
-            count -= 1;
-            let part = parts[count];
-            let Part { halvings, index, ends: [from, to] } = part;
-            if errors[halvings].is_nan() {
-                errors[halvings] = advance.interpolation_error(&tables.rows, step.step / real(1 << halvings));
-            }
-            let allowed = if halvings == most { f64::INFINITY } else { MINIMUM_FRACTION * tolerance };
-            if !followed.needs_halving(part, errors[halvings], allowed, surfaces) {
-                continue;
-            }
-            let (middle, halved) = (2 + halvings, halvings + 1);
-            let table = &tables.levels[level + halved];
-            let advance = |modes: &mut SectorState| advance.advance_part(table, modes, 2 * index, 1 << halved);
-            advance_between(followed, [from, middle], advance);
-            let theta = real(2 * index + 1) / real(1 << halved);
-            self.find_motion(followed, step, &tables.rows, middle, theta);
-            followed.record_instant(middle, theta, surfaces);
-            parts[count] = Part { halvings: halved, index: 2 * index + 1, ends: [middle, to] };
-            parts[count + 1] = Part { halvings: halved, index: 2 * index, ends: [from, middle] };
-            count += 2;
-        }
+        search_parts(&mut FollowInParts { trial: self, followed, of, advance, surfaces });
     }
 
     /// Finds the displacements, gaps and rates of the followed nodes from the modes at an instant.
@@ -413,12 +375,47 @@ impl Trial {
     }
 }
 
+/// The search for smallest gaps in parts of a step.
+struct FollowInParts<'a, 'b, W> {
+    trial: &'a mut Trial,
+    followed: &'a mut Followed,
+    of: &'a StepToFollow<'b>,
+    advance: &'a mut Advance,
+    surfaces: &'a W,
+}
+
+impl<W: Witness> PartSearch for FollowInParts<'_, '_, W> {
+    fn interpolation_error(&mut self, halvings: usize) -> f64 {
+        let StepToFollow { tables, step, .. } = self.of;
+        self.advance.interpolation_error(&tables.rows, step.step / real(1 << halvings))
+    }
+
+    fn needs_halving(&mut self, part: Part, error: f64) -> bool {
+        let StepToFollow { level, tolerance, .. } = *self.of;
+        let is_last = part.halvings == MAX_HALVINGS.min(HALVINGS - level);
+        let allowed = if is_last { f64::INFINITY } else { MINIMUM_FRACTION * tolerance };
+        self.followed.needs_halving(part, error, allowed, self.surfaces)
+    }
+
+    fn find_middle(&mut self, part: Part, middle: usize) {
+        let StepToFollow { tables, level, step, .. } = *self.of;
+        let (index, halved) = (2 * part.index, part.halvings + 1);
+        let table = &tables.levels[level + halved];
+        advance_between(self.followed, [part.ends[0], middle], |modes| {
+            self.advance.advance_part(table, modes, index, 1 << halved);
+        });
+        let theta = real(index + 1) / real(1 << halved);
+        self.trial.find_motion(self.followed, step, &tables.rows, middle, theta);
+        self.followed.record_instant(middle, theta, self.surfaces);
+    }
+}
+
 impl Followed {
     /// Records the smallest gaps within a part if the cubics are accurate enough. Returns whether the part must be halved instead. `error` bounds
     /// the error of the displacements (m), and `allowed` is the largest error of a gap that is accurate (m).
     fn needs_halving(&mut self, part: Part, error: f64, allowed: f64, surfaces: &impl Obstacle) -> bool {
         let Self { nodes, instants, lowest } = self;
-        let length = 1.0 / real(1 << part.halvings);
+        let length = part.length();
         let [before, after] = part.ends.map(|end| &instants[end].nodes);
         for (of, (first, last)) in nodes.iter().zip(before.iter().zip(after)) {
             let (slopes, of_surface) = if of.is_line {

@@ -5,9 +5,7 @@ use super::{ForceInterpolation, Obstacle, Trial};
 use crate::math::cubic::{evaluate, interior_minimum};
 use crate::math::vector::{Vector3, vector3_at};
 use crate::time::galerkin::basis::{POINTS, TimeBasis};
-
-/// A smaller gap matters if it is smaller by more than this fraction of the tolerance.
-const SHARE: f64 = 0.1;
+use crate::time::galerkin::parts::FOLLOW_FRACTION;
 
 impl Trial {
     /// Finds nodes that may come closer between the points of a step than at them, by more than a fraction of `tolerance` (m).
@@ -39,7 +37,7 @@ impl Trial {
             let lowest = gaps[..basis.count()].iter().copied().fold(f64::INFINITY, f64::min);
             let deeper = minimum.map_or(0.0, |theta| lowest - evaluate(&cubic, theta));
             let falls = minimum.is_none() && slope.abs() > left * FALLING;
-            let may_matter = !falls && deeper + left > SHARE * tolerance;
+            let may_matter = !falls && deeper + left > FOLLOW_FRACTION * tolerance;
             if may_matter && lowest - deeper - left < needed_below(node) {
                 self.minima[node] = minimum.unwrap_or(lower);
                 found = true;
