@@ -56,9 +56,10 @@ impl ContactSolver {
     #[inline]
     fn next_pivot(&self, rank: usize, count: usize) -> Option<usize> {
         let left = |row: usize| self.remaining[row].abs() / self.diagonal[row];
-        let pivot = (rank..count).fold(rank, |best, row| if left(row) > left(best) { row } else { best });
+        let larger = |best: (usize, f64), row: usize| if left(row) > best.1 { (row, left(row)) } else { best };
+        let (pivot, most) = (rank + 1..count).fold((rank, left(rank)), larger);
         // Also false for a node without any flexibility (0/0).
-        (left(pivot) > REDUNDANT_PIVOT).then_some(pivot)
+        (most > REDUNDANT_PIVOT).then_some(pivot)
     }
 
     /// Applies one pivot of a small system immediately.
