@@ -310,7 +310,7 @@ pub(crate) fn study(arguments: &BenchArguments, console: &Console) -> Result<Stu
     let common = &arguments.common;
     let libraries = libraries::load(&arguments.library, common.quick, console)?;
     let rubs = rubs(common, console)?;
-    let task = console.task("Timing rubs", Some((rubs.len() + features::COUNT + 1) as u64));
+    let task = console.task("Timing rubs", Some((rubs.len() * (1 + features::COUNT) + 1) as u64));
     let mut rows = Vec::new();
     for (done, rub) in (1..).zip(&rubs) {
         task.line(&format!("{} rub", rub.name));
@@ -318,7 +318,7 @@ pub(crate) fn study(arguments: &BenchArguments, console: &Console) -> Result<Stu
         task.at(done);
     }
     task.line("features");
-    let (by_feature, of_features) = features::compare(&rubs[0], &|done| task.at((rubs.len() + done) as u64))?;
+    let (by_feature, of_features) = features::compare(&rubs, &|done| task.at((rubs.len() + done) as u64))?;
     task.line("tolerances");
     let (by_tolerance, of_tolerances, printed) = tolerances::compare(&rubs[0], common.quick)?;
     drop(task);

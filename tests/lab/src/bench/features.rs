@@ -1,4 +1,4 @@
-//! Run time of the light rub with one additional feature, relative to the run time without it.
+//! Run time of the rubs with one additional feature, relative to the run time without it.
 
 use serde_json::{Value, json};
 use tiprub_core::scene::method::Solver;
@@ -131,27 +131,32 @@ impl Feature {
     }
 }
 
-/// Runs the rub with each feature. Returns a table and its data. Calls `finished` with the number of finished features.
+/// Runs each rub with each feature. Returns a table and its data. Calls `finished` with the number of finished runs.
 ///
 /// # Errors
 /// If a run fails.
-pub(super) fn compare(rub: &Rub, finished: &dyn Fn(usize)) -> Result<(Table, Vec<Value>)> {
-    let columns = ["added to the light rub", "time (s/s)", "relative to none", "attempted steps", "error"];
+pub(super) fn compare(rubs: &[Rub], finished: &dyn Fn(usize)) -> Result<(Table, Vec<Value>)> {
+    let columns = ["rub", "added", "time (s/s)", "relative to none", "attempted steps", "error"];
     let mut table = Table::new("Processor time by feature", columns);
-    let (mut data, mut plain) = (Vec::new(), f64::NAN);
-    for (done, feature) in (1..).zip(&FEATURES) {
-        let row =
-            feature.row(rub).map_err(|error| Failure::from_core(format!("lab bench, {}", feature.name), error))?;
-        let FeatureRow { name, seconds, error, trials } = row;
-        if plain.is_nan() {
-            plain = seconds;
+    let mut data = Vec::new();
+    for rub in rubs {
+        let mut plain = f64::NAN;
+        for feature in &FEATURES {
+            let row = feature
+                .row(rub)
+                .map_err(|error| Failure::from_core(format!("lab bench, {} rub, {}", rub.name, feature.name), error))?;
+            let FeatureRow { name, seconds, error, trials } = row;
+            if plain.is_nan() {
+                plain = seconds;
+            }
+            let (ratio, rub) = (seconds / plain, rub.name);
+            let (time, relative) = (rate(seconds), rate(ratio));
+            table.rows.push(vec![rub.into(), name.into(), time, relative, trials.to_string(), format!("{error:.1e}")]);
+            data.push(json!({
+                "rub": rub, "feature": name, "seconds_per_second": seconds, "ratio": ratio, "trials": trials, "error": error
+            }));
+            finished(table.rows.len());
         }
-        let ratio = seconds / plain;
-        table.rows.push(vec![name.into(), rate(seconds), rate(ratio), trials.to_string(), format!("{error:.1e}")]);
-        data.push(
-            json!({ "feature": name, "seconds_per_second": seconds, "ratio": ratio, "trials": trials, "error": error }),
-        );
-        finished(done);
     }
     Ok((table, data))
 }
