@@ -27,7 +27,8 @@ pub struct ContactRows {
     /// ξω and 1/ω_d of each mode; 1/ω_d is infinite for rigid-body modes.
     rates: Vec<[f64; 2]>,
     mode_bounds: ModeBounds,
-    lowest_frequency: f64,
+    /// See [`ContactRows::lowest_frequencies`].
+    lowest_frequencies: Vec<[f64; 2]>,
     /// Coefficients of the bound on the displacement of each mode.
     motions: Vec<FreeMotion>,
     /// The indices 0, 1, 2, …
@@ -36,6 +37,9 @@ pub struct ContactRows {
 
 /// Largest phase angle of a mode over a step that resolves its motion (rad).
 const RESOLVED: f64 = 2.0;
+
+/// A mode moves a node noticeably if it moves it by at least this fraction of the largest displacement of this node by any mode.
+const NOTICEABLE: f64 = 0.01;
 
 /// Coefficients of all modes and the sums over modes; allocated once.
 #[derive(Debug, Clone)]
@@ -98,7 +102,7 @@ impl ContactRows {
             rates.map(|(w, ratio)| [ratio * w, 1.0 / (w * (1.0 - ratio * ratio).sqrt())]).collect();
         Self {
             mode_bounds: ModeBounds::new(modes),
-            lowest_frequency: modes.frequencies.iter().copied().fold(f64::INFINITY, f64::min),
+            lowest_frequencies: (0..nodes).map(|node| lowest_frequencies(modes, node)).collect(),
             magnitudes: by_mode.iter().map(|shape| shape.abs()).collect(),
             by_mode,
             stride,
@@ -112,9 +116,9 @@ impl ContactRows {
         }
     }
 
-    /// Returns the lowest frequency of the modes (rad/s).
-    pub(crate) fn lowest_frequency(&self) -> f64 {
-        self.lowest_frequency
+    /// Returns the two lowest frequencies of the modes that move a node noticeably (rad/s).
+    pub(crate) fn lowest_frequencies(&self, node: usize) -> [f64; 2] {
+        self.lowest_frequencies[node]
     }
 
     /// Residual flexibility G (m/N), rows 3·node + component.
@@ -215,6 +219,18 @@ impl ContactRows {
     fn add_up<const N: usize>(&self, shapes: &[f64], coefficients: [&[f64]; N], sums: [&mut [f64]; N]) {
         self.instructions.run(Combine { table: shapes, stride: self.stride, columns: &self.all, coefficients, sums });
     }
+}
+
+/// Finds the two lowest frequencies of the modes that move a node noticeably (rad/s). Both are equal if there is only one such mode.
+fn lowest_frequencies(modes: &ContactModes, node: usize) -> [f64; 2] {
+    let size = |mode: usize| modes.shapes.fixed_view::<3, 1>(3 * node, mode).norm();
+    let largest = (0..modes.len()).map(size).fold(0.0, f64::max);
+    let noticeable = (0..modes.len()).filter(|mode| size(*mode) >= NOTICEABLE * largest);
+    let [first, second] =
+        noticeable.map(|mode| modes.frequencies[mode]).fold([f64::INFINITY; 2], |[first, second], new| {
+            if new < first { [new, first] } else { [first, second.min(new)] }
+        });
+    [first, if second.is_finite() { second } else { first }]
 }
 
 /// Coefficients of the bound on the displacement of a mode without forces.
