@@ -125,7 +125,7 @@ fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
 /// The blades hit slowly passing lobes and bounce. In the first two rubs, the vibration is much slower than the sliding. In the
 /// third one it is as fast, so that sliding reverses and tips stick for short times.
 #[test]
-fn errors_of_bouncing_blades_stay_near_the_tolerance() {
+fn errors_of_bouncing_blades_are_bounded() {
     for (speed, friction, phase, limit) in [(60.0, 0.3, 0.0, 4.0), (200.0, 0.2, 0.0, 4.0), (12.0, 0.7, -1.67, 30.0)] {
         let run = |tolerance: f64| displacements_of(&blade_under_lobes(speed, friction, phase, tolerance), 600);
         let (exact, _) = run(1e-6);
@@ -144,9 +144,10 @@ fn errors_of_bouncing_blades_stay_near_the_tolerance() {
     guide::hold("cargo test -p tiprub-core --test galerkin bouncing blades");
 }
 
-/// Blades of a fast rotor hardly ever stick, so that they need as few steps as without sticking. Errors are as large, too.
+/// Blades of a fast rotor hardly ever stick. With sticking, they attempt at most 10 % more steps than without, and errors are below
+/// four times the tolerance.
 #[test]
-fn blades_of_fast_rotors_need_no_more_steps_than_without_sticking() {
+fn fast_blades_need_hardly_more_steps_than_without_sticking() {
     for (speed, friction) in [(800.0, 0.3), (1300.0, 0.15), (1300.0, 0.6)] {
         for tolerance in [1e-2, 1e-3, 1e-4] {
             let [sliding, sticking] = [Solver::Lcp, Solver::Coulomb].map(|solver| {
@@ -164,9 +165,10 @@ fn blades_of_fast_rotors_need_no_more_steps_than_without_sticking() {
     }
 }
 
-/// Whether blades of a slow rotor can stick does not depend on modes of a low frequency that do not move the tip.
+/// A mode of low frequency that does not move the tip does not change whether blades count as hardly ever sticking: a slow blade
+/// needs about as many trials with the mode as without it.
 #[test]
-fn modes_that_do_not_move_the_tip_change_no_error() {
+fn modes_that_do_not_move_the_tip_hardly_change_the_step_count() {
     let with_idle_mode = || {
         let rom = three_springs();
         let shape = |row: usize, mode: usize| mode.checked_sub(1).map_or(0.0, |mode| spring_shape(row, mode));

@@ -131,12 +131,12 @@ impl Feature {
     }
 }
 
-/// Runs each rub with each feature. Returns a table and its data. Calls `finished` with the number of finished runs.
+/// Runs each rub with each feature. Returns a table and its data. Calls `finished` with the number of finished rows.
 ///
 /// # Errors
 /// If a run fails.
 pub(super) fn compare(rubs: &[Rub], finished: &dyn Fn(usize)) -> Result<(Table, Vec<Value>)> {
-    let columns = ["rub", "added", "time (s/s)", "relative to none", "attempted steps", "error"];
+    let columns = ["rub", "added feature", "time (s/s)", "relative to none", "attempted steps", "error"];
     let mut table = Table::new("Processor time by feature", columns);
     let mut data = Vec::new();
     for rub in rubs {

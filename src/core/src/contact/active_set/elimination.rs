@@ -55,11 +55,11 @@ impl ContactSolver {
     /// `None` if the others are redundant.
     #[inline]
     fn next_pivot(&self, rank: usize, count: usize) -> Option<usize> {
-        let left = |row: usize| self.remaining[row].abs() / self.diagonal[row];
-        let larger = |best: (usize, f64), row: usize| if left(row) > best.1 { (row, left(row)) } else { best };
-        let (pivot, most) = (rank + 1..count).fold((rank, left(rank)), larger);
+        let fraction = |row: usize| self.remaining[row].abs() / self.diagonal[row];
+        let larger = |best: (usize, f64), row: usize| if fraction(row) > best.1 { (row, fraction(row)) } else { best };
+        let (pivot, largest) = (rank + 1..count).fold((rank, fraction(rank)), larger);
         // Also false for a node without any flexibility (0/0).
-        (most > REDUNDANT_PIVOT).then_some(pivot)
+        (largest > REDUNDANT_PIVOT).then_some(pivot)
     }
 
     /// Applies one pivot of a small system immediately.

@@ -1,14 +1,15 @@
-//! Search for smallest gaps in parts of a step, which are halved until interpolation between their ends is accurate.
+//! Search for the smallest gaps in parts of a step. Parts are halved until the smallest gap is accurate or not needed, or until the shortest
+//! part is reached.
 
 use super::basis::real;
 
 /// Largest number of halvings of a step into parts.
 pub(super) const MAX_HALVINGS: usize = 7;
-/// Number of times at which motion is stored: the ends of the step, and the middle of one part of each length.
+/// Number of instants at which motion is stored: the ends of the step, and the middle of one part of each length.
 pub(super) const STORED_TIMES: usize = MAX_HALVINGS + 2;
 /// Nodes are followed if they may come closer between the points of a step than at them by more than this fraction of the tolerance.
 pub(super) const FOLLOW_FRACTION: f64 = 0.1;
-/// Largest error bound of a recorded minimum, as a fraction of the tolerance.
+/// Largest interpolation error at which the minimum of a cubic is recorded, as a fraction of the tolerance. The shortest parts have no limit.
 pub(super) const MINIMUM_FRACTION: f64 = 0.3;
 
 /// Part of a step that is halved `halvings` times. `index` counts the parts from the start of the step.
@@ -16,7 +17,7 @@ pub(super) const MINIMUM_FRACTION: f64 = 0.3;
 pub(super) struct Part {
     pub halvings: usize,
     pub index: usize,
-    /// Indices of the stored times at both ends.
+    /// Indices of the stored instants at both ends.
     pub ends: [usize; 2],
 }
 
@@ -36,7 +37,7 @@ impl Part {
         [self.index, self.index + 1].map(|end| real(end) * self.length())
     }
 
-    /// Returns both halves, which meet at a stored time.
+    /// Returns both halves. `middle` is the index of the stored instant between them.
     #[inline(always)]
     fn halves(&self, middle: usize) -> [Self; 2] {
         let half = |index: usize, ends: [usize; 2]| Self { halvings: self.halvings + 1, index, ends };
@@ -46,14 +47,14 @@ impl Part {
 
 /// Search in parts of a step. The motion at the ends of the step must be stored.
 pub(super) trait PartSearch {
-    /// Bounds the interpolation error of displacements over a part with this number of halvings (m).
+    /// Returns a bound on the interpolation error (m) of displacements in a part after `halvings` halvings.
     fn interpolation_error(&mut self, halvings: usize) -> f64;
 
-    /// Records the smallest gaps within a part whose displacements have this interpolation error (m) if they are accurate enough. Returns whether
-    /// the part must be halved instead.
+    /// Records the smallest gaps within a part if they are needed and accurate enough. Returns whether the part must be halved instead; always
+    /// false after [`MAX_HALVINGS`] halvings. `error` bounds the interpolation error of the displacements (m).
     fn needs_halving(&mut self, part: Part, error: f64) -> bool;
 
-    /// Finds the motion at the stored time `middle` in the middle of a part.
+    /// Finds the motion in the middle of a part, and stores it at the index `middle`.
     fn find_middle(&mut self, part: Part, middle: usize);
 }
 

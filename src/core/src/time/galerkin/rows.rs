@@ -38,7 +38,8 @@ pub struct ContactRows {
 /// Largest phase angle of a mode over a step that resolves its motion (rad).
 const RESOLVED: f64 = 2.0;
 
-/// A mode moves a node noticeably if it moves it by at least this fraction of the largest displacement of this node by any mode.
+/// A mode moves a node noticeably if its shape at the node is at least this fraction of the largest shape of any mode there (per
+/// unit modal amplitude).
 const NOTICEABLE: f64 = 0.01;
 
 /// Coefficients of all modes and the sums over modes; allocated once.
@@ -102,7 +103,7 @@ impl ContactRows {
             rates.map(|(w, ratio)| [ratio * w, 1.0 / (w * (1.0 - ratio * ratio).sqrt())]).collect();
         Self {
             mode_bounds: ModeBounds::new(modes),
-            lowest_frequencies: (0..nodes).map(|node| lowest_frequencies(modes, node)).collect(),
+            lowest_frequencies: (0..nodes).map(|node| find_lowest_frequencies(modes, node)).collect(),
             magnitudes: by_mode.iter().map(|shape| shape.abs()).collect(),
             by_mode,
             stride,
@@ -222,7 +223,8 @@ impl ContactRows {
 }
 
 /// Finds the two lowest frequencies of the modes that move a node noticeably (rad/s). Both are equal if there is only one such mode.
-fn lowest_frequencies(modes: &ContactModes, node: usize) -> [f64; 2] {
+/// All modes count if none moves the node.
+fn find_lowest_frequencies(modes: &ContactModes, node: usize) -> [f64; 2] {
     let size = |mode: usize| modes.shapes.fixed_view::<3, 1>(3 * node, mode).norm();
     let largest = (0..modes.len()).map(size).fold(0.0, f64::max);
     let noticeable = (0..modes.len()).filter(|mode| size(*mode) >= NOTICEABLE * largest);

@@ -80,17 +80,17 @@ impl<D: Fn(f64) -> (PointDrive, DriveRate)> OctetKernel for Follow<'_, D> {
         self.find_gaps::<L>(0, 0.0);
         self.advance::<L>(Part::WHOLE, 0);
         self.find_gaps::<L>(1, 1.0);
-        search_parts(&mut FollowInParts { follow: self, lanes: PhantomData::<L> });
+        search_parts(&mut BladePartSearch { follow: self, lanes: PhantomData::<L> });
     }
 }
 
 /// The search for smallest gaps in parts of the step.
-struct FollowInParts<'a, D, L> {
+struct BladePartSearch<'a, D, L> {
     follow: Follow<'a, D>,
     lanes: PhantomData<L>,
 }
 
-impl<D: Fn(f64) -> (PointDrive, DriveRate), L: Octet> PartSearch for FollowInParts<'_, D, L> {
+impl<D: Fn(f64) -> (PointDrive, DriveRate), L: Octet> PartSearch for BladePartSearch<'_, D, L> {
     #[inline(always)]
     fn interpolation_error(&mut self, halvings: usize) -> f64 {
         self.follow.interpolation_error::<L>(halvings)

@@ -1,4 +1,4 @@
-//! Bounds on the motion of modes between two times, from their amplitudes: errors of cubics and of straight lines.
+//! Bounds on the errors of cubics and straight lines that interpolate motion between two times, from the amplitudes of the modes.
 
 use super::{ContactRows, Sums};
 use crate::math::octet::{Octet, OctetKernel};

@@ -1,7 +1,7 @@
 //! Steps of a higher degree in which contacts that could stick slide fast. They may open and close within the step.
 //!
-//! If nodes vibrate more slowly than prescribed motion makes them slide, no contact sticks, and the contact problem has
-//! one unknown per lane, as without sticking. Friction opposes the slip under the solution, whose direction is found by
+//! If the vibration velocity of nodes is at most half of their prescribed sliding velocity, no contact sticks, and the contact problem
+//! has one unknown per lane, as without sticking. Friction opposes the slip under the solution, whose direction is found by
 //! iteration.
 
 use super::steady::Steady;
@@ -23,16 +23,17 @@ const FULL_PASSES: usize = 8;
 /// Largest vibration velocity at which contacts slide fast, as a fraction of the sliding velocity by prescribed motion.
 const LARGEST_VIBRATION: f64 = 0.5;
 /// Smallest ratios of the displacement that sticking requires in the two lowest modes to the largest displacement of a run, for
-/// blades that hardly ever stick. The second mode excludes blades that are soft in one mode only, such as pinned blades. Blades with
-/// larger ratios have errors as large as without sticking (`core/tests/galerkin/sticking.rs`).
-const LARGE_MOTIONS: [f64; 2] = [2.0, 0.5];
+/// blades that hardly ever stick. The second mode excludes blades that are soft in one mode only, such as pinned blades.
+/// `core/tests/galerkin/sticking.rs` tests three rubs with larger ratios.
+const MIN_STICKING_AMPLITUDES: [f64; 2] = [2.0, 0.5];
 
 /// Largest displacement that the last change of the directions of friction may cause, as a multiple of the accuracy of gaps.
 ///
-/// Larger multiples save evaluations, but with 30 the errors of slow blades reach the tolerance
+/// Larger multiples save evaluations, but with 30 the errors of a blade at 60 rad/s reach the tolerance
 /// (`core/tests/galerkin/sticking.rs`).
 const DIRECTION_PRECISION_FACTOR: f64 = 10.0;
-/// The same for blades that hardly ever stick. The displacement is a hundredth of the tolerance.
+/// Value of [`DIRECTION_PRECISION_FACTOR`] for blades that hardly ever stick: changes of the directions may move nodes by a hundredth of
+/// the tolerance.
 const LOOSE_DIRECTION_PRECISION_FACTOR: f64 = 100.0;
 
 impl Trial {
@@ -157,17 +158,17 @@ impl Trial {
         Some(largest)
     }
 
-    /// Returns whether a touching node could stick later. A node that sticks moves with the surface at a velocity v, so that a mode
-    /// of frequency ω has a displacement of v/ω there. Blades hardly ever stick if this is large against the largest displacement of
-    /// a run for the two lowest frequencies.
+    /// Returns whether a touching node could stick later. A node that sticks moves with the surface at a velocity v, for which a mode
+    /// of angular frequency ω needs the amplitude v/ω. Blades hardly ever stick if this amplitude, for the two lowest frequencies, is at
+    /// least [`MIN_STICKING_AMPLITUDES`] times the displacement at which a run ends.
     pub(super) fn may_stick_later(&self, level: &StepTables, rows: &ContactRows, obstacle: &impl Obstacle) -> bool {
         let last = level.basis.degree;
         let touches = |node: &usize| (0..=last).any(|point| self.multiplier(point, *node) > 0.0);
         (0..self.lanes.nodes).filter(touches).any(|node| {
             let drift = tangential(obstacle.drift(node, last, self.displacement(last, node)), self.normal(last, node));
             let (drift, largest) = (length(drift), level.step * obstacle.largest_displacement(node));
-            let mut modes = rows.lowest_frequencies(node).into_iter().zip(LARGE_MOTIONS);
-            // A mode without stiffness reaches every velocity.
+            let mut modes = rows.lowest_frequencies(node).into_iter().zip(MIN_STICKING_AMPLITUDES);
+            // A rigid-body mode can follow the surface at any velocity.
             modes.any(|(frequency, ratio)| frequency == 0.0 || drift < frequency * ratio * largest)
         })
     }

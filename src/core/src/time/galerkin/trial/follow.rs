@@ -319,7 +319,7 @@ impl Trial {
         self.find_motion(followed, step, &tables.rows, 0, 0.0);
         advance_between(followed, [0, 1], |modes| advance.advance_part(&tables.levels[level], modes, 0, 1));
         self.find_motion(followed, step, &tables.rows, 1, 1.0);
-        search_parts(&mut FollowInParts { trial: self, followed, of, advance, surfaces });
+        search_parts(&mut TrialPartSearch { trial: self, followed, followed_step: of, advance, surfaces });
     }
 
     /// Finds the displacements, gaps and rates of the followed nodes from the modes at an instant.
@@ -376,29 +376,29 @@ impl Trial {
 }
 
 /// The search for smallest gaps in parts of a step.
-struct FollowInParts<'a, 'b, W> {
+struct TrialPartSearch<'a, 'b, W> {
     trial: &'a mut Trial,
     followed: &'a mut Followed,
-    of: &'a StepToFollow<'b>,
+    followed_step: &'a StepToFollow<'b>,
     advance: &'a mut Advance,
     surfaces: &'a W,
 }
 
-impl<W: Witness> PartSearch for FollowInParts<'_, '_, W> {
+impl<W: Witness> PartSearch for TrialPartSearch<'_, '_, W> {
     fn interpolation_error(&mut self, halvings: usize) -> f64 {
-        let StepToFollow { tables, step, .. } = self.of;
+        let StepToFollow { tables, step, .. } = self.followed_step;
         self.advance.interpolation_error(&tables.rows, step.step / real(1 << halvings))
     }
 
     fn needs_halving(&mut self, part: Part, error: f64) -> bool {
-        let StepToFollow { level, tolerance, .. } = *self.of;
+        let StepToFollow { level, tolerance, .. } = *self.followed_step;
         let is_last = part.halvings == MAX_HALVINGS.min(HALVINGS - level);
         let allowed = if is_last { f64::INFINITY } else { MINIMUM_FRACTION * tolerance };
         self.followed.needs_halving(part, error, allowed, self.surfaces)
     }
 
     fn find_middle(&mut self, part: Part, middle: usize) {
-        let StepToFollow { tables, level, step, .. } = *self.of;
+        let StepToFollow { tables, level, step, .. } = *self.followed_step;
         let (index, halved) = (2 * part.index, part.halvings + 1);
         let table = &tables.levels[level + halved];
         advance_between(self.followed, [part.ends[0], middle], |modes| {
