@@ -123,7 +123,7 @@ fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// The blades hit slowly passing lobes and bounce. In the first two rubs, the vibration is much slower than the sliding. In the
-/// third one it is as fast, so that sliding reverses and tips stick for short times.
+/// third one it is about as fast.
 #[test]
 fn errors_of_bouncing_blades_are_bounded() {
     for (speed, friction, phase, limit) in [(60.0, 0.3, 0.0, 4.0), (200.0, 0.2, 0.0, 4.0), (12.0, 0.7, -1.67, 30.0)] {

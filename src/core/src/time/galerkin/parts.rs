@@ -13,7 +13,7 @@ pub(super) const FOLLOW_FRACTION: f64 = 0.1;
 pub(super) const MINIMUM_FRACTION: f64 = 0.3;
 
 /// Part of a step that is halved `halvings` times. `index` counts the parts from the start of the step.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Part {
     pub halvings: usize,
     pub index: usize,

@@ -6,7 +6,7 @@
 
 use super::steady::Steady;
 use super::{ForceInterpolation, Obstacle, Trial, TrialResult};
-use crate::math::vector::{Vector3, direction, length, tangential, vector3_at};
+use crate::math::vector::{Vector3, direction, length, tangential};
 use crate::time::galerkin::basis::POINTS;
 use crate::time::galerkin::level::StepTables;
 use crate::time::galerkin::rows::ContactRows;
@@ -126,14 +126,10 @@ impl Trial {
             if !touches {
                 continue;
             }
-            let (mut places, mut drift) = ([Vector3::zeros(); POINTS], Vector3::zeros());
-            for (point, place) in places.iter_mut().enumerate().take(last + 1).skip(1) {
-                let now = self.displacement(point, node);
-                drift = obstacle.drift(node, point, now);
-                *place = now - vector3_at(&self.start, node) + drift;
-            }
+            let mut places = [Vector3::zeros(); POINTS];
+            (1..=last).for_each(|point| places[point] = self.slip(node, point, obstacle));
             let normal = self.normal(last, node);
-            let drift = tangential(drift, normal);
+            let drift = tangential(obstacle.drift(node, last, self.displacement(last, node)), normal);
             for point in 0..=last {
                 let slip: Vector3 = (0..=last).map(|k| basis.work[point][k] * places[k]).sum();
                 let vibration = tangential(slip, normal) - basis.weights[point] * drift;

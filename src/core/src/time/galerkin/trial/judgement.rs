@@ -17,9 +17,8 @@ pub(crate) const KINK: f64 = 0.2;
 /// slide (`core/tests/galerkin/sticking.rs`): 0.2 to 0.8 times.
 const BEND: f64 = 0.5;
 /// Weight of the error of a contact that opens or closes, and of all contacts that slide fast, where contacts may stick: this
-/// error determines when the next contact sticks and slips. Measured once on a slow bouncing blade of three modes at 60 and 200 rad/s
-/// (`core/tests/galerkin/sticking.rs`): with 0.5, 10 and 30, its errors at tolerances from 1e-2 to 1e-5 were up to 305, 10 and 2.4
-/// times the tolerance; 10 and 30 needed 17 and 26 % more trials than 0.5. Blades that hardly ever stick have the weight 1.
+/// error determines when the next contact sticks and slips. `core/tests/galerkin/sticking.rs` measures the errors of slow bouncing
+/// blades with this weight. Blades that hardly ever stick have the weight 1.
 const OPENING: f64 = 30.0;
 /// A step is shortened if the gap of a node between the points may be below this multiple of the interpolation error.
 pub(crate) const NEAR: f64 = 4.0;
